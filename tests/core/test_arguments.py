@@ -1,4 +1,4 @@
-"""An argument is declared once: what is read, checked and shown follows from the declaration."""
+"""Declared arguments: parsing, validation, signatures and docstrings."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from asperity.measured.preparation import prepare
 from asperity.surface import CLAMP, LAW, Surface
 from asperity.textures import load_texture
 
-READ = [
+VALID = [
     ("quantity", "1.5 mm", 1.5e-3),
     ("quantity", "2m", 2.0),
     ("pair", "5 µm; 8 µm", [5e-6, 8e-6]),
@@ -51,15 +51,15 @@ READ = [
 ]
 
 
-@pytest.mark.parametrize(("form", "given", "value"), READ)
-def test_each_form_reads_text_numbers_and_lists(form: Form, given: Any, value: Any) -> None:
+@pytest.mark.parametrize(("form", "text", "value"), VALID)
+def test_each_form_parses_text_numbers_and_lists(form: Form, text: Any, value: Any) -> None:
     unit = "" if form in {"integer"} else "m"
-    read = Argument("length", "of something", unit, form=form).parse(given)
-    assert read == value
-    assert type(read) is type(value)
+    parsed = Argument("length", "of something", unit, form=form).parse(text)
+    assert parsed == value
+    assert type(parsed) is type(value)
 
 
-WRONG = [
+INVALID = [
     ("quantity", "3 N", "dimension"),
     ("size", "4000", "needs a unit: write 4000MB or 4000GB"),
     ("size", 4000, "needs a unit: write 4000MB or 4000GB"),
@@ -84,14 +84,14 @@ WRONG = [
 ]
 
 
-@pytest.mark.parametrize(("form", "given", "message"), WRONG)
-def test_each_form_refuses_other_values(form: Form, given: Any, message: str) -> None:
-    with pytest.raises(ParameterError, match=message) as caught:
-        Argument("length", "of something", "m", form=form).parse(given)
-    assert caught.value.argument == "length"
+@pytest.mark.parametrize(("form", "text", "message"), INVALID)
+def test_each_form_refuses_invalid_values(form: Form, text: Any, message: str) -> None:
+    with pytest.raises(ParameterError, match=message) as error:
+        Argument("length", "of something", "m", form=form).parse(text)
+    assert error.value.argument == "length"
 
 
-def test_bounds_are_those_of_every_part() -> None:
+def test_bounds_apply_to_every_component() -> None:
     sides = Argument("extent", "of the part", "m", form="pair", must_be_positive=True)
     assert sides.validate([1e-3, 2e-3]) == [1e-3, 2e-3]
     with pytest.raises(ParameterError, match=r"extent must be positive \[m\], got -0.002"):
@@ -104,41 +104,43 @@ def test_bounds_are_those_of_every_part() -> None:
         count.validate(0)
 
 
-def test_the_nearest_key_is_offered() -> None:
-    known = (Argument("gain", "of the spring"), Argument("phase", "at the origin", "rad"))
-    assert parse_arguments("surface", {"gain": "2.5"}, known) == {"gain": 2.5}
+def test_error_for_an_unknown_key_suggests_the_nearest() -> None:
+    arguments = (Argument("gain", "of the spring"), Argument("phase", "at the origin", "rad"))
+    assert parse_arguments("surface", {"gain": "2.5"}, arguments) == {"gain": 2.5}
     with pytest.raises(ParameterError, match=r"surface\.gian is unknown; did you mean 'gain'"):
-        parse_arguments("surface", {"gian": "2.5"}, known)
+        parse_arguments("surface", {"gian": "2.5"}, arguments)
 
 
-def _keywords(function: Any, *others: str) -> dict[str, inspect.Parameter]:
+def _keywords(function: Any, *excluded: str) -> dict[str, inspect.Parameter]:
     parameters = inspect.signature(function).parameters
-    return {name: one for name, one in parameters.items() if name not in others}
+    return {name: parameter for name, parameter in parameters.items() if name not in excluded}
 
 
-def test_signatures_are_the_declarations() -> None:
-    """Python users have explicit keywords: in name and order those that are declared."""
+def test_signatures_match_the_declared_arguments() -> None:
+    """The keywords of Python functions have the declared names, order and defaults."""
     names = [argument.name for argument in FILE_ARGUMENTS]
     assert list(_keywords(load_texture, "path")) == names
-    ready = _keywords(prepare, "raw", "progress", "on_stage")
-    assert list(ready) == [argument.name for argument in PREPARATION_ARGUMENTS]
+    prepare_keywords = _keywords(prepare, "raw", "progress", "on_stage")
+    assert list(prepare_keywords) == [argument.name for argument in PREPARATION_ARGUMENTS]
     for argument in PREPARATION_ARGUMENTS:
         if argument.form != "switch":
-            assert ready[argument.name].default == argument.default, argument.name
-    own = _keywords(Surface, "texture", "law_parameters")
+            assert prepare_keywords[argument.name].default == argument.default, argument.name
+    surface_keywords = _keywords(Surface, "texture", "law_parameters")
     for argument in (LAW, STIFFNESS, MAX_DEPTH, CLAMP):
-        assert own[argument.name].default == argument.default
+        assert surface_keywords[argument.name].default == argument.default
 
 
-def test_docstrings_list_what_is_declared() -> None:
+def test_docstrings_list_the_declared_arguments() -> None:
     for function, arguments in ((load_texture, FILE_ARGUMENTS), (prepare, PREPARATION_ARGUMENTS)):
         text = inspect.getdoc(function) or ""
         for argument in arguments:
             assert f"\n    {argument.name}: {argument.description}" in text
 
 
-@pytest.mark.parametrize("indent", ["    ", "        "])  # Python 3.13 takes that of the code away
-def test_a_list_stands_as_deep_as_its_mark(indent: str) -> None:
+@pytest.mark.parametrize(
+    "indent", ["    ", "        "]
+)  # Python 3.13 removes the indentation of the code
+def test_list_of_arguments_is_indented_like_its_placeholder(indent: str) -> None:
     def function() -> None: ...
 
     function.__doc__ = f"One.\n\n{indent}{{arguments}}\n{indent}last"

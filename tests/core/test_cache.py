@@ -1,4 +1,4 @@
-"""Entries of the cache: checks, size limit, locks."""
+"""Entries of the cache: integrity checks, trusted folders, size limit and locks."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     cache._warned.clear()
 
 
-def entry(folder: Path) -> Path:
-    (found,) = [path for path in (folder / NAMESPACE).iterdir() if path.suffix != ".damaged"]
-    return found
+def entry_path(folder: Path) -> Path:
+    (path,) = [item for item in (folder / NAMESPACE).iterdir() if item.suffix != ".damaged"]
+    return path
 
 
-def test_an_entry_is_found_by_its_key():
+def test_get_returns_the_entry_of_the_key():
     assert cache.get_entry(NAMESPACE, KEY) is None
     cache.put_entry(NAMESPACE, KEY, CONTENT)
     assert cache.get_entry(NAMESPACE, KEY) == CONTENT
@@ -45,26 +45,26 @@ def test_an_entry_is_found_by_its_key():
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_a_damaged_entry_is_not_used(folder: Path, seed: int):
+def test_damaged_entry_is_moved_aside_with_one_warning(folder: Path, seed: int):
     cache.put_entry(NAMESPACE, KEY, CONTENT)
-    draw, path = random.Random(seed), entry(folder)
-    whole = bytearray(path.read_bytes())
+    draw, path = random.Random(seed), entry_path(folder)
+    content = bytearray(path.read_bytes())
     if seed % 4:
-        whole[draw.randrange(len(whole))] ^= 1 << draw.randrange(8)
+        content[draw.randrange(len(content))] ^= 1 << draw.randrange(8)
     else:
-        del whole[draw.randrange(len(whole)) :]
-    path.write_bytes(whole)
-    with pytest.warns(cache.CacheWarning, match="damaged entries: they were moved aside") as caught:
+        del content[draw.randrange(len(content)) :]
+    path.write_bytes(content)
+    with pytest.warns(cache.CacheWarning, match="damaged entries: they were moved aside") as record:
         assert cache.get_entry(NAMESPACE, KEY) is None
-    assert str(folder) in str(caught[0].message)
+    assert str(folder) in str(record[0].message)
     assert cache.get_entry(NAMESPACE, KEY) is None  # reported once, and moved aside
     cache.put_entry(NAMESPACE, KEY, CONTENT)
     assert cache.get_entry(NAMESPACE, KEY) == CONTENT
 
 
-def test_exchanged_entries_are_not_used(folder: Path):
+def test_entry_of_another_key_is_not_used(folder: Path):
     cache.put_entry(NAMESPACE, KEY, CONTENT)
-    first = entry(folder)
+    first = entry_path(folder)
     cache.put_entry(NAMESPACE, "another", b"other")
     (other,) = set((folder / NAMESPACE).iterdir()) - {first}
     other.write_bytes(first.read_bytes())
@@ -72,15 +72,15 @@ def test_exchanged_entries_are_not_used(folder: Path):
         assert cache.get_entry(NAMESPACE, "another") is None
 
 
-class _Planted:
+class _MaliciousPickle:
     def __reduce__(self) -> tuple[object, tuple[str]]:
         return os.system, ("touch planted-code-ran",)
 
 
-def test_a_foreign_pickle_is_not_loaded(folder: Path, monkeypatch: pytest.MonkeyPatch):
+def test_foreign_pickle_is_not_loaded(folder: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(folder.parent)
     cache.put_entry(NAMESPACE, KEY, CONTENT)
-    entry(folder).write_bytes(pickle.dumps(_Planted()))
+    entry_path(folder).write_bytes(pickle.dumps(_MaliciousPickle()))
     with pytest.warns(cache.CacheWarning):
         assert cache.get_entry(NAMESPACE, KEY) is None
     assert not (folder.parent / "planted-code-ran").exists()
@@ -89,7 +89,7 @@ def test_a_foreign_pickle_is_not_loaded(folder: Path, monkeypatch: pytest.Monkey
 @pytest.mark.parametrize(
     ("mode", "reason"), [(0o777, "everybody may write"), (0o1777, "everybody may write")]
 )
-def test_a_world_writable_folder_is_not_used(folder: Path, mode: int, reason: str):
+def test_world_writable_folder_is_not_used(folder: Path, mode: int, reason: str):
     cache.put_entry(NAMESPACE, KEY, CONTENT)
     folder.chmod(mode)
     with pytest.warns(cache.CacheWarning, match=reason):
@@ -98,7 +98,7 @@ def test_a_world_writable_folder_is_not_used(folder: Path, mode: int, reason: st
     assert cache.get_entry(NAMESPACE, KEY) == CONTENT
 
 
-def test_nothing_is_written_to_a_folder_that_is_not_trusted(folder: Path):
+def test_nothing_is_written_to_an_untrusted_folder(folder: Path):
     folder.mkdir()
     folder.chmod(0o777)
     with pytest.warns(cache.CacheWarning, match="everybody may write"):
@@ -118,7 +118,7 @@ def test_nothing_is_written_to_a_folder_that_is_not_trusted(folder: Path):
         (0, 0, 0o755, ""),  # owned by root
     ],
 )
-def test_trust_by_owner_group_and_mode(
+def test_trust_depends_on_owner_group_and_mode(
     uid: int | None, gid: int | None, mode: int, reason: str, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.setattr(os, "geteuid", lambda: 77)
@@ -129,7 +129,7 @@ def test_trust_by_owner_group_and_mode(
     assert bool(cache._distrust_reason(os.stat_result((*numbers, 0, 0, 0, 0)))) == bool(reason)
 
 
-def test_a_file_in_place_of_the_folder_costs_time_only(folder: Path):
+def test_cache_path_that_is_a_file_gives_a_warning(folder: Path):
     folder.write_text("not a folder")
     with pytest.warns(cache.CacheWarning, match="cannot be written"):
         cache.put_entry(NAMESPACE, KEY, CONTENT)
@@ -137,7 +137,7 @@ def test_a_file_in_place_of_the_folder_costs_time_only(folder: Path):
     assert folder.read_text() == "not a folder"
 
 
-def test_a_file_in_place_of_a_namespace_costs_time_only(folder: Path):
+def test_namespace_path_that_is_a_file_gives_a_warning(folder: Path):
     folder.mkdir()
     (folder / NAMESPACE).write_text("not a folder")
     with pytest.warns(cache.CacheWarning, match="cannot be written"):
@@ -145,9 +145,9 @@ def test_a_file_in_place_of_a_namespace_costs_time_only(folder: Path):
     assert cache.get_entry(NAMESPACE, KEY) is None
 
 
-def test_a_pipe_in_place_of_an_entry_does_not_hang(folder: Path):
+def test_pipe_in_place_of_an_entry_does_not_block(folder: Path):
     cache.put_entry(NAMESPACE, KEY, CONTENT)
-    path = entry(folder)
+    path = entry_path(folder)
     path.unlink()
     os.mkfifo(path)
     with pytest.warns(cache.CacheWarning, match="damaged"):
@@ -156,7 +156,7 @@ def test_a_pipe_in_place_of_an_entry_does_not_hang(folder: Path):
 
 
 @pytest.mark.parametrize("mode", [0o700, 0o755, 0o2775])
-def test_a_namespace_has_the_mode_of_the_cache_folder(folder: Path, mode: int):
+def test_namespace_has_the_mode_of_the_cache_folder(folder: Path, mode: int):
     folder.mkdir()
     folder.chmod(mode)
     cache.put_entry(NAMESPACE, KEY, CONTENT)
@@ -164,7 +164,7 @@ def test_a_namespace_has_the_mode_of_the_cache_folder(folder: Path, mode: int):
     assert cache.get_entry(NAMESPACE, KEY) == CONTENT
 
 
-def test_a_new_folder_is_writable_by_its_owner_only(folder: Path):
+def test_new_folder_is_writable_only_by_its_owner(folder: Path):
     before = os.umask(0)
     try:
         cache.put_entry(NAMESPACE, KEY, CONTENT)
@@ -175,7 +175,7 @@ def test_a_new_folder_is_writable_by_its_owner_only(folder: Path):
 
 
 @pytest.mark.parametrize("trouble", ["loop", "device", "no permission"])
-def test_an_unusable_folder_is_reported_once(
+def test_unusable_folder_is_reported_once(
     trouble: str, folder: Path, monkeypatch: pytest.MonkeyPatch
 ):
     if trouble == "loop":
@@ -184,27 +184,27 @@ def test_an_unusable_folder_is_reported_once(
         monkeypatch.setenv("ASPERITY_CACHE_DIR", os.devnull)
     else:
         for name in ("open_input", "open_atomic"):
-            monkeypatch.setattr(cache, name, _refuse)  # root may open whatever it wants
+            monkeypatch.setattr(cache, name, _refuse)  # root may open any file
         (folder / NAMESPACE).mkdir(parents=True)
-    with pytest.warns(cache.CacheWarning) as caught:
-        found = [
+    with pytest.warns(cache.CacheWarning) as record:
+        results = [
             (cache.get_entry(NAMESPACE, key), cache.put_entry(NAMESPACE, key, CONTENT))
             for key in "ab"
         ]
-    assert found == [(None, None)] * 2
-    assert len(caught) == 1
+    assert results == [(None, None)] * 2
+    assert len(record) == 1
 
 
-def test_without_a_home_the_cache_is_a_temporary_folder(
+def test_cache_without_a_home_directory_is_a_temporary_folder(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ):
-    """As in a container that runs under a number without a name."""
+    """A container may run as a user id without a name."""
 
-    def nobody(_name: str) -> Path:
+    def raise_no_home(_name: str) -> Path:
         raise RuntimeError("could not determine the home directory")
 
     monkeypatch.delenv("ASPERITY_CACHE_DIR")
-    monkeypatch.setattr("platformdirs.user_cache_path", nobody)
+    monkeypatch.setattr("platformdirs.user_cache_path", raise_no_home)
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     cache.put_entry(NAMESPACE, KEY, CONTENT)
     assert cache.get_entry(NAMESPACE, KEY) == CONTENT
@@ -215,20 +215,20 @@ def _refuse(*_arguments: object, **_named: object) -> None:
     raise PermissionError(13, "Permission denied")
 
 
-def test_a_read_only_folder_can_be_read(monkeypatch: pytest.MonkeyPatch):
+def test_read_only_folder_can_be_read(monkeypatch: pytest.MonkeyPatch):
     cache.put_entry(NAMESPACE, KEY, CONTENT)
-    monkeypatch.setattr(cache, "open_atomic", _refuse)  # root may write wherever it wants
+    monkeypatch.setattr(cache, "open_atomic", _refuse)  # root may write to any folder
     with pytest.warns(cache.CacheWarning, match="cannot be written .Permission denied"):
         cache.put_entry(NAMESPACE, "another", CONTENT)
     assert cache.get_entry(NAMESPACE, KEY) == CONTENT
 
 
-def test_a_full_disk_costs_time_only(folder: Path, monkeypatch: pytest.MonkeyPatch):
-    def full(*_arguments: object) -> None:
+def test_full_disk_gives_a_warning(folder: Path, monkeypatch: pytest.MonkeyPatch):
+    def raise_no_space(*_arguments: object) -> None:
         raise OSError(28, "No space left on device")
 
     cache.put_entry(NAMESPACE, KEY, CONTENT)
-    monkeypatch.setattr(Path, "replace", full)
+    monkeypatch.setattr(Path, "replace", raise_no_space)
     with pytest.warns(cache.CacheWarning, match="No space left on device"):
         cache.put_entry(NAMESPACE, "another", CONTENT)
     assert len(list((folder / NAMESPACE).iterdir())) == 1
@@ -237,22 +237,24 @@ def test_a_full_disk_costs_time_only(folder: Path, monkeypatch: pytest.MonkeyPat
 # --- size limit -----------------------------------------------------------------------------------
 
 
-def test_the_least_recently_used_entries_are_evicted(monkeypatch: pytest.MonkeyPatch):
+def test_least_recently_used_entries_are_evicted(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("ASPERITY_CACHE_SIZE", "10kB")
     for number in range(8):
         cache.put_entry(NAMESPACE, str(number), bytes(1000))
-        for entry in cache.list_entries():  # each put moves the clock by a second
-            os.utime(entry.path, ns=(entry.last_used - 10**9, entry.last_used - 10**9))
+        for entry_path in cache.list_entries():  # each put advances the clock by a second
+            os.utime(
+                entry_path.path, ns=(entry_path.last_used - 10**9, entry_path.last_used - 10**9)
+            )
     assert cache.get_entry(NAMESPACE, "0") is not None  # used now
     for number in range(8, 12):
         cache.put_entry(NAMESPACE, str(number), bytes(1000))
-    assert sum(entry.size for entry in cache.list_entries()) <= 10_000
-    there = {number for number in range(12) if cache.get_entry(NAMESPACE, str(number)) is not None}
-    assert {0, 11} <= there
-    assert there.isdisjoint({1, 2})
+    assert sum(entry_path.size for entry_path in cache.list_entries()) <= 10_000
+    stored = {number for number in range(12) if cache.get_entry(NAMESPACE, str(number)) is not None}
+    assert {0, 11} <= stored
+    assert stored.isdisjoint({1, 2})
 
 
-def test_a_content_above_an_eighth_of_the_limit_is_not_stored(monkeypatch: pytest.MonkeyPatch):
+def test_content_above_an_eighth_of_the_limit_is_not_stored(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("ASPERITY_CACHE_SIZE", "8kB")
     cache.put_entry(NAMESPACE, "small", bytes(1000))
     cache.put_entry(NAMESPACE, "large", bytes(1001))
@@ -260,28 +262,28 @@ def test_a_content_above_an_eighth_of_the_limit_is_not_stored(monkeypatch: pytes
     assert cache.get_entry(NAMESPACE, "large") is None
 
 
-def test_a_limit_of_zero_stores_nothing(monkeypatch: pytest.MonkeyPatch):
+def test_size_limit_of_zero_stores_nothing(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("ASPERITY_CACHE_SIZE", "0")
     cache.put_entry(NAMESPACE, KEY, CONTENT)
     assert cache.list_entries() == []
 
 
-@pytest.mark.parametrize("given", ["5", "much", "-1GB", "4 furlongs", "1e9"])
-def test_an_invalid_size_limit_is_reported(given: str, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setenv("ASPERITY_CACHE_SIZE", given)
+@pytest.mark.parametrize("limit", ["5", "much", "-1GB", "4 furlongs", "1e9"])
+def test_invalid_size_limit_is_refused(limit: str, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("ASPERITY_CACHE_SIZE", limit)
     with pytest.raises(ParameterError, match=r"must be a size such as '4GB'|needs a unit"):
         cache.size_limit()
 
 
-def test_only_entries_are_deleted(folder: Path):
+def test_clear_deletes_only_entries(folder: Path):
     cache.put_entry(NAMESPACE, KEY, CONTENT)
-    theirs = [folder / "notes.txt", folder / NAMESPACE / "notes.txt"]
-    for path in theirs:
+    other_files = [folder / "notes.txt", folder / NAMESPACE / "notes.txt"]
+    for path in other_files:
         path.write_text("mine")
     assert len(cache.list_entries()) == 1
     assert cache.clear() == []
     assert cache.get_entry(NAMESPACE, KEY) is None
-    assert all(path.exists() for path in theirs)
+    assert all(path.exists() for path in other_files)
 
 
 def test_bypass_neither_reads_nor_writes_the_cache(folder: Path):
@@ -313,7 +315,7 @@ sys.stdin.readline()
 
 @pytest.fixture
 def holder() -> Iterator[subprocess.Popen[str]]:
-    """A process that locks the entry, stores it after a line, and ends after another."""
+    """Start a process that locks the entry, stores it after a first line, ends after a second."""
     with subprocess.Popen(
         [sys.executable, "-c", HOLDER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     ) as process:
@@ -329,42 +331,42 @@ def send_line(process: subprocess.Popen[str]) -> None:
     process.stdin.flush()
 
 
-def test_a_process_waits_for_an_entry_of_another(holder: subprocess.Popen[str]):
+def test_process_waits_for_an_entry_that_another_computes(holder: subprocess.Popen[str]):
     assert not cache.wait_and_lock(NAMESPACE, KEY + " of something else")
-    later = threading.Timer(0.3, send_line, [holder])
-    later.start()
+    timer = threading.Timer(0.3, send_line, [holder])
+    timer.start()
     assert cache.wait_and_lock(NAMESPACE, KEY)
     assert cache.get_entry(NAMESPACE, KEY) == b"made by another"
     assert not cache.wait_and_lock(NAMESPACE, KEY)  # this process holds the lock
-    later.join()
+    timer.join()
 
 
-def test_the_lock_of_a_process_that_dies_is_released(holder: subprocess.Popen[str]):
+def test_lock_of_a_killed_process_is_released(holder: subprocess.Popen[str]):
     threading.Timer(0.3, holder.kill).start()
     assert cache.wait_and_lock(NAMESPACE, KEY)
     assert cache.get_entry(NAMESPACE, KEY) is None
 
 
 @pytest.mark.usefixtures("holder")
-def test_the_wait_for_a_lock_is_limited(monkeypatch: pytest.MonkeyPatch):
+def test_wait_for_a_lock_has_a_timeout(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(cache, "LOCK_TIMEOUT", 0.2)
     assert not cache.wait_and_lock(NAMESPACE, KEY)
     monkeypatch.setattr(cache, "LOCK_TIMEOUT", 12.0)
-    begin = time.monotonic()
-    assert not cache.wait_and_lock(NAMESPACE, "another")  # nor for another lock of that process
-    assert time.monotonic() - begin < 10.0
+    start = time.monotonic()
+    assert not cache.wait_and_lock(NAMESPACE, "another")  # no wait for another lock of that process
+    assert time.monotonic() - start < 10.0
 
 
 @pytest.mark.usefixtures("holder")
 @pytest.mark.parametrize("size", ["", "0"])
-def test_without_a_usable_cache_nothing_is_locked(
+def test_nothing_is_locked_without_a_usable_cache(
     folder: Path, monkeypatch: pytest.MonkeyPatch, size: str
 ):
-    """With a limit of zero, or where the lock file cannot be created."""
+    """The size limit is zero, or the lock file cannot be created."""
     monkeypatch.setenv("ASPERITY_CACHE_SIZE", size)
     if not size:
         monkeypatch.setenv("ASPERITY_CACHE_DIR", str(folder / "elsewhere"))
         cache._entry_path(NAMESPACE, KEY).with_suffix(".lock").mkdir(parents=True)
-    begin = time.monotonic()
+    start = time.monotonic()
     assert not cache.wait_and_lock(NAMESPACE, KEY)
-    assert time.monotonic() - begin < 10.0
+    assert time.monotonic() - start < 10.0

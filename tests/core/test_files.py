@@ -1,4 +1,4 @@
-"""Files that are whole or not there, and values as JSON has them."""
+"""Atomic writing, reading of regular files, and conversion of values to plain data."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Outer(Serializable):
 
 
 @dataclass(frozen=True)
-class Own:
+class Custom:
     def to_dict(self) -> dict[str, Any]:
         return {"said": "by itself"}
 
@@ -78,18 +78,18 @@ class Own:
         (Side.LEFT, "left"),
         (Sign.LESS, "-inf"),
         (MappingProxyType({3: np.inf}), {"3": "inf"}),
-        (Own(), {"said": "by itself"}),
+        (Custom(), {"said": "by itself"}),
         (Inner(math.inf, (0.0, 1.0)), {"reach": "inf", "at": [0.0, 1.0]}),
     ],
 )
-def test_values_as_plain_data(value: object, expected: object) -> None:
-    found = to_plain_data(value)
-    assert found == expected
-    assert type(found) is type(expected)
-    json.dumps(found, allow_nan=False)
+def test_values_are_converted_to_plain_data(value: object, expected: object) -> None:
+    result = to_plain_data(value)
+    assert result == expected
+    assert type(result) is type(expected)
+    json.dumps(result, allow_nan=False)
 
 
-def test_an_overflow_is_not_an_unbounded_number() -> None:
+def test_infinity_may_be_converted_to_none() -> None:
     data = {"a": [math.inf, -math.inf], "b": Inner(math.inf, (math.nan, 1.0))}
     assert to_plain_data(data, infinity=None) == {
         "a": [None, None],
@@ -98,21 +98,21 @@ def test_an_overflow_is_not_an_unbounded_number() -> None:
 
 
 @pytest.mark.parametrize("value", [object(), {1}, 1j])
-def test_what_has_no_plain_form_is_refused(value: object) -> None:
+def test_values_without_plain_data_are_refused(value: object) -> None:
     with pytest.raises(TypeError, match="no plain data"):
         to_plain_data(value)
 
 
-def test_a_record_is_its_fields_or_the_attributes_that_are_named() -> None:
+def test_record_is_converted_by_its_fields_or_by_named_attributes() -> None:
     outer = Outer("o", Inner(1.0, (2.0, 3.0)), (Inner(math.inf, (0.0, 0.0)),))
     inner = {"reach": 1.0, "at": [2.0, 3.0]}
-    found = outer.to_dict()
-    assert list(found.items())[:2] == [("name", "o"), ("inner", inner)]
-    assert found["more"] == [{"reach": "inf", "at": [0.0, 0.0]}]
+    result = outer.to_dict()
+    assert list(result.items())[:2] == [("name", "o"), ("inner", inner)]
+    assert result["more"] == [{"reach": "inf", "at": [0.0, 0.0]}]
     assert list(attributes_to_dict(outer, "size", "name").items()) == [("size", 1), ("name", "o")]
 
 
-def test_a_class_says_what_is_written_of_it() -> None:
+def test_serialized_attributes_select_and_order_the_data() -> None:
     class Short(Outer):
         serialized_attributes = "size name"
 
@@ -129,25 +129,25 @@ def test_json_is_readable_and_strict() -> None:
 
 @pytest.mark.parametrize("exists", [False, True])
 @pytest.mark.parametrize("error", [OSError("full"), KeyboardInterrupt(), MemoryError()])
-def test_a_failure_leaves_what_was_there(
+def test_failed_write_leaves_the_old_file(
     tmp_path: Path, error: BaseException, exists: bool
 ) -> None:
     target = tmp_path / "a.txt"
     if exists:
         target.write_text("old")
 
-    def half() -> None:
+    def write_half() -> None:
         with open_atomic(target, durable=True) as stream:
             stream.write(b"half")
             raise error
 
     with pytest.raises(type(error)):
-        half()
+        write_half()
     assert [path.name for path in tmp_path.iterdir()] == ["a.txt"] * exists
     assert not exists or target.read_text() == "old"
 
 
-def test_nothing_is_seen_before_all_is_written(tmp_path: Path) -> None:
+def test_old_content_is_visible_until_all_is_written(tmp_path: Path) -> None:
     target = tmp_path / "a.txt"
     write_text(target, "old")
     with open_atomic(target) as stream:
@@ -158,21 +158,21 @@ def test_nothing_is_seen_before_all_is_written(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(os.name != "posix", reason="the mode of a file is one of POSIX")
-def test_the_mode_is_that_of_a_new_file(tmp_path: Path) -> None:
+def test_written_file_has_the_default_mode(tmp_path: Path) -> None:
     write_text(tmp_path / "a.txt", "text")
     (tmp_path / "b.txt").write_text("text")
     mode, expected = (stat.S_IMODE((tmp_path / name).stat().st_mode) for name in ("a.txt", "b.txt"))
     assert mode == expected
 
 
-def test_a_name_may_be_as_long_as_the_system_allows(tmp_path: Path) -> None:
-    """A temporary name made from the file's own was too long for some."""
+def test_file_name_may_have_the_maximum_length(tmp_path: Path) -> None:
+    """A temporary name with the file's name as its prefix would be too long."""
     target = tmp_path / ("a" * 255)
     write_text(target, "text")
     assert target.read_text() == "text"
 
 
-def test_a_link_stays_one(tmp_path: Path) -> None:
+def test_link_is_written_through_and_stays(tmp_path: Path) -> None:
     link, real = tmp_path / "link", tmp_path / "real"
     link.symlink_to(real)
     write_text(link, "text")
@@ -181,7 +181,7 @@ def test_a_link_stays_one(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
-def test_a_pipe_is_written_to_and_not_replaced(tmp_path: Path) -> None:
+def test_pipe_is_written_to_and_not_replaced(tmp_path: Path) -> None:
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
     reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
@@ -193,10 +193,10 @@ def test_a_pipe_is_written_to_and_not_replaced(tmp_path: Path) -> None:
     assert pipe.is_fifo()
 
 
-# --- what is read ---------------------------------------------------------------------------------
+# --- reading --------------------------------------------------------------------------------------
 
 
-def test_a_link_to_a_file_is_read(tmp_path: Path) -> None:
+def test_link_to_a_file_is_read(tmp_path: Path) -> None:
     (tmp_path / "file").write_bytes(b"content")
     (tmp_path / "link").symlink_to(tmp_path / "file")
     with open_input(tmp_path / "link") as stream:
@@ -204,7 +204,7 @@ def test_a_link_to_a_file_is_read(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", ["pipe", "link to a pipe", "folder", "device"])
-def test_what_is_no_file_is_refused_at_once(tmp_path: Path, kind: str) -> None:
+def test_input_that_is_not_a_regular_file_is_refused(tmp_path: Path, kind: str) -> None:
     path = tmp_path / "input"
     if kind == "folder":
         path.mkdir()
@@ -219,7 +219,7 @@ def test_what_is_no_file_is_refused_at_once(tmp_path: Path, kind: str) -> None:
         open_input(path)
 
 
-def test_a_file_above_the_cap_is_refused_with_both_sizes(tmp_path: Path) -> None:
+def test_error_for_a_too_large_file_has_both_sizes(tmp_path: Path) -> None:
     (tmp_path / "file").write_bytes(bytes(101))
     with pytest.raises(OSError, match="101 bytes; at most 100 are read"):
         open_input(tmp_path / "file", max_bytes=100)
@@ -237,17 +237,15 @@ def test_a_file_above_the_cap_is_refused_with_both_sizes(tmp_path: Path) -> None
     ],
     ids=["deep", "integer", "encoding", "size"],
 )
-def test_toml_that_cannot_be_read_is_refused_with_its_name(
-    tmp_path: Path, content: bytes, words: str
-) -> None:
+def test_error_for_invalid_toml_names_the_file(tmp_path: Path, content: bytes, words: str) -> None:
     path = tmp_path / "file.toml"
     path.write_bytes(content)
     with pytest.raises(ParameterError, match=f"scene file .*file.toml .*{words}"):
         read_toml("scene", path)
 
 
-def test_a_file_being_written_has_no_name(tmp_path: Path) -> None:
-    """A process that is killed while it writes leaves nothing behind."""
+def test_file_has_no_name_while_it_is_written(tmp_path: Path) -> None:
+    """A process that is killed while it writes then leaves no file."""
     with open_atomic(tmp_path / "target") as stream:
         stream.write(b"half")
         stream.flush()
@@ -257,7 +255,7 @@ def test_a_file_being_written_has_no_name(tmp_path: Path) -> None:
     assert len(list(tmp_path.iterdir())) == 1
 
 
-def test_without_such_files_there_is_a_name_meanwhile(
+def test_temporary_file_is_used_without_o_tmpfile(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delattr(os, "O_TMPFILE", raising=False)

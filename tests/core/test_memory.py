@@ -1,4 +1,4 @@
-"""What a command may use: the estimate against measured peaks, and what is refused."""
+"""Memory limit of commands: the estimate against measured peaks, and refused surfaces."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ import sys
 from asperity.cli.main import main
 sys.argv[0] = "asperity"
 main()
-# Of this program alone: what getrusage tells begins with the peak of the process that forked it.
+# The peak of this program: getrusage starts with the peak of the process that forked it.
 (line,) = [line for line in open("/proc/self/status") if line.startswith("VmHWM")]
 print("PEAK", int(line.split()[1]) * 1024, file=sys.stderr)
 """
 
 
-def _map(folder: Path, side: int, height: float = 20e-6) -> str:
-    """Save a smooth map of an amplitude [m]; returns its path."""
+def _save_map(folder: Path, side: int, height: float = 20e-6) -> str:
+    """Save a smooth map with an amplitude of height [m]; return its path."""
     x = np.linspace(0.0, 8.0 * np.pi, side)
     path = folder / f"map{side}.npy"
     np.save(path, height * np.sin(x) * np.cos(1.3 * x[:, None]))
@@ -38,19 +38,21 @@ def _map(folder: Path, side: int, height: float = 20e-6) -> str:
 @pytest.mark.skipif(sys.platform != "linux", reason="the peak stands in /proc, on Linux")
 @pytest.mark.parametrize("side", [256, 512])
 @pytest.mark.parametrize("command", ["limits", "prepare"])
-def test_the_estimate_is_above_the_peak(tmp_path: Path, command: str, side: int) -> None:
-    further = ["-o", str(tmp_path / "out.npz")] if command == "prepare" else []
-    # The first one may compile; of the second nothing is kept, not by an earlier run either.
+def test_estimate_is_between_one_and_2_3_times_the_peak(
+    tmp_path: Path, command: str, side: int
+) -> None:
+    options = ["-o", str(tmp_path / "out.npz")] if command == "prepare" else []
+    # The first run may compile; a random height keeps results of earlier runs from being used.
     for height in np.random.default_rng().uniform(20e-6, 21e-6, 2):
-        words = [command, _map(tmp_path, side, height), "--pitch", "10um", *further]
-        done = subprocess.run(
-            [sys.executable, "-c", _PEAK, *words], capture_output=True, text=True, check=True
+        arguments = [command, _save_map(tmp_path, side, height), "--pitch", "10um", *options]
+        process = subprocess.run(
+            [sys.executable, "-c", _PEAK, *arguments], capture_output=True, text=True, check=True
         )
-    peak = int(done.stderr.split("PEAK")[1])
+    peak = int(process.stderr.split("PEAK")[1])
     assert peak <= estimate_memory(command, side * side) <= 2.3 * peak
 
 
-def test_a_surface_that_does_not_fit_is_refused_before_it_is_made() -> None:
+def test_surface_above_the_limit_is_refused_before_its_computation() -> None:
     with limit_memory("compare", 500_000_000):
         require_memory(1000, 1000)
         with pytest.raises(ParameterError, match=r"memory must be about .* 2000 x 2000 points"):
@@ -60,8 +62,8 @@ def test_a_surface_that_does_not_fit_is_refused_before_it_is_made() -> None:
         with pytest.raises(ParameterError, match="2 times as long"):
             HeightMap(np.broadcast_to(0.0, (2000, 2000)), 1e-5)
     require_memory(10**9)  # nothing is limited outside of a command
-    words = "at least 420 MB for compare, got 999999 bytes"
-    with pytest.raises(ParameterError, match=words), limit_memory("compare", 999_999):
+    message = "at least 420 MB for compare, got 999999 bytes"
+    with pytest.raises(ParameterError, match=message), limit_memory("compare", 999_999):
         pass
 
 
@@ -69,32 +71,32 @@ def test_a_surface_that_does_not_fit_is_refused_before_it_is_made() -> None:
     ("text", "size"),
     [("4GB", 4 * 10**9), ("500 MB", 5 * 10**8), ("2GiB", 2 * 2**30), ("12B", 12), ("1.5k", 1500)],
 )
-def test_sizes_are_read(text: str, size: int) -> None:
+def test_sizes_with_units_are_parsed(text: str, size: int) -> None:
     assert MEMORY.parse(text) == size
 
 
 @pytest.mark.parametrize("text", ["", "4 apples", "-1GB", "1e9", "GB", "9" * 400])
-def test_what_is_no_size_is_refused(text: str) -> None:
+def test_invalid_sizes_are_refused(text: str) -> None:
     with pytest.raises(ParameterError, match="memory must be a size"):
         MEMORY.parse(text)
 
 
-def test_this_machine_says_what_is_free() -> None:
+def test_free_memory_is_plausible_or_unknown() -> None:
     free = free_memory()
     assert free is None or free > 10**6
 
 
 @pytest.mark.parametrize("command", ["compare", "analyze", "limits", "prepare", "show"])
-def test_every_command_with_a_surface_has_the_limit(
+def test_every_command_that_reads_a_surface_has_the_limit(
     command: str,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    further = {"prepare": ["-o", str(tmp_path / "o.npz")], "analyze": ["--law", "A"]}
+    options = {"prepare": ["-o", str(tmp_path / "o.npz")], "analyze": ["--law", "A"]}
     limit = "105MB" if command == "prepare" else "425MB"
-    words = [command, _map(tmp_path, 512), "--pitch", "10um", "--memory", limit]
-    monkeypatch.setattr("sys.argv", ["asperity", *words, *further.get(command, [])])
+    arguments = [command, _save_map(tmp_path, 512), "--pitch", "10um", "--memory", limit]
+    monkeypatch.setattr("sys.argv", ["asperity", *arguments, *options.get(command, [])])
     with pytest.raises(SystemExit) as stop:
         main()
     out, err = capsys.readouterr()

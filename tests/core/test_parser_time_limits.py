@@ -1,4 +1,4 @@
-"""Every text of at most 100 kB is accepted or refused within 1 s, by every parser there is."""
+"""Every parser accepts or refuses any text of at most 100 kB within 1 s."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ from asperity.measured.reading.readers import SIGNATURE_READERS
 from asperity.scene.scene_file import load_scene
 from asperity.scene.sections import read_path
 
-LONGEST = 100_000  # [bytes]
-SECONDS = 1.0  # of the processor, on a machine that has other work
-RANDOM = 8  # texts that are made of random pieces, for each beginning
+MAX_LENGTH = 100_000  # [bytes]
+SECONDS = 1.0  # processor time, as the machine may be busy
+N_RANDOM = 8  # texts of random pieces for each prefix
 
 PIECES = (
     *("[(", "[", "(", "{", "<", "<a>", "</a>", "((1", "[1,", "{a=", "a.", "a:", "a=1,", "a=", "="),
@@ -53,29 +53,29 @@ PIECES = (
 )
 
 
-def texts(beginning: str) -> Iterator[str]:
-    """Yield a beginning followed by one piece over and over, then by pieces as they come."""
-    room = (LONGEST - len(beginning.encode())) // 2
+def texts(prefix: str) -> Iterator[str]:
+    """Yield a prefix followed by repetitions of each piece, then by random pieces."""
+    length = (MAX_LENGTH - len(prefix.encode())) // 2
     for piece in PIECES:
-        once = piece * (room // len(piece.encode()))
-        yield beginning + once
-        yield f"{beginning}x{once}x\n1 2 3 4\n5 6 7 8\n"
-        yield beginning + once + once
-    rng = random.Random(beginning)
-    for _ in range(RANDOM):
-        text = beginning
-        while len(text.encode()) < LONGEST - 20_000:
+        repeated = piece * (length // len(piece.encode()))
+        yield prefix + repeated
+        yield f"{prefix}x{repeated}x\n1 2 3 4\n5 6 7 8\n"
+        yield prefix + repeated + repeated
+    rng = random.Random(prefix)
+    for _ in range(N_RANDOM):
+        text = prefix
+        while len(text.encode()) < MAX_LENGTH - 20_000:
             piece = "".join(rng.choices(PIECES, k=rng.randrange(1, 4)))
             text += piece * rng.choice((1, 3, 1000))
-        yield text.encode()[:LONGEST].decode(errors="ignore")
+        yield text.encode()[:MAX_LENGTH].decode(errors="ignore")
 
 
-def file_of(text: str) -> SurfaceFile:
+def to_surface_file(text: str) -> SurfaceFile:
     Path("text.dat").write_text(text, encoding="utf-8", newline="")
     return SurfaceFile(Path("text.dat"), text.encode()[:4096])
 
 
-def as_file(read: Callable[[str], object]) -> Callable[[str], object]:
+def from_path(read: Callable[[str], object]) -> Callable[[str], object]:
     def parse(text: str) -> object:
         Path("text.toml").write_text(text, encoding="utf-8", newline="")
         return read("text.toml")
@@ -85,10 +85,10 @@ def as_file(read: Callable[[str], object]) -> Callable[[str], object]:
 
 def recognise(text: str) -> None:
     for reader in SIGNATURE_READERS:
-        reader.recognises(file_of(text))
+        reader.recognises(to_surface_file(text))
 
 
-def every_form(text: str) -> None:
+def parse_every_form(text: str) -> None:
     for form in get_args(Form):
         try:
             Argument("a", "an argument", "m", form=form).parse(text)
@@ -105,23 +105,29 @@ SDF = (
 ESRI = "ncols 4\nnrows 3\ncellsize 1\n"
 PARSERS: dict[str, tuple[Callable[[str], object], tuple[str, ...]]] = {
     "quantity": (lambda text: parse_quantity("period", text, "m"), ("", "1 ", "1 mm")),
-    "argument": (every_form, ("",)),
+    "argument": (parse_every_form, ("",)),
     "surface": (load_scene, ("", "sinusoid:", "sinusoid:amplitude=1mm,period=", "fourier:phases=")),
-    "scene": (as_file(load_scene), ("", "a = ", '[texture]\nkind = "sinusoid"\namplitude = "')),
-    "device": (as_file(load_device), ("", "[workspace]\nvalue = [")),
-    "path of a motion": (as_file(read_path), ("", "t,x,y,z\n")),
+    "scene": (from_path(load_scene), ("", "a = ", '[texture]\nkind = "sinusoid"\namplitude = "')),
+    "device": (from_path(load_device), ("", "[workspace]\nvalue = [")),
+    "path of a motion": (from_path(read_path), ("", "t,x,y,z\n")),
     "mark of a format": (recognise, ("", "solid ", "aISO-1.0\n", "v 1 2 3\n")),
-    "text": (lambda text: read_text(file_of(text), ReadingOptions()), ("", "# Width: ", "x [um] ")),
+    "text": (
+        lambda text: read_text(to_surface_file(text), ReadingOptions()),
+        ("", "# Width: ", "x [um] "),
+    ),
     "text, resampled": (
-        lambda text: read_text(file_of(text), ReadingOptions(resample=1.0)),
+        lambda text: read_text(to_surface_file(text), ReadingOptions(resample=1.0)),
         ("", "x;z;valid\n[mm];[mm];[1/0]\n", "index,x [m],z [m]\n"),
     ),
     "ESRI grid": (
-        lambda text: read_esri(file_of(text), ReadingOptions()),
+        lambda text: read_esri(to_surface_file(text), ReadingOptions()),
         ("ncols ", ESRI, f"{ESRI}1 "),
     ),
     "OME": (ome_scale, ("", "<Pixels ", '<a:Pixels PhysicalSizeX="1" ')),
-    "SDF": (lambda text: read_sdf(file_of(text), ReadingOptions()), ("aISO-1.0\n", SDF, SDF + "*")),
+    "SDF": (
+        lambda text: read_sdf(to_surface_file(text), ReadingOptions()),
+        ("aISO-1.0\n", SDF, SDF + "*"),
+    ),
     "XML of an X3P": (
         lambda text: parse_header(text.encode(), []),
         ("", "<ISO5436_2>", '<?xml version="1.0"?>', BOMB, f"{BOMB}]><ISO5436_2>&a11;", "<a b='"),
@@ -129,21 +135,21 @@ PARSERS: dict[str, tuple[Callable[[str], object], tuple[str, ...]]] = {
 }
 
 
-def measured(parse: Callable[[str], object], beginnings: tuple[str, ...]) -> list[str]:
-    """Return the texts that take too long, or that raise what is no refusal."""
+def find_faults(parse: Callable[[str], object], prefixes: tuple[str, ...]) -> list[str]:
+    """Return the texts that take too long or raise anything but an AsperityError."""
     faults = []
-    for text in (text for beginning in beginnings for text in texts(beginning)):
-        assert len(text.encode()) <= LONGEST + 100
-        before = time.process_time()
+    for text in (text for prefix in prefixes for text in texts(prefix)):
+        assert len(text.encode()) <= MAX_LENGTH + 100
+        start = time.process_time()
         try:
             parse(text)
         except AsperityError:
             pass
-        except Exception as error:  # the very thing that is looked for
+        except Exception as error:  # any other error is a fault
             faults.append(f"{type(error).__name__} ({error!s:.60}): {text[:60]!r}")
-        taken = time.process_time() - before
-        if taken > SECONDS:
-            faults.append(f"{taken:.1f} s: {text[:60]!r}")
+        duration = time.process_time() - start
+        if duration > SECONDS:
+            faults.append(f"{duration:.1f} s: {text[:60]!r}")
     return faults
 
 
@@ -152,28 +158,28 @@ def test_every_text_is_accepted_or_refused_in_a_second(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    parse, beginnings = PARSERS[name]
-    for beginning in beginnings:
+    parse, prefixes = PARSERS[name]
+    for prefix in prefixes:
         with contextlib.suppress(AsperityError):
-            parse(beginning)  # what is imported at the first call is no part of it
-    # What other tests left behind is not looked through, should a collection of garbage be due:
-    # with their ten million objects one takes a second by itself.
+            parse(prefix)  # imports at the first call are not measured
+    # Objects of other tests are excluded from garbage collection: with ten million of them
+    # one collection takes a second.
     gc.collect()
     gc.freeze()
     try:
-        assert measured(parse, beginnings) == []
+        assert find_faults(parse, prefixes) == []
     finally:
         gc.unfreeze()
 
 
-def test_what_is_slow_or_no_refusal_is_found() -> None:
-    """Negative control: a search that is quadratic, and an error of somebody else's."""
-    found = []
+def test_slow_and_failing_parsers_are_detected() -> None:
+    """Negative control: a search with quadratic time, and a ValueError."""
+    calls = []
 
     def quadratic(text: str) -> object:
-        found.append(text)
-        return re.search(r"\s+$", " " * 30_000 + "y") if len(found) == 1 else None
+        calls.append(text)
+        return re.search(r"\s+$", " " * 30_000 + "y") if len(calls) == 1 else None
 
-    assert "s: " in measured(quadratic, ("",))[0]
-    raised = measured(lambda text: int(text[:1]), ("",))
-    assert any("ValueError" in fault for fault in raised)
+    assert "s: " in find_faults(quadratic, ("",))[0]
+    faults = find_faults(lambda text: int(text[:1]), ("",))
+    assert any("ValueError" in fault for fault in faults)

@@ -17,7 +17,7 @@ import pytest
 from asperity.analysis import characteristic_number, compare
 from asperity.analysis.energy.leak import worst_loop
 from asperity.analysis.energy.merit import merit
-from asperity.analysis.gain import characteristic as answers
+from asperity.analysis.gain import characteristic
 from asperity.core import cache, digests
 from asperity.core.files import json_text
 from asperity.laws import LAWS, Law
@@ -31,7 +31,7 @@ Compute = Callable[[], Any]
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """An empty namespace of results; compiled code is shared with other tests."""
+    """Use an empty namespace of results; compiled code is shared with other tests."""
     monkeypatch.setattr(cache, "RESULTS_NAMESPACE", f"results-{tmp_path.name}")
     yield cache.cache_folder() / cache.RESULTS_NAMESPACE
     for entry in cache.list_entries():
@@ -42,8 +42,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 
 @pytest.fixture
-def fresh(monkeypatch: pytest.MonkeyPatch) -> Callable[[Compute], Any]:
-    """Return a function that works an answer out without what is cache."""
+def without_cache(monkeypatch: pytest.MonkeyPatch) -> Callable[[Compute], Any]:
+    """Return a function that computes a result without the cache."""
 
     def compute(make: Compute) -> Any:
         with monkeypatch.context() as patch:
@@ -54,7 +54,7 @@ def fresh(monkeypatch: pytest.MonkeyPatch) -> Callable[[Compute], Any]:
     return compute
 
 
-# --- a comparison ---------------------------------------------------------------------------------
+# --- comparisons ----------------------------------------------------------------------------------
 
 ROUGH = 1e-4 * np.random.default_rng(7).normal(size=9)
 CHOICES: dict[str, list[Any]] = {
@@ -75,42 +75,42 @@ CHOICES: dict[str, list[Any]] = {
 }
 
 
-def change(draw: random.Random, arguments: dict[str, Any]) -> dict[str, Any]:
+def change_two(draw: random.Random, arguments: dict[str, Any]) -> dict[str, Any]:
     """Return the arguments with two of them changed at random."""
     changed = {name: draw.choice(CHOICES[name]) for name in draw.sample(sorted(CHOICES), 2)}
     return arguments | changed
 
 
 def compare_json(arguments: dict[str, Any]) -> str:
-    given = dict(arguments)
-    if "F" not in given["laws"]:
-        given["law_parameters"] = {}
-    return json_text(compare(given.pop("texture")(), **given))
+    keywords = dict(arguments)
+    if "F" not in keywords["laws"]:
+        keywords["law_parameters"] = {}
+    return json_text(compare(keywords.pop("texture")(), **keywords))
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_cached_comparison_equals_a_computed_one(
-    seed: int, fresh: Callable[[Compute], Any]
+def test_cached_comparison_equals_a_computed_one(
+    seed: int, without_cache: Callable[[Compute], Any]
 ) -> None:
     draw = random.Random(seed)
     arguments = {name: choices[0] for name, choices in CHOICES.items()}
     for _ in range(6):
-        arguments = change(draw, arguments)
-        alone = fresh(lambda given=arguments: compare_json(given))
-        assert compare_json(arguments) == alone  # with results of earlier comparisons
-        assert compare_json(arguments) == alone  # with its own results
+        arguments = change_two(draw, arguments)
+        expected = without_cache(lambda current=arguments: compare_json(current))
+        assert compare_json(arguments) == expected  # with results of earlier comparisons
+        assert compare_json(arguments) == expected  # with its own results
 
 
-def test_another_device_or_stiffness_computes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_another_device_or_stiffness_uses_cached_results(monkeypatch: pytest.MonkeyPatch) -> None:
     wave = Sinusoid(0.31e-3, 1.1e-3, phase=0.4)
     compare(wave, laws="AD")
-    made = []
-    monkeypatch.setattr(cache, "put_entry", lambda _namespace, key, _content: made.append(key))
-    again = Sinusoid(0.31e-3, 1.1e-3, phase=0.4)
-    compare(again, "touch", laws="AD", stiffness=321.0)
-    assert made == []
-    compare(again, laws="AD", max_depth=0.3e-3)
-    assert made != []
+    stored = []
+    monkeypatch.setattr(cache, "put_entry", lambda _namespace, key, _content: stored.append(key))
+    equal_wave = Sinusoid(0.31e-3, 1.1e-3, phase=0.4)
+    compare(equal_wave, "touch", laws="AD", stiffness=321.0)
+    assert stored == []
+    compare(equal_wave, laws="AD", max_depth=0.3e-3)
+    assert stored != []
 
 
 # --- keys: negative controls ----------------------------------------------------------------------
@@ -132,21 +132,21 @@ def numbers(surface: Surface) -> str:
 
 
 @pytest.mark.parametrize("field", FIELDS)
-def test_a_key_without_a_field_gives_wrong_results(
-    field: int, fresh: Callable[[Compute], Any], monkeypatch: pytest.MonkeyPatch
+def test_key_without_a_field_gives_wrong_results(
+    field: int, without_cache: Callable[[Compute], Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     _name, before, after = FIELDS[field]
-    right = fresh(lambda: numbers(after()))
+    expected = without_cache(lambda: numbers(after()))
     numbers(before())
-    assert numbers(after()) == right
-    whole = digests.content_digest
+    assert numbers(after()) == expected
+    content_digest = digests.content_digest
 
     def incomplete(*parts: Any) -> str:
-        return whole(*parts[:field], "omitted", *parts[field + 1 :])
+        return content_digest(*parts[:field], "omitted", *parts[field + 1 :])
 
-    monkeypatch.setattr(answers, "content_digest", incomplete)
+    monkeypatch.setattr(characteristic, "content_digest", incomplete)
     numbers(before())
-    assert numbers(after()) != right
+    assert numbers(after()) != expected
 
 
 HEIGHTS = np.random.default_rng(3).normal(size=(5, 6))
@@ -166,24 +166,24 @@ CONTENTS: list[Callable[[], Texture]] = [
 ]
 
 
-def test_equal_textures_have_equal_digests() -> None:
+def test_textures_have_equal_digests_exactly_when_they_are_equal() -> None:
     assert len({make().digest for make in CONTENTS}) == len(CONTENTS)
     for make in CONTENTS:
         assert make().digest == make().digest is not None
     assert HeightMap(HEIGHTS, 1e-3, preparation=("said",)).digest == CONTENTS[5]().digest
 
 
-def test_results_of_user_defined_code_are_not_shared() -> None:
+def test_results_of_user_defined_textures_and_laws_are_not_shared() -> None:
     class Mine(HeightMap):
         pass
 
     assert Mine(HEIGHTS, 1e-3).digest is None
-    own = Law("U", "own", "vertical", lambda c: (c.k * c.depth + c.k**2 * c.depth) * c.e_z)
-    nonlinear = Surface(WAVE, own, stiffness=2.0)  # not proportional to k
+    law = Law("U", "own", "vertical", lambda c: (c.k * c.depth + c.k**2 * c.depth) * c.e_z)
+    nonlinear = Surface(WAVE, law, stiffness=2.0)  # not proportional to k
     assert merit(nonlinear).ripple == pytest.approx(3.0 * merit(Surface(WAVE, "A")).ripple)
-    assert answers.at_unit_stiffness(nonlinear) is nonlinear
+    assert characteristic.at_unit_stiffness(nonlinear) is nonlinear
     stiffer = nonlinear.to_stiffness(3.0)
-    assert answers.surface_content(nonlinear) != answers.surface_content(stiffer)
+    assert characteristic.surface_content(nonlinear) != characteristic.surface_content(stiffer)
 
 
 def test_every_shipped_law_is_proportional_to_the_stiffness() -> None:
@@ -208,25 +208,25 @@ print(sorted(heavy & set(sys.modules)), file=sys.stderr)
 """
 
 
-def test_a_cached_comparison_imports_no_heavy_package() -> None:
-    done = [
+def test_cached_comparison_imports_no_heavy_package() -> None:
+    processes = [
         subprocess.run([sys.executable, "-c", _HEAVY], capture_output=True, text=True, check=True)
         for _ in range(2)
     ]
-    assert done[0].stdout == done[1].stdout
-    assert done[1].stderr.strip() == "[]"
+    assert processes[0].stdout == processes[1].stdout
+    assert processes[1].stderr.strip() == "[]"
 
 
-def test_results_depend_on_the_package(monkeypatch: pytest.MonkeyPatch) -> None:
-    made = iter("abcd")
-    ask = lambda: cache.get_or_compute("letter", "content", lambda: next(made))  # noqa: E731 - called again
-    assert (ask(), ask()) == ("a", "a")
+def test_cached_results_depend_on_the_package_source(monkeypatch: pytest.MonkeyPatch) -> None:
+    letters = iter("abcd")
+    request = lambda: cache.get_or_compute("letter", "content", lambda: next(letters))  # noqa: E731 - called again
+    assert (request(), request()) == ("a", "a")
     monkeypatch.setattr(cache, "package_digest", lambda: "another")
-    assert (ask(), ask()) == ("b", "b")
+    assert (request(), request()) == ("b", "b")
 
 
 @pytest.mark.parametrize("library", ["numpy", "scipy", "numba", "llvmlite"])
-def test_results_depend_on_the_versions_of_libraries(
+def test_package_digest_depends_on_library_versions(
     library: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     digest = digests.package_digest.__wrapped__
@@ -241,58 +241,61 @@ def test_results_depend_on_the_versions_of_libraries(
 
 
 @pytest.mark.filterwarnings("ignore::asperity.core.cache.CacheWarning")
-def test_an_incompatible_entry_is_computed_again() -> None:
+def test_incompatible_entry_is_recomputed() -> None:
     key = f"letter\ncontent\n{digests.package_digest()}"
     cache.put_entry(cache.RESULTS_NAMESPACE, key, b"no pickle")
     assert cache.get_or_compute("letter", "content", lambda: "made") == "made"
     assert cache.get_or_compute("letter", "content", lambda: "again") == "made"
 
 
-def _full(*_arguments: Any, **_named: Any) -> None:
+def _raise_no_space(*_arguments: Any, **_named: Any) -> None:
     raise OSError(28, "No space left on device")
 
 
-def _read_only(*_arguments: Any, **_named: Any) -> None:
+def _raise_no_permission(*_arguments: Any, **_named: Any) -> None:
     raise PermissionError(13, "Permission denied")
 
 
-def _flipped(content: bytes) -> bytes:
+def _flip_bit(content: bytes) -> bytes:
     return content[:-1] + bytes([content[-1] ^ 16])
 
 
-def _of_another_build(_content: bytes) -> Any:
+def _raise_missing_class(_content: bytes) -> Any:
     raise AttributeError("a class that this version does not have")
 
 
 @pytest.mark.parametrize("trouble", ["full", "read-only", "damaged", "another version"])
-def test_a_comparison_does_not_depend_on_problems_of_the_cache(
-    trouble: str, folder: Path, fresh: Callable[[Compute], Any], monkeypatch: pytest.MonkeyPatch
+def test_comparison_does_not_depend_on_problems_of_the_cache(
+    trouble: str,
+    folder: Path,
+    without_cache: Callable[[Compute], Any],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """All numbers are the same, and there is one warning for any number of entries."""
-    ask = lambda: json_text(compare(WAVE, laws="WAD"))  # noqa: E731 - called again
-    right = fresh(ask)
+    """All numbers are the same, with one warning for any number of entries."""
+    request = lambda: json_text(compare(WAVE, laws="WAD"))  # noqa: E731 - called again
+    expected = without_cache(request)
     if trouble in ("full", "read-only"):
-        broken = _full if trouble == "full" else _read_only
+        broken = _raise_no_space if trouble == "full" else _raise_no_permission
         monkeypatch.setattr(cache, "open_atomic", broken)
     else:
-        assert ask() == right
+        assert request() == expected
     entries = [path for path in folder.rglob("*") if path.is_file()]
     assert bool(entries) == (trouble in ("damaged", "another version"))
     if trouble == "damaged":
         for path in entries:
-            path.write_bytes(_flipped(path.read_bytes()))
+            path.write_bytes(_flip_bit(path.read_bytes()))
     elif trouble == "another version":
-        monkeypatch.setattr(cache.pickle, "loads", _of_another_build)
+        monkeypatch.setattr(cache.pickle, "loads", _raise_missing_class)
     cache._warned.clear()
-    with warnings.catch_warnings(record=True) as caught:
+    with warnings.catch_warnings(record=True) as record:
         warnings.simplefilter("always")
-        assert ask() == right
-    notes = [str(one.message) for one in caught if one.category is cache.CacheWarning]
-    assert len(notes) == 1, notes
-    assert ("cannot be written" if trouble in ("full", "read-only") else "damaged") in notes[0]
+        assert request() == expected
+    messages = [str(item.message) for item in record if item.category is cache.CacheWarning]
+    assert len(messages) == 1, messages
+    assert ("cannot be written" if trouble in ("full", "read-only") else "damaged") in messages[0]
 
 
-def test_a_value_without_a_digest_is_refused() -> None:
+def test_value_without_a_digest_is_refused() -> None:
     with pytest.raises(TypeError, match="cannot compute a content digest"):
         digests.content_digest({"a": 1})
 
@@ -300,46 +303,46 @@ def test_a_value_without_a_digest_is_refused() -> None:
 # --- measured surfaces ----------------------------------------------------------------------------
 
 
-def test_a_file_is_prepared_again_only_after_a_change(
+def test_file_is_prepared_again_only_after_a_change(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     file = tmp_path / "land.npy"
-    made = []
-    put = cache.put_entry
+    stored = []
+    put_entry = cache.put_entry
 
-    def counted(namespace: str, key: str, content: bytes) -> None:
-        made.append(key)
-        put(namespace, key, content)
+    def record_put(namespace: str, key: str, content: bytes) -> None:
+        stored.append(key)
+        put_entry(namespace, key, content)
 
-    monkeypatch.setattr(cache, "put_entry", counted)
+    monkeypatch.setattr(cache, "put_entry", record_put)
     np.save(file, 1e-5 * HEIGHTS.repeat(4, 0).repeat(4, 1))
     first = prepare_file(file, pitch=1e-4)
-    again = prepare_file(file, pitch=1e-4)
-    assert len(made) == 1
-    assert np.array_equal(first.heights, again.heights)
-    assert (first.steps, first.history, first.pitch) == (again.steps, again.history, again.pitch)
+    second = prepare_file(file, pitch=1e-4)
+    assert len(stored) == 1
+    assert np.array_equal(first.heights, second.heights)
+    assert (first.steps, first.history, first.pitch) == (second.steps, second.history, second.pitch)
     for count, changed in enumerate([{"magnify": 2.0}, {"cutoff": 9e-4}, {"pitch": [1e-4, 2e-4]}]):
         prepare_file(file, **{"pitch": 1e-4} | changed)
-        assert len(made) == 2 + count
+        assert len(stored) == 2 + count
     np.save(file, 2e-5 * HEIGHTS.repeat(4, 0).repeat(4, 1))
     assert np.ptp(prepare_file(file, pitch=1e-4).heights) > 1.5 * np.ptp(first.heights)
-    assert len(made) == 5
+    assert len(stored) == 5
 
 
 # --- pictures -------------------------------------------------------------------------------------
 
 
-def test_a_report_draws_each_picture_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_report_draws_each_picture_once(monkeypatch: pytest.MonkeyPatch) -> None:
     from asperity.report import html_text
     from asperity.report.pictures import plotting as plots
 
     drawn: list[str] = []
 
-    def counted(name: str, draw: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    def record_draw(name: str, draw: Callable[[Any], Any]) -> Callable[[Any], Any]:
         return lambda result: drawn.append(name) or draw(result)
 
     monkeypatch.setattr(plots, "COMPARISON_PICTURES", {
-        name: counted(name, draw) for name, draw in plots.COMPARISON_PICTURES.items()
+        name: record_draw(name, draw) for name, draw in plots.COMPARISON_PICTURES.items()
     })  # fmt: skip
     first = html_text(compare(WAVE, laws="WA"))
     assert sorted(drawn) == sorted(plots.COMPARISON_PICTURES)

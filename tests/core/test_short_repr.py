@@ -1,4 +1,4 @@
-"""Results and values say themselves in one line at a prompt."""
+"""The repr of results and values is one short line."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ def surface(law: str = "C") -> asp.Surface:
     return asp.Surface(asp.Sinusoid(2e-4, 2e-3), law)
 
 
-def recorded() -> Path:
-    """Return the recording of a short run."""
+def record_run() -> Path:
+    """Record a short run; return the path of the recording."""
     path = Path(tempfile.mkdtemp(), "run.mcap")
-    hand, still = SpringHand(stiffness=200.0), Stationary((0.0, 0.0, -1e-3))
-    simulate(surface("W"), Cartesian(0.05), hand, Servo(1e-3), still, 0.1, trace=path)
+    hand, motion = SpringHand(stiffness=200.0), Stationary((0.0, 0.0, -1e-3))
+    simulate(surface("W"), Cartesian(0.05), hand, Servo(1e-3), motion, 0.1, trace=path)
     return path
 
 
@@ -37,7 +37,7 @@ def closed_writer() -> asp.RecordingWriter:
     return writer
 
 
-MADE: dict[str, Callable[[], Any]] = {
+EXAMPLES: dict[str, Callable[[], Any]] = {
     "Analysis": lambda: asp.analyze(surface("B"), "touch"),
     "Bound": lambda: asp.characteristic_number(surface("F")),
     "Comparison": lambda: asp.compare(MANY, "touch", "WC", max_depth=1e-5),
@@ -53,9 +53,9 @@ MADE: dict[str, Callable[[], Any]] = {
     "Passivity": lambda: asp.analyze(surface("B"), "pantograph").passivity,
     "PopThrough": lambda: asp.pop_through(surface("H"), 2e-3),
     "Profile": lambda: asp.Profile(HEIGHTS[0], 5e-5),
-    "Recording": lambda: asp.open_recording(recorded()),
+    "Recording": lambda: asp.open_recording(record_run()),
     "RecordingWriter": closed_writer,
-    "Replay": lambda: asp.replay(asp.open_recording(recorded())),
+    "Replay": lambda: asp.replay(asp.open_recording(record_run())),
     "Sinusoid": lambda: asp.Sinusoid(2e-4, 2e-3),
     "SplitState": lambda: asp.split_state(surface("H"), np.zeros((200, 3))),
     "Surface": lambda: asp.Surface(MANY, "F", max_depth=1e-5),
@@ -66,21 +66,21 @@ MADE: dict[str, Callable[[], Any]] = {
 def test_every_public_class_is_tested() -> None:
     public = {name for name in asp.__all__ if isinstance(getattr(asp, name), type)}
     errors = {name for name in public if issubclass(getattr(asp, name), Exception)}
-    assert set(MADE) == public - errors
+    assert set(EXAMPLES) == public - errors
 
 
-@pytest.mark.parametrize("name", MADE)
-def test_values_are_one_short_line(name: str) -> None:
-    made = MADE[name]()
-    assert isinstance(made, getattr(asp, name))
-    text = repr(made)
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_repr_is_one_short_line(name: str) -> None:
+    value = EXAMPLES[name]()
+    assert isinstance(value, getattr(asp, name))
+    text = repr(value)
     assert len(text) < 300
     assert "\n" not in text
     assert " at 0x" not in text
-    assert type(made).__name__ in text
+    assert type(value).__name__ in text
 
 
-def test_a_long_one_would_be_noticed() -> None:
+def test_default_repr_of_a_dataclass_is_too_long() -> None:
     @dataclasses.dataclass
     class Bare:
         heights: np.ndarray
@@ -89,30 +89,30 @@ def test_a_long_one_would_be_noticed() -> None:
 
 
 @pytest.mark.parametrize("name", asp.surface_names())
-def test_named_surfaces_are_one_short_line(name: str) -> None:
+def test_repr_of_named_surfaces_is_one_short_line(name: str) -> None:
     assert repr(asp.named_surface(name)).startswith(f"named_surface('{name}', ")
     assert len(repr(asp.named_surface(name))) < 200
 
 
-def test_few_waves_are_all_said_and_many_are_counted() -> None:
+def test_repr_of_fourier_lists_few_waves_and_counts_many() -> None:
     assert repr(MANY) == "<Fourier of 60 waves>"
     few = asp.Fourier([1e-4, 2e-4], [[1e3, 0.0], [0.0, 2e3]])
     assert repr(few).startswith("Fourier(amplitudes=[0.0001, 0.0002], wavevectors=")
 
 
-def test_a_run_says_what_the_texture_did() -> None:
-    hand, still = SpringHand(stiffness=200.0, damping=2.0), Stationary((0.0, 0.0, -1e-3))
-    run = simulate(surface(), Cartesian(0.05), hand, Servo(1e-3), still, 0.1)
+def test_repr_of_a_run_has_the_energy_to_the_hand() -> None:
+    hand, motion = SpringHand(stiffness=200.0, damping=2.0), Stationary((0.0, 0.0, -1e-3))
+    run = simulate(surface(), Cartesian(0.05), hand, Servo(1e-3), motion, 0.1)
     assert repr(run) == f"<Run of law C, 0.1 s, {run.ledger.total:+.4g} J to the hand>"
 
 
-def test_results_say_their_answer() -> None:
+def test_repr_of_results_has_the_recommendation_or_verdict() -> None:
     texture = asp.Sinusoid(2e-4, 2e-3)
     result = asp.compare(texture, "omega.3", "WCH")
     row = result.recommended_row
     assert row is not None
-    start = f"start at {row.recommended_stiffness:g} N/m, felt"
-    assert repr(row) == f"<LawRow {row.law.letter}: {start}>"
+    recommendation = f"start at {row.recommended_stiffness:g} N/m, felt"
+    assert repr(row) == f"<LawRow {row.law.letter}: {recommendation}>"
     assert repr(result) == f"<Comparison of 3 laws on omega.3: {row!r} recommended>"
     assert repr(asp.compare(texture, "touch", "W")).endswith("none recommended>")
     analysis = repr(asp.analyze(asp.Surface(texture, "A", 100.0), "omega.3"))

@@ -1,4 +1,4 @@
-"""Quantities as text."""
+"""Parsing and formatting of quantities with units."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from asperity.core.units import format_quantity, parse_quantity
         ("20", "", 20.0),
     ],
 )
-def test_quantities(text: str | float, unit: str, value: float) -> None:
+def test_quantities_are_parsed_in_si_units(text: str | float, unit: str, value: float) -> None:
     assert parse_quantity("x", text, unit) == value
 
 
@@ -50,14 +50,14 @@ def test_quantities(text: str | float, unit: str, value: float) -> None:
      pytest.param("1 " + "m*" * 40 + "m", "m", id="a long unit"),
      pytest.param("1 " + "m " * 50_000 + "!", "m", id="100 kB of units")],
 )  # fmt: skip
-def test_bad_quantities_name_the_argument(text: object, unit: str) -> None:
-    with pytest.raises(ParameterError) as caught:
+def test_error_for_an_invalid_quantity_names_the_argument(text: object, unit: str) -> None:
+    with pytest.raises(ParameterError) as error:
         parse_quantity("period", text, unit)
-    assert caught.value.argument == "period"
+    assert error.value.argument == "period"
 
 
 @pytest.mark.parametrize(
-    ("given", "unit", "written"),
+    ("number", "unit", "suggestions"),
     [
         ("500", "N/m", "500N/m"),
         (500, "N/m", "500N/m"),
@@ -68,14 +68,16 @@ def test_bad_quantities_name_the_argument(text: object, unit: str) -> None:
         (3, "N*s/m", "3N*s/m"),
     ],
 )
-def test_a_number_without_its_unit_is_refused(given: str | float, unit: str, written: str) -> None:
-    """What is offered can be copied: it is read."""
-    with pytest.raises(ParameterError) as caught:
-        parse_quantity("length", given, unit)
-    assert str(caught.value) == f"length needs a unit: write {written}, got {given!r}"
-    for offered in written.split(" or "):
-        assert parse_quantity("length", offered, unit) != 0.0
-    assert parse_quantity("length", given, "") == float(given)
+def test_number_without_a_unit_is_refused_with_suggestions(
+    number: str | float, unit: str, suggestions: str
+) -> None:
+    """Each suggestion is a valid quantity."""
+    with pytest.raises(ParameterError) as error:
+        parse_quantity("length", number, unit)
+    assert str(error.value) == f"length needs a unit: write {suggestions}, got {number!r}"
+    for suggestion in suggestions.split(" or "):
+        assert parse_quantity("length", suggestion, unit) != 0.0
+    assert parse_quantity("length", number, "") == float(number)
 
 
 @pytest.mark.parametrize(
@@ -89,12 +91,12 @@ def test_a_number_without_its_unit_is_refused(given: str | float, unit: str, wri
         (0.0, "J", "0 J"),
     ],
 )
-def test_engineering(value: float, unit: str, text: str) -> None:
+def test_quantities_are_formatted_with_si_prefixes(value: float, unit: str, text: str) -> None:
     assert format_quantity(value, unit) == text
 
 
-def test_the_commonest_units_are_what_pint_says() -> None:
+def test_common_unit_factors_equal_those_of_pint() -> None:
     for unit, factors in units._SI_FACTORS.items():
-        for words, factor in factors.items():
-            assert units._UNIT_PATTERN.fullmatch(words) is not None
-            assert factor == units._unit_registry().Quantity(1.0, words).to(unit).magnitude, words
+        for name, factor in factors.items():
+            assert units._UNIT_PATTERN.fullmatch(name) is not None
+            assert factor == units._unit_registry().Quantity(1.0, name).to(unit).magnitude, name

@@ -1,4 +1,4 @@
-"""Worker processes: the same results with any number of them, and none is left behind."""
+"""Worker processes: the same results with any number of them, and all of them end."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ from asperity.textures.catalogue import CATALOGUE
 
 @pytest.fixture(autouse=True)
 def no_delay(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Workers start without a delay."""
+    """Start workers without a delay."""
     monkeypatch.setattr(processes, "START_DELAY", 0.0)
 
 
 @pytest.fixture
-def started(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """Numbers of workers of the pools that were started."""
+def started_workers(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Return a list to which each started pool appends its number of workers."""
     counts: list[int] = []
     make = processes.make_pool
 
@@ -54,7 +54,7 @@ def started(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 @pytest.fixture
 def futures(monkeypatch: pytest.MonkeyPatch) -> list[Future[Any]]:
-    """Tasks that were submitted to workers."""
+    """Return a list to which each task submitted to a worker is appended."""
     submitted: list[Future[Any]] = []
     submit = ProcessPoolExecutor.submit
 
@@ -66,13 +66,13 @@ def futures(monkeypatch: pytest.MonkeyPatch) -> list[Future[Any]]:
     return submitted
 
 
-def results(futures: list[Future[Any]]) -> list[Any]:
-    done = [one for one in futures if one.done() and not one.cancelled()]
-    return [one.result() for one in done if one.exception() is None]
+def completed_results(futures: list[Future[Any]]) -> list[Any]:
+    completed = [future for future in futures if future.done() and not future.cancelled()]
+    return [future.result() for future in completed if future.exception() is None]
 
 
-def precomputed(work: Any, tasks: list[Any], jobs: int, wait: float = 0.0) -> list[Any]:
-    """Return the results of workers; a task that is done here, None, takes a while."""
+def run_precompute(work: Any, tasks: list[Any], jobs: int, wait: float = 0.0) -> list[Any]:
+    """Return the results of workers; the caller waits for each task that it does itself (None)."""
     values = []
     with processes.limit_processes(jobs), processes.precompute(work, tasks) as iterator:
         for value in iterator:
@@ -82,59 +82,63 @@ def precomputed(work: Any, tasks: list[Any], jobs: int, wait: float = 0.0) -> li
 
 
 @pytest.mark.parametrize("jobs", [1, 2, 3])
-def test_every_task_is_yielded_once_with_its_result(jobs: int, started: list[int]) -> None:
+def test_every_task_is_yielded_once_with_its_result_or_none(
+    jobs: int, started_workers: list[int]
+) -> None:
     tasks = [float(number) for number in range(12)]
-    found = precomputed(math.sqrt, tasks, jobs, wait=0.3)
-    assert len(found) == 12
-    assert all(one in (None, math.sqrt(task)) for one, task in zip(found, tasks, strict=True))
-    assert (found.count(None) < 12) == (jobs > 1)
-    assert started == [jobs - 1] * (jobs > 1)
+    values = run_precompute(math.sqrt, tasks, jobs, wait=0.3)
+    assert len(values) == 12
+    assert all(value in (None, math.sqrt(task)) for value, task in zip(values, tasks, strict=True))
+    assert (values.count(None) < 12) == (jobs > 1)
+    assert started_workers == [jobs - 1] * (jobs > 1)
     assert active_children() == []
 
 
-def test_fast_tasks_start_no_workers(monkeypatch: pytest.MonkeyPatch, started: list[int]) -> None:
+def test_fast_tasks_start_no_workers(
+    monkeypatch: pytest.MonkeyPatch, started_workers: list[int]
+) -> None:
     monkeypatch.setattr(processes, "START_DELAY", 30.0)
-    assert precomputed(math.sqrt, [1.0] * 5, 2) == [None] * 5
-    assert started == []
+    assert run_precompute(math.sqrt, [1.0] * 5, 2) == [None] * 5
+    assert started_workers == []
 
 
-def test_a_compilation_starts_the_workers(
-    monkeypatch: pytest.MonkeyPatch, started: list[int]
+def test_compilation_starts_the_workers(
+    monkeypatch: pytest.MonkeyPatch, started_workers: list[int]
 ) -> None:
     monkeypatch.setattr(processes, "START_DELAY", 30.0)
     with processes.limit_processes(2), processes.precompute(math.sqrt, [1.0] * 5) as iterator:
         next(iterator)
         (callback,) = COMPILE_CALLBACKS
         callback("force_batch")
-        assert started == [1]
+        assert started_workers == [1]
     assert COMPILE_CALLBACKS == []
     assert active_children() == []
 
 
-def test_a_task_that_a_worker_cannot_do_is_left_to_the_caller() -> None:
-    assert precomputed(math.sqrt, [-1.0] * 6, 2, wait=0.2) == [None] * 6  # it raises
-    assert precomputed(lambda task: task, [1.0] * 6, 2, wait=0.2) == [None] * 6  # not picklable
-    assert precomputed(os._exit, [1] * 6, 2, wait=0.2) == [None] * 6  # the worker dies
+def test_task_that_fails_in_a_worker_is_left_to_the_caller() -> None:
+    assert run_precompute(math.sqrt, [-1.0] * 6, 2, wait=0.2) == [None] * 6  # it raises
+    assert run_precompute(lambda task: task, [1.0] * 6, 2, wait=0.2) == [None] * 6  # not picklable
+    assert run_precompute(os._exit, [1] * 6, 2, wait=0.2) == [None] * 6  # the worker dies
     assert active_children() == []
 
 
-def test_an_interrupt_leaves_no_process_behind(started: list[int]) -> None:
-    def interrupted() -> None:
+def test_interrupt_ends_all_worker_processes(started_workers: list[int]) -> None:
+    def run_interrupted() -> None:
         with processes.limit_processes(2), processes.precompute(time.sleep, [60.0] * 4) as tasks:
             next(tasks)
-            while not started:
+            while not started_workers:
                 time.sleep(0.01)
             raise KeyboardInterrupt
 
-    before = time.monotonic()
+    start = time.monotonic()
     with pytest.raises(KeyboardInterrupt):
-        interrupted()
+        run_interrupted()
     assert active_children() == []
-    assert time.monotonic() - before < 30.0
+    assert time.monotonic() - start < 30.0
 
 
 @pytest.fixture
-def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def empty_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("ASPERITY_CACHE_DIR", str(tmp_path))
     return tmp_path
 
@@ -143,43 +147,43 @@ WAVE = Sinusoid(0.31e-3, 1.3e-3)
 
 
 @pytest.mark.keeps_answers
-@pytest.mark.usefixtures("own_cache")
-def test_a_comparison_does_not_depend_on_the_workers(
-    started: list[int], futures: list[Future[Any]]
+@pytest.mark.usefixtures("empty_cache")
+def test_comparison_does_not_depend_on_the_workers(
+    started_workers: list[int], futures: list[Future[Any]]
 ) -> None:
     def compare_json() -> str:
         return json_text(compare(WAVE, laws="WACE", stiffness=700.0))
 
-    alone = compare_json()
+    expected = compare_json()
     cache.clear()
     with processes.limit_processes(2):
-        assert compare_json() == alone
-    assert started == [1]
+        assert compare_json() == expected
+    assert started_workers == [1]
     assert active_children() == []
-    assert results(futures)
+    assert completed_results(futures)
 
 
 @pytest.mark.keeps_answers
-@pytest.mark.usefixtures("own_cache")
-def test_a_report_does_not_depend_on_the_workers(
+@pytest.mark.usefixtures("empty_cache")
+def test_report_does_not_depend_on_the_workers(
     monkeypatch: pytest.MonkeyPatch, futures: list[Future[Any]]
 ) -> None:
     result = compare(WAVE, laws="WA", stiffness=700.0)
-    alone = html_text(result)
+    expected = html_text(result)
     cache.clear()
     with processes.limit_processes(2):
-        assert html_text(result) == alone
-    assert any(isinstance(value, RenderedPicture) for value in results(futures))
-    drawing = import_module("asperity.report.html")
-    monkeypatch.setattr(drawing, "render_picture", lambda _picture: None)
-    assert html_text(result) == alone  # pictures of workers are cached
+        assert html_text(result) == expected
+    assert any(isinstance(value, RenderedPicture) for value in completed_results(futures))
+    html = import_module("asperity.report.html")
+    monkeypatch.setattr(html, "render_picture", lambda _picture: None)
+    assert html_text(result) == expected  # pictures of workers are cached
 
 
 @pytest.mark.parametrize("workers", [1, 3])
 def test_onsets_do_not_depend_on_the_threads(monkeypatch: pytest.MonkeyPatch, workers: int) -> None:
     monkeypatch.setattr(sweeps, "available_cores", lambda: workers)
     steps: list[int] = []
-    found = sweeps.sweep_onsets(
+    cells = sweeps.sweep_onsets(
         band_setup("W"),
         "WAC",
         (0, 3),
@@ -187,26 +191,26 @@ def test_onsets_do_not_depend_on_the_threads(monkeypatch: pytest.MonkeyPatch, wo
         min_stiffness=5.0,
         progress=lambda: steps.append(1),
     )
-    by_law = [f"{one.onset.law}{one.onset.delay}" for one in found]
+    by_law = [f"{cell.onset.law}{cell.onset.delay}" for cell in cells]
     assert by_law == ["W0", "W3", "A0", "A3", "C0", "C3"]
     assert len(steps) == 6
-    for one in found[::5]:
-        setup = band_setup(one.onset.law)
-        alone = sweeps.sweep_onsets(
-            setup, one.onset.law, (one.onset.delay,), n_phases=2, min_stiffness=5.0
+    for cell in cells[::5]:
+        setup = band_setup(cell.onset.law)
+        single = sweeps.sweep_onsets(
+            setup, cell.onset.law, (cell.onset.delay,), n_phases=2, min_stiffness=5.0
         )
-        assert alone[0].onset == one.onset
+        assert single[0].onset == cell.onset
 
 
 def test_threads_are_notified_of_an_interrupt(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sweeps, "available_cores", lambda: 2)
-    begun, over, notified = Event(), Event(), []
+    work_started, over, notified = Event(), Event(), []
 
     def work(number: int) -> None:
         if number == 0:
-            begun.wait(60.0)
+            work_started.wait(60.0)
             raise KeyboardInterrupt
-        begun.set()
+        work_started.set()
         notified.append(over.wait(10.0))
 
     with pytest.raises(KeyboardInterrupt):
@@ -214,17 +218,17 @@ def test_threads_are_notified_of_an_interrupt(monkeypatch: pytest.MonkeyPatch) -
     assert notified == [True]
 
 
-def test_a_search_for_an_onset_ends_after_an_interrupt(monkeypatch: pytest.MonkeyPatch) -> None:
-    found: list[int] = []
+def test_onset_search_ends_after_an_interrupt(monkeypatch: pytest.MonkeyPatch) -> None:
+    progress_calls: list[int] = []
     over = Event()
     monkeypatch.setattr(sweeps, "map_threads", lambda work, jobs, _over: [work(*jobs[0])])
     monkeypatch.setattr(sweeps, "Event", lambda: over)
     over.set()
     with pytest.raises(CancelledError):
         sweeps.sweep_onsets(
-            band_setup("W"), "W", (0, 1), n_phases=2, progress=lambda: found.append(1)
+            band_setup("W"), "W", (0, 1), n_phases=2, progress=lambda: progress_calls.append(1)
         )
-    assert not found
+    assert not progress_calls
 
 
 @pytest.mark.parametrize("name", CATALOGUE)
@@ -232,14 +236,14 @@ def test_every_surface_can_be_pickled(name: str) -> None:
     texture = find_surfaces([name])[0].texture
     points = texture.domain.points(np.full((1, len(texture.domain.spans)), 0.3))
     heights = texture.height(points)  # by now it holds compiled loops
-    sent = pickle.loads(pickle.dumps(texture))
-    assert sent.describe() == texture.describe()
-    assert (sent.height(points) == heights).all()
+    copy = pickle.loads(pickle.dumps(texture))
+    assert copy.describe() == texture.describe()
+    assert (copy.height(points) == heights).all()
 
 
 @pytest.mark.keeps_answers
-@pytest.mark.usefixtures("own_cache")
-def test_a_precomputed_row_leaves_nothing_to_compute(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.usefixtures("empty_cache")
+def test_precomputed_row_stores_all_results(monkeypatch: pytest.MonkeyPatch) -> None:
     module = import_module("asperity.analysis.compare")
     tasks: list[Any] = []
 
@@ -268,10 +272,10 @@ print(*(os.environ[name] for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")
 """
 
 
-def test_a_command_uses_one_thread_of_linear_algebra_as_its_workers_do() -> None:
-    """With two threads a form fitted to a map differs in the last digit."""
-    done = subprocess.run(
+def test_command_uses_one_thread_of_linear_algebra() -> None:
+    """Workers use one thread, and with two a form fitted to a map differs in the last digit."""
+    process = subprocess.run(
         [sys.executable, "-c", _THREADS], capture_output=True, text=True, check=True,
         env=os.environ | {"OPENBLAS_NUM_THREADS": "7"},
     )  # fmt: skip
-    assert done.stdout.split() == ["1", "1"]
+    assert process.stdout.split() == ["1", "1"]

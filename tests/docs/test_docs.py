@@ -1,4 +1,4 @@
-"""The documentation agrees with the package: names, code blocks, formulas, nothing from outside.
+"""The documentation agrees with the package: names, code blocks, formulas and resources.
 
 The pages themselves are built by ``make docs``, where warnings are errors.
 """
@@ -45,7 +45,7 @@ def formulas() -> ModuleType:
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # dataclasses look their module up
+    sys.modules[spec.name] = module  # dataclasses look up their module
     spec.loader.exec_module(module)
     return module
 
@@ -66,24 +66,24 @@ def _resolve(target: str) -> Any:
     parts = target.split(".")
     for split in range(len(parts), 0, -1):
         try:
-            found: Any = importlib.import_module(".".join(parts[:split]))
+            value: Any = importlib.import_module(".".join(parts[:split]))
         except ModuleNotFoundError:
             continue
         for part in parts[split:]:
-            # A field of a dataclass without a default is no attribute of the class.
-            fields = getattr(found, "__dataclass_fields__", {})
-            found = fields[part] if part in fields else getattr(found, part)
-        return found
+            # A field of a dataclass without a default is not an attribute of the class.
+            fields = getattr(value, "__dataclass_fields__", {})
+            value = fields[part] if part in fields else getattr(value, part)
+        return value
     raise ModuleNotFoundError(target)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=_name)
-def test_every_name_that_a_page_refers_to_exists(page: Path) -> None:
-    for referred, shown in _NAME.findall(page.read_text("utf-8")):
-        assert _resolve(referred or shown) is not None
+def test_names_that_a_page_refers_to_exist(page: Path) -> None:
+    for role_target, directive_target in _NAME.findall(page.read_text("utf-8")):
+        assert _resolve(role_target or directive_target) is not None
 
 
-def test_a_name_that_does_not_exist_is_noticed() -> None:
+def test_missing_name_is_detected() -> None:
     with pytest.raises(AttributeError):
         _resolve("asperity.analysis.energy.merit.nothing_of_the_kind")
 
@@ -93,7 +93,7 @@ def _run_block(kind: str, body: str, names: dict[str, Any]) -> None:
     options = [line for line in lines if re.match(r":[\w-]+:", line)]
     code = "\n".join(line for line in lines if line not in options)
     if kind == "{shell}":
-        return  # the command line has tests of its own
+        return  # the command line is tested elsewhere
     compiled = compile(code, "<page>", "exec")
     if ":error:" not in options:
         exec(compiled, names)
@@ -103,7 +103,7 @@ def _run_block(kind: str, body: str, names: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize("page", TUTORIALS, ids=_name)
-def test_the_code_of_a_tutorial_runs(page: Path, tmp_path: Path) -> None:
+def test_code_of_a_tutorial_runs(page: Path, tmp_path: Path) -> None:
     blocks = _BLOCK.findall(page.read_text("utf-8"))
     assert len(blocks) >= 4
     names: dict[str, Any] = {"__name__": "__main__"}
@@ -112,7 +112,7 @@ def test_the_code_of_a_tutorial_runs(page: Path, tmp_path: Path) -> None:
             _run_block(kind, body, names)
 
 
-def test_every_displayed_formula_of_the_theory_is_numbered_once() -> None:
+def test_displayed_formulas_have_unique_labels() -> None:
     labels = []
     for page in PAGES:
         for body in _MATH.findall(page.read_text("utf-8")):
@@ -123,7 +123,7 @@ def test_every_displayed_formula_of_the_theory_is_numbered_once() -> None:
 
 
 @pytest.mark.parametrize("page", [p for p in PAGES if p.parent.name == "theory"], ids=_name)
-def test_every_formula_can_be_drawn(page: Path, formulas: ModuleType) -> None:
+def test_every_formula_of_the_theory_can_be_rendered(page: Path, formulas: ModuleType) -> None:
     text = page.read_text("utf-8")
     displayed = ["\n".join(body.splitlines()[1:]) for body in _MATH.findall(text)]
     prose = re.sub(r"^```.*?^```$", "", text, flags=re.M | re.S)
@@ -131,42 +131,42 @@ def test_every_formula_can_be_drawn(page: Path, formulas: ModuleType) -> None:
         assert 'fill="currentColor"' in formulas.render_svg(formula, "formula"), formula
 
 
-def test_a_formula_that_cannot_be_drawn_is_noticed(formulas: ModuleType) -> None:
+def test_invalid_formula_is_detected(formulas: ModuleType) -> None:
     with pytest.raises(ValueError, match="nothingofthekind"):
         formulas.render_svg(r"\nothingofthekind{x}", "formula")
 
 
-class _Loaded(HTMLParser):
-    """Collects what a page loads by itself: not what it links to."""
+class _ResourceParser(HTMLParser):
+    """Parser that collects the addresses of resources that a page loads, without its links."""
 
     def __init__(self) -> None:
         super().__init__()
         self.addresses: list[str] = []
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        given = dict(attrs)
-        loads = tag in {"script", "img", "iframe", "source", "video", "audio", "embed", "object"}
-        wanted = ["src", "srcset", "data"] if loads else ["href"] if tag == "link" else []
-        if tag == "link" and given.get("rel") in {"canonical", "alternate"}:
+        attributes = dict(attrs)
+        is_media = tag in {"script", "img", "iframe", "source", "video", "audio", "embed", "object"}
+        names = ["src", "srcset", "data"] if is_media else ["href"] if tag == "link" else []
+        if tag == "link" and attributes.get("rel") in {"canonical", "alternate"}:
             return
-        self.addresses += [str(given[name]) for name in wanted if given.get(name)]
+        self.addresses += [str(attributes[name]) for name in names if attributes.get(name)]
 
 
-def _from_outside(page: str) -> list[str]:
-    reader = _Loaded()
+def _external_resources(page: str) -> list[str]:
+    reader = _ResourceParser()
     reader.feed(page)
     styles = re.findall(r"(?:url\(|@import\s+)[\"']?((?:https?:)?//[^\"')\s]+)", page)
     return [a for a in reader.addresses if re.match(r"(https?:)?//", a)] + styles
 
 
-def test_built_pages_load_nothing_from_outside() -> None:
+def test_built_pages_load_no_external_resources() -> None:
     pages = sorted(BUILT.rglob("*.html")) if BUILT.exists() else []
     if not pages:
         pytest.skip("the documentation is not built here: make docs")
     for page in pages:
-        assert _from_outside(page.read_text("utf-8")) == [], page
+        assert _external_resources(page.read_text("utf-8")) == [], page
     for sheet in BUILT.rglob("*.css"):
-        assert _from_outside(sheet.read_text("utf-8")) == [], sheet
+        assert _external_resources(sheet.read_text("utf-8")) == [], sheet
 
 
 @pytest.mark.parametrize(
@@ -177,6 +177,6 @@ def test_built_pages_load_nothing_from_outside() -> None:
         "<style>@import url(https://example.org/a.css)</style>",
     ],
 )
-def test_a_page_that_loads_from_outside_is_noticed(page: str) -> None:
-    assert _from_outside(page) != []
-    assert _from_outside('<a href="https://example.org">a link is no load</a>') == []
+def test_external_resource_is_detected(page: str) -> None:
+    assert _external_resources(page) != []
+    assert _external_resources('<a href="https://example.org">a link is no load</a>') == []

@@ -1,4 +1,4 @@
-"""The page "In your own loop": its frames, its loop and its C code."""
+"""Code of the page "In your own loop": frames, servo loop and C function."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ RIGHTS = {
 
 @pytest.fixture(scope="module")
 def page() -> dict[str, Any]:
-    """The names of the page after all its blocks, whose asserts have held."""
+    """Return the names that the code blocks of the page define; their asserts have held."""
     names: dict[str, Any] = {}
     for block in _RUN.findall(PAGE.read_text("utf-8")):
         lines = [line for line in block.splitlines() if not re.match(r":[\w-]+:", line)]
@@ -51,60 +51,66 @@ def page() -> dict[str, Any]:
     return names
 
 
-def _faults(rotation: Callable[[str, str], np.ndarray], frame: str, wall: str) -> list[str]:
-    """Return what is wrong with a rotation."""
+def _rotation_errors(
+    rotation: Callable[[str, str], np.ndarray], frame: str, wall: str
+) -> list[str]:
+    """Return descriptions of the errors of a rotation."""
     turn = rotation(frame, wall)
-    faults = []
+    errors = []
     if not np.array_equal(turn.T @ turn, np.eye(3)):
-        faults.append("not orthonormal")
+        errors.append("not orthonormal")
     if round(np.linalg.det(turn)) != 1:
-        faults.append("not right-handed")
+        errors.append("not right-handed")
     if tuple(turn @ [0.0, 0.0, 1.0]) != NORMALS[frame, wall.partition(",")[0]]:
-        faults.append("the normal does not come out of the wall")
+        errors.append("the normal does not come out of the wall")
     if tuple(turn @ [1.0, 0.0, 0.0]) != RIGHTS[frame]:
-        faults.append("x is not the user's right")
-    return faults
+        errors.append("x is not the user's right")
+    return errors
 
 
-def test_every_frame_is_turned_right(page: dict[str, Any]) -> None:
-    found = {
-        (frame, wall): _faults(page["rotation"], frame, wall)
+def test_rotation_of_every_frame_is_correct(page: dict[str, Any]) -> None:
+    errors = {
+        (frame, wall): _rotation_errors(page["rotation"], frame, wall)
         for frame in page["FRAMES"]
         for wall in page["WALLS"]
     }
-    assert len(found) == len(NORMALS)
-    assert {where: faults for where, faults in found.items() if faults} == {}
+    assert len(errors) == len(NORMALS)
+    assert {case: messages for case, messages in errors.items() if messages} == {}
 
 
-def test_a_wrong_frame_is_noticed(page: dict[str, Any]) -> None:
-    right, frame, wall = page["rotation"], "OpenHaptics", "lying, like a table"
+def test_wrong_rotation_is_detected(page: dict[str, Any]) -> None:
+    rotation, frame, wall = page["rotation"], "OpenHaptics", "lying, like a table"
     mirrored = np.diag([1.0, 1.0, -1.0])  # Unity's
-    assert _faults(lambda f, w: mirrored @ right(f, w), frame, wall) == ["not right-handed"]
-    assert len(_faults(lambda f, w: -right(f, w), frame, wall)) == 3
-    assert len(_faults(lambda f, w: right(f, w).T, "CHAI3D, libdhd", wall)) == 1
-    assert "not orthonormal" in _faults(lambda f, w: 1e-3 * right(f, w), frame, wall)
+    assert _rotation_errors(lambda f, w: mirrored @ rotation(f, w), frame, wall) == [
+        "not right-handed"
+    ]
+    assert len(_rotation_errors(lambda f, w: -rotation(f, w), frame, wall)) == 3
+    assert len(_rotation_errors(lambda f, w: rotation(f, w).T, "CHAI3D, libdhd", wall)) == 1
+    assert "not orthonormal" in _rotation_errors(lambda f, w: 1e-3 * rotation(f, w), frame, wall)
 
 
-def test_the_frames_are_those_of_the_catalogue(page: dict[str, Any]) -> None:
-    words = {
+def test_frames_equal_the_axes_of_the_device_catalogue(page: dict[str, Any]) -> None:
+    directions = {
         "to the right": page["RIGHT"],
         "up": page["UP"],
         "towards the user": page["TOWARDS"],
         "forward": page["AWAY"],
     }
-    known = {"omega.3": "CHAI3D, libdhd", "touch": "OpenHaptics", "inverse3": "Haply Inverse3"}
-    for device, frame in known.items():
-        said = load_device(device).axes
+    frames = {"omega.3": "CHAI3D, libdhd", "touch": "OpenHaptics", "inverse3": "Haply Inverse3"}
+    for device, frame in frames.items():
+        description = load_device(device).axes
         axes, unit = page["FRAMES"][frame]
-        shown = re.match(r"x (.*?), y (.*?), z ([\w ]+)", said)
-        assert shown is not None
-        assert np.array_equal([words[part.strip()] for part in shown.groups()], axes)
-        assert unit == (1e-3 if "millimetres" in said else 1.0)
+        match = re.match(r"x (.*?), y (.*?), z ([\w ]+)", description)
+        assert match is not None
+        assert np.array_equal([directions[part.strip()] for part in match.groups()], axes)
+        assert unit == (1e-3 if "millimetres" in description else 1.0)
 
 
 @pytest.mark.parametrize("wall", ["lying, like a table", "standing, facing the user"])
 @pytest.mark.parametrize("frame", ["CHAI3D, libdhd", "OpenHaptics", "Haply Inverse3"])
-def test_a_tick_pushes_out_in_every_frame(page: dict[str, Any], frame: str, wall: str) -> None:
+def test_tick_returns_the_outward_force_in_every_frame(
+    page: dict[str, Any], frame: str, wall: str
+) -> None:
     turn, unit = page["rotation"](frame, wall), page["FRAMES"][frame][1]
     tick, surface = page["tick"], page["surface"]
     names = {"R": turn, "unit": unit, "origin": np.array([0.01, -0.02, 0.03]) / unit}
@@ -112,9 +118,9 @@ def test_a_tick_pushes_out_in_every_frame(page: dict[str, Any], frame: str, wall
     tick.__globals__.update(names)
     try:
         probe = np.array([0.11e-3, 0.3e-3, -0.35e-3])
-        there = turn @ probe / unit + names["origin"]
-        np.testing.assert_allclose(tick(there), turn @ surface.force(probe), rtol=1e-6)
-        assert tick(there) @ turn[:, 2] > 0.1
+        position = turn @ probe / unit + names["origin"]
+        np.testing.assert_allclose(tick(position), turn @ surface.force(probe), rtol=1e-6)
+        assert tick(position) @ turn[:, 2] > 0.1
         assert not tick(np.full(3, np.nan)).any()
         deep = turn @ [0.0, 0.0, -0.1] / unit + names["origin"]
         assert np.linalg.norm(tick(deep)) == pytest.approx(page["MAX_FORCE"])
@@ -122,7 +128,7 @@ def test_a_tick_pushes_out_in_every_frame(page: dict[str, Any], frame: str, wall
         tick.__globals__.update(before)
 
 
-def test_the_state_of_f_is_needed(page: dict[str, Any]) -> None:
+def test_force_of_law_f_depends_on_its_state(page: dict[str, Any]) -> None:
     path, sticky = page["path"], page["sticky"]
     np.testing.assert_allclose(page["forces"], sticky.trace(path), rtol=0, atol=1e-12)
     assert np.abs(sticky.force(path) - sticky.trace(path)).max() > 0.01
@@ -130,7 +136,7 @@ def test_the_state_of_f_is_needed(page: dict[str, Any]) -> None:
 
 @pytest.fixture(scope="module")
 def law_c(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """The C function of the page, compiled."""
+    """Return the C function of the page, compiled."""
     compiler = shutil.which("cc")
     if compiler is None:
         pytest.skip("not run: no C compiler here")
@@ -143,24 +149,24 @@ def law_c(tmp_path_factory: pytest.TempPathFactory) -> Any:
 
 
 def _forces(law_c: Any, points: np.ndarray, *numbers: float) -> np.ndarray:
-    three = ctypes.c_double * 3
+    vector = ctypes.c_double * 3
     rows = []
     for point in points:
-        out = three()
-        law_c(three(*point), *map(ctypes.c_double, numbers), out)
+        out = vector()
+        law_c(vector(*point), *map(ctypes.c_double, numbers), out)
         rows.append(list(out))
     return np.array(rows)
 
 
-def test_the_c_code_is_law_c(law_c: Any) -> None:
+def test_c_function_gives_the_force_of_law_c(law_c: Any) -> None:
     amplitude, period, stiffness = 0.2e-3, 1e-3, 800.0
     surface = asp.Surface(asp.Sinusoid(amplitude, period), "C", stiffness)
     points = np.random.default_rng(3).uniform(-1e-3, 1e-3, (500, 3))
-    wanted = surface.force(points)
+    expected = surface.force(points)
     atol = 1e-12 * stiffness * 1e-3
-    found = _forces(law_c, points, stiffness, amplitude, period)
-    np.testing.assert_allclose(found, wanted, rtol=0, atol=atol)
-    assert 100 < np.count_nonzero(wanted[:, 2]) < 400
-    off = _forces(law_c, points, stiffness, 1.0001 * amplitude, period)
-    assert np.abs(off - wanted).max() > 100 * atol
+    forces = _forces(law_c, points, stiffness, amplitude, period)
+    np.testing.assert_allclose(forces, expected, rtol=0, atol=atol)
+    assert 100 < np.count_nonzero(expected[:, 2]) < 400
+    perturbed = _forces(law_c, points, stiffness, 1.0001 * amplitude, period)
+    assert np.abs(perturbed - expected).max() > 100 * atol
     assert not _forces(law_c, np.full((1, 3), np.nan), stiffness, amplitude, period).any()
