@@ -1,4 +1,4 @@
-"""Cells of textures: their models contain the derivatives, and together they cover everything."""
+"""Cells of textures: their models contain the derivatives, and together they cover the domain."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ def flat_sum(count: int) -> Fourier:
     return Fourier(np.zeros(count), RNG.normal(size=(count, 2)) * 1e3)
 
 
-def many_waves() -> Fourier:
-    """500 waves that repeat together."""
+def periodic_sum_of_500_waves() -> Fourier:
+    """Return a periodic sum of 500 waves."""
     rng = np.random.default_rng(5)
     multiples = rng.integers(-6, 7, (500, 2))
     multiples[~multiples.any(axis=1)] = 1
@@ -83,7 +83,7 @@ TEXTURES: dict[str, Build] = {
     "third bounds": (lambda: ByThirdBounds(*SUM), None),
     "third bounds, extent": (lambda: ByThirdBounds(*SUM), (3e-3, 2e-3)),
     "bounds of a profile": (lambda: ByThirdBounds([2e-4, 1e-4], [1200.0, 2800.0]), None),
-    "500 waves": (many_waves, None),
+    "500 waves": (periodic_sum_of_500_waves, None),
     "no height": (lambda: flat_sum(2), None),
     "map": (lambda: HeightMap(1e-4 * ROUGH, (3e-4, 7e-4), origin=(-1.3e-3, 0.7e-3)), None),
     "periodic map": (
@@ -97,7 +97,7 @@ TEXTURES: dict[str, Build] = {
 }
 
 
-def cells(name: str, margin: float = 0.0) -> tuple[Texture, Any]:
+def make_cells(name: str, margin: float = 0.0) -> tuple[Texture, Any]:
     build, extent = TEXTURES[name]
     texture = build()
     found = texture.cells(extent, margin)
@@ -106,7 +106,7 @@ def cells(name: str, margin: float = 0.0) -> tuple[Texture, Any]:
 
 
 def random_cells(of: Cells, level: int, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return cells among those of the start, halved so many times."""
+    """Return random cells: initial cells that are halved ``level`` times."""
     rng = np.random.default_rng(seed)
     chunks, half = of.initial_cells()
     centres = np.concatenate(list(chunks))
@@ -116,15 +116,17 @@ def random_cells(of: Cells, level: int, count: int, seed: int) -> tuple[np.ndarr
     return centres - half + finer * (2.0 * steps + 1.0), finer
 
 
-def exactly(texture: Texture, margin: float, extent: Any, coordinates: np.ndarray) -> list[Any]:
-    """Return the six derivatives at coordinates, in 40 digits."""
+def exact_derivatives(
+    texture: Texture, margin: float, extent: Any, coordinates: np.ndarray
+) -> list[Any]:
+    """Return the six derivatives at coordinates with 40 digits."""
     c = [mpmath.mpf(float(value)) for value in coordinates]
     if isinstance(texture, ByBounds):
         spans = texture.domain.spans if extent is None else np.diag(extent)
         rows = [[mpmath.mpf(float(value)) for value in row] for row in spans]
         where = [sum(u * row[i] for u, row in zip(c, rows, strict=True)) for i in (0, 1)]
     elif isinstance(texture, (Sinusoid, Fourier)) and extent is None:
-        return _on_torus(texture, c)
+        return _exact_derivatives_on_torus(texture, c)
     elif isinstance(texture, HeightMap):
         where = [
             mpmath.mpf(float(o)) + u * mpmath.mpf(p)
@@ -138,7 +140,7 @@ def exactly(texture: Texture, margin: float, extent: Any, coordinates: np.ndarra
     return [h(*where, *DERIVATIVE_ORDERS[name]) for name in DERIVATIVE_NAMES]
 
 
-def _on_torus(texture: Sinusoid | Fourier, c: list[Any]) -> list[Any]:
+def _exact_derivatives_on_torus(texture: Sinusoid | Fourier, c: list[Any]) -> list[Any]:
     if isinstance(texture, Sinusoid):
         a, kx, ky, phase = texture.arguments
         waves = [(a, kx, ky, phase, [1])]
@@ -156,22 +158,26 @@ def _on_torus(texture: Sinusoid | Fourier, c: list[Any]) -> list[Any]:
     return totals
 
 
-def outside(model: Any, cell: int, xi: np.ndarray, value: Any) -> float:
-    """Return how far a value is outside of a model, in its own error; at most 1 if enclosed."""
+def distance_outside(model: Any, cell: int, xi: np.ndarray, value: Any) -> float:
+    """Return the distance of a value from a model relative to its error; at most 1 if enclosed."""
     if not isinstance(model, TaylorModel):
         return 0.0 if abs(value - model) <= 1e-300 else math.inf
     linear = mpmath.mpf(model.c[cell])
     for g, x in zip(model.g[:, cell], xi, strict=True):
         linear += mpmath.mpf(g) * mpmath.mpf(x)
-    off = abs(value - linear)
-    return float(off / model.e[cell]) if model.e[cell] > 0.0 else (0.0 if off == 0 else math.inf)
+    distance = abs(value - linear)
+    return (
+        float(distance / model.e[cell])
+        if model.e[cell] > 0.0
+        else (0.0 if distance == 0 else math.inf)
+    )
 
 
 @pytest.mark.parametrize("name", TEXTURES)
 @pytest.mark.parametrize("level", [0, 3, 14])
-def test_models_contain_the_derivatives_in_forty_digits(name: str, level: int) -> None:
-    """Strictly, rounding and all; and not if the error is made nothing of."""
-    texture, found = cells(name)
+def test_models_contain_the_exact_derivatives(name: str, level: int) -> None:
+    """The 40-digit derivatives are within the error, rounding included, which is not too wide."""
+    texture, found = make_cells(name)
     extent = TEXTURES[name][1]
     centres, half = random_cells(found, level, 4 if name == "500 waves" else 12, seed=level)
     models = found.enclosures(centres, half, DERIVATIVE_NAMES)
@@ -179,17 +185,17 @@ def test_models_contain_the_derivatives_in_forty_digits(name: str, level: int) -
     with mpmath.workdps(40):
         for cell, centre in enumerate(centres):
             xi = rng.choice([-1.0, -0.5, 0.25, 1.0], len(half))
-            exact = exactly(texture, 0.0, extent, centre + half * xi)
+            exact = exact_derivatives(texture, 0.0, extent, centre + half * xi)
             for i, value in enumerate(exact):
-                worst = max(worst, outside(models[DERIVATIVE_NAMES[i]], cell, xi, value))
+                worst = max(worst, distance_outside(models[DERIVATIVE_NAMES[i]], cell, xi, value))
     assert worst <= 1.0
     if name not in {"no height"}:
-        assert worst > 1e-4  # the error is not idle: bounds 10 000 times as wide would not pass
+        assert worst > 1e-4  # the error is not too wide: bounds 10 000 times as wide would not pass
 
 
 @pytest.mark.parametrize("name", [n for n in TEXTURES if "flat" not in n and "no h" not in n])
-def test_models_without_their_error_do_not(name: str) -> None:
-    _texture, found = cells(name)
+def test_models_without_their_error_do_not_contain_the_derivatives(name: str) -> None:
+    _texture, found = make_cells(name)
     centres, half = random_cells(found, 0, 50, seed=1)
     models = found.enclosures(centres, half, DERIVATIVE_NAMES)
     xi = np.random.default_rng(1).choice([-1.0, 1.0], centres.shape)
@@ -205,23 +211,26 @@ def test_models_without_their_error_do_not(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", TEXTURES)
-def test_derivatives_are_those_of_the_texture_in_the_plane(name: str) -> None:
-    texture, found = cells(name)
+def test_derivatives_of_cells_equal_those_of_the_texture(name: str) -> None:
+    texture, found = make_cells(name)
     coordinates = found.sample_coordinates(64)[: 8 if name == "three phases" else 64]
-    here, there = found.derivatives(coordinates), texture.derivatives(found.to_plane(coordinates))
-    slope, bend = texture.bounds
+    of_cells, of_texture = (
+        found.derivatives(coordinates),
+        texture.derivatives(found.to_plane(coordinates)),
+    )
+    slope, curvature = texture.bounds
     height = max(abs(v) for v in texture.extremes)
-    scale = np.array([height, *[slope] * 2, *[bend] * 3]) + 1e-300
-    # Three phases are only met nearly in a plane, which has two.
-    near = 0.02 if found.dimensions > len(texture.domain.spans) else 3e-8
-    near = 1e-12 if "turns" not in name and near < 1e-3 else near
-    assert (np.abs(here - there) <= near * scale).all()
+    scale = np.array([height, *[slope] * 2, *[curvature] * 3]) + 1e-300
+    # A plane has two coordinates, so that three phases are met only approximately.
+    tolerance = 0.02 if found.dimensions > len(texture.domain.spans) else 3e-8
+    tolerance = 1e-12 if "turns" not in name and tolerance < 1e-3 else tolerance
+    assert (np.abs(of_cells - of_texture) <= tolerance * scale).all()
 
 
 @pytest.mark.parametrize("name", [n for n in TEXTURES if "extent" not in n])
 def test_every_point_of_the_plane_has_coordinates(name: str) -> None:
-    """What a random point sees is what the torus, or the cell of a spline, says there."""
-    texture, found = cells(name)
+    """The derivatives at a random point equal those at its coordinates in the cells."""
+    texture, found = make_cells(name)
     xy = texture.domain.points(np.random.default_rng(2).random((20, len(texture.domain.spans))))
     if isinstance(texture, ByBounds):
         coordinates = xy @ np.linalg.pinv(texture.domain.spans)
@@ -229,18 +238,18 @@ def test_every_point_of_the_plane_has_coordinates(name: str) -> None:
         coordinates = xy @ found._basis.T
     else:
         coordinates = found.coordinates(xy)
-    slope, bend = texture.bounds
+    slope, curvature = texture.bounds
     height = max(abs(v) for v in texture.extremes)
-    scale = np.array([height, *[slope] * 2, *[bend] * 3]) + 1e-300
-    near = 1e-7 if "turns" in name else 1e-11
-    off = np.abs(found.derivatives(coordinates) - texture.derivatives(xy))
-    assert (off <= near * scale).all()
+    scale = np.array([height, *[slope] * 2, *[curvature] * 3]) + 1e-300
+    tolerance = 1e-7 if "turns" in name else 1e-11
+    error = np.abs(found.derivatives(coordinates) - texture.derivatives(xy))
+    assert (error <= tolerance * scale).all()
 
 
 @pytest.mark.parametrize("name", TEXTURES)
-def test_the_first_cells_cover_all(name: str) -> None:
-    """Without overlap, but for the last blocks of a map."""
-    _texture, found = cells(name)
+def test_initial_cells_cover_the_domain(name: str) -> None:
+    """They do not overlap, except for the last blocks of a map."""
+    _texture, found = make_cells(name)
     chunks, half = found.initial_cells()
     centres = np.concatenate(list(chunks))
     low, high = (centres - half).min(axis=0), (centres + half).max(axis=0)
@@ -262,26 +271,26 @@ def test_the_first_cells_cover_all(name: str) -> None:
 
 @pytest.mark.parametrize("dimensions", [1, 2, 3, 4])
 @pytest.mark.parametrize("count", [0, 1, 3, 200])
-def test_parts_of_cells_cover_them(dimensions: int, count: int) -> None:
+def test_subdivided_cells_cover_their_parents(dimensions: int, count: int) -> None:
     rng = np.random.default_rng(count)
     half = rng.uniform(0.5, 2.0, dimensions)
     centres = rng.normal(size=(count, dimensions)) * 10
     parts = _subdivision_count(count, dimensions)
     assert parts >= 2
     children = list(_subdivide(centres, half / parts, parts, chunk=64))
-    every = np.concatenate(children) if children else np.zeros((0, dimensions))
-    assert len(every) == count * parts**dimensions
+    all_children = np.concatenate(children) if children else np.zeros((0, dimensions))
+    assert len(all_children) == count * parts**dimensions
     points = centres[:, None] + half * rng.uniform(-1, 1, (count, 50, dimensions))
-    of = every.reshape(count, parts**dimensions, dimensions)
-    reach = np.abs(points[:, :, None] - of[:, None]) <= half / parts * (1 + 1e-12)
-    assert reach.all(axis=-1).any(axis=-1).all()
+    by_parent = all_children.reshape(count, parts**dimensions, dimensions)
+    contains = np.abs(points[:, :, None] - by_parent[:, None]) <= half / parts * (1 + 1e-12)
+    assert contains.all(axis=-1).any(axis=-1).all()
     assert all(len(part) <= max(64, parts**dimensions) for part in children)
 
 
 @pytest.mark.parametrize("name", ["three phases", "periodic map", "profile", "sinusoid, extent"])
-def test_the_error_shrinks_with_the_square_of_the_cell(name: str) -> None:
-    """That of h; second derivatives of a spline are linear in a cell, and exact."""
-    _texture, found = cells(name)
+def test_error_of_the_height_has_order_two(name: str) -> None:
+    """Only h is checked: second derivatives of a spline are linear in a cell, and exact."""
+    _texture, found = make_cells(name)
     errors = []
     levels = np.arange(2, 9)
     for level in levels:
@@ -294,25 +303,25 @@ def test_the_error_shrinks_with_the_square_of_the_cell(name: str) -> None:
 
 
 def test_blocks_of_a_tilted_plane_are_exact() -> None:
-    """A linear height is its own linear part: next to nothing is left, also of its slopes."""
+    """A linear height equals the linear part of its model, and so do its slopes."""
     y, x = np.mgrid[0:16.0, 0:16.0]
     found = HeightMap(1e-4 * x - 3e-4 * y, (3e-4, 7e-4)).cells()
     centres, half = np.array([[8.0, 8.0]]), np.array([2.0, 2.0])
     models = found.enclosures(centres, half, ["h", "hx", "hy"])
-    # The border is mirrored, which reaches a little into the middle.
+    # The mirrored border has a small effect in the middle.
     expected = {"h": (-16e-4, 2e-4, -6e-4), "hx": (1 / 3, 0.0, 0.0), "hy": (-3 / 7, 0.0, 0.0)}
     for name, (c, gx, gy) in expected.items():
         model = models[name]
         assert isinstance(model, TaylorModel)
-        near = 2e-2 * abs(c)
-        assert model.c[0] == pytest.approx(c, abs=near)
-        assert model.g[:, 0] == pytest.approx([gx, gy], abs=near)
-        assert model.e[0] < near
+        tolerance = 2e-2 * abs(c)
+        assert model.c[0] == pytest.approx(c, abs=tolerance)
+        assert model.g[:, 0] == pytest.approx([gx, gy], abs=tolerance)
+        assert model.e[0] < tolerance
         assert name != "h" or model.e[0] < 2e-3 * abs(c)
 
 
-def test_blocks_of_ridges_touch_their_bounds() -> None:
-    """Second derivatives along a ridged map are linear between nodes: its hull is attained."""
+def test_bounds_of_blocks_of_ridges_are_attained() -> None:
+    """Second derivatives along a ridged map are linear between nodes, so the hull is attained."""
     texture = HeightMap(1e-4 * np.tile(ROUGH[0], (9, 1)), 3e-4)
     found = texture.cells()
     chunks, half = found.initial_cells()
@@ -320,17 +329,17 @@ def test_blocks_of_ridges_touch_their_bounds() -> None:
     assert half.tolist() == [2.0, 2.0]
     model = found.enclosures(centres, half, ["hxx"])["hxx"]
     assert isinstance(model, TaylorModel)
-    most = np.zeros(len(centres))
+    ratio = np.zeros(len(centres))
     for xi in np.linspace(-1.0, 1.0, 5):
         exact = found.derivatives(centres + half * [xi, 0.3])[:, 3]
-        most = np.maximum(most, np.abs(exact - model.c - model.g[0] * xi) / model.e)
-    assert most.max() <= 1.0
-    # Not the coefficients beyond the block, but it is near.
-    assert most.min() > 0.99
+        ratio = np.maximum(ratio, np.abs(exact - model.c - model.g[0] * xi) / model.e)
+    assert ratio.max() <= 1.0
+    # Coefficients beyond the block keep the bound from being attained exactly.
+    assert ratio.min() > 0.99
 
 
-def test_a_margin_widens_the_extent_on_every_side() -> None:
-    texture, found = cells("five phases, extent", margin=1e-3)
+def test_margin_widens_the_extent_on_every_side() -> None:
+    texture, found = make_cells("five phases, extent", margin=1e-3)
     corners = found.to_plane(np.array([[0.0, 0.0], found.clip_to_region(np.full((1, 2), 1e9))[0]]))
     np.testing.assert_allclose(corners, [[-1e-3, -1e-3], [6e-3, 3e-3]], rtol=1e-12)
     coordinates = found.sample_coordinates(60)
@@ -349,17 +358,17 @@ def test_more_than_four_phases_need_an_extent() -> None:
     assert torus.dimensions == 4
 
 
-# --- waves that nearly repeat ---------------------------------------------------------------------
+# --- nearly periodic waves ------------------------------------------------------------------------
 
 
-def almost() -> Fourier:
-    """The second wave is twice the first but for 5e-10: they never repeat."""
+def nearly_periodic() -> Fourier:
+    """Return two waves whose frequency ratio is 2 (1 + 5e-10), which is not periodic."""
     return Fourier([1e-4, 1e-4], [[1000.0, 0.0], [2000.0 * (1 + 5e-10), 0.0]])
 
 
-def test_waves_that_nearly_repeat_have_a_phase_each() -> None:
-    """A period of the one would miss the other by far more than rounding."""
-    texture = almost()
+def test_nearly_periodic_waves_have_one_phase_each() -> None:
+    """A common period would give an error far above rounding."""
+    texture = nearly_periodic()
     found = texture.cells()
     assert found.dimensions == 2
     xy = np.random.default_rng(5).uniform(-0.01, 0.01, (50, 2))
@@ -371,8 +380,8 @@ def test_waves_that_nearly_repeat_have_a_phase_each() -> None:
             assert np.all(np.abs(exact[:, i] - model.c) <= model.e)
 
 
-def test_phases_that_cancel_are_charged_by_their_size() -> None:
-    """7·1000 - 7·1000 turns and a phase: the angles are small, their rounding is not."""
+def test_rounding_error_of_cancelling_phases_follows_their_size() -> None:
+    """The sum of 7·1000 - 7·1000 turns and a phase is small, but not its rounding error."""
     waves = np.array([[1.0, 0.0], [0.0, 1.0], [997.0, -991.0]])
     found = Fourier([1.0, 1.0, 1.0], waves).cells()
     centres = np.array([[6.0, 6.0]])
@@ -384,21 +393,21 @@ def test_phases_that_cancel_are_charged_by_their_size() -> None:
 # --- phases, spread, products ---------------------------------------------------------------------
 
 
-def test_nearest_phases_are_near() -> None:
+def test_nearest_phases_approximate_the_given_phases() -> None:
     basis = np.array([*SKEW, [1234.5, 987.6]])
-    wanted = np.array([1.0, 5.0, 3.0])
-    found = basis @ nearest_phases(basis, wanted)
-    off = np.abs((found - wanted + math.pi) % (2.0 * math.pi) - math.pi)
-    assert off[:2].max() < 1e-9
-    assert off[2] < 1e-3
+    phases = np.array([1.0, 5.0, 3.0])
+    nearest = basis @ nearest_phases(basis, phases)
+    error = np.abs((nearest - phases + math.pi) % (2.0 * math.pi) - math.pi)
+    assert error[:2].max() < 1e-9
+    assert error[2] < 1e-3
     parallel = np.array([[1e3, 0.0], [1e3 * math.sqrt(2), 0.0]])
-    found = parallel @ nearest_phases(parallel, np.array([1.0, 5.0]))
-    off = np.abs((found - [1.0, 5.0] + math.pi) % (2.0 * math.pi) - math.pi)
-    assert off.max() < 1e-3
+    nearest = parallel @ nearest_phases(parallel, np.array([1.0, 5.0]))
+    error = np.abs((nearest - [1.0, 5.0] + math.pi) % (2.0 * math.pi) - math.pi)
+    assert error.max() < 1e-3
 
 
 @pytest.mark.parametrize("dimensions", [1, 2, 3])
-def test_samples_are_spread_evenly(dimensions: int) -> None:
+def test_low_discrepancy_points_fill_every_box(dimensions: int) -> None:
     points = low_discrepancy_points(8**dimensions * 8, dimensions)
     boxes = np.unique(np.floor(points * 4.0), axis=0)
     assert len(boxes) == 4**dimensions
@@ -406,8 +415,8 @@ def test_samples_are_spread_evenly(dimensions: int) -> None:
     assert points.max() < 1.0
 
 
-def test_further_coordinates_are_enclosed_too() -> None:
-    texture, flat = cells("sinusoid")
+def test_deflection_and_depth_coordinates_are_enclosed() -> None:
+    texture, flat = make_cells("sinusoid")
     found = cells_with_deflection(flat, 2e-3, 5e-4)
     assert isinstance(found, ProductCells)
     assert found.dimensions == 4
@@ -416,14 +425,14 @@ def test_further_coordinates_are_enclosed_too() -> None:
     models = found.enclosures(centres, half, DERIVATIVE_NAMES)
     xi = rng.uniform(-1, 1, centres.shape)
     coordinates = centres + half * xi
-    further = found.extra_coordinates(coordinates)
-    u = np.stack([np.cos(further["deflection_angle"]), np.sin(further["deflection_angle"])])
-    assert further["deflection_length"].max() <= 2e-3
+    extra = found.extra_coordinates(coordinates)
+    u = np.stack([np.cos(extra["deflection_angle"]), np.sin(extra["deflection_angle"])])
+    assert extra["deflection_length"].max() <= 2e-3
     for sliding in (False, True):
-        d = (2e-3 if sliding else further["deflection_length"]) * u
+        d = (2e-3 if sliding else extra["deflection_length"]) * u
         s = np.array([1 - u[0] ** 2, -u[0] * u[1], 1 - u[1] ** 2]) if sliding else [1.0, 0.0, 1.0]
         exact = {"dx": d[0], "dy": d[1], "sxx": s[0], "sxy": s[1], "syy": s[2]}
-        exact |= {"depth": further["depth"], "h": texture.height(found.to_plane(coordinates))}
+        exact |= {"depth": extra["depth"], "h": texture.height(found.to_plane(coordinates))}
         state = {**models, **anchor_enclosures(models, 2e-3, sliding=sliding)}
         for name, value in exact.items():
             model = state[name]

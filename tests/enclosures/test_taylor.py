@@ -1,4 +1,4 @@
-"""Taylor models enclose what they stand for; without their remainder they do not."""
+"""Taylor models enclose the values of functions; without their remainder they do not."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ STRICT = np.finfo(WIDE).eps < 1e-18
 
 @dataclass(frozen=True)
 class Case:
-    """An operation, the same in numbers, and the range of its arguments."""
+    """An operation on models, the same on numbers, and the range of its arguments."""
 
     name: str
     model: Callable[..., Any]
@@ -74,14 +74,14 @@ CASES = [
 CURVED = [case for case in CASES if not case.linear]
 
 
-def named(cases: list[Case]) -> Any:
+def parametrize_cases(cases: list[Case]) -> Any:
     return pytest.mark.parametrize("case", cases, ids=lambda case: case.name)
 
 
 def random_models(
     case: Case, rng: np.random.Generator, half: float, cells: int, noise: float = 0.2
 ) -> tuple[list[TaylorModel], list[Any]]:
-    """Return the arguments as models, and functions that they enclose, (samples, cells)."""
+    """Return models of the arguments, and values that they enclose, (samples, cells)."""
     d = int(rng.integers(1, 4))
     points = rng.uniform(-1.0, 1.0, (SAMPLES, d)).astype(WIDE)
     points[: 2**d] = np.array(np.meshgrid(*[[-1.0, 1.0]] * d)).reshape(d, -1).T
@@ -92,20 +92,20 @@ def random_models(
         e = noise * np.abs(g).sum(axis=0)
         margin = np.abs(g).sum(axis=0) + e
         c = rng.uniform(case.low + margin, case.high - margin)
-        known = c + points @ g.astype(WIDE)
+        linear = c + points @ g.astype(WIDE)
         models.append(TaylorModel(c, g, e))
-        values.append(known + e * rng.choice([-1.0, 0.3, 1.0], (SAMPLES, cells)))
+        values.append(linear + e * rng.choice([-1.0, 0.3, 1.0], (SAMPLES, cells)))
     return models, [points, *values]
 
 
-def misses(model: TaylorModel, points: Any, values: Any) -> Any:
-    """Return how far values (samples, cells) are outside of a model; at most 0 if enclosed."""
+def excess(model: TaylorModel, points: Any, values: Any) -> Any:
+    """Return the distance of values (samples, cells) outside a model; at most 0 if enclosed."""
     linear = model.c.astype(WIDE) + points @ model.g.astype(WIDE)
     slack = 0.0 if STRICT else 1e-14 * np.abs(values).max(axis=0)
     return (np.abs(values - linear) - model.e - slack).max(axis=0)
 
 
-@named(CASES)
+@parametrize_cases(CASES)
 @pytest.mark.parametrize("half", [0.2, 1e-2, 1e-5, 0.0])
 def test_every_operation_encloses_dense_samples(case: Case, half: float) -> None:
     rng = np.random.default_rng(CASES.index(case))
@@ -113,57 +113,57 @@ def test_every_operation_encloses_dense_samples(case: Case, half: float) -> None
         models, (points, *values) = random_models(case, rng, half, cells=200)
         result = case.model(*models)
         assert np.isfinite(result.e).mean() >= (0.7 if half > 0.1 else 1.0)
-        assert (misses(result, points, case.number(*values)) <= 0.0).all()
+        assert (excess(result, points, case.number(*values)) <= 0.0).all()
 
 
-@named(CURVED)
-def test_without_its_remainder_a_model_encloses_nothing(case: Case) -> None:
+@parametrize_cases(CURVED)
+def test_models_without_their_remainder_do_not_enclose(case: Case) -> None:
     rng = np.random.default_rng(7)
     models, (points, *values) = random_models(case, rng, 0.1, cells=200, noise=0.0)
     result = case.model(*models)
     bare = replace(result, e=1e-13 * np.abs(result.c))
-    assert (misses(bare, points, case.number(*values)) > 0.0).mean() > 0.9
+    assert (excess(bare, points, case.number(*values)) > 0.0).mean() > 0.9
 
 
-@named([case for case in CASES if case.linear])
-def test_without_the_error_of_its_arguments_a_model_encloses_nothing(case: Case) -> None:
+@parametrize_cases([case for case in CASES if case.linear])
+def test_linear_models_with_a_reduced_error_do_not_enclose(case: Case) -> None:
     rng = np.random.default_rng(8)
     models, (points, *values) = random_models(case, rng, 0.1, cells=200)
     result = case.model(*models)
     bare = replace(result, e=0.4 * result.e)
-    assert (misses(bare, points, case.number(*values)) > 0.0).mean() > 0.9
+    assert (excess(bare, points, case.number(*values)) > 0.0).mean() > 0.9
 
 
 @pytest.mark.skipif(not STRICT, reason="no floating point wider than double here")
-@named([case for case in CASES if case.name not in {"+", "-", "1 -"}])  # exact there
-def test_rounding_is_charged(case: Case) -> None:
-    """On cells of width zero rounding is all there is, and without it nothing is enclosed."""
+@parametrize_cases([case for case in CASES if case.name not in {"+", "-", "1 -"}])  # exact there
+def test_rounding_is_included_in_the_error(case: Case) -> None:
+    """On cells of width zero the error is only rounding; without it values are not enclosed."""
     rng = np.random.default_rng(9)
     models, (points, *values) = random_models(case, rng, 0.0, cells=500)
     result = case.model(*models)
     assert (result.e <= 1e-13 * (1.0 + np.abs(result.c))).all()
     bare = replace(result, e=0.0 * result.e)
-    assert (misses(bare, points, case.number(*values)) > 0.0).any()
+    assert (excess(bare, points, case.number(*values)) > 0.0).any()
 
 
-@named(CURVED)
-def test_the_error_shrinks_with_the_square_of_the_cell(case: Case) -> None:
+@parametrize_cases(CURVED)
+def test_error_has_order_two(case: Case) -> None:
     rng = np.random.default_rng(11)
     models, _ = random_models(case, rng, 0.05, cells=50, noise=0.0)
     sizes = 2.0 ** -np.arange(2.0, 10.0)
     errors = []
     for size in sizes:
-        cut = [replace(m, g=size * m.g) for m in models]
-        errors.append(case.model(*cut).e.sum())
+        scaled = [replace(m, g=size * m.g) for m in models]
+        errors.append(case.model(*scaled).e.sum())
     order = np.polyfit(np.log(sizes), np.log(errors), 1)[0]
     assert order == pytest.approx(2.0, abs=0.1)
 
 
-# --- where nothing is known -----------------------------------------------------------------------
+# --- unbounded results ----------------------------------------------------------------------------
 
 
-def over(low: float, high: float) -> TaylorModel:
-    """Return a model of everything between two numbers."""
+def interval_model(low: float, high: float) -> TaylorModel:
+    """Return a model of all values between two numbers."""
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     return TaylorModel(np.array([middle]), np.array([[0.7 * half]]), np.array([0.3 * half]))
 
@@ -181,7 +181,7 @@ def over(low: float, high: float) -> TaylorModel:
         (M.log, -3.0, -1.0),
         (lambda x: x**-2, -1.0, 1.0),
         (lambda x: x**0.5, -1.0, 1.0),
-        (lambda x: x**100, -1.0, 1.0),  # no whole power that is multiplied out
+        (lambda x: x**100, -1.0, 1.0),  # an integer power too large for repeated multiplication
         (M.asin, 0.5, 1.0),
         (M.asin, 1.5, 2.0),
         (M.acos, -1.0, 0.0),
@@ -190,38 +190,40 @@ def over(low: float, high: float) -> TaylorModel:
         (M.cosh, -1000.0, 0.0),
     ],
 )
-def test_a_pole_in_the_cell_leaves_nothing_bounded(function: Any, low: float, high: float) -> None:
-    result = function(over(low, high))
+def test_pole_in_the_cell_gives_an_infinite_error(function: Any, low: float, high: float) -> None:
+    result = function(interval_model(low, high))
     assert np.isposinf(result.e).all()
     assert np.isfinite(result.c).all()
     assert np.isfinite(result.g).all()
 
 
-@named(CASES)
+@parametrize_cases(CASES)
 @pytest.mark.parametrize("bad", [math.inf, math.nan])
-def test_what_is_unknown_stays_unknown(case: Case, bad: float) -> None:
-    known = over(max(case.low, 0.4), 0.7) if case.high > 0 else over(-0.7, -0.5)
-    unknown = replace(known, e=np.array([bad]))
-    others = [known] * (case.arguments - 1)
+def test_infinite_and_nan_errors_propagate(case: Case, bad: float) -> None:
+    finite = (
+        interval_model(max(case.low, 0.4), 0.7) if case.high > 0 else interval_model(-0.7, -0.5)
+    )
+    unbounded = replace(finite, e=np.array([bad]))
+    others = [finite] * (case.arguments - 1)
     with np.errstate(invalid="ignore"):
-        result = case.model(unknown, *others)
+        result = case.model(unbounded, *others)
     assert not np.isfinite(result.e).any()
     c, g, e = _stack_entries([[result]], 1, 1)
     with np.errstate(all="ignore"):
         assert np.isposinf(NORM.upper_bounds(c, g, e, 0.0)).all()
 
 
-def test_an_absolute_value_across_zero_is_between_zero_and_the_greatest() -> None:
-    result = abs(over(-1.0, 3.0))
+def test_abs_and_copysign_across_zero_enclose_all_values() -> None:
+    result = abs(interval_model(-1.0, 3.0))
     assert result.c - result.e <= 0.0
     assert result.c + result.e >= 3.0
-    sign = M.copysign(2.0, over(-1.0, 3.0))
+    sign = M.copysign(2.0, interval_model(-1.0, 3.0))
     assert (sign.c - sign.e, sign.c + sign.e) == (-2.0, 2.0)
-    assert M.copysign(2.0, over(-3.0, -1.0)).c == -2.0
+    assert M.copysign(2.0, interval_model(-3.0, -1.0)).c == -2.0
 
 
-def test_nothing_is_equal_greater_or_true_of_a_model() -> None:
-    x, y = over(-1.0, 1.0), over(3.0, 4.0)
+def test_comparisons_and_truth_values_of_models_raise() -> None:
+    x, y = interval_model(-1.0, 1.0), interval_model(3.0, 4.0)
     for compare in (
         lambda: x > 0.0, lambda: x < y, lambda: x <= y, lambda: y >= x, lambda: x == 0.0,
         lambda: x != y, lambda: bool(x), lambda: max(x, 0.0), lambda: hash(x),
@@ -234,12 +236,15 @@ def test_nothing_is_equal_greater_or_true_of_a_model() -> None:
         _ = 2.0**x
 
 
-def test_a_numpy_number_on_the_left_leaves_the_operation_to_the_model() -> None:
-    for result in (np.float64(2.0) * over(1.0, 2.0), np.float64(1.0) / over(1.0, 2.0)):
+def test_numpy_scalar_on_the_left_returns_a_model() -> None:
+    for result in (
+        np.float64(2.0) * interval_model(1.0, 2.0),
+        np.float64(1.0) / interval_model(1.0, 2.0),
+    ):
         assert isinstance(result, TaylorModel)
 
 
-def test_numbers_stay_numbers() -> None:
+def test_taylor_math_of_numbers_equals_math() -> None:
     for name in ("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "tanh", "atan"):
         assert getattr(M, name)(0.3) == pytest.approx(getattr(math, name)(0.3), rel=1e-15)
     assert (M.pow(2.0, 3.0), M.fabs(-2.0), M.copysign(1.0, -3.0)) == (8.0, 2.0, -1.0)
@@ -252,20 +257,20 @@ TEXTURE = Fourier([4e-4, 3e-4], [[2100.0, 300.0], [-500.0, 1700.0]], [0.4, 1.1])
 DEPTH = 0.2e-3
 
 
-def own_law() -> Law:
+def user_defined_law() -> Law:
     return Law("V", "own", "vertical", lambda c: c.k * c.depth**2 * c.normal * 1e3)
 
 
-def plain_kernel(law: Law) -> Callable[..., Any]:
+def compile_kernel(law: Law) -> Callable[..., Any]:
     names: dict[str, Any] = {"math": math}
     exec(compile(kernel_source(law), "<plain>", "exec"), names)
     return names["law_jacobian"]
 
 
-@pytest.mark.parametrize("law", [*"WABCDEG", own_law()], ids=str)
+@pytest.mark.parametrize("law", [*"WABCDEG", user_defined_law()], ids=str)
 @pytest.mark.parametrize("level", [3, 6])
-def test_law_kernels_enclose_their_own_numbers(law: str | Law, level: int) -> None:
-    """On cells of the torus times a range of depths, at random points of each."""
+def test_law_kernels_on_models_enclose_their_values_on_numbers(law: str | Law, level: int) -> None:
+    """Checked on cells of the torus times a range of depths, at random points of each."""
     surface = Surface(TEXTURE, law, max_depth=DEPTH)
     texture_cells = TEXTURE.cells()
     assert texture_cells is not None
@@ -277,8 +282,8 @@ def test_law_kernels_enclose_their_own_numbers(law: str | Law, level: int) -> No
     kernel, arguments = law_kernel(surface.law)
     constants = {n: v for n, v in law_constants(surface).items() if n in arguments}
     with np.errstate(all="ignore"):
-        found = kernel(**{n: models[n] for n in arguments if n in models}, **constants)
-    plain = plain_kernel(surface.law)
+        entries = kernel(**{n: models[n] for n in arguments if n in models}, **constants)
+    kernel_of_numbers = compile_kernel(surface.law)
     points = rng.uniform(-1.0, 1.0, (6, 60, 3))
     points[0] = np.sign(points[0])
     bounded = 0
@@ -286,9 +291,11 @@ def test_law_kernels_enclose_their_own_numbers(law: str | Law, level: int) -> No
         coordinates = centres + half * xi
         rows = cells.derivatives(coordinates)
         for i, row in enumerate(rows):
-            known = {**dict(zip(DERIVATIVE_NAMES, row, strict=True)), "depth": coordinates[i, 2]}
-            exact = plain(**{n: known[n] for n in arguments if n in known}, **constants)
-            for model, value in zip(found, exact, strict=True):
+            values = {**dict(zip(DERIVATIVE_NAMES, row, strict=True)), "depth": coordinates[i, 2]}
+            exact = kernel_of_numbers(
+                **{n: values[n] for n in arguments if n in values}, **constants
+            )
+            for model, value in zip(entries, exact, strict=True):
                 bounded += _encloses(model, xi, i, float(value))
     assert bounded > 1000  # most cells have finite bounds
 
@@ -305,8 +312,8 @@ def _encloses(model: Any, xi: np.ndarray, cell: int, value: float) -> bool:
 
 
 @pytest.mark.parametrize("letter", "ABCDG")
-def test_law_kernels_enclose_the_definition(letter: str) -> None:
-    """The Jacobian in 30 digits, which shares nothing but the symbolic force."""
+def test_law_kernels_enclose_the_symbolic_jacobian(letter: str) -> None:
+    """The Jacobian with 30 digits shares only the symbolic force with the kernel."""
     surface = Surface(TEXTURE, letter, stiffness=1.0, max_depth=DEPTH)
     texture_cells = TEXTURE.cells()
     assert texture_cells is not None
@@ -314,17 +321,17 @@ def test_law_kernels_enclose_the_definition(letter: str) -> None:
     centres = rng.uniform(0.0, 6.0, (3, 2))
     kernel, arguments = law_kernel(find_law(letter))
     models = {**texture_cells.enclosures(centres, half, DERIVATIVE_NAMES), "depth": DEPTH}
-    found = kernel(**{n: models[n] for n in arguments if n in models}, k=1.0)[3:]
+    entries = kernel(**{n: models[n] for n in arguments if n in models}, k=1.0)[3:]
     for cell, centre in enumerate(centres):
         xi = rng.uniform(-1.0, 1.0, (1, 2))
         xy = texture_cells.to_plane(centre + half * xi)
         point = contact_point(letter, xy[0])
         exact = np.array(exact_jacobian(surface, point).tolist(), dtype=float).ravel()
-        everywhere = np.tile(xi, (len(centres), 1))
-        for model, value in zip(found, exact, strict=True):
+        positions = np.tile(xi, (len(centres), 1))
+        for model, value in zip(entries, exact, strict=True):
             if isinstance(model, TaylorModel):
-                assert model.e[cell] < 0.1  # worth something
-            assert _encloses(model, everywhere, cell, value) or abs(value) < 1e-12
+                assert model.e[cell] < 0.1  # a useful bound
+            assert _encloses(model, positions, cell, value) or abs(value) < 1e-12
 
 
 def contact_point(letter: str, xy: np.ndarray) -> np.ndarray:
@@ -337,9 +344,9 @@ def contact_point(letter: str, xy: np.ndarray) -> np.ndarray:
     return np.array([xy[0] + below * hx, xy[1] + below * hy, h - below])
 
 
-def test_a_kernel_with_a_wrong_entry_is_noticed() -> None:
-    """The negative control of the two tests above: 1 part in 1000 is outside."""
-    wrong = SimpleNamespace(**vars(over(1.0, 1.0002)))
+def test_wrong_kernel_entry_is_detected() -> None:
+    """Negative control of the two tests above: an error of 1 part in 1000 is outside."""
+    wrong = SimpleNamespace(**vars(interval_model(1.0, 1.0002)))
     model = TaylorModel(wrong.c * 1.001, wrong.g, wrong.e)
     with pytest.raises(AssertionError):
         _encloses(model, np.zeros((1, 1)), 0, 1.0001)

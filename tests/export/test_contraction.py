@@ -1,4 +1,4 @@
-"""Fused products and sums would change the last bits; the header keeps them out."""
+"""The exported header disables fused multiply-add, which would change the last bits."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from asperity.surface import Surface
 from asperity.textures import Texture
 
 
-def _fused(compiler: str, language: str, text: str, folder: Path) -> int:
-    """Return how many fused operations a compiler makes of a header."""
+def _count_fused(compiler: str, language: str, text: str, folder: Path) -> int:
+    """Return the number of fused operations that a compiler generates for a header."""
     (folder / "t.h").write_text(text)
     (folder / "t.c").write_text(
         '#include "t.h"\nvoid f(t_state *s, const double *p, double *f)\n'
@@ -25,19 +25,19 @@ def _fused(compiler: str, language: str, text: str, folder: Path) -> int:
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)
-def test_nothing_is_fused(
+def test_compilers_generate_no_fused_operations(
     compiler: str, make_texture: Callable[[str], Texture], tmp_path: Path
 ) -> None:
     text = header(Surface(make_texture("map"), "F"), "t")
     for language in ("c99", "gnu99", "c++17", "gnu++17"):
-        assert _fused(compiler, language, text, tmp_path) == 0, language
-    without = text.replace('#pragma GCC optimize ("fp-contract=off")', "")
-    without = without.replace("#pragma STDC FP_CONTRACT OFF", "#pragma STDC FP_CONTRACT ON")
-    assert _fused(compiler, "gnu99", without, tmp_path) > 20
+        assert _count_fused(compiler, language, text, tmp_path) == 0, language
+    unprotected = text.replace('#pragma GCC optimize ("fp-contract=off")', "")
+    unprotected = unprotected.replace("#pragma STDC FP_CONTRACT OFF", "#pragma STDC FP_CONTRACT ON")
+    assert _count_fused(compiler, "gnu99", unprotected, tmp_path) > 20
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)
-def test_fast_mathematics_does_not_compile(compiler: str, wave: Texture, tmp_path: Path) -> None:
+def test_fast_math_is_a_compile_error(compiler: str, wave: Texture, tmp_path: Path) -> None:
     (tmp_path / "t.h").write_text(header(Surface(wave, "B"), "t"))
     (tmp_path / "t.c").write_text('#include "t.h"\n')
     with pytest.raises(RuntimeError, match="compile without -ffast-math"):

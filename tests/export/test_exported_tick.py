@@ -1,4 +1,4 @@
-"""The exported tick of laws with a search: its budget, what it remembers, and its gap."""
+"""The exported tick of laws with a search: evaluation budget, state and error bound."""
 
 from __future__ import annotations
 
@@ -23,46 +23,50 @@ from asperity.export.export_request import ExportRequest
 from asperity.surface import Surface
 from asperity.textures import Texture
 
-FEW = 60
+SMALL_BUDGET = 60
 
 
-def path_of(surface: Surface) -> np.ndarray:
-    """Return probes anywhere, then a stroke on which each tick begins near the last."""
-    anywhere = probes(surface.texture, surface.max_depth, 400, 5)
+def probe_path(surface: Surface) -> np.ndarray:
+    """Return random probes, then a stroke on which each tick starts near the previous one."""
+    random_probes = probes(surface.texture, surface.max_depth, 400, 5)
     share = np.linspace(0.2, 0.7, 400)[:, None] * np.ones(len(surface.texture.domain.spans))
     xy = surface.texture.domain.points(share)
     stroke = np.column_stack([xy, surface.texture.height(xy) - 0.5 * surface.max_depth])
-    return np.ascontiguousarray(np.vstack([anywhere, stroke]))
+    return np.ascontiguousarray(np.vstack([random_probes, stroke]))
 
 
-def test_a_tick_is_the_kernel_s_within_any_budget(
+def test_tick_equals_the_kernel_with_any_budget(
     make_texture: Callable[[str], Texture], tmp_path: Path
 ) -> None:
     surfaces = {x: Surface(make_texture("map"), x, clamp="backed") for x in "DH"}
-    orders = {f"{x}_{looks:g}": (x, looks) for x in surfaces for looks in (FEW, np.inf)}
-    headers = {n: header(surfaces[x], n, max_evaluations=looks) for n, (x, looks) in orders.items()}
-    made = library(tmp_path, "gcc", headers, "-O1")
-    for name, (x, looks) in orders.items():
-        at = path_of(surfaces[x])
-        found = ticks(made, name, at)
-        assert same_bits(found, kernel_ticks(surfaces[x], at, looks)).all(), name
-        if looks == np.inf:
-            assert not found[:, 3].any()
+    cases = {f"{x}_{budget:g}": (x, budget) for x in surfaces for budget in (SMALL_BUDGET, np.inf)}
+    headers = {
+        n: header(surfaces[x], n, max_evaluations=budget) for n, (x, budget) in cases.items()
+    }
+    program = library(tmp_path, "gcc", headers, "-O1")
+    for name, (x, budget) in cases.items():
+        path = probe_path(surfaces[x])
+        result = ticks(program, name, path)
+        assert same_bits(result, kernel_ticks(surfaces[x], path, budget)).all(), name
+        if budget == np.inf:
+            assert not result[:, 3].any()
         else:
-            assert 0.0 < (found[:, 3] > 0.0).mean() < 1.0
+            assert 0.0 < (result[:, 3] > 0.0).mean() < 1.0
 
 
-def test_few_looks_change_the_force_by_at_most_the_gap(
+def test_small_budget_changes_the_force_by_at_most_the_error_bound(
     make_texture: Callable[[str], Texture], tmp_path: Path
 ) -> None:
     surface = Surface(make_texture("map"), "H", clamp="backed")
-    made = library(tmp_path, "gcc", {"t": header(surface, "t", max_evaluations=FEW)}, "-O1")
-    at = path_of(surface)
-    found = ticks(made, "t", at)
-    exact = kernel_ticks(surface, at, np.inf)
-    away = np.linalg.norm(found[:, :3] - exact[:, :3], axis=1)
-    assert (away <= surface.stiffness * found[:, 3] * (1.0 + 1e-9) + 1e-9).all()
-    assert away.max() > 1e-3  # and they do change it
+    program = library(
+        tmp_path, "gcc", {"t": header(surface, "t", max_evaluations=SMALL_BUDGET)}, "-O1"
+    )
+    path = probe_path(surface)
+    result = ticks(program, "t", path)
+    exact = kernel_ticks(surface, path, np.inf)
+    error = np.linalg.norm(result[:, :3] - exact[:, :3], axis=1)
+    assert (error <= surface.stiffness * result[:, 3] * (1.0 + 1e-9) + 1e-9).all()
+    assert error.max() > 1e-3  # the budget does change the force
 
 
 _STATES = """
@@ -84,34 +88,36 @@ void t_twice(const double *at, double *f)
 """
 
 
-def test_a_state_of_zeros_is_a_fresh_one(
+def test_zeroed_state_equals_a_reset_state(
     make_texture: Callable[[str], Texture], tmp_path: Path
 ) -> None:
-    """So is one that was told a position beyond all bounds."""
+    """So does a state after a position beyond all bounds."""
     surface = Surface(make_texture("map"), "H", clamp="backed")
-    (tmp_path / "t.h").write_text(header(surface, "t", max_evaluations=FEW))
+    (tmp_path / "t.h").write_text(header(surface, "t", max_evaluations=SMALL_BUDGET))
     (tmp_path / "t.c").write_text(_STATES)
-    made = compile_library(tmp_path, "gcc", tmp_path / "t.c")
-    at, found = probes(surface.texture, surface.max_depth, 40, 2), np.empty(7)
-    for point in np.ascontiguousarray(at):
-        made.t_twice(point.ctypes, found.ctypes)
-        expected = kernel_ticks(surface, point[None], FEW)[0, :3]
-        assert found.tolist() == [*expected, *expected, 0.0]
+    program = compile_library(tmp_path, "gcc", tmp_path / "t.c")
+    points, result = probes(surface.texture, surface.max_depth, 40, 2), np.empty(7)
+    for point in np.ascontiguousarray(points):
+        program.t_twice(point.ctypes, result.ctypes)
+        expected = kernel_ticks(surface, point[None], SMALL_BUDGET)[0, :3]
+        assert result.tolist() == [*expected, *expected, 0.0]
 
 
 @pytest.mark.parametrize(
-    ("law", "looks", "said"),
+    ("law", "budget", "number"),
     [
         ("B", None, "1.0"), ("B", 50, "1.0"), ("D", None, "600.0"), ("H", None, "1800.0"),
         ("H", 50, "50"), ("E", np.inf, "HUGE_VAL"),
     ],
 )  # fmt: skip
-def test_the_most_work_is_stated(law: str, looks: float | None, said: str, wave: Texture) -> None:
-    text = header(Surface(wave, law), "t", max_evaluations=looks)
-    assert re.search(rf"#define T_MAX_EVALUATIONS {re.escape(said)} ", text)
+def test_header_states_the_evaluation_budget(
+    law: str, budget: float | None, number: str, wave: Texture
+) -> None:
+    text = header(Surface(wave, law), "t", max_evaluations=budget)
+    assert re.search(rf"#define T_MAX_EVALUATIONS {re.escape(number)} ", text)
 
 
-@pytest.mark.parametrize("looks", [0, -1, np.nan, -np.inf])
-def test_looks_that_are_none_are_refused(looks: float, wave: Texture) -> None:
+@pytest.mark.parametrize("budget", [0, -1, np.nan, -np.inf])
+def test_invalid_evaluation_budgets_are_refused(budget: float, wave: Texture) -> None:
     with pytest.raises(ParameterError, match="max_evaluations must be"):
-        ExportRequest(Surface(wave, "D"), max_evaluations=looks)
+        ExportRequest(Surface(wave, "D"), max_evaluations=budget)

@@ -1,4 +1,4 @@
-"""Exported C gives the force of the kernel, bit by bit, on every law and texture kind."""
+"""Exported C gives the force of the kernel bit by bit, for every law and texture kind."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from asperity.surface import Surface
 from asperity.textures import HeightMap, Sinusoid, Texture
 from asperity.textures.catalogue import as_texture
 
-# Laws for each: all are maps, and a search is compared on the roughest and on plateaus.
+# Laws of each texture: a search is compared on the roughest map and on one with plateaus.
 LIBRARY = {
     "sandpaper:grit=P60": "BH", "tile:": "H", "cloth:": "B", "knurl:": "B", "wood:": "B",
     "brushed-metal:": "B",
@@ -33,8 +33,8 @@ LIBRARY = {
 SAME_MACHINE = platform.machine() == "x86_64"
 
 
-def _count(law: Law) -> int:
-    """Return how many probes: fewer where each takes a long search."""
+def _probe_count(law: Law) -> int:
+    """Return the number of probes: fewer for laws with a long search."""
     return (
         20_000
         if not law.contact.requires_search
@@ -44,36 +44,43 @@ def _count(law: Law) -> int:
     )
 
 
-def _check(folder: Path, surfaces: dict[str, Surface], *flags: str) -> None:
+def _assert_equal_forces(folder: Path, surfaces: dict[str, Surface], *flags: str) -> None:
     headers = {name: header(s, name, folder=folder) for name, s in surfaces.items()}
     paths = {
-        name: probes(surface.texture, surface.max_depth, _count(surface.law), 11)
+        name: probes(surface.texture, surface.max_depth, _probe_count(surface.law), 11)
         for name, surface in surfaces.items()
     }
     kernel = {name: kernel_ticks(surface, paths[name]) for name, surface in surfaces.items()}
     for compiler in COMPILERS:
-        made = library(folder, compiler, headers, *(flags or ("-O1",)))
-        equal = [_agree(surfaces[n], paths[n], ticks(made, n, paths[n]), kernel[n]) for n in paths]
+        program = library(folder, compiler, headers, *(flags or ("-O1",)))
+        equal = [
+            _equal_ticks(surfaces[n], paths[n], ticks(program, n, paths[n]), kernel[n])
+            for n in paths
+        ]
         assert not list_differing(surfaces, equal), compiler
     assert all(np.any(tick[:, :3] != 0.0) for tick in kernel.values())
 
 
-def _agree(surface: Surface, at: np.ndarray, tick: np.ndarray, kernel: np.ndarray) -> np.ndarray:
+def _equal_ticks(
+    surface: Surface, points: np.ndarray, tick: np.ndarray, kernel: np.ndarray
+) -> np.ndarray:
     if SAME_MACHINE:
         return same_bits(tick, kernel)
-    h = surface.texture.height(np.ascontiguousarray(at[:, :2]))
-    size = surface.stiffness * np.maximum(np.abs(h), np.abs(at[:, 2]))
+    h = surface.texture.height(np.ascontiguousarray(points[:, :2]))
+    size = surface.stiffness * np.maximum(np.abs(h), np.abs(points[:, 2]))
     return np.abs(tick - kernel)[:, :3].max(axis=1) <= 2.0 * np.finfo(float).eps * size
 
 
-def test_every_law_on_every_kind(texture: Texture, tmp_path: Path) -> None:
-    _check(tmp_path, {f"t{x}": Surface(texture, x, clamp="backed") for x in LAWS})
+def test_every_law_on_every_texture_kind(texture: Texture, tmp_path: Path) -> None:
+    _assert_equal_forces(tmp_path, {f"t{x}": Surface(texture, x, clamp="backed") for x in LAWS})
 
 
 @pytest.mark.parametrize("name", LIBRARY)
 def test_library_textures(name: str, tmp_path: Path) -> None:
     texture = as_texture(name)
-    _check(tmp_path, {f"t{x}": Surface(texture, x, max_depth=2e-4) for x in LIBRARY[name]})
+    _assert_equal_forces(
+        tmp_path, {f"t{x}": Surface(texture, x, max_depth=2e-4) for x in LIBRARY[name]}
+    )
 
 
 def test_every_clamp(make_texture: Callable[[str], Texture], tmp_path: Path) -> None:
@@ -81,7 +88,7 @@ def test_every_clamp(make_texture: Callable[[str], Texture], tmp_path: Path) -> 
     surfaces = {
         f"{x}_{clamp}": Surface(texture, x, clamp=clamp) for x in "BCGF" for clamp in CLAMPS
     }
-    _check(tmp_path, surfaces)
+    _assert_equal_forces(tmp_path, surfaces)
 
 
 @pytest.mark.parametrize("flags", [("-O2",), ("-O3", "-march=native"), ("-O2", "-std=gnu99")])
@@ -89,18 +96,20 @@ def test_any_optimisation(
     make_texture: Callable[[str], Texture], tmp_path: Path, flags: tuple[str, ...]
 ) -> None:
     texture = make_texture("map")
-    _check(tmp_path, {f"t{x}": Surface(texture, x, clamp="backed") for x in "BDFH"}, *flags)
+    _assert_equal_forces(
+        tmp_path, {f"t{x}": Surface(texture, x, clamp="backed") for x in "BDFH"}, *flags
+    )
 
 
-def test_a_flat_texture(tmp_path: Path) -> None:
+def test_flat_texture(tmp_path: Path) -> None:
     texture = HeightMap(np.zeros((4, 5)), 1e-3)
-    _check(tmp_path, {f"t{x}": Surface(texture, x, max_depth=1e-3) for x in "WDF"})
+    _assert_equal_forces(tmp_path, {f"t{x}": Surface(texture, x, max_depth=1e-3) for x in "WDF"})
 
 
-def test_another_force_is_noticed(wave: Sinusoid, tmp_path: Path) -> None:
+def test_changed_formula_is_detected(wave: Sinusoid, tmp_path: Path) -> None:
     surface = Surface(wave, "B")
-    at = probes(wave, surface.max_depth, 400, 3)
+    points = probes(wave, surface.max_depth, 400, 3)
     text = header(surface, "t")
     assert "1.0 + hx * hx" in text
-    made = library(tmp_path, "gcc", {"t": text.replace("1.0 + hx * hx", "1.0 - hx * hx")})
-    assert not same_bits(ticks(made, "t", at), kernel_ticks(surface, at)).all()
+    program = library(tmp_path, "gcc", {"t": text.replace("1.0 + hx * hx", "1.0 - hx * hx")})
+    assert not same_bits(ticks(program, "t", points), kernel_ticks(surface, points)).all()

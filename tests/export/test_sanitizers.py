@@ -1,4 +1,4 @@
-"""Exported C under the sanitizers of addresses and of undefined behaviour."""
+"""Exported C under AddressSanitizer and UndefinedBehaviorSanitizer."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from tests.helpers.c_programs import (
 from asperity.surface import Surface
 from asperity.textures import Texture
 
-CLEAN = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-O1", "-g")
+SANITIZE = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-O1", "-g")
 LAWS = "BDFH"
 _MAIN = """
 static int {name}_run(const char *file)
@@ -51,7 +51,7 @@ def _program(names: list[str]) -> str:
 
 @pytest.mark.parametrize("compiler", COMPILERS)
 @pytest.mark.parametrize("kind", ["sinusoid", "fourier", "steep map", "periodic profile"])
-def test_nothing_is_undefined(
+def test_sanitizers_find_no_undefined_behaviour(
     kind: str, compiler: str, make_texture: Callable[[str], Texture], tmp_path: Path
 ) -> None:
     texture = make_texture(kind)
@@ -59,23 +59,23 @@ def test_nothing_is_undefined(
     for x in LAWS:
         surface = Surface(texture, x, clamp="backed")
         (tmp_path / f"{x}.h").write_text(header(surface, x))
-        at = probes(texture, surface.max_depth, 80 if x == "H" else 400, 21)
-        # Beyond all borders, and what is no position.
+        points = probes(texture, surface.max_depth, 80 if x == "H" else 400, 21)
+        # Positions beyond all borders and positions that are not finite.
         far = [[9e2, -9e2, -1e-4], [np.nan, 0, -1e-4], [np.inf, 0, 0], [0, 0, -1e30], [1e3, 0, 0]]
-        at = np.vstack([at, far[:1] if x != "H" else at[:1], far[1:4]])
-        at.tofile(tmp_path / f"{x}.bin")
-        inside = kernel_ticks(surface, np.ascontiguousarray(at[:-3]))[:, :3]
+        points = np.vstack([points, far[:1] if x != "H" else points[:1], far[1:4]])
+        points.tofile(tmp_path / f"{x}.bin")
+        inside = kernel_ticks(surface, np.ascontiguousarray(points[:-3]))[:, :3]
         digest.update(np.vstack([inside, np.zeros((3, 3))]).tobytes())
     (tmp_path / "main.c").write_text(_program(list(LAWS)))
-    run_command(tool(compiler), *STRICT, *CLEAN, "main.c", "-o", "main", "-lm", cwd=tmp_path)
+    run_command(tool(compiler), *STRICT, *SANITIZE, "main.c", "-o", "main", "-lm", cwd=tmp_path)
     (tmp_path / "run.sh").write_text("./main > forces.bin\n")
     run_command(tool("sh"), "run.sh", cwd=tmp_path)
-    said = (tmp_path / "forces.bin").read_bytes()
-    assert hashlib.sha256(said).hexdigest() == digest.hexdigest()
+    output = (tmp_path / "forces.bin").read_bytes()
+    assert hashlib.sha256(output).hexdigest() == digest.hexdigest()
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)
-def test_what_is_undefined_is_noticed(
+def test_sanitizers_detect_an_index_out_of_bounds(
     compiler: str, make_texture: Callable[[str], Texture], tmp_path: Path
 ) -> None:
     text = header(Surface(make_texture("map"), "B"), "B")
@@ -83,6 +83,6 @@ def test_what_is_undefined_is_noticed(
     (tmp_path / "B.h").write_text(text.replace("B_data_c[i][j + 3]", "B_data_c[i][j + 300]"))
     np.array([[0.0, 0.0, -1e-4]]).tofile(tmp_path / "B.bin")
     (tmp_path / "main.c").write_text(_program(["B"]))
-    run_command(tool(compiler), *STRICT, *CLEAN, "main.c", "-o", "main", "-lm", cwd=tmp_path)
+    run_command(tool(compiler), *STRICT, *SANITIZE, "main.c", "-o", "main", "-lm", cwd=tmp_path)
     with pytest.raises(RuntimeError, match=r"out of bounds|overflow"):
         run_command(tmp_path / "main", cwd=tmp_path)

@@ -17,31 +17,33 @@ from asperity.textures import Texture
 
 
 @pytest.mark.parametrize("kind", ["sinusoid", "fourier", "map", "profile"])
-def test_close_to_the_force_in_double(kind: str, make_texture: Callable[[str], Texture]) -> None:
-    """Within 1e-5, or where rounding of the position, a tie or the solver says why not."""
+def test_single_precision_force_is_close_to_double(
+    kind: str, make_texture: Callable[[str], Texture]
+) -> None:
+    """The error is below 1e-5, or explained by rounding of the position, a tie or the solver."""
     for letter in LAWS:
         surface = Surface(make_texture(kind), letter, clamp="backed")
-        found = measure_single_precision(
+        counts = measure_single_precision(
             surface, 200 if surface.law.contact.requires_search else 1000
         )
-        assert found.unexplained == 0, letter
-        assert found.near + found.position >= 0.94 * sum(found[:5]), letter
+        assert counts.unexplained == 0, letter
+        assert counts.near + counts.position >= 0.94 * sum(counts[:5]), letter
 
 
-def test_another_force_is_not_explained(
+def test_changed_force_is_not_explained(
     make_texture: Callable[[str], Texture], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     surface = Surface(make_texture("map"), "D", clamp="backed")
-    right = bench_single.ticks
+    ticks = bench_single.ticks
 
-    def wrong(made: Any, name: str, at: Any) -> Any:
-        return right(made, name, at) * (1.0002 if name == "f" else 1.0)
+    def scaled_ticks(program: Any, name: str, points: Any) -> Any:
+        return ticks(program, name, points) * (1.0002 if name == "f" else 1.0)
 
-    monkeypatch.setattr(bench_single, "ticks", wrong)
+    monkeypatch.setattr(bench_single, "ticks", scaled_ticks)
     assert measure_single_precision(surface, 200).unexplained > 100
 
 
-def test_float_throughout(make_texture: Callable[[str], Texture]) -> None:
+def test_single_precision_code_contains_no_double(make_texture: Callable[[str], Texture]) -> None:
     text = header(Surface(make_texture("map"), "D"), "t", "float")
     code = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL).split("typedef struct t_state")[1]
     assert "double" not in code

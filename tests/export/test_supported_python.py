@@ -1,4 +1,4 @@
-"""The restricted subset in C: what Python means is what C does, and the rest is refused."""
+"""The supported subset of Python has the same meaning in C; other constructs are refused."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.helpers.c_programs import STRICT, run_command, tool
 from asperity.export.c_language import FLOAT, INT, NotExportableError, ValueType
 from asperity.export.program import LinkedSource, Program
 
-MEANING = '''
+SOURCE = '''
 def whole(a, b):
     """Integers."""
     bits = (a >> 2) + ((a & 6) ^ (b | 1))
@@ -97,15 +97,15 @@ def shifted(x):
 
 SCALE = 2.5
 '''
-KINDS: dict[str, tuple[ValueType, ...]] = {
+ARGUMENT_TYPES: dict[str, tuple[ValueType, ...]] = {
     "whole": (INT, INT), "real": (FLOAT, FLOAT), "rounding": (FLOAT, FLOAT),
     "choice": (FLOAT, FLOAT), "loops": (INT, FLOAT), "arrays": (INT, FLOAT),
 }  # fmt: skip
 HEAD = "#include <math.h>\n#include <stdint.h>\n#define T_INLINE static inline\n"
 
 
-def printed(source: str, **kinds: tuple[ValueType, ...]) -> str:
-    """Return functions as C, each with a public wrapper."""
+def to_c(source: str, **kinds: tuple[ValueType, ...]) -> str:
+    """Return functions as C code, each with a public wrapper."""
     program = Program(LinkedSource(source), "t", single=False)
     shown = []
     for name, given_kinds in kinds.items():
@@ -118,12 +118,12 @@ def printed(source: str, **kinds: tuple[ValueType, ...]) -> str:
 
 
 @pytest.fixture(scope="module")
-def meanings(
+def evaluate(
     tmp_path_factory: pytest.TempPathFactory,
 ) -> Callable[[str, Any, Any], tuple[Any, Any]]:
-    """``meanings(name, a, b)``: results of Python and C."""
+    """Return a function: ``evaluate(name, a, b)`` gives the results of Python and C."""
     folder = tmp_path_factory.mktemp("subset")
-    (folder / "m.c").write_text(printed(MEANING, **KINDS))
+    (folder / "m.c").write_text(to_c(SOURCE, **ARGUMENT_TYPES))
     run_command(
         tool("gcc"), *STRICT, "-O1", "-shared", "-fPIC", "m.c", "-o", "m.so", "-lm", cwd=folder
     )
@@ -131,12 +131,12 @@ def meanings(
     from asperity.core.compiled import local_array
 
     python: dict[str, Any] = {"math": math, "local_array": local_array}
-    exec(compile(MEANING, "<meaning>", "exec"), python)
+    exec(compile(SOURCE, "<meaning>", "exec"), python)
 
     def both(name: str, a: Any, b: Any) -> tuple[Any, Any]:
         function = getattr(made, f"show_{name}")
         types = {INT: ctypes.c_int64, FLOAT: ctypes.c_double}
-        function.argtypes = [types[kind] for kind in KINDS[name]]  # type: ignore[index]  # numbers
+        function.argtypes = [types[kind] for kind in ARGUMENT_TYPES[name]]  # type: ignore[index]  # numbers
         real = name in {"real", "rounding", "loops", "arrays"}
         function.restype = ctypes.c_double if real else ctypes.c_int64
         return python[name](a, b), function(a, b)
@@ -151,21 +151,21 @@ REAL = st.floats(-9.0, 9.0).filter(lambda x: abs(x) > 1e-3)
 @settings(max_examples=200, deadline=None)
 @given(a=SMALL, b=SMALL.filter(bool), x=REAL, y=REAL)
 def test_c_and_python_give_equal_results(
-    meanings: Callable[[str, Any, Any], tuple[Any, Any]], a: int, b: int, x: float, y: float
+    evaluate: Callable[[str, Any, Any], tuple[Any, Any]], a: int, b: int, x: float, y: float
 ) -> None:
-    for name, one, two in (("whole", a, b), ("choice", x, y), ("rounding", x, y)):
-        python, c = meanings(name, one, two)
+    for name, first, second in (("whole", a, b), ("choice", x, y), ("rounding", x, y)):
+        python, c = evaluate(name, first, second)
         assert c == python, name
-    for name, one, two in (("loops", abs(a) % 12, x), ("arrays", abs(a), x)):
-        python, c = meanings(name, one, two)
+    for name, first, second in (("loops", abs(a) % 12, x), ("arrays", abs(a), x)):
+        python, c = evaluate(name, first, second)
         assert c == python, name
-    python, c = meanings("real", x, y)  # Python's own powers go through pow
+    python, c = evaluate("real", x, y)  # Python computes powers with pow
     assert c == pytest.approx(python, rel=1e-13, abs=1e-11)
 
 
-def test_halves_are_rounded_to_even(meanings: Callable[[str, Any, Any], Any]) -> None:
+def test_halves_are_rounded_to_even(evaluate: Callable[[str, Any, Any], Any]) -> None:
     for x in (0.5, 1.5, 2.5, -0.5, -1.5, -2.0, 3.0):
-        python, c = meanings("rounding", x, x)
+        python, c = evaluate("rounding", x, x)
         assert c == python
 
 
@@ -205,5 +205,5 @@ def test_unsupported_constructs_are_refused(words: str) -> None:
         "\n\ndef put(w, a):\n    w[0] = a\n    return a\n\n\ndef starred(*a):\n    return 1.0\n"
     )
     with pytest.raises(NotExportableError, match=words) as error:
-        printed(source, refused=(FLOAT, FLOAT))
+        to_c(source, refused=(FLOAT, FLOAT))
     assert str(error.value).startswith("law cannot be exported: the function '")

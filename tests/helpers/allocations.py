@@ -1,4 +1,4 @@
-"""What a call allocates, seen by Python."""
+"""Memory allocations of a call, measured with tracemalloc."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from collections.abc import Callable
 
 
 def traced_peak(run: Callable[[], object]) -> int:
-    """Return the peak of a call's allocations [bytes], Python's own and NumPy's.
+    """Return the peak of the allocations of a call [bytes], those of NumPy included.
 
-    Tracing ends whatever happens: it slows down whatever allocates, and so all later tests.
+    Tracing is stopped after errors, too: it slows down every allocation of later tests.
     """
     tracemalloc.start()
     try:

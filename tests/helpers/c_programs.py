@@ -1,4 +1,4 @@
-"""Tools that the tests of the export need, and what they share with the benchmark."""
+"""Compilers and other tools for the tests of the export; most are shared with the benchmark."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ COMPILERS = ("gcc", "clang")
 
 
 def tool(name: str) -> str:
-    """Return the path of a program; without it the test is not run."""
+    """Return the path of a program; skip the test if it is not installed."""
     path = shutil.which(name)
     if path is None:
         pytest.skip(f"not run: no {name} here")

@@ -1,4 +1,4 @@
-"""Examples of the documentation, as a reader copies them from the page."""
+"""Code examples of the documentation pages."""
 
 from __future__ import annotations
 

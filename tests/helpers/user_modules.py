@@ -1,4 +1,4 @@
-"""Modules that a test writes, imported as a user's are."""
+"""Import of modules that a test writes, as a user does."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from types import ModuleType
 
 @contextmanager
 def imported(folder: Path, name: str) -> Iterator[ModuleType]:
-    """Import a module from a folder of the user's, for a while."""
+    """Import a module from a folder; forget the module and the folder at the end."""
     sys.path.insert(0, str(folder))
     try:
         yield importlib.import_module(name)
