@@ -1,4 +1,4 @@
-"""Depth clamps: what each one is, and a further one that a user registers."""
+"""Depth clamps: properties of the shipped clamps, and a user-defined clamp."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def upward() -> Iterator[Clamp]:
     del CLAMPS[UPWARD.name]
 
 
-def test_what_the_clamps_are() -> None:
+def test_properties_of_the_shipped_clamps() -> None:
     assert list(CLAMPS.values()) == [NONE, WHOLE, LATERAL, BACKED]
     assert [str(clamp) for clamp in CLAMPS.values()] == list(CLAMPS)
     assert [clamp.changes_force for clamp in CLAMPS.values()] == [False, True, True, True]
@@ -31,14 +31,14 @@ def test_what_the_clamps_are() -> None:
     assert [clamp.has_backing_wall for clamp in CLAMPS.values()] == [False, False, False, True]
 
 
-def test_an_unknown_clamp_is_refused_with_the_names_of_all() -> None:
+def test_error_for_an_unknown_clamp_lists_all_names() -> None:
     with pytest.raises(ParameterError, match="must be one of none, whole, lateral, backed"):
         find_clamp("upward")
     with pytest.raises(ParameterError, match="must be one of none, whole, lateral, backed"):
         asp.Surface(WAVE, clamp="upward")
 
 
-def test_a_name_is_taken_once(upward: Clamp) -> None:
+def test_registering_an_existing_name_is_refused(upward: Clamp) -> None:
     assert register_clamp(upward) is upward
     with pytest.raises(LawError, match="a clamp 'upward' already"):
         register_clamp(Clamp("upward", "another one"))
@@ -51,8 +51,8 @@ def probes(count: int = 200) -> np.ndarray:
     return np.column_stack([xy, WAVE.height(xy) - depth])
 
 
-def test_a_registered_clamp_renders_its_force_and_jacobian(upward: Clamp) -> None:
-    """The vertical force is that at max_depth, the lateral one that of the law."""
+def test_registered_clamp_renders_its_force_and_jacobian(upward: Clamp) -> None:
+    """The vertical force is that at max_depth, the lateral force that of the law."""
     plain = asp.Surface(WAVE, "B", max_depth=DEPTH)
     surface, whole = (
         asp.Surface(WAVE, "B", max_depth=DEPTH, clamp=name) for name in (upward.name, "whole")
@@ -67,7 +67,7 @@ def test_a_registered_clamp_renders_its_force_and_jacobian(upward: Clamp) -> Non
     assert np.abs(force - plain.force(p)).max() > 0.1
 
 
-def test_a_registered_clamp_gets_its_facts_and_numbers(upward: Clamp) -> None:
+def test_registered_clamp_has_facts_and_a_characteristic_number(upward: Clamp) -> None:
     surface = asp.Surface(WAVE, "C", max_depth=DEPTH, clamp=upward.name)
     assert not surface.facts.conservative
     assert "below max_depth the upward clamp gives the force a curl" in surface.facts.reason

@@ -1,7 +1,7 @@
 """Structure of the package: imports, seams, sizes and names.
 
-A seam is a place where a newcomer adds one thing in one folder. It works only while no other folder
-tests for a texture kind, contact, clamp or law. Each counter is tested on a short source.
+A seam is a place where a contributor adds one thing in one folder. It works only while no other
+folder tests for a texture kind, contact, clamp or law. Each checker is tested on a short source.
 """
 
 from __future__ import annotations
@@ -22,68 +22,73 @@ CLAMPS = {"none", "whole", "lateral", "backed"}
 
 
 @cache
-def parsed(text: str) -> ast.Module:
+def parse(text: str) -> ast.Module:
     return ast.parse(text)
 
 
 @lru_cache(maxsize=1)
-def modules() -> dict[str, str]:
+def read_modules() -> dict[str, str]:
     """Return the text of every module of the package by its dotted name."""
-    found = {}
+    texts = {}
     for path in SOURCE.rglob("*.py"):
         parts = path.relative_to(SOURCE).with_suffix("").parts
         name = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
-        found[name] = path.read_text(encoding="utf-8")
-    return found
+        texts[name] = path.read_text(encoding="utf-8")
+    return texts
 
 
-def rooms_but(*rooms: str) -> dict[str, str]:
-    """Return the modules outside these rooms."""
-    inside = tuple(f"asperity.{room}." for room in rooms)
-    return {name: text for name, text in modules().items() if not f"{name}.".startswith(inside)}
+def modules_outside(*packages: str) -> dict[str, str]:
+    """Return the modules outside these packages."""
+    inside = tuple(f"asperity.{package}." for package in packages)
+    return {
+        name: text for name, text in read_modules().items() if not f"{name}.".startswith(inside)
+    }
 
 
-def found_in(texts: Mapping[str, str], counter: Callable[[str], list[int]]) -> list[str]:
-    """Return the places that a counter finds, "module:line"."""
-    return [f"{name}:{line}" for name, text in texts.items() for line in counter(text)]
+def find_places(texts: Mapping[str, str], checker: Callable[[str], list[int]]) -> list[str]:
+    """Return the places that a checker finds, "module:line"."""
+    return [f"{name}:{line}" for name, text in texts.items() for line in checker(text)]
 
 
-# --- import circles ------------------------------------------------------------------------------
+# --- import cycles -------------------------------------------------------------------------------
 
 
-def imported(text: str, names: Mapping[str, str]) -> Iterator[str]:
+def imported_modules(text: str, names: Mapping[str, str]) -> Iterator[str]:
     """Yield the modules that a module imports anywhere: at its top, in functions, for types."""
-    for node in ast.walk(parsed(text)):
+    for node in ast.walk(parse(text)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module is not None:
             for alias in node.names:
-                whole = f"{node.module}.{alias.name}"
-                yield whole if whole in names else node.module
+                full_name = f"{node.module}.{alias.name}"
+                yield full_name if full_name in names else node.module
 
 
-def import_circles(texts: Mapping[str, str]) -> list[str]:
-    """Return the modules from which imports lead back to themselves."""
-    graph = {name: {m for m in imported(text, texts) if m in texts} for name, text in texts.items()}
-    circles = []
+def import_cycles(texts: Mapping[str, str]) -> list[str]:
+    """Return the modules that import themselves through others."""
+    graph = {
+        name: {m for m in imported_modules(text, texts) if m in texts}
+        for name, text in texts.items()
+    }
+    cycles = []
     for name in sorted(graph):
         reached: set[str] = set()
-        waiting = list(graph[name])
-        while waiting:
-            here = waiting.pop()
-            if here not in reached:
-                reached.add(here)
-                waiting.extend(graph[here])
+        pending = list(graph[name])
+        while pending:
+            module = pending.pop()
+            if module not in reached:
+                reached.add(module)
+                pending.extend(graph[module])
         if name in reached:
-            circles.append(name)
-    return circles
+            cycles.append(name)
+    return cycles
 
 
 def hidden_imports(text: str) -> list[int]:
-    """Return the lines that import a module of the package by a string."""
+    """Return the lines that import a module of the package by its name in a string."""
     return [
         node.lineno
-        for node in ast.walk(parsed(text))
+        for node in ast.walk(parse(text))
         if isinstance(node, ast.Call)
         and ast.unparse(node.func).endswith(("import_module", "__import__"))
         and isinstance(node.args[0], ast.Constant)
@@ -91,120 +96,123 @@ def hidden_imports(text: str) -> list[int]:
     ]
 
 
-def test_hidden_imports_are_counted() -> None:
+def test_hidden_imports_are_detected() -> None:
     assert hidden_imports("import_module('asperity.report')\nimport_module('numba')") == [1]
 
 
-def test_no_import_hides_in_a_string() -> None:
-    assert found_in(modules(), hidden_imports) == []
+def test_package_has_no_hidden_imports() -> None:
+    assert find_places(read_modules(), hidden_imports) == []
 
 
-def test_no_imports_go_in_a_circle() -> None:
-    assert import_circles(modules()) == []
+def test_package_has_no_import_cycles() -> None:
+    assert import_cycles(read_modules()) == []
 
 
-def test_a_circle_inside_functions_is_found() -> None:
-    inside = {
+def test_import_cycles_inside_functions_are_detected() -> None:
+    texts = {
         "a": "def f():\n    from b import g\n",
         "b": "if TYPE_CHECKING:\n    import c.d\n",
         "c.d": "from c import e\n",
         "c.e": "import a\n",
     }
-    assert import_circles(inside) == ["a", "b", "c.d", "c.e"]
-    assert import_circles(inside | {"c.e": "import b_b\n"}) == []
+    assert import_cycles(texts) == ["a", "b", "c.d", "c.e"]
+    assert import_cycles(texts | {"c.e": "import b_b\n"}) == []
 
 
-# --- who asks for a kind, a contact, a law -------------------------------------------------------
+# --- checks for a kind, a contact, a clamp, a law ------------------------------------------------
 
 
-def kinds_of(*roots: str) -> set[str]:
-    """Return the names of the classes that derive from classes of these names."""
+def subclasses_of(*roots: str) -> set[str]:
+    """Return the names of the classes that are derived from the classes with these names."""
     bases = {
         node.name: {base.id for base in node.bases if isinstance(base, ast.Name)}
-        for text in modules().values()
-        for node in ast.walk(parsed(text))
+        for text in read_modules().values()
+        for node in ast.walk(parse(text))
         if isinstance(node, ast.ClassDef)
     }
-    kinds: set[str] = set()
-    while more := {name for name, above in bases.items() if above & (kinds | {*roots})} - kinds:
-        kinds |= more
-    return kinds
+    subclasses: set[str] = set()
+    while (
+        new_kinds := {name for name, parents in bases.items() if parents & (subclasses | {*roots})}
+        - subclasses
+    ):
+        subclasses |= new_kinds
+    return subclasses
 
 
 def names_in(node: ast.AST) -> set[str]:
-    """Return the names and the last parts of dotted names in an expression."""
-    inside = list(ast.walk(node))
-    found = {part.id for part in inside if isinstance(part, ast.Name)}
-    return found | {part.attr for part in inside if isinstance(part, ast.Attribute)}
+    """Return the names and attribute names in an expression."""
+    nodes = list(ast.walk(node))
+    names = {part.id for part in nodes if isinstance(part, ast.Name)}
+    return names | {part.attr for part in nodes if isinstance(part, ast.Attribute)}
 
 
-def asked_kinds(text: str, kinds: set[str]) -> list[int]:
-    """Return the lines that ask whether something is of one of these classes.
+def kind_checks(text: str, kinds: set[str]) -> list[int]:
+    """Return the lines that check whether an object is of one of these classes.
 
-    By ``isinstance``, by a comparison of its type or of the name of its class, or by a pattern.
+    A check is ``isinstance``, a comparison of the type or of the class name, or a pattern.
     """
     lines = []
-    for node in ast.walk(parsed(text)):
+    for node in ast.walk(parse(text)):
         if isinstance(node, ast.Call) and names_in(node.func) & {"isinstance", "issubclass"}:
-            asked = names_in(node.args[1]) & kinds
+            checked = names_in(node.args[1]) & kinds
         elif isinstance(node, ast.Compare):
             sides = [node.left, *node.comparators]
             types = any(names_in(side) & {"type", "__name__", "__class__"} for side in sides)
-            asked = (kinds & {*names_in(node), *constants_in(node)}) if types else set()
+            checked = (kinds & {*names_in(node), *strings_in(node)}) if types else set()
         elif isinstance(node, ast.MatchClass):
-            asked = names_in(node.cls) & kinds
+            checked = names_in(node.cls) & kinds
         else:
             continue
-        if asked:
+        if checked:
             lines.append(node.lineno)
     return lines
 
 
-def constants_in(node: ast.AST) -> set[str]:
-    """Return the texts in an expression."""
-    inside = (part.value for part in ast.walk(node) if isinstance(part, ast.Constant))
-    return {value for value in inside if isinstance(value, str)}
+def strings_in(node: ast.AST) -> set[str]:
+    """Return the string constants in an expression."""
+    values = (part.value for part in ast.walk(node) if isinstance(part, ast.Constant))
+    return {value for value in values if isinstance(value, str)}
 
 
-def asked_names(text: str, names: set[str], owners: set[str]) -> list[int]:
-    """Return the lines that compare with one of these names, or look up what belongs to it.
+def name_checks(text: str, names: set[str], owners: set[str]) -> list[int]:
+    """Return the lines that compare with one of these names or look up a value for it.
 
     Args:
         text: source.
-        names: that are compared with.
-        owners: words by which the other side is known, such as ``contact`` in ``law.contact.name``;
-            a comparison without one of them means something else.
+        names: names of contacts, clamps or laws.
+        owners: words that identify the other side, such as ``contact`` in ``law.contact.name``;
+            comparisons without one of them are ignored.
     """
     lines = []
-    for node in ast.walk(parsed(text)):
+    for node in ast.walk(parse(text)):
         if isinstance(node, ast.Compare):
             sides = [node.left, *node.comparators]
-            texts = set[str]().union(*(constants_in(side) for side in sides))
-            meant = any(text in names or (text and set(text) <= names) for text in texts)
-            known = any(names_in(side) & owners for side in sides)
+            texts = set[str]().union(*(strings_in(side) for side in sides))
+            has_name = any(text in names or (text and set(text) <= names) for text in texts)
+            has_owner = any(names_in(side) & owners for side in sides)
         elif isinstance(node, ast.Subscript):
             table = node.value
-            meant = isinstance(table, ast.Dict) and bool(constants_in(table) & names)
-            known = bool(names_in(node.slice) & owners)
+            has_name = isinstance(table, ast.Dict) and bool(strings_in(table) & names)
+            has_owner = bool(names_in(node.slice) & owners)
         elif isinstance(node, ast.MatchValue):
-            meant, known = bool(constants_in(node) & names), True
+            has_name, has_owner = bool(strings_in(node) & names), True
         else:
             continue
-        if meant and known:
+        if has_name and has_owner:
             lines.append(node.lineno)
     return lines
 
 
-def test_no_room_but_textures_asks_for_a_texture_kind() -> None:
-    kinds = kinds_of("Texture")
+def test_only_textures_checks_for_a_texture_kind() -> None:
+    kinds = subclasses_of("Texture")
     assert kinds >= {"Sinusoid", "Fourier", "Profile", "HeightMap", "Noise"}
-    assert found_in(rooms_but("textures"), lambda text: asked_kinds(text, kinds)) == []
+    assert find_places(modules_outside("textures"), lambda text: kind_checks(text, kinds)) == []
 
 
-def test_no_room_but_the_simulation_asks_for_a_plant_or_a_hand() -> None:
-    kinds = kinds_of("Plant", "Hand")
+def test_only_simulation_checks_for_a_plant_or_hand_model() -> None:
+    kinds = subclasses_of("Plant", "Hand")
     assert kinds >= {"Cartesian", "Pantograph", "SpringHand", "BandHand", "PrescribedHand"}
-    assert found_in(rooms_but("simulation"), lambda text: asked_kinds(text, kinds)) == []
+    assert find_places(modules_outside("simulation"), lambda text: kind_checks(text, kinds)) == []
 
 
 @pytest.mark.parametrize(
@@ -217,33 +225,33 @@ def test_no_room_but_the_simulation_asks_for_a_plant_or_a_hand() -> None:
         "match texture:\n    case Sinusoid(): ...",
     ],
 )
-def test_a_question_for_a_kind_is_counted(text: str) -> None:
-    assert len(asked_kinds(text, {"Sinusoid", "HeightMap"})) == 1
-    assert asked_kinds(text, {"Fourier"}) == []
+def test_check_for_a_texture_kind_is_detected(text: str) -> None:
+    assert len(kind_checks(text, {"Sinusoid", "HeightMap"})) == 1
+    assert kind_checks(text, {"Fourier"}) == []
 
 
-def test_making_a_texture_is_no_question() -> None:
-    assert asked_kinds("flat = Sinusoid(0.0, 1.0)\nisinstance(x, float)\n", {"Sinusoid"}) == []
+def test_creating_a_texture_is_not_a_check() -> None:
+    assert kind_checks("flat = Sinusoid(0.0, 1.0)\nisinstance(x, float)\n", {"Sinusoid"}) == []
 
 
-def asked_contacts(text: str) -> list[int]:
-    return asked_names(text, CONTACTS, {"contact", "contact_name"})
+def contact_checks(text: str) -> list[int]:
+    return name_checks(text, CONTACTS, {"contact", "contact_name"})
 
 
-def asked_clamps(text: str) -> list[int]:
-    return asked_names(text, CLAMPS, {"clamp", "effective_clamp", "clamp_name"})
+def clamp_checks(text: str) -> list[int]:
+    return name_checks(text, CLAMPS, {"clamp", "effective_clamp", "clamp_name"})
 
 
-def asked_letters(text: str) -> list[int]:
-    return asked_names(text, LETTERS, {"law", "letter", "laws", "letters", "LAWS", "find_law"})
+def letter_checks(text: str) -> list[int]:
+    return name_checks(text, LETTERS, {"law", "letter", "laws", "letters", "LAWS", "find_law"})
 
 
-def test_no_room_but_contacts_asks_for_a_contact() -> None:
-    assert found_in(rooms_but("contacts"), asked_contacts) == []
+def test_only_contacts_checks_for_a_contact() -> None:
+    assert find_places(modules_outside("contacts"), contact_checks) == []
 
 
-def test_no_room_but_clamps_and_the_paper_asks_for_a_clamp() -> None:
-    assert found_in(rooms_but("clamps", "paper"), asked_clamps) == []
+def test_only_clamps_and_paper_check_for_a_clamp() -> None:
+    assert find_places(modules_outside("clamps", "paper"), clamp_checks) == []
 
 
 @pytest.mark.parametrize(
@@ -255,13 +263,13 @@ def test_no_room_but_clamps_and_the_paper_asks_for_a_clamp() -> None:
         "depth = {'none': 1, 'whole': 2}[surface.clamp]",
     ],
 )
-def test_a_question_for_a_clamp_is_counted(text: str) -> None:
-    assert len(asked_clamps(text)) == 1
-    assert asked_clamps("if surface.effective_clamp.holds_whole_force: ...") == []
+def test_check_for_a_clamp_is_detected(text: str) -> None:
+    assert len(clamp_checks(text)) == 1
+    assert clamp_checks("if surface.effective_clamp.holds_whole_force: ...") == []
 
 
-def test_no_room_but_laws_and_the_paper_asks_for_a_letter() -> None:
-    assert found_in(rooms_but("laws", "paper"), asked_letters) == []
+def test_only_laws_and_paper_check_for_a_law() -> None:
+    assert find_places(modules_outside("laws", "paper"), letter_checks) == []
 
 
 @pytest.mark.parametrize(
@@ -274,9 +282,9 @@ def test_no_room_but_laws_and_the_paper_asks_for_a_letter() -> None:
         "match contact.name:\n    case 'split': ...",
     ],
 )
-def test_a_question_for_a_contact_is_counted(text: str) -> None:
-    assert len(asked_contacts(text)) == 1
-    assert asked_letters(text) == []
+def test_check_for_a_contact_is_detected(text: str) -> None:
+    assert len(contact_checks(text)) == 1
+    assert letter_checks(text) == []
 
 
 @pytest.mark.parametrize(
@@ -290,9 +298,9 @@ def test_a_question_for_a_contact_is_counted(text: str) -> None:
         "words = {'A': 'rough', 'B': 'smooth'}[law.letter]",
     ],
 )
-def test_a_question_for_a_letter_is_counted(text: str) -> None:
-    assert len(asked_letters(text)) == 1
-    assert asked_contacts(text) == []
+def test_check_for_a_law_is_detected(text: str) -> None:
+    assert len(letter_checks(text)) == 1
+    assert contact_checks(text) == []
 
 
 @pytest.mark.parametrize(
@@ -304,41 +312,41 @@ def test_a_question_for_a_letter_is_counted(text: str) -> None:
         "if unit == 'A': ...",
     ],
 )
-def test_other_questions_are_not_counted(text: str) -> None:
-    assert asked_contacts(text) == asked_letters(text) == []
+def test_other_comparisons_are_ignored(text: str) -> None:
+    assert contact_checks(text) == letter_checks(text) == []
 
 
 # --- size, annotations, documentation ------------------------------------------------------------
 
-LINES_AT_MOST = 39_500
+MAX_LINES = 39_500
 """Lines of code without docstrings, comments, blank lines and generated files."""
 
 
 def functions(text: str) -> list[ast.FunctionDef]:
-    return [node for node in ast.walk(parsed(text)) if isinstance(node, ast.FunctionDef)]
+    return [node for node in ast.walk(parse(text)) if isinstance(node, ast.FunctionDef)]
 
 
-def documented(node: ast.AST) -> bool:
+def is_documented(node: ast.AST) -> bool:
     kinds = (ast.FunctionDef, ast.ClassDef, ast.Module)
     return isinstance(node, kinds) and ast.get_docstring(node) is not None
 
 
 def lines_of_code(text: str) -> set[int]:
-    """Return the numbers of the lines that hold code: no docstring, no comment, no blank."""
+    """Return the numbers of the lines with code: no docstrings, comments or blank lines."""
     lines = {
         number
         for number, line in enumerate(text.splitlines(), start=1)
         if line.strip() and not line.strip().startswith("#")
     }
-    for node in ast.walk(parsed(text)):
-        if documented(node):
-            said = node.body[0]
-            lines -= set(range(said.lineno, said.end_lineno + 1))
+    for node in ast.walk(parse(text)):
+        if is_documented(node):
+            docstring = node.body[0]
+            lines -= set(range(docstring.lineno, docstring.end_lineno + 1))
     return lines
 
 
 def body_lengths(text: str) -> list[int]:
-    """Return the lines of code in the body of each function."""
+    """Return the number of lines of code in the body of each function."""
     code = lines_of_code(text)
     return [
         len(code & set(range(node.body[0].lineno, (node.end_lineno or 0) + 1)))
@@ -346,55 +354,65 @@ def body_lengths(text: str) -> list[int]:
     ]
 
 
-def not_annotated(text: str) -> list[int]:
-    """Return the lines of functions of which an argument or the result has no type."""
+def missing_annotations(text: str) -> list[int]:
+    """Return the lines of functions with an argument or a result without a type."""
     lines = []
     for node in functions(text):
-        given = node.args
-        arguments = [*given.posonlyargs, *given.args, *given.kwonlyargs, given.vararg, given.kwarg]
-        bare = [a for a in arguments if a is not None and a.annotation is None]
-        if node.returns is None or any(a.arg not in {"self", "cls"} for a in bare):
+        signature = node.args
+        arguments = [
+            *signature.posonlyargs,
+            *signature.args,
+            *signature.kwonlyargs,
+            signature.vararg,
+            signature.kwarg,
+        ]
+        unannotated = [a for a in arguments if a is not None and a.annotation is None]
+        if node.returns is None or any(a.arg not in {"self", "cls"} for a in unannotated):
             lines.append(node.lineno)
     return lines
 
 
-def not_documented(text: str) -> list[int]:
-    """Return the lines of modules, public classes and their public functions without words."""
-    tree = parsed(text)
-    lines = [] if documented(tree) else [1]
-    waiting: list[ast.stmt] = list(tree.body)
-    for node in waiting:
+def missing_docstrings(text: str) -> list[int]:
+    """Return the lines of modules, public classes and public functions without a docstring."""
+    tree = parse(text)
+    lines = [] if is_documented(tree) else [1]
+    pending: list[ast.stmt] = list(tree.body)
+    for node in pending:
         if isinstance(node, (ast.ClassDef, ast.FunctionDef)) and not node.name.startswith("_"):
-            if not documented(node) and "overload" not in names_in(ast.List(node.decorator_list)):
+            if not is_documented(node) and "overload" not in names_in(
+                ast.List(node.decorator_list)
+            ):
                 lines.append(node.lineno)
-            waiting.extend(node.body if isinstance(node, ast.ClassDef) else [])
+            pending.extend(node.body if isinstance(node, ast.ClassDef) else [])
     return lines
 
 
-def written() -> dict[str, str]:
-    """Return the modules that people write."""
-    return rooms_but("derive.generated")
+def handwritten_modules() -> dict[str, str]:
+    """Return the modules that are not generated."""
+    return modules_outside("derive.generated")
 
 
-def test_the_code_does_not_grow_unnoticed() -> None:
+def test_package_has_at_most_the_maximum_lines_of_code() -> None:
     stub = (SOURCE / "asperity" / "__init__.pyi").read_text(encoding="utf-8")
-    lines = sum(len(lines_of_code(text)) for text in [stub, *written().values()])
-    assert lines <= LINES_AT_MOST
+    lines = sum(len(lines_of_code(text)) for text in [stub, *handwritten_modules().values()])
+    assert lines <= MAX_LINES
 
 
 def test_functions_are_short() -> None:
-    lengths = sorted(length for text in written().values() for length in body_lengths(text))
+    lengths = sorted(
+        length for text in handwritten_modules().values() for length in body_lengths(text)
+    )
     assert statistics.median(lengths) <= 5
     assert lengths[int(0.9 * len(lengths))] <= 16
     assert lengths[-1] <= 45
 
 
 def test_every_function_is_annotated_and_documented() -> None:
-    assert found_in(written(), not_annotated) == []
-    assert found_in(written(), not_documented) == []
+    assert find_places(handwritten_modules(), missing_annotations) == []
+    assert find_places(handwritten_modules(), missing_docstrings) == []
 
 
-SHORT = '''
+EXAMPLE = '''
 """A module."""
 
 # A comment.
@@ -416,21 +434,21 @@ def _own(): ...
 '''
 
 
-def test_lines_of_code_are_counted() -> None:
-    assert len(lines_of_code(SHORT)) == 7
-    assert sorted(body_lengths(SHORT)) == [1, 1, 2]
-    assert sorted(not_annotated(SHORT)) == [15, 19]
-    assert not_documented(SHORT) == [15]
-    assert not_documented("x = 1") == [1]
+def test_lines_and_missing_docstrings_of_an_example_are_counted() -> None:
+    assert len(lines_of_code(EXAMPLE)) == 7
+    assert sorted(body_lengths(EXAMPLE)) == [1, 1, 2]
+    assert sorted(missing_annotations(EXAMPLE)) == [15, 19]
+    assert missing_docstrings(EXAMPLE) == [15]
+    assert missing_docstrings("x = 1") == [1]
 
 
-# --- one name, one thing; rooms of a size worth entering -----------------------------------------
+# --- unique names, and numbers of files in packages ----------------------------------------------
 
 
 MAX_FILES = 15
 
 
-def repeated(names: Iterator[str]) -> list[str]:
+def repeated_names(names: Iterator[str]) -> list[str]:
     """Return the names that occur more than once."""
     return sorted(name for name, count in Counter(names).items() if count > 1)
 
@@ -438,35 +456,35 @@ def repeated(names: Iterator[str]) -> list[str]:
 def public_classes(texts: Mapping[str, str]) -> Iterator[str]:
     """Yield the names of the public classes."""
     for text in texts.values():
-        for node in ast.walk(parsed(text)):
+        for node in ast.walk(parse(text)):
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 yield node.name
 
 
 def file_names(texts: Mapping[str, str]) -> Iterator[str]:
-    """Yield the last parts of the modules' names, packages apart."""
+    """Yield the names of the modules without those of their packages."""
     packages = {name.rpartition(".")[0] for name in texts}
     yield from (name.rpartition(".")[2] for name in texts if name not in packages)
 
 
-def wide_rooms(texts: Mapping[str, str]) -> dict[str, int]:
+def large_packages(texts: Mapping[str, str]) -> dict[str, int]:
     """Return the packages with too many files, ``__init__.py`` counted."""
     packages = {name.rpartition(".")[0] for name in texts}
-    rooms = Counter(name if name in packages else name.rpartition(".")[0] for name in texts)
-    return {room: count for room, count in rooms.items() if count > MAX_FILES}
+    counts = Counter(name if name in packages else name.rpartition(".")[0] for name in texts)
+    return {package: count for package, count in counts.items() if count > MAX_FILES}
 
 
-def test_a_name_stands_for_one_thing() -> None:
-    assert repeated(public_classes(written())) == []
-    assert repeated(file_names(written())) == []
+def test_class_and_module_names_are_unique() -> None:
+    assert repeated_names(public_classes(handwritten_modules())) == []
+    assert repeated_names(file_names(handwritten_modules())) == []
 
 
-def test_rooms_have_at_most_fifteen_files() -> None:
-    assert wide_rooms(written()) == {}
+def test_packages_have_at_most_15_files() -> None:
+    assert large_packages(handwritten_modules()) == {}
 
 
-def test_repeated_names_and_wide_rooms_are_found() -> None:
+def test_repeated_names_and_large_packages_are_detected() -> None:
     texts = {"a": "", "a.b": "class X: ...", "a.c": "class X: ...\nclass _Y: ...", "d.b": ""}
-    assert repeated(public_classes(texts)) == ["X"]
-    assert repeated(file_names(texts)) == ["b"]
-    assert wide_rooms({f"a.m{i}": "" for i in range(16)}) == {"a": 16}
+    assert repeated_names(public_classes(texts)) == ["X"]
+    assert repeated_names(file_names(texts)) == ["b"]
+    assert large_packages({f"a.m{i}": "" for i in range(16)}) == {"a": 16}

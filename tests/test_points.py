@@ -1,4 +1,4 @@
-"""Whatever takes points takes one by itself, and answers as for the only row of an array."""
+"""Functions of points accept a single point and return the row of a one-row array."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ def surface(law: str) -> asp.Surface:
     return asp.Surface(STEEP, law)
 
 
-def table() -> asp.BakedField:
+def baked_field() -> asp.BakedField:
     return asp.bake(surface("H"), resolution=40e-6)
 
 
-TAKERS: dict[str, tuple[Callable[[], Callable[[Any], Any]], tuple[float, ...]]] = {
+FUNCTIONS: dict[str, tuple[Callable[[], Callable[[Any], Any]], tuple[float, ...]]] = {
     "height": (lambda: STEEP.height, PLACE),
     "gradient": (lambda: STEEP.gradient, PLACE),
     "hessian": (lambda: STEEP.hessian, PLACE),
@@ -32,9 +32,9 @@ TAKERS: dict[str, tuple[Callable[[], Callable[[Any], Any]], tuple[float, ...]]] 
     **{f"force {law}": (lambda law=law: surface(law).force, PROBE) for law in "WABCDEFGH"},
     **{f"jacobian {law}": (lambda law=law: surface(law).jacobian, PROBE) for law in "BF"},
     "force_and_jacobian": (lambda: surface("C").force_and_jacobian, PROBE),
-    "table force": (lambda: table().force, PROBE),
-    "table potential": (lambda: table().potential, PROBE),
-    "table jacobian": (lambda: table().jacobian, PROBE),
+    "table force": (lambda: baked_field().force, PROBE),
+    "table potential": (lambda: baked_field().potential, PROBE),
+    "table jacobian": (lambda: baked_field().jacobian, PROBE),
     "split_state": (lambda: lambda at: parts(asp.split_state(surface("H"), at)), PROBE),
     "beyond": (lambda: asp.pop_through(surface("H"), 2e-3).beyond, PROBE),
 }
@@ -44,57 +44,57 @@ def parts(state: asp.SplitState) -> tuple[Any, ...]:
     return state.potential, state.atoms, state.gap
 
 
-def together(answer: Any) -> tuple[Any, ...]:
-    return answer if isinstance(answer, tuple) else (answer,)
+def as_tuple(result: Any) -> tuple[Any, ...]:
+    return result if isinstance(result, tuple) else (result,)
 
 
-@pytest.mark.parametrize("name", TAKERS)
-def test_one_point_is_the_only_row(name: str) -> None:
-    made, point = TAKERS[name]
-    takes = made()
-    rows, alone = together(takes([point])), together(takes(point))
-    for row, own in zip(rows, alone, strict=True):
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_single_point_equals_a_one_row_array(name: str) -> None:
+    get_function, point = FUNCTIONS[name]
+    function = get_function()
+    rows, single = as_tuple(function([point])), as_tuple(function(point))
+    for row, value in zip(rows, single, strict=True):
         assert row.shape[0] == 1
-        assert own.shape == row.shape[1:]
-        assert np.array_equal(own, row[0])
-        assert own.ndim or float(own) == float(row[0])  # a number, no array
-        assert own.ndim or not isinstance(own, np.ndarray)
-    assert any(np.any(own != 0) for own in alone) or name == "beyond"
+        assert value.shape == row.shape[1:]
+        assert np.array_equal(value, row[0])
+        assert value.ndim or float(value) == float(row[0])  # a number, no array
+        assert value.ndim or not isinstance(value, np.ndarray)
+    assert any(np.any(value != 0) for value in single) or name == "beyond"
 
 
-@pytest.mark.parametrize("name", TAKERS)
+@pytest.mark.parametrize("name", FUNCTIONS)
 def test_no_points_give_empty_results(name: str) -> None:
-    made, point = TAKERS[name]
-    for answer in together(made()(np.empty((0, len(point))))):
-        assert len(answer) == 0
+    get_function, point = FUNCTIONS[name]
+    for result in as_tuple(get_function()(np.empty((0, len(point))))):
+        assert len(result) == 0
 
 
-@pytest.mark.parametrize("name", TAKERS)
+@pytest.mark.parametrize("name", FUNCTIONS)
 @pytest.mark.parametrize(
     "wrong", [lambda p: [[p]], lambda p: p[:-1], lambda p: (*p, 0.0), lambda _: []]
 )
-def test_errors_name_both_shapes(name: str, wrong: Callable[[Any], Any]) -> None:
-    made, point = TAKERS[name]
+def test_error_for_a_wrong_shape_names_both_shapes(name: str, wrong: Callable[[Any], Any]) -> None:
+    get_function, point = FUNCTIONS[name]
     width = len(point)
     message = rf"must have shape \(n, {width}\), or \({width},\) for one point \[m\]"
     with pytest.raises(asp.ParameterError, match=message):
-        made()(wrong(point))
+        get_function()(wrong(point))
 
 
-def test_the_state_beside_one_point_has_no_first_axis_either() -> None:
+def test_state_of_a_single_point_has_no_first_axis() -> None:
     law_f = surface("F")
-    many, matrices = law_f.force_and_jacobian([PROBE], [PULLED], [True])
-    one, matrix = law_f.force_and_jacobian(PROBE, PULLED, True)
-    assert np.array_equal(one, many[0])
+    forces, matrices = law_f.force_and_jacobian([PROBE], [PULLED], [True])
+    force, matrix = law_f.force_and_jacobian(PROBE, PULLED, True)
+    assert np.array_equal(force, forces[0])
     assert np.array_equal(matrix, matrices[0])
     assert np.array_equal(law_f.jacobian(PROBE, PULLED, np.True_), matrices[0])
     assert np.array_equal(law_f.force(PROBE, PULLED), law_f.force([PROBE], [PULLED])[0])
-    still = law_f.jacobian(PROBE, PULLED, False)
-    assert not np.array_equal(still, matrix)
-    assert not np.array_equal(law_f.force(PROBE), one)
+    sticking = law_f.jacobian(PROBE, PULLED, False)
+    assert not np.array_equal(sticking, matrix)
+    assert not np.array_equal(law_f.force(PROBE), force)
 
 
-def test_a_state_of_another_shape_is_an_error() -> None:
+def test_state_of_a_wrong_shape_is_refused() -> None:
     law_f = surface("F")
     with pytest.raises(asp.ParameterError, match=r"deflection must have shape \(2,\) \[m\]"):
         law_f.force(PROBE, [PULLED])
@@ -108,12 +108,12 @@ def test_a_state_of_another_shape_is_an_error() -> None:
         law_f.force(PROBE, (1.0, 0.0))
 
 
-def test_the_error_names_the_point_that_is_not_finite() -> None:
+def test_error_names_the_coordinate_that_is_not_finite() -> None:
     with pytest.raises(asp.ParameterError, match=r"must be finite \[m\]; the value at \[0, 2\]"):
         surface("C").force((0.0, 0.0, np.nan))
 
 
-def test_paths_and_polygons_stay_rows() -> None:
+def test_paths_and_polygons_must_be_arrays_of_rows() -> None:
     with pytest.raises(asp.ParameterError, match=r"path must have shape \(n, 3\) \[m\]"):
         surface("C").trace(PROBE)
     with pytest.raises(asp.ParameterError, match=r"vertices must have shape \(n, 3\) \[m\]"):
@@ -123,7 +123,7 @@ def test_paths_and_polygons_stay_rows() -> None:
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 @pytest.mark.parametrize("place", range(3))
 @pytest.mark.parametrize("form", [list, np.array, lambda row: np.array([row])])
-def test_one_point_that_is_not_finite_is_refused(
+def test_single_point_that_is_not_finite_is_refused(
     bad: float, place: int, form: Callable[[list[float]], Any]
 ) -> None:
     row = list(PROBE)
@@ -132,7 +132,7 @@ def test_one_point_that_is_not_finite_is_refused(
         surface("C").force(form(row))
 
 
-def test_infinities_that_cancel_are_an_error() -> None:
+def test_infinities_that_cancel_are_refused() -> None:
     with pytest.raises(asp.ParameterError, match="finite"):
         surface("C").force(np.array([np.inf, -np.inf, 0.0]))
 

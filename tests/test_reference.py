@@ -1,4 +1,4 @@
-"""The living definition, and the kernels against it."""
+"""The multi-precision reference, and the kernels against it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Check = Callable[..., Any]
 LETTERS = "WABCDEFG"
 ORDERS = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]
 
-# --- the definition itself ------------------------------------------------------------------------
+# --- the reference itself -------------------------------------------------------------------------
 
 
 def exact_derivatives(texture: Texture, xy: np.ndarray) -> np.ndarray:
@@ -29,8 +29,8 @@ def exact_derivatives(texture: Texture, xy: np.ndarray) -> np.ndarray:
         )
 
 
-def test_heights_are_those_of_the_sampler(texture: Texture, scatter: Check):
-    """Value, slopes and Hessian, also beyond the border of a map."""
+def test_exact_height_equals_the_sampler(texture: Texture, scatter: Check):
+    """Values, slopes and Hessians are compared, also beyond the border of a map."""
     xy = scatter(texture, 12, seed=1, stretch=3.0)
     exact = exact_derivatives(texture, xy)
     slope, second = texture.bounds
@@ -39,7 +39,7 @@ def test_heights_are_those_of_the_sampler(texture: Texture, scatter: Check):
 
 
 @pytest.mark.parametrize("texture", ["map", "periodic map", "profile"], indirect=True)
-def test_splines_are_those_of_scipy(texture: HeightMap | Profile, scatter: Check):
+def test_splines_equal_those_of_scipy(texture: HeightMap | Profile, scatter: Check):
     xy = scatter(texture, 25, seed=2, stretch=3.0)
     u = (xy - texture.domain.origin) / np.broadcast_to(texture.pitch, (2,))
     nodes = [u[:, 0]] if texture.is_profile else [u[:, 1], u[:, 0]]
@@ -50,7 +50,7 @@ def test_splines_are_those_of_scipy(texture: HeightMap | Profile, scatter: Check
 
 
 @pytest.mark.parametrize("order", ORDERS[1:])
-def test_derivatives_are_those_of_the_height(texture: Texture, order: tuple[int, int]):
+def test_exact_derivatives_equal_numerical_ones(texture: Texture, order: tuple[int, int]):
     h = texture.exact_height()
     point = (mpmath.mpf("1.3137e-4"), mpmath.mpf("2.7193e-4"))
     with mpmath.workdps(40):
@@ -59,8 +59,8 @@ def test_derivatives_are_those_of_the_height(texture: Texture, order: tuple[int,
         assert abs(h(*point, *order) - numeric) < 1e-8 * bound
 
 
-def test_a_kind_without_a_formula_is_continued_between_doubles(texture: Texture):
-    """Values and slopes are consistent: a difference over 1e-25 m is the slope."""
+def test_default_exact_height_is_consistent_between_doubles(texture: Texture):
+    """A difference of values over 1e-25 m equals the slope."""
     h, formula = Texture.exact_height(texture), texture.exact_height()
     scale = (texture.peak_to_valley, *texture.bounds)
     with mpmath.workdps(60):
@@ -86,7 +86,7 @@ def sampled_wave(count: int, rows: int) -> tuple[Texture, Sinusoid]:
 
 
 @pytest.mark.parametrize("rows", [1, 2], ids=["profile", "map"])
-def test_the_spline_converges_with_orders_four_three_and_two(rows: int):
+def test_spline_converges_with_orders_four_three_and_two(rows: int):
     xy = np.random.default_rng(3).random((4000, 2))
     errors = []
     for count in (96, 192):
@@ -103,24 +103,27 @@ def test_more_digits_give_the_same_force():
     surface = Surface(Sinusoid(0.4e-3, 1.5e-3, phase=0.7, direction=(2.0, 1.0)), "D")
     point = (1e-4, 3e-4, -0.5e-3)
     for exact in (exact_force, exact_jacobian):
-        few, many = exact(surface, point, digits=20), exact(surface, point, digits=50)
+        low_precision, high_precision = (
+            exact(surface, point, digits=20),
+            exact(surface, point, digits=50),
+        )
         with mpmath.workdps(60):
-            assert mpmath.norm(few - many) < 1e-19 * mpmath.norm(many)
+            assert mpmath.norm(low_precision - high_precision) < 1e-19 * mpmath.norm(high_precision)
 
 
-def test_outside_there_is_no_force():
+def test_force_is_zero_outside():
     surface = Surface(Sinusoid(0.4e-3, 1.5e-3), "B")
     assert exact_force(surface, (0.0, 0.0, 1e-9)) == mpmath.matrix([0, 0, 0])
     assert exact_jacobian(surface, (0.0, 0.0, 1e-9)) == mpmath.zeros(3, 3)
 
 
-# --- kernels against the definition ---------------------------------------------------------------
+# --- kernels against the reference ----------------------------------------------------------------
 
 
-def agrees(
+def assert_equals_reference(
     surface: Surface, points: np.ndarray, deflection: Any = None, sliding: bool = False
 ) -> None:
-    """Hold force to 1e-10 of k·max(|h|, |z|), Jacobian to 1e-9 of its norm."""
+    """Assert a force error below 1e-10 k·max(|h|, |z|), a Jacobian error below 1e-9 of its norm."""
     state: dict[str, Any] = {}
     if deflection is not None:
         state = {"deflection": deflection}
@@ -150,11 +153,9 @@ def generic_probes(texture: Texture, inside: Check, count: int, seed: int) -> np
 
 
 @pytest.mark.parametrize("letter", "WABCG")
-def test_every_explicit_law_on_every_texture(
-    letter: str, texture: Texture, inside: Check, plain: Check
-):
+def test_explicit_laws_on_every_texture(letter: str, texture: Texture, inside: Check, plain: Check):
     surface = plain(Surface(texture, letter, stiffness=700.0))
-    agrees(surface, generic_probes(texture, inside, 4, seed=31))
+    assert_equals_reference(surface, generic_probes(texture, inside, 4, seed=31))
 
 
 @pytest.mark.parametrize("letter", "DE")
@@ -171,12 +172,14 @@ def test_every_explicit_law_on_every_texture(
     ],
     indirect=True,
 )
-def test_every_god_object_on_every_kind(letter: str, texture: Texture, inside: Check, plain: Check):
+def test_god_object_laws_on_every_texture_kind(
+    letter: str, texture: Texture, inside: Check, plain: Check
+):
     surface = plain(Surface(texture, letter, stiffness=700.0))
-    agrees(surface, generic_probes(texture, inside, 4, seed=31))
+    assert_equals_reference(surface, generic_probes(texture, inside, 4, seed=31))
 
 
-# Where the kernels are compiled: every law and every kind at least once.
+# Combinations with compiled kernels: every law and every kind at least once.
 COMPILED = [
     *(("steep sinusoid", letter) for letter in "WACEG"),
     ("fourier", "B"),
@@ -188,9 +191,13 @@ COMPILED = [
 
 
 @pytest.mark.parametrize(("name", "letter"), COMPILED)
-def test_compiled_laws(name: str, letter: str, make_texture: Check, inside: Check):
+def test_compiled_laws_equal_the_reference(
+    name: str, letter: str, make_texture: Check, inside: Check
+):
     texture = make_texture(name)
-    agrees(Surface(texture, letter, stiffness=700.0), generic_probes(texture, inside, 5, seed=32))
+    assert_equals_reference(
+        Surface(texture, letter, stiffness=700.0), generic_probes(texture, inside, 5, seed=32)
+    )
 
 
 @pytest.mark.parametrize("sliding", [False, True], ids=["sticking", "sliding"])
@@ -201,32 +208,34 @@ def test_friction_on_every_texture(texture: Texture, sliding: bool, inside: Chec
     turn = rng.uniform(0.0, 2.0 * np.pi, 4)
     length = 0.8e-3 * (1.0 if sliding else rng.random(4))
     deflection = (length * np.array([np.cos(turn), np.sin(turn)])).T
-    agrees(plain(surface), points, deflection, sliding)
+    assert_equals_reference(plain(surface), points, deflection, sliding)
 
 
-def test_compiled_friction(make_texture: Check, inside: Check):
+def test_compiled_friction_equals_the_reference(make_texture: Check, inside: Check):
     texture = make_texture("fourier")
     deflection = np.array([[0.2e-3, -0.3e-3], [-0.6e-3, 0.8e-3], [0.0, 0.0]])
     for sliding in (False, True):
-        agrees(Surface(texture, "F"), inside(texture, 3, 35, 1e-3), deflection, sliding)
+        assert_equals_reference(
+            Surface(texture, "F"), inside(texture, 3, 35, 1e-3), deflection, sliding
+        )
 
 
 @pytest.mark.parametrize("letter", "ABCDEG")
-def test_on_a_nearly_vertical_flank(letter: str, make_texture: Check, plain: Check):
-    """Amplitude three times the period: the slope reaches 18.8."""
+def test_laws_on_a_nearly_vertical_flank(letter: str, make_texture: Check, plain: Check):
+    """The amplitude is three times the period, and the slope reaches 18.8."""
     texture = make_texture("steep sinusoid")
     along = np.array([[-0.3 / (2 * np.pi) + offset] for offset in (0.0, 0.5, 0.013)])
     xy = texture.domain.points(along)
     assert np.hypot(*texture.gradient(xy[:1])[0]) == pytest.approx(6 * np.pi, rel=1e-9)
     depth = np.array([1e-6, 0.2e-3, 1.5e-3])
     points = np.column_stack([xy, np.minimum(texture.height(xy), 0.0) - depth])
-    agrees(plain(Surface(texture, letter)), points)
+    assert_equals_reference(plain(Surface(texture, letter)), points)
 
 
 # --- the god-object near the medial axis ----------------------------------------------------------
 
 
-def below_a_crest(
+def probe_below_a_crest(
     texture: Texture, crest: np.ndarray, left: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the probe whose closest point is the crest, where 1 + δκ = left, and the crest."""
@@ -240,7 +249,7 @@ def below_a_crest(
     return closest - (1.0 - left) / -sharpest * n, closest
 
 
-def beside_the_crest(texture: Sinusoid, angle: float) -> np.ndarray:
+def point_near_the_crest(texture: Sinusoid, angle: float) -> np.ndarray:
     """Return the point of the plane at a phase angle from the crest."""
     turns = (np.pi / 2 - texture.phase + angle) / (2 * np.pi)
     return np.asarray(texture.domain.points(np.array([[turns]]))[0])
@@ -257,26 +266,26 @@ def beside_the_crest(texture: Sinusoid, angle: float) -> np.ndarray:
         ("steep sinusoid", -1e-3, 0.01),
     ],
 )
-def test_just_above_the_focal_point_of_a_crest(
+def test_god_object_just_above_the_focal_point_of_a_crest(
     letter: str, name: str, angle: float, left: float, make_texture: Check
 ):
     texture = make_texture(name)
-    probe, closest = below_a_crest(texture, beside_the_crest(texture, angle), left)
+    probe, closest = probe_below_a_crest(texture, point_near_the_crest(texture, angle), left)
     np.testing.assert_allclose(texture.nearest([probe])[0], closest, rtol=0, atol=1e-13)
     surface = Surface(texture, letter)
-    agrees(surface, probe[None, :])
+    assert_equals_reference(surface, probe[None, :])
     norm = np.linalg.norm(surface.jacobian([probe])[0], 2) / surface.stiffness
     assert norm == pytest.approx(1.0 if letter == "E" else max(1.0, (1.0 - left) / left), rel=1e-6)
 
 
 @pytest.mark.parametrize("texture", ["fourier", "map", "periodic map", "profile"], indirect=True)
-def test_near_the_focal_point_of_the_highest_crest(texture: Texture, plain: Check):
+def test_god_object_near_the_focal_point_of_the_highest_crest(texture: Texture, plain: Check):
     from scipy.optimize import minimize
 
     fractions = np.stack(np.meshgrid(*2 * [np.linspace(0, 1, 80)]), -1).reshape(-1, 2)
     xy = texture.domain.points(fractions[:, : len(texture.domain.spans)])
     start = xy[np.argmax(texture.height(xy))]
     top = minimize(lambda u: -texture.height([start + 1e-5 * u])[0] * 1e4, np.zeros(2))
-    probe, closest = below_a_crest(texture, start + 1e-5 * top.x + 1e-6, left=0.4)
+    probe, closest = probe_below_a_crest(texture, start + 1e-5 * top.x + 1e-6, left=0.4)
     np.testing.assert_allclose(texture.nearest([probe])[0], closest, rtol=0, atol=1e-12)
-    agrees(plain(Surface(texture, "D")), probe[None, :])
+    assert_equals_reference(plain(Surface(texture, "D")), probe[None, :])

@@ -1,4 +1,4 @@
-"""A surface: contact, defaults, force, Jacobian, clamp, state; and what it refuses."""
+"""Surfaces: contact, force, Jacobian, clamps and state, and invalid arguments."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ CLAMPS = ["none", "whole", "lateral", "backed"]
 
 
 @pytest.mark.parametrize("letter", LETTERS)
-def test_outside_the_force_is_exactly_zero(letter: str, wave: Sinusoid, scatter: Check):
+def test_force_is_exactly_zero_outside(letter: str, wave: Sinusoid, scatter: Check):
     xy = scatter(wave, 40, seed=1)
     zero = 0.0 * xy[:, 0] if letter in NOMINAL else wave.height(xy)
     surface = Surface(wave, letter)
@@ -36,7 +36,7 @@ def test_outside_the_force_is_exactly_zero(letter: str, wave: Sinusoid, scatter:
 
 
 @pytest.mark.parametrize("letter", LETTERS)
-def test_inside_there_is_a_force_from_the_first_nanometre(
+def test_force_is_nonzero_from_a_depth_of_one_nanometre(
     letter: str, wave: Sinusoid, scatter: Check
 ):
     xy = scatter(wave, 40, seed=2)
@@ -49,7 +49,7 @@ def test_inside_there_is_a_force_from_the_first_nanometre(
 
 
 @pytest.mark.parametrize("letter", NOMINAL)
-def test_a_nominal_law_does_not_depend_on_the_height(letter: str, wave: Sinusoid):
+def test_nominal_contact_does_not_depend_on_the_height(letter: str, wave: Sinusoid):
     crest = wave.domain.points(np.array([[0.25 - 0.7 / (2 * math.pi)]]))
     below_the_crest = np.column_stack([crest, [0.1e-3]])
     assert wave.height(crest)[0] == pytest.approx(0.4e-3)
@@ -60,8 +60,8 @@ def test_a_nominal_law_does_not_depend_on_the_height(letter: str, wave: Sinusoid
 # --- force and Jacobian ---------------------------------------------------------------------------
 
 
-def contact(surface: Surface, p: np.ndarray) -> dict[str, Any]:
-    """Return what the formulas by hand need of the contact of one probe in the body."""
+def contact_arguments(surface: Surface, p: np.ndarray) -> dict[str, Any]:
+    """Return the contact arguments of the explicit formulas for one probe inside."""
     texture = surface.texture
     xy = (
         texture.nearest(p[None, :])[:, :2] if surface.law.contact.name == "nearest" else p[None, :2]
@@ -82,10 +82,10 @@ def contact(surface: Surface, p: np.ndarray) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def force_of(surface: Surface, p: np.ndarray, d: np.ndarray, by_hand: Check) -> np.ndarray:
-    here = contact(surface, p)
-    here = {name: here[name] for name in ("k", "depth", "g", "m")}
-    return np.asarray(by_hand(surface.law.letter, **here, d=d, **STATE))
+def expected_force(surface: Surface, p: np.ndarray, d: np.ndarray, by_hand: Check) -> np.ndarray:
+    arguments = contact_arguments(surface, p)
+    arguments = {name: arguments[name] for name in ("k", "depth", "g", "m")}
+    return np.asarray(by_hand(surface.law.letter, **arguments, d=d, **STATE))
 
 
 def deflections(count: int, seed: int) -> np.ndarray:
@@ -95,49 +95,49 @@ def deflections(count: int, seed: int) -> np.ndarray:
     return np.column_stack([length * np.cos(turn), length * np.sin(turn)])
 
 
-def given_state(letter: str, deflection: np.ndarray) -> dict[str, Any]:
+def state_of(letter: str, deflection: np.ndarray) -> dict[str, Any]:
     return {"deflection": deflection} if letter == "F" else {}
 
 
 @pytest.mark.parametrize("texture", ["sinusoid", "fourier", "periodic map"], indirect=True)
 @pytest.mark.parametrize("letter", LETTERS)
-def test_the_force_is_the_formula(
+def test_force_equals_the_formula(
     letter: str, texture: Texture, inside: Check, plain: Check, force_by_hand: Check
 ):
     surface = plain(Surface(texture, letter, stiffness=650.0, modulation_depth=0.6, **STATE))
     points, d = inside(texture, 6, 3, 1e-3), deflections(6, 4)
-    forces = surface.force(points, **given_state(letter, d))
+    forces = surface.force(points, **state_of(letter, d))
     for i, p in enumerate(points):
-        expected = force_of(surface, p, d[i], force_by_hand)
+        expected = expected_force(surface, p, d[i], force_by_hand)
         assert np.abs(forces[i] - expected).max() <= 1e-12 * np.linalg.norm(expected)
 
 
 @pytest.mark.parametrize("texture", ["sinusoid", "fourier", "periodic map"], indirect=True)
 @pytest.mark.parametrize("letter", LETTERS)
-def test_the_jacobian_is_the_closed_form(
+def test_jacobian_equals_the_closed_form(
     letter: str, texture: Texture, inside: Check, plain: Check, jacobian_by_hand: Check
 ):
     surface = plain(Surface(texture, letter, stiffness=650.0, modulation_depth=0.6, **STATE))
     points, d = inside(texture, 6, 3, 1e-3), deflections(6, 4)
     for sliding in (False, True) if letter == "F" else (False,):
-        state = given_state(letter, d)
+        state = state_of(letter, d)
         if letter == "F":
             state["sliding"] = np.full(6, sliding)
         jacobians = surface.jacobian(points, **state)
         for i, p in enumerate(points):
-            here = contact(surface, p)
+            arguments = contact_arguments(surface, p)
             if letter == "F":
-                here |= {"d": d[i], "sliding": sliding, **STATE}
+                arguments |= {"d": d[i], "sliding": sliding, **STATE}
             else:
-                del here["m"], here["m_slope"]
-            expected = jacobian_by_hand(letter, **here)
+                del arguments["m"], arguments["m_slope"]
+            expected = jacobian_by_hand(letter, **arguments)
             error = np.abs(jacobians[i] - expected).max()
             assert error <= 1e-9 * np.linalg.norm(expected, 2)
 
 
 @pytest.mark.parametrize("texture", ["sinusoid", "fourier", "map"], indirect=True)
 @pytest.mark.parametrize("letter", LETTERS)
-def test_the_jacobian_is_the_derivative_of_the_force(
+def test_jacobian_equals_differences_of_the_force(
     letter: str, texture: Texture, inside: Check, plain: Check, differences: Check
 ):
     surface = plain(Surface(texture, letter, modulation_depth=0.6, **STATE))
@@ -145,15 +145,15 @@ def test_the_jacobian_is_the_derivative_of_the_force(
     anchor = points[:, :2] - d
 
     def force(moved: np.ndarray) -> np.ndarray:
-        return np.asarray(surface.force(moved, **given_state(letter, moved[:, :2] - anchor)))
+        return np.asarray(surface.force(moved, **state_of(letter, moved[:, :2] - anchor)))
 
-    jacobian = surface.jacobian(points, **given_state(letter, d))
+    jacobian = surface.jacobian(points, **state_of(letter, d))
     numeric = differences(force, points, step=3e-7)
     norms = np.linalg.norm(jacobian, 2, axis=(1, 2))
     assert (np.abs(numeric - jacobian).max(axis=(1, 2)) <= 2e-8 * norms).all()
 
 
-def test_a_sliding_anchor_is_differentiated_along_its_circle(wave: Sinusoid, differences: Check):
+def test_jacobian_of_a_sliding_anchor_follows_its_circle(wave: Sinusoid, differences: Check):
     surface = Surface(wave, "F", **STATE)
     points = np.array([[1e-4, 2e-4, -0.3e-3]])
     d = np.array([[0.48e-3, -0.64e-3]])
@@ -194,20 +194,22 @@ def test_force_and_jacobian_are_linear_in_the_stiffness(
 # --- clamps ---------------------------------------------------------------------------------------
 
 
-def clamped_by_hand(surface: Surface, p: np.ndarray, d: np.ndarray, by_hand: Check) -> np.ndarray:
-    here = contact(surface, p)
-    here = {name: here[name] for name in ("k", "depth", "g", "m")}
+def expected_clamped_force(
+    surface: Surface, p: np.ndarray, d: np.ndarray, by_hand: Check
+) -> np.ndarray:
+    arguments = contact_arguments(surface, p)
+    arguments = {name: arguments[name] for name in ("k", "depth", "g", "m")}
     letter, clamp = surface.law.letter, surface.clamp
-    free = by_hand(letter, **here, d=d, **STATE)
-    held = by_hand(letter, **(here | {"depth": min(here["depth"], D)}), d=d, **STATE)
+    free = by_hand(letter, **arguments, d=d, **STATE)
+    clamped = by_hand(letter, **(arguments | {"depth": min(arguments["depth"], D)}), d=d, **STATE)
     if clamp == "none":
         return np.asarray(free)
     if clamp == "lateral":
-        return np.array([held[0], held[1], free[2]])
+        return np.array([clamped[0], clamped[1], free[2]])
     if clamp == "backed":
         low = -D if letter in NOMINAL else surface.texture.extremes[0] - D
-        held = held + np.array([0.0, 0.0, surface.stiffness * max(low - p[2], 0.0)])
-    return np.asarray(held)
+        clamped = clamped + np.array([0.0, 0.0, surface.stiffness * max(low - p[2], 0.0)])
+    return np.asarray(clamped)
 
 
 def shallow_and_deep(texture: Texture, nominal: bool, scatter: Check) -> np.ndarray:
@@ -221,22 +223,22 @@ def shallow_and_deep(texture: Texture, nominal: bool, scatter: Check) -> np.ndar
 
 @pytest.mark.parametrize("clamp", CLAMPS)
 @pytest.mark.parametrize("letter", "ABCFG")
-def test_the_clamped_force_is_the_formula(
+def test_clamped_force_equals_the_formula(
     letter: str, clamp: Any, make_texture: Check, scatter: Check, plain: Check,
     force_by_hand: Check,
 ):  # fmt: skip
     texture = make_texture("fourier")
     surface = plain(Surface(texture, letter, max_depth=D, clamp=clamp, **STATE))
     points, d = shallow_and_deep(texture, letter in NOMINAL, scatter), deflections(9, 9)
-    forces = surface.force(points, **given_state(letter, d))
+    forces = surface.force(points, **state_of(letter, d))
     for i, p in enumerate(points):
-        expected = clamped_by_hand(surface, p, d[i], force_by_hand)
+        expected = expected_clamped_force(surface, p, d[i], force_by_hand)
         assert np.abs(forces[i] - expected).max() <= 1e-12 * np.linalg.norm(expected)
 
 
 @pytest.mark.parametrize("clamp", CLAMPS[1:])
 @pytest.mark.parametrize("letter", "ABCFG")
-def test_the_clamped_jacobian_is_the_derivative_of_the_force(
+def test_clamped_jacobian_equals_differences_of_the_force(
     letter: str, clamp: Any, make_texture: Check, scatter: Check, plain: Check, differences: Check
 ):
     texture = make_texture("fourier")
@@ -245,16 +247,18 @@ def test_the_clamped_jacobian_is_the_derivative_of_the_force(
     anchor = points[:, :2] - d
 
     def force(moved: np.ndarray) -> np.ndarray:
-        return np.asarray(surface.force(moved, **given_state(letter, moved[:, :2] - anchor)))
+        return np.asarray(surface.force(moved, **state_of(letter, moved[:, :2] - anchor)))
 
-    jacobian = surface.jacobian(points, **given_state(letter, d))
+    jacobian = surface.jacobian(points, **state_of(letter, d))
     error = np.abs(differences(force, points, step=3e-7) - jacobian).max(axis=(1, 2))
     assert (error <= 1e-8 * 1000.0).all()
 
 
 @pytest.mark.parametrize("clamp", CLAMPS[1:])
 @pytest.mark.parametrize("letter", "WDE")
-def test_a_bounded_law_is_never_clamped(letter: str, clamp: Any, wave: Sinusoid, scatter: Check):
+def test_clamp_has_no_effect_on_bounded_laws(
+    letter: str, clamp: Any, wave: Sinusoid, scatter: Check
+):
     points = shallow_and_deep(wave, letter in NOMINAL, scatter)
     free, clamped = Surface(wave, letter), Surface(wave, letter, max_depth=D, clamp=clamp)
     np.testing.assert_array_equal(clamped.force(points), free.force(points))
@@ -263,7 +267,7 @@ def test_a_bounded_law_is_never_clamped(letter: str, clamp: Any, wave: Sinusoid,
 
 @pytest.mark.parametrize(("name", "letter"), [("sinusoid", "C"), ("sinusoid", "F"), ("map", "G")])
 @pytest.mark.parametrize("clamp", ["lateral", "backed"])
-def test_compiled_clamps(
+def test_compiled_clamps_equal_interpreted_ones(
     name: str, letter: str, clamp: Any, make_texture: Check, scatter: Check, plain: Check
 ):
     texture = make_texture(name)
@@ -284,7 +288,7 @@ def curl(surface: Surface, points: np.ndarray, differences: Check) -> np.ndarray
     ("clamp", "conservative"),
     [("none", True), ("whole", True), ("backed", True), ("lateral", False)],
 )
-def test_which_clamp_keeps_change_of_height_conservative(
+def test_only_the_lateral_clamp_gives_law_c_a_curl(
     clamp: Any, conservative: bool, make_texture: Check, scatter: Check, plain: Check,
     differences: Check,
 ):  # fmt: skip
@@ -292,13 +296,13 @@ def test_which_clamp_keeps_change_of_height_conservative(
     surface = plain(Surface(texture, "C", max_depth=D, clamp=clamp))
     deep = shallow_and_deep(texture, False, scatter)[2:]
     deep = deep[texture.height(deep[:, :2]) - deep[:, 2] > D]
-    turning = curl(surface, deep, differences)
+    curls = curl(surface, deep, differences)
     assert len(deep) >= 5
-    assert (turning < 1e-6).all() if conservative else (turning > 10.0).all()
+    assert (curls < 1e-6).all() if conservative else (curls > 10.0).all()
 
 
-def test_the_backing_wall_stops_a_strong_hand(wave: Sinusoid, scatter: Check):
-    """The clamp whole alone saturates at k D: a strong hand breaks through."""
+def test_backing_wall_adds_a_force_below_the_clamped_depth(wave: Sinusoid, scatter: Check):
+    """The clamp "whole" alone saturates at k D, which a strong hand exceeds."""
     xy = scatter(wave, 10, seed=11)
     points = np.column_stack([xy, np.full(10, -5e-3)])
     whole = Surface(wave, "B", max_depth=D, clamp="whole").force(points)
@@ -309,14 +313,14 @@ def test_the_backing_wall_stops_a_strong_hand(wave: Sinusoid, scatter: Check):
 
 
 @pytest.mark.parametrize(("letter", "floor"), [("C", -0.4e-3 - D), ("G", -D), ("F", -D)])
-def test_the_floor(letter: str, floor: float, wave: Sinusoid):
+def test_floor_of_the_backing_wall(letter: str, floor: float, wave: Sinusoid):
     assert Surface(wave, letter, max_depth=D, clamp="backed").floor == pytest.approx(floor)
 
 
 # --- friction: deflection and trace ---------------------------------------------------------------
 
 
-def test_without_a_deflection_there_is_no_friction(wave: Sinusoid, inside: Check):
+def test_friction_is_zero_without_a_deflection(wave: Sinusoid, inside: Check):
     points = inside(wave, 5, 12, 1e-3)
     surface = Surface(wave, "F")
     forces = surface.force(points)
@@ -325,20 +329,20 @@ def test_without_a_deflection_there_is_no_friction(wave: Sinusoid, inside: Check
     np.testing.assert_allclose(forces[:, 2], -1000.0 * points[:, 2])
 
 
-def test_a_deflection_as_long_as_allowed(wave: Sinusoid):
+def test_deflection_may_have_at_most_the_maximum_length(wave: Sinusoid):
     surface = Surface(wave, "F", max_deflection=0.8e-3)
     turn = np.linspace(0.0, 2 * np.pi, 100)
     longest = 0.8e-3 * np.column_stack([np.cos(turn), np.sin(turn)])
     points = np.tile([1e-4, 0.0, -1e-4], (100, 1))
     assert np.isfinite(surface.force(points, deflection=longest)).all()
     for method in (surface.force, surface.jacobian):
-        with pytest.raises(ParameterError, match="max_deflection") as caught:
+        with pytest.raises(ParameterError, match="max_deflection") as error:
             method(points, deflection=longest * (1 + 1e-9))
-        assert caught.value.argument == "deflection"
+        assert error.value.argument == "deflection"
 
 
 @pytest.mark.parametrize("letter", LETTERS.replace("F", ""))
-def test_a_law_without_state_takes_none(letter: str, wave: Sinusoid):
+def test_law_without_state_refuses_state_arguments(letter: str, wave: Sinusoid):
     surface, point = Surface(wave, letter), [[0.0, 0.0, -1e-3]]
     for call in (
         lambda: surface.force(point, deflection=[[0.0, 0.0]]),
@@ -350,7 +354,7 @@ def test_a_law_without_state_takes_none(letter: str, wave: Sinusoid):
 
 
 class Anchor:
-    """Stick and slip, step by step: a thread of fixed length drags the anchor."""
+    """Stick and slip step by step: the probe drags an anchor at a fixed maximum distance."""
 
     def __init__(self, length: float) -> None:
         self.length = length
@@ -378,7 +382,7 @@ def wandering_path(count: int, seed: int) -> np.ndarray:
     return np.column_stack([np.cumsum(steps, axis=0), heights])
 
 
-def test_a_trace_of_friction_propagates_the_anchor(
+def test_trace_of_friction_propagates_the_anchor(
     make_texture: Check, plain: Check, force_by_hand: Check
 ):
     texture = make_texture("fourier")
@@ -392,20 +396,20 @@ def test_a_trace_of_friction_propagates_the_anchor(
         touched += p[2] < 0.0
         expected = np.zeros(3)
         if p[2] < 0.0:
-            expected = force_of(surface, p, np.array([d.real, d.imag]), force_by_hand)
+            expected = expected_force(surface, p, np.array([d.real, d.imag]), force_by_hand)
         assert np.abs(traced[i] - expected).max() <= 1e-12
     assert 50 < dragged < touched - 50  # the path sticks and slips
     assert touched < 350  # and loses contact
 
 
-def test_the_compiled_trace_is_the_plain_one(make_texture: Check, plain: Check):
+def test_compiled_trace_equals_the_interpreted_one(make_texture: Check, plain: Check):
     path = wandering_path(400, seed=14)
     compiled = Surface(make_texture("sinusoid"), "F", **STATE).trace(path)
     interpreted = plain(Surface(make_texture("sinusoid"), "F", **STATE)).trace(path)
     np.testing.assert_allclose(compiled, interpreted, rtol=0, atol=1e-15)
 
 
-def test_the_anchor_is_released_when_contact_is_lost(wave: Sinusoid):
+def test_anchor_is_released_when_contact_is_lost(wave: Sinusoid):
     surface = Surface(wave, "F")
     push, lift = [0.0, 0.0, -1e-4], [0.2e-3, 0.0, 0.0]
     path = [push, [0.3e-3, 0.0, -1e-4], lift, [0.4e-3, 0.0, -1e-4], [0.5e-3, 0.0, -1e-4]]
@@ -415,7 +419,7 @@ def test_the_anchor_is_released_when_contact_is_lost(wave: Sinusoid):
     assert friction[4] < 0.0
 
 
-def test_every_trace_starts_released(wave: Sinusoid):
+def test_every_trace_starts_without_an_anchor(wave: Sinusoid):
     surface = Surface(wave, "F")
     path = np.array([[0.0, 0.0, -1e-4], [0.3e-3, 0.0, -1e-4]])
     np.testing.assert_array_equal(surface.trace(path), surface.trace(path))
@@ -423,13 +427,13 @@ def test_every_trace_starts_released(wave: Sinusoid):
 
 
 @pytest.mark.parametrize("letter", LETTERS.replace("F", ""))
-def test_a_trace_without_state_is_the_force(letter: str, wave: Sinusoid):
+def test_trace_without_state_equals_the_force(letter: str, wave: Sinusoid):
     path = wandering_path(60, seed=15)
     surface = Surface(wave, letter)
     np.testing.assert_array_equal(surface.trace(path), surface.force(path))
 
 
-def test_an_empty_path_has_an_empty_trace(wave: Sinusoid):
+def test_empty_path_has_an_empty_trace(wave: Sinusoid):
     for letter in "CF":
         surface = Surface(wave, letter)
         assert surface.trace(np.zeros((0, 3))).shape == (0, 3)

@@ -25,7 +25,7 @@ LETTERS = "WABCDEFG"
 D = 0.2e-3  # the depth of the clamps
 
 
-# --- compiled = plain = definition ----------------------------------------------------------------
+# --- compiled = plain = reference -----------------------------------------------------------------
 
 COMBINATIONS = [
     *(("sinusoid", letter) for letter in LETTERS),
@@ -35,7 +35,7 @@ COMBINATIONS = [
     ("map", "G"),
     ("profile", "E"),
 ]
-anywhere = st.tuples(*2 * [st.floats(-1.5, 2.5)], st.floats(-0.5, 2.0))
+any_place = st.tuples(*2 * [st.floats(-1.5, 2.5)], st.floats(-0.5, 2.0))
 
 
 @pytest.mark.parametrize(("name", "letter"), COMBINATIONS)
@@ -51,8 +51,8 @@ def test_compiled_plain_and_reference_values_agree(
         max_examples=25, deadline=None, derandomize=True, database=None,
         suppress_health_check=list(HealthCheck),
     )  # fmt: skip
-    @given(anywhere)
-    def holds(place: tuple[float, float, float]) -> None:
+    @given(any_place)
+    def check_agreement(place: tuple[float, float, float]) -> None:
         xy = origin + np.array(place[: len(spans)]) @ spans
         h = compiled.texture.height(xy[None, :])[0]
         p = np.array([*xy, min(h, 0.0) - place[2] * size])
@@ -65,18 +65,18 @@ def test_compiled_plain_and_reference_values_agree(
         exact = np.array(exact_force(compiled, p, d).tolist(), dtype=float)[:, 0]
         assert np.abs(force - exact).max() <= 1e-10 * scale
 
-    holds()
+    check_agreement()
 
 
 # --- user-defined laws --------------------------------------------------------------------------
 
 
-def own_law(contact: Any, force: Callable[[ContactSymbols], Any], **options: Any) -> Law:
+def user_defined_law(contact: Any, force: Callable[[ContactSymbols], Any], **options: Any) -> Law:
     return Law("V", "own", contact, force, **options)
 
 
-def test_a_user_defined_law_with_a_parameter(wave: Sinusoid, inside: Check, plain: Check):
-    law = own_law(
+def test_user_defined_law_with_a_parameter(wave: Sinusoid, inside: Check, plain: Check):
+    law = user_defined_law(
         "vertical",
         lambda c: c.k * c.depth * (1 + c.parameter("hardening") * c.depth) * c.normal,
         parameters={"hardening": 2000.0},
@@ -84,15 +84,15 @@ def test_a_user_defined_law_with_a_parameter(wave: Sinusoid, inside: Check, plai
     points = inside(wave, 5, 16, 1e-3)
     depth = wave.height(points[:, :2]) - points[:, 2]
     plain_b = plain(Surface(wave, "B")).force(points)
-    for chosen, value in ((None, 2000.0), ({"hardening": 500.0}, 500.0)):
-        forces = plain(Surface(wave, law, law_parameters=chosen)).force(points)
+    for law_parameters, value in ((None, 2000.0), ({"hardening": 500.0}, 500.0)):
+        forces = plain(Surface(wave, law, law_parameters=law_parameters)).force(points)
         expected = plain_b * (1.0 + value * depth)[:, None]
         np.testing.assert_allclose(forces, expected, rtol=1e-12)
 
 
 @pytest.mark.parametrize("contact", ["nominal", "vertical", "nearest"])
-def test_the_relative_height_runs_from_minus_one_to_one(contact: Any, wave: Sinusoid, plain: Check):
-    law = own_law(contact, lambda c: c.k * c.depth * (2 + c.relative_height) * c.e_z)
+def test_relative_height_is_from_minus_one_to_one(contact: Any, wave: Sinusoid, plain: Check):
+    law = user_defined_law(contact, lambda c: c.k * c.depth * (2 + c.relative_height) * c.e_z)
     turns = np.array([[0.25], [0.75]]) - 0.7 / (2 * math.pi)
     xy = wave.domain.points(turns)  # a crest and a trough
     shallow = np.zeros(2) if contact == "nominal" else wave.height(xy)
@@ -102,11 +102,11 @@ def test_the_relative_height_runs_from_minus_one_to_one(contact: Any, wave: Sinu
 
 @pytest.mark.parametrize("contact", ["nominal", "vertical"])
 @pytest.mark.parametrize("clamp", ["whole", "lateral"])
-def test_a_clamped_user_defined_law_has_its_derivative(
+def test_jacobian_of_a_clamped_user_defined_law(
     contact: Any, clamp: Any, make_texture: Check, inside: Check, plain: Check, differences: Check
 ):
     texture = make_texture("fourier")
-    law = own_law(contact, lambda c: c.k * c.depth * c.normal, clampable=True)
+    law = user_defined_law(contact, lambda c: c.k * c.depth * c.normal, clampable=True)
     surface = plain(Surface(texture, law, max_depth=0.1e-3, clamp=clamp))
     points = inside(texture, 4, 17, 0.4e-3)
     numeric = differences(surface.force, points, step=3e-7)
@@ -114,20 +114,20 @@ def test_a_clamped_user_defined_law_has_its_derivative(
 
 
 @pytest.mark.parametrize("contact", ["vertical", "nearest", "split"])
-def test_a_law_with_state_is_on_the_nominal_contact(contact: Any):
-    """Its anchor is held while z < 0, which is contact on the nominal contact only."""
+def test_law_with_state_needs_the_nominal_contact(contact: Any):
+    """The anchor is held while z < 0, which means contact only on the nominal contact."""
     with pytest.raises(LawError, match="nominal contact"):
-        own_law(contact, lambda c: c.k * c.e_z, stateful=True)
+        user_defined_law(contact, lambda c: c.k * c.e_z, stateful=True)
 
 
 @pytest.mark.parametrize("contact", ["nearest", "split"])
-def test_a_law_on_the_nearest_contact_is_not_clamped(contact: Any):
+def test_law_on_the_nearest_or_split_contact_cannot_be_clampable(contact: Any):
     with pytest.raises(LawError, match="not clamped"):
-        own_law(contact, lambda c: c.k * c.e_z, clampable=True)
+        user_defined_law(contact, lambda c: c.k * c.e_z, clampable=True)
 
 
-def test_a_default_of_a_user_defined_law(wave: Sinusoid):
-    law = own_law(
+def test_default_parameter_of_a_user_defined_law(wave: Sinusoid):
+    law = user_defined_law(
         "nominal",
         lambda c: c.k * c.depth * c.parameter("friction") * c.e_z,
         parameters={"friction": 0.3},
@@ -135,20 +135,20 @@ def test_a_default_of_a_user_defined_law(wave: Sinusoid):
     assert Surface(wave, law).law_parameters == {"friction": 0.3}
 
 
-def test_a_user_defined_law_may_reuse_a_letter(wave: Sinusoid, plain: Check):
+def test_user_defined_law_may_reuse_a_letter(wave: Sinusoid, plain: Check):
     law = Law("C", "not-the-shipped-one", "nominal", lambda c: 2 * c.k * c.depth * c.e_z)
     force = plain(Surface(wave, law)).force([[0.0, 0.0, -1e-3]])
     np.testing.assert_allclose(force, [[0.0, 0.0, 2.0]])
 
 
-def test_a_law_in_pieces_has_a_kernel(wave: Sinusoid, plain: Check):
-    law = own_law("nominal", lambda c: c.k * sp.Min(c.depth, D) * c.e_z)
+def test_piecewise_law_has_a_kernel(wave: Sinusoid, plain: Check):
+    law = user_defined_law("nominal", lambda c: c.k * sp.Min(c.depth, D) * c.e_z)
     forces = plain(Surface(wave, law)).force([[0.0, 0.0, -D / 2], [0.0, 0.0, -3 * D]])
     np.testing.assert_allclose(forces[:, 2], [500.0 * D, 1000.0 * D])
 
 
-def test_a_law_with_state_needs_a_greatest_deflection(wave: Sinusoid):
-    law = own_law("nominal", lambda c: c.k * c.depth * c.e_z, stateful=True)
+def test_law_with_state_needs_max_deflection(wave: Sinusoid):
+    law = user_defined_law("nominal", lambda c: c.k * c.depth * c.e_z, stateful=True)
     with pytest.raises(LawError, match="needs the parameter max_deflection"):
         Surface(wave, law).force([[0.0, 0.0, -1e-3]])
 
@@ -156,7 +156,7 @@ def test_a_law_with_state_needs_a_greatest_deflection(wave: Sinusoid):
 # --- arguments ------------------------------------------------------------------------------------
 
 
-def test_defaults():
+def test_default_arguments_of_a_surface():
     surface = Surface(Sinusoid(0.2e-3, 1e-3))
     assert (surface.law, surface.stiffness, surface.clamp) == (LAWS["C"], 1000.0, "none")
     assert (surface.friction, surface.max_deflection, surface.modulation_depth) == (0.8, 1e-3, 0.8)
@@ -173,18 +173,18 @@ def test_defaults():
         (Profile(np.zeros(4), 1e-3), 1e-3),
     ],
 )
-def test_the_default_depth_is_the_height_at_most_a_millimetre(texture: Texture, depth: float):
+def test_default_depth_is_the_height_up_to_one_millimetre(texture: Texture, depth: float):
     assert Surface(texture, "A").max_depth == pytest.approx(depth)
 
 
-def test_a_flat_texture_modulates_nothing(plain: Check):
+def test_flat_texture_does_not_modulate_the_friction(plain: Check):
     flat = Profile(np.zeros(4), 1e-3)
     point, d = [[0.0, 0.0, -1e-3]], [[0.5e-3, 0.0]]
     force = plain(Surface(flat, "F")).force(point, deflection=d)
     np.testing.assert_allclose(force, [[-0.8 * 0.5 * 0.5, 0.0, 1.0]])
 
 
-WRONG: list[tuple[str, Any]] = [
+INVALID_ARGUMENTS: list[tuple[str, Any]] = [
     *[("texture", value) for value in (None, 3.0, np.zeros((4, 4)))],
     *[("law", value) for value in ("X", "", None, 1)],
     *[("stiffness", value) for value in (0.0, -1.0, math.nan, math.inf, "500 N/m", None, True)],
@@ -197,33 +197,33 @@ WRONG: list[tuple[str, Any]] = [
 ]
 
 
-@pytest.mark.parametrize(("argument", "value"), WRONG)
-def test_arguments_that_cannot_be_used(argument: str, value: Any, wave: Sinusoid):
+@pytest.mark.parametrize(("argument", "value"), INVALID_ARGUMENTS)
+def test_invalid_arguments_are_refused(argument: str, value: Any, wave: Sinusoid):
     arguments: dict[str, Any] = {"texture": wave, "law": "F", argument: value}
-    with pytest.raises(ParameterError, match=f"^{argument} ") as caught:
+    with pytest.raises(ParameterError, match=f"^{argument} ") as error:
         Surface(**arguments)
-    assert caught.value.argument == argument
+    assert error.value.argument == argument
 
 
 @pytest.mark.parametrize("value", [0.0, 1.0])
-def test_the_limits_of_the_modulation_depth_are_valid(value: float, wave: Sinusoid):
+def test_limits_of_modulation_depth_and_friction_are_valid(value: float, wave: Sinusoid):
     assert Surface(wave, "F", modulation_depth=value).modulation_depth == value
     assert Surface(wave, "F", friction=0.0).friction == 0.0
 
 
-def test_parameters_of_a_law_that_has_none(wave: Sinusoid):
+def test_parameters_of_a_law_without_parameters_are_refused(wave: Sinusoid):
     with pytest.raises(ParameterError, match="it has none"):
         Surface(wave, "B", law_parameters={"friction": 0.5})
 
 
-def test_a_law_parameter_must_be_a_number(wave: Sinusoid):
+def test_law_parameter_must_be_a_finite_number(wave: Sinusoid):
     for value in (math.nan, "0.5", None):
-        with pytest.raises(ParameterError) as caught:
+        with pytest.raises(ParameterError) as error:
             Surface(wave, "F", law_parameters={"friction": value})
-        assert caught.value.argument == "friction"
+        assert error.value.argument == "friction"
 
 
-POINTS: list[Any] = [
+INVALID_POINTS: list[Any] = [
     0.0,
     [],
     [0.0, 0.0, math.nan],
@@ -241,26 +241,26 @@ POINTS: list[Any] = [
 ]
 
 
-@pytest.mark.parametrize("points", POINTS, ids=repr)
-def test_points_that_cannot_be_used(points: Any, wave: Sinusoid):
+@pytest.mark.parametrize("points", INVALID_POINTS, ids=repr)
+def test_invalid_points_are_refused(points: Any, wave: Sinusoid):
     for letter in "CF":
         surface = Surface(wave, letter)
         for method, argument in (("force", "points"), ("jacobian", "points"), ("trace", "path")):
-            with pytest.raises(ParameterError) as caught:
+            with pytest.raises(ParameterError) as error:
                 getattr(surface, method)(points)
-            assert caught.value.argument == argument
+            assert error.value.argument == argument
 
 
-def test_points_of_any_layout_are_the_same_points(wave: Sinusoid):
+def test_force_does_not_depend_on_the_memory_layout_of_points(wave: Sinusoid):
     points = np.random.default_rng(18).normal(size=(6, 3)) * 1e-3
     surface = Surface(wave, "B")
     expected = surface.force(points)
     layouts = [points.tolist(), np.asfortranarray(points), points[::-1][::-1], points.astype(">f8")]
-    for same in layouts:
-        np.testing.assert_array_equal(surface.force(same), expected)
-    frozen = points.copy()
-    frozen.setflags(write=False)
-    np.testing.assert_array_equal(surface.force(frozen), expected)
+    for layout in layouts:
+        np.testing.assert_array_equal(surface.force(layout), expected)
+    read_only = points.copy()
+    read_only.setflags(write=False)
+    np.testing.assert_array_equal(surface.force(read_only), expected)
 
 
 @pytest.mark.parametrize(
@@ -277,39 +277,37 @@ def test_points_of_any_layout_are_the_same_points(wave: Sinusoid):
         ("sliding", True),
     ],
 )
-def test_state_that_cannot_be_used(argument: str, value: Any, wave: Sinusoid):
+def test_invalid_state_is_refused(argument: str, value: Any, wave: Sinusoid):
     surface = Surface(wave, "F")
-    with pytest.raises(ParameterError) as caught:
+    with pytest.raises(ParameterError) as error:
         surface.jacobian(np.zeros((3, 3)) - 1e-4, **{argument: value})
-    assert caught.value.argument == argument
+    assert error.value.argument == argument
 
 
-def test_the_representation_of_a_surface(wave: Sinusoid):
+def test_repr_of_a_surface_has_its_arguments(wave: Sinusoid):
     text = repr(Surface(wave, "B", stiffness=500.0, max_depth=D, clamp="backed"))
     for part in ("Sinusoid(", "law='B'", "stiffness=500.0", "max_depth=0.0002", "clamp='backed'"):
         assert part in text
 
 
-# --- sent to another process ----------------------------------------------------------------------
+# --- pickling -------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("law", "WCFH")
-def test_a_surface_can_be_sent_to_another_process(
-    law: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_surface_can_be_pickled(law: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Values given for other laws are pickled; a user-defined law must be registered."""
     surface = Surface(Sinusoid(0.3e-3, 1.1e-3), law, 345.6, 0.7e-3, friction=0.4, continuity=2.0)
     points = np.array([[0.1e-3, 0.0, 0.0], [0.4e-3, 0.2e-3, -0.2e-3]])
     before = surface.force(points)
-    sent = pickle.loads(pickle.dumps(surface))
-    np.testing.assert_array_equal(sent.force(points), before)
-    assert repr(sent) == repr(surface)
-    assert sent.law is surface.law
-    assert sent.law_parameters == surface.law_parameters
-    assert sent.to_law("F").law_parameters["friction"] == 0.4
-    assert sent.to_law("H").law_parameters["continuity"] == 2.0
-    own = Law("U", "own", "vertical", lambda c: c.k * c.depth * c.e_z)
+    copy = pickle.loads(pickle.dumps(surface))
+    np.testing.assert_array_equal(copy.force(points), before)
+    assert repr(copy) == repr(surface)
+    assert copy.law is surface.law
+    assert copy.law_parameters == surface.law_parameters
+    assert copy.to_law("F").law_parameters["friction"] == 0.4
+    assert copy.to_law("H").law_parameters["continuity"] == 2.0
+    law_u = Law("U", "own", "vertical", lambda c: c.k * c.depth * c.e_z)
     with pytest.raises((TypeError, AttributeError, pickle.PicklingError)):
-        pickle.dumps(surface.to_law(own))
-    monkeypatch.setitem(REGISTERED_LAWS, "U", own)
-    assert pickle.loads(pickle.dumps(surface.to_law(own))).law is own
+        pickle.dumps(surface.to_law(law_u))
+    monkeypatch.setitem(REGISTERED_LAWS, "U", law_u)
+    assert pickle.loads(pickle.dumps(surface.to_law(law_u))).law is law_u

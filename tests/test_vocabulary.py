@@ -103,17 +103,17 @@ def retired_phrases(text: str) -> list[str]:
 @cache
 def sources() -> dict[str, str]:
     """Return the Python files of the package that people write, by path."""
-    own = (path for path in (ROOT / "src").rglob("*.py") if "generated" not in path.parts)
-    return {str(path.relative_to(ROOT)): path.read_text("utf-8") for path in own}
+    paths = (path for path in (ROOT / "src").rglob("*.py") if "generated" not in path.parts)
+    return {str(path.relative_to(ROOT)): path.read_text("utf-8") for path in paths}
 
 
 def pages() -> list[Path]:
     """Return the pages of the documentation, and the texts of the reports."""
-    built = {"_build", "_generated", "gallery"}
+    generated = {"_build", "_generated", "gallery"}
     return [
         *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")),
         ROOT / "src/asperity/report/texts.toml",
-        *(p for p in sorted((ROOT / "docs").rglob("*.md")) if not built & {*p.parts}),
+        *(p for p in sorted((ROOT / "docs").rglob("*.md")) if not generated & {*p.parts}),
     ]
 
 
@@ -148,28 +148,28 @@ def test_help_is_imperative_and_in_current_terms(name: str) -> None:
     command = cli.get_command(click.Context(cli), name)
     assert command is not None
     assert COMMANDS[name][1].split()[0].strip(",") in SUMMARY_VERBS
-    for one in (command, *getattr(command, "commands", {}).values()):
-        text = one.get_help(click.Context(one))
+    for subcommand in (command, *getattr(command, "commands", {}).values()):
+        text = subcommand.get_help(click.Context(subcommand))
         assert retired_phrases(text) == []
 
 
 @pytest.mark.parametrize("name", ["next_foot", "LookCost", "_kept", "SAID"])
-def test_a_retired_name_is_found(name: str) -> None:
+def test_retired_name_is_detected(name: str) -> None:
     assert retired_names(f"{name} = 1\n") == [f"{name} (1)"]
     assert retired_names(f"def f({name}): ...\n") == [f"{name} (1)"]
 
 
-def test_a_participle_is_found_unless_it_is_local() -> None:
+def test_participle_is_detected_unless_it_is_a_local_name() -> None:
     assert retired_names("GIVEN = 1\ndef known(drawn):\n    made = drawn\n") == [
         "known (2)", "GIVEN (1)", "drawn (2)",
     ]  # fmt: skip
 
 
 @pytest.mark.parametrize("name", ["outlook", "given_argument", "footer", "unknown_fields"])
-def test_other_names_are_not_found(name: str) -> None:
+def test_other_names_are_accepted(name: str) -> None:
     assert retired_names(f"{name} = 1\n") == []
 
 
-def test_a_retired_phrase_is_found() -> None:
+def test_retired_phrase_is_detected() -> None:
     assert retired_phrases("The search is cut short.") == ["cut short -> truncated"]
     assert retired_phrases("It looks like a footnote.") == []
