@@ -77,7 +77,7 @@ def test_content_security_policy_allows_only_the_own_script(page: str, tmp_path:
 POINTER = """
 const figure = document.querySelectorAll("figure")[2], svg = figure.querySelector("svg");
 const panels = JSON.parse(figure.querySelector("script").textContent), panel = panels[1];
-const [x, y] = place(panel, values(panel.series[0].x)[100], panel.series[0].y[100]);
+const [x, y] = toSvgPoint(panel, expandValues(panel.series[0].x)[100], panel.series[0].y[100]);
 const at = new DOMPoint(x, y).matrixTransform(svg.getScreenCTM());
 svg.dispatchEvent(new PointerEvent("pointermove", { clientX: at.x, clientY: at.y }));
 const box = figure.querySelector(".reading");
@@ -204,7 +204,10 @@ def test_script_and_svg_positions_agree_on_every_scale(tmp_path: Path) -> None:
     )
     script = """
     const panels = JSON.parse(document.querySelector("figure script").textContent);
-    return panels.map((one) => one.series[0].x.map((x, i) => place(one, x, one.series[0].y[i])));
+    return panels.map((panel) => {
+      const { x, y } = panel.series[0];
+      return x.map((value, i) => toSvgPoint(panel, value, y[i]));
+    });
     """
     positions = evaluate_script(text, tmp_path / "page.html", script)
     paths = re.findall(r'<path d="M ([^"]*)" clip-path', text)

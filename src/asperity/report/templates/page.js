@@ -1,129 +1,134 @@
 "use strict";
-// What a page can do beyond being read: values at the pointer, zoom, saving a picture and its
-// numbers, hiding laws. Without this script the page says everything that it says with it.
+// Interactive tools of a report page: values at the pointer, zoom, export of a figure as SVG and of
+// its data as CSV, and hiding of laws. Without this script the page is complete but static.
 
 const hiddenLaws = new Set();
 
 /** Return an element with properties and children. */
-function make(tag, properties = {}, ...children) {
-  const made = Object.assign(document.createElement(tag), properties);
-  made.append(...children);
-  return made;
+function createElement(tag, properties = {}, ...children) {
+  const element = Object.assign(document.createElement(tag), properties);
+  element.append(...children);
+  return element;
 }
 
-/** Return a button; its words are read out, its sign is seen. */
-function button(sign, words, act) {
-  const made = make("button", { type: "button", textContent: sign, title: words, onclick: act });
-  made.setAttribute("aria-label", words);
-  return made;
+/** Return a button with a short visible label and a description for tooltips and screen readers. */
+function createButton(label, description, onclick) {
+  const button = createElement("button", { type: "button", textContent: label, title: description, onclick });
+  button.setAttribute("aria-label", description);
+  return button;
 }
 
-// --- numbers of a panel --------------------------------------------------------------------------
+// --- data of a panel -----------------------------------------------------------------------------
 
-/** Return all values of an axis, of which even steps are given by their ends. */
-function values(given) {
-  if (Array.isArray(given)) return given;
-  const step = (given.to - given.from) / (given.count - 1);
-  return Array.from({ length: given.count }, (_, i) => Number((given.from + i * step).toPrecision(8)));
+/** Return the x values of a series; equidistant values are stored as {from, to, count}. */
+function expandValues(data) {
+  if (Array.isArray(data)) return data;
+  const step = (data.to - data.from) / (data.count - 1);
+  return Array.from({ length: data.count }, (_, i) => Number((data.from + i * step).toPrecision(8)));
 }
 
-/** Return a value as far as it is along its axis: linear, in logarithms, or both about zero. */
-function scaled(axis, value) {
+/** Return a value transformed by the scale of its axis: linear, logarithmic or symmetric logarithmic. */
+function transformValue(axis, value) {
   if (axis.scale === "log") return Math.log10(value);
   if (axis.scale !== "symlog") return value;
   const size = Math.abs(value) / axis.linear;
   return Math.sign(value) * (size <= 1 ? size * (10 / 9) : 10 / 9 + Math.log10(size));
 }
 
-/** Return what part of an axis lies below a value. */
-function part(axis, value) {
-  const low = scaled(axis, axis.low);
-  return (scaled(axis, value) - low) / (scaled(axis, axis.high) - low);
+/** Return the position of a value along its axis, from 0 to 1. */
+function axisFraction(axis, value) {
+  const low = transformValue(axis, axis.low);
+  return (transformValue(axis, value) - low) / (transformValue(axis, axis.high) - low);
 }
 
-/** Return the value of a linear or logarithmic axis at a part of it. */
-function valueAt(axis, share) {
-  const [low, high] = [scaled(axis, axis.low), scaled(axis, axis.high)];
-  const found = low + share * (high - low);
-  return axis.scale === "log" ? 10 ** found : found;
+/** Return the value at a position along a linear or logarithmic axis, from 0 to 1. */
+function valueAt(axis, fraction) {
+  const [low, high] = [transformValue(axis, axis.low), transformValue(axis, axis.high)];
+  const transformed = low + fraction * (high - low);
+  return axis.scale === "log" ? 10 ** transformed : transformed;
 }
 
-/** Return where a point of a panel is in the picture. */
-function place(panel, x, y) {
+/** Return the SVG coordinates of a data point of a panel. */
+function toSvgPoint(panel, x, y) {
   const [left, top, width, height] = panel.box;
-  return [left + part(panel.x, x) * width, top + (1 - part(panel.y, y)) * height];
+  return [left + axisFraction(panel.x, x) * width, top + (1 - axisFraction(panel.y, y)) * height];
 }
 
 /** Return "name: value unit" for a name that ends with its unit in brackets. */
-function said(name, value) {
-  const [, words, unit] = /^(.*?)\s*(?:\[(.*?)\])?$/.exec(name);
+function formatValue(label, value) {
+  const [, name, unit] = /^(.*?)\s*(?:\[(.*?)\])?$/.exec(label);
   const number = String(Number(value.toPrecision(4))).replace("-", "−");
-  return `${words ? `${words}: ` : ""}${number}${unit && unit !== "1" ? ` ${unit}` : ""}`;
+  return `${name ? `${name}: ` : ""}${number}${unit && unit !== "1" ? ` ${unit}` : ""}`;
 }
 
-/** Return the name of a line with the unit of its axis. */
-function lineName(series, panel) {
+/** Return the name of a series with the unit of its axis. */
+function seriesName(series, panel) {
   const unit = /\[.*\]/.exec(panel.y.name);
   return series.name ? series.name + (unit ? ` ${unit[0]}` : "") : panel.y.name;
 }
 
-// --- reading at the pointer ----------------------------------------------------------------------
+// --- values at the pointer -----------------------------------------------------------------------
 
-/** Return the points of a panel's lines: of each line the nearest, by what is along if it rises. */
-function nearest(panel, x, y) {
-  const found = [];
+/**
+ * Return the data points of a panel nearest to a point of the SVG, one for each series.
+ *
+ * Series with increasing x values are compared by horizontal distance; a point of any other series
+ * takes precedence when it is close.
+ */
+function nearestPoints(panel, x, y) {
+  const candidates = [];
   for (const series of panel.series) {
     if (hiddenLaws.has(series.law)) continue;
-    series.all ??= values(series.x);
-    series.rises ??= series.all.length > 1 && series.all.every((v, i, all) => !i || v > all[i - 1]);
-    let best = null;
-    series.all.forEach((value, i) => {
+    series.xs ??= expandValues(series.x);
+    series.isIncreasing ??= series.xs.length > 1 && series.xs.every((v, i, xs) => !i || v > xs[i - 1]);
+    let nearest = null;
+    series.xs.forEach((value, i) => {
       if (value === null || series.y[i] === null) return;
-      const at = place(panel, value, series.y[i]);
-      const far = series.rises ? Math.abs(at[0] - x) : Math.hypot(at[0] - x, at[1] - y);
-      if (!best || far < best.far) best = { series, i, at, far };
+      const point = toSvgPoint(panel, value, series.y[i]);
+      const distance = series.isIncreasing ? Math.abs(point[0] - x) : Math.hypot(point[0] - x, point[1] - y);
+      if (!nearest || distance < nearest.distance) nearest = { series, i, point, distance };
     });
-    if (best) found.push(best);
+    if (nearest) candidates.push(nearest);
   }
-  const rising = found.filter((one) => one.series.rises);
-  const lone = found.filter((one) => !one.series.rises && one.far < 20);
-  const least = (some) => some.reduce((a, b) => (b.far < a.far ? b : a));
-  if (lone.length) return [least(lone)];
-  return rising.length ? rising.filter((one) => one.far <= least(rising).far + 1) : [];
+  const onCurves = candidates.filter(({ series }) => series.isIncreasing);
+  const closePoints = candidates.filter(({ series, distance }) => !series.isIncreasing && distance < 20);
+  const closest = (points) => points.reduce((a, b) => (b.distance < a.distance ? b : a));
+  if (closePoints.length) return [closest(closePoints)];
+  return onCurves.length ? onCurves.filter(({ distance }) => distance <= closest(onCurves).distance + 1) : [];
 }
 
-/** Return the value of a panel's field at a part of its width and height, or null. */
+/** Return the value of a field at a position in its panel, from 0 to 1 along each axis; may be null. */
 function fieldAt(field, right, up) {
   const rows = field.values.length / field.columns;
   const column = Math.min(Math.floor(right * field.columns), field.columns - 1);
   return field.values[Math.min(Math.floor(up * rows), rows - 1) * field.columns + column];
 }
 
-/** Return the words for a place of the picture and the points they are about; null for none. */
-function reading(panels, x, y) {
+/** Return the lines of text for a point of the SVG and the data points they describe, or null. */
+function readingAt(panels, x, y) {
   const panel = panels.find(({ box, law }) =>
     !hiddenLaws.has(law) && x >= box[0] && x <= box[0] + box[2] && y >= box[1] && y <= box[1] + box[3]);
   if (!panel) return null;
   const [left, top, width, height] = panel.box;
   const [right, up] = [(x - left) / width, 1 - (y - top) / height];
   const lines = panel.name ? [panel.name] : [];
-  const points = nearest(panel, x, y);
+  const points = nearestPoints(panel, x, y);
   if (points.length) {
-    lines.push(said(panel.x.name, points[0].series.all[points[0].i]));
-    for (const { series, i } of points) lines.push(said(lineName(series, panel), series.y[i]));
+    lines.push(formatValue(panel.x.name, points[0].series.xs[points[0].i]));
+    for (const { series, i } of points) lines.push(formatValue(seriesName(series, panel), series.y[i]));
   } else if (panel.field) {
-    lines.push(said(panel.x.name, valueAt(panel.x, right)), said(panel.y.name, valueAt(panel.y, up)));
+    lines.push(formatValue(panel.x.name, valueAt(panel.x, right)), formatValue(panel.y.name, valueAt(panel.y, up)));
     const value = fieldAt(panel.field, right, up);
-    if (value !== null) lines.push(said(panel.field.name, value));
+    if (value !== null) lines.push(formatValue(panel.field.name, value));
   } else {
     return null;
   }
   return { lines, points };
 }
 
-/** Show the values at the pointer beside it, and mark their points. */
+/** Show the values at the pointer in a box beside it, and mark their data points. */
 function addReading(figure, svg, panels) {
-  const box = make("div", { className: "reading", hidden: true });
+  const box = createElement("div", { className: "reading", hidden: true });
   const marks = document.createElementNS(svg.namespaceURI, "g");
   marks.setAttribute("class", "marks");
   svg.append(marks);
@@ -133,15 +138,15 @@ function addReading(figure, svg, panels) {
     marks.replaceChildren();
   };
   const show = (event) => {
-    const at = new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse());
-    const found = reading(panels, at.x, at.y);
-    if (!found) return hide();
-    marks.replaceChildren(...found.points.map(({ at: [x, y] }) => {
+    const pointer = new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse());
+    const reading = readingAt(panels, pointer.x, pointer.y);
+    if (!reading) return hide();
+    marks.replaceChildren(...reading.points.map(({ point: [x, y] }) => {
       const dot = document.createElementNS(svg.namespaceURI, "circle");
       Object.entries({ cx: x, cy: y, r: 3 }).forEach(([name, value]) => dot.setAttribute(name, value));
       return dot;
     }));
-    box.replaceChildren(...found.lines.map((line) => make("div", { textContent: line })));
+    box.replaceChildren(...reading.lines.map((line) => createElement("div", { textContent: line })));
     box.hidden = false;
     const frame = figure.getBoundingClientRect();
     const [right, down] = [event.clientX - frame.left, event.clientY - frame.top];
@@ -155,31 +160,31 @@ function addReading(figure, svg, panels) {
 
 // --- zoom ----------------------------------------------------------------------------------------
 
-/** Let a picture be enlarged: by buttons, the wheel with ctrl, and moved by dragging or arrows. */
+/** Add zoom by buttons and by the wheel with Ctrl, and panning by dragging and by arrow keys. */
 function addZoom(svg, tools) {
   const whole = svg.getAttribute("viewBox").split(/[\s,]+/).map(Number);
   let [x, y, width, height] = whole;
-  const show = () => {
+  const update = () => {
     x = Math.min(Math.max(x, whole[0]), whole[0] + whole[2] - width);
     y = Math.min(Math.max(y, whole[1]), whole[1] + whole[3] - height);
     svg.setAttribute("viewBox", `${x} ${y} ${width} ${height}`);
-    svg.classList.toggle("near", width < whole[2]);
+    svg.classList.toggle("zoomed", width < whole[2]);
     svg.tabIndex = width < whole[2] ? 0 : -1;
   };
   const zoom = (factor, right = 0.5, down = 0.5) => {
-    const wide = Math.min(Math.max(width / factor, whole[2] / 40), whole[2]);
-    x += right * (width - wide);
-    y += down * (height - (height * wide) / width);
-    height *= wide / width;
-    width = wide;
-    show();
+    const newWidth = Math.min(Math.max(width / factor, whole[2] / 40), whole[2]);
+    x += right * (width - newWidth);
+    y += down * (height - (height * newWidth) / width);
+    height *= newWidth / width;
+    width = newWidth;
+    update();
   };
-  const move = (right, down) => {
+  const pan = (right, down) => {
     [x, y] = [x + right * width, y + down * height];
-    show();
+    update();
   };
   svg.addEventListener("wheel", (event) => {
-    if (!event.ctrlKey) return; // ordinary scrolling is the page's
+    if (!event.ctrlKey) return; // the wheel alone scrolls the page
     event.preventDefault();
     const frame = svg.getBoundingClientRect();
     const [right, down] = [event.clientX - frame.left, event.clientY - frame.top];
@@ -188,31 +193,31 @@ function addZoom(svg, tools) {
   svg.addEventListener("pointermove", (event) => {
     if (!event.buttons || width === whole[2]) return;
     const frame = svg.getBoundingClientRect();
-    move(-event.movementX / frame.width, -event.movementY / frame.height);
+    pan(-event.movementX / frame.width, -event.movementY / frame.height);
   });
   svg.addEventListener("keydown", (event) => {
-    const way = { ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, -0.1], ArrowDown: [0, 0.1] };
-    if (!way[event.key] || width === whole[2]) return;
+    const steps = { ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, -0.1], ArrowDown: [0, 0.1] };
+    if (!steps[event.key] || width === whole[2]) return;
     event.preventDefault();
-    move(...way[event.key]);
+    pan(...steps[event.key]);
   });
   tools.append(
-    button("+", "Enlarge", () => zoom(1.5)),
-    button("−", "Make smaller", () => zoom(1 / 1.5)),
-    button("Whole", "Show the whole picture", () => zoom(1e-9)),
+    createButton("+", "Zoom in", () => zoom(1.5)),
+    createButton("−", "Zoom out", () => zoom(1 / 1.5)),
+    createButton("Whole", "Show the whole figure", () => zoom(1e-9)),
   );
 }
 
-// --- saving --------------------------------------------------------------------------------------
+// --- export --------------------------------------------------------------------------------------
 
-/** Offer a text as a file. */
-function save(name, type, text) {
-  const link = make("a", { download: name, href: URL.createObjectURL(new Blob([text], { type })) });
+/** Download a text as a file. */
+function downloadText(name, type, text) {
+  const link = createElement("a", { download: name, href: URL.createObjectURL(new Blob([text], { type })) });
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 10000);
 }
 
-/** Return a picture as a file of its own: whole, in the light colours, with its words. */
+/** Return a figure as a standalone SVG file: not zoomed, in the light theme, with its description. */
 function svgFile(svg, viewBox) {
   const copy = svg.cloneNode(true);
   copy.querySelector(".marks")?.remove();
@@ -227,92 +232,98 @@ function svgFile(svg, viewBox) {
   return text.replace(/var\(--p-\w+, (#[0-9a-f]{6})\)/g, "$1");
 }
 
-/** Return the numbers of a picture as columns of CSV, without those of hidden laws. */
+/** Return the data of a figure as CSV, one column for each quantity, without hidden laws. */
 function csvFile(panels) {
   const columns = [];
-  const add = (panel, name, given) =>
-    columns.push([panel.name ? `${panel.name}: ${name}` : name, ...given]);
+  const addColumn = (panel, name, values) =>
+    columns.push([panel.name ? `${panel.name}: ${name}` : name, ...values]);
   for (const panel of panels.filter(({ law }) => !hiddenLaws.has(law))) {
-    let along = "";
+    let previousX = "";
     for (const series of panel.series.filter(({ law }) => !hiddenLaws.has(law))) {
-      const x = values(series.x);
-      if (along !== String(x)) add(panel, panel.x.name, x);
-      along = String(x);
-      add(panel, lineName(series, panel), series.y);
+      const x = expandValues(series.x);
+      if (previousX !== String(x)) addColumn(panel, panel.x.name, x);
+      previousX = String(x);
+      addColumn(panel, seriesName(series, panel), series.y);
     }
-    if (panel.field) fieldColumns(panel).forEach(([name, given]) => add(panel, name, given));
+    if (panel.field) fieldColumns(panel).forEach(([name, values]) => addColumn(panel, name, values));
   }
-  const rows = Math.max(0, ...columns.map((column) => column.length));
-  const cell = (value) => typeof value === "string" ? `"${value.replaceAll('"', '""')}"` : value ?? "";
-  return Array.from({ length: rows }, (_, i) => columns.map((one) => cell(one[i])).join(",")).join("\n") + "\n";
+  const rowCount = Math.max(0, ...columns.map((column) => column.length));
+  const formatCell = (value) => typeof value === "string" ? `"${value.replaceAll('"', '""')}"` : value ?? "";
+  const formatRow = (_, i) => columns.map((column) => formatCell(column[i])).join(",");
+  return Array.from({ length: rowCount }, formatRow).join("\n") + "\n";
 }
 
-/** Return names and values of a field where there is one: along, up, and what is drawn. */
+/** Return x, y and value of the cells of a field that have a value, each with its name. */
 function fieldColumns({ field, x, y }) {
   const rows = field.values.length / field.columns;
-  const known = [...field.values.keys()].filter((i) => field.values[i] !== null);
-  const middle = (axis, i, count) => Number(valueAt(axis, (i + 0.5) / count).toPrecision(5));
+  const cells = [...field.values.keys()].filter((i) => field.values[i] !== null);
+  const centre = (axis, i, count) => Number(valueAt(axis, (i + 0.5) / count).toPrecision(5));
   return [
-    [x.name, known.map((i) => middle(x, i % field.columns, field.columns))],
-    [y.name, known.map((i) => middle(y, Math.floor(i / field.columns), rows))],
-    [field.name, known.map((i) => field.values[i])],
+    [x.name, cells.map((i) => centre(x, i % field.columns, field.columns))],
+    [y.name, cells.map((i) => centre(y, Math.floor(i / field.columns), rows))],
+    [field.name, cells.map((i) => field.values[i])],
   ];
 }
 
 // --- laws ----------------------------------------------------------------------------------------
 
-/** Show or hide the rows of a law, and in pictures all of its own. */
-function showLaw(law, shown) {
-  hiddenLaws[shown ? "delete" : "add"](law);
-  for (const one of document.querySelectorAll(`[data-law="${CSS.escape(law)}"]`)) {
-    if (one instanceof SVGElement) {
-      // Axes and legends stay: they serve other laws too. As attributes it holds in a saved file.
-      one.setAttribute("visibility", shown ? "inherit" : "hidden");
-      one.querySelectorAll(".shared").forEach((part) => part.setAttribute("visibility", "visible"));
+/** Show or hide a law: its rows in tables, and its panels and lines in figures. */
+function setLawVisible(law, isVisible) {
+  hiddenLaws[isVisible ? "delete" : "add"](law);
+  for (const element of document.querySelectorAll(`[data-law="${CSS.escape(law)}"]`)) {
+    if (element instanceof SVGElement) {
+      // Axes and legends are shared with other laws and stay. Attributes, unlike classes, keep their
+      // effect in an exported file.
+      element.setAttribute("visibility", isVisible ? "inherit" : "hidden");
+      element.querySelectorAll(".shared").forEach((shared) => shared.setAttribute("visibility", "visible"));
     } else {
-      one.hidden = !shown;
+      element.hidden = !isVisible;
     }
   }
 }
 
-/** Add a check box for each law, on a page that has several. */
-function addLaws() {
-  const found = new Set([...document.querySelectorAll("[data-law]")].map((one) => one.dataset.law));
-  if (found.size < 2) return;
-  const boxes = [...found].map((law) => {
-    const box = make("input", { type: "checkbox", checked: true, name: law });
-    box.addEventListener("change", () => showLaw(law, box.checked));
-    return make("label", {}, box, law);
+/** Add a check box for each law to a page with several laws. */
+function addLawFilter() {
+  const laws = new Set([...document.querySelectorAll("[data-law]")].map((element) => element.dataset.law));
+  if (laws.size < 2) return;
+  const labels = [...laws].map((law) => {
+    const box = createElement("input", { type: "checkbox", checked: true, name: law });
+    box.addEventListener("change", () => setLawVisible(law, box.checked));
+    return createElement("label", {}, box, law);
   });
-  const all = (checked) => () => boxes.forEach(({ firstChild: box }) => {
+  const setAll = (checked) => () => labels.forEach(({ firstChild: box }) => {
     box.checked = checked;
-    showLaw(box.name, checked);
+    setLawVisible(box.name, checked);
   });
-  const words = make("legend", { textContent: "Laws shown" });
-  const set = make("fieldset", { className: "laws" }, words, ...boxes);
-  set.append(button("All", "Show all laws", all(true)), button("None", "Hide all laws", all(false)));
-  document.querySelector("section").before(set);
+  const legend = createElement("legend", { textContent: "Laws shown" });
+  const filter = createElement("fieldset", { className: "laws" }, legend, ...labels);
+  filter.append(
+    createButton("All", "Show all laws", setAll(true)),
+    createButton("None", "Hide all laws", setAll(false)),
+  );
+  document.querySelector("section").before(filter);
 }
 
-// --- the page ------------------------------------------------------------------------------------
+// --- page ----------------------------------------------------------------------------------------
 
-/** Give every picture its tools. */
+/** Add zoom, values at the pointer and export to a figure. */
 function addTools(figure) {
   const svg = figure.querySelector("svg");
   const panels = JSON.parse(figure.querySelector("script").textContent);
   const heading = figure.closest("section").querySelector("h1, h2, h3, h4").textContent;
   const name = heading.toLowerCase().replace(/[^\p{L}\p{N}]+/gu, "-").replace(/^-|-$/g, "");
   const viewBox = svg.getAttribute("viewBox");
-  const tools = make("div", { className: "tools" });
+  const tools = createElement("div", { className: "tools" });
   addZoom(svg, tools);
-  const picture = () => save(`${name}.svg`, "image/svg+xml", svgFile(svg, viewBox));
-  tools.append(button("SVG", "Save the picture (SVG)", picture));
+  const saveSvg = () => downloadText(`${name}.svg`, "image/svg+xml", svgFile(svg, viewBox));
+  tools.append(createButton("SVG", "Save the figure (SVG)", saveSvg));
   if (panels.length) {
     addReading(figure, svg, panels);
-    tools.append(button("CSV", "Save the data (CSV)", () => save(`${name}.csv`, "text/csv", csvFile(panels))));
+    const saveCsv = () => downloadText(`${name}.csv`, "text/csv", csvFile(panels));
+    tools.append(createButton("CSV", "Save the data (CSV)", saveCsv));
   }
   figure.append(tools);
 }
 
 document.querySelectorAll("figure").forEach(addTools);
-addLaws();
+addLawFilter();
