@@ -41,7 +41,7 @@ while True:
     while time.perf_counter() < begun + float(sys.argv[1]) / 60: pass
     time.sleep(max(0.0, begun + 1 / 60 - time.perf_counter()))
 """
-_LIVE = "globalThis.lab?.frame && lab.news?.state == 'running'"
+_LIVE = "globalThis.lab?.frame && lab.status?.state == 'running'"
 
 
 def run(console: Console, seconds: float = SECONDS) -> None:
@@ -88,7 +88,7 @@ def first_picture(page: Browser) -> float:
     lab = Started()
     try:
         page.call("Page.navigate", url=lab.address)
-        page.until(f"{_LIVE} && lab.ready")
+        page.until(f"{_LIVE} && lab.hasPictures")
         return time.perf_counter() - begun
     finally:
         page.call("Page.navigate", url=BLANK)
@@ -112,7 +112,7 @@ def _pairs(lab: Started, page: Browser, seconds: float) -> tuple[FloatArray, Flo
     for number in range(PAIRS):
         span = seconds / PAIRS
         page.call("Page.navigate", url=lab.address)
-        page.until(f"{_LIVE} && lab.ready")
+        page.until(f"{_LIVE} && lab.hasPictures")
         before, begun = _cpu_time(page.process), time.monotonic()
         watched = _late_share(lab, span, page)
         taken = (_cpu_time(page.process) - before) / (time.monotonic() - begun)

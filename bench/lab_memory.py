@@ -63,7 +63,7 @@ def _use_page(lab: Started, laws: Iterator[str]) -> None:
             if now > looked + 0.5:
                 looked = now
                 say(page, "relief", x=0.0, y=0.0, size=8e-3)
-                say(page, "cut", box=[-4e-3, 4e-3, -2e-3, 2e-3], y=1e-3 * math.cos(now))
+                say(page, "section", box=[-4e-3, 4e-3, -2e-3, 2e-3], y=1e-3 * math.cos(now))
 
 
 def _memory(server: int) -> dict[int, float]:

@@ -28,12 +28,12 @@ def run(console: Console, actions: int = ACTIONS, seed: int = SEED) -> None:
         tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as home,
         Browser(lab.address, Path(home)) as page,
     ):
-        page.until("globalThis.lab?.frame && lab.ready")
+        page.until("globalThis.lab?.frame && lab.hasPictures")
         monkey = Monkey(page, seed)
         for _ in range(actions):
             monkey.act()
         errors, beyond, most, frames = monkey.end()
-        bound, starts = page.ask("[lab.news.max_force, lab.news.starts]")
+        bound, starts = page.ask("[lab.status.max_force, lab.status.start_count]")
         for words in page.said:
             console.print(f"lab: the page: {words}")
     code, said = lab.end()

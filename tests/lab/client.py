@@ -31,7 +31,7 @@ def joined(lab: Started, **more: Any) -> ClientConnection:
 
 
 def say(page: ClientConnection, what: str, **content: Any) -> None:
-    page.send(json.dumps({"do": what, **content}))
+    page.send(json.dumps({"type": what, **content}))
 
 
 def taken(page: ClientConnection) -> Any:
@@ -39,7 +39,7 @@ def taken(page: ClientConnection) -> Any:
     content = page.recv(timeout=120)
     message = json.loads(content) if isinstance(content, str) else np.frombuffer(content)
     if frames(message):
-        say(page, "seen", frame=head(message, "frame"))
+        say(page, "acknowledge", frame=head(message, "frame"))
     return message
 
 
@@ -55,7 +55,7 @@ def news(**wanted: Any) -> Callable[[Any], bool]:
     """Return what knows the message that things stand in some way."""
 
     def fits(message: Any) -> bool:
-        if not isinstance(message, dict) or message["say"] != "news":
+        if not isinstance(message, dict) or message["type"] != "status":
             return False
         known = {**message, **message["settings"]}
         return all(known[name] == value for name, value in wanted.items())
@@ -64,7 +64,7 @@ def news(**wanted: Any) -> Callable[[Any], bool]:
 
 
 def refused(message: Any) -> bool:
-    return isinstance(message, dict) and message["say"] == "refused"
+    return isinstance(message, dict) and message["type"] == "error"
 
 
 def frames(message: Any) -> bool:
@@ -72,7 +72,7 @@ def frames(message: Any) -> bool:
 
 
 def head(frame: Any, name: str) -> float:
-    return float(frame[LAYOUT["head"][name]])
+    return float(frame[LAYOUT["header"][name]])
 
 
 def column(frame: Any, part: str, name: str) -> float:

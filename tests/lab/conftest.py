@@ -36,7 +36,7 @@ def page(lab: Started, browser: Browser) -> Iterator[Browser]:
     browser.said.clear()
     browser.resize(1280, 900)
     browser.call("Page.navigate", url=lab.address)
-    browser.until("globalThis.lab?.frame && lab.ready")
+    browser.until("globalThis.lab?.frame && lab.hasPictures")
     yield browser
     browser.call("Page.navigate", url="about:blank")
 

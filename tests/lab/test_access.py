@@ -87,29 +87,33 @@ def said(**message: object) -> str:
 
 def test_what_our_page_says_is_understood() -> None:
     three = [1e-3, 0, -2e-3]
-    steer = parse_message(said(do="steer", target=three, cosine=three, sine=three, speed=2))
+    steer = parse_message(said(type="steer", target=three, cosine=three, sine=three, speed=2))
     assert steer.content == SteerRequest(*[(1e-3, 0.0, -2e-3)] * 3, 2.0)
-    assert parse_message(said(do="change", changes={"law": "B"})) == Message("change", {"law": "B"})
-    look = parse_message(said(do="cut", box=[-0.01, 0.01, -0.001, 0.001], y=0.0))
-    assert look.content == ViewRequest("cut", (-0.01, 0.01, -0.001, 0.001, 0.0))
-    assert parse_message(said(do="relief", x=0, y=0, size=0.01)).content == ViewRequest(
+    assert parse_message(said(type="change", changes={"law": "B"})) == Message(
+        "change", {"law": "B"}
+    )
+    look = parse_message(said(type="section", box=[-0.01, 0.01, -0.001, 0.001], y=0.0))
+    assert look.content == ViewRequest("section", (-0.01, 0.01, -0.001, 0.001, 0.0))
+    assert parse_message(said(type="relief", x=0, y=0, size=0.01)).content == ViewRequest(
         "relief", (0.0, 0.0, 0.01)
     )
-    assert parse_message(said(do="take")) == Message("take")
-    assert parse_message(said(do="seen", frame=7)) == Message("seen", 7.0)
+    assert parse_message(said(type="take_control")) == Message("take_control")
+    assert parse_message(said(type="acknowledge", frame=7)) == Message("acknowledge", 7.0)
 
 
 @pytest.mark.parametrize(
     "content",
     [
-        b"\x00\x01", "", "{", "[]", "7", "null", "{}", said(do="fly"), said(do=["take"]),
-        said(do="take", more=1), said(do="steer", target=[0, 0, 0]),
-        said(do="relief", x="0", y=0, size=0.01), said(do="relief", x=True, y=0, size=0.01),
-        said(do="change", changes=[]), said(do="change", changes={"law": ["B"]}),
-        said(do="cut", box=[0, 1, 2], y=0), said(do="seen", frame="7"), said(do="seen"),
-        '{"do": "relief", "x": NaN, "y": 0, "size": 0.01}',
-        '{"do": "relief", "x": Infinity, "y": 0, "size": 0.01}', "[" * 4000,
-        '{"do": "relief", "x": ' + "9" * 5000 + "}",
+        b"\x00\x01", "", "{", "[]", "7", "null", "{}", said(type="fly"),
+        said(type=["take_control"]),
+        said(type="take_control", more=1), said(type="steer", target=[0, 0, 0]),
+        said(type="relief", x="0", y=0, size=0.01), said(type="relief", x=True, y=0, size=0.01),
+        said(type="change", changes=[]), said(type="change", changes={"law": ["B"]}),
+        said(type="section", box=[0, 1, 2], y=0), said(type="acknowledge", frame="7"),
+        said(type="acknowledge"),
+        '{"type": "relief", "x": NaN, "y": 0, "size": 0.01}',
+        '{"type": "relief", "x": Infinity, "y": 0, "size": 0.01}', "[" * 4000,
+        '{"type": "relief", "x": ' + "9" * 5000 + "}",
     ],
 )  # fmt: skip
 def test_what_no_page_of_ours_says_is_malformed(content: str | bytes) -> None:
@@ -120,11 +124,12 @@ def test_what_no_page_of_ours_says_is_malformed(content: str | bytes) -> None:
 @pytest.mark.parametrize(
     "content",
     [
-        '{"do": "relief", "x": 1e999, "y": 0, "size": 0.01}',
-        said(do="relief", x=0, y=0, size=0), said(do="relief", x=0, y=0, size=1),
-        said(do="steer", target=[0, 0, 1], cosine=[0, 0, 0], sine=[0, 0, 0], speed=0),
-        said(do="steer", target=[0, 0, 0], cosine=[0, 0, 0], sine=[0, 0, 0], speed=1e4),
-        said(do="cut", box=[0.1, 0.0, 0, 0.1], y=0), said(do="cut", box=[0, 0.1, 0, 1e-9], y=0),
+        '{"type": "relief", "x": 1e999, "y": 0, "size": 0.01}',
+        said(type="relief", x=0, y=0, size=0), said(type="relief", x=0, y=0, size=1),
+        said(type="steer", target=[0, 0, 1], cosine=[0, 0, 0], sine=[0, 0, 0], speed=0),
+        said(type="steer", target=[0, 0, 0], cosine=[0, 0, 0], sine=[0, 0, 0], speed=1e4),
+        said(type="section", box=[0.1, 0.0, 0, 0.1], y=0),
+        said(type="section", box=[0, 0.1, 0, 1e-9], y=0),
     ],
 )  # fmt: skip
 def test_a_number_out_of_its_range_is_refused(content: str) -> None:
@@ -135,18 +140,18 @@ def test_a_number_out_of_its_range_is_refused(content: str) -> None:
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
     lambda inner: st.lists(inner, max_size=4) | st.dictionaries(
-        st.sampled_from(["do", "target", "cosine", "sine", "speed", "changes", "x", "y", "size",
+        st.sampled_from(["type", "target", "cosine", "sine", "speed", "changes", "x", "y", "size",
                          "box", "take", "frame"]), inner, max_size=5),
     max_leaves=8,
 )  # fmt: skip
-KINDS = st.sampled_from(["steer", "change", "relief", "cut", "take", "seen"])
+KINDS = st.sampled_from(["steer", "change", "relief", "section", "take_control", "acknowledge"])
 
 
 @settings(max_examples=200, deadline=None)
 @given(JSON, KINDS)
 def test_whatever_is_said_is_a_message_or_an_error_of_ours(content: object, kind: str) -> None:
     if isinstance(content, dict):
-        content = {**content, "do": kind}
+        content = {**content, "type": kind}
     with suppress(MalformedMessageError, ParameterError):
         assert isinstance(parse_message(json.dumps(content)), Message)
 
@@ -165,9 +170,9 @@ def test_a_frame_keeps_the_extremes_between_two_pictures() -> None:
     named = frame_layout()
     # The newest row alone would show nothing of it.
     assert abs(numbers[named["newest"] + place]) < 0.2
-    assert numbers[named["least"] + place] == rows[:, place].min() < -0.29
-    assert numbers[named["greatest"] + place] == rows[:, place].max() > 0.29
-    head = [numbers[named["head"][name]] for name in HEADER]
+    assert numbers[named["minima"] + place] == rows[:, place].min() < -0.29
+    assert numbers[named["maxima"] + place] == rows[:, place].max() > 0.29
+    head = [numbers[named["header"][name]] for name in HEADER]
     assert head == [1.0, 5.0, 50.0, 7.0, 3.0, 1.0, 2.0, 50.0, 0.0, 0.0, 0.0, 0.0]
     forces = numbers[named["forces"] :].reshape(-1, 3)
     assert (forces == rows[:, FORCE_COLUMNS]).all()
@@ -179,5 +184,5 @@ def test_a_page_that_was_slow_gets_the_newest_forces_and_all_extremes() -> None:
     rows[:, FORCE_COLUMNS.start] = np.arange(len(rows))
     counts = {"frame": 1, "acknowledged": 0, "late": 0, "skipped": 0}
     numbers = np.frombuffer(encode_frame(rows, 0, counts, np.zeros(6)))
-    assert numbers[frame_layout()["least"] + COLUMN_NAMES.index("x")] == -5.0
+    assert numbers[frame_layout()["minima"] + COLUMN_NAMES.index("x")] == -5.0
     assert numbers[frame_layout()["forces"] :: 3].tolist() == list(range(10, len(rows)))

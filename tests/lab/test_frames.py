@@ -19,5 +19,7 @@ def test_the_greatest_jump_is_found_with_the_way_that_goes_with_it() -> None:
     table = rows(x=[0.0, 3e-3, 3e-3], z=[0.0, 4e-3, 3e-3], commanded_x=[0.0, 1.0, 1.0],
                  commanded_z=[0.0, 0.0, -2.0])  # fmt: skip
     found = step_statistics(table)
-    assert found == pytest.approx({"way": 6e-3, "squares": 26e-6, "jump": 2.0, "moved": 1e-3})
-    assert step_statistics(table[:1]) == {"way": 0.0, "squares": 0.0, "jump": 0.0, "moved": 0.0}
+    assert found == pytest.approx(
+        {"path_length": 6e-3, "squared_steps": 26e-6, "max_force_step": 2.0, "position_step": 1e-3}
+    )
+    assert step_statistics(table[:1]) == dict.fromkeys(found, 0.0)

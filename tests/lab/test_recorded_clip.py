@@ -325,23 +325,23 @@ def shown(
     browser.said.clear()
     browser.resize(1280, 900)
     browser.call("Page.navigate", url=lab.address)
-    browser.until("globalThis.lab?.frame && lab.ready")
+    browser.until("globalThis.lab?.frame && lab.hasPictures")
     yield browser, open_recording(path)
     browser.call("Page.navigate", url="about:blank")
     assert lab.end() == (0, "")
 
 
 def go_to(page: Browser, row: int) -> None:
-    page.ask(f"(() => {{ const at = document.getElementById('at'); at.value = {row};"
+    page.ask(f"(() => {{ const at = document.getElementById('playback-time'); at.value = {row};"
              "at.dispatchEvent(new Event('input')); })()")  # fmt: skip
-    page.until(f"lab.player.sought === null && lab.player.row === {row}")
+    page.until(f"lab.player.targetRow === null && lab.player.row === {row}")
 
 
 @needs_browser
 def test_a_long_recording_is_shown_again_piece_by_piece(shown: tuple[Browser, Recording]) -> None:
     page, recording = shown
-    page.until("lab.player.on && lab.player.playing && lab.player.time > 0.2")
-    assert page.ask("document.querySelector('#takes button').textContent") == "Show long.mcap"
+    page.until("lab.player.isOpen && lab.player.isPlaying && lab.player.time > 0.2")
+    assert page.ask("document.querySelector('#clips button').textContent") == "Show long.mcap"
     page.press("j")
     assert recording.rows > 20 * CHUNK_ROWS
     names = {name: k for k, name in enumerate(recording.names)}
@@ -358,20 +358,20 @@ def test_a_long_recording_is_shown_again_piece_by_piece(shown: tuple[Browser, Re
         assert page.ask("lab.probeState().force") == pytest.approx(force, abs=0)
         probe = [rows[row - 1, names[axis]] for axis in "xyz"]
         assert page.ask("lab.probeState().probe") == pytest.approx(probe, abs=0)
-        first, count = page.ask("[lab.frame.first, lab.frame.rows]")
+        first, count = page.ask("[lab.frame.firstRow, lab.frame.rowCount]")
         assert first + count == row  # of a frame no extreme is lost, also where pieces meet
         least = rows[first:row, [names[axis] for axis in "xyz"]].min(axis=0)
-        seen = page.ask("['x','y','z'].map(a => lab.frame.least[lab.player.playback.columns[a]])")
+        seen = page.ask("['x','y','z'].map(a => lab.frame.minima[lab.player.playback.columns[a]])")
         assert seen == pytest.approx(least, abs=0)
-        assert page.ask("lab.player.playback.pieces.size") <= 16
+        assert page.ask("lab.player.playback.chunks.size") <= 16
     assert page.said == []
-    assert page.ask("lab.faults") == 0
+    assert page.ask("lab.errorCount") == 0
 
 
 @needs_browser
 def test_it_plays_as_time_goes_and_holds_at_its_end(shown: tuple[Browser, Recording]) -> None:
     page, recording = shown
-    page.until("lab.player.on")
+    page.until("lab.player.isOpen")
     go_to(page, 5000)
     was = page.ask("performance.now()")
     page.press("j")
@@ -389,14 +389,18 @@ def test_behind_it_is_its_own_surface_and_a_change_is_of_the_loop(
     shown: tuple[Browser, Recording],
 ) -> None:
     page, recording = shown
-    page.until("lab.player.on && lab.news.state === 'running'")
-    assert page.ask("lab.news.settings.law") == "F"
-    page.ask("document.querySelector('#letters button').click()")  # W
-    page.until("!lab.player.on && lab.news.settings.law === 'W' && lab.news.state === 'running'")
-    assert page.ask("document.getElementById('replay').hidden")
-    page.ask("document.querySelector('#takes button').click()")
-    page.until("lab.player.on && lab.news.settings.law === 'F' && lab.news.state === 'running'")
-    page.until("lab.current")
+    page.until("lab.player.isOpen && lab.status.state === 'running'")
+    assert page.ask("lab.status.settings.law") == "F"
+    page.ask("document.querySelector('#law-buttons button').click()")  # W
+    page.until(
+        "!lab.player.isOpen && lab.status.settings.law === 'W' && lab.status.state === 'running'"
+    )
+    assert page.ask("document.getElementById('playback').hidden")
+    page.ask("document.querySelector('#clips button').click()")
+    page.until(
+        "lab.player.isOpen && lab.status.settings.law === 'F' && lab.status.state === 'running'"
+    )
+    page.until("lab.hasCurrentPictures")
     shown_heights = np.array(page.ask("Array.from(lab.relief.heights)"))
     x, y, size = page.ask("[lab.relief.x, lab.relief.y, lab.relief.size]")
     along = np.linspace(-0.5 * size, 0.5 * size, 96)
@@ -407,7 +411,7 @@ def test_behind_it_is_its_own_surface_and_a_change_is_of_the_loop(
     )
     # After a reload it is there again.
     page.call("Page.reload")
-    page.until("globalThis.lab?.frame && lab.player.on")
+    page.until("globalThis.lab?.frame && lab.player.isOpen")
     page.press("l")
-    page.until("!lab.player.on")
+    page.until("!lab.player.isOpen")
     assert page.said == []

@@ -71,48 +71,48 @@ def test_a_page_that_wishes_at_every_frame_gets_no_more_of_them(lab: Started) ->
 def test_the_hand_is_steered_the_law_changes_and_the_loop_goes_on(lab: Started) -> None:
     with joined(lab) as page:
         first = heard(page, news(state="running"))
-        assert first["steers"]
-        wish = first["requested"] + 1
+        assert first["has_control"]
+        wish = first["request_count"] + 1
         say(page, "steer", target=[1e-3, 0, -1e-3], **STILL)
         frame = heard(page, lambda m: frames(m) and column(m, "newest", "applied z") > 0.1)
         assert head(frame, "acknowledged") == wish
-        assert column(frame, "greatest", "applied z") <= first["max_force"]
+        assert column(frame, "maxima", "applied z") <= first["max_force"]
         say(page, "change", changes={"law": "W", "stiffness": 200.0})
         changed = heard(page, news(state="running", law="W"))
         assert changed["settings"]["stiffness"] == 200.0
-        assert changed["starts"] == first["starts"]
+        assert changed["start_count"] == first["start_count"]
         heard(page, lambda m: frames(m) and column(m, "newest", "share") == 1.0)
         for changes in ({"stiffness": 1e9}, {"colour": "red"}, {"law": "Q"}, {"texture": "/etc/x"},
                        {"device": "x.toml"}, {"delay": -1}):  # fmt: skip
             say(page, "change", changes=changes)
-            told = heard(page, lambda m: news(state="running")(m) and bool(m["words"]))
-            assert next(iter(changes)) in told["words"]
+            told = heard(page, lambda m: news(state="running")(m) and bool(m["message"]))
+            assert next(iter(changes)) in told["message"]
             assert told["settings"] == changed["settings"]
         say(page, "steer", target=[9, 0, 0], **STILL)
-        assert "target" in heard(page, refused)["words"]
+        assert "target" in heard(page, refused)["message"]
 
 
 def test_one_page_steers_and_others_watch(lab: Started) -> None:
     with joined(lab) as first:
-        heard(first, news(steers=True))
+        heard(first, news(has_control=True))
         with joined(lab) as second:
-            assert heard(second, news())["steers"] is False
+            assert heard(second, news())["has_control"] is False
             heard(second, frames)
-            for what, content in (("steer", {"target": [0, 0, 0], **STILL}), ("take", {}),
+            for what, content in (("steer", {"target": [0, 0, 0], **STILL}), ("take_control", {}),
                                   ("change", {"changes": {"law": "A"}})):  # fmt: skip
                 say(second, what, **content)
-                assert "steering" in heard(second, refused)["words"]
+                assert "steering" in heard(second, refused)["message"]
             first.close()
-            heard(second, news(free=True))
-            say(second, "take")
-            heard(second, news(steers=True))
+            heard(second, news(control_available=True))
+            say(second, "take_control")
+            heard(second, news(has_control=True))
 
 
 @pytest.mark.parametrize(
     ("content", "code"),
-    [("{}", 1008), (b"\x00\xff", 1008), ('{"do": "steer"}', 1008),
-     ('{"do": "seen", "frame": 1e9}', 1008),
-     ('{"do": "take"}' + " " * MAX_MESSAGE_BYTES, 1009)],
+    [("{}", 1008), (b"\x00\xff", 1008), ('{"type": "steer"}', 1008),
+     ('{"type": "acknowledge", "frame": 1e9}', 1008),
+     ('{"type": "take_control"}' + " " * MAX_MESSAGE_BYTES, 1009)],
 )  # fmt: skip
 def test_a_malformed_frame_ends_the_connection_and_not_the_loop(
     lab: Started, content: str | bytes, code: int
@@ -138,7 +138,7 @@ def test_a_page_that_paints_nothing_is_not_sent_what_will_be_old(lab: Started) -
                 content = page.recv(timeout=1.0)
                 got += [np.frombuffer(content)] if isinstance(content, bytes) else []
         assert [head(frame, "frame") for frame in got] == list(range(1, MAX_PENDING_FRAMES + 1))
-        say(page, "seen", frame=MAX_PENDING_FRAMES)
+        say(page, "acknowledge", frame=MAX_PENDING_FRAMES)
         # The next one is new, and holds the extremes of all that happened in between.
         after = np.frombuffer(page.recv(timeout=60))
         assert head(after, "first") == head(got[-1], "first") + head(got[-1], "rows")
@@ -147,14 +147,16 @@ def test_a_page_that_paints_nothing_is_not_sent_what_will_be_old(lab: Started) -
 
 def test_pictures_are_computed_elsewhere(lab: Started) -> None:
     with joined(lab) as page:
-        version = heard(page, lambda m: news(state="running")(m) and m["version"] > 0)["version"]
+        version = heard(page, lambda m: news(state="running")(m) and m["surface_version"] > 0)[
+            "surface_version"
+        ]
         assert version >= 1
         say(page, "relief", x=0.0, y=0.0, size=0.008)
         relief = heard(page, lambda m: isinstance(m, np.ndarray) and m[0] == 2.0)
         heights = relief[5:].reshape(int(relief[1]), -1)
         along = np.linspace(-4e-3, 4e-3, len(heights))
         assert np.abs(heights[3] - 2e-4 * np.sin(2.0 * np.pi * along / 2e-3)).max() < 1e-12
-        say(page, "cut", box=[-1e-3, 1e-3, -1e-3, 1e-3], y=0.0)
+        say(page, "section", box=[-1e-3, 1e-3, -1e-3, 1e-3], y=0.0)
         cut = heard(page, lambda m: isinstance(m, np.ndarray) and m[0] == 3.0)
         line, across, deep = map(int, cut[1:4])
         assert len(cut) == 9 + line + 3 * across * deep
@@ -173,17 +175,27 @@ def niced(lab: Started) -> list[int]:
 def test_pictures_come_again_when_their_process_was_killed(lab: Started) -> None:
     look = {"x": 0.0, "y": 0.0, "size": 0.008}
     with joined(lab) as page:
-        first = heard(page, lambda m: news(state="running")(m) and m["version"] > 0 and m["limit"])
+        first = heard(
+            page, lambda m: news(state="running")(m) and m["surface_version"] > 0 and m["limit"]
+        )
         for one in niced(lab):
             os.kill(one, signal.SIGKILL)
         say(page, "relief", **look)
-        told = heard(page, lambda m: news()(m) and m["pictures"])
-        assert "has crashed and is restarted" in told["pictures"]
+        told = heard(page, lambda m: news()(m) and m["picture_message"])
+        assert "has crashed and is restarted" in told["picture_message"]
         assert (
-            heard(page, lambda m: isinstance(m, dict) and m["say"] == "later")["kind"] == "relief"
+            heard(page, lambda m: isinstance(m, dict) and m["type"] == "picture_unavailable")[
+                "kind"
+            ]
+            == "relief"
         )
-        told = heard(page, lambda m: news(pictures="")(m) and m["version"] > first["version"])
-        assert (told["state"], told["starts"]) == ("running", first["starts"])
+        told = heard(
+            page,
+            lambda m: (
+                news(picture_message="")(m) and m["surface_version"] > first["surface_version"]
+            ),
+        )
+        assert (told["state"], told["start_count"]) == ("running", first["start_count"])
         say(page, "relief", **look)
         assert heard(page, lambda m: isinstance(m, np.ndarray) and m[0] == 2.0).max() > 1e-4
 

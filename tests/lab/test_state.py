@@ -77,12 +77,12 @@ def place(page: Browser, name: str) -> dict[str, float]:
 def test_a_finger_presses_and_lifts(page: Browser) -> None:
     at = place(page, "relief")
     page.call("Input.dispatchTouchEvent", type="touchStart", touchPoints=[at])
-    page.until("lab.hand.pressed && lab.probeState().force[2] > 0.02")
+    page.until("lab.hand.isPressed && lab.probeState().force[2] > 0.02")
     before = page.ask("lab.hand.x")
     page.call("Input.dispatchTouchEvent", type="touchMove", touchPoints=[{**at, "x": at["x"] + 40}])
-    page.until(f"lab.hand.pressed && lab.hand.x > {before} + 5e-4")
+    page.until(f"lab.hand.isPressed && lab.hand.x > {before} + 5e-4")
     page.call("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
-    page.until("!lab.hand.pressed && !lab.probeState().inside")
+    page.until("!lab.hand.isPressed && !lab.probeState().isInside")
     # The page has neither scrolled nor zoomed.
     assert page.ask("[scrollX, scrollY, visualViewport.scale]") == [0, 0, 1]
 
@@ -100,10 +100,10 @@ def test_a_pen_presses_as_hard_as_it_is_pressed(page: Browser) -> None:
     depths = []
     for force in (0.25, 0.75):
         pen("mousePressed", force, 1)
-        page.until(f"lab.hand.pressed && Math.abs(lab.hand.force - 2 * {force}) < 0.01")
+        page.until(f"lab.hand.isPressed && Math.abs(lab.hand.pressure - 2 * {force}) < 0.01")
         depths.append(-page.ask("lab.hand.height"))
         pen("mouseReleased", 0.0, 0)
-        page.until("!lab.hand.pressed")
+        page.until("!lab.hand.isPressed")
     assert depths == pytest.approx([0.5 * 4e-4, 1.5 * 4e-4], rel=0.02)
 
 
@@ -121,43 +121,45 @@ def loop_of(lab: Started) -> int:
 def test_a_loop_that_has_stopped_is_said_with_its_reason_and_starts_again(
     page: Browser, lab: Started
 ) -> None:
-    starts = page.ask("lab.news.starts")
+    starts = page.ask("lab.status.start_count")
     os.kill(loop_of(lab), signal.SIGKILL)
-    page.until("lab.news.state == 'stopped'")
+    page.until("lab.status.state == 'stopped'")
     words = page.ask("document.getElementById('alarm').innerText")
     assert "The loop has stopped: the process of the loop ended" in words
     assert page.ask("document.getElementById('state').textContent") == "stopped"
-    page.ask("document.getElementById('again').click()")
-    page.until(f"lab.news.state == 'running' && lab.news.starts == {starts + 1}")
+    page.ask("document.getElementById('start').click()")
+    page.until(f"lab.status.state == 'running' && lab.status.start_count == {starts + 1}")
     page.until("document.getElementById('alarm').hidden || !/stopped/.test(alarm.innerText)")
     page.until("lab.frame.newest[0] < 60")
 
 
 @needs_browser
 def test_a_surface_that_cannot_be_is_said_and_the_former_stays(page: Browser) -> None:
-    before = page.ask("lab.news.settings.texture")
+    before = page.ask("lab.status.settings.texture")
     page.ask("{ const field = document.getElementById('texture'); field.value = 'velvet';"
              "field.dispatchEvent(new Event('change')); }")  # fmt: skip
     page.until("/velvet/.test(document.getElementById('alarm').innerText)")
-    assert page.ask("lab.news.settings.texture") == before
-    rows = page.ask("lab.frame.first")
-    page.until(f"lab.news.state == 'running' && lab.frame.first > {rows}")
+    assert page.ask("lab.status.settings.texture") == before
+    rows = page.ask("lab.frame.firstRow")
+    page.until(f"lab.status.state == 'running' && lab.frame.firstRow > {rows}")
 
 
 @needs_browser
 def test_a_page_that_watches_says_so_and_takes_over(page: Browser, lab: Started) -> None:
     page.call("Page.navigate", url="about:blank")
     with joined(lab) as other:
-        if not heard(other, lambda m: news(free=True)(m) or news(steers=True)(m))["steers"]:
-            say(other, "take")
-            heard(other, news(steers=True))
+        if not heard(other, lambda m: news(control_available=True)(m) or news(has_control=True)(m))[
+            "has_control"
+        ]:
+            say(other, "take_control")
+            heard(other, news(has_control=True))
         page.call("Page.navigate", url=lab.address)
-        page.until("globalThis.lab?.news && !lab.news.steers")
+        page.until("globalThis.lab?.status && !lab.status.has_control")
         words = "document.getElementById('alarm').innerText"
         assert "Another page has control; this page is read-only." in page.ask(words)
         assert page.ask("document.getElementById('stiffness').disabled")
-        assert page.ask("document.getElementById('take').hidden")
+        assert page.ask("document.getElementById('take-control').hidden")
         page.until("lab.frame")
-    page.until("!document.getElementById('take').hidden")
-    page.ask("document.getElementById('take').click()")
-    page.until("lab.news.steers && !document.getElementById('stiffness').disabled")
+    page.until("!document.getElementById('take-control').hidden")
+    page.ask("document.getElementById('take-control').click()")
+    page.until("lab.status.has_control && !document.getElementById('stiffness').disabled")

@@ -76,7 +76,7 @@ def render_view(kind: str, numbers: tuple[float, ...]) -> bytes:
     """Return a picture of the surface as a message; empty without a surface.
 
     Args:
-        kind: "relief" or "cut".
+        kind: "relief" or "section".
         numbers: the arguments of ``encode_relief`` or ``encode_section`` after the surface.
     """
     surface = _STATE.get("surface")

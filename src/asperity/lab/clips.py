@@ -189,7 +189,7 @@ class ClipStore:
         self, name: str, playback: Playback, scene_state: SceneState, title: str
     ) -> None:
         """Add a recording, which is never discarded and is opened at once."""
-        self._add(name, playback, scene_state, title=title, opens=True)
+        self._add(name, playback, scene_state, title=title, opens_at_start=True)
 
     def _add(
         self, name: str, playback: Playback, scene_state: SceneState, **words: Any
@@ -225,7 +225,7 @@ class ClipStore:
         finally:
             self._is_saving = False
         self._saved_count += 1
-        name = f"take-{self._saved_count}"
+        name = f"clip-{self._saved_count}"
         self._archives[name] = archive
         if len(self._archives) > MAX_CLIPS:
             self._discard(next(iter(self._archives)))

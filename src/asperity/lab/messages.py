@@ -46,8 +46,8 @@ class Message(NamedTuple):
     """A message of the page.
 
     Attributes:
-        kind: "steer", "change", "relief", "cut", "take" (control), "start", "stop", "save" or
-            "seen" (the newest painted frame).
+        kind: "steer", "change", "relief", "section", "take_control", "start", "stop", "save_clip"
+            or "acknowledge" (the newest painted frame).
         content: a :class:`SteerRequest`, the changes by name, a :class:`ViewRequest`, the number of
             a frame, or ``None``.
     """
@@ -60,7 +60,7 @@ def parse_message(content: str | bytes) -> Message:
     """Return a message of the page.
 
     Args:
-        content: JSON with the keys of one kind of message and "do".
+        content: JSON with "type" and the keys of that type of message.
 
     Raises:
         MalformedMessageError: for a message that the page never sends.
@@ -72,9 +72,9 @@ def parse_message(content: str | bytes) -> Message:
         message = json.loads(content, parse_constant=_reject_constant)
     except (ValueError, RecursionError):
         raise MalformedMessageError("a message must be JSON") from None
-    kind = message.pop("do", None) if isinstance(message, dict) else None
+    kind = message.pop("type", None) if isinstance(message, dict) else None
     if not isinstance(kind, str) or kind not in _PARSERS:
-        raise MalformedMessageError(f'a message must have "do": {", ".join(_PARSERS)}')
+        raise MalformedMessageError(f'a message must have "type": {", ".join(_PARSERS)}')
     keys, parse = _PARSERS[kind]
     if set(message) != set(keys):
         raise MalformedMessageError(f'"{kind}" has {", ".join(keys) or "no more keys"}')
@@ -130,7 +130,7 @@ def _parse_section(box: object, y: object) -> ViewRequest:
     if not all(MIN_VIEW_SIZE <= side <= MAX_VIEW_SIZE for side in (right - left, top - bottom)):
         limits = f"must have sides of {MIN_VIEW_SIZE:g} to {MAX_VIEW_SIZE:g} m"
         raise ParameterError("box", limits, box)
-    return ViewRequest("cut", (*sides, _parse_number("y", y, -1.0, 1.0)))
+    return ViewRequest("section", (*sides, _parse_number("y", y, -1.0, 1.0)))
 
 
 def _parse_frame(frame: object) -> float:
@@ -141,9 +141,9 @@ _PARSERS: dict[str, tuple[tuple[str, ...], Callable[..., Any]]] = {
     "steer": (("target", "cosine", "sine", "speed"), _parse_steer),
     "change": (("changes",), _parse_change),
     "relief": (("x", "y", "size"), _parse_relief),
-    "cut": (("box", "y"), _parse_section),
-    "seen": (("frame",), _parse_frame),
-    **{kind: ((), lambda: None) for kind in ("take", "start", "stop", "save")},
+    "section": (("box", "y"), _parse_section),
+    "acknowledge": (("frame",), _parse_frame),
+    **{kind: ((), lambda: None) for kind in ("take_control", "start", "stop", "save_clip")},
 }
 
 
@@ -154,11 +154,12 @@ COLUMN_NAMES = [name for name, _unit in COLUMNS]
 FORCE_COLUMNS = slice(COLUMN_NAMES.index("applied x"), COLUMN_NAMES.index("applied z") + 1)
 POSITION = slice(COLUMN_NAMES.index("x"), COLUMN_NAMES.index("z") + 1)
 _LAW_FORCE = slice(COLUMN_NAMES.index("commanded x"), COLUMN_NAMES.index("commanded z") + 1)
+_STEP_STATISTICS = ("path_length", "squared_steps", "max_force_step", "position_step")
 HEADER = (
     *("kind", "frame", "rows", "first", "acknowledged", "late", "skipped", "forces"),
-    *("way", "squares", "jump", "moved"),
+    *_STEP_STATISTICS,
 )
-_POSITION_NAMES = ("god x", "god y", "god z", "hand x", "hand y", "hand z")
+_POSITION_NAMES = ("closest x", "closest y", "closest z", "hand x", "hand y", "hand z")
 MAX_FORCE_ROWS = 2048
 """Greatest number of rows whose forces are in a frame, the newest."""
 
@@ -168,11 +169,11 @@ def frame_layout() -> dict[str, Any]:
     columns = len(COLUMN_NAMES)
     after = len(HEADER) + len(_POSITION_NAMES)
     return {
-        "head": {name: place for place, name in enumerate((*HEADER, *_POSITION_NAMES))},
+        "header": {name: place for place, name in enumerate((*HEADER, *_POSITION_NAMES))},
         "columns": {name: place for place, name in enumerate(COLUMN_NAMES)},
         "newest": after,
-        "least": after + columns,
-        "greatest": after + 2 * columns,
+        "minima": after + columns,
+        "maxima": after + 2 * columns,
         "forces": after + 3 * columns,
     }
 
@@ -197,17 +198,22 @@ def encode_frame(
 
 
 def step_statistics(rows: FloatArray) -> dict[str, float]:
-    """Return statistics of the steps from row to row: ``way``, ``squares``, ``jump``, ``moved``."""
+    """Return statistics of the steps from row to row.
+
+    ``path_length`` is the sum of the steps of the position [m], ``squared_steps`` that of their
+    squares [m²], ``max_force_step`` the greatest step of the force of the law [N], and
+    ``position_step`` the step of the position at that row [m].
+    """
     if len(rows) < 2:
-        return {"way": 0.0, "squares": 0.0, "jump": 0.0, "moved": 0.0}
+        return dict.fromkeys(_STEP_STATISTICS, 0.0)
     squares = np.square(np.diff(rows[:, POSITION], axis=0)).sum(axis=1)
     jumps = np.square(np.diff(rows[:, _LAW_FORCE], axis=0)).sum(axis=1)
     most = int(jumps.argmax())
     return {
-        "way": float(np.sqrt(squares).sum()),
-        "squares": float(squares.sum()),
-        "jump": float(jumps[most] ** 0.5),
-        "moved": float(squares[most] ** 0.5),
+        "path_length": float(np.sqrt(squares).sum()),
+        "squared_steps": float(squares.sum()),
+        "max_force_step": float(jumps[most] ** 0.5),
+        "position_step": float(squares[most] ** 0.5),
     }
 
 

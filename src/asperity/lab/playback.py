@@ -65,11 +65,11 @@ class Playback:
     def to_dict(self) -> dict[str, Any]:
         """Return the description for the page."""
         return {
-            "rows": self.row_count,
+            "row_count": self.row_count,
             "period": self.period,
-            "piece": CHUNK_ROWS,
-            "width": len(COLUMNS) + 2 * len(ANCHOR_COLUMNS),
-            "force": self.force_range.round(6).tolist(),
+            "chunk_rows": CHUNK_ROWS,
+            "row_width": len(COLUMNS) + 2 * len(ANCHOR_COLUMNS),
+            "force_ranges": self.force_range.round(6).tolist(),
         }
 
 

@@ -281,9 +281,9 @@ def _build_scene_state(
     return SceneState(setup, source, scene.texture, (source, scene.texture))
 
 
-SCENE_KEY = "stage"
+SCENE_KEY = "saved_scene"
 """Name of the change to a saved scene; other changes are applied to that scene."""
-TOUR_SCENE, PREVIOUS_SCENE = "tour", "back"
+TOUR_SCENE, PREVIOUS_SCENE = "tour", "previous"
 """The first scene of the guided tour, and the scene before the tour."""
 
 
@@ -321,7 +321,7 @@ class SavedScenes:
             before, self._previous = self._previous, None
             return before or scene_state
         if name not in self.clip_scenes:
-            raise ParameterError("stage", "is no longer stored", name)
+            raise ParameterError(SCENE_KEY, "is no longer stored", name)
         return self.clip_scenes[name]
 
 

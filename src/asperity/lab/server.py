@@ -117,7 +117,7 @@ class Client:
     async def send(self, topic: str, /, **content: Any) -> None:
         """Send a message with its content."""
         with suppress(ConnectionClosed):
-            await self.connection.send(json.dumps({"say": topic, **to_plain_data(content)}))
+            await self.connection.send(json.dumps({"type": topic, **to_plain_data(content)}))
 
 
 class LabServer:
@@ -192,7 +192,7 @@ class LabServer:
         try:
             await page.send("hello", **_greeting())
             for announcement in self.clip_store.announcements:
-                await page.send("take", **announcement)
+                await page.send("clip", **announcement)
             await self._broadcast_state()
             tasks = [
                 asyncio.create_task(_run_while_connected(work, page))
@@ -219,7 +219,7 @@ class LabServer:
                 await client.connection.close(1008, str(error)[:_MAX_REASON_BYTES])
                 return
             except ParameterError as error:
-                await client.send("refused", words=str(error))
+                await client.send("error", message=str(error))
 
     async def _handle_message(self, client: Client, message: str | bytes) -> None:
         kind, content = parse_message(message)
@@ -227,9 +227,9 @@ class LabServer:
             self._last_contact = self._loop.time()
         if isinstance(content, ViewRequest):
             client.request_view(content)
-        elif kind == "seen":
+        elif kind == "acknowledge":
             client.acknowledge(content)
-        elif kind == "take":
+        elif kind == "take_control":
             if self._controller is not None:
                 raise ParameterError("steering", "is done by a page: close that one first")
             self._controller = client
@@ -250,7 +250,7 @@ class LabServer:
             self.session.start()
         elif kind == "stop":
             self.session.release_force("the force was released")
-        elif kind == "save":
+        elif kind == "save_clip":
             saving = asyncio.create_task(self._save_clip(client))
             self._save_tasks.add(saving)
             saving.add_done_callback(self._save_tasks.discard)
@@ -258,28 +258,30 @@ class LabServer:
     async def _save_clip(self, client: Client) -> None:
         """Save the newest seconds as a clip."""
         try:
-            await client.send("take", **await self.clip_store.save_clip())
+            await client.send("clip", **await self.clip_store.save_clip())
         except ParameterError as error:
-            await client.send("refused", words=str(error))
+            await client.send("error", message=str(error))
 
     async def _broadcast_state(self) -> None:
         """Send the state to all pages."""
         session, setup = self.session, self.session.scene_state.setup
-        low, high = map(float, setup.surface.texture.extremes)
-        steps = session.scene_state.electronics
-        news = {
-            "state": session.state, "words": session.message, "starts": session.start_count,
+        lowest, highest = map(float, setup.surface.texture.extremes)
+        electronics = session.scene_state.electronics
+        status = {
+            "state": session.state, "message": session.message,
+            "start_count": session.start_count,
             "settings": session.scene_state.settings, "assumptions": setup.assumptions,
-            "free": self._controller is None, "requested": session.steering_progress["requested"],
-            "handle": session.handle,
-            "rate": 1.0 / setup.servo.period, "max_force": setup.servo.max_force,
-            "step": steps.position_resolution, "force_step": steps.force_resolution,
-            "low": low, "high": high, "middle": session.scene_state.centre,
-            "limit": self.background.limit, "version": self.background.version,
-            "pictures": self.background.message,
+            "control_available": self._controller is None,
+            "request_count": session.steering_progress["requested"], "handle": session.handle,
+            "update_rate": 1.0 / setup.servo.period, "max_force": setup.servo.max_force,
+            "position_resolution": electronics.position_resolution,
+            "force_resolution": electronics.force_resolution,
+            "lowest": lowest, "highest": highest, "centre": session.scene_state.centre,
+            "limit": self.background.limit, "surface_version": self.background.version,
+            "picture_message": self.background.message,
         }  # fmt: skip
         for page in tuple(self._clients):
-            await page.send("news", steers=page is self._controller, **news)
+            await page.send("status", has_control=page is self._controller, **status)
 
     async def _wait_for_response(self) -> None:
         """Wait until the loop has processed the newest request: two samples."""
@@ -333,7 +335,7 @@ class LabServer:
                 if content:
                     await client.connection.send(content)
                 else:
-                    await client.send("later", kind=kind)
+                    await client.send("picture_unavailable", kind=kind)
 
 
 async def _run_while_connected(
@@ -353,7 +355,7 @@ def _greeting() -> dict[str, Any]:
         {
             "letter": law.letter,
             "name": law.name,
-            "words": law.summary,
+            "summary": law.summary,
             "parameters": [argument.to_dict() for argument in law.arguments.values()],
         }
         for law in REGISTERED_LAWS.values()

@@ -56,8 +56,8 @@ class Handle:
         """Return driver, motion source and behaviour on loss for the page."""
         return {
             "driver": self.driver.name,
-            "where": self.motion_source,
-            "lost": self.driver.loss_notice,
+            "motion_source": self.motion_source,
+            "loss_notice": self.driver.loss_notice,
         }
 
 
@@ -69,7 +69,8 @@ def make_handle(driver: Driver, setup: Setup) -> Handle:
     name = setup.device.name
     return Handle(
         driver,
-        f"You hold the handle of {name}; the pointer has no effect. Delay and steps are its own",
+        f"You hold the handle of {name}; the pointer has no effect. Delay and resolution are"
+        " those of the device",
         f"stopped. Keep a hand near the switch of {name}, the handle in the air: Start ramps the"
         f" force up. If the loop dies: {driver.loss_notice}",
     )

@@ -28,10 +28,10 @@ _USE = """((k, share, text) => {
 # Frames that are beyond the greatest force of the device: of this loop, or of the one before.
 _WATCH = """lab.most = lab.beyond = 0; lab.bounds = [0, 0];
   lab.watch = setInterval(() => {
-    const { frame, news } = lab;
-    if (!frame || !news) return;
-    if (lab.bounds[1] !== news.max_force) lab.bounds = [lab.bounds[1], news.max_force];
-    for (const k of [7, 8, 9]) lab.most = Math.max(lab.most, frame.greatest[k], -frame.least[k]);
+    const { frame, status } = lab;
+    if (!frame || !status) return;
+    if (lab.bounds[1] !== status.max_force) lab.bounds = [lab.bounds[1], status.max_force];
+    for (const k of [7, 8, 9]) lab.most = Math.max(lab.most, frame.maxima[k], -frame.minima[k]);
     if (lab.most > Math.max(...lab.bounds) * (1 + 1e-9)) lab.beyond++;
   }, 4); 0"""
 
@@ -62,16 +62,16 @@ class Monkey:
         """Return errors in the page, frames beyond the greatest force, the greatest [N], frames."""
         page = self.page
         page.resize(*SIZES[0])
-        page.ask("lab.tour.on && lab.tour.end(), 0")
-        page.until("lab.news?.state == 'running'")
+        page.ask("lab.tour.isActive && lab.tour.end(), 0")
+        page.until("lab.status?.state == 'running'")
         frames = page.ask("lab.frame.number")
         page.until(f"lab.frame.number > {frames}")
         page.ask("clearInterval(lab.watch)")
-        beyond, most, faults = page.ask("[lab.beyond, lab.most, lab.faults]")
+        beyond, most, faults = page.ask("[lab.beyond, lab.most, lab.errorCount]")
         return faults + len(page.said), beyond, most, frames
 
     def _place(self) -> tuple[float, float]:
-        name = self._chance.choice(["relief", "cut"])
+        name = self._chance.choice(["relief", "section"])
         box = self.page.ask(f"document.getElementById('{name}').getBoundingClientRect().toJSON()")
         x, y = self._chance.random(), self._chance.random()
         return box["x"] + x * box["width"], box["y"] + y * box["height"]

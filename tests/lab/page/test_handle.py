@@ -106,10 +106,10 @@ def page(held: Started, device: Device) -> Iterator[Any]:
     device.fail(0)
     device.go(ABOVE)
     with joined(held) as line:
-        said = heard(line, lambda m: news(free=True)(m) or news(steers=True)(m))
-        if not said["steers"]:
-            say(line, "take")
-            said = heard(line, news(steers=True))
+        said = heard(line, lambda m: news(control_available=True)(m) or news(has_control=True)(m))
+        if not said["has_control"]:
+            say(line, "take_control")
+            said = heard(line, news(has_control=True))
         if said["state"] != "stopped":
             say(line, "stop")
             heard(line, news(state="stopped"))
@@ -129,18 +129,18 @@ def test_nothing_moves_before_somebody_starts_it(page: Any, held: Started, devic
     with joined(held) as watcher:
         first = heard(watcher, news(state="stopped"))
         assert first["handle"]["driver"] == "own"
-        assert "You hold the handle of 3D Systems Touch" in first["handle"]["where"]
+        assert "You hold the handle of 3D Systems Touch" in first["handle"]["motion_source"]
         assert not device.open
         # Who only watches can neither start nor end it.
         for what in ("start", "stop"):
             say(watcher, what)
-            assert "steering" in heard(watcher, refused)["words"]
-        starts = begin(page, device)["starts"]
+            assert "steering" in heard(watcher, refused)["message"]
+        starts = begin(page, device)["start_count"]
         say(watcher, "stop")
-        assert "steering" in heard(watcher, refused)["words"]
+        assert "steering" in heard(watcher, refused)["message"]
         # The nearest point is known once another process has compiled it.
-        frame = heard(watcher, lambda m: frames(m) and np.isfinite(head(m, "god z")))
-        assert starts == first["starts"] + 1
+        frame = heard(watcher, lambda m: frames(m) and np.isfinite(head(m, "closest z")))
+        assert starts == first["start_count"] + 1
     assert device.pushes
     # The frames are those of the real loop; nobody knows where the hand is pulled to.
     assert column(frame, "newest", "z") == PRESSED[2]
@@ -151,16 +151,16 @@ def test_nothing_moves_before_somebody_starts_it(page: Any, held: Started, devic
 def test_the_pointer_moves_nothing_and_the_device_stays(page: Any, device: Device) -> None:
     settings = begin(page, device)["settings"]
     say(page, "steer", target=[0, 0, 0], **STILL)
-    assert "done by the user of the handle" in heard(page, refused)["words"]
+    assert "done by the user of the handle" in heard(page, refused)["message"]
     for changes in ({"device": "omega.3"}, {"delay": 3}, {"hand_stiffness": 100.0},
-                   {"stage": "tour"}, {"stage": "back"}):  # fmt: skip
+                   {"saved_scene": "tour"}, {"saved_scene": "previous"}):  # fmt: skip
         say(page, "change", changes=changes)
         name = next(iter(changes))
-        words = f"{name} needs the simulated device" if name == "stage" else f"{name} is "
-        told = heard(page, lambda m, w=words: news(state="running")(m) and w in m["words"])
+        words = f"{name} needs the simulated device" if name == "saved_scene" else f"{name} is "
+        told = heard(page, lambda m, w=words: news(state="running")(m) and w in m["message"])
         assert told["settings"] == settings
-    say(page, "save")
-    assert "asperity run --record" in heard(page, refused)["words"]
+    say(page, "save_clip")
+    assert "asperity run --record" in heard(page, refused)["message"]
     assert device.pushes
 
 
@@ -169,19 +169,21 @@ def test_a_stiffness_above_the_limit_is_refused_and_one_below_is_ramped(
 ) -> None:
     first = begin(page, device)
     say(page, "change", changes={"stiffness": 2000.0})
-    told = heard(page, lambda m: news(state="running")(m) and bool(m["words"]))
-    assert "2000 N/m is above the limit" in told["words"]
-    assert "--accept-risk" in told["words"]
+    told = heard(page, lambda m: news(state="running")(m) and bool(m["message"]))
+    assert "2000 N/m is above the limit" in told["message"]
+    assert "--accept-risk" in told["message"]
     assert told["settings"]["stiffness"] == 150.0
     before = device.force[2]
     assert before > 0.05
     say(page, "change", changes={"stiffness": 75.0})
-    gone = heard(page, lambda m: frames(m) and column(m, "least", "share") == 0.0)
-    assert column(gone, "greatest", "applied z") < 0.1 * before
+    gone = heard(page, lambda m: frames(m) and column(m, "minima", "share") == 0.0)
+    assert column(gone, "maxima", "applied z") < 0.1 * before
     back = heard(page, lambda m: frames(m) and column(m, "newest", "share") == 1.0)
     assert column(back, "newest", "applied z") == pytest.approx(0.5 * before, rel=1e-6)
     say(page, "change", changes={"stiffness": 150.0})
-    assert heard(page, news(state="running", stiffness=150.0))["starts"] == first["starts"]
+    assert (
+        heard(page, news(state="running", stiffness=150.0))["start_count"] == first["start_count"]
+    )
 
 
 def test_the_force_is_let_go_by_a_ramp(page: Any, device: Device) -> None:
@@ -194,37 +196,37 @@ def test_the_force_is_let_go_by_a_ramp(page: Any, device: Device) -> None:
         assert time.monotonic() < then + 20.0
     assert max(seen) <= before
     assert sum(0.1 * before < one < 0.9 * before for one in seen) > 20  # it did not jump
-    assert heard(page, news(state="stopped"))["words"] == "the force was released"
+    assert heard(page, news(state="stopped"))["message"] == "the force was released"
     device.lets_go()
 
 
 def test_a_fault_is_said_and_only_a_start_brings_the_force_again(page: Any, device: Device) -> None:
-    starts = begin(page, device)["starts"]
+    starts = begin(page, device)["start_count"]
     device.fail(17)
     told = heard(page, news(state="stopped"))
-    assert "mapped_device.so returned 17" in told["words"]
-    assert "the force was made zero. Check the device" in told["words"]
-    assert "Start, with the handle in the air, ramps the force up again" in told["words"]
+    assert "mapped_device.so returned 17" in told["message"]
+    assert "the force was made zero. Check the device" in told["message"]
+    assert "Start, with the handle in the air, ramps the force up again" in told["message"]
     device.lets_go()
     device.fail(0)
     for changes in ({"stiffness": 75.0}, {}):
         say(page, "change", changes=changes)
         after = heard(page, news(state="stopped", stiffness=75.0))
-        assert "returned 17" in after["words"]  # what is said stays
-        assert (after["starts"], device.open) == (starts, False)
+        assert "returned 17" in after["message"]  # what is said stays
+        assert (after["start_count"], device.open) == (starts, False)
     # What is a risk is refused before it is started, too.
     say(page, "change", changes={"stiffness": 2000.0})
-    risky = heard(page, lambda m: news(state="stopped")(m) and "above the limit" in m["words"])
+    risky = heard(page, lambda m: news(state="stopped")(m) and "above the limit" in m["message"])
     assert risky["settings"]["stiffness"] == 75.0
     say(page, "change", changes={"stiffness": 150.0})
     heard(page, news(state="stopped", stiffness=150.0))
-    assert begin(page, device)["starts"] == starts + 1
+    assert begin(page, device)["start_count"] == starts + 1
 
 
 def test_a_handle_that_is_read_far_away_is_a_fault(page: Any, device: Device) -> None:
     begin(page, device)
     device.go((0.0, 0.0, 9.0))
-    assert "Move the handle to its centre" in heard(page, news(state="stopped"))["words"]
+    assert "Move the handle to its centre" in heard(page, news(state="stopped"))["message"]
     device.lets_go()
 
 
@@ -240,7 +242,7 @@ def test_the_force_goes_when_no_page_steers(
             page.close()
         # Else it is there, but hangs: nothing is painted, nothing said.
         words = "released: no page with control is connected"
-        heard(watcher, news(state="stopped", words=words), STEERING_TIMEOUT + 10.0)
+        heard(watcher, news(state="stopped", message=words), STEERING_TIMEOUT + 10.0)
         assert time.monotonic() - then > STEERING_TIMEOUT
         device.lets_go()
         with joined(held) as other:  # another page begins nothing
@@ -251,16 +253,16 @@ def test_the_force_goes_when_no_page_steers(
 def test_a_page_that_is_loaded_anew_keeps_the_force(
     page: Any, held: Started, device: Device
 ) -> None:
-    starts = begin(page, device)["starts"]
+    starts = begin(page, device)["start_count"]
     page.close()
     with joined(held) as again:
-        heard(again, news(state="running", steers=True))
+        heard(again, news(state="running", has_control=True))
         end = time.monotonic() + 1.5 * STEERING_TIMEOUT
         while time.monotonic() < end:
             heard(again, frames)
             assert device.pushes
         say(again, "stop")
-        assert heard(again, news(state="stopped"))["starts"] == starts
+        assert heard(again, news(state="stopped"))["start_count"] == starts
 
 
 @needs_browser
@@ -273,22 +275,25 @@ def test_the_page_is_the_window_on_the_device(
     browser.resize(1280, 900)
     # What an address says moves no handle.
     browser.call("Page.navigate", url=f"{held.address}#stiffness=100&law=W")
-    browser.until("globalThis.lab?.news?.state === 'stopped' && lab.ready")
-    if not browser.ask("lab.news.steers"):
-        browser.until("!document.getElementById('take').hidden")
-        browser.ask("document.getElementById('take').click()")
-    browser.until("lab.news.steers")
-    gone = "['press', 'motion', 'device', 'delay', 'hand_stiffness', 'save', 'tour-begin', 'halt']"
+    browser.until("globalThis.lab?.status?.state === 'stopped' && lab.hasPictures")
+    if not browser.ask("lab.status.has_control"):
+        browser.until("!document.getElementById('take-control').hidden")
+        browser.ask("document.getElementById('take-control').click()")
+    browser.until("lab.status.has_control")
+    gone = (
+        "['press-depth', 'motion', 'device', 'delay', 'hand_stiffness', 'save-clip', 'tour-start',"
+        " 'release']"
+    )
     seen = f"{gone}.filter(id => document.getElementById(id).checkVisibility())"
     assert browser.ask(seen) == []
-    assert "You hold the handle" in browser.ask("document.getElementById('held').innerText")
-    assert not browser.ask("document.getElementById('again').hidden")
-    browser.ask("document.getElementById('again').click()")
-    browser.until("lab.news.state === 'running'")
-    assert browser.ask("lab.news.settings.stiffness") == 150.0
+    assert "You hold the handle" in browser.ask("document.getElementById('handle-note').innerText")
+    assert not browser.ask("document.getElementById('start').hidden")
+    browser.ask("document.getElementById('start').click()")
+    browser.until("lab.status.state === 'running'")
+    assert browser.ask("lab.status.settings.stiffness") == 150.0
     device.go(PRESSED)
-    browser.until("lab.probeState().force[2] > 0.05 && lab.probeState().inside")
-    assert browser.ask(seen) == ["halt"]
+    browser.until("lab.probeState().force[2] > 0.05 && lab.probeState().isInside")
+    assert browser.ask(seen) == ["release"]
     # The pointer presses, keys move the hand and begin the tour: nothing of it is there.
     box = browser.ask("document.getElementById('relief').getBoundingClientRect().toJSON()")
     x, y = box["x"] + 0.4 * box["width"], box["y"] + 0.5 * box["height"]
@@ -298,21 +303,25 @@ def test_the_page_is_the_window_on_the_device(
     for key in (" ", "m", "t", "k", "ArrowLeft"):
         browser.press(key)
     browser.ask("new Promise(done => setTimeout(done, 500))")
-    assert browser.ask("[lab.hand.sent, lab.tour.on, lab.news.state]") == [0, False, "running"]
+    assert browser.ask("[lab.hand.requestCount, lab.tour.isActive, lab.status.state]") == [
+        0,
+        False,
+        "running",
+    ]
     assert browser.ask("lab.probeState().probe[2]") == PRESSED[2]
     # In the picture: probe and force, and no cross of a hand.
-    browser.until("lab.current")
-    assert browser.ask("lab.svg()").count("<svg") == 5
+    browser.until("lab.hasCurrentPictures")
+    assert browser.ask("lab.toSvg()").count("<svg") == 5
     browser.press("Escape")
     device.lets_go()
-    browser.until("lab.news.state === 'stopped' && !document.getElementById('again').hidden")
+    browser.until("lab.status.state === 'stopped' && !document.getElementById('start').hidden")
     device.go(ABOVE)
-    browser.ask("document.getElementById('again').click()")
-    browser.until("lab.news.state === 'running'")
+    browser.ask("document.getElementById('start').click()")
+    browser.until("lab.status.state === 'running'")
     device.go(PRESSED)
     browser.until("lab.probeState().force[2] > 0.05")
     device.fail(9)
-    browser.until("lab.news.state === 'stopped'")
+    browser.until("lab.status.state === 'stopped'")
     device.lets_go()
     words = browser.ask("document.getElementById('alarm').innerText")
     assert "The loop has stopped: mapped_device.so returned 9" in words
@@ -389,10 +398,10 @@ def test_a_recording_moves_the_handle_and_ends_with_its_rows(folder: Path) -> No
     setup.simulate(trace=str(folder / "run.mcap"))
     started = Started(str(scene), "--law", "W", "--driver", f"replay:{folder / 'run.mcap'}")
     with joined(started) as line:
-        assert "A recording moves the handle" in heard(line, news())["handle"]["where"]
+        assert "A recording moves the handle" in heard(line, news())["handle"]["motion_source"]
         for _ in range(2):
             say(line, "start")
             heard(line, news(state="running", law="W"))
             heard(line, lambda m: frames(m) and column(m, "newest", "inside") == 1.0)
-            heard(line, news(state="stopped", words="end of the recording; Start replays it"))
+            heard(line, news(state="stopped", message="end of the recording; Start replays it"))
     assert started.end()[0] == 0

@@ -46,31 +46,33 @@ def test_the_pointer_presses_and_the_force_is_drawn(page: Browser) -> None:
     page.until("lab.probeState().force[2] > 0.02 && lab.latencies.length > 0")
     assert page.ask("document.getElementById('readout').textContent").startswith("probe")
     page.mouse("mouseReleased", *inside(page, "relief", 0.5, 0.5))
-    page.until("!lab.probeState().inside && lab.probeState().probe[2] > 2e-4")
-    assert min(colours_in(page, name) for name in ("relief", "cut")) > 20
+    page.until("!lab.probeState().isInside && lab.probeState().probe[2] > 2e-4")
+    assert min(colours_in(page, name) for name in ("relief", "section")) > 20
 
 
 @needs_browser
 def test_all_is_done_by_keyboard(page: Browser) -> None:
     for key, reached in (
         (" ", "lab.probeState().force[2] > 0.02"), (" ", "lab.probeState().probe[2] > 2e-4"),
-        ("ArrowRight", "lab.hand.x != 0"), ("x", "lab.news.settings.law == 'A'"),
+        ("ArrowRight", "lab.hand.x != 0"), ("x", "lab.status.settings.law == 'A'"),
         ("m", "lab.hand.motion == 'stroke'"), ("m", "lab.hand.motion == 'loop'"),
     ):  # fmt: skip
         page.press(key)
-        page.until(f"{reached} && lab.news.state == 'running'")
+        page.until(f"{reached} && lab.status.state == 'running'")
     assert "law=A" in page.ask("location.hash")
 
 
 @needs_browser
 def test_law_a_feeds_the_hand_and_the_ledger_says_so(page: Browser) -> None:
-    page.ask("lab.hand.press = 2e-4, lab.hand.loop = 5e-4, lab.hand.x = 0, lab.hand.request()")
-    page.until("document.getElementById('ledger').classList.contains('fed')")
+    page.ask(
+        "Object.assign(lab.hand, { pressDepth: 2e-4, loopRadius: 5e-4, x: 0 }).requestMotion()"
+    )
+    page.until("document.getElementById('energy-card').classList.contains('supplies-energy')")
     assert "fed the hand" in page.ask("document.getElementById('verdict').textContent")
     page.press("w")
-    page.until("lab.news.settings.law == 'W' && lab.news.state == 'running'")
+    page.until("lab.status.settings.law == 'W' && lab.status.state == 'running'")
     page.press("r")
-    page.until("!document.getElementById('ledger').classList.contains('fed')")
+    page.until("!document.getElementById('energy-card').classList.contains('supplies-energy')")
 
 
 @needs_browser
@@ -79,7 +81,7 @@ def test_it_fits_every_screen(page: Browser, width: int, dark: bool) -> None:
     page.resize(width, 900 if width < 2000 else 2160, dark=dark)
     page.ask("new Promise(done => setTimeout(done, 300))")
     assert page.ask("document.documentElement.scrollWidth <= innerWidth")
-    words = "document.querySelector('#cut').getAttribute('aria-label')"
+    words = "document.querySelector('#section').getAttribute('aria-label')"
     assert page.ask(words).startswith("Section through the surface")
     if width > 360:
         assert page.ask("document.documentElement.scrollHeight <= innerHeight + 120")
@@ -90,53 +92,54 @@ def test_it_fits_every_screen(page: Browser, width: int, dark: bool) -> None:
 @needs_browser
 def test_a_lost_connection_is_said_and_comes_back(page: Browser) -> None:
     # What no page of ours sends.
-    page.ask("lab.hand.say('steer', {})")
+    page.ask("lab.hand.send('steer', {})")
     page.until("document.getElementById('state').textContent == 'connection lost'")
     words = page.ask("document.getElementById('alarm').innerText")
     assert 'The server closed the connection: "steer" has target, cosine' in words
-    page.until("lab.news?.steers && lab.news.state == 'running'")
-    numbers = page.ask("lab.frame.first")
-    page.until(f"lab.frame.first > {numbers} && lab.frame.number < 1e4")
+    page.until("lab.status?.has_control && lab.status.state == 'running'")
+    numbers = page.ask("lab.frame.firstRow")
+    page.until(f"lab.frame.firstRow > {numbers} && lab.frame.number < 1e4")
 
 
 @needs_browser
 def test_without_shared_memory_all_comes_as_messages(page: Browser, lab: Started) -> None:
-    assert page.ask("lab.line.reads")
+    assert page.ask("lab.connection.usesBuffer")
     script = "Object.defineProperty(globalThis, 'crossOriginIsolated', {value: false})"
     added = page.call("Page.addScriptToEvaluateOnNewDocument", source=script)
     try:
         page.call("Page.navigate", url="about:blank")
         page.call("Page.navigate", url=lab.address)
-        page.until("globalThis.lab?.frame && lab.ready && lab.news.state == 'running'")
-        assert not page.ask("lab.line.reads")
+        page.until("globalThis.lab?.frame && lab.hasPictures && lab.status.state == 'running'")
+        assert not page.ask("lab.connection.usesBuffer")
         numbers = page.ask("lab.frame.number")
         page.until(f"lab.frame.number > {numbers} + 100")
     finally:
         page.call("Page.removeScriptToEvaluateOnNewDocument", **added)
-    assert page.ask("lab.faults") == 0
+    assert page.ask("lab.errorCount") == 0
 
 
 # The thread's own source, and what reads its memory, one after the other: what is said, and heard.
 _THROUGH_MEMORY = """((size, count) => {
-  const [TOLD, socket] = ((postMessage, WebSocket) => {
-    let onmessage; %s; return [TOLD, () => socket];
+  const [COMMANDS, socket] = ((postMessage, WebSocket) => {
+    let onmessage; %s; return [COMMANDS, () => socket];
   })(() => {}, class {});
-  const shared = { places: new SharedArrayBuffer(8), ring: new SharedArrayBuffer(8 * size) };
+  const shared = { positions: new SharedArrayBuffer(8), ring: new SharedArrayBuffer(8 * size) };
   const said = [], heard = [], written = one => (typeof one === "string" ? one : [...one].join());
-  const line = Object.assign(Object.create(Object.getPrototypeOf(lab.line)), {
-    reads: true, places: new Int32Array(shared.places), ring: new Float64Array(shared.ring),
-    take(data) { heard.push(written(typeof data === "string" ? data : new Float64Array(data))); },
+  const line = Object.assign(Object.create(Object.getPrototypeOf(lab.connection)), {
+    usesBuffer: true,
+    positions: new Int32Array(shared.positions), ring: new Float64Array(shared.ring),
+    receive(one) { heard.push(written(typeof one === "string" ? one : new Float64Array(one))); },
   });
-  TOLD.memory(shared); TOLD.open(""); TOLD.reads(true);
+  COMMANDS.setBuffer(shared); COMMANDS.open(""); COMMANDS.useBuffer(true);
   const come = one => { said.push(written(one)); socket().onmessage({ data: one.buffer ?? one }); };
   for (let k = 0; k < count; k++) {
     const long = k * 7 %% 31;
     const numbers = Float64Array.from({ length: long + 1 }, (_, j) => k + j / 64);
     come(k %% 3 ? numbers : "é€".repeat(long) + k);
-    if (k %% 5 === 4) line.look();
+    if (k %% 5 === 4) line.readBuffer();
   }
   const late = count - heard.length;
-  while (heard.length < said.length && said.length < 3 * count) { come("more"); line.look(); }
+  while (heard.length < said.length && said.length < 3 * count) { come("more"); line.readBuffer(); }
   return [late, heard.length, said.length, heard.every((one, k) => one === said[k])];
 })"""
 

@@ -34,11 +34,11 @@ def colour(page: Browser, name: str) -> FloatArray:
 
 def change(page: Browser, name: str, value: str) -> None:
     """Type a value into a field, and wait until the page shows what it does."""
-    version = page.ask("lab.news.version")
+    version = page.ask("lab.status.surface_version")
     page.ask(f"{{ const field = document.getElementById('{name}'); field.value = '{value}';"
              "field.dispatchEvent(new Event('change')); }")  # fmt: skip
-    page.until(f"lab.news.settings['{name}'] == '{value}' && lab.news.state == 'running'")
-    page.until(f"lab.news.version > {version} && lab.current")
+    page.until(f"lab.status.settings['{name}'] == '{value}' && lab.status.state == 'running'")
+    page.until(f"lab.status.surface_version > {version} && lab.hasCurrentPictures")
 
 
 def height_of(surface: str) -> Heights:
@@ -87,7 +87,7 @@ def relief(page: Browser, height: Heights, wide: int, high: int) -> FloatArray:
 @pytest.fixture(scope="module", autouse=True)
 def wave(page: Browser) -> Iterator[None]:
     """The wave is shown, for as long as it is looked at."""
-    former = page.ask("lab.news.settings.texture")
+    former = page.ask("lab.status.settings.texture")
     change(page, "texture", WAVE)
     yield
     change(page, "texture", former)
@@ -99,7 +99,7 @@ def test_the_relief_is_the_surface(page: Browser, dark: bool) -> None:
     page.resize(1280, 900, dark=dark)
     # Painted in the colours of the day or of the night, and on the screen.
     low = "getComputedStyle(document.documentElement).getPropertyValue('--low').trim()"
-    page.until(f"lab.relief.key === {low}")
+    page.until(f"lab.relief.paintKey === {low}")
     page.ask("new Promise(done => setTimeout(done, 300))")
     got = shown(page, "relief")
     high, wide = got.shape[:2]
@@ -119,10 +119,10 @@ def test_the_relief_is_the_surface(page: Browser, dark: bool) -> None:
 def test_the_cut_is_the_surface_under_the_probe(page: Browser) -> None:
     page.resize(1280, 900)
     page.ask("new Promise(done => setTimeout(done, 300))")
-    got, ink = shown(page, "cut"), colour(page, "ink")
+    got, ink = shown(page, "section"), colour(page, "ink")
     high, wide = got.shape[:2]
-    left, right, bottom, top = page.ask("lab.cut.box")
-    y = page.ask("lab.cut.y")
+    left, right, bottom, top = page.ask("lab.section.box")
+    y = page.ask("lab.section.y")
     columns = np.arange(10, wide - 10)
     x = left + (columns + 0.5) / wide * (right - left)
 
@@ -139,14 +139,14 @@ def test_the_cut_is_the_surface_under_the_probe(page: Browser) -> None:
 
 @needs_browser
 def test_the_probe_is_where_the_loop_has_it(page: Browser) -> None:
-    box = page.ask("document.getElementById('cut').getBoundingClientRect().toJSON()")
+    box = page.ask("document.getElementById('section').getBoundingClientRect().toJSON()")
     for share in (0.3, 0.6):
         page.mouse("mouseMoved", box["x"] + share * box["width"], box["y"] + 0.2 * box["height"])
-        page.until("lab.hand.sent > 0 && lab.hand.sent <= lab.frame.acknowledged")
+        page.until("lab.hand.requestCount > 0 && lab.hand.requestCount <= lab.frame.acknowledged")
         page.ask("new Promise(done => setTimeout(done, 600))")  # until it rests
-        got = shown(page, "cut")
+        got = shown(page, "section")
         high, wide = got.shape[:2]
-        left, right, bottom, top = page.ask("lab.cut.box")
+        left, right, bottom, top = page.ask("lab.section.box")
         x, _y, z = page.ask("lab.probeState().probe")
         column, row = (x - left) / (right - left) * wide, (top - z) / (top - bottom) * high
         assert abs(column - share * wide) < 20.0  # friction holds it back
@@ -164,18 +164,17 @@ def test_the_hand_is_where_the_pointer_is_however_large_all_is_drawn(
     page: Browser, size: tuple[int, int]
 ) -> None:
     page.resize(*size)
-    page.until(
-        f"lab.cut.sheet.unit {'>' if size[0] > 2000 else '=='} 1 && lab.cut.sheet.blank === false"
-    )
-    box = page.ask("document.getElementById('cut').getBoundingClientRect().toJSON()")
+    canvas = "lab.section.scaledCanvas"
+    page.until(f"{canvas}.unit {'>' if size[0] > 2000 else '=='} 1 && !{canvas}.needsRepaint")
+    box = page.ask("document.getElementById('section').getBoundingClientRect().toJSON()")
     # In the page the picture has its place, pixel for pixel.
-    wide, drawn = page.ask("[lab.cut.sheet.width * lab.cut.sheet.unit, lab.cut.sheet.canvas.width]")
+    wide, drawn = page.ask(f"[{canvas}.width * {canvas}.unit, {canvas}.element.width]")
     assert wide == pytest.approx(box["width"], abs=1e-3)
     assert drawn == round(box["width"])
     for across, down in ((0.3, 0.2), (0.7, 0.4)):
         px, py = round(box["x"] + across * box["width"]), round(box["y"] + down * box["height"])
         page.mouse("mouseMoved", px, py)
-        left, right, bottom, top = page.ask("lab.boxes()")
+        left, right, bottom, top = page.ask("lab.sectionBox()")
         x = left + (px - box["x"]) / box["width"] * (right - left)
         z = top - (py - box["y"]) / box["height"] * (top - bottom)
         assert page.ask("[lab.hand.x, lab.hand.z]") == pytest.approx(
@@ -186,13 +185,14 @@ def test_the_hand_is_where_the_pointer_is_however_large_all_is_drawn(
             "Math.hypot(lab.frame.hand[0] - lab.hand.x, lab.frame.hand[2] - lab.hand.z) < 1e-5"
         )
         drawn_at = page.ask(
-            "(() => { const mark = lab.cut.marker, box = mark.canvas.getBoundingClientRect();"
-            "const [x, , z] = lab.frame.hand, [l, r, b, t] = lab.boxes(), s = lab.cut.sheet;"
+            "(() => { const mark = lab.section.overlay, box = mark.element.getBoundingClientRect();"
+            "const [x, , z] = lab.frame.hand, [l, r, b, t] = lab.sectionBox();"
+            "const s = lab.section.scaledCanvas;"
             "const u = (x - l) / (r - l) * s.width - mark.left;"
             "const v = (t - z) / (t - b) * s.height - mark.top;"
             "return [box.x + u * s.unit, box.y + v * s.unit, box.width / mark.width]; })()"
         )
         assert drawn_at[:2] == pytest.approx((px, py), abs=2.0)
-        assert drawn_at[2] == pytest.approx(page.ask("lab.cut.sheet.unit"), rel=1e-3)
+        assert drawn_at[2] == pytest.approx(page.ask("lab.section.scaledCanvas.unit"), rel=1e-3)
     page.resize(1280, 900)
-    page.ask("lab.hand.z = null; lab.hand.request()")
+    page.ask("lab.hand.z = null; lab.hand.requestMotion()")

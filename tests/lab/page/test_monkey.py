@@ -15,7 +15,7 @@ def test_whatever_is_done_nothing_breaks(browser: Browser) -> None:
     browser.said.clear()
     browser.resize(1280, 900)
     browser.call("Page.navigate", url=lab.address)
-    browser.until("globalThis.lab?.frame && lab.ready")
+    browser.until("globalThis.lab?.frame && lab.hasPictures")
     monkey = Monkey(browser)
     for _ in range(ACTIONS):
         monkey.act()

@@ -17,13 +17,14 @@ LONG = 0.6
 RENDER = """(async ({ rate, forces, every, long }) => {
   const context = new OfflineAudioContext(2, long * 48000, 48000);
   await context.audioWorklet.addModule("force_audio_processor.js");
-  const ear = new AudioWorkletNode(context, "ear", { numberOfInputs: 0, outputChannelCount: [2] });
-  ear.connect(context.destination);
+  const options = { numberOfInputs: 0, outputChannelCount: [2] };
+  const processor = new AudioWorkletNode(context, "force-audio", options);
+  processor.connect(context.destination);
   const part = Math.round(every * rate), pause = () => new Promise(done => setTimeout(done, 3));
   for (let k = 0; k * every < long; k++) {
     context.suspend(k * every).then(async () => {
       const rows = new Float32Array(forces.slice(2 * k * part, 2 * (k + 1) * part));
-      if (rows.length) ear.port.postMessage({ rate, forces: rows });
+      if (rows.length) processor.port.postMessage({ updateRate: rate, forces: rows });
       await pause();
       context.resume();
     });

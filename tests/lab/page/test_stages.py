@@ -59,7 +59,7 @@ def stage_of(name: str, folder: Path) -> SceneState:
 
 def tour_settings() -> dict[str, Any]:
     """Return what all steps of the tour set, as the page does."""
-    block = re.search(r"const STAGE = \{.*?\n(.*?)\};", PAGE.read_text("utf-8"), re.DOTALL)
+    block = re.search(r"const TOUR_SETTINGS = \{.*?\n(.*?)\};", PAGE.read_text("utf-8"), re.DOTALL)
     assert block is not None
     pairs = re.findall(r'(\w+): ("[^"]*"|[\d.e-]+)', block[1])
     return {name: value[1:-1] if value[0] == '"' else float(value) for name, value in pairs}
@@ -69,23 +69,25 @@ def tour_settings() -> dict[str, Any]:
 def test_the_tour_knows_its_own_stage_and_no_other(tmp_path: Path, name: str) -> None:
     stage, stages, wanted = stage_of(name, tmp_path), SavedScenes(), tour_settings()
     assert len(wanted) == 8
-    tour = stages.apply_changes(stage, {"stage": TOUR_SCENE, **wanted})
+    tour = stages.apply_changes(stage, {"saved_scene": TOUR_SCENE, **wanted})
     plain = make_scene_state(load_scene("sinusoid:amplitude=0.4mm,period=2mm")).with_changes(wanted)
     for part in ("surface", "hand", "servo", "plant", "safety"):
         assert str(getattr(tour.setup, part)) == str(getattr(plain.setup, part))
     assert isinstance(tour.setup.hand, SpringHand)
     # A second beginning, as after a reload of the page, forgets nothing.
-    again = stages.apply_changes(tour.with_changes({"law": "H"}), {"stage": TOUR_SCENE, **wanted})
+    again = stages.apply_changes(
+        tour.with_changes({"law": "H"}), {"saved_scene": TOUR_SCENE, **wanted}
+    )
     assert (
         stages.apply_changes(
-            again.with_changes({"law": "D", "delay": 1}), {"stage": PREVIOUS_SCENE}
+            again.with_changes({"law": "D", "delay": 1}), {"saved_scene": PREVIOUS_SCENE}
         )
         is stage
     )
     # There is nothing more to go back to.
-    assert stages.apply_changes(tour, {"stage": PREVIOUS_SCENE}) is tour
-    with pytest.raises(ParameterError, match="stage is no longer stored"):
-        stages.apply_changes(stage, {"stage": "take-9"})
+    assert stages.apply_changes(tour, {"saved_scene": PREVIOUS_SCENE}) is tour
+    with pytest.raises(ParameterError, match="saved_scene is no longer stored"):
+        stages.apply_changes(stage, {"saved_scene": "clip-9"})
 
 
 def test_without_that_the_hand_of_the_tour_is_refused(tmp_path: Path) -> None:
@@ -97,13 +99,13 @@ def test_wishes_for_the_stage_before_are_not_made_of_the_next(tmp_path: Path) ->
     session = Session(stage_of("band", tmp_path), lambda: None)
     try:
         session._requests = Queue()
-        for changes in ({"law": "A"}, {"stage": TOUR_SCENE, "law": "W"}, {"stiffness": 9.0},
-                       {"stage": PREVIOUS_SCENE}, {"law": "H"}):  # fmt: skip
+        for changes in ({"law": "A"}, {"saved_scene": TOUR_SCENE, "law": "W"}, {"stiffness": 9.0},
+                       {"saved_scene": PREVIOUS_SCENE}, {"law": "H"}):  # fmt: skip
             session.change(changes)
         assert session._next_requests() == [
             {"law": "A"},
-            {"stage": TOUR_SCENE, "law": "W", "stiffness": 9.0},
-            {"stage": PREVIOUS_SCENE, "law": "H"},
+            {"saved_scene": TOUR_SCENE, "law": "W", "stiffness": 9.0},
+            {"saved_scene": PREVIOUS_SCENE, "law": "H"},
         ]
     finally:
         assert session.pointer_hand is not None
@@ -118,7 +120,7 @@ def toured(tmp_path: Path, browser: Browser) -> Iterator[Browser]:
     browser.said.clear()
     browser.resize(1280, 900)
     browser.call("Page.navigate", url=lab.address)
-    browser.until("globalThis.lab?.frame && lab.ready && lab.news.state === 'running'")
+    browser.until("globalThis.lab?.frame && lab.hasPictures && lab.status.state === 'running'")
     yield browser
     browser.call("Page.navigate", url="about:blank")
     assert lab.end() == (0, "")
@@ -126,12 +128,12 @@ def toured(tmp_path: Path, browser: Browser) -> Iterator[Browser]:
 
 def saved_scene(page: Browser) -> str:
     """Return the scene of what was just felt, but for when and where."""
-    page.until("lab.news.state === 'running' && !lab.probeState().inside")
+    page.until("lab.status.state === 'running' && !lab.probeState().isInside")
     page.ask("new Promise(done => setTimeout(done, 800))")
-    known = page.ask("document.querySelectorAll('#takes a').length")
+    known = page.ask("document.querySelectorAll('#clips a').length")
     page.press("k")
-    page.until(f"document.querySelectorAll('#takes a').length > {known}")
-    href = page.ask("document.querySelector('#takes a').getAttribute('href')")
+    page.until(f"document.querySelectorAll('#clips a').length > {known}")
+    href = page.ask("document.querySelector('#clips a').getAttribute('href')")
     archive = zipfile.ZipFile(io.BytesIO(fetched(page, f"(await fetch('{href}')).blob()")))
     lines = archive.read("scene.toml").decode().splitlines()
     moment = ("duration", "start =", "velocity =")
@@ -145,21 +147,21 @@ def test_the_tour_is_shown_with_a_band_and_gives_it_back(toured: Browser) -> Non
     page.press("m")
     page.press("m")
     page.press("m")
-    former, span = page.ask("lab.news.settings"), page.ask("lab.span")
+    former, span = page.ask("lab.status.settings"), page.ask("lab.viewWidth")
     before = saved_scene(page)
     assert 'kind = "band"' in before
     page.press("t")
     page.press("v")
     for _step in range(2):
-        page.until("lab.tour.found")
+        page.until("lab.tour.isStepCompleted")
         page.press("n")
     page.until("document.getElementById('alarm').hidden")  # once the next law has compiled
-    assert page.ask("lab.news.settings.hand_stiffness") == 800
+    assert page.ask("lab.status.settings.hand_stiffness") == 800
     page.press("t")
-    page.until(f"lab.news.settings.device === '{former['device']}'")
-    page.until("lab.news.state === 'running'")
-    assert page.ask("lab.news.settings") == former
-    assert page.ask("lab.span") == pytest.approx(span)
+    page.until(f"lab.status.settings.device === '{former['device']}'")
+    page.until("lab.status.state === 'running'")
+    assert page.ask("lab.status.settings") == former
+    assert page.ask("lab.viewWidth") == pytest.approx(span)
     assert saved_scene(page) == before
     # A band has no such number: nothing of the tour's stands in the field.
     field = page.ask(

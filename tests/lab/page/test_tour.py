@@ -18,41 +18,41 @@ def text(page: Browser, name: str) -> str:
 
 def numbers_are_what_is_measured(page: Browser, number: int) -> None:
     """Whether a step tells of limits as they are, and of what was felt."""
-    limits, told = page.ask("lab.tour.limits"), text(page, "tour-why")
+    limits, told = page.ask("lab.tour.limits"), text(page, "tour-explanation")
     law = {3: "B", 5: "C"}[number]
     assert f"{1e-3 * limits[law]:.2f} kN/m, {100 * limits[law] / limits['W']:.0f}\u00a0%" in told
     if number == 3:
         assert f"set to 8.00 kN/m, {8000 / limits[law]:.1f} times that" in told
         return
-    times = float(re.search(r"yields ([\d.]+) times", text(page, "tour-found"))[1])  # type: ignore[index]  # it is there
-    wall, soft = page.ask("[lab.tour.kept, lab.tour.gauge.felt]")
+    times = float(re.search(r"yields ([\d.]+) times", text(page, "tour-result"))[1])  # type: ignore[index]  # it is there
+    wall, soft = page.ask("[lab.tour.reference, lab.tour.metrics.feltStiffness]")
     assert times > 2
     assert times == pytest.approx(wall / soft, rel=0.06)
 
 
 @needs_browser
 def test_the_tour_shows_itself_to_its_end_by_keys(page: Browser) -> None:
-    former = page.ask("lab.news.settings")
+    former = page.ask("lab.status.settings")
     page.press("t")
     page.press("v")
     for number, title in enumerate(TITLES, 1):
         assert text(page, "tour-title") == title
-        page.until("lab.tour.found")
-        page.until("document.getElementById('tour').classList.contains('found')")
-        assert text(page, "tour-place").startswith(f"Step {number} of 6")
-        assert text(page, "tour-found").startswith("✓")
+        page.until("lab.tour.isStepCompleted")
+        page.until("document.getElementById('tour').classList.contains('completed')")
+        assert text(page, "tour-step").startswith(f"Step {number} of 6")
+        assert text(page, "tour-result").startswith("✓")
         if number == 2:
             assert "fed the hand" in text(page, "verdict")
         if number == 3:
-            assert text(page, "limit-words").startswith("▲ above the limit")
-            assert text(page, "limit-words").endswith(": smooth-wall rule (quiet against buzz)")
+            assert text(page, "limit-text").startswith("▲ above the limit")
+            assert text(page, "limit-text").endswith(": smooth-wall rule (quiet against buzz)")
         if number in (3, 5):
             numbers_are_what_is_measured(page, number)
         page.press("n")
     assert page.ask("document.getElementById('tour').hidden")
     # As it was before.
     page.until(
-        f"JSON.stringify(lab.news.settings) === `{json.dumps(former, separators=(',', ':'))}`"
+        f"JSON.stringify(lab.status.settings) === `{json.dumps(former, separators=(',', ':'))}`"
     )
     assert page.said == []
 
@@ -60,12 +60,14 @@ def test_the_tour_shows_itself_to_its_end_by_keys(page: Browser) -> None:
 @needs_browser
 def test_what_is_not_there_is_not_found(page: Browser) -> None:
     # The hand goes in the loops of the step on law A, on the wall.
-    starts = page.ask("lab.news.starts")
+    starts = page.ask("lab.status.start_count")
     page.press("t")
-    page.ask("lab.tour.go(1); lab.tour.act.law = 'W'; lab.tour.show(true); lab.tour.start(0)")
-    page.until("lab.tour.gauge.way > 8e-3")
+    page.ask(
+        "lab.tour.goTo(1); lab.tour.task.law = 'W'; lab.tour.setDemo(true); lab.tour.startTask(0)"
+    )
+    page.until("lab.tour.metrics.pathLength > 8e-3")
     assert text(page, "tour-title") == TITLES[1]
-    assert not page.ask("lab.tour.found")
-    assert not page.ask("lab.ledger.fed")
+    assert not page.ask("lab.tour.isStepCompleted")
+    assert not page.ask("lab.energyMeter.suppliesEnergy")
     page.press("t")
-    page.until(f"lab.news.starts === {starts} + 2 && lab.news.state === 'running'")
+    page.until(f"lab.status.start_count === {starts} + 2 && lab.status.state === 'running'")

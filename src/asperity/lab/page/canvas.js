@@ -1,52 +1,56 @@
-// What pictures are drawn on, and in which colours.
+// Canvas elements that follow their layout size and the text size of the page, and the theme colours.
 
-const TEXT = 17; // px of the page's text where a picture is drawn as it is
+const REFERENCE_FONT_SIZE = 17; // root font size at which drawings are not enlarged [px]
 
 /**
- * A canvas and the size of its place, which is watched: to ask the page for it would cost a layout.
+ * A canvas element that follows its layout size.
  *
- * Where the page's text is larger, so is all that is drawn: width and height count in units, each so many pixels of the
- * page, and nothing who draws need know.
+ * The size is observed, because reading it from the page would force a layout. Drawings are enlarged
+ * with the text of the page: width and height count units of so many CSS pixels, so that the drawing
+ * code need not know the text size.
  */
-export class Sheet {
-  constructor(canvas) {
-    this.canvas = canvas;
-    this.draw = canvas.getContext("2d");
-    this.ratio = this.unit = this.width = this.height = 1;
-    this.left = this.top = 0; // in what it is placed in
-    this.blank = true; // nothing is drawn on it
-    new ResizeObserver(([{ contentRect }]) => this.fit(contentRect.width, contentRect.height)).observe(canvas);
+export class ScaledCanvas {
+  constructor(element) {
+    this.element = element;
+    this.context = element.getContext("2d");
+    this.pixelRatio = this.unit = this.width = this.height = 1;
+    this.left = this.top = 0; // within the offset parent [px]
+    this.needsRepaint = true;
+    new ResizeObserver(([{ contentRect }]) => this.resize(contentRect.width, contentRect.height)).observe(element);
   }
 
-  fit(width, height) {
-    const text = parseFloat(getComputedStyle(document.documentElement).fontSize);
-    this.unit = Math.max(1, Math.round(10 * text / TEXT) / 10);
-    this.ratio = Math.min(window.devicePixelRatio || 1, 2) * this.unit;
-    Object.assign(this, { width: Math.max(width / this.unit, 1), height: Math.max(height / this.unit, 1), blank: true });
-    Object.assign(this, { left: this.canvas.offsetLeft, top: this.canvas.offsetTop });
-    this.canvas.width = Math.round(this.width * this.ratio);
-    this.canvas.height = Math.round(this.height * this.ratio);
+  resize(width, height) {
+    const fontSize = parseFloat(getComputedStyle(document.documentElement).fontSize);
+    this.unit = Math.max(1, Math.round(10 * fontSize / REFERENCE_FONT_SIZE) / 10);
+    this.pixelRatio = Math.min(window.devicePixelRatio || 1, 2) * this.unit;
+    this.width = Math.max(width / this.unit, 1);
+    this.height = Math.max(height / this.unit, 1);
+    this.left = this.element.offsetLeft;
+    this.top = this.element.offsetTop;
+    this.needsRepaint = true;
+    this.element.width = Math.round(this.width * this.pixelRatio);
+    this.element.height = Math.round(this.height * this.pixelRatio);
   }
 
-  /** Return the context, cleared, and width and height in units. */
-  cleared() {
-    this.blank = false;
-    this.draw.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
-    this.draw.clearRect(0, 0, this.width, this.height);
-    return [this.draw, this.width, this.height];
+  /** Clear the canvas; return its context, and its width and height in units. */
+  clear() {
+    this.needsRepaint = false;
+    this.context.setTransform(this.pixelRatio, 0, 0, this.pixelRatio, 0, 0);
+    this.context.clearRect(0, 0, this.width, this.height);
+    return [this.context, this.width, this.height];
   }
 }
 
-let theme = {};
-/** Read the colours of the page; again when it turns dark. */
+let themeColours = {};
+/** Read the colours of the style sheet; called again when the theme changes. */
 export function readTheme() {
   const style = getComputedStyle(document.documentElement);
   const names = ["ground", "card", "ink", "soft", "line", "blue", "orange", "green", "red", "low", "high", "plus",
     "minus", "solid"];
-  theme = Object.fromEntries(names.map(name => [name, style.getPropertyValue(`--${name}`).trim()]));
-  return theme;
+  themeColours = Object.fromEntries(names.map(name => [name, style.getPropertyValue(`--${name}`).trim()]));
+  return themeColours;
 }
-export const colours = () => theme;
+export const colours = () => themeColours;
 
-/** Return red, green and blue of a colour as it is written in the style sheet. */
-export const channels = colour => [1, 3, 5].map(at => parseInt(colour.slice(at, at + 2), 16));
+/** Return red, green and blue of a colour "#rrggbb". */
+export const toRgb = colour => [1, 3, 5].map(start => parseInt(colour.slice(start, start + 2), 16));

@@ -1,82 +1,89 @@
-// The card of recordings: what was kept, where in it one is, and the file of each.
+// List of clips, and the controls of the player: play, pause, seek, and return to the live loop.
 
-import { Sheet, colours } from "./canvas.js";
+import { ScaledCanvas, colours } from "./canvas.js";
 
+const MAX_CLIPS = 4; // of this session, as in the clip store of the server
 const $ = id => document.getElementById(id);
 
-export class TakesPanel {
-  /** @param host object with player, columns, change(changes), save() and version */
+export class ClipsPanel {
+  /** @param host object with player, columns, changeScene(changes), saveClip() and surfaceVersion */
   constructor(host) {
     this.host = host;
-    this.first = null; // a recording of elsewhere, to be shown when its surface can be
-    this.overview = new Sheet($("overview"));
-    $("save").onclick = () => host.save();
-    $("live").onclick = () => this.close();
-    $("play").onclick = () => { host.player.toggle(); this.draw(); };
-    $("at").oninput = event => {
-      host.player.playing = false;
+    this.pendingClip = null; // opened as soon as pictures of its surface are available
+    this.overview = new ScaledCanvas($("overview"));
+    $("save-clip").onclick = () => host.saveClip();
+    $("return-to-live").onclick = () => this.close();
+    $("play").onclick = () => { host.player.togglePlaying(); this.update(); };
+    $("playback-time").oninput = event => {
+      host.player.isPlaying = false;
       host.player.seek(event.target.value / event.target.max);
-      this.draw();
+      this.update();
     };
   }
 
-  /** List a take that was kept, or a recording of elsewhere. */
-  add(take) {
-    if ([...$("takes").children].some(item => item.dataset.name === take.name)) return;
-    const { name, archive, title, law, opens, playback } = take, item = document.createElement("li");
-    const show = document.createElement("button"), words = document.createElement("span");
-    Object.assign(show, { type: "button", textContent: `Show ${title}`, onclick: () => this.open(take) });
-    words.textContent = `law ${law}, ${clock(playback.rows * playback.period)}`;
+  /** Add a clip of this session, or a recording that was opened at the start, to the list. */
+  add(clip) {
+    if ([...$("clips").children].some(item => item.dataset.name === clip.name)) return;
+    const { name, archive, title, law, playback } = clip, item = document.createElement("li");
+    const button = document.createElement("button"), description = document.createElement("span");
+    Object.assign(button, { type: "button", textContent: `Show ${title}`, onclick: () => this.open(clip) });
+    description.textContent = `law ${law}, ${formatTime(playback.row_count * playback.period)}`;
     item.dataset.name = name;
-    item.append(show, words);
+    item.append(button, description);
     if (archive) item.append(Object.assign(document.createElement("a"), { href: archive, download: `asperity-${archive}`, textContent: "save recording and scene" }));
-    $("takes").prepend(item);
-    const takes = [...$("takes").children].filter(one => one.dataset.name.startsWith("take-"));
-    for (const old of takes.slice(4)) old.remove();
-    if (opens) this.first = take;
+    $("clips").prepend(item);
+    const savedClips = [...$("clips").children].filter(({ dataset }) => dataset.name.startsWith("clip-"));
+    for (const oldItem of savedClips.slice(MAX_CLIPS)) oldItem.remove();
+    if (clip.opens_at_start) this.pendingClip = clip;
   }
 
-  open(take) {
-    // What is drawn behind it is the surface that it was felt on.
-    this.host.change({ stage: take.name });
-    this.host.player.open(take, this.host.columns);
-    $("at").max = take.playback.rows;
-    this.draw();
+  open(clip) {
+    // The views show the surface of the recording.
+    this.host.changeScene({ saved_scene: clip.name });
+    this.host.player.open(clip, this.host.columns);
+    $("playback-time").max = clip.playback.row_count;
+    this.update();
   }
 
   close() {
     const { player } = this.host;
-    if (!player.on) return;
+    if (!player.isOpen) return;
     player.close();
-    player.show.clear();
-    this.draw();
+    player.display.clear();
+    this.update();
   }
 
-  draw() {
+  update() {
     const { player } = this.host;
-    if (this.first && this.host.version) { const take = this.first; this.first = null; this.open(take); return; }
-    $("replay").hidden = !player.on;
-    if (!player.on) return;
-    $("play").textContent = player.playing ? "Pause" : "Play";
-    if (player.playing) $("at").value = player.share * $("at").max;
-    $("at-value").textContent = `${clock(player.time, 2)} of ${clock(player.length)}`;
-    $("at").setAttribute("aria-valuetext", $("at-value").textContent);
-    this.drawForce(player);
+    if (this.pendingClip && this.host.surfaceVersion) {
+      const clip = this.pendingClip;
+      this.pendingClip = null;
+      this.open(clip);
+      return;
+    }
+    $("playback").hidden = !player.isOpen;
+    if (!player.isOpen) return;
+    $("play").textContent = player.isPlaying ? "Pause" : "Play";
+    if (player.isPlaying) $("playback-time").value = player.fraction * $("playback-time").max;
+    $("playback-time-value").textContent = `${formatTime(player.time, 2)} of ${formatTime(player.duration)}`;
+    $("playback-time").setAttribute("aria-valuetext", $("playback-time-value").textContent);
+    this.drawOverview(player);
   }
 
-  /** Draw from the least to the greatest force of each part, and where one is. */
-  drawForce({ playback, share }) {
-    const [draw, width, height] = this.overview.cleared(), { force } = playback, wide = width / force.length;
-    const most = force.reduce((sofar, [, greatest]) => Math.max(sofar, greatest), 1e-9), y = value => (1 - value / most) * (height - 2) + 1;
-    draw.fillStyle = colours().red;
-    force.forEach(([least, greatest], k) => draw.fillRect(k * wide, y(greatest), Math.max(wide, 0.5), Math.max(y(least) - y(greatest), 1)));
-    draw.fillStyle = colours().ink;
-    draw.fillRect(share * width - 1, 0, 2, height);
+  /** Draw the range of the force in each bin of the recording, and the current time. */
+  drawOverview({ playback, fraction }) {
+    const [context, width, height] = this.overview.clear(), ranges = playback.forceRanges, binWidth = width / ranges.length;
+    const maximum = ranges.reduce((largest, [, high]) => Math.max(largest, high), 1e-9);
+    const y = force => (1 - force / maximum) * (height - 2) + 1;
+    context.fillStyle = colours().red;
+    ranges.forEach(([low, high], k) => context.fillRect(k * binWidth, y(high), Math.max(binWidth, 0.5), Math.max(y(low) - y(high), 1)));
+    context.fillStyle = colours().ink;
+    context.fillRect(fraction * width - 1, 0, 2, height);
   }
 }
 
-/** Return a time in words: "12.3 s", "1:02:03". */
-function clock(time, digits = 1) {
+/** Return a time as text: "12.3 s", "1:02:03". */
+function formatTime(time, digits = 1) {
   if (time < 60) return `${time.toFixed(digits)} s`;
   const parts = [time / 3600, time / 60 % 60, time % 60].map(Math.floor);
   return parts.slice(parts[0] ? 0 : 1).map((part, k) => (k ? String(part).padStart(2, "0") : part)).join(":");

@@ -1,96 +1,99 @@
-// The connection to the server: frames and messages in, requests out; it reconnects by itself.
+// Connection to the server, which is restored after a loss: decodes frames and messages, and sends requests.
 
-const STATE = 1;
-const AGAIN = 1000; // ms until the next attempt
-const MEMORY = 1 << 18; // numbers: more than all frames that are under way, and words
+const FRAME = 1; // first number of a binary message that is a frame, not a picture
+const RECONNECT_DELAY = 1000; // ms
+const RING_LENGTH = 1 << 18; // numbers: more than all pending frames and messages
 
-const letters = new TextDecoder("utf-16le");
+const utf16 = new TextDecoder("utf-16le");
 
-/** Return what a frame holds, by the layout that the server has named. */
-function readFrame(numbers, layout) {
-  const { head, newest, least, greatest, forces } = layout;
-  const at = name => numbers[head[name]], width = least - newest;
-  const place = who => ["x", "y", "z"].map(axis => numbers[head[`${who} ${axis}`]]);
+/** Return the content of a frame, by the layout that the server sent. */
+function decodeFrame(numbers, layout) {
+  const { header, newest, minima, maxima, forces } = layout, width = minima - newest;
+  const value = name => numbers[header[name]];
+  const point = name => ["x", "y", "z"].map(axis => value(`${name} ${axis}`));
   return {
-    number: at("frame"), rows: at("rows"), first: at("first"), acknowledged: at("acknowledged"), late: at("late"), skipped: at("skipped"),
-    way: at("way"), squares: at("squares"), jump: at("jump"), moved: at("moved"),
-    god: place("god"), hand: place("hand"), newest: numbers.subarray(newest, newest + width),
-    least: numbers.subarray(least, least + width), greatest: numbers.subarray(greatest, greatest + width),
-    forces: numbers.subarray(forces, forces + 3 * at("forces")),
+    number: value("frame"), rowCount: value("rows"), firstRow: value("first"),
+    acknowledged: value("acknowledged"), late: value("late"), skipped: value("skipped"),
+    pathLength: value("path_length"), squaredSteps: value("squared_steps"),
+    maxForceStep: value("max_force_step"), positionStep: value("position_step"),
+    closest: point("closest"), hand: point("hand"), newest: numbers.subarray(newest, newest + width),
+    minima: numbers.subarray(minima, minima + width), maxima: numbers.subarray(maxima, maxima + width),
+    forces: numbers.subarray(forces, forces + 3 * value("forces")),
   };
 }
 
-export class Line {
-  /** @param hear object with hello, news, refused, frame, picture, lost */
-  constructor(hear) {
-    this.hear = hear;
+export class Connection {
+  /** @param handlers functions by type of message, and frame, picture and disconnected */
+  constructor(handlers) {
+    this.handlers = handlers;
     this.layout = null;
-    this.there = false;
-    this.reads = false; // from memory; else what comes is a message
-    this.post = new Worker("socket_worker.js");
-    this.post.onmessage = ({ data }) => this.told(data);
-    // Where memory cannot be shared, and while nothing is painted, all comes as messages.
+    this.isOpen = false;
+    this.usesBuffer = false; // else the worker posts each message
+    this.worker = new Worker("socket_worker.js");
+    this.worker.onmessage = ({ data }) => this.handleWorkerMessage(data);
+    // The buffer is used only where memory can be shared, and while the page is painted.
     if (globalThis.crossOriginIsolated) {
-      const places = new SharedArrayBuffer(8), ring = new SharedArrayBuffer(8 * MEMORY);
-      [this.places, this.ring] = [new Int32Array(places), new Float64Array(ring)];
-      this.tell("memory", { places, ring });
+      const positions = new SharedArrayBuffer(8), ring = new SharedArrayBuffer(8 * RING_LENGTH);
+      [this.positions, this.ring] = [new Int32Array(positions), new Float64Array(ring)];
+      this.post("setBuffer", { positions, ring });
     }
-    const visible = () => this.tell("reads", !document.hidden);
-    document.addEventListener("visibilitychange", visible);
-    visible();
+    const updateVisibility = () => this.post("useBuffer", !document.hidden);
+    document.addEventListener("visibilitychange", updateVisibility);
+    updateVisibility();
     this.open();
   }
 
   open() {
-    const address = new URL("live", location.href);
-    address.protocol = "ws:";
-    address.hash = "";
-    this.tell("open", String(address));
+    const url = new URL("live", location.href);
+    url.protocol = "ws:";
+    url.hash = "";
+    this.post("open", String(url));
   }
 
-  tell(what, content) { this.post.postMessage([what, content]); }
+  /** Send a command to the worker. */
+  post(command, argument) { this.worker.postMessage([command, argument]); }
 
-  told({ data, opened, closed, reads }) {
-    this.look(); // what was written before comes before
-    if (reads !== undefined) this.reads = reads;
-    if (opened) this.there = true;
-    if (data !== undefined) this.take(data);
+  handleWorkerMessage({ data, opened, closed, usesBuffer }) {
+    this.readBuffer(); // its messages were received earlier
+    if (usesBuffer !== undefined) this.usesBuffer = usesBuffer;
+    if (opened) this.isOpen = true;
+    if (data !== undefined) this.receive(data);
     if (closed === undefined) return;
-    this.there = false;
-    this.hear.lost(closed);
-    setTimeout(() => this.open(), AGAIN);
+    this.isOpen = false;
+    this.handlers.disconnected(closed);
+    setTimeout(() => this.open(), RECONNECT_DELAY);
   }
 
-  /** Take what has come into the memory. */
-  look() {
-    if (!this.reads) return;
-    const { places, ring } = this, end = Atomics.load(places, 0);
-    for (let at = Atomics.load(places, 1); at !== end; Atomics.store(places, 1, at)) {
-      const length = ring[at];
-      if (!length) { at = 0; continue; }
-      const numbers = ring.slice(at + 2, at + 2 + length), text = ring[at + 1];
-      at += length + 2;
-      Atomics.store(places, 1, at); // before what may fail
-      this.take(text ? letters.decode(Uint16Array.from(numbers)) : numbers.buffer);
+  /** Receive all messages in the buffer. */
+  readBuffer() {
+    if (!this.usesBuffer) return;
+    const { positions, ring } = this, end = Atomics.load(positions, 0);
+    for (let position = Atomics.load(positions, 1); position !== end; Atomics.store(positions, 1, position)) {
+      const length = ring[position];
+      if (!length) { position = 0; continue; }
+      const numbers = ring.slice(position + 2, position + 2 + length), isText = ring[position + 1];
+      position += length + 2;
+      Atomics.store(positions, 1, position); // before a handler that may throw
+      this.receive(isText ? utf16.decode(Uint16Array.from(numbers)) : numbers.buffer);
     }
   }
 
-  take(data) {
+  receive(data) {
     if (typeof data === "string") {
-      const said = JSON.parse(data);
-      if (said.say === "hello") this.layout = said.layout;
-      this.hear[said.say]?.(said);
+      const message = JSON.parse(data);
+      if (message.type === "hello") this.layout = message.layout;
+      this.handlers[message.type]?.(message);
       return;
     }
     const numbers = new Float64Array(data);
-    if (numbers[0] === STATE) this.hear.frame(readFrame(numbers, this.layout));
-    else this.hear.picture(numbers);
+    if (numbers[0] === FRAME) this.handlers.frame(decodeFrame(numbers, this.layout));
+    else this.handlers.picture(numbers);
   }
 
-  /** Say something, if somebody listens; whether it was said. */
-  say(what, content = {}) {
-    if (!this.there) return false;
-    this.tell("say", JSON.stringify({ do: what, ...content }));
+  /** Send a message to the server; return whether the connection is open. */
+  send(type, payload = {}) {
+    if (!this.isOpen) return false;
+    this.post("send", JSON.stringify({ type, ...payload }));
     return true;
   }
 }

@@ -1,27 +1,27 @@
-// The handle that somebody holds: the page does not move it, but starts its loop and lets its force go.
+// Controls of a real device: its user moves the handle, the page starts the loop and releases the force.
 
 const $ = id => document.getElementById(id);
 
-export class Handle {
-  /** @param say says something to the lab */
-  constructor(say) {
-    this.there = false;
-    $("again").onclick = () => say("start");
-    $("halt").onclick = () => say("stop");
-    // Whatever is being typed into.
-    addEventListener("keydown", event => { if (this.there && event.key === "Escape") say("stop"); }, true);
+export class DeviceHandle {
+  /** @param send sends a message of some type to the server */
+  constructor(send) {
+    this.isPresent = false;
+    $("start").onclick = () => send("start");
+    $("release").onclick = () => send("stop");
+    // In the capture phase, so that Escape works while a field has the focus.
+    addEventListener("keydown", event => { if (this.isPresent && event.key === "Escape") send("stop"); }, true);
   }
 
-  /** Show how things stand. */
-  show({ handle, state, steers }) {
-    this.there = Boolean(handle);
-    document.body.classList.toggle("held", this.there);
-    $("held").hidden = !this.there;
-    if (handle) $("held").textContent = `${handle.where}. The guided tour needs the simulated device; asperity run --record records.`;
-    $("again").textContent = handle ? "Start" : "Start again";
-    $("again").hidden = state !== "stopped" || !steers;
-    $("halt").hidden = !handle || state === "stopped";
-    $("halt").disabled = !steers;
-    $("tour-begin").hidden = this.there;
+  /** Update the controls to a status of the session. */
+  update({ handle, state, has_control: hasControl }) {
+    this.isPresent = Boolean(handle);
+    document.body.classList.toggle("real-device", this.isPresent);
+    $("handle-note").hidden = !this.isPresent;
+    if (handle) $("handle-note").textContent = `${handle.motion_source}. The guided tour needs the simulated device; asperity run --record records.`;
+    $("start").textContent = handle ? "Start" : "Start again";
+    $("start").hidden = state !== "stopped" || !hasControl;
+    $("release").hidden = !handle || state === "stopped";
+    $("release").disabled = !hasControl;
+    $("tour-start").hidden = this.isPresent;
   }
 }

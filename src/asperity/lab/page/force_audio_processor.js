@@ -1,48 +1,54 @@
-// The force as sound, in the browser's thread for sound: from the loop's rate to the speaker's.
+// Audio worklet that plays the force, resampled from the update rate of the loop to that of the audio output.
 
-const KEPT = 1 << 16; // samples of the loop
-const LAG = 0.06; // s that are kept in hand, so that frames that come unevenly leave no gaps
+const BUFFER_SIZE = 1 << 16; // samples of the loop
+const LATENCY = 0.06; // s of buffered samples, which bridge the gaps between frames
+const HIGH_PASS = 25; // Hz, below which the force is not audible
 
-class Ear extends AudioWorkletProcessor {
+class ForceAudioProcessor extends AudioWorkletProcessor {
   constructor() {
     super();
-    this.kept = [new Float32Array(KEPT), new Float32Array(KEPT)];
-    this.written = 0;
-    this.read = 0;
-    this.rate = 1000;
-    this.before = [0, 0];
-    this.high = [0, 0];
+    this.buffers = [new Float32Array(BUFFER_SIZE), new Float32Array(BUFFER_SIZE)]; // left, right
+    this.writePosition = 0;
+    this.readPosition = 0; // fractional
+    this.updateRate = 1000;
+    this.previous = [0, 0];
+    this.filtered = [0, 0];
     this.port.onmessage = ({ data }) => {
-      this.rate = data.rate;
+      this.updateRate = data.updateRate;
       for (let k = 0; k < data.forces.length; k += 2) {
-        for (const side of [0, 1]) this.kept[side][this.written % KEPT] = data.forces[k + side];
-        this.written++;
+        for (const channel of [0, 1]) this.buffers[channel][this.writePosition % BUFFER_SIZE] = data.forces[k + channel];
+        this.writePosition++;
       }
     };
   }
 
   process(_inputs, outputs) {
-    const [sides] = outputs, lag = LAG * this.rate;
-    // A little faster or slower than the loop, towards the wanted lag; far away from it, a jump.
-    let behind = this.written - this.read;
-    if (behind < 0 || behind > 4 * lag + KEPT / 64) { this.read = Math.max(this.written - lag, 0); behind = lag; }
-    const step = this.rate / sampleRate * (1 + 0.02 * Math.max(-1, Math.min(1, (behind - lag) / lag)));
-    const keep = Math.exp(-2 * Math.PI * 25 / sampleRate);
-    for (let i = 0; i < sides[0].length; i++) {
-      const whole = Math.floor(this.read), part = this.read - whole;
-      const there = whole + 1 < this.written;
-      sides.forEach((side, k) => {
-        const kept = this.kept[Math.min(k, 1)];
-        const value = there ? kept[whole % KEPT] * (1 - part) + kept[(whole + 1) % KEPT] * part : this.before[k];
-        // Only what changes is heard, and never louder than full.
-        this.high[k] = keep * (this.high[k] + value - this.before[k]);
-        this.before[k] = value;
-        side[i] = Math.tanh(2 * this.high[k]);
+    const [channels] = outputs, target = LATENCY * this.updateRate;
+    // The playback speed is adjusted by up to 2 % to hold the latency; far from it, samples are skipped.
+    let lag = this.writePosition - this.readPosition;
+    if (lag < 0 || lag > 4 * target + BUFFER_SIZE / 64) {
+      this.readPosition = Math.max(this.writePosition - target, 0);
+      lag = target;
+    }
+    const step = this.updateRate / sampleRate * (1 + 0.02 * Math.max(-1, Math.min(1, (lag - target) / target)));
+    const decay = Math.exp(-2 * Math.PI * HIGH_PASS / sampleRate);
+    for (let i = 0; i < channels[0].length; i++) {
+      const index = Math.floor(this.readPosition), fraction = this.readPosition - index;
+      const isAvailable = index + 1 < this.writePosition;
+      channels.forEach((channel, k) => {
+        const buffer = this.buffers[Math.min(k, 1)];
+        const force = isAvailable
+          ? buffer[index % BUFFER_SIZE] * (1 - fraction) + buffer[(index + 1) % BUFFER_SIZE] * fraction
+          : this.previous[k];
+        // A high-pass filter removes constant forces; tanh limits the amplitude to full scale.
+        this.filtered[k] = decay * (this.filtered[k] + force - this.previous[k]);
+        this.previous[k] = force;
+        channel[i] = Math.tanh(2 * this.filtered[k]);
       });
-      if (there) this.read += step;
+      if (isAvailable) this.readPosition += step;
     }
     return true;
   }
 }
 
-registerProcessor("ear", Ear);
+registerProcessor("force-audio", ForceAudioProcessor);

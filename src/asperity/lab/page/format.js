@@ -1,23 +1,23 @@
-// Numbers as people read them.
+// Formatting of numbers.
 
-const STEPS = [[1e9, "G"], [1e6, "M"], [1e3, "k"], [1, ""], [1e-3, "m"], [1e-6, "µ"], [1e-9, "n"], [1e-12, "p"]];
+const PREFIXES = [[1e9, "G"], [1e6, "M"], [1e3, "k"], [1, ""], [1e-3, "m"], [1e-6, "µ"], [1e-9, "n"], [1e-12, "p"]];
 
 /** Return a value with three digits and a prefix: (0.00123, "J") is "1.23 mJ". */
-export function quantity(value, unit) {
+export function formatQuantity(value, unit) {
   if (!Number.isFinite(value)) return "–";
   const size = Math.abs(value);
   if (size < 1e-12) return `0 ${unit}`;
-  const [factor, prefix] = STEPS.find(([step]) => size >= step * 0.9995) ?? STEPS.at(-1);
+  const [factor, prefix] = PREFIXES.find(([step]) => size >= step * 0.9995) ?? PREFIXES.at(-1);
   const scaled = value / factor;
   const digits = Math.abs(scaled) >= 99.95 ? 0 : Math.abs(scaled) >= 9.995 ? 1 : 2;
   return `${scaled.toFixed(digits).replace("-", "−")} ${prefix}${unit}`;
 }
 
-/** Return a length in millimetres, always with as many digits, so that it does not jump. */
-export const millimetres = value => (1e3 * value).toFixed(3).replace("-", "−").padStart(7, " ");
+/** Return a length in millimetres with constant width, so that a changing value does not jitter. */
+export const formatMillimetres = value => (1e3 * value).toFixed(3).replace("-", "−").padStart(7, " ");
 
-/** Return a round step that divides a span into about so many parts. */
+/** Return the least step of 1, 2 or 5 times a power of ten that divides a span into at most so many parts. */
 export function roundStep(span, parts) {
   const rough = span / parts, power = 10 ** Math.floor(Math.log10(rough));
-  return [1, 2, 5, 10].map(part => part * power).find(step => step >= rough);
+  return [1, 2, 5, 10].map(factor => factor * power).find(step => step >= rough);
 }

@@ -1,103 +1,111 @@
-// A picture of what is seen, as PNG, or as SVG whose lines, arrows and words are lines, arrows and words.
+// Export of the views as PNG, or as SVG with vector lines, arrows and text.
 
 import { readTheme } from "./canvas.js";
 
-const SVG = document.createRange().createContextualFragment("<svg/>").firstChild.namespaceURI;
+const SVG_NAMESPACE = document.createRange().createContextualFragment("<svg/>").firstChild.namespaceURI;
 const GAP = 8; // pixels between two views
-const ruler = document.createElement("canvas").getContext("2d");
-const short = value => Number(value.toFixed(2));
-const escaped = text => text.replaceAll("&", "&amp;").replaceAll("<", "&lt;").replaceAll('"', "&quot;");
+const textMeasure = document.createElement("canvas").getContext("2d");
+const round = value => Number(value.toFixed(2));
+const escape = text => text.replaceAll("&", "&amp;").replaceAll("<", "&lt;").replaceAll('"', "&quot;");
 
-/** What the views ask of a canvas, written as SVG. */
-export class Pen {
-  vector = true;
+/** The part of CanvasRenderingContext2D that the views use, writing SVG elements. */
+class SvgContext {
   globalAlpha = 1;
   lineWidth = 1;
   fillStyle = "#000";
   strokeStyle = "#000";
   font = "12px system-ui, sans-serif";
 
-  constructor() { this.parts = []; this.path = []; this.dashes = []; }
+  constructor() { this.elements = []; this.path = []; this.dashes = []; }
 
-  put(name, values, content = "") {
-    const alpha = this.globalAlpha < 1 ? { opacity: this.globalAlpha } : {};
-    const said = Object.entries({ ...values, ...alpha }).map(([key, value]) => ` ${key}="${escaped(String(value))}"`);
-    this.parts.push(content ? `<${name}${said.join("")}>${escaped(content)}</${name}>` : `<${name}${said.join("")}/>`);
+  addElement(name, attributes, content = "") {
+    const opacity = this.globalAlpha < 1 ? { opacity: this.globalAlpha } : {};
+    const text = Object.entries({ ...attributes, ...opacity }).map(([key, value]) => ` ${key}="${escape(String(value))}"`).join("");
+    this.elements.push(content ? `<${name}${text}>${escape(content)}</${name}>` : `<${name}${text}/>`);
   }
 
   beginPath() { this.path = []; }
-  moveTo(x, y) { this.path.push(`M${short(x)} ${short(y)}`); }
-  lineTo(x, y) { this.path.push(`${this.path.length ? "L" : "M"}${short(x)} ${short(y)}`); }
+  moveTo(x, y) { this.path.push(`M${round(x)} ${round(y)}`); }
+  lineTo(x, y) { this.path.push(`${this.path.length ? "L" : "M"}${round(x)} ${round(y)}`); }
   closePath() { this.path.push("Z"); }
 
-  /** A whole circle: the views draw no other arcs. */
+  /** Add a whole circle: the views draw no other arcs. */
   arc(x, y, radius) {
-    const [left, right, r] = [x - radius, x + radius, radius].map(short);
-    this.path.push(`M${right} ${short(y)}A${r} ${r} 0 1 0 ${left} ${short(y)}A${r} ${r} 0 1 0 ${right} ${short(y)}`);
+    const [left, right, r] = [x - radius, x + radius, radius].map(round);
+    this.path.push(`M${right} ${round(y)}A${r} ${r} 0 1 0 ${left} ${round(y)}A${r} ${r} 0 1 0 ${right} ${round(y)}`);
   }
 
   stroke() {
     const dashes = this.dashes.length ? { "stroke-dasharray": this.dashes.join(" ") } : {};
-    this.put("path", { d: this.path.join(""), fill: "none", stroke: this.strokeStyle, "stroke-width": this.lineWidth, ...dashes });
+    this.addElement("path", { d: this.path.join(""), fill: "none", stroke: this.strokeStyle, "stroke-width": this.lineWidth, ...dashes });
   }
 
-  fill() { this.put("path", { d: this.path.join(""), fill: this.fillStyle }); }
+  fill() { this.addElement("path", { d: this.path.join(""), fill: this.fillStyle }); }
   setLineDash(dashes) { this.dashes = dashes; }
   save() {}
   restore() {}
 
   fillRect(x, y, width, height) {
-    this.put("rect", { x: short(x), y: short(y), width: short(width), height: short(height), fill: this.fillStyle });
+    this.addElement("rect", { x: round(x), y: round(y), width: round(width), height: round(height), fill: this.fillStyle });
   }
 
   fillText(text, x, y) {
-    this.put("text", { x: short(x), y: short(y), fill: this.fillStyle, style: `font: ${this.font}` }, text);
+    this.addElement("text", { x: round(x), y: round(y), fill: this.fillStyle, style: `font: ${this.font}` }, text);
   }
 
-  measureText(text) { ruler.font = this.font; return ruler.measureText(text); }
+  measureText(text) { textMeasure.font = this.font; return textMeasure.measureText(text); }
 
-  /** A picture in the picture: the relief, and the colours of the curl. */
+  /** Embed a raster image: the relief, and the colours of the curl. */
   drawImage(canvas, x, y, width, height) {
-    this.put("image", { x: short(x), y: short(y), width: short(width), height: short(height), preserveAspectRatio: "none", href: canvas.toDataURL() });
+    this.addElement("image", { x: round(x), y: round(y), width: round(width), height: round(height), preserveAspectRatio: "none", href: canvas.toDataURL() });
   }
 }
 
-/** Return views, each with what draws it, below each other as SVG. */
-export function svgOf(views) {
-  const parts = [], sizes = views.map(([view]) => [view.sheet.width, view.sheet.height]);
+/** Return views, each with the function that draws it, as one SVG below each other. */
+export function toSvg(views) {
+  const parts = [], sizes = views.map(([{ scaledCanvas }]) => [scaledCanvas.width, scaledCanvas.height]);
   let top = 0;
   views.forEach(([view, draw], k) => {
-    const pen = new Pen(), { sheet, marker } = view, [width, height] = sizes[k];
-    view.sheet = { canvas: sheet.canvas, ratio: sheet.ratio, width, height, blank: true, cleared: () => [pen, width, height] };
-    if (marker) view.marker = Object.assign(Object.create(marker), { draw: pen, fit: () => true });
-    try { draw(); } finally { Object.assign(view, marker ? { sheet, marker } : { sheet }); }
-    parts.push(`<svg y="${short(top)}" width="${short(width)}" height="${short(height)}">${pen.parts.join("")}</svg>`);
+    const [width, height] = sizes[k];
+    const elements = recordDrawing(view, draw, width, height);
+    parts.push(`<svg y="${round(top)}" width="${round(width)}" height="${round(height)}">${elements.join("")}</svg>`);
     top += height + GAP;
   });
-  const width = short(Math.max(...sizes.map(([wide]) => wide))), height = short(top - GAP);
-  return `<svg xmlns="${SVG}" width="${width}" height="${height}" viewBox="0 0 ${width} ${height}">`
+  const width = round(Math.max(...sizes.map(([viewWidth]) => viewWidth))), height = round(top - GAP);
+  return `<svg xmlns="${SVG_NAMESPACE}" width="${width}" height="${height}" viewBox="0 0 ${width} ${height}">`
     + `<rect width="100%" height="100%" fill="${readTheme().card}"/>${parts.join("")}</svg>`;
 }
 
-/** Return the views below each other as PNG. */
-export function pngOf(views) {
-  const sheets = views.map(([view]) => view.sheet.canvas), height = sheets.reduce((sum, one) => sum + one.height + GAP, -GAP);
-  const whole = Object.assign(document.createElement("canvas"), { width: Math.max(...sheets.map(one => one.width)), height });
-  const draw = whole.getContext("2d");
-  draw.fillStyle = readTheme().card;
-  draw.fillRect(0, 0, whole.width, whole.height);
-  let top = 0;
-  for (const [{ sheet, marker }] of views) {
-    draw.drawImage(sheet.canvas, 0, top);
-    marker?.copy(draw, 0, top);
-    top += sheet.canvas.height + GAP;
-  }
-  return new Promise(done => whole.toBlob(done));
+/** Draw a view and its overlay into an SVG context in place of their canvases; return the elements. */
+function recordDrawing(view, draw, width, height) {
+  const context = new SvgContext(), { scaledCanvas, overlay } = view, { element, pixelRatio } = scaledCanvas;
+  view.scaledCanvas = { element, pixelRatio, width, height, needsRepaint: true, clear: () => [context, width, height] };
+  if (overlay) view.overlay = Object.assign(Object.create(overlay), { context, fitTo: () => true });
+  try { draw(); } finally { Object.assign(view, overlay ? { scaledCanvas, overlay } : { scaledCanvas }); }
+  return context.elements;
 }
 
-/** Hand a file to whoever sits at the page. */
-export function download(content, name) {
-  const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(content), download: name });
+/** Return a promise of the views as one PNG below each other. */
+export function toPng(views) {
+  const canvases = views.map(([{ scaledCanvas }]) => scaledCanvas.element);
+  const width = Math.max(...canvases.map(canvas => canvas.width));
+  const height = canvases.reduce((sum, canvas) => sum + canvas.height + GAP, -GAP);
+  const image = Object.assign(document.createElement("canvas"), { width, height });
+  const context = image.getContext("2d");
+  context.fillStyle = readTheme().card;
+  context.fillRect(0, 0, width, height);
+  let top = 0;
+  for (const [{ scaledCanvas, overlay }] of views) {
+    context.drawImage(scaledCanvas.element, 0, top);
+    overlay?.drawOnto(context, 0, top);
+    top += scaledCanvas.element.height + GAP;
+  }
+  return new Promise(resolve => image.toBlob(resolve));
+}
+
+/** Download a blob as a file. */
+export function download(blob, name) {
+  const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(blob), download: name });
   link.click();
   URL.revokeObjectURL(link.href);
 }

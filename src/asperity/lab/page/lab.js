@@ -1,387 +1,426 @@
-// The page: what is acknowledged from the lab is shown, and what is done here is said to it.
+// The page of the lab: shows the frames and the status sent by the server, and sends the requests of the user.
 
-import { Ledger } from "./tactile_metrics.js";
-import { Hand } from "./pointer_hand.js";
-import { Handle } from "./device_handle.js";
-import { Latency } from "./latency.js";
-import { fromSlider, showLimit, toSlider } from "./stiffness_slider.js";
-import { Line } from "./connection.js";
-import { download, pngOf, svgOf } from "./image_export.js";
+import { EnergyMeter } from "./tactile_metrics.js";
+import { PointerHand } from "./pointer_hand.js";
+import { DeviceHandle } from "./device_handle.js";
+import { LatencyMonitor } from "./latency.js";
+import { fromSliderValue, showLimit, toSliderFraction } from "./stiffness_slider.js";
+import { Connection } from "./connection.js";
+import { download, toPng, toSvg } from "./image_export.js";
 import { readTheme } from "./canvas.js";
-import { Sound } from "./sound.js";
+import { ForceSound } from "./sound.js";
 import { Player } from "./player.js";
-import { TakesPanel } from "./clips_panel.js";
+import { ClipsPanel } from "./clips_panel.js";
 import { Tour } from "./tour.js";
 import { TourPanel } from "./tour_panel.js";
-import { Spectrum, Traces } from "./traces.js";
-import { Cut, Relief, isRelief } from "./views.js";
-import { millimetres, quantity } from "./format.js";
+import { SpectrumPlot, TracePlot } from "./traces.js";
+import { ReliefView, SectionView, isRelief } from "./views.js";
+import { formatMillimetres, formatQuantity } from "./format.js";
 
 const $ = id => document.getElementById(id);
-const NUMBERS = ["delay", "hand_stiffness", "hand_damping", "magnify", "magnify_height"]; // fields that say them as they are
-const relief = new Relief($("relief")), cut = new Cut($("cut"));
-const traces = new Traces($("traces")), spectrum = new Spectrum($("spectrum")), sound = new Sound();
-const ledger = new Ledger();
+// Settings whose fields have the same name and unit.
+const NUMBER_FIELDS = ["delay", "hand_stiffness", "hand_damping", "magnify", "magnify_height"];
+const LOCAL_CONTROLS = ["sound", "volume", "save-png", "save-svg", "reset-energy"]; // need no control of the loop
+const MIN_VIEW_WIDTH = 5e-4, MAX_VIEW_WIDTH = 0.06; // m
+const ZOOM_FACTOR = 1.15;
+const RETRY_DELAY = 500; // ms, after a picture was not available
+const relief = new ReliefView($("relief")), section = new SectionView($("section"));
+const traces = new TracePlot($("traces")), spectrum = new SpectrumPlot($("spectrum")), sound = new ForceSound();
+const energyMeter = new EnergyMeter(), latencyMonitor = new LatencyMonitor();
 
-let news = null, frame = null, span = 8e-3, centre = [0, 0], firstNews = true;
-let laws = []; // as the lab knows them, with their parameters
-let faults = 0, seen = -1; // the newest frame that was painted
-let asked = {}; // pictures, by kind: which, since when, and when again [ms]
-const latency = new Latency();
+let status = null, frame = null, viewWidth = 8e-3, viewCentre = [0, 0], isFirstStatus = true;
+let laws = []; // of the server, with their parameters
+let errorCount = 0, paintedFrame = -1;
+let viewRequests = {}; // last request of a picture by kind: key, surface version, time sent and earliest next request [ms]
 
-const line = new Line({
-  hello(said) {
-    laws = said.laws;
-    fill($("other"), said.laws.map(law => [law.letter, `${law.letter} ${law.name}`]), "A");
-    fill($("device"), said.devices.map(name => [name, name]));
-    $("textures").replaceChildren(...said.textures.map(name => new Option(name)));
-    $("letters").replaceChildren(...said.laws.map(law => {
+const connection = new Connection({
+  hello(message) {
+    laws = message.laws;
+    fillSelect($("other-law"), laws.map(law => [law.letter, `${law.letter} ${law.name}`]), "A");
+    fillSelect($("device"), message.devices.map(name => [name, name]));
+    $("textures").replaceChildren(...message.textures.map(name => new Option(name)));
+    $("law-buttons").replaceChildren(...laws.map(law => {
       const button = Object.assign(document.createElement("button"), { type: "button", textContent: law.letter });
       button.setAttribute("role", "radio");
       button.title = law.name;
-      button.dataset.words = `${law.name}. ${law.words}`;
-      button.onclick = () => change({ law: law.letter });
+      button.dataset.summary = `${law.name}. ${law.summary}`;
+      button.onclick = () => changeScene({ law: law.letter });
       return button;
     }));
   },
-  news(said) {
-    const before = news;
-    news = said;
-    if (said.steers && !before?.steers) hand.sent = said.requested;
-    if (before?.starts !== said.starts) traces.clear();
-    if (before?.starts !== said.starts || before?.settings.law !== said.settings.law) ledger.clear();
-    if (!before && !frame) [hand.x, hand.y] = centre = [...said.middle];
-    if (firstNews && said.steers && !said.handle) fromAddress(); // an address moves no handle
-    firstNews = false;
-    hand.high = said.high;
-    last.look = -Infinity; // other pictures may be wanted now
-    show();
+  status(message) {
+    const previous = status;
+    status = message;
+    const hasRestarted = previous?.start_count !== status.start_count;
+    if (status.has_control && !previous?.has_control) hand.requestCount = status.request_count;
+    if (hasRestarted) traces.clear();
+    if (hasRestarted || previous?.settings.law !== status.settings.law) energyMeter.reset();
+    if (!previous && !frame) [hand.x, hand.y] = viewCentre = [...status.centre];
+    if (isFirstStatus && status.has_control && !status.handle) applyUrlSettings(); // never on a real device
+    isFirstStatus = false;
+    hand.surfaceHeight = status.highest;
+    lastRun.requestPictures = -Infinity; // they may have changed
+    showStatus();
   },
-  refused(said) { alarm(said.words); },
-  take(said) { takes.add(said); },
-  frame(said) {
-    if (player.on) { line.say("seen", { frame: said.number }); return; } // what was is shown, not what is
-    tour.take(said, line.layout.columns);
-    feel(said);
-    if (document.hidden) line.say("seen", { frame: said.number }); // nothing is painted
+  error({ message }) { showAlarm(message); },
+  clip(clip) { clipsPanel.add(clip); },
+  frame(newFrame) {
+    if (player.isOpen) { acknowledge(newFrame); return; } // the recording is shown instead
+    tour.addFrame(newFrame, connection.layout.columns);
+    showFrame(newFrame);
+    if (document.hidden) acknowledge(newFrame); // nothing is painted
   },
   picture(numbers) {
-    const view = isRelief(numbers) ? relief : cut, now = performance.now();
-    const wait = asked[view.name];
-    if (wait) wait.again = now + RESTS * (now - wait.since);
-    view.take(numbers);
+    const view = isRelief(numbers) ? relief : section, now = performance.now();
+    const request = viewRequests[view.kind];
+    if (request) request.nextTime = now + REST_FACTOR * (now - request.sentTime);
+    view.setPicture(numbers);
   },
-  /** There is no such picture yet. */
-  later({ kind }) { if (asked[kind]) Object.assign(asked[kind], { key: "", version: -1, again: performance.now() + 500 }); },
-  lost(reason) {
-    const goes = news?.handle ? " The force goes when no page steers." : "";
-    firstNews = false;
-    news = null;
-    asked = {};
+  picture_unavailable({ kind }) {
+    if (viewRequests[kind]) Object.assign(viewRequests[kind], { key: "", version: -1, nextTime: performance.now() + RETRY_DELAY });
+  },
+  disconnected(reason) {
+    const notice = status?.handle ? " The force is released when no page with control is connected." : "";
+    isFirstStatus = false;
+    status = null;
+    viewRequests = {};
     $("state").className = "stopped";
     $("state").textContent = "connection lost";
-    alarm(`${reason ? `The server closed the connection: ${reason}.` : "Connection lost. Is asperity lab still running?"}${goes} Reconnecting …`);
+    showAlarm(`${reason ? `The server closed the connection: ${reason}.` : "Connection lost. Is asperity lab still running?"}${notice} Reconnecting …`);
   },
 });
 
-const hand = new Hand((what, content) => {
-  const said = Boolean(news?.steers && !news.handle) && line.say(what, content);
-  if (said) latency.request(hand.sent + 1, hand.since);
-  return said;
+const hand = new PointerHand((type, payload) => {
+  const isSent = Boolean(status?.has_control && !status.handle) && connection.send(type, payload);
+  if (isSent) latencyMonitor.addRequest(hand.requestCount + 1, hand.inputTime);
+  return isSent;
 });
-
-const handle = new Handle(what => line.say(what));
-const tour = new Tour({ change, hand, ledger, get span() { return span; }, set span(width) { span = width; }, get news() { return news; } }), panel = new TourPanel(tour);
+const handle = new DeviceHandle(type => connection.send(type));
+const tour = new Tour({
+  changeScene, hand, energyMeter, get status() { return status; },
+  get viewWidth() { return viewWidth; }, set viewWidth(width) { viewWidth = width; },
+});
+const tourPanel = new TourPanel(tour);
 
 const player = new Player({
-  frame(said) { feel({ ...said, number: seen }); },
+  showFrame(playbackFrame) { showFrame({ ...playbackFrame, number: paintedFrame }); },
   clear() {
-    traces.clear(); ledger.clear();
-    for (const wait of Object.values(asked)) wait.again = wait.again < Infinity ? 0 : wait.again; // it is another place
+    traces.clear(); energyMeter.reset();
+    // The probe may be elsewhere: pictures are requested again at once.
+    for (const request of Object.values(viewRequests)) if (request.nextTime < Infinity) request.nextTime = 0;
   },
 });
-const takes = new TakesPanel({
-  player, change(changes) { line.say("change", { changes }); }, save() { line.say("save"); },
-  get columns() { return line.layout.columns; }, get version() { return news?.version; },
+const clipsPanel = new ClipsPanel({
+  player, changeScene(changes) { connection.send("change", { changes }); }, saveClip() { connection.send("save_clip"); },
+  get columns() { return connection.layout.columns; }, get surfaceVersion() { return status?.surface_version; },
 });
 
-const rate = () => (player.on ? player.rate : news?.rate ?? 1000);
+const updateRate = () => (player.isOpen ? player.updateRate : status?.update_rate ?? 1000);
 
-/** Show what a frame says, of now or of a take. */
-function feel(said) {
-  frame = said;
-  if (news) ledger.take(said, line.layout.columns, news);
-  traces.take(said, line.layout.columns);
-  spectrum.take(said.forces);
-  sound.take(said.forces, rate());
+/** Tell the server that a frame was processed, so that it sends further ones. */
+function acknowledge({ number }) { connection.send("acknowledge", { frame: number }); }
+
+/** Show a frame of the live loop or of a clip. */
+function showFrame(newFrame) {
+  frame = newFrame;
+  if (status) energyMeter.addFrame(frame, connection.layout.columns, status);
+  traces.addFrame(frame, connection.layout.columns);
+  spectrum.addForces(frame.forces);
+  sound.addForces(frame.forces, updateRate());
 }
 
-function fill(select, pairs, chosen) {
-  const value = select.value || chosen;
-  select.replaceChildren(...pairs.map(([key, words]) => new Option(words, key, false, key === value)));
+function fillSelect(select, options, initialValue) {
+  const value = select.value || initialValue;
+  select.replaceChildren(...options.map(([key, text]) => new Option(text, key, false, key === value)));
 }
 
-/** Ask for something else; behind a recording is what it was felt on, and nothing else. */
-function change(changes) { takes.close(); line.say("change", { changes }); }
+/** Request a change of the scene, which closes the player: its surface must be that of the clip. */
+function changeScene(changes) { clipsPanel.close(); connection.send("change", { changes }); }
 
-function alarm(words) {
-  $("alarm").hidden = !words;
-  $("alarm").firstElementChild.textContent = words;
+function showAlarm(text) {
+  $("alarm").hidden = !text;
+  $("alarm").firstElementChild.textContent = text;
 }
 
-// --- what is known ------------------------------------------------------------------------------
+// --- status ---------------------------------------------------------------------------------------
 
-function show() {
-  const { settings, state, words, steers, free } = news;
-  const [size, height] = [settings.magnify, settings.magnify_height].map(times => Number(times.toPrecision(3)));
-  const times = size === height ? `, × ${size}` : `, × ${size}, heights × ${height}`;
+function showStatus() {
+  const { settings, state, has_control: hasControl } = status;
   $("surface").title = settings.texture;
-  $("surface").textContent = settings.texture.split(/[\\/]/).at(-1) + (size === 1 && height === 1 ? "" : times);
+  $("surface").textContent = settings.texture.split(/[\\/]/).at(-1) + magnificationText(settings);
   $("state").className = state;
-  $("state").textContent = { running: `law ${settings.law} at ${news.rate.toFixed(0)} Hz`, stopped: "stopped",
+  $("state").textContent = { running: `law ${settings.law} at ${status.update_rate.toFixed(0)} Hz`, stopped: "stopped",
     starting: "starting", changing: "changing" }[state];
-  const told = state === "stopped" ? `The loop has stopped: ${words}` : !steers
-    ? "Another page has control; this page is read-only." : words || news.pictures;
-  alarm(told);
-  handle.show(news);
-  $("take").hidden = !free || steers;
-  $("tour-begin").disabled = !steers;
-  for (const one of document.querySelectorAll(".panel :is(input, select, button)")) {
-    if (!["sound", "volume", "picture", "drawing", "reset"].includes(one.id)) one.disabled = !steers;
+  showAlarm(alarmText());
+  handle.update(status);
+  $("take-control").hidden = !status.control_available || hasControl;
+  $("tour-start").disabled = !hasControl;
+  for (const control of document.querySelectorAll(".panel :is(input, select, button)")) {
+    if (!LOCAL_CONTROLS.includes(control.id)) control.disabled = !hasControl;
   }
-  for (const button of $("letters").children) {
-    const chosen = button.textContent === settings.law;
-    button.setAttribute("aria-checked", chosen);
-    if (chosen) $("law-words").textContent = button.dataset.words;
+  for (const button of $("law-buttons").children) {
+    const isChecked = button.textContent === settings.law;
+    button.setAttribute("aria-checked", isChecked);
+    if (isChecked) $("law-summary").textContent = button.dataset.summary;
   }
-  for (const name of ["texture", "device", ...NUMBERS]) put(name, settings[name]);
-  showParameters(settings);
-  put("max_depth", (1e3 * settings.max_depth).toFixed(3).replace(/\.?0+$/, ""));
-  put("stiffness", 1000 * toSlider(settings.stiffness));
-  $("stiffness-value").textContent = quantity(settings.stiffness, "N/m");
-  $("assumptions").replaceChildren(...news.assumptions.map(words =>
-    Object.assign(document.createElement("li"), { textContent: words })));
-  showLimit(settings, news.limit);
-  if (steers && state === "running" && !news.handle) toAddress(settings);
+  for (const name of ["texture", "device", ...NUMBER_FIELDS]) setField(name, settings[name]);
+  showLawParameters(settings);
+  setField("max_depth", (1e3 * settings.max_depth).toFixed(3).replace(/\.?0+$/, ""));
+  setField("stiffness", 1000 * toSliderFraction(settings.stiffness));
+  $("stiffness-value").textContent = formatQuantity(settings.stiffness, "N/m");
+  $("assumptions").replaceChildren(...status.assumptions.map(text =>
+    Object.assign(document.createElement("li"), { textContent: text })));
+  showLimit(settings, status.limit);
+  if (hasControl && state === "running" && !status.handle) storeUrlSettings(settings);
 }
 
-/** Fields for the parameters of the law, as its catalogue declares them. */
-function showParameters(settings) {
+function magnificationText(settings) {
+  const [size, height] = [settings.magnify, settings.magnify_height].map(factor => Number(factor.toPrecision(3)));
+  if (size === 1 && height === 1) return "";
+  return size === height ? `, × ${size}` : `, × ${size}, heights × ${height}`;
+}
+
+function alarmText() {
+  if (status.state === "stopped") return `The loop has stopped: ${status.message}`;
+  if (!status.has_control) return "Another page has control; this page is read-only.";
+  return status.message || status.picture_message;
+}
+
+/** Show a field for each parameter of the current law. */
+function showLawParameters(settings) {
   const { parameters } = laws.find(law => law.letter === settings.law);
   if ($("parameters").dataset.law !== settings.law) {
     $("parameters").dataset.law = settings.law;
     $("parameters").replaceChildren(...parameters.flatMap(({ name, words, unit }) => {
       const label = Object.assign(document.createElement("label"), { htmlFor: name, textContent: `${name.replaceAll("_", " ")}${unit && ` [${unit}]`}` });
       const field = Object.assign(document.createElement("input"), { id: name, type: "number", step: "any", title: words });
-      field.onchange = () => change({ [name]: Number(field.value) });
+      field.onchange = () => changeScene({ [name]: Number(field.value) });
       return [label, field];
     }));
   }
-  for (const { name } of parameters) { put(name, settings[name]); $(name).disabled = !news.steers; }
+  for (const { name } of parameters) { setField(name, settings[name]); $(name).disabled = !status.has_control; }
 }
 
-function put(name, value) {
-  const field = $(name);
-  if (document.activeElement !== field) field.value = value ?? ""; // nothing of a hand that is a band
+/** Set the value of a field that has no focus; null disables it, as for the stiffness of an elastic band. */
+function setField(id, value) {
+  const field = $(id);
+  if (document.activeElement !== field) field.value = value ?? "";
   field.disabled ||= value === null;
 }
 
-function fromAddress() {
+/** Apply the settings in the fragment of the URL, if all are valid. */
+function applyUrlSettings() {
   const changes = {};
   for (const [name, text] of new URLSearchParams(location.hash.slice(1))) {
-    if (name in news.settings || laws.some(law => law.parameters.some(one => one.name === name))) changes[name] = ["law", "texture", "device"].includes(name) ? text : Number(text);
+    const isParameter = laws.some(law => law.parameters.some(parameter => parameter.name === name));
+    if (name in status.settings || isParameter) changes[name] = ["law", "texture", "device"].includes(name) ? text : Number(text);
   }
-  if (Object.keys(changes).length && Object.values(changes).every(value => value === value)) change(changes);
+  const values = Object.values(changes);
+  if (values.length && !values.some(Number.isNaN)) changeScene(changes);
 }
 
-function toAddress(settings) {
-  const said = Object.entries(settings).filter(([, value]) => value !== null);
-  history.replaceState(null, "", `#${new URLSearchParams(said)}`);
+function storeUrlSettings(settings) {
+  const entries = Object.entries(settings).filter(([, value]) => value !== null);
+  history.replaceState(null, "", `#${new URLSearchParams(entries)}`);
 }
 
-// --- every picture of the screen ------------------------------------------------------------------
+// --- painting -------------------------------------------------------------------------------------
 
+/** Return the probe of the current frame, for the views. */
 function probeState() {
   if (!frame) return null;
-  const at = line.layout.columns, value = name => frame.newest[at[name]];
+  const { columns } = connection.layout, value = name => frame.newest[columns[name]];
   return {
-    probe: [value("x"), value("y"), value("z")], god: frame.god, hand: frame.hand,
-    force: [value("applied x"), value("applied y"), value("applied z")], inside: value("inside") > 0,
-    energy: ledger.energy,
+    probe: [value("x"), value("y"), value("z")], closest: frame.closest, hand: frame.hand,
+    force: [value("applied x"), value("applied y"), value("applied z")], isInside: value("inside") > 0,
+    energy: energyMeter.energy,
   };
 }
 
-function boxes() {
-  const ratio = Math.max(0.15, cut.sheet.height / cut.sheet.width);
-  const half = 0.5 * ratio * span, low = news ? 0.5 * (news.low + news.high) : 0;
-  return [centre[0] - span / 2, centre[0] + span / 2, low - half, low + half];
+/** Return the box of the section to be shown: left, right, bottom, top [m]. */
+function sectionBox() {
+  const { width, height } = section.scaledCanvas, halfHeight = 0.5 * Math.max(0.15, height / width) * viewWidth;
+  const middle = status ? 0.5 * (status.lowest + status.highest) : 0;
+  return [viewCentre[0] - viewWidth / 2, viewCentre[0] + viewWidth / 2, middle - halfHeight, middle + halfHeight];
 }
 
-/** Ask for the pictures that have become others, each when the one before is there. */
-function look(state) {
-  if (!news) return;
+/** Request the pictures that have changed, centred on the probe when it leaves the view. */
+function requestPictures(state) {
+  if (!status) return;
   if (state) {
     const [x, y] = state.probe;
-    if (Math.abs(x - centre[0]) > 0.45 * span || Math.abs(y - centre[1]) > 0.45 * span) centre = [x, y];
+    if (Math.abs(x - viewCentre[0]) > 0.45 * viewWidth || Math.abs(y - viewCentre[1]) > 0.45 * viewWidth) viewCentre = [x, y];
   }
-  ask("relief", { x: centre[0], y: centre[1], size: span });
-  ask("cut", { box: boxes(), y: state ? Math.round(state.probe[1] / 5e-5) * 5e-5 : 0 });
+  requestPicture("relief", { x: viewCentre[0], y: viewCentre[1], size: viewWidth });
+  requestPicture("section", { box: sectionBox(), y: state ? Math.round(state.probe[1] / 5e-5) * 5e-5 : 0 });
 }
 
-// The process that computes pictures gets about a tenth of a core: it rests as much longer as a picture took.
-const RESTS = 8;
-function ask(kind, content) {
-  const key = `${news.version} ${news.starts} ${JSON.stringify(content)}`, now = performance.now();
-  if (!news.version || asked[kind]?.key === key || now < (asked[kind]?.again ?? 0)) return;
-  if (line.say(kind, content)) asked[kind] = { key, version: news.version, since: now, again: Infinity };
+// Requests pause for a multiple of the time that a picture took, so that pictures use a tenth of a core.
+const REST_FACTOR = 8;
+
+/** Request a picture unless it is the last one requested, that one is pending, or the pause has not passed. */
+function requestPicture(kind, view) {
+  const { surface_version: version, start_count: startCount } = status, now = performance.now();
+  const key = `${version} ${startCount} ${JSON.stringify(view)}`;
+  if (!version || viewRequests[kind]?.key === key || now < (viewRequests[kind]?.nextTime ?? 0)) return;
+  if (connection.send(kind, view)) viewRequests[kind] = { key, version, sentTime: now, nextTime: Infinity };
 }
 
-// When words, the spectrum and traces were last shown, and a picture last asked for [ms].
-const last = { words: 0, traces: 0, look: 0 };
-function due(what, time, every) {
-  if (time - last[what] < every) return false;
-  last[what] = time;
+const lastRun = { texts: 0, traces: 0, requestPictures: 0 }; // time of the last run of each periodic task [ms]
+
+/** Return whether a periodic task is due, and note that it runs. */
+function isDue(task, time, interval) {
+  if (time - lastRun[task] < interval) return false;
+  lastRun[task] = time;
   return true;
 }
 
 function paint(time) {
   requestAnimationFrame(paint);
-  latency.painted();
-  line.look();
+  latencyMonitor.recordPresented();
+  connection.readBuffer();
   player.tick(time);
   const state = probeState();
-  if (frame && frame.number !== seen) {
-    seen = frame.number;
-    line.say("seen", { frame: seen });
+  if (frame && frame.number !== paintedFrame) {
+    paintedFrame = frame.number;
+    acknowledge(frame);
   }
   relief.draw(state);
-  cut.draw(state, boxes());
-  if (due("traces", time, 60)) traces.draw(ledger.base);
-  latency.paints(frame?.acknowledged ?? 0);
-  if (due("look", time, 200)) look(state);
-  if (state && due("words", time, 150)) tell(state);
+  section.draw(state, sectionBox());
+  if (isDue("traces", time, 60)) traces.draw(energyMeter.offset);
+  latencyMonitor.recordDrawn(frame?.acknowledged ?? 0);
+  if (isDue("requestPictures", time, 200)) requestPictures(state);
+  if (state && isDue("texts", time, 150)) updateTexts(state);
 }
 
-/** Say in words what is seen. */
-function tell(state) {
-  const { probe, force, energy } = state;
-  panel.draw();
-  takes.draw();
-  put("motion", hand.motion);
-  put("press", 1e3 * hand.press);
-  $("press-value").textContent = quantity(hand.press, "m");
-  $("energy").textContent = quantity(energy, "J");
-  $("ledger").classList.toggle("fed", ledger.fed);
-  $("verdict").textContent = ledger.words;
-  const [f, amplitude] = spectrum.draw(rate());
-  $("peak").textContent = amplitude > 1e-3 ? `strongest ${quantity(f, "Hz")}, ${quantity(amplitude, "N")}` : "quiet";
+/** Update the panels, the numbers, and the descriptions of the views for screen readers. */
+function updateTexts({ probe, force, energy, isInside }) {
+  tourPanel.update();
+  clipsPanel.update();
+  setField("motion", hand.motion);
+  setField("press-depth", 1e3 * hand.pressDepth);
+  $("press-depth-value").textContent = formatQuantity(hand.pressDepth, "m");
+  $("energy").textContent = formatQuantity(energy, "J");
+  $("energy-card").classList.toggle("supplies-energy", energyMeter.suppliesEnergy);
+  $("verdict").textContent = energyMeter.verdict;
+  const [frequency, amplitude] = spectrum.draw(updateRate());
+  $("peak").textContent = amplitude > 1e-3 ? `strongest ${formatQuantity(frequency, "Hz")}, ${formatQuantity(amplitude, "N")}` : "quiet";
   $("trace-note").textContent = `${frame.late} late samples, ${frame.skipped} skipped`;
-  const size = Math.hypot(...force), place = probe.map(millimetres).join(", ");
-  $("readout").textContent = `probe ${place} mm · force ${quantity(size, "N")} · time ${frame.newest[0].toFixed(1)} s`;
-  $("relief-note").textContent = `heights × ${(relief.exaggeration ?? 1).toPrecision(2)} · ${handle.there ? "the handle is the hand" : "hold down to press"}`;
-  const curl = cut.most > 1e-6 * (cut.strongest ?? 1) ? `curl up to ${quantity(cut.most, "N/m")}` : "no curl: no loop feeds the hand";
-  $("cut-note").textContent = cut.box ? `${curl} · wheel: zoom` : "computing …";
-  const words = `Probe at ${place} millimetres, force ${quantity(size, "N")}${state.inside ? ", in contact" : ""}`;
-  $("relief").setAttribute("aria-label", `The surface in relief. ${words}`);
-  $("cut").setAttribute("aria-label", `Section through the surface along x. ${words}. ${curl}`);
-  $("traces").setAttribute("aria-label", `Traces of five seconds. Energy given to the hand ${quantity(energy, "J")}`);
+  const forceText = `force ${formatQuantity(Math.hypot(...force), "N")}`, position = probe.map(formatMillimetres).join(", ");
+  $("readout").textContent = `probe ${position} mm · ${forceText} · time ${frame.newest[0].toFixed(1)} s`;
+  $("relief-note").textContent = `heights × ${(relief.exaggeration ?? 1).toPrecision(2)} · ${handle.isPresent ? "move the handle of the device" : "hold down to press"}`;
+  const curl = section.hasCurl ? `curl up to ${formatQuantity(section.maxCurl, "N/m")}` : "no curl: no energy gain";
+  $("section-note").textContent = section.box ? `${curl} · wheel: zoom` : "computing …";
+  const description = `Probe at ${position} millimetres, ${forceText}${isInside ? ", in contact" : ""}`;
+  $("relief").setAttribute("aria-label", `The surface in relief. ${description}`);
+  $("section").setAttribute("aria-label", `Section through the surface along x. ${description}. ${curl}`);
+  $("traces").setAttribute("aria-label", `Traces of five seconds. Energy given to the hand ${formatQuantity(energy, "J")}`);
   $("spectrum").setAttribute("aria-label", `Spectrum of the normal force: ${$("peak").textContent}`);
 }
 
-// --- what is done here ----------------------------------------------------------------------------
+// --- input ----------------------------------------------------------------------------------------
 
-function zoom(factor) { span = Math.max(5e-4, Math.min(0.06, span * factor)); }
+function zoom(factor) { viewWidth = Math.max(MIN_VIEW_WIDTH, Math.min(MAX_VIEW_WIDTH, viewWidth * factor)); }
 
-for (const [canvas, move] of [
-  [$("relief"), event => { [hand.x, hand.y] = relief.under(event.offsetX, event.offsetY); hand.z = null; }],
-  [$("cut"), event => { [hand.x, hand.z] = cut.under(event.offsetX, event.offsetY, boxes()); }],
+for (const [canvas, moveHand] of [
+  [$("relief"), event => { [hand.x, hand.y] = relief.pointAt(event.offsetX, event.offsetY); hand.z = null; }],
+  [$("section"), event => { [hand.x, hand.z] = section.pointAt(event.offsetX, event.offsetY, sectionBox()); }],
 ]) {
-  let last = "";
-  const follow = event => {
-    // A browser says "moved" after a change of the page, too: that takes nothing from the keys.
-    const place = [event.offsetX, event.offsetY, event.buttons, event.pressure].join();
-    if (place === last) return;
-    last = place;
-    if (hand.motion !== "pointer" || !relief.heights || handle.there) return;
-    hand.pressed = event.buttons > 0;
-    hand.force = event.pointerType === "pen" ? 2 * event.pressure : 1;
-    move(event);
-    hand.request(event.timeStamp);
+  let lastInput = "";
+  const followPointer = event => {
+    // A browser also sends pointermove after a change of the layout, which must not override the keys.
+    const input = [event.offsetX, event.offsetY, event.buttons, event.pressure].join();
+    if (input === lastInput) return;
+    lastInput = input;
+    if (hand.motion !== "pointer" || !relief.heights || handle.isPresent) return;
+    hand.isPressed = event.buttons > 0;
+    hand.pressure = event.pointerType === "pen" ? 2 * event.pressure : 1;
+    moveHand(event);
+    hand.requestMotion(event.timeStamp);
   };
-  canvas.onpointerdown = event => { canvas.setPointerCapture(event.pointerId); follow(event); };
-  canvas.onpointermove = canvas.onpointerup = follow;
-  // Said at once, where a browser says it; "moved" waits for the next picture.
-  canvas.addEventListener("pointerrawupdate", follow);
-  canvas.onpointercancel = () => { hand.pressed = false; hand.request(); };
-  canvas.addEventListener("wheel", event => { event.preventDefault(); zoom(1.15 ** Math.sign(event.deltaY)); }, { passive: false });
+  canvas.onpointerdown = event => { canvas.setPointerCapture(event.pointerId); followPointer(event); };
+  canvas.onpointermove = canvas.onpointerup = followPointer;
+  // Where supported, raw updates are sent at once; pointermove waits for the next animation frame.
+  canvas.addEventListener("pointerrawupdate", followPointer);
+  canvas.onpointercancel = () => { hand.isPressed = false; hand.requestMotion(); };
+  canvas.addEventListener("wheel", event => { event.preventDefault(); zoom(ZOOM_FACTOR ** Math.sign(event.deltaY)); }, { passive: false });
 }
 
-$("stiffness").oninput = event => { $("stiffness-value").textContent = quantity(fromSlider(event.target.value), "N/m"); };
-$("stiffness").onchange = event => change({ stiffness: fromSlider(event.target.value) });
-$("press").oninput = event => { hand.press = 1e-3 * event.target.value; hand.request(); };
-$("motion").onchange = event => { hand.motion = event.target.value; hand.request(); };
-$("texture").onchange = event => change({ texture: event.target.value });
-$("device").onchange = event => change({ device: event.target.value });
-$("max_depth").onchange = event => change({ max_depth: 1e-3 * event.target.value });
-for (const name of NUMBERS) {
-  $(name).onchange = event => change({ [name]: Number(event.target.value) });
+$("stiffness").oninput = event => { $("stiffness-value").textContent = formatQuantity(fromSliderValue(event.target.value), "N/m"); };
+$("stiffness").onchange = event => changeScene({ stiffness: fromSliderValue(event.target.value) });
+$("press-depth").oninput = event => { hand.pressDepth = 1e-3 * event.target.value; hand.requestMotion(); };
+$("motion").onchange = event => { hand.motion = event.target.value; hand.requestMotion(); };
+$("texture").onchange = event => changeScene({ texture: event.target.value });
+$("device").onchange = event => changeScene({ device: event.target.value });
+$("max_depth").onchange = event => changeScene({ max_depth: 1e-3 * event.target.value });
+for (const name of NUMBER_FIELDS) {
+  $(name).onchange = event => changeScene({ [name]: Number(event.target.value) });
 }
-$("swap").onclick = () => {
-  const mine = news?.settings.law;
-  if (!mine) return;
-  change({ law: $("other").value });
-  $("other").value = mine;
+$("swap-laws").onclick = () => {
+  const previousLaw = status?.settings.law;
+  if (!previousLaw) return;
+  changeScene({ law: $("other-law").value });
+  $("other-law").value = previousLaw;
 };
-for (const [name, act] of [["reset", () => ledger.clear()], ["take", () => line.say("take")]]) $(name).onclick = act;
+$("reset-energy").onclick = () => energyMeter.reset();
+$("take-control").onclick = () => connection.send("take_control");
 $("volume").oninput = event => sound.setVolume(Number(event.target.value));
 $("sound").onclick = async () => {
-  const on = await sound.toggle();
-  $("sound").setAttribute("aria-pressed", on);
-  $("sound").textContent = on ? "Sound off" : "Sound on";
+  const isOn = await sound.toggle();
+  $("sound").setAttribute("aria-pressed", isOn);
+  $("sound").textContent = isOn ? "Sound off" : "Sound on";
 };
 const views = [
-  [relief, () => relief.draw(probeState())], [cut, () => cut.draw(probeState(), boxes())],
-  [traces, () => traces.draw(ledger.base)], [spectrum, () => spectrum.draw(rate())],
+  [relief, () => relief.draw(probeState())], [section, () => section.draw(probeState(), sectionBox())],
+  [traces, () => traces.draw(energyMeter.offset)], [spectrum, () => spectrum.draw(updateRate())],
 ];
-$("picture").onclick = async () => download(await pngOf(views), "asperity-lab.png");
-$("drawing").onclick = () => download(new Blob([svgOf(views)], { type: "image/svg+xml" }), "asperity-lab.svg");
+$("save-png").onclick = async () => download(await toPng(views), "asperity-lab.png");
+$("save-svg").onclick = () => download(new Blob([toSvg(views)], { type: "image/svg+xml" }), "asperity-lab.svg");
 
-const MOVES = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
-const KEYS = {
-  " ": () => { hand.z = null; hand.force = 1; hand.latched = !hand.latched; hand.request(); },
-  PageUp: () => { hand.z = Math.min(hand.height + span / 80, 0.01); hand.request(); },
-  PageDown: () => { hand.z = Math.max(hand.height - span / 80, -0.01); hand.request(); },
-  m: () => hand.next(),
-  x: () => $("swap").click(), r: () => ledger.clear(), s: () => $("sound").click(),
-  k: () => handle.there || $("save").click(), j: () => player.on && $("play").click(), l: () => player.on && $("live").click(),
-  t: () => handle.there || panel.toggle(), v: () => tour.on && $("tour-show").click(),
-  n: () => tour.on && $("tour-next").click(), p: () => tour.on && $("tour-back").click(),
-  "+": () => zoom(1 / 1.15), "-": () => zoom(1.15),
+const ARROW_DIRECTIONS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+const MAX_KEY_HEIGHT = 0.01; // m
+const KEY_ACTIONS = {
+  " ": () => { hand.z = null; hand.pressure = 1; hand.isLatched = !hand.isLatched; hand.requestMotion(); },
+  PageUp: () => { hand.z = Math.min(hand.height + viewWidth / 80, MAX_KEY_HEIGHT); hand.requestMotion(); },
+  PageDown: () => { hand.z = Math.max(hand.height - viewWidth / 80, -MAX_KEY_HEIGHT); hand.requestMotion(); },
+  m: () => hand.nextMotion(),
+  x: () => $("swap-laws").click(), r: () => energyMeter.reset(), s: () => $("sound").click(),
+  k: () => handle.isPresent || $("save-clip").click(),
+  j: () => player.isOpen && $("play").click(), l: () => player.isOpen && $("return-to-live").click(),
+  t: () => handle.isPresent || tourPanel.toggle(), v: () => tour.isActive && $("tour-demo").click(),
+  n: () => tour.isActive && $("tour-next").click(), p: () => tour.isActive && $("tour-back").click(),
+  "+": () => zoom(1 / ZOOM_FACTOR), "-": () => zoom(ZOOM_FACTOR),
 };
 
 addEventListener("keydown", event => {
-  const typing = event.target.closest("input:not([type=range]), select, textarea");
-  if (typing || event.ctrlKey || event.altKey || event.metaKey) return;
-  const { key } = event, letter = [...$("letters").children].find(one => one.textContent === key.toUpperCase());
-  const arrow = MOVES[key], ranged = event.target.matches("input[type=range]");
-  const pressing = event.target.closest("button, summary") && key === " ";
-  if (arrow && !ranged) {
-    hand.x += arrow[0] * span / 60;
-    hand.y += arrow[1] * span / 60;
-    hand.request();
-  } else if (KEYS[key] && !pressing && !(ranged && key.startsWith("Page"))) KEYS[key]();
-  else if (letter) { if (news?.steers) letter.click(); } else return;
+  const isTyping = event.target.closest("input:not([type=range]), select, textarea");
+  if (isTyping || event.ctrlKey || event.altKey || event.metaKey) return;
+  const { key } = event, direction = ARROW_DIRECTIONS[key], isSlider = event.target.matches("input[type=range]");
+  const lawButton = [...$("law-buttons").children].find(button => button.textContent === key.toUpperCase());
+  const activatesButton = event.target.closest("button, summary") && key === " ";
+  if (direction && !isSlider) {
+    hand.x += direction[0] * viewWidth / 60;
+    hand.y += direction[1] * viewWidth / 60;
+    hand.requestMotion();
+  } else if (KEY_ACTIONS[key] && !activatesButton && !(isSlider && key.startsWith("Page"))) KEY_ACTIONS[key]();
+  else if (lawButton) { if (status?.has_control) lawButton.click(); } else return;
   event.preventDefault();
 });
 
-for (const what of ["error", "unhandledrejection"]) addEventListener(what, () => faults++);
+for (const type of ["error", "unhandledrejection"]) addEventListener(type, () => errorCount++);
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", readTheme);
 readTheme();
 requestAnimationFrame(paint);
-// For tests, and for whoever is curious in the console.
+// For the tests and for the console of the browser.
 globalThis.lab = {
-  line, boxes, get span() { return span; }, get frame() { return frame; }, get news() { return news; }, get faults() { return faults; },
-  /** Whether both pictures are of the surface that is shown. */
-  get current() { return ["relief", "cut"].every(kind => asked[kind]?.again < Infinity && asked[kind].version === news?.version); },
-  get ready() { return Boolean(relief.heights && cut.box); }, latencies: latency.all, hand, tour, ledger, player, probeState, relief, cut, svg: () => svgOf(views), png: () => pngOf(views),
+  connection, hand, tour, energyMeter, player, relief, section, probeState, sectionBox,
+  latencies: latencyMonitor.latencies, toSvg: () => toSvg(views), toPng: () => toPng(views),
+  get viewWidth() { return viewWidth; }, get frame() { return frame; }, get status() { return status; },
+  get errorCount() { return errorCount; },
+  /** Whether both views have a picture. */
+  get hasPictures() { return Boolean(relief.heights && section.box); },
+  /** Whether both pictures are of the current surface. */
+  get hasCurrentPictures() {
+    return ["relief", "section"].every(kind => viewRequests[kind]?.nextTime < Infinity && viewRequests[kind].version === status?.surface_version);
+  },
 };

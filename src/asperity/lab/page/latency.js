@@ -1,32 +1,32 @@
-// How long it takes from the pointer to the picture that follows it.
+// Measurement of the latency from a motion of the pointer to the first picture that shows the response.
 
-const MOST = 5000; // that are kept
+const MAX_ENTRIES = 5000; // of pending requests, and of latencies
 
-export class Latency {
+export class LatencyMonitor {
   constructor() {
-    this.waits = []; // changes: number, and since when [ms]
-    this.all = []; // [ms]
-    this.shown = 0; // the newest request that the last picture follows
-    // A task after the picture says that the browser has done with it, or the next picture does: while a pointer
-    // moves tasks may wait for longer.
-    this.after = new MessageChannel();
-    this.after.port2.onmessage = () => this.painted();
+    this.pending = []; // requests: number, and time of the motion [ms]
+    this.latencies = []; // [ms]
+    this.drawnRequest = 0; // newest request whose response is in the last picture
+    // A picture is presented by the time a task queued after drawing runs, or the next picture is drawn,
+    // whichever comes first: tasks may be delayed while the pointer moves.
+    this.channel = new MessageChannel();
+    this.channel.port2.onmessage = () => this.recordPresented();
   }
 
-  request(number, since) {
-    this.waits.push([number, since]);
-    if (this.waits.length > MOST) this.waits.shift();
+  addRequest(number, time) {
+    this.pending.push([number, time]);
+    if (this.pending.length > MAX_ENTRIES) this.pending.shift();
   }
 
-  /** Hear that a picture is being painted which follows a request. */
-  paints(request) {
-    this.shown = request;
-    if (this.waits[0]?.[0] <= request) this.after.port1.postMessage(0);
+  /** Note that a picture is being drawn that shows the response to a request. */
+  recordDrawn(request) {
+    this.drawnRequest = request;
+    if (this.pending[0]?.[0] <= request) this.channel.port1.postMessage(0);
   }
 
-  /** Hear that the browser has done with the last picture. */
-  painted() {
-    while (this.waits[0]?.[0] <= this.shown) this.all.push(performance.now() - this.waits.shift()[1]);
-    if (this.all.length > MOST) this.all.splice(0, this.all.length - MOST);
+  /** Note that the last picture has been presented. */
+  recordPresented() {
+    while (this.pending[0]?.[0] <= this.drawnRequest) this.latencies.push(performance.now() - this.pending.shift()[1]);
+    if (this.latencies.length > MAX_ENTRIES) this.latencies.splice(0, this.latencies.length - MAX_ENTRIES);
   }
 }

@@ -1,93 +1,97 @@
-// Takes: what was recorded, shown again at any moment, or as time goes.
+// Player of clips: shows any moment of a recording, or plays it in real time.
 
 import { Playback } from "./playback.js";
 
-const EVERY = 5e-3; // s of a frame that is made of a take
-const SHOWN = 5; // s before a moment that the traces show
-const MOST = 60000; // rows of that
-const BACK = 40000; // rows before these in which it is looked for where the probe was free
+const FRAME_DURATION = 5e-3; // s
+const TRACE_DURATION = 5; // s before a moment, which the traces show
+const MAX_TRACE_ROWS = 60000;
+const MAX_SEARCH_ROWS = 40000; // before the traces, searched for a free probe
 
 export class Player {
-  /** @param show object with frame(frame) and clear(), which forgets what was before */
-  constructor(show) {
-    this.show = show;
+  /** @param display object with showFrame(frame), and clear(), which discards the previous frames */
+  constructor(display) {
+    this.display = display;
     this.playback = null;
-    this.row = 0; // until which it is shown
-    this.sought = null; // row that shall be shown as soon as it is held
-    this.playing = false;
+    this.row = 0; // end of the rows shown
+    this.targetRow = null; // shown as soon as it is loaded
+    this.isPlaying = false;
   }
 
-  get on() { return this.playback !== null; }
-  get rate() { return 1 / this.playback.period; }
-  get length() { return this.playback.rows * this.playback.period; }
-  get share() { return (this.sought ?? this.row) / this.playback.rows; }
-  get time() { return (this.sought ?? this.row) * this.playback.period; }
-  get step() { return Math.max(1, Math.round(EVERY / this.playback.period)); }
+  get isOpen() { return this.playback !== null; }
+  get updateRate() { return 1 / this.playback.period; }
+  get duration() { return this.playback.rowCount * this.playback.period; }
+  get fraction() { return (this.targetRow ?? this.row) / this.playback.rowCount; }
+  get time() { return (this.targetRow ?? this.row) * this.playback.period; }
+  get frameRows() { return Math.max(1, Math.round(FRAME_DURATION / this.playback.period)); }
 
-  open(about, columns) {
-    this.playback = new Playback(about, columns);
+  open(clip, columns) {
+    this.playback = new Playback(clip, columns);
     this.seek(0);
-    this.playing = true;
+    this.isPlaying = true;
   }
 
-  close() { this.playback = null; this.playing = false; }
+  close() { this.playback = null; this.isPlaying = false; }
 
-  /** Show how things stood after a share of the rows, as soon as they are there. */
-  seek(share) {
-    this.sought = Math.max(Math.min(this.step, this.playback.rows), Math.min(this.playback.rows, Math.round(share * this.playback.rows)));
-    this.find();
+  /** Show the moment at a fraction of the duration, as soon as its rows are loaded. */
+  seek(fraction) {
+    const { rowCount } = this.playback;
+    this.targetRow = Math.max(Math.min(this.frameRows, rowCount), Math.min(rowCount, Math.round(fraction * rowCount)));
+    this.showTarget();
   }
 
-  find() {
-    const { playback, sought } = this, from = Math.max(0, sought - Math.min(MOST, Math.round(SHOWN / playback.period)));
-    if (!playback.has(from, sought)) return;
-    const free = this.freeBefore(from);
-    if (free === null) return;
-    this.sought = null;
-    this.row = free;
-    this.show.clear();
-    this.go(sought);
-    this.then = performance.now();
+  /** Show the target row with the traces before it, if all of these are loaded. */
+  showTarget() {
+    const { playback, targetRow } = this;
+    const traceRows = Math.min(MAX_TRACE_ROWS, Math.round(TRACE_DURATION / playback.period));
+    const traceStart = Math.max(0, targetRow - traceRows);
+    if (!playback.ensureLoaded(traceStart, targetRow)) return;
+    const start = this.findFreeRow(traceStart);
+    if (start === null) return;
+    this.targetRow = null;
+    this.row = start;
+    this.display.clear();
+    this.showUntil(targetRow);
+    this.lastTick = performance.now();
   }
 
-  /** Return the row before another at which the probe was free, from where energy counts; null if it is not held yet. */
-  freeBefore(row) {
-    const { playback } = this, least = Math.max(0, row - BACK);
-    for (let free = row, held = Infinity; ; free--) {
-      if (free < held) {
-        if (!playback.has(free, free + 1)) return null;
-        held = Math.floor(free / playback.piece) * playback.piece;
+  /** Return the last row, up to a given one, with a free probe, at which the energy counts from zero; null while loading. */
+  findFreeRow(row) {
+    const { playback } = this, earliest = Math.max(0, row - MAX_SEARCH_ROWS);
+    for (let candidate = row, loadedFrom = Infinity; ; candidate--) {
+      if (candidate < loadedFrom) {
+        if (!playback.ensureLoaded(candidate, candidate + 1)) return null;
+        loadedFrom = Math.floor(candidate / playback.chunkRows) * playback.chunkRows;
       }
-      if (free <= least || !playback.at(free)[playback.columns.inside]) return free;
+      if (candidate <= earliest || !playback.row(candidate)[playback.columns.inside]) return candidate;
     }
   }
 
-  /** Show all that comes until a row. */
-  go(end) {
+  /** Show the rows up to an end, frame by frame. */
+  showUntil(end) {
     while (this.row < end) {
-      const next = Math.min(end, this.row + this.step);
-      this.show.frame(this.playback.frame(this.row, next));
+      const next = Math.min(end, this.row + this.frameRows);
+      this.display.showFrame(this.playback.frame(this.row, next));
       this.row = next;
     }
   }
 
-  /** Play on, as the clock goes [ms]; from the beginning again after the end. */
+  /** Continue in real time [ms]; at the end, start again. */
   tick(now) {
-    if (!this.on) return;
-    if (this.sought !== null) { this.find(); return; }
-    if (!this.playing) return;
-    const { playback } = this, rows = Math.round(1e-3 * (now - this.then) / playback.period);
-    if (rows < 1) return;
-    const end = Math.min(playback.rows, this.row + rows);
-    if (this.row >= playback.rows) { this.seek(0); return; }
-    this.then = now;
-    // What is not there yet is waited for; what comes then is asked for in time.
-    if (playback.has(this.row, end)) this.go(end);
-    playback.has(Math.min(end, playback.rows - 1), Math.min(playback.rows, end + Math.round(1 / playback.period)));
+    if (!this.isOpen) return;
+    if (this.targetRow !== null) { this.showTarget(); return; }
+    if (!this.isPlaying) return;
+    const { playback } = this, elapsedRows = Math.round(1e-3 * (now - this.lastTick) / playback.period);
+    if (elapsedRows < 1) return;
+    const end = Math.min(playback.rowCount, this.row + elapsedRows);
+    if (this.row >= playback.rowCount) { this.seek(0); return; }
+    this.lastTick = now;
+    if (playback.ensureLoaded(this.row, end)) this.showUntil(end);
+    // The rows of the next second are fetched in advance.
+    playback.ensureLoaded(Math.min(end, playback.rowCount - 1), Math.min(playback.rowCount, end + Math.round(1 / playback.period)));
   }
 
-  toggle() {
-    this.playing = !this.playing;
-    this.then = performance.now();
+  togglePlaying() {
+    this.isPlaying = !this.isPlaying;
+    this.lastTick = performance.now();
   }
 }

@@ -1,78 +1,85 @@
-// The hand: where the pointer, the keys or a motion want it.
+// The hand of the simulated device: it follows the pointer or the keys, or moves periodically.
 
-const ABOVE = 5e-4; // m over the highest point while it does not press
-const REACH = 0.09; // m that the hand goes from the middle
+const LIFT_HEIGHT = 5e-4; // m above the highest point of the surface while not pressing
+const MAX_REACH = 0.09; // m from the origin
+const MAX_HEIGHT = 0.02; // m above or below the plane z = 0
 const MOTIONS = ["pointer", "stroke", "loop"];
-const EVERY = 5; // ms between two changes at least
+const REQUEST_INTERVAL = 5; // least interval of two requests [ms]
+const STROKE_SPEED = 0.025; // greatest speed of a stroke [m/s]
 
-const held = (value, most) => Math.max(-most, Math.min(most, value));
+const clamp = (value, limit) => Math.max(-limit, Math.min(limit, value));
 
-export class Hand {
-  constructor(say) {
-    this.say = say;
+export class PointerHand {
+  /** @param send sends a message to the server; returns whether it was sent */
+  constructor(send) {
+    this.send = send;
     this.x = this.y = 0;
-    this.z = null; // height that a cut asks for; else pressed or lifted
-    this.press = 4e-4;
-    this.pressed = false; // by the pointer
-    this.latched = false; // by a key
-    this.force = 1; // of a pen, around 1
+    this.z = null; // height requested in the section; null if the hand is either pressed or lifted
+    this.pressDepth = 4e-4;
+    this.isPressed = false; // by the pointer
+    this.isLatched = false; // pressed by a key
+    this.pressure = 1; // of a pen, relative to a medium pressure
     this.motion = "pointer";
-    this.high = 0;
-    this.stroke = 4e-3;
-    this.loop = 5e-4; // m from the middle of a loop to its sides
-    this.turn = 20; // rad/s
-    this.sent = 0;
-    this.last = 0;
-    this.waiting = false;
+    this.surfaceHeight = 0; // highest point of the surface [m]
+    this.strokeAmplitude = 4e-3;
+    this.loopRadius = 5e-4; // m along x
+    this.loopSpeed = 20; // rad/s
+    this.requestCount = 0;
+    this.lastRequestTime = 0;
+    this.isRequestPending = false;
   }
 
   get height() {
     if (this.z !== null) return this.z;
-    return this.pressed || this.latched ? -this.press * this.force : this.high + ABOVE;
+    return this.isPressed || this.isLatched ? -this.pressDepth * this.pressure : this.surfaceHeight + LIFT_HEIGHT;
   }
 
-  /** What does it, as set() takes it. */
-  get kept() {
-    const { motion, x, y, press, stroke, loop, turn } = this;
-    return { motion, x, y, press, stroke, loop, turn, latched: false };
+  /** The current motion, to be restored by setMotion(). */
+  get motionSettings() {
+    const { motion, x, y, pressDepth, strokeAmplitude, loopRadius, loopSpeed } = this;
+    return { motion, x, y, pressDepth, strokeAmplitude, loopRadius, loopSpeed, isLatched: false };
   }
 
-  /** Do something else: fields of this object by name. */
-  set(wanted) {
-    Object.assign(this, { z: null, force: 1, pressed: false, ...wanted });
-    this.request();
+  /** Start another motion, given by properties of this object. */
+  setMotion(settings) {
+    Object.assign(this, { z: null, pressure: 1, isPressed: false, ...settings });
+    this.requestMotion();
   }
 
-  next() {
+  nextMotion() {
     this.motion = MOTIONS[(MOTIONS.indexOf(this.motion) + 1) % MOTIONS.length];
-    this.request();
+    this.requestMotion();
   }
 
-  /** Return the points that are wanted: a point, or an ellipse. */
-  path() {
-    const none = [0, 0, 0], x = held(this.x, REACH), y = held(this.y, REACH);
-    const still = { target: [x, y, held(this.height, 0.02)], cosine: none, sine: none, speed: 0 };
+  /** Return the requested trajectory, target + cosine cos(speed t) + sine sin(speed t): a point or an ellipse. */
+  trajectory() {
+    const none = [0, 0, 0], x = clamp(this.x, MAX_REACH), y = clamp(this.y, MAX_REACH);
+    const point = { target: [x, y, clamp(this.height, MAX_HEIGHT)], cosine: none, sine: none, speed: 0 };
     if (this.motion === "stroke") {
-      return { ...still, target: [x, y, -this.press], sine: [this.stroke, 0, 0], speed: 0.025 / this.stroke };
+      const speed = STROKE_SPEED / this.strokeAmplitude;
+      return { ...point, target: [x, y, -this.pressDepth], sine: [this.strokeAmplitude, 0, 0], speed };
     }
     if (this.motion === "loop") {
-      const deep = 0.6 * this.press;
-      return { target: [x, y, -deep], cosine: [this.loop, 0, 0], sine: [0, 0, deep], speed: this.turn };
+      const depth = 0.6 * this.pressDepth;
+      return { target: [x, y, -depth], cosine: [this.loopRadius, 0, 0], sine: [0, 0, depth], speed: this.loopSpeed };
     }
-    return still;
+    return point;
   }
 
-  /** Say where the hand is wanted, now or as soon as it is time again; since when it is wanted [ms]. */
-  request(since = performance.now()) {
-    this.since = since;
-    if (this.waiting) return;
-    const wait = this.last + EVERY - performance.now();
-    if (wait > 0) {
-      this.waiting = true;
-      setTimeout(() => { this.waiting = false; this.request(this.since); }, wait);
+  /**
+   * Send the trajectory to the server, now or once the least interval has passed.
+   * @param inputTime time of the user's input, from which the latency is measured [ms]
+   */
+  requestMotion(inputTime = performance.now()) {
+    this.inputTime = inputTime;
+    if (this.isRequestPending) return;
+    const delay = this.lastRequestTime + REQUEST_INTERVAL - performance.now();
+    if (delay > 0) {
+      this.isRequestPending = true;
+      setTimeout(() => { this.isRequestPending = false; this.requestMotion(this.inputTime); }, delay);
       return;
     }
-    this.last = performance.now();
-    if (this.say("steer", this.path())) this.sent++;
+    this.lastRequestTime = performance.now();
+    if (this.send("steer", this.trajectory())) this.requestCount++;
   }
 }

@@ -1,108 +1,113 @@
-// Probe, hand and force: a small picture over a large one, which need not be drawn anew when they move.
+// Overlay with probe, hand and force: a small canvas above a view, so that the view need not be repainted when they move.
 
 import { colours } from "./canvas.js";
 
-const ARROW = 250; // pixels per newton, as long as that fits
-const LONGEST = 130, SHARE = 0.45; // pixels, and of what is there to the side and in height
-const EDGE = 12; // pixels around what is drawn
-const STEP = 64; // pixels by which the picture grows: another size takes another memory
+const FORCE_SCALE = 250; // pixels per newton, reduced for an arrow that is too long
+const MAX_ARROW = 130, MAX_ARROW_FRACTION = 0.45; // pixels, and fraction of the view
+const MARGIN = 12; // pixels around the drawing
+const SIZE_STEP = 64; // pixels: the size is rounded up, because each new size allocates memory
 
-function dot(draw, x, y, radius, fill, line) {
-  draw.beginPath();
-  draw.arc(x, y, radius, 0, 2 * Math.PI);
-  if (fill) { draw.fillStyle = fill; draw.fill(); }
-  if (line) { draw.strokeStyle = line; draw.lineWidth = 2.5; draw.stroke(); }
+function drawDot(context, x, y, radius, fill, outline) {
+  context.beginPath();
+  context.arc(x, y, radius, 0, 2 * Math.PI);
+  if (fill) { context.fillStyle = fill; context.fill(); }
+  if (outline) { context.strokeStyle = outline; context.lineWidth = 2.5; context.stroke(); }
 }
 
-function arrow(draw, x, y, dx, dy, colour) {
+function drawArrow(context, x, y, dx, dy, colour) {
   const length = Math.hypot(dx, dy);
   if (length < 2) return;
-  const [ux, uy] = [dx / length, dy / length], tip = Math.min(12, 0.5 * length);
-  draw.strokeStyle = draw.fillStyle = colour;
-  draw.lineWidth = 4;
-  draw.beginPath();
-  draw.moveTo(x, y);
-  draw.lineTo(x + dx - tip * ux, y + dy - tip * uy);
-  draw.stroke();
-  draw.beginPath();
-  draw.moveTo(x + dx, y + dy);
-  draw.lineTo(x + dx - tip * ux - 0.5 * tip * uy, y + dy - tip * uy + 0.5 * tip * ux);
-  draw.lineTo(x + dx - tip * ux + 0.5 * tip * uy, y + dy - tip * uy - 0.5 * tip * ux);
-  draw.fill();
+  const [ux, uy] = [dx / length, dy / length], head = Math.min(12, 0.5 * length);
+  context.strokeStyle = context.fillStyle = colour;
+  context.lineWidth = 4;
+  context.beginPath();
+  context.moveTo(x, y);
+  context.lineTo(x + dx - head * ux, y + dy - head * uy);
+  context.stroke();
+  context.beginPath();
+  context.moveTo(x + dx, y + dy);
+  context.lineTo(x + dx - head * ux - 0.5 * head * uy, y + dy - head * uy + 0.5 * head * ux);
+  context.lineTo(x + dx - head * ux + 0.5 * head * uy, y + dy - head * uy - 0.5 * head * ux);
+  context.fill();
 }
 
-function cross(draw, x, y, colour) {
-  draw.strokeStyle = colour;
-  draw.lineWidth = 2;
-  draw.beginPath();
-  draw.moveTo(x - 7, y); draw.lineTo(x + 7, y); draw.moveTo(x, y - 7); draw.lineTo(x, y + 7);
-  draw.stroke();
+function drawCross(context, x, y, colour) {
+  context.strokeStyle = colour;
+  context.lineWidth = 2;
+  context.beginPath();
+  context.moveTo(x - 7, y); context.lineTo(x + 7, y); context.moveTo(x, y - 7); context.lineTo(x, y + 7);
+  context.stroke();
 }
 
-/** A force as it is drawn: in proportion, but never longer than fits. */
-function drawnForce(force, up, { width, height }) {
-  const longest = Math.min(LONGEST, SHARE * Math.min(width, height));
-  const size = Math.hypot(...force), scale = size === 0 ? 0 : Math.min(ARROW, longest / size);
-  return up(force).map(value => value * scale);
+/** Return the arrow of a force in pixels: proportional to the force, but limited in length. */
+function forceArrow(force, projectVector, { width, height }) {
+  const limit = Math.min(MAX_ARROW, MAX_ARROW_FRACTION * Math.min(width, height));
+  const size = Math.hypot(...force), scale = size === 0 ? 0 : Math.min(FORCE_SCALE, limit / size);
+  return projectVector(force).map(value => value * scale);
 }
 
-/** Return where a stretch of some parts begins, and how long it is; within 0 and most, in whole steps. */
-function stretch(parts, most) {
-  const first = Math.floor(Math.max(0, Math.min(...parts) - EDGE)), last = Math.min(most, Math.max(...parts) + EDGE);
-  const long = Math.min(Math.ceil(most), STEP * Math.ceil((last - first) / STEP));
-  return [Math.min(first, Math.ceil(most) - long), long];
+/** Return start and length of an interval that contains coordinates with a margin, within 0 and a limit. */
+function enclosingInterval(coordinates, limit) {
+  const start = Math.floor(Math.max(0, Math.min(...coordinates) - MARGIN)), end = Math.min(limit, Math.max(...coordinates) + MARGIN);
+  const length = Math.min(Math.ceil(limit), SIZE_STEP * Math.ceil((end - start) / SIZE_STEP));
+  return [Math.min(start, Math.ceil(limit) - length), length];
 }
 
-export class Marker {
-  /** @param sheet what it lies on */
-  constructor(sheet) {
-    this.sheet = sheet;
-    this.canvas = Object.assign(document.createElement("canvas"), { className: "marker" });
-    this.canvas.ariaHidden = "true";
-    this.draw = this.canvas.getContext("2d");
+export class ProbeOverlay {
+  /** @param base scaled canvas of the view */
+  constructor(base) {
+    this.base = base;
+    this.element = Object.assign(document.createElement("canvas"), { className: "overlay" });
+    this.element.ariaHidden = "true";
+    this.context = this.element.getContext("2d");
     this.left = this.top = this.width = this.height = 0;
-    sheet.canvas.after(this.canvas);
+    base.element.after(this.element);
   }
 
-  /** Draw a state where `place` says, with the force in the direction of the picture that `up` says. */
-  show(place, { probe, god, hand, force, inside }, up) {
-    const theme = colours(), at = place(probe), arm = drawnForce(force, up, this.sheet), known = point => point.every(Number.isFinite);
-    const held = known(hand) && place(hand), near = inside && known(god) && place(god);
-    const parts = [at, at.map((value, k) => value + arm[k]), held, near].filter(Boolean);
-    const { draw } = this;
-    if (!this.fit(parts)) return;
-    draw.strokeStyle = theme.soft;
-    draw.lineWidth = 1.5;
-    draw.setLineDash([4, 4]);
-    if (held) { draw.beginPath(); draw.moveTo(...at); draw.lineTo(...held); draw.stroke(); }
-    draw.setLineDash([]);
-    if (held) cross(draw, ...held, theme.soft);
-    if (near) dot(draw, ...near, 5, theme.green, theme.card);
-    dot(draw, ...at, 8, theme.card, theme.ink);
-    arrow(draw, ...at, ...arm, theme.red);
+  /**
+   * Draw the probe with its hand, closest point and force.
+   * @param project maps a point to pixels of the view
+   * @param projectVector maps a direction to the view
+   */
+  draw(project, { probe, closest, hand, force, isInside }, projectVector) {
+    const theme = colours(), { context } = this, isKnown = point => point.every(Number.isFinite);
+    const position = project(probe), arrow = forceArrow(force, projectVector, this.base);
+    const handPosition = isKnown(hand) && project(hand), closestPosition = isInside && isKnown(closest) && project(closest);
+    const arrowTip = position.map((value, k) => value + arrow[k]);
+    if (!this.fitTo([position, arrowTip, handPosition, closestPosition].filter(Boolean))) return;
+    context.strokeStyle = theme.soft;
+    context.lineWidth = 1.5;
+    context.setLineDash([4, 4]);
+    if (handPosition) { context.beginPath(); context.moveTo(...position); context.lineTo(...handPosition); context.stroke(); }
+    context.setLineDash([]);
+    if (handPosition) drawCross(context, ...handPosition, theme.soft);
+    if (closestPosition) drawDot(context, ...closestPosition, 5, theme.green, theme.card);
+    drawDot(context, ...position, 8, theme.card, theme.ink);
+    drawArrow(context, ...position, ...arrow, theme.red);
   }
 
-  /** Lie, cleared, over some points as far as they are in the picture; whether any is. */
-  fit(parts) {
-    const { sheet, canvas } = this, { ratio, unit } = sheet;
-    const [left, width] = stretch(parts.map(([x]) => x), sheet.width), [top, height] = stretch(parts.map(([, y]) => y), sheet.height);
-    const there = width > 0 && height > 0;
-    canvas.hidden = !there;
-    if (!there) return false;
-    if (this.width !== width || this.height !== height || this.ratio !== ratio) {
-      Object.assign(this, { width, height, ratio });
-      Object.assign(canvas, { width: Math.round(width * ratio), height: Math.round(height * ratio) });
-      Object.assign(canvas.style, { width: `${width * unit}px`, height: `${height * unit}px` });
+  /** Clear the overlay and move it over points; return whether any part of it is within the view. */
+  fitTo(points) {
+    const { base, element } = this, { pixelRatio, unit } = base;
+    const [left, width] = enclosingInterval(points.map(([x]) => x), base.width);
+    const [top, height] = enclosingInterval(points.map(([, y]) => y), base.height);
+    const isVisible = width > 0 && height > 0;
+    element.hidden = !isVisible;
+    if (!isVisible) return false;
+    if (this.width !== width || this.height !== height || this.pixelRatio !== pixelRatio) {
+      Object.assign(this, { width, height, pixelRatio });
+      Object.assign(element, { width: Math.round(width * pixelRatio), height: Math.round(height * pixelRatio) });
+      Object.assign(element.style, { width: `${width * unit}px`, height: `${height * unit}px` });
     }
     Object.assign(this, { left, top });
-    canvas.style.transform = `translate(${sheet.left + left * unit}px, ${sheet.top + top * unit}px)`;
-    this.draw.setTransform(ratio, 0, 0, ratio, -left * ratio, -top * ratio);
-    this.draw.clearRect(left, top, width, height);
+    element.style.transform = `translate(${base.left + left * unit}px, ${base.top + top * unit}px)`;
+    this.context.setTransform(pixelRatio, 0, 0, pixelRatio, -left * pixelRatio, -top * pixelRatio);
+    this.context.clearRect(left, top, width, height);
     return true;
   }
 
-  /** Draw it into another picture of what it lies on. */
-  copy(draw, left, top) {
-    if (!this.canvas.hidden && this.width) draw.drawImage(this.canvas, left + this.left * this.ratio, top + this.top * this.ratio);
+  /** Draw the overlay onto a copy of its view. */
+  drawOnto(context, left, top) {
+    if (!this.element.hidden && this.width) context.drawImage(this.element, left + this.left * this.pixelRatio, top + this.top * this.pixelRatio);
   }
 }

@@ -1,46 +1,48 @@
-// The connection, in a thread of its own: while a pointer moves, a browser lets the page's messages wait.
+// Worker that owns the WebSocket: while the pointer moves, a browser delays the message events of the page.
 //
-// What comes goes, in its order, into memory that the page reads when it paints: its length, whether it is text,
-// then numbers, which are the letters of a text. A length of 0 says that the next one begins the memory anew.
+// Received messages are passed in order through a ring buffer in shared memory, which the page reads
+// when it paints. An entry is its length, whether it is text, and that many numbers, which are the
+// UTF-16 code units of a text. A length of 0 marks that the next entry is at the start of the buffer.
+// positions[0] is the write position, positions[1] the read position.
 
-const waiting = []; // what found no room
-let socket, places, ring, at = 0, reads = false;
+const backlog = []; // messages that did not fit into the buffer
+let socket, positions, ring, writePosition = 0, usesBuffer = false;
 
-/** Return whether there is room from a place on, or from the beginning, before what was not read yet. */
-function room(size) {
-  const read = Atomics.load(places, 1);
-  if (at < read) return size < read - at;
-  return size <= ring.length - at || size < read;
+/** Return whether an entry fits between the write position, or the start, and the read position. */
+function hasSpace(size) {
+  const readPosition = Atomics.load(positions, 1);
+  if (writePosition < readPosition) return size < readPosition - writePosition;
+  return size <= ring.length - writePosition || size < readPosition;
 }
 
-function write([text, numbers]) {
-  const size = numbers.length + 3; // with the 0 that may follow
-  if (!room(size)) return false;
-  if (size > ring.length - at) { ring[at] = 0; at = 0; }
-  ring.set([numbers.length, text], at);
-  ring.set(numbers, at + 2);
-  at += numbers.length + 2;
-  Atomics.store(places, 0, at);
+function writeEntry([isText, numbers]) {
+  const size = numbers.length + 3; // including the 0 that may follow
+  if (!hasSpace(size)) return false;
+  if (size > ring.length - writePosition) { ring[writePosition] = 0; writePosition = 0; }
+  ring.set([numbers.length, isText], writePosition);
+  ring.set(numbers, writePosition + 2);
+  writePosition += numbers.length + 2;
+  Atomics.store(positions, 0, writePosition);
   return true;
 }
 
-function take(data) {
-  if (!reads) { postMessage({ data }); return; }
-  const text = typeof data === "string";
-  waiting.push([text, text ? Uint16Array.from(data, letter => letter.charCodeAt(0)) : new Float64Array(data)]);
-  while (waiting.length && write(waiting[0])) waiting.shift();
+function passOn(data) {
+  if (!usesBuffer) { postMessage({ data }); return; }
+  const isText = typeof data === "string";
+  backlog.push([isText, isText ? Uint16Array.from(data, character => character.charCodeAt(0)) : new Float64Array(data)]);
+  while (backlog.length && writeEntry(backlog[0])) backlog.shift();
 }
 
-const TOLD = {
-  open(address) {
-    socket = new WebSocket(address);
+const COMMANDS = {
+  open(url) {
+    socket = new WebSocket(url);
     socket.binaryType = "arraybuffer";
     socket.onopen = () => postMessage({ opened: true });
     socket.onclose = event => postMessage({ closed: event.reason });
-    socket.onmessage = ({ data }) => take(data);
+    socket.onmessage = ({ data }) => passOn(data);
   },
-  say(text) { socket.send(text); },
-  memory(shared) { places = new Int32Array(shared.places); ring = new Float64Array(shared.ring); },
-  reads(does) { reads = does && Boolean(ring); postMessage({ reads }); },
+  send(text) { socket.send(text); },
+  setBuffer(shared) { positions = new Int32Array(shared.positions); ring = new Float64Array(shared.ring); },
+  useBuffer(isRead) { usesBuffer = isRead && Boolean(ring); postMessage({ usesBuffer }); },
 };
-onmessage = ({ data: [what, content] }) => TOLD[what](content);
+onmessage = ({ data: [command, argument] }) => COMMANDS[command](argument);

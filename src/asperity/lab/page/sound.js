@@ -1,41 +1,42 @@
-// The force as sound: along the surface in the left ear, normal to it in the right one.
+// The force as sound: tangential components in the left channel, the normal component in the right.
 
-const LOUDEST = 0.5;
+const MAX_GAIN = 0.5;
 
-export class Sound {
+export class ForceSound {
   constructor() {
     this.context = null;
     this.volume = 0.3;
-    this.on = false;
+    this.isOn = false;
   }
 
-  /** Turn it on or off; whether it is on then. */
+  /** Switch the sound on or off; return whether it is on. */
   async toggle() {
     if (!this.context) {
       this.context = new AudioContext();
       await this.context.audioWorklet.addModule("force_audio_processor.js");
-      this.ear = new AudioWorkletNode(this.context, "ear", { numberOfInputs: 0, outputChannelCount: [2] });
+      this.processor = new AudioWorkletNode(this.context, "force-audio", { numberOfInputs: 0, outputChannelCount: [2] });
       this.gain = this.context.createGain();
-      this.ear.connect(this.gain).connect(this.context.destination);
+      this.processor.connect(this.gain).connect(this.context.destination);
     }
-    this.on = !this.on;
+    this.isOn = !this.isOn;
     this.setVolume(this.volume);
-    await (this.on ? this.context.resume() : this.context.suspend());
-    return this.on;
+    await (this.isOn ? this.context.resume() : this.context.suspend());
+    return this.isOn;
   }
 
   setVolume(volume) {
     this.volume = volume;
-    this.gain?.gain.setTargetAtTime(LOUDEST * volume ** 2, this.context.currentTime, 0.02);
+    this.gain?.gain.setTargetAtTime(MAX_GAIN * volume ** 2, this.context.currentTime, 0.02);
   }
 
-  take(forces, rate) {
-    if (!this.on) return;
-    const pairs = new Float32Array(2 * forces.length / 3);
+  /** Play forces (x, y, z of each row) of a loop with an update rate [Hz]. */
+  addForces(forces, updateRate) {
+    if (!this.isOn) return;
+    const samples = new Float32Array(2 * forces.length / 3);
     for (let k = 0; k < forces.length / 3; k++) {
-      pairs[2 * k] = forces[3 * k] + forces[3 * k + 1];
-      pairs[2 * k + 1] = forces[3 * k + 2];
+      samples[2 * k] = forces[3 * k] + forces[3 * k + 1];
+      samples[2 * k + 1] = forces[3 * k + 2];
     }
-    this.ear.port.postMessage({ forces: pairs, rate }, [pairs.buffer]);
+    this.processor.port.postMessage({ forces: samples, updateRate }, [samples.buffer]);
   }
 }

@@ -1,24 +1,28 @@
-// The slider of the stiffness, and the mark of the limit on it.
+// Scale of the stiffness slider, and the mark of the stability limit on it.
 
-import { quantity } from "./format.js";
+import { formatQuantity } from "./format.js";
 
 const $ = id => document.getElementById(id);
 
 // The slider is logarithmic: 10 to 10 000 N/m.
-export const toSlider = stiffness => Math.max(0, Math.min(1, Math.log10(stiffness / 10) / 3));
-export const fromSlider = value => Number((10 * 10 ** (3 * value / 1000)).toPrecision(3));
+export const toSliderFraction = stiffness => Math.max(0, Math.min(1, Math.log10(stiffness / 10) / 3));
+export const fromSliderValue = value => Number((10 * 10 ** (3 * value / 1000)).toPrecision(3));
 
-/** Mark the limit at the slider, and say what it is. */
+/** Show the stability limit as a mark on the slider and as text. */
 export function showLimit({ stiffness, law }, limit) {
-  const known = Number.isFinite(limit.stiffness);
-  $("limit").hidden = !known;
-  const words = $("limit-words");
-  words.classList.toggle("over", known && stiffness > limit.stiffness);
-  if (known) {
-    $("limit").style.left = `calc(0.5rem + ${toSlider(limit.stiffness)} * (100% - 1rem))`;
+  const isKnown = Number.isFinite(limit.stiffness);
+  $("limit-mark").hidden = !isKnown;
+  $("limit-text").classList.toggle("above-limit", isKnown && stiffness > limit.stiffness);
+  $("limit-text").textContent = limitText(stiffness, law, limit, isKnown);
+  if (isKnown) $("limit-mark").style.left = `calc(0.5rem + ${toSliderFraction(limit.stiffness)} * (100% - 1rem))`;
+}
+
+function limitText(stiffness, law, limit, isKnown) {
+  if (isKnown) {
     const side = stiffness > limit.stiffness ? "▲ above" : "below";
-    words.textContent = `${side} the limit of ${quantity(limit.stiffness, "N/m")} for law ${law}: ${limit.criterion} (${limit.basis})`;
-  } else {
-    words.textContent = limit.q === "inf" ? `No limit: the force of law ${law} jumps` : "basis" in limit ? `No limit is known${limit.basis === "none" ? "" : `: ${limit.basis}`}` : "Computing the limit …";
+    return `${side} the limit of ${formatQuantity(limit.stiffness, "N/m")} for law ${law}: ${limit.criterion} (${limit.basis})`;
   }
+  if (limit.q === "inf") return `No limit: the force of law ${law} jumps`;
+  if (!("basis" in limit)) return "Computing the limit …";
+  return limit.basis === "none" ? "No limit is known" : `No limit is known: ${limit.basis}`;
 }

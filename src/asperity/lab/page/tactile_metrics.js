@@ -1,87 +1,109 @@
-// What the frames show of a law, as numbers: energy fed, buzz, clicks, softness. Each has its threshold, and why.
+// Metrics of the frames: energy supplied to the hand, buzz, clicks and stiffness, each with its threshold.
 
-const NOTICED = 0.01; // N of an oscillating force that a hand notices; the same as asperity.analysis.limits.perceptibility
-export const BUZZ = 15 * NOTICED; // N: no doubt that it is felt, and above what the encoder's steps make of a wall's force
-export const CLICK = 20 * NOTICED; // N in one sample
-const STEEPER = 4; // times the law's stiffness: what jumps more in a sample is no steep slope
-const DEEP = 1e-5; // m below which a depth is too small for a stiffness
-const FED = 2e-6; // J: less is a rounding
-const STILL = 1e-6; // m that the anchor of a hand that holds still moves from frame to frame
-const WINDOW = 0.6; // s over which a force is watched
-const HOP = 0.1; // s: a probe that is in the air for less is still being pressed, and bounces
+const PERCEPTION_THRESHOLD = 0.01; // N of an oscillating force; the same as in asperity.analysis.limits.perceptibility
+export const BUZZ_AMPLITUDE = 15 * PERCEPTION_THRESHOLD; // N: clearly felt, and above the effect of encoder steps at a wall
+export const CLICK_FORCE = 20 * PERCEPTION_THRESHOLD; // N in one sample
+const CLICK_STEEPNESS = 4; // times the stiffness of the law: a smaller change in one sample may be a steep slope
+const MIN_DEPTH = 1e-5; // m, below which a stiffness cannot be determined
+const MIN_ENERGY = 2e-6; // J, above the rounding errors
+const STILL_DISTANCE = 1e-6; // m per frame, below which the anchor of the hand is at rest
+const WINDOW = 0.6; // s over which an oscillation is observed
+const MAX_BOUNCE = 0.1; // s: a probe that leaves the surface for less is still pressed
 
-/** The energy that the hand was given since the probe was last free, and how much of it sampling and steps explain. */
-export class Ledger {
-  constructor() { this.clear(); this.waits = false; }
+/** Energy supplied to the hand since the probe was last free, and how much of it sampling and quantisation explain. */
+export class EnergyMeter {
+  constructor() { this.reset(); this.awaitsFreeProbe = false; }
 
-  /** Reset energy, from the next time that the probe is free, until then from the next frame. */
-  clear() { this.waits = true; this.base = null; this.energy = this.sampled = 0; }
-
-  /**
-   * Take a frame. A field without curl, read in steps of the encoder, sampled, held and late by d samples,
-   * gives a hand at most k (q⁺/2 + d q) Σ|Δp|² + φ Σ|Δp|, with φ = k q |δ|/2 + |b|/2 of the steps δ of the
-   * position and b of the force, in any motion (docs/theory/passivity). More than that is fed by the field.
-   */
-  take(frame, columns, news) {
-    const { rows, way, squares, newest } = frame, { settings, limit, step, force_step: forceStep } = news;
-    const given = newest[columns.supplied];
-    this.base ??= given;
-    if (frame.greatest[columns.inside]) {
-      const q = limit.q === "inf" ? Infinity : limit.q ?? 1, k = settings.stiffness, diagonal = 0.5 * Math.sqrt(3);
-      const late = settings.delay ? settings.delay * q : 0, steps = step ? k * q * diagonal * step : 0;
-      const bound = k * (0.5 * (limit.one_sided ?? 1) + late) * squares + (steps + diagonal * forceStep) * way;
-      this.sampled += bound * rows / Math.max(rows - 1, 1); // the step from the frame before is like the others
-    }
-    if (this.waits && !newest[columns.inside]) { this.waits = false; this.base = given; this.sampled = 0; }
-    this.energy = given - this.base;
+  /** Reset the energy at the next frame, and again at the next frame with a free probe. */
+  reset() {
+    this.awaitsFreeProbe = true;
+    this.offset = null; // of the supplied energy
+    this.energy = this.samplingBound = 0;
   }
 
-  get fed() { return this.energy > Math.max(FED, this.sampled); }
+  /**
+   * Add a frame. A field without curl that is evaluated at quantised positions, sampled, held and
+   * delayed by d samples supplies a hand with at most k (q⁺/2 + d q) Σ|Δp|² + φ Σ|Δp|, where
+   * φ = k q |δ|/2 + |b|/2 for the resolutions δ of position and b of force, in any motion
+   * (docs/theory/passivity). Any further energy is due to the curl of the field.
+   */
+  addFrame(frame, columns, status) {
+    const { rowCount, pathLength, squaredSteps, newest } = frame, { settings, limit } = status;
+    const { position_resolution: positionResolution, force_resolution: forceResolution } = status;
+    const supplied = newest[columns.supplied];
+    this.offset ??= supplied;
+    if (frame.maxima[columns.inside]) {
+      const q = limit.q === "inf" ? Infinity : limit.q ?? 1, k = settings.stiffness, halfDiagonal = 0.5 * Math.sqrt(3);
+      const delayTerm = settings.delay ? settings.delay * q : 0;
+      const quantisation = positionResolution ? k * q * halfDiagonal * positionResolution : 0;
+      const bound = k * (0.5 * (limit.one_sided ?? 1) + delayTerm) * squaredSteps + (quantisation + halfDiagonal * forceResolution) * pathLength;
+      this.samplingBound += bound * rowCount / Math.max(rowCount - 1, 1); // includes the step from the previous frame
+    }
+    if (this.awaitsFreeProbe && !newest[columns.inside]) {
+      this.awaitsFreeProbe = false;
+      this.offset = supplied;
+      this.samplingBound = 0;
+    }
+    this.energy = supplied - this.offset;
+  }
 
-  get words() {
-    if (this.fed) return "⚠ the field has fed the hand";
-    return this.energy > FED ? "no more than sampling and steps explain" : "the hand was not fed";
+  get suppliesEnergy() { return this.energy > Math.max(MIN_ENERGY, this.samplingBound); }
+
+  get verdict() {
+    if (this.suppliesEnergy) return "⚠ the field has fed the hand";
+    return this.energy > MIN_ENERGY ? "no more than sampling and quantisation explain" : "the hand was not fed";
   }
 }
 
-/** What was seen since it was begun. */
-export class Gauge {
-  constructor() { this.begin(); }
+/** Path, clicks, oscillation and stiffness since the last reset. */
+export class ContactMetrics {
+  constructor() { this.reset(); }
 
-  begin() {
-    Object.assign(this, { way: 0, clicks: 0, still: 0, swing: 0, span: 0, felt: 0, frames: [], before: null, touched: -1, free: true });
+  reset() {
+    Object.assign(this, {
+      pathLength: 0, // in contact [m]
+      clickCount: 0,
+      stillTime: 0, // since when the hand is at rest [s]
+      forceAmplitude: 0, // of the oscillation within the window [N]
+      feltStiffness: 0, // N/m; 0 if it cannot be determined
+      isFree: true,
+      window: [], // time, and range of each force component, of the frames within the window
+      previous: null,
+      lastContact: -1, // s
+    });
   }
 
   /**
-   * Take a frame; what comes with a change of the law is left out.
-   * @param plane whether depth is that below the plane z = 0, not that below the texture
+   * Add a frame; frames during a ramp after a change of the law are skipped.
+   * @param usesPlane whether the depth is relative to the plane z = 0, not to the texture
    */
-  take(frame, columns, { settings, step }, plane = false) {
-    const { newest, least, greatest, hand, god } = frame, at = name => newest[columns[name]];
-    const inside = least[columns.inside] === 1, before = this.before, time = at("time");
-    this.before = { hand: [...hand], x: at("x"), y: at("y"), time };
-    if (!before || least[columns.share] < 1) { this.frames = []; return; }
-    const moved = Math.hypot(...hand.map((value, k) => value - before.hand[k]));
-    if (greatest[columns.inside] === 1) this.touched = time;
-    this.free = time - this.touched > HOP;
-    if (inside) this.way += Math.hypot(at("x") - before.x, at("y") - before.y);
-    this.still = !this.free && moved < STILL ? this.still + time - before.time : 0;
-    if (frame.jump > CLICK && frame.jump > STEEPER * settings.stiffness * (frame.moved + step) && inside) this.clicks++;
-    this.watch(time, columns, least, greatest);
-    const force = Math.hypot(at("applied x"), at("applied y"), at("applied z"));
-    const deep = plane ? -at("z") : Math.hypot(at("x") - god[0], at("y") - god[1], at("z") - god[2]);
-    // Stiffness as it is felt: force for depth, at rest.
-    this.felt = this.still > WINDOW && this.swing < BUZZ && force > 5 * NOTICED && deep > DEEP ? force / deep : 0;
+  addFrame(frame, columns, { settings, position_resolution: positionResolution }, usesPlane = false) {
+    const { newest, minima, maxima, hand, closest } = frame, value = name => newest[columns[name]];
+    const isInside = minima[columns.inside] === 1, previous = this.previous, time = value("time");
+    this.previous = { hand: [...hand], x: value("x"), y: value("y"), time };
+    if (!previous || minima[columns.share] < 1) { this.window = []; return; }
+    const handDistance = Math.hypot(...hand.map((coordinate, k) => coordinate - previous.hand[k]));
+    if (maxima[columns.inside] === 1) this.lastContact = time;
+    this.isFree = time - this.lastContact > MAX_BOUNCE;
+    if (isInside) this.pathLength += Math.hypot(value("x") - previous.x, value("y") - previous.y);
+    this.stillTime = !this.isFree && handDistance < STILL_DISTANCE ? this.stillTime + time - previous.time : 0;
+    const slopeForce = CLICK_STEEPNESS * settings.stiffness * (frame.positionStep + positionResolution);
+    if (isInside && frame.maxForceStep > CLICK_FORCE && frame.maxForceStep > slopeForce) this.clickCount++;
+    this.measureOscillation(time, columns, minima, maxima);
+    const force = Math.hypot(value("applied x"), value("applied y"), value("applied z"));
+    const depth = usesPlane ? -value("z") : Math.hypot(value("x") - closest[0], value("y") - closest[1], value("z") - closest[2]);
+    const isAtRest = this.stillTime > WINDOW && this.forceAmplitude < BUZZ_AMPLITUDE;
+    this.feltStiffness = isAtRest && force > 5 * PERCEPTION_THRESHOLD && depth > MIN_DEPTH ? force / depth : 0;
   }
 
-  /** How far the force goes to and fro within the window; known once it was in contact for as long. */
-  watch(time, columns, least, greatest) {
-    const sides = ["applied x", "applied y", "applied z"].map(name => [least[columns[name]], greatest[columns[name]]]);
-    this.frames = !this.free ? [...this.frames.filter(([then]) => then > time - WINDOW), [time, sides]] : [];
-    this.span = this.frames.length ? time - this.frames[0][0] : 0;
-    if (this.span < 0.8 * WINDOW) { this.swing = 0; return; }
-    const swings = [0, 1, 2].map(k => 0.5 * (Math.max(...this.frames.map(([, side]) => side[k][1]))
-      - Math.min(...this.frames.map(([, side]) => side[k][0]))));
-    this.swing = Math.hypot(...swings);
+  /** Update the amplitude of the force within the window; it is 0 until the contact has lasted that long. */
+  measureOscillation(time, columns, minima, maxima) {
+    const ranges = ["applied x", "applied y", "applied z"].map(name => [minima[columns[name]], maxima[columns[name]]]);
+    this.window = this.isFree ? [] : [...this.window.filter(([start]) => start > time - WINDOW), [time, ranges]];
+    const duration = this.window.length ? time - this.window[0][0] : 0;
+    if (duration < 0.8 * WINDOW) { this.forceAmplitude = 0; return; }
+    const amplitudes = [0, 1, 2].map(k => 0.5 * (Math.max(...this.window.map(([, range]) => range[k][1]))
+      - Math.min(...this.window.map(([, range]) => range[k][0]))));
+    this.forceAmplitude = Math.hypot(...amplitudes);
   }
 }

@@ -1,4 +1,4 @@
-// The guided tour on the page: what to do, what to watch, and what was seen.
+// Panel of the guided tour: the task, what to watch, the progress and the result of a step.
 
 import { STEPS } from "./tour.js";
 
@@ -7,43 +7,44 @@ const $ = name => document.getElementById(`tour-${name}`);
 export class TourPanel {
   constructor(tour) {
     this.tour = tour;
-    this.drawn = "";
-    document.getElementById("tour-begin").onclick = () => this.toggle();
+    $("start").onclick = () => this.toggle();
     $("end").onclick = () => this.toggle();
-    $("show").onclick = () => { tour.show(); this.draw(); };
-    $("back").onclick = () => this.go(tour.step - 1);
-    $("next").onclick = () => (tour.step + 1 < STEPS.length ? this.go(tour.step + 1) : this.toggle());
+    $("demo").onclick = () => { tour.setDemo(); this.update(); };
+    $("back").onclick = () => this.goTo(tour.stepIndex - 1);
+    $("next").onclick = () => (tour.stepIndex + 1 < STEPS.length ? this.goTo(tour.stepIndex + 1) : this.toggle());
   }
 
+  /** Start or end the tour. */
   toggle() {
-    if (this.tour.on) this.tour.end(); else this.tour.begin();
-    this.draw();
-    (this.tour.on ? $("title") : $("begin")).focus();
+    if (this.tour.isActive) this.tour.end(); else this.tour.start();
+    this.update();
+    (this.tour.isActive ? $("title") : $("start")).focus();
   }
 
-  go(step) {
-    this.tour.go(step);
-    this.draw();
+  goTo(stepIndex) {
+    this.tour.goTo(stepIndex);
+    this.update();
   }
 
-  /** Show how things stand. */
-  draw() {
+  update() {
     const { tour } = this, panel = document.getElementById("tour");
-    panel.hidden = !tour.on;
-    $("begin").setAttribute("aria-pressed", tour.on);
-    if (!tour.on) { this.drawn = ""; return; }
-    const { title, watch } = tour.now, last = tour.step + 1 === STEPS.length;
-    panel.classList.toggle("found", tour.found);
-    const told = {
-      place: `Step ${tour.step + 1} of ${STEPS.length} ${tour.seen.map(seen => (seen ? "●" : "○")).join(" ")}`,
-      title, why: tour.why, watch, ask: tour.act.ask, words: tour.result?.words ?? "getting ready …",
-      found: tour.found ? `✓ ${tour.told}` : "", next: last ? "Finish" : "Next",
+    panel.hidden = !tour.isActive;
+    $("start").setAttribute("aria-pressed", tour.isActive);
+    if (!tour.isActive) return;
+    const { title, watch, tasks } = tour.step, isLast = tour.stepIndex + 1 === STEPS.length;
+    panel.classList.toggle("completed", tour.isStepCompleted);
+    const texts = {
+      step: `Step ${tour.stepIndex + 1} of ${STEPS.length} ${tour.completedSteps.map(isCompleted => (isCompleted ? "●" : "○")).join(" ")}`,
+      title, watch, explanation: tour.explanation, instruction: tour.task.instruction,
+      progress: tour.progress?.text ?? "getting ready …",
+      result: tour.isStepCompleted ? `✓ ${tour.resultText}` : "", next: isLast ? "Finish" : "Next",
     };
-    for (const [name, words] of Object.entries(told)) if ($(name).textContent !== words) $(name).textContent = words;
-    const done = tour.turn / tour.now.acts.length, share = Math.min(tour.result?.share ?? 0, 1) / tour.now.acts.length;
-    $("bar").value = tour.found ? 1 : Math.min(done + share, 0.99);
-    $("show").setAttribute("aria-pressed", tour.shows);
-    $("show").textContent = tour.shows ? "Try it" : "Show me";
-    $("back").disabled = tour.step === 0;
+    // Unchanged texts are left alone, so that screen readers do not repeat them.
+    for (const [name, text] of Object.entries(texts)) if ($(name).textContent !== text) $(name).textContent = text;
+    const fraction = (tour.taskIndex + Math.min(tour.progress?.fraction ?? 0, 1)) / tasks.length;
+    $("bar").value = tour.isStepCompleted ? 1 : Math.min(fraction, 0.99);
+    $("demo").setAttribute("aria-pressed", tour.isDemo);
+    $("demo").textContent = tour.isDemo ? "Try it" : "Show me";
+    $("back").disabled = tour.stepIndex === 0;
   }
 }

@@ -1,108 +1,111 @@
-// What happened in the last seconds: bands from the least to the greatest of each frame, and a spectrum.
+// Plots of the last seconds: traces of position, force and energy, and the spectrum of the normal force.
 
-import { Sheet, colours } from "./canvas.js";
-import { quantity } from "./format.js";
+import { ScaledCanvas, colours } from "./canvas.js";
+import { formatQuantity } from "./format.js";
 
-const SECONDS = 5, BINS = 400; // of time: what a band is wide
+const DURATION = 5, BINS = 400; // s, and bins of that time, each drawn as a band from minimum to maximum
 const STRIPS = [
   ["position", "m", [["x", "blue"], ["z", "orange"]]],
   ["force", "N", [["applied x", "blue"], ["applied z", "orange"]]],
   ["energy", "J", [["supplied", "green"]]],
 ];
-const LINES = STRIPS.flatMap(([, , lines]) => lines.map(([name]) => name));
-const LEAST_SPAN = { m: 1e-4, N: 1e-2, J: 1e-7 };
+const TRACES = STRIPS.flatMap(([, , traces]) => traces.map(([name]) => name));
+const MIN_SPAN = { m: 1e-4, N: 1e-2, J: 1e-7 };
 
-export class Traces {
-  constructor(canvas) {
-    this.sheet = new Sheet(canvas);
-    this.least = LINES.map(() => new Float64Array(BINS));
-    this.greatest = LINES.map(() => new Float64Array(BINS));
-    this.newest = -1; // bin, counted from the loop's beginning
-    this.count = 0; // of bins that hold something
+export class TracePlot {
+  constructor(element) {
+    this.scaledCanvas = new ScaledCanvas(element);
+    this.minima = TRACES.map(() => new Float64Array(BINS));
+    this.maxima = TRACES.map(() => new Float64Array(BINS));
+    this.newestBin = -1; // counted from the start of the loop
+    this.binCount = 0; // bins with data
   }
 
-  take(frame, columns) {
-    const bin = Math.floor(frame.newest[0] / SECONDS * BINS);
-    if (bin < this.newest) this.count = 0; // another loop
-    // A frame reaches back to the one before, so that no gap opens between two.
-    const from = this.count ? Math.max(this.newest + 1, bin - BINS + 1) : bin;
-    this.count = Math.min(this.count + bin - from + 1, BINS);
-    LINES.forEach((name, line) => {
-      const low = frame.least[columns[name]], high = frame.greatest[columns[name]];
-      const least = this.least[line], greatest = this.greatest[line], at = bin % BINS;
-      for (let k = from; k <= bin; k++) { least[k % BINS] = low; greatest[k % BINS] = high; }
-      least[at] = Math.min(least[at], low);
-      greatest[at] = Math.max(greatest[at], high);
+  addFrame(frame, columns) {
+    const bin = Math.floor(frame.newest[0] / DURATION * BINS);
+    if (bin < this.newestBin) this.binCount = 0; // the loop was restarted
+    // Bins between two frames are filled, so that the traces have no gaps.
+    const firstBin = this.binCount ? Math.max(this.newestBin + 1, bin - BINS + 1) : bin;
+    this.binCount = Math.min(this.binCount + bin - firstBin + 1, BINS);
+    TRACES.forEach((name, trace) => {
+      const low = frame.minima[columns[name]], high = frame.maxima[columns[name]];
+      const minima = this.minima[trace], maxima = this.maxima[trace], index = bin % BINS;
+      for (let k = firstBin; k <= bin; k++) { minima[k % BINS] = low; maxima[k % BINS] = high; }
+      minima[index] = Math.min(minima[index], low);
+      maxima[index] = Math.max(maxima[index], high);
     });
-    this.newest = bin;
+    this.newestBin = bin;
   }
 
-  /** Forget what was: the clock of another loop begins anew. */
-  clear() { this.count = 0; this.newest = -1; }
+  /** Discard all data: the time of another loop starts at zero. */
+  clear() { this.binCount = 0; this.newestBin = -1; }
 
-  draw(base) {
-    const [draw, width, height] = this.sheet.cleared();
-    if (!this.count) return;
-    const high = height / STRIPS.length;
-    let line = 0;
-    STRIPS.forEach(([name, unit, lines], strip) => {
-      const shift = unit === "J" ? base : 0, numbers = lines.map((_, k) => line + k);
-      const [low, most] = this.extremes(numbers).map(value => value - shift);
-      const span = Math.max(most - low, LEAST_SPAN[unit]), middle = (low + most) / 2, top = strip * high;
-      const y = value => top + 4 + (0.5 - (value - shift - middle) / span) * (high - 22) + 11;
-      draw.strokeStyle = colours().line;
-      draw.lineWidth = 1;
-      draw.beginPath(); draw.moveTo(0, top); draw.lineTo(width, top);
-      if (Math.abs(middle) < span / 2) { draw.moveTo(0, y(shift)); draw.lineTo(width, y(shift)); }
-      draw.stroke();
-      numbers.forEach((number, k) => this.drawBand(draw, width, number, y, colours()[lines[k][1]]));
-      drawWords(draw, width, top + 12, `${name}, ${quantity(low, unit)} to ${quantity(most, unit)}`, lines);
-      line += lines.length;
+  /** Draw the traces, the energy relative to an offset [J]. */
+  draw(energyOffset) {
+    const [context, width, height] = this.scaledCanvas.clear();
+    if (!this.binCount) return;
+    const stripHeight = height / STRIPS.length;
+    let firstTrace = 0;
+    STRIPS.forEach(([name, unit, traces], strip) => {
+      const offset = unit === "J" ? energyOffset : 0, indices = traces.map((_, k) => firstTrace + k);
+      const [low, high] = this.range(indices).map(value => value - offset);
+      const span = Math.max(high - low, MIN_SPAN[unit]), middle = (low + high) / 2, top = strip * stripHeight;
+      const y = value => top + 4 + (0.5 - (value - offset - middle) / span) * (stripHeight - 22) + 11;
+      context.strokeStyle = colours().line;
+      context.lineWidth = 1;
+      context.beginPath(); context.moveTo(0, top); context.lineTo(width, top);
+      if (Math.abs(middle) < span / 2) { context.moveTo(0, y(offset)); context.lineTo(width, y(offset)); }
+      context.stroke();
+      indices.forEach((index, k) => this.drawTrace(context, width, index, y, colours()[traces[k][1]]));
+      drawLabels(context, width, top + 12, `${name}, ${formatQuantity(low, unit)} to ${formatQuantity(high, unit)}`, traces);
+      firstTrace += traces.length;
     });
   }
 
-  /** Return the least and the greatest value of some lines. */
-  extremes(numbers) {
-    let low = Infinity, most = -Infinity;
-    for (const line of numbers) {
-      for (let k = this.newest - this.count + 1; k <= this.newest; k++) {
-        low = Math.min(low, this.least[line][k % BINS]);
-        most = Math.max(most, this.greatest[line][k % BINS]);
+  /** Return the least and the greatest value of some traces. */
+  range(indices) {
+    let low = Infinity, high = -Infinity;
+    for (const trace of indices) {
+      for (let k = this.newestBin - this.binCount + 1; k <= this.newestBin; k++) {
+        low = Math.min(low, this.minima[trace][k % BINS]);
+        high = Math.max(high, this.maxima[trace][k % BINS]);
       }
     }
-    return [low, most];
+    return [low, high];
   }
 
-  drawBand(draw, width, line, y, colour) {
-    const wide = (width - 8) / BINS, first = this.newest - this.count + 1;
-    draw.fillStyle = colour;
-    for (let k = first; k <= this.newest; k++) {
-      const upper = y(this.greatest[line][k % BINS]), lower = y(this.least[line][k % BINS]);
-      draw.fillRect(width - 4 - (this.newest + 1 - k) * wide, upper - 0.8, wide + 0.3, lower - upper + 1.6);
+  drawTrace(context, width, trace, y, colour) {
+    const binWidth = (width - 8) / BINS, firstBin = this.newestBin - this.binCount + 1;
+    context.fillStyle = colour;
+    for (let k = firstBin; k <= this.newestBin; k++) {
+      const upper = y(this.maxima[trace][k % BINS]), lower = y(this.minima[trace][k % BINS]);
+      context.fillRect(width - 4 - (this.newestBin + 1 - k) * binWidth, upper - 0.8, binWidth + 0.3, lower - upper + 1.6);
     }
   }
 }
 
-function drawWords(draw, width, y, words, lines) {
-  draw.font = "11px system-ui, sans-serif";
-  draw.fillStyle = colours().soft;
-  draw.fillText(words, 4, y);
-  let at = width - 4;
-  for (const [label, colour] of [...lines].reverse()) {
-    draw.fillStyle = colours()[colour];
-    const name = label.replace("applied ", "f").replace("supplied", "given to the hand");
-    at -= draw.measureText(name).width;
-    draw.fillText(name, at, y);
-    at -= 10;
+/** Draw the title of a strip at the left, and the names of its traces at the right. */
+function drawLabels(context, width, y, title, traces) {
+  context.font = "11px system-ui, sans-serif";
+  context.fillStyle = colours().soft;
+  context.fillText(title, 4, y);
+  let x = width - 4;
+  for (const [name, colour] of [...traces].reverse()) {
+    context.fillStyle = colours()[colour];
+    const label = name.replace("applied ", "f").replace("supplied", "given to the hand");
+    x -= context.measureText(label).width;
+    context.fillText(label, x, y);
+    x -= 10;
   }
 }
 
-const SIZE = 2048;
+const SIZE = 2048; // samples of the Fourier transform
 const COSINES = Float64Array.from({ length: SIZE / 2 }, (_, k) => Math.cos(2 * Math.PI * k / SIZE));
 const SINES = Float64Array.from({ length: SIZE / 2 }, (_, k) => -Math.sin(2 * Math.PI * k / SIZE));
-const WINDOW = Float64Array.from({ length: SIZE }, (_, k) => 0.5 - 0.5 * Math.cos(2 * Math.PI * k / SIZE));
+const HANN_WINDOW = Float64Array.from({ length: SIZE }, (_, k) => 0.5 - 0.5 * Math.cos(2 * Math.PI * k / SIZE));
+const MIN_PEAK_FREQUENCY = 20, MIN_SHOWN_FREQUENCY = 5; // Hz
 
-/** Fourier transform of SIZE samples, in place: real and imaginary parts. */
+/** Compute the fast Fourier transform of SIZE samples in place: real and imaginary parts. */
 function transform(real, imaginary) {
   const n = real.length;
   for (let i = 1, j = 0; i < n; i++) {
@@ -124,60 +127,66 @@ function transform(real, imaginary) {
   }
 }
 
-export class Spectrum {
-  constructor(canvas) {
-    this.sheet = new Sheet(canvas);
+export class SpectrumPlot {
+  constructor(element) {
+    this.scaledCanvas = new ScaledCanvas(element);
     this.samples = new Float64Array(SIZE);
     this.amplitudes = new Float64Array(SIZE / 2);
   }
 
-  take(forces) {
+  /** Add the normal components of forces (x, y, z of each row). */
+  addForces(forces) {
     const count = Math.min(forces.length / 3, SIZE);
     this.samples.copyWithin(0, count);
     for (let k = 0; k < count; k++) this.samples[SIZE - count + k] = forces[forces.length - 3 * (count - k) + 2];
   }
 
-  /** Compute the amplitudes of the normal force [N]; return the strongest frequency above 20 Hz, and its amplitude. */
-  compute(rate) {
+  /** Compute the amplitudes of the normal force [N]; return frequency and amplitude of the peak. */
+  compute(updateRate) {
     const mean = this.samples.reduce((sum, value) => sum + value, 0) / SIZE;
-    const real = this.samples.map((value, k) => (value - mean) * WINDOW[k]);
+    const real = this.samples.map((value, k) => (value - mean) * HANN_WINDOW[k]);
     const imaginary = new Float64Array(SIZE);
     transform(real, imaginary);
-    let strongest = Math.ceil(20 * SIZE / rate);
+    let peak = Math.ceil(MIN_PEAK_FREQUENCY * SIZE / updateRate);
     for (let k = 0; k < SIZE / 2; k++) {
       this.amplitudes[k] = 4 * Math.hypot(real[k], imaginary[k]) / SIZE;
-      if (k > strongest && this.amplitudes[k] > this.amplitudes[strongest]) strongest = k;
+      if (k > peak && this.amplitudes[k] > this.amplitudes[peak]) peak = k;
     }
-    return [strongest * rate / SIZE, this.amplitudes[strongest]];
+    return [peak * updateRate / SIZE, this.amplitudes[peak]];
   }
 
-  draw(rate) {
-    const [draw, width, height] = this.sheet.cleared(), shown = colours(), peak = this.compute(rate);
-    const lowest = 5, x = f => Math.log(f / lowest) / Math.log(rate / 2 / lowest) * width;
+  /** Draw the spectrum; return frequency and amplitude of its peak. */
+  draw(updateRate) {
+    const [context, width, height] = this.scaledCanvas.clear(), theme = colours(), peak = this.compute(updateRate);
+    const x = f => Math.log(f / MIN_SHOWN_FREQUENCY) / Math.log(updateRate / 2 / MIN_SHOWN_FREQUENCY) * width;
     const y = amplitude => height - 18 - (Math.log10(Math.max(amplitude, 1e-6)) + 6) / 7 * (height - 22);
-    draw.font = "11px system-ui, sans-serif";
-    draw.strokeStyle = shown.line;
-    draw.fillStyle = shown.soft;
-    draw.lineWidth = 1;
-    for (const f of [10, 100, 1000, 10000].filter(f => f < rate / 2)) {
-      draw.beginPath(); draw.moveTo(x(f), 0); draw.lineTo(x(f), height - 16); draw.stroke();
-      draw.fillText(quantity(f, "Hz").replace(".00", "").replace(".0", ""), x(f) - 14, height - 4);
+    drawGrid(context, width, height, updateRate, x, y);
+    context.strokeStyle = theme.orange;
+    context.lineWidth = 1.6;
+    context.beginPath();
+    // Of the frequencies within one pixel, the greatest amplitude is drawn.
+    for (let k = Math.ceil(MIN_SHOWN_FREQUENCY * SIZE / updateRate), pixel = -1, maximum = 0; k < SIZE / 2; k++) {
+      const column = Math.round(x(k * updateRate / SIZE));
+      maximum = Math.max(column === pixel ? maximum : 0, this.amplitudes[k]);
+      if (column !== Math.round(x((k + 1) * updateRate / SIZE))) context.lineTo(column, y(maximum));
+      pixel = column;
     }
-    for (const amplitude of [1e-4, 1e-2, 1]) {
-      draw.beginPath(); draw.moveTo(0, y(amplitude)); draw.lineTo(width, y(amplitude)); draw.stroke();
-      draw.fillText(quantity(amplitude, "N").replace(/\.0+/, ""), 3, y(amplitude) - 3);
-    }
-    draw.strokeStyle = shown.orange;
-    draw.lineWidth = 1.6;
-    draw.beginPath();
-    // Of all frequencies that share a pixel, the strongest is shown.
-    for (let k = Math.ceil(lowest * SIZE / rate), pixel = -1, most = 0; k < SIZE / 2; k++) {
-      const at = Math.round(x(k * rate / SIZE));
-      most = Math.max(at === pixel ? most : 0, this.amplitudes[k]);
-      if (at !== Math.round(x((k + 1) * rate / SIZE))) draw.lineTo(at, y(most));
-      pixel = at;
-    }
-    draw.stroke();
+    context.stroke();
     return peak;
+  }
+}
+
+function drawGrid(context, width, height, updateRate, x, y) {
+  context.font = "11px system-ui, sans-serif";
+  context.strokeStyle = colours().line;
+  context.fillStyle = colours().soft;
+  context.lineWidth = 1;
+  for (const f of [10, 100, 1000, 10000].filter(frequency => frequency < updateRate / 2)) {
+    context.beginPath(); context.moveTo(x(f), 0); context.lineTo(x(f), height - 16); context.stroke();
+    context.fillText(formatQuantity(f, "Hz").replace(".00", "").replace(".0", ""), x(f) - 14, height - 4);
+  }
+  for (const amplitude of [1e-4, 1e-2, 1]) {
+    context.beginPath(); context.moveTo(0, y(amplitude)); context.lineTo(width, y(amplitude)); context.stroke();
+    context.fillText(formatQuantity(amplitude, "N").replace(/\.0+/, ""), 3, y(amplitude) - 3);
   }
 }

@@ -1,178 +1,190 @@
-// The surface in relief, and a cut under the probe with field and curl behind it.
+// Views of the surface: the relief, and the section below the probe with the force field and its curl.
 
-import { Marker } from "./probe_overlay.js";
-import { corners, paintRelief } from "./relief_renderer.js";
-import { Sheet, channels, colours } from "./canvas.js";
-import { quantity, roundStep } from "./format.js";
+import { ProbeOverlay } from "./probe_overlay.js";
+import { projectionGeometry, renderRelief } from "./relief_renderer.js";
+import { ScaledCanvas, colours, toRgb } from "./canvas.js";
+import { formatQuantity, roundStep } from "./format.js";
 
-const RELIEF = 2;
+const RELIEF = 2; // first number of a picture of the relief
+const SECTION_HEADER = 9; // numbers before the heights of a section
+const ARROW_LENGTH = 16; // of the greatest force [px]
+const MAX_LIFT = 40; // greatest exaggeration of heights
+const CURL_TOLERANCE = 1e-6; // relative to the greatest force of a section
 
-export class Relief {
-  name = "relief";
+export class ReliefView {
+  kind = "relief";
 
-  constructor(canvas) {
-    this.sheet = new Sheet(canvas);
-    this.marker = new Marker(this.sheet);
-    this.drawn = document.createElement("canvas");
+  constructor(element) {
+    this.scaledCanvas = new ScaledCanvas(element);
+    this.overlay = new ProbeOverlay(this.scaledCanvas);
+    this.image = document.createElement("canvas");
     this.heights = null;
   }
 
-  take(numbers) {
+  setPicture(numbers) {
     const [, side, x, y, size] = numbers;
     Object.assign(this, { side, x, y, size, heights: numbers.subarray(5) });
-    this.key = "";
+    this.paintKey = "";
   }
 
-  place(width, height) {
-    const { skew, left, across, bottom, deep } = corners(width, height);
+  /** Return a function that maps a point to pixels of a view of some size. */
+  projection(width, height) {
+    const { skew, left, across, bottom, depth } = projectionGeometry(width, height);
     return ([x, y, z]) => {
       const u = (x - this.x) / this.size + 0.5, v = (y - this.y) / this.size + 0.5;
-      return [left + u * across + v * skew, bottom - v * deep - z * this.lift];
+      return [left + u * across + v * skew, bottom - v * depth - z * this.lift];
     };
   }
 
   /** Return x and y of the point of the plane z = 0 at a pixel of the page. */
-  under(px, py) {
-    const { width, height, unit } = this.sheet, { skew, left, across, bottom, deep } = corners(width, height);
-    const v = (bottom - py / unit) / deep, u = (px / unit - left - v * skew) / across;
+  pointAt(px, py) {
+    const { width, height, unit } = this.scaledCanvas;
+    const { skew, left, across, bottom, depth } = projectionGeometry(width, height);
+    const v = (bottom - py / unit) / depth, u = (px / unit - left - v * skew) / across;
     return [this.x + (u - 0.5) * this.size, this.y + (v - 0.5) * this.size];
   }
 
-  draw(state) {
+  /** Draw the probe, and the relief if it has changed. */
+  draw(probeState) {
     if (!this.heights) return;
-    const { width, height } = this.sheet;
-    if (this.sheet.blank || this.key !== colours().low) this.paint();
-    if (!state) return;
-    // Heights are exaggerated: what is further below than the surface is high stays in the picture.
-    const place = this.place(width, height), shown = ([x, y, z]) => place([x, y, Math.max(z, -this.lowest)]);
-    this.marker.show(shown, state, ([x, y, z]) => [x + 0.2 * y, -z - 0.5 * y]);
+    const { width, height, needsRepaint } = this.scaledCanvas;
+    if (needsRepaint || this.paintKey !== colours().low) this.paint();
+    if (!probeState) return;
+    // Heights are exaggerated, so a low point would be outside the view.
+    const project = this.projection(width, height), projectVisible = ([x, y, z]) => project([x, y, Math.max(z, -this.maxDepth)]);
+    this.overlay.draw(projectVisible, probeState, ([x, y, z]) => [x + 0.2 * y, -z - 0.5 * y]);
   }
 
   paint() {
-    const [draw, width, height] = this.sheet.cleared();
-    this.key = colours().low;
-    const most = this.heights.reduce((most, z) => Math.max(most, Math.abs(z)), 1e-9);
-    const { rise, across } = corners(width, height);
-    this.lift = Math.min(rise / most, 40 * across / this.size);
-    this.lowest = 1.6 * most;
+    const [context, width, height] = this.scaledCanvas.clear();
+    this.paintKey = colours().low;
+    const maxHeight = this.heights.reduce((maximum, z) => Math.max(maximum, Math.abs(z)), 1e-9);
+    const { maxRise, across } = projectionGeometry(width, height);
+    this.lift = Math.min(maxRise / maxHeight, MAX_LIFT * across / this.size);
+    this.maxDepth = 1.6 * maxHeight;
     this.exaggeration = this.lift * this.size / across;
-    paintRelief(this.drawn, this, width, height);
-    draw.drawImage(this.drawn, 0, 0, width, height);
+    renderRelief(this.image, this, width, height);
+    context.drawImage(this.image, 0, 0, width, height);
   }
 }
 
-export class Cut {
-  name = "cut";
+export class SectionView {
+  kind = "section";
 
-  constructor(canvas) {
-    this.sheet = new Sheet(canvas);
-    this.marker = new Marker(this.sheet);
-    this.field = document.createElement("canvas");
-    this.box = null;
+  constructor(element) {
+    this.scaledCanvas = new ScaledCanvas(element);
+    this.overlay = new ProbeOverlay(this.scaledCanvas);
+    this.curlImage = document.createElement("canvas");
+    this.box = null; // of the picture: left, right, bottom, top [m]
   }
 
-  take(numbers) {
-    const [, line, across, deep, y, left, right, bottom, top] = numbers;
-    const after = 9, cells = across * deep;
-    const part = (from, count) => numbers.subarray(from, from + count);
+  setPicture(numbers) {
+    const [, points, columns, rows, y, ...box] = numbers.subarray(0, SECTION_HEADER);
+    const fieldStart = SECTION_HEADER + points, cells = columns * rows;
+    const part = (start, count) => numbers.subarray(start, start + count);
     Object.assign(this, {
-      y, across, deep, box: [left, right, bottom, top], heights: part(after, line),
-      fx: part(after + line, cells), fz: part(after + line + cells, cells),
-      curl: part(after + line + 2 * cells, cells), key: "",
+      y, columns, rows, box, heights: part(SECTION_HEADER, points),
+      fx: part(fieldStart, cells), fz: part(fieldStart + cells, cells),
+      curl: part(fieldStart + 2 * cells, cells), paintKey: "",
     });
-    this.most = this.curl.reduce((most, value) => Math.max(most, Math.abs(value)), 0);
-    this.strongest = this.fx.reduce((most, value, k) => Math.max(most, Math.hypot(value, this.fz[k])), 0);
+    this.maxCurl = this.curl.reduce((maximum, value) => Math.max(maximum, Math.abs(value)), 0);
+    this.maxForce = this.fx.reduce((maximum, value, k) => Math.max(maximum, Math.hypot(value, this.fz[k])), 0);
   }
 
-  /** Return x and z at a pixel of the page, of the box that is wanted. */
-  under(px, py, [left, right, bottom, top]) {
-    const { width, height, unit } = this.sheet;
+  get hasCurl() { return this.maxCurl > CURL_TOLERANCE * (this.maxForce ?? 1); }
+
+  /** Return x and z at a pixel of the page, for the box shown. */
+  pointAt(px, py, [left, right, bottom, top]) {
+    const { width, height, unit } = this.scaledCanvas;
     return [left + px / unit / width * (right - left), top - py / unit / height * (top - bottom)];
   }
 
-  draw(state, wanted) {
-    const { width, height } = this.sheet, [left, right, bottom, top] = wanted;
-    const place = ([x, , z]) => [(x - left) / (right - left) * width, (top - z) / (top - bottom) * height];
-    const key = [colours().plus, ...wanted].join();
-    if (this.sheet.blank || this.key !== key) this.paint(place, right - left);
-    this.key = key;
-    if (state) this.marker.show(place, state, ([x, , z]) => [x, -z]);
+  /** Draw the probe, and the section if it or the box shown has changed. */
+  draw(probeState, shownBox) {
+    const { width, height, needsRepaint } = this.scaledCanvas, [left, right, bottom, top] = shownBox;
+    const project = ([x, , z]) => [(x - left) / (right - left) * width, (top - z) / (top - bottom) * height];
+    const paintKey = [colours().plus, ...shownBox].join();
+    if (needsRepaint || this.paintKey !== paintKey) this.paint(project, right - left);
+    this.paintKey = paintKey;
+    if (probeState) this.overlay.draw(project, probeState, ([x, , z]) => [x, -z]);
   }
 
-  paint(place, span) {
-    const [draw, width, height] = this.sheet.cleared();
-    draw.fillStyle = colours().ground;
-    draw.fillRect(0, 0, width, height);
-    if (this.box) this.drawField(draw, place);
-    this.drawScale(draw, width, height, span);
+  paint(project, span) {
+    const [context, width, height] = this.scaledCanvas.clear();
+    context.fillStyle = colours().ground;
+    context.fillRect(0, 0, width, height);
+    if (this.box) this.drawSection(context, project);
+    this.drawScaleBar(context, width, height, span);
   }
 
-  drawField(draw, place) {
-    this.paintField();
+  drawSection(context, project) {
+    this.paintCurl();
     const [left, right, bottom, top] = this.box, count = this.heights.length;
-    const [x0, y0] = place([left, 0, top]), [x1, y1] = place([right, 0, bottom]);
-    const outline = () => {
-      draw.beginPath();
-      this.heights.forEach((z, k) => draw.lineTo(...place([left + k / (count - 1) * (right - left), 0, z])));
+    const [x0, y0] = project([left, 0, top]), [x1, y1] = project([right, 0, bottom]);
+    const traceProfile = () => {
+      context.beginPath();
+      this.heights.forEach((z, k) => context.lineTo(...project([left + k / (count - 1) * (right - left), 0, z])));
     };
-    draw.save();
-    outline();
-    draw.lineTo(x1, y1); draw.lineTo(x0, y1); draw.closePath();
-    draw.fillStyle = colours().solid;
-    draw.fill();
-    draw.restore();
-    draw.imageSmoothingEnabled = true;
-    draw.globalAlpha = 0.75;
-    draw.drawImage(this.field, x0, y0, x1 - x0, y1 - y0);
-    draw.globalAlpha = 1;
-    this.drawArrows(draw, place);
-    outline();
-    draw.strokeStyle = colours().ink;
-    draw.lineWidth = 2;
-    draw.stroke();
+    context.save();
+    traceProfile();
+    context.lineTo(x1, y1); context.lineTo(x0, y1); context.closePath();
+    context.fillStyle = colours().solid;
+    context.fill();
+    context.restore();
+    context.imageSmoothingEnabled = true;
+    context.globalAlpha = 0.75;
+    context.drawImage(this.curlImage, x0, y0, x1 - x0, y1 - y0);
+    context.globalAlpha = 1;
+    this.drawForces(context, project);
+    traceProfile();
+    context.strokeStyle = colours().ink;
+    context.lineWidth = 2;
+    context.stroke();
   }
 
-  drawArrows(draw, place) {
-    if (this.strongest < 1e-6) return;
-    const [left, right, bottom, top] = this.box, scale = 16 / this.strongest;
-    draw.strokeStyle = colours().blue;
-    draw.globalAlpha = 0.65;
-    draw.lineWidth = 1.2;
-    draw.beginPath();
-    for (let j = 1; j < this.deep; j += 3) {
-      for (let i = 1; i < this.across; i += 3) {
-        const k = j * this.across + i, dx = this.fx[k] * scale, dy = -this.fz[k] * scale;
+  /** Draw the force field as arrows, at every third grid point. */
+  drawForces(context, project) {
+    if (this.maxForce < 1e-6) return;
+    const [left, right, bottom, top] = this.box, scale = ARROW_LENGTH / this.maxForce;
+    context.strokeStyle = colours().blue;
+    context.globalAlpha = 0.65;
+    context.lineWidth = 1.2;
+    context.beginPath();
+    for (let j = 1; j < this.rows; j += 3) {
+      for (let i = 1; i < this.columns; i += 3) {
+        const k = j * this.columns + i, dx = this.fx[k] * scale, dy = -this.fz[k] * scale;
         if (Math.hypot(dx, dy) < 0.7) continue;
-        const [x, y] = place([left + i / (this.across - 1) * (right - left), 0, bottom + j / (this.deep - 1) * (top - bottom)]);
-        draw.moveTo(x, y); draw.lineTo(x + dx, y + dy);
-        draw.moveTo(x + 1.5, y); draw.arc(x, y, 1.5, 0, 6.3);
+        const [x, y] = project([left + i / (this.columns - 1) * (right - left), 0, bottom + j / (this.rows - 1) * (top - bottom)]);
+        context.moveTo(x, y); context.lineTo(x + dx, y + dy);
+        context.moveTo(x + 1.5, y); context.arc(x, y, 1.5, 0, 6.3);
       }
     }
-    draw.stroke();
-    draw.globalAlpha = 1;
+    context.stroke();
+    context.globalAlpha = 1;
   }
 
-  paintField() {
-    Object.assign(this.field, { width: this.across, height: this.deep });
-    const draw = this.field.getContext("2d"), image = draw.createImageData(this.across, this.deep);
-    const [plus, minus] = [channels(colours().plus), channels(colours().minus)];
+  /** Paint the curl as an image of one pixel for each grid point: colour by sign, opacity by magnitude. */
+  paintCurl() {
+    Object.assign(this.curlImage, { width: this.columns, height: this.rows });
+    const context = this.curlImage.getContext("2d"), image = context.createImageData(this.columns, this.rows);
+    const [positive, negative] = [toRgb(colours().plus), toRgb(colours().minus)], { hasCurl } = this;
     this.curl.forEach((curl, k) => {
-      const row = this.deep - 1 - Math.floor(k / this.across), at = 4 * (row * this.across + k % this.across);
-      const share = this.most > 1e-6 * this.strongest ? Math.min(1, 2 * Math.abs(curl) / this.most) : 0;
-      image.data.set([...(curl > 0 ? plus : minus), 215 * share], at);
+      const row = this.rows - 1 - Math.floor(k / this.columns), offset = 4 * (row * this.columns + k % this.columns);
+      const opacity = hasCurl ? Math.min(1, 2 * Math.abs(curl) / this.maxCurl) : 0;
+      image.data.set([...(curl > 0 ? positive : negative), 215 * opacity], offset);
     });
-    draw.putImageData(image, 0, 0);
+    context.putImageData(image, 0, 0);
   }
 
-  drawScale(draw, width, height, span) {
+  drawScaleBar(context, width, height, span) {
     const step = roundStep(span, 6), length = step / span * width;
-    draw.strokeStyle = draw.fillStyle = colours().ink;
-    draw.lineWidth = 2;
-    draw.beginPath();
-    draw.moveTo(12, height - 12); draw.lineTo(12 + length, height - 12);
-    draw.stroke();
-    draw.font = "12px system-ui, sans-serif";
-    draw.fillText(quantity(step, "m"), 14, height - 18);
+    context.strokeStyle = context.fillStyle = colours().ink;
+    context.lineWidth = 2;
+    context.beginPath();
+    context.moveTo(12, height - 12); context.lineTo(12 + length, height - 12);
+    context.stroke();
+    context.font = "12px system-ui, sans-serif";
+    context.fillText(formatQuantity(step, "m"), 14, height - 18);
   }
 }
 
