@@ -63,6 +63,16 @@ def test_all_is_done_by_keyboard(page: Browser) -> None:
 
 
 @needs_browser
+def test_a_parameter_of_a_law_has_a_tooltip(page: Browser) -> None:
+    page.press("h")
+    page.until("lab.status.settings.law == 'H' && lab.status.state == 'running'")
+    tooltip = page.ask("document.getElementById('continuity').title")
+    assert tooltip.startswith("parameter c of law H")
+    page.press("a")
+    page.until("lab.status.settings.law == 'A' && lab.status.state == 'running'")
+
+
+@needs_browser
 def test_law_a_feeds_the_hand_and_the_ledger_says_so(page: Browser) -> None:
     page.ask(
         "Object.assign(lab.hand, { pressDepth: 2e-4, loopRadius: 5e-4, x: 0 }).requestMotion()"

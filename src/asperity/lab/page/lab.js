@@ -191,9 +191,9 @@ function showLawParameters(settings) {
   const { parameters } = laws.find(law => law.letter === settings.law);
   if ($("parameters").dataset.law !== settings.law) {
     $("parameters").dataset.law = settings.law;
-    $("parameters").replaceChildren(...parameters.flatMap(({ name, words, unit }) => {
+    $("parameters").replaceChildren(...parameters.flatMap(({ name, description, unit }) => {
       const label = Object.assign(document.createElement("label"), { htmlFor: name, textContent: `${name.replaceAll("_", " ")}${unit && ` [${unit}]`}` });
-      const field = Object.assign(document.createElement("input"), { id: name, type: "number", step: "any", title: words });
+      const field = Object.assign(document.createElement("input"), { id: name, type: "number", step: "any", title: description });
       field.onchange = () => changeScene({ [name]: Number(field.value) });
       return [label, field];
     }));
