@@ -1,4 +1,4 @@
-"""One law on one surface and one device."""
+"""Results of analyze() for one law on one surface and one device."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Sinusoid
 
 AMPLITUDE, PERIOD, DEPTH, K = 0.3e-3, 1.1e-3, 0.37e-3, 730.0
-# Not symmetric about any axis that the code prefers.
+# Not symmetric about the origin.
 TEXTURE = Sinusoid(AMPLITUDE, PERIOD, phase=0.4)
 SLOPE = 2 * math.pi * AMPLITUDE / PERIOD
 HESSIAN = SLOPE * 2 * math.pi / PERIOD
@@ -42,8 +42,8 @@ def groove(rig: Device) -> Analysis:
     return analyze(surface("A"), rig)
 
 
-def test_numbers_are_the_closed_forms(groove: Analysis, rig: Device) -> None:
-    """MATH section 4: q, q⁺ and the curl of A; the greatest of slope and curvature for B."""
+def test_numbers_equal_the_closed_forms(groove: Analysis, rig: Device) -> None:
+    """MATH section 4: q, q⁺ and the curl of A; for B the maximum of slope and curvature terms."""
     expected = {
         "q": math.hypot(1.0, SLOPE),
         "one_sided": 0.5 * (1.0 + math.hypot(1.0, SLOPE)),
@@ -66,7 +66,7 @@ def test_curl_density_is_the_curl_times_the_stiffness(groove: Analysis) -> None:
 
 
 @pytest.mark.parametrize("law", ["A", "B", "C", "F", "G"])
-def test_the_witness_attains_lower(law: str, rig: Device) -> None:
+def test_witness_attains_the_lower_bound(law: str, rig: Device) -> None:
     bound = analyze(surface(law), rig).q
     state = ()
     if law == "F":
@@ -78,8 +78,8 @@ def test_the_witness_attains_lower(law: str, rig: Device) -> None:
     assert np.linalg.norm(jacobian, 2) / K == pytest.approx(bound.lower, rel=1e-12)
 
 
-def test_the_worst_loop_of_a_and_its_speed(groove: Analysis) -> None:
-    """W = k D 2A, down one flank and up the other; v* = W/(σ₀ length)."""
+def test_worst_loop_and_critical_speed_of_law_a(groove: Analysis) -> None:
+    """The energy is k D 2A and v* = W/(σ₀ length)."""
     energy = 2 * K * DEPTH * AMPLITUDE
     assert groove.leak.energy == pytest.approx(energy, rel=1e-3)
     assert groove.leak.energy <= energy <= groove.leak.upper_per_period
@@ -94,7 +94,7 @@ def test_the_worst_loop_of_a_and_its_speed(groove: Analysis) -> None:
     assert "is not passive: a loop gains" in groove.answer
 
 
-def test_a_conservative_law_has_no_leak_and_no_v_star(rig: Device) -> None:
+def test_conservative_law_has_zero_leak_and_v_star(rig: Device) -> None:
     result = analyze(surface("C"), rig)
     assert result.conservative
     assert result.curl is not None
@@ -115,7 +115,7 @@ def test_a_conservative_law_has_no_leak_and_no_v_star(rig: Device) -> None:
         ("D", PARTIAL, "undecided", "is passive is undecided"),
     ],
 )
-def test_the_answer_follows_the_verdict(
+def test_answer_states_the_verdict(
     law: str, device: dict[str, str], verdict: str, words: str
 ) -> None:
     result = analyze(surface(law), parse_device(device, "mine"))
@@ -127,7 +127,7 @@ def test_the_answer_follows_the_verdict(
     assert ("its force jumps" in result.answer) == (law == "D")
 
 
-def test_missing_data_are_listed_not_guessed() -> None:
+def test_missing_data_are_listed() -> None:
     result = analyze(surface("A"), parse_device(PARTIAL, "mine"))
     assert result.v_star is None
     assert result.to_dict()["v_star"] is None
@@ -138,7 +138,7 @@ def test_missing_data_are_listed_not_guessed() -> None:
     assert nothing.passivity.verdict == "undecided"
 
 
-def test_damping_of_zero_never_absorbs_the_loop() -> None:
+def test_zero_damping_gives_an_infinite_v_star() -> None:
     rig = parse_device(RIG, "mine")
     without = replace(rig, data={**rig.data, "damping": Datum(0.0, "N*s/m", "by hand", True)})
     result = analyze(surface("A"), without)
@@ -146,7 +146,7 @@ def test_damping_of_zero_never_absorbs_the_loop() -> None:
     assert result.to_dict()["v_star"] == "inf"
 
 
-def test_law_d_jumps_and_its_infinite_number_is_plain_text(rig: Device) -> None:
+def test_law_d_has_jumps_and_its_infinite_number_is_a_string_in_json(rig: Device) -> None:
     result = analyze(surface("D"), rig)
     assert result.q.lower == math.inf
     onset = np.array(result.q.at)
@@ -162,10 +162,10 @@ def test_law_d_jumps_and_its_infinite_number_is_plain_text(rig: Device) -> None:
     assert data["law_parameters"] == {}
 
 
-def test_the_loop_lies_in_the_given_plane(rig: Device) -> None:
+def test_worst_loop_lies_in_the_plane_of_the_direction_argument(rig: Device) -> None:
     across = analyze(surface("A"), rig, direction=(0.0, 2.0))
     assert across.leak.line.direction.tolist() == [0.0, 1.0]
-    # Along the grooves nothing changes: no loop there gains, though others do.
+    # Along the grooves the height is constant: no loop there gains energy, though others do.
     assert across.leak.energy < 1e-9 * K * DEPTH * AMPLITUDE
     assert across.passivity.verdict != "passive"
     assert any("along (0, 1)" in sentence for sentence in across.assumptions)
@@ -178,62 +178,62 @@ def _map() -> HeightMap:
     return HeightMap(heights, 5e-5)
 
 
-def test_tolerance_and_work_limit_reach_the_search(rig: Device) -> None:
+def test_tolerance_and_work_limit_are_passed_to_the_search(rig: Device) -> None:
     patch = Surface(_map(), "C", max_depth=1e-4)
     fine, coarse = analyze(patch, rig, tolerance=1e-5), analyze(patch, rig, tolerance=0.2)
     assert fine.q.gap <= 1e-5 < coarse.q.gap <= 0.2
     assert coarse.q.lower <= fine.q.upper
     assert fine.q.lower <= coarse.q.upper
-    stopped = analyze(patch, rig, work_limit=1)
-    assert "work limit" in stopped.q.note
-    assert stopped.q.lower <= fine.q.upper
-    assert fine.q.lower <= stopped.q.upper
+    truncated = analyze(patch, rig, work_limit=1)
+    assert "work limit" in truncated.q.note
+    assert truncated.q.lower <= fine.q.upper
+    assert fine.q.lower <= truncated.q.upper
     assert "work limit" not in fine.q.note
 
 
-def test_extent_narrows_the_bounds_of_a_sum_of_many_waves(rig: Device) -> None:
+def test_extent_tightens_the_bounds_of_a_sum_of_many_waves(rig: Device) -> None:
     vectors = [[9e3, 0], [0, 9e3 / 2**0.5], [9e3 / 3**0.5, 4e3], [-9e3 / 5**0.5, 9e3 / 7**0.5]]
     waves = Fourier([1e-5] * 5, [*vectors, [3e3, -9e3 / 11**0.5]])
     patch = Surface(waves, "A")
     everywhere = analyze(patch, rig)
     assert everywhere.q.gap > 2e-3
     assert "need an extent" in everywhere.q.note
-    closed = analyze(patch, rig, extent=(1e-3, 1e-3), tolerance=1e-3)
-    assert closed.q.method == "certified"
-    assert closed.q.gap <= 1e-3
-    assert closed.q.lower <= everywhere.q.upper
-    assert "1 mm x 1 mm from the origin" in " ".join(closed.assumptions)
+    bounded = analyze(patch, rig, extent=(1e-3, 1e-3), tolerance=1e-3)
+    assert bounded.q.method == "certified"
+    assert bounded.q.gap <= 1e-3
+    assert bounded.q.lower <= everywhere.q.upper
+    assert "1 mm x 1 mm from the origin" in " ".join(bounded.assumptions)
 
 
-def test_a_sampled_number_is_reported_as_unproved(rig: Device) -> None:
-    """A law of one's own below the medial axis; law D itself, at half that depth, is proved."""
-    mine = replace(find_law("D"), letter="Z", name="mine")
-    sampled = analyze(Surface(TEXTURE, mine, K, DEPTH), rig, tolerance=0.2)
+def test_sampled_number_is_reported_as_unproved(rig: Device) -> None:
+    """A user-defined law is sampled below the medial axis and certified at half that depth."""
+    user_law = replace(find_law("D"), letter="Z", name="mine")
+    sampled = analyze(Surface(TEXTURE, user_law, K, DEPTH), rig, tolerance=0.2)
     assert sampled.q.upper == math.inf
     assert math.isfinite(sampled.q.lower)
     assert any("not a proof" in sentence for sentence in sampled.assumptions)
-    proved = analyze(Surface(TEXTURE, mine, K, 0.5 / HESSIAN), rig, tolerance=0.2)
+    proved = analyze(Surface(TEXTURE, user_law, K, 0.5 / HESSIAN), rig, tolerance=0.2)
     assert not any("not a proof" in sentence for sentence in proved.assumptions)
 
 
-def test_progress_names_every_step_in_order(rig: Device) -> None:
+def test_progress_reports_every_step_in_order(rig: Device) -> None:
     seen: list[str] = []
     analyze(surface("W"), rig, progress=seen.append)
     assert tuple(seen) == STEPS
 
 
-def test_only_used_defaults_are_stated(rig: Device) -> None:
-    given = analyze(surface("F", friction=0.3), rig).assumptions
-    assert not any("stiffness" in s or "max depth" in s for s in given if "Default" in s)
-    assert "Default friction 0.8" not in given
-    assert "Default modulation depth 0.8" in given
-    taken = analyze(Surface(TEXTURE, "F"), rig).assumptions
-    assert "Default stiffness 1000 N/m" in taken
-    assert "Default friction 0.8" in taken
-    assert any(sentence.startswith("Default max depth 600 µm") for sentence in taken)
+def test_assumptions_state_only_the_defaults_in_use(rig: Device) -> None:
+    explicit = analyze(surface("F", friction=0.3), rig).assumptions
+    assert not any("stiffness" in s or "max depth" in s for s in explicit if "Default" in s)
+    assert "Default friction 0.8" not in explicit
+    assert "Default modulation depth 0.8" in explicit
+    defaults = analyze(Surface(TEXTURE, "F"), rig).assumptions
+    assert "Default stiffness 1000 N/m" in defaults
+    assert "Default friction 0.8" in defaults
+    assert any(sentence.startswith("Default max depth 600 µm") for sentence in defaults)
 
 
-def test_unverified_data_and_notes_of_the_device_are_stated() -> None:
+def test_assumptions_state_unverified_data_and_device_notes() -> None:
     assumptions = " ".join(analyze(surface("W"), "pantograph").assumptions)
     assert "Not verified for the Pantograph Mk-II (the paper's): damping 1.16 N·s/m" in assumptions
     assert "brakes act inside the virtual body" in assumptions
@@ -253,20 +253,20 @@ def test_unverified_data_and_notes_of_the_device_are_stated() -> None:
         ({"extent": (1e-3, -1e-3)}, "extent"),
     ],
 )
-def test_bad_arguments_are_named(arguments: dict[str, object], name: str) -> None:
+def test_error_messages_name_the_invalid_argument(arguments: dict[str, object], name: str) -> None:
     values = {"surface": surface("A"), "device": "omega.3", **arguments}
     with pytest.raises(ParameterError, match=name):
-        analyze(**values)  # wrong on purpose
+        analyze(**values)  # deliberately invalid
 
 
-def test_a_wrong_device_file_is_named(tmp_path: Path) -> None:
+def test_invalid_device_file_raises_naming_the_field(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     path.write_text('damping = "2 N/m"\n')
     with pytest.raises(ParameterError, match="damping"):
         analyze(surface("A"), path)
 
 
-def test_the_notebook_table_escapes_names(rig: Device) -> None:
+def test_notebook_table_escapes_html(rig: Device) -> None:
     hostile = "<script>alert(1)</script>"
     device = parse_device({**RIG, "name": hostile}, "mine")
     text = analyze(surface("A"), device)._repr_html_()
@@ -275,7 +275,7 @@ def test_the_notebook_table_escapes_names(rig: Device) -> None:
     assert text.count("<tr") == 2 + 4 + len(analyze(surface("A"), rig).passivity.criteria)
 
 
-def test_a_finite_surface_is_not_pressed_deeper_than_it_is_wide() -> None:
+def test_max_depth_above_the_width_of_a_finite_surface_raises() -> None:
     heights = 1e-5 * np.random.default_rng(2).normal(size=(8, 9))
     shallow = asp.Surface(asp.HeightMap(heights, 1e-5), "A", max_depth=6e-5)
     assert analyze(shallow).q.method == "certified"
@@ -286,7 +286,7 @@ def test_a_finite_surface_is_not_pressed_deeper_than_it_is_wide() -> None:
     assert analyze(endless).q.method == "certified"
 
 
-def test_the_default_depth_of_a_tiny_map_is_answered_and_named() -> None:
+def test_default_depth_above_the_width_is_stated_as_an_assumption() -> None:
     flat = asp.Surface(asp.HeightMap(np.full((8, 8), 1e-3), 1e-5), "A")
     assert flat.max_depth == 1e-3  # 1 mm below a surface of 70 um
     sentence = "Below 70 µm, the surface's width, only its mirror images are in contact"

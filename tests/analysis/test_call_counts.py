@@ -1,4 +1,4 @@
-"""The number of functions of the package that one call of the analysis enters."""
+"""The number of package functions that one analysis call enters."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ def entered_functions(call: Callable[[], Any]) -> set[tuple[str, str]]:
 
 
 @pytest.mark.parametrize("law", ["W", "A", "B", "E", "G"])
-def test_a_number_in_closed_form_enters_few_functions(law: str) -> None:
+def test_closed_form_number_enters_few_functions(law: str) -> None:
     texture = Sinusoid(amplitude=0.8e-3, period=1e-3)
-    characteristic_number(Surface(texture, law))  # compiled before it is counted
+    characteristic_number(Surface(texture, law))  # compile before counting
     surface = Surface(Sinusoid(amplitude=0.7e-3, period=1e-3), law)
     entered = entered_functions(lambda: characteristic_number(surface))
     assert 10 < len(entered) <= 40, sorted(entered)

@@ -1,4 +1,4 @@
-"""The main job: rows, rules, recommendation, words and plain data."""
+"""compare(): rows, limits, verdicts, recommendation and plain data."""
 
 from __future__ import annotations
 
@@ -22,14 +22,12 @@ def result() -> asp.Comparison:
     return asp.compare(PAPER, device="omega.3")
 
 
-def test_one_row_per_law_in_order(result: asp.Comparison) -> None:
+def test_rows_are_one_per_law_in_order(result: asp.Comparison) -> None:
     assert "".join(row.law.letter for row in result.rows) == "WABCDEFGH"
 
 
-def test_without_a_known_delay_every_law_is_allowed_its_gain_s_share(
-    result: asp.Comparison,
-) -> None:
-    """K₀/q for every law, since q⁺ is no limit of a loop with delay; for D pressed deep, none."""
+def test_safe_stiffness_without_known_delay_is_k0_over_q(result: asp.Comparison) -> None:
+    """Every law has K₀/q, since q⁺ does not limit a loop with delay; D at large depth has zero."""
     for row in result.rows:
         assert row.safe_stiffness == pytest.approx(5000.0 / row.q.value, rel=1e-15)
         basis = "plausible" if row.conservative else "quiet against buzz"
@@ -37,13 +35,15 @@ def test_without_a_known_delay_every_law_is_allowed_its_gain_s_share(
     assert result.row("D").safe_stiffness == 0.0
 
 
-def test_the_paper_s_table_ii(result: asp.Comparison) -> None:
+def test_conservative_and_discontinuous_laws_match_table_ii_of_the_paper(
+    result: asp.Comparison,
+) -> None:
     conservative = "".join(row.law.letter for row in result.rows if row.conservative)
     jumps = "".join(row.law.letter for row in result.rows if not row.continuous)
-    assert (conservative, jumps) == ("WCDH", "D")  # H is not the paper's
+    assert (conservative, jumps) == ("WCDH", "D")  # law H is not in the paper
 
 
-def test_texture_force_is_the_ripple_at_the_start(result: asp.Comparison) -> None:
+def test_texture_force_is_the_ripple_at_the_recommended_stiffness(result: asp.Comparison) -> None:
     row = result.row("A")
     surface = asp.Surface(PAPER, "A", stiffness=row.recommended_stiffness)
     x = (np.arange(5000) + 0.5) / 5000 * 1e-3
@@ -60,10 +60,10 @@ def test_leak_scales_with_the_stiffness(result: asp.Comparison) -> None:
     assert doubled.row("A").safe_stiffness == result.row("A").safe_stiffness
 
 
-def test_verdicts_name_the_artefacts(result: asp.Comparison) -> None:
-    request = asp.compare(PAPER, laws="A", stiffness=1000.0)
-    assert "may buzz at 1000 N/m" in request.row("A").verdict
-    assert "buzz at" not in result.row("A").verdict  # each law at its own stiffness
+def test_verdicts_describe_the_artefacts(result: asp.Comparison) -> None:
+    stiff = asp.compare(PAPER, laws="A", stiffness=1000.0)
+    assert "may buzz at 1000 N/m" in stiff.row("A").verdict
+    assert "buzz at" not in result.row("A").verdict  # each law at its recommended stiffness
     assert "feels alive" in result.row("E").verdict
     assert "clicks" in result.row("D").verdict
     assert result.row("W").verdict == "plausible up to 5000 N/m, with any delay; no texture"
@@ -73,7 +73,7 @@ def test_verdicts_name_the_artefacts(result: asp.Comparison) -> None:
     )
 
 
-def test_recommends_a_sound_law_that_can_be_felt(result: asp.Comparison) -> None:
+def test_recommends_a_sound_law_that_is_felt(result: asp.Comparison) -> None:
     assert result.recommended == "H"
     assert "gives net energy, and its force does not jump" in result.recommendation
     for part in ("felt, ", "The stiffest wall known to be stable on this device is 5000 N/m.",
@@ -82,37 +82,37 @@ def test_recommends_a_sound_law_that_can_be_felt(result: asp.Comparison) -> None
     assert asp.compare(PAPER, laws="WABCDEFG").recommended == "C"
 
 
-def test_recommends_the_least_leak_where_no_sound_law_can_be_felt() -> None:
+def test_recommends_the_smallest_leak_if_no_sound_law_is_felt() -> None:
     steep = asp.Sinusoid(amplitude=2e-3, period=0.5e-3)
     rig = parse_device({"max_stiffness": "400 N/m"}, "mine")
-    found = asp.compare(steep, device=rig, laws="WABCDEFG")
-    weak = found.row("C")
+    result = asp.compare(steep, device=rig, laws="WABCDEFG")
+    weak = result.row("C")
     assert weak.tier == "not felt"  # the premise
-    assert found.recommended != "C"
-    assert "which is not felt" in found.recommendation
-    chosen = found.row(found.recommended)
+    assert result.recommended != "C"
+    assert "which is not felt" in result.recommendation
+    chosen = result.row(result.recommended)
     assert chosen.tier != "not felt"
     assert chosen.continuous
     assert not chosen.conservative
 
 
-def test_nothing_to_recommend_without_texture() -> None:
+def test_no_recommendation_without_a_textured_law() -> None:
     assert asp.compare(PAPER, laws="W").recommended == ""
 
 
-def test_every_default_is_named(result: asp.Comparison) -> None:
+def test_assumptions_state_every_default(result: asp.Comparison) -> None:
     text = " ".join(result.assumptions)
     for part in ("scanning speed 0.1 m/s", "max depth 1 mm", "friction 0.8", "max deflection 1 mm",
                  "modulation depth 0.8", "K₀ = 5000", "update rate"):  # fmt: skip
         assert part in text
-    given = asp.compare(PAPER, laws="F", stiffness=500.0, max_depth=1e-4, friction=0.5)
-    text = " ".join(given.assumptions)
+    explicit = asp.compare(PAPER, laws="F", stiffness=500.0, max_depth=1e-4, friction=0.5)
+    text = " ".join(explicit.assumptions)
     assert "Default max depth" not in text
     assert "Default friction" not in text
     assert "Default modulation depth" in text
 
 
-def test_plain_data_is_json_without_nan(result: asp.Comparison) -> None:
+def test_to_dict_is_json_without_nan(result: asp.Comparison) -> None:
     text = json.dumps(result.to_dict(), allow_nan=False)
     data = json.loads(text)
     assert data["schema"] == 2
@@ -122,17 +122,17 @@ def test_plain_data_is_json_without_nan(result: asp.Comparison) -> None:
     assert data["laws"][1]["q"]["value"] == pytest.approx(5.125054855, abs=1e-8)
 
 
-def test_a_user_defined_law_gets_a_row() -> None:
-    own = Law(
+def test_user_defined_law_has_a_row() -> None:
+    stiffening = Law(
         "S", "stiffening", "vertical",
         lambda c: c.k * c.depth**3 / c.parameter("reference") ** 2 * c.w,
         parameters={"reference": 0.3e-3},
     )  # fmt: skip
     gentle = asp.Sinusoid(amplitude=0.1e-3, period=2e-3)
-    row = asp.compare(gentle, laws=["C", own], max_depth=0.3e-3).row("S")
+    row = asp.compare(gentle, laws=["C", stiffening], max_depth=0.3e-3).row("S")
     assert row.conservative
     assert row.q.method == "certified"
-    # ‖J‖ at full depth by hand: on a grid of phases.
+    # ‖J‖ at full depth by hand on a grid of phases.
     x = np.linspace(0, 2e-3, 4001)
     d = gentle.derivatives(np.column_stack([x, 0 * x]))
     depth = 0.3e-3
@@ -148,8 +148,8 @@ def test_measured_profile_and_map_have_finite_rows() -> None:
         asp.Profile(1e-5 * rng.normal(size=40), 1e-4),
         asp.HeightMap(1e-5 * rng.normal(size=(12, 15)), 1e-4),
     ):
-        found = asp.compare(texture, laws="ABCEG", max_depth=2e-5)
-        for row in found.rows:
+        result = asp.compare(texture, laws="ABCEG", max_depth=2e-5)
+        for row in result.rows:
             assert math.isfinite(row.q.value)
             assert row.q.value >= 1.0 - 1e-12
             assert row.leak.energy >= 0.0
@@ -178,12 +178,12 @@ def test_limits_are_rounded_down(stiffness: float, text: str) -> None:
         ({"max_deflection": math.inf}, "max_deflection"),
     ],
 )
-def test_bad_arguments_are_named(arguments: dict[str, object], name: str) -> None:
+def test_error_names_the_invalid_argument(arguments: dict[str, object], name: str) -> None:
     with pytest.raises(ParameterError) as caught:
         asp.compare(PAPER, **arguments)
     assert caught.value.argument == name
 
 
-def test_a_device_without_stiffness_is_refused() -> None:
+def test_device_without_max_stiffness_raises() -> None:
     with pytest.raises(ParameterError, match="max_stiffness"):
         asp.compare(PAPER, device=parse_device({"max_force": "3 N"}, "mine"))

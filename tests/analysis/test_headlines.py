@@ -1,9 +1,9 @@
-"""Headlines for surfaces on devices: which law, and is it felt? Each decided by a stated rule.
+"""Headlines for surfaces on devices: the recommended law and its perceptibility, by a fixed rule.
 
-The rule: of the force along a scan at constant height, by hand, the amplitude √2 RMS is held
-against the device's levels. Below 10 mN, the dry friction, or a step of force: nothing. From
-20 mN, twice the friction and five steps on: felt. Waves of fewer than five updates or position
-steps come distorted, and are borderline at best; of fewer than two nothing comes.
+The rule compares √2 times the RMS force along a scan at constant height, computed by hand,
+with the thresholds of the device. Below 10 mN, the dry friction or a force step: not felt. From
+20 mN, twice the friction and five force steps on: felt. Waves with fewer than five updates or
+position steps are distorted and at best borderline; with fewer than two they are not felt.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from asperity.textures import Sinusoid, load_texture
 DATA = Path(__file__).parents[3] / "shared" / "data"
 needs_data = pytest.mark.skipif(not DATA.is_dir(), reason=f"no sample surfaces in {DATA}")
 DEVICES = ("touch", "touch-x", "inverse3", "omega.3", "pantograph", "falcon", "premium-1.5")
-# Amplitude and period [mm]; then, device by device, the law that an expert would take, "-" if it
-# is not felt whatever the law, and "?" where it is borderline.
+# Amplitude and period [mm]; then, for each device, the law that an expert would select, "-" if
+# no law is felt, and "?" if it is borderline.
 SINUSOIDS = """
     0.001 0.1    -    -    -    -    -    -    -
     0.005 0.5    -    -    -    C    -    C?   -
@@ -64,7 +64,7 @@ def headline(result: Comparison) -> str:
 
 
 @pytest.mark.parametrize(("amplitude", "period", "name", "expected"), cases())
-def test_a_sinusoid(amplitude: float, period: float, name: str, expected: str) -> None:
+def test_headline_of_a_sinusoid(amplitude: float, period: float, name: str, expected: str) -> None:
     result = compare(Sinusoid(amplitude, period), name, "ACH")
     assert headline(result) == expected
     for row in result.rows:
@@ -72,17 +72,19 @@ def test_a_sinusoid(amplitude: float, period: float, name: str, expected: str) -
 
 
 @pytest.mark.parametrize(("spec", "name"), OTHERS)
-def test_a_surface_of_the_library(spec: str, name: str) -> None:
+def test_headline_of_a_library_surface(spec: str, name: str) -> None:
     result = compare(load_scene(spec).texture, name, "CH")
     assert headline(result) == OTHERS[spec, name]
 
 
-def test_a_law_not_felt_by_limits_is_never_recommended() -> None:
-    """Limits asks about the law that the comparison of all laws recommends."""
+def test_limits_have_the_tier_of_the_headline() -> None:
+    """limits() analyzes the law that the comparison of all laws recommends."""
     for amplitude, period, name, expected in cases()[::9]:
-        request = limits(Sinusoid(amplitude, period), name)
-        wanted = "not felt" if expected == "-" else "borderline" if "?" in expected else "felt"
-        assert request.perceptibility.tier == wanted
+        result = limits(Sinusoid(amplitude, period), name)
+        expected_tier = (
+            "not felt" if expected == "-" else "borderline" if "?" in expected else "felt"
+        )
+        assert result.perceptibility.tier == expected_tier
 
 
 def tier_by_hand(row: LawRow, device: Device, amplitude: float, period: float) -> str:
@@ -115,22 +117,24 @@ def _samples(device: Device, period: float, speed: float = 0.1) -> float:
     return min(counts)
 
 
-def test_the_table_has_at_least_sixty_cases() -> None:
+def test_headlines_cover_at_least_sixty_cases() -> None:
     assert len(cases()) + len(OTHERS) >= 60
     assert {load_device(name).id for name in DEVICES}
 
 
 REAL = [
-    ("sample-land.x3p", 1.0, "omega.3", "H?"),  # strong, but too fine for it at 0.1 m/s
+    ("sample-land.x3p", 1.0, "omega.3", "H?"),  # large force, but undersampled at 0.1 m/s
     ("sample-land.x3p", 20.0, "touch", "-"),
-    ("sample-land.x3p", 20.0, "inverse3", "H?"),  # its form is ten times its texture
+    ("sample-land.x3p", 20.0, "inverse3", "H?"),  # the form is ten times the texture
     ("dektak-1.csv", 20.0, "touch", "-"),
 ]
 
 
 @needs_data
 @pytest.mark.parametrize(("name", "magnify", "device", "expected"), REAL)
-def test_a_measured_surface(name: str, magnify: float, device: str, expected: str) -> None:
+def test_headline_of_a_measured_surface(
+    name: str, magnify: float, device: str, expected: str
+) -> None:
     result = compare(load_texture(DATA / name, magnify=magnify), device, "CH")
     assert headline(result) == expected
     row = result.recommended_row or result.nearest_row

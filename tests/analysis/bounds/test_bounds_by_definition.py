@@ -1,4 +1,4 @@
-"""Witnesses, samples and the parts of the search for bounds, each against its definition."""
+"""Witnesses, samples and the components of the bound search, each compared with its definition."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ DEPTH = 0.5e-3
 
 @pytest.mark.parametrize("far", [0.0, 400.0])
 @pytest.mark.parametrize("letter", ["A", "D", "F"])
-def test_a_witness_is_strictly_inside(letter: str, far: float) -> None:
-    """1e-9 of the greatest depth, or 1e-14 of the coordinates where that is more."""
+def test_witness_lies_strictly_inside_the_depth_range(letter: str, far: float) -> None:
+    """The margin is 1e-9 of the maximum depth, or 1e-14 of the coordinates where that is larger."""
     surface = Surface(WAVE, letter, max_depth=DEPTH)
     xy = XY + far
     derivatives = WAVE.derivatives(xy[None])
@@ -46,24 +46,24 @@ def test_a_witness_is_strictly_inside(letter: str, far: float) -> None:
         np.testing.assert_array_equal(witnesses.probe_position(surface, xy, depth), expected)
 
 
-def test_a_witness_stays_above_a_clamp() -> None:
+def test_witness_stays_above_the_depth_clamp() -> None:
     for clamp, depth in (("none", DEPTH), ("whole", (1.0 - 1e-9) * DEPTH)):
         surface = Surface(WAVE, "A", max_depth=DEPTH, clamp=clamp)
         expected = float(WAVE.height(XY[None])[0]) - depth
         assert witnesses.probe_position(surface, XY, 1.0)[2] == pytest.approx(expected, rel=1e-14)
 
 
-def test_a_witness_is_the_surface_evaluated_there() -> None:
+def test_witness_value_is_the_jacobian_measure_at_its_position() -> None:
     surface = Surface(WAVE, "F", max_depth=DEPTH, max_deflection=0.3e-3, stiffness=350.0)
     held = np.array([0.1e-3, -0.25e-3])
     for sliding in (False, True):
-        found = witnesses.witness_in_contact(surface, NORM, XY, 0.4e-3, held, sliding=sliding)
-        matrix = surface.jacobian([found.at], held[None], [sliding])[0] / 350.0
-        assert found.at == (*XY, -0.4e-3)
-        assert found.deflection == tuple(held)
-        assert found.sliding == sliding
-        assert found.value == pytest.approx(np.linalg.norm(matrix, 2), rel=1e-14)
-        assert found.size == pytest.approx(np.linalg.norm(matrix), rel=1e-14)
+        witness = witnesses.witness_in_contact(surface, NORM, XY, 0.4e-3, held, sliding=sliding)
+        matrix = surface.jacobian([witness.at], held[None], [sliding])[0] / 350.0
+        assert witness.at == (*XY, -0.4e-3)
+        assert witness.deflection == tuple(held)
+        assert witness.sliding == sliding
+        assert witness.value == pytest.approx(np.linalg.norm(matrix, 2), rel=1e-14)
+        assert witness.size == pytest.approx(np.linalg.norm(matrix), rel=1e-14)
     plain = Surface(WAVE, "C", max_depth=DEPTH, stiffness=350.0, clamp="backed")
     for depth in (0.4e-3, 0.7e-3, 3e-3):
         seen = witnesses.witness_at_depth(plain, ONE_SIDED, XY, depth)
@@ -76,8 +76,8 @@ def test_a_witness_is_the_surface_evaluated_there() -> None:
 
 
 @pytest.mark.parametrize("letter", ["A", "D", "F"])
-def test_a_witness_exceeds_its_bound_by_rounding_only(letter: str) -> None:
-    """2⁸ units, times 2¹⁶ for differences of heights, and as much as coordinates move a depth."""
+def test_witness_may_exceed_its_bound_by_rounding_error_only(letter: str) -> None:
+    """The tolerance is 2⁸ round-off units, 2¹⁶ times that for heights, plus depth errors."""
     surface = Surface(WAVE, letter, max_depth=0.7e-3)
     at = (0.9, 2.5, 1e-3)
     height = abs(float(WAVE.height([at[:2]])[0]))
@@ -87,8 +87,8 @@ def test_a_witness_exceeds_its_bound_by_rounding_only(letter: str) -> None:
         allowed = 2.0**-44 * relative * max(norm, proved)
         for part in (-1.0, 0.0, 0.999):
             value = proved + part * allowed
-            found = witnesses.checked_upper_bound(surface, NORM, proved, Witness(value, norm, at))
-            assert found == max(value, proved)
+            result = witnesses.checked_upper_bound(surface, NORM, proved, Witness(value, norm, at))
+            assert result == max(value, proved)
         for value in (proved + 1.001 * allowed, math.nan):
             state = Witness(value, norm, at, (1e-3, 2e-3)) if letter == "F" else None
             wrong = state or Witness(value, norm, at)
@@ -100,17 +100,17 @@ def test_a_witness_exceeds_its_bound_by_rounding_only(letter: str) -> None:
             assert ("deflection (0.001, 0.002) m" in str(caught.value)) == (letter == "F")
 
 
-def test_a_theorem_s_number_is_attained_but_for_rounding() -> None:
+def test_number_of_a_theorem_is_attained_up_to_rounding() -> None:
     surface = Surface(WAVE, "A", max_depth=DEPTH)
     at = (*XY, 0.0)
     for value, lower in ((2.0 * (1.0 - 0.9e-13), 2.0), (2.0 * (1.0 - 1.2e-13), None), (1.0, None)):
-        found = witnesses.checked_lower_bound(surface, NORM, 2.0, Witness(value, 1.0, at))
-        assert found == (value if lower is None else lower)
+        result = witnesses.checked_lower_bound(surface, NORM, 2.0, Witness(value, 1.0, at))
+        assert result == (value if lower is None else lower)
     with pytest.raises(InternalError):
         witnesses.checked_lower_bound(surface, NORM, 2.0, Witness(2.1, 1.0, at))
 
 
-def test_a_theorem_shows_the_best_of_its_witnesses() -> None:
+def test_bound_from_theorem_reports_the_largest_witness() -> None:
     surface = Surface(WAVE, "B", max_depth=DEPTH)
     values = [
         witnesses.witness_in_contact(surface, NORM, XY, depth) for depth in (0.0, 0.2e-3, DEPTH)
@@ -126,7 +126,7 @@ def test_a_theorem_shows_the_best_of_its_witnesses() -> None:
 # --- parts of the search --------------------------------------------------------------------------
 
 
-def test_a_cell_is_looked_at_in_its_centre_and_corners() -> None:
+def test_cell_stencil_is_the_centre_and_the_corners() -> None:
     assert search._cell_stencil(1).tolist() == [[0.0], [-1.0], [1.0]]
     for d in (2, 3):
         star = search._cell_stencil(d)
@@ -135,15 +135,15 @@ def test_a_cell_is_looked_at_in_its_centre_and_corners() -> None:
         assert (np.abs(star[1:]) == 1.0).all()
 
 
-def test_cells_are_cut_into_equal_parts() -> None:
-    """In more than two where few are left: as long as there are at most 128."""
+def test_cells_are_subdivided_into_equal_parts() -> None:
+    """Few cells are divided into more than two parts per axis, up to 128 cells in total."""
     centres, half = np.array([[0.0, 10.0], [4.0, 30.0], [8.0, 50.0]]), np.array([0.5, 1.0])
     for chunk, pieces in ((16, 3), (32, 2), (1, 3), (10**6, 1)):
-        found = list(search._subdivide(centres, half, 4, chunk))
-        assert len(found) == pieces
+        result = list(search._subdivide(centres, half, 4, chunk))
+        assert len(result) == pieces
         ticks = np.array([-3.0, -1.0, 1.0, 3.0])
         expected = [[x + a, y + b] for x, y in centres for a in 0.5 * ticks for b in ticks]
-        np.testing.assert_array_equal(np.concatenate(found), expected)
+        np.testing.assert_array_equal(np.concatenate(result), expected)
     for d in (1, 2, 3, 4):
         for cells in (0, 1, 2, 3, 8, 9, 32, 33, 1000):
             parts = search._subdivision_count(cells, d)
@@ -152,7 +152,7 @@ def test_cells_are_cut_into_equal_parts() -> None:
             assert few * (2 * parts) ** d > 128
 
 
-def test_nan_is_never_the_greatest() -> None:
+def test_argmax_ignores_nan() -> None:
     assert search._argmax_ignoring_nan(np.array([1.0, math.nan, 3.0, 3.0, -math.inf])) == 2
     assert search._argmax_ignoring_nan(np.array([math.nan, -5.0])) == 1
 
@@ -169,7 +169,7 @@ class Line(Cells):
         return ((np.arange(count) + 0.5) / count)[:, None]
 
     def enclosures(self, *_arguments: Any) -> Any:
-        raise NotImplementedError  # no part of what is searched here
+        raise NotImplementedError  # not used by this search
 
     derivatives = to_plane = enclosures
 
@@ -178,7 +178,7 @@ class Line(Cells):
 
 
 class Peaks(Problem):
-    """As many peaks as there are heights, side by side; a bound that falls short by a share."""
+    """Adjacent peaks of these heights, with an upper bound too low by the fraction ``short``."""
 
     def __init__(self, heights: FloatArray, short: float = 0.0) -> None:
         self.cells, self._heights, self._short = Line(), np.asarray(heights), short
@@ -200,36 +200,36 @@ class Peaks(Problem):
 
 
 @pytest.mark.parametrize(("short", "noticed"), [(3e-9, False), (5e-9, True)])
-def test_how_far_rounding_may_put_a_value_above_its_bound(short: float, noticed: bool) -> None:
-    """2²⁴ units of the round-off: 3.7e-9."""
+def test_values_above_a_bound_by_more_than_rounding_raise(short: float, noticed: bool) -> None:
+    """The tolerance is 2²⁴ round-off units, 3.7e-9."""
     problem = Peaks(np.array([1.0]), short)
     if noticed:
         with pytest.raises(InternalError, match="1 is attained, above the proved bound 1"):
             search.supremum(problem, 1e-12, 100)
     else:
-        found = search.supremum(problem, 1e-12, 100)
-        assert found.lower == found.upper == pytest.approx(1.0, abs=1e-15)
+        result = search.supremum(problem, 1e-12, 100)
+        assert result.lower == result.upper == pytest.approx(1.0, abs=1e-15)
 
 
-def test_without_bounds_the_best_samples_are_climbed_from(monkeypatch: pytest.MonkeyPatch) -> None:
-    """65 536 samples, of which the twelve best are climbed from; nothing is proved."""
-    heights, tops = np.linspace(1.0, 2.0, 500), []
+def test_sampled_supremum_climbs_from_the_best_samples(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of 65 536 samples the twelve largest start a local search; the upper bound is infinite."""
+    heights, start_values = np.linspace(1.0, 2.0, 500), []
 
-    def climbed(*given: Any) -> Any:
-        tops.append(given[3])
-        return search.polish(*given)
+    def recorded_polish(*arguments: Any) -> Any:
+        start_values.append(arguments[3])
+        return search.polish(*arguments)
 
-    monkeypatch.setattr(sampling, "polish", climbed)
+    monkeypatch.setattr(sampling, "polish", recorded_polish)
     problem = Peaks(heights)
-    found = sample_supremum(problem)
-    assert len(tops) == 12
-    assert tops == sorted(Peaks(heights).values(Line().sample_coordinates(65_536)))[:-13:-1]
-    assert (found.cell_count, found.upper, found.converged) == (65_536, math.inf, False)
+    result = sample_supremum(problem)
+    assert len(start_values) == 12
+    assert start_values == sorted(Peaks(heights).values(Line().sample_coordinates(65_536)))[:-13:-1]
+    assert (result.cell_count, result.upper, result.converged) == (65_536, math.inf, False)
     assert sum(len(points) for points in problem.requests[:16]) == 65_536
-    assert found.lower == pytest.approx(2.0, rel=1e-12)
-    assert found.at is not None
-    assert problem.values(found.at[None])[0] == found.lower
-    assert found.at[0] == pytest.approx((499 + 0.37) / 500, abs=1e-9)
+    assert result.lower == pytest.approx(2.0, rel=1e-12)
+    assert result.at is not None
+    assert problem.values(result.at[None])[0] == result.lower
+    assert result.at[0] == pytest.approx((499 + 0.37) / 500, abs=1e-9)
     low = Peaks(heights)
     low.floor = 2.5
     nothing = sample_supremum(low)
@@ -237,26 +237,29 @@ def test_without_bounds_the_best_samples_are_climbed_from(monkeypatch: pytest.Mo
 
 
 @pytest.mark.parametrize("rises", [(), (0.0625,), (1.0, 0.25), (1.0,) * 60])
-def test_steps_of_a_climb(rises: tuple[float, ...]) -> None:
-    """From two half-widths on; a step that helped is tried twice as far, else a 512th of it.
+def test_step_sizes_of_local_search(rises: tuple[float, ...]) -> None:
+    """The first step is two half-widths; it doubles after success and is divided by 512 otherwise.
 
-    Five sizes at once, each a quarter of the one before; until 1e-10, or fifty times.
+    Each iteration tests five sizes, each a quarter of the previous one; the search ends at 1e-10
+    or after fifty iterations.
     """
-    problem, half, request = Peaks(np.array([1.0])), 0.01, []
+    problem, half, step_sizes = Peaks(np.array([1.0])), 0.01, []
 
     def values(points: FloatArray) -> FloatArray:
-        # Symmetric about where the climb has come to.
+        # Symmetric about the current point.
         away = np.abs(points[:, 0] - points[:, 0].mean())
         sizes = np.unique(np.round(away / away.max(), 6))
         np.testing.assert_allclose(sizes, 4.0 ** np.arange(-4.0, 1.0), rtol=1e-3)
-        request.append(away.max() / half)
-        found = np.zeros(len(points))
-        if len(request) <= len(rises):
-            found[np.argmin(np.abs(away / away.max() - rises[len(request) - 1]))] = len(request)
-        return found
+        step_sizes.append(away.max() / half)
+        result = np.zeros(len(points))
+        if len(step_sizes) <= len(rises):
+            result[np.argmin(np.abs(away / away.max() - rises[len(step_sizes) - 1]))] = len(
+                step_sizes
+            )
+        return result
 
     problem.values = values  # type: ignore[method-assign]  # records the evaluated points
-    problem.cells.clip_to_region = lambda points: points  # type: ignore[method-assign]  # nothing is cut
+    problem.cells.clip_to_region = lambda points: points  # type: ignore[method-assign]  # no clipping
     expected, step = [], 2.0
     for rise in rises[:50]:
         expected.append(step)
@@ -266,10 +269,10 @@ def test_steps_of_a_climb(rises: tuple[float, ...]) -> None:
         step /= 512.0
     best, _at = search.polish(problem, np.array([0.0]), np.array([half]), 0.0)
     assert best == float(min(len(rises), 50))
-    np.testing.assert_allclose(request, expected, rtol=1e-6)
+    np.testing.assert_allclose(step_sizes, expected, rtol=1e-6)
 
 
-def test_the_highest_point_is_higher_than_all_around() -> None:
+def test_highest_point_attains_the_maximum_height() -> None:
     for texture in (WAVE, WAVES):
         at = highest_point(texture)
         assert float(texture.height(at[None])[0]) == pytest.approx(texture.extremes[1], rel=1e-9)
@@ -288,32 +291,32 @@ def no_limit(surface: Surface) -> dense.DepthLimit:
      ("C", spectral_norm, forms.q_c), ("G", spectral_norm, forms.q_g),
      ("A", one_sided, forms.one_sided_a), ("C", one_sided, forms.q_c)],
 )  # fmt: skip
-def test_dense_samples_attain_the_closed_forms(letter: str, measure: Any, form: Any) -> None:
+def test_dense_maximum_equals_the_closed_forms(letter: str, measure: Any, form: Any) -> None:
     surface = Surface(WAVE, letter, max_depth=0.3e-3)
-    found = dense.dense_maximum(surface, measure, no_limit(surface))
+    result = dense.dense_maximum(surface, measure, no_limit(surface))
     wave = WAVE.single_wave
     assert wave is not None
-    assert found.value == pytest.approx(form(wave, 0.3e-3), rel=1e-12)
-    probe = witnesses.probe_position(surface, np.array(found.xy), found.depth)
+    assert result.value == pytest.approx(form(wave, 0.3e-3), rel=1e-12)
+    probe = witnesses.probe_position(surface, np.array(result.xy), result.depth)
     matrix = surface.jacobian([probe])[0] / surface.stiffness
     exact = (NORM if measure is spectral_norm else ONE_SIDED).accurate(matrix[None])[0]
-    assert exact == pytest.approx(found.value, rel=1e-6)
+    assert exact == pytest.approx(result.value, rel=1e-6)
 
 
-def test_dense_samples_keep_to_the_depth_that_is_allowed() -> None:
-    """Law D, whose number grows with the depth; a limit below zero is none."""
+def test_dense_maximum_respects_the_depth_limit() -> None:
+    """The number of law D grows with the depth; a negative limit leaves depth 0."""
     surface = Surface(WAVE, "D", max_depth=DEPTH)
     radius = WAVE.period**2 / (4.0 * math.pi**2 * WAVE.amplitude)
     for share in (0.6, 0.8):
-        found = dense.dense_maximum(
+        result = dense.dense_maximum(
             surface, spectral_norm, lambda d, share=share: np.full(len(d), share * radius)
         )
-        assert found.value == pytest.approx(share / (1.0 - share), rel=1e-9)
-        assert found.depth == pytest.approx(share * radius, rel=1e-9)
+        assert result.value == pytest.approx(share / (1.0 - share), rel=1e-9)
+        assert result.depth == pytest.approx(share * radius, rel=1e-9)
     assert dense.dense_maximum(surface, spectral_norm, lambda d: np.full(len(d), -1.0)).depth == 0.0
 
 
-def test_samples_lie_in_the_middle_of_their_cells_or_on_the_nodes_to_both_ends() -> None:
+def test_samples_lie_at_cell_centres_or_on_grid_nodes() -> None:
     for texture in (WAVE, WAVES):
         points, spacing = dense.sample_fractions(texture)
         counts = texture.sample_counts()
@@ -328,36 +331,36 @@ def test_samples_lie_in_the_middle_of_their_cells_or_on_the_nodes_to_both_ends()
         assert points[0, 0] == 0.0
         assert points[-1, 0] == (last or pytest.approx(1.0 - spacing[0], rel=1e-12))
     plate = HeightMap(1e-4 * np.random.default_rng(2).normal(size=(7, 9)), (3e-4, 7e-4))
-    found = dense.dense_maximum(
+    result = dense.dense_maximum(
         Surface(plate, "A", max_depth=DEPTH), spectral_norm, lambda d: 0.0 * d[:, 0]
     )
-    slope = math.sqrt(found.value**2 - 1.0)
-    assert slope == pytest.approx(np.hypot(*plate.gradient([found.xy])[0]), rel=1e-9)
+    slope = math.sqrt(result.value**2 - 1.0)
+    assert slope == pytest.approx(np.hypot(*plate.gradient([result.xy])[0]), rel=1e-9)
 
 
-def test_neighbours_are_one_candidate() -> None:
-    """Of 256 blocks the best twelve, in rising order."""
+def test_each_block_of_samples_gives_one_candidate() -> None:
+    """The best twelve of 256 blocks are returned in ascending order."""
     values = np.zeros(2560)
     values[[5, 7, 400, 2559, 1300]] = [3.0, 4.0, 1.0, 5.0, 2.0]
-    found = dense._best_of_blocks(values)
-    assert len(found) == 12
-    assert found[-4:].tolist() == [400, 1300, 7, 2559]
+    result = dense._best_of_blocks(values)
+    assert len(result) == 12
+    assert result[-4:].tolist() == [400, 1300, 7, 2559]
     assert len(dense._best_of_blocks(np.arange(40.0))) == 12
     assert dense._best_of_blocks(np.arange(5.0)).tolist() == [0, 1, 2, 3, 4]
 
 
-def test_the_worst_deflection_is_against_the_slope() -> None:
+def test_worst_deflection_opposes_the_slope() -> None:
     surface = Surface(WAVE, "F", max_deflection=0.3e-3)
-    found = dense.worst_deflection(surface, np.array([[3.0, -4.0], [0.0, 0.0], [0.0, 1e-9]]))
+    deflection = dense.worst_deflection(surface, np.array([[3.0, -4.0], [0.0, 0.0], [0.0, 1e-9]]))
     expected = [[-0.18e-3, 0.24e-3], [-0.3e-3, 0.0], [0.0, -0.3e-3]]
-    np.testing.assert_allclose(found, expected, rtol=1e-12)
+    np.testing.assert_allclose(deflection, expected, rtol=1e-12)
 
 
 # --- contacts of a law ----------------------------------------------------------------------------
 
 
-def test_every_depth_and_state_of_a_law_is_looked_at() -> None:
-    """Both ends where J is affine in the depth, else every depth; an anchor sticks or slides."""
+def test_law_problem_covers_all_depths_and_anchor_states() -> None:
+    """Depths are both ends if J is affine in the depth, else all; anchors stick or slide."""
     for letter, ends, coordinates in (
         ("A", (0.0, DEPTH), 1),
         ("D", (None,), 2),
@@ -369,10 +372,10 @@ def test_every_depth_and_state_of_a_law_is_looked_at() -> None:
         problem = LawProblem(surface, cells, NORM)
         at = problem.cells.sample_coordinates(400)
         assert problem.cells.dimensions == coordinates
-        found = problem.contacts(at)
+        contacts = problem.contacts(at)
         slides = (False, True) if letter == "F" else (False,)
-        assert [one.sliding for one in found] == [s for s in slides for _ in ends]
-        for one, end in zip(found, [*ends] * len(slides), strict=True):
+        assert [one.sliding for one in contacts] == [s for s in slides for _ in ends]
+        for one, end in zip(contacts, [*ends] * len(slides), strict=True):
             if end is None:
                 assert 0.0 <= one.depth.min() < 0.05 * DEPTH
                 assert 0.95 * DEPTH < one.depth.max() <= DEPTH
@@ -386,11 +389,11 @@ def test_every_depth_and_state_of_a_law_is_looked_at() -> None:
         values = problem.values(at)
         xy = problem.cells.to_plane(at)
         best = np.zeros(len(at))
-        for one in found:
+        for one in contacts:
             inside = np.clip(one.depth, 1e-9 * DEPTH, (1.0 - 1e-9) * DEPTH)
             probes = surface.law.contact.probe_positions(xy, inside, WAVE.derivatives(xy))
             state = (one.deflection, np.full(len(at), one.sliding)) if letter == "F" else ()
             matrices = surface.jacobian(probes, *state) / surface.stiffness
             best = np.maximum(best, np.linalg.norm(matrices, 2, axis=(1, 2)))
-        if letter != "D":  # whose probes may be nearer to another point
+        if letter != "D":  # its probes may be nearer to another surface point
             np.testing.assert_allclose(values, best, rtol=1e-5)

@@ -1,4 +1,4 @@
-"""Branch and bound, what it is given to bound, and the problems of the laws."""
+"""Branch and bound, the bounded Jacobian measures, and the maximization problems of the laws."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ NUMBERS = [NORM, ONE_SIDED, CURL]
 EXACT = {"norm": precise_norm, "one-sided": precise_one_sided, "curl": curl_norm}
 
 
-def by_name(numbers: list[JacobianMeasure]) -> Any:
+def parametrize_measures(numbers: list[JacobianMeasure]) -> Any:
     return pytest.mark.parametrize("number", numbers, ids=lambda number: number.name)
 
 
@@ -55,7 +55,7 @@ def random_cells(
 
 
 def worst_of(number: JacobianMeasure, c: FloatArray, g: FloatArray, e: FloatArray) -> FloatArray:
-    """Return the greatest value at corners, the unknown part spent on what counts most."""
+    """Return the largest value at the corners, with the error ``e`` in its worst direction."""
     best = np.full(len(c), -np.inf)
     for corner in range(2 ** len(g)):
         signs = np.array([1.0 if corner >> axis & 1 else -1.0 for axis in range(len(g))])
@@ -80,10 +80,10 @@ def _pushes(number: JacobianMeasure, middle: FloatArray) -> Iterator[FloatArray]
     assert (values[:, -1] >= values[:, 0]).all()
 
 
-@by_name(NUMBERS)
+@parametrize_measures(NUMBERS)
 @pytest.mark.parametrize("d", [0, 1, 2, 3])
 @pytest.mark.parametrize("unknown", [0.0, 1e-6, 0.1])
-def test_bounds_hold_at_the_worst_of_a_cell(
+def test_upper_bounds_hold_at_the_worst_point_of_a_cell(
     number: JacobianMeasure, d: int, unknown: float
 ) -> None:
     rng = np.random.default_rng(d)
@@ -92,7 +92,7 @@ def test_bounds_hold_at_the_worst_of_a_cell(
     for above in (-np.inf, float(np.median(worst)), np.inf):
         bound = number.upper_bounds(c, g, e, above)
         assert (bound >= worst).all()
-        # Where it counts it is no more than the unknown part, and rounding, above the corners.
+        # Above the threshold it exceeds the corner values by the error and rounding only.
         close = bound > above
         corners = worst_of(number, c, g, 0.0 * e)
         size = np.linalg.norm(c, axis=(1, 2)) + np.linalg.norm(g, axis=(2, 3)).sum(axis=0)
@@ -100,8 +100,8 @@ def test_bounds_hold_at_the_worst_of_a_cell(
         assert (bound[close] <= most[close]).all()
 
 
-def test_the_curl_may_change_by_more_than_the_matrix() -> None:
-    """A change of 1 in two entries is √2 as a matrix and 2 as a curl."""
+def test_curl_bound_uses_a_lipschitz_constant_above_one() -> None:
+    """A change of 1 in two entries has matrix norm √2 and changes the curl by 2."""
     c, g, e = np.zeros((1, 3, 3)), np.zeros((0, 1, 3, 3)), np.zeros((1, 3, 3))
     c[0, 0, 1], c[0, 1, 0] = 3.0, -3.0
     e[0, 0, 1] = e[0, 1, 0] = 1.0
@@ -109,17 +109,17 @@ def test_the_curl_may_change_by_more_than_the_matrix() -> None:
     assert replace(CURL, lipschitz=1.0).upper_bounds(c, g, e, 0.0)[0] < 8.0 - 0.5
 
 
-@by_name(NUMBERS)
-def test_a_bound_tightened_by_little_fails(number: JacobianMeasure) -> None:
+@parametrize_measures(NUMBERS)
+def test_bounds_tightened_by_1e_6_are_exceeded(number: JacobianMeasure) -> None:
     c, g, e = random_cells(np.random.default_rng(4), 200, 2, 0.0)
     worst = worst_of(number, c, g, e)
     tight = number.upper_bounds(c, g, e, 0.0) * (1.0 - 1e-6)
     assert (tight < worst).mean() > 0.5
 
 
-@by_name([NORM, ONE_SIDED])
-def test_the_careful_way_decides_between_nearly_equal_eigenvalues(number: JacobianMeasure) -> None:
-    """diag(1, 1, 0) and near it: the closed form of an eigenvalue has half the digits there."""
+@parametrize_measures([NORM, ONE_SIDED])
+def test_accurate_bound_resolves_nearly_equal_eigenvalues(number: JacobianMeasure) -> None:
+    """Near diag(1, 1, 0) the closed form of an eigenvalue has only half of the digits."""
     rng = np.random.default_rng(3)
     base = -np.diag([1.0, 1.0, 0.0])
     c = base + 1e-9 * rng.normal(size=(300, 3, 3))
@@ -131,8 +131,8 @@ def test_the_careful_way_decides_between_nearly_equal_eigenvalues(number: Jacobi
     assert np.median(sure / exact - 1.0) < 1e-12
 
 
-@by_name(NUMBERS)
-def test_non_finite_values_are_not_bounded(number: JacobianMeasure) -> None:
+@parametrize_measures(NUMBERS)
+def test_non_finite_values_have_infinite_bounds(number: JacobianMeasure) -> None:
     c, g, e = random_cells(np.random.default_rng(4), 5, 1, 0.0)
     e[0, 1, 1] = np.inf
     c[1, 0, 0], g[0, 2, 0, 0], e[3, 0, 0] = np.nan, np.nan, np.nan
@@ -141,25 +141,25 @@ def test_non_finite_values_are_not_bounded(number: JacobianMeasure) -> None:
         huge = number.upper_bounds(c * 1e200, g * 1e200, 0.0 * c, 0.0)
     assert np.isposinf(bound[:4]).all()
     assert np.isfinite(bound[4])
-    assert np.isposinf(huge[[0, 4]]).all()  # its squares overflow
+    assert np.isposinf(huge[[0, 4]]).all()  # the squares overflow
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("number", [NORM, ONE_SIDED])
-def test_where_the_quick_way_does_not_decide_the_careful_bound_holds_too(
+def test_upper_bound_holds_just_above_and_below_the_threshold(
     number: JacobianMeasure, sign: float
 ) -> None:
-    """Minus the identity, known to 1e-8: at most 1 + 1e-8 is attained, and rounding is charged."""
+    """Minus the identity with error 1e-8: the bound includes the error and rounding."""
     c, g = -np.eye(3)[None], np.zeros((1, 1, 3, 3))
     for unknown in (0.0, 1e-8):
         e = unknown * np.eye(3)[None]
         reached = float(number.accurate(c - e)[0])
-        found = float(number.upper_bounds(c, g, e, threshold=1.0 + sign * 1e-9)[0])
-        assert reached + 0.9e-14 <= found <= 1.0 + 2.0 * unknown + 1e-13
+        result = float(number.upper_bounds(c, g, e, threshold=1.0 + sign * 1e-9)[0])
+        assert reached + 0.9e-14 <= result <= 1.0 + 2.0 * unknown + 1e-13
 
 
-def test_corners_that_overflow_leave_the_rough_bound() -> None:
-    """The middle of the cell does not overflow: its number is finite, theirs is not a number."""
+def test_cells_with_overflowing_corners_get_the_coarse_bound() -> None:
+    """The number at the centre of the cell is finite; at the corners it is NaN."""
     c = np.diag([2e51, 1e51, 1e51])[None]
     still, empty = np.zeros_like(c), np.zeros((0, 1, 3, 3))
     assert np.isfinite(NORM.upper_bounds(c, empty, still, 0.0)).all()
@@ -177,7 +177,7 @@ def test_accurate_measures_of_non_finite_matrices_are_nan() -> None:
 
 
 class Unit(Cells):
-    """The unit cube, in as many cells as one likes."""
+    """The unit cube, divided into ``count`` cells per axis."""
 
     default_gap = 1e-6
 
@@ -203,7 +203,7 @@ class Unit(Cells):
 
 
 class Hill(Problem):
-    """1 - |u - top|^p, with a bound from its greatest slope that may be spoilt."""
+    """1 - |u - top|^p, with a bound from its largest slope, reduced by the fraction ``spoil``."""
 
     def __init__(self, top: FloatArray, power: float = 2.0, spoil: float = 0.0) -> None:
         self.cells, self._top, self._power = Unit(len(top)), top, power
@@ -223,34 +223,34 @@ class Hill(Problem):
 
 @pytest.mark.parametrize("dimensions", [1, 2, 3])
 @pytest.mark.parametrize("power", [1.0, 2.0])
-def test_known_suprema_are_found_within_the_tolerance(dimensions: int, power: float) -> None:
+def test_supremum_is_within_the_tolerance_of_the_exact_value(dimensions: int, power: float) -> None:
     top = np.array([0.3141, 0.7, 0.123456])[:dimensions]
     for tolerance in (1e-1, 1e-2, 1e-3):
         problem = Hill(top, power)
-        found = supremum(problem, tolerance)
-        assert found.lower <= 1.0 <= found.upper
-        assert found.converged
-        assert found.upper <= found.lower * (1.0 + tolerance) * (1.0 + 1e-15)
-        assert found.cell_count == problem.evaluated
-        assert found.at is not None
-        assert problem.values(found.at[None])[0] == found.lower
+        result = supremum(problem, tolerance)
+        assert result.lower <= 1.0 <= result.upper
+        assert result.converged
+        assert result.upper <= result.lower * (1.0 + tolerance) * (1.0 + 1e-15)
+        assert result.cell_count == problem.evaluated
+        assert result.at is not None
+        assert problem.values(result.at[None])[0] == result.lower
         # An upper bound lowered by twice the gap is wrong.
-        assert found.upper - 2.0 * (found.upper - found.lower) < 1.0 or found.lower == 1.0
+        assert result.upper - 2.0 * (result.upper - result.lower) < 1.0 or result.lower == 1.0
 
 
-def test_a_top_at_the_border_is_found() -> None:
-    found = supremum(Hill(np.array([1.0, 0.0])), 1e-6)
-    assert found.lower == pytest.approx(1.0, abs=1e-15)
+def test_maximum_on_the_boundary_is_found() -> None:
+    result = supremum(Hill(np.array([1.0, 0.0])), 1e-6)
+    assert result.lower == pytest.approx(1.0, abs=1e-15)
 
 
-def test_polishing_ends_at_the_top() -> None:
+def test_polishing_converges_to_the_maximum() -> None:
     for power, near in ((2.0, 1e-16), (1.0, 1e-10)):
-        found = supremum(Hill(np.array([0.3141, 0.7]), power), 1e-2)
-        assert 1.0 - found.lower <= near
+        result = supremum(Hill(np.array([0.3141, 0.7]), power), 1e-2)
+        assert 1.0 - result.lower <= near
 
 
-def test_polishing_goes_on_with_smaller_steps() -> None:
-    """From far off its scale: the finest step, 1e-10 of the cell, is what is left of the way."""
+def test_polishing_reduces_its_step_size() -> None:
+    """Converges to 1e-8 from starts at large and small distances relative to the cell."""
     for top in ([0.3141, 0.7], [0.29997, 0.70003]):
         problem = Hill(np.array(top), 1.0)
         best, at = polish(problem, np.array([0.3, 0.7]), np.array([0.5, 0.5]), 0.0)
@@ -258,23 +258,23 @@ def test_polishing_goes_on_with_smaller_steps() -> None:
         np.testing.assert_allclose(at, top, atol=1e-8)
 
 
-def test_bounds_that_are_none_are_noticed() -> None:
-    """The negative control: with bounds of a tenth of the slope the supremum is above them."""
+def test_invalid_bounds_raise_an_internal_error() -> None:
+    """Negative control: bounds from 5 % of the slope lie below the supremum."""
     with pytest.raises(InternalError, match="above the proved bound"):
         supremum(Hill(np.array([0.3141, 0.7]), 1.0, spoil=0.95), 1e-9, 10_000)
 
 
 @pytest.mark.parametrize("limit", [1, 100, 1000])
-def test_bounds_at_the_work_limit_are_valid_and_noted(limit: int) -> None:
+def test_bounds_at_the_work_limit_are_valid_but_not_converged(limit: int) -> None:
     problem = Hill(np.array([0.3, 0.7, 0.1]), 1.0)
-    found = supremum(problem, 1e-9, limit)
-    assert not found.converged
-    assert found.lower <= 1.0 <= found.upper
-    assert found.cell_count <= max(limit, 64)
+    result = supremum(problem, 1e-9, limit)
+    assert not result.converged
+    assert result.lower <= 1.0 <= result.upper
+    assert result.cell_count <= max(limit, 64)
 
 
 class Unknown(Hill):
-    """A hill with a bound, or a value, that is no number in one half."""
+    """A hill with bounds and values that are NaN in one half."""
 
     def upper_bounds(self, centres: FloatArray, half: FloatArray, threshold: float) -> FloatArray:
         return np.where(centres[:, 0] > 0.5, np.nan, super().upper_bounds(centres, half, threshold))
@@ -283,14 +283,14 @@ class Unknown(Hill):
         return np.where(coordinates[:, 0] > 0.5, np.nan, super().values(coordinates))
 
 
-def test_a_cell_with_nan_is_not_pruned() -> None:
-    found = supremum(Unknown(np.array([0.3, 0.7])), 1e-3, 20_000)
-    assert found.upper == math.inf
-    assert not found.converged
-    assert found.lower == pytest.approx(1.0, abs=1e-9)
+def test_cells_with_nan_are_not_pruned() -> None:
+    result = supremum(Unknown(np.array([0.3, 0.7])), 1e-3, 20_000)
+    assert result.upper == math.inf
+    assert not result.converged
+    assert result.lower == pytest.approx(1.0, abs=1e-9)
 
 
-def test_nothing_above_the_floor_is_the_floor() -> None:
+def test_supremum_is_at_least_the_floor() -> None:
     problem = Hill(np.array([0.5]))
     problem.floor = 7.0
     assert supremum(problem, 1e-3) == Supremum(7.0, 7.0, None, 4, converged=True)
@@ -334,11 +334,11 @@ def test_no_value_in_a_cell_exceeds_its_bound(texture: Texture, level: int) -> N
             xi = rng.choice([-1.0, -0.4, 0.3, 1.0], centres.shape)
             best = np.maximum(best, problem.values(centres + fine * xi))
         assert (best <= bounds * (1.0 + 1e-14)).all()
-        if level == 8:  # and small cells leave little room
+        if level == 8:  # small cells have tight bounds
             assert np.median(bounds / np.maximum(best, problem.floor)) < 1.2
 
 
-def test_the_slope_is_the_length_of_the_gradient() -> None:
+def test_slope_problem_values_are_gradient_norms() -> None:
     cells = WAVES.cells()
     assert cells is not None
     at = cells.sample_coordinates(20)
@@ -348,7 +348,7 @@ def test_the_slope_is_the_length_of_the_gradient() -> None:
     assert math.hypot(1.0, whole) == pytest.approx(math.hypot(1.0, 2.0) * 1.001, rel=1e-14)
 
 
-def test_crests_are_as_sharp_as_their_principal_curvature() -> None:
+def test_crest_problem_values_are_principal_curvatures() -> None:
     cells = MAP.cells()
     assert cells is not None
     at = cells.sample_coordinates(200)
@@ -356,7 +356,7 @@ def test_crests_are_as_sharp_as_their_principal_curvature() -> None:
     np.testing.assert_allclose(CrestProblem(cells).values(at), expected, rtol=1e-9, atol=1e-9)
 
 
-def test_a_crest_at_the_centre_of_curvature_needs_no_further_search() -> None:
+def test_crest_search_stops_at_the_centre_of_curvature() -> None:
     cells = MAP.cells()
     assert cells is not None
     problem = CrestProblem(cells, 1e-3)
@@ -365,7 +365,7 @@ def test_a_crest_at_the_centre_of_curvature_needs_no_further_search() -> None:
     assert y / (1.0 - y) == pytest.approx(4.0 * (1.0 + 1e-6), rel=1e-12)
 
 
-def test_the_normal_turns_as_fast_as_differences_say() -> None:
+def test_normal_change_rate_against_finite_differences() -> None:
     cells = WAVES.cells()
     assert cells is not None
     at = cells.sample_coordinates(10)
@@ -398,8 +398,8 @@ def friction_jacobian(
     return result
 
 
-def test_no_state_of_the_anchor_is_worse_than_the_two_entries() -> None:
-    """And the deflection against the slope, as long as can be and sticking, attains them."""
+def test_two_entry_reduction_bounds_every_anchor_state() -> None:
+    """The sticking anchor with the longest deflection against the slope attains the bound."""
     rng = np.random.default_rng(8)
     exceeded = {True: -math.inf, False: -math.inf}
     for _ in range(1500):
@@ -421,14 +421,14 @@ def test_no_state_of_the_anchor_is_worse_than_the_two_entries() -> None:
                 part = friction_jacobian(
                     still, slope, rng.random() * depth, d, friction, sliding=sliding
                 )
-                found = float(measure(part[None])[0])
-                assert found <= most * (1.0 + 1e-12)
-                exceeded[sliding] = max(exceeded[sliding], found - 0.999 * most)
+                result = float(measure(part[None])[0])
+                assert result <= most * (1.0 + 1e-12)
+                exceeded[sliding] = max(exceeded[sliding], result - 0.999 * most)
     assert exceeded[True] > 0.0  # a bound a thousandth lower fails
     assert exceeded[False] > 0.0
 
 
-def test_the_two_numbers_of_two_entries() -> None:
+def test_two_entry_formulas_equal_the_matrix_measures() -> None:
     rng = np.random.default_rng(9)
     a, b = rng.random(200) * 3, rng.random(200) * 3
     matrices = np.zeros((200, 3, 3))
@@ -438,10 +438,10 @@ def test_the_two_numbers_of_two_entries() -> None:
     np.testing.assert_allclose(largest_symmetric_eigenvalue(a, b), symmetric, rtol=1e-12)
 
 
-def test_the_height_has_only_a_lower_bound() -> None:
+def test_height_supremum_has_only_a_lower_bound() -> None:
     texture = HeightMap(1e-4 * np.random.default_rng(3).normal(size=(8, 9)), 3e-4)
-    found = supremum(HeightProblem(texture.sampling_cells()), 1e-3, work_limit=5000)
+    result = supremum(HeightProblem(texture.sampling_cells()), 1e-3, work_limit=5000)
     low, high = texture.extremes
-    assert low < found.lower <= high * (1.0 + 1e-14)
-    assert found.upper == math.inf
-    assert not found.converged
+    assert low < result.lower <= high * (1.0 + 1e-14)
+    assert result.upper == math.inf
+    assert not result.converged

@@ -1,4 +1,4 @@
-"""A witness above a proved bound is an internal error, loudly; rounding is none."""
+"""A witness above a proved bound raises ``InternalError``; an excess within rounding does not."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ WAVES = Fourier([1e-4, 5e-5], [[3000.0, 0.0], [6000.0, 0.0]], [0.3, 1.0])
 HEIGHTS = 5e-5 * np.random.default_rng(3).normal(size=(7, 7))
 
 
-class Flatterer(Fourier):
-    """Waves that declare half of their true slopes and second derivatives."""
+class UnderstatedFourier(Fourier):
+    """Waves that declare half of their true slope and Hessian bounds."""
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -39,14 +39,14 @@ def copy_of(letter: str) -> Law:
     return Law("copy", "copy", law.contact, law.force)
 
 
-def test_wrong_bounds_of_a_texture_are_detected() -> None:
+def test_understated_texture_bounds_are_detected() -> None:
     # Five independent waves are not certified: their bound uses the declared derivatives.
     waves = [1e-4, 5e-5, 4e-5, 3e-5, 2e-5]
     vectors = [[3000.0, 0.0], [0.0, 5000.0], [1234.0, 777.0], [-500.0, 2222.0], [1777.0, -3210.0]]
-    honest, liar = Fourier(waves, vectors), Flatterer(waves, vectors)
-    assert characteristic_number(Surface(honest, "A")).upper > 1.0
+    correct, understated = Fourier(waves, vectors), UnderstatedFourier(waves, vectors)
+    assert characteristic_number(Surface(correct, "A")).upper > 1.0
     with pytest.raises(InternalError) as caught:
-        characteristic_number(Surface(liar, "A"))
+        characteristic_number(Surface(understated, "A"))
     text = str(caught.value)
     for part in ("norm", "law='A'", "proved to be at most", "is attained at (", "report"):
         assert part in text
@@ -54,23 +54,23 @@ def test_wrong_bounds_of_a_texture_are_detected() -> None:
     assert isinstance(caught.value, AsperityError)
 
 
-def test_a_broken_kernel_is_detected(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its Jacobians are one in a million too large: branch and bound knows better."""
+def test_wrong_jacobian_kernel_is_detected(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Jacobians too large by 1e-6 contradict the bounds of branch and bound."""
     surface = Surface(WAVES, "B")
     assert characteristic_number(surface).method == "certified"
     intact = Surface.jacobian
 
-    def broken(self: Surface, *arguments: Any) -> Any:
+    def scaled_jacobian(self: Surface, *arguments: Any) -> Any:
         return (1.0 + 1e-6) * intact(self, *arguments)
 
-    monkeypatch.setattr(Surface, "jacobian", broken)
+    monkeypatch.setattr(Surface, "jacobian", scaled_jacobian)
     with pytest.raises(InternalError, match="norm"):
         characteristic_number(surface)
     with pytest.raises(InternalError, match="one-sided"):
         one_sided_number(Surface(WAVE, "D"))
 
 
-def test_a_wrong_theorem_is_detected() -> None:
+def test_wrong_theorem_is_detected() -> None:
     constant, closed = copy_of("W"), copy_of("A")
     register_theorem(constant, Theorem({NORM: Constant(0.999, "wrong")}))
     form = ClosedForm(lambda _wave, _depth: 1.1, lambda _wave, _depth: 0.0)
@@ -80,22 +80,22 @@ def test_a_wrong_theorem_is_detected() -> None:
             characteristic_number(Surface(WAVE, law))
 
 
-def test_a_wrong_crest_is_detected(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_understated_crest_bound_is_detected(monkeypatch: pytest.MonkeyPatch) -> None:
     surface = Surface(WAVES, "D", max_depth=3e-4)
     assert characteristic_number(surface).upper > 1.0
     intact = search.supremum
 
-    def flatter(*arguments: Any) -> Any:
-        found = intact(*arguments)
-        return replace(found, upper=0.999 * found.upper)
+    def scaled_down(*arguments: Any) -> Any:
+        result = intact(*arguments)
+        return replace(result, upper=0.999 * result.upper)
 
-    monkeypatch.setattr(search, "supremum", flatter)
+    monkeypatch.setattr(search, "supremum", scaled_down)
     with pytest.raises(InternalError, match="norm"):
         characteristic_number(surface)
 
 
-def test_a_crest_of_which_nothing_is_proved_is_undecided(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A search that ends before its first proof gives no bound, and no error."""
+def test_crest_without_proved_bound_gives_a_sampled_number(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A search that ends without a bound raises no error and gives an infinite upper bound."""
     intact = search.supremum
     monkeypatch.setattr(
         search, "supremum", lambda *arguments: replace(intact(*arguments), upper=math.inf)
@@ -114,28 +114,28 @@ LEAKING = {
 
 
 @pytest.mark.parametrize("case", LEAKING.values(), ids=list(LEAKING))
-def test_a_loop_above_its_proved_bound_is_detected(
+def test_loop_energy_above_its_proved_bound_is_detected(
     case: tuple[Any, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     surface = Surface(*case)
-    honest = worst_loop(surface)
-    assert 0.9 * honest.upper_per_period < honest.energy <= honest.upper_per_period
+    correct = worst_loop(surface)
+    assert 0.9 * correct.upper_per_period < correct.energy <= correct.upper_per_period
     intact, share = leaks.curl_integral_bounds, [0.8]
 
-    def flatter(*arguments: Any) -> Any:
-        found = intact(*arguments)
-        assert found is not None
-        return [(share[0] * low, share[0] * high) for low, high in found]
+    def scaled_down(*arguments: Any) -> Any:
+        result = intact(*arguments)
+        assert result is not None
+        return [(share[0] * low, share[0] * high) for low, high in result]
 
-    monkeypatch.setattr(leaks, "curl_integral_bounds", flatter)
+    monkeypatch.setattr(leaks, "curl_integral_bounds", scaled_down)
     with pytest.raises(InternalError, match="gains"):
         worst_loop(surface)
-    share[0] = honest.energy / honest.upper_per_period * (1.0 - 1e-12)  # that much is rounding
+    share[0] = correct.energy / correct.upper_per_period * (1.0 - 1e-12)  # that much is rounding
     # Scaled to the stiffness, a bound is rounded up.
-    assert worst_loop(surface).upper_per_period == math.nextafter(honest.energy, math.inf)
+    assert worst_loop(surface).upper_per_period == math.nextafter(correct.energy, math.inf)
 
 
-def test_rounding_is_no_contradiction() -> None:
+def test_rounding_error_is_not_a_contradiction() -> None:
     surface = Surface(WAVE, "A")
     for excess in (-1e-3, 0.0, 1e-15, 1e-12):
         witness = Witness(2.0 * (1.0 + excess), 2.0, (0.0, 0.0, -1e-5))
@@ -147,7 +147,7 @@ def test_rounding_is_no_contradiction() -> None:
         checked_lower_bound(surface, NORM, 2.0, witness)
 
 
-def test_the_command_line_has_an_exit_code_for_contradictions(
+def test_command_line_returns_the_exit_code_of_internal_errors(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     from asperity.cli import main as commands

@@ -1,4 +1,4 @@
-"""The anchor along straight edges against the kernel's, step by step."""
+"""The anchor along straight edges, compared with the step-by-step anchor of the kernel."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ K, LONGEST = 1000.0, 0.4e-3
 WAVE = Sinusoid(0.3e-3, 2e-3, 0.4, (2.0, 1.0))
 
 
-class Held(VerticalContact):
-    """The vertical contact, whose surface is curved, with an anchor."""
+class StatefulVerticalContact(VerticalContact):
+    """The vertical contact, whose contact surface is curved, with an anchor."""
 
     name = "held"
     supports_state = True
 
 
 PULLED = Law(
-    "pull", "pulled-back", Held(),
+    "pull", "pulled-back", StatefulVerticalContact(),
     lambda c: c.k * c.depth * (c.e_z - c.tangential(c.deflection) / c.parameter("max_deflection")),
     stateful=True,
     parameters={"max_deflection": Argument("max_deflection", "of the anchor", "m", LONGEST)},
@@ -42,7 +42,7 @@ SURFACES = {
 
 
 def polylines(surface: Surface, count: int) -> Iterator[np.ndarray]:
-    """Random closed ways in and out of contact; every other vertex exactly on the surface."""
+    """Yield random closed paths in and out of contact, every other vertex on the surface."""
     rng = np.random.default_rng(11)
     for _ in range(count):
         vertices = rng.uniform([-1e-3, -1e-3, -0.6e-3], [1e-3, 1e-3, 0.2e-3], (7, 3))
@@ -52,8 +52,8 @@ def polylines(surface: Surface, count: int) -> Iterator[np.ndarray]:
         yield vertices
 
 
-def traced(surface: Surface, vertices: np.ndarray, count: int) -> tuple[float, float]:
-    """The work along a path of many steps by the kernel's own anchor, and its absolute value."""
+def traced_work(surface: Surface, vertices: np.ndarray, count: int) -> tuple[float, float]:
+    """Return the work along a path of many kernel steps, and the sum of its absolute values."""
     ends = np.roll(vertices, -1, axis=0)
     edges = [np.linspace(a, b, count, endpoint=False) for a, b in zip(vertices, ends, strict=True)]
     path = np.concatenate([*edges, vertices[:1]])
@@ -63,36 +63,40 @@ def traced(surface: Surface, vertices: np.ndarray, count: int) -> tuple[float, f
 
 
 def worst_error(surface: Surface) -> float:
-    """The greatest difference to the kernel's path of small steps, over the work either way."""
+    """Return the largest difference from the work of small kernel steps, over its absolute work."""
     worst = 0.0
     for vertices in polylines(surface, 12):
-        coarse, _size = traced(surface, vertices, 4_000)
-        fine, size = traced(surface, vertices, 8_000)
-        limit = 2.0 * fine - coarse  # the steps err to first order
+        coarse, _size = traced_work(surface, vertices, 4_000)
+        fine, size = traced_work(surface, vertices, 8_000)
+        limit = (
+            2.0 * fine - coarse
+        )  # Richardson extrapolation: the error of the steps is of first order
         worst = max(worst, abs(loop_work(surface, vertices) - limit) / size)
     return worst
 
 
 @pytest.mark.parametrize("letter", SURFACES)
-def test_loops_are_worked_as_the_kernel_traces_them(letter: str) -> None:
+def test_loop_work_matches_small_kernel_steps(letter: str) -> None:
     assert "F" in SURFACES
     assert worst_error(SURFACES[letter]) < 2e-4
 
 
 @pytest.mark.parametrize("letter", SURFACES)
-def test_an_anchor_on_the_surface_is_detected(letter: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Negative control: contact that counts a vertex exactly on the surface keeps the anchor."""
+def test_counting_surface_points_as_contact_changes_the_work(
+    letter: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Negative control: if a vertex on the surface counts as contact, the anchor persists."""
     monkeypatch.setattr(
         Contact, "is_in_contact", lambda self, texture, points: self.depth(texture, points) >= 0.0
     )
     assert worst_error(SURFACES[letter]) > 1e-2
 
 
-def test_a_touch_from_below_releases_the_anchor() -> None:
-    """Back where it came in, along the surface of an edge in contact: nothing was held."""
+def test_reaching_the_surface_from_below_releases_the_anchor() -> None:
+    """After the surface vertex the path re-enters contact there with zero deflection."""
     surface = SURFACES["F"]
-    way = [[0, 0, 1e-3], [0, 0, -2e-4], [3e-4, 0, -2e-4], [3e-4, 0, 0], [3e-4, 0, -2e-4]]
-    corners = np.array(way)
+    path = [[0, 0, 1e-3], [0, 0, -2e-4], [3e-4, 0, -2e-4], [3e-4, 0, 0], [3e-4, 0, -2e-4]]
+    corners = np.array(path)
     segments = anchored_segments(surface, corners[:-1], corners[1:])
     held = [float(np.hypot(*segment.deflection(np.ones(1))[0])) for segment in segments]
     assert held == pytest.approx([0.0, 3e-4, 3e-4, 0.0], abs=1e-15)
@@ -100,8 +104,8 @@ def test_a_touch_from_below_releases_the_anchor() -> None:
     assert ends == pytest.approx([-2e-4, -2e-4, 0.0, -2e-4], abs=1e-18)
 
 
-def test_contact_is_found_on_both_sides_of_a_crest() -> None:
-    """One edge through two crests: contact twice, the anchor released in between."""
+def test_edge_through_two_crests_has_two_contact_intervals() -> None:
+    """The anchor is released between the two contact intervals."""
     texture = Sinusoid(0.3e-3, 2e-3)
     surface = Surface(texture, PULLED, K)
     start, end = np.array([[0.0, 0.0, 0.2e-3]]), np.array([[4e-3, 0.0, 0.2e-3]])
@@ -114,8 +118,8 @@ def test_contact_is_found_on_both_sides_of_a_crest() -> None:
     assert float(segments[1].end[0]) == pytest.approx(1e-3 - x0, rel=1e-12)
 
 
-def test_dragged_anchor_keeps_its_distance_and_follows_the_tractrix() -> None:
-    """By small steps: d' = -(I - u uᵀ) t along the way, |d| = d_max."""
+def test_dragged_anchor_keeps_its_length_and_follows_the_tractrix() -> None:
+    """Finite differences satisfy d' = (I - u uᵀ) t along the edge, with |d| = d_max."""
     surface = SURFACES["F"]
     start, end = np.array([[0.0, 0.0, -1e-3]]), np.array([[5e-4, 0.0, -1e-3]])
     corner = np.concatenate([start, end, end + np.array([[0.3e-3, 1e-3, 0.0]])])
@@ -132,8 +136,8 @@ def test_dragged_anchor_keeps_its_distance_and_follows_the_tractrix() -> None:
     np.testing.assert_allclose(np.gradient(d, s, axis=0)[1:-1], rate[1:-1], atol=1e-7 * 1e-3)
 
 
-def test_a_deflection_is_never_longer_than_allowed() -> None:
-    """An edge a thousandth longer than the way on which the anchor sticks: dragged at its end."""
+def test_deflection_never_exceeds_max_deflection() -> None:
+    """On an edge slightly longer than the sticking distance the anchor is dragged at the end."""
     surface = SURFACES["F"]
     ends = np.array([[0.0, 0.0, -1e-3], [1.0005 * LONGEST, 0.0, -1e-3], [0.0, 0.0, -1e-3]])
     stuck, dragged, back = anchored_segments(surface, ends[:-1], ends[1:])

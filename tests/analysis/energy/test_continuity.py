@@ -1,4 +1,4 @@
-"""Jumps of the force against closest points computed by hand, and their absence elsewhere."""
+"""Jumps of the force compared with closest points computed by hand, and their absence elsewhere."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ WAVE = Sinusoid(0.1e-3, 2e-3)
 RADIUS = 2e-3**2 / (4 * math.pi**2 * 0.1e-3)
 
 
-def examine(surface: Surface) -> Continuity:
+def analyze_continuity(surface: Surface) -> Continuity:
     return continuity(surface, characteristic_number(surface))
 
 
-def extent(texture: Texture) -> float:
+def min_span(texture: Texture) -> float:
     return float(np.linalg.norm(texture.domain.spans, axis=1).min())
 
 
@@ -41,25 +41,25 @@ def extent(texture: Texture) -> float:
     [(0.2e-3, 1e-3, 0.4e-3), (0.2e-3, 1e-3, 20e-3), (3e-3, 1e-3, 1e-3), (1e-6, 1e-3, 0.1),
      (0.1e-3, 2e-3, 1.001 * RADIUS)],
 )  # fmt: skip
-def test_jumps_of_d_on_a_sinusoid_are_twice_the_distance_of_the_foot(
+def test_jumps_of_law_d_on_a_sinusoid_equal_the_distance_of_the_closest_points(
     amplitude: float, period: float, depth: float
 ) -> None:
-    """Closest points at ±s from the crest: the normal from s meets the crest's at the depth."""
+    """The closest points lie at ±s from the crest; their normals meet below it at the depth."""
     texture = Sinusoid(amplitude, period, phase=0.3, direction=(1.0, 2.0))
     surface = Surface(texture, "D", 700.0, depth)
     wave = 2.0 * math.pi / period
 
-    def reach(s: float) -> float:
+    def depth_of(s: float) -> float:
         slope = amplitude * wave * math.sin(wave * s)
         return s * math.sqrt(1.0 + slope**2) / slope
 
-    found = find_jumps(surface)
+    jumps = find_jumps(surface)
     radius = 1.0 / (amplitude * wave**2)
     expected = radius + (depth - radius) * np.arange(1, 9) / 8
-    assert [jump.depth for jump in found] == pytest.approx(expected, rel=2e-9)
-    for jump in found:
+    assert [jump.depth for jump in jumps] == pytest.approx(expected, rel=2e-9)
+    for jump in jumps:
         target = jump.depth
-        s = brentq(lambda s, d=target: reach(s) - d, 1e-9 * period, 0.5 * period * (1 - 1e-12),
+        s = brentq(lambda s, d=target: depth_of(s) - d, 1e-9 * period, 0.5 * period * (1 - 1e-12),
                    xtol=1e-22, rtol=1e-14)  # fmt: skip
         assert jump.size == pytest.approx(2.0 * 700.0 * s, rel=1e-5)
         # Below the crest: on the line where the phase is a quarter turn.
@@ -67,8 +67,8 @@ def test_jumps_of_d_on_a_sinusoid_are_twice_the_distance_of_the_foot(
         assert along == pytest.approx(period * (0.25 - 0.3 / (2 * math.pi)), abs=1e-9 * period)
 
 
-def test_the_jump_is_small_just_below_the_onset() -> None:
-    """It grows as the root of what is left: s² is about linear in the depth."""
+def test_jump_grows_as_the_square_root_beyond_the_onset() -> None:
+    """Just beyond the onset s² is about linear in the depth."""
     sizes = []
     for part in (1e-3, 4e-3):
         surface = Surface(WAVE, "D", 1.0, (1.0 + part) * RADIUS)
@@ -79,20 +79,20 @@ def test_the_jump_is_small_just_below_the_onset() -> None:
 # --- witnesses on any texture ---------------------------------------------------------------------
 
 
-def test_witnesses_of_d_reproduce_their_jump(texture: Texture) -> None:
+def test_witnesses_of_law_d_reproduce_their_jump(texture: Texture) -> None:
     surface = Surface(texture, "D", 300.0, 0.9 * texture.peak_to_valley)
-    result = examine(surface)
-    found = result.jumps
+    result = analyze_continuity(surface)
+    jumps = result.jumps
     # A direct call searches again, independent of the result of continuity.
     assert result.continuous is (len(find_jumps(surface, levels=1)) == 0)
-    if not found:
+    if not jumps:
         return
-    assert len(found) == 8
-    assert found[-1].depth == pytest.approx(surface.max_depth, rel=2e-9)
-    assert np.all(np.diff([jump.depth for jump in found]) > 0.0)
-    for jump in found:
+    assert len(jumps) == 8
+    assert jumps[-1].depth == pytest.approx(surface.max_depth, rel=2e-9)
+    assert np.all(np.diff([jump.depth for jump in jumps]) > 0.0)
+    for jump in jumps:
         pair = np.array([jump.before, jump.after])
-        assert np.linalg.norm(pair[1] - pair[0]) <= 1e-9 * extent(texture)
+        assert np.linalg.norm(pair[1] - pair[0]) <= 1e-9 * min_span(texture)
         before, after = surface.force(pair)
         assert np.linalg.norm(after - before) == jump.size
         closest_points = texture.nearest(pair)
@@ -105,7 +105,7 @@ def test_witnesses_of_d_reproduce_their_jump(texture: Texture) -> None:
         assert jump.size > 1e-3 * 300.0 * jump.depth
 
 
-def test_both_feet_of_a_witness_are_nearest_by_brute_force(make_texture: Any) -> None:
+def test_both_closest_points_of_a_witness_against_brute_force(make_texture: Any) -> None:
     texture = make_texture("map")
     jump = find_jumps(Surface(texture, "D", 1.0), levels=2)[0]
     probe = np.array(jump.before)
@@ -125,22 +125,22 @@ def test_both_feet_of_a_witness_are_nearest_by_brute_force(make_texture: Any) ->
     assert max(distance[part].min() for part in near) < 1.001 * jump.depth
 
 
-def test_a_narrow_ridge_is_followed_down_a_tilted_sheet(make_texture: Any) -> None:
-    """A profile without symmetry: the ridge is not below its crest."""
-    found = find_jumps(Surface(make_texture("periodic profile"), "D", 1.0, 1e-3))
-    drift = np.diff([jump.before[0] for jump in found])
+def test_ridge_of_an_asymmetric_profile_drifts_with_depth(make_texture: Any) -> None:
+    """Without symmetry the medial axis does not stay vertically below its crest."""
+    jumps = find_jumps(Surface(make_texture("periodic profile"), "D", 1.0, 1e-3))
+    drift = np.diff([jump.before[0] for jump in jumps])
     assert np.abs(drift).max() > 1e-5
 
 
-# --- no jump where there is none ------------------------------------------------------------------
+# --- absence of jumps -----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("letter", "WABCEFGH")
-def test_other_laws_do_not_jump_not_even_where_d_does(letter: str) -> None:
+def test_other_laws_are_continuous_where_law_d_jumps(letter: str) -> None:
     texture = Sinusoid(0.2e-3, 1e-3, phase=0.3, direction=(1.0, 2.0))
     witnesses = find_jumps(Surface(texture, "D", 1000.0))
     surface = Surface(texture, letter, 1000.0)
-    result = examine(surface)
+    result = analyze_continuity(surface)
     assert result.continuous
     assert result.jumps == find_jumps(surface) == ()
     assert result.lipschitz is not None
@@ -151,31 +151,34 @@ def test_other_laws_do_not_jump_not_even_where_d_does(letter: str) -> None:
         assert jump.size > 0.1
 
 
-def test_d_does_not_jump_above_the_onset() -> None:
-    result = examine(Surface(WAVE, "D", 1000.0, 0.999 * RADIUS))
+def test_law_d_is_continuous_above_the_onset() -> None:
+    result = analyze_continuity(Surface(WAVE, "D", 1000.0, 0.999 * RADIUS))
     assert result.continuous
     assert result.jumps == ()
-    below = examine(Surface(WAVE, "D", 1000.0, 1.001 * RADIUS))
+    below = analyze_continuity(Surface(WAVE, "D", 1000.0, 1.001 * RADIUS))
     assert (below.continuous, below.lipschitz) == (False, None)
     assert "at depths from 1.01 mm" in below.reason  # 1.0132 mm, never overstated
-    assert "at depths from 1.01 mm" in examine(Surface(WAVE, "D", max_depth=2.0 * RADIUS)).reason
+    assert (
+        "at depths from 1.01 mm"
+        in analyze_continuity(Surface(WAVE, "D", max_depth=2.0 * RADIUS)).reason
+    )
 
 
-def test_down_to_the_least_radius_of_curvature_nothing_needs_to_be_searched(
+def test_no_crest_search_above_the_smallest_radius_of_curvature(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The free set has reach 1/K at least."""
+    """The free set has a reach of at least 1/K."""
 
     def refuse(*_: Any) -> None:
         raise AssertionError("searched")
 
     monkeypatch.setattr(module, "sharpest_crest", refuse)
     # A user-defined law on the nearest contact that depends on the slope.
-    own = Law("N", "normal", "nearest", lambda c: c.k * c.depth * c.normal)
+    user_law = Law("N", "normal", "nearest", lambda c: c.k * c.depth * c.normal)
     bound = Bound(1.0, math.inf, "sampled")
-    assert continuity(Surface(WAVE, own, max_depth=0.99 * RADIUS), bound).continuous
+    assert continuity(Surface(WAVE, user_law, max_depth=0.99 * RADIUS), bound).continuous
     with pytest.raises(AssertionError, match="searched"):
-        continuity(Surface(WAVE, own, max_depth=1.01 * RADIUS), bound)
+        continuity(Surface(WAVE, user_law, max_depth=1.01 * RADIUS), bound)
 
 
 def test_jumps_are_located_on_first_access(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -197,11 +200,9 @@ def test_jumps_are_located_on_first_access(monkeypatch: pytest.MonkeyPatch) -> N
 
 @pytest.mark.parametrize(("letter", "depth"), [("B", 0.2e-3), ("C", 0.2e-3), ("E", 5e-3),
                                                ("D", 0.8 * RADIUS), ("H", 5e-3)])  # fmt: skip
-def test_the_force_changes_by_no_more_than_the_lipschitz_constant(
-    letter: str, depth: float
-) -> None:
+def test_lipschitz_constant_bounds_force_changes_and_is_attained(letter: str, depth: float) -> None:
     surface = Surface(WAVE, letter, 1000.0, depth)
-    slope = examine(surface).lipschitz
+    slope = analyze_continuity(surface).lipschitz
     assert slope is not None
     rng = np.random.default_rng(2)
     x = rng.uniform(0.0, 2e-3, 4000)
@@ -212,13 +213,13 @@ def test_the_force_changes_by_no_more_than_the_lipschitz_constant(
     moved = np.linalg.norm(second - first, axis=1)
     changed = np.linalg.norm(surface.force(second) - surface.force(first), axis=1)
     assert (changed <= slope.upper * moved + 1e-15).all()
-    # It is attained: next to the witness the force changes that fast.
+    # Attained: the Jacobian next to the witness has this norm.
     at = np.array(slope.at)
     jacobian = surface.jacobian([at - [0, 0, 1e-12]])[0]
     assert np.linalg.norm(jacobian, 2) == pytest.approx(slope.lower, rel=1e-6)
 
 
-def test_the_lipschitz_constant_is_k_q_rounded_outwards() -> None:
+def test_lipschitz_constant_is_k_q_rounded_outwards() -> None:
     q = Bound(1.1, 1.3, "certified", (0.0, 0.0, 0.0), "a note")
     slope = continuity(Surface(WAVE, "C", 7.0), q).lipschitz
     assert slope is not None
@@ -232,7 +233,7 @@ def test_the_lipschitz_constant_is_k_q_rounded_outwards() -> None:
     assert "Lipschitz" not in unknown.reason
 
 
-# --- laws of one's own ----------------------------------------------------------------------------
+# --- user-defined laws ----------------------------------------------------------------------------
 
 
 def step_law(contact: Any) -> Law:
@@ -241,9 +242,9 @@ def step_law(contact: Any) -> Law:
 
 
 @pytest.mark.parametrize("contact", ["nominal", "vertical"])
-def test_a_force_that_jumps_at_contact(contact: str) -> None:
+def test_force_with_preload_jumps_where_contact_begins(contact: str) -> None:
     surface = Surface(WAVE, step_law(contact), 1000.0)
-    result = examine(surface)
+    result = analyze_continuity(surface)
     assert not result.continuous
     assert "where contact begins" in result.reason
     (jump,) = result.jumps
@@ -251,19 +252,19 @@ def test_a_force_that_jumps_at_contact(contact: str) -> None:
     outside, inside = surface.force([jump.before, jump.after])
     assert not outside.any()
     assert np.linalg.norm(inside - outside) == jump.size
-    assert np.linalg.norm(np.subtract(jump.before, jump.after)) <= 1e-9 * extent(WAVE)
+    assert np.linalg.norm(np.subtract(jump.before, jump.after)) <= 1e-9 * min_span(WAVE)
 
 
-def test_a_step_of_height_zero_is_no_witness() -> None:
-    """Negative control: the formula does not vanish, but this surface's force does."""
+def test_zero_preload_gives_no_jump() -> None:
+    """Negative control: with preload 0 this surface's force has no step; with 1e-9 m it has one."""
     surface = Surface(WAVE, step_law("nominal"), 1000.0, law_parameters={"preload": 0.0})
     assert find_jumps(surface) == ()
     surface = Surface(WAVE, step_law("nominal"), 1000.0, law_parameters={"preload": 1e-9})
     assert find_jumps(surface)[0].size == pytest.approx(1e-6, rel=1e-3)
 
 
-def test_a_user_defined_law_on_the_nearest_contact() -> None:
-    """Twice D's force jumps twice as far; a function of the distance alone does not jump."""
+def test_jumps_of_user_defined_laws_on_the_nearest_contact() -> None:
+    """Twice the force of D has twice the jump; a function of the distance alone has none."""
     twice = Law("T", "twice", "nearest", lambda c: 2 * c.k * c.depth * c.normal)
     texture, depth = Sinusoid(0.2e-3, 1e-3), 0.4e-3
     mine, d = (find_jumps(Surface(texture, law, 500.0, depth)) for law in (twice, "D"))
@@ -276,33 +277,35 @@ def test_a_user_defined_law_on_the_nearest_contact() -> None:
     assert continuity(Surface(texture, up), Bound(1.0, 1.0, "theorem")).continuous
 
 
-def test_the_reason_between_found_and_proved_crest(monkeypatch: pytest.MonkeyPatch) -> None:
-    own = Law("N", "normal", "nearest", lambda c: c.k * c.depth * c.normal)
+def test_reason_says_whether_the_crest_is_proved(monkeypatch: pytest.MonkeyPatch) -> None:
+    user_law = Law("N", "normal", "nearest", lambda c: c.k * c.depth * c.normal)
     y, x = np.mgrid[:12, :12]
     bumps = HeightMap(2e-5 * np.sin(0.9 * x + 0.3) * np.cos(0.8 * y), 1e-4)
     crest = module.sharpest_crest(bumps)
     assert crest is not None
     bound = Bound(1.0, math.inf, "sampled")
-    proved = continuity(Surface(bumps, own, max_depth=0.999 * crest.min_radius), bound)
+    proved = continuity(Surface(bumps, user_law, max_depth=0.999 * crest.min_radius), bound)
     assert proved.continuous
     assert "no crest is so sharp" in proved.reason
     monkeypatch.setattr(module, "sharpest_crest", lambda _texture: None)
-    unproved = continuity(Surface(bumps, own, max_depth=0.999 * crest.min_radius), bound)
+    unproved = continuity(Surface(bumps, user_law, max_depth=0.999 * crest.min_radius), bound)
     assert "no medial axis found" in unproved.reason
 
 
-def test_plain_data() -> None:
+def test_continuity_to_dict_is_json_serializable() -> None:
     surface = Surface(Sinusoid(0.2e-3, 1e-3), "D")
-    read = json.loads(json.dumps(examine(surface).to_dict(), allow_nan=False))
+    read = json.loads(json.dumps(analyze_continuity(surface).to_dict(), allow_nan=False))
     assert read["lipschitz"] is None
     assert len(read["jumps"]) == 8
     assert read["jumps"][0]["before"] == list(find_jumps(surface)[0].before)
-    smooth = json.loads(json.dumps(examine(Surface(WAVE, "H")).to_dict(), allow_nan=False))
+    smooth = json.loads(
+        json.dumps(analyze_continuity(Surface(WAVE, "H")).to_dict(), allow_nan=False)
+    )
     assert smooth["lipschitz"]["upper"] == pytest.approx(1000.0)
 
 
-def test_no_ridge_is_made_up_where_the_foot_moves_steadily() -> None:
-    """Started half-way to the centre of curvature, the walk finds nothing to follow."""
+def test_no_ridge_is_found_where_the_closest_point_is_continuous() -> None:
+    """A descent that starts half-way to the centre of curvature finds no ridge."""
     crest = module.sharpest_crest(WAVE)
     assert crest is not None
     middle = tuple(0.5 * (f + c) for f, c in zip(crest.point, crest.centre, strict=True))

@@ -1,4 +1,4 @@
-"""The parts that worst loops, merit and continuity are made of, each against its definition."""
+"""The components of worst loops, merit and continuity, each compared with its definition."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ LUMPS = HeightMap(2e-5 * RNG.normal(size=(12, 16)), 1e-4, periodic=True)
 # --- layers and columns ---------------------------------------------------------------------------
 
 
-def cut(top: float, bottom: float, count: int, *, held: bool = False) -> list[Layer]:
+def equal_layers(top: float, bottom: float, count: int, *, held: bool = False) -> list[Layer]:
     ends = [top + (bottom - top) * i / count for i in range(count + 1)]
     return [Layer(ends[i], ends[i + 1], held) for i in range(count)]
 
@@ -48,23 +48,23 @@ def cut(top: float, bottom: float, count: int, *, held: bool = False) -> list[La
     ],
     ids=str,
 )  # fmt: skip
-def test_layers_reach_from_the_surface_to_where_nothing_changes(
+def test_layers_extend_from_the_surface_to_the_last_change_of_force(
     law: Any, clamp: Any, free: int, held: int
 ) -> None:
-    """Down to max_depth, or of a clamp to z_b; more than one where the curl is not affine."""
+    """They end at max_depth, or at z_b under a clamp; a curl that is not affine has 64 layers."""
     surface = Surface(SAW, law, K, D, clamp=clamp)
     for deeper in (0.0, 1e-5):
-        found, bottom = columns.depth_layers(surface, deeper), surface.clamped_depth + deeper
-        expected = cut(0.0, bottom if clamp == "none" else D, free) if free else []
-        expected += cut(D, bottom, held, held=True) if held else []
-        assert len(found) == len(expected)
-        for one, other in zip(found, expected, strict=True):
+        result, bottom = columns.depth_layers(surface, deeper), surface.clamped_depth + deeper
+        expected = equal_layers(0.0, bottom if clamp == "none" else D, free) if free else []
+        expected += equal_layers(D, bottom, held, held=True) if held else []
+        assert len(result) == len(expected)
+        for one, other in zip(result, expected, strict=True):
             assert (one.top, one.bottom) == pytest.approx((other.top, other.bottom), rel=1e-12)
             assert one.is_clamped is other.is_clamped
 
 
-def test_columns_stand_at_equal_steps_of_a_period() -> None:
-    """1024 steps of a wave; four to a cell of a map, between 1024 and 4096."""
+def test_columns_are_equally_spaced_along_the_line() -> None:
+    """1024 per period of a wave; four per cell of a map, between 1024 and 4096."""
     surface, line = Surface(SAW, "A", K, D), SAW.scan_line()
     vertices = columns.curl_region_loop(surface, line, 1.0)
     along = np.unique(np.round((vertices[:, :2] @ line.direction) / line.length * 1024, 6))
@@ -81,8 +81,8 @@ def test_columns_stand_at_equal_steps_of_a_period() -> None:
         assert columns._node_count(texture, texture.scan_line()) == expected
 
 
-def test_between_levels_the_curl_is_linear() -> None:
-    """Every column against a dense search for its longest positive interval."""
+def test_positive_interval_of_piecewise_linear_columns() -> None:
+    """Each column is compared with a dense search for its longest positive interval."""
     levels = np.array([0.0, 0.5, 0.8, 2.0, 2.0, 3.0])
     values = RNG.normal(size=(6, 200))
     top, bottom = positive_interval(levels.tolist(), values)
@@ -104,14 +104,14 @@ def test_between_levels_the_curl_is_linear() -> None:
 
 
 def area(vertices: FloatArray) -> float:
-    """Of a polygon in the x-z plane, turned as it is."""
+    """Return the signed area of a polygon in the x-z plane."""
     x, z = vertices[:, 0], vertices[:, 2]
     return 0.5 * float(np.sum(x * np.roll(z, -1) - np.roll(x, -1) * z))
 
 
 @pytest.mark.parametrize("periodic", [True, False])
-def test_a_comb_goes_around_its_columns_and_nothing_else(periodic: bool) -> None:
-    """Random columns: the area is that of trapezia, the gap that is left out the widest."""
+def test_column_polygon_encloses_exactly_its_columns(periodic: bool) -> None:
+    """For random columns the area is the sum of trapezia, and the widest gap is left out."""
     for _ in range(100):
         n = int(RNG.integers(4, 12))
         full = RNG.random(n) < 0.5
@@ -122,20 +122,22 @@ def test_a_comb_goes_around_its_columns_and_nothing_else(periodic: bool) -> None
             height[-1] = height[0]
         low = np.zeros(n + 1) if full.all() else -RNG.random(n + 1)
         low[-1] = low[0] if periodic else low[-1]
-        found = column_polygon(np.column_stack([x, 2.0 * x]), low + height, low, periodic=periodic)
+        polygon = column_polygon(
+            np.column_stack([x, 2.0 * x]), low + height, low, periodic=periodic
+        )
         if not full.any():
-            assert found.shape == (0, 3)
+            assert polygon.shape == (0, 3)
             continue
-        assert (np.linalg.norm(np.diff(found, axis=0, append=found[:1]), axis=1) > 0.0).all()
-        np.testing.assert_allclose(found[:, 1], 2.0 * found[:, 0])
+        assert (np.linalg.norm(np.diff(polygon, axis=0, append=polygon[:1]), axis=1) > 0.0).all()
+        np.testing.assert_allclose(polygon[:, 1], 2.0 * polygon[:, 0])
         expected = 0.5 * float((height[1:] + height[:-1]).sum())
-        assert abs(area(found)) == pytest.approx(expected, rel=1e-12)
-        assert area(found) < 0.0  # along the tops, back along the bottoms
-        width = np.ptp(found[:, 0])
+        assert abs(area(polygon)) == pytest.approx(expected, rel=1e-12)
+        assert area(polygon) < 0.0  # along the tops, back along the bottoms
+        width = np.ptp(polygon[:, 0])
         if not periodic:
             inside = np.flatnonzero(full)
-            assert found[:, 0].min() == max(inside[0] - 1, 0)
-            assert found[:, 0].max() == min(inside[-1] + 1, n)
+            assert polygon[:, 0].min() == max(inside[0] - 1, 0)
+            assert polygon[:, 0].max() == min(inside[-1] + 1, n)
         elif not full.all():
             runs = "".join("x" if one else "." for one in np.tile(full[:-1], 2)).split("x")
             widest = min(max(map(len, runs)), n)
@@ -145,7 +147,7 @@ def test_a_comb_goes_around_its_columns_and_nothing_else(periodic: bool) -> None
 # --- lines ----------------------------------------------------------------------------------------
 
 
-def test_lines_of_a_map_are_spread_over_it() -> None:
+def test_parallel_scan_lines_are_evenly_spaced_over_a_map() -> None:
     for letter, count in (("A", 33), ("E", 4)):
         surface = Surface(LUMPS, letter, K, 2e-5)
         line = LUMPS.scan_line()
@@ -161,7 +163,7 @@ def test_lines_of_a_map_are_spread_over_it() -> None:
         for one in lines:
             assert (one.length, one.periodic) == (line.length, line.periodic)
             np.testing.assert_array_equal(one.direction, line.direction)
-    # Along y across is against x: the map lies on that side of the line alone.
+    # For a line along y, "across" is -x: the map lies on one side of the line only.
     along_y = leak.parallel_scan_lines(
         Surface(LUMPS, "A", K, 2e-5), leak.scan_line_along(Surface(LUMPS, "A", K, 2e-5), (0.0, 1.0))
     )
@@ -171,52 +173,52 @@ def test_lines_of_a_map_are_spread_over_it() -> None:
     assert len(leak.parallel_scan_lines(profile, SAW.scan_line())) == 1
 
 
-def test_a_line_across_is_as_long_as_the_domain_is_wide() -> None:
+def test_scan_line_in_a_direction_spans_the_domain() -> None:
     surface = Surface(LUMPS, "A", K, 2e-5)
-    own = LUMPS.scan_line()
-    x, y = (float(part) for part in own.direction)
+    default_line = LUMPS.scan_line()
+    x, y = (float(part) for part in default_line.direction)
     assert leak.scan_line_along(surface, (3.0 * x, 3.0 * y)).periodic
     assert leak.scan_line_along(surface, (-3.0 * x, -3.0 * y)).periodic
     for direction in ((0.6, 0.8), (0.0, 1.0), (-3.0, 4.0)):
-        found = leak.scan_line_along(surface, direction)
+        line = leak.scan_line_along(surface, direction)
         unit = np.array(direction) / math.hypot(*direction)
-        if abs(float(unit @ own.direction)) > 1.0 - 1e-12:
+        if abs(float(unit @ default_line.direction)) > 1.0 - 1e-12:
             continue
-        np.testing.assert_allclose(found.direction, unit, rtol=1e-15)
-        assert found.length == pytest.approx(max(abs(s @ unit) for s in LUMPS.domain.spans))
-        assert found.periodic is False
-        np.testing.assert_array_equal(found.start, LUMPS.domain.origin)
+        np.testing.assert_allclose(line.direction, unit, rtol=1e-15)
+        assert line.length == pytest.approx(max(abs(s @ unit) for s in LUMPS.domain.spans))
+        assert line.periodic is False
+        np.testing.assert_array_equal(line.start, LUMPS.domain.origin)
 
 
-def test_the_worst_of_the_lines_is_the_worst() -> None:
-    """The description contains the depth, the orientation and the number of lines."""
+def test_worst_loop_is_the_worst_of_all_scan_lines() -> None:
+    """The description contains the depth and the number of lines."""
     surface = Surface(LUMPS, "A", K, 2e-5)
-    found = worst_loop(surface)
+    loop = worst_loop(surface)
     line = LUMPS.scan_line()
     sides = [
         max(columns.sample_curl_integrals(surface, one))
         for one in leak.parallel_scan_lines(surface, line)
     ]
-    assert found.energy == pytest.approx(max(sides), rel=0.02)
-    assert found.description.endswith("depth to 0.02 mm, the worst of 33 lines")
-    assert loop_work(surface, found.vertices) == pytest.approx(found.energy, rel=1e-12)
-    assert found.per_length == found.energy / found.line.length
+    assert loop.energy == pytest.approx(max(sides), rel=0.02)
+    assert loop.description.endswith("depth to 0.02 mm, the worst of 33 lines")
+    assert loop_work(surface, loop.vertices) == pytest.approx(loop.energy, rel=1e-12)
+    assert loop.per_length == loop.energy / loop.line.length
 
 
 @pytest.mark.parametrize("mirror", [1.0, -1.0])
-def test_the_side_that_gains_more_is_taken(mirror: float) -> None:
-    """On a line that climbs more than it falls, either way along."""
+def test_column_leak_uses_the_side_that_gains_more(mirror: float) -> None:
+    """The line rises more than it falls; both directions are tested."""
     start = np.array([0.1 * L, 0.0]) if mirror > 0.0 else np.array([0.55 * L, 0.0])
     line = ScanLine(start, np.array([mirror, 0.0]), 0.35 * L, periodic=False)
     surface = Surface(Sinusoid(1e-4, L), "A", K, D)
     sides = columns.sample_curl_integrals(surface, line)
     assert abs(sides[0] - sides[1]) > 0.1 * max(sides)
-    found = leak._column_leak(surface, [line])
-    assert found.energy == pytest.approx(max(sides), rel=1e-3)
-    assert found.energy <= found.upper_per_period <= found.energy * 1.01
+    loop = leak._column_leak(surface, [line])
+    assert loop.energy == pytest.approx(max(sides), rel=1e-3)
+    assert loop.energy <= loop.upper_per_period <= loop.energy * 1.01
 
 
-def test_the_outlines_of_either_sign_differ() -> None:
+def test_nearest_outlines_of_both_signs_differ() -> None:
     surface = Surface(SAW, "E", K, D)
     (first, up, _), (second, down, _) = leak._nearest_outlines(surface, SAW.scan_line())
     assert first != second
@@ -224,13 +226,13 @@ def test_the_outlines_of_either_sign_differ() -> None:
     for polygon in (up, down):
         along = polygon[:, :2] @ ACROSS / SAW.scan_line().length * 512
         assert np.abs(along - np.round(along)).max() < 1e-6
-    found = worst_loop(surface)
-    assert "nearer than 0.3 mm" in found.description
+    loop = worst_loop(surface)
+    assert "nearer than 0.3 mm" in loop.description
 
 
 @pytest.mark.parametrize("letter", ["A", "E"])
-def test_the_estimate_of_an_outline_is_the_curl_inside(letter: str) -> None:
-    """∬|∂f_t/∂z - ∂f_z/∂t| where it has one sign, down to max_depth from the surface, in E."""
+def test_outline_estimate_is_the_curl_integral_inside(letter: str) -> None:
+    """∬|∂f_t/∂z - ∂f_z/∂t| over one sign, within max_depth of the law's contact surface."""
     texture = Sinusoid(0.1e-3, L)
     surface = Surface(texture, letter, K, D)
     line = texture.scan_line()
@@ -240,36 +242,36 @@ def test_the_estimate_of_an_outline_is_the_curl_inside(letter: str) -> None:
     points = np.column_stack([line.start + x[:, None] * line.direction, height])
     jacobian = surface.jacobian(points)
     curl = jacobian[:, :2, 2] @ line.direction - jacobian[:, 2, :2] @ line.direction
-    if letter == "A":  # deeper by the slope than in E: the region is not the law's own
-        promises = columns.sample_curl_integrals(surface, line)
+    if letter == "A":  # the vertical depth is larger than the distance in E
+        estimates = columns.sample_curl_integrals(surface, line)
         depth = surface.law.contact.depth(texture, points)
         curl = np.where(depth <= D, curl, 0.0)
     else:
-        promises = tuple(one[0] for one in leak._nearest_outlines(surface, line))
+        estimates = tuple(one[0] for one in leak._nearest_outlines(surface, line))
         closest_points = texture.nearest(points)
         near = np.linalg.norm(closest_points - points, axis=1) <= D
         curl = np.where(near & (height <= texture.height(points[:, :2])), curl, 0.0)
     area = line.length / 400 * 2e-6
     expected = [float(np.maximum(sign * curl, 0.0).sum()) * area for sign in (1.0, -1.0)]
-    assert sorted(promises) == pytest.approx(sorted(expected), rel=0.02)
+    assert sorted(estimates) == pytest.approx(sorted(expected), rel=0.02)
 
 
-def test_a_leak_grows_with_the_stiffness_and_its_bound_is_rounded_up() -> None:
-    found = worst_loop(Surface(SAW, "A", K, D))
-    assert found.scale(1.0) is found
+def test_scaled_leak_multiplies_energies_and_rounds_its_bound_up() -> None:
+    loop = worst_loop(Surface(SAW, "A", K, D))
+    assert loop.scale(1.0) is loop
     for factor in (2.0, 0.3):
-        other = found.scale(factor)
-        assert other.energy == found.energy * factor
-        assert found.thrust is not None
-        assert other.thrust == found.thrust * factor
-        assert other.upper_per_period == math.nextafter(found.upper_per_period * factor, math.inf)
+        other = loop.scale(factor)
+        assert other.energy == loop.energy * factor
+        assert loop.thrust is not None
+        assert other.thrust == loop.thrust * factor
+        assert other.upper_per_period == math.nextafter(loop.upper_per_period * factor, math.inf)
     nothing = worst_loop(Surface(SAW, "C", K, D)).scale(3.0)
     assert (nothing.energy, nothing.upper_per_period) == (0.0, 0.0)
     assert worst_loop(FRICTION).scale(2.0).thrust is None
 
 
-def test_a_loop_that_gains_more_than_is_proved_is_refused() -> None:
-    """By more than K Δ²/8 in depth, 1e-12 of each edge's work and the rounding of each force."""
+def test_loop_energy_above_the_proved_bound_raises() -> None:
+    """The tolerance is K Δ²/8 in depth, 1e-12 of each edge's work and rounding of each force."""
     surface, line = Surface(SAW, "A", K, D), SAW.scan_line()
     vertices = columns.curl_region_loop(surface, line, 1.0)
     edges = np.linalg.norm(vertices - np.roll(vertices, -1, axis=0), axis=1)
@@ -285,13 +287,13 @@ def test_a_loop_that_gains_more_than_is_proved_is_refused() -> None:
         leak._check_against_bound(surface, line, vertices, most * (1.0 + 1e-12))
 
 
-def test_a_loop_is_turned_the_way_it_gains() -> None:
+def test_orient_loop_returns_the_direction_that_gains() -> None:
     surface = Surface(SAW, "A", K, D)
     loop = columns.curl_region_loop(surface, SAW.scan_line(), 1.0)
     for vertices in (loop, loop[::-1]):
-        found, energy = leak.orient_loop(surface, np.ascontiguousarray(vertices))
+        result, energy = leak.orient_loop(surface, np.ascontiguousarray(vertices))
         assert energy > 0.0
-        assert loop_work(surface, found) == pytest.approx(energy, rel=1e-12)
+        assert loop_work(surface, result) == pytest.approx(energy, rel=1e-12)
     empty, nothing = leak.orient_loop(surface, loop[:1])
     assert (empty.shape, nothing) == ((0, 3), 0.0)
 
@@ -302,8 +304,8 @@ def test_a_loop_is_turned_the_way_it_gains() -> None:
 FRICTION = Surface(Sinusoid(0.4e-3, L), "F", K, D, max_deflection=0.5e-3)
 
 
-def test_an_edge_is_cut_at_every_crest_it_passes() -> None:
-    """Ten waves at half the amplitude: sin = 1/2 at 1/12 and 5/12 of each period."""
+def test_edge_is_split_at_every_crest_it_passes() -> None:
+    """At half the amplitude over ten periods, sin = 1/2 at 1/12 and 5/12 of each period."""
     surface = Surface(Sinusoid(0.2e-3, L), "A", K, D)
     for first, last in ((-5, 5), (3, 13)):
         start, end = np.array([first * L, 0.0, 1e-4]), np.array([last * L, 0.0, 1e-4])
@@ -315,7 +317,7 @@ def test_an_edge_is_cut_at_every_crest_it_passes() -> None:
         np.testing.assert_array_equal((parts[0][0], parts[-1][1]), (start, end))
 
 
-def test_the_paths_of_friction_are_the_paper_s() -> None:
+def test_friction_paths_are_those_of_the_paper() -> None:
     start, along = np.array([1e-4, 2e-4]), np.array([0.6, 0.8])
     end = start + 0.5e-3 * along
     above, light = 0.1 * D, 1e-6 * D
@@ -324,22 +326,22 @@ def test_the_paths_of_friction_are_the_paper_s() -> None:
     ]  # fmt: skip
     np.testing.assert_allclose(leak.friction_path(FRICTION, start, along), expected)
     line = FRICTION.texture.scan_line()
-    found = leak.light_then_deep_loop(FRICTION, line)
+    loop = leak.light_then_deep_loop(FRICTION, line)
     works = [
         loop_work(FRICTION, leak.friction_path(FRICTION, one, sign * line.direction))
         for one in line.points(64)
         for sign in (1.0, -1.0)
     ]
-    assert found.energy == max(works)
-    assert found.energy == loop_work(FRICTION, found.vertices)
-    assert "worst of 128 starts: 0.5 mm along" in found.description
-    assert "back at 0.3 mm" in found.description
+    assert loop.energy == max(works)
+    assert loop.energy == loop_work(FRICTION, loop.vertices)
+    assert "worst of 128 starts: 0.5 mm along" in loop.description
+    assert "back at 0.3 mm" in loop.description
 
 
-def test_the_best_promise_of_a_plane_is_tried() -> None:
-    """Of 64 places and both senses the four that promise most: none of the others gains more."""
+def test_in_plane_loop_tries_the_outlines_with_the_best_estimates() -> None:
+    """The four best estimates of 64 places and both directions are evaluated."""
     line = FRICTION.texture.scan_line()
-    found = leak.in_plane_loop(FRICTION, line)
+    loop = leak.in_plane_loop(FRICTION, line)
     outlines = [
         leak._in_plane_outline(FRICTION, line, start, sign)
         for start in line.points(64)
@@ -347,16 +349,16 @@ def test_the_best_promise_of_a_plane_is_tried() -> None:
     ]
     outlines.sort(key=lambda one: one[0])
     works = [loop_work(FRICTION, vertices) for _, vertices in outlines[-4:]]
-    assert found.energy == pytest.approx(max(works), rel=1e-12)
-    assert found.energy > 1.4 * max(loop_work(FRICTION, outlines[i][1]) for i in range(4))
-    assert "0.3 mm" in found.description
+    assert loop.energy == pytest.approx(max(works), rel=1e-12)
+    assert loop.energy > 1.4 * max(loop_work(FRICTION, outlines[i][1]) for i in range(4))
+    assert "0.3 mm" in loop.description
 
 
-def test_an_outline_stays_where_the_anchor_sticks() -> None:
-    """Within the circle of the greatest deflection, at one depth, on one side by the slope."""
+def test_in_plane_outline_stays_within_max_deflection() -> None:
+    """The outline lies at one depth, on the side that the sign of the slope selects."""
     line, anchor = FRICTION.texture.scan_line(), np.array([0.3e-3, 0.0])
     for sign in (1.0, -1.0):
-        promise, vertices = leak._in_plane_outline(FRICTION, line, anchor, sign)
+        estimate, vertices = leak._in_plane_outline(FRICTION, line, anchor, sign)
         np.testing.assert_allclose(vertices[0], [*anchor, 0.1 * D])
         np.testing.assert_allclose(vertices[1], [*anchor, -D])
         np.testing.assert_allclose(vertices[-1], [*anchor, -D])
@@ -372,40 +374,42 @@ def test_an_outline_stays_where_the_anchor_sticks() -> None:
         assert inner.sum() == 127
         steps = np.linspace(-0.5e-3, 0.5e-3, 129)
         np.testing.assert_allclose(np.unique(np.round(t * 1e12)), np.round(steps * 1e12), atol=600)
-        # ∬ |h'| |side| across: the circle's half width squared, but for a factor.
+        # ∬ |h'| |side| across: proportional to the squared half width of the circle.
         h = np.abs(FRICTION.texture.gradient(anchor + steps[:, None] * line.direction)[:, 0])
         expected = float((h * (0.25e-6 - steps**2)).sum())
-        assert promise == pytest.approx(expected, rel=1e-6)
+        assert estimate == pytest.approx(expected, rel=1e-6)
 
 
 # --- merit ----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("letter", "ABCDEGW")
-def test_merit_is_the_ripple_and_the_mean_slope_on_the_scan(letter: str) -> None:
-    """By points of one's own along the line: strength, support, contact that is lost."""
+def test_merit_is_the_ripple_and_mean_slope_along_the_scan(letter: str) -> None:
+    """Strength, support and lost contact are recomputed from points along the line."""
     texture = Sinusoid(0.2e-3, L, 0.4, (0.6, 0.8)) if letter != "D" else Sinusoid(2e-5, L)
     surface = Surface(texture, letter, K, 0.25e-3)
-    found, line = merit.merit(surface), texture.scan_line()
+    result, line = merit.merit(surface), texture.scan_line()
     t = (np.arange(2048) + 0.5) / 2048 * line.length
     xy = line.start + t[:, None] * line.direction
     height = surface.law.contact.extremes(texture)[1] - 0.25e-3
     points = np.column_stack([xy, np.full(len(t), height)])
     force, jacobian = surface.force_and_jacobian(points)
     ripple = math.sqrt(float(force.var(axis=0).sum())) / K
-    assert found.height == pytest.approx(height, rel=1e-12)
-    assert found.ripple == pytest.approx(ripple, rel=1e-6, abs=1e-12)
-    assert found.strength == pytest.approx(ripple / (found.gain * line.length), rel=1e-6, abs=1e-9)
-    support = float(-jacobian[:, 2, 2].mean()) / K / found.gain
-    assert found.support == pytest.approx(support, rel=1e-6)
+    assert result.height == pytest.approx(height, rel=1e-12)
+    assert result.ripple == pytest.approx(ripple, rel=1e-6, abs=1e-12)
+    assert result.strength == pytest.approx(
+        ripple / (result.gain * line.length), rel=1e-6, abs=1e-9
+    )
+    support = float(-jacobian[:, 2, 2].mean()) / K / result.gain
+    assert result.support == pytest.approx(support, rel=1e-6)
     lost = float((force == 0.0).all(axis=1).mean())
-    assert found.contact_lost == pytest.approx(lost, abs=1.0 / 1024)
+    assert result.contact_lost == pytest.approx(lost, abs=1.0 / 1024)
 
 
 @pytest.mark.parametrize("stiffness", [1e-3, 1.0, 1e6])
-def test_a_constant_force_has_no_ripple(stiffness: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A ripple of 1e-13 of the force is none, of 1e-11 one, whatever the size of the force."""
-    for part, there in ((1e-13, False), (1e-11, True)):
+def test_ripple_below_rounding_is_zero(stiffness: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A ripple of 1e-13 of the force counts as zero, one of 1e-11 does not, at any force."""
+    for part, is_counted in ((1e-13, False), (1e-11, True)):
         for size in (1e-6, 1.0, 1e6):
 
             def scan(_s: Surface, _l: ScanLine, _h: float, part: float = part,
@@ -415,13 +419,13 @@ def test_a_constant_force_has_no_ripple(stiffness: float, monkeypatch: pytest.Mo
                 return forces, np.ones((1, 4)), 0.0
 
             monkeypatch.setattr(merit, "_scan_forces_and_slopes", scan)
-            found = merit.merit(Surface(SAW, "A", stiffness, D))
-            assert (found.ripple > 0.0) is there
-            if there:
-                assert found.ripple == pytest.approx(part * size, rel=1e-3)
+            result = merit.merit(Surface(SAW, "A", stiffness, D))
+            assert (result.ripple > 0.0) is is_counted
+            if is_counted:
+                assert result.ripple == pytest.approx(part * size, rel=1e-3)
 
 
-def test_three_digits_are_never_less() -> None:
+def test_round_up_to_three_digits_never_decreases() -> None:
     for value in 10.0 ** RNG.uniform(-3, 6, 500):
         rounded = round_up(value)
         digits = 10.0 ** (math.floor(math.log10(value)) - 2)
@@ -432,6 +436,6 @@ def test_three_digits_are_never_less() -> None:
     assert round_up(0.0) == 0.0
 
 
-def test_a_way_over_a_plane_has_a_panel() -> None:
-    """Where the height never changes its course, with as many edges as there may be."""
+def test_panel_count_on_a_plane_is_at_least_one() -> None:
+    """The wavelength is infinite; the count is 1 even for 10⁶ edges."""
     assert [loops._panel_count(1e-3, np.inf, edges) for edges in (1, 10**6)] == [4, 1]

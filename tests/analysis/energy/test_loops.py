@@ -1,4 +1,4 @@
-"""The paper's loops (Fig. 3) to 1e-8 of k A², and paths with state."""
+"""The loops of the paper's Fig. 3 to 1e-8 of k A², and paths of a law with state."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def work(letter: str, path: object, **arguments: object) -> float:
     return loop_work(Surface(TEXTURE, letter, stiffness=K, **arguments), path)
 
 
-def test_a_gains_half_k_a_squared() -> None:
+def test_energy_of_law_a_is_half_k_a_squared() -> None:
     assert abs(work("A", FIGURE_3) - K * AMPLITUDE**2 / 2) < TOLERANCE
 
 
@@ -37,11 +37,11 @@ def test_energy_of_law_b_is_equation_12() -> None:
 
 
 @pytest.mark.parametrize("letter", "CD")
-def test_conservative_laws_gain_nothing(letter: str) -> None:
+def test_energy_of_conservative_laws_is_zero(letter: str) -> None:
     assert abs(work(letter, FIGURE_3)) < TOLERANCE
 
 
-def test_e_gains_the_integral_of_the_distance() -> None:
+def test_energy_of_law_e_is_the_integral_of_the_distance() -> None:
     def distance(z: float) -> float:
         probe = np.array([[QUARTER, 0.0, z]])
         return float(np.linalg.norm(TEXTURE.nearest(probe) - probe))
@@ -71,22 +71,22 @@ def test_energy_of_law_f_is_equation_27(light: float) -> None:
         [0, 0, -depth],
     ]
     expected = K * 0.8 * 0.5 * deflection * (depth - light) / 2
-    gained = work("F", path, modulation_depth=0.0, max_deflection=deflection)
-    assert abs(gained - expected) < TOLERANCE
+    energy = work("F", path, modulation_depth=0.0, max_deflection=deflection)
+    assert abs(energy - expected) < TOLERANCE
 
 
-def test_reversed_loop_gains_the_opposite() -> None:
+def test_reversed_loop_has_the_opposite_energy() -> None:
     assert work("A", FIGURE_3[::-1]) == pytest.approx(-work("A", FIGURE_3), abs=1e-18)
 
 
 def test_starting_vertex_does_not_matter_without_state() -> None:
-    turned = FIGURE_3[2:] + FIGURE_3[:2]
-    assert work("B", turned) == pytest.approx(work("B", FIGURE_3), abs=1e-17)
+    rotated = FIGURE_3[2:] + FIGURE_3[:2]
+    assert work("B", rotated) == pytest.approx(work("B", FIGURE_3), abs=1e-17)
 
 
 @pytest.mark.parametrize("letter", "ABCEG")
 def test_loops_in_space_against_brute_force(letter: str) -> None:
-    surface = Surface(_rough(), letter, stiffness=K)
+    surface = Surface(_random_map(), letter, stiffness=K)
     rng = np.random.default_rng(5)
     vertices = rng.uniform(1e-3, 2e-3, (5, 3)) - [0, 0, 2e-3]
     path = np.concatenate(
@@ -98,23 +98,23 @@ def test_loops_in_space_against_brute_force(letter: str) -> None:
     )
     force = surface.force(path)
     trapezoid = float(np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(path, axis=0)))
-    # The rule's own error is of second order in steps of 1/20000 of an edge.
+    # The trapezoidal rule has an error of second order in steps of 1/20000 of an edge.
     assert loop_work(surface, vertices) == pytest.approx(trapezoid, abs=1e-11)
 
 
-def test_god_object_gains_nothing_across_its_ridges() -> None:
-    """The force jumps on the way; the energy does not; E is the negative control."""
-    surface = Surface(_rough(), "D", stiffness=K)
+def test_god_object_gains_no_energy_across_its_ridges() -> None:
+    """The force jumps along the path, the energy does not; law E is the negative control."""
+    surface = Surface(_random_map(), "D", stiffness=K)
     rng = np.random.default_rng(7)
     scale = 0.5 * K * 1e-6
     for _ in range(5):
         vertices = rng.uniform(1e-3, 2e-3, (5, 3)) - [0, 0, 2e-3]
         assert abs(loop_work(surface, vertices)) < 1e-9 * scale
-        control = loop_work(Surface(_rough(), "E", stiffness=K), vertices)
+        control = loop_work(Surface(_random_map(), "E", stiffness=K), vertices)
         assert abs(control) > 1e-4 * scale
 
 
-def _rough() -> HeightMap:
+def _random_map() -> HeightMap:
     rng = np.random.default_rng(0)
     return HeightMap(rng.normal(size=(20, 30)) * 1e-4, (2e-4, 1.5e-4))
 
@@ -141,8 +141,8 @@ def test_friction_loop_is_the_limit_of_small_steps() -> None:
     assert math.log2(errors[0] / errors[1]) == pytest.approx(1.0, abs=0.5)  # first order
 
 
-def test_a_wave_is_two_panels() -> None:
-    """2π M/K is the period of a sinusoid, whatever its amplitude; what is flat has no waves."""
+def test_initial_panels_are_two_per_wavelength() -> None:
+    """2π M/K is the period of a sinusoid of any amplitude; a flat map has infinite wavelength."""
     for amplitude in (1e-6, AMPLITUDE):
         surface = Surface(Sinusoid(amplitude, PERIOD, direction=(1.0, 2.0)), "A")
         assert [initial_panels(surface, n * PERIOD) for n in (1.0, 50.2)] == [4, 101]
@@ -153,15 +153,15 @@ def test_a_wave_is_two_panels() -> None:
 @pytest.mark.parametrize(
     "vertices", [[[0, 0, 0]], [[0, 0], [1, 1]], [[0, 0, 0], [math.nan, 0, 0]], "no"]
 )
-def test_bad_polygons(vertices: object) -> None:
+def test_invalid_polygons_raise(vertices: object) -> None:
     with pytest.raises(ParameterError) as caught:
         work("A", vertices)
     assert caught.value.argument == "vertices"
 
 
 @pytest.mark.parametrize("tolerance", [0.0, -1e-9, math.nan])
-def test_a_tolerance_that_nothing_reaches_is_refused(tolerance: float) -> None:
-    """Panels would be halved until memory ends."""
+def test_unreachable_tolerances_raise(tolerance: float) -> None:
+    """Panels would be halved until the memory is exhausted."""
     surface = Surface(Sinusoid(1e-4, 1e-3), "A")
     with pytest.raises(ParameterError) as caught:
         loop_work(surface, [[0.0, 0.0, -1e-4], [1e-4, 0.0, 0.0]], tolerance)

@@ -1,4 +1,4 @@
-"""Strength and support against MATH section 6, and against scans done by hand."""
+"""Strength and support compared with MATH section 6 and with scans computed by hand."""
 
 from __future__ import annotations
 
@@ -33,29 +33,31 @@ BELOW_CREST, BELOW_NOMINAL = 0.65 * PERIOD, 0.45 * PERIOD
         ("H", 0.117, 0.89),
     ],
 )
-def test_reference_points(letter: str, strength: float, support: float) -> None:
-    """MATH section 6; for G it prints a support of .21, the value is 0.2190."""
+def test_reference_values_of_strength_and_support(
+    letter: str, strength: float, support: float
+) -> None:
+    """Values of MATH section 6; for G it prints a support of .21, the value is 0.2190."""
     depth = BELOW_NOMINAL if letter == "G" else BELOW_CREST
-    found = merit(Surface(WAVE, letter, max_depth=depth))
-    assert found.strength == pytest.approx(strength, abs=6e-4)
-    assert found.support == pytest.approx(support, abs=6e-3)
-    assert found.contact_lost == 0.0
+    result = merit(Surface(WAVE, letter, max_depth=depth))
+    assert result.strength == pytest.approx(strength, abs=6e-4)
+    assert result.support == pytest.approx(support, abs=6e-3)
+    assert result.contact_lost == 0.0
 
 
-def test_a_by_hand() -> None:
-    found = merit(Surface(WAVE, "A", max_depth=BELOW_CREST))
+def test_merit_of_law_a_by_hand() -> None:
+    result = merit(Surface(WAVE, "A", max_depth=BELOW_CREST))
     gain = math.hypot(1.0, 2 * math.pi * 0.2)
-    assert found.gain == pytest.approx(gain, rel=1e-12)
-    assert found.ripple == pytest.approx(WAVE.amplitude / math.sqrt(2), rel=1e-9)
-    assert found.support == pytest.approx(1.0 / gain, rel=1e-12)
+    assert result.gain == pytest.approx(gain, rel=1e-12)
+    assert result.ripple == pytest.approx(WAVE.amplitude / math.sqrt(2), rel=1e-9)
+    assert result.support == pytest.approx(1.0 / gain, rel=1e-12)
 
 
-def test_g_by_hand() -> None:
-    """⟨1/√(1 + g²)⟩ over max(1, y), g = G₁ cos, y = D K."""
-    found = merit(Surface(WAVE, "G", max_depth=BELOW_NOMINAL))
+def test_support_of_law_g_by_hand() -> None:
+    """The support is ⟨1/√(1 + g²)⟩ / max(1, y) with g = G₁ cos and y = D K."""
+    result = merit(Surface(WAVE, "G", max_depth=BELOW_NOMINAL))
     slope = 2 * math.pi * 0.2 * np.cos(2 * math.pi * (np.arange(1000) + 0.5) / 1000)
     y = BELOW_NOMINAL * 4 * math.pi**2 * WAVE.amplitude / PERIOD**2
-    assert found.support == pytest.approx(float(np.mean(1 / np.sqrt(1 + slope**2))) / y, rel=1e-9)
+    assert result.support == pytest.approx(float(np.mean(1 / np.sqrt(1 + slope**2))) / y, rel=1e-9)
 
 
 def test_support_is_the_slope_of_the_mean_force() -> None:
@@ -68,41 +70,41 @@ def test_support_is_the_slope_of_the_mean_force() -> None:
             )
             forces.append(Surface(WAVE, letter, stiffness=1.0).force(points)[:, 2].mean())
         slope = (forces[1] - forces[0]) / (0.002 * BELOW_CREST)
-        found = merit(Surface(WAVE, letter, max_depth=BELOW_CREST))
-        assert found.support * found.gain == pytest.approx(slope, rel=1e-4)
+        result = merit(Surface(WAVE, letter, max_depth=BELOW_CREST))
+        assert result.support * result.gain == pytest.approx(slope, rel=1e-4)
 
 
 def test_smooth_wall_has_no_texture() -> None:
-    found = merit(Surface(WAVE, "W", max_depth=1e-3))
-    assert (found.strength, found.support) == (0.0, 1.0)
+    result = merit(Surface(WAVE, "W", max_depth=1e-3))
+    assert (result.strength, result.support) == (0.0, 1.0)
 
 
-def test_lost_contact_is_counted() -> None:
-    """Pressed to half the amplitude below the crest, contact lasts where sin > 1/2: a third."""
-    found = merit(Surface(WAVE, "A", max_depth=0.5 * WAVE.amplitude))
-    assert found.contact_lost == pytest.approx(2 / 3, abs=1e-3)
+def test_contact_lost_is_the_fraction_out_of_contact() -> None:
+    """At half the amplitude below the crest, contact holds where sin > 1/2, a third of the line."""
+    result = merit(Surface(WAVE, "A", max_depth=0.5 * WAVE.amplitude))
+    assert result.contact_lost == pytest.approx(2 / 3, abs=1e-3)
 
 
-def test_a_map_has_strength_in_metres() -> None:
-    """Heights in cosines of x alone: every parallel line sees the same sinusoid, mirrored."""
+def test_strength_of_a_map_is_in_metres() -> None:
+    """The heights are cosines of x alone, so every parallel line has the same sinusoid."""
     x = np.arange(41) / 40
     heights = np.tile(1e-4 * np.cos(2 * np.pi * 2 * x), (41, 1))
-    found = merit(Surface(HeightMap(heights, 1e-4), "A", max_depth=4e-4))
-    assert found.ripple == pytest.approx(1e-4 / math.sqrt(2), rel=1e-3)
-    assert found.strength == pytest.approx(found.ripple / found.gain, rel=1e-12)
+    result = merit(Surface(HeightMap(heights, 1e-4), "A", max_depth=4e-4))
+    assert result.ripple == pytest.approx(1e-4 / math.sqrt(2), rel=1e-3)
+    assert result.strength == pytest.approx(result.ripple / result.gain, rel=1e-12)
 
 
-def test_a_force_that_nowhere_varies_has_neither_strength_nor_support():
+def test_constant_force_has_zero_strength_and_support():
     law = Law("K", "constant", "vertical", lambda c: c.k * 1e-3 * c.e_z)
-    found = merit(Surface(Sinusoid(0.2e-3, 1e-3), law))
-    assert (found.gain, found.strength, found.support) == (0.0, 0.0, 0.0)
+    result = merit(Surface(Sinusoid(0.2e-3, 1e-3), law))
+    assert (result.gain, result.strength, result.support) == (0.0, 0.0, 0.0)
 
 
-def test_a_faint_ripple_on_a_large_force_counts() -> None:
-    """A hundred nanometres under a millimetre: the ripple is A/√2 all the same."""
+def test_small_ripple_on_a_large_force_is_resolved() -> None:
+    """An amplitude of 100 nm at a depth of 1 mm still has ripple A/√2."""
     faint = Sinusoid(1e-7, PERIOD)
-    found = merit(Surface(faint, "A", max_depth=1e-3))
-    assert found.ripple == pytest.approx(1e-7 / math.sqrt(2), rel=1e-6)
+    result = merit(Surface(faint, "A", max_depth=1e-3))
+    assert result.ripple == pytest.approx(1e-7 / math.sqrt(2), rel=1e-6)
 
 
 RIDGES = np.cos(np.arange(33) * 0.7) * np.linspace(0.2, 1.0, 25)[:, None]
@@ -111,8 +113,8 @@ SLOPED = HeightMap(5e-5 * RIDGES + 2e-5 * np.arange(25)[:, None], 1e-4)
 
 @pytest.mark.parametrize("letter", ["A", "C", "F"])
 @pytest.mark.parametrize("texture", [SLOPED, WAVE], ids=["map", "wave"])
-def test_ripple_of_parallel_lines_each_with_its_own_mean(letter: str, texture: Texture) -> None:
-    """All three components count; the lines of a map are spread evenly from border to border."""
+def test_ripple_subtracts_the_mean_of_each_parallel_line(letter: str, texture: Texture) -> None:
+    """All three force components count; the lines of a map are evenly spaced across it."""
     surface = Surface(texture, letter, 800.0, max_depth=1e-3, max_deflection=0.3e-3)
     line, high = texture.scan_line(), surface.law.contact.extremes(texture)[1]
     across = [np.zeros(2)]
@@ -127,14 +129,14 @@ def test_ripple_of_parallel_lines_each_with_its_own_mean(letter: str, texture: T
         force, jacobian = surface.force_and_jacobian(points, trailing)
         squares.append(force.var(axis=0).sum())
         slopes.append(-jacobian[:, 2, 2].mean())
-    found = merit(surface)
-    assert found.ripple == pytest.approx(math.sqrt(np.mean(squares)) / 800.0, rel=2e-3)
-    assert found.support * found.gain == pytest.approx(np.mean(slopes) / 800.0, rel=1e-9)
-    assert found.height == pytest.approx(high - 1e-3, rel=1e-12)
+    result = merit(surface)
+    assert result.ripple == pytest.approx(math.sqrt(np.mean(squares)) / 800.0, rel=2e-3)
+    assert result.support * result.gain == pytest.approx(np.mean(slopes) / 800.0, rel=1e-9)
+    assert result.height == pytest.approx(high - 1e-3, rel=1e-12)
 
 
-def test_lines_of_a_map_are_those_of_its_domain() -> None:
-    """Of a map that begins elsewhere and repeats, too, and across whichever way the scan goes."""
+def test_parallel_lines_are_evenly_spaced_over_the_domain() -> None:
+    """Also for a periodic map, and for a scan along y."""
     periodic = HeightMap(5e-5 * RIDGES[:24, :32], 1e-4, periodic=True)
     lines = parallel_line_points(periodic, periodic.scan_line(), 8)
     assert lines.shape == (16, 8, 2)

@@ -1,4 +1,4 @@
-"""Checks that every certified number has to pass."""
+"""Checks that every certified number must pass."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from asperity.surface import Surface
 from asperity.textures import Fourier, Sinusoid
 
 
-def fixed(examples: int) -> settings:
-    """Return the profile of every test here: the same examples in every run."""
+def deterministic_settings(examples: int) -> settings:
+    """Return hypothesis settings that give the same examples in every run."""
     return settings(
         max_examples=examples,
         deadline=None,
@@ -34,15 +34,15 @@ MEASURES = {
 }
 
 
-def as_sum(texture: Sinusoid) -> Fourier:
-    """Return the same surface as a sum, for which there is no closed form."""
+def as_fourier(texture: Sinusoid) -> Fourier:
+    """Return the same surface as a Fourier sum, which has no closed form."""
     k = 2.0 * math.pi / texture.period
     vector = [[k * texture.direction[0], k * texture.direction[1]]]
     return Fourier([texture.amplitude], vector, [texture.phase])
 
 
-def evaluated(surface: Surface, bound: Bound, name: str) -> float:
-    """Return what the surface's own Jacobian gives at the witness."""
+def value_at_witness(surface: Surface, bound: Bound, name: str) -> float:
+    """Return the measure of the surface's Jacobian at the witness."""
     state: tuple[Any, ...] = ()
     if bound.deflection is not None:
         state = (np.array([bound.deflection]), np.array([bound.sliding]))
@@ -50,8 +50,8 @@ def evaluated(surface: Surface, bound: Bound, name: str) -> float:
     return float(MEASURES[name][1](jacobian)[0])
 
 
-def check(surface: Surface, bound: Bound, name: str, gap: float) -> None:
-    """Check what every bound promises."""
+def check_bound(surface: Surface, bound: Bound, name: str, gap: float) -> None:
+    """Check that ``lower <= upper``, that ``lower`` is attained, and that the gap is reached."""
     assert bound.lower <= bound.upper
-    assert evaluated(surface, bound, name) == pytest.approx(bound.lower, rel=1e-12)
+    assert value_at_witness(surface, bound, name) == pytest.approx(bound.lower, rel=1e-12)
     assert bound.gap <= 1.01 * gap

@@ -1,6 +1,6 @@
-"""Certified numbers: nothing exceeds ``upper``, ``lower`` is attained, and the gap is not idle.
+"""Certified numbers: no sample exceeds ``upper``, ``lower`` is attained, and the gap is exact.
 
-The random surfaces are those of the long run, ``python -m bench.certificates --random 10000``.
+The random surfaces are those of the long benchmark ``python -m bench.certificates --random 10000``.
 """
 
 from __future__ import annotations
@@ -17,7 +17,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.analysis.gain.bound_checks import MEASURES, as_sum, check, fixed
+from tests.analysis.gain.bound_checks import (
+    MEASURES,
+    as_fourier,
+    check_bound,
+    deterministic_settings,
+)
 
 from asperity.analysis import characteristic_number, one_sided_number
 from asperity.analysis.bounds.bound import CURL, NORM, ONE_SIDED, Bound, precise_norm
@@ -36,7 +41,7 @@ WAVE = Sinusoid(0.3e-3, 1e-3, 0.4, (1.0, 2.0))
 
 
 @pytest.fixture(scope="module")
-def chance() -> ModuleType:
+def random_surfaces() -> ModuleType:
     spec = importlib.util.spec_from_file_location("random_surfaces", _PATH)
     assert spec is not None
     assert spec.loader is not None
@@ -50,23 +55,25 @@ def chance() -> ModuleType:
 # --- random surfaces ------------------------------------------------------------------------------
 
 
-def test_random_surfaces(chance: ModuleType) -> None:
+def test_bounds_on_random_surfaces_are_correct_and_tight(random_surfaces: ModuleType) -> None:
     seen = set()
 
-    @fixed(45)
+    @deterministic_settings(45)
     @given(st.integers(0, 2**32))
     def holds(seed: int) -> None:
-        found = chance.run_trial(seed, "ABCDFG", points=60)
-        assert found.is_correct, found
-        assert found.is_tight, found
-        seen.add((found.kind, found.name, found.bound.method))
+        trial = random_surfaces.run_trial(seed, "ABCDFG", points=60)
+        assert trial.is_correct, trial
+        assert trial.is_tight, trial
+        seen.add((trial.kind, trial.name, trial.bound.method))
 
     holds()
     assert len(seen) > 18
 
 
-def test_a_wrong_bound_is_noticed(chance: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The negative control: upper bounds 1 per cent too low, witnesses 1e-9 off."""
+def test_trials_detect_wrong_bounds(
+    random_surfaces: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Negative control: upper bounds 1 % too low and lower bounds too high by 1e-9 are detected."""
 
     def low(surface: Surface, **_options: Any) -> Bound:
         bound = characteristic_number(surface)
@@ -74,18 +81,18 @@ def test_a_wrong_bound_is_noticed(chance: ModuleType, monkeypatch: pytest.Monkey
         at = (bound.at[0], bound.at[1], bound.at[2] * 1.01)
         return Bound(bound.lower * (1.0 + 1e-9), 0.99 * bound.upper, "certified", at)
 
-    monkeypatch.setitem(chance.NUMBERS, "q", (low, precise_norm))
-    monkeypatch.setattr(chance, "NUMBERS", {"q": chance.NUMBERS["q"]})
-    # The points that are tried are not made for the supremum: half of them are near the witness.
-    wrong = [chance.run_trial(seed, "BG", points=200) for seed in range(8)]
-    assert all(found.missed > 1e-10 for found in wrong)
-    assert sum(found.excess > 1e-12 for found in wrong) >= 4
+    monkeypatch.setitem(random_surfaces.NUMBERS, "q", (low, precise_norm))
+    monkeypatch.setattr(random_surfaces, "NUMBERS", {"q": random_surfaces.NUMBERS["q"]})
+    # The sample points do not target the supremum: half of them are near the witness.
+    wrong = [random_surfaces.run_trial(seed, "BG", points=200) for seed in range(8)]
+    assert all(result.missed > 1e-10 for result in wrong)
+    assert sum(result.excess > 1e-12 for result in wrong) >= 4
 
 
-# --- where the supremum is known ------------------------------------------------------------------
+# --- closed-form suprema --------------------------------------------------------------------------
 
 
-KNOWN = [
+CLOSED_FORMS = [
     ("A", "norm", closed_forms.q_a),
     ("B", "norm", closed_forms.q_b),
     ("C", "norm", closed_forms.q_c),
@@ -99,11 +106,11 @@ KNOWN = [
 shapes = st.tuples(st.floats(-2.5, 1.0), st.floats(-2.0, 1.0), st.floats(-8.0, 3.0))
 
 
-@pytest.mark.parametrize(("letter", "name", "exact"), KNOWN)
+@pytest.mark.parametrize(("letter", "name", "exact"), CLOSED_FORMS)
 def test_closed_forms_lie_inside_certified_bounds(letter: str, name: str, exact: Any) -> None:
-    """And an upper bound lowered by twice the gap would not hold them: the gap is exact."""
+    """An upper bound lowered by twice the gap is below the closed form, so the gap is exact."""
 
-    @fixed(12)
+    @deterministic_settings(12)
     @given(shapes)
     def holds(shape: tuple[float, float, float]) -> None:
         length = 10.0 ** shape[2]
@@ -113,7 +120,7 @@ def test_closed_forms_lie_inside_certified_bounds(letter: str, name: str, exact:
         if letter == "D" and y > 0.99:
             depth *= 0.7 / y
         value = exact(wave, depth)
-        surface = Surface(as_sum(wave), letter, max_depth=depth)
+        surface = Surface(as_fourier(wave), letter, max_depth=depth)
         number = MEASURES[name][0]
         for tolerance in (1e-3, 1e-6):
             bound = number(surface, tolerance=tolerance)
@@ -121,19 +128,19 @@ def test_closed_forms_lie_inside_certified_bounds(letter: str, name: str, exact:
             assert bound.lower <= value * (1.0 + 1e-12)
             assert value <= bound.upper * (1.0 + 1e-13)
             if bound.upper > 1e-6:
-                check(surface, bound, name, tolerance)
+                check_bound(surface, bound, name, tolerance)
                 lowered = bound.upper - 2.0 * max(bound.upper - bound.lower, 1e-13 * bound.upper)
                 assert lowered < value
         closed = number(Surface(wave, letter, max_depth=depth))
         assert closed.method == "closed form"
         assert closed.upper == value
-        check(Surface(wave, letter, max_depth=depth), closed, name, 1e-9)
+        check_bound(Surface(wave, letter, max_depth=depth), closed, name, 1e-9)
 
     holds()
 
 
-def test_law_f_against_the_definition_of_its_number() -> None:
-    """1-D maximum over the phase, by a dense scan and golden section; MATH: 2.4863 < 2.84."""
+def test_number_of_law_f_against_a_dense_scan_of_its_definition() -> None:
+    """The number is a 1-D maximum over the phase; MATH gives 2.4863 < 2.84."""
     wave = Sinusoid(0.8e-3, 1e-3)
     surface = Surface(wave, "F", max_depth=1e-3)
 
@@ -147,19 +154,19 @@ def test_law_f_against_the_definition_of_its_number() -> None:
     best = float(number(phases).max())
     bound, at_once = characteristic_number(surface), characteristic_number(surface, tolerance=1e-5)
     assert best == pytest.approx(2.4863, abs=5e-5)
-    for found, gap in ((bound, 1e-9), (at_once, 1e-6)):
-        assert found.lower <= best * (1.0 + 1e-12)
-        assert best <= found.upper
-        assert found.gap <= gap
-        assert found.upper - 2.0 * (found.upper - found.lower) < best
-    check(surface, bound, "norm", 1e-6)
+    for result, gap in ((bound, 1e-9), (at_once, 1e-6)):
+        assert result.lower <= best * (1.0 + 1e-12)
+        assert best <= result.upper
+        assert result.gap <= gap
+        assert result.upper - 2.0 * (result.upper - result.lower) < best
+    check_bound(surface, bound, "norm", 1e-6)
     assert "tangents" in at_once.note
     assert "cells" in bound.note
 
 
 @pytest.mark.parametrize("count", [2, 5, 1024])
-def test_tangents_meet_at_the_corners(count: int) -> None:
-    """The polygon encloses half the circle: each corner lies on the tangents on its two sides."""
+def test_half_circle_polygon_corners_lie_on_the_tangents(count: int) -> None:
+    """The polygon encloses half the circle: each corner lies on the tangents on both sides."""
     touch, corner, radius = friction._half_circle(count)
     np.testing.assert_allclose(touch[[0, -1]], [-0.5 * math.pi, 0.5 * math.pi], rtol=1e-15)
     assert (len(touch), len(corner)) == (count + 1, count)
@@ -169,32 +176,32 @@ def test_tangents_meet_at_the_corners(count: int) -> None:
 
 @pytest.mark.parametrize("modulation", [0.0, 0.3, 1.0])
 @pytest.mark.parametrize("name", ["norm", "one-sided"])
-def test_law_f_at_once_and_by_cells_are_one(modulation: float, name: str) -> None:
+def test_tangent_and_cell_bounds_of_law_f_agree(modulation: float, name: str) -> None:
     for amplitude, phase in ((1e-6, 0.0), (0.4e-3, 2.0), (3e-3, -9.0)):
         wave = Sinusoid(amplitude, 1.5e-3, phase, (1.0, 3.0))
         options = {"max_depth": 0.7e-3, "max_deflection": 0.2e-3, "modulation_depth": modulation}
         number = MEASURES[name][0]
         once = number(Surface(wave, "F", friction=1.3, **options), tolerance=1e-4)
-        cells = number(Surface(as_sum(wave), "F", friction=1.3, **options), tolerance=1e-7)
+        cells = number(Surface(as_fourier(wave), "F", friction=1.3, **options), tolerance=1e-7)
         assert once.lower <= cells.upper * (1.0 + 1e-13)
         assert cells.lower <= once.upper
         assert once.gap < 1e-6
-        check(Surface(wave, "F", friction=1.3, **options), once, name, 1e-6)
+        check_bound(Surface(wave, "F", friction=1.3, **options), once, name, 1e-6)
 
 
-def test_c_on_sharp_crests_has_the_two_numbers_of_the_theory() -> None:
+def test_numbers_of_law_c_on_sharp_crests_against_math() -> None:
     waves = 2.0 * math.pi * np.array([1.0, 2.0, 3.0])
     surface = Surface(Fourier([0.1, 0.04, 0.02], waves, [math.pi / 2] * 3), "C", max_depth=0.5)
     q, plus = characteristic_number(surface), one_sided_number(surface)
     assert q.lower <= 8.685 + 5e-4
     assert q.upper >= 8.685 - 5e-4
     assert plus.upper == pytest.approx(5.533, abs=5e-4)
-    check(surface, q, "norm", 1e-6)
-    check(surface, plus, "one-sided", 1e-6)
+    check_bound(surface, q, "norm", 1e-6)
+    check_bound(surface, plus, "one-sided", 1e-6)
 
 
-def test_the_witness_attains_in_forty_digits() -> None:
-    """Evaluated by the definition, which shares no code with kernels or cells."""
+def test_witness_attains_the_lower_bound_in_forty_digits() -> None:
+    """The symbolic definition shares no code with the kernels or cells."""
     waves = Fourier([2e-4, 1e-4], [[2100.0, 300.0], [-500.0, 1700.0]], [0.4, 1.1])
     for letter in "BG":
         surface = Surface(waves, letter, stiffness=1.0, max_depth=0.3e-3)
@@ -231,30 +238,32 @@ KINDS: dict[str, Texture] = {
 )
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_dense_sample_exceeds_the_upper_bound(
-    chance: ModuleType, kind: str, letter: str, name: str
+    random_surfaces: ModuleType, kind: str, letter: str, name: str
 ) -> None:
     texture = KINDS[kind]
     surface = Surface(texture, letter, max_depth=0.3 * texture.peak_to_valley)
     number, measure = MEASURES[name]
     gap = {"three phases": 1e-4}.get(kind, 1e-3 if "map" in kind else 1e-6)
     bound = number(surface, tolerance=gap)
-    check(surface, bound, name, gap)
+    check_bound(surface, bound, name, gap)
     assert bound.at is not None
-    contacts = chance.random_contacts(np.random.default_rng(1), surface, 4000, bound.at[:2])
+    contacts = random_surfaces.random_contacts(
+        np.random.default_rng(1), surface, 4000, bound.at[:2]
+    )
     # Heights of 300 m leave fewer digits to a depth of a tenth of a millimetre.
     rounding = 1e-8 if "mountain" in kind else 1e-12
     values = measure(contacts.jacobians(surface))
     assert values.max() <= bound.upper * (1.0 + rounding)
-    assert values.max() >= 0.5 * bound.lower  # the points are worth something
+    assert values.max() >= 0.5 * bound.lower  # the samples come close to the bound
 
 
-def test_a_flat_surface_has_the_numbers_of_a_wall() -> None:
+def test_numbers_of_a_flat_surface_are_those_of_a_wall() -> None:
     for texture in (HeightMap(np.zeros((6, 6)), 1e-3), Fourier([0.0, 0.0], [[1e3, 0.0], [0, 5e2]])):
         for letter in "WABCDEGH":
             surface = Surface(texture, letter, max_depth=1e-3)
             for number in (characteristic_number, one_sided_number):
                 bound = number(surface)
-                # The quick way to a norm has half the digits, enough for a map's 1e-3.
+                # The fast norm has half of the digits, enough for the tolerance of 1e-3 of a map.
                 assert (bound.lower, bound.upper) == pytest.approx((1.0, 1.0), rel=2e-7)
             assert curl_number(surface).upper <= 1e-8
         friction = Surface(texture, "F", max_depth=1e-3)
@@ -262,14 +271,14 @@ def test_a_flat_surface_has_the_numbers_of_a_wall() -> None:
         assert characteristic_number(friction).upper == pytest.approx(float(stick[0]), rel=1e-9)
 
 
-def test_five_hundred_waves() -> None:
+def test_number_of_five_hundred_waves_is_certified() -> None:
     multiples = RNG.integers(-6, 7, (500, 2))
     multiples[~multiples.any(axis=1)] = 1
     waves = multiples @ np.array([[900.0, 100.0], [-300.0, 800.0]])
     texture = Fourier(2e-6 * RNG.normal(size=500), waves, RNG.uniform(0, 7, 500))
     surface = Surface(texture, "A", max_depth=1e-4)
     bound = characteristic_number(surface, tolerance=1e-4)
-    check(surface, bound, "norm", 1e-4)
+    check_bound(surface, bound, "norm", 1e-4)
     slopes = np.hypot(*texture.gradient(RNG.random((3000, 2))).T)
     assert np.hypot(1.0, slopes.max()) <= bound.upper
 
@@ -277,17 +286,17 @@ def test_five_hundred_waves() -> None:
 # --- tolerance, work limit, extent, clamps --------------------------------------------------------
 
 
-def test_the_tolerance_is_reached_and_a_smaller_one_lies_inside() -> None:
+def test_bounds_reach_their_tolerance_and_overlap() -> None:
     surface = Surface(KINDS["periodic sum"], "B", max_depth=0.3e-3)
     wide, narrow = (characteristic_number(surface, tolerance=t) for t in (1e-2, 1e-8))
-    check(surface, wide, "norm", 1e-2)
-    check(surface, narrow, "norm", 1e-8)
+    check_bound(surface, wide, "norm", 1e-2)
+    check_bound(surface, narrow, "norm", 1e-8)
     assert wide.lower <= narrow.upper
     assert narrow.lower <= wide.upper
 
 
 @pytest.mark.parametrize("limit", [1, 500, 5000])
-def test_at_the_work_limit_bounds_are_valid_and_noted(limit: int) -> None:
+def test_bounds_at_the_work_limit_are_valid_and_noted(limit: int) -> None:
     surface = Surface(KINDS["three phases"], "B", max_depth=0.3e-3)
     bound = characteristic_number(surface, tolerance=1e-9, work_limit=limit)
     assert "work limit" in bound.note
@@ -298,7 +307,7 @@ def test_at_the_work_limit_bounds_are_valid_and_noted(limit: int) -> None:
     assert bound.gap > 1e-9
 
 
-def test_four_phases_keep_the_safe_bound_and_an_extent_certifies() -> None:
+def test_five_independent_waves_are_certified_on_an_extent_only() -> None:
     rng = np.random.default_rng(3)
     texture = Fourier(1e-4 * rng.normal(size=5), 2e3 * rng.normal(size=(5, 2)), rng.normal(size=5))
     extent = (4e-3, 2e-3)
@@ -311,7 +320,7 @@ def test_four_phases_keep_the_safe_bound_and_an_extent_certifies() -> None:
         if letter != "D":
             assert "need an extent" in whole.note
             assert whole.upper == derivative_bound(surface, NORM)
-        check(surface, part, "norm", 1e-6)
+        check_bound(surface, part, "norm", 1e-6)
         assert part.at is not None
         margin = surface.max_depth if letter == "D" else 1e-15
         assert -margin <= part.at[0] <= extent[0] + margin
@@ -330,7 +339,7 @@ def test_four_independent_waves_are_certified_on_the_whole_plane(letter: str) ->
     assert len(texture.waves.lattice[0]) == 4
     surface = Surface(texture, letter, max_depth=0.1e-3)
     whole, part = (characteristic_number(surface, extent=side) for side in (None, (5e-3, 5e-3)))
-    check(surface, whole, "norm", 1e-3)
+    check_bound(surface, whole, "norm", 1e-3)
     assert part.lower <= whole.upper <= derivative_bound(surface, NORM) * (1.0 + 1e-12)
     xy, depth = rng.uniform(-1.0, 1.0, (5000, 2)), surface.max_depth * rng.random(5000)
     z = -depth if letter in "FG" else texture.height(xy) - depth
@@ -338,7 +347,7 @@ def test_four_independent_waves_are_certified_on_the_whole_plane(letter: str) ->
     assert values.max() <= surface.stiffness * whole.upper * (1.0 + 1e-12)
 
 
-def test_four_independent_waves_at_the_work_limit_keep_the_safe_bound() -> None:
+def test_work_limit_on_four_independent_waves_gives_a_certified_bound() -> None:
     rng = np.random.default_rng(7)
     texture = Fourier(6e-5 * rng.normal(size=4), 3e3 * rng.normal(size=(4, 2)), rng.normal(size=4))
     surface = Surface(texture, "C", max_depth=0.1e-3)
@@ -348,8 +357,8 @@ def test_four_independent_waves_at_the_work_limit_keep_the_safe_bound() -> None:
     assert characteristic_number(surface).lower <= bound.upper <= derivative_bound(surface, NORM)
 
 
-def test_an_extent_of_a_sinusoid_is_looked_at_too() -> None:
-    """Around a trough only: the steepest flank is outside."""
+def test_extent_restricts_the_number_of_a_sinusoid() -> None:
+    """The extent contains only a trough; the steepest flank is outside."""
     wave = Sinusoid(0.8e-3, 4e-3, phase=-math.pi / 2)
     surface = Surface(wave, "A", max_depth=1e-3)
     part = characteristic_number(surface, extent=(0.2e-3, 1e-3))
@@ -359,7 +368,7 @@ def test_an_extent_of_a_sinusoid_is_looked_at_too() -> None:
     assert part.upper < 0.9 * characteristic_number(surface).upper
 
 
-def test_safe_bounds_are_safe() -> None:
+def test_derivative_bounds_are_above_certified_lower_bounds() -> None:
     for texture in (KINDS["periodic sum"], KINDS["map"], KINDS["profile"]):
         for letter in "ABCFG":
             surface = Surface(texture, letter, max_depth=0.2e-3)
@@ -374,13 +383,13 @@ def test_safe_bounds_are_safe() -> None:
 
 @pytest.mark.parametrize("clamp", ["whole", "lateral", "backed"])
 @pytest.mark.parametrize("letter", "ABCFG")
-def test_a_clamp_does_not_move_the_witness_out_of_reach(letter: str, clamp: Any) -> None:
+def test_witness_under_a_clamp_attains_the_number(letter: str, clamp: Any) -> None:
     surface = Surface(WAVE, letter, max_depth=0.3e-3, clamp=clamp)
     free = characteristic_number(Surface(WAVE, letter, max_depth=0.3e-3))
     bound = characteristic_number(surface)
-    # Where the clamp acts B may be greater under a wall or a z part that grows, G under a wall.
+    # The zone of the clamp may raise the number of B (lateral, backed) and of G (backed).
     if (letter, clamp) in {("B", "lateral"), ("B", "backed"), ("G", "backed")}:
         assert bound.upper > free.upper
     else:
         assert bound.upper == free.upper
-    check(surface, bound, "norm", 2e-6)
+    check_bound(surface, bound, "norm", 2e-6)

@@ -1,4 +1,4 @@
-"""Each part of a characteristic number against its slow definition, at generic geometry."""
+"""Each component of a characteristic number compared with its definition, at generic geometry."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.analysis.gain.bound_checks import MEASURES, as_sum
+from tests.analysis.gain.bound_checks import MEASURES, as_fourier
 
 from asperity.analysis import characteristic_number
 from asperity.analysis.bounds.bound import CURL, NORM, ONE_SIDED, precise_norm, precise_one_sided
@@ -31,11 +31,11 @@ from asperity.textures.plane_waves import SingleWave
 NUMBERS = {"norm": NORM, "one-sided": ONE_SIDED, "curl": CURL}
 RNG = np.random.default_rng(77)
 K = 2.0 * math.pi / 1e-3 * np.array([[0.6, 0.8], [1.2, 1.6], [1.8, 2.4]])
-# A profile along (3, 4)/5 whose slope is steepest where it is neither level nor extreme.
+# A profile along (3, 4)/5 whose slope is steepest away from mean height and extremes.
 LINES = Fourier([0.11e-3, 0.05e-3, 0.02e-3], K, [0.4, 2.0, -1.0])
 WAVE = Sinusoid(0.13e-3, 0.9e-3, 0.4, (1.0, 2.0))
 
-# --- what a theorem reduces a number to -----------------------------------------------------------
+# --- numbers by theorem ---------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -44,10 +44,10 @@ WAVE = Sinusoid(0.13e-3, 0.9e-3, 0.4, (1.0, 2.0))
      ("E", "curl"), ("G", "norm"), ("W", "norm"), ("W", "one-sided")],
 )  # fmt: skip
 @pytest.mark.parametrize("depth", [0.02e-3, 0.4e-3])
-def test_a_theorem_s_number_is_that_of_the_law_s_own_jacobian(
+def test_number_by_theorem_equals_branch_and_bound_over_the_jacobian(
     letter: str, name: str, depth: float
 ) -> None:
-    """What the proofs simplify, against branch and bound over the Jacobian itself."""
+    """The simplified problems are compared with branch and bound over the Jacobian."""
     surface = Surface(LINES, letter, max_depth=depth)
     cells = LINES.cells()
     assert cells is not None
@@ -61,8 +61,8 @@ def test_a_theorem_s_number_is_that_of_the_law_s_own_jacobian(
 
 
 @pytest.mark.parametrize("depth", [0.03e-3, 0.5e-3])
-def test_safe_bounds_are_those_of_the_theory(depth: float) -> None:
-    """MATH section 4, from M >= |∇h| and K >= ‖Hess h‖ alone."""
+def test_derivative_bounds_equal_the_formulas_of_math(depth: float) -> None:
+    """MATH section 4 gives them from M >= |∇h| and K >= ‖Hess h‖ alone."""
     m, hessian = LINES.bounds
     assert m != pytest.approx(1.0, rel=0.1)
     kd = hessian * depth
@@ -76,8 +76,8 @@ def test_safe_bounds_are_those_of_the_theory(depth: float) -> None:
     assert derivative_bound(Surface(LINES, "D"), NORM) == math.inf
 
 
-def test_the_safe_bound_of_friction_is_that_of_the_greatest_entries() -> None:
-    """MATH: 2.84 for the paper's sinusoid, where a and b are maximised apart."""
+def test_derivative_bound_of_friction_uses_the_largest_entries() -> None:
+    """MATH: 2.84 for the paper's sinusoid, with a and b maximised separately."""
     paper = Surface(Sinusoid(0.8e-3, 1e-3), "F", max_depth=1e-3)
     assert derivative_bound(paper, NORM) == pytest.approx(2.84, abs=5e-3)
     options: dict[str, Any] = {"friction": 0.7, "max_deflection": 0.3e-3, "modulation_depth": 0.6}
@@ -88,8 +88,8 @@ def test_the_safe_bound_of_friction_is_that_of_the_greatest_entries() -> None:
     assert derivative_bound(surface, NORM) == pytest.approx(np.linalg.norm(matrix, 2), rel=1e-12)
 
 
-def test_above_a_height_the_gain_of_a_law_is_its_greatest() -> None:
-    """W and E have 1 everywhere; H has the greater of 1 and its continuity."""
+def test_gain_above_height_is_constant_for_laws_w_e_and_h() -> None:
+    """W and E have 1 at every height; H has the larger of 1 and its continuity."""
     for letter, options, expected in (
         ("W", {}, 1.0), ("E", {}, 1.0), ("H", {"continuity": 0.4}, 1.0),
         ("H", {"continuity": 2.5}, 2.5),
@@ -103,8 +103,8 @@ def test_above_a_height_the_gain_of_a_law_is_its_greatest() -> None:
 # --- law F ----------------------------------------------------------------------------------------
 
 
-def of_phase(surface: Surface, number: Any) -> Any:
-    """Return F's number as a function of the phase of a wave, from MATH."""
+def law_f_number_of_phase(surface: Surface, number: Any) -> Any:
+    """Return the number of law F as a function of the phase of a wave, from MATH."""
     wave, m = surface.texture.single_wave, surface.texture.bounds[0]
     assert wave is not None
     mu, longest, swing = (
@@ -125,37 +125,37 @@ def of_phase(surface: Surface, number: Any) -> Any:
     ("deflection", "swing"),
     [(1e-3, 0.8), (0.2e-3, 0.8), (1e-9, 0.5), (5e-3, 1.0), (40e-6, 0.9), (1e-3, 0.05)],
 )
-def test_law_f_on_a_wave_is_found_to_the_last_digits(
+def test_direct_bound_of_law_f_is_accurate_and_tight(
     number: Any, deflection: float, swing: float
 ) -> None:
-    """From the trough, where a short deflection is worst, to the flank; the polygon is tight."""
+    """Covers maxima from the trough (short deflections) to the flank; the bound is tight."""
     surface = Surface(
         WAVE, "F", max_depth=0.5e-3, friction=0.7, max_deflection=deflection,
         modulation_depth=swing,
     )  # fmt: skip
-    at = of_phase(surface, number)
+    at = law_f_number_of_phase(surface, number)
     phases = np.linspace(-0.5 * math.pi, 0.5 * math.pi, 4001)
     start = phases[int(np.argmax(at(phases)))]
-    # Two finer grids around the best: the last step is 1e-9, its square is nothing.
+    # Two finer grids around the maximum: the last step is 1e-9, its square is negligible.
     for width in (2e-3, 2e-6):
         near = np.clip(start + np.linspace(-width, width, 4001), phases[0], phases[-1])
         start = near[int(np.argmax(at(near)))]
     exact = float(at(start))
     cells = WAVE.cells()
     assert cells is not None
-    found = FrictionProblem(surface, cells, number).direct_bound()
-    assert found is not None
-    assert found.at is not None
-    assert found.converged
-    assert found.lower <= exact * (1.0 + 1e-13)
-    assert found.lower >= exact * (1.0 - 1e-11)
-    assert exact <= found.upper <= exact * (1.0 + 4e-6)
-    assert float(at(found.at[0] + WAVE.phase)) == pytest.approx(found.lower, rel=1e-13)
-    assert found.cell_count == 1024
+    bound = FrictionProblem(surface, cells, number).direct_bound()
+    assert bound is not None
+    assert bound.at is not None
+    assert bound.converged
+    assert bound.lower <= exact * (1.0 + 1e-13)
+    assert bound.lower >= exact * (1.0 - 1e-11)
+    assert exact <= bound.upper <= exact * (1.0 + 4e-6)
+    assert float(at(bound.at[0] + WAVE.phase)) == pytest.approx(bound.lower, rel=1e-13)
+    assert bound.cell_count == 1024
 
 
-def test_law_f_by_cells_holds_at_the_worst_of_a_cell() -> None:
-    """And is as tight as the models of a small cell: an upper limit of the looseness."""
+def test_cell_bounds_of_law_f_hold_and_are_tight() -> None:
+    """On small cells the bounds exceed the largest sample by 1e-4 at most."""
     surface = Surface(LINES, "F", max_depth=0.5e-3, max_deflection=0.2e-3)
     cells = LINES.cells()
     assert cells is not None
@@ -170,8 +170,8 @@ def test_law_f_by_cells_holds_at_the_worst_of_a_cell() -> None:
         assert (upper <= values * (1.0 + 1e-4)).all()
 
 
-def test_law_f_s_number_is_that_of_the_surface_s_own_jacobian() -> None:
-    """At a place, with the worst deflection, and with no other."""
+def test_number_of_law_f_equals_its_jacobian_at_the_worst_deflection() -> None:
+    """The opposite deflection gives a smaller value."""
     options: dict[str, Any] = {"friction": 0.7, "max_deflection": 0.3e-3, "modulation_depth": 0.6}
     surface, deeper = (
         Surface(LINES, "F", max_depth=depth, stiffness=1.0, **options) for depth in (4e-4, 5e-4)
@@ -188,16 +188,16 @@ def test_law_f_s_number_is_that_of_the_surface_s_own_jacobian() -> None:
         assert not state.sliding
         np.testing.assert_allclose(np.hypot(*state.deflection.T), 0.3e-3, rtol=1e-12)
         xy = cells.to_plane(at)
-        points = np.column_stack([xy, -state.depth])  # F feels the plane z = 0
+        points = np.column_stack([xy, -state.depth])  # the contact surface of F is the plane z = 0
         for sign, same in ((1.0, True), (-1.0, False)):
             stuck = deeper.jacobian(points, sign * state.deflection, np.zeros(30, bool))
-            found = measure(stuck)
-            assert (found <= values * (1.0 + 1e-12)).all()
-            assert np.allclose(found, values, rtol=1e-9, atol=0.0) == same
+            result = measure(stuck)
+            assert (result <= values * (1.0 + 1e-12)).all()
+            assert np.allclose(result, values, rtol=1e-9, atol=0.0) == same
 
 
-class Level(Cells):
-    """One cell of which the slopes are known to lie within errors, and nothing else varies."""
+class ConstantCell(Cells):
+    """One cell with constant height and slopes within constant errors."""
 
     dimensions = 1
 
@@ -207,52 +207,52 @@ class Level(Cells):
         return {n: TaylorModel(np.array([c]), still, np.array([e])) for n, (c, e) in parts.items()}
 
     initial_cells = sample_coordinates = derivatives = to_plane = clip_to_region = (
-        enclosures  # not part of the problem
+        enclosures  # not used by the problem
     )
 
 
-def test_law_f_counts_all_that_is_unknown_of_the_slope() -> None:
-    """And rounds up: a bound is above the value at the worst of the cell."""
+def test_cell_bound_of_law_f_includes_the_slope_error() -> None:
+    """The bound is rounded up from the value at the worst slope."""
     surface = Surface(LINES, "F", max_depth=50.0, friction=0.7, max_deflection=0.3e-3)
-    problem = FrictionProblem(surface, Level(), largest_singular_value)
+    problem = FrictionProblem(surface, ConstantCell(), largest_singular_value)
     worst = float(problem._entries(np.array([0.1e-3]), np.array([1.0]))[0])
     bound = float(problem.upper_bounds(np.zeros((1, 1)), np.ones(1), 0.0)[0])
     assert worst * (1.0 + 1e-13) < bound < worst * (1.0 + 2e-12)
 
 
-def test_friction_that_is_the_same_everywhere_has_a_number() -> None:
-    """Without modulation every phase is as bad: a = μ D/(2 d_max), b = μ/2."""
+def test_number_of_law_f_without_modulation() -> None:
+    """Without modulation every phase has a = μ D/(2 d_max) and b = μ/2."""
     surface = Surface(
         WAVE, "F", max_depth=0.5e-3, friction=0.7, max_deflection=0.2e-3, modulation_depth=0.0
     )
-    found = characteristic_number(surface)
+    bound = characteristic_number(surface)
     exact = np.linalg.norm([[0.7 * 0.5 / 0.2 / 2.0, 0.35], [0.0, 1.0]], 2)
-    assert found.lower == pytest.approx(exact, rel=1e-12)
-    assert found.upper == pytest.approx(exact, rel=1e-5)
+    assert bound.lower == pytest.approx(exact, rel=1e-12)
+    assert bound.upper == pytest.approx(exact, rel=1e-5)
 
 
 # --- closed forms ---------------------------------------------------------------------------------
 
 
-def single(amplitude: float, period: float) -> SingleWave:
+def single_wave(amplitude: float, period: float) -> SingleWave:
     wave = Sinusoid(amplitude, period).single_wave
     assert wave is not None
     return wave
 
 
-def waves(count: int) -> list[tuple[SingleWave, float]]:
-    """Return waves gentle to steep, and depths shallow to deep."""
+def random_waves(count: int) -> list[tuple[SingleWave, float]]:
+    """Return random waves from gentle to steep, and depths from shallow to deep."""
     result = []
     for slope, hessian in 10.0 ** RNG.uniform(-1.5, 1.5, (count, 2)):
         period = 10.0 ** RNG.uniform(-4, -2)
         amplitude = slope * period / (2.0 * math.pi)
         depth = hessian * period**2 / (4.0 * math.pi**2 * amplitude)
-        result.append((single(amplitude, period), depth))
+        result.append((single_wave(amplitude, period), depth))
     return result
 
 
-def section(wave: SingleWave, depth: float, phase: Any) -> tuple[Any, Any]:
-    """Return slope and depth times curvature at phases."""
+def slope_and_curvature(wave: SingleWave, depth: float, phase: Any) -> tuple[Any, Any]:
+    """Return the slope, and the depth times the curvature, at phases."""
     rate = 2.0 * math.pi / wave.period
     return (
         wave.amplitude * rate * np.cos(phase),
@@ -263,10 +263,10 @@ def section(wave: SingleWave, depth: float, phase: Any) -> tuple[Any, Any]:
 PHASES = np.linspace(-math.pi, math.pi, 20_001)
 
 
-def test_q_of_c_is_the_greatest_eigenvalue_of_its_symmetric_jacobian() -> None:
-    """-J/k = w wᵀ + δ Hess h, w = (-h', 1): its eigenvalues at δ = 0 and at full depth."""
-    for wave, depth in waves(150):
-        slope, hessian = section(wave, depth, PHASES)
+def test_q_of_law_c_is_the_largest_eigenvalue_of_its_jacobian() -> None:
+    """-J/k = w wᵀ + δ Hess h with w = (-h', 1); eigenvalues at δ = 0 and at full depth."""
+    for wave, depth in random_waves(150):
+        slope, hessian = slope_and_curvature(wave, depth, PHASES)
         best = 1.0
         for part in (0.0, 1.0):
             a, d = slope * slope + part * hessian, 1.0
@@ -276,19 +276,19 @@ def test_q_of_c_is_the_greatest_eigenvalue_of_its_symmetric_jacobian() -> None:
         value = forms.q_c(wave, depth)
         assert best <= value * (1.0 + 1e-12)
         assert value <= best * (1.0 + 1e-4)
-        # And it is attained at the stated phase.
-        s, b = section(wave, depth, forms.phase_c(wave, depth))
+        # It is attained at the returned phase.
+        s, b = slope_and_curvature(wave, depth, forms.phase_c(wave, depth))
         at = np.linalg.norm([[s * s + b, -s], [-s, 1.0]], 2)
         assert at == pytest.approx(value, rel=1e-9)
 
 
-def test_q_of_b_is_the_greatest_norm_and_where() -> None:
-    """-J/k = n wᵀ - δ ∂n/∂x e_xᵀ, w = (-h', 1), n = w/|w|: √(1 + h'²), or the turning normal."""
-    for wave, depth in waves(150):
+def test_q_of_law_b_is_the_largest_norm_and_its_phase_attains_it() -> None:
+    """-J/k = n wᵀ - δ ∂n/∂x e_xᵀ with w = (-h', 1) and n = w/|w|."""
+    for wave, depth in random_waves(150):
         value = forms.q_b(wave, depth)
 
         def norm(phase: Any, part: float, wave: SingleWave = wave, depth: float = depth) -> Any:
-            slope, hessian = section(wave, depth, np.asarray(phase))
+            slope, hessian = slope_and_curvature(wave, depth, np.asarray(phase))
             w = np.stack([-slope, np.ones_like(slope)])
             s = np.hypot(*w)
             matrix = np.einsum("i...,j...->...ij", w / s, w)
@@ -303,34 +303,34 @@ def test_q_of_b_is_the_greatest_norm_and_where() -> None:
         assert max(norm(phase, 0.0), norm(phase, 1.0)) == pytest.approx(value, rel=1e-9)
 
 
-def test_the_feasible_root_is_the_only_one_of_the_cubic_s() -> None:
+def test_feasible_root_of_the_cubic_is_unique() -> None:
     """λ³ - (1 + G₁² + E²/4) λ² + (E²/2) λ - E²/4 = 0, λ > 1, E (λ - 1) <= 2 G₁ λ."""
-    refused = none = 0
-    for wave, depth in waves(500):
+    with_infeasible_roots = without_root = 0
+    for wave, depth in random_waves(500):
         g = 2.0 * math.pi * wave.amplitude / wave.period
         e = 2.0 * math.pi * depth / wave.period
         roots = np.roots([1.0, -(1.0 + g * g + e * e / 4.0), e * e / 2.0, -e * e / 4.0])
         real = roots[np.abs(roots.imag) < 1e-9 * np.abs(roots)].real
         expected = [r for r in real if r > 1.0 and e * (r - 1.0) <= 2.0 * g * r]
         assert len(expected) <= 1
-        found = forms._feasible_root(wave, depth)
+        result = forms._feasible_root(wave, depth)
         if expected:
-            refused += int((real > 1.0).sum()) > 1
-            assert found == pytest.approx(expected[0], rel=1e-6)
-            t = 1.0 / found
+            with_infeasible_roots += int((real > 1.0).sum()) > 1
+            assert result == pytest.approx(expected[0], rel=1e-6)
+            t = 1.0 / result
             assert abs(e * e / 4.0 * t * (1.0 - t) ** 2 + (1.0 + g * g) * t - 1.0) < 1e-14
         else:
-            none += 1
-            assert found == 0.0
+            without_root += 1
+            assert result == 0.0
             assert g * e > 1.0 + 2.0 * g * g
-    assert refused > 5
-    assert none > 50
+    assert with_infeasible_roots > 5
+    assert without_root > 50
 
 
-def test_the_curls_of_a_wave() -> None:
-    """A: k ∇h is turned by a right angle. E: k (n_x, n_y), at most the sine of the steepest."""
-    for wave, depth in waves(50):
-        slope = float(np.abs(section(wave, depth, PHASES)[0]).max())
+def test_closed_forms_of_the_curls_of_a_wave() -> None:
+    """The curl of A is the largest slope, that of E the sine of the largest slope angle."""
+    for wave, depth in random_waves(50):
+        slope = float(np.abs(slope_and_curvature(wave, depth, PHASES)[0]).max())
         assert forms.curl_a(wave, depth) == pytest.approx(slope, rel=1e-12)
         sine = math.sin(math.atan(slope))
         assert forms.curl_e(wave, depth) == pytest.approx(sine, rel=1e-12)
@@ -339,20 +339,20 @@ def test_the_curls_of_a_wave() -> None:
         )
 
 
-def test_the_phases_are_those_of_flank_and_trough() -> None:
-    wave = single(0.3e-3, 1e-3)
-    slope, hessian = section(wave, 1.0, forms.phase_steepest(wave, 1e-3))
-    assert slope == section(wave, 1.0, PHASES)[0].max()
+def test_phases_of_the_steepest_flank_and_the_trough() -> None:
+    wave = single_wave(0.3e-3, 1e-3)
+    slope, hessian = slope_and_curvature(wave, 1.0, forms.phase_steepest(wave, 1e-3))
+    assert slope == slope_and_curvature(wave, 1.0, PHASES)[0].max()
     assert hessian == 0.0
-    _slope, hessian = section(wave, 1.0, forms.phase_trough(wave, 1e-3))
-    assert hessian == pytest.approx(section(wave, 1.0, PHASES)[1].max(), rel=1e-12)
+    _slope, hessian = slope_and_curvature(wave, 1.0, forms.phase_trough(wave, 1e-3))
+    assert hessian == pytest.approx(slope_and_curvature(wave, 1.0, PHASES)[1].max(), rel=1e-12)
 
 
 # --- crests ---------------------------------------------------------------------------------------
 
 
-def test_a_ball_is_as_sharp_everywhere() -> None:
-    """Where both curvatures are equal rounding must not make their difference a root of less."""
+def test_crest_curvature_of_a_sphere_is_constant() -> None:
+    """Where both curvatures are equal, rounding must not make the discriminant negative."""
     x, y = 0.7 * RNG.uniform(-1.0, 1.0, (2, 1000))
     z = np.sqrt(1.0 - x * x - y * y)
     ball = np.stack([z, -x / z, -y / z, -(1 - y * y) / z**3, -x * y / z**3, -(1 - x * x) / z**3], 1)
@@ -362,14 +362,16 @@ def test_a_ball_is_as_sharp_everywhere() -> None:
 
 @pytest.mark.parametrize("direction", [(1.0, 0.0), (1.0, 2.0), (-3.0, 1.0)])
 @pytest.mark.parametrize("phase", [0.0, 1.1, -2.5])
-def test_the_crest_of_a_wave_and_of_the_same_sum(phase: float, direction: Any) -> None:
+def test_sharpest_crests_of_a_wave_and_of_its_fourier_form_agree(
+    phase: float, direction: Any
+) -> None:
     wave = Sinusoid(0.2e-3, 1.3e-3, phase, direction)
     radius = wave.period**2 / (4.0 * math.pi**2 * wave.amplitude)
-    exact, found = sharpest_crest(wave), sharpest_crest(as_sum(wave))
+    exact, result = sharpest_crest(wave), sharpest_crest(as_fourier(wave))
     assert exact is not None
-    assert found is not None
-    # What is proved is not above what is there, and no more than its tolerance below.
-    for crest, gap in ((exact, 1e-12), (found, 1e-4)):
+    assert result is not None
+    # The proved radius is at most the actual one, and lower by its tolerance at most.
+    for crest, gap in ((exact, 1e-12), (result, 1e-4)):
         assert crest.radius * (1.0 - gap) <= crest.min_radius <= crest.radius
         assert crest.radius == pytest.approx(radius, rel=1e-6)
         closest_point, centre = np.array(crest.point), np.array(crest.centre)
@@ -378,7 +380,7 @@ def test_the_crest_of_a_wave_and_of_the_same_sum(phase: float, direction: Any) -
             closest_point[2], rel=1e-9
         )
         np.testing.assert_allclose(centre - closest_point, [0.0, 0.0, -radius], atol=2e-3 * radius)
-        # The surface normal at the closest point leads to the centre.
+        # The centre lies on the surface normal at the closest point.
         slope = wave.gradient([closest_point[:2]])[0]
         normal = np.array([-slope[0], -slope[1], 1.0]) / math.hypot(1.0, *slope)
         np.testing.assert_allclose(
@@ -386,8 +388,8 @@ def test_the_crest_of_a_wave_and_of_the_same_sum(phase: float, direction: Any) -
         )
 
 
-def test_the_centre_of_an_oblique_crest_lies_on_its_normal() -> None:
-    """Where the sharpest crest is not level: its radius, point and centre belong to one circle."""
+def test_centre_of_an_oblique_crest_lies_on_its_normal() -> None:
+    """On a sloping crest, radius, point and centre belong to one circle."""
     x = np.linspace(0.0, 2.0 * math.pi, 40, endpoint=False)
     texture = Profile(1e-3 * (np.sin(x) + 0.4 * np.sin(3.0 * x + 1.0)), 4e-3 / 40, periodic=True)
     crest = sharpest_crest(texture)
@@ -403,18 +405,18 @@ def test_the_centre_of_an_oblique_crest_lies_on_its_normal() -> None:
     assert crest.radius == pytest.approx(-(math.hypot(1.0, slope) ** 3) / hessian, rel=1e-9)
 
 
-def test_the_number_of_law_d_grows_with_the_depth_over_the_crest() -> None:
-    """Certified ones are tight: y/(1 - y) within the tolerance, above and below."""
+def test_number_of_law_d_by_depth_relative_to_the_crest_radius() -> None:
+    """Certified numbers equal y/(1 - y) within the tolerance."""
     crest = sharpest_crest(LINES)
     assert crest is not None
     bound = LINES.bounds[1]
     for y in (0.2, 0.45, 0.55, 0.8, 0.97):
-        found = characteristic_number(Surface(LINES, "D", max_depth=y * crest.radius), 1e-6)
+        result = characteristic_number(Surface(LINES, "D", max_depth=y * crest.radius), 1e-6)
         exact = max(1.0, y / (1.0 - y))
         shallow = y * crest.radius * bound <= 0.5
-        assert found.method == ("theorem" if shallow else "certified")
-        assert found.lower == pytest.approx(exact, rel=1e-3)
-        assert found.lower <= found.upper <= found.lower * (1.0 + 1.01e-6)
+        assert result.method == ("theorem" if shallow else "certified")
+        assert result.lower == pytest.approx(exact, rel=1e-3)
+        assert result.lower <= result.upper <= result.lower * (1.0 + 1.01e-6)
         height = crest.point[2] - y * (crest.point[2] - crest.centre[2])
         assert gain_above_crest(Surface(LINES, "D"), height) == pytest.approx(exact, rel=1e-9)
     half = next(d for d in (0.5 / bound, math.nextafter(0.5 / bound, 0.0)) if d * bound == 0.5)
@@ -422,27 +424,27 @@ def test_the_number_of_law_d_grows_with_the_depth_over_the_crest() -> None:
         assert characteristic_number(Surface(LINES, "D", max_depth=depth)).method == method
 
 
-def test_law_h_is_law_d_where_nothing_splits() -> None:
-    """min(c, y/(1 - y)) from y = 1/2 on, and the witness attains it."""
+def test_number_of_law_h_is_that_of_law_d_without_a_split() -> None:
+    """The number is min(c, y/(1 - y)) from y = 1/2 on, and the witness attains it."""
     crest = sharpest_crest(WAVE)
     assert crest is not None
     for c in (1.5, 4.0):
         for y in (0.4, 0.55, 0.9 * c / (1.0 + c), c / (1.0 + c), 1.1 * c / (1.0 + c), 3.0):
             surface = Surface(WAVE, "H", max_depth=y * crest.radius, continuity=c)
-            found = characteristic_number(surface)
+            bound = characteristic_number(surface)
             exact = max(1.0, min(c, y / (1.0 - y) if y < 1.0 else math.inf))
-            assert found.upper == pytest.approx(exact, rel=1e-12)
-            assert found.upper >= exact
-            assert found.lower == pytest.approx(exact, rel=1e-4)
-            assert ("too small" in found.note) == (exact < c * (1.0 - 1e-12))
+            assert bound.upper == pytest.approx(exact, rel=1e-12)
+            assert bound.upper >= exact
+            assert bound.lower == pytest.approx(exact, rel=1e-4)
+            assert ("too small" in bound.note) == (exact < c * (1.0 - 1e-12))
 
 
-def test_law_h_just_below_the_split_is_law_d_just_above_it() -> None:
-    """A billionth below the onset the two closest points are one up to rounding."""
+def test_number_of_law_h_is_continuous_at_the_split() -> None:
+    """Below the onset by 1e-9 the two closest points coincide up to rounding."""
     for texture in (LINES, WAVE):
         crest = sharpest_crest(texture)
         assert crest is not None
         surface = Surface(texture, "H", max_depth=0.6 * crest.radius * (1.0 + 1e-9), continuity=1.5)
-        found = characteristic_number(surface)
-        assert found.upper == pytest.approx(1.5, rel=1e-12)
-        assert found.lower >= 1.5 * (1.0 - 3e-6)
+        bound = characteristic_number(surface)
+        assert bound.upper == pytest.approx(1.5, rel=1e-12)
+        assert bound.lower >= 1.5 * (1.0 - 3e-6)

@@ -1,4 +1,4 @@
-"""Two waves whose ratio is nearly, but not exactly, rational drift through all of the torus."""
+"""Two waves of nearly, but not exactly, rational ratio take all pairs of phases (the torus)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def surface(ratio: float, law: str = "C") -> Surface:
 
 
 def number_c(first: np.ndarray, second: np.ndarray, ratio: float = 2.0) -> float:
-    """The greatest ‖J‖/k of law C over phases: J = -k(w wᵀ + δ diag(h'', 0))."""
+    """Return the largest ‖J‖/k of law C over phases: J = -k(w wᵀ + δ diag(h'', 0))."""
     slope = A * WAVE * (np.cos(first) + 0.4 * ratio * np.cos(second))
     hessian = -A * WAVE**2 * (np.sin(first) + 0.4 * ratio**2 * np.sin(second))
     worst = 0.0
@@ -33,43 +33,45 @@ def number_c(first: np.ndarray, second: np.ndarray, ratio: float = 2.0) -> float
     return worst
 
 
-def on_the_torus(ratio: float) -> float:
-    """What is reached where the sum goes on for ever: every pair of phases."""
+def number_on_the_torus(ratio: float) -> float:
+    """Return the number over all pairs of phases, which the unbounded sum approaches."""
     turn = np.linspace(0.0, 2 * math.pi, 1001)
     return number_c(*np.meshgrid(turn, turn), ratio)
 
 
 @pytest.mark.parametrize("ratio", RATIOS)
-def test_a_ratio_that_is_nearly_two_is_certified_on_the_torus(ratio: float) -> None:
+def test_nearly_rational_ratio_is_certified_on_the_torus(ratio: float) -> None:
     assert ratio * WAVE != 2.0 * WAVE
-    reached = on_the_torus(ratio)
+    torus_number = number_on_the_torus(ratio)
     for number in (characteristic_number, one_sided_number):
-        found = number(surface(ratio))
-        assert found.method == "certified"
-        assert reached <= found.upper <= reached * (1 + 1e-4)
-        assert found.lower <= reached * (1 + 1e-4)
+        bound = number(surface(ratio))
+        assert bound.method == "certified"
+        assert torus_number <= bound.upper <= torus_number * (1 + 1e-4)
+        assert bound.lower <= torus_number * (1 + 1e-4)
     assert not surface(ratio).texture.domain.periodic
 
 
-def test_a_ratio_of_exactly_two_repeats() -> None:
-    locked = surface(2.0)
+def test_ratio_of_exactly_two_is_periodic() -> None:
+    periodic_surface = surface(2.0)
     turn = np.linspace(0.0, 2 * math.pi, 2_000_001)
     expected = number_c(turn, 2 * turn + PHASE)
-    found = characteristic_number(locked)
-    assert locked.texture.domain.periodic
-    assert found.upper == pytest.approx(expected, rel=1e-6)
-    assert expected < on_the_torus(2.0) * (1 - 1e-3)
+    bound = characteristic_number(periodic_surface)
+    assert periodic_surface.texture.domain.periodic
+    assert bound.upper == pytest.approx(expected, rel=1e-6)
+    assert expected < number_on_the_torus(2.0) * (1 - 1e-3)
 
 
-def test_a_looser_ratio_is_detected(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Negative control: what counts as rational up to 1e-9 is certified too low."""
+def test_loose_tolerance_for_rational_ratios_gives_too_low_a_number(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Negative control: with a tolerance of 1e-9 for rational ratios the number is too low."""
     monkeypatch.setattr(plane_waves, "_ROUNDING", 1e-9)
     ratio = 2.0 * (1.0 + 9e-10)
-    assert characteristic_number(surface(ratio)).upper < on_the_torus(ratio) * (1 - 1e-3)
+    assert characteristic_number(surface(ratio)).upper < number_on_the_torus(ratio) * (1 - 1e-3)
 
 
-def test_the_extremes_are_those_of_the_torus() -> None:
-    """Locked, the crests of the second wave miss those of the first; drifting, they meet."""
+def test_extremes_are_those_of_the_torus() -> None:
+    """At ratio 2 the crests of the two waves never coincide; at nearly rational ratios they do."""
     assert surface(2.0).texture.extremes[1] < 1.39 * A
     for ratio in RATIOS:
         low, high = surface(ratio).texture.extremes

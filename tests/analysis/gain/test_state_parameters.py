@@ -1,4 +1,4 @@
-"""A law's parameters have one home: kernel, certificates and loops see the same values."""
+"""Kernel, certificates and loops use the same values of a law's parameters."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from asperity.surface import Surface
 from asperity.textures import Fourier, Sinusoid
 
 WAVE = Sinusoid(amplitude=0.2e-3, period=1e-3)
-# More independent waves than are certified on the whole plane.
+# Too many independent waves to be certified on the whole plane.
 FIVE = Fourier(
     [1e-4, 5e-5, 4e-5, 3e-5, 2e-5],
     [[3000.0, 0.0], [0.0, 5000.0], [1234.0, 777.0], [-500.0, 2222.0], [1777.0, -3210.0]],
@@ -28,7 +28,7 @@ RUBBING = {"friction": 4.0, "max_deflection": 1e-4, "modulation_depth": 0.6}
 
 
 def _dragged(c: Any) -> Any:
-    """Return k δ (e_z - g (1 - m) d/d_max) with a grip g and no friction of that name."""
+    """Return k δ (e_z - g (1 - m) d/d_max) with a parameter "grip" g in place of "friction"."""
     grip = c.parameter("grip") * (1 - c.relative_height / 2) / c.parameter("max_deflection")
     return c.k * c.depth * (c.e_z - c.tangential(grip * c.deflection))
 
@@ -39,12 +39,12 @@ DRAGGED = Law(
 )  # fmt: skip
 SURFACES = {
     "F": Surface(WAVE, "F", law_parameters=RUBBING),
-    "one's own": Surface(WAVE, DRAGGED, law_parameters={"grip": 2.0, "max_deflection": 5e-5}),
+    "user-defined": Surface(WAVE, DRAGGED, law_parameters={"grip": 2.0, "max_deflection": 5e-5}),
 }
 
 
 def _jacobians(surface: Surface, count: int = 4000) -> FloatArray:
-    """Return J/k at random contacts with random deflections, the longest ones among them."""
+    """Return J/k at random contacts with random deflections, half of them of maximum length."""
     rng = np.random.default_rng(11)
     points = rng.uniform([-1e-3, -1e-3, -surface.max_depth], [1e-3, 1e-3, 0.0], (count, 3))
     longest = surface.law_parameters["max_deflection"]
@@ -59,23 +59,23 @@ def _jacobians(surface: Surface, count: int = 4000) -> FloatArray:
     ("number", "measure"),
     [(characteristic_number, precise_norm), (one_sided_number, precise_one_sided)],
 )
-def test_no_value_of_the_kernel_exceeds_the_certificate(
+def test_kernel_values_do_not_exceed_the_certified_number(
     surface: Surface, number: Any, measure: Any
 ) -> None:
     bound = number(surface, 0.05)
     assert bound.method == "certified"
     greatest = float(measure(_jacobians(surface)).max())
     assert 0.8 * bound.upper < greatest <= bound.upper
-    assert bound.upper > 2.0  # the defaults would give less
+    assert bound.upper > 2.0  # more than with the default parameters
     state = (np.array([bound.deflection]), np.array([bound.sliding]))
     attained = measure(surface.jacobian([bound.at], *state) / surface.stiffness)
     assert attained[0] == pytest.approx(bound.lower, rel=1e-12)
 
 
-def test_it_does_not_matter_how_a_parameter_was_given() -> None:
+def test_parameters_by_mapping_and_by_keyword_are_equivalent() -> None:
     mapping, keywords = Surface(WAVE, "F", law_parameters=RUBBING), Surface(WAVE, "F", **RUBBING)
-    for what in (characteristic_number, one_sided_number, merit):
-        assert what(mapping) == what(keywords)
+    for analysis in (characteristic_number, one_sided_number, merit):
+        assert analysis(mapping) == analysis(keywords)
     one, other = worst_loop(mapping), worst_loop(keywords)
     assert (one.energy, one.description) == (other.energy, other.description)
     assert "0.1 mm along" in one.description or "in the plane" in one.description
@@ -85,16 +85,16 @@ def test_it_does_not_matter_how_a_parameter_was_given() -> None:
     assert characteristic_number(mapping).upper > 2.0 * default.upper
 
 
-def test_the_safe_bound_knows_the_parameters() -> None:
+def test_derivative_bound_uses_the_law_parameters() -> None:
     surface = Surface(FIVE, "F", law_parameters=RUBBING)
     bound = characteristic_number(surface)
     assert bound.lower <= bound.upper == derivative_bound(surface, NORM)
     assert bound.upper > 2.0 * characteristic_number(Surface(FIVE, "F")).upper
 
 
-def test_loops_of_a_user_defined_law_use_its_anchor() -> None:
-    """The path's first leg is as long as the law's own deflection, and the energy is its own."""
-    surface = SURFACES["one's own"]
+def test_loops_of_a_user_defined_law_use_its_max_deflection() -> None:
+    """The path is as long as the max_deflection of the law, and a larger one gives more energy."""
+    surface = SURFACES["user-defined"]
     leak = worst_loop(surface)
     assert leak.energy > 0.0
     span = np.ptp(leak.vertices[:, :2], axis=0).max()

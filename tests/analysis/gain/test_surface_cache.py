@@ -1,4 +1,4 @@
-"""Cached numbers of a surface: found by content, computed again when anything changes."""
+"""Cached numbers of a surface: keyed by content, recomputed after any change."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ OTHER_HEIGHTS[3, 4] *= 1.0 + 1e-14
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty cache folder."""
+    """Return an empty cache folder."""
     monkeypatch.setenv("ASPERITY_CACHE_DIR", str(tmp_path))
     return tmp_path
 
@@ -83,25 +83,25 @@ CHANGES = {
 }
 
 
-def test_every_change_of_the_surface_changes_its_content() -> None:
+def test_every_change_of_the_surface_changes_its_cache_content() -> None:
     contents = [surface_content(make()) for make in (surface, *CHANGES.values())]
     assert None not in contents
     assert len(set(contents)) == len(contents)
 
 
-def test_content_does_not_depend_on_the_object() -> None:
-    """The stiffness of a shipped law is a factor; how the texture was prepared is only text."""
+def test_equal_surfaces_have_equal_cache_content() -> None:
+    """The stiffness of a shipped law is a factor, and the preparation of a texture is only text."""
     same = surface(of=texture(preparation=("as measured",)), stiffness=77.0)
     assert surface_content(same) == surface_content(surface())
     assert surface_content(surface(user_law(1.5))) == surface_content(surface(user_law(1.5)))
 
 
 class UserMap(HeightMap):
-    """A user-defined kind: what its bounds follow from is unknown."""
+    """A user-defined texture, whose bounds depend on unknown code."""
 
 
-def test_results_that_rest_on_code_of_the_user_are_not_cached() -> None:
-    """Such code may read a value from another file, which may change."""
+def test_results_of_user_defined_theorems_and_textures_are_not_cached() -> None:
+    """User code may read values from files that change."""
     law = user_law(1.5)
     assert surface_content(surface(law)) is not None
     register_theorem(law, Theorem(norm_bound=lambda _surface: 7.0))
@@ -116,7 +116,7 @@ def entries(folder: Path) -> Iterator[Path]:
     return (path for path in folder.glob(f"{cache.RESULTS_NAMESPACE}/*") if path.suffix == "")
 
 
-def test_a_number_is_stored_once(folder: Path) -> None:
+def test_each_number_is_stored_once(folder: Path) -> None:
     before = {path.name for path in folder.iterdir()} if folder.exists() else set()
     for number in (characteristic_number, one_sided_number):
         number(surface())
@@ -149,7 +149,7 @@ print(repr(characteristic_number(Surface(HeightMap(heights, 3e-4), "B", max_dept
 """
 
 
-def test_another_process_reads_a_cached_number(folder: Path) -> None:
+def test_cached_number_is_read_by_another_process(folder: Path) -> None:
     bound = characteristic_number(surface())
     environment = {"ASPERITY_CACHE_DIR": str(folder), "PYTHONPATH": ":".join(sys.path)}
     command = [sys.executable, "-c", _SECOND_PROCESS]

@@ -1,4 +1,4 @@
-"""Theorems belong to law objects: a law that borrows a letter borrows none."""
+"""Theorems belong to law objects: a user-defined law with a shipped letter has none."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ from asperity.textures import Fourier, Sinusoid
 STEEP = Sinusoid(amplitude=0.8e-3, period=1e-3)
 
 
-def like(letter: str, formula_of: str, factor: float = 1.0) -> Law:
-    """Return a law of a user's own with a shipped law's letter and another's formula."""
+def law_with_formula_of(letter: str, formula_of: str, factor: float = 1.0) -> Law:
+    """Return a user-defined law with the letter of one shipped law and the formula of another."""
     law = LAWS[formula_of]
 
     def force(c: Any) -> Any:
@@ -39,33 +39,33 @@ def like(letter: str, formula_of: str, factor: float = 1.0) -> Law:
 
 
 @pytest.mark.parametrize("letter", ["E", "D", "H"])
-def test_a_borrowed_letter_changes_no_number(letter: str) -> None:
-    """The formula of B under another law's letter has B's merit and B's numbers."""
-    b, own = Surface(STEEP, "B"), Surface(STEEP, like(letter, "B"))
-    expected, found = merit(b), merit(own)
+def test_law_with_a_shipped_letter_has_the_numbers_of_its_formula(letter: str) -> None:
+    """The formula of B under another letter has the merit and numbers of B."""
+    b, borrowed = Surface(STEEP, "B"), Surface(STEEP, law_with_formula_of(letter, "B"))
+    expected, result = merit(b), merit(borrowed)
     for name in ("strength", "support", "ripple", "gain", "contact_lost"):
-        assert getattr(found, name) == pytest.approx(getattr(expected, name), rel=1e-9)
+        assert getattr(result, name) == pytest.approx(getattr(expected, name), rel=1e-9)
     for number in (characteristic_number, one_sided_number, curl_number):
-        assert number(own, 1e-3).value == pytest.approx(number(b).value, rel=2e-3)
+        assert number(borrowed, 1e-3).value == pytest.approx(number(b).value, rel=2e-3)
 
 
-def test_the_god_object_of_another_is_not_law_d() -> None:
-    """Twice D's force under D's letter: q⁺ is 2, not D's 1, and q need not say where it jumps."""
+def test_user_defined_god_object_does_not_use_the_theorem_of_law_d() -> None:
+    """Twice the force of D under the letter D has q⁺ = 2, not the 1 of law D."""
     shallow = Sinusoid(amplitude=0.05e-3, period=1e-3)
-    own = Surface(shallow, like("D", "D", 2.0))
-    assert one_sided_number(own, 1e-3).value == pytest.approx(2.0, rel=2e-3)
-    q = characteristic_number(own, 1e-3)
+    borrowed = Surface(shallow, law_with_formula_of("D", "D", 2.0))
+    assert one_sided_number(borrowed, 1e-3).value == pytest.approx(2.0, rel=2e-3)
+    q = characteristic_number(borrowed, 1e-3)
     assert q.value == pytest.approx(2.0, rel=2e-3)
-    assert continuity(own, q).continuous
-    steep = Surface(STEEP, like("D", "D", 2.0))
+    assert continuity(borrowed, q).continuous
+    steep = Surface(STEEP, law_with_formula_of("D", "D", 2.0))
     q = characteristic_number(steep, work_limit=10_000)
     assert q.method == "sampled"
     assert not continuity(steep, q).continuous
 
 
 def test_a_user_defined_theorem_is_used() -> None:
-    """Half the smooth wall: its numbers are known without a search."""
-    law = like("half", "W", 0.5)
+    """Half the smooth wall, whose number is known without a search."""
+    law = law_with_formula_of("half", "W", 0.5)
     surface = Surface(STEEP, law)
     assert characteristic_number(surface).method == "certified"
     half = Constant(0.5, "-J = k e_z e_zᵀ/2")
@@ -73,27 +73,29 @@ def test_a_user_defined_theorem_is_used() -> None:
     q = characteristic_number(surface)
     assert (q.value, q.method, q.note) == (0.5, "theorem", half.reason)
     assert q.lower == pytest.approx(0.5, rel=1e-12)
-    assert one_sided_number(surface).method == "certified"  # it does not cover the others
+    assert (
+        one_sided_number(surface).method == "certified"
+    )  # the theorem does not cover the one-sided number
     assert merit(surface).gain == 0.5
     with pytest.raises(ParameterError, match="already has a theorem"):
         register_theorem(law, Theorem())
 
 
 @pytest.mark.parametrize("law", ["E", None, "half"])
-def test_a_theorem_belongs_to_a_law_not_to_a_letter(law: Any) -> None:
+def test_theorem_registration_requires_a_law_object(law: Any) -> None:
     with pytest.raises(ParameterError, match="must be a Law"):
         register_theorem(law, Theorem())
 
 
-def test_every_shipped_law_has_its_entry_and_none_can_be_replaced() -> None:
+def test_shipped_laws_have_theorems_that_cannot_be_replaced() -> None:
     for law in LAWS.values():
         assert theorem_of(law) != Theorem()
         with pytest.raises(ParameterError, match="already has a theorem"):
             register_theorem(law, Theorem())
 
 
-def test_law_d_on_many_waves_has_the_bound_of_their_second_derivatives() -> None:
-    """Where no crest is certified: y = D K, K the sum of a |k|²; an extent gives the crest's."""
+def test_law_d_on_many_waves_uses_the_hessian_bound() -> None:
+    """Without a certified crest y = D K, where K is the sum of a |k|²."""
     angles = np.arange(5.0)
     vectors = (
         6000.0
@@ -102,19 +104,19 @@ def test_law_d_on_many_waves_has_the_bound_of_their_second_derivatives() -> None
     )
     many = Fourier(np.full(5, 0.02e-3), vectors, angles)
     hessian = 0.02e-3 * float((vectors**2).sum())
-    found = characteristic_number(Surface(many, "D", max_depth=0.7 / hessian))
-    assert found.upper == pytest.approx(0.7 / 0.3, rel=1e-9)
-    assert found.method == "certified"
+    bound = characteristic_number(Surface(many, "D", max_depth=0.7 / hessian))
+    assert bound.upper == pytest.approx(0.7 / 0.3, rel=1e-9)
+    assert bound.method == "certified"
 
 
-def test_law_d_down_to_the_very_onset_is_infinite() -> None:
-    """At the sharpest crest's radius, to the last bit; just above it is a number."""
+def test_number_of_law_d_is_infinite_from_the_crest_radius_on() -> None:
+    """Infinite at exactly the radius of the sharpest crest, finite just above it."""
     crest = sharpest_crest(LINES)
     assert crest is not None
     for depth, infinite in ((crest.radius, True), (crest.radius * (1.0 - 1e-3), False)):
-        found = characteristic_number(Surface(LINES, "D", max_depth=depth))
-        assert (found.lower == math.inf) is infinite
-        assert found.method == "certified"
+        bound = characteristic_number(Surface(LINES, "D", max_depth=depth))
+        assert (bound.lower == math.inf) is infinite
+        assert bound.method == "certified"
         if infinite:
-            assert found.at == crest.centre
-            assert "onset" in found.note
+            assert bound.at == crest.centre
+            assert "onset" in bound.note

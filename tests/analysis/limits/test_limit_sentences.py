@@ -1,4 +1,4 @@
-"""What the limits say: in words, as data, in a notebook, and of a flat surface."""
+"""The result of limits as sentences, as data and in a notebook, and on a flat surface."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ LONG = 5.0**2 / (5.0**2 + 2.4**2)  # share of the long wave
 
 
 def device(**changes: float | None) -> Device:
-    """A device that knows everything; None leaves a number out."""
+    """Return a device with all data; None omits a value."""
     content = {field: value for field, value in {**NUMBERS, **changes}.items() if value is not None}
     return parse_device(content, "bench")
 
 
-def ask(texture: Texture | None = None, **arguments: Any) -> Limits:
-    """The limits of law A at 500 N/m on the bench by default."""
-    given = {"device": device(), "speed": V, "law": "A", "stiffness": 500.0, "max_depth": D}
-    return limits(texture or Sinusoid(A, L), **{**given, **arguments})
+def default_limits(texture: Texture | None = None, **arguments: Any) -> Limits:
+    """Return the limits, by default of law A at 500 N/m on the bench device."""
+    defaults = {"device": device(), "speed": V, "law": "A", "stiffness": 500.0, "max_depth": D}
+    return limits(texture or Sinusoid(A, L), **{**defaults, **arguments})
 
 
 def verdicts(result: Limits) -> dict[int, bool | None]:
@@ -50,13 +50,13 @@ def verdicts(result: Limits) -> dict[int, bool | None]:
         (dict.fromkeys(NUMBERS.keys() - {"max_stiffness"}), "limit 5 holds at 0.12 m/s"),
     ],
 )
-def test_one_limit_holds_and_several_hold(changes: dict[str, None], words: str) -> None:
-    result = ask(device=device(**changes))
+def test_answer_lists_the_limits_that_hold(changes: dict[str, None], words: str) -> None:
+    result = default_limits(device=device(**changes))
     assert f"As far as can be decided: {words}. Not decidable: " in result.answer
 
 
-def test_plain_data_are_complete() -> None:
-    result = ask(TWO)
+def test_limits_to_dict_is_complete() -> None:
+    result = default_limits(TWO)
     content = json.loads(json.dumps(result.to_dict(), allow_nan=False))
     assert content["schema"] == 2
     assert [limit["number"] for limit in content["limits"]] == [1, 2, 3, 4, 5, 6]
@@ -67,31 +67,33 @@ def test_plain_data_are_complete() -> None:
     assert content["gain"]["symbol"] == "q"
 
 
-def test_defaults_are_stated() -> None:
+def test_assumptions_state_the_defaults_in_use() -> None:
     assumptions = " | ".join(limits(Sinusoid(A, L), device()).assumptions)
-    for words in ("Default speed 0.1 m/s", "α = 5, β = 5, γ = 5", "Default max depth 100 µm"):
-        assert words in assumptions
-    given = " | ".join(ask(time_samples=5.0, position_samples=5.0, force_steps=5.0).assumptions)
-    for words in ("Default speed", "α = ", "Default max depth", "Stiffness"):
-        assert words not in given
+    for phrase in ("Default speed 0.1 m/s", "α = 5, β = 5, γ = 5", "Default max depth 100 µm"):
+        assert phrase in assumptions
+    explicit = " | ".join(
+        default_limits(time_samples=5.0, position_samples=5.0, force_steps=5.0).assumptions
+    )
+    for phrase in ("Default speed", "α = ", "Default max depth", "Stiffness"):
+        assert phrase not in explicit
     assert "Not verified for the bench: update rate 2 kHz" in assumptions
 
 
-def test_a_verified_number_is_not_called_unverified() -> None:
+def test_verified_device_data_are_not_reported_as_unverified() -> None:
     assumptions = " | ".join(limits(Sinusoid(A, L), "inverse3").assumptions)
     assert "Not verified" not in assumptions
     assert "filters the force" in assumptions
 
 
-def test_notebooks_show_a_table() -> None:
-    text = ask(device=device(bandwidth=None))._repr_html_()
+def test_notebook_representation_is_a_table() -> None:
+    text = default_limits(device=device(bandwidth=None))._repr_html_()
     assert text.count("<tr") == 7
     assert "needs" in text
     assert "bandwidth" in text
 
 
-def test_a_flat_surface_is_reported_as_flat() -> None:
-    result = ask(HeightMap(np.full((6, 6), 1e-3), 1e-4))
+def test_flat_surface_is_reported_as_flat() -> None:
+    result = default_limits(HeightMap(np.full((6, 6), 1e-3), 1e-4))
     assert result.answer == "The surface is flat: there is no texture to feel."
     assert verdicts(result) == {**dict.fromkeys([1, 2, 3, 4, 6]), 5: True}
     assert result.limit(1).missing_data == ("waves: the surface is flat",)

@@ -1,4 +1,4 @@
-"""The six limits, each side by hand; a texture below a limit fails exactly that limit."""
+"""The six limits computed by hand; crossing one limit fails exactly that limit."""
 
 from __future__ import annotations
 
@@ -32,15 +32,15 @@ A, L, V, D = 5e-5, 0.8e-3, 0.12, 2e-4
 
 
 def device(**changes: float | None) -> Device:
-    """A device that knows everything; None leaves a number out."""
+    """Return a device with all data; None omits a value."""
     content = {field: value for field, value in {**NUMBERS, **changes}.items() if value is not None}
     return parse_device(content, "bench")
 
 
-def ask(texture: Texture | None = None, **arguments: Any) -> Limits:
-    """The limits of law A at 500 N/m on the bench by default."""
-    given = {"device": device(), "speed": V, "law": "A", "stiffness": 500.0, "max_depth": D}
-    return limits(texture or Sinusoid(A, L), **{**given, **arguments})
+def default_limits(texture: Texture | None = None, **arguments: Any) -> Limits:
+    """Return the limits, by default of law A at 500 N/m on the bench device."""
+    defaults = {"device": device(), "speed": V, "law": "A", "stiffness": 500.0, "max_depth": D}
+    return limits(texture or Sinusoid(A, L), **{**defaults, **arguments})
 
 
 def verdicts(result: Limits) -> dict[int, bool | None]:
@@ -50,8 +50,8 @@ def verdicts(result: Limits) -> dict[int, bool | None]:
 ALL = dict.fromkeys(range(1, 7), True)
 
 
-def test_the_sides_by_hand() -> None:
-    result = ask(time_samples=6.0, position_samples=7.0, force_steps=8.0)
+def test_both_sides_of_each_limit_by_hand() -> None:
+    result = default_limits(time_samples=6.0, position_samples=7.0, force_steps=8.0)
     q = math.hypot(1.0, 2 * math.pi * A / L)
     expected = {
         1: (6 * V / 2000.0, L, "m"),
@@ -71,8 +71,8 @@ def test_the_sides_by_hand() -> None:
     assert result.answer.startswith("Yes: all six limits hold at 0.12 m/s.")
 
 
-# One change of the texture, of the scan or of the device that crosses one limit alone, just so:
-# which limit, and the value at which its two sides are equal.
+# Changes of the texture, the scan or the device that cross exactly one limit:
+# the limit, the change, and the value at which the two sides are equal.
 CROSSINGS: dict[str, tuple[int, Any, float]] = {
     # A short wave is too short for the updates at this speed: l = α v T.
     "texture: updates": (1, lambda x: ({"texture": Sinusoid(A, 1 / x)}, {"bandwidth": 1e5}),
@@ -90,7 +90,7 @@ CROSSINGS: dict[str, tuple[int, Any, float]] = {
                                              {"bandwidth": 1e5, "update_rate": 1e5,
                                               "max_stiffness": 1e4}), 1.0 / (5 * 20e-6)),
     "samples: fast position": (3, lambda x: ({"time_samples": x}, {"update_rate": 1e5}), L / 20e-6),
-    # A faint wave pushes with less than γ steps of force: k A = γ b.
+    # The force of a small wave is below γ force steps: k A = γ b.
     "texture: force": (4, lambda x: ({"texture": Sinusoid(1 / x, L)}, {}), 500.0 / (5 * 2e-3)),
     "device: force": (4, lambda x: ({}, {"force_resolution": x}), 500.0 * A / 5),
     "samples: force": (4, lambda x: ({"force_steps": x}, {}), 500.0 * A / 2e-3),
@@ -112,7 +112,7 @@ def test_exceeding_one_limit_fails_exactly_that_limit(name: str) -> None:
     number, change, value = CROSSINGS[name]
     for factor, expected in ((1.0 - 1e-6, ALL), (1.0 + 1e-6, {**ALL, number: False})):
         arguments, of_device = change(value * factor)
-        result = ask(device=device(**of_device), **arguments)
+        result = default_limits(device=device(**of_device), **arguments)
         assert verdicts(result) == expected, factor
     limit = result.limit(number)
     assert limit.left == pytest.approx(limit.right, rel=1e-5)
@@ -130,8 +130,8 @@ NEEDS = {
 
 
 @pytest.mark.parametrize("field", list(NEEDS))
-def test_unknown_data_are_not_guessed(field: str) -> None:
-    whole, result = ask(), ask(device=device(**{field: None}))
+def test_missing_device_data_leave_limits_undecided(field: str) -> None:
+    whole, result = default_limits(), default_limits(device=device(**{field: None}))
     for limit in result.limits:
         if limit.number in NEEDS[field]:
             assert (limit.holds, limit.missing_data) == (None, (field,))
@@ -144,8 +144,8 @@ def test_unknown_data_are_not_guessed(field: str) -> None:
     assert all(set(wave.holds) == {1, 2, 3, 4, 6} - NEEDS[field] for wave in result.waves)
 
 
-def test_a_device_without_data_decides_nothing() -> None:
-    result = ask(device=parse_device({}, "none"))
+def test_device_without_data_decides_no_limit() -> None:
+    result = default_limits(device=parse_device({}, "none"))
     assert verdicts(result) == dict.fromkeys(range(1, 7))
     assert result.answer.startswith("No limit can be decided.")
     assert result.safe_stiffness is None
@@ -154,8 +154,8 @@ def test_a_device_without_data_decides_nothing() -> None:
     )  # fmt: skip
 
 
-def test_speeds_that_the_limits_allow() -> None:
-    result = ask()
+def test_speed_range_of_each_limit() -> None:
+    result = default_limits()
     tops = {limit.number: limit.speeds for limit in result.limits}
     assert tops[1] == (0.0, pytest.approx(L * 2000.0 / 5))
     assert tops[6] == (0.0, pytest.approx(L * 300.0))
@@ -164,21 +164,21 @@ def test_speeds_that_the_limits_allow() -> None:
 
 
 @pytest.mark.parametrize("number", [1, 6])
-def test_a_limit_holds_below_its_speed_and_not_above(number: int) -> None:
-    top = ask().limit(number).speeds[1]
-    assert ask(speed=top * (1 - 1e-9)).limit(number).holds
-    assert not ask(speed=top * (1 + 1e-9)).limit(number).holds
+def test_limit_holds_below_its_top_speed_only(number: int) -> None:
+    top = default_limits().limit(number).speeds[1]
+    assert default_limits(speed=top * (1 - 1e-9)).limit(number).holds
+    assert not default_limits(speed=top * (1 + 1e-9)).limit(number).holds
 
 
 def test_no_speed_satisfies_a_limit_independent_of_speed() -> None:
-    result = ask(force_steps=50.0)
+    result = default_limits(force_steps=50.0)
     assert result.limit(4).speeds == (0.0, 0.0)
     assert result.speeds == (0.0, 0.0)
     assert "No speed satisfies limit 4" in result.answer
 
 
-def test_a_slower_scan_mends_the_others() -> None:
-    result = ask(speed=0.3)
+def test_answer_states_the_speed_below_which_limits_hold() -> None:
+    result = default_limits(speed=0.3)
     assert verdicts(result) == {**ALL, 6: False}
     assert "Below 0.24 m/s they hold." in result.answer
 
@@ -187,12 +187,12 @@ TWO = Fourier([5e-5, 2.4e-5], [2 * math.pi / 0.8e-3, 2 * math.pi / 0.32e-3], [0.
 LONG = 5.0**2 / (5.0**2 + 2.4**2)  # share of the long wave
 
 
-def test_every_wave_of_a_sum_has_its_own_length_and_force() -> None:
-    result = ask(TWO)
+def test_waves_of_a_sum_have_individual_wavelengths_and_forces() -> None:
+    result = default_limits(TWO)
     assert [wave.wavelength for wave in result.waves] == pytest.approx([0.8e-3, 0.32e-3])
     assert [wave.force for wave in result.waves] == pytest.approx([0.025, 0.012], rel=1e-6)
     assert [wave.frequency for wave in result.waves] == pytest.approx([V / 0.8e-3, V / 0.32e-3])
-    # The short wave: α v T = 0.3 mm and γ b = 10 mN are less, but 375 Hz is above 300 Hz.
+    # For the short wave α v T = 0.3 mm and γ b = 10 mN are lower, but 375 Hz exceeds 300 Hz.
     whole = {1: True, 2: True, 3: True, 4: True, 6: True}
     assert [wave.holds for wave in result.waves] == [whole, {**whole, 6: False}]
     assert result.limit(6).wavelength == pytest.approx(0.32e-3)
@@ -202,13 +202,13 @@ def test_every_wave_of_a_sum_has_its_own_length_and_force() -> None:
     assert result.waves[1].top_speed == pytest.approx(0.32e-3 * 300.0)
 
 
-def test_a_sum_fails_a_limit_for_the_waves_below_it() -> None:
-    """The short wave is too fast for the bandwidth; the long one alone is not."""
-    result = ask(TWO)
+def test_sum_fails_a_limit_if_one_of_its_waves_fails() -> None:
+    """The short wave exceeds the bandwidth; the long one alone does not."""
+    result = default_limits(TWO)
     assert verdicts(result) == {**ALL, 6: False}
     assert result.resolved_share == pytest.approx(LONG)
     assert "only waves with 81.3 % of the height variance" in result.answer
-    assert verdicts(ask(Sinusoid(5e-5, 0.8e-3))) == ALL
+    assert verdicts(default_limits(Sinusoid(5e-5, 0.8e-3))) == ALL
 
 
 @settings(max_examples=8, deadline=None)
@@ -220,14 +220,14 @@ def test_a_sum_fails_a_limit_for_the_waves_below_it() -> None:
 def test_verdicts_do_not_depend_on_the_unit_of_length(
     scale: float, lengths: list[float], seed: int
 ) -> None:
-    """All lengths and the speed times s, force steps too: every ratio of sides stays."""
+    """Scaling all lengths, the speed and the force steps leaves every ratio of sides unchanged."""
     rng = np.random.default_rng(seed)
     k, a = 2 * np.pi / np.array(lengths), rng.uniform(1e-5, 4e-5, len(lengths))
-    one = ask(Fourier(a, k), max_depth=3e-4)
+    one = default_limits(Fourier(a, k), max_depth=3e-4)
     bench = device(
         position_resolution=20e-6 * scale, force_resolution=2e-3 * scale, friction=5e-3 * scale
     )
-    other = ask(Fourier(scale * a, k / scale), device=bench, speed=V * scale,
+    other = default_limits(Fourier(scale * a, k / scale), device=bench, speed=V * scale,
                 max_depth=3e-4 * scale)  # fmt: skip
     for first, second in zip(one.limits, other.limits, strict=True):
         assert first.left is not None
@@ -237,8 +237,8 @@ def test_verdicts_do_not_depend_on_the_unit_of_length(
         )  # fmt: skip
 
 
-def test_default_stiffness_is_the_recommended_one() -> None:
-    result = ask(stiffness=None)
+def test_default_stiffness_is_the_recommended_stiffness() -> None:
+    result = default_limits(stiffness=None)
     q = math.hypot(1.0, 2 * math.pi * A / L)
     assert result.safe_stiffness == pytest.approx(900.0 / q, rel=1e-12)
     assert result.margin.law == "A"
@@ -249,15 +249,19 @@ def test_default_stiffness_is_the_recommended_one() -> None:
     assert any("no buzz expected up to" in words for words in result.assumptions)
 
 
-def test_a_known_delay_limits_a_conservative_law_by_less_than_q() -> None:
+def test_conservative_law_with_known_delay_has_a_gain_below_q() -> None:
     deep = Sinusoid(4e-4, 1e-3)
-    result = ask(deep, law="D", stiffness=None, max_depth=1e-3, device=device(delay_samples=0))
+    result = default_limits(
+        deep, law="D", stiffness=None, max_depth=1e-3, device=device(delay_samples=0)
+    )
     assert (result.gain_symbol, result.gain.value) == ("q⁺", 1.0)
     assert result.safe_stiffness == 900.0
     assert result.limit(5).inequality == "q⁺ k ≤ K₀"
     assert result.limit(5).holds
     steep = Sinusoid(1e-4, 1e-3, phase=0.3)
-    result = ask(steep, law="C", stiffness=None, max_depth=4e-4, device=device(delay_samples=2))
+    result = default_limits(
+        steep, law="C", stiffness=None, max_depth=4e-4, device=device(delay_samples=2)
+    )
     q = characteristic_number(result.surface).upper
     plus = one_sided_number(result.surface).upper
     assert result.gain_symbol == "(q⁺/2 + d q)/(1/2 + d)"
@@ -267,7 +271,7 @@ def test_a_known_delay_limits_a_conservative_law_by_less_than_q() -> None:
 
 @pytest.mark.parametrize("law", ["A", "C", "G", "H"])
 @pytest.mark.parametrize("delay", [None, 0, 2])
-def test_it_agrees_with_the_comparison(law: str, delay: int | None) -> None:
+def test_limits_agree_with_compare(law: str, delay: int | None) -> None:
     texture, rig = Sinusoid(4e-4, 1e-3), device(delay_samples=delay)
     row = compare(texture, rig, law, max_depth=1e-3).rows[0]
     result = limits(texture, rig, law=law, max_depth=1e-3)
@@ -277,50 +281,54 @@ def test_it_agrees_with_the_comparison(law: str, delay: int | None) -> None:
     assert result.perceptibility.rms == pytest.approx(row.texture_force, rel=1e-9)
 
 
-def test_an_unknown_stiffest_wall_leaves_the_default() -> None:
-    result = ask(stiffness=None, device=device(max_stiffness=None))
+def test_without_max_stiffness_the_default_stiffness_is_used() -> None:
+    result = default_limits(stiffness=None, device=device(max_stiffness=None))
     assert result.surface.stiffness == 1000.0
     assert any("a default: no stable stiffness is known" in words for words in result.assumptions)
 
 
-def test_no_stiffness_is_known_where_q_is_unbounded() -> None:
-    result = ask(Sinusoid(4e-4, 1e-3), law="D", stiffness=None, max_depth=1e-3)
+def test_infinite_q_gives_no_safe_stiffness() -> None:
+    result = default_limits(Sinusoid(4e-4, 1e-3), law="D", stiffness=None, max_depth=1e-3)
     assert (result.safe_stiffness, result.surface.stiffness) == (0.0, 900.0)  # at K₀
     assert not result.limit(5).holds
     assert result.to_dict()["limits"][4]["left"] == "inf"
     assert any("no stable stiffness is known" in words for words in result.assumptions)
 
 
-def test_the_force_against_resolution_friction_and_bandwidth() -> None:
-    """Law A: RMS k √(Σ a²/2); of it the long wave alone is below 300 Hz."""
-    felt = ask(TWO).perceptibility
+def test_perceptibility_of_a_sum_of_two_waves() -> None:
+    """The RMS of law A is k √(Σ a²/2), and only the long wave is below 300 Hz."""
+    perceptibility = default_limits(TWO).perceptibility
     rms = 500.0 * math.sqrt((5e-5**2 + 2.4e-5**2) / 2)
-    assert felt.rms == felt.texture_rms == pytest.approx(rms, rel=1e-3)
-    assert felt.rms == pytest.approx(500.0 * merit(Surface(TWO, "A", 500.0, D)).ripple)
-    assert felt.resolved == pytest.approx(LONG, rel=1e-6)
-    assert felt.resolved_rms == pytest.approx(500.0 * 5e-5 / math.sqrt(2), rel=1e-3)
-    assert felt.missing_data == ()
-    assert ask(TWO).answer.endswith("20 mN RMS of texture: felt.")
+    assert perceptibility.rms == perceptibility.texture_rms == pytest.approx(rms, rel=1e-3)
+    assert perceptibility.rms == pytest.approx(500.0 * merit(Surface(TWO, "A", 500.0, D)).ripple)
+    assert perceptibility.resolved == pytest.approx(LONG, rel=1e-6)
+    assert perceptibility.resolved_rms == pytest.approx(500.0 * 5e-5 / math.sqrt(2), rel=1e-3)
+    assert perceptibility.missing_data == ()
+    assert default_limits(TWO).answer.endswith("20 mN RMS of texture: felt.")
 
 
 @pytest.mark.parametrize("field", ["force_resolution", "friction"])
-def test_a_force_below_the_resolution_of_the_device(field: str) -> None:
+def test_force_below_resolution_or_friction_is_not_felt(field: str) -> None:
     for factor, hidden in ((0.999, False), (1.001, True)):
-        result = ask(device=device(**{field: 500.0 * A * factor}))
+        result = default_limits(device=device(**{field: 500.0 * A * factor}))
         assert (result.perceptibility.tier == "not felt") is hidden
         assert (": not felt;" in result.answer) is hidden
 
 
-def test_a_force_beyond_the_bandwidth_is_not_felt() -> None:
-    felt = ask(speed=1.0).perceptibility
-    assert (felt.resolved, felt.resolved_rms, felt.tier) == (0.0, 0.0, "not felt")
+def test_force_above_the_bandwidth_is_not_felt() -> None:
+    perceptibility = default_limits(speed=1.0).perceptibility
+    assert (perceptibility.resolved, perceptibility.resolved_rms, perceptibility.tier) == (
+        0.0,
+        0.0,
+        "not felt",
+    )
 
 
-def test_a_map_of_a_wave_is_judged_like_the_wave() -> None:
+def test_map_of_a_wave_has_the_limits_of_the_wave() -> None:
     x = np.arange(64) / 64
     heights = np.tile(A * np.sin(2 * np.pi * 4 * x), (16, 1))
-    result = ask(HeightMap(heights, 4 * L / 64, periodic=True))
-    exact = ask()
+    result = default_limits(HeightMap(heights, 4 * L / 64, periodic=True))
+    exact = default_limits()
     assert [wave.wavelength for wave in result.waves] == pytest.approx([L], rel=1e-9)
     assert [wave.amplitude for wave in result.waves] == pytest.approx([A], rel=1e-9)
     for number in (1, 2, 3, 6):
@@ -330,28 +338,28 @@ def test_a_map_of_a_wave_is_judged_like_the_wave() -> None:
     assert not result.spectrum.exact
 
 
-def test_bands_that_carry_nearly_nothing_do_not_decide() -> None:
-    """A short wave with less than a thousandth of the variance is omitted, as stated."""
+def test_bands_with_negligible_variance_are_ignored() -> None:
+    """A short wave with less than 0.1 % of the variance is omitted; the assumptions state it."""
     x = np.arange(1024) / 1024
     for ratio, remaining in ((0.02, 1), (0.05, 2)):
         heights = A * (np.sin(2 * np.pi * x) + ratio * np.sin(2 * np.pi * 100 * x))
         stiff = device(max_stiffness=1e4)
-        result = ask(Profile(heights, L / 1024, periodic=True), device=stiff)
+        result = default_limits(Profile(heights, L / 1024, periodic=True), device=stiff)
         assert len(result.waves) == remaining
         left_out = [words for words in result.assumptions if "left out" in words]
         assert bool(left_out) is (remaining == 1)
     assert verdicts(result) == {**ALL, 1: False, 2: False, 3: False, 4: False, 6: False}
 
 
-def test_waves_of_little_height_count_if_they_push() -> None:
-    """Force shading follows slopes: a faint short wave makes as much force as a high long one."""
+def test_low_waves_with_significant_force_are_included() -> None:
+    """Force shading follows slopes: a low short wave can have as much force as a high long one."""
     x = np.arange(1024) / 1024
     heights = A * (np.sin(2 * np.pi * x) + 0.02 * np.sin(2 * np.pi * 100 * x))
     texture = Profile(heights, L / 1024, periodic=True)
-    assert len(ask(texture, law="G").waves) > len(ask(texture, law="A").waves)
+    assert len(default_limits(texture, law="G").waves) > len(default_limits(texture, law="A").waves)
 
 
-def test_a_rough_surface_on_a_real_device() -> None:
+def test_limits_of_noise_on_a_real_device() -> None:
     result = limits(Noise(rms=20e-6, size=5e-3, seed=3), "pantograph", law="A")
     assert result.limit(2).holds
     assert result.limit(4).missing_data == ("force_resolution",)
@@ -359,7 +367,7 @@ def test_a_rough_surface_on_a_real_device() -> None:
     assert sum(wave.share for wave in result.waves) > 0.98
 
 
-BAD = [
+INVALID = [
     ({"speed": 0.0}, "speed must be positive"),
     ({"speed": -1.0}, "speed must be positive"),
     ({"speed": math.nan}, "speed must be finite"),
@@ -375,27 +383,27 @@ BAD = [
 ]
 
 
-@pytest.mark.parametrize(("arguments", "message"), BAD, ids=str)
-def test_bad_input_is_named(arguments: dict[str, Any], message: str) -> None:
+@pytest.mark.parametrize(("arguments", "message"), INVALID, ids=str)
+def test_error_messages_name_the_invalid_argument(arguments: dict[str, Any], message: str) -> None:
     with pytest.raises(ParameterError, match=message):
-        ask(**arguments)
+        default_limits(**arguments)
 
 
-def test_the_fewest_samples_are_allowed() -> None:
-    result = ask(time_samples=2.0, position_samples=2.0, force_steps=1.0)
+def test_minimum_sample_counts_are_accepted() -> None:
+    result = default_limits(time_samples=2.0, position_samples=2.0, force_steps=1.0)
     assert (result.time_samples, result.position_samples, result.force_steps) == (2.0, 2.0, 1.0)
 
 
-def test_a_limit_that_does_not_exist_is_a_key_error() -> None:
+def test_unknown_limit_number_raises_a_key_error() -> None:
     with pytest.raises(KeyError):
-        ask().limit(7)
+        default_limits().limit(7)
 
 
-def test_the_share_is_of_the_waves_that_count() -> None:
-    """Bands that are too small to count are in neither part of it: all that hold are all of it."""
+def test_share_is_relative_to_the_significant_waves() -> None:
+    """Insignificant bands are in neither numerator nor denominator, so the share can reach 1."""
     rng = np.random.default_rng(2)
     smooth = np.cumsum(np.cumsum(rng.normal(size=400)))
-    result = ask(Profile(1e-5 * smooth / np.abs(smooth).max(), 1e-4), speed=1e-4)
+    result = default_limits(Profile(1e-5 * smooth / np.abs(smooth).max(), 1e-4), speed=1e-4)
     assert len(result.waves) < len(result.spectrum.waves)
     remaining = sum(wave.share for wave in result.waves)
     assert remaining < 1.0

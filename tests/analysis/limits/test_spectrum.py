@@ -1,4 +1,4 @@
-"""The waves of a texture: exact for sums, by Parseval for measured surfaces."""
+"""The spectrum of a texture: exact for sums, by Parseval's theorem for measured surfaces."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from asperity.analysis.limits.spectrum import Spectrum, band_variances, compute_
 from asperity.textures import Fourier, Grating, HeightMap, Noise, NoiseProfile, Profile, Sinusoid
 
 
-def power(found: Spectrum) -> float:
-    """Σ a²/2: what the waves say of the variance of the heights."""
-    return float(np.sum(found.amplitudes**2)) / 2.0
+def total_variance(spectrum: Spectrum) -> float:
+    """Return Σ a²/2, the variance of the heights according to the spectrum."""
+    return float(np.sum(spectrum.amplitudes**2)) / 2.0
 
 
 def hann_variance(heights: np.ndarray) -> float:
@@ -27,26 +27,26 @@ def hann_variance(heights: np.ndarray) -> float:
     return float(np.sum((window * (heights - mean)) ** 2) / np.sum(window**2))
 
 
-def test_a_sinusoid_is_its_own_wave() -> None:
-    found = compute_spectrum(Sinusoid(0.3e-3, 1.7e-3, phase=0.4, direction=(1.0, -2.0)))
-    (wave,) = found.waves
-    assert found.exact
+def test_spectrum_of_a_sinusoid_is_one_wave() -> None:
+    spectrum = compute_spectrum(Sinusoid(0.3e-3, 1.7e-3, phase=0.4, direction=(1.0, -2.0)))
+    (wave,) = spectrum.waves
+    assert spectrum.exact
     assert (wave.wavelength, wave.amplitude, wave.share, wave.phase) == (1.7e-3, 0.3e-3, 1.0, 0.4)
     assert wave.vector is not None
     assert np.hypot(*wave.vector) == pytest.approx(2 * math.pi / 1.7e-3, rel=1e-14)
 
 
-def test_a_sum_is_its_waves_the_longest_first() -> None:
-    found = compute_spectrum(
+def test_spectrum_of_a_sum_lists_its_waves_by_wavelength() -> None:
+    spectrum = compute_spectrum(
         Fourier([1e-4, -3e-4], [[4000.0, 3000.0], [-600.0, 800.0]], [0.2, 1.0])
     )
-    assert found.exact
-    assert found.wavelengths == pytest.approx([2 * math.pi / 1000, 2 * math.pi / 5000])
-    assert found.amplitudes == pytest.approx([3e-4, 1e-4])
-    assert [wave.share for wave in found.waves] == pytest.approx([0.9, 0.1])
+    assert spectrum.exact
+    assert spectrum.wavelengths == pytest.approx([2 * math.pi / 1000, 2 * math.pi / 5000])
+    assert spectrum.amplitudes == pytest.approx([3e-4, 1e-4])
+    assert [wave.share for wave in spectrum.waves] == pytest.approx([0.9, 0.1])
 
 
-def test_a_sum_can_be_put_together_from_its_waves() -> None:
+def test_heights_of_a_sum_are_reconstructed_from_its_spectrum() -> None:
     texture = Fourier(
         [1e-4, -3e-4, 2e-4], [[4e3, 3e3], [-600.0, 800.0], [-4e3, -3e3]], [0.2, 1.0, 2.0]
     )
@@ -56,7 +56,7 @@ def test_a_sum_can_be_put_together_from_its_waves() -> None:
         for wave in compute_spectrum(texture).waves
     )
     np.testing.assert_allclose(total, texture.height(xy), atol=1e-15)
-    assert len(compute_spectrum(texture).waves) == 2  # equal up to sign: one wave
+    assert len(compute_spectrum(texture).waves) == 2  # vectors equal up to sign are one wave
 
 
 @pytest.mark.parametrize(
@@ -67,35 +67,35 @@ def test_a_sum_can_be_put_together_from_its_waves() -> None:
         ([[0.0, 1e3], [0.0, -1e3]], [0.0, 0.0], None),  # they cancel
     ],
 )
-def test_waves_along_one_vector_are_one(
+def test_waves_with_parallel_equal_vectors_are_merged(
     vectors: list[list[float]], phases: list[float], amplitude: float | None
 ) -> None:
-    found = compute_spectrum(Fourier([1e-4, 1e-4], vectors, phases))
+    spectrum = compute_spectrum(Fourier([1e-4, 1e-4], vectors, phases))
     if amplitude is None:
-        assert found.waves == ()
+        assert spectrum.waves == ()
     else:
-        assert found.amplitudes == pytest.approx([1e-4 * amplitude], rel=1e-12)
+        assert spectrum.amplitudes == pytest.approx([1e-4 * amplitude], rel=1e-12)
 
 
 @pytest.mark.parametrize("count", [240, 243])
-def test_a_periodic_profile_gives_its_waves_exactly(count: int) -> None:
+def test_spectrum_of_a_periodic_profile_recovers_its_waves(count: int) -> None:
     x = np.arange(count) / count
     heights = 2e-5 * np.sin(2 * np.pi * 3 * x + 0.4) + 5e-6 * np.cos(2 * np.pi * 40 * x) + 7e-3
-    found = compute_spectrum(Profile(heights, 6e-3 / count, periodic=True))
-    strong = [wave for wave in found.waves if wave.share > 1e-12]
+    spectrum = compute_spectrum(Profile(heights, 6e-3 / count, periodic=True))
+    strong = [wave for wave in spectrum.waves if wave.share > 1e-12]
     assert [wave.wavelength for wave in strong] == pytest.approx([2e-3, 0.15e-3], rel=1e-12)
     assert [wave.amplitude for wave in strong] == pytest.approx([2e-5, 5e-6], rel=1e-9)
-    assert not found.exact
+    assert not spectrum.exact
 
 
-def test_a_periodic_map_is_taken_radially() -> None:
-    """An oblique wave counts by its own length, not by its length along x."""
+def test_spectrum_of_a_periodic_map_is_radial() -> None:
+    """An oblique wave is listed with its wavelength, not with its period along x."""
     ny, nx, px, py = 60, 90, 2e-5, 5e-5
     i, j = np.arange(ny)[:, None] / ny, np.arange(nx)[None, :] / nx
     oblique = 3e-5 * np.sin(2 * np.pi * (5 * j - 2 * i) + 0.7)
     across = 1e-5 * np.sin(2 * np.pi * 20 * i)
-    found = compute_spectrum(HeightMap(oblique + across, (px, py), periodic=True))
-    strong = [wave for wave in found.waves if wave.share > 1e-12]
+    spectrum = compute_spectrum(HeightMap(oblique + across, (px, py), periodic=True))
+    strong = [wave for wave in spectrum.waves if wave.share > 1e-12]
     first = 1.0 / math.hypot(5 / (nx * px), 2 / (ny * py))
     assert [wave.wavelength for wave in strong] == pytest.approx([first, 3e-3 / 20], rel=1e-12)
     assert [wave.amplitude for wave in strong] == pytest.approx([3e-5, 1e-5], rel=1e-9)
@@ -103,70 +103,70 @@ def test_a_periodic_map_is_taken_radially() -> None:
 
 @pytest.mark.parametrize(("ny", "nx"), [(31, 40), (40, 31), (32, 32), (1, 57)])
 @pytest.mark.parametrize("periodic", [True, False])
-def test_the_waves_carry_the_variance_of_the_heights(ny: int, nx: int, periodic: bool) -> None:
+def test_spectrum_has_the_variance_of_the_heights(ny: int, nx: int, periodic: bool) -> None:
     heights = np.random.default_rng(5).normal(size=(ny, nx)) * 1e-5 + 3e-4
     if ny == 1:
         texture = Profile(heights[0], 1e-5, periodic=periodic)
     else:
         texture = HeightMap(heights, (1e-5, 3e-5), periodic=periodic)
     expected = np.var(heights) if periodic else hann_variance(heights)
-    found = compute_spectrum(texture)
-    assert power(found) == pytest.approx(expected, rel=1e-10)
-    assert sum(wave.share for wave in found.waves) == pytest.approx(1.0, rel=1e-12)
+    spectrum = compute_spectrum(texture)
+    assert total_variance(spectrum) == pytest.approx(expected, rel=1e-10)
+    assert sum(wave.share for wave in spectrum.waves) == pytest.approx(1.0, rel=1e-12)
 
 
-def test_a_wave_on_a_finite_map_keeps_its_length_and_amplitude() -> None:
+def test_wave_on_a_finite_map_has_its_wavelength_and_amplitude() -> None:
     x = np.arange(400) * 1e-5
     heights = np.tile(2e-5 * np.sin(2 * np.pi * x / 1.37e-4 + 0.3), (300, 1))
-    found = compute_spectrum(HeightMap(heights, 1e-5))
-    best = max(found.waves, key=lambda wave: wave.share)
+    spectrum = compute_spectrum(HeightMap(heights, 1e-5))
+    best = max(spectrum.waves, key=lambda wave: wave.share)
     assert best.wavelength == pytest.approx(1.37e-4, rel=0.003)
-    assert math.sqrt(2.0 * power(found)) == pytest.approx(2e-5, rel=0.003)
+    assert math.sqrt(2.0 * total_variance(spectrum)) == pytest.approx(2e-5, rel=0.003)
     assert best.share > 0.99
 
 
-def test_noise_has_the_spectrum_that_it_was_made_with() -> None:
-    """Isotropic power q^(-2 - 2H): an octave carries 2^(2H) of the next shorter one."""
+def test_noise_has_its_specified_spectrum() -> None:
+    """With isotropic power q^(-2 - 2H) an octave has 2^(2H) times the variance of the next."""
     rough = Noise(rms=1e-5, size=10e-3, hurst=0.5, rolloff=10e-3, cutoff=0.1e-3, seed=2)
-    found = compute_spectrum(rough)
-    assert power(found) == pytest.approx(1e-10, rel=1e-9)
-    lengths, squares = found.wavelengths, found.amplitudes**2
+    spectrum = compute_spectrum(rough)
+    assert total_variance(spectrum) == pytest.approx(1e-10, rel=1e-9)
+    lengths, squares = spectrum.wavelengths, spectrum.amplitudes**2
 
-    def octave(longest: float) -> float:
+    def octave_variance(longest: float) -> float:
         return float(squares[(lengths <= longest) & (lengths > longest / 2)].sum())
 
-    assert octave(1.6e-3) / octave(0.8e-3) == pytest.approx(2.0, rel=0.12)
-    assert octave(0.8e-3) / octave(0.4e-3) == pytest.approx(2.0, rel=0.06)
+    assert octave_variance(1.6e-3) / octave_variance(0.8e-3) == pytest.approx(2.0, rel=0.12)
+    assert octave_variance(0.8e-3) / octave_variance(0.4e-3) == pytest.approx(2.0, rel=0.06)
     assert lengths.min() >= 0.1e-3 * (1 - 1e-9)
 
 
-def test_a_grating_has_odd_harmonics() -> None:
-    found = compute_spectrum(Grating(height=2e-4, period=3e-3, duty=0.5, edge=0.3e-3))
-    strong = [wave.wavelength for wave in found.waves if wave.share > 1e-4]
+def test_spectrum_of_a_grating_has_odd_harmonics() -> None:
+    spectrum = compute_spectrum(Grating(height=2e-4, period=3e-3, duty=0.5, edge=0.3e-3))
+    strong = [wave.wavelength for wave in spectrum.waves if wave.share > 1e-4]
     assert strong[:3] == pytest.approx([3e-3, 1e-3, 0.6e-3], rel=1e-9)
 
 
-def test_many_waves_are_taken_by_bands() -> None:
+def test_spectrum_of_many_waves_is_by_bands() -> None:
     rng = np.random.default_rng(7)
     angles = rng.uniform(0, 2 * np.pi, 80)
     lengths = np.geomspace(2e-4, 2e-3, 80)
     vectors = 2 * np.pi / lengths[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
     amplitudes = rng.uniform(1e-6, 3e-6, 80)
-    found = compute_spectrum(Fourier(amplitudes, vectors, rng.uniform(0, 6, 80)))
-    assert not found.exact
-    assert power(found) == pytest.approx(0.5 * float(amplitudes @ amplitudes), rel=0.1)
-    weight = found.amplitudes**2
-    inside = (found.wavelengths > 1.7e-4) & (found.wavelengths < 2.4e-3)
+    spectrum = compute_spectrum(Fourier(amplitudes, vectors, rng.uniform(0, 6, 80)))
+    assert not spectrum.exact
+    assert total_variance(spectrum) == pytest.approx(0.5 * float(amplitudes @ amplitudes), rel=0.1)
+    weight = spectrum.amplitudes**2
+    inside = (spectrum.wavelengths > 1.7e-4) & (spectrum.wavelengths < 2.4e-3)
     assert weight[inside].sum() / weight.sum() > 0.98
 
 
-def test_a_flat_texture_has_no_waves() -> None:
+def test_flat_texture_has_no_waves() -> None:
     assert compute_spectrum(HeightMap(np.full((6, 7), 3e-3), 1e-4)).waves == ()
     assert compute_spectrum(Profile(np.full(9, 3e-3), 1e-4, periodic=True)).waves == ()
     assert compute_spectrum(HeightMap(np.zeros((6, 7)), 1e-4)).waves == ()
 
 
-def test_rows_are_counted_in_parts_alike(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_band_variances_do_not_depend_on_the_block_size(monkeypatch: pytest.MonkeyPatch) -> None:
     values = np.random.default_rng(1).normal(size=(2, 37, 20))
     whole = band_variances(values, (1e-5, 2e-5), False)
     monkeypatch.setattr(module, "_ROWS_PER_BLOCK", 5)
@@ -176,7 +176,7 @@ def test_rows_are_counted_in_parts_alike(monkeypatch: pytest.MonkeyPatch) -> Non
     np.testing.assert_allclose(parts.wavelength, whole.wavelength, rtol=1e-12)
 
 
-def test_components_are_added() -> None:
+def test_band_variances_of_components_are_added() -> None:
     values = np.random.default_rng(1).normal(size=(2, 16, 20))
     both = band_variances(values, (1e-5, 2e-5), True)
     each = [band_variances(values[i : i + 1], (1e-5, 2e-5), True) for i in range(2)]
@@ -184,7 +184,7 @@ def test_components_are_added() -> None:
 
 
 @pytest.mark.parametrize("periodic", [True, False])
-def test_nodes_of_a_map_are_its_samples(periodic: bool) -> None:
+def test_grid_of_a_map_is_its_samples(periodic: bool) -> None:
     heights = np.random.default_rng(2).normal(size=(9, 12)) * 1e-5
     texture = HeightMap(heights, (1e-5, 3e-5), periodic=periodic, origin=(1e-3, -2e-3))
     points, spacing, repeats = texture.domain.grid(texture.grid_counts())
@@ -196,7 +196,7 @@ def test_nodes_of_a_map_are_its_samples(periodic: bool) -> None:
     np.testing.assert_array_equal(texture.samples()[0], heights)
 
 
-def test_a_patch_is_the_middle_of_the_map() -> None:
+def test_limited_grid_is_the_centre_of_the_map() -> None:
     texture = HeightMap(np.random.default_rng(2).normal(size=(20, 31)), 1e-5, periodic=True)
     points, spacing, repeats = texture.domain.grid(texture.grid_counts(), max_count=8)
     assert (points.shape, repeats) == ((8, 8, 2), False)
@@ -205,7 +205,7 @@ def test_a_patch_is_the_middle_of_the_map() -> None:
     np.testing.assert_allclose(heights, texture.heights[6:14, 11:19], atol=1e-12)
 
 
-def test_a_skew_period_is_covered_by_a_rectangle() -> None:
+def test_grid_of_a_skew_period_is_a_rectangle() -> None:
     texture = Fourier([1e-4, 1e-4], [[2e3, 0.0], [1.1e3, 1.5e3]])
     points, spacing, repeats = texture.domain.grid(texture.grid_counts())
     assert not repeats
@@ -214,12 +214,12 @@ def test_a_skew_period_is_covered_by_a_rectangle() -> None:
     assert (np.hypot(*along), np.hypot(*across)) == pytest.approx(spacing)
 
 
-def test_noise_profile_by_parseval() -> None:
+def test_spectrum_of_a_noise_profile_has_its_variance() -> None:
     texture = NoiseProfile(rms=2e-6, size=5e-3, seed=1)
-    assert power(compute_spectrum(texture)) == pytest.approx(4e-12, rel=1e-9)
+    assert total_variance(compute_spectrum(texture)) == pytest.approx(4e-12, rel=1e-9)
 
 
-def test_plain_data() -> None:
+def test_spectrum_to_dict() -> None:
     content = compute_spectrum(Sinusoid(1e-4, 1e-3)).to_dict()
     assert content["wavelengths"] == [1e-3]
     assert content["amplitudes"] == [1e-4]

@@ -1,4 +1,4 @@
-"""The script that tries to break law H: H holds, other laws fail, and a broken H is noticed."""
+"""The example script that tests law H: H passes all statements, other laws and a wrong H fail."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def script() -> ModuleType:
     return module
 
 
-def test_h_holds_and_every_statement_has_teeth(script: ModuleType) -> None:
+def test_law_h_passes_and_each_statement_fails_for_another_law(script: ModuleType) -> None:
     case = script.make_case(Sinusoid(amplitude=0.4e-3, period=1e-3, direction=(1.0, 2.0)), seed=3)
     statements = script.run([case], Console(quiet=True))
     assert len(statements) == len(script.TRIALS) == 11
@@ -39,14 +39,12 @@ def test_h_holds_and_every_statement_has_teeth(script: ModuleType) -> None:
     assert table.row_count == 11
 
 
-def test_a_force_that_is_off_by_little_is_noticed(
-    script: ModuleType, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A hundred-thousandth too much force breaks the Lipschitz constant."""
-    right = Surface.force
+def test_small_force_error_is_detected(script: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A force that is too large by 1e-5 violates the Lipschitz constant."""
+    intact = Surface.force
 
     def wrong(self: Surface, points: np.ndarray) -> np.ndarray:
-        force = right(self, points)
+        force = intact(self, points)
         return force * (1.0 + 1e-5) if self.law.letter == "H" else force
 
     case = script.make_case(Sinusoid(amplitude=0.4e-3, period=1e-3), seed=3)
@@ -57,7 +55,7 @@ def test_a_force_that_is_off_by_little_is_noticed(
     assert script.equals_god_object(case).breaks("H")
 
 
-def test_no_number_breaks_a_statement(script: ModuleType) -> None:
+def test_nan_breaks_a_statement(script: ModuleType) -> None:
     statement = script.Statement("words", 1.0)
     statement.record("H", 0.5)
     assert not statement.breaks("H")

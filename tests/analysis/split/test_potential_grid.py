@@ -1,4 +1,4 @@
-"""Where the nodes of a tabulated law H are, and what is proved from them, by hand."""
+"""Node positions of a baked field of law H and its proved error bounds, by hand."""
 
 from __future__ import annotations
 
@@ -25,35 +25,35 @@ def grid(steps: list[list[float]], cells: tuple[int, ...], *, periodic: bool = T
 
 
 @pytest.mark.parametrize("resolution", [0.7e-4, 1e-4, 3e-4, 1.0])
-def test_nodes_are_at_most_the_resolution_apart(resolution: float) -> None:
+def test_node_spacing_is_at_most_the_resolution(resolution: float) -> None:
     surface = Surface(WAVE, "H", max_depth=0.35e-3)
-    found = FieldGrid.fit(surface, resolution)
-    along, rise = found.spacing
+    fitted = FieldGrid.fit(surface, resolution)
+    along, rise = fitted.spacing
     for spacing, length, count in (
-        (along, 1e-3, found.cells[0]),
-        (rise, 0.55e-3, found.levels - 3),
+        (along, 1e-3, fitted.cells[0]),
+        (rise, 0.55e-3, fitted.levels - 3),
     ):
         assert spacing <= resolution * (1 + 1e-12)
         assert count >= 4
         assert count == 4 or length / (count - 1) > resolution * (1 - 1e-12)
         assert spacing * count == pytest.approx(length, rel=1e-12)
     # The floor is halfway between the two lowest levels, two levels are above the highest point.
-    low, next_one = found.height(0), found.height(1)
+    low, next_one = fitted.height(0), fitted.height(1)
     assert 0.5 * (low + next_one) == pytest.approx(-0.1e-3 - 0.35e-3, rel=1e-12)
-    above = found.height(np.arange(found.levels)) > WAVE.extremes[1]
-    np.testing.assert_array_equal(np.flatnonzero(above), [found.levels - 2, found.levels - 1])
-    assert found.height(found.levels - 2) == pytest.approx(0.1e-3 + 0.5 * rise, rel=1e-9)
+    above = fitted.height(np.arange(fitted.levels)) > WAVE.extremes[1]
+    np.testing.assert_array_equal(np.flatnonzero(above), [fitted.levels - 2, fitted.levels - 1])
+    assert fitted.height(fitted.levels - 2) == pytest.approx(0.1e-3 + 0.5 * rise, rel=1e-9)
 
 
-def test_borders_repeat_or_are_mirrored() -> None:
+def test_border_nodes_are_periodic_or_mirrored() -> None:
     steps = [[0.1, 0.0]]
     assert grid(steps, (4,)).nodes(0).tolist() == [3, 0, 1, 2, 3, 0, 1]
     assert grid(steps, (4,), periodic=False).nodes(0).tolist() == [1, 0, 1, 2, 3, 4, 3]
     assert grid([[0.1, 0.0], [0.0, 0.2]], (4, 5)).shape == (7, 8, 6)
 
 
-def test_the_proved_errors_by_hand() -> None:
-    """Variance of a quarter of each squared step, and a twelfth of the step's own."""
+def test_error_bounds_by_hand() -> None:
+    """Variances: a quarter of the sum of squared steps plus a twelfth of each squared step."""
     gradient, potential = grid([[0.3, 0.0], [0.0, 0.2]], (4, 4)).error_bounds(2.0)
     squares = np.array([0.09, 0.04, 0.01])
     assert potential == pytest.approx(0.5 * 2.0 * 0.25 * 0.14, rel=1e-12)
@@ -61,23 +61,23 @@ def test_the_proved_errors_by_hand() -> None:
     assert gradient == pytest.approx(math.sqrt(float(parts @ parts)), rel=1e-12)
 
 
-def test_steps_that_lean_enlarge_the_error() -> None:
-    """A gradient is solved for from its parts along unit steps at 60 degrees: at most √2 longer."""
+def test_oblique_steps_increase_the_error_bound() -> None:
+    """The gradient from its components along unit steps at 60 degrees is at most √2 longer."""
     upright, _ = grid([[0.1, 0.0], [0.0, 0.1]], (4, 4)).error_bounds(1.0)
-    lean = [[0.1, 0.0], [0.05, 0.1 * math.sqrt(0.75)]]
-    leaning, _ = grid(lean, (4, 4)).error_bounds(1.0)
-    directions = np.array(lean) / 0.1
+    oblique_steps = [[0.1, 0.0], [0.05, 0.1 * math.sqrt(0.75)]]
+    oblique, _ = grid(oblique_steps, (4, 4)).error_bounds(1.0)
+    directions = np.array(oblique_steps) / 0.1
     longest = 1.0 / np.linalg.svd(directions, compute_uv=False)[-1]
     assert longest == pytest.approx(math.sqrt(2.0), rel=1e-12)
-    assert leaning == pytest.approx(longest * upright, rel=1e-12)
+    assert oblique == pytest.approx(longest * upright, rel=1e-12)
 
 
 @pytest.mark.parametrize("periodic", [True, False])
 @pytest.mark.parametrize("stiffer", [0, 1])
-def test_the_greatest_of_all_parts_counts(
+def test_curvature_bounds_are_the_maximum_over_all_batches(
     periodic: bool, stiffer: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Every column is searched once; positive and negative eigenvalues each by their greatest."""
+    """Every column is searched once; positive and negative eigenvalues each by their maximum."""
     seen: list[int] = []
 
     def hull_batch(first: int, last: int, out: np.ndarray, _table: object) -> None:
@@ -87,79 +87,79 @@ def test_the_greatest_of_all_parts_counts(
             out[side] = (size + 0.5, size, first, 0.5, 2.0)
 
     monkeypatch.setattr(fuse, "fuse_module", lambda *_: SimpleNamespace(hull_batch=hull_batch))
-    own = grid([[0.1, 0.0], [0.0, 0.2]], (40, 4), periodic=periodic)
-    table = own.kernel_arguments(np.full((7, 43, 6), 2.0))
-    norm, positive = curvature_bounds(own, table)
+    field_grid = grid([[0.1, 0.0], [0.0, 0.2]], (40, 4), periodic=periodic)
+    table = field_grid.kernel_arguments(np.full((7, 43, 6), 2.0))
+    norm, positive = curvature_bounds(field_grid, table)
     assert sorted(seen) == list(range(40 if periodic else 41))
     rounding = potential_grid._DIFFERENCE_ROUNDING * 2.0 / 0.1**2
     assert rounding > 0.0
     assert (norm.lower, norm.upper) == (4.0, 4.5 + rounding)
     size = 4.0 if stiffer == 0 else 2.0
     assert (positive.lower, positive.upper) == (size, size + 0.5 + rounding)
-    # At the node (16, ½) and level 2: where the witness was found.
-    place = (1e-3 + 16 * 0.1, 2e-3 + 0.5 * 0.2, 5.0 + 1.5 * 0.1)
-    assert norm.at == pytest.approx(place)
-    assert positive.at == pytest.approx(place)
+    # The witness is at node (16, ½) and level 2.
+    position = (1e-3 + 16 * 0.1, 2e-3 + 0.5 * 0.2, 5.0 + 1.5 * 0.1)
+    assert norm.at == pytest.approx(position)
+    assert positive.at == pytest.approx(position)
 
 
-def test_the_table_is_given_the_place_of_its_first_node() -> None:
-    own = grid([[0.1, 0.0], [0.0, 0.2]], (4, 4), periodic=False)
-    table = own.kernel_arguments(np.zeros((7, 7, 6)))
-    place = np.array([1e-3 + 0.25, 2e-3 + 0.3])
+def test_kernel_arguments_contain_the_position_of_the_first_node() -> None:
+    field_grid = grid([[0.1, 0.0], [0.0, 0.2]], (4, 4), periodic=False)
+    table = field_grid.kernel_arguments(np.zeros((7, 7, 6)))
+    position = np.array([1e-3 + 0.25, 2e-3 + 0.3])
     rates = np.array([[table.m00, table.m01], [table.m10, table.m11]])
-    np.testing.assert_allclose(rates @ (place - [table.x0, table.y0]), [2.5, 1.5], rtol=1e-12)
+    np.testing.assert_allclose(rates @ (position - [table.x0, table.y0]), [2.5, 1.5], rtol=1e-12)
     assert table.z0 == pytest.approx(5.0 - 0.05)
-    assert own.bytes == 8 * 7 * 7 * 6
+    assert field_grid.bytes == 8 * 7 * 7 * 6
 
 
-def test_a_map_that_ends_is_fitted_from_its_corner() -> None:
+def test_grid_of_a_finite_map_starts_at_its_corner() -> None:
     texture = HeightMap(1e-5 * np.random.default_rng(0).normal(size=(9, 12)), 1e-4)
-    found = FieldGrid.fit(Surface(texture, "H", max_depth=1e-4), 0.9e-4)
-    assert not found.periodic
-    np.testing.assert_allclose(found.start, texture.domain.origin)
-    ends = found.start + np.array(found.cells) @ found.steps
+    fitted = FieldGrid.fit(Surface(texture, "H", max_depth=1e-4), 0.9e-4)
+    assert not fitted.periodic
+    np.testing.assert_allclose(fitted.start, texture.domain.origin)
+    ends = fitted.start + np.array(fitted.cells) @ fitted.steps
     np.testing.assert_allclose(ends, texture.domain.origin + texture.domain.spans.sum(axis=0))
 
 
-# --- how fine a table is --------------------------------------------------------------------------
+# --- resolution -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("most", [3_000, 40_000, 10**6])
-def test_the_finest_resolution_that_fits_is_found_to_three_digits(most: int) -> None:
-    """On a wave of 1 mm, and on one of 4 km, whose nodes are farther apart than 1 m."""
+@pytest.mark.parametrize("max_bytes", [3_000, 40_000, 10**6])
+def test_finest_resolution_that_fits_is_accurate_to_three_digits(max_bytes: int) -> None:
+    """On a wave of 1 mm and on one of 4 km, whose node spacing exceeds 1 m."""
     for size in (1.0, 4e6):
         texture = Sinusoid(0.1e-3 * size, 1e-3 * size)
         surface = Surface(texture, "H", max_depth=0.35e-3 * size)
-        found = potential_table._finest_resolution(surface, most)
-        assert FieldGrid.fit(surface, found).bytes <= most
-        assert FieldGrid.fit(surface, found / 1.002).bytes > most
+        finest = potential_table._finest_resolution(surface, max_bytes)
+        assert FieldGrid.fit(surface, finest).bytes <= max_bytes
+        assert FieldGrid.fit(surface, finest / 1.002).bytes > max_bytes
 
 
-def test_three_digits_are_never_finer() -> None:
+def test_round_up_of_the_resolution_never_decreases() -> None:
     for value in 10.0 ** np.random.default_rng(3).uniform(-8.0, 2.0, 300):
-        found = round_up(value)
+        result = round_up(value)
         unit = 10.0 ** (math.floor(math.log10(value)) - 2)
-        assert value <= found <= value + unit * (1.0 + 1e-9)
-        assert abs(found / unit - round(found / unit)) < 1e-6
+        assert value <= result <= value + unit * (1.0 + 1e-9)
+        assert abs(result / unit - round(result / unit)) < 1e-6
 
 
-@pytest.mark.parametrize(("limit", "counted"), [(2**28, "waves"), (10_000, "bytes")])
-def test_the_default_is_64_nodes_a_wave_or_the_size_limit(limit: int, counted: str) -> None:
+@pytest.mark.parametrize(("limit", "criterion"), [(2**28, "waves"), (10_000, "bytes")])
+def test_default_grid_has_64_nodes_per_wave_or_the_size_limit(limit: int, criterion: str) -> None:
     surface = Surface(WAVE, "H", max_depth=0.35e-3)
     slope, hessian = WAVE.bounds
-    found = potential_table._default_grid(surface, limit)
-    if counted == "waves":
+    fitted = potential_table._default_grid(surface, limit)
+    if criterion == "waves":
         finest = 2.0 * math.pi * slope / hessian / 64
-        assert found.shape == FieldGrid.fit(surface, finest).shape
+        assert fitted.shape == FieldGrid.fit(surface, finest).shape
     else:
-        assert found.bytes <= limit < FieldGrid.fit(surface, 0.99 * min(found.spacing)).bytes
-    # A million nodes of eight bytes, however much is allowed; a flat surface has no shortest wave.
+        assert fitted.bytes <= limit < FieldGrid.fit(surface, 0.99 * min(fitted.spacing)).bytes
+    # At most a million nodes of eight bytes; a flat surface has no shortest wave.
     flat = Surface(HeightMap(np.zeros((4, 5)), 1e-4), "H", max_depth=1e-4)
     assert 7e6 < potential_table._default_grid(flat, 2**28).bytes <= 8e6
 
 
-def test_half_of_the_probes_are_near_the_surface() -> None:
-    """4096 within two nodes of it, as many all over; none below the floor, all over the table."""
+def test_half_of_the_random_probes_are_near_the_surface() -> None:
+    """4096 probes lie within two nodes of the surface, 4096 in the whole field above the floor."""
     texture = HeightMap(1e-5 * np.random.default_rng(0).normal(size=(9, 12)), 1e-4)
     surface = Surface(texture, "H", max_depth=1e-4)
     grid = FieldGrid.fit(surface, 0.2e-4)

@@ -1,7 +1,7 @@
-"""Law H: the statements of MATH section 6, each with a law that fails it.
+"""Law H: the statements of MATH section 6, each with a law for which it fails.
 
-Some statements hold for C or D too, by mathematics: both are free of force outside, keep the
-stiffness of a flat wall and gain nothing in loops. There another law is the negative control.
+Some statements hold for C or D too: both have zero force outside contact, the stiffness of a
+flat wall and no energy gain in loops. There another law is the negative control.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ K, PERIOD = 800.0, 1e-3
 
 
 def _profile(shape: Callable[[np.ndarray], np.ndarray]) -> Profile:
-    """Twenty nodes per period; the spline rounds corners over one of them."""
+    """Return a periodic profile of 20 nodes, whose spline rounds corners over one node spacing."""
     return Profile(0.5e-3 * shape(np.arange(20) / 20), 0.05e-3, periodic=True)
 
 
@@ -56,7 +56,7 @@ def _god_object_energy(texture: Texture, points: np.ndarray) -> np.ndarray:
     return 0.5 * np.where(texture.height(points[:, :2]) > points[:, 2], square, 0.0)
 
 
-# --- outside, and how large the energy is ---------------------------------------------------------
+# --- outside contact; bounds of the energy --------------------------------------------------------
 
 
 def _outside(texture: Texture) -> np.ndarray:
@@ -68,7 +68,7 @@ def _outside(texture: Texture) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", TEXTURES)
-def test_there_is_nothing_outside(name: str) -> None:
+def test_force_energy_and_jacobian_are_zero_outside_contact(name: str) -> None:
     surface = Surface(TEXTURES[name], "H", K)
     points = _outside(surface.texture)
     state = split_state(surface, points)
@@ -79,7 +79,7 @@ def test_there_is_nothing_outside(name: str) -> None:
 
 
 @pytest.mark.parametrize("letter", "WG")
-def test_laws_of_the_wall_push_outside(letter: str) -> None:
+def test_wall_laws_have_a_force_outside_the_texture(letter: str) -> None:
     surface = Surface(TEXTURES["steep"], letter, K)
     assert surface.force(_outside(surface.texture)).any()
 
@@ -87,12 +87,12 @@ def test_laws_of_the_wall_push_outside(letter: str) -> None:
 @pytest.mark.parametrize("name", TEXTURES)
 @pytest.mark.parametrize("c", [0.5, 1.0, 3.0])
 def test_energy_lies_between_its_bounds(name: str, c: float) -> None:
-    """(1 - μ) φ <= U <= φ, and the gap certifies U."""
+    """Checks (1 - μ) φ <= U <= φ and that the gap certifies U."""
     texture = TEXTURES[name]
     points = _probes(texture, 400)
     phi = K * _god_object_energy(texture, points)
     state = split_state(Surface(texture, "H", K, continuity=c), points)
-    # Positions are rounded: a distance d is known to 1e-15 of the coordinates.
+    # Positions are rounded: a distance is accurate to 1e-15 of the coordinates.
     size = np.abs(points).sum(axis=1) + texture.peak_to_valley
     rounding = 2e-15 * size * np.sqrt(2.0 * K * phi)
     assert (state.potential <= phi + rounding).all()
@@ -100,7 +100,7 @@ def test_energy_lies_between_its_bounds(name: str, c: float) -> None:
     assert (state.gap <= rounding).all()
 
 
-def test_the_energy_of_c_is_larger() -> None:
+def test_energy_of_law_c_exceeds_the_upper_bound() -> None:
     texture = TEXTURES["noise"]
     points = _probes(texture, 400)
     vertical = 0.5 * K * (texture.height(points[:, :2]) - points[:, 2]) ** 2
@@ -123,12 +123,12 @@ def test_force_is_minus_the_gradient_of_the_energy(name: str, c: float) -> None:
     points = _probes(surface.texture, 150)
     step = 1e-4 * surface.texture.peak_to_valley
     error = np.linalg.norm(_gradient(surface, points, step) + surface.force(points), axis=1)
-    # The Hessian is at most k max(1, c): a central difference errs by at most half a step of it.
+    # The Hessian is at most k max(1, c): a central difference has an error of half a step of it.
     assert error.max() <= 0.5 * math.sqrt(3.0) * K * max(1.0, c) * step
 
 
 @pytest.mark.parametrize("letter", "CD")
-def test_the_force_of_c_or_d_is_another(letter: str) -> None:
+def test_forces_of_laws_c_and_d_are_not_this_gradient(letter: str) -> None:
     surface = Surface(TEXTURES["steep"], "H", K)
     points = _probes(surface.texture, 150)
     other = Surface(surface.texture, letter, K).force(points)
@@ -136,8 +136,8 @@ def test_the_force_of_c_or_d_is_another(letter: str) -> None:
     assert error.max() > 100.0 * K * 6e-7
 
 
-def test_loops_gain_nothing_across_the_medial_axis() -> None:
-    """C and D gain nothing either; A and E do."""
+def test_loops_across_the_medial_axis_gain_no_energy() -> None:
+    """Negative control: laws A and E gain energy."""
     texture = TEXTURES["noise"]
     rng = np.random.default_rng(3)
     scale = 0.5 * K * 1e-6
@@ -153,7 +153,7 @@ def test_loops_gain_nothing_across_the_medial_axis() -> None:
 
 @cache
 def _pairs(name: str, count: int = 1500) -> tuple[np.ndarray, np.ndarray]:
-    """Return random pairs of all distances, and pairs that straddle the jumps of a nearest point.
+    """Return random pairs of all distances, and pairs that straddle jumps of the nearest point.
 
     The latter come from bisection between two points whose nearest points are far apart.
     """
@@ -162,14 +162,14 @@ def _pairs(name: str, count: int = 1500) -> tuple[np.ndarray, np.ndarray]:
     a = _probes(texture, count)
     b = a + rng.normal(size=a.shape) * 10 ** rng.uniform(-9, -4, (count, 1))
     low, high = a.copy(), a + rng.normal(size=a.shape) * [2e-4, 2e-4, 0.0]
-    foot_low, foot_high = texture.nearest(low), texture.nearest(high)
+    point_low, point_high = texture.nearest(low), texture.nearest(high)
     for _ in range(26):
         middle = 0.5 * (low + high)
         closest_point = texture.nearest(middle)
-        to_low = np.linalg.norm(closest_point - foot_low, axis=1, keepdims=True)
-        left = to_low < np.linalg.norm(closest_point - foot_high, axis=1, keepdims=True)
-        low, foot_low = np.where(left, middle, low), np.where(left, closest_point, foot_low)
-        high, foot_high = np.where(left, high, middle), np.where(left, foot_high, closest_point)
+        to_low = np.linalg.norm(closest_point - point_low, axis=1, keepdims=True)
+        left = to_low < np.linalg.norm(closest_point - point_high, axis=1, keepdims=True)
+        low, point_low = np.where(left, middle, low), np.where(left, closest_point, point_low)
+        high, point_high = np.where(left, high, middle), np.where(left, point_high, closest_point)
     return np.concatenate([a, low]), np.concatenate([b, high])
 
 
@@ -190,13 +190,13 @@ def test_force_is_lipschitz_across_ridges(name: str, c: float) -> None:
 
 @pytest.mark.parametrize("name", ["middle", "steep", "triangle", "square", "sawtooth", "noise"])
 @pytest.mark.parametrize("letter", "CD")
-def test_the_forces_of_c_and_d_are_not(name: str, letter: str) -> None:
+def test_forces_of_laws_c_and_d_are_not_lipschitz(name: str, letter: str) -> None:
     surface = Surface(TEXTURES[name], letter, K)
     assert _excess(surface, name, 1.0).max() > 1e-3
 
 
-def test_the_bound_is_sharp() -> None:
-    """A bound that is smaller by 1e-6 of itself fails."""
+def test_lipschitz_bound_is_sharp() -> None:
+    """The largest measured ratio equals the bound to 1e-9."""
     surface = Surface(TEXTURES["middle"], "H", K)
     a, b = _pairs("middle")
     far = np.linalg.norm(b - a, axis=1) > 1e-7
@@ -232,21 +232,21 @@ def test_jacobian_against_differences_and_bounds(name: str) -> None:
     assert values.min() >= -c - 1e-9
 
 
-def test_the_jacobians_of_c_and_d_leave_the_bounds() -> None:
+def test_jacobians_of_laws_c_and_d_exceed_the_bounds() -> None:
     steep, gentle = TEXTURES["steep"], TEXTURES["gentle"]
     values = np.linalg.eigvalsh(-Surface(steep, "C", K).jacobian(_probes(steep, 200)) / K)
     assert values.max() > 1.1
-    # Below a crest, nine tenths of the way to its centre of curvature: 0.9/(1 - 0.9).
+    # Below a crest, at 0.9 of its radius of curvature: 0.9/(1 - 0.9).
     depth = 0.9 / gentle.bounds[1]
     crest = [[0.25 * PERIOD, 0.0, 0.05 * PERIOD - depth]]
     values = np.linalg.eigvalsh(-Surface(gentle, "D", K).jacobian(crest) / K)
     assert values.min() == pytest.approx(-9.0)
 
 
-# --- what it is near to ---------------------------------------------------------------------------
+# --- relation to other laws -----------------------------------------------------------------------
 
 
-def test_flat_wall_has_the_stiffness() -> None:
+def test_flat_wall_has_the_nominal_stiffness() -> None:
     flat = Profile(np.zeros(8), 1e-3)
     points = [[1e-3, 0.0, -2e-4], [2e-3, 1.0, 1e-4]]
     expected = [[0.0, 0.0, 2e-4 * K], [0.0, 0.0, 0.0]]
@@ -259,8 +259,8 @@ def test_flat_wall_has_the_stiffness() -> None:
 
 
 @pytest.mark.parametrize("c", [0.5, 1.0, 3.0])
-def test_equals_d_up_to_its_fraction_of_the_way_to_the_medial_axis(c: float) -> None:
-    """Below a crest of radius R: to c/(1 + c) R law D, beyond it softer, and no jump."""
+def test_law_h_equals_law_d_up_to_a_fraction_of_the_crest_radius(c: float) -> None:
+    """Below a crest of radius R law H equals D down to c/(1 + c) R; deeper, it is softer."""
     gentle = TEXTURES["gentle"]
     radius = PERIOD**2 / (4 * math.pi**2 * 0.05 * PERIOD)
     limit = c / (1.0 + c) * radius
@@ -274,23 +274,23 @@ def test_equals_d_up_to_its_fraction_of_the_way_to_the_medial_axis(c: float) -> 
 
 
 @pytest.mark.parametrize("name", SOME)
-def test_equals_d_where_the_foot_stays(name: str) -> None:
-    """H is D wherever going on by 1/c keeps the nearest point; C is not."""
+def test_law_h_equals_law_d_where_the_closest_point_does_not_change(name: str) -> None:
+    """H equals D wherever an extension by 1/c has the same nearest point; C does not."""
     texture = TEXTURES[name]
     points, c = _probes(texture, 400), 2.0
     closest_points = texture.nearest(points)
-    on = points - (closest_points - points) / c
-    stays = np.linalg.norm(texture.nearest(on) - closest_points, axis=1) < 1e-9
+    extended = points - (closest_points - points) / c
+    is_unchanged = np.linalg.norm(texture.nearest(extended) - closest_points, axis=1) < 1e-9
     single, split = (Surface(texture, law, K, continuity=c).force(points) for law in "DH")
     error = np.linalg.norm(split - single, axis=1) / np.linalg.norm(single, axis=1)
-    assert 20 < stays.sum() < 380
-    assert error[stays].max() < 1e-6  # of a depth that is itself rounded
-    assert error[~stays].max() > 1e-2
+    assert 20 < is_unchanged.sum() < 380
+    assert error[is_unchanged].max() < 1e-6  # relative to a depth with rounding error
+    assert error[~is_unchanged].max() > 1e-2
     vertical = Surface(texture, "C", K).force(points)
-    assert np.linalg.norm(vertical - single, axis=1)[stays].max() > 1e-2 * K * PERIOD
+    assert np.linalg.norm(vertical - single, axis=1)[is_unchanged].max() > 1e-2 * K * PERIOD
 
 
-def test_tends_to_d_as_c_grows() -> None:
+def test_law_h_converges_to_law_d_with_continuity() -> None:
     texture = TEXTURES["noise"]
     points = _probes(texture, 300)
     reference = Surface(texture, "D", K).force(points)
@@ -299,24 +299,24 @@ def test_tends_to_d_as_c_grows() -> None:
         force = Surface(texture, letter, K, continuity=c).force(points)
         return float(np.mean(np.linalg.norm(force - reference, axis=1)))
 
-    # |z̄ - p_h| shrinks like 1/c on average, because the split region does.
+    # |z̄ - p_h| decreases as 1/c on average, because the split region does.
     near = [distance("H", c) for c in (1.0, 10.0, 100.0, 1000.0)]
     assert all(b < 0.2 * a for a, b in pairwise(near))
     assert distance("C") > 2.0 * near[1]
 
 
 @pytest.mark.parametrize("name", SOME)
-def test_no_gentler_law_stores_more_energy(name: str) -> None:
+def test_laws_with_at_most_its_gain_store_no_more_energy(name: str) -> None:
     """Item 4: U_1 is the largest potential of a law with q <= 1 that is free of force outside.
 
-    Candidates: C divided by its own gain, H with less continuity. D and the whole of C are larger.
+    Candidates: C divided by its gain, and H with less continuity. D and undivided C are larger.
     """
     texture = TEXTURES[name]
     points = _probes(texture, 300)
     largest = split_state(Surface(texture, "H", 1.0), points).potential
     depth = texture.height(points[:, :2]) - points[:, 2]
     slope, hessian = texture.bounds
-    # The safe bound of MATH section 4 for C, down to the deepest probe.
+    # The derivative bound of MATH section 4 for C, down to the deepest probe.
     gain = 1.0 + slope**2 + depth.max() * hessian
     assert (0.5 * depth**2 / gain <= largest * (1.0 + 1e-9)).all()
     gentler = split_state(Surface(texture, "H", 1.0, continuity=0.3), points).potential
@@ -326,8 +326,8 @@ def test_no_gentler_law_stores_more_energy(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["steep", "sawtooth", "triangle"])
-def test_oscillation_is_bounded_and_nearly_attained(name: str) -> None:
-    """Item 5: with ‖J‖ <= k the RMS of one component is at most k l/(4√3); D has twice that."""
+def test_lateral_force_oscillation_attains_its_bound(name: str) -> None:
+    """Item 5: with ‖J‖ <= k the RMS of one component is at most k l/(4√3); law D has twice that."""
     texture = TEXTURES[name]
     line = texture.scan_line()
     xy = line.points(2000)
@@ -343,43 +343,43 @@ def test_oscillation_is_bounded_and_nearly_attained(name: str) -> None:
     assert oscillation("C") > 1.5 * limit
 
 
-# --- numbers, limits, bad input -------------------------------------------------------------------
+# --- numbers, limits, invalid input ---------------------------------------------------------------
 
 
-def test_numbers_are_theorems() -> None:
+def test_numbers_of_law_h_follow_from_theorems() -> None:
     surface = Surface(TEXTURES["steep"], "H", continuity=2.5)
     for bound, value in ((characteristic_number(surface), 2.5), (one_sided_number(surface), 1.0)):
         assert (bound.lower, bound.upper, bound.method) == (value, value, "theorem")
 
 
 @pytest.mark.parametrize("c", [0.0, -1.0, math.inf, math.nan])
-def test_bad_continuity(c: float) -> None:
+def test_invalid_continuity_raises(c: float) -> None:
     with pytest.raises(ParameterError) as caught:
         Surface(TEXTURES["gentle"], "H", continuity=c)
     assert caught.value.argument == "continuity"
 
 
 @pytest.mark.parametrize("name", ["steep", "noise"])
-def test_far_below_and_extreme_continuity(name: str) -> None:
-    """A body of a height function has no bottom: there is a force however deep the probe is."""
+def test_force_far_below_the_surface_at_extreme_continuity(name: str) -> None:
+    """The body below a height function is unbounded, so there is a force at any depth."""
     texture = TEXTURES[name]
     for c in (0.1, 1e3, 1e6):
         surface = Surface(texture, "H", K, continuity=c)
         points = _probes(texture, 20)
         points[:, 2] = texture.extremes[0] - 5e-3
         force = surface.force(points)
-        # Between the lowest and the highest point of the surface, seen from the probe.
+        # Between the distances to the lowest and the highest point of the surface.
         assert (force[:, 2] >= K * 5e-3).all()
         assert (force[:, 2] <= K * (5e-3 + texture.peak_to_valley)).all()
 
 
-def test_state_is_of_the_split_contact_only() -> None:
+def test_split_state_requires_the_split_contact() -> None:
     with pytest.raises(ParameterError, match="split contact"):
         split_state(Surface(TEXTURES["gentle"], "D"), [[0.0, 0.0, 0.0]])
 
 
-def test_a_probe_is_beyond_where_the_plate_can_pull_it_down() -> None:
-    """Deeper below the highest point than (1 - μ) t/2, 1 - μ = c/(1 + c), wherever it is."""
+def test_probe_is_beyond_the_pop_through_depth_of_a_plate() -> None:
+    """That depth below the highest point is (1 - μ) t/2 everywhere, with 1 - μ = c/(1 + c)."""
     surface = Surface(Sinusoid(0.1e-3, PERIOD), "H", K, continuity=0.5)
     plate = pop_through(surface, 2e-3)
     assert plate.depth == pytest.approx(1e-3 / 3.0)

@@ -1,4 +1,4 @@
-"""Law H below a sinusoid: the closed form against the general method, and what it takes."""
+"""Law H below a sinusoid: the closed form compared with the general method, and its conditions."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def _surface(part: float, c: float) -> Surface:
 
 
 def _general(surface: Surface) -> ModuleType:
-    """Return the loops that know nothing of sinusoids but their nearest points."""
+    """Return the general loops, which use only the nearest points of the sinusoid."""
     return fuse_surface(surface.law, (sinusoid,), NONE)
 
 
@@ -54,12 +54,12 @@ def test_force_and_jacobian_agree_with_the_general_method(part: float, c: float)
     force, jacobian = np.empty((len(points), 3)), np.empty((len(points), 3, 3))
     arguments = (surface.texture.arguments, surface.law_arguments)
     _general(surface).jacobian_batch(points, force, jacobian, *arguments)
-    known, exact = surface.force_and_jacobian(points)
-    np.testing.assert_allclose(surface.force(points), known, rtol=0.0, atol=1e-18)
+    reference, exact = surface.force_and_jacobian(points)
+    np.testing.assert_allclose(surface.force(points), reference, rtol=0.0, atol=1e-18)
     amplitude = surface.texture.extremes[1]
-    error = np.linalg.norm(force - known, axis=1) / np.maximum(amplitude, np.abs(points[:, 2]))
+    error = np.linalg.norm(force - reference, axis=1) / np.maximum(amplitude, np.abs(points[:, 2]))
     assert np.quantile(error, 0.99) < 3e-14
-    # Where its atoms have just parted, the general method knows them to the root of rounding.
+    # Where atoms have just separated, the general method is accurate to the root of rounding.
     assert error.max() < 1e-10
     difference = np.linalg.norm(jacobian - exact, axis=(1, 2)) / max(1.0, c)
     assert np.quantile(difference, 0.98) < 1e-8
@@ -75,14 +75,14 @@ def test_energy_atoms_and_gap_agree_with_the_general_method(part: float, c: floa
     rounding = 4e-15 * (PERIOD + surface.texture.extremes[1]) * np.sqrt(2.0 * state.potential)
     assert (np.abs(out[:, 0] - state.potential) <= rounding).all()
     assert (state.gap <= rounding).all()
-    # Atoms that have just parted may count as one.
+    # Atoms that have just separated may count as one.
     assert np.mean(out[:, 1] == state.atoms) > 0.98
     assert set(state.atoms) == {1, 2}
 
 
 @pytest.mark.parametrize("c", [0.3, 1.0, 4.0])
-def test_the_split_region_is_at_the_stated_place(c: float) -> None:
-    """|u| < μ s with s from h(s) + (1 - μ) s/h'(s) = z; there f = k (c u, h(s) - z)."""
+def test_split_region_and_force_equal_their_formulas(c: float) -> None:
+    """The region is |u| < μ s with h(s) + (1 - μ) s/h'(s) = z; there f = k (c u, h(s) - z)."""
     surface = _surface(0.4, c)
     texture, mu = surface.texture, 1.0 / (1.0 + c)
     assert isinstance(texture, Sinusoid)
@@ -101,14 +101,14 @@ def test_the_split_region_is_at_the_stated_place(c: float) -> None:
                 np.testing.assert_allclose(surface.force(point)[0], expected, atol=1e-15)
 
 
-def test_a_profile_with_a_step_in_its_flank_is_no_such_case() -> None:
-    """Even about the crest and monotone, but h + s/h' is not: more than two atoms.
+def test_profile_with_a_step_in_its_flank_has_more_than_two_atoms() -> None:
+    """The profile is even about the crest and monotone, but h + s/h' is not monotone.
 
-    So the closed form is for sinusoids; to be even and monotone is not enough.
+    The closed form therefore holds for sinusoids only; even and monotone is not sufficient.
     """
     from asperity.textures.kinds.fourier import Fourier
 
-    # h' = -sin u (1 - 0.98 sin² u) and the like: flat halfway down.
+    # Similar to h' = -sin u (1 - 0.98 sin² u): level halfway down.
     kappa = 2.0 * math.pi / PERIOD
     texture = Fourier([1e-3, 0.3e-3], [kappa, 3.0 * kappa], [math.pi / 2, math.pi / 2])
     x = np.linspace(0.0, 0.5 * PERIOD, 2001)[1:-1]
@@ -124,8 +124,8 @@ def test_a_profile_with_a_step_in_its_flank_is_no_such_case() -> None:
 
 @pytest.mark.parametrize("z", [0.999, 0.0, -1.0, -10.0, -1e6])
 @pytest.mark.parametrize("c", [1e-6, 1.0, 1e6])
-def test_extremes(z: float, c: float) -> None:
-    """Anywhere below, at any continuity: finite, within the bounds, the gap next to nothing."""
+def test_extreme_depths_and_continuities_give_finite_results(z: float, c: float) -> None:
+    """The force is finite, the Jacobian within its bounds, and the gap negligible."""
     surface = Surface(Sinusoid(0.8e-3, PERIOD), "H", 1.0, continuity=c)
     x = np.concatenate([[0.25, 0.75, -0.75, 1000.25], np.random.default_rng(1).uniform(-1, 1, 40)])
     points = np.column_stack([x * PERIOD, 0 * x, np.full_like(x, 0.8e-3 * z)])

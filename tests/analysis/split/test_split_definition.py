@@ -1,4 +1,4 @@
-"""Law H against its definition, searched by brute force; and what a thin plate makes of it."""
+"""Law H compared with a brute-force search of its definition, and pop-through of thin plates."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ Distance = Callable[[np.ndarray], np.ndarray]
 
 
 def _distance(texture: Texture) -> Distance:
-    """Return the distance to the free set by a tree of many points of the profile.
+    """Return the distance to the free set by a k-d tree of many points of the profile.
 
-    It shares nothing with the package's nearest points.
+    It shares no code with the package's nearest points.
     """
     x = np.linspace(-4e-3, 6e-3, 400_001)
     tree = cKDTree(np.column_stack([x, texture.height(np.column_stack([x, 0 * x]))]))
@@ -63,8 +63,8 @@ def _definition(distance: Distance, p: np.ndarray, c: float) -> float:
 
 @pytest.mark.parametrize("name", ["middle", "noise"])
 @pytest.mark.parametrize("c", [0.5, 1.0, 4.0])
-def test_energy_against_its_definition(name: str, c: float) -> None:
-    """The maximum is attained at y = p - (z̄ - p)/c, and no search finds more."""
+def test_energy_equals_its_definition(name: str, c: float) -> None:
+    """The maximum is attained at y = p - (z̄ - p)/c, and no search exceeds it."""
     texture = TEXTURES[name]
     points = _probes(texture, 30, seed=4)
     surface, distance = Surface(texture, "H", 1.0, continuity=c), _distance(texture)
@@ -73,16 +73,16 @@ def test_energy_against_its_definition(name: str, c: float) -> None:
     y = (points - surface.force(points) / c)[:, [0, 2]]
     square = np.square(points[:, [0, 2]] - y).sum(axis=1)
     attained = 0.5 * (c * distance(y) ** 2 / (1.0 + c) - c * square)
-    # Chords of 25 nm miss the profile by a millionth of the least of these depths.
+    # Chords of 25 nm deviate from the profile by 1e-6 of the smallest of these depths.
     np.testing.assert_allclose(state.potential, attained, rtol=2e-6)
-    found = [_definition(distance, p, c) for p in points[:8, [0, 2]]]
-    assert (np.array(found) <= state.potential[:8] * (1.0 + 2e-6)).all()
-    # The search is a good one: it comes within 2 per cent, where a kink holds it up.
-    assert (np.array(found) >= state.potential[:8] * 0.98).all()
+    result = [_definition(distance, p, c) for p in points[:8, [0, 2]]]
+    assert (np.array(result) <= state.potential[:8] * (1.0 + 2e-6)).all()
+    # The search is accurate to 2 % even at kinks.
+    assert (np.array(result) >= state.potential[:8] * 0.98).all()
 
 
-def test_a_plate_pops_through_at_the_stated_depth() -> None:
-    """Against the energy of a plate by its definition, φ from both sides."""
+def test_plate_pops_through_at_the_returned_depth() -> None:
+    """Compared with the energy of a plate by its definition, with φ from both sides."""
     texture, c, thickness = TEXTURES["gentle"], 2.0, 0.5e-3
     surface = Surface(texture, "H", 1.0, continuity=c)
     plate = pop_through(surface, thickness)
@@ -94,12 +94,12 @@ def test_a_plate_pops_through_at_the_stated_depth() -> None:
 
         return _definition(distance, np.array([x, z]), c)
 
-    for part, same in ((0.5, True), (0.98, True), (1.35, False)):
+    for part, is_equal in ((0.5, True), (0.98, True), (1.35, False)):
         point = [[0.5e-3, 0.0, top - part * plate.depth]]
         whole = split_state(surface, point).potential[0]
-        assert bool(abs(energy(0.5e-3, point[0][2]) / whole - 1.0) < 1e-3) is same, part
+        assert bool(abs(energy(0.5e-3, point[0][2]) / whole - 1.0) < 1e-3) is is_equal, part
         assert plate.beyond(point)[0] == (part > 1.0)
-    # Whoever pushes through passes the middle of the flat plate below the troughs.
+    # Every path through the plate passes its middle below the troughs.
     middle = 0.5 * (texture.extremes[0] + plate.underside)
     energies = [energy(x, middle) for x in (0.25e-3, 0.6e-3, 0.75e-3)]
     assert plate.barrier * (1.0 - 1e-3) <= min(energies) < 1.05 * plate.barrier
@@ -107,8 +107,8 @@ def test_a_plate_pops_through_at_the_stated_depth() -> None:
 
 
 @pytest.mark.parametrize("c", [0.5, 1.0, 3.0])
-def test_the_depth_is_that_of_a_flat_plate(c: float) -> None:
-    """There it is sharp: 3 per cent deeper the plate's energy is another."""
+def test_pop_through_depth_is_sharp_for_a_flat_plate(c: float) -> None:
+    """3 % below that depth the energy of the plate differs."""
     thickness = 0.8e-3
     surface = Surface(Profile(np.zeros(8), 1e-3), "H", 1.0, continuity=c, max_depth=1e-3)
     plate = pop_through(surface, thickness)
@@ -116,23 +116,23 @@ def test_the_depth_is_that_of_a_flat_plate(c: float) -> None:
     def distance(y: np.ndarray) -> np.ndarray:
         return np.maximum(np.minimum(-y[:, 1], y[:, 1] + thickness), 0.0)
 
-    for part, same in ((0.9, True), (0.999, True), (1.03, False)):
+    for part, is_equal in ((0.9, True), (0.999, True), (1.03, False)):
         z = -part * plate.depth
         whole = split_state(surface, [[3e-3, 0.0, z]]).potential[0]
         assert whole == pytest.approx(0.5 * z * z)
         energy = _definition(distance, np.array([3e-3, z]), c)
-        assert bool(abs(energy / whole - 1.0) < 1e-4) is same, part
+        assert bool(abs(energy / whole - 1.0) < 1e-4) is is_equal, part
 
 
 @pytest.mark.parametrize("thickness", [0.0, -1.0, 0.1e-3, math.nan])
-def test_a_plate_with_holes_is_refused(thickness: float) -> None:
+def test_plate_thinner_than_the_texture_raises(thickness: float) -> None:
     with pytest.raises(ParameterError) as caught:
         pop_through(Surface(TEXTURES["gentle"], "H"), thickness)
     assert caught.value.argument == "thickness"
 
 
-def test_a_plate_ends_where_it_is_as_thin_as_the_surface_is_high() -> None:
-    """And down to its depth, that depth included, the law is the plate's: numbers exact in bits."""
+def test_plate_must_be_thicker_than_the_peak_to_valley_height() -> None:
+    """The pop-through depth itself is not beyond; the numbers are exact in binary."""
     texture = Profile(np.array([0.0, 0.25, 0.0, 0.125]), 1.0)
     surface = Surface(texture, "H", continuity=1.0, max_depth=1.0)
     low, high = texture.extremes
@@ -151,11 +151,11 @@ def test_a_plate_ends_where_it_is_as_thin_as_the_surface_is_high() -> None:
     assert plate.beyond(probes).tolist() == [False, True, False]
 
 
-def test_a_plate_is_of_the_split_contact_only() -> None:
+def test_pop_through_requires_the_split_contact() -> None:
     with pytest.raises(ParameterError, match="split contact"):
         pop_through(Surface(TEXTURES["gentle"], "D"), 1e-3)
 
 
-def test_a_state_outside_is_of_no_points() -> None:
+def test_split_state_outside_contact_has_no_atoms() -> None:
     state = split_state(Surface(TEXTURES["gentle"], "H"), [[0.0, 0.0, 1e-3], [0.1e-3, 0.0, 2e-3]])
     assert repr(state) == "<SplitState of 2 points, into 0 points at most>"

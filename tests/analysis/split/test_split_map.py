@@ -1,4 +1,4 @@
-"""Law H on maps: in space, at borders, on a measured surface; without allocation, in threads."""
+"""Law H on maps: accuracy, borders, a measured surface, allocation and threads."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def _probes(texture: Texture, count: int, seed: int = 0) -> np.ndarray:
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("c", [0.5, 1.0, 4.0])
 def test_force_is_lipschitz_and_certified(name: str, c: float) -> None:
-    """Random pairs, and pairs that straddle the jumps of the nearest point; D fails there."""
+    """Random pairs and pairs that straddle jumps of the nearest point; law D fails there."""
     texture, rng = _texture(name), np.random.default_rng(5)
     a = _probes(texture, 250)
     b = a + rng.normal(size=a.shape) * 10 ** rng.uniform(-9, -4, (len(a), 1))
@@ -76,7 +76,7 @@ def test_force_is_lipschitz_and_certified(name: str, c: float) -> None:
     assert state.gap.max() <= 1e-12 * state.potential.max()
 
 
-def test_up_to_four_atoms_in_space() -> None:
+def test_maps_have_up_to_four_atoms() -> None:
     points = _probes(_texture("rough"), 8000, seed=1)
     state = split_state(Surface(_texture("rough"), "H", K), points)
     inside, *atoms = np.bincount(state.atoms)
@@ -105,8 +105,10 @@ def test_jacobian_against_differences(name: str) -> None:
     assert values.min() >= -c - 1e-9
 
 
-def test_the_plain_solver_finds_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As plain Python, where an index beyond an array is an error."""
+def test_interpreted_solver_agrees_with_the_compiled_solver(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """In plain Python an index out of range is an error."""
     texture = _texture("egg crate")
 
     def hessian(x: float, y: float, _texture: object) -> tuple[float, ...]:
@@ -133,8 +135,8 @@ def test_the_plain_solver_finds_the_same(monkeypatch: pytest.MonkeyPatch) -> Non
         np.testing.assert_allclose(matrix, jacobian, rtol=0, atol=1e-6 * K)
 
 
-def test_a_finite_map_goes_on_in_the_mirror() -> None:
-    """Near the border: no jump across it, and no force across it on it."""
+def test_finite_map_is_mirrored_at_its_border() -> None:
+    """The force is mirrored across the border, and has no component across it on the border."""
     surface = Surface(_texture("rough"), "H", K)
     (x0, y0), spans = surface.texture.domain.origin, surface.texture.domain.spans
     rng = np.random.default_rng(6)
@@ -154,7 +156,7 @@ def test_a_finite_map_goes_on_in_the_mirror() -> None:
 
 
 def _allocations(run: Callable[[], object]) -> int:
-    """Return how many arrays compiled code allocates in a call."""
+    """Return the number of arrays that compiled code allocates in a call."""
     from numba.core.runtime import _nrt_python, rtsys
 
     enabled = _nrt_python.memsys_stats_enabled()
@@ -169,36 +171,36 @@ def _allocations(run: Callable[[], object]) -> int:
 
 
 @pytest.mark.parametrize("kind", ["map", "sinusoid"])
-def test_nothing_is_allocated(kind: str) -> None:
+def test_force_loop_allocates_no_arrays(kind: str) -> None:
     texture = _texture("rough") if kind == "map" else asp.Sinusoid(4e-4, 1e-3)
     surface, points = Surface(texture, "H", K), np.zeros((200, 3))
     points[:, :2] = np.random.default_rng(0).uniform(0.0, 1e-3, (200, 2))
     points[:, 2] = texture.extremes[0]
     out, arguments = np.empty((200, 3)), (texture.arguments, surface.law_arguments)
-    surface.force(points[:1])  # compiled
+    surface.force(points[:1])  # compile
     assert _allocations(lambda: surface._loops.force_batch(points, out, *arguments)) == 0
     assert out.any()
 
 
-def test_an_allocation_would_be_counted() -> None:
+def test_allocations_are_counted() -> None:
     from numba import njit
 
     @njit
-    def careless(count: int) -> float:
+    def allocating(count: int) -> float:
         total = 0.0
         for i in range(count):
             total += np.full(3, float(i)).sum()
         return total
 
-    careless(1)
-    assert _allocations(lambda: careless(50)) >= 50
+    allocating(1)
+    assert _allocations(lambda: allocating(50)) >= 50
 
 
-def test_threads_do_not_disturb_each_other() -> None:
+def test_parallel_threads_give_the_same_forces() -> None:
     surface = Surface(_texture("rough"), "H", K)
     parts = [_probes(surface.texture, 200, seed) for seed in range(8)]
-    alone = [surface.force(part) for part in parts]
+    sequential = [surface.force(part) for part in parts]
     with ThreadPoolExecutor(max_workers=4) as pool:
-        together = list(pool.map(surface.force, parts * 3))
-    for index, force in enumerate(together):
-        np.testing.assert_array_equal(force, alone[index % 8])
+        parallel = list(pool.map(surface.force, parts * 3))
+    for index, force in enumerate(parallel):
+        np.testing.assert_array_equal(force, sequential[index % 8])
