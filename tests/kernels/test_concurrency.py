@@ -1,4 +1,4 @@
-"""Many threads and processes begin with one empty cache: the same bits, and nothing left over."""
+"""Threads and processes that share an empty cache: equal results, and no leftover files."""
 
 from __future__ import annotations
 
@@ -40,29 +40,29 @@ if __name__ == "__main__":
 """
 
 
-def answers(how: str, count: int, folder: Path) -> list[list[str]]:
-    """Return what so many threads or processes compute."""
+def compute_concurrently(how: str, count: int, folder: Path) -> list[list[str]]:
+    """Return the results of several concurrent threads or processes."""
     script = folder / "script.py"
     script.write_text(_SCRIPT)
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, str(script), how, str(count)],
         capture_output=True, text=True, check=True, timeout=300,
         env=os.environ | {"ASPERITY_CACHE_DIR": str(folder / f"cache-{how}")},
     )  # fmt: skip
-    assert not done.stderr
-    found: list[list[str]] = json.loads(done.stdout)
-    return found
+    assert not process.stderr
+    results: list[list[str]] = json.loads(process.stdout)
+    return results
 
 
 @pytest.mark.parametrize(("how", "count"), [("threads", 8), ("fork", 3), ("spawn", 3)])
-def test_all_who_begin_at_once_have_the_same_bits(how: str, count: int, tmp_path: Path) -> None:
-    alone = answers("threads", 1, tmp_path)
-    together = answers(how, count, tmp_path)
-    assert together == alone * count
-    kept = {path.name for path in (tmp_path / f"cache-{how}").rglob("*") if path.is_file()}
-    kept.discard(".turns")
-    assert kept
-    assert all(len(name) == 40 for name in kept)  # entries only: nothing damaged, nothing half
+def test_concurrent_workers_get_bitwise_equal_results(how: str, count: int, tmp_path: Path) -> None:
+    expected = compute_concurrently("threads", 1, tmp_path)
+    results = compute_concurrently(how, count, tmp_path)
+    assert results == expected * count
+    entries = {path.name for path in (tmp_path / f"cache-{how}").rglob("*") if path.is_file()}
+    entries.discard(".turns")
+    assert entries
+    assert all(len(name) == 40 for name in entries)  # complete entries only
 
 
 _COMPILING = """
@@ -79,48 +79,50 @@ surface.to_law("D").jacobian([[0.0, 0.0, 0.0]])
 """
 
 
-def test_two_processes_compile_nothing_twice(tmp_path: Path) -> None:
-    def begun(cache: str) -> subprocess.Popen[str]:
+def test_concurrent_processes_compile_everything_once(tmp_path: Path) -> None:
+    def start_process(cache: str) -> subprocess.Popen[str]:
         return subprocess.Popen(
             [sys.executable, "-c", _COMPILING], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
             text=True, env=os.environ | {"ASPERITY_CACHE_DIR": str(tmp_path / cache)},
         )  # fmt: skip
 
-    def compiled(cache: str, count: int) -> list[str]:
-        processes = [begun(cache) for _ in range(count)]
+    def compiled_names(cache: str, count: int) -> list[str]:
+        processes = [start_process(cache) for _ in range(count)]
         for process in processes:
             assert process.stdout is not None
             while process.stdout.readline() != "ready\n":
                 pass
-        for process in processes:  # at once
+        for process in processes:  # simultaneously
             assert process.stdin is not None
             process.stdin.write("\n")
             process.stdin.flush()
-        return [name for one in processes for name in one.communicate(timeout=200)[0].split()]
+        return [
+            name for process in processes for name in process.communicate(timeout=200)[0].split()
+        ]
 
-    assert sorted(compiled("two", 2)) == sorted(compiled("one", 1)) != []
+    assert sorted(compiled_names("two", 2)) == sorted(compiled_names("one", 1)) != []
 
 
-def test_threads_that_ask_at_once_get_one_unit(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The linker tells units by identity: two of one module would leave loops out."""
+def test_concurrent_threads_get_the_same_unit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The linker identifies units by identity: two units of one module would lose loops."""
     module = ModuleType("at_once")
     vars(module)["KERNELS"] = Kernels(provides=("total",))
-    meeting = threading.Barrier(8, timeout=30)
+    barrier = threading.Barrier(8, timeout=30)
 
     def source(_module: ModuleType) -> str:
-        meeting.wait()  # all have found that there is none yet
+        barrier.wait()  # all threads have missed the cache
         return "def total(x, y):\n    return x + y\n"
 
     monkeypatch.setattr(link.inspect, "getsource", source)
     with ThreadPoolExecutor(8) as pool:
-        found = list(pool.map(link.unit_from_module, [module] * 8))
-    assert {id(unit) for unit in found} == {id(link.unit_from_module(module))}
-    assert list(found[0].sources) == ["total"]
+        units = list(pool.map(link.unit_from_module, [module] * 8))
+    assert {id(unit) for unit in units} == {id(link.unit_from_module(module))}
+    assert list(units[0].sources) == ["total"]
 
 
-def test_threads_that_load_at_once_get_one_module() -> None:
-    """Of two with one name, kept code would belong to the one that was made last."""
+def test_concurrent_threads_load_the_same_module() -> None:
+    """With two modules of one name, cached code would belong to the later one only."""
     source = "import time\n\ntime.sleep(0.05)  # the others come meanwhile\n"
     with ThreadPoolExecutor(8) as pool:
-        found = list(pool.map(load_fused, [source] * 8))
-    assert {id(module) for module in found} == {id(sys.modules[found[0].__name__])}
+        modules = list(pool.map(load_fused, [source] * 8))
+    assert {id(module) for module in modules} == {id(sys.modules[modules[0].__name__])}

@@ -1,4 +1,4 @@
-"""Ingredients: what is the same in several fused modules is compiled once, what differs is not."""
+"""Functions that are identical in several fused modules are compiled once, others separately."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from llvmlite import binding  # type: ignore[import-untyped]  # it has no types
+from llvmlite import binding  # type: ignore[import-untyped]
 
 from asperity.clamps import BACKED
 from asperity.kernels import fuse
@@ -16,7 +16,7 @@ from asperity.laws import LAWS
 from asperity.textures import Sinusoid
 
 HEAD = fuse._module_header("A test.", "")
-BELOW = """
+SOURCE = """
 @scalar
 def below(x):
     return {number} * x
@@ -33,13 +33,15 @@ def run(x):
 """
 
 
-def loaded(number: str = "3.0", factor: str = "2.0", loop: str = "1.0", head: str = HEAD) -> Any:
-    text = BELOW.format(number=number, loop=loop)
+def load_module(
+    number: str = "3.0", factor: str = "2.0", loop: str = "1.0", head: str = HEAD
+) -> Any:
+    text = SOURCE.format(number=number, loop=loop)
     return fuse.load_fused(f"{head}FACTOR = {factor}\n\n{text}")
 
 
-def test_modules_share_what_is_the_same() -> None:
-    first, second = loaded(), loaded(loop="5.0")
+def test_modules_share_identical_functions() -> None:
+    first, second = load_module(), load_module(loop="5.0")
     assert second.above is first.above
     assert second.below is first.below
     assert second.run is not first.run
@@ -47,22 +49,22 @@ def test_modules_share_what_is_the_same() -> None:
 
 
 @pytest.mark.parametrize(
-    ("changed", "value"),
+    ("changes", "value"),
     [({"number": "4.0"}, 30.0), ({"factor": "2.5"}, 23.5), ({"factor": "2"}, 23.0),
      ({"head": HEAD.replace('"numpy", _nrt', '"python", _nrt')}, 23.0)],
 )  # fmt: skip
-def test_what_differs_anywhere_below_is_another_function(
-    changed: dict[str, str], value: float
+def test_function_with_a_different_dependency_is_not_shared(
+    changes: dict[str, str], value: float
 ) -> None:
-    """A number in what it calls, a number or its type that it names, an option of the compiler."""
-    first, second = loaded(), loaded(**changed)
+    """Called code, the value or type of a named number, or a compiler option differs."""
+    first, second = load_module(), load_module(**changes)
     assert second.above is not first.above
-    assert (second.below is first.below) == ("factor" in changed)
+    assert (second.below is first.below) == ("factor" in changes)
     assert (first.run(7.0), second.run(7.0)) == (23.0, value)
 
 
-def test_a_record_that_was_defined_again_is_another_one() -> None:
-    """Who makes one is another function; who receives one is compiled for each, by its type."""
+def test_redefined_record_is_a_different_type() -> None:
+    """Functions that construct it are not shared; functions that receive it specialise by type."""
     text = """
 @scalar
 def made(x):
@@ -78,17 +80,17 @@ def first(record):
 def run(x):
     return first(made(x))
 """
-    define = "from typing import NamedTuple\n\nRecord = NamedTuple('Record', {})\n"
-    one, two = (
-        fuse.load_fused(HEAD + define.format(fields) + text)
+    definition = "from typing import NamedTuple\n\nRecord = NamedTuple('Record', {})\n"
+    original, redefined = (
+        fuse.load_fused(HEAD + definition.format(fields) + text)
         for fields in ("[('a', float), ('b', float)]", "[('b', float), ('a', float)]")
     )
-    assert one.made is not two.made
-    assert one.first is two.first
-    assert (one.run(3.0), two.run(3.0)) == (3.0, 6.0)
+    assert original.made is not redefined.made
+    assert original.first is redefined.first
+    assert (original.run(3.0), redefined.run(3.0)) == (3.0, 6.0)
 
 
-def test_a_function_that_calls_itself_is_like_no_other() -> None:
+def test_recursive_function_is_not_shared() -> None:
     text = """
 @scalar
 def count(n):
@@ -99,19 +101,19 @@ def count(n):
 def run(n):
     return {loop} * count(n)
 """
-    one, two = (fuse.load_fused(HEAD + text.format(loop=loop)) for loop in (1, 2))
-    assert one.count is not two.count
-    assert (one.run(4), two.run(4)) == (4, 8)
+    first, second = (fuse.load_fused(HEAD + text.format(loop=loop)) for loop in (1, 2))
+    assert first.count is not second.count
+    assert (first.run(4), second.run(4)) == (4, 8)
 
 
-def test_laws_on_a_texture_share_its_functions() -> None:
+def test_laws_on_a_texture_share_its_sampler() -> None:
     sampler = Sinusoid(1e-4, 1e-3).sampler
-    one, two = (fuse.fuse_path(LAWS[letter], sampler, BACKED) for letter in "BC")
-    assert one.sample_gradient is two.sample_gradient
-    assert one.path_batch is not two.path_batch
+    first, second = (fuse.fuse_path(LAWS[letter], sampler, BACKED) for letter in "BC")
+    assert first.sample_gradient is second.sample_gradient
+    assert first.path_batch is not second.path_batch
 
 
-KEPT = """
+CACHED_RUN = """
 import sys
 from asperity import Surface
 from asperity.core.compiled import COMPILE_CALLBACKS
@@ -123,27 +125,27 @@ for law in sys.argv[1]:
 """
 
 
-def test_code_with_ingredients_of_another_module_is_kept_by_itself(
+def test_cached_code_does_not_depend_on_other_modules(
     tmp_path: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Law C, compiled after B, is found by a process that never asks for B."""
+    """Law C, compiled after B, is found in the cache by a process that never loads B."""
     monkeypatch.setenv("ASPERITY_CACHE_DIR", str(tmp_path))
 
-    def said(laws: str) -> list[str]:
-        command = [sys.executable, "-W", "error", "-c", KEPT, laws]
+    def run_laws(laws: str) -> list[str]:
+        command = [sys.executable, "-W", "error", "-c", CACHED_RUN, laws]
         return subprocess.run(command, check=True, capture_output=True, text=True).stdout.split()
 
-    both = said("BC")
-    assert len(both) > 2  # it compiled
-    assert said("C") == both[-1:]
+    output = run_laws("BC")
+    assert len(output) > 2  # messages of compilations and two results
+    assert run_laws("C") == output[-1:]
 
 
-def test_loops_are_compiled_for_the_widest_registers(
+def test_loops_use_the_widest_vector_registers(
     tmp_path: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Where the processor has AVX-512, a loop over many points takes eight of them at a time.
+    """With AVX-512 a loop over many points processes eight of them at a time.
 
-    So does what loops share.
+    This includes functions that loops share.
     """
     monkeypatch.setenv("ASPERITY_CACHE_DIR", str(tmp_path))
     text = """
@@ -161,7 +163,7 @@ def run(x, out):
     module, out = fuse.load_fused(HEAD + text), np.empty(64)
     module.run(np.arange(64.0), out)
     assert out.tolist() == [2.0 * x + 3.0 for x in range(64)]
-    has = dict(binding.get_host_cpu_features()).get("avx512f", False)
+    has_avx512 = dict(binding.get_host_cpu_features()).get("avx512f", False)
     for function in (module.fill, module.run):
-        (code,) = function.inspect_asm().values()
-        assert ("zmm" in code) == has
+        (assembly,) = function.inspect_asm().values()
+        assert ("zmm" in assembly) == has_avx512

@@ -1,4 +1,4 @@
-"""The interfaces that compiled code is bound to are those of the functions that are bound."""
+"""Compiled modules define functions with the signatures that their interfaces declare."""
 
 from __future__ import annotations
 
@@ -33,33 +33,31 @@ BODIES = (axes, banded, dense, five_bar, prescribed, resonant)
 PAIRS = [(sampler, one) for one in SAMPLERS] + [(body_functions, one) for one in BODIES]
 
 
-def arguments(module: ModuleType) -> dict[str, int]:
-    """How many arguments each function of a module takes."""
+def argument_counts(module: ModuleType) -> dict[str, int]:
+    """Return the number of arguments of each function of a module."""
     functions = inspect.getmembers(module, inspect.isfunction)
     return {name: len(inspect.signature(function).parameters) for name, function in functions}
 
 
 @pytest.mark.parametrize(("interface", "module"), PAIRS)
-def test_a_module_defines_what_its_interface_says(
-    interface: ModuleType, module: ModuleType
-) -> None:
-    said, found = arguments(interface), arguments(module)
-    shared = said.keys() & set(unit_from_module(module).kernels.provides)
+def test_module_matches_its_interface(interface: ModuleType, module: ModuleType) -> None:
+    declared, defined = argument_counts(interface), argument_counts(module)
+    shared = declared.keys() & set(unit_from_module(module).kernels.provides)
     assert shared
-    assert {name: found[name] for name in shared} == {name: said[name] for name in shared}
+    assert {name: defined[name] for name in shared} == {name: declared[name] for name in shared}
 
 
 @pytest.mark.parametrize("letter", LAWS)
 @pytest.mark.parametrize("clamp", CLAMPS.values(), ids=str)
-def test_what_is_written_for_a_law_is_what_loops_call(letter: str, clamp: Clamp) -> None:
+def test_generated_law_code_matches_its_interface(letter: str, clamp: Clamp) -> None:
     law = LAWS[letter]
     if clamp.changes_force and not law.clampable:
         return
     plan = LawCode(law, kernel_source(law), clamp)
     text = probe_source(plan) + (contact_source(plan) if law.contact.is_determined_by_depth else "")
-    found = {
+    defined = {
         n.name: len(n.args.args) for n in ast.parse(text).body if isinstance(n, ast.FunctionDef)
     }
-    said = arguments(law_functions)
-    assert found == {name: said[name] for name in found}
-    assert set(found) >= {"probe_force", "probe_jacobian", "probe_in_contact", "probe_tick"}
+    declared = argument_counts(law_functions)
+    assert defined == {name: declared[name] for name in defined}
+    assert set(defined) >= {"probe_force", "probe_jacobian", "probe_in_contact", "probe_tick"}

@@ -1,4 +1,4 @@
-"""Modules say what they provide and require, and the linker goes by that alone."""
+"""Modules declare what they provide and require, and the linker uses only these declarations."""
 
 from __future__ import annotations
 
@@ -37,20 +37,20 @@ from asperity.textures import Sinusoid
 
 
 def compiled_modules() -> Iterator[ModuleType]:
-    """All modules of the package that declare themselves."""
-    for found in pkgutil.walk_packages(asperity.__path__, "asperity."):
-        path = Path(found.module_finder.path) / f"{found.name.rpartition('.')[2]}.py"
+    """Yield the modules of the package that declare kernels."""
+    for info in pkgutil.walk_packages(asperity.__path__, "asperity."):
+        path = Path(info.module_finder.path) / f"{info.name.rpartition('.')[2]}.py"
         if path.exists() and "\nKERNELS = " in path.read_text(encoding="utf-8"):
-            yield importlib.import_module(found.name)
+            yield importlib.import_module(info.name)
 
 
-Make = Callable[[str], ModuleType]
+MakeModule = Callable[[str], ModuleType]
 
 MODULES = list(compiled_modules())
 
 
-def written(module: ModuleType) -> tuple[set[str], set[str], set[str]]:
-    """Functions that a module defines, calls of its own, and calls of others, by its AST."""
+def parsed_functions(module: ModuleType) -> tuple[set[str], set[str], set[str]]:
+    """Return functions that a module defines, calls of these, and calls of others, by its AST."""
     tree = ast.parse(inspect.getsource(module))
     defined = {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
     called = {
@@ -58,30 +58,30 @@ def written(module: ModuleType) -> tuple[set[str], set[str], set[str]]:
         for node in ast.walk(tree)
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
     }
-    known = {*INTRINSIC_MODULES, *dir(__builtins__), *__builtins__}
+    builtin_names = {*INTRINSIC_MODULES, *dir(__builtins__), *__builtins__}
     records = {name for name, value in vars(module).items() if isinstance(value, type)}
-    return defined, called & defined, called - defined - known - records
+    return defined, called & defined, called - defined - builtin_names - records
 
 
 def disagreements(module: ModuleType) -> list[str]:
-    """What a module says of itself and its text does not."""
+    """Return the differences between a module's declaration and its source."""
     kernels = unit_from_module(module).kernels
-    defined, own, others = written(module)
+    defined, internal_calls, external_calls = parsed_functions(module)
     offered = {*kernels.provides, *kernels.loops}
-    faults = [f"calls {name}" for name in others - vars(module).keys()]
-    faults += [f"binds {name}" for name in {*kernels.native} - others]
+    faults = [f"calls {name}" for name in external_calls - vars(module).keys()]
+    faults += [f"binds {name}" for name in {*kernels.native} - external_calls]
     faults += [f"offers {name}" for name in offered - defined]
-    faults += [f"hides {name}" for name in defined - own - offered]
+    faults += [f"hides {name}" for name in defined - internal_calls - offered]
     hinted = {*kernels.not_inlined, *kernels.shared, *kernels.merged}
     return faults + [f"hints {name}" for name in hinted - defined]
 
 
 @pytest.mark.parametrize("module", MODULES, ids=lambda module: module.__name__)
-def test_what_a_module_declares_is_what_it_does(module: ModuleType) -> None:
+def test_declaration_of_a_module_matches_its_source(module: ModuleType) -> None:
     assert disagreements(module) == []
 
 
-def test_all_samplers_and_searches_declare_themselves() -> None:
+def test_samplers_and_searches_declare_kernels() -> None:
     names = {module.__name__.removeprefix("asperity.") for module in MODULES}
     assert names >= {"textures.kinds.sinusoid_sampler", "contacts.split.solver"}
     assert "kernels.loops.sampler_loops" in names
@@ -98,8 +98,8 @@ FAULTS = {
 
 
 @pytest.fixture
-def user(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Make]:
-    """``user(text)``: a module of a user's, outside of the package."""
+def user_module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[MakeModule]:
+    """``user_module(text)`` writes and imports a module outside of the package."""
     monkeypatch.syspath_prepend(str(tmp_path))
     names: list[str] = []
 
@@ -115,8 +115,8 @@ def user(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Make]:
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_a_declaration_that_lies_is_found(fault: str, user: Make) -> None:
-    assert disagreements(user(FAULTS[fault])) == [fault]
+def test_wrong_declaration_is_detected(fault: str, user_module: MakeModule) -> None:
+    assert disagreements(user_module(FAULTS[fault])) == [fault]
 
 
 # --- linking --------------------------------------------------------------------------------------
@@ -130,47 +130,47 @@ def unit(name: str, text: str, **kernels: Any) -> SourceUnit:
     return unit_from_source(name, text, Kernels(**kernels))
 
 
-def result(*at_hand: SourceUnit) -> int:
+def link_and_run(*units: SourceUnit) -> int:
     loop = unit("loop", LOOP, loops=("run_batch",))
-    text = link(loops_of(loop), (*at_hand, loop))
+    text = link(loops_of(loop), (*units, loop))
     space: dict[str, object] = {name: lambda f: f for name in ("loop", "inlined", "scalar")}
     exec(text, space)
     assert "idle" not in space
     return space["run_batch"](0)
 
 
-def test_the_first_that_provides_a_name_is_taken() -> None:
+def test_first_provider_of_a_name_is_used() -> None:
     one, two = unit("m1", ONE, provides=("one",)), unit("m2", TWO, provides=("one",))
-    assert (result(one, two), result(two, one)) == (1, 2)
+    assert (link_and_run(one, two), link_and_run(two, one)) == (1, 2)
 
 
-def test_what_a_module_keeps_to_itself_is_its_own() -> None:
-    """A helper is not offered: another module's function of that name does not replace it."""
-    one, other = unit("m1", ONE, provides=("one",)), unit("m2", "def helper(x): return 7")
-    assert result(other, one) == 1
-    offered = unit("m2", "def helper(x): return 7", provides=("helper",))
-    assert result(offered, one) == 1
-    open_ = unit("m1", ONE, provides=("one", "helper"))
-    assert result(offered, open_) == 7
+def test_private_function_is_not_replaced() -> None:
+    """A function that is not provided is never replaced by another module's function."""
+    one, private_helper = unit("m1", ONE, provides=("one",)), unit("m2", "def helper(x): return 7")
+    assert link_and_run(private_helper, one) == 1
+    public_helper = unit("m2", "def helper(x): return 7", provides=("helper",))
+    assert link_and_run(public_helper, one) == 1
+    public_module = unit("m1", ONE, provides=("one", "helper"))
+    assert link_and_run(public_helper, public_module) == 7
 
 
-def test_two_needed_functions_of_one_name_are_an_error() -> None:
+def test_name_conflict_of_required_functions_is_an_error() -> None:
     one = unit("m1", "def one(x): return two(x) + helper(x)\ndef helper(x): return 1",
                provides=("one",))  # fmt: skip
     two = unit("m2", "def two(x): return helper(x)\ndef helper(x): return 2", provides=("two",))
     with pytest.raises(ParameterError, match="function 'helper' is defined by both m"):
-        result(one, two)
+        link_and_run(one, two)
 
 
-def test_what_is_required_and_missing_is_named() -> None:
+def test_missing_function_is_named_in_the_error() -> None:
     with pytest.raises(MissingFunctionError, match="provide 'one', which loop requires"):
-        result()
-    secret = unit("m1", "def one(x): return other(x)", provides=("one",))
+        link_and_run()
+    requiring = unit("m1", "def one(x): return other(x)", provides=("one",))
     with pytest.raises(MissingFunctionError, match="provide 'other', which m1 requires"):
-        result(secret)
+        link_and_run(requiring)
 
 
-def test_a_module_without_a_declaration_is_refused() -> None:
+def test_module_without_declaration_is_an_error() -> None:
     with pytest.raises(ParameterError, match="test_link must declare KERNELS"):
         unit_from_module(sys.modules[__name__])
 
@@ -185,13 +185,13 @@ def decorators(text: str) -> dict[str, str]:
     ("iterates", "expected"),
     [(False, "@inlined @scalar @inlined"), (True, "@scalar @scalar @merged")],
 )
-def test_hints_are_followed(iterates: bool, expected: str) -> None:
+def test_compilation_hints_become_decorators(iterates: bool, expected: str) -> None:
     text = "def run(x): return a(x) + b(x) + c(x)\n" + "".join(
         f"def {name}(x): return x\n" for name in "abc"
     )
-    one = unit("m", text, loops=("run",), not_inlined=("b",), merged=("c",), iterates=iterates)
-    found = decorators(link(loops_of(one), (one,)))
-    assert found == dict(zip(["run", "a", "b", "c"], ["@loop", *expected.split()], strict=True))
+    module = unit("m", text, loops=("run",), not_inlined=("b",), merged=("c",), iterates=iterates)
+    result = decorators(link(loops_of(module), (module,)))
+    assert result == dict(zip(["run", "a", "b", "c"], ["@loop", *expected.split()], strict=True))
 
 
 # --- textures -------------------------------------------------------------------------------------
@@ -202,15 +202,15 @@ def sample_gradient(x, y, texture): return 0.1 * x, 0.1, 0.0
 """
 
 
-def test_a_texture_serves_the_laws_that_need_no_more_than_it_offers(user: Make) -> None:
-    """A needs slopes; B second derivatives, E nearest points, and both say so."""
-    sampler = (user(FLAT),)
+def test_law_that_requires_a_missing_sampler_is_an_error(user_module: MakeModule) -> None:
+    """A needs slopes; B second derivatives; E closest points."""
+    sampler = (user_module(FLAT),)
     fuse.fuse_surface(LAWS["A"], sampler, NONE)
-    what = (
+    missing = (
         r"texture lacks the sampler function 'sample_hessian' \(second derivatives\), required by"
     )
     provided = "provides sample_gradient, sample_height"
-    with pytest.raises(ParameterError, match=rf"{what} law B.*users_module.* {provided}"):
+    with pytest.raises(ParameterError, match=rf"{missing} law B.*users_module.* {provided}"):
         fuse.fuse_surface(LAWS["B"], sampler, NONE)
     with pytest.raises(ParameterError, match=r"texture lacks .*closest points.*law E"):
         fuse.fuse_surface(LAWS["E"], sampler, NONE)
@@ -218,8 +218,8 @@ def test_a_texture_serves_the_laws_that_need_no_more_than_it_offers(user: Make) 
         fuse.fuse_surface(LAWS["H"], sampler, NONE)
 
 
-def test_loops_over_a_texture_are_those_that_it_can_serve(user: Make) -> None:
-    loops = fuse.fuse_sampler((user(FLAT),))
+def test_sampler_loops_exist_for_provided_functions_only(user_module: MakeModule) -> None:
+    loops = fuse.fuse_sampler((user_module(FLAT),))
     out = np.empty((1, 1))
     loops.height_batch(np.array([[2.0, 0.0]]), out, ())
     assert out[0, 0] == 0.2
@@ -227,9 +227,9 @@ def test_loops_over_a_texture_are_those_that_it_can_serve(user: Make) -> None:
         loops.curvature_batch(np.zeros((1, 2)), np.empty((1, 6)), ())
 
 
-def test_the_closed_form_of_a_sinusoid_comes_before_the_general_split() -> None:
-    split = fuse.fuse_surface(LAWS["H"], Sinusoid(1e-3, 1e-3).sampler, NONE)
-    text = "".join(linecache.getlines(split.__file__ or ""))
+def test_sinusoid_uses_its_closed_form_of_the_split_contact() -> None:
+    module = fuse.fuse_surface(LAWS["H"], Sinusoid(1e-3, 1e-3).sampler, NONE)
+    text = "".join(linecache.getlines(module.__file__ or ""))
     assert "def split_contact" in text
     assert "def split_newton" not in text
 
@@ -248,15 +248,15 @@ def run_batch(x):
 """
 
 
-def test_records_and_numbers_of_a_module_come_along(user: Make) -> None:
-    module = user(RECORD)
+def test_records_and_constants_of_a_module_are_linked(user_module: MakeModule) -> None:
+    module = user_module(RECORD)
     loops = fuse.fuse_module(module)
     assert loops.run_batch(3.0) == module.Pair(2.5, 3.0)
     assert isinstance(loops.run_batch(3.0), module.Pair)
 
 
-def test_the_fields_of_a_record_are_part_of_the_text() -> None:
-    """Machine code accesses fields by position: other fields of the same record need other code."""
+def test_fields_of_a_record_are_part_of_the_linked_source() -> None:
+    """Machine code accesses fields by position, so other fields need other code."""
     text = "def run_batch(x): return Pair(x, x).a"
     lines = set()
     for fields in ("a b", "b a", "a b c"):
@@ -266,11 +266,13 @@ def test_the_fields_of_a_record_are_part_of_the_text() -> None:
     assert "from home import Pair  # a b" in lines
 
 
-def test_a_number_of_two_values_is_an_error(user: Make) -> None:
+def test_constant_with_two_values_is_an_error(user_module: MakeModule) -> None:
     one = unit_from_module(
-        user("LIMIT = 1\nKERNELS = Kernels(('one',))\ndef one(x): return LIMIT + two(x)")
+        user_module("LIMIT = 1\nKERNELS = Kernels(('one',))\ndef one(x): return LIMIT + two(x)")
     )
-    two = unit_from_module(user("LIMIT = 2\nKERNELS = Kernels(('two',))\ndef two(x): return LIMIT"))
+    two = unit_from_module(
+        user_module("LIMIT = 2\nKERNELS = Kernels(('two',))\ndef two(x): return LIMIT")
+    )
     one = replace(one, kernels=Kernels(("one",), loops=("one",)))
     with pytest.raises(ParameterError, match=r"defines 'LIMIT' in two ways: 'LIMIT = [12]' and"):
         link(loops_of(one), (one, two))

@@ -1,4 +1,4 @@
-"""Every loop as a plain function: what it tells the law of each point, and where it puts what."""
+"""Every loop as a plain function: the law's arguments at each point, and the stored results."""
 
 from __future__ import annotations
 
@@ -23,80 +23,82 @@ POINTS = RNG.normal(size=(COUNT, 3))
 TEXTURE, LAW = object(), object()
 
 
-def answer(count: int, *given: float) -> tuple[float, ...]:
-    """Return numbers that tell every argument from every other."""
+def distinct_values(count: int, *arguments: float) -> tuple[float, ...]:
+    """Return values that depend on every argument differently."""
     return tuple(
-        float(np.dot(given, np.cos(np.arange(len(given)) + 9.0 * k))) for k in range(count)
+        float(np.dot(arguments, np.cos(np.arange(len(arguments)) + 9.0 * k))) for k in range(count)
     )
 
 
-def law(count: int, calls: list[tuple[Any, ...]] | None = None) -> Any:
-    """Return a law's function: so many numbers, made of what it was told."""
+def stand_in_law(count: int, calls: list[tuple[Any, ...]] | None = None) -> Any:
+    """Return a stand-in for a law's function, which returns values of its arguments."""
 
-    def function(*given: Any) -> tuple[float, ...]:
-        *numbers, texture, parameters = given
+    def function(*arguments: Any) -> tuple[float, ...]:
+        *numbers, texture, parameters = arguments
         if calls is not None:
             calls.append((texture, parameters))
-        return answer(count, *numbers)
+        return distinct_values(count, *numbers)
 
     return function
 
 
 @pytest.mark.parametrize("loops", [probe_loops, block_loops])
 @pytest.mark.parametrize("count", [1, BLOCK - 1, BLOCK, COUNT])
-def test_a_law_without_state_is_told_no_deflection_that_moves_with_the_probe(
+def test_law_without_state_gets_zero_deflection(
     loops: Any, count: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """D = 0, ∂d/∂p = (1, 0, 1)."""
     points, calls = POINTS[:count], list[Any]()
-    monkeypatch.setattr(loops, "probe_force", law(3, calls))
-    monkeypatch.setattr(loops, "probe_jacobian", law(12, calls))
-    force, again = np.full((2, count, 3), np.nan)
+    monkeypatch.setattr(loops, "probe_force", stand_in_law(3, calls))
+    monkeypatch.setattr(loops, "probe_jacobian", stand_in_law(12, calls))
+    force, force_with_jacobian = np.full((2, count, 3), np.nan)
     jacobian = np.full((count, 3, 3), np.nan)
     loops.force_batch(points, force, TEXTURE, LAW)
-    loops.jacobian_batch(points, again, jacobian, TEXTURE, LAW)
+    loops.jacobian_batch(points, force_with_jacobian, jacobian, TEXTURE, LAW)
     assert calls == 2 * count * [(TEXTURE, LAW)]
     for k, point in enumerate(points):
-        np.testing.assert_array_equal(force[k], answer(3, *point, 0.0, 0.0))
-        expected = answer(12, *point, 0.0, 0.0, 1.0, 0.0, 1.0)
-        np.testing.assert_array_equal(again[k], expected[:3])
+        np.testing.assert_array_equal(force[k], distinct_values(3, *point, 0.0, 0.0))
+        expected = distinct_values(12, *point, 0.0, 0.0, 1.0, 0.0, 1.0)
+        np.testing.assert_array_equal(force_with_jacobian[k], expected[:3])
         np.testing.assert_array_equal(jacobian[k].ravel(), expected[3:])
 
 
 @pytest.mark.parametrize("loops", [probe_loops, block_loops])
-def test_arrays_of_another_shape_are_left_alone(loops: Any) -> None:
-    fits, narrow = np.full((2, 3), np.nan), np.full((2, 2), np.nan)
+def test_arrays_of_wrong_shape_are_not_written(loops: Any) -> None:
+    points_3d, narrow = np.full((2, 3), np.nan), np.full((2, 2), np.nan)
     square = np.full((2, 3, 3), np.nan)
-    for points, out in ((fits, narrow), (narrow, fits)):
+    for points, out in ((points_3d, narrow), (narrow, points_3d)):
         loops.force_batch(points, out, TEXTURE, LAW)
         loops.jacobian_batch(points, out, square, TEXTURE, LAW)
-    for wrong in (np.full((2, 2, 3), np.nan), np.full((2, 3, 2), np.nan)):
-        loops.jacobian_batch(fits, fits.copy(), wrong, TEXTURE, LAW)
-        assert np.isnan(wrong).all()
+    for invalid in (np.full((2, 2, 3), np.nan), np.full((2, 3, 2), np.nan)):
+        loops.jacobian_batch(points_3d, points_3d.copy(), invalid, TEXTURE, LAW)
+        assert np.isnan(invalid).all()
     assert np.isnan(square).all()
-    assert np.isnan(fits).all()
+    assert np.isnan(points_3d).all()
     assert np.isnan(narrow).all()
 
 
-def test_a_law_with_state_is_told_its_deflection(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_law_with_state_gets_its_deflection(monkeypatch: pytest.MonkeyPatch) -> None:
     deflection, sliding = RNG.normal(size=(COUNT, 2)), RNG.random(COUNT) < 0.5
-    monkeypatch.setattr(anchored_loops, "probe_force", law(3))
-    monkeypatch.setattr(anchored_loops, "probe_jacobian", law(12))
-    force, again = np.full((2, COUNT, 3), np.nan)
+    monkeypatch.setattr(anchored_loops, "probe_force", stand_in_law(3))
+    monkeypatch.setattr(anchored_loops, "probe_jacobian", stand_in_law(12))
+    force, force_with_jacobian = np.full((2, COUNT, 3), np.nan)
     jacobian = np.full((COUNT, 3, 3), np.nan)
     anchored_loops.force_batch(POINTS, deflection, force, TEXTURE, LAW)
-    anchored_loops.jacobian_batch(POINTS, deflection, sliding, again, jacobian, TEXTURE, LAW)
+    anchored_loops.jacobian_batch(
+        POINTS, deflection, sliding, force_with_jacobian, jacobian, TEXTURE, LAW
+    )
     for k, (point, d) in enumerate(zip(POINTS, deflection, strict=True)):
-        np.testing.assert_array_equal(force[k], answer(3, *point, *d))
-        moves = storing.sliding_derivative(*d, bool(sliding[k]))
-        expected = answer(12, *point, *d, *moves)
-        np.testing.assert_array_equal(again[k], expected[:3])
+        np.testing.assert_array_equal(force[k], distinct_values(3, *point, *d))
+        deflection_derivative = storing.sliding_derivative(*d, bool(sliding[k]))
+        expected = distinct_values(12, *point, *d, *deflection_derivative)
+        np.testing.assert_array_equal(force_with_jacobian[k], expected[:3])
         np.testing.assert_array_equal(jacobian[k].ravel(), expected[3:])
 
 
-def test_a_path_carries_what_the_law_remembers(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The anchor is free at the start; gap and looks are those of each tick alone."""
-    told: list[tuple[Any, ...]] = []
+def test_path_carries_the_state_of_the_law(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The anchor is free at the start; error bound and evaluations are those of each tick."""
+    states: list[tuple[Any, ...]] = []
 
     def probe_tick(x: float, y: float, z: float, *rest: Any) -> Any:
         ax, ay, held, memory, texture, parameters = rest
@@ -106,34 +108,42 @@ def test_a_path_carries_what_the_law_remembers(monkeypatch: pytest.MonkeyPatch) 
             TEXTURE,
             LAW,
         )
-        told.append((ax, ay, held))
+        states.append((ax, ay, held))
         memory[ERROR_BOUND], memory[EVALUATIONS] = x, y
         return x + y, y + z, z + x, 2.0 * x, 3.0 * y, True
 
     monkeypatch.setattr(path_loops, "probe_tick", probe_tick)
-    out, seen, memory = np.empty((COUNT, 3)), np.empty((COUNT, 2)), np.full(20, np.nan)
-    path_loops.path_batch(POINTS, out, seen, memory, TEXTURE, LAW)
+    out, bounds, memory = np.empty((COUNT, 3)), np.empty((COUNT, 2)), np.full(20, np.nan)
+    path_loops.path_batch(POINTS, out, bounds, memory, TEXTURE, LAW)
     x, y, z = POINTS.T
     np.testing.assert_array_equal(out, np.column_stack([x + y, y + z, z + x]))
-    np.testing.assert_array_equal(seen, POINTS[:, :2])
-    before = [(0.0, 0.0, False), *((2.0 * a, 3.0 * b, True) for a, b, _c in POINTS[:-1])]
-    assert told == before
+    np.testing.assert_array_equal(bounds, POINTS[:, :2])
+    expected = [(0.0, 0.0, False), *((2.0 * a, 3.0 * b, True) for a, b, _c in POINTS[:-1])]
+    assert states == expected
 
 
-def test_contacts_that_are_given_are_told_in_order(monkeypatch: pytest.MonkeyPatch) -> None:
-    depths, derivatives, held = RNG.normal(size=5), RNG.normal(size=(5, 6)), RNG.normal(size=(5, 2))
+def test_contact_batch_passes_contacts_in_order(monkeypatch: pytest.MonkeyPatch) -> None:
+    depths, derivatives, deflections = (
+        RNG.normal(size=5),
+        RNG.normal(size=(5, 6)),
+        RNG.normal(size=(5, 2)),
+    )
     sliding = np.array([True, False, True, False, True])
-    monkeypatch.setattr(contact_loop, "contact_jacobian", lambda *g: answer(12, *g[:-1]))
+    monkeypatch.setattr(contact_loop, "contact_jacobian", lambda *g: distinct_values(12, *g[:-1]))
     force, jacobian = np.full((5, 3), np.nan), np.full((5, 3, 3), np.nan)
-    contact_loop.contact_batch(POINTS, depths, derivatives, held, sliding, force, jacobian, LAW)
+    contact_loop.contact_batch(
+        POINTS, depths, derivatives, deflections, sliding, force, jacobian, LAW
+    )
     for k in range(5):
-        moves = storing.sliding_derivative(*held[k], bool(sliding[k]))
-        expected = answer(12, *POINTS[k], depths[k], *derivatives[k], *held[k], *moves)
+        deflection_derivative = storing.sliding_derivative(*deflections[k], bool(sliding[k]))
+        expected = distinct_values(
+            12, *POINTS[k], depths[k], *derivatives[k], *deflections[k], *deflection_derivative
+        )
         np.testing.assert_array_equal(force[k], expected[:3])
         np.testing.assert_array_equal(jacobian[k].ravel(), expected[3:])
 
 
-def test_samplers_are_asked_point_by_point(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_sampler_loops_evaluate_each_point(monkeypatch: pytest.MonkeyPatch) -> None:
     cases = {
         "sample_height": ("height", 1, 2),
         "sample_gradient": ("slope", 3, 2),
@@ -142,23 +152,23 @@ def test_samplers_are_asked_point_by_point(monkeypatch: pytest.MonkeyPatch) -> N
     }
     for name, (batch, count, coordinates) in cases.items():
 
-        def sampler(*given: Any, count: int = count) -> Any:
-            assert given[-1] is TEXTURE
-            found = answer(count, *given[:-1])
-            return found if count > 1 else found[0]
+        def sampler(*arguments: Any, count: int = count) -> Any:
+            assert arguments[-1] is TEXTURE
+            values = distinct_values(count, *arguments[:-1])
+            return values if count > 1 else values[0]
 
         monkeypatch.setattr(sampler_loops, name, sampler)
-        kept = 2 if name == "closest_point" else count
-        out = np.full((COUNT, kept), np.nan)
+        columns = 2 if name == "closest_point" else count
+        out = np.full((COUNT, columns), np.nan)
         getattr(sampler_loops, f"{batch}_batch")(POINTS, out, TEXTURE)
-        expected = [answer(count, *point[:coordinates])[:kept] for point in POINTS]
+        expected = [distinct_values(count, *point[:coordinates])[:columns] for point in POINTS]
         np.testing.assert_array_equal(out, expected)
 
 
-def test_results_stand_in_the_row_of_their_point() -> None:
+def test_results_are_stored_in_the_row_of_their_point() -> None:
     force, jacobian = np.full((3, 3), np.nan), np.full((3, 3, 3), np.nan)
     storing.store_force(force, 2, (1.0, 2.0, 3.0))
-    storing.store_jacobian(force, jacobian, 1, tuple(map(float, range(12))))  # type: ignore[arg-type]  # twelve
+    storing.store_jacobian(force, jacobian, 1, tuple(map(float, range(12))))  # type: ignore[arg-type]
     np.testing.assert_array_equal(force[1:], [[0.0, 1.0, 2.0], [1.0, 2.0, 3.0]])
     np.testing.assert_array_equal(jacobian[1], np.arange(3.0, 12.0).reshape(3, 3))
     assert np.isnan(force[0]).all()
@@ -168,7 +178,7 @@ def test_results_stand_in_the_row_of_their_point() -> None:
 # --- anchors and ticks ----------------------------------------------------------------------------
 
 
-def test_an_anchor_sticks_until_its_deflection_is_too_long() -> None:
+def test_anchor_sticks_up_to_the_maximum_deflection() -> None:
     assert storing.drag_anchor(3.0, 4.0, False, 9.0, 9.0, 5.0) == (3.0, 4.0, 0.0, 0.0)
     assert storing.drag_anchor(4.0, 6.0, True, 1.0, 2.0, 5.0) == (1.0, 2.0, 3.0, 4.0)
     dragged = storing.drag_anchor(4.0, 6.0, True, 1.0, 2.0, 2.5)
@@ -181,12 +191,12 @@ def test_an_anchor_sticks_until_its_deflection_is_too_long() -> None:
 
 
 def settings(**more: float) -> tick.ServoSettings:
-    plain = {"position_step": 0.0, "force_step": 0.0, "max_force": 1e9, "virtual_damping": 0.0,
+    defaults = {"position_step": 0.0, "force_step": 0.0, "max_force": 1e9, "virtual_damping": 0.0,
              "velocity_share": 1.0, "period": 0.5}  # fmt: skip
-    return tick.ServoSettings(**(plain | more))
+    return tick.ServoSettings(**(defaults | more))
 
 
-def test_positions_and_forces_are_rounded_to_steps() -> None:
+def test_positions_and_forces_are_quantised() -> None:
     for value, step, expected in (
         (0.74, 0.5, 0.5),
         (0.75, 0.5, 1.0),
@@ -197,43 +207,43 @@ def test_positions_and_forces_are_rounded_to_steps() -> None:
         assert tick.quantize(value, step) == expected
     assert tick.quantize_force(1.3, -2.8, 0.6, 0.0, 1.0) == (1.3, -2.8, 0.6)
     assert tick.quantize_force(1.3, -2.8, 0.6, 0.5, 99.0) == (1.5, -3.0, 0.5)
-    # 1.5² + 3² + 0.5² = 11.5 is not longer than that, but for the last bits.
+    # The squared length of the rounded force is 11.5, equal to the limit up to rounding.
     assert tick.quantize_force(1.3, -2.8, 0.6, 0.5, 11.5) == (1.5, -3.0, 0.5)
     assert tick.quantize_force(1.3, -2.8, 0.6, 0.5, 11.5 * (1.0 - 0.9e-12)) == (1.5, -3.0, 0.5)
     assert tick.quantize_force(1.3, -2.8, 0.6, 0.5, 11.5 * (1.0 - 1.1e-12)) == (1.0, -2.5, 0.5)
 
 
-def test_next_to_nothing_is_nothing() -> None:
+def test_subnormal_state_is_flushed_to_zero() -> None:
     state = tick.ServoState(*[1e-60 * (-1.0) ** k for k in range(8)], True, 1e-60, -1e-60, 1e-60)
     assert tick.flush_subnormal_state(state) == state
     small = tick.ServoState(*[0.9e-60] * 8, True, *[-0.9e-60] * 3)
     assert tick.flush_subnormal_state(small) == tick.ServoState(held=True)
 
 
-def test_a_tick_reads_asks_damps_limits_and_rounds(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_tick_quantises_damps_limits_and_rounds(monkeypatch: pytest.MonkeyPatch) -> None:
     memory = np.zeros(3)
 
-    def probe_tick(*given: Any) -> Any:
-        assert given == (0.5, -1.0, 2.0, 7.0, 8.0, True, memory, TEXTURE, LAW)
+    def probe_tick(*arguments: Any) -> Any:
+        assert arguments == (0.5, -1.0, 2.0, 7.0, 8.0, True, memory, TEXTURE, LAW)
         return 3.0, -4.0, 12.0, 0.1, 0.2, False
 
     monkeypatch.setattr(tick, "probe_tick", probe_tick)
-    before = tick.ServoState(0.25, -0.5, 1.0, 1.0, 2.0, 3.0, 7.0, 8.0, True, 9.0, 9.0, 9.0)
+    state = tick.ServoState(0.25, -0.5, 1.0, 1.0, 2.0, 3.0, 7.0, 8.0, True, 9.0, 9.0, 9.0)
 
-    def after(**more: float) -> tick.ServoState:
-        given = settings(position_step=0.5, **more)
-        return tick.servo_tick(before, given, 0.6, -1.1, 2.1, memory, TEXTURE, LAW)
+    def next_state(**more: float) -> tick.ServoState:
+        servo_settings = settings(position_step=0.5, **more)
+        return tick.servo_tick(state, servo_settings, 0.6, -1.1, 2.1, memory, TEXTURE, LAW)
 
-    plain = after(max_force=13.0)
-    assert plain == (0.5, -1.0, 2.0, 1.0, 2.0, 3.0, 0.1, 0.2, False, 3.0, -4.0, 12.0)
-    assert after(max_force=6.5)[9:] == pytest.approx((1.5, -2.0, 6.0), rel=1e-15)
-    assert after(max_force=6.5, force_step=4.0)[9:] == (0.0, 0.0, 4.0)
-    # The newest difference over a period of 0.5 s: 0.5, -1 and 2 m/s.
+    undamped = next_state(max_force=13.0)
+    assert undamped == (0.5, -1.0, 2.0, 1.0, 2.0, 3.0, 0.1, 0.2, False, 3.0, -4.0, 12.0)
+    assert next_state(max_force=6.5)[9:] == pytest.approx((1.5, -2.0, 6.0), rel=1e-15)
+    assert next_state(max_force=6.5, force_step=4.0)[9:] == (0.0, 0.0, 4.0)
+    # The newest velocities over a period of 0.5 s are 0.5, -1 and 2 m/s.
     velocity = (1.0 + 0.25 * (0.5 - 1.0), 2.0 + 0.25 * (-1.0 - 2.0), 3.0 + 0.25 * (2.0 - 3.0))
-    damped = after(virtual_damping=2.0, velocity_share=0.25)
+    damped = next_state(virtual_damping=2.0, velocity_share=0.25)
     assert damped[3:6] == velocity
     force = (3.0 - 2.0 * velocity[0], -4.0 - 2.0 * velocity[1], 12.0 - 2.0 * velocity[2])
     assert damped[9:] == force
-    fresh = tick.initial_servo_state(0.6, -1.1, 2.1, settings(position_step=0.5))
-    assert fresh == (0.5, -1.0, 2.0, 0, 0, 0, 0, 0, False, 0, 0, 0)
-    assert math.isclose(float(np.linalg.norm(after(max_force=1e-3)[9:])), 1e-3)
+    initial = tick.initial_servo_state(0.6, -1.1, 2.1, settings(position_step=0.5))
+    assert initial == (0.5, -1.0, 2.0, 0, 0, 0, 0, 0, False, 0, 0, 0)
+    assert math.isclose(float(np.linalg.norm(next_state(max_force=1e-3)[9:])), 1e-3)

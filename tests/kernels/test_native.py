@@ -1,4 +1,4 @@
-"""What compiled code hands to C."""
+"""Calls from compiled code to C."""
 
 from __future__ import annotations
 
@@ -11,38 +11,38 @@ import numpy as np
 from asperity.kernels.intrinsics import call_address, load_acquire, store_release
 
 
-def test_a_function_by_address_is_given_arrays_numbers_and_truth_values() -> None:
-    """An array as the address of its data; the answer is C's, with its sign."""
+def test_call_address_passes_arrays_numbers_and_booleans() -> None:
+    """An array is passed as the address of its data; the signed result is returned."""
     numbers = ctypes.POINTER(ctypes.c_double)
 
     @ctypes.CFUNCTYPE(ctypes.c_int32, numbers, ctypes.c_double, ctypes.c_int64, ctypes.c_int64)
-    def answer(array: Any, number: float, whole: int, truth: int) -> int:
+    def c_function(array: Any, number: float, whole: int, truth: int) -> int:
         array[1] = number
         return -whole if truth else whole
 
     @numba.njit
-    def ask(address: int, array: Any, truth: bool) -> Any:
+    def call(address: int, array: Any, truth: bool) -> Any:
         return call_address(address, array, 2.5, 7, truth)
 
-    address = ctypes.cast(answer, ctypes.c_void_p).value
+    address = ctypes.cast(c_function, ctypes.c_void_p).value
     array = np.zeros(3)
-    assert (ask(address, array, True), ask(address, array, False)) == (-7, 7)
+    assert (call(address, array, True), call(address, array, False)) == (-7, 7)
     assert array.tolist() == [0.0, 2.5, 0.0]
 
 
-def test_a_function_by_address_may_be_given_one_argument() -> None:
+def test_call_address_with_one_argument() -> None:
     @ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_double)
-    def answer(number: float) -> int:
+    def c_function(number: float) -> int:
         return int(10.0 * number)
 
     @numba.njit
-    def ask(address: int, number: float) -> Any:
+    def call(address: int, number: float) -> Any:
         return call_address(address, number)
 
-    assert ask(ctypes.cast(answer, ctypes.c_void_p).value, -2.5) == -25
+    assert call(ctypes.cast(c_function, ctypes.c_void_p).value, -2.5) == -25
 
 
-def test_a_number_is_stored_and_loaded_at_its_place() -> None:
+def test_load_acquire_and_store_release_use_their_index() -> None:
     @numba.njit
     def exchange(words: Any, value: int) -> Any:
         before = load_acquire(words, 1)

@@ -43,7 +43,7 @@ USED: dict[str, tuple[Any, str, tuple[str, ...] | None, str]] = {
 
 
 @pytest.mark.parametrize("case", USED)
-def test_a_private_name_is_there(case: str) -> None:
+def test_private_name_exists(case: str) -> None:
     owner, name, parameters, user = USED[case]
     message = f"Numba {numba.__version__}: {owner.__name__}.{name} changed; adapt {user}"
     assert hasattr(owner, name), message
@@ -52,7 +52,7 @@ def test_a_private_name_is_there(case: str) -> None:
         assert tuple(inspect.signature(getattr(owner, name)).parameters) == parameters, message
 
 
-def test_a_dispatcher_has_a_cache_and_a_compiler() -> None:
+def test_dispatcher_has_a_cache_and_a_compiler() -> None:
     function = numba.njit(lambda x: x)
     message = f"Numba {numba.__version__}: Dispatcher changed; adapt "
     assert isinstance(function, dispatcher.Dispatcher), message + "_is_link_only"
@@ -60,20 +60,20 @@ def test_a_dispatcher_has_a_cache_and_a_compiler() -> None:
     assert function._compiler.pipeline_class is compiler.Compiler, message + "_is_link_only"
 
 
-def test_the_pipeline_has_one_lowering_to_replace() -> None:
+def test_pipeline_has_one_lowering_pass() -> None:
     message = f"Numba {numba.__version__}: the pipeline changed; adapt _CustomLoweringCompiler"
     state = compiler.StateDict()
     state.flags, state.func_ir = compiler.Flags(), None
     for kind in (numba_internals.LinkOnlyCompiler, numba_internals.LoopCompiler):
-        built = object.__new__(kind)
-        built.state = state
-        (manager,) = built.define_pipelines()
+        instance = object.__new__(kind)
+        instance.state = state
+        (manager,) = instance.define_pipelines()
         steps = [step for step, _description in manager.passes]
         assert steps.count(kind.lowering) == 1, message
         assert typed_passes.NativeLowering not in steps, message
 
 
-def test_the_dependency_on_numba_has_an_upper_bound() -> None:
+def test_numba_dependency_has_an_upper_bound() -> None:
     project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text("utf-8"))
     (bound,) = [r for r in project["project"]["dependencies"] if r.startswith("numba")]
     major, minor = map(int, numba.__version__.split(".")[:2])

@@ -1,4 +1,4 @@
-"""Programs in parts: what many loops call is compiled once, and nothing is optimised twice."""
+"""Programs in parts: code shared by loops is compiled once, and nothing is optimised twice."""
 
 from __future__ import annotations
 
@@ -28,40 +28,43 @@ def unit(
     return unit_from_source(name, text, Kernels(**kernels), space or {})
 
 
-FOUND = unit("finds", SEARCH, {"FAR": 100.0}, provides=("search", "step"), shared=("search",))
+PROVIDER = unit("finds", SEARCH, {"FAR": 100.0}, provides=("search", "step"), shared=("search",))
 TIMES = unit("times", "def times(x): return search(x) * step(3.0 * x)",
              loops=("times",))  # fmt: skip
 MINUS = unit("minus", "def minus(x): return -search(x)", loops=("minus",))
 
 
-def test_a_shared_function_is_a_part_of_its_own() -> None:
-    one, two = (link_modules(loops_of(loop), (FOUND, loop)) for loop in (TIMES, MINUS))
-    assert one[0] == two[0]  # whoever borrows it
-    assert (one[0].name, one[0].imports) == ("search", ())
-    assert one[0].title == "Function search of finds."
-    assert ["def search" in part.source for part in one] == [True, False]
-    assert ["def step" in part.source for part in one] == [True, True]  # copied: it is small
-    assert (one[1].name, one[1].imports, one[1].title) == ("", ("search",), "")
-    assert "FAR = 100.0" in one[0].source
-    assert "FAR" not in one[1].source
-    assert "@shared\ndef search" in one[0].source
+def test_shared_function_is_a_separate_part() -> None:
+    first, second = (link_modules(loops_of(loop), (PROVIDER, loop)) for loop in (TIMES, MINUS))
+    assert first[0] == second[0]  # for any importing loop
+    assert (first[0].name, first[0].imports) == ("search", ())
+    assert first[0].title == "Function search of finds."
+    assert ["def search" in part.source for part in first] == [True, False]
+    assert ["def step" in part.source for part in first] == [
+        True,
+        True,
+    ]  # copied, because it is small
+    assert (first[1].name, first[1].imports, first[1].title) == ("", ("search",), "")
+    assert "FAR = 100.0" in first[0].source
+    assert "FAR" not in first[1].source
+    assert "@shared\ndef search" in first[0].source
     assert "def search" in link(
-        loops_of(TIMES), (FOUND, TIMES)
+        loops_of(TIMES), (PROVIDER, TIMES)
     )  # in one piece, where that is asked
 
 
-def test_parts_come_after_those_that_they_borrow_from() -> None:
-    deep = unit("deep", "def a(x): return b(x)\ndef b(x): return c(x)\ndef c(x): return x",
+def test_parts_are_sorted_after_their_imports() -> None:
+    provider = unit("deep", "def a(x): return b(x)\ndef b(x): return c(x)\ndef c(x): return x",
                 provides=("a", "b", "c"), shared=("a", "b", "c"))  # fmt: skip
     loop = unit("loop", "def run(x): return a(x) + c(x)", loops=("run",))
-    parts = link_modules(loops_of(loop), (deep, loop))
+    parts = link_modules(loops_of(loop), (provider, loop))
     assert sorted(part.name for part in parts) == ["", "a", "b", "c"]
     for index, part in enumerate(parts):
         assert set(part.imports) <= {earlier.name for earlier in parts[:index]}
     assert parts[-1].imports == ("a", "c")
 
 
-def test_a_shared_function_that_calls_itself_is_refused() -> None:
+def test_recursive_shared_function_is_an_error() -> None:
     ring = unit("ring", "def a(x): return b(x)\ndef b(x): return a(x)",
                 provides=("a", "b"), shared=("a", "b"))  # fmt: skip
     loop = unit("loop", "def run(x): return a(x)", loops=("run",))
@@ -69,47 +72,47 @@ def test_a_shared_function_that_calls_itself_is_refused() -> None:
         link_modules(loops_of(loop), (ring, loop))
 
 
-def test_two_shared_functions_of_one_name_are_refused() -> None:
+def test_shared_functions_of_one_name_are_an_error() -> None:
     one = unit("one", "def a(x): return x", shared=("a",))
     two = unit("two", "def b(x): return a(x)\ndef a(x): return x", provides=("b",), shared=("a",))
     loop = unit("loop", "def run(x): return a(x) + b(x)", loops=("run",))
-    offers = unit("one", one.sources["a"], provides=("a",), shared=("a",))
+    public = unit("one", one.sources["a"], provides=("a",), shared=("a",))
     with pytest.raises(ParameterError, match="function 'a' is defined by both one and two"):
-        link_modules(loops_of(loop), (offers, two, loop))
+        link_modules(loops_of(loop), (public, two, loop))
 
 
 def load(loop: SourceUnit) -> Any:
-    return fuse.load_fused(fuse._assemble(f"Of {loop.name}.", loops_of(loop), (FOUND, loop)))
+    return fuse.load_fused(fuse._assemble(f"Of {loop.name}.", loops_of(loop), (PROVIDER, loop)))
 
 
 @pytest.fixture
-def nothing_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def empty_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     monkeypatch.setenv("ASPERITY_CACHE_DIR", str(tmp_path))
     fuse._load_module.cache_clear()
     yield
     fuse._load_module.cache_clear()
 
 
-@pytest.mark.usefixtures("nothing_kept")
-def test_it_is_compiled_once_for_all(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.usefixtures("empty_cache")
+def test_shared_function_is_compiled_once(monkeypatch: pytest.MonkeyPatch) -> None:
     finished: list[str] = []
-    intact = codegen.JITCPUCodegen._add_module
+    add_module = codegen.JITCPUCodegen._add_module
 
-    def noted(self: Any, module: Any) -> Any:
+    def record(self: Any, module: Any) -> Any:
         if "asperity_fused" in str(module):
             finished.append(str(module))
-        return intact(self, module)
+        return add_module(self, module)
 
-    monkeypatch.setattr(codegen.JITCPUCodegen, "_add_module", noted)
+    monkeypatch.setattr(codegen.JITCPUCodegen, "_add_module", record)
     assert load(TIMES).times(2.0) == (2.0 * 3.0 + 100.0) * 7.0
-    # Machine code of the loop and of what is shared, not of the step that both contain.
+    # Machine code of the loop and of the shared function, not of the step that both contain.
     assert len(finished) == 2
     assert load(MINUS).minus(2.0) == -106.0
     assert len(finished) == 3
     search = sys.modules[load(MINUS).search.__module__].search
     assert search is load(TIMES).search
     assert sum(search.stats.cache_misses.values()) == 1
-    fuse._load_module.cache_clear()  # as in another process
+    fuse._load_module.cache_clear()  # as in a new process
     assert load(MINUS).minus(2.0) == -106.0
     other = unit("other", "def other(x): return search(x) + 1.0",
                  loops=("other",))  # fmt: skip
@@ -118,10 +121,10 @@ def test_it_is_compiled_once_for_all(monkeypatch: pytest.MonkeyPatch) -> None:
     assert sum(load(other).search.stats.cache_hits.values()) == 1
 
 
-@pytest.mark.usefixtures("nothing_kept")
-def test_an_ingredient_has_no_code_of_its_own() -> None:
+@pytest.mark.usefixtures("empty_cache")
+def test_link_only_function_has_no_machine_code() -> None:
     step = load(TIMES).step
     load(TIMES).times(1.0)
-    (made,) = step.overloads.values()
-    assert isinstance(made.library, LinkOnlyLibrary)
-    assert made.library.get_pointer_to_function(made.fndesc.llvm_func_name) == 0
+    (compiled,) = step.overloads.values()
+    assert isinstance(compiled.library, LinkOnlyLibrary)
+    assert compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name) == 0

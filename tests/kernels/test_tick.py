@@ -1,4 +1,4 @@
-"""The servo's tick on its own: a loop of a user's calls it as the simulation does."""
+"""The servo tick by itself: a user-defined loop calls it as the simulation does."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SERVO = Servo(
     1e-4, position_resolution=5e-6, force_resolution=5e-3, max_force=0.4, virtual_damping=0.3,
     velocity_share=0.2,
 )  # fmt: skip
-WAY = Strokes((0.1e-3, 0.0, -0.05e-3), (7e-3, 3e-3, -0.25e-3), speed=0.05, count=3)
+STROKES = Strokes((0.1e-3, 0.0, -0.05e-3), (7e-3, 3e-3, -0.25e-3), speed=0.05, count=3)
 
 DEVICE = """
 from asperity.core.compiled import Kernels
@@ -52,8 +52,8 @@ def device(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ModuleType]:
         yield module
 
 
-def commanded(device: ModuleType, surface: Surface, positions: FloatArray) -> FloatArray:
-    """The forces of the device's loop at the positions of a handle."""
+def commanded_forces(device: ModuleType, surface: Surface, positions: FloatArray) -> FloatArray:
+    """Return the forces of the device's loop at these positions of the handle."""
     fused = fuse_on_texture(surface.law, surface.texture.sampler, NONE, (device, tick))
     forces = np.empty_like(positions)
     arguments = surface.texture.arguments, surface.law_arguments
@@ -65,36 +65,37 @@ def commanded(device: ModuleType, surface: Surface, positions: FloatArray) -> Fl
 
 
 @pytest.mark.parametrize("letter", ["C", "F", "D"])
-def test_a_device_s_loop_commands_what_the_simulation_does(device: ModuleType, letter: str) -> None:
-    """Reading, law with its anchor, virtual damping, limit and rounding: bit for bit."""
+def test_user_defined_loop_equals_the_simulation(device: ModuleType, letter: str) -> None:
+    """Bitwise, with reading, anchor of the law, virtual damping, force limit and rounding."""
     heights = 1e-4 * np.random.default_rng(3).normal(size=(8, 9))
     texture = HeightMap(heights, 0.5e-3) if letter == "D" else Sinusoid(0.2e-3, 2e-3)
     surface = Surface(texture, letter, 900.0)
-    run = simulate(surface, Cartesian(0.05), PrescribedHand(), SERVO, WAY, 0.3)
-    forces = commanded(device, surface, np.ascontiguousarray(run.position))
+    run = simulate(surface, Cartesian(0.05), PrescribedHand(), SERVO, STROKES, 0.3)
+    forces = commanded_forces(device, surface, np.ascontiguousarray(run.position))
     np.testing.assert_array_equal(forces, run.commanded)
     lengths = np.linalg.norm(forces, axis=1)
     assert 0.1 < lengths.max() <= 0.4 * (1.0 + 1e-12)
-    # In another order the state differs: it is carried from tick to tick.
-    back = commanded(device, surface, np.ascontiguousarray(run.position[::-1]))[::-1]
-    assert np.abs(back - forces).max() > 0.01
+    # Negative control: in reverse order the state, carried from tick to tick, differs.
+    reversed_forces = commanded_forces(device, surface, np.ascontiguousarray(run.position[::-1]))[
+        ::-1
+    ]
+    assert np.abs(reversed_forces - forces).max() > 0.01
 
 
-def test_each_setting_matters(device: ModuleType) -> None:
-    """Without one of them the tick commands something else."""
+def test_damping_and_force_steps_change_the_command(device: ModuleType) -> None:
     surface = Surface(Sinusoid(0.2e-3, 2e-3), "C", 900.0)
-    positions = np.ascontiguousarray(WAY.at(np.arange(3000) * 1e-4))
-    forces = commanded(device, surface, positions)
-    plain = surface.force(5e-6 * np.floor(positions / 5e-6 + 0.5))
-    short = np.linalg.norm(plain, axis=1) < 0.3
-    assert short.any()
-    damped = np.abs(forces - plain)[short].max()
+    positions = np.ascontiguousarray(STROKES.at(np.arange(3000) * 1e-4))
+    forces = commanded_forces(device, surface, positions)
+    law_forces = surface.force(5e-6 * np.floor(positions / 5e-6 + 0.5))
+    is_unlimited = np.linalg.norm(law_forces, axis=1) < 0.3
+    assert is_unlimited.any()
+    damped = np.abs(forces - law_forces)[is_unlimited].max()
     assert 5e-3 < damped < 0.1
     steps = forces / 5e-3
     np.testing.assert_allclose(steps, np.round(steps), atol=1e-9)
 
 
-def test_a_state_that_nothing_is_said_of_rests_at_the_origin() -> None:
+def test_default_state_rests_at_the_origin() -> None:
     assert tick.ServoState() == tick.initial_servo_state(0.0, 0.0, 0.0, SERVO.settings)
     assert tick.initial_servo_state(1.2e-5, -1e-6, 3.7e-6, SERVO.settings)[:4] == (
         1e-5,
