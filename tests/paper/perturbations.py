@@ -194,7 +194,9 @@ def scale_work(factor: float, offset: float = 0.0) -> Perturbation:
 
 def _replace_limit(description: str, number: int, inequality: Inequality) -> Perturbation:
     """Replace a printed inequality."""
-    return replace_name(description, "PRINTED_LIMITS", lambda was: was | {number: inequality})
+    return replace_name(
+        description, "PRINTED_LIMITS", lambda original: original | {number: inequality}
+    )
 
 
 def _observed(_original: Callable[..., Check]) -> Callable[..., Check]:
@@ -210,11 +212,11 @@ def _double_deflection(original: Callable[..., Surface]) -> Callable[..., Surfac
 
 
 def _without_curvature(probe: ProbePoint) -> Any:
-    """Jacobian of D as printed in (18)."""
+    """Return the Jacobian of D as printed in (18)."""
     import numpy as np
 
-    inner = np.array([[probe.slope**2, -probe.slope], [-probe.slope, 1.0]])
-    return -probe.k / (1.0 + probe.slope**2) * inner
+    matrix = np.array([[probe.slope**2, -probe.slope], [-probe.slope, 1.0]])
+    return -probe.k / (1.0 + probe.slope**2) * matrix
 
 
 def _replace_clamp(name: str, original: Callable[..., float]) -> Callable[..., float]:
@@ -225,7 +227,7 @@ def _replace_clamp(name: str, original: Callable[..., float]) -> Callable[..., f
 
 
 def _count_as_printed(original: Callable[..., Any]) -> Callable[..., Any]:
-    """Count no cycle of W, and one from every start of the others."""
+    """Count no cycles for W and all starts for the other laws."""
 
     def count(law: str, divisor: float, delay: int) -> Any:
         counts = original(law, divisor, 0)
@@ -236,7 +238,7 @@ def _count_as_printed(original: Callable[..., Any]) -> Callable[..., Any]:
 
 def _strokes_of(law: str) -> Perturbation:
     return replace_name(
-        f"strokes of law {law}", "_simulated_strokes", lambda was: lambda _law: was(law)
+        f"strokes of law {law}", "_simulated_strokes", lambda original: lambda _law: original(law)
     )
 
 
@@ -244,7 +246,7 @@ def _bumps_of(law: str, substitute: str) -> Perturbation:
     return replace_name(
         f"bumps of law {substitute} for {law}",
         "_simulated_bumps",
-        lambda was: lambda wanted: was(substitute if wanted == law else wanted),
+        lambda original: lambda requested: original(substitute if requested == law else requested),
     )
 
 
@@ -255,12 +257,12 @@ def _negate_sum(original: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _delay_onsets(original: Callable[..., Any]) -> Callable[..., Any]:
-    def delayed(one: Any) -> Any:
-        if one.onset.is_smooth_wall:
-            return one
-        return replace(one, onset=replace(one.onset, cycling=10.0 * one.onset.cycling))
+    def delay(onset: Any) -> Any:
+        if onset.onset.is_smooth_wall:
+            return onset
+        return replace(onset, onset=replace(onset.onset, cycling=10.0 * onset.onset.cycling))
 
-    return lambda laws, delays, _starts: tuple(delayed(one) for one in original(laws, delays, 1))
+    return lambda laws, delays, _starts: tuple(delay(onset) for onset in original(laws, delays, 1))
 
 
 SCALED_FORCES, SCALED_JACOBIANS = scale_forces(1.001), scale_jacobians(1.001)
@@ -294,27 +296,27 @@ _ALL = (
     ),
     _replace_limit("γ b < A", 4, CORRECTED_LIMITS[4]),
     _replace_limit("v l < F₀", 6, lambda v: (v["v"] * v["l"], v["resonance"])),
-    replace_name("a hand of 0.4 m/s", "_SPEED", lambda _was: 0.4),
+    replace_name("a hand of 0.4 m/s", "_SPEED", lambda _original: 0.4),
     replace_name(
         "one sample of delay for two",
         "_delayed_wall_gain",
-        lambda was: lambda delay=2: was(1 if delay == 2 else delay),
+        lambda original: lambda delay=2: original(1 if delay == 2 else delay),
     ),
     replace_name(
         "√2 times the norm of (26)",
         "sticking_norm",
-        lambda was: lambda case: math.sqrt(2.0) * was(case),
+        lambda original: lambda case: math.sqrt(2.0) * original(case),
         FrictionCase,
     ),
     replace_name(
         "three times the damping",
         "_handle_damping",
-        lambda was: lambda joint_damping, x: 3.0 * was(joint_damping, x),
+        lambda original: lambda joint_damping, x: 3.0 * original(joint_damping, x),
     ),
     replace_name(
         "each force held over the step before it",
         "held_force_work",
-        lambda was: lambda path, _force: was(path, SCANNING.surface("W").force(path[1:])),
+        lambda original: lambda path, _force: original(path, SCANNING.surface("W").force(path[1:])),
     ),
     replace_name(
         "an anchor that is dragged from twice the deflection on",
@@ -325,18 +327,21 @@ _ALL = (
     Perturbation(
         "D's Jacobian without curvature, (18)",
         tuple(
-            Replacement(name, lambda _was: _without_curvature, ProbePoint)
+            Replacement(name, lambda _original: _without_curvature, ProbePoint)
             for name in ("jacobian", "compiled_jacobian")
         ),
     ),
     replace_name(
         "2πA/l for every q",
         "q",
-        lambda _was: lambda case, _law: 2.0 * math.pi * case.amplitude / case.period,
+        lambda _original: lambda case, _law: 2.0 * math.pi * case.amplitude / case.period,
         ExperimentCase,
     ),
     replace_name(
-        "A's q for every law", "q", lambda was: lambda case, _law: was(case, "A"), ExperimentCase
+        "A's q for every law",
+        "q",
+        lambda original: lambda case, _law: original(case, "A"),
+        ExperimentCase,
     ),
     replace_name(
         "a lateral clamp that holds the whole force",
@@ -349,12 +354,12 @@ _ALL = (
     replace_name(
         "∞ printed for q of D",
         "_printed_rows",
-        lambda was: lambda: was() | {"D": replace(was()["D"], value=math.inf)},
+        lambda original: lambda: original() | {"D": replace(original()["D"], value=math.inf)},
     ),
     replace_name(
         "Jacobians of the paper's F times 1.2",
         "max_norm_ratio",
-        lambda was: lambda case: 1.2 * was(case),
+        lambda original: lambda case: 1.2 * original(case),
         FrictionCase,
     ),
     replace_name(

@@ -1,4 +1,4 @@
-"""A verdict follows from numbers, and its evidence can be written as JSON."""
+"""A verdict follows from the numbers, and its evidence can be written as JSON."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from asperity.paper.claim import (
 )
 
 
-def test_what_agrees_holds_whatever_the_correction() -> None:
+def test_correct_printed_formula_holds_without_correction() -> None:
     check = check_values(
         "x", printed=[1.0, 2.0], corrected=[5.0, 5.0], reference=[1.0, 2.0], correction="c"
     )
@@ -28,7 +28,7 @@ def test_what_agrees_holds_whatever_the_correction() -> None:
     assert check.correction == ""
 
 
-def test_a_wrong_formula_with_a_right_correction() -> None:
+def test_wrong_formula_with_right_correction_holds_with_correction() -> None:
     check = check_values(
         "x", printed=[1.0, 2.1], corrected=[1.0, 2.0], reference=[1.0, 2.0], correction="c"
     )
@@ -37,26 +37,28 @@ def test_a_wrong_formula_with_a_right_correction() -> None:
 
 
 @pytest.mark.parametrize("corrected", [None, [1.0, 2.2]])
-def test_a_wrong_formula_without_a_right_correction(corrected: list[float] | None) -> None:
+def test_wrong_formula_without_right_correction_does_not_hold(
+    corrected: list[float] | None,
+) -> None:
     check = check_values(
         "x", printed=[1.0, 2.1], corrected=corrected, reference=[1.0, 2.0], correction="c"
     )
     assert check.verdict == "does not hold"
-    # A correction that is wrong itself is not passed on as one.
+    # A wrong correction is not reported.
     assert check.correction == ("c" if corrected is None else "")
 
 
-def test_the_tolerance_is_the_border() -> None:
-    for off, verdict in ((0.9e-9, "holds"), (1.1e-9, "does not hold")):
+def test_verdict_changes_at_the_tolerance() -> None:
+    for error, verdict in ((0.9e-9, "holds"), (1.1e-9, "does not hold")):
         assert (
-            check_values("x", printed=[0.0, 2.0 * (1.0 + off)], reference=[0.0, 2.0]).verdict
+            check_values("x", printed=[0.0, 2.0 * (1.0 + error)], reference=[0.0, 2.0]).verdict
             == verdict
         )
 
 
-@pytest.mark.parametrize("truth", [math.nan, [1.0, math.nan], []])
-def test_without_truth_nothing_is_decided(truth: object) -> None:
-    assert check_values("x", printed=truth, reference=truth).verdict == "undecided"
+@pytest.mark.parametrize("reference", [math.nan, [1.0, math.nan], []])
+def test_missing_reference_is_undecided(reference: object) -> None:
+    assert check_values("x", printed=reference, reference=reference).verdict == "undecided"
 
 
 @pytest.mark.parametrize(
@@ -79,7 +81,7 @@ def test_errors_are_relative_to_the_largest_entry(
     assert relative_error(printed, truth) == pytest.approx(error)
 
 
-def test_statements() -> None:
+def test_verdicts_of_statements() -> None:
     assert check_statement("s", printed=True).verdict == "holds"
     assert (
         check_statement("s", printed=np.bool_(False), corrected=True, correction="c").correction
@@ -92,8 +94,8 @@ def test_statements() -> None:
     assert check_statement("s", printed=False, corrected=False, correction="c").correction == ""
     assert check_statement("s", printed=False, correction="c").correction == "c"
     assert check_statement("s", printed=None).verdict == "undecided"
-    known = check_statement("s", printed=True, numbers={"a b": 1.0}, c_d=2.0).numbers
-    assert known == {"a b": 1.0, "c d": 2.0}
+    numbers = check_statement("s", printed=True, numbers={"a b": 1.0}, c_d=2.0).numbers
+    assert numbers == {"a b": 1.0, "c d": 2.0}
 
 
 @pytest.mark.parametrize(
@@ -105,40 +107,40 @@ def test_statements() -> None:
         (("undecided", "does not hold", "holds"), "does not hold"),
     ],
 )
-def test_a_claim_is_as_good_as_its_weakest_part(parts: tuple[str, ...], whole: str) -> None:
+def test_combined_verdict_is_that_of_the_weakest_part(parts: tuple[str, ...], whole: str) -> None:
     checks = [
         Check(verdict[:1], {str(i): 1.0}, f"c{i}" if "cor" in verdict else "", verdict, verdict)
         for i, verdict in enumerate(parts)
     ]
-    found = combine_checks(*checks)
-    assert found.verdict == whole
-    assert len(found.numbers) == len(parts)
-    assert found.fitted == "; ".join(dict.fromkeys(parts))
+    combined = combine_checks(*checks)
+    assert combined.verdict == whole
+    assert len(combined.numbers) == len(parts)
+    assert combined.fitted == "; ".join(dict.fromkeys(parts))
 
 
-def test_json_has_no_infinity() -> None:
-    found = Check(
+def test_json_evidence_has_no_infinity() -> None:
+    check = Check(
         "s", {"a": math.inf, "b": [1.0, -math.inf, math.nan], "c": "text"}, verdict="holds"
     )
-    result = Claim("x-1", ("(1)",), "I", "words", lambda: found).run()
-    back = json.loads(json.dumps(result.to_dict(), allow_nan=False))
-    assert list(back) == ["id", "equations", "statement", "verdict", "evidence", "flips_under"]
-    assert back["evidence"]["numbers"] == {"a": "inf", "b": [1.0, "-inf", None], "c": "text"}
-    assert back["equations"] == ["(1)"]
+    result = Claim("x-1", ("(1)",), "I", "words", lambda: check).run()
+    data = json.loads(json.dumps(result.to_dict(), allow_nan=False))
+    assert list(data) == ["id", "equations", "statement", "verdict", "evidence", "flips_under"]
+    assert data["evidence"]["numbers"] == {"a": "inf", "b": [1.0, "-inf", None], "c": "text"}
+    assert data["equations"] == ["(1)"]
 
 
-def test_what_the_package_refuses_is_undecided_and_a_fault_is_a_fault() -> None:
-    def refused() -> Check:
+def test_parameter_error_is_undecided_and_other_errors_propagate() -> None:
+    def raise_parameter_error() -> Check:
         raise ParameterError("depth", "must be positive [m]", -1.0)
 
-    def broken() -> Check:
+    def raise_other_error() -> Check:
         raise ZeroDivisionError
 
-    result = Claim("x", (), "I", "", refused).run()
+    result = Claim("x", (), "I", "", raise_parameter_error).run()
     assert result.verdict == "undecided"
     assert "depth must be positive" in result.evidence.summary
     with pytest.raises(ZeroDivisionError):
-        Claim("x", (), "I", "", broken).run()
+        Claim("x", (), "I", "", raise_other_error).run()
 
 
 def test_there_are_four_verdicts() -> None:

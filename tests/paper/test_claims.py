@@ -1,4 +1,4 @@
-"""Every claim of the paper: which there are, and what computing them gives."""
+"""The claims of the paper: their catalogue and their verdicts."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from asperity.paper.claims.simulated_claims import SIMULATED_CLAIM_IDS
 
 SIMULATED = set(SIMULATED_CLAIM_IDS)
 
-# As printed, by the law's definition, an identity, or a sum that gives what is printed.
+# Hold as printed, by the law's definition, an identity, or a reproduced number.
 HOLDS = """
 sentence-abstract-texture limit-1 limit-2 limit-6 eq-3 eq-4 eq-5 sentence-III.B-compare
 sentence-III.C-case-1 sentence-III.C-case-2 table-1-A table-1-BG table-1-D
@@ -30,23 +30,23 @@ sentence-V.B-lateral sentence-V.C-perpendicular sentence-VI-increase sentence-VI
 sentence-IV-figure-3 sentence-VI-F eq-32 eq-33 eq-34 eq-36 eq-38 eq-39
 """.split()  # noqa: SIM905 - a list of 54 would fill the page
 
-# What must be changed.
+# The required correction.
 CORRECTED = {
-    "limit-3": "one condition",  # the same as limit 2
-    "limit-4": "A_F",  # a force over a length against a force
-    "limit-5": "q k <= K₀",  # a number against a stiffness
-    "eq-1": "conservative",  # a loop of A gains under any damping
+    "limit-3": "one condition",  # equivalent to limit 2
+    "limit-4": "A_F",  # compares a force per length with a force
+    "limit-5": "q k <= K₀",  # compares a number with a stiffness
+    "eq-1": "conservative",  # a loop of A gains energy under any damping
     "eq-2": "conservative",
     "sentence-III.B-doubling": "A and F",  # q of B, C, G goes as 1/l²
     "sentence-III.C-curl": "jump where contact begins",
     "sentence-III.C-case-3": "one sample of delay",
     "sentence-IV-closed-form": "a search gives them, and on a sinusoid",
-    "table-1-E": "negative inside",  # as printed it pulls inwards
+    "table-1-E": "negative inside",  # as printed it points inwards
     "table-1-F": "d_max",  # lacks the deflection
     "table-1-C": "plus sign",
-    "remark-2": "K on h''",  # a Lipschitz bound does not bound h''
+    "remark-2": "K on h''",  # a Lipschitz bound on h' does not name h''
     "remark-3": "whole force",
-    "eq-9": "max over",  # a ratio of the greatest equals a value at each place
+    "eq-9": "max over",  # a ratio of maxima is not a pointwise value
     "eq-10": "l/2",
     "eq-13": "stored energy is -U",
     "eq-16": "stored energy is -U",
@@ -54,9 +54,9 @@ CORRECTED = {
     "eq-18": "curvature",
     "eq-19": "without the minus sign",
     "eq-20": "without the minus sign",
-    "eq-22": "oppose",  # friction drove the motion
-    "eq-23": "d\\^x",  # a dimension was lost
-    "eq-24": "\\|d\\^x\\|",  # the anchor is dragged backwards too
+    "eq-22": "oppose",  # as printed, friction drives the motion
+    "eq-23": "d\\^x",  # dimensionally inconsistent
+    "eq-24": "\\|d\\^x\\|",  # the anchor is also dragged backwards
     "eq-25": "entry by entry",
     "eq-26": "entry by entry",
     "eq-27": "limit a → 0",
@@ -79,7 +79,7 @@ CORRECTED = {
     "eq-44": "curvature",
 }
 
-# What the evidence must say against it.
+# The evidence against the claim.
 FAILS = {
     "sentence-IV.C-normal": r"at most \d\.\de-1\d of it",  # it does follow the normal
     "sentence-IV.D-singular": "changes by 0.010 to 0.3",
@@ -99,51 +99,51 @@ def results() -> dict[str, Result]:
     return {result.id: result for result in reproduce_claims(names)}
 
 
-def test_every_claim_is_pinned() -> None:
-    pinned = [*HOLDS, *CORRECTED, *FAILS, *UNDECIDED]
-    assert len(set(pinned)) == len(pinned)
-    assert set(pinned) == set(CLAIMS) - SIMULATED
+def test_every_claim_has_an_expected_verdict() -> None:
+    expected = [*HOLDS, *CORRECTED, *FAILS, *UNDECIDED]
+    assert len(set(expected)) == len(expected)
+    assert set(expected) == set(CLAIMS) - SIMULATED
 
 
-def test_what_holds(results: dict[str, Result]) -> None:
+def test_claims_that_hold(results: dict[str, Result]) -> None:
     assert {name: results[name].verdict for name in HOLDS} == dict.fromkeys(HOLDS, "holds")
     assert all(results[name].evidence.correction == "" for name in HOLDS)
 
 
 @pytest.mark.parametrize("name", CORRECTED)
-def test_what_holds_with_a_correction(results: dict[str, Result], name: str) -> None:
+def test_claims_that_hold_with_a_correction(results: dict[str, Result], name: str) -> None:
     assert results[name].verdict == "holds with correction", results[name].evidence.summary
     assert re.search(CORRECTED[name], results[name].evidence.correction)
 
 
 @pytest.mark.parametrize("name", FAILS)
-def test_what_does_not_hold(results: dict[str, Result], name: str) -> None:
+def test_claims_that_do_not_hold(results: dict[str, Result], name: str) -> None:
     assert results[name].verdict == "does not hold"
     assert re.search(FAILS[name], results[name].evidence.summary), results[name].evidence.summary
 
 
-def test_what_cannot_be_decided(results: dict[str, Result]) -> None:
+def test_undecided_claims(results: dict[str, Result]) -> None:
     for name in UNDECIDED:
         assert results[name].verdict == "undecided"
         assert "comput" in results[name].evidence.summary
 
 
-def test_every_entry_of_the_catalogue_has_a_function() -> None:
-    declared = {name for name, item in CLAIMS.items() if inspect.isfunction(item.compute)}
-    assert set(CATALOGUE) == declared
+def test_catalogue_lists_the_claims_with_a_function() -> None:
+    with_function = {name for name, item in CLAIMS.items() if inspect.isfunction(item.compute)}
+    assert set(CATALOGUE) == with_function
 
 
-def test_every_number_of_the_paper_has_a_claim() -> None:
+def test_every_numbered_item_of_the_paper_has_a_claim() -> None:
     covered = [number for item in CLAIMS.values() for number in item.equations]
-    wanted = [f"({n})" for n in range(1, 45)]
-    wanted += ["Table I", "Table II", *(f"Remark {n}" for n in range(1, 8))]
-    wanted += [f"Limit {n}" for n in range(1, 7)]
-    assert set(covered) == set(wanted)
+    expected = [f"({n})" for n in range(1, 45)]
+    expected += ["Table I", "Table II", *(f"Remark {n}" for n in range(1, 8))]
+    expected += [f"Limit {n}" for n in range(1, 7)]
+    assert set(covered) == set(expected)
     tables = [covered.count(name) for name in ("Table I", "Table II")]
     assert tables == [6, 7]
 
 
-FOUND = [
+REFERENCES = [
     ("eq-12", ["eq-12"]),
     ("(12)", ["eq-12"]),
     ("Fig. 5", ["sentence-V.A-cycles", "sentence-V.A-settles"]),
@@ -155,17 +155,17 @@ FOUND = [
 ]
 
 
-@pytest.mark.parametrize(("name", "ids"), FOUND)
-def test_a_place_of_the_paper_finds_its_claims(name: str, ids: list[str]) -> None:
-    assert sorted(one.id for one in find_claims(name)) == sorted(ids)
+@pytest.mark.parametrize(("name", "ids"), REFERENCES)
+def test_find_claims_by_reference(name: str, ids: list[str]) -> None:
+    assert sorted(claim.id for claim in find_claims(name)) == sorted(ids)
 
 
-def test_the_figures_that_show_what_is_claimed_are_found() -> None:
-    """1 and 4 are drawings of a tool and of the device."""
+def test_find_claims_by_figure() -> None:
+    """Figures 1 and 4 are drawings without a claim."""
     for number in (2, 3, 5, 6, 7):
         assert len(find_claims(f"fig-{number}")) >= 2
-    three = [one.id for one in find_claims("fig-3")]
-    assert set(three) >= {"sentence-IV-figure-3", "eq-12", "eq-27", "eq-29"}
+    figure_3 = [claim.id for claim in find_claims("fig-3")]
+    assert set(figure_3) >= {"sentence-IV-figure-3", "eq-12", "eq-27", "eq-29"}
     for name in ("fig-1", "fig-4", "fig", "fig-33", ""):
         with pytest.raises(ParameterError, match="claim is unknown"):
             find_claims(name)
@@ -181,7 +181,7 @@ def test_claims_are_in_the_order_of_the_paper() -> None:
     assert numbers == sorted(numbers) == list(range(1, 45))
 
 
-def test_ids_and_statements_are_fit_to_print() -> None:
+def test_ids_and_statements_are_well_formed() -> None:
     for name, item in CLAIMS.items():
         assert item.id == name
         assert re.fullmatch(r"(eq|limit|remark|table|sentence)-[\w.-]+", name)
@@ -189,7 +189,7 @@ def test_ids_and_statements_are_fit_to_print() -> None:
         assert item.statement.endswith(".")
 
 
-def test_evidence_is_fit_to_print(results: dict[str, Result]) -> None:
+def test_evidence_is_complete_and_serializable(results: dict[str, Result]) -> None:
     for result in results.values():
         assert result.verdict in VERDICTS
         assert result.evidence.summary
@@ -203,50 +203,52 @@ def test_evidence_is_fit_to_print(results: dict[str, Result]) -> None:
 
 
 @pytest.mark.parametrize("name", ["eq-12", "eq-31", "table-2-F", "sentence-IV.D-number", "limit-5"])
-def test_a_claim_alone_is_the_claim_among_all(results: dict[str, Result], name: str) -> None:
-    (alone,) = reproduce_claims([name])
-    assert alone == results[name]
+def test_single_claim_has_the_same_result_as_among_all(
+    results: dict[str, Result], name: str
+) -> None:
+    (result,) = reproduce_claims([name])
+    assert result == results[name]
 
 
-def test_order_and_progress_do_not_depend_on_how_they_are_asked_for() -> None:
-    seen: list[tuple[str, int, int]] = []
+def test_results_and_progress_are_in_the_order_of_the_paper() -> None:
+    calls: list[tuple[str, int, int]] = []
 
     def progress(result: Result, done: int, total: int) -> None:
-        seen.append((result.id, done, total))
+        calls.append((result.id, done, total))
 
-    found = reproduce_claims(["eq-30", "limit-1", "limit-1", "eq-12"], progress)
-    assert [result.id for result in found] == ["limit-1", "eq-12", "eq-30"]
-    assert seen == [("limit-1", 1, 3), ("eq-12", 2, 3), ("eq-30", 3, 3)]
+    reproduced = reproduce_claims(["eq-30", "limit-1", "limit-1", "eq-12"], progress)
+    assert [result.id for result in reproduced] == ["limit-1", "eq-12", "eq-30"]
+    assert calls == [("limit-1", 1, 3), ("eq-12", 2, 3), ("eq-30", 3, 3)]
 
 
-def test_other_processes_give_the_same(results: dict[str, Result]) -> None:
+def test_worker_processes_give_the_same_results(results: dict[str, Result]) -> None:
     names = ["limit-2", "limit-3", "eq-31"]
     assert reproduce_claims(names, workers=2) == tuple(results[name] for name in names)
 
 
-@pytest.mark.parametrize("given", ["eq-45", "table-3", "Eq-12", "", 12])
-def test_an_unknown_claim_is_refused(given: Any) -> None:
+@pytest.mark.parametrize("name", ["eq-45", "table-3", "Eq-12", "", 12])
+def test_unknown_claim_is_an_error(name: Any) -> None:
     with pytest.raises(ParameterError, match="claim is unknown"):
-        get_claim(given)
+        get_claim(name)
 
 
-def test_the_nearest_claims_are_offered() -> None:
+def test_unknown_claim_suggests_similar_ones() -> None:
     with pytest.raises(ParameterError, match=r"did you mean 'sentence-V\.A-qF'"):
         reproduce_claims(["sentence-V.A-qff"])
 
 
 @pytest.mark.parametrize("workers", [0, -1, 1.5, True])
-def test_a_wrong_number_of_workers_is_refused(workers: Any) -> None:
+def test_invalid_number_of_workers_is_an_error(workers: Any) -> None:
     with pytest.raises(ParameterError, match="workers must be a whole number"):
         reproduce_claims(["limit-1"], workers=workers)
 
 
-def test_ids_as_one_text_are_refused() -> None:
+def test_ids_as_a_single_string_are_an_error() -> None:
     with pytest.raises(ParameterError, match="ids must be a sequence"):
         reproduce_claims("eq-12")
 
 
-def test_simulated_claims_come_from_the_experiments(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_simulated_claims_use_the_experiments(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(simulated_claims, "_simulated_bumps", lambda _law: ())
-    found = get_claim("sentence-V.C-A").run().evidence
-    assert (found.numbers, found.fitted) == ({}, "guessed: two hands with their paths")
+    result = get_claim("sentence-V.C-A").run().evidence
+    assert (result.numbers, result.fitted) == ({}, "guessed: two hands with their paths")

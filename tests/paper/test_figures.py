@@ -1,4 +1,4 @@
-"""The data of figures 2 and 3 are what the laws give."""
+"""The data of figures 2 and 3 agree with the laws."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def test_figure_2_has_a_panel_for_each_law(fields: dict[str, ForceField]) -> Non
         json.dumps(panel.to_dict(), allow_nan=False)
 
 
-def test_forces_act_inside_and_point_out(fields: dict[str, ForceField]) -> None:
+def test_forces_act_inside_and_point_outwards(fields: dict[str, ForceField]) -> None:
     for law, panel in fields.items():
         x, z = panel.points[..., 0], panel.points[..., 1]
         level = 0.0 * x if law in "FG" else _profile(x)
@@ -44,8 +44,8 @@ def test_forces_act_inside_and_point_out(fields: dict[str, ForceField]) -> None:
         assert np.all(panel.forces[inside][:, 1] > 0.0)
 
 
-def test_what_tells_the_laws_apart(fields: dict[str, ForceField]) -> None:
-    """A and E push along z alone; the others also along x, downhill, F against the motion."""
+def test_lateral_forces_distinguish_the_laws(fields: dict[str, ForceField]) -> None:
+    """A and E act along z only; the others also along x, downhill, and F against the motion."""
     for law, panel in fields.items():
         left, right = panel.handle_forces
         if law in "AE":
@@ -53,11 +53,11 @@ def test_what_tells_the_laws_apart(fields: dict[str, ForceField]) -> None:
         elif law == "F":
             assert left[0] < 0.0
             assert right[0] < 0.0
-        else:  # the left handle is on a rising flank, whose normal leans to the left
+        else:  # the left handle is on a rising flank, with its normal to the left
             assert left[0] < 0.0 < right[0]
 
 
-def test_figure_3_ends_with_the_energy_of_the_loop(loops: dict[str, LoopEnergy]) -> None:
+def test_figure_3_work_ends_at_the_loop_energy(loops: dict[str, LoopEnergy]) -> None:
     for panel in loops.values():
         assert panel.arc_length.shape == panel.work.shape
         assert panel.work[0] == panel.arc_length[0] == 0.0
@@ -68,18 +68,18 @@ def test_figure_3_ends_with_the_energy_of_the_loop(loops: dict[str, LoopEnergy])
         json.dumps(panel.to_dict(), allow_nan=False)
 
 
-def test_energies_by_the_papers_formulas(loops: dict[str, LoopEnergy]) -> None:
+def test_loop_energies_agree_with_the_papers_formulas(loops: dict[str, LoopEnergy]) -> None:
     k, amplitude, length = SCANNING.stiffness, SCANNING.amplitude, SCANNING.period
     assert loops["A"].energy == pytest.approx(k * amplitude**2 / 2)
     root = math.hypot(1.0, 2.0 * math.pi * amplitude / length)
-    second = k * length**2 / (4.0 * math.pi**2) * (1.0 - root)
-    assert loops["B"].energy == pytest.approx(k * amplitude**2 / 2 + second)
+    correction = k * length**2 / (4.0 * math.pi**2) * (1.0 - root)
+    assert loops["B"].energy == pytest.approx(k * amplitude**2 / 2 + correction)
     for law in "CD":
         assert abs(loops[law].energy) < 1e-6 * k * amplitude**2
     gain = k * SCANNING.friction * SCANNING.deflection * (SCANNING.depth - 0.1e-3) / 2
     assert loops["F"].energy == pytest.approx(gain)
     assert np.all(loops["F"].height == 0.0)
-    shaded = k * 0.1e-3 * length / math.pi * math.atan(2.0 * math.pi * amplitude / length)
-    assert loops["G"].energy == pytest.approx(shaded)
+    groove_energy = k * 0.1e-3 * length / math.pi * math.atan(2.0 * math.pi * amplitude / length)
+    assert loops["G"].energy == pytest.approx(groove_energy)
     assert loops["E"].energy > 0.0
     assert [loops[law].equation for law in "BFG"] == ["(12)", "(27)", "(29)"]

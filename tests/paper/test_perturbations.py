@@ -26,11 +26,11 @@ VERDICTS |= dict.fromkeys(FAILS, "does not hold") | EXPECTED
 
 
 @pytest.mark.parametrize("name", CLAIMS)
-def test_the_perturbation_changes_the_verdict(name: str) -> None:
+def test_perturbation_changes_the_verdict(name: str) -> None:
     with PERTURBATIONS[CLAIMS[name].flips_under].apply():
         result = get_claim(name).run()
     assert result.verdict != VERDICTS[name], result.evidence.summary
-    # A claim that becomes undecided has no other verdict.
+    # Becoming undecided does not count as a different verdict.
     assert result.verdict != "undecided"
     assert result.flips_under == CLAIMS[name].flips_under
     assert "could not be computed" not in result.evidence.summary
@@ -45,11 +45,11 @@ def test_scaled_kernels_change_the_claims_on_formulas() -> None:
     scaled = {SCALED_FORCES.description, SCALED_JACOBIANS.description}
     by_kernel = [name for name, claim in CLAIMS.items() if claim.flips_under in scaled]
     assert len(by_kernel) >= 45
-    wanted = "eq-6 eq-7 eq-8 eq-10 eq-11 eq-12 eq-14 eq-15 eq-17 eq-18 eq-20 eq-22 eq-23 eq-44"
-    assert set(wanted.split()) <= set(by_kernel)
+    expected = "eq-6 eq-7 eq-8 eq-10 eq-11 eq-12 eq-14 eq-15 eq-17 eq-18 eq-20 eq-22 eq-23 eq-44"
+    assert set(expected.split()) <= set(by_kernel)
 
 
-def test_a_perturbation_is_reverted_after_an_error() -> None:
+def test_perturbation_is_reverted_after_an_error() -> None:
     surface = Surface(Sinusoid(1e-4, 1e-3), "A")
     inside = [[0.1e-3, 0.0, -1e-3]]
     before, force, method = get_claim("eq-6").run(), surface.force(inside), Surface.force
@@ -68,7 +68,7 @@ def test_a_perturbation_is_reverted_after_an_error() -> None:
     assert get_claim("eq-6").run() == before
 
 
-def test_caches_are_cleared() -> None:
+def test_caches_are_cleared_around_a_perturbation() -> None:
     """Table II is cached; it is recomputed under a perturbation and after it."""
     verdict = get_claim("table-2-A").run().verdict
     with PERTURBATIONS[CLAIMS["table-2-A"].flips_under].apply():
@@ -76,7 +76,7 @@ def test_caches_are_cleared() -> None:
     assert get_claim("table-2-A").run().verdict == verdict
 
 
-def test_a_replacement_of_an_unused_name_is_an_error() -> None:
+def test_replacement_of_an_unknown_name_is_an_error() -> None:
     with (
         pytest.raises(LookupError, match="'no_such_name'"),
         replace_name("nothing", "no_such_name", lambda _was: 1).apply(),
@@ -84,16 +84,16 @@ def test_a_replacement_of_an_unused_name_is_an_error() -> None:
         pytest.fail("was applied")
 
 
-def test_a_replacement_in_one_class_leaves_the_others() -> None:
+def test_replacement_with_owner_affects_only_that_class() -> None:
     replacement = Replacement("norms", lambda _was: None, ProbePoint)
     with Perturbation("no norms", (replacement,)).apply():
         assert ProbePoint.norms is None
     assert callable(ProbePoint.norms)
 
 
-def test_a_user_defined_claim_needs_no_perturbation() -> None:
-    own = register(Claim("own", (), "mine", "Mine.", get_claim("eq-6").compute))
+def test_user_defined_claim_needs_no_perturbation() -> None:
+    claim = register(Claim("own", (), "mine", "Mine.", get_claim("eq-6").compute))
     try:
-        assert own.run().flips_under == ""
+        assert claim.run().flips_under == ""
     finally:
         del CLAIMS["own"]

@@ -1,4 +1,4 @@
-"""Table II: what the paper prints, against what its own formulas and ours give."""
+"""Table II: the printed values against the values of the paper's formulas and of this package."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def table() -> TableTwo:
     return table_two()
 
 
-def test_rows_are_those_of_the_paper(table: TableTwo) -> None:
+def test_rows_have_the_printed_values(table: TableTwo) -> None:
     assert [row.law for row in table.rows] == list("ABCDEFG")
     printed = {row.law: (row.printed.number, row.printed.conservative) for row in table.rows}
     assert printed["B"] == printed["G"] == ("No closed-form", "No")
@@ -36,8 +36,8 @@ def test_rows_are_those_of_the_paper(table: TableTwo) -> None:
         table.row("W")
 
 
-def test_which_rows_stand(table: TableTwo) -> None:
-    """Numbers, conservativity, continuity and energy, one by one."""
+def test_agreement_of_each_row(table: TableTwo) -> None:
+    """Number, conservativity, continuity and energy are compared separately."""
     verdicts = {
         row.law: (
             row.number_agrees, row.conservativity_agrees, row.continuity_agrees, row.energy_agrees
@@ -58,7 +58,7 @@ def test_which_rows_stand(table: TableTwo) -> None:
 
 
 def test_numbers_by_brute_force(table: TableTwo) -> None:
-    """The Jacobian at 20 000 phases and full depth, on the paper's surface."""
+    """From the Jacobian at 20 000 phases and full depth, on the paper's surface."""
     xy = WAVE.domain.points(np.arange(20_000)[:, None] / 20_000)
     for law in "ABCG":
         z = -1e-3 if law == "G" else WAVE.height(xy) - 1e-3
@@ -73,8 +73,8 @@ def test_numbers_by_brute_force(table: TableTwo) -> None:
         assert row.one_sided.value <= row.q.value * (1.0 + 1e-6)
 
 
-def test_the_printed_formulas_have_their_printed_values(table: TableTwo) -> None:
-    """q_A = 5.1 as in section V.A; the paper's q_F = 8.3 is √2 times what its formula gives."""
+def test_printed_formulas_have_their_printed_values(table: TableTwo) -> None:
+    """q_A = 5.1 as in section V.A; the paper's q_F = 8.3 is √2 times the value of its formula."""
     assert table.row("A").printed.value == pytest.approx(5.1, abs=0.05)
     appendix = table.row("F").printed.value
     assert appendix is not None
@@ -84,9 +84,9 @@ def test_the_printed_formulas_have_their_printed_values(table: TableTwo) -> None
     assert appendix == pytest.approx(5.85, abs=5e-3)
 
 
-def test_energies_of_the_paper_s_loops(table: TableTwo) -> None:
+def test_loop_energies_agree_with_closed_forms(table: TableTwo) -> None:
     k, a, length = 1000.0, 0.8e-3, 2e-3
-    root = math.sqrt(1 + 4 * math.pi**2 * a**2 / length**2)
+    slope_factor = math.sqrt(1 + 4 * math.pi**2 * a**2 / length**2)
     wave = Sinusoid(a, length)
 
     def distance(z: float) -> float:
@@ -96,7 +96,7 @@ def test_energies_of_the_paper_s_loops(table: TableTwo) -> None:
     kink = a - length**2 / (4 * math.pi**2 * a)
     expected = {
         "A": k * a**2 / 2,
-        "B": k * a**2 / 2 + k * length**2 / (4 * math.pi**2) * (1 - root),
+        "B": k * a**2 / 2 + k * length**2 / (4 * math.pi**2) * (1 - slope_factor),
         "C": 0.0,
         "D": 0.0,
         "E": k * quad(distance, 0, a, points=[kink], epsabs=1e-18, epsrel=1e-12)[0],
@@ -107,22 +107,22 @@ def test_energies_of_the_paper_s_loops(table: TableTwo) -> None:
         assert table.row(law).energy == pytest.approx(energy, abs=1e-9 * k * a**2)
 
 
-def test_what_changed_is_said_with_its_numbers(table: TableTwo) -> None:
+def test_changes_are_described_with_their_numbers(table: TableTwo) -> None:
     assert "y = 31.58" in table.row("B").change
     assert "0.0316629 mm" in table.row("D").change
     for number in ("8.3", "5.85", "8.27", "2.4863"):
         assert number in table.row("F").change
-    head, *cells = table.cells()
+    header, *cells = table.cells()
     assert len(cells) == 7
-    assert {len(row) for row in cells} == {len(head)}
+    assert {len(row) for row in cells} == {len(header)}
     assert cells[3][2] == "∞ (closed form)"
     assert [row[4] for row in cells] == ["no", "no", "yes", "yes", "no", "no (Almost)", "no"]
     assert [row[5] for row in cells] == ["yes", "yes", "yes", "no", "yes", "yes", "yes"]
     assert [row[-1] for row in cells] == ["yes", "new", "new", "no", "yes", "no", "new"]
 
 
-def test_a_row_with_another_number_does_not_stand(table: TableTwo) -> None:
-    """The negative controls of every verdict."""
+def test_changed_values_do_not_agree(table: TableTwo) -> None:
+    """Negative controls of each comparison."""
     row = table.row("A")
     assert replace(row, q=Bound(5.13, 5.13, "closed form")).number_agrees is False
     assert not replace(row, conservative=True).conservativity_agrees
@@ -134,10 +134,10 @@ def test_a_row_with_another_number_does_not_stand(table: TableTwo) -> None:
     assert not replace(table.row("D"), continuous=True).continuity_agrees
 
 
-def test_plain_data_and_html(table: TableTwo) -> None:
-    plain = json.loads(json.dumps(table.to_dict(), allow_nan=False))
-    assert plain["rows"][3]["q"]["value"] == "inf"
-    assert plain["rows"][5]["number_agrees"] is False
+def test_json_and_html_of_the_table(table: TableTwo) -> None:
+    data = json.loads(json.dumps(table.to_dict(), allow_nan=False))
+    assert data["rows"][3]["q"]["value"] == "inf"
+    assert data["rows"][5]["number_agrees"] is False
     text = table._repr_html_()
     assert text.count("<tr") == 8
     assert "no (Almost)" in text
