@@ -1,4 +1,4 @@
-"""The derived Jacobians against closed forms and against differences, at generic contacts."""
+"""The derived Jacobians against closed forms and differences, at generic contacts."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ class Patch:
         slope = self.g + self.hessian @ u + 3.0 * self.twist * along**2 * self.e
         return h, slope, self.hessian + 6.0 * self.twist * along * np.outer(self.e, self.e)
 
-    def foot(self, p: np.ndarray) -> np.ndarray:
-        """Return the foot of p on the branch of the contact, by Newton's method from there."""
+    def closest_point(self, p: np.ndarray) -> np.ndarray:
+        """Return the closest point to p near the contact, by Newton's method."""
         u = np.zeros(2)
         for _ in range(12):
             h, g, hessian = self.derivatives(u)
@@ -50,16 +50,16 @@ class Patch:
 
 
 def patches() -> list[Patch]:
-    """Surfaces in mm-like units: steep and shallow, crest, saddle and trough, never aligned."""
+    """Return steep and shallow surfaces with crests, saddles and troughs in general orientation."""
     rng = np.random.default_rng(11)
-    found = []
+    surfaces = []
     for size in (0.2, 1.0, 5.0):
         for eigenvalues in ((-900.0, -300.0), (800.0, -500.0), (1100.0, 400.0)):
-            turn = np.linalg.qr(rng.normal(size=(2, 2)))[0]
-            hessian = turn @ np.diag(eigenvalues) @ turn.T
+            rotation = np.linalg.qr(rng.normal(size=(2, 2)))[0]
+            hessian = rotation @ np.diag(eigenvalues) @ rotation.T
             g = size * rng.normal(size=2)
-            found.append(Patch(rng.normal() * 2e-4, g, hessian, 3e5, rng.normal(size=2)))
-    return found
+            surfaces.append(Patch(rng.normal() * 2e-4, g, hessian, 3e5, rng.normal(size=2)))
+    return surfaces
 
 
 def symbolic_jacobian(law: Law, values: dict[str, float]) -> np.ndarray:
@@ -89,17 +89,17 @@ def modulation(h: float) -> float:
     return (1.0 + MODULATION * (h - H_MID) / H_HALF) / 2.0
 
 
-def depth_of(patch: Patch, letter: str) -> float:
-    """Return a depth well inside: for D and E 60 % of the way to the nearest focal point."""
+def generic_depth(patch: Patch, letter: str) -> float:
+    """Return a depth well inside: for D and E 60 % of the distance to the nearest focal point."""
     if LAWS[letter].contact.name != "nearest":
         return 0.7e-3
     s = np.sqrt(1.0 + patch.g @ patch.g)
-    first = np.eye(2) + np.outer(patch.g, patch.g)
-    curvatures = np.linalg.eigvals(np.linalg.solve(first, patch.hessian / s)).real
+    metric = np.eye(2) + np.outer(patch.g, patch.g)
+    curvatures = np.linalg.eigvals(np.linalg.solve(metric, patch.hessian / s)).real
     return min(0.7e-3, 0.6 / max(-curvatures.min(), 1.0))
 
 
-def by_hand(
+def closed_form_jacobian(
     letter: str, patch: Patch, depth: float, sliding: bool, jacobian_by_hand: ByHand
 ) -> np.ndarray:
     state: dict[str, Any] = {}
@@ -119,11 +119,11 @@ IDS = [*LETTERS, "F sliding"]
 
 
 @pytest.mark.parametrize(("letter", "sliding"), CASES, ids=IDS)
-def test_the_jacobian_is_the_closed_form(letter: str, sliding: bool, jacobian_by_hand: ByHand):
+def test_jacobian_agrees_with_closed_form(letter: str, sliding: bool, jacobian_by_hand: ByHand):
     for patch in patches():
-        depth = depth_of(patch, letter)
+        depth = generic_depth(patch, letter)
         derived = symbolic_jacobian(LAWS[letter], contact_values(patch, depth, sliding))
-        expected = by_hand(letter, patch, depth, sliding, jacobian_by_hand)
+        expected = closed_form_jacobian(letter, patch, depth, sliding, jacobian_by_hand)
         assert np.abs(derived - expected).max() <= 1e-12 * np.linalg.norm(expected, 2)
 
 
@@ -132,8 +132,8 @@ def force_on_patch(
 ) -> Callable[[np.ndarray], np.ndarray]:
     """Return the force as a function of the probe, (n, 3) -> (n, 3)."""
 
-    def one(p: np.ndarray) -> np.ndarray:
-        u = patch.foot(p) if LAWS[letter].contact.name == "nearest" else p[:2]
+    def force_at(p: np.ndarray) -> np.ndarray:
+        u = patch.closest_point(p) if LAWS[letter].contact.name == "nearest" else p[:2]
         h, g, _ = patch.derivatives(u)
         depth = {
             "nominal": -p[2],
@@ -148,10 +148,10 @@ def force_on_patch(
             max_deflection=MAX_DEFLECTION,
         )  # fmt: skip
 
-    return lambda points: np.array([one(p) for p in points])
+    return lambda points: np.array([force_at(p) for p in points])
 
 
-def probe_of(patch: Patch, letter: str, depth: float) -> np.ndarray:
+def probe_position(patch: Patch, letter: str, depth: float) -> np.ndarray:
     n = np.array([-patch.g[0], -patch.g[1], 1.0]) / np.sqrt(1.0 + patch.g @ patch.g)
     return {
         "nominal": np.array([0.0, 0.0, -depth]),
@@ -161,29 +161,29 @@ def probe_of(patch: Patch, letter: str, depth: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("letter", "sliding"), CASES, ids=IDS)
-def test_the_jacobian_is_the_derivative_of_the_force(
+def test_jacobian_agrees_with_differences_of_the_force(
     letter: str, sliding: bool, force_by_hand: ByHand, differences: Differences
 ):
     for patch in patches():
-        depth = depth_of(patch, letter)
+        depth = generic_depth(patch, letter)
         derived = symbolic_jacobian(LAWS[letter], contact_values(patch, depth, sliding))
         force = force_on_patch(letter, patch, -DEFLECTION, sliding, force_by_hand)
-        numeric = differences(force, probe_of(patch, letter, depth)[None, :], step=1e-6)[0]
+        numeric = differences(force, probe_position(patch, letter, depth)[None, :], step=1e-6)[0]
         assert np.abs(derived - numeric).max() <= 1e-8 * np.linalg.norm(derived, 2)
 
 
-def test_the_curvature_matters_for_the_god_object():
-    """The paper's (18) leaves it out; at these depths that is far off."""
+def test_curvature_term_of_the_god_object_is_not_small():
+    """The paper's (18) omits it; at these depths the error is over 1 % of the stiffness."""
     for patch in patches():
-        depth = depth_of(patch, "D")
+        depth = generic_depth(patch, "D")
         n = np.array([-patch.g[0], -patch.g[1], 1.0]) / np.sqrt(1.0 + patch.g @ patch.g)
         exact = symbolic_jacobian(LAWS["D"], contact_values(patch, depth, False))
-        flat = -STIFFNESS * np.outer(n, n)
-        assert np.linalg.norm(exact - flat, 2) > 0.01 * STIFFNESS
+        without_curvature = -STIFFNESS * np.outer(n, n)
+        assert np.linalg.norm(exact - without_curvature, 2) > 0.01 * STIFFNESS
 
 
 @pytest.mark.parametrize("letter", LETTERS)
-def test_the_saturated_jacobian_is_the_jacobian_without_the_depth(letter: str):
+def test_saturated_jacobian_omits_the_depth_term(letter: str):
     """While a clamp holds the depth, only ∂f/∂depth ∇depth is missing."""
     derivation = derive(LAWS[letter])
     w = sp.Matrix([[sp.Symbol("hx", real=True), sp.Symbol("hy", real=True), -1]])
@@ -193,11 +193,11 @@ def test_the_saturated_jacobian_is_the_jacobian_without_the_depth(letter: str):
         "nearest": w / sp.sqrt(w.dot(w)),
     }[derivation.law.contact.name]
     by_depth = derivation.force.diff(DEPTH) * gradient
-    rest = derivation.jacobian - derivation.jacobian_saturated - by_depth
-    assert rest.applyfunc(sp.simplify) == sp.zeros(3, 3)
+    remainder = derivation.jacobian - derivation.jacobian_saturated - by_depth
+    assert remainder.applyfunc(sp.simplify) == sp.zeros(3, 3)
 
 
-def test_a_position_in_the_formula_is_differentiated_too():
+def test_explicit_position_is_differentiated():
     law = Law("P", "position", "nominal", lambda c: c.k * c.depth * c.position[0] * c.e_z)
     k, depth, x = K, DEPTH, POSITION[0]
     expected = sp.Matrix([[0, 0, 0], [0, 0, 0], [k * depth, 0, -k * x]])

@@ -1,4 +1,4 @@
-"""Formulas that cannot be used are refused with a reason."""
+"""Unusable formulas of laws are rejected with a reason."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def law(force: Formula, **options: Any) -> Law:
         lambda c: c.e_z * np.sin(c.depth),
         lambda c: c.e_z * float(c.k),
         lambda c: c.k * c.undefined * c.e_z,
-        lambda c: None,  # noqa: ARG005 - a formula that forgot its return
+        lambda c: None,  # noqa: ARG005 - a formula without return value
         lambda c: c.depth,
         lambda c: c.parameter("gain") * c.e_z,
         lambda p: -500.0 * np.asarray(p)[2:3],  # a function of positions
@@ -56,18 +56,21 @@ def law(force: Formula, **options: Any) -> Law:
         "if",
     ],
 )
-def test_a_force_that_is_no_formula(force: Formula):
+def test_force_that_is_not_symbolic_is_an_error(force: Formula):
     with pytest.raises(LawError, match=r"law V: its force is not a symbolic formula \("):
         symbolic_force(law(force))
 
 
-def test_a_function_that_only_computes_is_refused_with_the_reason():
-    """Wherever its numbers are asked for: nothing can be derived from them."""
-    own = law(lambda c: np.sqrt(c.depth) * np.array([0.0, 0.0, 1.0]))
-    surface = Surface(Sinusoid(amplitude=1e-4, period=1e-3), own)
-    for ask in (lambda: surface.force([[0.0, 0.0, -1e-4]]), lambda: characteristic_number(surface)):
+def test_numpy_function_is_an_error_with_the_reason():
+    """The error is the same wherever its numbers are requested: nothing can be derived from it."""
+    definition = law(lambda c: np.sqrt(c.depth) * np.array([0.0, 0.0, 1.0]))
+    surface = Surface(Sinusoid(amplitude=1e-4, period=1e-3), definition)
+    for compute in (
+        lambda: surface.force([[0.0, 0.0, -1e-4]]),
+        lambda: characteristic_number(surface),
+    ):
         with pytest.raises(LawError) as caught:
-            ask()
+            compute()
         message = str(caught.value)
         assert message.startswith("law V: its force is not a symbolic formula (")
         assert "no callable sqrt method" in message
@@ -76,33 +79,36 @@ def test_a_function_that_only_computes_is_refused_with_the_reason():
 
 
 @pytest.mark.parametrize("count", [1, 2, 4])
-def test_a_force_with_the_wrong_number_of_components(count: int):
+def test_force_must_have_three_components(count: int):
     with pytest.raises(LawError, match="must have 3 components"):
         symbolic_force(law(lambda c: [c.depth] * count))
 
 
 @pytest.mark.parametrize(
-    ("force", "named"),
+    ("force", "symbols"),
     [
         (lambda c: sp.Symbol("stiffness") * c.depth * c.e_z, "stiffness"),
-        (lambda c: sp.Symbol("k") * c.depth * c.e_z, "k"),  # not the real, positive k
+        (
+            lambda c: sp.Symbol("k") * c.depth * c.e_z,
+            "k",
+        ),  # a different symbol from the real, positive k
         (lambda c: HXX * c.depth * c.e_z, "hxx"),
-        (lambda c: c.k * c.tangential(c.deflection), "dx, dy"),  # of a law without state
+        (lambda c: c.k * c.tangential(c.deflection), "dx, dy"),  # in a law without state
     ],
 )
-def test_a_force_with_symbols_that_the_contact_does_not_offer(force: Formula, named: str):
-    with pytest.raises(LawError, match=f"force uses {named}, which the contact does not offer"):
+def test_symbols_that_the_contact_does_not_offer_are_an_error(force: Formula, symbols: str):
+    with pytest.raises(LawError, match=f"force uses {symbols}, which the contact does not offer"):
         derive(law(force))
 
 
-def test_deflection_is_offered_to_a_law_with_state():
-    own = law(
+def test_law_with_state_may_use_the_deflection():
+    definition = law(
         lambda c: -c.k * c.tangential(c.deflection),
         contact="nominal",
         stateful=True,
         parameters={"max_deflection": 1e-3},
     )
-    force = symbolic_force(own)
+    force = symbolic_force(definition)
     assert {str(symbol) for symbol in force.free_symbols} == {"k", "dx", "dy"}
 
 
@@ -110,31 +116,31 @@ RESERVED = ["x", "depth", "h", "hx", "hyy", "dx", "sxy", "k", "h_mid", "h_half"]
 
 
 @pytest.mark.parametrize("name", RESERVED)
-def test_a_parameter_cannot_have_the_name_of_a_contact_symbol(name: str):
-    own = law(lambda c: c.k * c.depth * c.e_z, parameters={name: 1.0})
+def test_parameter_named_like_a_contact_symbol_is_an_error(name: str):
+    definition = law(lambda c: c.k * c.depth * c.e_z, parameters={name: 1.0})
     reason = f"called '{name}': formulas on the vertical contact have another symbol of that name"
     with pytest.raises(LawError, match=reason):
-        law_source(own)
+        law_source(definition)
 
 
 @pytest.mark.parametrize("name", ["two words", "1st", ""])
-def test_a_parameter_needs_the_name_of_a_variable(name: str):
-    own = law(lambda c: c.k * c.depth * c.e_z, parameters={name: 1.0})
+def test_parameter_name_must_be_an_identifier(name: str):
+    definition = law(lambda c: c.k * c.depth * c.e_z, parameters={name: 1.0})
     with pytest.raises(LawError, match="needs a name like a variable's"):
-        law_source(own)
+        law_source(definition)
 
 
-def test_symbols_of_a_contact_s_derivative_are_reserved_on_that_contact_only():
-    def own(contact: str) -> Law:
+def test_derivative_symbols_are_reserved_on_their_contact_only():
+    def law_with_q11(contact: str) -> Law:
         return law(lambda c: c.k * c.depth * c.e_z, contact=contact, parameters={"q11": 1.0})
 
-    assert "def law_force" in law_source(own("vertical"))
+    assert "def law_force" in law_source(law_with_q11("vertical"))
     with pytest.raises(LawError, match="formulas on the nearest contact have another symbol"):
-        law_source(own("nearest"))
+        law_source(law_with_q11("nearest"))
 
 
 def names_in_code(text: str) -> set[str]:
-    """All names of functions, arguments, variables and modules in a source text."""
+    """Return all names of functions, arguments, variables and modules in a source text."""
     nodes = list(ast.walk(ast.parse(text)))
     functions = [node for node in nodes if isinstance(node, ast.FunctionDef)]
     names = {node.id for node in nodes if isinstance(node, ast.Name)}
@@ -142,8 +148,8 @@ def names_in_code(text: str) -> set[str]:
     return names | arguments | {f.name for f in functions}
 
 
-def test_a_parameter_may_have_the_name_of_anything_in_compiled_code():
-    """All at once: every name in the fused modules of two laws, and Python's own words."""
+def test_parameters_may_have_any_name_of_the_compiled_code():
+    """All at once: the names in the fused modules of the laws, and Python's keywords."""
     wave = Sinusoid(amplitude=1e-4, period=1e-3)
     texts = []
     for letter in "BHF":
@@ -151,41 +157,41 @@ def test_a_parameter_may_have_the_name_of_anything_in_compiled_code():
         modules = (stateful_loops, path_loop, *shipped.contact.kernels())
         clamp = BACKED if shipped.clampable else NONE
         texts.append(source_on_texture(shipped, wave.sampler, clamp, modules))
-    found = set().union(*map(names_in_code, texts)) | {
+    code_names = set().union(*map(names_in_code, texts)) | {
         *keyword.kwlist,
         "weights",
         "below",
         "double",
     }
-    assert found >= {"gap", "count", "weights", "below", "law_force", "probe_force", "texture"}
-    taken = {str(symbol) for symbol in ARGUMENT_ORDER}
-    names = sorted(name for name in found - taken if name.isidentifier())
+    assert code_names >= {"gap", "count", "weights", "below", "law_force", "probe_force", "texture"}
+    contact_symbols = {str(symbol) for symbol in ARGUMENT_ORDER}
+    names = sorted(name for name in code_names - contact_symbols if name.isidentifier())
     assert len(names) > 150
 
     def force(c: ContactSymbols) -> Any:
         return sum(c.parameter(name) for name in names) * c.k * c.depth * c.normal
 
-    plain = Surface(wave, "B", clamp="backed")
-    own = law(force, parameters=dict.fromkeys(names, 1.0 / len(names)), clampable=True)
+    expected_surface = Surface(wave, "B", clamp="backed")
+    definition = law(force, parameters=dict.fromkeys(names, 1.0 / len(names)), clampable=True)
     points = np.array([[1e-4, 0.0, -1e-5], [3e-4, 2e-4, -5e-4]])
-    expected = plain.force_and_jacobian(points)
-    found_values = Surface(wave, own, clamp="backed").force_and_jacobian(points)
-    for value, right in zip(found_values, expected, strict=True):
-        np.testing.assert_allclose(value, right, rtol=1e-12, atol=1e-12)
+    expected = expected_surface.force_and_jacobian(points)
+    results = Surface(wave, definition, clamp="backed").force_and_jacobian(points)
+    for value, expected_value in zip(results, expected, strict=True):
+        np.testing.assert_allclose(value, expected_value, rtol=1e-12, atol=1e-12)
 
 
 @pytest.mark.parametrize("value", [sp.nan, sp.oo, sp.zoo, sp.I], ids=str)
-def test_a_force_that_is_no_real_number(value: Any):
+def test_force_that_is_not_real_is_an_error(value: Any):
     with pytest.raises(LawError):
         law_source(law(lambda c: value * c.depth * c.e_z))
 
 
-def test_a_force_that_cannot_be_printed_for_the_kernels():
+def test_force_without_kernel_code_is_an_error():
     with pytest.raises(LawError):
         law_source(law(lambda c: sp.besselj(0, c.depth) * c.e_z))
 
 
-def test_a_law_with_state_needs_to_know_how_far_its_anchor_may_lag():
-    own = law(lambda c: -c.k * c.tangential(c.deflection), contact="nominal", stateful=True)
+def test_law_with_state_needs_max_deflection():
+    definition = law(lambda c: -c.k * c.tangential(c.deflection), contact="nominal", stateful=True)
     with pytest.raises(LawError, match="max_deflection"):
-        law_source(own)
+        law_source(definition)

@@ -1,4 +1,4 @@
-"""The kernels as text: scalar Python that says the same as the symbols."""
+"""The kernels as source text: scalar Python that agrees with the symbolic law."""
 
 from __future__ import annotations
 
@@ -42,49 +42,52 @@ def call(law: Law, function: str) -> np.ndarray:
     return np.array(functions(law)[function](*values))
 
 
-def exact(law: Law, matrix: Any) -> np.ndarray:
+def evaluate_exactly(law: Law, matrix: Any) -> np.ndarray:
     matrix = expand_definitions(derive(law), matrix)
     numbers = {symbol: sp.Rational(VALUES[str(symbol)]) for symbol in matrix.free_symbols}
     return np.array(matrix.subs(numbers).evalf(30), dtype=float).ravel()
 
 
 @pytest.mark.parametrize("law", LAWS.values(), ids=str)
-def test_the_text_says_what_the_symbols_say(law: Law):
+def test_source_agrees_with_symbolic_force_and_jacobian(law: Law):
     derivation = derive(law)
-    force, jacobian = exact(law, derivation.force), exact(law, derivation.jacobian)
+    force, jacobian = (
+        evaluate_exactly(law, derivation.force),
+        evaluate_exactly(law, derivation.jacobian),
+    )
     np.testing.assert_allclose(call(law, "law_force"), force, rtol=1e-13, atol=1e-15)
-    both = call(law, "law_jacobian")
-    np.testing.assert_allclose(both[:3], force, rtol=1e-13, atol=1e-15)
-    assert np.abs(both[3:] - jacobian).max() <= 1e-13 * np.abs(jacobian).max()
+    force_and_jacobian = call(law, "law_jacobian")
+    np.testing.assert_allclose(force_and_jacobian[:3], force, rtol=1e-13, atol=1e-15)
+    assert np.abs(force_and_jacobian[3:] - jacobian).max() <= 1e-13 * np.abs(jacobian).max()
 
 
 @pytest.mark.parametrize("law", [law for law in LAWS.values() if law.clampable], ids=str)
-def test_the_saturated_jacobian_as_text(law: Law):
-    expected = exact(law, derive(law).jacobian_saturated)
+def test_source_agrees_with_symbolic_saturated_jacobian(law: Law):
+    expected = evaluate_exactly(law, derive(law).jacobian_saturated)
     error = np.abs(call(law, "law_jacobian_saturated") - expected).max()
     assert error <= 1e-13 * max(np.abs(expected).max(), 1.0)
 
 
 @pytest.mark.parametrize("law", LAWS.values(), ids=str)
-def test_only_a_clampable_law_has_a_saturated_jacobian(law: Law):
+def test_only_clampable_laws_have_a_saturated_jacobian(law: Law):
     assert ("law_jacobian_saturated" in functions(law)) == law.clampable
 
 
 @pytest.mark.parametrize("law", LAWS.values(), ids=str)
-def test_arguments_keep_their_order_and_are_all_used(law: Law):
+def test_arguments_are_ordered_and_all_used(law: Law):
     order = [
         *(str(symbol) for symbol in ARGUMENT_ORDER),
         *(f"param_{name}" for name in law.parameters),
     ]
     for function in ("law_force", "law_jacobian"):
-        taken = arguments(law, function)
-        assert taken == sorted(taken, key=order.index)
+        names_of_arguments = arguments(law, function)
+        assert names_of_arguments == sorted(names_of_arguments, key=order.index)
         body = law_source(law).split(f"def {function}(")[1].split("\ndef ")[0]
         names = [n.id for n in ast.walk(ast.parse("def f(" + body)) if isinstance(n, ast.Name)]
-        assert set(taken) <= set(names)
+        assert set(names_of_arguments) <= set(names)
 
 
-def test_the_force_asks_for_no_more_than_it_needs():
+def test_functions_take_only_the_arguments_they_use():
     assert arguments(LAWS["W"], "law_force") == ["depth", "k"]
     assert arguments(LAWS["B"], "law_force") == ["depth", "hx", "hy", "k"]
     assert arguments(LAWS["E"], "law_jacobian") == ["depth", "hx", "hy", "k"]
@@ -111,7 +114,7 @@ def test_powers_of_sums_keep_their_parentheses():
     assert call(law, "law_force")[2] == pytest.approx(expected, rel=1e-14)
 
 
-def test_the_length_of_the_normal_is_computed_once():
+def test_length_of_the_normal_is_computed_once():
     for letter in "BDG":
         for function in law_source(LAWS[letter]).split("\n\n\n"):
             assert function.count("math.sqrt") <= 1

@@ -1,4 +1,4 @@
-"""The catalogue: every number that is known, with its source, and nothing that is not."""
+"""The catalogue of devices: exactly the known numbers, each with its source."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from asperity.devices import (
 )  # fmt: skip
 from asperity.devices.five_bar import FiveBar, handle_damping
 
-# What was read (True) or is remembered (False), written down apart from the catalogue.
-KNOWN: dict[str, dict[str, list[tuple[float, bool]]]] = {
+# Read (True) or remembered (False) values, recorded independently of the catalogue.
+EXPECTED: dict[str, dict[str, list[tuple[float, bool]]]] = {
     "omega.3": {
         "max_force": [(12, True)],
         "max_stiffness": [(5000, True), (14500, False)],
@@ -107,9 +107,9 @@ KNOWN: dict[str, dict[str, list[tuple[float, bool]]]] = {
         "base_distance": [(0.025, False)],
     },
 }
-EVERY = [(name, field) for name, fields in KNOWN.items() for field in fields]
-# Further numbers that come with a source: a driver's constants, what follows from others.
-FURTHER = {"controller_damping", "workspace_radius", "damping", "base_distance"}
+EXPECTED_FIELDS = [(name, field) for name, fields in EXPECTED.items() for field in fields]
+# Further numbers with a source: constants of drivers, and derived values.
+OTHER_FIELDS = {"controller_damping", "workspace_radius", "damping", "base_distance"}
 
 
 def entries() -> list[tuple[Device, str, Datum]]:
@@ -122,66 +122,68 @@ def entries() -> list[tuple[Device, str, Datum]]:
     ]
 
 
-def test_the_catalogue_has_every_device() -> None:
-    assert set(device_names()) == set(KNOWN)
+def test_catalogue_contains_every_device() -> None:
+    assert set(device_names()) == set(EXPECTED)
 
 
-@pytest.mark.parametrize(("name", "field"), EVERY)
-def test_every_known_number_is_there(name: str, field: str) -> None:
+@pytest.mark.parametrize(("name", "field"), EXPECTED_FIELDS)
+def test_catalogue_contains_every_known_number(name: str, field: str) -> None:
     datum = load_device(name).data[field]
-    found = [(one.value, one.verified) for one in (datum, *datum.also)]
-    expected = KNOWN[name][field]
-    assert len(found) == len(expected)
-    for one, (value, verified) in zip(found, expected, strict=True):
-        assert one == (pytest.approx(value, rel=1e-12), verified)
+    values = [(entry.value, entry.verified) for entry in (datum, *datum.also)]
+    expected = EXPECTED[name][field]
+    assert len(values) == len(expected)
+    for entry, (value, verified) in zip(values, expected, strict=True):
+        assert entry == (pytest.approx(value, rel=1e-12), verified)
 
 
-@pytest.mark.parametrize("name", list(KNOWN))
-def test_nothing_is_there_that_is_not_known(name: str) -> None:
-    assert set(load_device(name).data) <= set(KNOWN[name]) | FURTHER
+@pytest.mark.parametrize("name", list(EXPECTED))
+def test_catalogue_contains_no_unknown_number(name: str) -> None:
+    assert set(load_device(name).data) <= set(EXPECTED[name]) | OTHER_FIELDS
 
 
 def test_every_number_has_a_unit_and_a_source() -> None:
-    every = entries()
-    assert len(every) > 80
-    for device, field, datum in every:
-        place = f"{device.id}.{field}"
-        assert datum.unit == FIELD_UNITS[field], place
-        assert len(datum.source) > 10, place
-        assert math.isfinite(datum.value), place
-        # What is remembered is never called verified, and what is not verified says why.
+    all_entries = entries()
+    assert len(all_entries) > 80
+    for device, field, datum in all_entries:
+        field_name = f"{device.id}.{field}"
+        assert datum.unit == FIELD_UNITS[field], field_name
+        assert len(datum.source) > 10, field_name
+        assert math.isfinite(datum.value), field_name
+        # Remembered numbers are never marked verified, and unverified ones state the reason.
         assert datum.verified != any(
             word in datum.source for word in ("remembered", "not verified", "derived likewise")
-        ), place
+        ), field_name
 
 
-def test_a_sourced_number_goes_before_a_remembered_one() -> None:
+def test_verified_number_precedes_remembered_ones() -> None:
     for device, field, datum in entries():
         if not datum.verified:
             continue
         assert device.data[field].verified, f"{device.id}.{field}"
 
 
-def test_resolutions_that_are_derived_follow_from_their_sources() -> None:
+def test_derived_resolutions_follow_from_their_sources() -> None:
     haply = load_device("2diy").data
     length = haply["proximal_link"].value
     counts = [haply["encoder_counts"], *haply["encoder_counts"].also]
     steps = [haply["position_resolution"], *haply["position_resolution"].also]
     for count, step in zip(counts, steps, strict=True):
         assert step.value == pytest.approx(2 * math.pi * length / count.value, rel=0.005)
-    # libnifalcon: 320 slots read in quadrature, capstan 14.25 mm on an arc of 110 mm, arm 60 mm.
-    falcon = 60e-3 * 2 * math.pi / (4 * 320) * 14.25 / 110
-    assert load_device("falcon").value("position_resolution") == pytest.approx(falcon, rel=0.005)
+    # libnifalcon: 320 slots in quadrature, capstan of 14.25 mm on an arc of 110 mm, arm of 60 mm.
+    falcon_step = 60e-3 * 2 * math.pi / (4 * 320) * 14.25 / 110
+    assert load_device("falcon").value("position_resolution") == pytest.approx(
+        falcon_step, rel=0.005
+    )
 
 
 def test_damping_of_the_pantograph_follows_from_its_joints() -> None:
-    """σ₀(B) with B = J⁻ᵀ b J⁻¹; a limit, so it is rounded down."""
+    """σ₀(B) with B = J⁻ᵀ b J⁻¹, rounded down because it is a limit."""
     device = load_device("pantograph")
     data = device.data
     linkage = FiveBar(*(data[f].value for f in ("proximal_link", "distal_link", "base_distance")))
     joint = data["joint_damping"].value
-    stated = [data["damping"], *data["damping"].also]
-    for datum, point in zip(stated, [(-12.5e-3, 0.1), (37.5e-3, 0.1)], strict=True):
+    dampings = [data["damping"], *data["damping"].also]
+    for datum, point in zip(dampings, [(-12.5e-3, 0.1), (37.5e-3, 0.1)], strict=True):
         x, y = (f"{1e3 * value:g}" for value in point)
         assert f"({x}, {y}) mm" in datum.source
         sigma = float(
@@ -197,48 +199,48 @@ def _eigenvalues(matrix: object) -> tuple[float, float]:
     return middle - half, middle + half
 
 
-def test_a_force_filter_of_the_driver_is_said() -> None:
+def test_force_filter_of_a_driver_is_noted() -> None:
     assert any("filters the force" in note for note in load_device("inverse3").notes)
 
 
-def test_frames_are_named() -> None:
+def test_axes_of_devices_are_described() -> None:
     assert load_device("omega.3").axes.startswith("x towards the user, y to the right, z up")
     assert load_device("touch").axes.startswith("x to the right, y up, z towards the user")
     assert load_device("inverse3").axes == "x to the right, y forward, z up"
 
 
-def test_case_does_not_matter() -> None:
+def test_device_names_are_case_insensitive() -> None:
     assert load_device("OMEGA.3").id == "omega.3"
 
 
-def test_a_device_is_taken_as_it_is() -> None:
+def test_load_device_accepts_a_device() -> None:
     device = load_device("touch")
     assert load_device(device) is device
 
 
 @pytest.mark.parametrize(
-    ("given", "nearest"),
+    ("name", "nearest"),
     [("omega3", r"'omega\.3'"), ("premium1.5", r"'premium-1\.5'"), ("toch", "'touch'")],
 )
-def test_unknown_device_offers_the_nearest(given: str, nearest: str) -> None:
+def test_unknown_device_suggests_similar_names(name: str, nearest: str) -> None:
     with pytest.raises(ParameterError, match=f"did you mean {nearest}"):
-        load_device(given)
+        load_device(name)
 
 
-@pytest.mark.parametrize("given", [None, 5, b"touch", ["touch"]])
-def test_what_is_no_name_is_refused(given: object) -> None:
+@pytest.mark.parametrize("argument", [None, 5, b"touch", ["touch"]])
+def test_invalid_type_of_device_is_an_error(argument: object) -> None:
     with pytest.raises(ParameterError, match="must be an id, a TOML file or a Device"):
-        load_device(given)  # the point
+        load_device(argument)  # wrong type on purpose
 
 
-def test_what_is_not_known_is_none_and_a_stiffness_that_is_needed_an_error() -> None:
+def test_unknown_value_is_none_and_required_stiffness_an_error() -> None:
     device = load_device("2diy")
     assert device.value("max_stiffness") is None
     with pytest.raises(ParameterError, match="2diy needs max_stiffness"):
         _ = device.max_stiffness
 
 
-def test_plain_data_says_everything() -> None:
+def test_device_to_dict_is_complete() -> None:
     content = load_device("omega.3").to_dict()
     stiffness = content["data"]["max_stiffness"]
     assert (stiffness["value"], stiffness["unit"], stiffness["verified"]) == (5000.0, "N/m", True)
@@ -254,11 +256,11 @@ def test_plain_data_says_everything() -> None:
         (4000.0, "Hz", "4 kHz"), (1.5e-6, "m", "1.5 µm"),
     ],
 )  # fmt: skip
-def test_values_for_reading(value: float, unit: str, text: str) -> None:
+def test_values_are_formatted_with_units(value: float, unit: str, text: str) -> None:
     assert Datum(value, unit, "", True).text == text
 
 
-def test_every_field_can_be_given() -> None:
+def test_every_field_can_be_parsed() -> None:
     content = {
         field: {"value": 1, "unit": unit, "source": "s"} for field, unit in FIELD_UNITS.items()
     }

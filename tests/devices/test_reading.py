@@ -1,4 +1,4 @@
-"""Devices of users: what a file may say, and what is refused, with the reason."""
+"""Device files of users: their valid contents, and errors that name the reason."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from asperity.core.errors import ParameterError
 from asperity.devices import load_device, parse_device
 
 
-def test_device_file(tmp_path: Path) -> None:
+def test_load_device_from_a_file(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     path.write_text(
         'name = "My arm"\naxes = "x right"\nnotes = ["old"]\nmax_stiffness = "1.2 N/mm"\n'
@@ -29,7 +29,7 @@ def test_device_file(tmp_path: Path) -> None:
     assert device.max_stiffness == pytest.approx(1200.0)
     rate = device.data["update_rate"]
     assert (rate.value, rate.source, rate.verified) == (2000.0, "measured", True)
-    assert [(one.value, one.source, one.verified) for one in rate.also] == [
+    assert [(datum.value, datum.source, datum.verified) for datum in rate.also] == [
         (1000.0, "by USB 2", False)
     ]
     stiffness = device.data["max_stiffness"]
@@ -41,7 +41,7 @@ def test_device_file(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("mark", [b"", b"\xef\xbb\xbf"])
-def test_a_mark_of_the_encoding_does_no_harm(tmp_path: Path, mark: bytes) -> None:
+def test_byte_order_mark_is_ignored(tmp_path: Path, mark: bytes) -> None:
     path = tmp_path / "mine.TOML"
     path.write_bytes(mark + b"max_force = '5 N'\r\n")
     assert load_device(str(path)).value("max_force") == 5.0
@@ -63,7 +63,7 @@ def test_a_mark_of_the_encoding_does_no_harm(tmp_path: Path, mark: bytes) -> Non
         ({"position_resolution": {"value": 55, "unit": "um"}}, "position_resolution", 5.5e-5),
     ],
 )  # fmt: skip
-def test_values_that_are_allowed(content: dict[str, object], field: str, value: float) -> None:
+def test_valid_values_are_parsed(content: dict[str, object], field: str, value: float) -> None:
     assert parse_device(content, "mine").value(field) == value
 
 
@@ -75,12 +75,12 @@ def test_values_that_are_allowed(content: dict[str, object], field: str, value: 
         ("position_resolution", "10 um", "m"),
     ],
 )
-def test_a_unit_given_twice_is_refused(field: str, value: str, unit: str) -> None:
+def test_unit_in_value_and_field_is_an_error(field: str, value: str, unit: str) -> None:
     with pytest.raises(ParameterError, match=f"device.{field} must be a number, got '{value}'"):
         parse_device({field: {"value": value, "unit": unit}}, "mine")
 
 
-WRONG = [
+INVALID_CONTENT = [
     ({"max_stifness": "3 N/m"}, "did you mean 'max_stiffness'"),
     ({"dampening": 3}, "did you mean 'damping'"),
     ({"max_stiffness": "3 N"}, "another dimension"),
@@ -144,8 +144,8 @@ WRONG = [
 ]
 
 
-@pytest.mark.parametrize(("content", "message"), WRONG, ids=lambda value: str(value)[:60])
-def test_bad_content_is_refused(content: dict[str, object], message: str) -> None:
+@pytest.mark.parametrize(("content", "message"), INVALID_CONTENT, ids=lambda value: str(value)[:60])
+def test_invalid_content_is_an_error(content: dict[str, object], message: str) -> None:
     with pytest.raises(ParameterError, match=message) as caught:
         parse_device(content, "mine")
     assert "device" in str(caught.value)
@@ -164,13 +164,13 @@ def test_bad_content_is_refused(content: dict[str, object], message: str) -> Non
         ("[max_stiffness]\nvalue = '2 N/mm'\nupdate_rate = 1", "update_rate needs a unit"),
     ],
 )
-def test_numbers_of_a_file_need_their_units(tmp_path: Path, text: str, message: str) -> None:
+def test_number_without_unit_is_an_error(tmp_path: Path, text: str, message: str) -> None:
     (tmp_path / "mine.toml").write_text(text)
     with pytest.raises(ParameterError, match=re.escape(message)):
         load_device(tmp_path / "mine.toml")
 
 
-def test_numbers_of_a_file_that_have_units_or_need_none(tmp_path: Path) -> None:
+def test_numbers_with_units_or_without_dimension_are_valid(tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text(
         "delay_samples = 2\nfriction = 0\n"
         "[max_stiffness]\nvalue = 2\nunit = 'N/mm'\nlightest = 0.8\ncycled = '2.5 N/mm'\n"
@@ -182,14 +182,14 @@ def test_numbers_of_a_file_that_have_units_or_need_none(tmp_path: Path) -> None:
     assert (device.max_stiffness, device.wall_test.cycled) == (2000.0, 2500.0)
 
 
-def test_the_same_without_the_mistake_is_taken() -> None:
-    """What is refused above is refused for its mistake alone."""
+def test_corrected_contents_are_valid() -> None:
+    """Control: the invalid contents above are rejected only for their error."""
     parse_device({"max_force": "3 N", "continuous_force": "3 N"}, "mine")
     parse_device({"max_stiffness": {"value": 3, "unit": "N/m", "verified": True}}, "mine")
     parse_device({"name": "μ-arm · 2", "notes": ["a", "b"]}, "mine")
 
 
-BAD_FILES = {
+INVALID_FILES = {
     "broken.toml": b"a = = b",
     "twice.toml": b"max_force = 1\nmax_force = 2",
     "latin.toml": "name = 'Gerät'".encode("latin-1"),
@@ -199,14 +199,14 @@ BAD_FILES = {
 }
 
 
-@pytest.mark.parametrize("name", list(BAD_FILES))
-def test_bad_files(tmp_path: Path, name: str) -> None:
-    (tmp_path / name).write_bytes(BAD_FILES[name])
+@pytest.mark.parametrize("name", list(INVALID_FILES))
+def test_invalid_toml_is_an_error(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_bytes(INVALID_FILES[name])
     with pytest.raises(ParameterError, match=f"{name} is (not valid TOML|nested too deeply)"):
         load_device(tmp_path / name)
 
 
-def test_files_that_are_none(tmp_path: Path) -> None:
+def test_unreadable_files_are_an_error(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match="cannot be read"):
         load_device(tmp_path / "none.toml")
     (tmp_path / "folder.toml").mkdir()

@@ -1,4 +1,4 @@
-"""What a device file may say of a wall that was tried, and what is refused."""
+"""Wall tests in a device file: their contents and errors."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ FULL = {
 }  # fmt: skip
 
 
-def test_everything_that_a_test_says_is_kept() -> None:
+def test_all_fields_of_a_wall_test_are_parsed() -> None:
     test = parse_device({"max_stiffness": FULL}, "mine").wall_test
     assert test == WallTest(
         1800.0, "N/m", "tried", True, (), True, ("x", "z"), 2000.0, 1000.0, "stepped", 0.7
@@ -25,15 +25,15 @@ def test_everything_that_a_test_says_is_kept() -> None:
     }  # fmt: skip
 
 
-def test_a_plain_number_is_a_test_of_which_nothing_else_is_known() -> None:
-    plain = parse_device({"max_stiffness": "1 kN/m"}, "mine").wall_test
-    assert plain == WallTest(1000.0, "N/m", "given by the user", False)
-    built = Device("x", "x", {"max_stiffness": Datum(1000.0, "N/m", "given by the user", False)})
-    assert built.wall_test == plain
+def test_plain_stiffness_is_a_wall_test_without_details() -> None:
+    wall_test = parse_device({"max_stiffness": "1 kN/m"}, "mine").wall_test
+    assert wall_test == WallTest(1000.0, "N/m", "given by the user", False)
+    device = Device("x", "x", {"max_stiffness": Datum(1000.0, "N/m", "given by the user", False)})
+    assert device.wall_test == wall_test
     assert parse_device({}, "mine").wall_test is None
 
 
-def test_only_the_paper_s_wall_was_measured() -> None:
+def test_only_the_papers_wall_was_measured() -> None:
     pedigrees = {
         name: load_device(name).data["max_stiffness"].pedigree
         for name in ("omega.3", "touch", "inverse3", "pantograph")
@@ -44,7 +44,7 @@ def test_only_the_paper_s_wall_was_measured() -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "words"),
+    ("change", "message"),
     [
         ({"cycled": "1.8 N/mm"}, r"cycled must be above the stiffness that held, 1800 N/m"),
         ({"cycled": "2 N"}, "another dimension"),
@@ -63,12 +63,12 @@ def test_only_the_paper_s_wall_was_measured() -> None:
         ({"also": [{"value": 3, "cycled": 4}]}, "unknown key 'cycled'"),
     ],
 )
-def test_what_makes_no_sense_is_refused(change: dict[str, object], words: str) -> None:
-    with pytest.raises(ParameterError, match=words) as caught:
+def test_invalid_wall_test_is_an_error(change: dict[str, object], message: str) -> None:
+    with pytest.raises(ParameterError, match=message) as caught:
         parse_device({"max_stiffness": {**FULL, **change}}, "mine")
     assert "device.max_stiffness" in str(caught.value)
 
 
-def test_other_fields_know_no_wall() -> None:
+def test_wall_fields_are_unknown_in_other_fields() -> None:
     with pytest.raises(ParameterError, match="unknown key 'cycled'"):
         parse_device({"update_rate": {"value": 1000, "cycled": 3}}, "mine")

@@ -1,4 +1,4 @@
-"""The symbolic force of every law against formulas and numbers written by hand."""
+"""The symbolic force of every law against independent formulas and numbers."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from asperity.contacts.symbols import ContactSymbols
 from asperity.derive.jacobian import symbolic_force
 from asperity.laws import LAWS
 
-# Nothing here is round or symmetric, so that no exchanged term goes unnoticed.
+# Generic values without symmetry, so that exchanged terms are detected.
 VALUES = {
     "k": 700.0, "depth": 0.4e-3, "h": 0.25e-3, "hx": 0.6, "hy": -1.1, "dx": 0.3e-3, "dy": -0.5e-3,
     "h_mid": 0.1e-3, "h_half": 0.5e-3, "friction": 0.7, "max_deflection": 0.8e-3,
@@ -40,27 +40,27 @@ def evaluate(expression: Any, values: dict[str, float]) -> np.ndarray:
 
 
 @pytest.mark.parametrize("letter", BY_HAND)
-def test_the_force_has_the_numbers_of_the_formula(letter: str):
+def test_force_has_the_expected_values(letter: str):
     force = evaluate(symbolic_force(LAWS[letter]), VALUES)
     np.testing.assert_allclose(force, BY_HAND[letter], rtol=1e-14, atol=1e-16)
 
 
 @pytest.mark.parametrize("letter", BY_HAND)
-def test_the_force_is_the_formula_at_random_contacts(
+def test_force_agrees_with_independent_formula_at_random_contacts(
     letter: str, force_by_hand: Callable[..., np.ndarray]
 ):
     rng = np.random.default_rng(5)
     symbolic = symbolic_force(LAWS[letter])
     for _ in range(5):
         values = {name: value * rng.uniform(0.3, 1.5) for name, value in VALUES.items()}
-        relative = (values["h"] - values["h_mid"]) / values["h_half"]
+        relative_height = (values["h"] - values["h_mid"]) / values["h_half"]
         expected = force_by_hand(
             letter,
             k=values["k"],
             depth=values["depth"],
             g=(values["hx"], values["hy"]),
             d=(values["dx"], values["dy"]),
-            m=(1 + values["modulation_depth"] * relative) / 2,
+            m=(1 + values["modulation_depth"] * relative_height) / 2,
             friction=values["friction"],
             max_deflection=values["max_deflection"],
         )
@@ -68,17 +68,17 @@ def test_the_force_is_the_formula_at_random_contacts(
         assert error <= 1e-14 * np.abs(expected).max()
 
 
-def test_change_of_height_is_minus_the_gradient_of_its_energy():
+def test_force_of_law_c_is_minus_the_gradient_of_its_energy():
     x, y, z, k = sp.symbols("x y z k", real=True)
     h = sp.Function("h")(x, y)
     energy = k * (h - z) ** 2 / 2
     gradient = sp.Matrix([energy]).jacobian([x, y, z]).T
     force = symbolic_force(LAWS["C"])
     names = {str(symbol): symbol for symbol in force.free_symbols}
-    here = force.subs(
+    values = force.subs(
         {names["hx"]: h.diff(x), names["hy"]: h.diff(y), names["depth"]: h - z, names["k"]: k}
     )
-    assert (here + gradient).applyfunc(sp.simplify) == sp.zeros(3, 1)
+    assert (values + gradient).applyfunc(sp.simplify) == sp.zeros(3, 1)
 
 
 def test_friction_opposes_the_deflection_and_is_weakest_on_the_crest():
@@ -90,14 +90,14 @@ def test_friction_opposes_the_deflection_and_is_weakest_on_the_crest():
     assert crest[0] / valley[0] == pytest.approx(0.05 / 0.95)
 
 
-def test_the_unit_normal_is_one_long():
+def test_normal_has_unit_length():
     c = ContactSymbols()
     assert sp.simplify(c.normal.dot(c.normal)) == 1
     assert sp.simplify(c.w.dot(sp.Matrix([1, 0, c.slope[0]]))) == 0
     assert sp.simplify(c.w.dot(sp.Matrix([0, 1, c.slope[1]]))) == 0
 
 
-def test_a_parameter_must_be_declared():
+def test_undeclared_parameter_is_an_error():
     with pytest.raises(KeyError, match="does not declare"):
         ContactSymbols(("gain",)).parameter("gian")
     assert str(ContactSymbols(("gain",)).parameter("gain")) == "gain"

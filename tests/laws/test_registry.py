@@ -1,4 +1,4 @@
-"""Finding laws by letter and by name."""
+"""Lookup of laws by letter and name."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ CONTACTS = {
 }
 
 
-def test_the_wall_comes_first_and_the_letters_follow():
+def test_laws_are_ordered_with_the_wall_first():
     assert "".join(LAWS)[:8] == "WABCDEFG"
 
 
 @pytest.mark.parametrize(("letter", "name"), NAMES.items())
-def test_every_spelling_finds_the_law(letter: str, name: str):
+def test_find_law_accepts_letters_and_names(letter: str, name: str):
     spellings = [letter, letter.lower(), f" {letter} ", name, name.upper(), name.replace("-", "_")]
     spellings.append(name.replace("-", " "))
     assert {find_law(spelling) for spelling in spellings} == {LAWS[letter]}
@@ -37,38 +37,38 @@ def test_every_spelling_finds_the_law(letter: str, name: str):
 
 
 @pytest.mark.parametrize(("letter", "contact"), CONTACTS.items())
-def test_every_law_names_its_contact(letter: str, contact: str):
+def test_contact_of_each_law(letter: str, contact: str):
     assert LAWS[letter].contact.name == contact
 
 
-def test_only_the_laws_on_an_unbounded_depth_are_clampable():
+def test_only_laws_of_unbounded_depth_are_clampable():
     assert {letter for letter, law in LAWS.items() if law.clampable} == set("ABCFG")
 
 
-def test_only_friction_modulation_carries_state():
+def test_only_friction_modulation_has_state():
     assert {letter for letter, law in LAWS.items() if law.stateful} == {"F"}
 
 
-def test_a_law_is_returned_as_it_is():
-    own = Law("V", "own", "nominal", lambda c: c.k * c.depth * c.e_z)
-    assert find_law(own) is own
+def test_find_law_accepts_a_law():
+    law = Law("V", "own", "nominal", lambda c: c.k * c.depth * c.e_z)
+    assert find_law(law) is law
 
 
 @pytest.mark.parametrize(
-    ("wrong", "nearest"),
+    ("name", "nearest"),
     [("god-objet", "god-object"), ("force-shadng", "force-shading"), ("smoothwall", "smooth-wall")],
 )
-def test_an_unknown_law_offers_the_nearest(wrong: str, nearest: str):
+def test_unknown_law_suggests_similar_names(name: str, nearest: str):
     with pytest.raises(ParameterError, match=f"did you mean .*'{nearest}'") as caught:
-        find_law(wrong)
+        find_law(name)
     assert caught.value.argument == "law"
-    assert repr(wrong) in str(caught.value)
+    assert repr(name) in str(caught.value)
 
 
-@pytest.mark.parametrize("wrong", [3, None, b"A", ["A"]])
-def test_what_is_no_text_is_no_law(wrong: object):
+@pytest.mark.parametrize("argument", [3, None, b"A", ["A"]])
+def test_invalid_type_of_law_is_an_error(argument: object):
     with pytest.raises(ParameterError, match="letter, a name or a Law"):
-        find_law(wrong)
+        find_law(argument)
 
 
 @pytest.mark.parametrize(
@@ -83,9 +83,9 @@ def test_what_is_no_text_is_no_law(wrong: object):
         (("E",), "E"),
     ],
 )
-def test_several_laws_in_the_order_asked_for(laws: object, letters: str):
-    found = find_laws(laws)
-    assert "".join(law.letter for law in found) == letters
+def test_several_laws_keep_the_requested_order(laws: object, letters: str):
+    result = find_laws(laws)
+    assert "".join(law.letter for law in result) == letters
 
 
 @pytest.mark.parametrize(
@@ -100,7 +100,7 @@ def test_several_laws_in_the_order_asked_for(laws: object, letters: str):
         (["A", "nothing"], "law", "'nothing'"),
     ],
 )
-def test_several_laws_that_cannot_be(laws: object, argument: str, message: str):
+def test_invalid_lists_of_laws_are_an_error(laws: object, argument: str, message: str):
     with pytest.raises(ParameterError, match=message) as caught:
         find_laws(laws)
     assert caught.value.argument == argument
