@@ -194,7 +194,7 @@ class Unit(Cells):
         return np.random.default_rng(0).random((count, self.dimensions))
 
     def enclosures(self, *_arguments: Any) -> Any:
-        raise NotImplementedError  # no part of what is searched here
+        raise NotImplementedError  # not used by this search
 
     derivatives = to_plane = enclosures
 

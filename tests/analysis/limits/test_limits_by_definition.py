@@ -11,8 +11,7 @@ import pytest
 
 from asperity.analysis import check_limits
 from asperity.analysis.bounds.bound import Bound
-from asperity.analysis.limits import perceptibility as felt
-from asperity.analysis.limits import spectrum
+from asperity.analysis.limits import perceptibility, spectrum
 from asperity.analysis.limits.limit_rules import LIMIT_RULES, LimitCase, evaluate_limit
 from asperity.analysis.limits.perceptibility import (
     MaskingSource,
@@ -182,8 +181,8 @@ def test_tier_thresholds_are_inclusive() -> None:
     # Of equal masking sources the first is reported: the hand, then friction.
     even = {"force_resolution": 2.0, "friction": 8.0}
     assert assess_share(1.0, even).masked_by is MaskingSource.FRICTION
-    assert assess_share(1.0, {}).missing_data == felt._MASKING_FIELDS
-    assert assess_share(1.0, dict.fromkeys(felt._MASKING_FIELDS, 1e-9)).missing_data == ()
+    assert assess_share(1.0, {}).missing_data == perceptibility._MASKING_FIELDS
+    assert assess_share(1.0, dict.fromkeys(perceptibility._MASKING_FIELDS, 1e-9)).missing_data == ()
 
 
 def test_mostly_form_requires_more_than_half_of_the_force() -> None:
@@ -213,15 +212,18 @@ def test_remedies_of_a_masked_texture() -> None:
 def test_required_magnification_just_reaches_the_threshold() -> None:
     for share in (0.9, 0.5, 0.01, 1e-6, 1.0 / 5e8):
         texture = 16.0 * share / math.sqrt(2.0)
-        times = felt._required_magnification(make_case({"friction": 8.0}), texture, 16.0)
+        times = perceptibility._required_magnification(make_case({"friction": 8.0}), texture, 16.0)
         assert times is not None
         assert math.sqrt(2.0) * times * texture >= 16.0
         assert times == pytest.approx(1.0 / share, rel=2e-13)
     for texture in (16.0 / 2e9 / math.sqrt(2.0), 0.0):
-        assert felt._required_magnification(make_case({"friction": 8.0}), texture, 16.0) is None
+        assert (
+            perceptibility._required_magnification(make_case({"friction": 8.0}), texture, 16.0)
+            is None
+        )
     # A bandwidth of 0.25 Hz: magnified four times, all waves are long enough.
     slow = make_case({"bandwidth": 0.25, "friction": 8.0}, wavelengths=np.array([1.0, 1.0, 1.0]))
-    times = felt._required_magnification(slow, 1e3, 16.0)
+    times = perceptibility._required_magnification(slow, 1e3, 16.0)
     assert times == pytest.approx(4.0, rel=1e-12)
 
 
@@ -229,7 +231,7 @@ def test_weighted_quantile_is_the_value_that_completes_the_share() -> None:
     values, squares = np.array([1.0, 4.0, 2.0]), np.array([1.0, 2.0, 1.0])
     for share, expected in ((0.0, 4.0), (0.5, 4.0), (0.5000001, 2.0), (0.75, 2.0), (0.76, 1.0),
                             (1.0, 1.0), (1.0 + 1e-12, 1.0)):  # fmt: skip
-        assert felt._weighted_quantile(values, squares, share) == expected
+        assert perceptibility._weighted_quantile(values, squares, share) == expected
 
 
 def test_resolution_remedy_is_a_slower_scan_only_if_speed_matters() -> None:
@@ -237,13 +239,15 @@ def test_resolution_remedy_is_a_slower_scan_only_if_speed_matters() -> None:
     steps = make_case(
         {"position_resolution": 0.6}, speed=1.0, position_samples=4.0, time_samples=5.0
     )
-    remedy = felt._resolution_remedy(
+    remedy = perceptibility._resolution_remedy(
         steps, 0.9
     )  # 2.4 m and 3 m are required: only the 4 m wave is resolved
     assert (remedy.kind, remedy.value) == ("position_resolution", 2.0 / 5.0)
-    slower = felt._resolution_remedy(make_case({"bandwidth": 0.125}), 0.9)
+    slower = perceptibility._resolution_remedy(make_case({"bandwidth": 0.125}), 0.9)
     assert (slower.kind, slower.value) == ("slower", 0.25)
-    slowest = felt._resolution_remedy(make_case({"bandwidth": 0.125, "update_rate": 0.5}), 1.0)
+    slowest = perceptibility._resolution_remedy(
+        make_case({"bandwidth": 0.125, "update_rate": 0.5}), 1.0
+    )
     assert (slowest.kind, slowest.value) == ("slower", pytest.approx(0.1))
     # The force is just sufficient if all of it is resolved.
     enough = assess_share(1.0, {"friction": 8.0, "bandwidth": 0.125})

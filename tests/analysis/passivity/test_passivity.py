@@ -53,7 +53,7 @@ def rectangle(surface: Surface) -> Leak:
     return Leak(abs(energy), math.inf, along, "sampled", "a rectangle", vertices, None)
 
 
-def exactly(value: float) -> Bound:
+def exact_bound(value: float) -> Bound:
     return Bound(value, value, "theorem", (0.0, 0.0, 0.0))
 
 
@@ -78,9 +78,9 @@ def test_limit_of_each_criterion_equals_its_formula(name: str, expected: float) 
         rig["virtual_damping"] = "0.5 N*s/m"
     if name == "wall test":
         del rig["damping"]  # otherwise both damping and delay are known
-    criterion = assess(Surface(WAVE, "C", 500.0), rig, q=exactly(3.0), plus=exactly(2.0)).criterion(
-        name
-    )
+    criterion = assess(
+        Surface(WAVE, "C", 500.0), rig, q=exact_bound(3.0), plus=exact_bound(2.0)
+    ).criterion(name)
     assert criterion.limit == pytest.approx(expected, rel=1e-15)
     assert criterion.margin == pytest.approx(expected / 500.0, rel=1e-15)
     assert criterion.holds is (expected >= 500.0)
@@ -113,16 +113,17 @@ def test_limits_are_rounded_down_to_the_nearest_float(
 ) -> None:
     rig = {"damping": sigma, "update_rate": rate, "delay_samples": delay}
     surface = Surface(WAVE, "W", 1.0)
-    result = assess(surface, rig, q=exactly(q), plus=exactly(1.0))
+    result = assess(surface, rig, q=exact_bound(q), plus=exact_bound(1.0))
     exact = Fraction(sigma) * Fraction(rate) / (Fraction(1, 2) + delay * Fraction(q))
     limit = result.criterion("delay").limit
     assert limit is not None
     assert Fraction(limit) <= exact < Fraction(math.nextafter(limit, math.inf))
     assert (
-        assess(Surface(WAVE, "W", limit), rig, q=exactly(q), plus=exactly(1.0)).verdict == "passive"
+        assess(Surface(WAVE, "W", limit), rig, q=exact_bound(q), plus=exact_bound(1.0)).verdict
+        == "passive"
     )
     above = Surface(WAVE, "W", math.nextafter(limit, math.inf))
-    assert assess(above, rig, q=exactly(q), plus=exactly(1.0)).verdict != "passive"
+    assert assess(above, rig, q=exact_bound(q), plus=exact_bound(1.0)).verdict != "passive"
 
 
 def test_round_up_gives_the_smallest_float_not_below() -> None:
@@ -202,7 +203,7 @@ def test_virtual_damping_does_not_replace_a_known_delay() -> None:
 
 def test_slack_direction_refutes_passivity_with_delay() -> None:
     """At d = 1, q⁺ = 1, q = 4: proved up to 8000/4.5 N/m, refuted by k q/2 > σ₀/T + b_v/T."""
-    numbers = {"q": exactly(4.0), "plus": exactly(1.0)}
+    numbers = {"q": exact_bound(4.0), "plus": exact_bound(1.0)}
     cases = [(1777.0, 0.0, "passive"), (1778.0, 0.0, "undecided"), (3999.0, 0.0, "undecided"),
              (4001.0, 0.0, "not passive"), (4001.0, 0.5, "undecided"), (4999.0, 0.5, "undecided"),
              (5001.0, 0.5, "not passive")]  # fmt: skip
@@ -220,9 +221,9 @@ def test_slack_direction_requires_q_above_q_plus() -> None:
     """If q equals the upper bound of q⁺, a stiff direction may attain it; nothing is refuted."""
     device = {**RIG, "delay_samples": 1}
     loose = Bound(0.5, 4.0, "certified")
-    equal = assess(Surface(WAVE, "C", 4500.0), device, q=exactly(4.0), plus=loose)
+    equal = assess(Surface(WAVE, "C", 4500.0), device, q=exact_bound(4.0), plus=loose)
     assert equal.verdict == "undecided"
-    above = assess(Surface(WAVE, "C", 4500.0), device, q=exactly(4.01), plus=loose)
+    above = assess(Surface(WAVE, "C", 4500.0), device, q=exact_bound(4.01), plus=loose)
     assert above.verdict == "not passive"
 
 
@@ -231,7 +232,7 @@ def test_largest_proved_delay_includes_virtual_damping() -> None:
     assert assess(Surface(WAVE, "H"), {**RIG, "virtual_damping": 0.5}).greatest_delay == 5
     assert assess(Surface(WAVE, "H", 16001.0), RIG).greatest_delay is None
     # k (q⁺/2 + d q) <= σ₀/T with q = 2, q⁺ = 1.5: d <= (8 - 0.75)/2.
-    result = assess(Surface(WAVE, "C", 1000.0), RIG, q=exactly(2.0), plus=exactly(1.5))
+    result = assess(Surface(WAVE, "C", 1000.0), RIG, q=exact_bound(2.0), plus=exact_bound(1.5))
     assert result.greatest_delay == 3
 
 
@@ -240,7 +241,7 @@ def test_unverified_data_are_marked_in_the_assumptions() -> None:
     unverified = Datum(2.0, "N*s/m", "a guess", verified=False)
     device = Device("x", "x", {"update_rate": verified, "damping": unverified})
     surface = Surface(WAVE, "W")
-    result = passivity(surface, device, exactly(1.0), exactly(1.0), worst_loop(surface))
+    result = passivity(surface, device, exact_bound(1.0), exact_bound(1.0), worst_loop(surface))
     line = result.criterion("one-sided").assumptions
     assert "damping 2 N·s/m (not verified)" in line
     assert "update_rate 4 kHz (not" not in line
@@ -257,17 +258,17 @@ def test_invalid_data_of_a_device_object_raise(field: str, value: float) -> None
     device = Device("x", "x", {field: Datum(value, "1", "", verified=True)})
     surface = Surface(WAVE, "W")
     with pytest.raises(ParameterError, match=field):
-        passivity(surface, device, exactly(1.0), exactly(1.0), worst_loop(surface))
+        passivity(surface, device, exact_bound(1.0), exact_bound(1.0), worst_loop(surface))
 
 
 def test_arguments_of_wrong_type_raise() -> None:
     surface = Surface(WAVE, "W")
     leak = worst_loop(surface)
     for arguments, name in (
-        ((WAVE, "omega.3", exactly(1.0), exactly(1.0), leak), "surface"),
-        ((surface, "omega.3", 1.0, exactly(1.0), leak), "q"),
-        ((surface, "omega.3", exactly(1.0), 1.0, leak), "one_sided"),
-        ((surface, "omega.3", exactly(1.0), exactly(1.0), 0.0), "leak"),
+        ((WAVE, "omega.3", exact_bound(1.0), exact_bound(1.0), leak), "surface"),
+        ((surface, "omega.3", 1.0, exact_bound(1.0), leak), "q"),
+        ((surface, "omega.3", exact_bound(1.0), 1.0, leak), "one_sided"),
+        ((surface, "omega.3", exact_bound(1.0), exact_bound(1.0), 0.0), "leak"),
     ):
         with pytest.raises(ParameterError, match=f"^{name} must be"):
             passivity(*arguments)
@@ -304,7 +305,7 @@ def test_leak_below_rounding_is_undecided(energy: float, verdict: str) -> None:
     line = WAVE.scan_line()
     assert line.length == pytest.approx(2e-3)
     leak = replace(rectangle(surface), energy=energy)
-    result = passivity(surface, parse_device(RIG, "mine"), exactly(1.0), exactly(1.0), leak)
+    result = passivity(surface, parse_device(RIG, "mine"), exact_bound(1.0), exact_bound(1.0), leak)
     assert result.verdict == verdict
 
 
@@ -321,7 +322,7 @@ def test_zero_damping_gives_an_infinite_critical_speed() -> None:
     zero = Device("x", "x", {"damping": Datum(0.0, "N*s/m", "", verified=True)})
     surface = Surface(WAVE, "A")
     leak = worst_loop(surface)
-    speed = passivity(surface, zero, exactly(1.0), exactly(1.0), leak).critical_speed
+    speed = passivity(surface, zero, exact_bound(1.0), exact_bound(1.0), leak).critical_speed
     assert speed == math.inf
 
 
@@ -360,7 +361,7 @@ def test_conservative_law_with_a_jump_is_undecided() -> None:
 def test_wall_test_makes_limits_plausible_but_not_proved() -> None:
     """The limit K₀/q covers any delay; for a known delay it lies between K₀/q⁺ and K₀/q."""
     wall = {"max_stiffness": "5000 N/m"}
-    numbers = {"q": exactly(4.0), "plus": exactly(2.0)}
+    numbers = {"q": exact_bound(4.0), "plus": exact_bound(2.0)}
     cases = [(1250.0, wall, "plausible"), (1251.0, wall, "undecided"),
              (2500.0, {**wall, "delay_samples": 0}, "plausible"),
              (2501.0, {**wall, "delay_samples": 0}, "undecided"),
@@ -420,7 +421,7 @@ def test_unknown_criterion_raises_a_key_error() -> None:
 def test_quantization_step_of_three_axes_is_rounded_up() -> None:
     """The length of √3 steps is rounded up by at most 1e-16."""
     device = parse_device({**RIG, "position_resolution": "3 um", "force_resolution": "0.1 N"}, "x")
-    loop = make_device_loop(Surface(WAVE, "C"), device, exactly(1.0), exactly(1.0), None)
+    loop = make_device_loop(Surface(WAVE, "C"), device, exact_bound(1.0), exact_bound(1.0), None)
     for field, length in (
         ("position_resolution", loop.position_step),
         ("force_resolution", loop.force_step),

@@ -26,7 +26,7 @@ WAVE = Sinusoid(0.1e-3, 2e-3)
 LEAKS = {letter: worst_loop(Surface(WAVE, letter, 1.0)) for letter in "WCDHA"}
 
 
-def exactly(value: float) -> Bound:
+def exact_bound(value: float) -> Bound:
     return Bound(value, value, "theorem", (0.0, 0.0, 0.0))
 
 
@@ -35,7 +35,7 @@ def assess(
 ) -> Passivity:
     surface = Surface(WAVE, law, stiffness)
     device = parse_device(fields, "mine")
-    return passivity(surface, device, exactly(q), exactly(plus), LEAKS[law])
+    return passivity(surface, device, exact_bound(q), exact_bound(plus), LEAKS[law])
 
 
 # --- pairs of damping and delay admitted by a wall test -------------------------------------------
