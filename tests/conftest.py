@@ -1,4 +1,4 @@
-"""Shared fixtures: generic textures, laws by hand, interpreted kernels, finite differences."""
+"""Shared fixtures: generic textures, explicit formulas, interpreted kernels, differences."""
 
 from __future__ import annotations
 
@@ -51,29 +51,29 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.fixture(autouse=True)
 def uncached_results(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Results are computed without the cache, since a test may change the code.
+    """Compute results without the cache, since a test may change the code.
 
-    Tests of the cache have the marker ``@pytest.mark.keeps_answers``.
+    Tests of the cache have the marker ``@pytest.mark.caches_results``.
     """
-    if request.node.get_closest_marker("keeps_answers") is None:
+    if request.node.get_closest_marker("caches_results") is None:
         monkeypatch.setattr(cache, "_result_key", lambda _name, _content: None)
 
 
 @pytest.fixture(autouse=True)
 def one_process(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Commands start no workers: the tests themselves run in parallel."""
+    """Start no worker processes in commands, since the tests run in parallel."""
     monkeypatch.setattr("asperity.cli.options.available_cores", lambda: 1)
 
 
 @pytest.fixture(params=list(TEXTURES))
 def texture(request: pytest.FixtureRequest) -> Texture:
-    """One texture of each kind; a test names fewer with ``indirect``."""
+    """Return a texture of each kind in turn; ``indirect`` parameters select some of them."""
     return TEXTURES[request.param]()
 
 
 @pytest.fixture(scope="session")
 def make_texture() -> Callable[[str], Texture]:
-    """A texture by its name in ``TEXTURES``."""
+    """Return a function that creates a texture by its name in ``TEXTURES``."""
     return lambda name: TEXTURES[name]()
 
 
@@ -110,7 +110,7 @@ def inside() -> Callable[..., np.ndarray]:
     return probes
 
 
-# --- the laws by hand (MATH, sections 2 and 3) ----------------------------------------------------
+# --- explicit formulas of the laws (MATH, sections 2 and 3) ---------------------------------------
 
 
 def _force_by_hand(
@@ -195,28 +195,28 @@ def _god_object_by_curvatures(
 
 @pytest.fixture(scope="session")
 def force_by_hand() -> Callable[..., np.ndarray]:
-    """The force of a law, written by hand."""
+    """Return the explicit formula of the force: ``force_by_hand(letter, k=..., ...)``."""
     return _force_by_hand
 
 
 @pytest.fixture(scope="session")
 def jacobian_by_hand() -> Callable[..., np.ndarray]:
-    """The Jacobian of a law, written by hand."""
+    """Return the explicit formula of the Jacobian: ``jacobian_by_hand(letter, k=..., ...)``."""
     return _jacobian_by_hand
 
 
-# --- kernels without compilation ------------------------------------------------------------------
+# --- interpreted kernels --------------------------------------------------------------------------
 
 
 def _run_source(source: str) -> SimpleNamespace:
-    """Run a fused module as plain Python: the same text, nothing compiled."""
-    head, without = "from __future__", ("@", "from numba", "from asperity_fused_")
+    """Execute the source of a fused module as Python, without compilation."""
+    head, compiled_only = "from __future__", ("@", "from numba", "from asperity_fused_")
     text = source
-    for home in INTRINSIC_MODULES.values():
+    for module in INTRINSIC_MODULES.values():
         text = text.replace(
-            f"from {home} ", "from asperity.core.compiled "
+            f"from {module} ", "from asperity.core.compiled "
         )  # Python's own versions
-    lines = [line for line in text.splitlines() if not line.startswith((head, *without))]
+    lines = [line for line in text.splitlines() if not line.startswith((head, *compiled_only))]
     lines.insert(0, f"{head} import annotations")
     lines = [line for line in lines if "njit(" not in line and "code_store" not in line]
     names: dict[str, Any] = {}
@@ -226,22 +226,22 @@ def _run_source(source: str) -> SimpleNamespace:
 
 @pytest.fixture
 def interpreted(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[], Any]], Any]:
-    """``interpreted(make)``: the result of a function that fuses kernels, run as plain Python."""
+    """``interpreted(make)``: result of a function that fuses kernels, run as interpreted Python."""
 
     def run(make: Callable[[], Any]) -> Any:
-        forget_fused()
+        clear_fused_kernels()
         try:
             with monkeypatch.context() as patch:
                 patch.setattr(fuse, "load_fused", _run_source)
                 return make()
         finally:
-            forget_fused()
+            clear_fused_kernels()
 
     return run
 
 
-def forget_fused() -> None:
-    """Forget what was fused, so that it is loaded again; loaded modules themselves are kept."""
+def clear_fused_kernels() -> None:
+    """Clear the caches of fused kernels; loaded modules are not unloaded."""
     for name, member in vars(fuse).items():
         if name.startswith("fuse_") and hasattr(member, "cache_clear"):
             member.cache_clear()
@@ -249,13 +249,15 @@ def forget_fused() -> None:
 
 @pytest.fixture
 def plain(interpreted: Callable[[Callable[[], Any]], Any]) -> Callable[[Any], Any]:
-    """``plain(surface)`` or ``plain(texture)``: its kernels run as Python from now on."""
+    """``plain(surface)`` or ``plain(texture)``: the same object with interpreted kernels."""
 
-    def interpret(thing: Any) -> Any:
-        assert interpreted(lambda: thing._loops) is not None  # cached from now on
-        if isinstance(thing, Surface) and "_loops" not in vars(thing.texture):
-            interpret(thing.texture)
-        return thing
+    def interpret(surface_or_texture: Any) -> Any:
+        assert interpreted(lambda: surface_or_texture._loops) is not None  # cached from now on
+        if isinstance(surface_or_texture, Surface) and "_loops" not in vars(
+            surface_or_texture.texture
+        ):
+            interpret(surface_or_texture.texture)
+        return surface_or_texture
 
     return interpret
 
@@ -264,13 +266,13 @@ def plain(interpreted: Callable[[Callable[[], Any]], Any]) -> Callable[[Any], An
 
 
 def _differences(f: Callable[[np.ndarray], np.ndarray], points: np.ndarray, step: float) -> Any:
-    """Return ∂f/∂p by central differences of fourth order, the last axis of the result."""
+    """Return ∂f/∂p by central differences of fourth order, along the last axis of the result."""
     columns = []
     for axis in range(points.shape[1]):
-        move = np.zeros(points.shape[1])
-        move[axis] = step
-        near = f(points + move) - f(points - move)
-        far = f(points + 2 * move) - f(points - 2 * move)
+        offset = np.zeros(points.shape[1])
+        offset[axis] = step
+        near = f(points + offset) - f(points - offset)
+        far = f(points + 2 * offset) - f(points - 2 * offset)
         columns.append((8.0 * near - far) / (12.0 * step))
     return np.stack(columns, axis=-1)
 
@@ -281,30 +283,30 @@ def differences() -> Callable[..., np.ndarray]:
     return _differences
 
 
-# --- what every texture promises ------------------------------------------------------------------
+# --- properties of every texture ------------------------------------------------------------------
 
 
 def _check_derivatives(texture: Texture, xy: np.ndarray, step: float) -> None:
     gradient, hessian = texture.gradient(xy), texture.hessian(xy)
     numeric = _differences(texture.height, xy, step)
-    slope, bend = texture.bounds
+    slope, curvature = texture.bounds
     assert np.abs(gradient - numeric).max() <= 1e-8 * slope
-    assert np.abs(hessian - _differences(texture.gradient, xy, step)).max() <= 1e-8 * bend
-    every = texture.derivatives(xy)
-    np.testing.assert_array_equal(every[:, 0], texture.height(xy))
-    np.testing.assert_array_equal(every[:, 1:3], gradient)
-    np.testing.assert_array_equal(every[:, [3, 4, 4, 5]].reshape(-1, 2, 2), hessian)
+    assert np.abs(hessian - _differences(texture.gradient, xy, step)).max() <= 1e-8 * curvature
+    derivatives = texture.derivatives(xy)
+    np.testing.assert_array_equal(derivatives[:, 0], texture.height(xy))
+    np.testing.assert_array_equal(derivatives[:, 1:3], gradient)
+    np.testing.assert_array_equal(derivatives[:, [3, 4, 4, 5]].reshape(-1, 2, 2), hessian)
 
 
 @pytest.fixture(scope="session")
 def check_derivatives() -> Callable[..., None]:
-    """``check_derivatives(texture, xy, step)``: slopes and Hessian are those of the height."""
+    """``check_derivatives(texture, xy, step)``: assert that derivatives match the height."""
     return _check_derivatives
 
 
 @pytest.fixture
 def wave(make_texture: Callable[..., Any]) -> Sinusoid:
-    """The sinusoid."""
+    """Return the generic sinusoid."""
     return make_texture("sinusoid")
 
 
@@ -314,8 +316,8 @@ def _grid(texture: Texture, per_side: int) -> np.ndarray:
     return texture.domain.points(np.stack(np.meshgrid(*axes), -1).reshape(-1, len(axes)))
 
 
-def _climb(texture: Texture, sign: float, per_side: int) -> float:
-    """Return the greatest value of sign·h: a dense grid, its best points polished by SciPy."""
+def _find_maximum(texture: Texture, sign: float, per_side: int) -> float:
+    """Return the maximum of sign·h: the best points of a dense grid, refined by SciPy."""
     from scipy.optimize import minimize
 
     xy = _grid(texture, per_side)
@@ -324,29 +326,29 @@ def _climb(texture: Texture, sign: float, per_side: int) -> float:
     best = float(values.max())
     for start in xy[np.argsort(values)[-8:]]:
 
-        def falling(u: np.ndarray, start: np.ndarray = start) -> float:
+        def objective(u: np.ndarray, start: np.ndarray = start) -> float:
             return float(-sign * texture.height((start + scale * u)[None, :])[0] / size)
 
         def slope(u: np.ndarray, start: np.ndarray = start) -> np.ndarray:
             return -sign * scale * texture.gradient((start + scale * u)[None, :])[0] / size
 
-        found = minimize(falling, np.zeros(2), jac=slope, method="BFGS", options={"gtol": 1e-10})
-        best = max(best, -float(found.fun) * size)
+        result = minimize(objective, np.zeros(2), jac=slope, method="BFGS", options={"gtol": 1e-10})
+        best = max(best, -float(result.fun) * size)
     return best
 
 
 @pytest.fixture(scope="session")
 def sampled_extremes() -> Callable[..., tuple[float, float]]:
-    """``sampled_extremes(texture, per_side)``: extremes found without any certificate."""
+    """``sampled_extremes(texture, per_side)``: extremes by sampling, without a certificate."""
     return lambda texture, per_side: (
-        -_climb(texture, -1.0, per_side),
-        _climb(texture, 1.0, per_side),
+        -_find_maximum(texture, -1.0, per_side),
+        _find_maximum(texture, 1.0, per_side),
     )
 
 
 @pytest.fixture(scope="session")
 def sampled_bounds() -> Callable[..., tuple[float, float]]:
-    """``sampled_bounds(texture, per_side)``: greatest |∇h| and ‖Hess h‖ on a dense grid."""
+    """``sampled_bounds(texture, per_side)``: maximum |∇h| and ‖Hess h‖ on a dense grid."""
 
     def measure(texture: Texture, per_side: int) -> tuple[float, float]:
         xy = _grid(texture, per_side)

@@ -58,7 +58,7 @@ def test_invalid_size_limit_is_a_usage_error(call: Call, monkeypatch: pytest.Mon
     assert "ASPERITY_CACHE_SIZE must be a size such as '4GB', '500MB' or '2GiB', got 'much'" in err
 
 
-@pytest.mark.keeps_answers
+@pytest.mark.caches_results
 def test_no_cache_gives_the_same_output_and_leaves_entries_unused(call: Call, folder: Path) -> None:
     code, out, _err = call(*DEMO)
     entries = {entry.path: entry.last_used for entry in cache.list_entries()}
@@ -68,7 +68,7 @@ def test_no_cache_gives_the_same_output_and_leaves_entries_unused(call: Call, fo
     assert cache.cache_folder() == folder
 
 
-@pytest.mark.keeps_answers
+@pytest.mark.caches_results
 @pytest.mark.filterwarnings("default::asperity.core.cache.CacheWarning")
 def test_damaged_entries_are_recomputed_with_one_warning(call: Call) -> None:
     _code, out, _err = call(*DEMO)
@@ -81,7 +81,7 @@ def test_damaged_entries_are_recomputed_with_one_warning(call: Call) -> None:
     assert call(*DEMO) == (0, out, "")
 
 
-@pytest.mark.keeps_answers
+@pytest.mark.caches_results
 @pytest.mark.filterwarnings("default::asperity.core.cache.CacheWarning")
 def test_cache_path_that_is_a_file_gives_one_warning(call: Call, folder: Path) -> None:
     folder.write_text("no folder")

@@ -151,7 +151,7 @@ def test_swallowed_interrupt_is_reported_and_ends_the_program(work: str, swallow
 
 
 def test_interrupt_during_interpreter_shutdown_is_ignored() -> None:
-    """Python restores the default handlers while it exits, so signals must be blocked then."""
+    """Python restores the default handlers while it exits, so it ignores interrupts before."""
     script = (
         "import atexit, os, signal\n"
         "atexit.register(lambda: os.kill(os.getpid(), signal.SIGINT))\n"

@@ -124,9 +124,9 @@ def test_profile_and_prepared_file_are_shown(call: Call, tmp_path: Path) -> None
     assert "Sal" not in out
     assert call("prepare", line, "--pitch", "1um", "--unit", "m", "-o", prepared)[0] == 0
     page = tmp_path / "page.html"
-    code, shown, _ = call("show", prepared, "--html", str(page))
+    code, prepared_out, _ = call("show", prepared, "--html", str(page))
     assert code == 0
-    assert [row[0] for row in first_table(shown)] == ["as read", "levelled", "S-filter 4 µm"]
+    assert [row[0] for row in first_table(prepared_out)] == ["as read", "levelled", "S-filter 4 µm"]
     assert page.read_text(encoding="utf-8").count("<svg") == 1
 
 

@@ -27,7 +27,7 @@ def precompiled_code() -> tuple[dict[Path, bytes], list[str]]:
     return code, messages
 
 
-@pytest.mark.keeps_answers
+@pytest.mark.caches_results
 def test_compiled_code_is_cached_and_reused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -25,7 +25,7 @@ from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Profile, Sinusoid, Texture
 from asperity.textures.texture_loading import prepare_file
 
-pytestmark = pytest.mark.keeps_answers
+pytestmark = pytest.mark.caches_results
 Compute = Callable[[], Any]
 
 

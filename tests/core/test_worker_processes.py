@@ -146,7 +146,7 @@ def empty_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 WAVE = Sinusoid(0.31e-3, 1.3e-3)
 
 
-@pytest.mark.keeps_answers
+@pytest.mark.caches_results
 @pytest.mark.usefixtures("empty_cache")
 def test_comparison_does_not_depend_on_the_workers(
     started_workers: list[int], futures: list[Future[Any]]
@@ -163,7 +163,7 @@ def test_comparison_does_not_depend_on_the_workers(
     assert completed_results(futures)
 
 
-@pytest.mark.keeps_answers
+@pytest.mark.caches_results
 @pytest.mark.usefixtures("empty_cache")
 def test_report_does_not_depend_on_the_workers(
     monkeypatch: pytest.MonkeyPatch, futures: list[Future[Any]]
@@ -241,7 +241,7 @@ def test_every_surface_can_be_pickled(name: str) -> None:
     assert (copy.height(points) == heights).all()
 
 
-@pytest.mark.keeps_answers
+@pytest.mark.caches_results
 @pytest.mark.usefixtures("empty_cache")
 def test_precomputed_row_stores_all_results(monkeypatch: pytest.MonkeyPatch) -> None:
     module = import_module("asperity.analysis.compare")

@@ -100,9 +100,9 @@ TEXTURES: dict[str, Build] = {
 def make_cells(name: str, margin: float = 0.0) -> tuple[Texture, Any]:
     build, extent = TEXTURES[name]
     texture = build()
-    found = texture.cells(extent, margin)
-    assert found is not None
-    return texture, found
+    cells = texture.cells(extent, margin)
+    assert cells is not None
+    return texture, cells
 
 
 def random_cells(of: Cells, level: int, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -177,10 +177,10 @@ def distance_outside(model: Any, cell: int, xi: np.ndarray, value: Any) -> float
 @pytest.mark.parametrize("level", [0, 3, 14])
 def test_models_contain_the_exact_derivatives(name: str, level: int) -> None:
     """The 40-digit derivatives are within the error, rounding included, which is not too wide."""
-    texture, found = make_cells(name)
+    texture, cells = make_cells(name)
     extent = TEXTURES[name][1]
-    centres, half = random_cells(found, level, 4 if name == "500 waves" else 12, seed=level)
-    models = found.enclosures(centres, half, DERIVATIVE_NAMES)
+    centres, half = random_cells(cells, level, 4 if name == "500 waves" else 12, seed=level)
+    models = cells.enclosures(centres, half, DERIVATIVE_NAMES)
     rng, worst = np.random.default_rng(level), 0.0
     with mpmath.workdps(40):
         for cell, centre in enumerate(centres):
@@ -195,11 +195,11 @@ def test_models_contain_the_exact_derivatives(name: str, level: int) -> None:
 
 @pytest.mark.parametrize("name", [n for n in TEXTURES if "flat" not in n and "no h" not in n])
 def test_models_without_their_error_do_not_contain_the_derivatives(name: str) -> None:
-    _texture, found = make_cells(name)
-    centres, half = random_cells(found, 0, 50, seed=1)
-    models = found.enclosures(centres, half, DERIVATIVE_NAMES)
+    _texture, cells = make_cells(name)
+    centres, half = random_cells(cells, 0, 50, seed=1)
+    models = cells.enclosures(centres, half, DERIVATIVE_NAMES)
     xi = np.random.default_rng(1).choice([-1.0, 1.0], centres.shape)
-    exact = found.derivatives(centres + half * xi)
+    exact = cells.derivatives(centres + half * xi)
     failed = 0
     for i, derivative in enumerate(DERIVATIVE_NAMES):
         model = models[derivative]
@@ -212,17 +212,17 @@ def test_models_without_their_error_do_not_contain_the_derivatives(name: str) ->
 
 @pytest.mark.parametrize("name", TEXTURES)
 def test_derivatives_of_cells_equal_those_of_the_texture(name: str) -> None:
-    texture, found = make_cells(name)
-    coordinates = found.sample_coordinates(64)[: 8 if name == "three phases" else 64]
+    texture, cells = make_cells(name)
+    coordinates = cells.sample_coordinates(64)[: 8 if name == "three phases" else 64]
     of_cells, of_texture = (
-        found.derivatives(coordinates),
-        texture.derivatives(found.to_plane(coordinates)),
+        cells.derivatives(coordinates),
+        texture.derivatives(cells.to_plane(coordinates)),
     )
     slope, curvature = texture.bounds
     height = max(abs(v) for v in texture.extremes)
     scale = np.array([height, *[slope] * 2, *[curvature] * 3]) + 1e-300
     # A plane has two coordinates, so that three phases are met only approximately.
-    tolerance = 0.02 if found.dimensions > len(texture.domain.spans) else 3e-8
+    tolerance = 0.02 if cells.dimensions > len(texture.domain.spans) else 3e-8
     tolerance = 1e-12 if "turns" not in name and tolerance < 1e-3 else tolerance
     assert (np.abs(of_cells - of_texture) <= tolerance * scale).all()
 
@@ -230,27 +230,27 @@ def test_derivatives_of_cells_equal_those_of_the_texture(name: str) -> None:
 @pytest.mark.parametrize("name", [n for n in TEXTURES if "extent" not in n])
 def test_every_point_of_the_plane_has_coordinates(name: str) -> None:
     """The derivatives at a random point equal those at its coordinates in the cells."""
-    texture, found = make_cells(name)
+    texture, cells = make_cells(name)
     xy = texture.domain.points(np.random.default_rng(2).random((20, len(texture.domain.spans))))
     if isinstance(texture, ByBounds):
         coordinates = xy @ np.linalg.pinv(texture.domain.spans)
     elif isinstance(texture, (Sinusoid, Fourier)):
-        coordinates = xy @ found._basis.T
+        coordinates = xy @ cells._basis.T
     else:
-        coordinates = found.coordinates(xy)
+        coordinates = cells.coordinates(xy)
     slope, curvature = texture.bounds
     height = max(abs(v) for v in texture.extremes)
     scale = np.array([height, *[slope] * 2, *[curvature] * 3]) + 1e-300
     tolerance = 1e-7 if "turns" in name else 1e-11
-    error = np.abs(found.derivatives(coordinates) - texture.derivatives(xy))
+    error = np.abs(cells.derivatives(coordinates) - texture.derivatives(xy))
     assert (error <= tolerance * scale).all()
 
 
 @pytest.mark.parametrize("name", TEXTURES)
 def test_initial_cells_cover_the_domain(name: str) -> None:
     """They do not overlap, except for the last blocks of a map."""
-    _texture, found = make_cells(name)
-    chunks, half = found.initial_cells()
+    _texture, cells = make_cells(name)
+    chunks, half = cells.initial_cells()
     centres = np.concatenate(list(chunks))
     low, high = (centres - half).min(axis=0), (centres + half).max(axis=0)
     np.testing.assert_allclose(low, 0.0, atol=1e-12 * high.max())
@@ -263,10 +263,10 @@ def test_initial_cells_cover_the_domain(name: str) -> None:
     assert fine.min() == 1
     assert "map" in name or fine.max() == 1
     np.testing.assert_allclose(corners * least, centres - half, rtol=1e-12, atol=1e-15)
-    samples = found.sample_coordinates(100)
+    samples = cells.sample_coordinates(100)
     assert (samples >= low - 1e-12).all()
     assert (samples <= high * (1.0 + 1e-12)).all()
-    assert found.clip_to_region(samples).shape == samples.shape
+    assert cells.clip_to_region(samples).shape == samples.shape
 
 
 @pytest.mark.parametrize("dimensions", [1, 2, 3, 4])
@@ -290,12 +290,12 @@ def test_subdivided_cells_cover_their_parents(dimensions: int, count: int) -> No
 @pytest.mark.parametrize("name", ["three phases", "periodic map", "profile", "sinusoid, extent"])
 def test_error_of_the_height_has_order_two(name: str) -> None:
     """Only h is checked: second derivatives of a spline are linear in a cell, and exact."""
-    _texture, found = make_cells(name)
+    _texture, cells = make_cells(name)
     errors = []
     levels = np.arange(2, 9)
     for level in levels:
-        centres, half = random_cells(found, int(level), 200, seed=5)
-        model = found.enclosures(centres, half, ["h"])["h"]
+        centres, half = random_cells(cells, int(level), 200, seed=5)
+        model = cells.enclosures(centres, half, ["h"])["h"]
         assert isinstance(model, TaylorModel)
         errors.append(model.e.mean())
     order = -np.polyfit(levels, np.log2(errors), 1)[0]
@@ -305,9 +305,9 @@ def test_error_of_the_height_has_order_two(name: str) -> None:
 def test_blocks_of_a_tilted_plane_are_exact() -> None:
     """A linear height equals the linear part of its model, and so do its slopes."""
     y, x = np.mgrid[0:16.0, 0:16.0]
-    found = HeightMap(1e-4 * x - 3e-4 * y, (3e-4, 7e-4)).cells()
+    cells = HeightMap(1e-4 * x - 3e-4 * y, (3e-4, 7e-4)).cells()
     centres, half = np.array([[8.0, 8.0]]), np.array([2.0, 2.0])
-    models = found.enclosures(centres, half, ["h", "hx", "hy"])
+    models = cells.enclosures(centres, half, ["h", "hx", "hy"])
     # The mirrored border has a small effect in the middle.
     expected = {"h": (-16e-4, 2e-4, -6e-4), "hx": (1 / 3, 0.0, 0.0), "hy": (-3 / 7, 0.0, 0.0)}
     for name, (c, gx, gy) in expected.items():
@@ -323,15 +323,15 @@ def test_blocks_of_a_tilted_plane_are_exact() -> None:
 def test_bounds_of_blocks_of_ridges_are_attained() -> None:
     """Second derivatives along a ridged map are linear between nodes, so the hull is attained."""
     texture = HeightMap(1e-4 * np.tile(ROUGH[0], (9, 1)), 3e-4)
-    found = texture.cells()
-    chunks, half = found.initial_cells()
+    cells = texture.cells()
+    chunks, half = cells.initial_cells()
     centres = np.concatenate(list(chunks))
     assert half.tolist() == [2.0, 2.0]
-    model = found.enclosures(centres, half, ["hxx"])["hxx"]
+    model = cells.enclosures(centres, half, ["hxx"])["hxx"]
     assert isinstance(model, TaylorModel)
     ratio = np.zeros(len(centres))
     for xi in np.linspace(-1.0, 1.0, 5):
-        exact = found.derivatives(centres + half * [xi, 0.3])[:, 3]
+        exact = cells.derivatives(centres + half * [xi, 0.3])[:, 3]
         ratio = np.maximum(ratio, np.abs(exact - model.c - model.g[0] * xi) / model.e)
     assert ratio.max() <= 1.0
     # Coefficients beyond the block keep the bound from being attained exactly.
@@ -339,13 +339,13 @@ def test_bounds_of_blocks_of_ridges_are_attained() -> None:
 
 
 def test_margin_widens_the_extent_on_every_side() -> None:
-    texture, found = make_cells("five phases, extent", margin=1e-3)
-    corners = found.to_plane(np.array([[0.0, 0.0], found.clip_to_region(np.full((1, 2), 1e9))[0]]))
+    texture, cells = make_cells("five phases, extent", margin=1e-3)
+    corners = cells.to_plane(np.array([[0.0, 0.0], cells.clip_to_region(np.full((1, 2), 1e9))[0]]))
     np.testing.assert_allclose(corners, [[-1e-3, -1e-3], [6e-3, 3e-3]], rtol=1e-12)
-    coordinates = found.sample_coordinates(60)
-    xy = found.to_plane(coordinates)
+    coordinates = cells.sample_coordinates(60)
+    xy = cells.to_plane(coordinates)
     scale = np.array([1e-3, 1.0, 1.0, 1e4, 1e4, 1e4])
-    assert (np.abs(found.derivatives(coordinates) - texture.derivatives(xy)) < 1e-12 * scale).all()
+    assert (np.abs(cells.derivatives(coordinates) - texture.derivatives(xy)) < 1e-12 * scale).all()
 
 
 def test_more_than_four_phases_need_an_extent() -> None:
@@ -369,11 +369,11 @@ def nearly_periodic() -> Fourier:
 def test_nearly_periodic_waves_have_one_phase_each() -> None:
     """A common period would give an error far above rounding."""
     texture = nearly_periodic()
-    found = texture.cells()
-    assert found.dimensions == 2
+    cells = texture.cells()
+    assert cells.dimensions == 2
     xy = np.random.default_rng(5).uniform(-0.01, 0.01, (50, 2))
     exact = texture.derivatives(xy)
-    models = found.enclosures(xy @ found._basis.T, np.full(2, 1e-9), DERIVATIVE_NAMES)
+    models = cells.enclosures(xy @ cells._basis.T, np.full(2, 1e-9), DERIVATIVE_NAMES)
     for i, name in enumerate(DERIVATIVE_NAMES):
         model = models[name]
         if isinstance(model, TaylorModel):
@@ -383,9 +383,9 @@ def test_nearly_periodic_waves_have_one_phase_each() -> None:
 def test_rounding_error_of_cancelling_phases_follows_their_size() -> None:
     """The sum of 7·1000 - 7·1000 turns and a phase is small, but not its rounding error."""
     waves = np.array([[1.0, 0.0], [0.0, 1.0], [997.0, -991.0]])
-    found = Fourier([1.0, 1.0, 1.0], waves).cells()
+    cells = Fourier([1.0, 1.0, 1.0], waves).cells()
     centres = np.array([[6.0, 6.0]])
-    model = found.enclosures(centres, np.zeros(2), ["h"])["h"]
+    model = cells.enclosures(centres, np.zeros(2), ["h"])["h"]
     assert isinstance(model, TaylorModel)
     assert model.e[0] > 6e3 * np.finfo(float).eps
 
@@ -417,22 +417,22 @@ def test_low_discrepancy_points_fill_every_box(dimensions: int) -> None:
 
 def test_deflection_and_depth_coordinates_are_enclosed() -> None:
     texture, flat = make_cells("sinusoid")
-    found = cells_with_deflection(flat, 2e-3, 5e-4)
-    assert isinstance(found, ProductCells)
-    assert found.dimensions == 4
+    cells = cells_with_deflection(flat, 2e-3, 5e-4)
+    assert isinstance(cells, ProductCells)
+    assert cells.dimensions == 4
     rng = np.random.default_rng(1)
-    centres, half = random_cells(found, 3, 40, seed=9)
-    models = found.enclosures(centres, half, DERIVATIVE_NAMES)
+    centres, half = random_cells(cells, 3, 40, seed=9)
+    models = cells.enclosures(centres, half, DERIVATIVE_NAMES)
     xi = rng.uniform(-1, 1, centres.shape)
     coordinates = centres + half * xi
-    extra = found.extra_coordinates(coordinates)
+    extra = cells.extra_coordinates(coordinates)
     u = np.stack([np.cos(extra["deflection_angle"]), np.sin(extra["deflection_angle"])])
     assert extra["deflection_length"].max() <= 2e-3
     for sliding in (False, True):
         d = (2e-3 if sliding else extra["deflection_length"]) * u
         s = np.array([1 - u[0] ** 2, -u[0] * u[1], 1 - u[1] ** 2]) if sliding else [1.0, 0.0, 1.0]
         exact = {"dx": d[0], "dy": d[1], "sxx": s[0], "sxy": s[1], "syy": s[2]}
-        exact |= {"depth": extra["depth"], "h": texture.height(found.to_plane(coordinates))}
+        exact |= {"depth": extra["depth"], "h": texture.height(cells.to_plane(coordinates))}
         state = {**models, **anchor_enclosures(models, 2e-3, sliding=sliding)}
         for name, value in exact.items():
             model = state[name]
@@ -442,5 +442,5 @@ def test_deflection_and_depth_coordinates_are_enclosed() -> None:
             linear = model.c + (model.g * xi.T).sum(axis=0)
             assert (np.abs(value - linear) <= model.e + 1e-16).all(), name
             assert (np.abs(value - model.c) > model.e).any(), name
-    clipped = found.clip_to_region(np.full((1, 4), 99.0))
+    clipped = cells.clip_to_region(np.full((1, 4), 99.0))
     np.testing.assert_allclose(clipped[0, 1:], [2e-3, 2 * math.pi, 5e-4])

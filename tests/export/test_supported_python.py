@@ -104,17 +104,17 @@ ARGUMENT_TYPES: dict[str, tuple[ValueType, ...]] = {
 HEAD = "#include <math.h>\n#include <stdint.h>\n#define T_INLINE static inline\n"
 
 
-def to_c(source: str, **kinds: tuple[ValueType, ...]) -> str:
+def to_c(source: str, **argument_types: tuple[ValueType, ...]) -> str:
     """Return functions as C code, each with a public wrapper."""
     program = Program(LinkedSource(source), "t", single=False)
-    shown = []
-    for name, given_kinds in kinds.items():
-        inner = program.function_name(name, given_kinds)
-        result = program.c_type(program.infer_types(name, given_kinds).result_type)
-        types = [program.c_type(kind) for kind in given_kinds]
-        head = f"{result} show_{name}({types[0]} a, {types[1]} b)"
-        shown.append(f"{head};\n{head}\n{{\n    return {inner}(a, b);\n}}\n")
-    return "\n".join([HEAD, *program.types, *program.helpers, *program.functions, *shown])
+    wrappers = []
+    for name, types in argument_types.items():
+        inner = program.function_name(name, types)
+        result = program.c_type(program.infer_types(name, types).result_type)
+        c_types = [program.c_type(kind) for kind in types]
+        head = f"{result} show_{name}({c_types[0]} a, {c_types[1]} b)"
+        wrappers.append(f"{head};\n{head}\n{{\n    return {inner}(a, b);\n}}\n")
+    return "\n".join([HEAD, *program.types, *program.helpers, *program.functions, *wrappers])
 
 
 @pytest.fixture(scope="module")
@@ -127,21 +127,21 @@ def evaluate(
     run_command(
         tool("gcc"), *STRICT, "-O1", "-shared", "-fPIC", "m.c", "-o", "m.so", "-lm", cwd=folder
     )
-    made = ctypes.CDLL(str(folder / "m.so"))
+    compiled_library = ctypes.CDLL(str(folder / "m.so"))
     from asperity.core.compiled import local_array
 
     python: dict[str, Any] = {"math": math, "local_array": local_array}
     exec(compile(SOURCE, "<meaning>", "exec"), python)
 
-    def both(name: str, a: Any, b: Any) -> tuple[Any, Any]:
-        function = getattr(made, f"show_{name}")
+    def evaluate_both(name: str, a: Any, b: Any) -> tuple[Any, Any]:
+        function = getattr(compiled_library, f"show_{name}")
         types = {INT: ctypes.c_int64, FLOAT: ctypes.c_double}
         function.argtypes = [types[kind] for kind in ARGUMENT_TYPES[name]]  # type: ignore[index]  # numbers
         real = name in {"real", "rounding", "loops", "arrays"}
         function.restype = ctypes.c_double if real else ctypes.c_int64
         return python[name](a, b), function(a, b)
 
-    return both
+    return evaluate_both
 
 
 SMALL = st.integers(-40, 40)

@@ -22,7 +22,7 @@ from asperity.laws import Law
 from asperity.surface import Surface
 from asperity.textures import HeightMap, Sinusoid, Texture
 
-pytestmark = pytest.mark.keeps_answers
+pytestmark = pytest.mark.caches_results
 
 HEIGHTS = 1e-4 * np.random.default_rng(1).normal(size=(8, 9))
 OTHER_HEIGHTS = HEIGHTS.copy()

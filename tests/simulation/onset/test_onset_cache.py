@@ -19,7 +19,7 @@ from asperity.simulation.limit_cycles.onset import Onset
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
 
-pytestmark = pytest.mark.keeps_answers
+pytestmark = pytest.mark.caches_results
 LOOP: dict[str, Any] = {
     "surface": Surface(Sinusoid(0.2e-3, 2e-3), "W", max_depth=1e-2),
     "plant": Cartesian(0.05, 3.0),
