@@ -134,7 +134,7 @@ class RecordedPolynomial:
         self.line: list[float] = []
         self.plane: list[FloatArray] = []
 
-    def polynomial_derivatives(self, x: float, _texture: object) -> tuple[float, float, float]:
+    def along(self, x: float, _texture: object) -> tuple[float, float, float]:
         self.line.append(x)
         return polynomial_derivatives(x, self.coefficients)
 

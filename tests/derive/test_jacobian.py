@@ -30,14 +30,14 @@ class Patch:
     h0: float
     g: np.ndarray
     hessian: np.ndarray
-    twist: float
+    cubic: float
     e: np.ndarray
 
     def derivatives(self, u: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
         along = float(self.e @ u)
-        h = self.h0 + self.g @ u + 0.5 * u @ self.hessian @ u + self.twist * along**3
-        slope = self.g + self.hessian @ u + 3.0 * self.twist * along**2 * self.e
-        return h, slope, self.hessian + 6.0 * self.twist * along * np.outer(self.e, self.e)
+        h = self.h0 + self.g @ u + 0.5 * u @ self.hessian @ u + self.cubic * along**3
+        slope = self.g + self.hessian @ u + 3.0 * self.cubic * along**2 * self.e
+        return h, slope, self.hessian + 6.0 * self.cubic * along * np.outer(self.e, self.e)
 
     def closest_point(self, p: np.ndarray) -> np.ndarray:
         """Return the closest point to p near the contact, by Newton's method."""

@@ -111,13 +111,13 @@ def replace_name(
 
 def _scale_result(factor: float, original: Callable[..., Any]) -> Callable[..., Any]:
     """Return a function whose result is multiplied."""
-    return lambda *given, **named: factor * original(*given, **named)
+    return lambda *arguments, **keywords: factor * original(*arguments, **keywords)
 
 
 def scale_forces(factor: float) -> Perturbation:
     """Scale compiled forces, including those along a path of a law with state."""
 
-    def traced(original: Callable[..., Any]) -> Callable[..., Any]:
+    def scale_trace(original: Callable[..., Any]) -> Callable[..., Any]:
         # Without state a trace evaluates forces, which are scaled already.
         return lambda surface, path: (
             (factor if surface.law.stateful else 1.0) * original(surface, path)
@@ -125,7 +125,7 @@ def scale_forces(factor: float) -> Perturbation:
 
     replacements = (
         Replacement("force", partial(_scale_result, factor), Surface),
-        Replacement("trace", traced, Surface),
+        Replacement("trace", scale_trace, Surface),
     )
     return Perturbation(f"compiled forces times {factor:g}", replacements)
 
@@ -133,15 +133,15 @@ def scale_forces(factor: float) -> Perturbation:
 def scale_jacobians(factor: float) -> Perturbation:
     """Scale compiled Jacobians and the result of a search over them."""
 
-    def scale_second(original: Callable[..., Any]) -> Callable[..., Any]:
-        def both(*given: Any, **named: Any) -> tuple[Any, Any]:
-            force, jacobian = original(*given, **named)
+    def scale_jacobian(original: Callable[..., Any]) -> Callable[..., Any]:
+        def scaled(*arguments: Any, **keywords: Any) -> tuple[Any, Any]:
+            force, jacobian = original(*arguments, **keywords)
             return force, factor * jacobian
 
-        return both
+        return scaled
 
     replacements = (
-        Replacement("force_and_jacobian", scale_second, Surface),
+        Replacement("force_and_jacobian", scale_jacobian, Surface),
         Replacement("find_max_norm", partial(_scale_result, factor)),
     )
     return Perturbation(f"compiled Jacobians times {factor:g}", replacements)
@@ -165,8 +165,8 @@ def scale_numbers(factor: float, min_period: float = 0.0) -> Perturbation:
     """Scale the characteristic numbers of textures with a period above a limit [m]."""
 
     def scaled(original: Callable[..., Any]) -> Callable[..., Any]:
-        def number(surface: Surface, *given: Any) -> Any:
-            bound = original(surface, *given)
+        def number(surface: Surface, *arguments: Any) -> Any:
+            bound = original(surface, *arguments)
             if getattr(surface.texture, "period", 1.0) <= min_period:
                 return bound
             return replace(bound, lower=factor * bound.lower, upper=factor * bound.upper)
@@ -182,11 +182,11 @@ def scale_numbers(factor: float, min_period: float = 0.0) -> Perturbation:
 def scale_work(factor: float, offset: float = 0.0) -> Perturbation:
     """Scale the work around closed paths, and add an offset [J]."""
 
-    def other(original: Callable[..., Any]) -> Callable[..., Any]:
-        return lambda *given: factor * original(*given) + offset
+    def scale(original: Callable[..., Any]) -> Callable[..., Any]:
+        return lambda *arguments: factor * original(*arguments) + offset
 
     added = f" plus {offset:g} J" if offset else ""
-    return replace_name(f"work around a path times {factor:g}{added}", "loop_work", other)
+    return replace_name(f"work around a path times {factor:g}{added}", "loop_work", scale)
 
 
 # --- single functions -----------------------------------------------------------------------------

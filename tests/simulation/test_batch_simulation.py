@@ -105,8 +105,8 @@ def assert_same(start: Trajectory, watcher: SegmentRecorder, run: Run) -> None:
 
 def test_batch_of_stiffnesses_and_delays_equals_single_runs() -> None:
     """In segments that end between the flushes every 256 samples, independently of each other."""
-    begin, velocity = (1e-4, 0.0, 1e-3), (0.0, 0.05, 0.0)
-    loop = BatchSimulation(*LOOP, MOTION, begin, velocity)
+    start_position, velocity = (1e-4, 0.0, 1e-3), (0.0, 0.05, 0.0)
+    loop = BatchSimulation(*LOOP, MOTION, start_position, velocity)
     goal_lists = [(300, 1100, 17_000), (7, 8, 900), (40_000,), (1, 2, 3, 20_011)]
     watchers = [SegmentRecorder(*goals) for goals in goal_lists]
     starts = [
@@ -118,10 +118,12 @@ def test_batch_of_stiffnesses_and_delays_equals_single_runs() -> None:
     loop.run(starts[1:3])  # the others start later
     run_all(loop, starts)
     for start, watcher, goals in zip(starts, watchers, goal_lists, strict=True):
-        assert_same(start, watcher, simulate_alone(LOOP, start, begin, velocity, goals[-1]))
+        assert_same(
+            start, watcher, simulate_alone(LOOP, start, start_position, velocity, goals[-1])
+        )
         assert [segment.samples for segment in watcher.segments] == list(goals)
     # Negative control: another stiffness or delay gives another state.
-    wrong = simulate_alone(LOOP, starts[2], begin, velocity, 40_000)
+    wrong = simulate_alone(LOOP, starts[2], start_position, velocity, 40_000)
     for start in starts[0], starts[3]:
         assert not np.array_equal(start.state, wrong.state)
 
@@ -129,12 +131,12 @@ def test_batch_of_stiffnesses_and_delays_equals_single_runs() -> None:
 def test_subnormal_numbers_are_flushed_at_the_same_samples() -> None:
     """The sample at which a freely decaying motion becomes zero does not depend on segments."""
     parts = SURFACE, Cartesian(0.05, 40.0), SpringHand(), Servo(1e-3)
-    still, begin, velocity = Stationary((0.0, 0.0, 1.0)), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
-    loop = BatchSimulation(*parts, still, begin, velocity)
+    still, start_position, velocity = Stationary((0.0, 0.0, 1.0)), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
+    loop = BatchSimulation(*parts, still, start_position, velocity)
     watcher = SegmentRecorder(100, 171, 600)
     start = loop.new_trajectory(900.0, 0, np.zeros(3), watcher.judge())
     run_all(loop, [start])
-    run = simulate_alone(parts, start, begin, velocity, 600, still)
+    run = simulate_alone(parts, start, start_position, velocity, 600, still)
     assert_same(start, watcher, run)
     assert run.table[-1, 4] == 0.0 < run.table[170, 4] < 1e-50
 

@@ -352,8 +352,10 @@ def stand_in_solver(count: int, gap: float, *, truncated: bool) -> Any:
     atoms_found, pull, calls = random_atoms(max(count, 1)), RNG.normal(size=3), []
 
     def split_atoms(x: float, y: float, z: float, *arguments: Any) -> Any:
-        continuity, known, budget, p, atoms, out, texture = arguments
-        calls.append((x, y, z, continuity, int(known), budget, atoms[:known].copy(), texture))
+        continuity, known_count, budget, p, atoms, out, texture = arguments
+        calls.append(
+            (x, y, z, continuity, int(known_count), budget, atoms[:known_count].copy(), texture)
+        )
         p[:], atoms[:], out[:] = (x, y, z), atoms_found, pull
         return count, gap, 17.0, truncated
 
@@ -361,21 +363,21 @@ def stand_in_solver(count: int, gap: float, *, truncated: bool) -> Any:
 
 
 @pytest.mark.parametrize(
-    ("known", "count", "truncated"), [(0, 1, False), (2, 4, True), (4, 3, True)]
+    ("known_count", "count", "truncated"), [(0, 1, False), (2, 4, True), (4, 3, True)]
 )
 def test_warm_start_uses_and_stores_atoms(
-    known: int, count: int, truncated: bool, monkeypatch: pytest.MonkeyPatch
+    known_count: int, count: int, truncated: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     split_atoms, atoms_found, pull, calls = stand_in_solver(count, 0.02, truncated=truncated)
     monkeypatch.setattr(answers, "split_compute_atoms", split_atoms)
     memory = np.arange(100.0, 100.0 + WARM_START_SIZE)
-    memory[[BUDGET, POINT_COUNT, TRUNCATED_TICKS]] = 55.0, known, 3.0
+    memory[[BUDGET, POINT_COUNT, TRUNCATED_TICKS]] = 55.0, known_count, 3.0
     before = memory.copy()
     assert answers.split_contact_warm(0.1, 0.2, 0.3, 1.5, memory, "texture") == tuple(pull)
     ((*numbers, atoms, texture),) = calls
-    assert (numbers, texture) == ([0.1, 0.2, 0.3, 1.5, known, 55.0], "texture")
+    assert (numbers, texture) == ([0.1, 0.2, 0.3, 1.5, known_count, 55.0], "texture")
     np.testing.assert_array_equal(
-        atoms, before[FIRST_POINT : FIRST_POINT + 4 * known].reshape(known, 4)
+        atoms, before[FIRST_POINT : FIRST_POINT + 4 * known_count].reshape(known_count, 4)
     )
     assert (memory[POINT_COUNT], memory[EVALUATIONS], memory[TRUNCATED_TICKS]) == (
         count,

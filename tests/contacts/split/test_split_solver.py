@@ -133,7 +133,7 @@ def test_dual_point_and_mean_follow_from_each_other(
 
 
 @pytest.mark.parametrize(
-    ("known", "succeeds", "expected_calls", "expected"),
+    ("known_count", "succeeds", "expected_calls", "expected"),
     [
         (0, True, ["query", "settle 1"], (1, 0, 9.0)),
         (1, True, ["follow", "settle 1"], (1, 0, 4.0)),
@@ -144,7 +144,7 @@ def test_dual_point_and_mean_follow_from_each_other(
     ],
 )
 def test_initialization_from_known_atoms(
-    known: int, succeeds: bool, expected_calls: list[str], expected: tuple[float, ...],
+    known_count: int, succeeds: bool, expected_calls: list[str], expected: tuple[float, ...],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
     """Moved atoms of a nearby probe; one tracked point; otherwise the closest point.
@@ -185,9 +185,9 @@ def test_initialization_from_known_atoms(
     for name, function in stand_ins:
         monkeypatch.setattr(solver, f"split_{name}", function)
     atoms, y, pull = random_atoms(4), np.zeros(3), np.zeros(3)
-    weight = 0.5 if known == 2 else atoms[0, 3]
+    weight = 0.5 if known_count == 2 else atoms[0, 3]
     a = np.zeros((7, 10))
-    result = solver.split_initialize(atoms, known, P, y, pull, C, a, 40.0, "texture")
+    result = solver.split_initialize(atoms, known_count, P, y, pull, C, a, 40.0, "texture")
     assert result == expected
     assert calls == expected_calls
     assert atoms[0, 3] == (1.0 if expected_calls[-1] == "settle 1" else weight)

@@ -101,14 +101,14 @@ class UserMotion(Stationary):
     """A user-defined motion, whose behaviour the cache key cannot capture."""
 
 
-def test_the_onset_of_a_user_defined_motion_is_not_cached(runs: list[float]) -> None:
+def test_onset_of_a_user_defined_motion_is_not_cached(runs: list[float]) -> None:
     for _ in range(2):
         runs.clear()
         cached_onset(motion=UserMotion((0.0, 0.0, 0.0)))
         assert runs
 
 
-def test_the_onset_of_a_user_defined_law_is_cached_by_its_formula(runs: list[float]) -> None:
+def test_onset_of_a_user_defined_law_is_cached_by_its_formula(runs: list[float]) -> None:
     for power in (1, 2):
         law = Law("U", "own", "vertical", lambda c, n=power: c.k * c.depth**n * c.e_z)
         runs.clear()
