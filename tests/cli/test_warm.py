@@ -5,17 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from tests.helpers.fused_code import forget_fused_modules
 
 from asperity.cli import setup_commands as warm
 from asperity.core import cache
-from asperity.kernels import fuse
 from asperity.laws import LAWS
 
 
 def precompiled_code() -> tuple[dict[Path, bytes], list[str]]:
     """Return the cached code after a precompilation without loaded code, and its messages."""
-    for function in (fuse._load_module, fuse.fuse_surface, fuse.fuse_sampler, fuse.fuse_contact):
-        function.cache_clear()
+    forget_fused_modules()
     messages: list[str] = []
     name = "sinusoids"
     warm.precompile((LAWS["W"],), {name: warm.sample_textures()[name]}, messages.append)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator
-from pathlib import Path
+from collections.abc import Callable, Iterable
 
 import mpmath
 import numpy as np
@@ -85,17 +84,6 @@ def test_sine_of_huge_angles_stays_bounded(angle: float) -> None:
     for x in (angle, -angle):
         assert abs(batch_sine.sine(x)) < 1.0 + 1e-15
         assert abs(batch_sine.cosine(x)) < 1.0 + 1e-15
-
-
-@pytest.fixture
-def empty_code_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Use an empty cache: cached code cannot be inspected."""
-    monkeypatch.setenv("ASPERITY_CACHE_DIR", str(tmp_path))
-    fuse._load_module.cache_clear()
-    fuse.fuse_surface.cache_clear()
-    yield
-    fuse._load_module.cache_clear()
-    fuse.fuse_surface.cache_clear()
 
 
 def llvm_code(surface: Surface, loop: object) -> str:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from pathlib import Path
 
 import mpmath
 import numpy as np
@@ -14,7 +12,6 @@ from llvmlite import binding  # type: ignore[import-untyped]
 from asperity import HeightMap, Sinusoid, Surface
 from asperity.contacts.warm_start import new_warm_start
 from asperity.core.checks import FloatArray
-from asperity.kernels import fuse
 from asperity.kernels.loops import block_loops
 from asperity.kernels.loops.block_loops import BLOCK
 from asperity.laws import LAWS
@@ -121,17 +118,6 @@ def test_only_laws_sampled_above_the_probe_use_blocks() -> None:
     for law in "WDEFH":
         assert "store_block" not in vars(Surface(height_map(periodic=True), LAWS[law])._loops)
     assert block_loops.KERNELS.loops == ("force_batch", "jacobian_batch")
-
-
-@pytest.fixture
-def empty_code_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Use an empty cache: cached code cannot be inspected."""
-    monkeypatch.setenv("ASPERITY_CACHE_DIR", str(tmp_path))
-    for cached in (fuse._load_module, fuse.fuse_surface, fuse.fuse_path):
-        cached.cache_clear()
-    yield
-    for cached in (fuse._load_module, fuse.fuse_surface, fuse.fuse_path):
-        cached.cache_clear()
 
 
 @pytest.mark.usefixtures("empty_code_cache")
