@@ -191,6 +191,7 @@ REFUSED = {
     "without a constant shape": "w = local_array((int(a),))",
     "returns a work array": "w = local_array((3,))\n    return w",
     "unpacks 2 values into 3 names": "t = (1.0, 2.0)\n    x, y, z = t",
+    "assigns a tuple to several targets": "(x, y) = z = (a, b)",
     "chains comparisons of": "x = 0.0 < math.sin(a) < 1.0",
     "on an evaluation order that C leaves open": "w = local_array((3,))\n    x = put(w, a) + w[0]",
     "has starred": "x = starred(1.0)",

@@ -210,6 +210,8 @@ class FunctionPrinter(ast.NodeVisitor):
             return self._array(targets, value)
         first, *others = targets
         if isinstance(first, ast.Tuple):
+            if others:
+                raise self.types.not_exportable("assigns a tuple to several targets", value)
             if isinstance(value, ast.Tuple):
                 return self._assign_each(node, first.elts, value.elts)
             return self._unpack(node, first.elts, value)
