@@ -122,10 +122,13 @@ def test_closed_forms_lie_inside_certified_bounds(letter: str, name: str, exact:
         value = exact(wave, depth)
         surface = Surface(as_fourier(wave), letter, max_depth=depth)
         number = MEASURES[name][0]
+        # The probe's height is rounded to 2**-53 of the wave's; y/(1 - y) of law D amplifies the
+        # relative change of the depth by 1 + q, the other formulas by 1 at most.
+        rounding = 1e-12 + 2.0**-52 * wave.amplitude / depth * (1.0 + value)
         for tolerance in (1e-3, 1e-6):
             bound = number(surface, tolerance=tolerance)
             assert bound.method in {"certified", "theorem"}
-            assert bound.lower <= value * (1.0 + 1e-12)
+            assert bound.lower <= value * (1.0 + rounding)
             assert value <= bound.upper * (1.0 + 1e-13)
             if bound.upper > 1e-6:
                 check_bound(surface, bound, name, tolerance)
