@@ -49,7 +49,7 @@ def run(console: Console) -> None:
     if not filled or touched or second["misses"]:
         console.print(f"  COMPILED AGAIN: {', '.join(touched) or 'no cache'}", style="bold")
     else:
-        console.print("  no compile in the second: names and modification times all unchanged")
+        console.print("  no compile in the second: every file is the same")
 
 
 def _run_process(cache: Path) -> dict[str, Any]:
@@ -61,9 +61,9 @@ def _run_process(cache: Path) -> dict[str, Any]:
 
 
 def _files(directory: Path) -> dict[str, int]:
-    """Return the modification time [ns] of every file, by its path."""
+    """Return the inode of every file by its path: a file that is written again has another."""
     return {
-        str(path.relative_to(directory)): path.stat().st_mtime_ns
+        str(path.relative_to(directory)): path.stat().st_ino
         for path in directory.rglob("*")
         if path.is_file()
     }
