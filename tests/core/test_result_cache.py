@@ -235,7 +235,7 @@ def test_package_digest_depends_on_library_versions(
     if library in ("numpy", "scipy"):
         monkeypatch.setattr(f"{library}.__version__", "another")
     else:
-        other = lambda name: "another" if name == library else version(name)  # noqa: E731
+        other = lambda name: "another" if name == library else version(name)  # noqa: E731 - one use
         monkeypatch.setattr(digests, "version", other)
     assert digest() != before
 

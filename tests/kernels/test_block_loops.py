@@ -7,7 +7,7 @@ import re
 import mpmath
 import numpy as np
 import pytest
-from llvmlite import binding  # type: ignore[import-untyped]
+from llvmlite import binding  # type: ignore[import-untyped]  # it has no types
 
 from asperity import HeightMap, Sinusoid, Surface
 from asperity.contacts.warm_start import new_warm_start

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from llvmlite import binding  # type: ignore[import-untyped]
+from llvmlite import binding  # type: ignore[import-untyped]  # it has no types
 
 from asperity.clamps import BACKED
 from asperity.kernels import fuse

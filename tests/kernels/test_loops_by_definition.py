@@ -168,7 +168,7 @@ def test_sampler_loops_evaluate_each_point(monkeypatch: pytest.MonkeyPatch) -> N
 def test_results_are_stored_in_the_row_of_their_point() -> None:
     force, jacobian = np.full((3, 3), np.nan), np.full((3, 3, 3), np.nan)
     storing.store_force(force, 2, (1.0, 2.0, 3.0))
-    storing.store_jacobian(force, jacobian, 1, tuple(map(float, range(12))))  # type: ignore[arg-type]
+    storing.store_jacobian(force, jacobian, 1, tuple(map(float, range(12))))  # type: ignore[arg-type]  # twelve numbers
     np.testing.assert_array_equal(force[1:], [[0.0, 1.0, 2.0], [1.0, 2.0, 3.0]])
     np.testing.assert_array_equal(jacobian[1], np.arange(3.0, 12.0).reshape(3, 3))
     assert np.isnan(force[0]).all()

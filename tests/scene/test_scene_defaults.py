@@ -85,7 +85,7 @@ def test_inapplicable_arguments_are_refused(
     device: dict[str, float], arguments: dict[str, object], message: str
 ) -> None:
     with pytest.raises(ParameterError, match=message):
-        make_plant(parse_device(device, "mine"), **arguments)  # type: ignore[arg-type]
+        make_plant(parse_device(device, "mine"), **arguments)  # type: ignore[arg-type]  # invalid on purpose
 
 
 def test_servo_uses_the_device_data() -> None:

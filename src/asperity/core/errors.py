@@ -42,7 +42,7 @@ class ParameterError(AsperityError, ValueError):
         super().__init__(f"{argument} {requirement}{tail}")
 
     def __reduce__(self) -> tuple[object, ...]:  # by state: subclasses have other arguments
-        return copyreg.__newobj__, (type(self), *self.args), self.__dict__  # type: ignore[attr-defined]
+        return copyreg.__newobj__, (type(self), *self.args), self.__dict__  # type: ignore[attr-defined]  # typeshed omits it
 
 
 class _ReasonError(ParameterError):

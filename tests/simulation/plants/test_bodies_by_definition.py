@@ -405,8 +405,8 @@ def test_linear_sample_has_substeps_only_with_friction(
         record = sampled_plant(
             Cartesian(MASS, damping, mode, friction), SPRING, Servo(PERIOD)
         ).record
-        assert (record.substeps, record.substep) == (count, PERIOD / count)  # type: ignore[attr-defined]
-        assert record.stopping_mass.any() == (friction > 0.0 or damping is COUPLED)  # type: ignore[attr-defined]
+        assert (record.substeps, record.substep) == (count, PERIOD / count)  # type: ignore[attr-defined]  # of its own record
+        assert record.stopping_mass.any() == (friction > 0.0 or damping is COUPLED)  # type: ignore[attr-defined]  # of its own record
 
 
 def test_linkage_reach_is_limited_by_the_elbow_angles() -> None:
