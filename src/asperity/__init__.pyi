@@ -14,8 +14,6 @@ from asperity.analysis.analyze import analyze as analyze
 from asperity.analysis.check_limits import limits as limits
 from asperity.analysis.limits.limit_result import Limits as Limits
 from asperity.analysis.passivity.assess_passivity import passivity as passivity
-from asperity.analysis.split.baked_field import BakedField as BakedField
-from asperity.analysis.split.baked_field import bake as bake
 from asperity.analysis.split.split_state import PopThrough as PopThrough
 from asperity.analysis.split.split_state import SplitState as SplitState
 from asperity.analysis.split.split_state import pop_through as pop_through
@@ -33,6 +31,7 @@ from asperity.recording.recording import open_recording as open_recording
 from asperity.recording.replay import Replay as Replay
 from asperity.recording.replay import replay as replay
 from asperity.recording.writer import RecordingWriter as RecordingWriter
+from asperity.rendering import bake as bake
 from asperity.surface import Surface as Surface
 from asperity.textures import Fourier as Fourier
 from asperity.textures import Grating as Grating
@@ -44,3 +43,4 @@ from asperity.textures import Sinusoid as Sinusoid
 from asperity.textures import load_texture as load_texture
 from asperity.textures import named_surface as named_surface
 from asperity.textures import surface_names as surface_names
+from asperity.textures.fields.potential_field import PotentialField as PotentialField

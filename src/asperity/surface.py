@@ -46,7 +46,8 @@ _Optional = ArrayLike | None
 def default_max_depth(texture: Texture) -> float:
     """Return the peak-to-valley height of the texture, at most 1 mm [m]."""
     height = texture.peak_to_valley
-    return min(height, MAX_DEFAULT_DEPTH) if height > 0.0 else MAX_DEFAULT_DEPTH
+    depth = min(height, MAX_DEFAULT_DEPTH) if height > 0.0 else MAX_DEFAULT_DEPTH
+    return min(depth, texture.depth_limit)
 
 
 def _depth_or(max_depth: float | None, default: float) -> float:
@@ -164,6 +165,11 @@ class Surface(Plottable):
         }
         if law.stateful and "max_deflection" in parameters:  # the derivation requires it
             check_positive("max_deflection", parameters["max_deflection"], "m")
+        texture = state["texture"]
+        texture.check_law(law.contact.name, parameters)
+        if state["max_depth"] > texture.depth_limit:
+            limit = f"must be at most {texture.depth_limit:.9g} m, the depth of the baked field"
+            raise ParameterError("max_depth", limit, state["max_depth"])
         vars(self).update(state, law=law, law_parameters=MappingProxyType(parameters))
 
     def _replace(self, **values: Any) -> Surface:

@@ -74,14 +74,14 @@ def build_program(surface: Surface, driver: Driver) -> LoopProgram:
     Raises:
         ParameterError: for a texture without a function that the law needs.
     """
-    from asperity.analysis.gain.theorems import theorem_of
+    from asperity.analysis.gain.theorems import theorem_on
 
     source = source_on_texture(
         surface.law, surface.texture.sampler, surface.effective_clamp,
         (servo_loop, *loop_parts(), *driver.kernel_modules()),
     )  # fmt: skip
     bounded = surface.effective_clamp.holds_whole_force
-    everywhere = bounded or theorem_of(surface.law).holds_at_any_depth(surface)
+    everywhere = bounded or theorem_on(surface).holds_at_any_depth(surface)
     crest = surface.law.contact.extremes(surface.texture)[1]
     safe_height = -math.inf if everywhere else crest - surface.max_depth
     return LoopProgram(

@@ -45,6 +45,21 @@ _PROFILE_SAMPLES, _SIDE_SAMPLES, _SAMPLES_PER_WAVE = 4096, 512, 24
 _MIN_SAMPLES, _MAX_SAMPLES = 64, 1000
 
 
+@dataclass(frozen=True)
+class CertifiedNumber:
+    """A certified number of a force field that is attained.
+
+    Attributes:
+        lower: attained.
+        upper: proved.
+        at: where ``lower`` is attained [m].
+    """
+
+    lower: float
+    upper: float
+    at: tuple[float, float, float]
+
+
 @dataclass(frozen=True, eq=False)
 class TexturePart:
     """A texture without form and waviness.
@@ -168,6 +183,19 @@ class Texture(Plottable, ABC):
     def single_wave(self) -> SingleWave | None:
         """The only wave of the height, for closed forms; ``None`` for other heights."""
         return None
+
+    @property
+    def baked_numbers(self) -> Mapping[str, CertifiedNumber]:
+        """Certified numbers of a baked field by the name of their measure; none for heights."""
+        return {}
+
+    @property
+    def depth_limit(self) -> float:
+        """Greatest max_depth [m] of a surface with this texture: that of a baked field."""
+        return math.inf
+
+    def check_law(self, contact: str, parameters: Mapping[str, float]) -> None:
+        """Raise a ParameterError for a law that cannot be rendered: a baked field renders H."""
 
     @property
     def is_mirrored(self) -> bool:

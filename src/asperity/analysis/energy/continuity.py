@@ -12,7 +12,7 @@ import numpy as np
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.gain.characteristic import cached_result
 from asperity.analysis.gain.medial_axis import Crest, sharpest_crest
-from asperity.analysis.gain.theorems import theorem_of
+from asperity.analysis.gain.theorems import theorem_on
 from asperity.core.checks import FloatArray
 from asperity.core.files import Serializable
 from asperity.core.units import format_quantity, round_down, round_up
@@ -136,7 +136,7 @@ def _nearest_continuity(surface: Surface, q: Bound) -> Continuity:
 def _jump_onset(surface: Surface, q: Bound) -> tuple[float, bool]:
     """Return the onset of jumps [m], and whether their absence above max_depth is proved."""
     depth = surface.max_depth
-    if theorem_of(surface.law).detects_medial_axis:
+    if theorem_on(surface).detects_medial_axis:
         onset = math.inf
         if math.isinf(q.lower) and q.at is not None:
             distance = np.linalg.norm(surface.texture.nearest([q.at])[0] - np.array(q.at))

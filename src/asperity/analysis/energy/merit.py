@@ -10,7 +10,7 @@ import numpy as np
 from asperity.analysis.bounds.bound import spectral_norm
 from asperity.analysis.bounds.sampling import dense_maximum
 from asperity.analysis.gain.characteristic import at_unit_stiffness, cached_result
-from asperity.analysis.gain.theorems import theorem_of
+from asperity.analysis.gain.theorems import theorem_on
 from asperity.core.checks import FloatArray
 from asperity.surface import Surface
 from asperity.textures.texture import ScanLine, Texture
@@ -113,7 +113,7 @@ def _scan_forces_and_slopes(
 
 def _gain_above_height(surface: Surface, height: float) -> float:
     """Return sup‖J‖/k over the body above a height: by theorem, else sampled."""
-    proved = theorem_of(surface.law).gain_above_height
+    proved = theorem_on(surface).gain_above_height
     if proved is not None:
         return proved(surface, height)
 

@@ -18,7 +18,7 @@ from asperity.analysis.bounds.branch_and_bound import Problem, Supremum
 from asperity.analysis.bounds.problems import ClampProblem, LawProblem
 from asperity.analysis.bounds.sampling import require_depth_contact, sample_supremum
 from asperity.analysis.gain.medial_axis import SearchOptions
-from asperity.analysis.gain.theorems import Reduction, derivative_bound, theorem_of
+from asperity.analysis.gain.theorems import Reduction, derivative_bound, theorem_on
 from asperity.core.checks import FloatArray
 from asperity.surface import Surface
 
@@ -39,7 +39,7 @@ def certify(surface: Surface, measure: JacobianMeasure, options: SearchOptions) 
         ParameterError: for a user-defined law on the split contact.
     """
     require_depth_contact(surface)
-    reduction = theorem_of(surface.law).reductions.get(measure) or Reduction(
+    reduction = theorem_on(surface).reductions.get(measure) or Reduction(
         lambda surface, cells: LawProblem(surface, cells, measure)
     )
     cells = surface.texture.cells(options.extent, options.margin(surface))
@@ -89,7 +89,7 @@ def _direct_bound(problem: Problem, options: SearchOptions) -> Supremum | None:
 
 def _unique_depth(surface: Surface, options: SearchOptions) -> float:
     """Return the depth [m] below which closest points may be ambiguous, infinite if irrelevant."""
-    if surface.law.contact.single_valued or theorem_of(surface.law).holds_beyond_medial_axis:
+    if surface.law.contact.single_valued or theorem_on(surface).holds_beyond_medial_axis:
         return math.inf
     crest = options.crest(surface)
     return math.inf if crest is None else crest.min_radius
@@ -170,7 +170,7 @@ def include_clamp(
 def _is_unaffected_by_clamp(surface: Surface, measure: JacobianMeasure) -> bool:
     """Return whether no clamp acts, or the number is not greater where it acts."""
     clamp = surface.effective_clamp
-    not_raised = theorem_of(surface.law).not_raised_by_clamp.get(clamp, ())
+    not_raised = theorem_on(surface).not_raised_by_clamp.get(clamp, ())
     is_empty = not clamp.holds_whole_force and surface.clamped_depth <= surface.max_depth
     return measure in not_raised or is_empty
 

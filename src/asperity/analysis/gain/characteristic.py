@@ -22,7 +22,7 @@ from asperity.analysis.bounds.branch_and_bound import DEFAULT_WORK_LIMIT
 from asperity.analysis.bounds.sampling import highest_point
 from asperity.analysis.gain.certificate import certify, include_clamp
 from asperity.analysis.gain.medial_axis import SearchOptions
-from asperity.analysis.gain.theorems import THEOREMS, theorem_of
+from asperity.analysis.gain.theorems import THEOREMS, theorem_on
 from asperity.core.cache import get_or_compute
 from asperity.core.checks import check_positive
 from asperity.core.digests import content_digest, is_shipped
@@ -175,7 +175,7 @@ def _cached_bound(surface: Surface, measure: JacobianMeasure, options: SearchOpt
 def _search_bound(surface: Surface, measure: JacobianMeasure, options: SearchOptions) -> Bound:
     bound = _bound_without_search(surface, measure, options)
     if bound is None:
-        proof = theorem_of(surface.law).special_proofs.get(measure)
+        proof = theorem_on(surface).special_proofs.get(measure)
         bound = certify(surface, measure, options) if proof is None else proof(surface, options)
     return include_clamp(surface, measure, options, bound)
 
@@ -184,7 +184,7 @@ def _bound_without_search(
     surface: Surface, measure: JacobianMeasure, options: SearchOptions
 ) -> Bound | None:
     """Return a number above max_depth by theorem or closed form, ``None`` if it needs a search."""
-    theorem, wave = theorem_of(surface.law), surface.texture.single_wave
+    theorem, wave = theorem_on(surface), surface.texture.single_wave
     constant = theorem.constants.get(measure)
     if constant is not None:
         # Just inside the highest point the normal is e_z.

@@ -358,6 +358,27 @@ def theorem_of(law: Law) -> Theorem:
     return THEOREMS.get(law, _NO_THEOREM)
 
 
+def _baked_number(measure: JacobianMeasure) -> Callable[[Surface, SearchOptions], Bound]:
+    def number(surface: Surface, _options: SearchOptions) -> Bound:
+        found = surface.texture.baked_numbers[measure.name]
+        note = "hull of the second differences of the field; attained on one side of a knot"
+        return Bound(found.lower, found.upper, "certified", found.at, note)
+
+    return number
+
+
+_BAKED = Theorem(
+    special_proofs={measure: _baked_number(measure) for measure in (NORM, ONE_SIDED)},
+    gain_above_height=lambda surface, _height: surface.texture.baked_numbers[NORM.name].upper,
+)
+"""A baked field: its numbers are those of its coefficients."""
+
+
+def theorem_on(surface: Surface) -> Theorem:
+    """Return the theorem of the force that is rendered: of its law, or of a baked field."""
+    return _BAKED if surface.texture.baked_numbers else theorem_of(surface.law)
+
+
 def register_theorem(law: Law, theorem: Theorem) -> None:
     """Add the theorem of a user-defined law.
 
@@ -376,6 +397,6 @@ def derivative_bound(surface: Surface, measure: JacobianMeasure) -> float:
 
     q⁺ is at most the norm, |curl| at most twice the norm.
     """
-    bound = theorem_of(surface.law).norm_bound
+    bound = theorem_on(surface).norm_bound
     norm = math.inf if bound is None else bound(surface)
     return 2.0 * norm if measure is CURL else norm

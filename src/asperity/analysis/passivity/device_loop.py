@@ -10,7 +10,7 @@ from fractions import Fraction
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.continuity import continuity
 from asperity.analysis.energy.leak import Leak
-from asperity.analysis.gain.theorems import theorem_of
+from asperity.analysis.gain.theorems import theorem_on
 from asperity.core.checks import check_positive, check_real
 from asperity.core.errors import ParameterError
 from asperity.devices import Device, WallTest
@@ -208,7 +208,7 @@ def _find_obstacle(surface: Surface, q: Bound) -> tuple[Obstacle | None, str]:
     """
     if not surface.facts.conservative:
         return Obstacle.CURL, surface.facts.reason
-    if theorem_of(surface.law).is_infimum:
+    if theorem_on(surface).is_infimum:
         return None, ""
     smooth = continuity(surface, q)
     return (None, "") if smooth.continuous else (Obstacle.JUMPS, smooth.reason)

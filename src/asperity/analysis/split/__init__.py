@@ -1,1 +1,1 @@
-"""Law H beyond its force: its state, and its baked potential field."""
+"""Law H beyond its force: the state of the split god-object, and pop-through of thin plates."""

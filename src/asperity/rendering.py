@@ -1,0 +1,153 @@
+"""How a loop renders a law: a formula, a search within a budget, or a baked potential field."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from asperity.core.arguments import Argument
+from asperity.core.cache import get_or_compute
+from asperity.core.checks import check_positive
+from asperity.core.digests import content_digest
+from asperity.core.errors import ParameterError
+from asperity.kernels.link import unit_from_module
+from asperity.surface import Surface
+from asperity.textures.fields.bake import BakeGoal, bake_texture
+from asperity.textures.fields.field_certificate import Progress
+from asperity.textures.spline.spline_texture import HeightMap
+from asperity.textures.texture import Texture
+
+FIELD, SEARCH = "field", "search"
+RENDERING = Argument(
+    "rendering",
+    "how law H is rendered where it has no closed form: as a baked potential field, or by a search "
+    "within the time of a sample",
+    default=FIELD,
+    form="text",
+    choices=(FIELD, SEARCH),
+)
+
+Extent = Sequence[float]
+_NODES_PER_WAVE = 16
+
+
+def bake(
+    surface: Surface,
+    resolution: float | None = None,
+    *,
+    extent: Extent | None = None,
+    share: float = BakeGoal.share,
+    max_gain: float | None = BakeGoal.max_gain,
+    max_bytes: int = BakeGoal.max_bytes,
+    progress: Progress | None = None,
+) -> Surface:
+    """Bake law H of a surface as a potential field: nothing is searched when it is rendered.
+
+    Args:
+        surface: a surface with law H; the field extends down to min h - max_depth.
+        resolution: greatest distance of the nodes [m]; by default the coarsest one at which the
+            force differs from exact H by the share, within the size.
+        extent: width and depth [m], from the origin, of the part of a texture that never repeats;
+            it is mirrored at its border.
+        share: RMS difference from the exact force, over the RMS of the texture's force.
+        max_gain: certified q over max(1, c) at which smoothing of the nodes stops; ``None`` for
+            no smoothing.
+        max_bytes: greatest size of the coefficients.
+        progress: called with the finished fraction, from 0 to 1.
+
+    Returns:
+        The same surface with a :class:`~asperity.textures.fields.potential_field.PotentialField`
+        as its texture.
+
+    Raises:
+        ParameterError: for another law, a texture that neither repeats nor has a border if no
+            extent is given, or a field larger than ``max_bytes``; the message states what fits.
+
+    Reference:
+        MATH section 10.
+
+    Example:
+        >>> from asperity.textures.kinds.sinusoid import Sinusoid
+        >>> steep = Surface(Sinusoid(amplitude=0.4e-3, period=1e-3), "H", max_depth=0.5e-3)
+        >>> bake(steep, resolution=10e-6, max_gain=1.1).texture.grid.node_counts
+        (100, 133)
+    """
+    if surface.law.contact.name != "split":
+        raise ParameterError("surface", f"must have law H to be baked, not {surface.law}")
+    goal = BakeGoal(
+        check_positive("share", share),
+        math.inf if max_gain is None else check_positive("max_gain", max_gain),
+        int(check_positive("max_bytes", max_bytes, "byte")),
+    )
+    field = bake_texture(
+        surface.texture if extent is None else _finite_part(surface.texture, extent),
+        surface.max_depth,
+        surface.parameter("continuity"),
+        resolution=resolution,
+        goal=goal,
+        progress=progress,
+    )
+    return surface.to_texture(field)
+
+
+def is_searched(surface: Surface) -> bool:
+    """Return whether law H is rendered by a search: the texture has no closed form of it."""
+    if surface.law.contact.name != "split":
+        return False
+    provided = [unit_from_module(module) for module in surface.texture.sampler]
+    return not any(
+        "split_contact" in unit.kernels.provides or "split_contact" in unit.sources
+        for unit in provided
+    )
+
+
+def rendered_surface(
+    surface: Surface,
+    rendering: str = FIELD,
+    extent: Extent | None = None,
+    progress: Progress | None = None,
+) -> Surface:
+    """Return the surface as a loop renders it: law H baked where it would be searched.
+
+    A field is made on first use and kept in the cache.
+
+    Args:
+        surface: the surface.
+        rendering: ``"field"`` or ``"search"``.
+        extent: see :func:`bake`.
+        progress: see :func:`bake`.
+
+    Raises:
+        ParameterError: see :func:`bake`.
+    """
+    if RENDERING.validate(rendering) == SEARCH or not is_searched(surface):
+        return surface
+    texture = surface.texture
+    content = texture.digest and content_digest(
+        texture.digest, surface.max_depth, surface.parameter("continuity"), *(extent or ())
+    )
+    field: Texture = get_or_compute(
+        "field", content, lambda: bake(surface, extent=extent, progress=progress).texture
+    )
+    return surface.to_texture(field)
+
+
+def _finite_part(texture: Texture, extent: Extent) -> Texture:
+    """Return the spline through a texture on a rectangle from the origin, mirrored at its border.
+
+    Raises:
+        ParameterError: for an extent that is not two positive lengths.
+    """
+    if len(extent) != 2:
+        raise ParameterError("extent", "must be (width, depth) [m]", extent)
+    sides = [check_positive("extent", side, "m") for side in extent]
+    slope, hessian = texture.bounds
+    wave = 2.0 * math.pi * slope / hessian if hessian > 0.0 else min(sides)
+    counts = [max(math.ceil(side / wave * _NODES_PER_WAVE), 8) for side in sides]
+    x, y = (np.linspace(0.0, side, count + 1) for side, count in zip(sides, counts, strict=True))
+    points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    heights = texture.height(points).reshape(len(y), len(x))
+    pitch = (sides[0] / counts[0], sides[1] / counts[1])
+    return HeightMap(heights, pitch, preparation=texture.preparation)

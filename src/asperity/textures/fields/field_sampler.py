@@ -1,0 +1,294 @@
+"""Force of a baked potential field: the gradient of a quadratic B-spline on a grid of nodes.
+
+The potential is T(p) = Σ c_n Π β((p - p_n)_i/h_i), β the quadratic B-spline, and the force -k ∇T,
+evaluated as written: it is conservative and continuous whatever the coefficients are, and takes 27
+of them (MATH section 10). Coefficients are stored by columns of nodes along z, each from its first
+to its last coefficient that is not zero; outside of a column they are zero.
+
+Below the floor, halfway between the two lowest levels, the field of a surface continues with its
+value and slope there and the curvature of the flat wall. The field of a closed body ends inside its
+grid.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.core.checks import FloatArray
+from asperity.core.compiled import EVERY_FUNCTION, Kernels
+
+KERNELS = Kernels(provides=EVERY_FUNCTION)
+
+# What the field is beyond its first and last node.
+PERIODIC = 0
+MIRRORED = 1
+ZERO = 2
+
+# Entries of a column: where its node at level 0 would be stored, its first level, the level after
+# its last, and the greatest of these among the column and its eight neighbours.
+OFFSET = 0
+FIRST = 1
+END = 2
+REACH = 3
+
+ThreeWeights = tuple[float, float, float]
+SixEntries = tuple[float, float, float, float, float, float]
+Vector = tuple[float, float, float]
+
+
+class FieldArguments(NamedTuple):
+    """Record of a baked field.
+
+    Attributes:
+        c: coefficients [m²], column after column.
+        columns: OFFSET, FIRST, END and REACH, shape (rows, columns, 4), with one node before the
+            first and two after the last along both axes; one row for a profile.
+        x0: the first node [m].
+        y0: likewise.
+        z0: likewise.
+        m00: nodes per metre along the first axis of the field: x.
+        m01: y.
+        m10: along the second: x.
+        m11: y.
+        iz: nodes per metre along z.
+        levels: number of levels.
+        border: PERIODIC, MIRRORED or ZERO.
+    """
+
+    c: NDArray[np.float32]
+    columns: NDArray[np.int32]
+    x0: float
+    y0: float
+    z0: float
+    m00: float
+    m01: float
+    m10: float
+    m11: float
+    iz: float
+    levels: int
+    border: int
+
+
+def field_fold(u: float, cells: int, border: int) -> tuple[float, float]:
+    """Return the coordinate inside [0, cells] and the sign of its derivative, 0 outside."""
+    if 0.0 <= u <= cells:
+        return u, 1.0
+    if border == PERIODIC:
+        return min(u - cells * math.floor(u / cells), float(cells)), 1.0
+    if border == ZERO:
+        return 0.0, 0.0
+    u -= 2.0 * cells * math.floor(u / (2.0 * cells))
+    if u > cells:
+        return max(2.0 * cells - u, 0.0), -1.0
+    return u, 1.0
+
+
+def field_coordinates(
+    x: float, y: float, field: FieldArguments
+) -> tuple[float, float, float, float]:
+    """Return both coordinates inside the field, in nodes, each with the sign of its derivative."""
+    columns = field.columns
+    x -= field.x0
+    y -= field.y0
+    u, u_sign = field_fold(x * field.m00 + y * field.m01, columns.shape[1] - 3, field.border)
+    if columns.shape[0] == 1:  # a profile has no second axis
+        return u, u_sign, 0.0, 1.0
+    v, v_sign = field_fold(x * field.m10 + y * field.m11, columns.shape[0] - 3, field.border)
+    return u, u_sign, v, v_sign
+
+
+def quadratic_weights(t: float) -> ThreeWeights:
+    """Return the three quadratic B-spline weights at t in [-1/2, 1/2] from the middle node."""
+    return 0.5 * (0.5 - t) * (0.5 - t), 0.75 - t * t, 0.5 * (0.5 + t) * (0.5 + t)
+
+
+def quadratic_weight_slopes(t: float) -> ThreeWeights:
+    """Return the derivatives of the weights by t."""
+    return t - 0.5, -2.0 * t, t + 0.5
+
+
+def field_row_weights(rows: int, v: float) -> tuple[int, ThreeWeights, ThreeWeights]:
+    """Return node, weights and slopes along the second axis, also for the one row of a profile."""
+    if rows == 1:
+        return 0, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    i = int(v + 0.5)
+    return i, quadratic_weights(v - i), quadratic_weight_slopes(v - i)
+
+
+def field_z_weights(w: float) -> tuple[int, float, ThreeWeights, ThreeWeights]:
+    """Return node, negative height above the floor or 0, weights and slopes along z.
+
+    Below the floor the weights are linear.
+    """
+    if w >= 0.5:
+        m = int(w + 0.5)
+        return m, 0.0, quadratic_weights(w - m), quadratic_weight_slopes(w - m)
+    t = w - 0.5
+    return 1, t, (0.5 - t, 0.5 + t, 0.0), (-1.0, 1.0, 0.0)
+
+
+def field_triple(i: int, j: int, m: int, field: FieldArguments) -> Vector:
+    """Return the coefficients of a column at levels m - 1, m and m + 1."""
+    start = field.columns[i, j, OFFSET] + m
+    first = field.columns[i, j, FIRST]
+    end = field.columns[i, j, END]
+    if first < m and m + 1 < end:
+        return float(field.c[start - 1]), float(field.c[start]), float(field.c[start + 1])
+    below = float(field.c[start - 1]) if first <= m - 1 < end else 0.0
+    middle = float(field.c[start]) if first <= m < end else 0.0
+    above = float(field.c[start + 1]) if first <= m + 1 < end else 0.0
+    return below, middle, above
+
+
+def field_gradient(x: float, y: float, z: float, field: FieldArguments) -> Vector:
+    """Return ∇T [m]."""
+    columns = field.columns
+    w = (z - field.z0) * field.iz
+    u, u_sign, v, v_sign = field_coordinates(x, y, field)
+    j = int(u + 0.5)
+    i, v0, v1 = field_row_weights(columns.shape[0], v)
+    rows = min(columns.shape[0], 3)
+    if w >= columns[i + rows // 2, j + 1, REACH] + 0.5 or u_sign * v_sign == 0.0:
+        return 0.0, 0.0, 0.0
+    u0 = quadratic_weights(u - j)
+    u1 = quadratic_weight_slopes(u - j)
+    m, below, w0, w1 = field_z_weights(w)
+    gu = gv = gw = 0.0
+    for a in range(rows):
+        value = along = upward = 0.0
+        for b in range(3):
+            c0, c1, c2 = field_triple(i + a, j + b, m, field)
+            s = w0[0] * c0 + w0[1] * c1 + w0[2] * c2
+            value += u0[b] * s
+            along += u1[b] * s
+            upward += u0[b] * (w1[0] * c0 + w1[1] * c1 + w1[2] * c2)
+        gu += v0[a] * along
+        gv += v1[a] * value
+        gw += v0[a] * upward
+    gu *= u_sign
+    gv *= v_sign
+    if field.border == ZERO:
+        below = 0.0
+    return (
+        field.m00 * gu + field.m10 * gv,
+        field.m01 * gu + field.m11 * gv,
+        field.iz * gw + below / field.iz,
+    )
+
+
+def field_hessian(
+    uu: float, uv: float, uw: float, vv: float, vw: float, ww: float, field: FieldArguments
+) -> SixEntries:
+    """Return xx, xy, xz, yy, yz, zz of a Hessian along the axes of the field, in nodes."""
+    m00 = field.m00
+    m01 = field.m01
+    m10 = field.m10
+    m11 = field.m11
+    iz = field.iz
+    return (
+        m00 * m00 * uu + 2.0 * m00 * m10 * uv + m10 * m10 * vv,
+        m00 * m01 * uu + (m00 * m11 + m01 * m10) * uv + m10 * m11 * vv,
+        iz * (m00 * uw + m10 * vw),
+        m01 * m01 * uu + 2.0 * m01 * m11 * uv + m11 * m11 * vv,
+        iz * (m01 * uw + m11 * vw),
+        iz * iz * ww,
+    )
+
+
+def field_node_expansion(
+    u: float, v: float, w: float, field: FieldArguments
+) -> tuple[float, float, float, float, float, float, float]:
+    """Return T and its second derivatives in nodes: value, uu, uv, uw, vv, vw, ww."""
+    rows = min(field.columns.shape[0], 3)
+    j = int(u + 0.5)
+    u0 = quadratic_weights(u - j)
+    u1 = quadratic_weight_slopes(u - j)
+    i, v0, v1 = field_row_weights(field.columns.shape[0], v)
+    m, below, w0, w1 = field_z_weights(w)
+    second = (1.0, -2.0, 1.0)
+    value = uu = uv = uw = vv = vw = ww = 0.0
+    for a in range(rows):
+        for b in range(3):
+            c0, c1, c2 = field_triple(i + a, j + b, m, field)
+            s0 = w0[0] * c0 + w0[1] * c1 + w0[2] * c2
+            s1 = w1[0] * c0 + w1[1] * c1 + w1[2] * c2
+            value += v0[a] * u0[b] * s0
+            uu += v0[a] * second[b] * s0
+            uv += v1[a] * u1[b] * s0
+            uw += v0[a] * u1[b] * s1
+            vv += second[a] * u0[b] * s0
+            vw += v1[a] * u0[b] * s1
+            ww += v0[a] * u0[b] * (c0 - 2.0 * c1 + c2)
+    return value, uu, uv, uw, vv if rows > 1 else 0.0, vw, ww if below == 0.0 else 0.0
+
+
+def field_expansion(
+    x: float, y: float, z: float, field: FieldArguments
+) -> tuple[float, float, float, float, float, float, float]:
+    """Return T [m²] and its second derivatives xx, xy, xz, yy, yz, zz [1]."""
+    w = (z - field.z0) * field.iz
+    u, u_sign, v, v_sign = field_coordinates(x, y, field)
+    if w >= field.levels - 1.5 or u_sign * v_sign == 0.0:
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    value, uu, uv, uw, vv, vw, ww = field_node_expansion(u, v, w, field)
+    uv *= u_sign * v_sign
+    uw *= u_sign
+    vw *= v_sign
+    drop = 0.0 if field.border == ZERO else min(w - 0.5, 0.0) / field.iz
+    xx, xy, xz, yy, yz, zz = field_hessian(uu, uv, uw, vv, vw, ww, field)
+    zz += 1.0 if drop < 0.0 else 0.0
+    return value + 0.5 * drop * drop, xx, xy, xz, yy, yz, zz
+
+
+# --- the functions of a texture and of the split contact ------------------------------------------
+
+
+def sample_height(x: float, y: float, field: FieldArguments) -> float:
+    """Return z [m] above which the force is zero, at most 2 nodes above the surface."""
+    u, _u_sign, v, _v_sign = field_coordinates(x, y, field)
+    i = min(field.columns.shape[0] // 2, 1) + int(v + 0.5)
+    return float(field.z0 + (field.columns[i, int(u + 0.5) + 1, REACH] + 0.5) / field.iz)
+
+
+def closest_point_within_budget(
+    x: float, y: float, z: float, _start_x: float, _start_y: float, _budget: float,
+    field: FieldArguments,
+) -> tuple[float, float, float, float, float, float, float]:  # fmt: skip
+    """Return the point to which the probe is pulled: X, Y, Z, two slopes of 0, exactly, at once."""
+    gx, gy, gz = field_gradient(x, y, z, field)
+    return x - gx, y - gy, z - gz, 0.0, 0.0, 0.0, 1.0
+
+
+def split_contact(
+    x: float, y: float, z: float, _continuity: float, field: FieldArguments
+) -> Vector:
+    """Return -∇T [m]."""
+    gx, gy, gz = field_gradient(x, y, z, field)
+    return -gx, -gy, -gz
+
+
+def split_contact_warm(
+    x: float, y: float, z: float, _continuity: float, _warm_start: FloatArray,
+    field: FieldArguments,
+) -> Vector:  # fmt: skip
+    """Return -∇T [m]: nothing is searched."""
+    gx, gy, gz = field_gradient(x, y, z, field)
+    return -gx, -gy, -gz
+
+
+def split_energy(
+    x: float, y: float, z: float, _continuity: float, field: FieldArguments
+) -> tuple[float, int, float]:
+    """Return T [m²], 1 for the number of points, and 0 for the duality gap."""
+    return field_expansion(x, y, z, field)[0], 1, 0.0
+
+
+def split_derivative(
+    x: float, y: float, z: float, _continuity: float, field: FieldArguments
+) -> tuple[float, float, float, float, float, float, float, float, float]:
+    """Return -∇T [m] and -Hess T as xx, xy, xz, yy, yz, zz."""
+    gx, gy, gz = field_gradient(x, y, z, field)
+    _value, xx, xy, xz, yy, yz, zz = field_expansion(x, y, z, field)
+    return -gx, -gy, -gz, -xx, -xy, -xz, -yy, -yz, -zz

@@ -1,0 +1,87 @@
+"""The exact potential of law H at the nodes of a field, and its smoothing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from asperity.clamps import NONE
+from asperity.core.checks import FloatArray
+from asperity.laws import LAWS
+from asperity.textures.fields.field_certificate import Progress, run_in_threads
+from asperity.textures.fields.field_grid import FieldGrid, SingleArray
+from asperity.textures.fields.field_sampler import PERIODIC, ZERO
+from asperity.textures.texture import Texture
+
+_NODES_PER_BLOCK = 20_000
+
+PotentialFunction = Callable[[FloatArray], FloatArray]
+"""Returns U [m²], shape (n,), at points (n, 3) [m]; called by several threads at once."""
+
+
+def split_potential(texture: Texture, continuity: float) -> PotentialFunction:
+    """Return the exact potential of law H of a texture, over its stiffness."""
+    from asperity.kernels.fuse import fuse_surface
+
+    loops = fuse_surface(LAWS["H"], texture.sampler, NONE)
+
+    def potential(points: FloatArray) -> FloatArray:
+        out = np.empty((len(points), 3))
+        loops.split_batch(points, out, continuity, texture.arguments)
+        return np.ascontiguousarray(out[:, 0])
+
+    return potential
+
+
+def compute_potentials(
+    potential: PotentialFunction, grid: FieldGrid, progress: Progress | None = None
+) -> SingleArray:
+    """Return U [m²] at the nodes, shape ``grid.node_counts``, in single precision."""
+    *plane, levels = grid.node_counts
+    result = np.zeros((int(np.prod(plane)), levels), np.float32)
+    at_once = max(_NODES_PER_BLOCK // levels, 1)
+    z = grid.height(np.arange(levels))
+
+    def fill(first: int) -> None:
+        part = np.arange(first, min(first + at_once, len(result)))
+        xy = grid.positions(np.stack(np.unravel_index(part, plane), axis=-1))
+        points = np.empty((len(part), levels, 3))
+        points[:, :, :2] = xy[:, None]
+        points[:, :, 2] = z
+        result[part] = potential(points.reshape(-1, 3)).reshape(len(part), levels)
+
+    run_in_threads(fill, range(0, len(result), at_once), progress)
+    return result.reshape(grid.node_counts)
+
+
+def smooth(potentials: SingleArray, grid: FieldGrid) -> SingleArray:
+    """Return means of potentials with weights 1/4, 1/2, 1/4 along each axis.
+
+    A mean of exact potentials over shifted copies keeps the bounds -c <= Hess U <= 1 (MATH
+    section 10). The lowest level is lost, since it has no neighbour.
+
+    Args:
+        potentials: [m²], shape ``grid.node_counts``; changed in place.
+        grid: the nodes.
+    """
+    for axis in range(potentials.ndim - 1):
+        _smooth_axis(np.moveaxis(potentials, axis, 0), grid.border)
+    above = np.zeros_like(potentials[..., :1])
+    for part in np.array_split(np.arange(len(potentials)), max(len(potentials) // 64, 1)):
+        rows = slice(part[0], part[-1] + 1)
+        wide = np.concatenate([potentials[rows], above[rows]], axis=-1)
+        potentials[rows, ..., 1:] = 0.5 * wide[..., 1:-1] + 0.25 * (wide[..., :-2] + wide[..., 2:])
+    return potentials[..., 1:]
+
+
+def _smooth_axis(rows: SingleArray, border: int) -> None:
+    """Smooth along the first axis, in place; borders repeat, are mirrored, or zero."""
+    nothing = np.zeros_like(rows[0])
+    before = {PERIODIC: rows[-1], ZERO: nothing}.get(border, rows[1]).copy()
+    after = {PERIODIC: rows[0], ZERO: nothing}.get(border, rows[-2]).copy()
+    for k in range(len(rows)):
+        here = rows[k].copy()
+        beyond = rows[k + 1] if k + 1 < len(rows) else after
+        rows[k] = 0.5 * here + 0.25 * (before + beyond)
+        before = here

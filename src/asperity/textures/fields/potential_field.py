@@ -1,0 +1,252 @@
+"""A texture whose law H is rendered as a baked potential field."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from types import ModuleType
+from typing import Any, ClassVar
+
+from numpy.typing import ArrayLike
+
+from asperity.core.checks import FloatArray, Points
+from asperity.core.digests import content_digest
+from asperity.core.errors import ParameterError
+from asperity.core.files import to_plain_data
+from asperity.enclosures.cells import Cells
+from asperity.textures.bounds.bounded_cells import LineSegments
+from asperity.textures.domain import Domain, GridValues, ScanLine
+from asperity.textures.fields.field_grid import FieldGrid
+from asperity.textures.fields.field_sampler import FieldArguments
+from asperity.textures.plane_waves import PlaneWaves
+from asperity.textures.texture import CertifiedNumber, ExactHeight, Texture, TexturePart
+
+
+@dataclass(frozen=True)
+class FieldAccuracy:
+    """Difference of a baked field from exact law H, forces over the stiffness.
+
+    Attributes:
+        rms: RMS difference of the forces [m], measured at random probes.
+        largest: the greatest one measured [m].
+        bound: the greatest one possible [m], proved for all z above the floor.
+        potential_bound: greatest difference of the potentials [m²], proved there.
+        texture_rms: RMS of the texture's force [m]: the exact force about its mean at one height.
+        probes: number of probes measured.
+    """
+
+    rms: float
+    largest: float
+    bound: float
+    potential_bound: float
+    texture_rms: float
+    probes: int
+
+    @property
+    def share(self) -> float:
+        """RMS difference over the RMS of the texture's force."""
+        return self.rms / self.texture_rms if self.texture_rms > 0.0 else 0.0
+
+
+class PotentialField(Texture):
+    """A potential field baked from law H of a texture: nothing is searched when it is rendered.
+
+    T(p) = Σ c_n Π β((p - p_n)_i/h_i), β the quadratic B-spline, c_n the exact potential U of law H
+    at nodes p_n, or its mean over neighbouring nodes; the force is -k ∇T. So the force that is
+    rendered is conservative and continuous, and its gain is certified from the coefficients. There
+    is no force farther than 2 nodes outside of the body. Below the floor, the least height minus
+    ``max_depth``, the field continues with its value and slope there and the curvature of the flat
+    wall: still conservative and continuous, but without a bound.
+
+    Heights, slopes and the domain are those of the texture that was baked.
+
+    Attributes:
+        source: the texture that was baked.
+        grid: the nodes.
+        max_depth: depth below the least height down to which the numbers hold [m].
+        continuity: c of law H.
+        passes: number of smoothing passes with weights 1/4, 1/2, 1/4 along each axis.
+        gain: certified sup ‖Hess T‖, the characteristic number q.
+        one_sided: certified sup λ_max(Hess T), the one-sided number q⁺.
+        accuracy: difference from exact law H.
+
+    Reference:
+        MATH section 10.
+    """
+
+    kind: ClassVar[str] = "field"
+
+    def __init__(
+        self,
+        source: Texture,
+        grid: FieldGrid,
+        arguments: FieldArguments,
+        *,
+        max_depth: float,
+        continuity: float,
+        passes: int,
+        gain: CertifiedNumber,
+        one_sided: CertifiedNumber,
+        accuracy: FieldAccuracy,
+    ) -> None:
+        self.source, self.grid, self.max_depth = source, grid, max_depth
+        self.continuity, self.passes = continuity, passes
+        self.gain, self.one_sided, self.accuracy = gain, one_sided, accuracy
+        self.preparation = (*source.preparation, self._sentence(arguments))
+        self.filled_mask, self.history = source.filled_mask, source.history
+        vars(self)["arguments"] = arguments
+
+    def _sentence(self, arguments: FieldArguments) -> str:
+        smoothed = {0: "not smoothed", 1: "smoothed once"}
+        how = smoothed.get(self.passes, f"smoothed {self.passes} times")
+        nodes, spacing = arguments.c.size, max(self.grid.spacing)
+        return (
+            f"baked as a potential field: {nodes} nodes, {spacing * 1e6:.3g} µm apart, {how}; "
+            f"q at most {self.gain.upper:.4g}, {100 * self.accuracy.share:.2g} % RMS from exact H"
+        )
+
+    def __repr__(self) -> str:
+        size, q = self.arguments.c.size, self.gain.upper
+        return f"<PotentialField of {self.source!r}, {size} nodes, q at most {q:.4g}>"
+
+    @property
+    def resolution(self) -> float:
+        """Greatest distance of nodes [m]."""
+        return max(self.grid.spacing)
+
+    @property
+    def bytes(self) -> int:
+        """Size of coefficients and columns in memory."""
+        return int(self.arguments.c.nbytes + self.arguments.columns.nbytes)
+
+    @property
+    def sampler(self) -> tuple[ModuleType, ...]:
+        """See :class:`Texture`."""
+        from asperity.textures.fields import field_sampler
+
+        return (field_sampler,)
+
+    @cached_property
+    def arguments(self) -> FieldArguments:
+        """See :class:`Texture`; set when the field is made."""
+        raise AttributeError("arguments")
+
+    def describe(self) -> dict[str, Any]:
+        """See :class:`Texture`."""
+        numbers = {name: getattr(self, name) for name in ("max_depth", "continuity", "passes")}
+        parts = {name: vars(getattr(self, name)) for name in ("gain", "one_sided", "accuracy")}
+        return {
+            "kind": self.kind,
+            "spacing": list(self.grid.spacing),
+            "nodes": int(self.arguments.c.size),
+            **to_plain_data(numbers | parts),
+            "source": self.source.describe(),
+        }
+
+    # --- the texture that was baked ---------------------------------------------------------------
+
+    @cached_property
+    def extremes(self) -> tuple[float, float]:
+        """See :class:`Texture`."""
+        return self.source.extremes
+
+    @cached_property
+    def bounds(self) -> tuple[float, float]:
+        """See :class:`Texture`."""
+        return self.source.bounds
+
+    @cached_property
+    def domain(self) -> Domain:
+        """See :class:`Texture`."""
+        return self.source.domain
+
+    @property
+    def third_derivative_bound(self) -> float:
+        """See :class:`Texture`."""
+        return self.source.third_derivative_bound
+
+    @property
+    def waves(self) -> PlaneWaves | None:
+        """See :class:`Texture`."""
+        return self.source.waves
+
+    @property
+    def is_mirrored(self) -> bool:
+        """See :class:`Texture`."""
+        return self.source.is_mirrored
+
+    def scan_line(self) -> ScanLine:
+        """See :class:`Texture`."""
+        return self.source.scan_line()
+
+    def exact_height(self) -> ExactHeight:
+        """See :class:`Texture`."""
+        return self.source.exact_height()
+
+    def cells(self, extent: tuple[float, float] | None = None, margin: float = 0.0) -> Cells | None:
+        """See :class:`Texture`."""
+        return self.source.cells(extent, margin)
+
+    def line_segments(self, line: ScanLine, min_count: int) -> LineSegments | None:
+        """See :class:`Texture`."""
+        return self.source.line_segments(line, min_count)
+
+    def sample_counts(self) -> list[int]:
+        """See :class:`Texture`."""
+        return self.source.sample_counts()
+
+    def grid_counts(self) -> list[int]:
+        """See :class:`Texture`."""
+        return self.source.grid_counts()
+
+    def samples(self, dense: bool = False) -> GridValues:
+        """See :class:`Texture`."""
+        return self.source.samples(dense)
+
+    def texture_part(self) -> TexturePart:
+        """See :class:`Texture`."""
+        return self.source.texture_part()
+
+    def nearest(self, points: ArrayLike) -> FloatArray:
+        """See :class:`Texture`."""
+        return self.source.nearest(points)
+
+    def _evaluate(self, loop_name: str, xy: ArrayLike, width: int) -> tuple[Points, FloatArray]:
+        return self.source._evaluate(loop_name, xy, width)
+
+    # --- the force that is rendered ---------------------------------------------------------------
+
+    @property
+    def baked_numbers(self) -> Mapping[str, CertifiedNumber]:
+        """See :class:`Texture`."""
+        return {"norm": self.gain, "one-sided": self.one_sided}
+
+    @property
+    def depth_limit(self) -> float:
+        """See :class:`Texture`."""
+        return self.max_depth
+
+    def check_law(self, contact: str, parameters: Mapping[str, float]) -> None:
+        """See :class:`Texture`.
+
+        Raises:
+            ParameterError: for a law other than H, or another continuity.
+        """
+        if contact != "split":
+            raise ParameterError("law", "must be H on a baked field: no other law was baked")
+        if parameters["continuity"] != self.continuity:
+            words = f"must be {self.continuity:.6g}, as baked"
+            raise ParameterError("continuity", words, parameters["continuity"])
+
+    @cached_property
+    def digest(self) -> str | None:
+        """See :class:`Texture`."""
+        source = self.source.digest
+        return source and content_digest(source, type(self).__qualname__, *self.arguments)
+
+
+def certified_number(upper: float, attained: FloatArray) -> CertifiedNumber:
+    """Return a number of a field from a row of :func:`curvature_bounds`."""
+    value, x, y, z = (float(number) for number in attained)
+    return CertifiedNumber(value, upper, (x, y, z))
