@@ -15,11 +15,11 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
+from asperity.analysis.split.baked_field import bake
 from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from asperity.analysis.split.baked_field import bake
 from asperity.analysis.split.split_state import split_state
 from asperity.core.checks import FloatArray
 from asperity.surface import Surface

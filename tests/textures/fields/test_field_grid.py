@@ -7,10 +7,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from asperity.analysis.split.baked_field import FieldGrid, curvature_bounds
 
 from asperity.analysis.split import baked_field as potential_grid
 from asperity.analysis.split import baked_field as potential_table
-from asperity.analysis.split.baked_field import FieldGrid, curvature_bounds
 from asperity.core.units import round_up
 from asperity.kernels import fuse
 from asperity.surface import Surface

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from asperity.analysis.split.baked_field import BakedField, bake
 
 from asperity.analysis import loop_work
-from asperity.analysis.split.baked_field import BakedField, bake
 from asperity.analysis.split.split_state import split_state
 from asperity.core.errors import ParameterError
 from asperity.surface import Surface
