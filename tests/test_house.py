@@ -318,7 +318,7 @@ def test_other_comparisons_are_ignored(text: str) -> None:
 
 # --- size, annotations, documentation ------------------------------------------------------------
 
-MAX_LINES = 39_500
+MAX_LINES = 41_000
 """Lines of code without docstrings, comments, blank lines and generated files."""
 
 

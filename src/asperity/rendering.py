@@ -74,7 +74,7 @@ def bake(
         >>> bake(steep, resolution=10e-6, max_gain=1.1).texture.grid.node_counts
         (100, 133)
     """
-    if surface.law.contact.name != "split":
+    if not surface.law.contact.has_potential_field:
         raise ParameterError("surface", f"must have law H to be baked, not {surface.law}")
     goal = BakeGoal(
         check_positive("share", share),
@@ -94,7 +94,7 @@ def bake(
 
 def is_searched(surface: Surface) -> bool:
     """Return whether law H is rendered by a search: the texture has no closed form of it."""
-    if surface.law.contact.name != "split":
+    if not surface.law.contact.has_potential_field:
         return False
     provided = [unit_from_module(module) for module in surface.texture.sampler]
     return not any(

@@ -166,7 +166,7 @@ class Surface(Plottable):
         if law.stateful and "max_deflection" in parameters:  # the derivation requires it
             check_positive("max_deflection", parameters["max_deflection"], "m")
         texture = state["texture"]
-        texture.check_law(law.contact.name, parameters)
+        texture.check_law(law.contact, parameters)
         if state["max_depth"] > texture.depth_limit:
             limit = f"must be at most {texture.depth_limit:.9g} m, the depth of the baked field"
             raise ParameterError("max_depth", limit, state["max_depth"])

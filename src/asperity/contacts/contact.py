@@ -88,6 +88,8 @@ class Contact(ABC):
             search; `make bench` measures their time.
         bounds_force_error: whether the error bound of a truncated search bounds the error of the
             force over the stiffness; else it bounds how much nearer another point may be.
+        has_potential_field: whether a law on this contact may be rendered as a baked potential
+            field.
         parameters: names of parameters that every law on this contact must declare.
     """
 
@@ -102,6 +104,7 @@ class Contact(ABC):
     has_warm_start: ClassVar[bool] = False
     max_evaluations: ClassVar[float] = 1.0
     bounds_force_error: ClassVar[bool] = False
+    has_potential_field: ClassVar[bool] = False
     parameters: ClassVar[tuple[str, ...]] = ()
 
     def __str__(self) -> str:

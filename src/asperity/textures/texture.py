@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from asperity.contacts.contact import ExactHeight
+from asperity.contacts.contact import Contact, ExactHeight
 from asperity.core.arguments import Argument
 from asperity.core.checks import FloatArray, Points, check_points
 from asperity.core.digests import content_digest, is_shipped
@@ -194,7 +194,7 @@ class Texture(Plottable, ABC):
         """Greatest max_depth [m] of a surface with this texture: that of a baked field."""
         return math.inf
 
-    def check_law(self, contact: str, parameters: Mapping[str, float]) -> None:
+    def check_law(self, contact: Contact, parameters: Mapping[str, float]) -> None:
         """Raise a ParameterError for a law that cannot be rendered: a baked field renders H."""
 
     @property

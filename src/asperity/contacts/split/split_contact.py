@@ -22,6 +22,7 @@ class SplitContact(NearestContact):
     bounds_force_error = True
     single_valued = True
     is_determined_by_depth = False
+    has_potential_field = True
     parameters = ("continuity",)
 
     def kernels(self) -> tuple[ModuleType, ...]:

@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 
 from numpy.typing import ArrayLike
 
+from asperity.contacts.contact import Contact
 from asperity.core.checks import FloatArray, Points
 from asperity.core.digests import content_digest
 from asperity.core.errors import ParameterError
@@ -227,13 +228,13 @@ class PotentialField(Texture):
         """See :class:`Texture`."""
         return self.max_depth
 
-    def check_law(self, contact: str, parameters: Mapping[str, float]) -> None:
+    def check_law(self, contact: Contact, parameters: Mapping[str, float]) -> None:
         """See :class:`Texture`.
 
         Raises:
             ParameterError: for a law other than H, or another continuity.
         """
-        if contact != "split":
+        if not contact.has_potential_field:
             raise ParameterError("law", "must be H on a baked field: no other law was baked")
         if parameters["continuity"] != self.continuity:
             words = f"must be {self.continuity:.6g}, as baked"
