@@ -15,6 +15,7 @@ from asperity.core.checks import FloatArray
 from asperity.core.digests import content_digest
 from asperity.core.errors import ParameterError, suggest_names
 from asperity.measured.file_arguments import FILE_ARGUMENTS, SYNTHETIC_ARGUMENTS
+from asperity.textures.fields.field_file import is_field, load_field
 from asperity.textures.kinds.fourier import FOURIER
 from asperity.textures.kinds.grating import GRATING
 from asperity.textures.kinds.noise import NOISE, NOISE_PROFILE
@@ -60,8 +61,31 @@ def register(kind: TextureKind) -> TextureKind:
 TextureLike = Texture | str | os.PathLike[str]
 """A texture, or an argument of :func:`as_texture`."""
 
+
+def _load_file(path: str | os.PathLike[str], **values: Any) -> Texture:
+    """Return the texture of a measured file, or a baked field; see :func:`load_texture`.
+
+    Raises:
+        SurfaceFileError: for a file that cannot be read.
+        ParameterError: for an argument that cannot be used; nothing can be done to a baked field.
+    """
+    if not is_field(path):
+        return load_texture(path, **values)
+    for name in values:
+        raise ParameterError(name, f"cannot be applied: {os.fspath(path)} was baked already")
+    return load_field(path, _build_described)
+
+
+def _build_described(description: Mapping[str, Any]) -> Texture:
+    texture = _rebuild_from_description(description)
+    if texture is None:
+        words = f"is of a kind that is not known here: {description.get('kind')}"
+        raise ParameterError("texture", f"{words}; name its file, --plugin FILE")
+    return texture
+
+
 _PATH = Argument("path", "the file, relative to the scene", form="path", required=True)
-_FILE = TextureKind("file", "a measured surface", load_texture, (_PATH, *FILE_ARGUMENTS))
+_FILE = TextureKind("file", "a measured surface", _load_file, (_PATH, *FILE_ARGUMENTS))
 
 KINDS: ChainMap[str, TextureKind] = ChainMap({_FILE.name: _FILE}, CATALOGUE)
 """Texture kinds accepted in [texture]: the catalogue and measured files."""
@@ -100,7 +124,7 @@ def as_texture(
     if is_scene(texture):
         words = "is a scene, which defines more than a texture; use asperity.scene.load_scene"
         raise ParameterError(name, words, os.fspath(texture))
-    return load_texture(texture, **extra)
+    return _load_file(texture, **extra)
 
 
 def is_scene(source: str | os.PathLike[str]) -> bool:

@@ -1,0 +1,270 @@
+"""Files of baked fields: little-endian, versioned, checked, and loaded by memory map.
+
+A file is a header of 256 bytes (:data:`HEADER`), the table of columns, the coefficients, the
+heights of a texture that is a spline, and a description as JSON. A C program needs the header, the
+columns and the coefficients; the description holds the certified numbers and the source.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import zlib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.core.checks import FloatArray
+from asperity.core.errors import ParameterError, SurfaceFileError
+from asperity.core.files import json_text, open_atomic, open_input
+from asperity.textures.fields.field_grid import FieldGrid
+from asperity.textures.fields.field_sampler import MIRRORED, PERIODIC, ZERO, FieldArguments
+from asperity.textures.fields.potential_field import FieldAccuracy, PotentialField
+from asperity.textures.spline.spline_texture import Spline, fit_spline
+from asperity.textures.texture import CertifiedNumber, Texture
+
+MAGIC = b"ASPFIELD"
+VERSION = 1
+_BYTE_ORDER = 0x01020304
+_ALIGNMENT = 4096
+_SCALARS = ("x0", "y0", "z0", "m00", "m01", "m10", "m11", "iz")
+
+HEADER = np.dtype(
+    [
+        ("magic", "S8"),
+        ("version", "<u4"),
+        ("byte_order", "<u4"),  # 0x01020304
+        ("file_bytes", "<u8"),
+        ("rows", "<u4"),
+        ("columns", "<u4"),
+        ("columns_offset", "<u8"),  # int32 (rows, columns, 4)
+        ("count", "<u8"),
+        ("values_offset", "<u8"),  # float32 (count,)
+        ("heights_offset", "<u8"),  # float64, to the description
+        ("json_offset", "<u8"),  # UTF-8, to the end of the file
+        *((name, "<f8") for name in _SCALARS),
+        ("levels", "<i4"),
+        ("border", "<i4"),
+        ("q", "<f8"),  # certified characteristic number
+        ("floor", "<f8"),  # z down to which it holds [m]
+        ("reserved", "V88"),
+        ("checksum", "<u4"),  # CRC-32 of all that follows the header
+        ("header_checksum", "<u4"),  # CRC-32 of the header before this entry
+    ]
+)
+"""The header of a file."""
+
+BuildTexture = Callable[[Mapping[str, Any]], Texture]
+"""Builds the texture of a description; see :meth:`Texture.describe`."""
+
+
+def save_field(path: str | os.PathLike[str], field: PotentialField) -> None:
+    """Save a baked field; the file is written atomically.
+
+    Args:
+        path: the file to write; an existing one is replaced.
+        field: the field.
+
+    Raises:
+        ParameterError: if it cannot be written.
+    """
+    header, sections = _encode(field)
+    try:
+        with open_atomic(path, durable=True) as stream:
+            stream.write(header.tobytes())
+            for offset, section in sections:
+                stream.seek(offset)
+                stream.write(section)
+    except OSError as error:
+        reason = f"cannot be written: {error.strerror or error}"
+        raise ParameterError("output", reason, os.fspath(path)) from None
+
+
+def _encode(field: PotentialField) -> tuple[NDArray[Any], list[tuple[int, bytes]]]:
+    record, source = field.arguments, field.source
+    heights = source.heights if isinstance(source, Spline) else np.empty(0)
+    description = json_text(_description(field)).encode()
+    parts = [
+        np.ascontiguousarray(record.columns, "<i4").tobytes(),
+        np.ascontiguousarray(record.c, "<f4").tobytes(),
+        np.ascontiguousarray(heights, "<f8").tobytes(),
+        description,
+    ]
+    offsets, end = [], HEADER.itemsize
+    for part in parts:
+        offsets.append(-(-end // _ALIGNMENT) * _ALIGNMENT)
+        end = offsets[-1] + len(part)
+    header = np.zeros((), HEADER)
+    header["magic"], header["version"], header["byte_order"] = MAGIC, VERSION, _BYTE_ORDER
+    header["file_bytes"], header["count"] = end, record.c.size
+    header["rows"], header["columns"] = record.columns.shape[:2]
+    names = ("columns_offset", "values_offset", "heights_offset", "json_offset")
+    for name, offset in zip(names, offsets, strict=True):
+        header[name] = offset
+    for name in (*_SCALARS, "levels", "border"):
+        header[name] = getattr(record, name)
+    header["q"], header["floor"] = field.gain.upper, field.grid.floor
+    sections = list(zip(offsets, parts, strict=True))
+    header["checksum"] = _checksum(sections, HEADER.itemsize)
+    header["header_checksum"] = zlib.crc32(header.tobytes()[:-4])
+    return header, sections
+
+
+def _checksum(sections: list[tuple[int, bytes]], start: int) -> int:
+    """Return the CRC-32 of the file after its header; between sections it is zero."""
+    value = 0
+    for offset, section in sections:
+        value = zlib.crc32(section, zlib.crc32(bytes(offset - start), value))
+        start = offset + len(section)
+    return value
+
+
+def _description(field: PotentialField) -> dict[str, Any]:
+    source, grid = field.source, field.grid
+    spline = {}
+    if isinstance(source, Spline):
+        spline = {
+            "shape": list(source.heights.shape),
+            "pitch": np.ravel(source.pitch).tolist(),
+            "origin": np.ravel(source.origin).tolist(),
+            "periodic": source.periodic,
+        }
+    return {
+        **field.describe(),
+        "preparation": list(source.preparation),
+        "spline": spline,
+        "grid": {
+            "steps": grid.steps.tolist(),
+            "cells": list(grid.cells),
+            "start": grid.start.tolist(),
+            "level_spacing": grid.level_spacing,
+            "floor": grid.floor,
+        },
+    }
+
+
+def is_field(path: str | os.PathLike[str]) -> bool:
+    """Return whether a file is a baked field, by its content."""
+    try:
+        with open_input(path, 2**40) as stream:
+            return stream.read(len(MAGIC)) == MAGIC
+    except OSError:  # which the reader of surfaces reports
+        return False
+
+
+def load_field(path: str | os.PathLike[str], build_texture: BuildTexture) -> PotentialField:
+    """Load a baked field by memory map.
+
+    Args:
+        path: the file.
+        build_texture: builds the texture that was baked, unless it is a spline.
+
+    Raises:
+        SurfaceFileError: the file is damaged, cut, or of another version.
+    """
+    name = Path(path).name
+    try:
+        with open_input(path, 2**40) as stream:
+            data = np.memmap(stream, np.uint8, "c")
+        return _decode(data, build_texture)
+    except SurfaceFileError as error:
+        raise SurfaceFileError(f"{name}: {error}") from None
+    except (OSError, MemoryError) as error:
+        raise SurfaceFileError(f"{name}: cannot be read ({error})") from None
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
+        raise SurfaceFileError(f"{name}: damaged field ({error})") from None
+
+
+def _decode(data: NDArray[np.uint8], build_texture: BuildTexture) -> PotentialField:
+    header = _read_header(data)
+    rows, width, count = (int(header[name]) for name in ("rows", "columns", "count"))
+    columns = _section(data, header["columns_offset"], rows * width * 4, "<i4")
+    values = _section(data, header["values_offset"], count, "<f4")
+    text = bytes(data[int(header["json_offset"]) :])
+    scalars = [float(header[name]) for name in _SCALARS]
+    levels, border = int(header["levels"]), int(header["border"])
+    record = FieldArguments(values, columns.reshape(rows, width, 4), *scalars, levels, border)
+    described = json.loads(text)
+    numbers = described["grid"]
+    grid = FieldGrid(
+        steps=np.array(numbers["steps"]), cells=tuple(numbers["cells"]),
+        start=np.array(numbers["start"]), levels=levels,
+        level_spacing=numbers["level_spacing"], floor=numbers["floor"], border=border,
+    )  # fmt: skip
+    _check_record(record, grid)
+    source = _source(data, header, described, build_texture)
+    gain, one_sided = (
+        CertifiedNumber(**(described[name] | {"at": tuple(described[name]["at"])}))
+        for name in ("gain", "one_sided")
+    )
+    names = ("max_depth", "continuity", "passes")
+    return PotentialField(
+        source, grid, record, gain=gain, one_sided=one_sided,
+        accuracy=FieldAccuracy(**described["accuracy"]),
+        **{name: described[name] for name in names},
+    )  # fmt: skip
+
+
+def _read_header(data: NDArray[np.uint8]) -> Any:
+    """Return the header.
+
+    Raises:
+        SurfaceFileError: the file is damaged, cut, or of another version.
+    """
+    if len(data) < HEADER.itemsize:
+        raise SurfaceFileError("is cut: it has no whole header")
+    header = data[: HEADER.itemsize].view(HEADER)[0]
+    if header["byte_order"] != _BYTE_ORDER:
+        raise SurfaceFileError("has another byte order, or is damaged")
+    if header["version"] != VERSION:
+        raise SurfaceFileError(f"has version {header['version']}; version {VERSION} is read")
+    if header["header_checksum"] != zlib.crc32(data[: HEADER.itemsize - 4].data):
+        raise SurfaceFileError("has a damaged header")
+    if header["file_bytes"] != len(data):
+        raise SurfaceFileError(f"is cut: {len(data)} of {header['file_bytes']} bytes")
+    if header["checksum"] != zlib.crc32(data[HEADER.itemsize :].data):
+        raise SurfaceFileError("is damaged: its checksum is wrong")
+    return header
+
+
+def _check_record(record: FieldArguments, grid: FieldGrid) -> None:
+    """Refuse a table that points outside of the coefficients: the force kernels do not check.
+
+    Raises:
+        SurfaceFileError: the table is damaged.
+    """
+    offset, first, end, reach = np.moveaxis(record.columns.astype(np.int64), -1, 0)
+    rows = 1 if len(grid.cells) == 1 else grid.cells[1] + 3
+    fits = record.columns.shape == (rows, grid.cells[0] + 3, 4) and record.levels >= 3
+    fits = fits and record.border in (PERIODIC, MIRRORED, ZERO)
+    ordered = (first >= 0) & (first <= end) & (end <= reach) & (reach <= record.levels)
+    stored = (first == end) | ((offset + first >= 0) & (offset + end <= record.c.size))
+    numbers = np.array([getattr(record, name) for name in _SCALARS])
+    if not (fits and ordered.all() and stored.all()):
+        raise SurfaceFileError("has a damaged table of columns")
+    if not (np.isfinite(numbers).all() and record.iz > 0.0 and np.isfinite(record.c).all()):
+        raise SurfaceFileError("has numbers that are not finite")
+
+
+def _section(data: NDArray[np.uint8], offset: Any, count: int, dtype: str) -> NDArray[Any]:
+    """Return an array of a file; writing to it would change a copy only."""
+    values = data[int(offset) : int(offset) + count * np.dtype(dtype).itemsize]
+    return values.view(np.ndarray).view(dtype)
+
+
+def _source(
+    data: NDArray[np.uint8], header: Any, described: Mapping[str, Any], build: BuildTexture
+) -> Texture:
+    spline = described["spline"]
+    if not spline:
+        return build(described["source"])
+    count = int(np.prod(spline["shape"]))
+    heights: FloatArray = _section(data, header["heights_offset"], count, "<f8")
+    origin = spline["origin"] if len(spline["shape"]) == 2 else spline["origin"][0]
+    return fit_spline(
+        heights.reshape(spline["shape"]), spline["pitch"], periodic=spline["periodic"],
+        origin=origin, preparation=described["preparation"],
+    )  # fmt: skip
