@@ -40,7 +40,8 @@ def main() -> None:
     for row in result.rows:
         print(
             f"{row.law.letter}: q = {row.q.value:.3f} ({row.q.method}), "
-            f"up to {row.safe_stiffness:.0f} N/m, conservative: {row.conservative}; {row.verdict}"
+            f"up to {row.stability_limit.stiffness:.0f} N/m, "
+            f"conservative: {row.conservative}; {row.verdict}"
         )
 
 

@@ -26,13 +26,13 @@ def test_rows_are_one_per_law_in_order(result: asp.Comparison) -> None:
     assert "".join(row.law.letter for row in result.rows) == "WABCDEFGH"
 
 
-def test_safe_stiffness_without_known_delay_is_k0_over_q(result: asp.Comparison) -> None:
+def test_stability_limit_without_known_delay_is_k0_over_q(result: asp.Comparison) -> None:
     """Every law has K₀/q, since q⁺ does not limit a loop with delay; D at large depth has zero."""
     for row in result.rows:
-        assert row.safe_stiffness == pytest.approx(5000.0 / row.q.value, rel=1e-15)
+        assert row.stability_limit.stiffness == pytest.approx(5000.0 / row.q.value, rel=1e-15)
         basis = "plausible" if row.conservative else "quiet against buzz"
-        assert row.stability_limit.basis == (basis if row.safe_stiffness else "none")
-    assert result.row("D").safe_stiffness == 0.0
+        assert row.stability_limit.basis == (basis if row.stability_limit.stiffness else "none")
+    assert result.row("D").stability_limit.stiffness == 0.0
 
 
 def test_conservative_and_discontinuous_laws_match_table_ii_of_the_paper(
@@ -57,7 +57,7 @@ def test_leak_scales_with_the_stiffness(result: asp.Comparison) -> None:
     doubled = asp.compare(PAPER, laws="A", stiffness=2.0 * row.recommended_stiffness)
     assert doubled.row("A").leak.energy == pytest.approx(2 * row.leak.energy, rel=1e-12)
     assert doubled.row("A").recommended_leak == pytest.approx(row.recommended_leak, rel=1e-12)
-    assert doubled.row("A").safe_stiffness == result.row("A").safe_stiffness
+    assert doubled.row("A").stability_limit.stiffness == result.row("A").stability_limit.stiffness
 
 
 def test_verdicts_describe_the_artefacts(result: asp.Comparison) -> None:
@@ -115,7 +115,7 @@ def test_assumptions_state_every_default(result: asp.Comparison) -> None:
 def test_to_dict_is_json_without_nan(result: asp.Comparison) -> None:
     text = json.dumps(result.to_dict(), allow_nan=False)
     data = json.loads(text)
-    assert data["schema"] == 2
+    assert data["schema"] == 3
     god_object = data["laws"][4]
     assert god_object["law"] == "D"
     assert god_object["q"]["value"] == "inf"

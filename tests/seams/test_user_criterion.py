@@ -82,7 +82,7 @@ def test_it_does_not_change_the_verdict(monkeypatch: pytest.MonkeyPatch) -> None
     after = asp.analyze(SURFACE, device).passivity
     assert after.criteria[:-1] == before.criteria
     assert after.criteria[-1].name == "liar"
-    for name in ("verdict", "decided_by", "reason", "safe_stiffness"):
+    for name in ("verdict", "decided_by", "reason", "stability_limit"):
         assert getattr(after, name) == getattr(before, name)
 
 

@@ -69,7 +69,7 @@ def test_every_command_accepts_the_device_file(
         (row,) = data["laws"]
         # k (q⁺/2 + d q) <= σ₀/T admits less than the wall; quantisation prevents a proof.
         share = 0.5 * row["one_sided"]["value"] + row["q"]["value"]
-        assert row["safe_stiffness"] == pytest.approx(0.6 * 4000.0 / share)
+        assert row["stability_limit"]["stiffness"] == pytest.approx(0.6 * 4000.0 / share)
         limit = row["stability_limit"]
         assert (limit["basis"], limit["proved_stiffness"]) == ("plausible", 0.0)
 
@@ -99,11 +99,14 @@ def test_device_can_be_defined_in_a_scene(read_json: Answer, tmp_path: Path) -> 
     (tmp_path / "loop.toml").write_text(f"{LOOP}[device]\n{section}", encoding="utf-8")
     data = read_json("compare", str(tmp_path / "loop.toml"), "--laws", "C")
     assert data["device"]["name"] == "bench-rig"
-    assert data["laws"][0]["safe_stiffness"] < 1800.0 / data["laws"][0]["one_sided"]["lower"] * 1.01
+    assert (
+        data["laws"][0]["stability_limit"]["stiffness"]
+        < 1800.0 / data["laws"][0]["one_sided"]["lower"] * 1.01
+    )
 
 
 def test_compare_accepts_the_device_file(device_path: str) -> None:
     texture = asp.Sinusoid(amplitude=0.1e-3, period=2e-3)
     row = asp.compare(texture, device_path, laws="W").row("W")
-    assert row.safe_stiffness == pytest.approx(0.6 * 4000.0 / 1.5, rel=1e-15)
+    assert row.stability_limit.stiffness == pytest.approx(0.6 * 4000.0 / 1.5, rel=1e-15)
     assert asp.load_device(device_path).value("force_resolution") == 8e-3

@@ -17,8 +17,9 @@ from asperity.analysis.compare import DEFAULT_DEVICE, recommended_law
 from asperity.analysis.energy.continuity import Continuity, continuity
 from asperity.analysis.energy.leak import Leak, worst_loop
 from asperity.analysis.energy.merit import Merit, merit
-from asperity.analysis.gain.characteristic import cached_number, curl_number
+from asperity.analysis.gain.characteristic import cached_number, curl_number, make_options
 from asperity.analysis.passivity.assess_passivity import (
+    Passivity,
     buzz_text,
     energy_gained_text,
     passivity,
@@ -26,11 +27,7 @@ from asperity.analysis.passivity.assess_passivity import (
     stiffness_limit_text,
 )
 from asperity.analysis.passivity.criteria import LEAK
-from asperity.analysis.passivity.verdict import (
-    Passivity,
-    at_recommended_stiffness,
-    recommend_stiffness,
-)
+from asperity.analysis.passivity.verdict import at_recommended_stiffness, recommend_stiffness
 from asperity.analysis.surface_sentences import (
     SCOPE_SENTENCE,
     default_depth_text,
@@ -51,7 +48,7 @@ from asperity.textures.texture import Texture
 STEPS = ("q", "q⁺", "curl", "worst loop", "continuity", "strength and support", "passivity")
 
 Progress = Callable[[str], None]
-SCHEMA = 2
+SCHEMA = 3
 
 
 @dataclass(frozen=True)
@@ -238,14 +235,14 @@ def analyze(
     device = load_device(device)
     surface = _resolve_surface(surface, device, surface_arguments)
     _check_depth(surface)
-    search: dict[str, Any] = {"tolerance": tolerance, "work_limit": work_limit, "extent": extent}
+    search = make_options(surface, tolerance, work_limit, extent)
     report_step: Progress = progress or (lambda _step: None)
     report_step(STEPS[0])
-    q = cached_number(surface, NORM, **search)
+    q = cached_number(surface, NORM, search)
     report_step(STEPS[1])
-    one_sided = cached_number(surface, ONE_SIDED, **search)
+    one_sided = cached_number(surface, ONE_SIDED, search)
     report_step(STEPS[2])
-    curl = None if surface.law.stateful else curl_number(surface, **search)
+    curl = None if surface.law.stateful else curl_number(surface, tolerance, work_limit, extent)
     report_step(STEPS[3])
     leak = worst_loop(surface, direction)
     report_step(STEPS[4])

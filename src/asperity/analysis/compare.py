@@ -32,7 +32,7 @@ from asperity.surface import Surface
 from asperity.textures.catalogue import TextureLike, as_texture
 from asperity.textures.texture import Texture, TexturePart
 
-SCHEMA = 2
+SCHEMA = 3
 DEFAULT_DEVICE = "omega.3"
 ALL_LAWS = "".join(LAWS)
 
@@ -139,7 +139,7 @@ def compare(
 
     Example:
         >>> result = compare("sinusoid:amplitude=0.8mm,period=1mm", laws="WA")
-        >>> [f"{row.law.letter} {row.safe_stiffness:.0f} N/m" for row in result.rows]
+        >>> [f"{row.law.letter} {row.stability_limit.stiffness:.0f} N/m" for row in result.rows]
         ['W 5000 N/m', 'A 976 N/m']
     """
     laws = find_laws(list(laws) if not isinstance(laws, str) else laws)

@@ -162,7 +162,8 @@ def _no_recommendation_text(recommended: Recommendation, device: Device) -> str:
 
 def _limit_basis_text(row: LawRow, device: Device) -> str:
     """Return the basis of the recommended stiffness, in a sentence."""
-    limit, at_most = row.stability_limit, stiffness_limit_text(row.safe_stiffness)
+    limit = row.stability_limit
+    at_most = stiffness_limit_text(limit.stiffness or 0.0)
     passivity = row.passivity
     if limit.basis == "proved":
         delay = device.value("delay_samples") or 0.0

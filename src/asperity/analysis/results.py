@@ -10,11 +10,12 @@ from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.leak import Leak
 from asperity.analysis.limits.perceptibility import Perceptibility, Tier, texture_amount_text
 from asperity.analysis.passivity.assess_passivity import (
+    Passivity,
     buzz_text,
     stability_limit_text,
     stiffness_limit_text,
 )
-from asperity.analysis.passivity.verdict import Margin, Passivity, StabilityLimit
+from asperity.analysis.passivity.verdict import Margin, StabilityLimit
 from asperity.analysis.surface_sentences import leak_energy_text
 from asperity.core.files import attributes_to_dict, to_plain_data
 from asperity.laws import Law
@@ -80,11 +81,6 @@ class LawRow:
         return self.passivity.stability_limit
 
     @property
-    def safe_stiffness(self) -> float:
-        """Stiffness of ``stability_limit`` [N/m], 0 where none is known."""
-        return self.stability_limit.stiffness or 0.0
-
-    @property
     def texture_force(self) -> float:
         """RMS of the oscillating force at ``recommended_stiffness`` [N]."""
         return self.ripple * self.recommended_stiffness
@@ -102,7 +98,7 @@ class LawRow:
     @property
     def may_buzz(self) -> bool:
         """Whether the law may buzz: the stiffness of ``surface`` is above the stability limit."""
-        return self.safe_stiffness < self.surface.stiffness
+        return (self.stability_limit.stiffness or 0.0) < self.surface.stiffness
 
     @property
     def is_textureless(self) -> bool:
@@ -147,7 +143,7 @@ class LawRow:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""
-        before = "q one_sided safe_stiffness stability_limit margin recommended_stiffness"
+        before = "q one_sided stability_limit margin recommended_stiffness"
         after = (
             "conservative conservative_reason leak continuous continuous_reason strength support "
             "contact_lost texture_force verdict"

@@ -9,8 +9,7 @@ import numpy as np
 
 from asperity.analysis.analyze import Analysis
 from asperity.analysis.bounds.bound import Bound
-from asperity.analysis.passivity.assess_passivity import stability_limit_text
-from asperity.analysis.passivity.verdict import Passivity
+from asperity.analysis.passivity.assess_passivity import Passivity, stability_limit_text
 from asperity.clamps import NONE
 from asperity.core.units import format_quantity
 from asperity.laws import LAWS, SHIPPED_LAW_ARGUMENTS

@@ -75,10 +75,11 @@ _OMITTED_NAMES = {"kind", "preparation", "phase", "direction", "phases", "waveve
 
 def row_limit_text(row: LawRow) -> str:
     """Return the stability limit of the stiffness on the device: "995 N/m", or "none"."""
-    if row.safe_stiffness <= 0.0:
+    limit = row.stability_limit
+    if not limit.stiffness:
         return "none"
-    mark = SAMPLED_MARK if row.stability_limit.sampled else ""
-    return f"{mark}{format_quantity(round_down(row.safe_stiffness), 'N/m')}"
+    mark = SAMPLED_MARK if limit.sampled else ""
+    return f"{mark}{format_quantity(round_down(limit.stiffness), 'N/m')}"
 
 
 def has_sampled(comparison: Comparison) -> bool:

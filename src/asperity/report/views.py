@@ -11,7 +11,7 @@ from asperity.analysis.analyze import Analysis
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.compare import Comparison, DeviceComparisons
 from asperity.analysis.limits.limit_result import Limits
-from asperity.analysis.passivity.verdict import Passivity
+from asperity.analysis.passivity.assess_passivity import Passivity
 from asperity.core.files import json_text, text_digest
 from asperity.core.units import format_quantity
 from asperity.devices import Device

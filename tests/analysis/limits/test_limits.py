@@ -148,7 +148,7 @@ def test_device_without_data_decides_no_limit() -> None:
     result = default_limits(device=parse_device({}, "none"))
     assert verdicts(result) == dict.fromkeys(range(1, 7))
     assert result.answer.startswith("No limit can be decided.")
-    assert result.safe_stiffness is None
+    assert result.stability_limit.stiffness is None
     assert result.perceptibility.missing_data == (
         "force_resolution", "friction", "bandwidth", "update_rate", "position_resolution",
     )  # fmt: skip
@@ -240,7 +240,7 @@ def test_verdicts_do_not_depend_on_the_unit_of_length(
 def test_default_stiffness_is_the_recommended_stiffness() -> None:
     result = default_limits(stiffness=None)
     q = math.hypot(1.0, 2 * math.pi * A / L)
-    assert result.safe_stiffness == pytest.approx(900.0 / q, rel=1e-12)
+    assert result.stability_limit.stiffness == pytest.approx(900.0 / q, rel=1e-12)
     assert result.margin.law == "A"
     assert result.surface.stiffness == pytest.approx(900.0 / q * result.margin.factor, rel=1e-2)
     assert result.surface.stiffness <= 900.0 / q * result.margin.factor
@@ -255,7 +255,7 @@ def test_conservative_law_with_known_delay_has_a_gain_below_q() -> None:
         deep, law="D", stiffness=None, max_depth=1e-3, device=device(delay_samples=0)
     )
     assert (result.gain_symbol, result.gain.value) == ("q⁺", 1.0)
-    assert result.safe_stiffness == 900.0
+    assert result.stability_limit.stiffness == 900.0
     assert result.limit(5).inequality == "q⁺ k ≤ K₀"
     assert result.limit(5).holds
     steep = Sinusoid(1e-4, 1e-3, phase=0.3)
@@ -266,7 +266,7 @@ def test_conservative_law_with_known_delay_has_a_gain_below_q() -> None:
     plus = one_sided_number(result.surface).upper
     assert result.gain_symbol == "(q⁺/2 + d q)/(1/2 + d)"
     assert result.gain.value == pytest.approx((plus / 2 + 2 * q) / 2.5, rel=1e-12)
-    assert result.safe_stiffness == pytest.approx(900.0 / result.gain.value, rel=1e-12)
+    assert result.stability_limit.stiffness == pytest.approx(900.0 / result.gain.value, rel=1e-12)
 
 
 @pytest.mark.parametrize("law", ["A", "C", "G", "H"])
@@ -276,7 +276,9 @@ def test_limits_agree_with_compare(law: str, delay: int | None) -> None:
     row = compare(texture, rig, law, max_depth=1e-3).rows[0]
     result = limits(texture, rig, law=law, max_depth=1e-3)
     assert result.stability_limit == row.stability_limit
-    assert result.safe_stiffness == pytest.approx(row.safe_stiffness, rel=1e-12)
+    assert result.stability_limit.stiffness == pytest.approx(
+        row.stability_limit.stiffness, rel=1e-12
+    )
     assert result.perceptibility == row.perceptibility
     assert result.perceptibility.rms == pytest.approx(row.texture_force, rel=1e-9)
 
@@ -287,9 +289,9 @@ def test_without_max_stiffness_the_default_stiffness_is_used() -> None:
     assert any("a default: no stable stiffness is known" in words for words in result.assumptions)
 
 
-def test_infinite_q_gives_no_safe_stiffness() -> None:
+def test_infinite_q_gives_no_stable_stiffness() -> None:
     result = default_limits(Sinusoid(4e-4, 1e-3), law="D", stiffness=None, max_depth=1e-3)
-    assert (result.safe_stiffness, result.surface.stiffness) == (0.0, 900.0)  # at K₀
+    assert (result.stability_limit.stiffness, result.surface.stiffness) == (0.0, 900.0)  # at K₀
     assert not result.limit(5).holds
     assert result.to_dict()["limits"][4]["left"] == "inf"
     assert any("no stable stiffness is known" in words for words in result.assumptions)

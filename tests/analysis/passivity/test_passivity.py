@@ -17,10 +17,9 @@ from asperity.analysis import characteristic_number, loop_work, one_sided_number
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.leak import Leak, worst_loop
 from asperity.analysis.passivity import criteria
-from asperity.analysis.passivity.assess_passivity import passivity
+from asperity.analysis.passivity.assess_passivity import Passivity, passivity
 from asperity.analysis.passivity.criteria import Criterion
 from asperity.analysis.passivity.device_loop import make_device_loop
-from asperity.analysis.passivity.verdict import Passivity
 from asperity.core.errors import ParameterError
 from asperity.derive.facts import law_facts
 from asperity.devices import Datum, Device, parse_device
@@ -93,12 +92,12 @@ def test_virtual_damping_without_delay_is_the_colgate_schenkel_condition() -> No
         rig = {**RIG, "delay_samples": 0, "virtual_damping": sign * 0.5}
         result = assess(Surface(WAVE, "W", 500.0), rig)
         assert result.decided_by == "virtual damping"
-        assert result.safe_stiffness == pytest.approx((SIGMA - 0.5) * 2 / T, rel=1e-15)
+        assert result.stability_limit.stiffness == pytest.approx((SIGMA - 0.5) * 2 / T, rel=1e-15)
 
 
 def test_virtual_damping_above_the_physical_damping_gives_zero_stiffness() -> None:
     result = assess(Surface(WAVE, "H"), {**RIG, "delay_samples": 0, "virtual_damping": 3.0})
-    assert (result.verdict, result.safe_stiffness) == ("not passive", 0.0)
+    assert (result.verdict, result.stability_limit.stiffness) == ("not passive", 0.0)
 
 
 @settings(max_examples=200, deadline=None)
@@ -142,7 +141,7 @@ def test_verdict_is_undecided_between_the_bounds_of_a_number() -> None:
         assert result.criterion("one-sided").holds is holds
         verdict = {True: "passive", None: "undecided", False: "not passive"}[holds]
         assert result.verdict == verdict
-        assert result.safe_stiffness == 4000.0
+        assert result.stability_limit.stiffness == 4000.0
 
 
 def test_sampled_number_proves_nothing_but_can_refute() -> None:
@@ -151,7 +150,7 @@ def test_sampled_number_proves_nothing_but_can_refute() -> None:
     small, great = (
         assess(Surface(WAVE, "C", k), rig, q=sampled, plus=sampled) for k in (10.0, 9e3)
     )
-    assert (small.verdict, small.safe_stiffness) == ("undecided", 8000.0)
+    assert (small.verdict, small.stability_limit.stiffness) == ("undecided", 8000.0)
     assert small.stability_limit.sampled
     assert small.criterion("one-sided").limit is None
     assert "only sampled" in small.reason
@@ -176,7 +175,7 @@ def test_missing_data_are_listed_for_each_criterion() -> None:
         assert criterion.missing == missing
         assert (criterion.holds, criterion.limit, criterion.margin) == (None, None, None)
         assert criterion.conclusion == f"not decidable: needs {', '.join(missing)}"
-    assert (result.verdict, result.safe_stiffness, result.greatest_delay) == (
+    assert (result.verdict, result.stability_limit.stiffness, result.greatest_delay) == (
         "undecided",
         None,
         None,
@@ -290,7 +289,7 @@ def test_leaking_law_is_never_passive(letter: str) -> None:
         "quiet against buzz",
         None,
     )
-    assert result.safe_stiffness == result.criterion("smooth-wall rule").limit
+    assert result.stability_limit.stiffness == result.criterion("smooth-wall rule").limit
     for name in ("one-sided", "delay", "virtual damping", "wall test"):
         assert (result.criterion(name).holds, result.criterion(name).missing) == (None, ())
         assert result.criterion(name).conclusion.startswith(
@@ -373,7 +372,7 @@ def test_wall_test_makes_limits_plausible_but_not_proved() -> None:
         assert result.decided_by == "wall test"
         assert result.stability_limit.basis == "plausible"
     assert "delay_samples" in assess(Surface(WAVE, "C", 1251.0), wall, **numbers).reason
-    assert result.safe_stiffness == 1500.0
+    assert result.stability_limit.stiffness == 1500.0
     assert "damping is equal in all directions" in result.criterion("wall test").assumptions
 
 

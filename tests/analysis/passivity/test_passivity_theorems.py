@@ -16,8 +16,7 @@ from scipy.linalg import expm
 from asperity.analysis import characteristic_number, loop_work, one_sided_number
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.leak import worst_loop
-from asperity.analysis.passivity.assess_passivity import passivity
-from asperity.analysis.passivity.verdict import Passivity
+from asperity.analysis.passivity.assess_passivity import Passivity, passivity
 from asperity.analysis.split.split_state import split_state
 from asperity.devices import parse_device
 from asperity.surface import Surface
@@ -260,7 +259,7 @@ def spectral_radius(
 @pytest.mark.parametrize("delay", [0, 1, 2, 4])
 def test_delay_rule_of_a_wall_is_the_stability_limit_of_a_heavy_mass(delay: int) -> None:
     """The limit k < b/((d + 1/2) T) from eigenvalues of mass, damper and delayed, held spring."""
-    limit = assess(Surface(WAVE, "W"), {**RIG, "delay_samples": delay}).safe_stiffness
+    limit = assess(Surface(WAVE, "W"), {**RIG, "delay_samples": delay}).stability_limit.stiffness
     assert limit == pytest.approx(SIGMA / ((delay + 0.5) * T), rel=1e-15)
     heavy = 10.0
     assert spectral_radius(0.999 * limit, heavy, SIGMA, delay) < 1.0
@@ -287,7 +286,7 @@ def test_paper_condition_is_not_sufficient_with_two_samples_of_delay() -> None:
 def test_virtual_damping_limit_against_eigenvalues(virtual: float) -> None:
     """Light masses attain K T/2 + b_v; with b_v < 0 heavy masses attain K T/2 - b_v."""
     rig = {**RIG, "delay_samples": 0, "virtual_damping": virtual}
-    limit = assess(Surface(WAVE, "W"), rig).safe_stiffness
+    limit = assess(Surface(WAVE, "W"), rig).stability_limit.stiffness
     assert limit is not None
     critical = 1e-7 if virtual > 0.0 else 10.0
     assert spectral_radius(0.999 * limit, critical, SIGMA, 0, virtual) < 1.0
@@ -298,7 +297,7 @@ def test_virtual_damping_limit_against_eigenvalues(virtual: float) -> None:
 @pytest.mark.parametrize("delay", [0, 1, 2])
 def test_virtual_damping_with_delay_is_stable_at_its_limit(virtual: float, delay: int) -> None:
     rig = {**RIG, "delay_samples": delay, "virtual_damping": virtual}
-    limit = assess(Surface(WAVE, "W"), rig).safe_stiffness
+    limit = assess(Surface(WAVE, "W"), rig).stability_limit.stiffness
     assert limit is not None
     for mass in 10.0 ** np.arange(-7.0, 5.0):
         assert spectral_radius(0.999 * limit, mass, SIGMA, delay, virtual) < 1.0

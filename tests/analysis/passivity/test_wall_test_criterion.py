@@ -15,8 +15,7 @@ from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.check_limits import limits
 from asperity.analysis.compare import compare
 from asperity.analysis.energy.leak import worst_loop
-from asperity.analysis.passivity.assess_passivity import passivity
-from asperity.analysis.passivity.verdict import Passivity
+from asperity.analysis.passivity.assess_passivity import Passivity, passivity
 from asperity.core.errors import ParameterError
 from asperity.devices import Device, parse_device
 from asperity.surface import Surface
@@ -101,13 +100,15 @@ def test_limit_depends_on_lightest_direction_and_rate_of_the_test() -> None:
     wall = {"value": "2 kN/m", "lightest": 0.7, "update_rate": "4 kHz", "directions": ["y"]}
     fields = {"max_stiffness": wall, "update_rate": "2 kHz"}
     result = assess(fields, 100.0, 2.0, 2.0)
-    assert result.safe_stiffness == pytest.approx(2000.0 * 0.7 * 0.5 / 2.0, rel=1e-12)
+    assert result.stability_limit.stiffness == pytest.approx(2000.0 * 0.7 * 0.5 / 2.0, rel=1e-12)
     assert "no direction is damped less than 0.7" in result.criterion("wall test").assumptions
     # The force of the wall itself acts only along the tested direction.
-    assert assess(fields, 100.0, law="W").safe_stiffness == pytest.approx(1000.0, rel=1e-12)
+    assert assess(fields, 100.0, law="W").stability_limit.stiffness == pytest.approx(
+        1000.0, rel=1e-12
+    )
     # A faster loop than the tested one has no larger limit.
     fields["update_rate"] = "40 kHz"
-    assert assess(fields, 100.0, law="W").safe_stiffness == 2000.0
+    assert assess(fields, 100.0, law="W").stability_limit.stiffness == 2000.0
 
 
 @pytest.mark.parametrize("law", sorted(set(LEAKS) - {"W"}))
@@ -197,9 +198,10 @@ def test_omitting_a_datum_never_reverses_a_verdict(
         part = {name: value for name, value in rig.items() if name != field}
         zero = assess({**part, field: 0.0}, stiffness, plus * more, plus, law)
         omitted = assess(part, stiffness, plus * more, plus, law)
-        assert (zero.verdict, zero.safe_stiffness) == (omitted.verdict, omitted.safe_stiffness), (
-            field
-        )
+        assert (zero.verdict, zero.stability_limit.stiffness) == (
+            omitted.verdict,
+            omitted.stability_limit.stiffness,
+        ), field
 
 
 def test_former_wall_rule_is_reversed_by_a_known_delay() -> None:
@@ -336,7 +338,7 @@ def checked_passivity(
     surface = Surface(texture, law, stiffness, depth)
     result = analyze(surface, device).passivity
     assert row.passivity == result
-    assert row.safe_stiffness == (result.stability_limit.stiffness or 0.0)
+    assert row.stability_limit == result.stability_limit
     assert limits(
         texture, device, law=law, stiffness=stiffness, max_depth=depth
     ).stability_limit == (result.stability_limit)

@@ -340,7 +340,7 @@ def test_calibration_file_is_a_device_for_comparisons(tmp_path: Path) -> None:
     resolution = math.hypot(3e-5, 12**0.5 * 2e-6)
     assert loaded.value("position_resolution") == pytest.approx(resolution, rel=1e-3)
     comparison = asp.compare("sinusoid:amplitude=0.1mm,period=2mm", device=path, laws="W")
-    assert 0.0 < comparison.row("W").safe_stiffness <= 640.0
+    assert 0.0 < comparison.row("W").stability_limit.stiffness <= 640.0
 
 
 @pytest.mark.parametrize("name", device_names())

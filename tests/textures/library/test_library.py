@@ -158,7 +158,13 @@ def test_scaling_all_lengths_scales_the_surface(name: str, lengths: list[str]):
 def test_laws_can_be_compared_on_a_named_surface(name: str):
     result = asperity.compare(named_surface(name), laws="WAC")
     numbers = [
-        (row.q.value, row.one_sided.value, row.safe_stiffness, row.leak.energy, row.strength)
+        (
+            row.q.value,
+            row.one_sided.value,
+            row.stability_limit.stiffness,
+            row.leak.energy,
+            row.strength,
+        )
         for row in result.rows
     ]
     assert np.isfinite(numbers).all()

@@ -121,7 +121,7 @@ def _nearest_continuity(surface: Surface, q: Bound) -> Continuity:
         reason = "the nearest point is unique down to 1/K, K >= ‖Hess h‖"
         return _continuous_force(surface, q, reason)
     key = repr((q.lower, q.upper, q.at))
-    onset, proved = cached_result("onset of jumps", surface, lambda: _jump_onset(surface, q), key)
+    onset, proved = cached_result("onset of jumps", surface, lambda unit: _jump_onset(unit, q), key)
     if onset <= depth:
         start = format_quantity(round_down(onset), "m")
         reason = f"the contact point jumps below crests, at depths from {start}"

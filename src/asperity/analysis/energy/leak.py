@@ -19,7 +19,7 @@ from asperity.analysis.energy.curl_columns import (
 )
 from asperity.analysis.energy.loop_integral import initial_panels, integrate, loop_work
 from asperity.analysis.energy.merit import scan_height
-from asperity.analysis.gain.characteristic import at_unit_stiffness, cached_result
+from asperity.analysis.gain.characteristic import cached_result, is_shipped_law
 from asperity.core.checks import FloatArray, check_array, check_positive
 from asperity.core.errors import InternalError, ParameterError
 from asperity.core.files import Serializable
@@ -146,10 +146,9 @@ def worst_loop(surface: Surface, direction: tuple[float, float] | None = None) -
         (1.28, 1.28)
     """
     line = surface.texture.scan_line() if direction is None else scan_line_along(surface, direction)
-    unit = at_unit_stiffness(surface)
     key = repr((line.start.tolist(), line.direction.tolist(), line.length, line.periodic))
-    leak = cached_result("worst loop", unit, lambda: _find_worst_loop(unit, line), key)
-    return leak.scale(surface.stiffness / unit.stiffness)
+    leak = cached_result("worst loop", surface, lambda unit: _find_worst_loop(unit, line), key)
+    return leak.scale(surface.stiffness if is_shipped_law(surface.law) else 1.0)
 
 
 def _find_worst_loop(surface: Surface, line: ScanLine) -> Leak:

@@ -9,7 +9,7 @@ import numpy as np
 
 from asperity.analysis.bounds.bound import spectral_norm
 from asperity.analysis.bounds.sampling import dense_maximum
-from asperity.analysis.gain.characteristic import at_unit_stiffness, cached_result
+from asperity.analysis.gain.characteristic import cached_result
 from asperity.analysis.gain.theorems import theorem_on
 from asperity.core.checks import FloatArray
 from asperity.surface import Surface
@@ -49,8 +49,7 @@ def merit(surface: Surface) -> Merit:
     (nominal contact), along the texture's scan line; on a map along parallel lines, each with
     its own mean. A law with state slides, its anchor trailing the probe at full deflection.
     """
-    unit = at_unit_stiffness(surface)
-    return cached_result("merit", unit, lambda: _compute_merit(unit))
+    return cached_result("merit", surface, _compute_merit)
 
 
 def _compute_merit(surface: Surface) -> Merit:

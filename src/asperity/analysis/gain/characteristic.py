@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import astuple
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from asperity.analysis.bounds.bound import (
     CURL,
@@ -73,7 +73,7 @@ def characteristic_number(
         >>> round(characteristic_number(Surface(paper, "A")).value, 4)
         5.1251
     """
-    return _compute_bound(surface, NORM, _make_options(surface, tolerance, work_limit, extent))
+    return _compute_bound(surface, NORM, make_options(surface, tolerance, work_limit, extent))
 
 
 def one_sided_number(
@@ -92,7 +92,7 @@ def one_sided_number(
         >>> one_sided_number(Surface(paper, "D")).value
         1.0
     """
-    return _compute_bound(surface, ONE_SIDED, _make_options(surface, tolerance, work_limit, extent))
+    return _compute_bound(surface, ONE_SIDED, make_options(surface, tolerance, work_limit, extent))
 
 
 def curl_number(
@@ -114,7 +114,7 @@ def curl_number(
         >>> round(curl_number(Surface(paper, "A")).value, 4)  # the greatest slope, 2πA/l
         5.0265
     """
-    options = _make_options(surface, tolerance, work_limit, extent)
+    options = make_options(surface, tolerance, work_limit, extent)
     if surface.law.stateful:
         raise ParameterError(
             "law", f"{surface.law} has state: its force is not a field with a curl"
@@ -122,15 +122,16 @@ def curl_number(
     facts = surface.facts
     if facts.conservative:
         return Bound(0.0, 0.0, "theorem", None, facts.reason)
-    return _cached_bound(surface, CURL, options)
+    return cached_number(surface, CURL, options)
 
 
-def _make_options(
+def make_options(
     surface: Surface,
     tolerance: float | None = None,
     work_limit: int = DEFAULT_WORK_LIMIT,
     extent: tuple[float, float] | None = None,
 ) -> SearchOptions:
+    """Return the checked options of a search; see :func:`characteristic_number`."""
     if not isinstance(surface, Surface):
         raise ParameterError("surface", "must be a Surface", surface)
     if tolerance is not None:
@@ -144,7 +145,9 @@ def _make_options(
     return SearchOptions(tolerance, limit, extent)
 
 
-def cached_number(surface: Surface, measure: JacobianMeasure, **search: Any) -> Bound:
+def cached_number(
+    surface: Surface, measure: JacobianMeasure, options: SearchOptions | None = None
+) -> Bound:
     """Return a number from the cache, also where it is a theorem or a closed form.
 
     Reading the cache is faster than importing the compiled kernels that evaluate a witness.
@@ -152,24 +155,23 @@ def cached_number(surface: Surface, measure: JacobianMeasure, **search: Any) -> 
     Args:
         surface: the surface.
         measure: the measure of the Jacobian.
-        **search: tolerance, work_limit and extent; see :func:`characteristic_number`.
+        options: options of the search; the default ones if omitted.
     """
-    return _cached_bound(surface, measure, _make_options(surface, **search))
+    search = options or SearchOptions()
+    return cached_result(
+        f"number {measure.name}",
+        surface,
+        lambda unit: _search_bound(unit, measure, search),
+        repr(astuple(search)),
+    )
 
 
 def _compute_bound(surface: Surface, measure: JacobianMeasure, options: SearchOptions) -> Bound:
     """Return a number of the rendered force: by theorem or closed form, else by a cached search."""
-    known = _bound_without_search(surface, measure, options)
-    if known is not None and not surface.effective_clamp.changes_force:
-        return known
-    return _cached_bound(surface, measure, options)
-
-
-def _cached_bound(surface: Surface, measure: JacobianMeasure, options: SearchOptions) -> Bound:
-    unit, key = at_unit_stiffness(surface), repr(astuple(options))
-    return cached_result(
-        f"number {measure.name}", unit, lambda: _search_bound(unit, measure, options), key
-    )
+    known = None
+    if not surface.effective_clamp.changes_force:
+        known = _bound_without_search(surface, measure, options)
+    return known or cached_number(surface, measure, options)
 
 
 def _search_bound(surface: Surface, measure: JacobianMeasure, options: SearchOptions) -> Bound:
@@ -192,8 +194,12 @@ def _bound_without_search(
         return bound_from_theorem(
             surface, measure, constant.value, "theorem", constant.reason, top, [0.0]
         )
-    form = theorem.closed_forms.get(measure)
-    if form is None or wave is None or options.extent is not None:
+    if wave is None or options.extent is not None:
+        return None
+    proof, form = theorem.special_proofs.get(measure), theorem.closed_forms.get(measure)
+    if proof is not None:
+        return proof(surface, options)
+    if form is None:
         return None
     value, phase = form.value(wave, surface.max_depth), form.phase(wave, surface.max_depth)
     xy = point_at_phase(wave, phase)
@@ -225,17 +231,18 @@ def at_unit_stiffness(surface: Surface) -> Surface:
 
 
 def cached_result(
-    name: str, surface: Surface, compute: Callable[[], Result], *extra: str
+    name: str, surface: Surface, compute: Callable[[Surface], Result], *extra: str
 ) -> Result:
     """Return a result about a surface from the cache, or compute and cache it.
 
     Args:
         name: name of the result.
-        surface: the surface; for a shipped law the result must not depend on its stiffness.
-        compute: computes the result.
+        surface: the surface; for a shipped law its stiffness does not count.
+        compute: computes the result from :func:`at_unit_stiffness`.
         extra: everything else the result depends on.
     """
-    return get_or_compute(name, surface_content(surface, *extra), compute)
+    content = surface_content(surface, *extra)
+    return get_or_compute(name, content, lambda: compute(at_unit_stiffness(surface)))
 
 
 def surface_content(surface: Surface, *extra: str) -> str | None:

@@ -80,7 +80,8 @@ class Theorem:
     Attributes:
         constants: numbers that are the same on every surface.
         closed_forms: numbers on a single wave in closed form.
-        special_proofs: numbers with a proof specific to this law.
+        special_proofs: numbers with a proof specific to this law, which needs no search on a
+            single wave without an extent.
         reductions: numbers given by a simpler problem.
         norm_bound: proved bound of q from the bounds of the height's derivatives alone.
         gain_above_height: sup‖J‖/k over the body above a height [m].

@@ -32,7 +32,7 @@ from asperity.devices import Device
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
 
-SCHEMA = 2
+SCHEMA = 3
 
 
 @dataclass(frozen=True)
@@ -101,11 +101,6 @@ class Limits(Plottable, Reportable):
     assumptions: tuple[str, ...] = ()
 
     @property
-    def safe_stiffness(self) -> float | None:
-        """Stiffness of ``stability_limit`` [N/m]; ``None`` if none is known."""
-        return self.stability_limit.stiffness
-
-    @property
     def texture(self) -> Texture:
         """The texture."""
         return self.surface.texture
@@ -160,8 +155,8 @@ class Limits(Plottable, Reportable):
         """Return plain data, SI units, with a schema number."""
         surface = self.surface
         after_gain = (
-            "safe_stiffness stability_limit margin limits waves spectrum perceptibility "
-            "resolved_share speeds answer assumptions"
+            "stability_limit margin limits waves spectrum perceptibility resolved_share speeds "
+            "answer assumptions"
         )
         return {
             "schema": SCHEMA,
@@ -295,10 +290,12 @@ def _default_sentences(result: Limits, defaults: Mapping[str, bool]) -> list[str
         shown = ", ".join(f"{name} = {n:g}" for name, n in zip("αβγ", counts, strict=True))
         sentences.append(f"Samples in a wave: {shown}; the paper recommends 5 to 10")
     if defaults["stiffness"]:
-        share, why = result.margin.factor, stability_limit_text(result.stability_limit)
-        default = "" if result.safe_stiffness else ", a default"
-        part = f"{share:g} of what is " if result.safe_stiffness and share < 1.0 else ""
-        sentences.append(f"Stiffness {stiffness_text(result)}{default}: {part}{why}")
+        share, limit = result.margin.factor, result.stability_limit
+        default = "" if limit.stiffness else ", a default"
+        part = f"{share:g} of what is " if limit.stiffness and share < 1.0 else ""
+        sentences.append(
+            f"Stiffness {stiffness_text(result)}{default}: {part}{stability_limit_text(limit)}"
+        )
     if defaults["max_depth"]:
         sentences.append(default_depth_text(result.surface))
     return sentences + law_parameter_sentences(result.surface)

@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from asperity.analysis.energy.merit import merit
-from asperity.analysis.limits.limit_rules import LIMIT_RULES, Decision, LimitCase, evaluate_limit
+from asperity.analysis.limits.limit_rules import LIMIT_RULES, LimitCase, evaluate_limit
 from asperity.analysis.limits.spectrum import compute_spectrum, wave_forces
 from asperity.core.checks import FloatArray
 from asperity.core.files import Serializable
@@ -40,7 +40,7 @@ CLEAR_RATIO = 2.0
 the dry friction. Of force steps it needs γ, as in the paper's limit 4."""
 
 # The limits that decide whether a wave is resolved: all limits on waves but that on its force.
-_SAMPLING_LIMITS = (1, 2, 3, 6)
+_SAMPLING_RULES = tuple(rule for rule in LIMIT_RULES if rule.number in {1, 2, 3, 6})
 _MAX_MAGNIFICATION = 1e9
 _MASKING_FIELDS = "force_resolution", "friction", "bandwidth", "update_rate", "position_resolution"
 
@@ -187,6 +187,7 @@ def classify_perceptibility(
     coarse_amplitude = math.sqrt(2.0 * _resolved_share(coarse)) * texture_rms
     tier: Tier = "not felt" if coarse_amplitude < detection else "borderline"
     tier = "felt" if amplitude >= clear else tier
+    has_remedies = tier != "felt" and texture_rms > 0.0
     return Perceptibility(
         tier=tier,
         rms=rms,
@@ -199,19 +200,15 @@ def classify_perceptibility(
         masked_by=masked_by,
         speed=case.speed,
         missing_data=tuple(field for field in _MASKING_FIELDS if field not in case.device),
-        remedies=() if tier == "felt" else tuple(_find_remedies(case, amplitude, texture_rms)),
+        remedies=tuple(_find_remedies(case, amplitude, texture_rms)) if has_remedies else (),
     )
-
-
-def _sampling_decisions(case: LimitCase) -> list[Decision]:
-    return [evaluate_limit(rule, case) for rule in LIMIT_RULES if rule.number in _SAMPLING_LIMITS]
 
 
 def _resolved_share(case: LimitCase) -> float:
     """Return the share of the force's variance that the device resolves; 1 without force."""
     squares = case.forces**2
     total = float(squares.sum())
-    is_resolved = np.all([decision.holds for decision in _sampling_decisions(case)], axis=0)
+    is_resolved = np.all([evaluate_limit(rule, case).holds for rule in _SAMPLING_RULES], axis=0)
     return float(squares[is_resolved].sum()) / total if total > 0.0 else 1.0
 
 
@@ -271,7 +268,7 @@ def _required_magnification(case: LimitCase, texture_rms: float, clear: float) -
 def _resolution_remedy(case: LimitCase, share: float) -> Remedy:
     """Return the scan speed, or the position resolution, that resolves a share of the force."""
     squares = case.forces**2
-    tops = [decision.top_speeds for decision in _sampling_decisions(case)]
+    tops = [evaluate_limit(rule, case).top_speeds for rule in _SAMPLING_RULES]
     speed = _weighted_quantile(np.min(tops, axis=0), squares, share)
     if speed > 0.0:
         return Remedy("slower", speed)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from asperity.analysis.energy.merit import scan_height
-from asperity.analysis.gain.characteristic import at_unit_stiffness, cached_result
+from asperity.analysis.gain.characteristic import cached_result, is_shipped_law
 from asperity.core.cache import get_or_compute
 from asperity.core.checks import FloatArray
 from asperity.core.files import Serializable
@@ -277,11 +277,10 @@ def wave_forces(surface: Surface, spectrum: Spectrum) -> FloatArray:
     """
     if not spectrum.waves:
         return np.zeros(0)
-    unit = at_unit_stiffness(surface)
     compute = _fit_waves if spectrum.exact else _band_force_amplitudes
     key = repr((spectrum.exact, spectrum.waves))
-    forces = cached_result("wave forces", unit, lambda: compute(unit, spectrum), key)
-    return forces * (surface.stiffness / unit.stiffness)
+    forces = cached_result("wave forces", surface, lambda unit: compute(unit, spectrum), key)
+    return forces * (surface.stiffness if is_shipped_law(surface.law) else 1.0)
 
 
 def scan_forces(surface: Surface, xy: FloatArray) -> FloatArray:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.leak import Leak
@@ -24,13 +26,15 @@ from asperity.analysis.passivity.device_loop import (
 )
 from asperity.analysis.passivity.verdict import (
     Ground,
-    Passivity,
     StabilityLimit,
+    Verdict,
     decide_verdict,
     stability_limit,
 )
 from asperity.analysis.surface_sentences import depth_range_text
+from asperity.core.display import Displayable
 from asperity.core.errors import ParameterError
+from asperity.core.files import Serializable
 from asperity.core.units import format_quantity, round_down
 from asperity.devices import Device, load_device
 from asperity.surface import Surface
@@ -206,6 +210,82 @@ def _criterion_assumptions(loop: DeviceLoop, criterion: Criterion) -> str:
     return "; ".join(filter(None, (criterion.assumptions, depth, numbers)))
 
 
+@dataclass(frozen=True)
+class Passivity(Serializable, Displayable):
+    """Passivity of a surface on a device: whether the hand can gain energy without limit.
+
+    Attributes:
+        loop: the surface on the device.
+        evaluated: all criteria by name, before their sentences are added.
+        decided_by: name of the deciding criterion; for ``"undecided"``, of the one that would
+            decide.
+        verdict: ``"passive"`` (proved, under the assumptions of that criterion), ``"bounded"``
+            (proved but for quantisation, whose buzz stays below ``buzz``), ``"plausible"`` (no
+            proof: a smooth wall did not cycle), ``"not passive"`` (a motion of the hand that gains
+            energy without limit is known) or ``"undecided"``.
+        ground: ground of the verdict.
+        stability_limit: stability limit of the stiffness, and its basis.
+        buzz: bound of the motion that quantisation may cause; ``None`` if there is no bound.
+    """
+
+    serialized_attributes = (
+        "verdict decided_by reason stiffness stability_limit critical_speed greatest_delay buzz "
+        "criteria"
+    )
+
+    loop: DeviceLoop = field(compare=False)
+    evaluated: Mapping[str, Criterion]
+    decided_by: str
+    verdict: Verdict
+    ground: Ground
+    stability_limit: StabilityLimit
+    buzz: BuzzBound | None
+
+    @cached_property
+    def criteria(self) -> tuple[Criterion, ...]:
+        """All criteria with their sentences, also those that do not decide."""
+        return tuple(with_sentences(self.loop, one) for one in self.evaluated.values())
+
+    @cached_property
+    def reason(self) -> str:
+        """The reason of the verdict in one sentence."""
+        return verdict_reason(self.loop, self.criterion(self.decided_by), self.ground, self.buzz)
+
+    @property
+    def stiffness(self) -> float:
+        """Stiffness of the surface [N/m]."""
+        return self.loop.surface.stiffness
+
+    @property
+    def critical_speed(self) -> float | None:
+        """v* [m/s], the speed on the worst loop below which damping does not absorb its energy.
+
+        0 for a conservative law, ``None`` if unknown.
+        """
+        return critical_speed(self.loop)
+
+    @property
+    def greatest_delay(self) -> int | None:
+        """Greatest number of whole samples of delay for which the delay rule is proved.
+
+        At this stiffness; ``None`` if not even 0 is proved, or if it is unknown.
+        """
+        return max_proved_delay(self.loop)
+
+    def criterion(self, name: str) -> Criterion:
+        """Return a criterion by its name, with its sentences.
+
+        Raises:
+            KeyError: if there is none of that name.
+        """
+        return with_sentences(self.loop, self.evaluated[name])
+
+    def __repr__(self) -> str:
+        stiffness = self.stability_limit.stiffness
+        limit = "not known" if stiffness is None else f"{stiffness:.4g} N/m"
+        return f"<Passivity: {self.verdict}, decided by {self.decided_by}, stiffness up to {limit}>"
+
+
 def passivity(
     surface: Surface,
     device: str | os.PathLike[str] | Device,
@@ -254,7 +334,7 @@ def passivity(
         >>> numbers = characteristic_number(surface), one_sided_number(surface)
         >>> leak = worst_loop(surface)
         >>> result = passivity(surface, parse_device(rig, "mine"), *numbers, leak)
-        >>> result.verdict, result.decided_by, round(result.safe_stiffness, 3)
+        >>> result.verdict, result.decided_by, round(result.stability_limit.stiffness, 3)
         ('passive', 'delay', 5333.333)
     """
     types = (("surface", surface, Surface), ("q", q, Bound), ("one_sided", one_sided, Bound))
@@ -262,20 +342,7 @@ def passivity(
         if not isinstance(value, kind):
             raise ParameterError(name, f"must be a {kind.__name__}", value)
     loop = make_device_loop(surface, load_device(device), q, one_sided, leak)
-    criteria = {
-        name: with_sentences(loop, criterion) for name, criterion in evaluate_criteria(loop).items()
-    }
-    buzz = buzz_bound(loop)
-    verdict, decisive, ground = decide_verdict(loop, criteria, buzz)
-    return Passivity(
-        criteria=tuple(criteria.values()),
-        decided_by=decisive,
-        verdict=verdict,
-        ground=ground,
-        reason=verdict_reason(loop, criteria[decisive], ground, buzz),
-        stiffness=surface.stiffness,
-        stability_limit=stability_limit(loop, criteria),
-        critical_speed=critical_speed(loop),
-        greatest_delay=max_proved_delay(loop),
-        buzz=buzz,
-    )
+    criteria, buzz = evaluate_criteria(loop), buzz_bound(loop)
+    verdict, decided_by, ground = decide_verdict(loop, criteria, buzz)
+    limit = stability_limit(loop, criteria)
+    return Passivity(loop, criteria, decided_by, verdict, ground, limit, buzz)

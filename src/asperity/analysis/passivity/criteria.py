@@ -135,22 +135,16 @@ _ZERO, _ONE = Fraction(0), Fraction(1)
 _DAMPING_FIELDS = ("update_rate", "damping")
 
 
-def _scaled(factor: Fraction | int, value: Fraction | None) -> Fraction | None:
-    return None if value is None else factor * value
-
-
 def _paper_rule(loop: DeviceLoop) -> StiffnessRule:
     note = "zero-order hold; no certificate for a field with curl, nor from 2 samples of delay on"
-    budget = _scaled(HALF, loop.damping_gain)
-    return StiffnessRule(PAPER, "k q <= σ₀/(2T)", _ZERO, _ONE, budget, _DAMPING_FIELDS, note)
+    formula, twice = "k q <= σ₀/(2T)", Fraction(2)
+    return StiffnessRule(PAPER, formula, _ZERO, twice, loop.damping_gain, _DAMPING_FIELDS, note)
 
 
 def _one_sided_rule(loop: DeviceLoop) -> StiffnessRule:
     note = f"{_COMMON_ASSUMPTIONS}, no delay, no virtual damping"
-    formula, budget = "k q⁺ <= 2σ₀/T", _scaled(2, loop.damping_gain)
-    return StiffnessRule(
-        ONE_SIDED, formula, _ONE, _ZERO, budget, _DAMPING_FIELDS, note, loop.obstacle
-    )
+    rule = (ONE_SIDED, "k q⁺ <= 2σ₀/T", HALF, _ZERO, loop.damping_gain, _DAMPING_FIELDS, note)
+    return StiffnessRule(*rule, loop.obstacle)
 
 
 def _delay_rule(loop: DeviceLoop) -> StiffnessRule:
@@ -203,9 +197,10 @@ def _wall_test_rule(loop: DeviceLoop) -> StiffnessRule:
     formula, weights = "k q <= K₀", (_ZERO, _ONE)
     if longest is not None and longest != math.inf:
         formula, weights = "k (q⁺/2 + d q) <= K₀ (1/2 + d)", (HALF, Fraction(longest))
-        budget = _scaled(HALF + Fraction(longest), budget)
-        if budget is not None and loop.damping_gain is not None:
-            budget = min(budget, loop.damping_gain)  # the one admissible pair is known
+        if budget is not None:
+            budget *= HALF + Fraction(longest)
+            if loop.damping_gain is not None:
+                budget = min(budget, loop.damping_gain)  # the one admissible pair is known
     needed, more = ("max_stiffness",), ("delay_samples", "damping", "update_rate")
     return StiffnessRule(WALL_TEST, formula, *weights, budget, needed, note, loop.obstacle, more)
 

@@ -33,11 +33,10 @@ from asperity.analysis.passivity.device_loop import (
     make_device_loop,
 )
 from asperity.core.arguments import DEFAULT_STIFFNESS
-from asperity.core.display import Displayable
 from asperity.core.files import Serializable
 from asperity.core.units import round_down
 from asperity.devices import Device
-from asperity.laws import Law, find_law
+from asperity.laws import LAWS, Law
 from asperity.surface import Surface
 
 Verdict = Literal["passive", "bounded", "plausible", "not passive", "undecided"]
@@ -93,64 +92,6 @@ class StabilityLimit(Serializable):
     delay: float | None = None
     sampled: bool = False
     proved_stiffness: float = 0.0
-
-
-@dataclass(frozen=True)
-class Passivity(Serializable, Displayable):
-    """Passivity of a surface on a device: whether the hand can gain energy without limit.
-
-    Attributes:
-        criteria: all criteria, also those that do not decide.
-        decided_by: name of the deciding criterion; for ``"undecided"``, of the one that would
-            decide.
-        verdict: ``"passive"`` (proved, under the assumptions of that criterion), ``"bounded"``
-            (proved but for quantisation, whose buzz stays below ``buzz``), ``"plausible"`` (no
-            proof: a smooth wall did not cycle), ``"not passive"`` (a motion of the hand that gains
-            energy without limit is known) or ``"undecided"``.
-        ground: ground of the verdict.
-        reason: the reason in one sentence.
-        stiffness: stiffness of the surface [N/m].
-        stability_limit: stability limit of the stiffness, and its basis.
-        critical_speed: v* [m/s], the speed on the worst loop below which damping does not absorb
-            the energy gained; 0 for a conservative law, ``None`` if unknown.
-        greatest_delay: greatest number of whole samples of delay for which the delay rule is proved
-            at this stiffness; ``None`` if not even 0 is proved, or if it is unknown.
-        buzz: bound of the motion that quantisation may cause; ``None`` if there is no bound.
-    """
-
-    serialized_attributes = (
-        "verdict decided_by reason stiffness safe_stiffness stability_limit critical_speed "
-        "greatest_delay buzz criteria"
-    )
-
-    criteria: tuple[Criterion, ...]
-    decided_by: str
-    verdict: Verdict
-    ground: Ground
-    reason: str
-    stiffness: float
-    stability_limit: StabilityLimit
-    critical_speed: float | None
-    greatest_delay: int | None
-    buzz: BuzzBound | None
-
-    @property
-    def safe_stiffness(self) -> float | None:
-        """Stiffness of ``stability_limit`` [N/m]."""
-        return self.stability_limit.stiffness
-
-    def criterion(self, name: str) -> Criterion:
-        """Return a criterion by its name.
-
-        Raises:
-            KeyError: if there is none of that name.
-        """
-        return {criterion.name: criterion for criterion in self.criteria}[name]
-
-    def __repr__(self) -> str:
-        stiffness = self.safe_stiffness
-        limit = "not known" if stiffness is None else f"{stiffness:.4g} N/m"
-        return f"<Passivity: {self.verdict}, decided by {self.decided_by}, stiffness up to {limit}>"
 
 
 def decide_verdict(
@@ -249,7 +190,8 @@ def _find_unstable_motion(loop: DeviceLoop) -> Ground | None:
     K = -k q, where q is attained if q > q⁺, m even gives the third (d >= 1). A wall that cycled has
     σ₀/T < K (½ + d): then θ -> 0 gains energy from that K on, for any σ₀ and d.
     """
-    if _has_unbounded_slack(loop):
+    # Delay meets an unbounded slack direction, as below crests with law D.
+    if loop.delay and math.isinf(loop.q.lower) and math.isfinite(loop.one_sided.upper):
         return Ground.GAINS_ENERGY_REGARDLESS
     stiff = loop.weighted_gain(Fraction(1), Fraction(0), "lower") * loop.stiffness
     if loop.cycling_stiffness is not None and stiff >= loop.cycling_stiffness:
@@ -263,11 +205,6 @@ def _find_unstable_motion(loop: DeviceLoop) -> Ground | None:
         slack = loop.weighted_gain(Fraction(0), Fraction(1), "lower") * loop.stiffness
         gains.append(slack / 2 - loop.virtual_damping_gain)
     return Ground.GAINS_ENERGY if max(gains) > loop.damping_gain else None
-
-
-def _has_unbounded_slack(loop: DeviceLoop) -> bool:
-    """Return whether delay meets an unbounded slack direction, as below crests with law D."""
-    return bool(loop.delay) and math.isinf(loop.q.lower) and math.isfinite(loop.one_sided.upper)
 
 
 def _assess_wall_test(
@@ -328,7 +265,7 @@ def load_margins(along_lightest: bool = False) -> dict[Law, Margin]:
     name = "along_lightest" if along_lightest else "factor"
     fields = ("loop", "surface", "delay", "below", "cases")
     return {
-        find_law(law): Margin(entry[name], law, *(entry[field] for field in fields))
+        LAWS[law]: Margin(entry[name], law, *(entry[field] for field in fields))
         for law, entry in table.items()
     }
 
