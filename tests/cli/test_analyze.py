@@ -76,7 +76,7 @@ def test_energy_of_the_worst_loop_has_bounds_for_law_a(call: Call) -> None:
     energy = next(line for line in section(out, "Worst loop") if line.startswith("energy"))
     low, high = re.findall(r"[\d.]+", energy)[:2]
     assert float(low) <= 40.0 <= float(high) < 40.1
-    assert "µJ per turn (certified)" in energy
+    assert "µJ per traversal (certified)" in energy
 
 
 def test_force_jumps_are_listed(call: Call) -> None:

@@ -57,7 +57,7 @@ def test_recommendation_answers_the_questions_of_a_new_user(result: asp.Comparis
         "which law": f"Use law {best.law.letter} ({best.law.name.replace('-', ' ')})",
         "on what": "on the Force Dimension omega.3",
         "which stiffness": f"start at {limit_text(best.recommended_stiffness)}",
-        "is it felt": "felt, ",
+        "is it felt": ": felt.",
         "how much": "RMS of texture",
         "is it proved": "but not proved",
         "why so much": "simulated loops",

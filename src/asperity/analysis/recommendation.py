@@ -108,11 +108,12 @@ def recommendation_text(recommended: Recommendation, device: Device) -> str:
     if best is None or best.perceptibility is None:
         return _no_recommendation_text(recommended, device)
     texture, start = best.perceptibility, stiffness_limit_text(best.recommended_stiffness)
-    felt = f"{best.tier}, {texture_amount_text(texture)}"
+    gives = f"{texture_amount_text(texture)}: {best.tier}"
     if best.tier != "felt":
-        felt += f"; {masking_text(texture, device)}"
+        gives += f"; {masking_text(texture, device)}"
     sentences = [
-        f"Use law {_law_title(best)} on the {device.name} and start at {start}: {felt}.",
+        f"Use law {_law_title(best)} on the {device.name} "
+        f"and start at {start}, which gives {gives}.",
         "" if best.tier == "felt" else remedies_text(texture),
         _form_advice(texture),
         _contact_loss_text(best),
@@ -202,11 +203,12 @@ def _margin_text(row: LawRow) -> str:
     """Return the safety margin below the stability limit and its reason, in a sentence."""
     margin = row.margin
     if not margin.cases:
-        return "The recommended stiffness equals it."
+        return "The recommended stiffness equals this limit."
     stable = f"law {margin.law} was stable in all {margin.cases} simulated loops"
     if margin.factor == 1.0:
-        return f"The recommended stiffness equals it; up to there {stable}."
-    return f"The recommended stiffness is {margin.factor:g} of it; at this ratio {stable}."
+        return f"The recommended stiffness equals this limit; up to it {stable}."
+    start = f"The recommended stiffness is {margin.factor:g} times this limit"
+    return f"{start}; at this ratio {stable}."
 
 
 _SOUND_REASON = "No closed path of its field gives net energy, and its force does not jump."
@@ -290,8 +292,8 @@ def comparison_assumptions(
             f"{format_quantity(first.max_depth, 'm')}, not bounds"
         )
     sentences.append(
-        "The leak is the work of the field on one slow turn of its worst loop, without delay, "
-        "quantisation and friction of the device"
+        "The leak is the work of the field on one slow traversal of its worst loop, without "
+        "delay, quantisation and friction of the device"
     )
     return (*sentences, SCOPE_SENTENCE)
 
@@ -303,7 +305,7 @@ def _perceptibility_assumption(texture: Perceptibility) -> str:
         f"Felt: an amplitude of {CLEAR_RATIO:g} times the {hand} that a hand is assumed to "
         f"notice, {CLEAR_RATIO:g} times the dry friction and {DEFAULT_SAMPLES:g} steps of force, "
         f"in waves that the device resolves at {speed}"
-        + (f"; assumed to mask nothing, being unknown: {unknown}" if unknown else "")
+        + (f"; unknown and assumed to mask nothing: {unknown}" if unknown else "")
     )
 
 

@@ -105,7 +105,7 @@ def compare_command(
 
     SURFACE is a texture with its arguments (sinusoid:amplitude=0.8mm,period=1mm), a measured file
     (X3P, SDF, NPY, text, PNG, TIFF, STL, OBJ ...) or a scene file (TOML). Several devices and
-    depths give one table.
+    depths are compared in one table.
     """
     from asperity.analysis.compare import compare_devices
 

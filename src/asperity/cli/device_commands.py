@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 def devices_command(names: tuple[str, ...], outputs: Outputs, *, template: bool) -> None:
     """List the devices of the catalogue and the source of each value.
 
-    With IDs, or device files (TOML), show every value with its unit, source and verification. To
-    describe another device: asperity devices --template > mine.toml
+    With IDs, or device files (TOML), show every value with its unit, its source, and whether
+    it was verified. To describe another device: asperity devices --template > mine.toml
     """
     from asperity.devices import device_names, load_device
     from asperity.devices.device_file import device_template
@@ -64,7 +64,7 @@ _CALIBRATE = options.command_arguments("calibrate")
 @click.option(
     "--driver", metavar="NAME", default=SIMULATED,
     help="'simulated', 'real' (the driver named in the device entry), or another driver of asperity"
-    " run.  [default: simulated: no device is measured]",
+    " run.  [default: simulated, without a real device]",
 )  # fmt: skip
 @options.argument_options(_CALIBRATE)
 @options.set_option

@@ -30,7 +30,7 @@ _FORMER_NAMES = {"largest": "max-data", "looks": "max-evaluations"}
 @click.command(
     "export", context_settings={"token_normalize_func": lambda name: _FORMER_NAMES.get(name, name)}
 )
-@click.option("-o", "--output", metavar="PATH", required=True, help="The file to write, texture.h.")
+@click.option("-o", "--output", metavar="PATH", required=True, help="Header file to write.")
 @click.option(
     "--exact",
     is_flag=True,
@@ -123,7 +123,7 @@ def maps_command(
 ) -> None:
     """Write SURFACE as a height map or a normal map, and report its accuracy.
 
-    Every file states its physical size. A program that rotates the force of a smooth wall by a
+    Every file contains its physical size. A program that rotates the force of a smooth wall by a
     normal map renders law G; the report describes that law at the given stiffness.
     """
     from asperity.export.surface_maps import HEIGHT_MAPS, find_convention, normal_png, sample_map

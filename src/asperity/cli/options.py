@@ -95,8 +95,8 @@ set_option = click.option(
     metavar="NAME=VALUE",
     multiple=True,
     callback=parse_settings,
-    help="Set a law parameter, 'gain=2.5', or a device field, 'max_stiffness=1500N/m' or"
-    " 'device.friction=80mN'; may be repeated.",
+    help="Set a law parameter, such as 'gain=2.5', or a device field, such as"
+    " 'max_stiffness=1500N/m' or 'device.friction=80mN'; may be repeated.",
 )
 
 
@@ -127,12 +127,12 @@ def option_help(argument: Argument) -> str:
 
     Example:
         >>> option_help(Argument("length", "of the scan", "m", 0.1, example="5mm"))
-        "Of the scan, '5mm'.  [default: 100 mm]"
+        "Of the scan, such as '5mm'.  [default: 100 mm]"
     """
     first, rest = argument.description[:1], argument.description[1:]
     # A leading symbol keeps its case: "c of law H".
     words = f"{first.upper()}{rest}" if rest[:1].isalpha() else f"{first}{rest}"
-    example = f", '{argument.example}'" if argument.example else ""
+    example = f", such as '{argument.example}'" if argument.example else ""
     default = f"  [default: {argument.default_text}]" if argument.default_text else ""
     return f"{words}{example}.{default}"
 

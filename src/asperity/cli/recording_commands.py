@@ -19,7 +19,7 @@ def recording_command() -> None:
     """Show, plot, export or replay a recording.
 
     A recording is the file that asperity simulate writes with --trace run.mcap, or asperity run
-    with --record. A recording whose process was killed remains readable.
+    with --record. It remains readable if the process that writes it is killed.
     """
 
 
@@ -75,7 +75,7 @@ def plot_command(file: str, output: str) -> None:
 @recording_command.command("export", short_help="Export a recording as CSV, MAT or Parquet.")
 @click.argument("file")
 @_output_option(
-    "The file to write: .csv, .mat (MATLAB), or .parquet, which needs the extra 'parquet'."
+    "The file to write: .csv, .mat (MATLAB), or .parquet (optional dependency 'parquet')."
 )
 def export_rows_command(file: str, output: str) -> None:
     """Export the rows of the recording FILE with all digits as CSV, MAT or Parquet."""

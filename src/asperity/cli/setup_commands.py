@@ -87,8 +87,8 @@ def _format_megabytes(sizes: Iterable[int]) -> str:
 def warm_command() -> None:
     """Compile the shipped laws for every texture kind and store the code in the cache.
 
-    Functions in the cache are not compiled again. Afterwards, comparisons of shipped laws compile
-    nothing.
+    Functions that are in the cache are not compiled again. Afterwards, comparisons of shipped
+    laws compile nothing.
     """
     from asperity.laws import LAWS
 

@@ -28,7 +28,7 @@ _SIMULATE_ARGUMENTS = options.command_arguments("simulate")
     "--trace",
     "trace_path",
     metavar="PATH",
-    help="Record every sample to a recording, 'run.mcap', or a text table, 'run.csv'.",
+    help="Write the samples to a recording ('run.mcap') or to a text table ('run.csv').",
 )
 @output_options()
 def simulate_command(
@@ -68,7 +68,7 @@ _report_options = output_options()
 def onset_command(
     scene: str, outputs: Outputs, laws: tuple[Law, ...] | None, **values: Any
 ) -> None:
-    """Find the stiffness at which limit cycles begin in SCENE by simulation, by law and delay.
+    """Simulate SCENE to find the stiffness at which limit cycles begin, for each law and delay.
 
     The motion of the scene must end at rest ([motion] kind = "still"). The report compares each
     onset with the passivity criteria.

@@ -110,7 +110,7 @@ def leak_facts(analysis: Analysis) -> list[tuple[str, str]]:
     plane = f"vertical, along ({x:.6g}, {y:.6g}) through ({start}) mm"
     energy = range_text(leak.energy, leak.upper_per_period, "J")
     facts = [
-        ("energy", f"{energy} per turn ({leak.method})"),
+        ("energy", f"{energy} per traversal ({leak.method})"),
         ("description", leak.description),
         ("plane", f"{plane}, {format_quantity(line.length, 'm')} of it"),
     ]

@@ -176,7 +176,7 @@ SUMMARY_COLUMNS = (
     LawColumn("start at", _recommendation_cell, True),
     LawColumn("texture", _texture_force_cell, True, 44),
     LawColumn("felt?", lambda row, _: Cell(tier_text(row.perceptibility))),
-    LawColumn("feeds?", _leak_cell, True, 44),
+    LawColumn("leak", _leak_cell, True, 44),
     LawColumn("clicks?", lambda row, _: _continuity_cell(row, not row.continuous), False, 36),
 )
 _CONSOLE_COLUMNS = (*SUMMARY_COLUMNS, VERDICT_COLUMN)

@@ -63,12 +63,12 @@ class Stroke:
 
     @property
     def total(self) -> float:
-        """Energy per stroke, all axes [J]; > 0 feeds the hand."""
+        """Energy per stroke, all axes [J]; > 0: the hand gains energy."""
         return float(sum(self.energy))
 
     @property
     def gains_energy(self) -> bool:
-        """Whether the law itself feeds the hand, by more than its spread and its error."""
+        """Whether the law itself delivers energy, by more than its spread and its error."""
         return self.field > self.spread + self.error
 
     @property

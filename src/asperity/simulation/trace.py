@@ -222,7 +222,7 @@ class Ledger:
 
     Attributes:
         supplied: work of the held force on the true motion, Σ f_k · (p_{k+1} - p_k), per axis;
-            > 0 feeds the hand.
+            > 0: the hand gains energy.
         same_sample: the paper's sum, Σ f_k · (p_k - p_{k-1}) with the measured position and the
             force commanded at the same sample, per axis; it inverts the sign of the sampling leak.
         dissipated: loss in the damping of device and hand.

@@ -77,7 +77,7 @@ class Leak(Serializable):
 
     def __repr__(self) -> str:
         upper = f"at most {self.upper_per_period:.4g} J per period"
-        return f"<Leak: {self.energy:.4g} J per turn, {upper}, {self.method}>"
+        return f"<Leak: {self.energy:.4g} J per traversal, {upper}, {self.method}>"
 
     @property
     def worst_per_period(self) -> float:

@@ -105,7 +105,7 @@ def stability_limit_text(limit: StabilityLimit, speed: float | None = None) -> s
 
     Example:
         >>> stability_limit_text(StabilityLimit(1999.9, "plausible", "wall test", math.inf))
-        'plausible up to 1990 N/m, with any delay'
+        'plausible up to 1990 N/m, for any delay'
         >>> stability_limit_text(StabilityLimit(None, "none"))
         'no stable stiffness is known: the device data are insufficient'
         >>> stability_limit_text(StabilityLimit(0.0, "none"))
@@ -126,7 +126,7 @@ def delay_clause(delay: float | None) -> str:
     """Return the admissible delay [samples], to be appended to a limit; empty for ``None``."""
     if delay is None:
         return ""
-    return ", with any delay" if math.isinf(delay) else f", with a delay up to {delay:.3g} samples"
+    return ", for any delay" if math.isinf(delay) else f", for a delay up to {delay:.3g} samples"
 
 
 def stiffness_limit_text(stiffness: float) -> str:

@@ -302,7 +302,7 @@ def _leak_criterion(loop: DeviceLoop) -> Criterion:
         note = "the law's curl is identically zero; no data of the device are needed"
         return Criterion(LEAK, formula, True, math.inf, math.inf, note)
     method = "" if loop.leak is None else f" ({loop.leak.method})"
-    note = f"one slow turn of the loop{method}; dry friction is not counted"
+    note = f"one slow traversal of the loop{method}; dry friction is not counted"
     if not has_known_leak(loop):
         return Criterion(LEAK, formula, assumptions=note, used_fields=fields)
     missing = () if loop.damping is not None else fields

@@ -47,10 +47,12 @@ def energy_text(value: float) -> str:
 def work_text(surface: Surface, run: Run) -> str:
     """Return the work that the texture did on the hand."""
     total = run.ledger.total
-    verb = "feeds the hand" if total > 0.0 else "takes from the hand"
-    work = f"{verb} {format_quantity(abs(total), 'J', digits=3)}" if total else "does no work"
+    energy = format_quantity(abs(total), "J", digits=3)
+    work = f"delivers {energy} to the hand" if total > 0.0 else f"takes {energy} from the hand"
+    if not total:
+        work = "does no work"
     if not math.isfinite(total):
-        work = "feeds the hand an energy that is not finite"
+        work = "delivers an energy that is not finite"
     stiffness = format_quantity(surface.stiffness, "N/m")
     duration = format_quantity(run.duration, "s")
     return f"Law {surface.law.letter} at {stiffness} {work} in {duration}"
@@ -154,9 +156,9 @@ def closure_text(run: Run) -> str:
     if not math.isfinite(share):
         return "The run diverged: its energies are not finite."
     return (
-        "Positive feeds the hand. Exact: the held force on the true motion. The paper's sum: the "
-        "command and the measured step of one sample. By sampling: the energy that holding the "
-        f"force adds, ½ Σ (f_k - f_k+1)·(p_k+1 - p_k). Residual: {share:.1g} of the "
+        "Positive: the hand gains energy. Exact: the held force on the true motion. The paper's "
+        "sum: the command and the measured step of one sample. By sampling: the energy that "
+        f"holding the force adds, ½ Σ (f_k - f_k+1)·(p_k+1 - p_k). Residual: {share:.1g} of the "
         f"{format_quantity(ledger.exchanged, 'J', digits=3)} exchanged."
     )
 

@@ -176,10 +176,10 @@ def _stroke_table(strokes: Sequence[Stroke]) -> Table:
 
 
 def stroke_answer(strokes: Sequence[Stroke]) -> str:
-    """Return which laws feed the hand, and which do so by their field, in two sentences."""
+    """Return which laws deliver energy, and which do so by their field, in two sentences."""
     by_all = _group_laws(strokes, lambda stroke: stroke.total > stroke.spread + stroke.error)
     by_field = _group_laws(strokes, lambda stroke: stroke.gains_energy)
-    return f"A stroke feeds the hand: {by_all}. The law's field itself feeds it: {by_field}."
+    return f"A stroke delivers energy: {by_all}. The field of the law itself does: {by_field}."
 
 
 def _group_laws(strokes: Sequence[Stroke], gains_energy: Callable[[Stroke], bool]) -> str:

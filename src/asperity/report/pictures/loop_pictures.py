@@ -124,7 +124,7 @@ def _draw_energy(axes: Axes, run: NamedColumns, selection: slice) -> None:
     style.draw_zero_line(axes)
     style.add_legend(axes)
     style.label_axes(axes, "time [s]", "energy [mJ]")
-    style.set_panel_title(axes, "Energy", "supplied by the texture; positive feeds the hand")
+    style.set_panel_title(axes, "Energy", "supplied by the texture; positive: gained by the hand")
 
 
 def _draw_path(axes: Axes, run: NamedColumns, height_at: HeightFunction, selection: slice) -> None:

@@ -77,7 +77,7 @@ def _judge_stopped_run(
 
 
 def _gains_energy(first: SegmentStatistics, last: SegmentStatistics) -> bool:
-    """Return whether the texture feeds the handle between two segments."""
+    """Return whether the texture delivers energy between two segments."""
     supplied = last.previous_energies[0] - first.energies[0]
     taken = last.previous_energies[1] - first.energies[1]
     return supplied > SUPPLY_SHARE * taken
