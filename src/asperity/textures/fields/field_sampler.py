@@ -136,9 +136,9 @@ def field_triple(i: int, j: int, m: int, field: FieldArguments) -> Vector:
     end = field.columns[i, j, END]
     if first < m and m + 1 < end:
         return float(field.c[start - 1]), float(field.c[start]), float(field.c[start + 1])
-    below = float(field.c[start - 1]) if first <= m - 1 < end else 0.0
+    below = float(field.c[start - 1]) if first < m <= end else 0.0
     middle = float(field.c[start]) if first <= m < end else 0.0
-    above = float(field.c[start + 1]) if first <= m + 1 < end else 0.0
+    above = float(field.c[start + 1]) if first - 1 <= m < end - 1 else 0.0
     return below, middle, above
 
 
