@@ -10,8 +10,6 @@ import numpy as np
 import pytest
 
 from asperity.contacts.split import optimality as conditions
-from asperity.contacts.split import potential_hull as hull
-from asperity.contacts.split import potential_spline as table
 from asperity.contacts.split import solver
 from asperity.contacts.split import split_evaluation as answers
 from asperity.contacts.warm_start import (
@@ -283,65 +281,6 @@ def test_duality_gap_and_query_error() -> None:
     distance = 100.0 * math.sqrt(3.0)
     error = solver.split_query_error(atoms, 3, y, MU, 5.0)
     assert error == pytest.approx(0.5 * (1.0 - MU) * (distance**2 - (distance - 5.0) ** 2))
-
-
-# --- hulls of tabulated potentials ----------------------------------------------------------------
-
-
-def test_bernstein_coefficients_reproduce_the_spline() -> None:
-    """On the middle cell Σ b_i B_i(u) is the quadratic spline, and for its derivatives."""
-    c0, c1, c2 = RNG.normal(size=3)
-    u = np.linspace(0.0, 1.0, 7)
-    basis = np.stack([(1 - u) ** 2, 2 * u * (1 - u), u * u])
-    spline = 0.5 * (c0 * (1 - u) ** 2 + c1 * (1 + 2 * u - 2 * u * u) + c2 * u * u)
-    slope = c0 * (u - 1) + c1 * (1 - 2 * u) + c2 * u
-    for order, expected in enumerate((spline, slope, np.full(7, c0 - 2 * c1 + c2))):
-        result = (
-            np.array([hull.bernstein_coefficient(c0, c1, c2, order, i) for i in range(3)]) @ basis
-        )
-        np.testing.assert_allclose(result, expected, rtol=1e-12, atol=1e-14)
-
-
-def test_spline_weights_and_their_derivatives() -> None:
-    """For the middle node and its neighbours; below the table the potential is linear."""
-    for t in (-0.5, -0.2, 0.0, 0.37, 0.5):
-        weights, slopes = (
-            np.array(table.quadratic_weights(t)),
-            np.array(table.quadratic_weight_slopes(t)),
-        )
-        assert weights.sum() == pytest.approx(1.0, rel=1e-15)
-        assert weights @ [-1.0, 0.0, 1.0] == pytest.approx(t, abs=1e-15)
-        assert weights @ [1.0, 0.0, 1.0] == pytest.approx(t * t + 0.25, rel=1e-15)
-        assert slopes.sum() == pytest.approx(0.0, abs=1e-15)
-        assert slopes @ [-1.0, 0.0, 1.0] == pytest.approx(1.0, rel=1e-15)
-        assert slopes @ [1.0, 0.0, 1.0] == pytest.approx(2.0 * t, abs=1e-15)
-    for w, node in ((0.5, 1), (1.49, 1), (1.51, 2), (7.2, 7)):
-        m, distance_below, weights, slopes = table.potential_z_weights(w)
-        assert (m, distance_below) == (node, 0.0)
-        assert (weights, slopes) == (
-            table.quadratic_weights(w - node),
-            table.quadratic_weight_slopes(w - node),
-        )
-    for w in (0.4, -3.0):
-        m, distance_below, weights, slopes = table.potential_z_weights(w)
-        assert (m, distance_below) == (1, w - 0.5)
-        assert np.array(weights) @ [0.0, 1.0, 2.0] == pytest.approx(w, rel=1e-14)
-        assert slopes == (-1.0, 1.0, 0.0)
-
-
-def test_eigenvalues_and_pivots_agree_with_lapack() -> None:
-    for _ in range(200):
-        m = RNG.normal(size=(3, 3))
-        m = m + m.T
-        entries = m[0, 0], m[0, 1], m[0, 2], m[1, 1], m[1, 2], m[2, 2]
-        top = float(np.linalg.eigvalsh(m)[-1])
-        assert hull.largest_eigenvalue_3x3(*entries) == pytest.approx(top, rel=1e-7)
-        for margin, is_below in ((1e-6, True), (-1e-6, False), (-2.0, False), (5.0, True)):
-            assert hull.eigenvalues_below(top + margin * (1.0 + abs(top)), *entries) == is_below
-    assert hull.largest_eigenvalue_3x3(2.0, 0.0, 0.0, 2.0, 0.0, 2.0) == 2.0
-    diagonal: Any = (1.0, 0.0, 0.0, 1.0, 0.0, 1.0)
-    assert not hull.eigenvalues_below(1.0, *diagonal)
-    assert not hull.eigenvalues_below(1.5, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0)
 
 
 # --- calls of the solver --------------------------------------------------------------------------

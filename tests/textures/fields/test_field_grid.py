@@ -1,63 +1,122 @@
-"""Node positions of a baked field of law H and its proved error bounds, by hand."""
+"""Nodes of a baked field, what it stores of them, and its proved error bounds, by hand."""
 
 from __future__ import annotations
 
 import math
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from asperity.analysis.split.baked_field import FieldGrid, curvature_bounds
 
-from asperity.analysis.split import baked_field as potential_grid
-from asperity.analysis.split import baked_field as potential_table
-from asperity.core.units import round_up
-from asperity.kernels import fuse
-from asperity.surface import Surface
+from asperity.textures.fields.field_grid import FieldGrid
+from asperity.textures.fields.field_sampler import END, FIRST, MIRRORED, PERIODIC, REACH, ZERO
 from asperity.textures.kinds.sinusoid import Sinusoid
 from asperity.textures.spline.spline_texture import HeightMap
 
 WAVE = Sinusoid(0.1e-3, 1e-3)
+SQUARE = [[0.1, 0.0], [0.0, 0.2]]
 
 
-def grid(steps: list[list[float]], cells: tuple[int, ...], *, periodic: bool = True) -> FieldGrid:
-    return FieldGrid(np.array(steps), cells, np.array([1e-3, 2e-3]), 6, 0.1, 5.0, periodic)
+def grid(steps: list[list[float]], cells: tuple[int, ...], border: int = PERIODIC) -> FieldGrid:
+    return FieldGrid(np.array(steps), cells, np.array([1e-3, 2e-3]), 6, 0.1, 5.0, border)
 
 
+@pytest.mark.parametrize("margin", [0, 3])
 @pytest.mark.parametrize("resolution", [0.7e-4, 1e-4, 3e-4, 1.0])
-def test_node_spacing_is_at_most_the_resolution(resolution: float) -> None:
-    surface = Surface(WAVE, "H", max_depth=0.35e-3)
-    fitted = FieldGrid.fit(surface, resolution)
+def test_node_spacing_is_at_most_the_resolution(resolution: float, margin: int) -> None:
+    fitted = FieldGrid.fit(WAVE.domain, WAVE.extremes, 0.35e-3, resolution, margin)
     along, rise = fitted.spacing
     for spacing, length, count in (
         (along, 1e-3, fitted.cells[0]),
-        (rise, 0.55e-3, fitted.levels - 3),
+        (rise, 0.55e-3, fitted.levels - 3 - margin),
     ):
         assert spacing <= resolution * (1 + 1e-12)
         assert count >= 4
         assert count == 4 or length / (count - 1) > resolution * (1 - 1e-12)
         assert spacing * count == pytest.approx(length, rel=1e-12)
-    # The floor is halfway between the two lowest levels, two levels are above the highest point.
+    # The floor is halfway between the two lowest levels; above the highest point are two levels
+    # and the margin.
     low, next_one = fitted.height(0), fitted.height(1)
     assert 0.5 * (low + next_one) == pytest.approx(-0.1e-3 - 0.35e-3, rel=1e-12)
+    first_above = fitted.levels - 2 - margin
     above = fitted.height(np.arange(fitted.levels)) > WAVE.extremes[1]
-    np.testing.assert_array_equal(np.flatnonzero(above), [fitted.levels - 2, fitted.levels - 1])
-    assert fitted.height(fitted.levels - 2) == pytest.approx(0.1e-3 + 0.5 * rise, rel=1e-9)
+    np.testing.assert_array_equal(np.flatnonzero(above), np.arange(first_above, fitted.levels))
+    assert fitted.height(first_above) == pytest.approx(0.1e-3 + 0.5 * rise, rel=1e-9)
 
 
-def test_border_nodes_are_periodic_or_mirrored() -> None:
+def test_grid_of_a_closed_body_has_two_nodes_of_margin_around_its_box() -> None:
+    lower, upper = np.array([-1.0, 2.0, 0.3]), np.array([0.5, 2.9, 1.27])
+    fitted = FieldGrid.around(lower, upper, 0.1)
+    assert fitted.border == ZERO
+    assert fitted.spacing == pytest.approx((0.1, 0.1, 0.1), rel=1e-12)
+    counts = np.array(fitted.node_counts) - 1
+    first = np.array([*fitted.start, fitted.height(0)])
+    assert (lower - first > 0.1999).all()
+    assert (first + 0.1 * counts - upper > 0.1999).all()
+    assert (counts * 0.1 <= upper - lower + 0.5 + 1e-12).all()
+
+
+def test_nodes_beyond_a_border_repeat_are_mirrored_or_missing() -> None:
     steps = [[0.1, 0.0]]
-    assert grid(steps, (4,)).nodes(0).tolist() == [3, 0, 1, 2, 3, 0, 1]
-    assert grid(steps, (4,), periodic=False).nodes(0).tolist() == [1, 0, 1, 2, 3, 4, 3]
-    assert grid([[0.1, 0.0], [0.0, 0.2]], (4, 5)).shape == (7, 8, 6)
+    assert grid(steps, (4,)).stored_nodes(0).tolist() == [3, 0, 1, 2, 3, 0, 1]
+    assert grid(steps, (4,), MIRRORED).stored_nodes(0).tolist() == [1, 0, 1, 2, 3, 4, 3]
+    assert grid(steps, (4,), ZERO).stored_nodes(0).tolist() == [-1, 0, 1, 2, 3, 4, -1]
+    assert grid(SQUARE, (4, 5)).node_counts == (4, 5, 6)
+    assert grid(SQUARE, (4, 5), MIRRORED).node_counts == (5, 6, 6)
 
 
-def test_error_bounds_by_hand() -> None:
-    """Variances: a quarter of the sum of squared steps plus a twelfth of each squared step."""
-    gradient, potential = grid([[0.3, 0.0], [0.0, 0.2]], (4, 4)).error_bounds(2.0)
+def test_columns_hold_only_what_is_between_their_first_and_last_potential() -> None:
+    """And the reach of a column is the greatest end among its neighbours and itself."""
+    fitted = grid(SQUARE, (5, 4), ZERO)
+    dense = np.zeros(fitted.node_counts, np.float32)
+    dense[2, 3, 1:4] = 1.0, 0.0, 2.0
+    dense[4, 0, :2] = 3.0
+    arguments = fitted.arguments(dense)
+    assert arguments.c.dtype == np.float32
+    assert sorted(arguments.c.tolist()) == [0.0, 1.0, 2.0, 3.0, 3.0]
+    table = arguments.columns
+    assert table.shape == (4 + 3, 5 + 3, 4)
+    ends = np.zeros((7, 8))
+    ends[3 + 1, 2 + 1], ends[0 + 1, 4 + 1] = 4, 2
+    np.testing.assert_array_equal(table[..., END], ends)
+    assert table[4, 3, FIRST] == 1
+    reach = np.zeros((7, 8))
+    reach[0:3, 4:7], reach[3:6, 2:5] = 2, 4
+    np.testing.assert_array_equal(table[..., REACH], reach)
+
+
+def test_arguments_contain_the_position_of_the_first_node() -> None:
+    fitted = grid(SQUARE, (4, 4), MIRRORED)
+    arguments = fitted.arguments(np.zeros((5, 5, 6), np.float32))
+    assert arguments.c.size == 0
+    position = np.array([1e-3 + 0.25, 2e-3 + 0.3])
+    rates = np.array([[arguments.m00, arguments.m01], [arguments.m10, arguments.m11]])
+    place = rates @ (position - [arguments.x0, arguments.y0])
+    np.testing.assert_allclose(place, [2.5, 1.5], rtol=1e-12)
+    assert arguments.z0 == pytest.approx(5.0 - 0.05)
+    assert (arguments.levels, arguments.border) == (6, MIRRORED)
+
+
+def test_extending_down_moves_the_floor_and_keeps_the_upper_levels() -> None:
+    fitted = grid(SQUARE, (4, 4))
+    deep = fitted.extend_down(3)
+    assert deep.levels == fitted.levels + 3
+    np.testing.assert_allclose(
+        deep.height(np.arange(3, deep.levels)), fitted.height(np.arange(fitted.levels)), rtol=1e-14
+    )
+
+
+# --- error bounds ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("passes", [0, 1, 3])
+def test_error_bounds_by_hand(passes: int) -> None:
+    """Variances: a quarter of a squared step and half of it a pass, and a twelfth along it."""
+    fitted = grid([[0.3, 0.0], [0.0, 0.2]], (4, 4))
+    gradient, potential = fitted.error_bounds(2.0, passes)
     squares = np.array([0.09, 0.04, 0.01])
-    assert potential == pytest.approx(0.5 * 2.0 * 0.25 * 0.14, rel=1e-12)
-    parts = 2.0 * np.sqrt(0.25 * 0.14 + squares / 12.0)
+    spread = (0.25 + 0.5 * passes) * 0.14
+    assert potential == pytest.approx(0.5 * 2.0 * spread, rel=1e-12)
+    parts = 2.0 * np.sqrt(spread + squares / 12.0)
     assert gradient == pytest.approx(math.sqrt(float(parts @ parts)), rel=1e-12)
 
 
@@ -72,107 +131,10 @@ def test_oblique_steps_increase_the_error_bound() -> None:
     assert oblique == pytest.approx(longest * upright, rel=1e-12)
 
 
-@pytest.mark.parametrize("periodic", [True, False])
-@pytest.mark.parametrize("stiffer", [0, 1])
-def test_curvature_bounds_are_the_maximum_over_all_batches(
-    periodic: bool, stiffer: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Every column is searched once; positive and negative eigenvalues each by their maximum."""
-    seen: list[int] = []
-
-    def hull_batch(first: int, last: int, out: np.ndarray, _table: object) -> None:
-        seen.extend(range(first, last))
-        for side in range(2):
-            size = (3.0 if side == stiffer else 1.0) + (1.0 if first == 16 else 0.0)
-            out[side] = (size + 0.5, size, first, 0.5, 2.0)
-
-    monkeypatch.setattr(fuse, "fuse_module", lambda *_: SimpleNamespace(hull_batch=hull_batch))
-    field_grid = grid([[0.1, 0.0], [0.0, 0.2]], (40, 4), periodic=periodic)
-    table = field_grid.kernel_arguments(np.full((7, 43, 6), 2.0))
-    norm, positive = curvature_bounds(field_grid, table)
-    assert sorted(seen) == list(range(40 if periodic else 41))
-    rounding = potential_grid._DIFFERENCE_ROUNDING * 2.0 / 0.1**2
-    assert rounding > 0.0
-    assert (norm.lower, norm.upper) == (4.0, 4.5 + rounding)
-    size = 4.0 if stiffer == 0 else 2.0
-    assert (positive.lower, positive.upper) == (size, size + 0.5 + rounding)
-    # The witness is at node (16, ½) and level 2.
-    position = (1e-3 + 16 * 0.1, 2e-3 + 0.5 * 0.2, 5.0 + 1.5 * 0.1)
-    assert norm.at == pytest.approx(position)
-    assert positive.at == pytest.approx(position)
-
-
-def test_kernel_arguments_contain_the_position_of_the_first_node() -> None:
-    field_grid = grid([[0.1, 0.0], [0.0, 0.2]], (4, 4), periodic=False)
-    table = field_grid.kernel_arguments(np.zeros((7, 7, 6)))
-    position = np.array([1e-3 + 0.25, 2e-3 + 0.3])
-    rates = np.array([[table.m00, table.m01], [table.m10, table.m11]])
-    np.testing.assert_allclose(rates @ (position - [table.x0, table.y0]), [2.5, 1.5], rtol=1e-12)
-    assert table.z0 == pytest.approx(5.0 - 0.05)
-    assert field_grid.bytes == 8 * 7 * 7 * 6
-
-
 def test_grid_of_a_finite_map_starts_at_its_corner() -> None:
     texture = HeightMap(1e-5 * np.random.default_rng(0).normal(size=(9, 12)), 1e-4)
-    fitted = FieldGrid.fit(Surface(texture, "H", max_depth=1e-4), 0.9e-4)
-    assert not fitted.periodic
+    fitted = FieldGrid.fit(texture.domain, texture.extremes, 1e-4, 0.9e-4)
+    assert fitted.border == MIRRORED
     np.testing.assert_allclose(fitted.start, texture.domain.origin)
     ends = fitted.start + np.array(fitted.cells) @ fitted.steps
     np.testing.assert_allclose(ends, texture.domain.origin + texture.domain.spans.sum(axis=0))
-
-
-# --- resolution -----------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("max_bytes", [3_000, 40_000, 10**6])
-def test_finest_resolution_that_fits_is_accurate_to_three_digits(max_bytes: int) -> None:
-    """On a wave of 1 mm and on one of 4 km, whose node spacing exceeds 1 m."""
-    for size in (1.0, 4e6):
-        texture = Sinusoid(0.1e-3 * size, 1e-3 * size)
-        surface = Surface(texture, "H", max_depth=0.35e-3 * size)
-        finest = potential_table._finest_resolution(surface, max_bytes)
-        assert FieldGrid.fit(surface, finest).bytes <= max_bytes
-        assert FieldGrid.fit(surface, finest / 1.002).bytes > max_bytes
-
-
-def test_round_up_of_the_resolution_never_decreases() -> None:
-    for value in 10.0 ** np.random.default_rng(3).uniform(-8.0, 2.0, 300):
-        result = round_up(value)
-        unit = 10.0 ** (math.floor(math.log10(value)) - 2)
-        assert value <= result <= value + unit * (1.0 + 1e-9)
-        assert abs(result / unit - round(result / unit)) < 1e-6
-
-
-@pytest.mark.parametrize(("limit", "criterion"), [(2**28, "waves"), (10_000, "bytes")])
-def test_default_grid_has_64_nodes_per_wave_or_the_size_limit(limit: int, criterion: str) -> None:
-    surface = Surface(WAVE, "H", max_depth=0.35e-3)
-    slope, hessian = WAVE.bounds
-    fitted = potential_table._default_grid(surface, limit)
-    if criterion == "waves":
-        finest = 2.0 * math.pi * slope / hessian / 64
-        assert fitted.shape == FieldGrid.fit(surface, finest).shape
-    else:
-        assert fitted.bytes <= limit < FieldGrid.fit(surface, 0.99 * min(fitted.spacing)).bytes
-    # At most a million nodes of eight bytes; a flat surface has no shortest wave.
-    flat = Surface(HeightMap(np.zeros((4, 5)), 1e-4), "H", max_depth=1e-4)
-    assert 7e6 < potential_table._default_grid(flat, 2**28).bytes <= 8e6
-
-
-def test_half_of_the_random_probes_are_near_the_surface() -> None:
-    """4096 probes lie within two nodes of the surface, 4096 in the whole field above the floor."""
-    texture = HeightMap(1e-5 * np.random.default_rng(0).normal(size=(9, 12)), 1e-4)
-    surface = Surface(texture, "H", max_depth=1e-4)
-    grid = FieldGrid.fit(surface, 0.2e-4)
-    points = potential_table._random_probes(surface, grid)
-    assert points.shape == (8192, 3)
-    above = (points[:, 2] - texture.height(points[:, :2])) / grid.level_spacing
-    assert np.abs(above[:4096]).max() <= 2.0 + 1e-9
-    assert above[:4096].min() < -1.99
-    assert above[:4096].max() > 1.99
-    assert points[:, 2].min() >= grid.floor
-    rest = points[4096:, 2]
-    assert rest.max() > texture.extremes[1] - 0.01 * np.ptp(rest)
-    assert rest.min() < grid.floor + 0.01 * np.ptp(rest)
-    parts = (points[:, :2] - texture.domain.origin) @ np.linalg.inv(texture.domain.spans)
-    assert 0.0 <= parts.min() < 0.01
-    assert 0.99 < parts.max() <= 1.0

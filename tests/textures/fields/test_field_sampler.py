@@ -1,0 +1,225 @@
+"""The force kernels of a baked field against a B-spline of a dense array, evaluated plainly."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from asperity.core.checks import FloatArray
+from asperity.textures.fields import field_sampler as kernels
+from asperity.textures.fields.field_grid import FieldGrid, SingleArray
+from asperity.textures.fields.field_sampler import MIRRORED, PERIODIC, ZERO, FieldArguments
+
+STEPS = np.array([[1.1e-5, 0.3e-5], [-0.2e-5, 0.9e-5]])
+BORDERS = [PERIODIC, MIRRORED, ZERO]
+AXES = [1, 2]
+
+
+def random_field(axes: int, border: int) -> tuple[FieldGrid, SingleArray, FieldArguments]:
+    """Return a grid of random potentials in columns of random ends, some of them empty."""
+    rng = np.random.default_rng(10 * axes + border)
+    cells = (7, 5)[:axes]
+    grid = FieldGrid(
+        STEPS[:axes], cells, np.array([2e-5, -1e-5]), 9, 0.8e-5, -3e-5, border,
+    )  # fmt: skip
+    dense = rng.uniform(1e-10, 2e-10, grid.node_counts).astype(np.float32)
+    levels = np.arange(grid.levels)
+    plane = grid.node_counts[:-1]
+    first = rng.integers(0, 4, plane) if border == ZERO else np.zeros(plane, int)
+    end = rng.integers(0, grid.levels - 1, plane)  # two levels are above every body
+    dense[(levels < first[..., None]) | (levels >= end[..., None])] = 0.0
+    dense[rng.uniform(size=dense.shape) < 0.1] = 0.0
+    return grid, dense, grid.arguments(dense)
+
+
+def basis(t: FloatArray, order: int) -> FloatArray:
+    """Return the quadratic B-spline at t, or its first or second derivative."""
+    a, inner = np.abs(t), np.abs(t) < 0.5
+    if order == 0:
+        values = np.where(inner, 0.75 - t * t, 0.5 * (1.5 - a) ** 2)
+    elif order == 1:
+        values = np.where(inner, -2.0 * t, np.sign(t) * (a - 1.5))
+    else:
+        values = np.where(inner, -2.0, 1.0)
+    return np.where(a < 1.5, values, 0.0)
+
+
+def dense_spline(
+    grid: FieldGrid, dense: FloatArray, nodes: FloatArray, orders: tuple[int, ...]
+) -> FloatArray:
+    """Return a derivative by the coordinates in nodes (n, d + 1), by a sum over all nodes."""
+    result = np.broadcast_to(dense.astype(float), (len(nodes), *dense.shape))
+    for axis, order in enumerate(orders):
+        count = dense.shape[axis]
+        weights = np.zeros((len(nodes), count))
+        for place in range(-6 * count, 7 * count):
+            node = place
+            if axis < len(orders) - 1 and grid.border == PERIODIC:
+                node = place % count
+            elif axis < len(orders) - 1 and grid.border == MIRRORED:
+                node = place % (2 * count - 2)
+                node = min(node, 2 * count - 2 - node)
+            if 0 <= node < count:
+                weights[:, node] += basis(nodes[:, axis] - place, order)
+        result = np.einsum("nk...,nk->n...", result, weights)
+    return np.asarray(result)
+
+
+def derivatives(
+    grid: FieldGrid, dense: FloatArray, points: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return T, ∇T and Hess T at points above the floor, by :func:`dense_spline`."""
+    axes = len(grid.cells)
+    rates = np.zeros((axes + 1, 3))
+    rates[:axes, :2] = np.linalg.pinv(grid.steps).T
+    rates[axes, 2] = 1.0 / grid.level_spacing
+    nodes = (points - [*grid.start, grid.height(0)]) @ rates.T
+    unit = np.eye(axes + 1, dtype=int)
+    value = dense_spline(grid, dense, nodes, (0,) * (axes + 1))
+    first = np.stack([dense_spline(grid, dense, nodes, tuple(row)) for row in unit], axis=-1)
+    second = np.empty((len(points), axes + 1, axes + 1))
+    for a, b in itertools.product(range(axes + 1), repeat=2):
+        second[:, a, b] = dense_spline(grid, dense, nodes, tuple(unit[a] + unit[b]))
+    return value, first @ rates, rates.T @ second @ rates
+
+
+def random_points(grid: FieldGrid, count: int) -> FloatArray:
+    """Return points above the floor, also far beyond the border and above the last level."""
+    rng = np.random.default_rng(5)
+    nodes = rng.uniform(-2.5, 3.5, (count, len(grid.cells))) * grid.cells
+    across = rng.uniform(-1e-4, 1e-4, (count, 1)) * [-STEPS[0, 1], STEPS[0, 0]]
+    xy = grid.positions(nodes) + (across if len(grid.cells) == 1 else 0.0)
+    top = grid.height(grid.levels + 1)
+    return np.column_stack([xy, rng.uniform(grid.floor, top, count)])
+
+
+@pytest.mark.parametrize("border", BORDERS)
+@pytest.mark.parametrize("axes", AXES)
+def test_columns_equal_a_spline_of_the_dense_array(axes: int, border: int) -> None:
+    grid, dense, arguments = random_field(axes, border)
+    points = random_points(grid, 400)
+    if border == ZERO:  # beyond its last node a closed body has no force
+        points[:200, :2] = grid.positions(
+            np.random.default_rng(6).uniform(0.0, 1.0, (200, axes)) * grid.cells
+        )
+        dense = dense.copy()
+        for axis in range(axes):
+            np.moveaxis(dense, axis, 0)[[0, 1, -2, -1]] = 0.0
+        arguments = grid.arguments(dense)
+    value, slope, hessian = derivatives(grid, dense, points)
+    assert np.count_nonzero(value) > 50
+    found = np.array([kernels.field_expansion(*p, arguments) for p in points])
+    gradient = np.array([kernels.field_gradient(*p, arguments) for p in points])
+    size, spacing = float(dense.max()), min(grid.spacing)
+    np.testing.assert_allclose(found[:, 0], value, atol=1e-14 * size)
+    np.testing.assert_allclose(gradient, slope, atol=1e-13 * size / spacing)
+    entries = hessian[:, [0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]]
+    np.testing.assert_allclose(found[:, 1:], entries, atol=1e-12 * size / spacing**2)
+
+
+@pytest.mark.parametrize("border", [PERIODIC, MIRRORED])
+@pytest.mark.parametrize("axes", AXES)
+def test_field_continues_below_the_floor_with_the_curvature_of_the_wall(
+    axes: int, border: int
+) -> None:
+    """T(floor - d) = T + d |∂T/∂z| + d²/2, its slope along the plane continued linearly."""
+    grid, dense, arguments = random_field(axes, border)
+    points = random_points(grid, 50)
+    points[:, 2] = grid.floor
+    value, slope, hessian = derivatives(grid, dense, points)
+    drop = 0.7e-5
+    below = points - [0.0, 0.0, drop]
+    found = np.array([kernels.field_expansion(*p, arguments) for p in below])
+    gradient = np.array([kernels.field_gradient(*p, arguments) for p in below])
+    size, spacing = float(dense.max()), min(grid.spacing)
+    np.testing.assert_allclose(
+        found[:, 0], value - drop * slope[:, 2] + 0.5 * drop**2, atol=1e-14 * size
+    )
+    expected = slope - drop * np.column_stack([hessian[:, 0, 2], hessian[:, 1, 2], np.ones(50)])
+    np.testing.assert_allclose(gradient, expected, atol=1e-12 * size / spacing)
+    np.testing.assert_array_equal(found[:, 6], 1.0)
+
+
+def test_a_closed_body_has_no_force_beyond_its_last_node() -> None:
+    grid, _dense, arguments = random_field(2, ZERO)
+    for u, v in ((-0.1, 2.0), (7.1, 2.0), (3.0, -0.1), (3.0, 5.1)):
+        x, y = grid.positions(np.array([u, v]))
+        assert kernels.field_gradient(x, y, 0.0, arguments) == (0.0, 0.0, 0.0)
+        assert kernels.field_expansion(x, y, 0.0, arguments) == (0.0,) * 7
+    # Nor is its floor a wall.
+    x, y = grid.positions(np.array([3.0, 2.0]))
+    assert kernels.field_expansion(x, y, grid.floor - 1e-3, arguments)[6] == 0.0
+
+
+@pytest.mark.parametrize("border", BORDERS)
+def test_force_is_zero_above_the_height_of_the_sampler(border: int) -> None:
+    """It is the least such height on the grid of the levels: just below it some force is not."""
+    grid, _dense, arguments = random_field(2, border)
+    forces = []
+    for x, y, _z in random_points(grid, 200):
+        top = kernels.sample_height(x, y, arguments)
+        assert top <= grid.height(grid.levels - 0.5) + 1e-12
+        assert not any(kernels.field_gradient(x, y, top + 1e-15, arguments))
+        forces.append(kernels.field_gradient(x, y, top - 1e-8, arguments))
+    assert np.any(forces)
+
+
+def test_functions_of_the_contact_repeat_gradient_and_potential() -> None:
+    _grid, _dense, arguments = random_field(2, PERIODIC)
+    p = (3e-5, 1e-5, -2e-5)
+    gradient = np.array(kernels.field_gradient(*p, arguments))
+    value, *hessian = kernels.field_expansion(*p, arguments)
+    assert gradient.any()
+    np.testing.assert_array_equal(kernels.split_contact(*p, 1.0, arguments), -gradient)
+    warm = kernels.split_contact_warm(*p, 1.0, np.zeros(3), arguments)
+    np.testing.assert_array_equal(warm, -gradient)
+    closest = kernels.closest_point_within_budget(*p, 0.0, 0.0, 9.0, arguments)
+    np.testing.assert_array_equal(closest, [*(p - gradient), 0.0, 0.0, 0.0, 1.0])
+    assert kernels.split_energy(*p, 1.0, arguments) == (value, 1, 0.0)
+    derivative = kernels.split_derivative(*p, 1.0, arguments)
+    np.testing.assert_array_equal(derivative, [*-gradient, *-np.array(hessian)])
+
+
+# --- weights --------------------------------------------------------------------------------------
+
+
+def test_spline_weights_and_their_derivatives() -> None:
+    for t in (-0.5, -0.2, 0.0, 0.37, 0.5):
+        weights = np.array(kernels.quadratic_weights(t))
+        slopes = np.array(kernels.quadratic_weight_slopes(t))
+        assert weights.sum() == pytest.approx(1.0, rel=1e-15)
+        assert weights @ [-1.0, 0.0, 1.0] == pytest.approx(t, abs=1e-15)
+        assert weights @ [1.0, 0.0, 1.0] == pytest.approx(t * t + 0.25, rel=1e-15)
+        assert slopes.sum() == pytest.approx(0.0, abs=1e-15)
+        assert slopes @ [-1.0, 0.0, 1.0] == pytest.approx(1.0, rel=1e-15)
+        assert slopes @ [1.0, 0.0, 1.0] == pytest.approx(2.0 * t, abs=1e-15)
+
+
+def test_weights_along_z_are_linear_below_the_floor() -> None:
+    for w, node in ((0.5, 1), (1.49, 1), (1.51, 2), (7.2, 7)):
+        expected = kernels.quadratic_weights(w - node), kernels.quadratic_weight_slopes(w - node)
+        assert kernels.field_z_weights(w) == (node, 0.0, *expected)
+    for w in (0.4, -3.0):
+        m, below, weights, slopes = kernels.field_z_weights(w)
+        assert (m, below) == (1, w - 0.5)
+        assert np.array(weights) @ [0.0, 1.0, 2.0] == pytest.approx(w, rel=1e-14)
+        assert slopes == (-1.0, 1.0, 0.0)
+
+
+@pytest.mark.parametrize("border", BORDERS)
+def test_fold_returns_a_coordinate_inside_and_its_sign(border: int) -> None:
+    cells = 6
+    for u in np.linspace(-20.0, 20.0, 401):
+        inside, sign = kernels.field_fold(u, cells, border)
+        assert 0.0 <= inside <= cells
+        if 0.0 <= u <= cells:
+            assert (inside, sign) == (u, 1.0)
+        elif border == ZERO:
+            assert sign == 0.0
+        else:
+            period = cells if border == PERIODIC else 2 * cells
+            turns = (u - sign * inside) / period
+            assert turns == pytest.approx(round(turns), abs=1e-12)
+            assert sign == 1.0 or border == MIRRORED
