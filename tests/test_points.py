@@ -19,7 +19,7 @@ def surface(law: str) -> asp.Surface:
     return asp.Surface(STEEP, law)
 
 
-def baked_field() -> asp.BakedField:
+def baked() -> asp.Surface:
     return asp.bake(surface("H"), resolution=40e-6)
 
 
@@ -32,9 +32,9 @@ FUNCTIONS: dict[str, tuple[Callable[[], Callable[[Any], Any]], tuple[float, ...]
     **{f"force {law}": (lambda law=law: surface(law).force, PROBE) for law in "WABCDEFGH"},
     **{f"jacobian {law}": (lambda law=law: surface(law).jacobian, PROBE) for law in "BF"},
     "force_and_jacobian": (lambda: surface("C").force_and_jacobian, PROBE),
-    "table force": (lambda: baked_field().force, PROBE),
-    "table potential": (lambda: baked_field().potential, PROBE),
-    "table jacobian": (lambda: baked_field().jacobian, PROBE),
+    "baked force": (lambda: baked().force, PROBE),
+    "baked jacobian": (lambda: baked().jacobian, PROBE),
+    "baked split_state": (lambda: lambda at: parts(asp.split_state(baked(), at)), PROBE),
     "split_state": (lambda: lambda at: parts(asp.split_state(surface("H"), at)), PROBE),
     "beyond": (lambda: asp.pop_through(surface("H"), 2e-3).beyond, PROBE),
 }

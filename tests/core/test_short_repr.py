@@ -59,7 +59,6 @@ EXAMPLES: dict[str, Callable[[], Any]] = {
     "Sinusoid": lambda: asp.Sinusoid(2e-4, 2e-3),
     "SplitState": lambda: asp.split_state(surface("H"), np.zeros((200, 3))),
     "Surface": lambda: asp.Surface(MANY, "F", max_depth=1e-5),
-    "BakedField": lambda: asp.bake(surface("H"), resolution=1e-4),
 }
 
 
@@ -98,6 +97,12 @@ def test_repr_of_fourier_lists_few_waves_and_counts_many() -> None:
     assert repr(MANY) == "<Fourier of 60 waves>"
     few = asp.Fourier([1e-4, 2e-4], [[1e3, 0.0], [0.0, 2e3]])
     assert repr(few).startswith("Fourier(amplitudes=[0.0001, 0.0002], wavevectors=")
+
+
+def test_repr_of_a_baked_surface_has_nodes_and_gain() -> None:
+    text = repr(asp.bake(surface("H"), resolution=1e-4).texture)
+    assert text.startswith("<PotentialField of Sinusoid(amplitude=0.0002, ")
+    assert "nodes, q at most 1." in text
 
 
 def test_repr_of_a_run_has_the_energy_to_the_hand() -> None:

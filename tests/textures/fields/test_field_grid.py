@@ -120,6 +120,15 @@ def test_error_bounds_by_hand(passes: int) -> None:
     assert gradient == pytest.approx(math.sqrt(float(parts @ parts)), rel=1e-12)
 
 
+def test_error_bounds_include_single_precision() -> None:
+    fitted = grid([[0.3, 0.0], [0.0, 0.2]], (4, 4))
+    rounding = 11.0 * 3.0 * 2.0**-24
+    gradient, potential = fitted.error_bounds(1.0, 2, 3.0)
+    exact_gradient, exact_potential = fitted.error_bounds(1.0, 2)
+    assert potential - exact_potential == pytest.approx(rounding, rel=1e-6)
+    assert 0.0 < gradient - exact_gradient <= 2.0 * rounding * math.sqrt(1 / 0.09 + 1 / 0.04 + 100)
+
+
 def test_oblique_steps_increase_the_error_bound() -> None:
     """The gradient from its components along unit steps at 60 degrees is at most √2 longer."""
     upright, _ = grid([[0.1, 0.0], [0.0, 0.1]], (4, 4)).error_bounds(1.0)

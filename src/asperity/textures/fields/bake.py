@@ -235,7 +235,8 @@ class _Plan:
         numbers = [certified_number(float(upper[i]), attained[i]) for i in range(2)]
         one_sided, other = numbers
         larger = max(numbers, key=lambda number: number.lower)
-        force, energy = grid.error_bounds(self.gain, passes)
+        largest = float(arguments.c.max(initial=0.0))
+        force, energy = grid.error_bounds(self.gain, passes, largest)
         accuracy = FieldAccuracy(math.nan, math.nan, force, energy, self.texture_rms, _PROBES)
         field = PotentialField(
             self.texture, grid, arguments, max_depth=self.max_depth, continuity=self.continuity,

@@ -135,25 +135,30 @@ class FieldGrid:
         """
         return (0.25 + 0.5 * passes) * float(np.square(self.spacing).sum())
 
-    def error_bounds(self, gain: float, passes: int = 0) -> tuple[float, float]:
+    def error_bounds(
+        self, gain: float, passes: int = 0, largest: float = 0.0
+    ) -> tuple[float, float]:
         """Return proved bounds of |∇T - ∇U| [m] and of |T - U| [m²].
 
         A derivative of T along a step is the mean of that derivative of U over points around the
         probe, its potential the mean of U over other points. Both have the probe as their mean;
         :meth:`spread` is the variance of the latter, and in the former the variance along the step
         itself is at most 1/12 of its square greater (a linear B-spline, at most 1/4, and the
-        step's own 1/12, for 1/4).
+        step's own 1/12, for 1/4). Single precision rounds a potential once, and less than 5 times
+        in a smoothing pass; a slope takes at most twice that over a step.
 
         Args:
             gain: Lipschitz constant of ∇U [1].
             passes: number of smoothing passes.
+            largest: greatest potential that is stored in single precision [m²].
         """
+        rounding = (1.0 + 5.0 * passes) * largest * 0.5 * float(np.finfo(np.float32).eps)
         square, spread = np.square(self.spacing), self.spread(passes)
-        components = gain * np.sqrt(spread + square / 12.0)
+        components = gain * np.sqrt(spread + square / 12.0) + 2.0 * rounding / np.sqrt(square)
         rates = np.linalg.pinv(self.steps).T * np.hypot(*self.steps.T)[:, None]
         # Derivatives along non-orthogonal steps amplify an error of the gradient.
         skew = max(1.0, float(np.linalg.norm(rates, 2)))
-        return skew * float(np.linalg.norm(components)), 0.5 * gain * float(spread)
+        return skew * float(np.linalg.norm(components)), 0.5 * gain * float(spread) + rounding
 
     def arguments(self, potentials: SingleArray) -> FieldArguments:
         """Return the record of a field from its potentials at the nodes.
