@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
-from asperity.core.arguments import Argument
+from asperity.core.arguments import FIELD, RENDERING, SEARCH
 from asperity.core.cache import get_or_compute
 from asperity.core.checks import check_positive
 from asperity.core.digests import content_digest
@@ -16,24 +17,39 @@ from asperity.kernels.link import unit_from_module
 from asperity.surface import Surface
 from asperity.textures.fields.bake import BakeGoal, bake_texture
 from asperity.textures.fields.field_certificate import Progress
+from asperity.textures.fields.potential_field import PotentialField
 from asperity.textures.spline.spline_texture import HeightMap
 from asperity.textures.texture import Texture
-
-FIELD, SEARCH = "field", "search"
-RENDERING = Argument(
-    "rendering",
-    "how law H is rendered where it has no closed form: as a baked potential field, or by a search "
-    "within the time of a sample",
-    default=FIELD,
-    form="text",
-    choices=(FIELD, SEARCH),
-)
 
 Extent = Sequence[float]
 _NODES_PER_WAVE = 16
 
 
-def bake(
+def bake(surface: Surface, resolution: float | None = None, **options: Any) -> Surface:
+    """Bake law H of a surface as a potential field: nothing is searched when it is rendered.
+
+    Args:
+        surface: a surface with law H; the field extends down to min h - max_depth.
+        resolution: greatest distance of the nodes [m]; see :func:`bake_field`.
+        **options: of :func:`bake_field`: extent, share, max_gain, max_bytes, progress.
+
+    Returns:
+        The same surface with a :class:`~asperity.textures.fields.potential_field.PotentialField`
+        as its texture.
+
+    Raises:
+        ParameterError: see :func:`bake_field`.
+
+    Example:
+        >>> from asperity.textures.kinds.sinusoid import Sinusoid
+        >>> steep = Surface(Sinusoid(amplitude=0.4e-3, period=1e-3), "H", max_depth=0.5e-3)
+        >>> bake(steep, resolution=10e-6, max_gain=1.1).texture.resolution
+        1e-05
+    """
+    return surface.to_texture(bake_field(surface, resolution, **options))
+
+
+def bake_field(
     surface: Surface,
     resolution: float | None = None,
     *,
@@ -42,8 +58,8 @@ def bake(
     max_gain: float | None = BakeGoal.max_gain,
     max_bytes: int = BakeGoal.max_bytes,
     progress: Progress | None = None,
-) -> Surface:
-    """Bake law H of a surface as a potential field: nothing is searched when it is rendered.
+) -> PotentialField:
+    """Return the potential field of law H of a surface.
 
     Args:
         surface: a surface with law H; the field extends down to min h - max_depth.
@@ -57,22 +73,12 @@ def bake(
         max_bytes: greatest size of the coefficients.
         progress: called with the finished fraction, from 0 to 1.
 
-    Returns:
-        The same surface with a :class:`~asperity.textures.fields.potential_field.PotentialField`
-        as its texture.
-
     Raises:
         ParameterError: for another law, a texture that neither repeats nor has a border if no
             extent is given, or a field larger than ``max_bytes``; the message states what fits.
 
     Reference:
         MATH section 10.
-
-    Example:
-        >>> from asperity.textures.kinds.sinusoid import Sinusoid
-        >>> steep = Surface(Sinusoid(amplitude=0.4e-3, period=1e-3), "H", max_depth=0.5e-3)
-        >>> bake(steep, resolution=10e-6, max_gain=1.1).texture.grid.node_counts
-        (100, 133)
     """
     if not surface.law.contact.has_potential_field:
         raise ParameterError("surface", f"must have law H to be baked, not {surface.law}")
@@ -81,7 +87,7 @@ def bake(
         math.inf if max_gain is None else check_positive("max_gain", max_gain),
         int(check_positive("max_bytes", max_bytes, "byte")),
     )
-    field = bake_texture(
+    return bake_texture(
         surface.texture if extent is None else _finite_part(surface.texture, extent),
         surface.max_depth,
         surface.parameter("continuity"),
@@ -89,7 +95,6 @@ def bake(
         goal=goal,
         progress=progress,
     )
-    return surface.to_texture(field)
 
 
 def is_searched(surface: Surface) -> bool:
@@ -111,7 +116,8 @@ def rendered_surface(
 ) -> Surface:
     """Return the surface as a loop renders it: law H baked where it would be searched.
 
-    A field is made on first use and kept in the cache.
+    A field is made on first use and kept in the cache. A texture that never repeats is searched
+    unless an extent is given.
 
     Args:
         surface: the surface.
@@ -122,16 +128,22 @@ def rendered_surface(
     Raises:
         ParameterError: see :func:`bake`.
     """
-    if RENDERING.validate(rendering) == SEARCH or not is_searched(surface):
-        return surface
     texture = surface.texture
+    is_finite = texture.domain.periodic or texture.is_mirrored or extent is not None
+    if RENDERING.validate(rendering) == SEARCH or not (is_searched(surface) and is_finite):
+        return surface
     content = texture.digest and content_digest(
         texture.digest, surface.max_depth, surface.parameter("continuity"), *(extent or ())
     )
     field: Texture = get_or_compute(
-        "field", content, lambda: bake(surface, extent=extent, progress=progress).texture
+        "field", content, lambda: bake_field(surface, extent=extent, progress=progress)
     )
     return surface.to_texture(field)
+
+
+def rendering_sentences(surface: Surface) -> list[str]:
+    """Return how a surface is rendered, in one sentence, where law H was baked."""
+    return [surface.texture.preparation[-1]] if surface.texture.baked_numbers else []
 
 
 def _finite_part(texture: Texture, extent: Extent) -> Texture:

@@ -35,12 +35,13 @@ from asperity.analysis.surface_sentences import (
     law_parameter_sentences,
     unverified_sentences,
 )
-from asperity.core.arguments import DEFAULT_STIFFNESS
+from asperity.core.arguments import DEFAULT_STIFFNESS, FIELD
 from asperity.core.display import Plottable, Reportable
 from asperity.core.errors import ParameterError
 from asperity.core.files import attributes_to_dict, to_plain_data
 from asperity.core.units import format_quantity
 from asperity.devices import Device, load_device
+from asperity.rendering import rendered_surface
 from asperity.surface import Surface, default_max_depth
 from asperity.textures.catalogue import TextureLike, as_texture
 from asperity.textures.texture import Texture
@@ -189,6 +190,7 @@ def analyze(
     work_limit: int = DEFAULT_WORK_LIMIT,
     extent: tuple[float, float] | None = None,
     progress: Progress | None = None,
+    rendering: str = FIELD,
     **surface_arguments: Any,
 ) -> Analysis:
     """Analyze one law on one surface and one device.
@@ -210,6 +212,8 @@ def analyze(
             reached, the bounds found so far are returned with a note.
         extent: width and depth [m] of the part of the plane to search, for sums of waves.
         progress: called with the name of each of ``STEPS`` before it is computed.
+        rendering: how law H of a texture is rendered: ``"field"`` or ``"search"``; see
+            :func:`~asperity.rendering.rendered_surface`. A surface is analyzed as it is.
         **surface_arguments: of :class:`~asperity.surface.Surface` (law, stiffness, max_depth, ...),
             for a texture.
 
@@ -233,7 +237,7 @@ def analyze(
         (1.6, 0.255)
     """
     device = load_device(device)
-    surface = _resolve_surface(surface, device, surface_arguments)
+    surface = _resolve_surface(surface, device, rendering, extent, surface_arguments)
     _check_depth(surface)
     search = make_options(surface, tolerance, work_limit, extent)
     report_step: Progress = progress or (lambda _step: None)
@@ -268,9 +272,13 @@ def analyze(
 
 
 def _resolve_surface(
-    surface: Surface | TextureLike, device: Device, arguments: dict[str, Any]
+    surface: Surface | TextureLike,
+    device: Device,
+    rendering: str,
+    extent: tuple[float, float] | None,
+    arguments: dict[str, Any],
 ) -> Surface:
-    """Return the surface, of a texture with the recommended law and stiffness by default."""
+    """Return the surface, of a texture as rendered, by default as recommended."""
     given = {name: value for name, value in arguments.items() if value is not None}
     if isinstance(surface, Surface):
         for name in given:
@@ -279,8 +287,8 @@ def _resolve_surface(
         return surface
     texture = as_texture(surface, name="surface")
     if "law" not in given:
-        given["law"] = recommended_law(texture, device, **given)
-    surface = Surface(texture, **given)
+        given["law"] = recommended_law(texture, device, rendering=rendering, **given)
+    surface = rendered_surface(Surface(texture, **given), rendering, extent)
     if "stiffness" in given:
         return surface
     numbers = cached_number(surface, NORM), cached_number(surface, ONE_SIDED)

@@ -32,11 +32,12 @@ from asperity.analysis.passivity.verdict import (
     at_recommended_stiffness,
     recommend_stiffness,
 )
-from asperity.core.arguments import DEFAULT_STIFFNESS
+from asperity.core.arguments import DEFAULT_STIFFNESS, FIELD
 from asperity.core.checks import FloatArray, check_positive, check_real
 from asperity.core.errors import ParameterError
 from asperity.devices import Device, load_device
 from asperity.laws import Law
+from asperity.rendering import rendered_surface
 from asperity.surface import Surface
 from asperity.textures.catalogue import TextureLike, as_texture
 
@@ -52,6 +53,7 @@ def limits(
     time_samples: float | None = None,
     position_samples: float | None = None,
     force_steps: float | None = None,
+    rendering: str = FIELD,
     **surface_arguments: Any,
 ) -> Limits:
     """Check the six limits of haptic texture synthesis for a surface on a device.
@@ -72,6 +74,7 @@ def limits(
         time_samples: α, updates that a wave needs; at least 2, by the paper 5 to 10; default 5.
         position_samples: β, position steps that a wave needs; at least 2, default 5.
         force_steps: γ, force steps that an amplitude needs; at least 1, default 5.
+        rendering: see :func:`~asperity.analysis.analyze.analyze`.
         **surface_arguments: further arguments of :class:`~asperity.surface.Surface`.
 
     Raises:
@@ -98,9 +101,12 @@ def limits(
         "force_steps": _check_sample_count("force_steps", force_steps, 1.0),
     }
     if law is None:
-        law = recommended_law(texture, device, max_depth, speed=v, **surface_arguments)
+        law = recommended_law(
+            texture, device, max_depth, speed=v, rendering=rendering, **surface_arguments
+        )
     k = DEFAULT_STIFFNESS if stiffness is None else stiffness
     surface = Surface(texture, law, k, max_depth, **surface_arguments)
+    surface = rendered_surface(surface, rendering)
     q, one_sided = cached_number(surface, NORM), cached_number(surface, ONE_SIDED)
     recommended = recommend_stiffness(surface, device, q, one_sided)
     if stiffness is None:

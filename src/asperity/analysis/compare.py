@@ -19,7 +19,7 @@ from asperity.analysis.passivity.assess_passivity import passivity
 from asperity.analysis.passivity.verdict import at_recommended_stiffness, recommend_stiffness
 from asperity.analysis.recommendation import comparison_assumptions, recommend, recommendation_text
 from asperity.analysis.results import LawRow
-from asperity.core.arguments import DEFAULT_STIFFNESS
+from asperity.core.arguments import DEFAULT_STIFFNESS, FIELD
 from asperity.core.checks import check_positive
 from asperity.core.display import Plottable, Reportable
 from asperity.core.errors import ParameterError
@@ -28,6 +28,7 @@ from asperity.core.processes import precompute
 from asperity.core.units import format_quantity
 from asperity.devices import Device, load_device
 from asperity.laws import LAWS, REGISTERED_LAWS, Law, distribute_parameters, find_laws
+from asperity.rendering import rendered_surface
 from asperity.surface import Surface
 from asperity.textures.catalogue import TextureLike, as_texture
 from asperity.textures.texture import Texture, TexturePart
@@ -108,6 +109,7 @@ def compare(
     speed: float | None = None,
     progress: Progress | None = None,
     law_parameters: Mapping[str, float] | None = None,
+    rendering: str = FIELD,
     **surface_arguments: Any,
 ) -> Comparison:
     """Compare laws on a surface and a device: stability, perceptibility and artefacts.
@@ -131,6 +133,8 @@ def compare(
         speed: speed of the scan for which perceptibility is assessed [m/s]; 0.1 by default.
         progress: called with the letter of each law before it is analysed.
         law_parameters: parameters of laws by name; each goes to the laws that declare it.
+        rendering: how law H is rendered: ``"field"`` or ``"search"``; see
+            :func:`~asperity.rendering.rendered_surface`.
         **surface_arguments: further arguments of :class:`~asperity.surface.Surface`.
 
     Raises:
@@ -142,7 +146,8 @@ def compare(
         >>> [f"{row.law.letter} {row.stability_limit.stiffness:.0f} N/m" for row in result.rows]
         ['W 5000 N/m', 'A 976 N/m']
     """
-    laws = find_laws(list(laws) if not isinstance(laws, str) else laws)
+    texture = as_texture(texture)
+    laws = _renderable_laws(find_laws(list(laws) if not isinstance(laws, str) else laws), texture)
     device = load_device(device)
     if stiffness is not None:
         stiffness = check_positive("stiffness", stiffness, "N/m")
@@ -152,14 +157,13 @@ def compare(
         needs = f"needs max_stiffness to compare laws: add {hint}, the stiffest smooth wall"
         raise ParameterError("device", f"{device.id} {needs} that held, to its file; or {others}")
     parameters = distribute_parameters(law_parameters or {}, laws)
-    texture = as_texture(texture)
     surface_arguments |= {"stiffness": stiffness or DEFAULT_STIFFNESS, "max_depth": max_depth}
     surfaces = [
         Surface(texture, law, law_parameters=own, **surface_arguments)
         for law, own in zip(laws, parameters, strict=True)
     ]
     part, explicit_depth = texture.texture_part(), max_depth is not None
-    query = _ComparisonQuery(device, stiffness, scan_speed, part, explicit_depth)
+    query = _ComparisonQuery(device, stiffness, scan_speed, part, explicit_depth, rendering)
     rows = []
     with precompute(precompute_row, _precompute_tasks(surfaces, query)) as precomputed:
         for surface, _ in zip(surfaces, precomputed, strict=True):
@@ -180,6 +184,13 @@ def compare(
         recommendation=recommendation_text(recommended, device),
         assumptions=comparison_assumptions(rows, part, device, defaults),
     )
+
+
+def _renderable_laws(laws: tuple[Law, ...], texture: Texture) -> tuple[Law, ...]:
+    """Return the laws, of all laws on a baked field the one that was baked."""
+    if not texture.baked_numbers or len(laws) < len(ALL_LAWS):
+        return laws
+    return tuple(law for law in laws if law.contact.has_potential_field)
 
 
 def missing_data_hint(device: Device) -> str:
@@ -228,6 +239,7 @@ class _ComparisonQuery:
     speed: float
     part: TexturePart
     explicit_depth: bool
+    rendering: str
 
 
 Task = tuple[Surface, _ComparisonQuery]
@@ -250,7 +262,7 @@ def precompute_row(task: Task | None) -> None:
 
 
 def _compute_row(surface: Surface, query: _ComparisonQuery) -> LawRow:
-    device = query.device
+    device, surface = query.device, rendered_surface(surface, query.rendering)
     q, one_sided = cached_number(surface, NORM), cached_number(surface, ONE_SIDED)
     recommended = recommend_stiffness(surface, device, q, one_sided)
     if query.stiffness is None:

@@ -32,6 +32,7 @@ from asperity.analysis.surface_sentences import (
 )
 from asperity.core.units import format_quantity
 from asperity.devices import Device
+from asperity.rendering import rendering_sentences
 from asperity.textures.texture import TexturePart
 
 EQUAL_STRENGTH_RATIO = 0.8
@@ -272,7 +273,9 @@ def comparison_assumptions(
     """
     first = rows[0].surface
     texture = next((row.perceptibility for row in rows if row.perceptibility is not None), None)
-    sentences = [*first.texture.preparation, *_default_sentences(rows, defaults)]
+    rendered = [text for row in rows for text in rendering_sentences(row.surface)]
+    steps = dict.fromkeys((*first.texture.preparation, *rendered))
+    sentences = [*steps, *_default_sentences(rows, defaults)]
     sentences += form_removal_sentences(texture, part.form, part.waviness)
     sentences += _wall_assumptions(rows, device)
     sentences += _margin_assumptions(rows)

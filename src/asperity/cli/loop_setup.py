@@ -79,6 +79,7 @@ def load_setup(
     Raises:
         ParameterError: for a missing, unknown or invalid value.
     """
+    from asperity.rendering import rendered_surface, rendering_sentences
     from asperity.scene import load_scene
     from asperity.scene.setup import make_setup
 
@@ -111,7 +112,12 @@ def load_setup(
         uses_delay=include_delay,
         use_defaults=driver is not None,
     )
-    return replace(setup, assumptions=(note, *setup.assumptions)) if note else setup
+    with progress_bar("baking the field") as update:
+        rendered = rendered_surface(setup.surface, setup.rendering, progress=update)
+    notes = (*([note] if note else []), *rendering_sentences(rendered))
+    setup = replace(setup, assumptions=(*notes, *setup.assumptions))
+    vars(setup)["rendered"] = rendered  # also where nothing is kept in the cache
+    return setup
 
 
 def _recommend_law_and_stiffness(
@@ -223,7 +229,7 @@ def check_stiffness_limit(setup: Setup) -> None:
     from asperity.servo.safety import excess_stiffness_reason
 
     with progress_bar("analyzing the surface"):
-        reason = excess_stiffness_reason(setup.surface, setup.device)
+        reason = excess_stiffness_reason(setup.rendered, setup.device)
     if reason:
         raise ParameterError("stiffness", f"is refused: {reason}; --accept-risk accepts it")
 

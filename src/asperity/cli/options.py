@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from asperity.cli.plugins import load_plugins
-from asperity.core.arguments import MAX_DEPTH, STIFFNESS, Argument, read_arguments
+from asperity.core.arguments import MAX_DEPTH, RENDERING, STIFFNESS, Argument, read_arguments
 from asperity.core.errors import ParameterError, suggest_names
 from asperity.core.memory import limit_memory
 from asperity.core.processes import available_cores, limit_processes
@@ -110,7 +110,7 @@ def command_arguments(command: str) -> tuple[Argument, ...]:
 
 
 REQUESTED_STIFFNESS, SPEED, MEMORY, JOBS = command_arguments("shared")
-LAW_OPTIONS = (STIFFNESS, MAX_DEPTH, *SHIPPED_LAW_ARGUMENTS.values())
+LAW_OPTIONS = (STIFFNESS, MAX_DEPTH, RENDERING, *SHIPPED_LAW_ARGUMENTS.values())
 
 
 Parser = Callable[[str], Any]

@@ -126,7 +126,7 @@ def make_loop(
             duration = setup.servo.period * driver.max_readings
     reach = setup.safety.reach_limit(setup.device)
     return ServoProcess(
-        setup.surface, driver, setup.servo, setup.safety, reach, duration, prestarted=process
+        setup.rendered, driver, setup.servo, setup.safety, reach, duration, prestarted=process
     )
 
 
@@ -155,7 +155,7 @@ def record_loop(path: str | None, loop: ServoProcess, setup: Setup) -> Iterator[
     from asperity.servo.process import LoopRecorder
 
     metadata = setup.recording_metadata(loop.driver.name)
-    with LoopRecorder(path, loop, setup.surface, setup.servo, metadata) as recorder:
+    with LoopRecorder(path, loop, setup.rendered, setup.servo, metadata) as recorder:
         yield recorder.write_new_rows
     if lost := recorder.lost_rows:
         print_message(f"{lost} rows are missing in the recording: this program was too slow")

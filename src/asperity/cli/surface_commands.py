@@ -9,8 +9,18 @@ from typing import Any
 
 import click
 
-from asperity.cli.options import file_options, file_values, plugin_option
+from asperity.cli.options import (
+    argument_options,
+    command_arguments,
+    file_options,
+    file_values,
+    plugin_option,
+    provided_values,
+)
 from asperity.cli.output import Outputs, check_outputs, output_options, progress_bar
+from asperity.core.arguments import MAX_DEPTH
+from asperity.core.files import check_not_existing
+from asperity.laws import SHIPPED_LAW_ARGUMENTS
 
 
 @click.command("surfaces")
@@ -80,6 +90,46 @@ def prepare_command(file: str, output: str, outputs: Outputs, **values: Any) -> 
     from asperity.report.measured_report import preparation_page
 
     outputs.write(prepared, preparation_page(prepared, output))
+
+
+_BAKE = command_arguments("bake")
+
+
+@click.command("bake")
+@click.argument("surface")
+@click.option(
+    "-o", "--output", metavar="PATH", required=True, help="The file to write, surface.field."
+)
+@click.option("--force", is_flag=True, help="Replace an existing file.")
+@argument_options((*_BAKE, MAX_DEPTH, SHIPPED_LAW_ARGUMENTS["continuity"]))
+@plugin_option
+@file_options
+@output_options(html=False)
+def bake_command(
+    surface: str, output: str, *, force: bool, outputs: Outputs, **values: Any
+) -> None:
+    """Bake law H of SURFACE as a potential field, and write it to a file.
+
+    The rendered force is the gradient of the field: conservative and continuous, with a certified
+    gain, and no search. Every other command accepts the file in place of SURFACE; C programs read
+    it, see docs/howto/export.md.
+    """
+    from asperity.rendering import bake_field
+    from asperity.scene import load_scene
+    from asperity.surface import Surface
+    from asperity.textures.fields.field_file import save_field
+
+    check_outputs(output=output, json=outputs.json)
+    check_not_existing("output", output, force=force)
+    with progress_bar("baking the field") as update:
+        scene = load_scene(surface, file_values(values))
+        given = provided_values(values, (MAX_DEPTH, SHIPPED_LAW_ARGUMENTS["continuity"]))
+        options = provided_values(values, _BAKE)
+        field = bake_field(Surface(scene.texture, "H", **given), progress=update, **options)
+        save_field(output, field)
+    from asperity.report.measured_report import field_page
+
+    outputs.write(field.describe(), field_page(field, output))
 
 
 @click.command("show")

@@ -238,6 +238,15 @@ MAX_DEPTH = Argument(
     must_be_positive=True,
     example="0.5mm",
 )
+FIELD, SEARCH = "field", "search"
+RENDERING = Argument(
+    "rendering",
+    "how law H is rendered where it has no closed form: as a baked field, or by a search within "
+    "the time of a sample",
+    default=FIELD,
+    form="text",
+    choices=(FIELD, SEARCH),
+)
 
 
 # --- parsers of the forms: name of the argument, value, unit --------------------------------------

@@ -81,12 +81,12 @@ class Clip:
         setup = self.scene_state.setup
         metadata = {
             "made_by": "run",
-            "surface": field_metadata(setup.surface),
+            "surface": field_metadata(setup.rendered),
             "servo": to_plain_data(setup.servo),
             "every": 1,
             **setup.recording_metadata(SIMULATED_DRIVER),
         }
-        field, columns = field_attachments(setup.surface), (*COLUMNS, *ANCHOR_COLUMNS)
+        field, columns = field_attachments(setup.rendered), (*COLUMNS, *ANCHOR_COLUMNS)
         with RecordingWriter(folder / RECORDING_FILE, columns, metadata, field) as writer:
             writer.append(self._table)
         path, header = np.column_stack([self.rows[:, 0], self.anchors]), ",".join(PATH_COLUMNS)

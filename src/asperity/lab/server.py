@@ -160,7 +160,7 @@ class LabServer:
 
     def _update_background(self) -> None:
         scene = self.session.scene_state
-        self.background.show(scene.setup.surface, scene.rated_device)
+        self.background.show(scene.setup.rendered, scene.rated_device)
 
     async def watch_session(self) -> None:
         """Send changes of the session to the pages, until cancelled."""

@@ -275,7 +275,7 @@ class Session:
         self._set_state("starting", "compiling the loop: the first time takes some seconds")
         prestarted, self._prestarted = self._prestarted, None
         loop = ServoProcess(
-            setup.surface,
+            setup.rendered,
             self._make_driver(setup),
             setup.servo,
             setup.safety,
@@ -325,7 +325,7 @@ class Session:
             return
         self._set_state("changing", "compiling the law: the first time takes some seconds")
         # The risk is assessed already; a simulated device may buzz.
-        self._loop.change_surface(scene.setup.surface, accept_risk=True)
+        self._loop.change_surface(scene.setup.rendered, accept_risk=True)
         self.scene_state = scene
         self._set_state("running")
 
@@ -340,7 +340,7 @@ class Session:
         loop, stop_count = self._loop, self._stop_count
         if loop is not None:
             self._set_state("changing", "analysing the surface; the previous one is still rendered")
-        assessment = self._assess_risk(scene_state.setup.surface, scene_state.setup.device)
+        assessment = self._assess_risk(scene_state.setup.rendered, scene_state.setup.device)
         while not (done := wait([assessment], POLL_INTERVAL).done):
             self._poll()
             if self._loop is not loop or self._stop_count != stop_count:

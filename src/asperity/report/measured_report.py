@@ -21,6 +21,7 @@ from asperity.measured.prepared import PreparationStage, PreparedSurface
 from asperity.report import page
 from asperity.report.page import HEADED, SCREEN, Cell, Media, Row, Section, Table, TableLayout
 from asperity.report.sentences.number_text import NOT_AVAILABLE
+from asperity.textures.fields.potential_field import PotentialField
 from asperity.textures.texture import Texture
 from asperity.textures.texture_loading import MeasurementSummary, decimate
 
@@ -289,3 +290,22 @@ def removed_text(stage: PreparationStage) -> str:
         return "nothing"
     rms, span = format_quantity(stage.removed.rms, "m"), format_quantity(stage.removed.range, "m")
     return f"{rms} RMS, range {span}"
+
+
+def field_page(field: PotentialField, path: str) -> page.Page:
+    """Return the numbers of a baked field, for a terminal, and the path of its file."""
+    accuracy, spacing = field.accuracy, max(field.grid.spacing)
+    smoothing = f"smoothed {field.passes} times" if field.passes else "not smoothed"
+    facts = [
+        ("Nodes", f"{field.arguments.c.size}, {format_quantity(spacing, 'm')} apart, {smoothing}"),
+        ("Size", f"{field.bytes / 1e6:.3g} MB"),
+        ("q", f"at most {field.gain.upper:.4g}, certified; attained {field.gain.lower:.4g}"),
+        ("q⁺", f"at most {field.one_sided.upper:.4g}"),
+        ("Difference", f"{100.0 * accuracy.share:.2g} % RMS of the texture's force, measured"),
+        ("", f"at most {format_quantity(accuracy.bound, 'm')} times the stiffness, proved"),
+        ("Valid", f"down to z = {format_quantity(field.grid.floor, 'm')}"),
+        ("Saved", escape_unprintable(path)),
+    ]
+    width = max(len(name) for name, _text in facts)
+    blocks = [page.Paragraph(f"{name:<{width}}  {text}", "code") for name, text in facts]
+    return page.Page("", "", (), [page.terminal_section(*blocks)])

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from asperity.core.arguments import MAX_DEPTH, STIFFNESS, Argument, parse_arguments
+from asperity.core.arguments import MAX_DEPTH, RENDERING, STIFFNESS, Argument, parse_arguments
 from asperity.core.errors import ParameterError, suggest_names
 from asperity.core.files import open_input, to_plain_data
 from asperity.laws import SHIPPED_LAW_ARGUMENTS, Law, registered_arguments
@@ -63,7 +63,7 @@ def _column(names: list[str], name: str, file: str) -> int:
     return names.index(name)
 
 
-SURFACE_FIELDS = (LAW, STIFFNESS, MAX_DEPTH, CLAMP)
+SURFACE_FIELDS = (LAW, STIFFNESS, MAX_DEPTH, CLAMP, RENDERING)
 """Arguments of [surface] besides the parameters of its law."""
 
 
@@ -73,7 +73,7 @@ def surface_arguments() -> tuple[Argument, ...]:
 
 
 def surface_keywords(values: Mapping[str, Any], *laws: Law) -> dict[str, Any]:
-    """Return values of a surface as keywords of :class:`~asperity.surface.Surface`.
+    """Return values of a surface as keywords of :class:`~asperity.surface.Surface`, and rendering.
 
     Parameters declared by one of the laws, and those unknown to the shipped laws, become
     ``law_parameters``; parameters of other shipped laws are accepted.

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from asperity.analysis.surface_sentences import law_parameter_sentences
-from asperity.core.arguments import parse_arguments
+from asperity.core.arguments import FIELD, parse_arguments
 from asperity.core.errors import ParameterError
 from asperity.core.files import attributes_to_dict, to_plain_data
 from asperity.core.units import format_quantity
@@ -18,6 +19,7 @@ from asperity.devices import Device, load_device
 from asperity.devices.device_file import to_device_toml
 from asperity.laws import Law, distribute_parameters, find_law
 from asperity.recording.replay import file_digest
+from asperity.rendering import rendered_surface
 from asperity.scene import scene_defaults, sections
 from asperity.scene.scene_file import Scene
 from asperity.servo import safety
@@ -50,6 +52,7 @@ class Setup:
         assumptions: the assumptions, in sentences.
         files: the files of the scene.
         safety: limits of the loop on a device.
+        rendering: how law H is rendered.
     """
 
     surface: Surface
@@ -65,6 +68,12 @@ class Setup:
     assumptions: tuple[str, ...] = ()
     files: tuple[Path, ...] = ()
     safety: Safety = safety.DEFAULT_SAFETY
+    rendering: str = FIELD
+
+    @cached_property
+    def rendered(self) -> Surface:
+        """The surface as the loop renders it; see :mod:`asperity.rendering`."""
+        return rendered_surface(self.surface, self.rendering)
 
     def simulate(
         self,
@@ -74,7 +83,7 @@ class Setup:
     ) -> Run:
         """Run the loop; see :func:`~asperity.simulation.simulate`."""
         return simulate(
-            self.surface, self.plant, self.hand, self.servo, self.motion, self.duration,
+            self.rendered, self.plant, self.hand, self.servo, self.motion, self.duration,
             start=self.start, velocity=self.velocity, trace=trace, every=self.every,
             max_rows=max_rows, progress=progress, metadata=self.recording_metadata(),
         )  # fmt: skip
@@ -165,6 +174,7 @@ def make_setup(
         brakes=brakes, needs_dynamics=needs_plant,
     )  # fmt: skip
     servo, notes = scene_defaults.make_servo(chosen, uses_delay=uses_delay)
+    rendering = merged.pop("rendering", FIELD)
     if share is not None:
         servo = replace(servo, velocity_share=share)
     span, default = _resolve_duration(duration, run.pop("duration", None), motion)
@@ -176,7 +186,7 @@ def make_setup(
     return Setup(
         whole, chosen, plant, hand, servo, motion, span,
         assumptions=(*assumed, *notes, *default, *_leaving_warnings(scene.texture, motion, span)),
-        files=scene.files, safety=Safety(**limits), **run,
+        files=scene.files, safety=Safety(**limits), rendering=rendering, **run,
     )  # fmt: skip
 
 
@@ -199,6 +209,7 @@ def _make_surface(texture: Texture, values: Mapping[str, Any], laws: Sequence[La
     law = find_law(values["law"])
     all_laws = [*laws, law]
     keywords = sections.surface_keywords(values, *all_laws)
+    keywords.pop("rendering", None)
     parameters = keywords.pop("law_parameters", {})
     surface = Surface(texture, **keywords)
     distributed = distribute_parameters(parameters, all_laws)

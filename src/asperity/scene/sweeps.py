@@ -87,12 +87,13 @@ def sweep_onsets(
     def find(law: str) -> list[Onset]:
         loop = setup.with_law(law)
         start = loop.motion.at(np.zeros(1))[0] if loop.start is None else loop.start
+        rendered = loop.rendered
         nears = [
-            expected_onset(loop.surface, loop.plant, loop.hand, loop.with_delay(delay).servo, start)
+            expected_onset(rendered, loop.plant, loop.hand, loop.with_delay(delay).servo, start)
             for delay in delays
         ]
         return find_onsets(
-            loop.surface, loop.plant, loop.hand, loop.servo, loop.motion, delays, nears,
+            rendered, loop.plant, loop.hand, loop.servo, loop.motion, delays, nears,
             start=loop.start, velocity=loop.velocity, duration=loop.duration, starts=n_phases,
             tolerance=tolerance, lowest=min_stiffness, progress=check_cancelled,
             onset_callback=progress,
@@ -103,7 +104,7 @@ def sweep_onsets(
     jobs = [(law, delay) for law in laws for delay in delays]
     return tuple(
         predict(
-            setup.with_law(law).surface, setup.plant, setup.hand, setup.with_delay(delay).servo,
+            setup.with_law(law).rendered, setup.plant, setup.hand, setup.with_delay(delay).servo,
             onset, smooth_wall_onset(found, delay),
         )
         for (law, delay), onset in zip(jobs, found, strict=True)
@@ -150,7 +151,7 @@ def sweep_strokes(
 
     def one(law: str, speed: float, depth: float) -> Stroke:
         (found,) = scan_strokes(
-            setup.with_law(law).surface, setup.plant, setup.hand, setup.servo, path,
+            setup.with_law(law).rendered, setup.plant, setup.hand, setup.servo, path,
             speeds=[speed], depths=[depth], start=setup.start, velocity=setup.velocity,
         )  # fmt: skip
         done[0] += 1

@@ -184,9 +184,10 @@ def _decode(data: NDArray[np.uint8], build_texture: BuildTexture) -> PotentialFi
     columns = _section(data, header["columns_offset"], rows * width * 4, "<i4")
     values = _section(data, header["values_offset"], count, "<f4")
     text = bytes(data[int(header["json_offset"]) :])
-    scalars = [float(header[name]) for name in _SCALARS]
+    scalars = {name: float(header[name]) for name in _SCALARS}
     levels, border = int(header["levels"]), int(header["border"])
-    record = FieldArguments(values, columns.reshape(rows, width, 4), *scalars, levels, border)
+    table = columns.reshape(rows, width, 4)
+    record = FieldArguments(values, table, **scalars, levels=levels, border=border)
     described = json.loads(text)
     numbers = described["grid"]
     grid = FieldGrid(
