@@ -138,7 +138,7 @@ def test_no_page_has_a_retired_phrase(page: Path) -> None:
 
 
 SUMMARY_VERBS = {
-    "Analyze", "Calibrate", "Compare", "Compile", "Compute", "Convert", "Export", "Find", "List",
+    "Analyze", "Bake", "Calibrate", "Compare", "Compile", "Compute", "Convert", "Export", "Find", "List",
     "Measure", "Prepare", "Render", "Report", "Run", "Show", "Simulate", "Write",
 }  # fmt: skip
 

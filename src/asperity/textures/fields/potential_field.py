@@ -94,18 +94,20 @@ class PotentialField(Texture):
         self.source, self.grid, self.max_depth = source, grid, max_depth
         self.continuity, self.passes = continuity, passes
         self.gain, self.one_sided, self.accuracy = gain, one_sided, accuracy
-        self.preparation = (*source.preparation, self._sentence(arguments))
         self.filled_mask, self.history = source.filled_mask, source.history
         vars(self)["arguments"] = arguments
 
-    def _sentence(self, arguments: FieldArguments) -> str:
+    @property
+    def preparation(self) -> tuple[str, ...]:  # type: ignore[override]  # computed here
+        """See :class:`Texture`; the last step is the baking."""
         smoothed = {0: "not smoothed", 1: "smoothed once"}
         how = smoothed.get(self.passes, f"smoothed {self.passes} times")
-        nodes, spacing = arguments.c.size, max(self.grid.spacing)
-        return (
-            f"baked as a potential field: {nodes} nodes, {spacing * 1e6:.3g} µm apart, {how}; "
-            f"q at most {self.gain.upper:.4g}, {100 * self.accuracy.share:.2g} % RMS from exact H"
+        nodes, spacing = self.arguments.c.size, max(self.grid.spacing)
+        text = (
+            f"Law H baked as a potential field: {nodes} nodes, {1e6 * spacing:.3g} µm apart, {how};"
+            f" q at most {self.gain.upper:.4g}, {100 * self.accuracy.share:.2g} % RMS from exact H"
         )
+        return (*self.source.preparation, text)
 
     def __repr__(self) -> str:
         size, q = self.arguments.c.size, self.gain.upper
