@@ -138,8 +138,8 @@ def test_no_page_has_a_retired_phrase(page: Path) -> None:
 
 
 SUMMARY_VERBS = {
-    "Analyze", "Bake", "Calibrate", "Compare", "Compile", "Compute", "Convert", "Export", "Find", "List",
-    "Measure", "Prepare", "Render", "Report", "Run", "Show", "Simulate", "Write",
+    "Analyze", "Bake", "Calibrate", "Compare", "Compile", "Compute", "Convert", "Export",
+    "Find", "List", "Measure", "Prepare", "Render", "Report", "Run", "Show", "Simulate", "Write",
 }  # fmt: skip
 
 
