@@ -10,11 +10,12 @@ from typing import Any
 import pytest
 
 import asperity
-from asperity.analysis import characteristic_number
+from asperity.analysis import characteristic_number, compare
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
 
 _PACKAGE = asperity.__path__[0]
+_TEXTURE = Sinusoid(amplitude=0.7e-3, period=1e-3)
 
 
 def entered_functions(call: Callable[[], Any]) -> set[tuple[str, str]]:
@@ -34,10 +35,39 @@ def entered_functions(call: Callable[[], Any]) -> set[tuple[str, str]]:
     return {(file, name) for file, name in entered if not name.endswith(">")}
 
 
-@pytest.mark.parametrize("law", ["W", "A", "B", "E", "G"])
-def test_closed_form_number_enters_few_functions(law: str) -> None:
-    texture = Sinusoid(amplitude=0.8e-3, period=1e-3)
-    characteristic_number(Surface(texture, law))  # compile before counting
-    surface = Surface(Sinusoid(amplitude=0.7e-3, period=1e-3), law)
+@pytest.mark.parametrize("amplitude", [0.1e-3, 0.7e-3])
+@pytest.mark.parametrize("law", ["W", "A", "B", "C", "D", "E", "G", "H"])
+def test_number_without_search_enters_few_functions(law: str, amplitude: float) -> None:
+    """Law F's number and, on sums of waves, all others need a search."""
+    for factor in (1.01, 1.02):  # compile before counting
+        characteristic_number(Surface(Sinusoid(factor * amplitude, period=1e-3), law))
+    surface = Surface(Sinusoid(amplitude, period=1e-3), law)
     entered = entered_functions(lambda: characteristic_number(surface))
     assert 10 < len(entered) <= 40, sorted(entered)
+
+
+@pytest.mark.caches_results
+def test_cached_number_enters_few_functions() -> None:
+    surface = Surface(_TEXTURE, "F")
+    characteristic_number(surface)
+    entered = entered_functions(lambda: characteristic_number(surface))
+    assert 10 < len(entered) <= 40, sorted(entered)
+
+
+@pytest.mark.caches_results
+@pytest.mark.parametrize("law", "WABCDEFGH")
+def test_cached_row_of_a_comparison_enters_few_functions(
+    law: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    compare(_TEXTURE, laws=law)
+    module, entered = sys.modules["asperity.analysis.compare"], set()
+    compute_row = module._compute_row
+
+    def count(*arguments: Any) -> Any:
+        rows = []
+        entered.update(entered_functions(lambda: rows.append(compute_row(*arguments))))
+        return rows[0]
+
+    monkeypatch.setattr(module, "_compute_row", count)
+    compare(_TEXTURE, laws=law)
+    assert 50 < len(entered) <= 90, sorted(entered)

@@ -267,7 +267,7 @@ def _compute_row(surface: Surface, query: _ComparisonQuery) -> LawRow:
     recommended = recommend_stiffness(surface, device, q, one_sided)
     if query.stiffness is None:
         surface = at_recommended_stiffness(surface, device, recommended)
-    leak, merit, force = worst_loop(surface), compute_merit(surface), continuity(surface, q)
+    leak, merit = worst_loop(surface), compute_merit(surface)
     perceptibility = None
     if recommended.stiffness:
         perceptibility = assess_perceptibility(
@@ -289,8 +289,7 @@ def _compute_row(surface: Surface, query: _ComparisonQuery) -> LawRow:
         conservative=surface.facts.conservative,
         conservative_reason=surface.facts.reason,
         leak=leak,
-        continuous=force.continuous,
-        continuous_reason=force.reason,
+        continuity=continuity(surface, q),
         strength=merit.strength,
         support=merit.support,
         contact_lost=merit.contact_lost,

@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import Any
 
 from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.energy.continuity import Continuity
 from asperity.analysis.energy.leak import Leak
 from asperity.analysis.limits.perceptibility import Perceptibility, Tier, texture_amount_text
 from asperity.analysis.passivity.assess_passivity import (
@@ -40,8 +41,7 @@ class LawRow:
         conservative: whether the work around every closed path is zero.
         conservative_reason: one sentence.
         leak: the worst simple loop at the stiffness of ``surface``.
-        continuous: whether the force is continuous.
-        continuous_reason: one sentence.
+        continuity: whether the force is continuous, and why.
         strength: T, RMS of the oscillating force over sup‖J‖ · l [1]; times l [m] if the surface
             has no period.
         support: S, slope of the mean normal force over sup‖J‖ [1].
@@ -59,8 +59,7 @@ class LawRow:
     conservative: bool
     conservative_reason: str
     leak: Leak
-    continuous: bool
-    continuous_reason: str
+    continuity: Continuity
     strength: float
     support: float
     contact_lost: float
@@ -74,6 +73,16 @@ class LawRow:
     def law(self) -> Law:
         """The law of this row."""
         return self.surface.law
+
+    @property
+    def continuous(self) -> bool:
+        """Whether the force is continuous."""
+        return self.continuity.continuous
+
+    @property
+    def continuous_reason(self) -> str:
+        """Why the force is continuous, or not, in one sentence."""
+        return self.continuity.reason
 
     @property
     def stability_limit(self) -> StabilityLimit:

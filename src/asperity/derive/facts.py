@@ -56,7 +56,7 @@ def law_facts(law: Law) -> LawFacts:
     """
     if LAWS.get(law.letter) is not law:
         return derive_facts(law)
-    generated = import_module(f"asperity.derive.generated.{generated_kernel_path(law).stem}")
+    generated = import_module(f"asperity.derive.generated.law_{law.letter.lower()}")
     return LawFacts(**generated.FACTS)
 
 

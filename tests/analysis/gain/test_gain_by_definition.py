@@ -20,7 +20,7 @@ from asperity.analysis.gain.theorems import (
     derivative_bound,
     largest_singular_value,
     largest_symmetric_eigenvalue,
-    theorem_of,
+    theorem_on,
 )
 from asperity.enclosures.cells import Cells
 from asperity.enclosures.taylor import TaylorModel
@@ -95,7 +95,7 @@ def test_gain_above_height_is_constant_for_laws_w_e_and_h() -> None:
         ("H", {"continuity": 2.5}, 2.5),
     ):  # fmt: skip
         surface = Surface(WAVE, letter, **options)
-        above = theorem_of(surface.law).gain_above_height
+        above = theorem_on(surface).gain_above_height
         assert above is not None
         assert [above(surface, height) for height in (-1e-3, 0.0, 1e-3)] == [expected] * 3
 

@@ -53,8 +53,15 @@ def make_loop(stiffness: float = 1.0, **more: Any) -> DeviceLoop:
         "conservative": True, "obstacle": None, "reason": "", "rate": Fraction(1),
         "damping": None, "virtual_damping": None, "delay": None, "wall_test": None,
         "friction": Fraction(0), "position_step": Fraction(0), "force_step": Fraction(0),
-    }  # fmt: skip
-    return DeviceLoop(**(plain | more))
+    } | more  # fmt: skip
+    rate, damping, virtual = plain["rate"] or 0, plain["damping"], plain["virtual_damping"] or 0
+    return DeviceLoop(
+        **plain,
+        stiffness=Fraction(stiffness),
+        damping_gain=damping * rate if damping is not None and rate else None,
+        virtual_damping_gain=Fraction(virtual * rate),
+        known_delay=Fraction(plain["delay"] or 0),
+    )
 
 
 def make_wall_test(cycled: float) -> WallTest:

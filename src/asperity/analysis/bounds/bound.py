@@ -130,7 +130,7 @@ def _witness_rounding(surface: Surface, witness: Witness, upper: float) -> float
     1/(1 - y) = 1 + y/(1 - y) <= 1 + q. The effect of rounded heights grows with their size.
     """
     xy, depth = np.array(witness.at[:2]), surface.max_depth
-    height = float(surface.texture.height(xy[None])[0])
+    height = float(surface.texture.derivatives(xy[None])[0, 0])
     moved = surface.law.contact.coordinate_scale(xy, height) / depth * (1.0 + upper)
     return ROUNDING_ERROR * (DIFFERENCE_AMPLIFICATION * (1.0 + abs(height) / depth) + moved)
 

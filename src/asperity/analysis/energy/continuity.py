@@ -58,7 +58,7 @@ class Continuity(Serializable):
 
     Attributes:
         continuous: whether the force is continuous.
-        reason: the reason, in one sentence.
+        cause: the reason, without the Lipschitz constant.
         lipschitz: Lipschitz constant k q [N/m] of a continuous force along straight paths inside
             the working region; ``None`` if the force jumps.
         surface: the surface.
@@ -67,9 +67,17 @@ class Continuity(Serializable):
     serialized_attributes = "continuous reason lipschitz jumps"
 
     continuous: bool
-    reason: str
+    cause: str
     lipschitz: Bound | None = None
     surface: Surface | None = field(default=None, repr=False, compare=False)
+
+    @property
+    def reason(self) -> str:
+        """The reason, in one sentence."""
+        upper = math.inf if self.lipschitz is None else self.lipschitz.upper
+        if math.isinf(upper):
+            return self.cause
+        return f"{self.cause}; Lipschitz constant at most {round_up(upper):.10g} N/m"
 
     @cached_property
     def jumps(self) -> tuple[Jump, ...]:
@@ -154,10 +162,7 @@ def _continuous_force(surface: Surface, q: Bound, reason: str) -> Continuity:
     # One unit in the last place covers the rounding of the product.
     upper = math.nextafter(k * q.upper, math.inf)
     slope = replace(q, lower=k * q.lower, upper=upper, note=f"k q [N/m]; q: {q.note}")
-    if math.isinf(upper):
-        return Continuity(True, reason, slope, surface)
-    text = f"{reason}; Lipschitz constant at most {round_up(upper):.10g} N/m"
-    return Continuity(True, text, slope, surface)
+    return Continuity(True, reason, slope, surface)
 
 
 # --- jumps ----------------------------------------------------------------------------------------

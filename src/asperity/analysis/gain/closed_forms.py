@@ -51,16 +51,12 @@ def _feasible_root(wave: SingleWave, depth: float) -> float:
     """
     g, e = _max_slope(wave), 2.0 * math.pi * depth / wave.period
     quarter, rate = e * e / 4.0, 1.0 + g * g
-
-    def excess(t: float) -> float:
-        return (quarter * (1.0 - t) ** 2 + rate) * t - 1.0
-
     low, high = max(1.0 - 2.0 * g / e, 0.0), 1.0
-    if excess(low) > 0.0:
+    if (quarter * (1.0 - low) ** 2 + rate) * low > 1.0:
         return 0.0
     t = max(1.0 / rate, low)
     for _ in range(_MAX_ITERATIONS):
-        off = excess(t)
+        off = (quarter * (1.0 - t) ** 2 + rate) * t - 1.0
         low, high = (t, high) if off <= 0.0 else (low, t)
         slope = quarter * (1.0 - t) * (1.0 - 3.0 * t) + rate
         step = t - off / slope if slope > 0.0 else low

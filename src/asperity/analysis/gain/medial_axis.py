@@ -85,7 +85,9 @@ def sharpest_crest(
     every side.
     """
     if texture.single_wave is not None and extent is None:
-        return _crest_of_wave(texture, texture.single_wave)
+        wave = texture.single_wave
+        curvature = (2.0 * math.pi / wave.period) ** 2 * wave.amplitude
+        return _make_crest(texture, point_at_phase(wave, 0.5 * math.pi), curvature)
     cells = texture.cells(extent, margin)
     if cells is None:
         cells = texture.sampling_cells()
@@ -98,13 +100,6 @@ def sharpest_crest(
     if found.at is None:
         return None
     return _make_crest(texture, cells.to_plane(found.at[None])[0], found.upper)
-
-
-def _crest_of_wave(texture: Texture, wave: SingleWave) -> Crest:
-    curvature = (2.0 * math.pi / wave.period) ** 2 * wave.amplitude
-    crest = _make_crest(texture, point_at_phase(wave, 0.5 * math.pi), curvature)
-    assert crest is not None
-    return crest
 
 
 def _make_crest(texture: Texture, xy: FloatArray, max_curvature: float) -> Crest | None:
@@ -206,14 +201,13 @@ def crest_number(surface: Surface, options: SearchOptions) -> Bound:
 
 
 def _crest_number_of_wave(surface: Surface, wave: SingleWave) -> Bound:
-    value, crest = closed_forms.q_d(wave, surface.max_depth), sharpest_crest(surface.texture)
-    assert crest is not None
+    value, note = closed_forms.q_d(wave, surface.max_depth), "formula on a sinusoid"
     if math.isinf(value):
+        crest = sharpest_crest(surface.texture)
+        assert crest is not None
         return Bound(math.inf, math.inf, "closed form", crest.centre, _ONSET_NOTE)
-    xy, depths = np.array(crest.point[:2]), [surface.max_depth]
-    return bound_from_theorem(
-        surface, NORM, value, "closed form", "formula on a sinusoid", xy, depths
-    )
+    xy, depths = point_at_phase(wave, 0.5 * math.pi), [surface.max_depth]
+    return bound_from_theorem(surface, NORM, value, "closed form", note, xy, depths)
 
 
 def gain_above_crest(surface: Surface, height: float) -> float:

@@ -354,11 +354,6 @@ THEOREMS: dict[Law, Theorem] = {
 _NO_THEOREM = Theorem()
 
 
-def theorem_of(law: Law) -> Theorem:
-    """Return the theorem of a law, an empty one for a law without an entry."""
-    return THEOREMS.get(law, _NO_THEOREM)
-
-
 def _baked_number(measure: JacobianMeasure) -> Callable[[Surface, SearchOptions], Bound]:
     def number(surface: Surface, _options: SearchOptions) -> Bound:
         found = surface.texture.baked_numbers[measure.name]
@@ -376,8 +371,11 @@ _BAKED = Theorem(
 
 
 def theorem_on(surface: Surface) -> Theorem:
-    """Return the theorem of the force that is rendered: of its law, or of a baked field."""
-    return _BAKED if surface.texture.baked_numbers else theorem_of(surface.law)
+    """Return the theorem of the force that is rendered: of its law, or of a baked field.
+
+    It is empty for a law without an entry.
+    """
+    return _BAKED if surface.texture.baked_numbers else THEOREMS.get(surface.law, _NO_THEOREM)
 
 
 def register_theorem(law: Law, theorem: Theorem) -> None:

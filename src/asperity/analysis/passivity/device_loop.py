@@ -42,10 +42,15 @@ class DeviceLoop:
         conservative: whether the law is conservative.
         obstacle: why the rules for conservative laws do not apply; ``None`` if they do.
         reason: reason of the obstacle, from the curl or the continuity of the force.
+        stiffness: k of the surface [N/m].
         rate: update rate 1/T [Hz].
         damping: σ₀ [N s/m].
+        damping_gain: σ₀/T [N/m].
         virtual_damping: b_v [N s/m].
+        virtual_damping_gain: b_v/T [N/m]; 0 if virtual damping is unknown, as every criterion
+            states.
         delay: d, whole samples.
+        known_delay: d, 0 where it is unknown: only for criteria that state this assumption.
         wall_test: test of the smooth wall K₀.
         friction: f_c, least dry friction [N]; 0 where it is unknown.
         position_step: |δ|, greatest step of the quantised position [m].
@@ -60,34 +65,18 @@ class DeviceLoop:
     conservative: bool
     obstacle: Obstacle | None
     reason: str
+    stiffness: Fraction
     rate: Fraction | None
     damping: Fraction | None
+    damping_gain: Fraction | None
     virtual_damping: Fraction | None
+    virtual_damping_gain: Fraction
     delay: int | None
+    known_delay: Fraction
     wall_test: WallTest | None
     friction: Fraction
     position_step: Fraction
     force_step: Fraction
-
-    @property
-    def stiffness(self) -> Fraction:
-        """The surface's k [N/m]."""
-        return Fraction(self.surface.stiffness)
-
-    @property
-    def damping_gain(self) -> Fraction | None:
-        """σ₀/T [N/m]."""
-        return None if self.damping is None or self.rate is None else self.damping * self.rate
-
-    @property
-    def virtual_damping_gain(self) -> Fraction:
-        """b_v/T [N/m]; 0 if virtual damping is unknown, as every criterion states."""
-        return (self.virtual_damping or Fraction(0)) * (self.rate or Fraction(0))
-
-    @property
-    def known_delay(self) -> Fraction:
-        """d, 0 where it is unknown: only for criteria that state this assumption."""
-        return Fraction(self.delay or 0)
 
     @property
     def wall_stiffness(self) -> Fraction | None:
@@ -148,6 +137,9 @@ def make_device_loop(
     delay = _exact_value(device, "delay_samples", _NOT_NEGATIVE)
     if delay is not None and delay.denominator != 1:
         raise ParameterError("device.delay_samples", "must be a whole number", float(delay))
+    rate = _exact_value(device, "update_rate", _POSITIVE)
+    damping = _exact_value(device, "damping", _NOT_NEGATIVE)
+    virtual_damping = _exact_value(device, "virtual_damping", _FINITE)
     return DeviceLoop(
         surface=surface,
         device=device,
@@ -157,10 +149,14 @@ def make_device_loop(
         conservative=surface.facts.conservative,
         obstacle=obstacle,
         reason=reason,
-        rate=_exact_value(device, "update_rate", _POSITIVE),
-        damping=_exact_value(device, "damping", _NOT_NEGATIVE),
-        virtual_damping=_exact_value(device, "virtual_damping", _FINITE),
+        stiffness=Fraction(surface.stiffness),
+        rate=rate,
+        damping=damping,
+        damping_gain=None if damping is None or rate is None else damping * rate,
+        virtual_damping=virtual_damping,
+        virtual_damping_gain=(virtual_damping or Fraction(0)) * (rate or Fraction(0)),
         delay=None if delay is None else int(delay),
+        known_delay=delay or Fraction(0),
         wall_test=_checked_wall_test(device),
         friction=_exact_value(device, "least_friction", _NOT_NEGATIVE) or Fraction(0),
         position_step=_SQRT_3 * (_exact_value(device, "position_resolution", _NOT_NEGATIVE) or 0),
