@@ -98,10 +98,13 @@ def test_python_examples_of_readme_run() -> None:
 def _parse(command: str) -> None:
     """Parse a command as click does, without its values: files that a page names may not exist."""
     words = shlex.split(command.partition(" > ")[0], comments=True)
-    parsed_command = cli.get_command(click.Context(cli), words[0])
+    # Without the settings of the group, click would cache a help option without "-h".
+    group = click.Context(cli, **cli.context_settings)
+    parsed_command = cli.get_command(group, words[0])
     assert parsed_command is not None, words[0]
-    parsed_command.make_parser(click.Context(parsed_command)).parse_args(words[1:])
-    check_not_repeated(parsed_command, words[1:])
+    context = click.Context(parsed_command, parent=group)
+    parsed_command.make_parser(context).parse_args(words[1:])
+    check_not_repeated(parsed_command, words[1:], group)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)

@@ -30,7 +30,7 @@ _FORMER_NAMES = {"largest": "max-data", "looks": "max-evaluations"}
 @click.command(
     "export", context_settings={"token_normalize_func": lambda name: _FORMER_NAMES.get(name, name)}
 )
-@click.option("-o", "--output", metavar="PATH", required=True, help="Header file to write.")
+@click.option("-o", "--output", metavar="PATH", required=True, help="File to write ('texture.h').")
 @click.option(
     "--exact",
     is_flag=True,

@@ -66,7 +66,7 @@ COMMANDS = {
     "lab": ("servo", "Run a texture interactively in a browser."),
     "limits": ("analysis", "Report which wavelengths of a surface are perceptible on a device."),
     "maps": ("export", "Write a height map or a normal map."),
-    "onset": ("simulation", "Simulate the onset of limit cycles, by stiffness and delay."),
+    "onset": ("simulation", "Simulate the onset of limit cycles for each law and delay."),
     "prepare": ("surface", "Prepare a measured surface and write it to a file."),
     "recording": ("recording", "Show, plot, export or replay a recording."),
     "reproduce": ("paper", "Report which claims of the paper hold, with their evidence."),

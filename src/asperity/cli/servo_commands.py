@@ -55,7 +55,7 @@ _RUN_ARGUMENTS = options.command_arguments("run")
 @loop_options(stiffness_option("the scene's; without a scene, the recommended stiffness"))
 @options.argument_options(_RUN_ARGUMENTS)
 @driver_options
-@click.option("--record", metavar="PATH", help="Write a recording of every sample, 'run.mcap'.")
+@click.option("--record", metavar="PATH", help="Write every sample to a recording ('run.mcap').")
 @output_options(html=False)
 def run_command(
     scene: str,
