@@ -47,7 +47,11 @@ def test_every_declared_argument_is_an_option_with_its_help(command: str) -> Non
 
 def test_every_parameter_of_a_shipped_law_is_an_option() -> None:
     declared = {name for law in LAWS.values() for name in law.arguments}
-    assert {argument.name for argument in LAW_OPTIONS} == declared | {"stiffness", "max_depth"}
+    assert {argument.name for argument in LAW_OPTIONS} == declared | {
+        "stiffness",
+        "max_depth",
+        "rendering",
+    }
 
 
 def test_default_values_in_help_equal_those_of_the_functions() -> None:

@@ -56,7 +56,7 @@ BAD_INPUT = AsperityError.exit_code
 
 COMMANDS = {
     "analyze": ("analysis", "Analyze one law on a surface and a device."),
-    "bake": ("surface", "Bake law H of a surface as a potential field and write it to a file."),
+    "bake": ("surface", "Bake law H of a surface as a potential field."),
     "cache": ("setup", "Show or clear the cache."),
     "calibrate": ("device", "Calibrate a device: stiffest wall, resolution, delay, damping."),
     "compare": ("analysis", "Compare all laws on a surface and recommend one with its stiffness."),

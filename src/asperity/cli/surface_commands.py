@@ -98,7 +98,7 @@ _BAKE = command_arguments("bake")
 @click.command("bake")
 @click.argument("surface")
 @click.option(
-    "-o", "--output", metavar="PATH", required=True, help="The file to write, surface.field."
+    "-o", "--output", metavar="PATH", required=True, help="File to write ('surface.field')."
 )
 @click.option("--force", is_flag=True, help="Replace an existing file.")
 @argument_options((*_BAKE, MAX_DEPTH, SHIPPED_LAW_ARGUMENTS["continuity"]))
@@ -110,9 +110,8 @@ def bake_command(
 ) -> None:
     """Bake law H of SURFACE as a potential field, and write it to a file.
 
-    The rendered force is the gradient of the field: conservative and continuous, with a certified
-    gain, and no search. Every other command accepts the file in place of SURFACE; C programs read
-    it, see docs/howto/export.md.
+    The rendered force is the negative gradient of the field. It is conservative and continuous,
+    has a certified gain, and needs no search. Other commands accept the file as SURFACE.
     """
     from asperity.rendering import bake_field
     from asperity.scene import load_scene

@@ -241,8 +241,8 @@ MAX_DEPTH = Argument(
 FIELD, SEARCH = "field", "search"
 RENDERING = Argument(
     "rendering",
-    "how law H is rendered where it has no closed form: as a baked field, or by a search within "
-    "the time of a sample",
+    "rendering of law H where it has no closed form: field (a baked potential field) or search "
+    "(with an evaluation budget)",
     default=FIELD,
     form="text",
     choices=(FIELD, SEARCH),
