@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Mapping
-from concurrent.futures import Future, wait
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from queue import Empty, Queue
@@ -313,7 +313,7 @@ class Session:
         if scene is self.scene_state and self._loop is not None:
             self._set_state("running")
             return
-        if not self._is_accepted(scene):
+        if not (self._is_rendered(scene.setup) and self._is_accepted(scene)):
             return
         if self.handle is not None and self._loop is None:
             self.scene_state = scene  # for the next start: a change never starts a real device
@@ -329,6 +329,31 @@ class Session:
         self.scene_state = scene
         self._set_state("running")
 
+    def _is_rendered(self, setup: Setup) -> bool:
+        """Bake a field where one is needed, while polling the loop; false if the loop ended.
+
+        Raises:
+            ParameterError: for a surface that cannot be baked.
+        """
+        if "rendered" in vars(setup) or not setup.is_baked:
+            return True
+        with ThreadPoolExecutor(1) as pool:
+            baking = pool.submit(lambda: setup.rendered)
+            done = self._is_done(baking, "baking law H as a potential field")
+        return done and baking.result() is setup.rendered
+
+    def _is_done(self, work: Future[Any], text: str) -> bool:
+        """Wait for work in the background while polling the loop; false if the loop ended."""
+        loop, stop_count = self._loop, self._stop_count
+        if loop is not None:
+            self._set_state("changing", f"{text}; the previous one is still rendered")
+        while not wait([work], POLL_INTERVAL).done:
+            self._poll()
+            if self._loop is not loop or self._stop_count != stop_count:
+                work.cancel()
+                return False
+        return True
+
     def _is_accepted(self, scene_state: SceneState) -> bool:
         """Assess a surface in another process while polling the loop; false if the loop ended.
 
@@ -337,17 +362,11 @@ class Session:
         """
         if self._assess_risk is None or scene_state.setup.surface is self.scene_state.setup.surface:
             return True
-        loop, stop_count = self._loop, self._stop_count
-        if loop is not None:
-            self._set_state("changing", "analysing the surface; the previous one is still rendered")
         assessment = self._assess_risk(scene_state.setup.rendered, scene_state.setup.device)
-        while not (done := wait([assessment], POLL_INTERVAL).done):
-            self._poll()
-            if self._loop is not loop or self._stop_count != stop_count:
-                assessment.cancel()
-                return False
+        if not self._is_done(assessment, "analysing the surface"):
+            return False
         try:
-            reason = done.pop().result()
+            reason = assessment.result()
         except BrokenProcessPool:
             reason = "the process that analyses it has crashed: try again"
         if reason:
