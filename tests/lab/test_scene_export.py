@@ -86,7 +86,7 @@ def felt(stage: SceneState, samples: int = 900) -> Clip:
     driver = pointer_driver(setup.plant, setup.hand, setup.servo, wheel)
     with wheel:
         loop = DriverLoop(driver, setup.servo, setup.safety, 1.0, shared.block(), no_clock())
-        cause, _code = loop.run(build_program(setup.surface, driver), driver.open(), samples)
+        cause, _code = loop.run(build_program(setup.rendered, driver), driver.open(), samples)
         assert cause is EndReason.FINISHED
         return extract_clip(stage, shared, wheel)
 

@@ -49,6 +49,7 @@ class RecordedField:
         sampler: modules whose functions evaluate the texture.
         texture: record of the texture.
         law_arguments: parameters of the law.
+        heights: heights of the spline that a baked field was made from [m].
     """
 
     law: Law
@@ -56,6 +57,7 @@ class RecordedField:
     sampler: tuple[ModuleType, ...]
     texture: tuple[Any, ...]
     law_arguments: tuple[float, ...]
+    heights: FloatArray | None = None
 
     def height(self, points: FloatArray) -> FloatArray:
         """Return the height of the texture [m], shape (n,), at points (n, 2) [m]."""
@@ -120,7 +122,8 @@ def field_attachments(surface: Surface) -> dict[str, bytes]:
     if sum(np.asarray(value).nbytes for value in arguments) > MAX_BYTES:
         return {}
     stream = io.BytesIO()
-    np.savez(stream, *map(np.asarray, arguments))
+    heights = {"heights": surface.texture.stored_heights()} if surface.texture.baked_numbers else {}
+    np.savez(stream, *map(np.asarray, arguments), **heights)  # type: ignore[arg-type]  # typed as if one might be a flag
     return {TEXTURE_FILE: stream.getvalue()}
 
 
@@ -142,7 +145,8 @@ def read_field(metadata: Mapping[str, Any], data: bytes) -> RecordedField:
         sampler = tuple(dict.fromkeys(modules))  # earlier recordings name modules merged since
         kind = getattr(sampler[0], str(metadata["record"]))
         with np.load(io.BytesIO(data), allow_pickle=False) as archive:
-            values = [archive[f"arr_{i}"] for i in range(len(archive.files))]
+            values = [archive[name] for name in archive.files if name != "heights"]
+            heights = archive["heights"] if "heights" in archive.files else None
         texture = kind(*(value if value.ndim else value.item() for value in values))
         parameters = tuple(float.fromhex(text) for text in metadata["law_arguments"])
     except ParameterError:
@@ -152,7 +156,7 @@ def read_field(metadata: Mapping[str, Any], data: bytes) -> RecordedField:
         raise ParameterError("recording", reason) from None
     if not has_digest(texture, metadata):
         raise ParameterError("recording", "holds another texture than its metadata: it is damaged")
-    return RecordedField(law, clamp, sampler, texture, parameters)
+    return RecordedField(law, clamp, sampler, texture, parameters, heights)
 
 
 def _sampler_module(name: str) -> ModuleType:

@@ -153,7 +153,7 @@ def recorded_texture(recording: Recording) -> Texture:
     field = recorded_field(recording)
     described = surface_data.get("texture")
     described = described if isinstance(described, Mapping) else {}
-    texture = rebuild_texture(field.texture, field.sampler, described)
+    texture = rebuild_texture(field.texture, field.sampler, described, field.heights)
     if texture is None or not has_digest(texture.arguments, surface_data):
         words = f"has a texture of a kind of your own, {described.get('kind')}, that cannot be made"
         raise ParameterError("recording", f"{words} again: describe() must name its arguments")

@@ -10,12 +10,15 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, cast
 
+import numpy as np
+
 from asperity.core.arguments import Argument, parse_arguments
 from asperity.core.checks import FloatArray
 from asperity.core.digests import content_digest
 from asperity.core.errors import ParameterError, suggest_names
 from asperity.measured.file_arguments import FILE_ARGUMENTS, SYNTHETIC_ARGUMENTS
-from asperity.textures.fields.field_file import is_field, load_field
+from asperity.textures.fields.field_file import assemble_field, is_field, load_field
+from asperity.textures.fields.field_sampler import FieldArguments
 from asperity.textures.kinds.fourier import FOURIER
 from asperity.textures.kinds.grating import GRATING
 from asperity.textures.kinds.noise import NOISE, NOISE_PROFILE
@@ -209,7 +212,10 @@ def _require_all(kind: TextureKind, arguments: dict[str, Any]) -> dict[str, Any]
 
 
 def rebuild_texture(
-    arguments: tuple[Any, ...], sampler: tuple[ModuleType, ...], description: Mapping[str, Any]
+    arguments: tuple[Any, ...],
+    sampler: tuple[ModuleType, ...],
+    description: Mapping[str, Any],
+    heights: FloatArray | None = None,
 ) -> Texture | None:
     """Return the texture with this sampler record.
 
@@ -220,6 +226,7 @@ def rebuild_texture(
         arguments: the record that the sampler functions receive.
         sampler: modules of the sampler functions.
         description: description of the texture, see :meth:`Texture.describe`.
+        heights: of the spline that a field was baked from, see :meth:`Texture.stored_heights`.
 
     Returns:
         The texture; ``None`` if it cannot be rebuilt.
@@ -231,6 +238,9 @@ def rebuild_texture(
         >>> rebuilt, rebuilt.arguments == wave.arguments
         (Sinusoid(amplitude=0.0002, period=0.002, phase=0.0, direction=(1.0, 0.0)), True)
     """
+    if isinstance(arguments, FieldArguments):
+        nodes = np.empty(0) if heights is None else heights
+        return assemble_field(arguments, description, nodes, _build_described)
     texture = None
     if isinstance(arguments, (ProfileArguments, HeightMapArguments)):
         texture = _rebuild_spline(arguments)

@@ -184,6 +184,10 @@ class Texture(Plottable, ABC):
         """The only wave of the height, for closed forms; ``None`` for other heights."""
         return None
 
+    def stored_heights(self) -> FloatArray:
+        """Return the heights at the nodes [m] that a file needs besides the description, if any."""
+        return np.empty(0)
+
     @property
     def baked_numbers(self) -> Mapping[str, CertifiedNumber]:
         """Certified numbers of a baked field by the name of their measure; none for heights."""

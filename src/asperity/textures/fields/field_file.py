@@ -8,6 +8,7 @@ columns and the coefficients; the description holds the certified numbers and th
 from __future__ import annotations
 
 import json
+import math
 import os
 import zlib
 from collections.abc import Callable, Mapping
@@ -23,7 +24,7 @@ from asperity.core.files import json_text, open_atomic, open_input
 from asperity.textures.fields.field_grid import FieldGrid
 from asperity.textures.fields.field_sampler import MIRRORED, PERIODIC, ZERO, FieldArguments
 from asperity.textures.fields.potential_field import FieldAccuracy, PotentialField
-from asperity.textures.spline.spline_texture import Spline, fit_spline
+from asperity.textures.spline.spline_texture import fit_spline
 from asperity.textures.texture import CertifiedNumber, Texture
 
 MAGIC = b"ASPFIELD"
@@ -84,9 +85,9 @@ def save_field(path: str | os.PathLike[str], field: PotentialField) -> None:
 
 
 def _encode(field: PotentialField) -> tuple[NDArray[Any], list[tuple[int, bytes]]]:
-    record, source = field.arguments, field.source
-    heights = source.heights if isinstance(source, Spline) else np.empty(0)
-    description = json_text(_description(field)).encode()
+    record = field.arguments
+    heights = field.stored_heights()
+    description = json_text(field.describe()).encode()
     parts = [
         np.ascontiguousarray(record.columns, "<i4").tobytes(),
         np.ascontiguousarray(record.c, "<f4").tobytes(),
@@ -120,30 +121,6 @@ def _checksum(sections: list[tuple[int, bytes]], start: int) -> int:
         value = zlib.crc32(section, zlib.crc32(bytes(offset - start), value))
         start = offset + len(section)
     return value
-
-
-def _description(field: PotentialField) -> dict[str, Any]:
-    source, grid = field.source, field.grid
-    spline = {}
-    if isinstance(source, Spline):
-        spline = {
-            "shape": list(source.heights.shape),
-            "pitch": np.ravel(source.pitch).tolist(),
-            "origin": np.ravel(source.origin).tolist(),
-            "periodic": source.periodic,
-        }
-    return {
-        **field.describe(),
-        "preparation": list(source.preparation),
-        "spline": spline,
-        "grid": {
-            "steps": grid.steps.tolist(),
-            "cells": list(grid.cells),
-            "start": grid.start.tolist(),
-            "level_spacing": grid.level_spacing,
-            "floor": grid.floor,
-        },
-    }
 
 
 def is_field(path: str | os.PathLike[str]) -> bool:
@@ -189,21 +166,43 @@ def _decode(data: NDArray[np.uint8], build_texture: BuildTexture) -> PotentialFi
     table = columns.reshape(rows, width, 4)
     record = FieldArguments(values, table, **scalars, levels=levels, border=border)
     described = json.loads(text)
+    count = math.prod(described["shape"]) if described["shape"] else 0
+    heights = _section(data, header["heights_offset"], count, "<f8")
+    return assemble_field(record, described, heights, build_texture)
+
+
+def assemble_field(
+    record: FieldArguments,
+    described: Mapping[str, Any],
+    heights: FloatArray,
+    build_texture: BuildTexture,
+) -> PotentialField:
+    """Return a field from its record, its description and the heights of a spline.
+
+    Args:
+        record: coefficients and columns.
+        described: see :meth:`PotentialField.describe`.
+        heights: see :meth:`PotentialField.stored_heights`.
+        build_texture: builds the texture that was baked, unless it is a spline.
+
+    Raises:
+        SurfaceFileError: the table of columns is damaged.
+        KeyError, TypeError, ValueError: the description is damaged.
+    """
     numbers = described["grid"]
     grid = FieldGrid(
         steps=np.array(numbers["steps"]), cells=tuple(numbers["cells"]),
-        start=np.array(numbers["start"]), levels=levels,
-        level_spacing=numbers["level_spacing"], floor=numbers["floor"], border=border,
+        start=np.array(numbers["start"]), levels=record.levels,
+        level_spacing=numbers["level_spacing"], floor=numbers["floor"], border=record.border,
     )  # fmt: skip
     _check_record(record, grid)
-    source = _source(data, header, described, build_texture)
     gain, one_sided = (
         CertifiedNumber(**(described[name] | {"at": tuple(described[name]["at"])}))
         for name in ("gain", "one_sided")
     )
     names = ("max_depth", "continuity", "passes")
     return PotentialField(
-        source, grid, record, gain=gain, one_sided=one_sided,
+        _source(described, heights, build_texture), grid, record, gain=gain, one_sided=one_sided,
         accuracy=FieldAccuracy(**described["accuracy"]),
         **{name: described[name] for name in names},
     )  # fmt: skip
@@ -256,16 +255,12 @@ def _section(data: NDArray[np.uint8], offset: Any, count: int, dtype: str) -> ND
     return values.view(np.ndarray).view(dtype)
 
 
-def _source(
-    data: NDArray[np.uint8], header: Any, described: Mapping[str, Any], build: BuildTexture
-) -> Texture:
-    spline = described["spline"]
-    if not spline:
-        return build(described["source"])
-    count = int(np.prod(spline["shape"]))
-    heights: FloatArray = _section(data, header["heights_offset"], count, "<f8")
-    origin = spline["origin"] if len(spline["shape"]) == 2 else spline["origin"][0]
+def _source(described: Mapping[str, Any], heights: FloatArray, build: BuildTexture) -> Texture:
+    source = described["source"]
+    if not described["shape"]:
+        return build(source)
+    origin = described["origin"] if len(described["shape"]) == 2 else described["origin"][0]
     return fit_spline(
-        heights.reshape(spline["shape"]), spline["pitch"], periodic=spline["periodic"],
+        heights.reshape(described["shape"]), described["pitch"], periodic=described["periodic"],
         origin=origin, preparation=described["preparation"],
     )  # fmt: skip

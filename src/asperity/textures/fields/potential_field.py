@@ -8,6 +8,7 @@ from functools import cached_property
 from types import ModuleType
 from typing import Any, ClassVar
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from asperity.contacts.contact import Contact
@@ -136,16 +137,27 @@ class PotentialField(Texture):
         raise AttributeError("arguments")
 
     def describe(self) -> dict[str, Any]:
-        """See :class:`Texture`."""
+        """See :class:`Texture`; the whole field but for its record and the stored heights."""
+        grid, source, heights = self.grid, self.source, self.stored_heights()
         numbers = {name: getattr(self, name) for name in ("max_depth", "continuity", "passes")}
         parts = {name: vars(getattr(self, name)) for name in ("gain", "one_sided", "accuracy")}
+        nodes = {name: getattr(grid, name) for name in ("cells", "level_spacing", "floor")}
+        nodes |= {"steps": grid.steps.tolist(), "start": grid.start.tolist()}
         return {
             "kind": self.kind,
-            "spacing": list(self.grid.spacing),
+            "spacing": list(grid.spacing),
             "nodes": int(self.arguments.c.size),
-            **to_plain_data(numbers | parts),
-            "source": self.source.describe(),
+            **to_plain_data(numbers | parts | {"grid": nodes}),
+            "source": source.describe(),
+            "preparation": list(source.preparation),
+            "shape": list(heights.shape) if heights.size else [],
+            **{name: np.ravel(getattr(source, name, ())).tolist() for name in ("pitch", "origin")},
+            "periodic": source.domain.periodic,
         }
+
+    def stored_heights(self) -> FloatArray:
+        """See :class:`Texture`: the heights of a spline that was baked [m]."""
+        return self.source.stored_heights()
 
     # --- the texture that was baked ---------------------------------------------------------------
 

@@ -67,6 +67,10 @@ class Spline(Texture):
     def _set_grid(self, pitch: Any, origin: Any) -> None:
         """Check and set the pitch and the origin."""
 
+    def stored_heights(self) -> FloatArray:
+        """See :class:`Texture`."""
+        return self.heights
+
     def with_heights(self, heights: ArrayLike) -> Spline:
         """Return the spline through other heights at the same nodes."""
         return fit_spline(heights, self._pitches, periodic=self.periodic, origin=self.origin)
