@@ -58,44 +58,20 @@ static inline int64_t @rest_int(int64_t a, int64_t b)
 
 static inline real @quotient(real a, real b)
 {
-    real rest = fmod!(a, b);
-    real whole = (a - rest) / b;
-    real below;
-    if (rest != 0) {
-        if ((b < 0) != (rest < 0)) {
-            rest += b;
-            whole -= 1;
-        }
-    } else {
-        rest = copysign!(0, b);
-    }
-    below = floor!(whole);
-    if (whole - below > (real)0.5) {
-        below += 1;
-    }
-    (void)rest;
-    return below;
+    const real rest = fmod!(a, b);
+    const real change = rest != 0 && (b < 0) != (rest < 0) ? 1 : 0;
+    const real whole = (a - rest) / b - change;
+    const real below = floor!(whole);
+    return whole - below > (real)0.5 ? below + 1 : below;
 }
 
 static inline real @rest(real a, real b)
 {
-    real rest = fmod!(a, b);
-    real whole = (a - rest) / b;
-    real below;
-    if (rest != 0) {
-        if ((b < 0) != (rest < 0)) {
-            rest += b;
-            whole -= 1;
-        }
-    } else {
-        rest = copysign!(0, b);
+    const real rest = fmod!(a, b);
+    if (rest == 0) {
+        return copysign!(0, b);
     }
-    below = floor!(whole);
-    if (whole - below > (real)0.5) {
-        below += 1;
-    }
-    (void)below;
-    return rest;
+    return (b < 0) != (rest < 0) ? rest + b : rest;
 }
 
 static inline real @power(real a, int64_t n)
