@@ -12,13 +12,13 @@ from asperity.core.checks import FloatArray, check_positive
 from asperity.core.errors import ParameterError
 from asperity.core.units import round_up
 from asperity.laws import LAWS
-from asperity.textures.fields.field_certificate import Progress, curvature_bounds
+from asperity.textures.fields.field_certificate import Progress, curvature_bounds, run_in_threads
 from asperity.textures.fields.field_grid import FieldGrid, SingleArray
 from asperity.textures.fields.node_potentials import (
-    PotentialFunction,
+    ColumnFunction,
     compute_potentials,
     smooth,
-    split_potential,
+    split_columns,
 )
 from asperity.textures.fields.potential_field import FieldAccuracy, PotentialField, certified_number
 from asperity.textures.texture import Texture
@@ -89,7 +89,7 @@ def bake_texture(
     grid = plan.grid(chosen)
     plan.check_size(grid)
     deep = grid.extend_down(goal.passes)
-    potentials = compute_potentials(plan.potential, deep, _share(progress, 0.0, 0.9))
+    potentials = compute_potentials(plan.columns, deep, _share(progress, 0.0, 0.9))
     return plan.certify(potentials, grid, _share(progress, 0.9, 0.1))
 
 
@@ -105,7 +105,7 @@ class _Plan:
     ) -> None:
         self.texture, self.max_depth, self.continuity = texture, max_depth, continuity
         self.goal, self.gain = goal, max(1.0, continuity)
-        self.potential: PotentialFunction = split_potential(texture, continuity)
+        self.columns: ColumnFunction = split_columns(texture, continuity)
         self._law_arguments = (1.0, 0.0, 1.0, max_depth, 0.0, continuity)
         self.probes = self._random_probes(_PROBES)
         self.force = self._exact_force(self.probes)
@@ -165,9 +165,14 @@ class _Plan:
         place = np.random.default_rng(1).uniform(-0.5, 0.5, (len(points), len(steps)))
         reach = 1 + _TRIAL_PASSES
         ticks = [np.arange(-reach, reach + 1.0)] * len(steps)
-        lattice = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1).reshape(-1, len(steps))
-        nodes = points[:, None] + (lattice - place[:, None]) @ steps
-        values = self.potential(nodes.reshape(-1, 3)).reshape(len(points), *map(len, ticks))
+        plane = np.stack(np.meshgrid(*ticks[1:], indexing="ij"), axis=-1).reshape(
+            -1, len(steps) - 1
+        )
+        xy = points[:, None, :2] + (plane - place[:, None, :-1]) @ steps[:-1, :2]
+        z = points[:, 2:] + (ticks[0] - place[:, -1:]) * steps[-1, 2]
+        values = np.empty((len(points), len(plane), len(ticks[0])), np.float32)
+        run_in_threads(lambda i: self.columns(xy[i], z[i], values[i]), range(len(points)), None)
+        values = values.reshape(len(points), *map(len, ticks))
         weights, slopes = _smoothed_weights(place, _TRIAL_PASSES)
         gradient = np.empty((len(points), len(steps)))
         for axis in range(len(steps)):

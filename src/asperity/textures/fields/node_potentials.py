@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -9,47 +10,40 @@ import numpy as np
 from asperity.clamps import NONE
 from asperity.core.checks import FloatArray
 from asperity.laws import LAWS
+from asperity.textures.fields import node_loop
 from asperity.textures.fields.field_certificate import Progress, run_in_threads
 from asperity.textures.fields.field_grid import FieldGrid, SingleArray
 from asperity.textures.fields.field_sampler import PERIODIC, ZERO
 from asperity.textures.texture import Texture
 
-_NODES_PER_BLOCK = 20_000
+_NODES_PER_BLOCK = 10_000
 
-PotentialFunction = Callable[[FloatArray], FloatArray]
-"""Returns U [m²], shape (n,), at points (n, 3) [m]; called by several threads at once."""
+ColumnFunction = Callable[[FloatArray, FloatArray, SingleArray], None]
+"""Writes U [m²] in single precision, (n, levels), at columns of nodes at x, y (n, 2) and rising z
+(levels,) [m]; called by several threads at once."""
 
 
-def split_potential(texture: Texture, continuity: float) -> PotentialFunction:
-    """Return the exact potential of law H of a texture, over its stiffness."""
-    from asperity.kernels.fuse import fuse_surface
+def split_columns(texture: Texture, continuity: float) -> ColumnFunction:
+    """Return the function of the exact potential of law H of a texture, over its stiffness."""
+    from asperity.kernels.fuse import fuse_on_texture
 
-    loops = fuse_surface(LAWS["H"], texture.sampler, NONE)
-
-    def potential(points: FloatArray) -> FloatArray:
-        out = np.empty((len(points), 3))
-        loops.split_batch(points, out, continuity, texture.arguments)
-        return np.ascontiguousarray(out[:, 0])
-
-    return potential
+    loops = fuse_on_texture(LAWS["H"], texture.sampler, NONE, (node_loop,))
+    return lambda xy, z, out: loops.column_batch(xy, z, out, continuity, texture.arguments)
 
 
 def compute_potentials(
-    potential: PotentialFunction, grid: FieldGrid, progress: Progress | None = None
+    columns: ColumnFunction, grid: FieldGrid, progress: Progress | None = None
 ) -> SingleArray:
     """Return U [m²] at the nodes, shape ``grid.node_counts``, in single precision."""
     *plane, levels = grid.node_counts
-    result = np.zeros((int(np.prod(plane)), levels), np.float32)
+    result = np.empty((math.prod(plane), levels), np.float32)
     at_once = max(_NODES_PER_BLOCK // levels, 1)
     z = grid.height(np.arange(levels))
 
     def fill(first: int) -> None:
         part = np.arange(first, min(first + at_once, len(result)))
         xy = grid.positions(np.stack(np.unravel_index(part, plane), axis=-1))
-        points = np.empty((len(part), levels, 3))
-        points[:, :, :2] = xy[:, None]
-        points[:, :, 2] = z
-        result[part] = potential(points.reshape(-1, 3)).reshape(len(part), levels)
+        columns(xy, z, result[first : first + at_once])
 
     run_in_threads(fill, range(0, len(result), at_once), progress)
     return result.reshape(grid.node_counts)

@@ -1,0 +1,93 @@
+"""Potentials at columns of nodes: those of a search from scratch, whatever came before."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from asperity.clamps import NONE
+from asperity.core.checks import FloatArray
+from asperity.kernels.fuse import fuse_surface
+from asperity.laws import LAWS
+from asperity.textures.fields.field_grid import FieldGrid
+from asperity.textures.fields.node_potentials import compute_potentials, split_columns
+from asperity.textures.kinds.fourier import Fourier
+from asperity.textures.kinds.sinusoid import Sinusoid
+from asperity.textures.library import named_surface
+from asperity.textures.spline.spline_texture import HeightMap, Profile
+from asperity.textures.texture import Texture
+
+RNG = np.random.default_rng(5)
+ROUGH = RNG.normal(size=(9, 10))
+TEXTURES = {
+    "sinusoid": Sinusoid(0.3e-3, 1e-3, phase=0.6, direction=(3.0, -1.0)),
+    "profile": Profile(8e-5 * ROUGH[0], 1e-4, origin=2e-4),
+    "ridges": HeightMap(6e-5 * ROUGH, (1e-4, 1.3e-4), periodic=True, origin=(1e-4, -2e-4)),
+    "finite map": HeightMap(5e-5 * ROUGH, (1e-4, 1.3e-4)),
+    "waves": Fourier([5e-5, 4e-5, 3e-5], [[9e3, 0.0], [3e3, 8e3], [-6e3, 1.6e4]], [0.3, 1, 2]),
+    "cloth": named_surface("cloth"),
+}
+DEPTH = 2e-4
+
+
+def exact_potentials(texture: Texture, continuity: float, points: FloatArray) -> FloatArray:
+    """Return U [m²] and the number of atoms, (n, 2), of a search from scratch at each point."""
+    out = np.empty((len(points), 3))
+    loops = fuse_surface(LAWS["H"], texture.sampler, NONE)
+    loops.split_batch(points, out, continuity, texture.arguments)
+    return out[:, :2]
+
+
+def random_columns(
+    texture: Texture, count: int, levels: int
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return x, y (count, 2), rising z, and all nodes (count levels, 3), some of them outside."""
+    xy = texture.domain.points(RNG.uniform(-0.5, 1.5, (count, len(texture.domain.spans))))
+    low, high = texture.extremes
+    z = np.linspace(low - DEPTH, high + 1e-5, levels)
+    points = np.empty((count, levels, 3))
+    points[..., :2], points[..., 2] = xy[:, None], z
+    return xy, z, points.reshape(-1, 3)
+
+
+@pytest.mark.parametrize("name", TEXTURES)
+@pytest.mark.parametrize("continuity", [1.0, 4.0])
+def test_columns_equal_searches_from_scratch(name: str, continuity: float) -> None:
+    texture = TEXTURES[name]
+    xy, z, points = random_columns(texture, 40, 25)
+    found = np.empty((len(xy), len(z)), np.float32)
+    split_columns(texture, continuity)(xy, z, found)
+    value, atoms = exact_potentials(texture, continuity, points).T
+    np.testing.assert_allclose(found.ravel(), value, rtol=2.0**-23, atol=1e-20)
+    assert (value == 0.0).any()
+    if name in ("ridges", "waves", "cloth"):
+        assert (atoms >= 3).mean() > 0.003
+    # Negative control: the closest point alone, without a split, has another potential.
+    single = 0.5 * np.square(texture.nearest(points) - points).sum(axis=1)
+    assert np.abs(np.where(value > 0.0, single, 0.0) - value).max() > 1e-3 * value.max()
+
+
+def test_result_does_not_depend_on_the_levels_between() -> None:
+    """A start from far above leads to the same potential as one from the level above."""
+    texture = TEXTURES["ridges"]
+    xy, z, _points = random_columns(texture, 30, 41)
+    fine, coarse = np.empty((30, 41), np.float32), np.empty((30, 5), np.float32)
+    columns = split_columns(texture, 1.0)
+    columns(xy, z, fine)
+    columns(xy, np.ascontiguousarray(z[::10]), coarse)
+    np.testing.assert_allclose(fine[:, ::10], coarse, rtol=2.0**-23)
+
+
+@pytest.mark.parametrize("name", ["profile", "finite map"])
+def test_grid_holds_the_potential_of_each_node(name: str) -> None:
+    texture = TEXTURES[name]
+    grid = FieldGrid.fit(texture.domain, texture.extremes, DEPTH, 2.7e-5)
+    seen: list[float] = []
+    found = compute_potentials(split_columns(texture, 1.0), grid, seen.append)
+    assert found.shape == grid.node_counts
+    assert seen[-1] == 1.0
+    for index in RNG.integers(0, grid.node_counts, (50, len(grid.node_counts))):
+        (xy,) = grid.positions(index[None, :-1])
+        point = np.array([[*xy, grid.height(index[-1])]])
+        value = exact_potentials(texture, 1.0, point)[0, 0]
+        assert found[tuple(index)] == pytest.approx(value, rel=1e-6, abs=1e-18)
