@@ -23,6 +23,8 @@ from asperity.textures.texture import Texture
 
 Extent = Sequence[float]
 _NODES_PER_WAVE = 16
+# Greatest size of a field that is baked without being asked for: some ten seconds.
+_AUTOMATIC_BYTES = 2**26
 
 
 def bake(surface: Surface, resolution: float | None = None, **options: Any) -> Surface:
@@ -136,7 +138,9 @@ def rendered_surface(
         texture.digest, surface.max_depth, surface.parameter("continuity"), *(extent or ())
     )
     field: Texture = get_or_compute(
-        "field", content, lambda: bake_field(surface, extent=extent, progress=progress)
+        "field",
+        content,
+        lambda: bake_field(surface, extent=extent, max_bytes=_AUTOMATIC_BYTES, progress=progress),
     )
     return surface.to_texture(field)
 
