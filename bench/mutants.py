@@ -179,7 +179,7 @@ def copy_tree(folder: Path) -> Path:
 def plan_mutants(tree: Path, name: str, room: Room, python: str) -> tuple[Path, Path]:
     """Plan the mutants of a room; return the paths of configuration and session."""
     modules = [f"src/asperity/{part}" for part in room.code]
-    tests = f"{python} -m pytest -x -q -p no:xdist -p no:cacheprovider {' '.join(room.tests)}"
+    tests = f"{python} -m pytest -x -q -n 0 -p no:cacheprovider {' '.join(room.tests)}"
     lines = [
         "[cosmic-ray]",
         f"module-path = {modules}",

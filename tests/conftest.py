@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import gc
 import math
 import os
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
+
+os.environ.update(OPENBLAS_NUM_THREADS="1", OMP_NUM_THREADS="1")  # as the program does
 
 import numpy as np
 import pytest
@@ -47,6 +50,12 @@ def pytest_configure(config: pytest.Config) -> None:
     """Use a cache of the test suite, in ``.pytest_cache``, instead of the user's cache."""
     if config.cache is not None and "ASPERITY_CACHE_DIR" not in os.environ:
         os.environ["ASPERITY_CACHE_DIR"] = str(config.cache.mkdir("asperity"))
+
+
+def pytest_collection_finish() -> None:
+    """Collect garbage less often: compilers create many objects, of which few are garbage."""
+    gc.freeze()
+    gc.set_threshold(20_000, 10, 10)
 
 
 @pytest.fixture(autouse=True)
