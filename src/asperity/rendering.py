@@ -13,7 +13,6 @@ from asperity.core.cache import get_or_compute
 from asperity.core.checks import check_positive
 from asperity.core.digests import content_digest
 from asperity.core.errors import ParameterError
-from asperity.kernels.link import unit_from_module
 from asperity.surface import Surface
 from asperity.textures.fields.bake import BakeGoal, bake_texture
 from asperity.textures.fields.field_certificate import Progress
@@ -101,13 +100,7 @@ def bake_field(
 
 def is_searched(surface: Surface) -> bool:
     """Return whether law H is rendered by a search: the texture has no closed form of it."""
-    if not surface.law.contact.has_potential_field:
-        return False
-    provided = [unit_from_module(module) for module in surface.texture.sampler]
-    return not any(
-        "split_contact" in unit.kernels.provides or "split_contact" in unit.sources
-        for unit in provided
-    )
+    return surface.law.contact.has_potential_field and not surface.texture.has_split_formula
 
 
 def rendered_surface(
@@ -130,9 +123,12 @@ def rendered_surface(
     Raises:
         ParameterError: see :func:`bake`.
     """
+    if rendering not in RENDERING.choices:
+        RENDERING.validate(rendering)
+    if rendering == SEARCH or not is_searched(surface):
+        return surface
     texture = surface.texture
-    is_finite = texture.domain.periodic or texture.is_mirrored or extent is not None
-    if RENDERING.validate(rendering) == SEARCH or not (is_searched(surface) and is_finite):
+    if not (texture.domain.periodic or texture.is_mirrored or extent is not None):
         return surface
     content = texture.digest and content_digest(
         texture.digest, surface.max_depth, surface.parameter("continuity"), *(extent or ())

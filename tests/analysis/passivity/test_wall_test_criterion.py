@@ -18,6 +18,7 @@ from asperity.analysis.energy.leak import worst_loop
 from asperity.analysis.passivity.assess_passivity import Passivity, passivity
 from asperity.core.errors import ParameterError
 from asperity.devices import Device, parse_device
+from asperity.rendering import rendered_surface
 from asperity.surface import Surface
 from asperity.textures import Fourier, Profile, Sinusoid, Texture
 
@@ -335,7 +336,7 @@ def checked_passivity(
 ) -> Passivity:
     """Return the passivity result, after checking that compare, analyze and limits agree on it."""
     (row,) = compare(texture, device, law, stiffness, depth).rows
-    surface = Surface(texture, law, stiffness, depth)
+    surface = rendered_surface(Surface(texture, law, stiffness, depth))
     result = analyze(surface, device).passivity
     assert row.passivity == result
     assert row.stability_limit == result.stability_limit

@@ -78,6 +78,7 @@ class PotentialField(Texture):
     """
 
     kind: ClassVar[str] = "field"
+    has_split_formula: ClassVar[bool] = True
 
     def __init__(
         self,
