@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from asperity.analysis.bounds.bound import NORM
-from asperity.analysis.bounds.problems import _stack_entries, law_constants, law_kernel
+from asperity.analysis.bounds.problems import law_constants, law_kernel, stack_entries
 from asperity.enclosures.cells import DERIVATIVE_NAMES, cells_with_depth
 from asperity.enclosures.taylor import TaylorMath, TaylorModel, reciprocal
 from asperity.kernels.fuse import kernel_source
@@ -208,7 +208,7 @@ def test_infinite_and_nan_errors_propagate(case: Case, bad: float) -> None:
     with np.errstate(invalid="ignore"):
         result = case.model(unbounded, *others)
     assert not np.isfinite(result.e).any()
-    c, g, e = _stack_entries([[result]], 1, 1)
+    c, g, e = stack_entries([[result]], 1, 1)
     with np.errstate(all="ignore"):
         assert np.isposinf(NORM.upper_bounds(c, g, e, 0.0)).all()
 

@@ -17,7 +17,7 @@ from asperity.core.errors import ParameterError
 from asperity.laws import REGISTERED_LAWS
 
 if TYPE_CHECKING:
-    from asperity.analysis.compare import DeviceComparisons
+    from asperity.analysis.device_comparisons import DeviceComparisons
     from asperity.devices import Device
     from asperity.laws import Law
     from asperity.textures import Texture
@@ -107,7 +107,7 @@ def compare_command(
     (X3P, SDF, NPY, text, PNG, TIFF, STL, OBJ ...) or a scene file (TOML). Several devices and
     depths are compared in one table.
     """
-    from asperity.analysis.compare import compare_devices
+    from asperity.analysis.device_comparisons import compare_devices
 
     chosen = laws or tuple(REGISTERED_LAWS.values())
     first, *others = device or (None,)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from functools import partial
 
-from asperity.analysis.compare import Comparison, DeviceComparisons
+from asperity.analysis.compare import Comparison
+from asperity.analysis.device_comparisons import DeviceComparisons
 from asperity.analysis.gain.characteristic import surface_content
 from asperity.analysis.limits.perceptibility import force_magnitude_text, speed_text, tier_text
 from asperity.analysis.results import LawRow

@@ -9,7 +9,8 @@ from rich.console import RenderableType
 
 from asperity.analysis.analyze import Analysis
 from asperity.analysis.bounds.bound import Bound
-from asperity.analysis.compare import Comparison, DeviceComparisons
+from asperity.analysis.compare import Comparison
+from asperity.analysis.device_comparisons import DeviceComparisons
 from asperity.analysis.limits.limit_result import Limits
 from asperity.analysis.passivity.assess_passivity import Passivity
 from asperity.core.files import json_text, text_digest

@@ -20,8 +20,12 @@ from asperity.analysis.bounds.bound import (
     precise_one_sided,
 )
 from asperity.analysis.bounds.branch_and_bound import Problem, Supremum, polish, supremum
-from asperity.analysis.bounds.problems import CrestProblem, NormalChangeProblem, SlopeProblem
 from asperity.analysis.bounds.sampling import HeightProblem
+from asperity.analysis.bounds.surface_problems import (
+    CrestProblem,
+    NormalChangeProblem,
+    SlopeProblem,
+)
 from asperity.analysis.gain.medial_axis import crest_curvature
 from asperity.analysis.gain.theorems import (
     FrictionProblem,

@@ -18,16 +18,14 @@ from asperity.analysis.energy.curl_columns import (
     sample_curl_integrals,
 )
 from asperity.analysis.energy.loop_integral import initial_panels, integrate, loop_work
-from asperity.analysis.energy.merit import scan_height
+from asperity.analysis.energy.scan_lines import parallel_scan_lines, scan_height, scan_line_along
 from asperity.analysis.gain.characteristic import cached_result, is_shipped_law
-from asperity.core.checks import FloatArray, check_array, check_positive
-from asperity.core.errors import InternalError, ParameterError
+from asperity.core.checks import FloatArray, check_positive
+from asperity.core.errors import InternalError
 from asperity.core.files import Serializable
 from asperity.surface import Surface
 from asperity.textures.texture import ScanLine
 
-_SCAN_LINES = 33
-_NEAREST_SCAN_LINES = 4
 # Relative error of the work of an edge.
 _TOLERANCE = 1e-12
 # The same where each force requires a closest-point search.
@@ -164,38 +162,6 @@ def _find_worst_loop(surface: Surface, line: ScanLine) -> Leak:
     if len(lines) > 1:
         return replace(leak, description=f"{leak.description}, the worst of {len(lines)} lines")
     return leak
-
-
-def scan_line_along(surface: Surface, direction: tuple[float, float]) -> ScanLine:
-    """Return the line in a direction through the start of the texture's own scan line."""
-    vector = check_array("direction", direction, (2,), "1")
-    size = math.hypot(*vector)
-    if size == 0.0:
-        raise ParameterError("direction", "must have a length", direction)
-    own = surface.texture.scan_line()
-    unit = vector / size
-    if abs(float(unit @ own.direction)) > 1.0 - 1e-12:
-        return own
-    domain = surface.texture.domain
-    reach = float(np.abs(domain.spans @ unit).max())
-    return ScanLine(domain.origin, unit, reach if reach > 0.0 else own.length, periodic=False)
-
-
-def parallel_scan_lines(surface: Surface, line: ScanLine) -> list[ScanLine]:
-    """Return lines parallel to a line, spread over a map; on a profile only the line itself."""
-    domain = surface.texture.domain
-    if surface.texture.is_profile:
-        return [line]
-    across = np.array([-line.direction[1], line.direction[0]])
-    reach = domain.spans @ across
-    low, high = float(np.minimum(reach, 0.0).sum()), float(np.maximum(reach, 0.0).sum())
-    count = _SCAN_LINES if surface.law.contact.is_above_probe else _NEAREST_SCAN_LINES
-    first = float((domain.origin - line.start) @ across) + low
-    shifts = first + (high - low) * (np.arange(count) + 0.5) / count
-    return [
-        ScanLine(line.start + shift * across, line.direction, line.length, line.periodic)
-        for shift in shifts
-    ]
 
 
 def _column_leak(surface: Surface, lines: list[ScanLine]) -> Leak:

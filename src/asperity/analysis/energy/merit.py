@@ -9,14 +9,14 @@ import numpy as np
 
 from asperity.analysis.bounds.bound import spectral_norm
 from asperity.analysis.bounds.sampling import dense_maximum
+from asperity.analysis.energy.scan_lines import parallel_line_points, scan_height
 from asperity.analysis.gain.characteristic import cached_result
 from asperity.analysis.gain.theorems import theorem_on
 from asperity.core.checks import FloatArray
 from asperity.surface import Surface
-from asperity.textures.texture import ScanLine, Texture
+from asperity.textures.texture import ScanLine
 
 _SCAN_POINTS_PER_LINE = 2048
-_MAP_LINES = 16
 _NEAREST_SCAN_POINTS = {True: 2048, False: 128}
 
 
@@ -67,27 +67,6 @@ def _compute_merit(surface: Surface) -> Merit:
     else:
         strength, support = ripple / (gain * unit), float(slopes.mean()) / gain
     return Merit(strength, support, ripple, gain, height, lost)
-
-
-def scan_height(surface: Surface) -> float:
-    """Return z [m] of the scan at which laws are compared."""
-    return surface.law.contact.extremes(surface.texture)[1] - surface.max_depth
-
-
-def parallel_line_points(texture: Texture, line: ScanLine, count: int) -> FloatArray:
-    """Return points (lines, count, 2) [m] of the scan line of a profile, or 16 lines of a map.
-
-    The lines of a map are parallel to its scan line and spread evenly over the domain.
-    """
-    xy = line.points(count)
-    if texture.is_profile:
-        return xy[None]
-    spans = texture.domain.spans
-    parts = (np.arange(_MAP_LINES) + 0.5) / _MAP_LINES
-    across = spans[np.argmin(np.abs(spans @ line.direction) / np.hypot(*spans.T))]
-    first = line.start if line.periodic else texture.domain.origin
-    shifts = parts[:, None] * across + (first - line.start)
-    return np.asarray(xy + shifts[:, None, :])
 
 
 def _scan_forces_and_slopes(

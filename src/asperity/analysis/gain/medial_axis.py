@@ -30,8 +30,8 @@ from asperity.analysis.bounds.branch_and_bound import (
     Supremum,
     supremum,
 )
-from asperity.analysis.bounds.problems import CrestProblem
 from asperity.analysis.bounds.sampling import highest_point, sample_supremum
+from asperity.analysis.bounds.surface_problems import CrestProblem
 from asperity.analysis.gain import closed_forms
 from asperity.core.checks import FloatArray
 from asperity.enclosures.cells import Cells

@@ -16,8 +16,8 @@ import numpy as np
 
 from asperity.analysis.bounds.bound import CURL, NORM, ONE_SIDED, Bound, JacobianMeasure
 from asperity.analysis.bounds.branch_and_bound import Contacts, Problem, Supremum
-from asperity.analysis.bounds.problems import NormalChangeProblem, SlopeProblem
 from asperity.analysis.bounds.sampling import worst_deflection
+from asperity.analysis.bounds.surface_problems import NormalChangeProblem, SlopeProblem
 from asperity.analysis.gain import closed_forms as forms
 from asperity.analysis.gain.medial_axis import (
     SearchOptions,

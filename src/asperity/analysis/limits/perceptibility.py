@@ -177,17 +177,24 @@ def classify_perceptibility(
         texture_rms: RMS of the force of its texture [N].
         nesting_index: wavelength that separates texture from waviness [m].
     """
-    thresholds = _thresholds(case)
-    detection = max(least for least, _clear in thresholds.values())
-    masked_by = max(thresholds, key=lambda source: thresholds[source][1])
-    clear = thresholds[masked_by][1]
+    friction = max(case.device.get("friction", 0.0), case.device.get("least_friction", 0.0))
+    step = case.device.get("force_resolution", 0.0)
+    clear_by_source = {
+        MaskingSource.HAND: CLEAR_RATIO * HAND_THRESHOLD,
+        MaskingSource.FRICTION: CLEAR_RATIO * friction,
+        MaskingSource.STEPS: case.force_steps * step,
+    }
+    masked_by = max(clear_by_source, key=lambda source: clear_by_source[source])
+    clear, detection = clear_by_source[masked_by], max(HAND_THRESHOLD, friction, step)
     resolved = _resolved_share(case)
     amplitude = math.sqrt(2.0 * resolved) * texture_rms
     coarse = replace(case, time_samples=MIN_SAMPLES, position_samples=MIN_SAMPLES)
     coarse_amplitude = math.sqrt(2.0 * _resolved_share(coarse)) * texture_rms
     tier: Tier = "not felt" if coarse_amplitude < detection else "borderline"
     tier = "felt" if amplitude >= clear else tier
-    has_remedies = tier != "felt" and texture_rms > 0.0
+    remedies = []
+    if tier != "felt" and texture_rms > 0.0:
+        remedies = _find_remedies(case, amplitude, texture_rms, clear_by_source)
     return Perceptibility(
         tier=tier,
         rms=rms,
@@ -200,7 +207,7 @@ def classify_perceptibility(
         masked_by=masked_by,
         speed=case.speed,
         missing_data=tuple(field for field in _MASKING_FIELDS if field not in case.device),
-        remedies=tuple(_find_remedies(case, amplitude, texture_rms)) if has_remedies else (),
+        remedies=tuple(remedies),
     )
 
 
@@ -212,20 +219,10 @@ def _resolved_share(case: LimitCase) -> float:
     return float(squares[is_resolved].sum()) / total if total > 0.0 else 1.0
 
 
-def _thresholds(case: LimitCase) -> dict[MaskingSource, tuple[float, float]]:
-    """Return the amplitudes [N] from which a texture is borderline and felt, by source."""
-    friction = max(case.device.get("friction", 0.0), case.device.get("least_friction", 0.0))
-    step = case.device.get("force_resolution", 0.0)
-    return {
-        MaskingSource.HAND: (HAND_THRESHOLD, CLEAR_RATIO * HAND_THRESHOLD),
-        MaskingSource.FRICTION: (friction, CLEAR_RATIO * friction),
-        MaskingSource.STEPS: (step, case.force_steps * step),
-    }
-
-
-def _find_remedies(case: LimitCase, amplitude: float, texture_rms: float) -> list[Remedy]:
+def _find_remedies(
+    case: LimitCase, amplitude: float, texture_rms: float, clear: dict[MaskingSource, float]
+) -> list[Remedy]:
     """Return the changes that would make a texture felt, each by itself."""
-    clear = {source: threshold for source, (_least, threshold) in _thresholds(case).items()}
     masked_by = max(clear, key=lambda source: clear[source])
     remedies = []
     magnification = _required_magnification(case, texture_rms, clear[masked_by])

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from asperity.analysis.energy.merit import scan_height
+from asperity.analysis.energy.scan_lines import scan_height
 from asperity.analysis.gain.characteristic import cached_result, is_shipped_law
 from asperity.core.cache import get_or_compute
 from asperity.core.checks import FloatArray

@@ -137,6 +137,11 @@ def make_device_loop(
     delay = _exact_value(device, "delay_samples", _NOT_NEGATIVE)
     if delay is not None and delay.denominator != 1:
         raise ParameterError("device.delay_samples", "must be a whole number", float(delay))
+    _exact_value(device, "max_stiffness", _POSITIVE)
+    test = device.wall_test
+    for name in ("cycled", "update_rate", "lightest") if test is not None else ():
+        if (value := getattr(test, name)) is not None:
+            check_positive(f"device.max_stiffness.{name}", value)
     rate = _exact_value(device, "update_rate", _POSITIVE)
     damping = _exact_value(device, "damping", _NOT_NEGATIVE)
     virtual_damping = _exact_value(device, "virtual_damping", _FINITE)
@@ -157,7 +162,7 @@ def make_device_loop(
         virtual_damping_gain=(virtual_damping or Fraction(0)) * (rate or Fraction(0)),
         delay=None if delay is None else int(delay),
         known_delay=delay or Fraction(0),
-        wall_test=_checked_wall_test(device),
+        wall_test=test,
         friction=_exact_value(device, "least_friction", _NOT_NEGATIVE) or Fraction(0),
         position_step=_SQRT_3 * (_exact_value(device, "position_resolution", _NOT_NEGATIVE) or 0),
         force_step=_SQRT_3 * (_exact_value(device, "force_resolution", _NOT_NEGATIVE) or 0),
@@ -166,17 +171,6 @@ def make_device_loop(
 
 # √3, rounded up: a step along each of three axes at once.
 _SQRT_3 = Fraction(17320508075688773, 10**16)
-
-
-def _checked_wall_test(device: Device) -> WallTest | None:
-    """Return the test of the smooth wall, checked, since a device may be built by hand."""
-    _exact_value(device, "max_stiffness", _POSITIVE)
-    test = device.wall_test
-    for name in ("cycled", "update_rate", "lightest"):
-        value = None if test is None else getattr(test, name)
-        if value is not None:
-            check_positive(f"device.max_stiffness.{name}", value)
-    return test
 
 
 _POSITIVE = ("must be positive", 5e-324)

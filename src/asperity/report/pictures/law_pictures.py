@@ -17,7 +17,7 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from asperity.analysis.compare import Comparison
-from asperity.analysis.energy.merit import scan_height
+from asperity.analysis.energy.scan_lines import scan_height
 from asperity.analysis.results import LawRow
 from asperity.core.units import format_quantity
 from asperity.report.pictures import style

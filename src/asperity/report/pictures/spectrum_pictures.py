@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from asperity.analysis.energy.merit import parallel_line_points
+from asperity.analysis.energy.scan_lines import parallel_line_points
 from asperity.analysis.limits.limit_result import Limits, stiffness_text
 from asperity.analysis.limits.perceptibility import speed_text
 from asperity.core.checks import FloatArray
