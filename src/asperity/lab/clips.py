@@ -20,7 +20,8 @@ from asperity.core.files import to_plain_data
 from asperity.devices import Device, load_device
 from asperity.lab.messages import COLUMN_NAMES, POSITION
 from asperity.lab.playback import ANCHOR_COLUMNS, Playback, load_playback, make_playback
-from asperity.lab.scene_state import DEFAULT_DEVICE, SceneState, format_scene, make_scene_state
+from asperity.lab.scene_export import format_scene
+from asperity.lab.scene_state import DEFAULT_DEVICE, SceneState, make_scene_state
 from asperity.lab.session import Session
 from asperity.loop.shared_trace import COLUMNS
 from asperity.recording.recorded_field import TEXTURE_FILE, field_attachments, field_metadata

@@ -13,7 +13,6 @@ import numpy as np
 from asperity.core.errors import ParameterError
 from asperity.core.processes import available_cores
 from asperity.scene.setup import Setup
-from asperity.simulation.hands import Strokes
 from asperity.simulation.limit_cycles.onset import (
     MIN_STIFFNESS,
     Onset,
@@ -23,6 +22,7 @@ from asperity.simulation.limit_cycles.onset import (
     predict,
     smooth_wall_onset,
 )
+from asperity.simulation.motions import Strokes
 from asperity.simulation.scan import Stroke, scan_strokes
 
 DEFAULT_SPEEDS = (0.02, 0.05, 0.1, 0.2)  # m/s

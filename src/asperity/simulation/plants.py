@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from asperity.core.checks import FloatArray, check_array
 from asperity.core.errors import ParameterError
 from asperity.simulation.discretization import Resonance, integrate, linear_body
-from asperity.simulation.hands import Hand, NamedPart, SpringHand, Triple, nonnegative, per_axis
+from asperity.simulation.hands import Hand, SpringHand, Triple, nonnegative, per_axis
 from asperity.simulation.kernels import (
     axis_body,
     coupled_body,
@@ -26,6 +26,7 @@ from asperity.simulation.kernels import (
     prescribed_motion,
     resonant_axis,
 )
+from asperity.simulation.motions import NamedPart
 from asperity.simulation.servo import Servo
 
 # Parts of a sample over which dry friction is held constant.

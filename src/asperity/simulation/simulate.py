@@ -25,12 +25,13 @@ from asperity.loop import no_guards, servo_loop
 from asperity.loop.interface import LoopState
 from asperity.recording.recorded_field import field_attachments, field_metadata
 from asperity.recording.writer import RecordingWriter
-from asperity.simulation.hands import Hand, Motion
+from asperity.simulation.hands import Hand
 from asperity.simulation.kernels import energy_trace, simulated_device
 from asperity.simulation.kernels.body_interface import LEFT_WORKSPACE
 from asperity.simulation.kernels.energy_ledger import LEDGER_SIZE
 from asperity.simulation.kernels.energy_trace import TraceRows
 from asperity.simulation.kernels.simulated_device import SimulatedDevice
+from asperity.simulation.motions import Motion
 from asperity.simulation.plants import Plant, SampledPlant, sampled_plant
 from asperity.simulation.servo import Servo
 from asperity.simulation.trace import (

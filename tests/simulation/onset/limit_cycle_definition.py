@@ -10,8 +10,8 @@ import numpy as np
 
 from asperity.core.checks import FloatArray
 from asperity.simulation import Run
-from asperity.simulation.hands import Motion
 from asperity.simulation.limit_cycles.onset_search import CYCLE_SPEED, DURATION_FACTORS
+from asperity.simulation.motions import Motion
 from asperity.simulation.trace import StopReason
 
 

@@ -30,8 +30,9 @@ from asperity.servo.kernels.pointer_anchor import (
     STATE_ROW,
     TARGET,
 )
-from asperity.simulation.hands import Hand, Stationary
+from asperity.simulation.hands import Hand
 from asperity.simulation.kernels.simulated_device import SimulatedDevice
+from asperity.simulation.motions import Stationary
 from asperity.simulation.plants import Plant
 from asperity.simulation.servo import Servo
 

@@ -22,7 +22,7 @@ from asperity.core.errors import ParameterError
 from asperity.core.files import Serializable, attributes_to_dict, json_text, to_plain_data
 from asperity.laws.w_smooth_wall import LAW as SMOOTH_WALL
 from asperity.simulation.batch import BatchSimulation, Trajectory
-from asperity.simulation.hands import Hand, Motion
+from asperity.simulation.hands import Hand
 from asperity.simulation.kernels.body_interface import LANES
 from asperity.simulation.limit_cycles.onset_search import (
     CYCLE_SPEED,
@@ -31,6 +31,7 @@ from asperity.simulation.limit_cycles.onset_search import (
     limit_cycle_rule,
     run_searches,
 )
+from asperity.simulation.motions import Motion
 from asperity.simulation.plants import Plant
 from asperity.simulation.servo import Servo
 from asperity.simulation.simulate import count_samples
