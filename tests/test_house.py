@@ -1,4 +1,4 @@
-"""Structure of the package: imports, seams, sizes and names.
+"""Structure of the package: seams, sizes and names.
 
 A seam is a place where a contributor adds one thing in one folder. It works only while no other
 folder tests for a texture kind, contact, clamp or law. Each checker is tested on a short source.
@@ -9,114 +9,14 @@ from __future__ import annotations
 import ast
 import statistics
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
-from functools import cache, lru_cache
-from pathlib import Path
+from collections.abc import Iterator, Mapping
 
 import pytest
+from tests.helpers.source_modules import SOURCE, find_places, modules_outside, parse, read_modules
 
-SOURCE = Path(__file__).parents[1] / "src"
 LETTERS = set("WABCDEFGH")
 CONTACTS = {"nominal", "vertical", "nearest", "split"}
 CLAMPS = {"none", "whole", "lateral", "backed"}
-
-
-@cache
-def parse(text: str) -> ast.Module:
-    return ast.parse(text)
-
-
-@lru_cache(maxsize=1)
-def read_modules() -> dict[str, str]:
-    """Return the text of every module of the package by its dotted name."""
-    texts = {}
-    for path in SOURCE.rglob("*.py"):
-        parts = path.relative_to(SOURCE).with_suffix("").parts
-        name = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
-        texts[name] = path.read_text(encoding="utf-8")
-    return texts
-
-
-def modules_outside(*packages: str) -> dict[str, str]:
-    """Return the modules outside these packages."""
-    inside = tuple(f"asperity.{package}." for package in packages)
-    return {
-        name: text for name, text in read_modules().items() if not f"{name}.".startswith(inside)
-    }
-
-
-def find_places(texts: Mapping[str, str], checker: Callable[[str], list[int]]) -> list[str]:
-    """Return the places that a checker finds, "module:line"."""
-    return [f"{name}:{line}" for name, text in texts.items() for line in checker(text)]
-
-
-# --- import cycles -------------------------------------------------------------------------------
-
-
-def imported_modules(text: str, names: Mapping[str, str]) -> Iterator[str]:
-    """Yield the modules that a module imports anywhere: at its top, in functions, for types."""
-    for node in ast.walk(parse(text)):
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom) and node.module is not None:
-            for alias in node.names:
-                full_name = f"{node.module}.{alias.name}"
-                yield full_name if full_name in names else node.module
-
-
-def import_cycles(texts: Mapping[str, str]) -> list[str]:
-    """Return the modules that import themselves through others."""
-    graph = {
-        name: {m for m in imported_modules(text, texts) if m in texts}
-        for name, text in texts.items()
-    }
-    cycles = []
-    for name in sorted(graph):
-        reached: set[str] = set()
-        pending = list(graph[name])
-        while pending:
-            module = pending.pop()
-            if module not in reached:
-                reached.add(module)
-                pending.extend(graph[module])
-        if name in reached:
-            cycles.append(name)
-    return cycles
-
-
-def hidden_imports(text: str) -> list[int]:
-    """Return the lines that import a module of the package by its name in a string."""
-    return [
-        node.lineno
-        for node in ast.walk(parse(text))
-        if isinstance(node, ast.Call)
-        and ast.unparse(node.func).endswith(("import_module", "__import__"))
-        and isinstance(node.args[0], ast.Constant)
-        and str(node.args[0].value).startswith("asperity")
-    ]
-
-
-def test_hidden_imports_are_detected() -> None:
-    assert hidden_imports("import_module('asperity.report')\nimport_module('numba')") == [1]
-
-
-def test_package_has_no_hidden_imports() -> None:
-    assert find_places(read_modules(), hidden_imports) == []
-
-
-def test_package_has_no_import_cycles() -> None:
-    assert import_cycles(read_modules()) == []
-
-
-def test_import_cycles_inside_functions_are_detected() -> None:
-    texts = {
-        "a": "def f():\n    from b import g\n",
-        "b": "if TYPE_CHECKING:\n    import c.d\n",
-        "c.d": "from c import e\n",
-        "c.e": "import a\n",
-    }
-    assert import_cycles(texts) == ["a", "b", "c.d", "c.e"]
-    assert import_cycles(texts | {"c.e": "import b_b\n"}) == []
 
 
 # --- checks for a kind, a contact, a clamp, a law ------------------------------------------------

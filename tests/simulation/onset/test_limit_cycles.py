@@ -16,9 +16,11 @@ from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
 from asperity.simulation import Cartesian, Resonance, Run, Servo, SpringHand, Stationary, simulate
 from asperity.simulation.limit_cycles.onset import Onset, find_onset, predict, start_offsets
+from asperity.simulation.trace import COLUMNS, TailStatistics
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
 
+NAMES = [name for name, _unit in COLUMNS]
 WALL = Surface(Sinusoid(0.4e-3, 1e-3), "W", stiffness=800.0, max_depth=0.5e-3)
 PRESS = SpringHand(50.0, 20.0, 0.05, (0.0, 0.0, -0.5))
 
@@ -87,3 +89,22 @@ def test_too_short_duration_is_an_error() -> None:
         find_onset(
             WALL, Cartesian(0.05), PRESS, Servo(1e-3), Stationary((0.0, 0.0, -1e-3)), duration=10e-3
         )
+
+
+def test_tail_statistics_do_not_depend_on_the_chunks() -> None:
+    """The same as from the last quarter of the whole table."""
+    rng, verdicts = np.random.default_rng(48), set()
+    for rows in range(4, 64):
+        table = rng.normal(size=(rows, len(COLUMNS)))
+        tail, row_count = TailStatistics(rows), 0
+        for part in np.split(table, np.sort(rng.integers(0, rows + 1, 3))):
+            tail.update(part)
+            row_count += len(part)
+            assert tail.is_complete == (row_count == rows)
+        moving = table[rows - rows // 4 :, [NAMES.index(f"v{axis}") for axis in "xyz"]]
+        assert tail.velocity_spread == pytest.approx(np.std(moving, axis=0).sum(), abs=1e-15)
+        change = dict(zip(NAMES, table[-1] - table[rows - max(rows // 4, 2)], strict=True))
+        supplied = sum(change[f"supplied {axis}"] for axis in "xyz")
+        assert tail.gains_energy == (supplied > 0.2 * (change["lost"] - change["friction"]))
+        verdicts.add(tail.gains_energy)
+    assert verdicts == {True, False}

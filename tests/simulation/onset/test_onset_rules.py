@@ -22,11 +22,10 @@ from asperity.simulation.limit_cycles.onset_search import (
     bracket_onset,
     limit_cycle_rule,
 )
-from asperity.simulation.trace import COLUMNS, StopReason, TailStatistics
+from asperity.simulation.trace import StopReason
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
 
-NAMES = [name for name, _unit in COLUMNS]
 SURFACE = Surface(Sinusoid(0.2e-3, 2e-3), "A", max_depth=1e-3)
 
 
@@ -434,22 +433,3 @@ def test_start_offsets_exclude_the_full_period() -> None:
     shifts: FloatArray = start_offsets(SURFACE, 5)
     np.testing.assert_allclose(shifts[:, 0], np.arange(5) * 0.4e-3, atol=1e-18)
     assert not shifts[:, 1:].any()
-
-
-def test_tail_statistics_do_not_depend_on_the_chunks() -> None:
-    """The same as from the last quarter of the whole table."""
-    rng, verdicts = np.random.default_rng(48), set()
-    for rows in range(4, 64):
-        table = rng.normal(size=(rows, len(COLUMNS)))
-        tail, row_count = TailStatistics(rows), 0
-        for part in np.split(table, np.sort(rng.integers(0, rows + 1, 3))):
-            tail.update(part)
-            row_count += len(part)
-            assert tail.is_complete == (row_count == rows)
-        moving = table[rows - rows // 4 :, [NAMES.index(f"v{axis}") for axis in "xyz"]]
-        assert tail.velocity_spread == pytest.approx(np.std(moving, axis=0).sum(), abs=1e-15)
-        change = dict(zip(NAMES, table[-1] - table[rows - max(rows // 4, 2)], strict=True))
-        supplied = sum(change[f"supplied {axis}"] for axis in "xyz")
-        assert tail.gains_energy == (supplied > 0.2 * (change["lost"] - change["friction"]))
-        verdicts.add(tail.gains_energy)
-    assert verdicts == {True, False}

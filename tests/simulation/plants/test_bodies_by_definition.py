@@ -307,13 +307,6 @@ def test_friction_force_for_a_mass_matrix() -> None:
     assert dense.friction_force(0.0, 0.0, 0.0, 0.0, mass, 0.01) == (0.0, 0.0, 0.0)
 
 
-def test_multiply_columns_is_the_matrix_product() -> None:
-    rng = np.random.default_rng(2)
-    columns, z, result = rng.normal(size=(7, 5)), rng.normal(size=7), np.full(5, 3.0)
-    dense.multiply_columns(columns, z, result)
-    np.testing.assert_allclose(result, columns.T @ z, rtol=1e-13)
-
-
 # --- bands ----------------------------------------------------------------------------------------
 
 
@@ -407,25 +400,6 @@ def test_linear_sample_has_substeps_only_with_friction(
         ).record
         assert (record.substeps, record.substep) == (count, PERIOD / count)  # type: ignore[attr-defined]  # of its own record
         assert record.stopping_mass.any() == (friction > 0.0 or damping is COUPLED)  # type: ignore[attr-defined]  # of its own record
-
-
-def test_linkage_reach_is_limited_by_the_elbow_angles() -> None:
-    """|cos| of both elbow angles is below √(1 - s²), and the handle is in front of the motors."""
-    plant, min_sine = HEAVY, 0.3
-    record, links = linkage_record(plant), plant.linkage
-    rng = np.random.default_rng(6)
-    cases = set()
-    for x, z in rng.uniform(-0.16, 0.16, (2000, 2)):
-        place = np.add(plant.centre, (x, z))
-        cosines = [
-            (links.proximal**2 + links.distal**2 - (place[0] - motor) ** 2 - place[1] ** 2)
-            / (2.0 * links.proximal * links.distal)
-            for motor in (0.0, -links.base)
-        ]
-        is_reached = bool(place[1] > 0.0 and max(map(abs, cosines)) < math.sqrt(1.0 - min_sine**2))
-        assert five_bar.linkage_reaches(x, z, min_sine, record) == is_reached
-        cases.add((is_reached, place[1] > 0.0, cosines[0] > 0.0, cosines[1] > 0.0))
-    assert len(cases) > 6
 
 
 def test_state_is_unchanged_when_the_sample_leaves_the_workspace() -> None:

@@ -36,6 +36,7 @@ from asperity.simulation.kernels.pantograph_dynamics import (
     linkage_dynamics,
     linkage_friction,
     linkage_rates,
+    linkage_reaches,
 )
 from asperity.simulation.pantograph import linkage_record
 from asperity.surface import Surface
@@ -328,3 +329,22 @@ def test_motion_must_stay_in_the_plane_of_the_linkage() -> None:
     run = simulate(Surface(WAVE, "A"), Pantograph(), PrescribedHand(), Servo(1e-3), STROKES, 0.1)
     np.testing.assert_allclose(run.position, run.anchor, atol=1e-15)
     assert run.ledger.closure == 0.0
+
+
+def test_linkage_reach_is_limited_by_the_elbow_angles() -> None:
+    """|cos| of both elbow angles is below √(1 - s²), and the handle is in front of the motors."""
+    plant, min_sine = Pantograph(centre=(0.02, 0.09)), 0.3
+    record, links = linkage_record(plant), plant.linkage
+    rng = np.random.default_rng(6)
+    cases = set()
+    for x, z in rng.uniform(-0.16, 0.16, (2000, 2)):
+        place = np.add(plant.centre, (x, z))
+        cosines = [
+            (links.proximal**2 + links.distal**2 - (place[0] - motor) ** 2 - place[1] ** 2)
+            / (2.0 * links.proximal * links.distal)
+            for motor in (0.0, -links.base)
+        ]
+        is_reached = bool(place[1] > 0.0 and max(map(abs, cosines)) < math.sqrt(1.0 - min_sine**2))
+        assert linkage_reaches(x, z, min_sine, record) == is_reached
+        cases.add((is_reached, place[1] > 0.0, cosines[0] > 0.0, cosines[1] > 0.0))
+    assert len(cases) > 6

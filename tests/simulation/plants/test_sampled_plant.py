@@ -20,6 +20,7 @@ from asperity.simulation import (
     simulate,
 )
 from asperity.simulation.kernels import pantograph_dynamics as five_bar
+from asperity.simulation.kernels.coupled_body import multiply_columns
 from asperity.simulation.pantograph import linkage_record
 from asperity.simulation.plants import sampled_plant
 from asperity.surface import Surface
@@ -86,3 +87,10 @@ def test_pantograph_at_extreme_speed_ends_the_run(speed: float) -> None:
     assert (
         five_bar.linkage_step_count(speed, 0.0, 1.0, 1.0, linkage_record(Pantograph())) == 1_000_000
     )
+
+
+def test_multiply_columns_is_the_matrix_product() -> None:
+    rng = np.random.default_rng(2)
+    columns, z, result = rng.normal(size=(7, 5)), rng.normal(size=7), np.full(5, 3.0)
+    multiply_columns(columns, z, result)
+    np.testing.assert_allclose(result, columns.T @ z, rtol=1e-13)
