@@ -75,7 +75,7 @@ def test_content_digest_depends_on_the_law_and_not_on_the_name(call: Call, tmp_p
 @pytest.mark.parametrize(
     ("options", "budget"),
     [
-        ((), "600.0"),
+        ((), "1500.0"),
         (("--max-evaluations", "90"), "90"),
         (("--looks", "90"), "90"),  # the former name
         (("--exact",), "HUGE_VAL"),

@@ -94,8 +94,8 @@ def test_coordinate_scale_and_lateral_reach_of_contacts() -> None:
 
 
 def test_depth_code_uses_half_the_budget_of_a_tick() -> None:
-    """It searches the closest point from below the probe; a tick has 600 evaluations."""
-    assert LAWS["D"].contact.max_evaluations == 600.0
+    """It searches the closest point from below the probe; a tick has 1500 evaluations."""
+    assert LAWS["D"].contact.max_evaluations == 1500.0
     code = LAWS["D"].contact.depth_code()
     assert code[-2].endswith("= closest_point_within_budget(x, y, z, x, y, 300.0, texture)")
     assert code[:2] == ["if not sample_height(x, y, texture) - z > 0.0:", "    return 0.0"]

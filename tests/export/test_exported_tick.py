@@ -106,7 +106,7 @@ def test_zeroed_state_equals_a_reset_state(
 @pytest.mark.parametrize(
     ("law", "budget", "number"),
     [
-        ("B", None, "1.0"), ("B", 50, "1.0"), ("D", None, "600.0"), ("H", None, "1800.0"),
+        ("B", None, "1.0"), ("B", 50, "1.0"), ("D", None, "1500.0"), ("H", None, "2800.0"),
         ("H", 50, "50"), ("E", np.inf, "HUGE_VAL"),
     ],
 )  # fmt: skip

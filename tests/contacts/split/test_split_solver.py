@@ -138,8 +138,8 @@ def test_dual_point_and_mean_follow_from_each_other(
         (0, True, ["query", "settle 1"], (1, 0, 9.0)),
         (1, True, ["follow", "settle 1"], (1, 0, 4.0)),
         (1, False, ["follow", "query", "settle 1"], (1, 0, 13.0)),
-        (3, True, ["weights 3", "settle 3"], (2, 2, 6.0)),
-        (3, False, ["weights 3", "settle 3", "query", "settle 1"], (1, 0, 15.0)),
+        (3, True, ["weights 3", "settle 3"], (3, 2, 6.0)),
+        (3, False, ["weights 3", "settle 3"], (3, 0, 6.0)),
         (2, True, ["weights 2", "settle 2"], (2, 2, 6.0)),
     ],
 )
@@ -147,10 +147,30 @@ def test_initialization_from_known_atoms(
     known_count: int, succeeds: bool, expected_calls: list[str], expected: tuple[float, ...],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
-    """Moved atoms of a nearby probe; one tracked point; otherwise the closest point.
+    """Atoms of a nearby probe, with optimal weights if all are positive: here two have them."""
+    calls = replace_parts(monkeypatch, succeeds)
+    atoms, y, pull = random_atoms(4), np.zeros(3), np.zeros(3)
+    weight = 0.5 if known_count == 2 else atoms[0, 3]
+    a = np.zeros((7, 10))
+    result = solver.split_initialize(atoms, known_count, P, y, pull, C, a, 160.0, "texture")
+    assert result == expected
+    assert calls == expected_calls
+    assert atoms[0, 3] == (1.0 if expected_calls[-1] == "settle 1" else weight)
 
-    Several atoms get optimal weights if all of these are positive, which here holds for two.
-    """
+
+def test_atoms_of_a_distant_probe_are_dropped(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A mean with more energy than the point straight above the probe is no good start."""
+    calls = replace_parts(monkeypatch, succeeds=True, height=-0.7)
+    atoms, y, pull = random_atoms(4), np.zeros(3), np.zeros(3)
+    a = np.zeros((7, 10))
+    solver.split_initialize(atoms, 3, P, y, pull, C, a, 160.0, "texture")
+    assert calls == ["query", "settle 1"]
+
+
+def replace_parts(
+    monkeypatch: pytest.MonkeyPatch, succeeds: bool, height: float = 99.0
+) -> list[str]:
+    """Replace the functions that an initialization calls, and return the list of their calls."""
     calls: list[str] = []
 
     def solve_subset(candidates: Any, count: int, mask: int, p: Any, mu: float, *rest: Any) -> int:
@@ -165,7 +185,7 @@ def test_initialization_from_known_atoms(
     ) -> Any:
         calls.append(f"settle {int(count)}")
         assert (tuple(p), c) == (tuple(P), C)
-        assert rest[1:] == (10.0 if count > 1 else 0.0, "texture")
+        assert rest[1:] == (40.0 if count > 1 else 0.0, "texture")
         return (2 if succeeds else 0, 6.0) if count > 1 else (0, 50.0)
 
     def track_point(p: Any, _atoms: Any, row: int, most: int, _texture: Any) -> Any:
@@ -184,10 +204,37 @@ def test_initialization_from_known_atoms(
     )  # fmt: skip
     for name, function in stand_ins:
         monkeypatch.setattr(solver, f"split_{name}", function)
-    atoms, y, pull = random_atoms(4), np.zeros(3), np.zeros(3)
-    weight = 0.5 if known_count == 2 else atoms[0, 3]
-    a = np.zeros((7, 10))
-    result = solver.split_initialize(atoms, known_count, P, y, pull, C, a, 40.0, "texture")
-    assert result == expected
-    assert calls == expected_calls
-    assert atoms[0, 3] == (1.0 if expected_calls[-1] == "settle 1" else weight)
+    monkeypatch.setattr(solver, "sample_height", lambda *_: height)
+    monkeypatch.setattr(solver, "evaluation_cost", lambda _texture: 1.0)
+    return calls
+
+
+@pytest.mark.parametrize("is_final", [True, False])
+def test_search_for_a_closer_point_ends_with_the_first(
+    is_final: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Near the atoms, then briefly, then all: only a complete search shows that none is closer."""
+    for stage_with_progress in (0, 1, 2):
+        calls: list[Any] = []
+
+        def query(_y: Any, _atoms: Any, _row: int, budget: float, _t: Any, c: Any = calls) -> Any:
+            c.append(budget)
+            return (0.0 if budget == 900.0 else 0.5), 10.0
+
+        def nearby(*_arguments: Any, c: Any = calls) -> float:
+            c.append("nearby")
+            return 0.0
+
+        def gap(*_arguments: Any, c: Any = calls, stage: int = stage_with_progress) -> Any:
+            return (1.0 if len(c) == stage + 1 else 0.0), 1e-6
+
+        monkeypatch.setattr(solver, "split_query", query)
+        monkeypatch.setattr(solver, "split_query_nearby", nearby)
+        monkeypatch.setattr(solver, "split_duality_gap", gap)
+        monkeypatch.setattr(solver, "evaluation_cost", lambda _texture: 1.0)
+        args = (Y, random_atoms(2), 2, is_final, 0.4, 1.0, 900.0 if is_final else 910.0, None)
+        _gap, _rounding, error_bound, _evaluations = solver.split_query_closer(*args)
+        expected = [900.0] if is_final else ["nearby", solver.SHORT_SEARCH, 900.0]
+        count = 1 if is_final else stage_with_progress + 1
+        assert calls == expected[:count]
+        assert error_bound == (0.0 if is_final else (np.inf, 0.5, 0.0)[stage_with_progress])

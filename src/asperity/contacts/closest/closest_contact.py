@@ -18,7 +18,7 @@ class NearestContact(Contact):
     name = "nearest"
     relative_cost = 100.0
     has_warm_start = True
-    max_evaluations = 600.0
+    max_evaluations = 1500.0
 
     def derivatives(self) -> ContactDerivatives:
         """Return ∇depth = -n and, by the implicit function theorem, ∂(X, Y)/∂p = Q⁻¹ [I g].

@@ -143,10 +143,10 @@ def search_line_within_budget(
 
     See ``plane_budget``.
     """
-    best, left = descend_within_budget(x, z, start, 0.5 * budget, texture)
+    best, left = descend_within_budget(x, z, start, 0.75 * budget, texture)
     best, left = search_line(x, z, best, 1.0 - ROUNDING_SLACK * EPS, left, texture)
     share = 0.0 if left > 0.0 else 1.0
-    left += 0.5 * budget
+    left += 0.25 * budget
     # At most as many passes as there are digits; none after a complete search.
     while left > 0.0 and share > 4.0 * EPS:
         factor = 1.0 - 0.25 * share

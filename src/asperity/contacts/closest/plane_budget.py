@@ -1,10 +1,10 @@
 """The closest surface point, exactly or within an evaluation budget, with an error bound.
 
-Half of a budget is for the closest point itself. If it does not suffice, the rest is for passes
-over everything that can be closer; each pass prunes what is closer than the best point by less
-than a fraction of its distance. The first fraction is a quarter, so that the pass ends after few
-evaluations; each further pass prunes a quarter of what the one before did. The last completed pass
-bounds the error. The work grows with the accuracy, as in a best-first search, but no queue is
+Three quarters of a budget are for the closest point itself. If they do not suffice, the rest is for
+passes over everything that can be closer; each pass prunes what is closer than the best point by
+less than a fraction of its distance. The first fraction is a quarter, so that the pass ends after
+few evaluations; each further pass prunes a quarter of what the one before did. The last completed
+pass bounds the error. The work grows with the accuracy, as in a best-first search, but no queue is
 needed.
 """
 
@@ -35,10 +35,10 @@ def closest_point_within_budget(
     x: float, y: float, z: float, start_x: float, start_y: float, budget: float, texture: object
 ) -> tuple[float, float, float, float, float, float, float]:
     """Return the closest point found within a budget; see ``sampler_interface``."""
-    best, left = descend_within_budget(x, y, z, start_x, start_y, 0.5 * budget, texture)
+    best, left = descend_within_budget(x, y, z, start_x, start_y, 0.75 * budget, texture)
     best, left = search_plane(x, y, z, best, 1.0 - ROUNDING_SLACK * EPS, left, texture)
     share = 0.0 if left > 0.0 else 1.0
-    left += 0.5 * budget
+    left += 0.25 * budget
     # At most as many passes as there are digits; none after a complete search.
     while left > 0.0 and share > 4.0 * EPS:
         factor = 1.0 - 0.25 * share

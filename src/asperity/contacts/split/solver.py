@@ -10,7 +10,8 @@ U(p) = (1 - μ) max_y [dist²(y)/2 - |p - y|²/(2μ)].
 
 The method is fully-corrective Frank-Wolfe. Each iteration queries the closest point of y, adds it
 to the atoms, solves for the weights exactly, drops atoms without weight, and moves the atoms along
-with y by Newton's method on the optimality conditions. The last query certifies the duality gap.
+with y by Newton's method on the optimality conditions. The last query certifies the duality gap;
+before it, any point closer than the atoms improves y, and one near an atom is found at little cost.
 
 With an evaluation budget the queries may have an error bound g: y is at most d from an atom, and no
 point is closer than d - g. The dual is then at least its value with d - g in place of d, which adds
@@ -52,6 +53,11 @@ KERNELS = Kernels(
 
 # Newton steps of each atom before the joint solution; more do not pay.
 NEWTON_STEPS = 2
+# Evaluations of a short search for a point closer than the atoms, and of one near an atom.
+SHORT_SEARCH = 150.0
+NEARBY_SEARCH = 24.0
+# Iterations after which every search is for the closest point.
+NEARBY_ITERATIONS = 20
 
 
 def split_query(
@@ -288,7 +294,7 @@ def split_initialize(
     atoms: FloatArray, warm_count: int, p: FloatArray, y: FloatArray, offset: FloatArray,
     continuity: float, a: FloatArray, budget: float, texture: object,
 ) -> tuple[int, int, float]:  # fmt: skip
-    """Write the initial atoms, y and z̄ - p: moved atoms of a nearby probe, or one closest point.
+    """Write the initial atoms, y and z̄ - p: moved atoms of a nearby probe, or one surface point.
 
     The old weights would move y away from the point that is equally far from all atoms, where
     Newton's method converges; the optimal weights of the fixed atoms come first.
@@ -297,30 +303,95 @@ def split_initialize(
         The number of atoms, of refined atoms, and of evaluations.
     """
     first: Any = np.int64(0)
-    solved: Any = first
-    evaluations = 0.0
-    if warm_count > 1:
+    one: Any = np.int64(1)
+    mu = 1.0 / (1.0 + continuity)
+    straight = sample_height(p[0], p[1], texture) - p[2]
+    if warm_count > 1 and split_evaluate_energy(atoms, warm_count, p, mu, offset) < (
+        0.5 * straight * straight
+    ):
         trial = local_array((4, 4))
         every: Any = (1 << warm_count) - 1
-        mu = 1.0 / (1.0 + continuity)
         if split_solve_subset(atoms, warm_count, every, p, mu, a, trial, y) == warm_count:
             split_copy_atoms(trial, atoms, warm_count)
         solved, evaluations = split_update_dual(
             atoms, warm_count, p, y, offset, continuity, a, 0.25 * budget, texture
         )
-        if solved > 0:
-            return solved, solved, evaluations
+        return warm_count, solved, evaluations
     found = False
+    evaluations = 0.0
     max_steps: Any = np.int64(25)
     if warm_count == 1:
         found, evaluations = split_track_point(p, atoms, first, max_steps, texture)
     if not found:
-        _gap, taken = split_query(p, atoms, first, budget, texture)
+        short = min(SHORT_SEARCH * evaluation_cost(texture), 0.25 * budget)
+        _gap, taken = split_query(p, atoms, first, short, texture)
         evaluations += taken
     atoms[0, 3] = 1.0
-    one: Any = np.int64(1)
     split_update_dual(atoms, one, p, y, offset, continuity, a, 0.0, texture)
     return one, first, evaluations
+
+
+def split_query_nearby(y: FloatArray, atoms: FloatArray, count: int, texture: object) -> float:
+    """Write the closest of the local minima near the atoms into the row after them.
+
+    Returns:
+        The evaluations.
+    """
+    trial = local_array((2, 4))
+    one: Any = np.int64(1)
+    max_steps: Any = np.int64(25)
+    best = np.inf
+    evaluations = 0.0
+    for i in range(count):
+        for d in range(4):
+            trial[0, d] = trial[1, d] = atoms[i, d]
+        found, taken = split_track_point(y, trial, one, max_steps, texture)
+        evaluations += taken
+        if not found:
+            _gap, taken = split_query(
+                y, trial, one, NEARBY_SEARCH * evaluation_cost(texture), texture
+            )
+            evaluations += taken
+        square = 0.0
+        for d in range(3):
+            square += (trial[1, d] - y[d]) ** 2
+        if square < best:
+            best = square
+            for d in range(3):
+                atoms[count, d] = trial[1, d]
+    atoms[count, 3] = 0.0
+    return evaluations
+
+
+def split_query_closer(
+    y: FloatArray, atoms: FloatArray, count: int, is_final: bool, mu: float, scale: float,
+    budget: float, texture: object,
+) -> tuple[float, float, float, float]:  # fmt: skip
+    """Write a point closer to y than the atoms into the row after them, or the closest one.
+
+    The closest one is needed to show that y is final. Otherwise any closer one improves y: it is
+    searched near the atoms, then by a short search.
+
+    Returns:
+        The duality gap [m²], its possible rounding error, the error bound of the distance [m] of
+        the closest point, infinite if it is unknown, and the evaluations.
+    """
+    error_bound = np.inf
+    evaluations = 0.0
+    gap = rounding = 0.0
+    for stage in range(2 if is_final else 0, 3):
+        if stage == 0:
+            evaluations += split_query_nearby(y, atoms, count, texture)
+        else:
+            left = budget - evaluations
+            if stage == 1:
+                left = min(SHORT_SEARCH * evaluation_cost(texture), 0.5 * left)
+            error_bound, taken = split_query(y, atoms, count, left, texture)
+            evaluations += taken
+        gap, rounding = split_duality_gap(atoms, count, y, mu, scale)
+        if error_bound == 0.0 or gap > 1e3 * rounding:
+            break
+    return gap, rounding, error_bound, evaluations
 
 
 def split_compute_atoms(
@@ -335,7 +406,7 @@ def split_compute_atoms(
         z: likewise.
         continuity: c.
         warm_count: number of rows of ``atoms`` that hold the atoms of a nearby probe with weights.
-        budget: evaluations allowed, a quarter of them in one query.
+        budget: evaluations allowed.
         p: result.
         atoms: result.
         offset: result.
@@ -352,35 +423,42 @@ def split_compute_atoms(
     p[1] = y
     p[2] = z
     scale = abs(p[0]) + abs(p[1]) + abs(p[2])
-    each = 0.25 * budget
+    reserve = 2.0 * SHORT_SEARCH * evaluation_cost(texture)
     doubts = 0
+    stuck = False
     count, solved, evaluations = split_initialize(
-        atoms, warm_count, p, at, offset, continuity, a, each, texture
+        atoms, warm_count, p, at, offset, continuity, a, budget, texture
     )
-    for _ in range(60):
-        error_bound, taken = split_query(at, atoms, count, each, texture)
+    for iteration in range(60):
+        is_last = evaluations >= 0.75 * budget
+        single = count == 1 and split_is_local_minimum(atoms, at, texture)
+        unlikely = iteration >= NEARBY_ITERATIONS or budget - evaluations < reserve
+        is_final = is_last or stuck or solved > 0 or single or unlikely
+        gap, rounding, error_bound, taken = split_query_closer(
+            at, atoms, count, is_final, mu, scale, budget - evaluations, texture
+        )
         evaluations += taken
-        gap, rounding = split_duality_gap(atoms, count, at, mu, scale)
         converged = gap <= rounding
         gap += split_query_error(atoms, count, at, mu, error_bound)
         if converged:
             doubts += 1
-            single = count == 1 and split_is_local_minimum(atoms, at, texture)
             if solved > 0 or doubts > 6 or single or error_bound > 0.0:
                 return count, gap, evaluations, error_bound > 0.0
-        # The other half is reserved for one iteration.
-        if evaluations >= 0.5 * budget:
+        if is_last:
             return count, gap, evaluations, True
         left = split_solve_weights(atoms, count + 1, p, mu, a)
-        if left == 0:
+        if left == 0 and is_final:
             break  # by rounding: there are no better weights
+        stuck = left == 0
+        if stuck:
+            continue
         count = left
         solved, taken = split_update_dual(
-            atoms, count, p, at, offset, continuity, a, 0.25 * each, texture
+            atoms, count, p, at, offset, continuity, a, 0.1 * budget, texture
         )
         evaluations += taken
         count = solved if solved > 0 else count
-    return count, gap, evaluations, False
+    return count, gap, evaluations, gap > 1e3 * rounding
 
 
 def split_query_error(
@@ -390,4 +468,6 @@ def split_query_error(
     square = 0.0
     for d in range(3):
         square += (atoms[count, d] - y[d]) ** 2
-    return (1.0 - mu) * error_bound * (math.sqrt(square) - 0.5 * error_bound)
+    distance = math.sqrt(square)
+    error_bound = min(error_bound, distance)
+    return (1.0 - mu) * error_bound * (distance - 0.5 * error_bound)

@@ -18,7 +18,7 @@ class SplitContact(NearestContact):
 
     name = "split"
     relative_cost = 1000.0
-    max_evaluations = 1800.0
+    max_evaluations = 2800.0
     bounds_force_error = True
     single_valued = True
     is_determined_by_depth = False

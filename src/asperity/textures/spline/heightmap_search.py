@@ -34,7 +34,7 @@ KERNELS = Kernels(
 )
 
 # A window with at most so many cells, and cells along x, is searched cell by cell.
-MAX_ROW_SEARCH_CELLS = 1000
+MAX_ROW_SEARCH_CELLS = 4000
 MAX_ROW_SEARCH_COLUMNS = 64
 # Costs, in evaluations: of the coefficients of a row, of each of its cells, of subdividing a cell.
 ROW_COST = 0.4
