@@ -15,20 +15,21 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
-from asperity.analysis.split.baked_field import bake
 from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
 from asperity.analysis.split.split_state import split_state
 from asperity.core.checks import FloatArray
+from asperity.rendering import bake
 from asperity.surface import Surface
 from asperity.textures import HeightMap, Profile, Sinusoid, load_texture
+from asperity.textures.fields.potential_field import PotentialField
 from asperity.textures.texture import Texture
 from bench import cases
 from bench.timing import seconds, take_turns
 
-GOALS = {"closed form": 1.5, "map": 100.0, "table": 0.1}  # µs
+GOALS = {"closed form": 1.5, "map": 100.0, "baked": 0.1}  # µs
 ROUNDS = 15
 BATCH_SECONDS = 0.05
 PIXELS = 10
@@ -48,8 +49,8 @@ def run(console: Console) -> None:
         force, jacobian = _exact_times(surface, points)
         share = float(np.mean(split_state(surface, points[:2000]).atoms > 1))
         table.add_row(form, what, *_cells(form, force), f"{jacobian:.2f}", f"{share:.0%}")
-    for what, time in _table_times():
-        table.add_row("table", what, *_cells("table", time), "-", "-")
+    for what, time in _baked_times():
+        table.add_row("baked", what, *_cells("baked", time), "-", "-")
     console.print("medians of batches over random probe points, one thread")
     console.print(table)
 
@@ -107,7 +108,7 @@ def _exact_times(surface: Surface, points: FloatArray) -> tuple[float, float]:
     return times[0], times[1]
 
 
-def _table_times() -> list[tuple[str, float]]:
+def _baked_times() -> list[tuple[str, float]]:
     rng = np.random.default_rng(cases.SEED)
     textures: dict[str, Texture] = {
         "sinusoid A/l = 0.4": Sinusoid(0.4e-3, 1e-3, direction=(0.8, 0.6)),
@@ -117,16 +118,17 @@ def _table_times() -> list[tuple[str, float]]:
     for name, texture in textures.items():
         surface = Surface(texture, "H", STIFFNESS, max_depth=0.3e-3)
         start = perf_counter()
-        table = bake(surface, 1e-5 if texture.is_profile else 3e-5)
-        built = perf_counter() - start
+        surface = bake(surface, 1e-5 if texture.is_profile else 3e-5)
+        built, field = perf_counter() - start, surface.texture
+        assert isinstance(field, PotentialField)
         xy = texture.domain.points(rng.uniform(size=(100_000, len(texture.domain.spans))))
-        z = rng.uniform(table.floor, texture.extremes[0], len(xy))
+        z = rng.uniform(field.grid.floor, texture.extremes[0], len(xy))
         points, out = np.column_stack([xy, z]), np.empty((len(xy), 3))
-        batch = partial(table._loops.table_force_batch, points, out, STIFFNESS, table._coefficients)
-        runs = take_turns([batch], ROUNDS)
-        size = " x ".join(str(count) for count in table.shape)
-        what = f"{name}: {size} nodes, {table.bytes / 1e6:.1f} MB, built in {built:.1f} s, "
-        what += f"q = {table.lipschitz.value:.3f}"
+        loop, arguments = surface._loops.force_batch, (field.arguments, surface.law_arguments)
+        runs = take_turns([partial(loop, points, out, *arguments)], ROUNDS)
+        size = " x ".join(str(count) for count in field.grid.node_counts)
+        what = f"{name}: {size} nodes, {field.bytes / 1e6:.1f} MB, built in {built:.1f} s, "
+        what += f"q at most {field.gain.upper:.3f}"
         result.append((what, float(np.median(runs)) / len(xy) * 1e6))
     return result
 
