@@ -35,7 +35,7 @@ def load_json(*arguments: str) -> dict[str, dict]:
     result = call(*arguments, "--json", "-")
     assert result.exit_code == 0
     data = json.loads(result.output)
-    assert data["schema"] == 3
+    assert data["schema"] == 2
     return {surface["name"]: surface for surface in data["surfaces"]}
 
 

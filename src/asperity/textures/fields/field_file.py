@@ -128,7 +128,7 @@ def is_field(path: str | os.PathLike[str]) -> bool:
     try:
         with open_input(path, 2**40) as stream:
             return stream.read(len(MAGIC)) == MAGIC
-    except OSError:  # which the reader of surfaces reports
+    except (OSError, ValueError):  # which the reader of surfaces reports
         return False
 
 
