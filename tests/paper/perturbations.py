@@ -19,7 +19,7 @@ import asperity.surface
 from asperity.paper.cases import SCANNING, ExperimentCase
 from asperity.paper.claim import Check, check_statement
 from asperity.paper.claims.design_limits import CORRECTED_LIMITS, Inequality
-from asperity.paper.claims.friction_law import FrictionCase
+from asperity.paper.friction_case import FrictionCase
 from asperity.paper.probes import ProbePoint
 from asperity.surface import Surface
 

@@ -64,8 +64,7 @@ def parse_settings(
     """
     law: dict[str, Any] = {}
     device: dict[str, str] = {}
-    earlier: dict[tuple[bool, str], str] = {}
-    parameters = registered_arguments()
+    earlier, parameters = dict[tuple[bool, str], str](), registered_arguments()
     for text in texts:
         name, equals, value = text.partition("=")
         if not equals:

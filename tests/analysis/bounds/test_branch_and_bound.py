@@ -26,12 +26,12 @@ from asperity.analysis.bounds.surface_problems import (
     NormalChangeProblem,
     SlopeProblem,
 )
-from asperity.analysis.gain.medial_axis import crest_curvature
-from asperity.analysis.gain.theorems import (
+from asperity.analysis.gain.friction_problem import (
     FrictionProblem,
     largest_singular_value,
     largest_symmetric_eigenvalue,
 )
+from asperity.analysis.gain.medial_axis import crest_curvature
 from asperity.core.checks import FloatArray
 from asperity.core.errors import InternalError
 from asperity.enclosures.cells import Cells

@@ -27,11 +27,12 @@ from tests.analysis.gain.bound_checks import (
 from asperity.analysis import characteristic_number, one_sided_number
 from asperity.analysis.bounds.bound import CURL, NORM, ONE_SIDED, Bound, precise_norm
 from asperity.analysis.gain import closed_forms
-from asperity.analysis.gain import theorems as friction
+from asperity.analysis.gain import friction_problem as friction
 from asperity.analysis.gain.certificate import certify
 from asperity.analysis.gain.characteristic import curl_number
+from asperity.analysis.gain.friction_problem import largest_singular_value
 from asperity.analysis.gain.medial_axis import SearchOptions
-from asperity.analysis.gain.theorems import derivative_bound, largest_singular_value
+from asperity.analysis.gain.theorems import derivative_bound
 from asperity.reference import exact_jacobian
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Profile, Sinusoid, Texture

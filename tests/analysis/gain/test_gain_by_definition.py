@@ -14,14 +14,13 @@ from asperity.analysis.bounds.bound import CURL, NORM, ONE_SIDED, precise_norm, 
 from asperity.analysis.bounds.branch_and_bound import supremum
 from asperity.analysis.bounds.problems import LawProblem
 from asperity.analysis.gain import closed_forms as forms
-from asperity.analysis.gain.medial_axis import crest_curvature, gain_above_crest, sharpest_crest
-from asperity.analysis.gain.theorems import (
+from asperity.analysis.gain.friction_problem import (
     FrictionProblem,
-    derivative_bound,
     largest_singular_value,
     largest_symmetric_eigenvalue,
-    theorem_on,
 )
+from asperity.analysis.gain.medial_axis import crest_curvature, gain_above_crest, sharpest_crest
+from asperity.analysis.gain.theorems import derivative_bound, theorem_on
 from asperity.enclosures.cells import Cells
 from asperity.enclosures.taylor import TaylorModel
 from asperity.surface import Surface

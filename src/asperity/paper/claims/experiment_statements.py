@@ -33,7 +33,6 @@ from asperity.paper.claim import (
     combine_checks,
     declare_claim,
 )
-from asperity.paper.claims.friction_law import PAPER_CASE, SCANNING_CASE, FrictionCase
 from asperity.paper.claims.passivity_condition import energy_gained
 from asperity.paper.formula_checks import (
     check_continuity,
@@ -41,6 +40,7 @@ from asperity.paper.formula_checks import (
     check_zero_outside,
     format_by_name,
 )
+from asperity.paper.friction_case import PAPER_CASE, SCANNING_CASE, FrictionCase
 
 _RESOLUTION = 15e-6  # [m]
 _SPEED = 0.2  # [m/s], greatest
@@ -113,12 +113,12 @@ def number_a() -> Check:
     return check_statement(f"q_A = {q:.4f}", printed=round(q, 1) == 5.1, q=q)
 
 
-def _handle_damping(joint_damping: float, x: float) -> float:
+def _handle_damping(x: float) -> float:
     """Return σ₀(B) of the Pantograph at x, with unverified link lengths [N·s/m]."""
     device = load_device("pantograph")
     lengths = [device.value(field) for field in ("proximal_link", "distal_link", "base_distance")]
     proximal, distal, base = (math.nan if length is None else length for length in lengths)
-    matrix = handle_damping(FiveBar(proximal, distal, base), joint_damping, (x, 0.1))
+    matrix = handle_damping(FiveBar(proximal, distal, base), PASSIVITY.joint_damping, (x, 0.1))
     return float(np.linalg.svd(matrix, compute_uv=False)[-1])
 
 
@@ -128,10 +128,7 @@ def stability_rule() -> Check:
     q_a, q_f = PASSIVITY.q("A"), PAPER_CASE.sticking_norm()
     numbers = {"W": 1.0, "A": q_a, "F": q_f, "A/5.1": q_a / 5.1, "F/8.3": q_f / 8.3}
     loads = {name: PASSIVITY.stiffness * number for name, number in numbers.items()}
-    limits = [
-        _handle_damping(PASSIVITY.joint_damping, x) / (2 * SAMPLING_PERIOD)
-        for x in (-0.0125, 0.0375)
-    ]
+    limits = [_handle_damping(x) / (2 * SAMPLING_PERIOD) for x in (-0.0125, 0.0375)]
     return check_statement(
         f"κ₀ q [N/m]: {format_by_name(loads, '.0f')}; σ₀/(2T) is {min(limits):.0f} to "
         f"{max(limits):.0f} (links not verified)",
@@ -151,7 +148,7 @@ def division_ensures_passivity() -> Check:
 
     With divided stiffness, A and F still gain energy on a slow loop.
     """
-    damping = _handle_damping(PASSIVITY.joint_damping, 0.0375)
+    damping = _handle_damping(0.0375)
     speeds = {}
     for law, number in (("A", 5.1), ("F", 8.3)):
         surface = PASSIVITY.surface(law, stiffness=PASSIVITY.stiffness / number)

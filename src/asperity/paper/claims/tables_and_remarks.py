@@ -23,9 +23,9 @@ from asperity.paper.claim import (
     declare_claim,
     relative_error,
 )
-from asperity.paper.claims.friction_law import PAPER_CASE
 from asperity.paper.figures import loop_energies
 from asperity.paper.formula_checks import format_by_name
+from asperity.paper.friction_case import PAPER_CASE
 from asperity.paper.probes import generic_profile
 from asperity.paper.table_two import TABLE_TWO, TableTwoRow, table_two
 from asperity.surface import Surface
