@@ -309,9 +309,7 @@ _ALL = (
         FrictionCase,
     ),
     replace_name(
-        "three times the damping",
-        "_handle_damping",
-        lambda original: lambda joint_damping, x: 3.0 * original(joint_damping, x),
+        "three times the damping", "_handle_damping", lambda original: lambda x: 3.0 * original(x)
     ),
     replace_name(
         "each force held over the step before it",
