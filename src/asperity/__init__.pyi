@@ -32,6 +32,7 @@ from asperity.recording.replay import Replay as Replay
 from asperity.recording.replay import replay as replay
 from asperity.recording.writer import RecordingWriter as RecordingWriter
 from asperity.rendering import bake as bake
+from asperity.rendering import bake_mesh as bake_mesh
 from asperity.surface import Surface as Surface
 from asperity.textures import Fourier as Fourier
 from asperity.textures import Grating as Grating

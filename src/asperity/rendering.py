@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from asperity.core.arguments import FIELD, RENDERING, SEARCH
+from asperity.core.arguments import DEFAULT_STIFFNESS, FIELD, RENDERING, SEARCH
 from asperity.core.cache import get_or_compute
 from asperity.core.checks import check_positive
 from asperity.core.digests import content_digest
@@ -17,6 +18,8 @@ from asperity.surface import Surface
 from asperity.textures.fields.bake import BakeGoal, bake_texture
 from asperity.textures.fields.field_certificate import Progress
 from asperity.textures.fields.potential_field import PotentialField
+from asperity.textures.meshes.bake_body import bake_body
+from asperity.textures.meshes.mesh_body import load_mesh
 from asperity.textures.spline.spline_texture import HeightMap
 from asperity.textures.texture import Texture
 
@@ -83,11 +86,7 @@ def bake_field(
     """
     if not surface.law.contact.has_potential_field:
         raise ParameterError("surface", f"must have law H to be baked, not {surface.law}")
-    goal = BakeGoal(
-        check_positive("share", share),
-        math.inf if max_gain is None else check_positive("max_gain", max_gain),
-        int(check_positive("max_bytes", max_bytes, "byte")),
-    )
+    goal = _goal(share, max_gain, max_bytes)
     return bake_texture(
         surface.texture if extent is None else _finite_part(surface.texture, extent),
         surface.max_depth,
@@ -95,6 +94,64 @@ def bake_field(
         resolution=resolution,
         goal=goal,
         progress=progress,
+    )
+
+
+def bake_mesh(
+    path: str | os.PathLike[str],
+    unit: str | None = None,
+    max_depth: float | None = None,
+    resolution: float | None = None,
+    *,
+    continuity: float = 1.0,
+    stiffness: float = DEFAULT_STIFFNESS,
+    repair: bool = False,
+    share: float = BakeGoal.share,
+    max_gain: float | None = BakeGoal.max_gain,
+    max_bytes: int = BakeGoal.max_bytes,
+    progress: Progress | None = None,
+) -> Surface:
+    """Bake law H of a closed body as a potential field.
+
+    Args:
+        path: an STL, OBJ, PLY or glTF file.
+        unit: unit of its coordinates, such as ``"mm"``.
+        max_depth: depth down to which the force is that of law H [m]; deeper inside it falls to
+            zero. By default 1 mm, or the greatest depth of the body if that is less.
+        resolution: distance of the nodes [m]; by default the coarsest one at which the force
+            differs from exact H by the share, within the size.
+        continuity: c of law H, at least 1.
+        stiffness: [N/m].
+        repair: whether faults that leave the inside undefined are repaired.
+        share: RMS difference from the exact force, over the RMS force.
+        max_gain: certified q over c at which smoothing stops; ``None`` for no smoothing.
+        max_bytes: greatest size of the coefficients.
+        progress: called with the finished fraction, from 0 to 1.
+
+    Returns:
+        A surface with law H. The heights of its texture are those of the body seen from above, and
+        ``texture.thin_regions`` are its parts thinner than twice the depth.
+
+    Raises:
+        ParameterError: a missing unit, or a depth or a resolution that does not fit the body.
+        SurfaceFileError: a file that cannot be read, or a mesh whose inside is undefined.
+
+    Reference:
+        MATH section 9.
+    """
+    goal = _goal(share, max_gain, max_bytes)
+    field = bake_body(
+        load_mesh(path, unit, repair=repair), max_depth, continuity,
+        resolution=resolution, goal=goal, progress=progress,
+    )  # fmt: skip
+    return Surface(field, "H", stiffness, field.max_depth, continuity=continuity)
+
+
+def _goal(share: float, max_gain: float | None, max_bytes: int) -> BakeGoal:
+    return BakeGoal(
+        check_positive("share", share),
+        math.inf if max_gain is None else check_positive("max_gain", max_gain),
+        int(check_positive("max_bytes", max_bytes, "byte")),
     )
 
 

@@ -48,7 +48,9 @@ from asperity.core.checks import FloatArray
 from asperity.core.compiled import EPS, Kernels, local_array
 
 KERNELS = Kernels(
-    provides=("split_compute_atoms",), merged=("split_newton", "split_try_newton"), iterates=True
+    provides=("split_compute_atoms", "split_solve_weights", "split_duality_gap"),
+    merged=("split_newton", "split_try_newton"),
+    iterates=True,
 )
 
 # Newton steps of each atom before the joint solution; more do not pay.

@@ -28,7 +28,8 @@ DEFAULT_SHARE = 0.05
 """Default of the RMS difference from exact H, over the RMS of the texture's force."""
 DEFAULT_MAX_GAIN = 1.15
 _MAX_PASSES = 4
-_PROBES = 1024
+PROBES = 1024
+"""Number of probes at which the difference from exact H is measured."""
 _TRIAL_PROBES = 100
 _TRIAL_PASSES = 1
 _BYTES_PER_NODE = 4
@@ -84,20 +85,21 @@ def bake_texture(
         raise ParameterError(
             "texture", "never repeats: no finite field represents it; give an extent"
         )
-    plan = _Plan(texture, max_depth, continuity, goal)
+    plan = BakePlan(texture, max_depth, continuity, goal)
     chosen = plan.choose() if resolution is None else check_positive("resolution", resolution, "m")
     grid = plan.grid(chosen)
     plan.check_size(grid)
     deep = grid.extend_down(goal.passes)
-    potentials = compute_potentials(plan.columns, deep, _share(progress, 0.0, 0.9))
-    return plan.certify(potentials, grid, _share(progress, 0.9, 0.1))
+    potentials = compute_potentials(plan.columns, deep, scale_progress(progress, 0.0, 0.9))
+    return plan.certify(potentials, grid, scale_progress(progress, 0.9, 0.1))
 
 
-def _share(progress: Progress | None, start: float, size: float) -> Progress | None:
+def scale_progress(progress: Progress | None, start: float, size: float) -> Progress | None:
+    """Return the progress of a part of a task that reports its own from 0 to 1."""
     return None if progress is None else lambda done: progress(start + size * done)
 
 
-class _Plan:
+class BakePlan:
     """A field to bake: exact force and potential at probes, from which its grid is chosen."""
 
     def __init__(
@@ -105,13 +107,15 @@ class _Plan:
     ) -> None:
         self.texture, self.max_depth, self.continuity = texture, max_depth, continuity
         self.goal, self.gain = goal, max(1.0, continuity)
+        self.lipschitz = self.gain
         self.columns: ColumnFunction = split_columns(texture, continuity)
         self._law_arguments = (1.0, 0.0, 1.0, max_depth, 0.0, continuity)
-        self.probes = self._random_probes(_PROBES)
+        self.probes = self._random_probes(PROBES)
         self.force = self._exact_force(self.probes)
         self.texture_rms = self._texture_force()
 
     def grid(self, resolution: float) -> FieldGrid:
+        """Return the coarsest grid of a resolution [m]."""
         texture = self.texture
         heights, passes = texture.extremes, self.goal.passes
         return FieldGrid.fit(texture.domain, heights, self.max_depth, resolution, passes)
@@ -241,8 +245,8 @@ class _Plan:
         one_sided, other = numbers
         larger = max(numbers, key=lambda number: number.lower)
         largest = float(arguments.c.max(initial=0.0))
-        force, energy = grid.error_bounds(self.gain, passes, largest)
-        accuracy = FieldAccuracy(math.nan, math.nan, force, energy, self.texture_rms, _PROBES)
+        force, energy = grid.error_bounds(self.lipschitz, passes, largest)
+        accuracy = FieldAccuracy(math.nan, math.nan, force, energy, self.texture_rms, PROBES)
         field = PotentialField(
             self.texture, grid, arguments, max_depth=self.max_depth, continuity=self.continuity,
             passes=passes, gain=replace(larger, upper=max(one_sided.upper, other.upper)),

@@ -51,6 +51,22 @@ class FieldAccuracy:
         return self.rms / self.texture_rms if self.texture_rms > 0.0 else 0.0
 
 
+@dataclass(frozen=True)
+class ThinRegion:
+    """A part of a body that is thinner than twice the depth of its field.
+
+    Attributes:
+        at: where it is thinnest, on the medial axis [m].
+        half_thickness: half of the thickness there [m]: pressed deeper, the probe is pulled to the
+            other side.
+        columns: number of columns of nodes that it spans.
+    """
+
+    at: tuple[float, float, float]
+    half_thickness: float
+    columns: int
+
+
 class PotentialField(Texture):
     """A potential field baked from law H of a texture: nothing is searched when it is rendered.
 
@@ -72,6 +88,7 @@ class PotentialField(Texture):
         gain: certified sup ‖Hess T‖, the characteristic number q.
         one_sided: certified sup λ_max(Hess T), the one-sided number q⁺.
         accuracy: difference from exact law H.
+        thin_regions: where a body can be pressed less deep than ``max_depth``, the thinnest first.
 
     Reference:
         MATH section 10.
@@ -79,6 +96,7 @@ class PotentialField(Texture):
 
     kind: ClassVar[str] = "field"
     has_split_formula: ClassVar[bool] = True
+    thin_regions: tuple[ThinRegion, ...] = ()
 
     def __init__(
         self,

@@ -1,0 +1,1 @@
+"""Closed bodies from meshes: reading, faults, closest points, and law H baked as a field."""

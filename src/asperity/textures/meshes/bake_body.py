@@ -1,0 +1,229 @@
+"""Law H of a closed body, baked as a potential field."""
+
+from __future__ import annotations
+
+from types import ModuleType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.contacts.split import optimality, solver
+from asperity.core.checks import FloatArray, check_positive
+from asperity.core.errors import ParameterError, SurfaceFileError
+from asperity.measured.lengths import format_length, format_lengths
+from asperity.textures.fields.bake import PROBES, BakeGoal, BakePlan, scale_progress
+from asperity.textures.fields.field_certificate import Progress
+from asperity.textures.fields.field_grid import FieldGrid, SingleArray
+from asperity.textures.fields.node_potentials import compute_potentials
+from asperity.textures.fields.potential_field import PotentialField, ThinRegion
+from asperity.textures.meshes import mesh_potential, triangle_tree
+from asperity.textures.meshes.mesh_body import MeshBody
+from asperity.textures.meshes.mesh_faults import INTERSECTING, make_fault
+from asperity.textures.meshes.mesh_potential import BodyLaw
+from asperity.textures.spline.spline_texture import HeightMap
+
+DEFAULT_DEPTH = 1e-3
+"""Greatest default of the depth to which the field of a body is exact [m]."""
+DEFAULT_GOAL = BakeGoal()
+_MOST_CROSSINGS = 4096
+_LEAST_CELLS = 4
+# Duality gap in squared spacings: it adds less than 4 times as much to the gain.
+_GAP = 1e-4
+
+
+def bake_body(
+    body: MeshBody,
+    max_depth: float | None = None,
+    continuity: float = 1.0,
+    *,
+    resolution: float | None = None,
+    goal: BakeGoal = DEFAULT_GOAL,
+    progress: Progress | None = None,
+) -> PotentialField:
+    """Return law H of a closed body as a baked potential field.
+
+    The potential is exact, up to the spline, where the probe is at most ``max_depth`` deep. Deeper
+    inside the force falls to zero, at about e times this depth. There is no force outside. The
+    source of the field is the height map of the body seen from above, +z.
+
+    Args:
+        body: the body.
+        max_depth: [m]; by default 1 mm, or the greatest depth of the body if that is less.
+        continuity: c of law H, at least 1.
+        resolution: distance of the nodes [m]; by default the coarsest one that reaches the goal,
+            where the share is that of the RMS force.
+        goal: what the field must reach.
+        progress: called with the finished fraction, from 0 to 1.
+
+    Raises:
+        ParameterError: for a depth that the body does not have, a resolution coarser than the body,
+            or a field that is larger than allowed.
+        SurfaceFileError: if the mesh overlaps itself.
+    """
+    if not continuity >= 1.0:
+        raise ParameterError("continuity", "must be at least 1 for a body", continuity)
+    depth = DEFAULT_DEPTH if max_depth is None else check_positive("max_depth", max_depth, "m")
+    deepest = _BodyLoops(body, BodyLaw(continuity, depth, np.inf)).sample_depth()
+    if max_depth is None and deepest > 0.0:
+        depth = min(depth, deepest)
+    plan = _BodyPlan(body, depth, continuity, goal)
+    chosen = plan.choose() if resolution is None else check_positive("resolution", resolution, "m")
+    grid = plan.checked_grid(chosen)
+    plan.loops.prepare(grid.extend_down(goal.passes), _GAP * chosen**2)
+    potentials = compute_potentials(
+        plan.columns, plan.loops.grid, scale_progress(progress, 0.05, 0.85)
+    )
+    deepest = max(deepest, plan.loops.deepest)
+    if depth > deepest:
+        reason = f"must be at most {format_length(deepest)}, the greatest depth of the body"
+        raise ParameterError("max_depth", reason, depth)
+    plan.texture = plan.loops.upper_envelope(body)
+    field = plan.certify(potentials, grid, scale_progress(progress, 0.9, 0.1))
+    field.thin_regions = plan.loops.thin_regions(depth)
+    return field
+
+
+class _BodyLoops:
+    """The compiled loops on one body, and what they find at the columns of a grid."""
+
+    def __init__(self, body: MeshBody, law: BodyLaw) -> None:
+        from asperity.kernels.fuse import fuse_module
+
+        modules: tuple[ModuleType, ...] = (triangle_tree, solver, optimality)
+        self._loops = fuse_module(mesh_potential, *modules)
+        self.body, self.law, self.deepest = body, law, 0.0
+        self._tolerance = 1e-9 * float(np.ptp(np.array(body.box), axis=0).max())
+
+    def evaluate(self, points: FloatArray) -> FloatArray:
+        """Return potential [m²], force over stiffness [m] and depth [m] at points, (n, 5)."""
+        out = np.empty((len(points), 5))
+        crossings = np.empty((_MOST_CROSSINGS, 2))
+        self._loops.point_batch(points, self.law, out, crossings, self.body.tree)
+        return out
+
+    def columns(self, xy: FloatArray, z: FloatArray, out: SingleArray) -> FloatArray:
+        """Write the potentials of columns of nodes; return the summary of each, (n, 7)."""
+        out[:] = 0.0
+        summary = np.zeros((len(xy), 7))
+        crossings = np.empty((_MOST_CROSSINGS, 2))
+        self._loops.column_batch(
+            np.ascontiguousarray(xy), np.ascontiguousarray(z), self.law, self._tolerance, out,
+            summary, crossings, self.body.tree,
+        )  # fmt: skip
+        return summary
+
+    def sample_depth(self) -> float:
+        """Return the greatest distance from the outside [m] found on a coarse lattice."""
+        lower, upper = self.body.box
+        ticks = [np.linspace(a, b, 19)[1:-1] for a, b in zip(lower, upper, strict=True)]
+        points = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1).reshape(-1, 3)
+        return float(self.evaluate(points)[:, 4].max())
+
+    def surface_probes(self, count: int) -> FloatArray:
+        """Return random points at most the law's depth inside, (n, 3) [m]."""
+        rng, corners = np.random.default_rng(0), self.body.triangles
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        areas = np.linalg.norm(normals, axis=1)
+        chosen = np.searchsorted(np.cumsum(areas), rng.uniform(0.0, areas.sum(), 4 * count))
+        chosen = np.minimum(chosen, len(areas) - 1)
+        weights = rng.dirichlet(np.ones(3), len(chosen))
+        inward = -normals[chosen] / np.maximum(areas[chosen], 1e-300)[:, None]
+        points = np.einsum("nk,nkd->nd", weights, corners[chosen])
+        points += inward * rng.uniform(0.0, self.law.max_depth, (len(chosen), 1))
+        depth = self.evaluate(points)[:, 4]
+        return np.asarray(points[(depth > 0.0) & (depth <= self.law.max_depth)][:count])
+
+    def prepare(self, grid: FieldGrid, tolerance: float) -> None:
+        """Set the grid, and check that no column of nodes finds the mesh overlapping itself."""
+        self.grid, self.law = grid, self.law._replace(tolerance=tolerance)
+        width, depth, _levels = grid.node_counts
+        index = np.stack(np.unravel_index(np.arange(width * depth), (width, depth)), axis=-1)
+        self._xy = grid.positions(index)
+        empty = np.zeros((len(self._xy), 0), np.float32)
+        self._summary = self.columns(self._xy, np.empty(0), empty)
+        least, greatest = self._summary[:, 4], self._summary[:, 5]
+        wrong = (least < 0.0) | (greatest > 1.0)
+        places = np.column_stack([self._xy, self._summary[:, 6]])[wrong]
+        if fault := make_fault(INTERSECTING, places):
+            raise SurfaceFileError(f"{self.body.name} has no defined inside: {fault[0]}")
+
+    def record_columns(self, xy: FloatArray, z: FloatArray, out: SingleArray) -> None:
+        """Write the potentials of columns of the grid, and keep their summaries."""
+        rows = self._rows(xy)
+        self._summary[rows] = self.columns(xy, z, out)
+
+    def _rows(self, xy: FloatArray) -> NDArray[np.intp]:
+        steps = np.rint((xy - self.grid.start) / self.grid.spacing[0]).astype(np.intp)
+        return np.asarray(steps[:, 0] * self.grid.node_counts[1] + steps[:, 1])
+
+    def upper_envelope(self, body: MeshBody) -> HeightMap:
+        """Return the height map of the body seen from above; beside the body, its least height."""
+        self.deepest = float(self._summary[:, 1].max())
+        heights = self._summary[:, 0].reshape(self.grid.node_counts[:2]).T
+        missing = ~np.isfinite(heights)
+        if missing.all() or self.deepest == 0.0:
+            raise ParameterError("resolution", "is coarser than the body", self.grid.spacing[0])
+        filled = np.where(missing, heights[~missing].min(), heights)
+        sides = format_lengths([float(side) for side in np.ptp(np.array(body.box), axis=0)])
+        text = f"body {body.name}, seen from above: {len(body.triangles)} triangles, {sides}"
+        faults = [f"accepted: {fault}" for fault in body.faults]
+        faults += [f"repaired: {fault}" for fault in body.repaired]
+        return HeightMap(
+            filled, self.grid.spacing[:2], origin=self.grid.start.tolist(),
+            preparation=(text, *faults), filled_mask=missing if missing.any() else None,
+        )  # fmt: skip
+
+    def thin_regions(self, max_depth: float) -> tuple[ThinRegion, ...]:
+        """Return the parts thinner than twice the depth, the thinnest first."""
+        from scipy import ndimage
+
+        half = self._summary[:, 2].reshape(self.grid.node_counts[:2])
+        labels, count = ndimage.label(half < max_depth, structure=np.ones((3, 3)))
+        found = []
+        for label in range(1, count + 1):
+            rows = np.flatnonzero(labels.ravel() == label)
+            best = rows[np.argmin(self._summary[rows, 2])]
+            x, y = (float(value) for value in self._xy[best])
+            thin = float(self._summary[best, 2])
+            found.append(ThinRegion((x, y, float(self._summary[best, 3])), thin, len(rows)))
+        return tuple(sorted(found, key=lambda region: region.half_thickness))
+
+
+class _BodyPlan(BakePlan):
+    """A field of a body to bake."""
+
+    def __init__(self, body: MeshBody, max_depth: float, continuity: float, goal: BakeGoal) -> None:
+        self.max_depth, self.continuity, self.goal = max_depth, continuity, goal
+        self.gain, self.lipschitz = continuity, continuity + 1.0
+        self._law_arguments = (1.0, 0.0, 1.0, max_depth, 0.0, continuity)
+        self.loops = _BodyLoops(body, BodyLaw(continuity, max_depth, 0.0))
+        self.probes = self.loops.surface_probes(PROBES)
+        if len(self.probes) == 0:
+            raise ParameterError("max_depth", "finds no point inside the body", max_depth)
+        self.force = np.ascontiguousarray(self.loops.evaluate(self.probes)[:, 1:4])
+        self.texture_rms = float(np.sqrt(np.square(self.force).sum(axis=1).mean()))
+
+    def columns(self, xy: FloatArray, z: FloatArray, out: SingleArray) -> None:
+        """Write the potentials of columns of nodes; see :data:`ColumnFunction`."""
+        if hasattr(self.loops, "grid"):
+            self.loops.record_columns(xy, z, out)
+        else:
+            self.loops.columns(xy, z, out)
+
+    def grid(self, resolution: float) -> FieldGrid:
+        """Return the grid around the body, with a margin for smoothing."""
+        lower, upper = self.loops.body.box
+        spacing = min(resolution, float((upper - lower).min()) / _LEAST_CELLS)
+        margin = self.goal.passes * spacing
+        return FieldGrid.around(lower - margin, upper + margin, spacing)
+
+    def checked_grid(self, resolution: float) -> FieldGrid:
+        """Return the grid of a resolution that suits the body and the size allowed."""
+        lower, upper = self.loops.body.box
+        coarsest = float((upper - lower).min()) / _LEAST_CELLS
+        if resolution > coarsest * (1.0 + 1e-9):
+            reason = f"must be at most {coarsest:.3g} m, a quarter of the thinnest side of the body"
+            raise ParameterError("resolution", reason, resolution)
+        grid = self.grid(resolution)
+        self.check_size(grid)
+        return grid

@@ -1,0 +1,204 @@
+"""A closed body from a mesh file."""
+
+from __future__ import annotations
+
+import os
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.core.checks import FloatArray
+from asperity.core.errors import ParameterError, SurfaceFileError
+from asperity.measured.lengths import unit_to_metres
+from asperity.measured.reading.isolation import reject_on_error
+from asperity.textures.meshes.build_tree import build_tree
+from asperity.textures.meshes.mesh_faults import UNSOUND, MeshFault, find_faults
+from asperity.textures.meshes.triangle_tree import TriangleTree
+
+MESH_FORMATS = ("stl", "obj", "ply", "glb", "gltf")
+MAX_TRIANGLES = 30_000_000
+"""Largest mesh that is read."""
+# A triangle takes at least these bytes in a file of each format, whatever its header states.
+_LEAST_BYTES = {"stl": 50, "obj": 8, "ply": 7, "glb": 6, "gltf": 6}
+_STL_HEADER = 84
+
+
+@dataclass(frozen=True, eq=False)
+class MeshBody:
+    """A solid bounded by triangles whose normals point out of it.
+
+    Attributes:
+        triangles: corners [m], shape (n, 3, 3).
+        name: of the file.
+        faults: faults found and not repaired, none of which leaves the inside undefined.
+        repaired: the faults that were repaired.
+    """
+
+    triangles: FloatArray
+    name: str = "mesh"
+    faults: tuple[MeshFault, ...] = ()
+    repaired: tuple[MeshFault, ...] = ()
+
+    @cached_property
+    def box(self) -> tuple[FloatArray, FloatArray]:
+        """Corners of least and of greatest coordinates [m], (3,) each."""
+        corners = self.triangles.reshape(-1, 3)
+        return corners.min(axis=0), corners.max(axis=0)
+
+    @cached_property
+    def tree(self) -> TriangleTree:
+        """The record in which closest points are searched."""
+        return build_tree(self.triangles)
+
+    @classmethod
+    def from_arrays(
+        cls, vertices: FloatArray, faces: NDArray[np.int64], name: str = "mesh",
+        repair: bool = False,
+    ) -> MeshBody:  # fmt: skip
+        """Return the body with the given vertices (m, 3) [m] and faces (n, 3), if it is sound.
+
+        Raises:
+            SurfaceFileError: for an empty mesh, vertices that are not finite, or faults that leave
+                the inside undefined and are not, or cannot be, repaired.
+        """
+        if len(faces) == 0:
+            raise SurfaceFileError(f"{name} has no triangles")
+        if not np.isfinite(vertices).all():
+            raise SurfaceFileError(f"{name} has corners that are not finite numbers")
+        vertices, faces = _merge_vertices(vertices, faces)
+        before = find_faults(vertices, faces)
+        after, repaired = before, False
+        if repair and _unsound(before):
+            vertices, faces = _repair(vertices, faces)
+            after, repaired = find_faults(vertices, faces), True
+        if wrong := _unsound(after):
+            tried = " after the repair" if repaired else "; repair=True may close and turn it"
+            raise SurfaceFileError(f"{name} has no defined inside{tried}: {_list(wrong)}")
+        sound = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
+        triangles = vertices[faces[sound]]
+        if not np.ptp(triangles.reshape(-1, 3), axis=0).all():
+            raise SurfaceFileError(f"{name} is flat: it encloses no volume")
+        return cls(triangles, name, tuple(after), tuple(before if repaired else ()))
+
+
+def _unsound(faults: Sequence[MeshFault]) -> list[MeshFault]:
+    return [fault for fault in faults if fault.kind in UNSOUND]
+
+
+def _list(faults: Sequence[MeshFault]) -> str:
+    return "; ".join(map(str, faults))
+
+
+def load_mesh(
+    path: str | os.PathLike[str], unit: str | None = None, *, repair: bool = False
+) -> MeshBody:
+    """Load a closed body from an STL, OBJ, PLY or glTF file.
+
+    Args:
+        path: the file.
+        unit: unit of its coordinates, such as ``"mm"``; glTF files are in metres by definition.
+        repair: whether open edges are filled and triangles turned, by trimesh's repair functions.
+
+    Raises:
+        ParameterError: no unit, or one that is unknown.
+        SurfaceFileError: the file is damaged or too large, or its inside is undefined.
+
+    Example:
+        >>> load_mesh("part.stl", "mm").triangles.shape  # doctest: +SKIP
+        (12, 3, 3)
+    """
+    path = Path(path)
+    suffix = path.suffix.lower().lstrip(".")
+    if suffix not in MESH_FORMATS:
+        raise SurfaceFileError(f"{path.name} is none of {', '.join(MESH_FORMATS)}")
+    if unit is None and suffix in ("glb", "gltf"):
+        unit = "m"
+    if unit is None:
+        raise ParameterError("unit", f"is required: {path.name} does not state one, such as 'mm'")
+    metres = unit_to_metres(unit)
+    _check_count(path, suffix)
+    vertices, faces = _parse(path, suffix)
+    return MeshBody.from_arrays(vertices * metres, faces, path.name, repair)
+
+
+def _check_count(path: Path, suffix: str) -> None:
+    """Refuse a file whose header states, or whose size allows for, too many triangles."""
+    try:
+        size = path.stat().st_size
+        with path.open("rb") as stream:
+            head = stream.read(4096)
+    except OSError as error:
+        raise SurfaceFileError(f"cannot read {path.name}: {error.strerror or error}") from None
+    count = size // _LEAST_BYTES[suffix]
+    stated = _stated_count(head, suffix)
+    if stated is not None and suffix == "ply":
+        count = max(min(count, stated), stated)
+    elif stated is not None and size == _STL_HEADER + 50 * stated:
+        count = stated
+    if count > MAX_TRIANGLES:
+        raise SurfaceFileError(
+            f"{path.name} may hold {count:,} triangles, more than {MAX_TRIANGLES:,}"
+        )
+
+
+def _stated_count(head: bytes, suffix: str) -> int | None:
+    """Return the number of triangles in the header of a file; ``None`` if it states none."""
+    if suffix == "stl" and len(head) >= _STL_HEADER:
+        return int(struct.unpack_from("<I", head, 80)[0])
+    if suffix == "ply":
+        for line in head.splitlines():
+            words = line.split()
+            if words[:2] == [b"element", b"face"] and len(words) == 3 and words[2].isdigit():
+                return int(words[2])
+    return None
+
+
+def _parse(path: Path, suffix: str) -> tuple[FloatArray, NDArray[np.int64]]:
+    """Return vertices in the file's unit, and faces."""
+    import trimesh
+
+    with reject_on_error(f"damaged mesh {path.name}"):
+        loaded: Any = trimesh.load(path, file_type=suffix, process=False, skip_materials=True)
+        mesh = loaded.to_mesh() if isinstance(loaded, trimesh.Scene) else loaded
+        vertices = np.array(mesh.vertices, dtype=np.float64)
+        faces = np.array(mesh.faces, dtype=np.int64).reshape(-1, 3)
+    if len(faces) and not (faces.min() >= 0 and faces.max() < len(vertices)):
+        raise SurfaceFileError(f"damaged mesh {path.name} (a triangle has a corner that is none)")
+    return vertices, faces
+
+
+def _merge_vertices(
+    vertices: FloatArray, faces: NDArray[np.int64]
+) -> tuple[FloatArray, NDArray[np.int64]]:
+    """Return each vertex once: files repeat them for each triangle, or along seams."""
+    vertices = vertices + 0.0  # no negative zeros
+    order = np.lexsort(vertices.T)
+    ordered = vertices[order]
+    new = np.ones(len(order), dtype=bool)
+    new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    index = np.empty(len(order), np.int64)
+    index[order] = np.cumsum(new) - 1
+    return ordered[new], index[faces]
+
+
+def _repair(vertices: FloatArray, faces: NDArray[np.int64]) -> tuple[FloatArray, NDArray[np.int64]]:
+    """Return the mesh with holes filled and triangles turned by trimesh."""
+    import trimesh
+
+    if find_spec("networkx") is None:  # trimesh turns triangles along its graphs
+        raise ParameterError("repair", "needs the optional dependency: asperity[meshes]")
+    repair: Any = trimesh.repair
+    with reject_on_error("the mesh cannot be repaired"):
+        mesh = trimesh.Trimesh(vertices, faces, process=False)
+        mesh.update_faces(mesh.unique_faces())
+        repair.fix_winding(mesh)
+        repair.fill_holes(mesh)
+        repair.fix_normals(mesh, multibody=True)
+    return np.array(mesh.vertices, dtype=np.float64), np.array(mesh.faces, dtype=np.int64)

@@ -1,0 +1,319 @@
+"""Closed bodies from meshes: closest points, faults, and law H baked inside them."""
+
+from __future__ import annotations
+
+import struct
+import sys
+from functools import cache
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+import asperity as asp
+from asperity.core.errors import ParameterError, SurfaceFileError
+from asperity.textures.fields.potential_field import PotentialField
+from asperity.textures.meshes.bake_body import _BodyLoops, bake_body
+from asperity.textures.meshes.mesh_body import MeshBody, load_mesh
+from asperity.textures.meshes.mesh_potential import BodyLaw
+
+MM = 1e-3
+
+
+def to_body(mesh: trimesh.Trimesh) -> MeshBody:
+    return MeshBody.from_arrays(np.array(mesh.vertices), np.array(mesh.faces, dtype=np.int64))
+
+
+def exact(body: MeshBody, points: np.ndarray, max_depth: float = 1.0) -> np.ndarray:
+    law = BodyLaw(1.0, max_depth, 0.0)
+    return _BodyLoops(body, law).evaluate(np.ascontiguousarray(points, dtype=float))
+
+
+@cache
+def cube() -> MeshBody:
+    turn = trimesh.transformations.rotation_matrix(0.4, (1.0, 2.0, 0.5))
+    return to_body(trimesh.creation.box((4 * MM, 4 * MM, 4 * MM), transform=turn))
+
+
+@cache
+def baked(name: str) -> PotentialField:
+    makers = {
+        "cube": cube,
+        "torus": lambda: to_body(trimesh.creation.torus(3 * MM, 1 * MM)),
+        "tetrahedron": lambda: to_body(
+            trimesh.Trimesh(4 * MM * np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]),
+                            [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])
+        ),
+    }  # fmt: skip
+    return bake_body(makers[name](), 0.6 * MM, resolution=0.15 * MM)
+
+
+# --- the exact law --------------------------------------------------------------------------------
+
+
+def test_sphere_is_law_d_to_half_its_radius_and_quadratic_beyond() -> None:
+    """Beyond, the god-object splits over the whole sphere: U = (r² - 2 |p|²)/4 for c = 1."""
+    radius = 2 * MM
+    body = to_body(trimesh.creation.icosphere(5, radius=radius))
+    direction = np.array([0.36, 0.48, 0.8])
+    sizes = np.linspace(0.05, 0.999, 40) * radius
+    found = exact(body, sizes[:, None] * direction)
+    outer = 0.5 * (radius - sizes) ** 2
+    inner = 0.25 * (radius**2 - 2.0 * sizes**2)
+    expected = np.where(sizes >= 0.5 * radius, outer, inner)
+    np.testing.assert_allclose(found[:, 0], expected, atol=1e-3 * radius**2)
+    pull = np.where(sizes >= 0.5 * radius, radius - sizes, sizes)
+    np.testing.assert_allclose(found[:, 1:4], pull[:, None] * direction, atol=0.03 * radius)
+
+
+def test_box_is_exact_at_faces_and_edges() -> None:
+    """At an edge against the definition, maximised over a grid."""
+    body = to_body(trimesh.creation.box((4 * MM, 6 * MM, 4 * MM)))
+    face = np.array([[0.1, 0.2, 1.7], [0.3, -0.2, 1.2], [0.0, 1.0, 1.05]]) * MM
+    depth = 2 * MM - face[:, 2]
+    found = exact(body, face)
+    np.testing.assert_allclose(found[:, 0], 0.5 * depth**2, rtol=1e-12)
+    np.testing.assert_allclose(found[:, 3], depth, rtol=1e-12)
+    rng = np.random.default_rng(0)
+    corner = 2 * MM - rng.uniform(0.05, 0.4, (40, 2)) * MM
+    points = np.column_stack([corner[:, 0], np.zeros(40), corner[:, 1]])
+    found = exact(body, points)
+    for point, value in zip(points, found, strict=True):
+        ticks = np.linspace(0.0, 2.0 * MM, 801)
+        y = np.stack(np.meshgrid(ticks, ticks), axis=-1)
+        phi = 0.5 * np.square(2 * MM - y.max(axis=-1))
+        best = 0.5 * (phi - np.square(y - point[[0, 2]]).sum(axis=-1)).max()
+        assert value[0] == pytest.approx(best, abs=2e-3 * MM * 2.5e-3 * MM + 1e-3 * best)
+
+
+def test_outside_there_is_nothing() -> None:
+    rng = np.random.default_rng(1)
+    torus = to_body(trimesh.creation.torus(3 * MM, 1 * MM))
+    points = rng.uniform(-5 * MM, 5 * MM, (3000, 3))
+    around = np.hypot(np.hypot(points[:, 0], points[:, 1]) - 3 * MM, points[:, 2])
+    found = exact(torus, points)
+    assert not found[around > 1.001 * MM].any()
+    inside = around < 0.95 * MM
+    assert inside.sum() > 50
+    assert (found[inside, 0] > 0.0).all()
+
+
+def test_inside_on_lines_through_vertices_and_edges() -> None:
+    """The vertical lines of this lattice meet vertices, edges and vertical faces."""
+    body = to_body(trimesh.creation.box((4.0, 4.0, 4.0)).subdivide())
+    ticks = np.arange(-3.0, 3.5, 0.5)
+    points = np.stack(np.meshgrid(ticks, ticks, ticks), axis=-1).reshape(-1, 3)
+    found = exact(body, points, 10.0)[:, 0] > 0.0
+    np.testing.assert_array_equal(found, np.abs(points).max(axis=1) < 2.0)
+
+
+def test_closest_points_agree_with_brute_force() -> None:
+    mesh = trimesh.creation.icosphere(3, radius=2.0)  # trimesh's tolerances are absolute
+    mesh.vertices *= 1.0 + 0.2 * np.sin(3.0 * mesh.vertices[:, [1, 2, 0]])
+    points = np.random.default_rng(2).uniform(-1.0, 1.0, (50, 3))
+    found = exact(to_body(mesh), points, 100.0)[:, 4]
+    triangles = np.asarray(mesh.triangles)
+    for point, distance in zip(points, found, strict=True):
+        closest = trimesh.triangles.closest_point(triangles, np.tile(point, (len(triangles), 1)))
+        least = np.linalg.norm(closest - point, axis=1).min()
+        assert distance == pytest.approx(least, rel=1e-12)
+
+
+# --- the baked field ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["cube", "torus", "tetrahedron"])
+def test_secants_are_below_the_certified_gain(name: str) -> None:
+    """Also over edges and through corners; a bound 2 % below the attained gain fails."""
+    field = baked(name)
+    surface = asp.Surface(field, "H", 1000.0)
+    rng = np.random.default_rng(3)
+    corners = field.source.domain.points(rng.uniform(size=(30_000, 2)))
+    z = rng.uniform(field.grid.floor, field.source.extremes[1], len(corners))
+    a = np.column_stack([corners, z])
+    b = a + rng.normal(size=a.shape) * 10 ** rng.uniform(-7, -3, (len(a), 1))
+    rates = np.linalg.norm(surface.force(b) - surface.force(a), axis=1)
+    rates /= 1000.0 * np.linalg.norm(b - a, axis=1)
+    assert 0.9 < rates.max() <= field.gain.upper
+    assert field.gain.upper <= 1.15
+
+
+@pytest.mark.parametrize("name", ["cube", "tetrahedron"])
+def test_closed_paths_gain_nothing(name: str) -> None:
+    """The midpoint rule on short chords; a field with curl gains more by orders of magnitude."""
+    surface = asp.Surface(baked(name), "H", 1000.0)
+    angle = np.linspace(0.0, 2.0 * np.pi, 40_001)
+    rng = np.random.default_rng(4)
+    for _ in range(3):
+        frame = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        centre = rng.uniform(-1 * MM, 1 * MM, 3)
+        path = centre + 1.5 * MM * (
+            np.cos(angle)[:, None] * frame[0] + np.sin(angle)[:, None] * frame[1]
+        )
+        middle, step = 0.5 * (path[1:] + path[:-1]), np.diff(path, axis=0)
+        force = surface.force(middle)
+        scale = np.abs((force * step).sum(axis=1)).sum()
+        assert abs((force * step).sum()) < 1e-7 * scale
+        twisted = force + 0.01 * np.cross(frame[2], force)
+        assert abs((twisted * step).sum()) > 1e-4 * scale
+
+
+def test_force_is_close_to_exact_h() -> None:
+    field, body = baked("cube"), cube()
+    surface = asp.Surface(field, "H", 1.0)
+    loops = _BodyLoops(body, BodyLaw(1.0, 0.6 * MM, 0.0))
+    probes = loops.surface_probes(500)
+    difference = surface.force(probes) - loops.evaluate(probes)[:, 1:4]
+    largest = np.linalg.norm(difference, axis=1).max()
+    assert largest <= field.accuracy.bound
+    assert 0.05 * 0.6 * MM < largest < 0.2 * 0.6 * MM
+    outside = np.array([[9.0, 0.0, 0.0], [0.0, 0.0, 4.0], [0.0, 0.0, -4.0]]) * MM
+    assert not surface.force(outside).any()
+
+
+def test_heights_are_those_seen_from_above() -> None:
+    body = to_body(trimesh.creation.icosphere(4, radius=2 * MM))
+    field = bake_body(body, 0.5 * MM, resolution=0.2 * MM)
+    nodes = field.grid.positions(np.array([[12, 12], [10, 15]]))
+    heights = field.height(nodes)
+    expected = np.sqrt((2 * MM) ** 2 - np.square(nodes).sum(axis=1))
+    np.testing.assert_allclose(heights, expected, atol=0.02 * MM)
+    assert field.filled_mask is not None
+    assert field.filled_mask[0, 0]
+    assert "seen from above" in field.preparation[0]
+
+
+def test_thin_parts_are_reported() -> None:
+    plate = trimesh.creation.box((6 * MM, 6 * MM, 0.6 * MM))
+    field = bake_body(to_body(plate), 0.3 * MM, resolution=0.1 * MM)
+    assert field.thin_regions == ()
+    dumbbell = trimesh.creation.box((6 * MM, 2 * MM, 2 * MM))
+    vertices = dumbbell.subdivide().subdivide().vertices.copy()
+    waist = np.abs(vertices[:, 0]) < 1 * MM
+    vertices[waist, 2] *= 0.25
+    faces = dumbbell.subdivide().subdivide().faces
+    field = bake_body(to_body(trimesh.Trimesh(vertices, faces)), 0.5 * MM, resolution=0.15 * MM)
+    region = field.thin_regions[0]
+    assert region.half_thickness == pytest.approx(0.25 * MM, rel=0.05)
+    assert abs(region.at[0]) < 1.5 * MM
+    assert abs(region.at[2]) < 0.1 * MM
+
+
+# --- bad input ------------------------------------------------------------------------------------
+
+
+def test_faults_are_counted_with_their_place() -> None:
+    mesh = trimesh.creation.icosphere(2, radius=1 * MM)
+    vertices, faces = np.array(mesh.vertices), np.array(mesh.faces, dtype=np.int64)
+    with pytest.raises(SurfaceFileError, match=r"3 open edges, one at \("):
+        MeshBody.from_arrays(vertices, faces[1:])
+    turned = faces.copy()
+    turned[5] = turned[5, ::-1]
+    with pytest.raises(SurfaceFileError, match="3 edges of triangles with opposite orientation"):
+        MeshBody.from_arrays(vertices, turned)
+    with pytest.raises(SurfaceFileError, match="inside out"):
+        MeshBody.from_arrays(vertices, faces[:, ::-1])
+    with pytest.raises(SurfaceFileError, match="no triangles"):
+        MeshBody.from_arrays(vertices, faces[:0])
+    with pytest.raises(SurfaceFileError, match="not finite"):
+        MeshBody.from_arrays(vertices * np.nan, faces)
+    degenerate = np.concatenate([faces, [[1, 1, 2]]])
+    body = MeshBody.from_arrays(vertices, degenerate)
+    assert [fault.count for fault in body.faults] == [1]
+    assert len(body.triangles) == len(faces)
+
+
+def test_repair_on_request() -> None:
+    pytest.importorskip("networkx")
+    mesh = trimesh.creation.icosphere(2, radius=1 * MM)
+    faces = np.array(mesh.faces, dtype=np.int64)[1:]
+    faces[::4] = faces[::4, ::-1]
+    body = MeshBody.from_arrays(np.array(mesh.vertices), faces, repair=True)
+    assert len(body.triangles) == len(mesh.faces)
+    assert {fault.kind for fault in body.repaired} >= {"open edges"}
+
+
+def test_overlapping_bodies_are_refused() -> None:
+    first = trimesh.creation.box((2 * MM, 2 * MM, 2 * MM))
+    second = first.copy().apply_translation((1 * MM, 0.3 * MM, 0.2 * MM))
+    both = trimesh.util.concatenate([first, second])
+    with pytest.raises(SurfaceFileError, match="overlaps itself"):
+        bake_body(to_body(both), 0.3 * MM, resolution=0.2 * MM)
+
+
+def test_depth_and_resolution_must_fit() -> None:
+    with pytest.raises(ParameterError, match="greatest depth") as caught:
+        bake_body(cube(), 2.5 * MM, resolution=0.4 * MM)
+    assert caught.value.argument == "max_depth"
+    with pytest.raises(ParameterError, match="thinnest side"):
+        bake_body(cube(), 0.5 * MM, resolution=3 * MM)
+    with pytest.raises(ParameterError, match="max_bytes"):
+        bake_body(cube(), 0.5 * MM, resolution=1e-6)
+    with pytest.raises(ParameterError, match="at least 1"):
+        bake_body(cube(), 0.5 * MM, 0.5)
+
+
+def test_files(tmp_path: Path) -> None:
+    mesh = trimesh.creation.box((4.0, 4.0, 4.0))
+    for suffix in ("stl", "ply", "obj", "glb"):
+        path = tmp_path / f"part.{suffix}"
+        mesh.export(path)
+        body = load_mesh(path, "mm")
+        assert len(body.triangles) == 12
+        np.testing.assert_allclose(body.box[1], 2e-3)
+    assert load_mesh(tmp_path / "part.glb").box[1][0] == pytest.approx(2.0)
+    with pytest.raises(ParameterError, match="unit is required"):
+        load_mesh(tmp_path / "part.stl")
+    surface = asp.bake_mesh(tmp_path / "part.stl", "mm", 0.5e-3, 0.25e-3)
+    force = surface.force([[0.1e-3, 0.2e-3, 1.7e-3]])
+    np.testing.assert_allclose(force, [[0.0, 0.0, 0.3]], atol=0.01)
+    huge = tmp_path / "huge.stl"
+    with huge.open("wb") as stream:
+        stream.write(bytes(80) + struct.pack("<I", 10**8))
+        stream.truncate(84 + 50 * 10**8)
+    with pytest.raises(SurfaceFileError, match="100,000,000 triangles"):
+        load_mesh(huge, "mm")
+    for name, content in (
+        ("cut.stl", b"solid x\nfacet"),
+        ("text.ply", b"ply\nnothing"),
+        ("e.obj", b""),
+    ):
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(SurfaceFileError):
+            load_mesh(tmp_path / name, "mm")
+
+
+def shipped_meshes() -> list[Path]:
+    """Return meshes that ship with installed packages."""
+    roots = [Path(root) for root in sys.path if root.endswith("site-packages")]
+    found = (
+        path for root in roots for path in root.rglob("*")
+        if path.suffix.lower() in (".stl", ".ply", ".obj", ".glb") and path.stat().st_size < 2e6
+    )  # fmt: skip
+    return sorted(islice(found, 200))
+
+
+def test_meshes_of_installed_packages() -> None:
+    """Each is refused with a reason, or baked with secants below its certified gain."""
+    paths, count = shipped_meshes(), 0
+    if not paths:
+        pytest.skip("no installed package ships a mesh")
+    for path in paths:
+        try:
+            body = load_mesh(path, "mm")
+            lower, upper = body.box
+            field = bake_body(
+                body, 0.05 * (upper - lower).min(), resolution=(upper - lower).max() / 60
+            )
+        except (SurfaceFileError, ParameterError):
+            continue
+        surface, rng = asp.Surface(field, "H", 1.0), np.random.default_rng(count)
+        a = rng.uniform(lower, upper, (5000, 3))
+        b = a + rng.normal(size=a.shape) * 0.01 * (upper - lower).min()
+        rates = np.linalg.norm(surface.force(b) - surface.force(a), axis=1)
+        assert (rates <= field.gain.upper * np.linalg.norm(b - a, axis=1) * (1 + 1e-9)).all(), path
+        count += 1
+        if count == 20:
+            break
