@@ -80,7 +80,8 @@ class MeshBody:
             after, repaired = find_faults(vertices, faces), True
         if wrong := _unsound(after):
             tried = " after the repair" if repaired else "; repair=True may close and turn it"
-            raise SurfaceFileError(f"{name} has no defined inside{tried}: {_list(wrong)}")
+            faults = "; ".join(map(str, wrong))
+            raise SurfaceFileError(f"{name} has no defined inside{tried}: {faults}")
         sound = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
         triangles = vertices[faces[sound]]
         if not np.ptp(triangles.reshape(-1, 3), axis=0).all():
@@ -90,10 +91,6 @@ class MeshBody:
 
 def _unsound(faults: Sequence[MeshFault]) -> list[MeshFault]:
     return [fault for fault in faults if fault.kind in UNSOUND]
-
-
-def _list(faults: Sequence[MeshFault]) -> str:
-    return "; ".join(map(str, faults))
 
 
 def load_mesh(
@@ -138,9 +135,7 @@ def _check_count(path: Path, suffix: str) -> None:
         raise SurfaceFileError(f"cannot read {path.name}: {error.strerror or error}") from None
     count = size // _LEAST_BYTES[suffix]
     stated = _stated_count(head, suffix)
-    if stated is not None and suffix == "ply":
-        count = max(min(count, stated), stated)
-    elif stated is not None and size == _STL_HEADER + 50 * stated:
+    if stated is not None and (suffix == "ply" or size == _STL_HEADER + 50 * stated):
         count = stated
     if count > MAX_TRIANGLES:
         raise SurfaceFileError(

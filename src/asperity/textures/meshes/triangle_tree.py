@@ -24,6 +24,7 @@ LEAF_SIZE = 4
 # Squared sine of the angle of two sides below which a triangle is searched as its sides.
 _NEEDLE = 1e-20
 
+Vector = tuple[float, float, float]
 FourNumbers = tuple[float, float, float, float]
 FoundPoint = tuple[float, float, float, float, int]
 
@@ -42,6 +43,18 @@ class TriangleTree(NamedTuple):
     leaves: int
 
 
+def corner(t: int, start: int, tree: TriangleTree) -> Vector:
+    """Return the corner of a triangle at a column of its record."""
+    return tree.corners[t, start], tree.corners[t, start + 1], tree.corners[t, start + 2]
+
+
+def side_vector(t: int, start: int, end: int, tree: TriangleTree) -> Vector:
+    """Return the vector between two corners of a triangle."""
+    ax, ay, az = corner(t, start, tree)
+    bx, by, bz = corner(t, end, tree)
+    return bx - ax, by - ay, bz - az
+
+
 def box_distance(x: float, y: float, z: float, node: int, tree: TriangleTree) -> float:
     """Return the squared distance [m²] of a point from the box of a node."""
     dx = max(tree.boxes[node, 0] - x, x - tree.boxes[node, 3], 0.0)
@@ -54,35 +67,21 @@ def closest_on_side(
     x: float, y: float, z: float, t: int, start: int, end: int, tree: TriangleTree
 ) -> FourNumbers:
     """Return the squared distance of a side of a triangle, and the closest point on it."""
-    ax = tree.corners[t, start]
-    ay = tree.corners[t, start + 1]
-    az = tree.corners[t, start + 2]
-    ux = tree.corners[t, end] - ax
-    uy = tree.corners[t, end + 1] - ay
-    uz = tree.corners[t, end + 2] - az
+    ax, ay, az = corner(t, start, tree)
+    ux, uy, uz = side_vector(t, start, end, tree)
     square = ux * ux + uy * uy + uz * uz
     along = ux * (x - ax) + uy * (y - ay) + uz * (z - az)
     s = min(max(along / square, 0.0), 1.0) if square > 0.0 else 0.0
-    px = ax + s * ux
-    py = ay + s * uy
-    pz = az + s * uz
+    px, py, pz = ax + s * ux, ay + s * uy, az + s * uz
     return (px - x) ** 2 + (py - y) ** 2 + (pz - z) ** 2, px, py, pz
 
 
 def closest_on_triangle(x: float, y: float, z: float, t: int, tree: TriangleTree) -> FourNumbers:
     """Return the squared distance [m²] of a triangle, and the closest point on it [m]."""
-    ax = tree.corners[t, 0]
-    ay = tree.corners[t, 1]
-    az = tree.corners[t, 2]
-    ux = tree.corners[t, 3] - ax
-    uy = tree.corners[t, 4] - ay
-    uz = tree.corners[t, 5] - az
-    vx = tree.corners[t, 6] - ax
-    vy = tree.corners[t, 7] - ay
-    vz = tree.corners[t, 8] - az
-    wx = x - ax
-    wy = y - ay
-    wz = z - az
+    ax, ay, az = corner(t, 0, tree)
+    ux, uy, uz = side_vector(t, 0, 3, tree)
+    vx, vy, vz = side_vector(t, 0, 6, tree)
+    wx, wy, wz = x - ax, y - ay, z - az
     uu = ux * ux + uy * uy + uz * uz
     uv = ux * vx + uy * vy + uz * vz
     vv = vx * vx + vy * vy + vz * vz
@@ -125,11 +124,7 @@ def tree_closest(
     least, cx, cy, cz = closest_on_triangle(x, y, z, near, tree)
     found = near
     if least >= limit:
-        least = limit
-        cx = x
-        cy = y
-        cz = z
-        found = -1
+        least, cx, cy, cz, found = limit, x, y, z, -1
     stack = local_array((64, 2))
     stack[0, 0] = 0.0
     stack[0, 1] = box_distance(x, y, z, 0, tree)
@@ -144,11 +139,7 @@ def tree_closest(
             for t in range(first, min(first + LEAF_SIZE, tree.corners.shape[0])):
                 square, px, py, pz = closest_on_triangle(x, y, z, t, tree)
                 if square < least:
-                    least = square
-                    cx = px
-                    cy = py
-                    cz = pz
-                    found = t
+                    least, cx, cy, cz, found = square, px, py, pz, t
             continue
         left = box_distance(x, y, z, 2 * node + 1, tree)
         right = box_distance(x, y, z, 2 * node + 2, tree)
@@ -163,10 +154,8 @@ def tree_closest(
 
 def side_crossing(x: float, y: float, t: int, start: int, end: int, tree: TriangleTree) -> int:
     """Return 1 or -1 where a projected side crosses the ray from (x, y) along +x, else 0."""
-    ax = tree.corners[t, start]
-    ay = tree.corners[t, start + 1]
-    bx = tree.corners[t, end]
-    by = tree.corners[t, end + 1]
+    ax, ay, _az = corner(t, start, tree)
+    bx, by, _bz = corner(t, end, tree)
     if (ay <= y) == (by <= y):
         return 0
     sign = 1
@@ -182,15 +171,9 @@ def triangle_crossing(x: float, y: float, t: int, tree: TriangleTree) -> tuple[i
     turns += side_crossing(x, y, t, 6, 0, tree)
     if turns == 0:
         return 0, 0.0
-    ax = tree.corners[t, 0]
-    ay = tree.corners[t, 1]
-    az = tree.corners[t, 2]
-    ux = tree.corners[t, 3] - ax
-    uy = tree.corners[t, 4] - ay
-    uz = tree.corners[t, 5] - az
-    vx = tree.corners[t, 6] - ax
-    vy = tree.corners[t, 7] - ay
-    vz = tree.corners[t, 8] - az
+    ax, ay, az = corner(t, 0, tree)
+    ux, uy, uz = side_vector(t, 0, 3, tree)
+    vx, vy, vz = side_vector(t, 0, 6, tree)
     area = ux * vy - uy * vx
     if area == 0.0:
         return turns, az
@@ -230,9 +213,8 @@ def tree_crossings(x: float, y: float, out: FloatArray, tree: TriangleTree) -> i
     while size > 0:
         size -= 1
         node = int(stack[size])
-        if x < tree.boxes[node, 0] or x > tree.boxes[node, 3]:
-            continue
-        if y < tree.boxes[node, 1] or y > tree.boxes[node, 4]:
+        box = tree.boxes
+        if x < box[node, 0] or x > box[node, 3] or y < box[node, 1] or y > box[node, 4]:
             continue
         if node < tree.leaves - 1:
             stack[size] = 2 * node + 1
