@@ -12,7 +12,7 @@ from asperity.surface import Surface
 from asperity.textures.fields.bake import BakeGoal, bake_texture
 from asperity.textures.fields.field_grid import FieldGrid, SingleArray
 from asperity.textures.fields.field_sampler import MIRRORED, PERIODIC, ZERO
-from asperity.textures.fields.node_potentials import compute_potentials, smooth, split_potential
+from asperity.textures.fields.node_potentials import compute_potentials, smooth, split_columns
 from asperity.textures.fields.potential_field import PotentialField
 from asperity.textures.spline.spline_texture import HeightMap, Profile
 from asperity.textures.texture import Texture
@@ -30,7 +30,7 @@ TEXTURES: dict[str, Texture] = {
 def potentials_of(name: str, c: float) -> tuple[FieldGrid, SingleArray]:
     texture = TEXTURES[name]
     grid = FieldGrid.fit(texture.domain, texture.extremes, DEPTH, 2.5e-5, 3).extend_down(3)
-    return grid, compute_potentials(split_potential(texture, c), grid)
+    return grid, compute_potentials(split_columns(texture, c), grid)
 
 
 def second_differences(grid: FieldGrid, potentials: FloatArray) -> list[FloatArray]:

@@ -1,0 +1,110 @@
+"""What is asked of baking: resolution, size, accuracy, progress, and what is refused."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import asperity as asp
+from asperity.core.errors import ParameterError
+from asperity.core.units import round_up
+from asperity.surface import Surface
+from asperity.textures.fields.bake import BakeGoal, BakePlan
+from asperity.textures.fields.potential_field import PotentialField
+from asperity.textures.kinds.fourier import Fourier
+from asperity.textures.kinds.sinusoid import Sinusoid
+from asperity.textures.spline.spline_texture import HeightMap, Profile
+from asperity.textures.texture import Texture
+
+K = 700.0
+WAVE = Sinusoid(0.3e-3, 1e-3, phase=0.6, direction=(3.0, -1.0))
+_ROUGH = np.random.default_rng(3).normal(size=(7, 8))
+MAP = HeightMap(5e-5 * _ROUGH, (1e-4, 1.3e-4), periodic=True)
+
+
+@pytest.mark.parametrize("max_bytes", [5_000, 40_000, 10**6])
+@pytest.mark.parametrize("size", [1.0, 4e6])
+def test_finest_resolution_that_fits_is_accurate_to_three_digits(
+    size: float, max_bytes: int
+) -> None:
+    """On a wave of 1 mm and on one of 4 km, whose node spacing exceeds 1 m."""
+    texture = Sinusoid(0.1e-3 * size, 1e-3 * size)
+    plan = BakePlan(texture, 0.35e-3 * size, 1.0, BakeGoal(max_bytes=max_bytes))
+    finest = plan.finest_resolution()
+    plan.check_size(plan.grid(finest))
+    with pytest.raises(ParameterError, match="more than max_bytes"):
+        plan.check_size(plan.grid(finest / 1.01))
+
+
+def test_error_for_a_too_large_field_gives_a_fitting_resolution() -> None:
+    surface = Surface(MAP, "H", K)
+    with pytest.raises(ParameterError) as caught:
+        asp.bake(surface, 1e-6, max_bytes=200_000)
+    message = str(caught.value)
+    assert caught.value.argument == "resolution"
+    assert "MB" in message
+    words = message.split()
+    fits = float(words[[word.strip(",;") for word in words].index("fits") - 2])
+    field = asp.bake(surface, fits, max_bytes=200_000).texture
+    assert 4 * math.prod(field.grid.node_counts) <= 200_000
+    assert field.arguments.c.nbytes > 50_000
+    with pytest.raises(ParameterError, match="even the coarsest"):
+        asp.bake(surface, 1e-6, max_bytes=100)
+
+
+def test_round_up_of_the_resolution_never_decreases() -> None:
+    for value in 10.0 ** np.random.default_rng(3).uniform(-8.0, 2.0, 300):
+        result = round_up(value)
+        unit = 10.0 ** (math.floor(math.log10(value)) - 2)
+        assert value <= result <= value + unit * (1.0 + 1e-9)
+        assert abs(result / unit - round(result / unit)) < 1e-6
+
+
+@pytest.mark.parametrize("resolution", [0.0, -1e-6, math.nan, math.inf])
+def test_invalid_resolution_raises(resolution: float) -> None:
+    with pytest.raises(ParameterError) as caught:
+        asp.bake(Surface(WAVE, "H"), resolution)
+    assert caught.value.argument == "resolution"
+
+
+@pytest.mark.parametrize("argument", ["share", "max_gain", "max_bytes"])
+def test_invalid_goals_raise(argument: str) -> None:
+    with pytest.raises(ParameterError) as caught:
+        asp.bake(Surface(WAVE, "H"), **{argument: -1.0})
+    assert caught.value.argument == argument
+
+
+def test_bake_requires_law_h_and_a_periodic_or_bounded_texture() -> None:
+    with pytest.raises(ParameterError, match="law H"):
+        asp.bake(Surface(WAVE, "D"))
+    endless = Fourier([1e-4, 1e-4], [[6000.0, 0.0], [6000.0 * math.sqrt(2), 0.0]])
+    with pytest.raises(ParameterError, match="never repeats"):
+        asp.bake(Surface(endless, "H"))
+
+
+def test_progress_rises_to_one() -> None:
+    seen: list[float] = []
+    asp.bake(Surface(WAVE, "H", K), 8e-6, progress=seen.append)
+    assert seen == sorted(seen)
+    assert seen[-1] == 1.0
+
+
+@pytest.mark.parametrize("texture", [WAVE, Profile(8e-5 * _ROUGH[0], 1e-4)])
+def test_default_spacing_reaches_the_share_that_was_asked_for(texture: Texture) -> None:
+    """Measured at other points; a spacing three times as coarse does not reach it."""
+    exact = Surface(texture, "H", K, max_depth=1.5e-4)
+    surface = asp.bake(exact)
+    field = surface.texture
+    assert isinstance(field, PotentialField)
+    assert field.accuracy.share <= 0.05
+    rng = np.random.default_rng(17)
+    xy = texture.domain.points(rng.uniform(size=(4000, 1)))
+    top, low = texture.height(xy), field.grid.floor
+    points = np.column_stack([xy, low + (top - low) * rng.uniform(size=len(xy))])
+    error = (surface.force(points) - exact.force(points)) / K
+    rms = math.sqrt(float(np.square(error).sum(axis=1).mean()))
+    assert rms == pytest.approx(field.accuracy.rms, rel=0.15)
+    coarse = asp.bake(exact, 3.0 * field.resolution).texture
+    assert coarse.accuracy.share > 0.05
