@@ -255,6 +255,14 @@ def test_depth_and_resolution_must_fit() -> None:
         bake_body(cube(), 0.5 * MM, 0.5)
 
 
+def test_depth_of_a_slender_body_is_found_at_the_nodes() -> None:
+    """A coarse lattice finds no point of a ring at that depth."""
+    turn = trimesh.transformations.rotation_matrix(0.7, (0.3, 1.0, 0.6))
+    ring = to_body(trimesh.creation.torus(3.0, 0.12, transform=turn).apply_scale(MM))
+    assert _BodyLoops(ring, BodyLaw(1.0, 0.11 * MM, np.inf)).sample_depth() < 0.11 * MM
+    assert bake_body(ring, 0.11 * MM, resolution=0.05 * MM).max_depth == 0.11 * MM
+
+
 def test_files(tmp_path: Path) -> None:
     mesh = trimesh.creation.box((4.0, 4.0, 4.0))
     for suffix in ("stl", "ply", "obj", "glb"):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from types import ModuleType
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -73,11 +71,10 @@ def bake_body(
     potentials = compute_potentials(
         plan.columns, plan.loops.grid, scale_progress(progress, 0.05, 0.85)
     )
-    deepest = max(deepest, plan.loops.deepest)
-    if depth > deepest:
+    plan.texture, found = plan.loops.upper_envelope(body)
+    if depth > (deepest := max(deepest, found)):
         reason = f"must be at most {format_length(deepest)}, the greatest depth of the body"
         raise ParameterError("max_depth", reason, depth)
-    plan.texture = plan.loops.upper_envelope(body)
     field = plan.certify(potentials, grid, scale_progress(progress, 0.9, 0.1))
     field.thin_regions = plan.loops.thin_regions(depth)
     return field
@@ -89,9 +86,8 @@ class _BodyLoops:
     def __init__(self, body: MeshBody, law: BodyLaw) -> None:
         from asperity.kernels.fuse import fuse_module
 
-        modules: tuple[ModuleType, ...] = (triangle_tree, solver, optimality)
-        self._loops = fuse_module(mesh_potential, *modules)
-        self.body, self.law, self.deepest = body, law, 0.0
+        self._loops = fuse_module(mesh_potential, triangle_tree, solver, optimality)
+        self.body, self.law = body, law
         self._tolerance = 1e-9 * float(np.ptp(np.array(body.box), axis=0).max())
 
     def evaluate(self, points: FloatArray) -> FloatArray:
@@ -156,22 +152,23 @@ class _BodyLoops:
         steps = np.rint((xy - self.grid.start) / self.grid.spacing[0]).astype(np.intp)
         return np.asarray(steps[:, 0] * self.grid.node_counts[1] + steps[:, 1])
 
-    def upper_envelope(self, body: MeshBody) -> HeightMap:
-        """Return the height map of the body seen from above; beside the body, its least height."""
-        self.deepest = float(self._summary[:, 1].max())
+    def upper_envelope(self, body: MeshBody) -> tuple[HeightMap, float]:
+        """Return the body seen from above, its least height around it, and its greatest depth."""
+        deepest = float(self._summary[:, 1].max())
         heights = self._summary[:, 0].reshape(self.grid.node_counts[:2]).T
         missing = ~np.isfinite(heights)
-        if missing.all() or self.deepest == 0.0:
+        if missing.all() or deepest == 0.0:
             raise ParameterError("resolution", "is coarser than the body", self.grid.spacing[0])
         filled = np.where(missing, heights[~missing].min(), heights)
         sides = format_lengths([float(side) for side in np.ptp(np.array(body.box), axis=0)])
         text = f"body {body.name}, seen from above: {len(body.triangles)} triangles, {sides}"
         faults = [f"accepted: {fault}" for fault in body.faults]
         faults += [f"repaired: {fault}" for fault in body.repaired]
-        return HeightMap(
+        envelope = HeightMap(
             filled, self.grid.spacing[:2], origin=self.grid.start.tolist(),
             preparation=(text, *faults), filled_mask=missing if missing.any() else None,
         )  # fmt: skip
+        return envelope, deepest
 
     def thin_regions(self, max_depth: float) -> tuple[ThinRegion, ...]:
         """Return the parts thinner than twice the depth, the thinnest first."""
@@ -183,9 +180,8 @@ class _BodyLoops:
         for label in range(1, count + 1):
             rows = np.flatnonzero(labels.ravel() == label)
             best = rows[np.argmin(self._summary[rows, 2])]
-            x, y = (float(value) for value in self._xy[best])
-            thin = float(self._summary[best, 2])
-            found.append(ThinRegion((x, y, float(self._summary[best, 3])), thin, len(rows)))
+            x, y, thin, z = map(float, (*self._xy[best], *self._summary[best, 2:4]))
+            found.append(ThinRegion((x, y, z), thin, len(rows)))
         return tuple(sorted(found, key=lambda region: region.half_thickness))
 
 

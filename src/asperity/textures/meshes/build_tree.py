@@ -18,9 +18,9 @@ def build_tree(triangles: FloatArray) -> TriangleTree:
     leaves = 1
     while leaves * LEAF_SIZE < len(triangles):
         leaves *= 2
-    fill = leaves * LEAF_SIZE - len(triangles)
-    padded = np.concatenate([triangles, np.broadcast_to(triangles[-1:, :1], (fill, 3, 3))])
-    ordered = np.ascontiguousarray(padded[_median_order(padded, leaves)])
+    order = _median_order(triangles, leaves)
+    ordered = triangles[np.minimum(order, len(triangles) - 1)]
+    ordered[order >= len(triangles)] = triangles[-1, 0]
     boxes = np.empty((2 * leaves - 1, 6), np.float32)
     _write_boxes(ordered.reshape(leaves, 3 * LEAF_SIZE, 3), boxes)
     return TriangleTree(ordered.reshape(-1, 9), boxes, leaves)
@@ -28,15 +28,17 @@ def build_tree(triangles: FloatArray) -> TriangleTree:
 
 def _median_order(triangles: FloatArray, leaves: int) -> NDArray[np.int32]:
     """Return the indices of the triangles in the order of the leaves."""
-    centres = triangles.mean(axis=1, dtype=np.float32)
-    order = np.arange(len(triangles), dtype=np.int32)[None]
+    order = np.arange(leaves * LEAF_SIZE, dtype=np.int32)[None]
+    centres = np.empty((order.size, 3), np.float32)
+    centres[: len(triangles)] = triangles.mean(axis=1)
+    centres[len(triangles) :] = triangles[-1, 0]
     while len(order) < leaves:
         places = centres[order]
         axis = np.ptp(places, axis=1).argmax(axis=1)
         keys = np.take_along_axis(places, axis[:, None, None], axis=2)[..., 0]
         del places
         half = order.shape[1] // 2
-        parts = np.argpartition(keys, half, axis=1)
+        parts = np.argpartition(keys, half, axis=1).astype(np.int32)
         order = np.take_along_axis(order, parts, axis=1).reshape(-1, half)
     return order.ravel()
 

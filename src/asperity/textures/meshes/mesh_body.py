@@ -122,7 +122,8 @@ def load_mesh(
     metres = unit_to_metres(unit)
     _check_count(path, suffix)
     vertices, faces = _parse(path, suffix)
-    return MeshBody.from_arrays(vertices * metres, faces, path.name, repair)
+    np.multiply(vertices, metres, out=vertices)
+    return MeshBody.from_arrays(vertices, faces, path.name, repair)
 
 
 def _check_count(path: Path, suffix: str) -> None:
@@ -173,14 +174,15 @@ def _merge_vertices(
     vertices: FloatArray, faces: NDArray[np.int64]
 ) -> tuple[FloatArray, NDArray[np.int64]]:
     """Return each vertex once: files repeat them for each triangle, or along seams."""
-    vertices = vertices + 0.0  # no negative zeros
-    order = np.lexsort(vertices.T)
-    ordered = vertices[order]
-    new = np.ones(len(order), dtype=bool)
-    new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
-    index = np.empty(len(order), np.int64)
-    index[order] = np.cumsum(new) - 1
-    return ordered[new], index[faces]
+    order = np.lexsort(vertices.T).astype(np.int32)
+    new = np.zeros(len(order), dtype=bool)
+    new[:1] = True
+    for axis in range(3):
+        values = vertices[order, axis]
+        new[1:] |= values[1:] != values[:-1]
+    index = np.empty(len(order), np.int32)
+    index[order] = np.cumsum(new, dtype=np.int32) - 1
+    return vertices[order[new]], index[faces].astype(np.int64)
 
 
 def _repair(vertices: FloatArray, faces: NDArray[np.int64]) -> tuple[FloatArray, NDArray[np.int64]]:
@@ -190,10 +192,11 @@ def _repair(vertices: FloatArray, faces: NDArray[np.int64]) -> tuple[FloatArray,
     if find_spec("networkx") is None:  # trimesh turns triangles along its graphs
         raise ParameterError("repair", "needs the optional dependency: asperity[meshes]")
     repair: Any = trimesh.repair
+    size = np.ptp(vertices, axis=0).max() or 1.0  # its tolerances are absolute
     with reject_on_error("the mesh cannot be repaired"):
-        mesh = trimesh.Trimesh(vertices, faces, process=False)
+        mesh = trimesh.Trimesh(vertices / size, faces, process=False)
         mesh.update_faces(mesh.unique_faces())
         repair.fix_winding(mesh)
         repair.fill_holes(mesh)
         repair.fix_normals(mesh, multibody=True)
-    return np.array(mesh.vertices, dtype=np.float64), np.array(mesh.faces, dtype=np.int64)
+    return size * np.array(mesh.vertices), np.array(mesh.faces, dtype=np.int64)
