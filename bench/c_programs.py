@@ -16,6 +16,7 @@ from asperity.export.c99 import c99_files
 from asperity.export.export_request import ExportRequest
 from asperity.kernels.fuse import fuse_on_texture
 from asperity.kernels.loops import path_loop
+from asperity.rendering import bake, is_searched
 from asperity.surface import Surface
 from asperity.textures import Texture
 
@@ -34,6 +35,19 @@ def run_command(*command: str | Path, cwd: Path | None = None) -> str:
     if done.returncode != 0:
         raise RuntimeError(f"{command}\n{done.stdout}{done.stderr}")
     return done.stdout
+
+
+def as_exported(surface: Surface) -> Surface:
+    """Return a surface with law H baked, on a coarse grid, where it would be searched."""
+    if not is_searched(surface):
+        return surface
+    domain = surface.texture.domain
+    extent = None
+    if not (domain.periodic or surface.texture.is_mirrored):
+        extent = tuple(float(side) for side in np.abs(domain.spans).max(axis=0))
+    low, high = surface.texture.extremes
+    coarse = 0.25 * (high - low + surface.max_depth)
+    return bake(surface, coarse, extent=extent, max_gain=None)
 
 
 def header(

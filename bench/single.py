@@ -5,8 +5,7 @@ within 1e-5 of k max(|h|, |z|), and puts each of the others under the first witn
 
 - *position*: it is as near to forces in double along the path moved by four roundings of its
   largest coordinates. Positions are rounded on the way from metres to cells and phases;
-- *tie* (laws that take one nearest point): it is as long, of another point as near as the nearest;
-- *solver* (law H): it is within k √(2 (1 + c) ε), ε the gap of energies at which a search ends.
+- *tie* (laws that search for a nearest point): it is as long, of another point as near.
 
 What has none is not explained.
 """
@@ -22,15 +21,14 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from asperity.contacts.sampler_interface import ROUNDING_SLACK
+from asperity.export.export_request import is_searching
 from asperity.laws import LAWS
 from asperity.surface import Surface
 from bench import cases
-from bench.c_programs import header, library, probes, ticks
+from bench.c_programs import as_exported, header, library, probes, ticks
 
 NEAR = 1e-5
 PROBES = 2000
-EPS = float(np.finfo(np.float32).eps)
 
 
 class SinglePrecisionError(NamedTuple):
@@ -39,7 +37,6 @@ class SinglePrecisionError(NamedTuple):
     near: int
     position: int
     tie: int
-    solver: int
     unexplained: int
     worst: float
 
@@ -48,6 +45,7 @@ def measure_single_precision(
     surface: Surface, count: int = PROBES, seed: int = 3
 ) -> SinglePrecisionError:
     """Return how exported C in single precision compares with that in double, searched exactly."""
+    surface = as_exported(surface)
     at = probes(surface.texture, surface.max_depth, count, seed).astype(np.float32)
     with tempfile.TemporaryDirectory() as directory:
         double, found = (
@@ -78,16 +76,10 @@ def _compare_forces(surface: Surface, at: Any, double: Any, found: Any) -> Singl
     near = error <= NEAR * size
     position = error <= NEAR * size + _position_rounding_error(at, h, double, exact)
     length, whole = (np.linalg.norm(force, axis=1) for force in (found, exact))
-    contact = surface.law.contact
-    tie = np.abs(length - whole) <= NEAR * size
-    solver = np.zeros(len(at), bool)
-    if contact.bounds_force_error:
-        tie, solver = solver, error <= k * _resolution(surface, at, np.abs(exact / k).sum(axis=1))
-    elif not contact.has_warm_start:
-        tie = solver
+    tie = (np.abs(length - whole) <= NEAR * size) & is_searching(surface.law.contact)
     left = np.ones(len(at), bool)
     counts = []
-    for witness in (near, position, tie, solver, left):
+    for witness in (near, position, tie, left):
         counts.append(int((witness & left).sum()))
         left &= ~witness
     return SinglePrecisionError._make(
@@ -104,27 +96,15 @@ def _position_rounding_error(at: Any, h: Any, double: Any, exact: Any) -> Any:
     return np.max([np.abs(other - exact).max(axis=1) for other in others], axis=0)
 
 
-def _resolution(surface: Surface, at: Any, pull: Any) -> Any:
-    """Return how well law H's solver knows the vector to the mean [m]: ``split_gap``, the search.
-
-    Of a vector of length ``pull`` (the sum of its components' sizes) the nearest points are looked
-    for from y, farther by pull/c.
-    """
-    c = surface.continuity
-    away = pull * (1.0 + 1.0 / c)
-    rounding = 2.0 * away * (away + np.abs(at).sum(axis=1)) + 0.5 * ROUNDING_SLACK * away**2
-    return np.sqrt(2.0 * (1.0 + c) * EPS * c / (1.0 + c) * rounding)
-
-
 def run(console: Console) -> None:
     """Print a row for each law and texture kind."""
     table = Table(box=None, pad_edge=False)
-    for heading in ("law, texture", "within 1e-5", "position", "tie", "solver", "not", "worst"):
+    for heading in ("law, texture", "within 1e-5", "position", "tie", "not", "worst"):
         table.add_column(heading, justify="left" if heading[0] == "l" else "right")
     for kind, texture in cases.textures().items():
         for law in LAWS:
             one = measure_single_precision(Surface(texture, law, clamp="backed"))
-            shares = [f"{100.0 * part / PROBES:.2f} %" for part in one[:5]]
+            shares = [f"{100.0 * part / PROBES:.2f} %" for part in one[:4]]
             table.add_row(f"{law}, {kind}", *shares, f"{one.worst:.1e}")
     console.print(f"float against double, {PROBES:,} probes for each law and texture kind:")
     console.print(table)

@@ -43,10 +43,20 @@ static void limit(double force[3])
     }
 }
 
-int main(void)
+int main(int count, char **words)
 {
     texture_state state;
     double position[3], force[3];
+#if defined(TEXTURE_LOADED) /* exported with --load */
+    if (texture_load(count > 1 ? words[1] : "texture.field") != TEXTURE_LOADED) {
+        fprintf(stderr, "the field cannot be loaded\n");
+        return 1;
+    }
+#else
+    (void)count;
+    (void)words;
+#endif
+    texture_prepare();
     texture_reset(&state);
     printf("k = %g N/m, q <= %g, content %.12s\n", TEXTURE_STIFFNESS, TEXTURE_Q_UPPER,
            TEXTURE_CONTENT);

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.helpers.c_programs import energies, header, library, ticks
+from tests.helpers.c_programs import as_exported, energies, header, library, ticks
 
 from asperity.clamps import NONE
 from asperity.laws import LAWS, Law
@@ -22,7 +22,9 @@ def test_force_is_minus_the_gradient_of_the_energy(
     clamp: str, make_texture: Callable[[str], Texture], tmp_path: Path
 ) -> None:
     texture = make_texture("map")
-    surfaces = {x: Surface(texture, x, max_depth=2e-4, clamp=clamp) for x in WITH_POTENTIAL}
+    surfaces = {
+        x: as_exported(Surface(texture, x, max_depth=2e-4, clamp=clamp)) for x in WITH_POTENTIAL
+    }
     headers = {x: header(s, x, max_evaluations=np.inf) for x, s in surfaces.items()}
     program = library(tmp_path, "gcc", headers, "-O1")
     rng = np.random.default_rng(4)

@@ -38,7 +38,7 @@ def probe_path(surface: Surface) -> np.ndarray:
 def test_tick_equals_the_kernel_with_any_budget(
     make_texture: Callable[[str], Texture], tmp_path: Path
 ) -> None:
-    surfaces = {x: Surface(make_texture("map"), x, clamp="backed") for x in "DH"}
+    surfaces = {x: Surface(make_texture("map"), x, clamp="backed") for x in "DE"}
     cases = {f"{x}_{budget:g}": (x, budget) for x in surfaces for budget in (SMALL_BUDGET, np.inf)}
     headers = {
         n: header(surfaces[x], n, max_evaluations=budget) for n, (x, budget) in cases.items()
@@ -52,21 +52,6 @@ def test_tick_equals_the_kernel_with_any_budget(
             assert not result[:, 3].any()
         else:
             assert 0.0 < (result[:, 3] > 0.0).mean() < 1.0
-
-
-def test_small_budget_changes_the_force_by_at_most_the_error_bound(
-    make_texture: Callable[[str], Texture], tmp_path: Path
-) -> None:
-    surface = Surface(make_texture("map"), "H", clamp="backed")
-    program = library(
-        tmp_path, "gcc", {"t": header(surface, "t", max_evaluations=SMALL_BUDGET)}, "-O1"
-    )
-    path = probe_path(surface)
-    result = ticks(program, "t", path)
-    exact = kernel_ticks(surface, path, np.inf)
-    error = np.linalg.norm(result[:, :3] - exact[:, :3], axis=1)
-    assert (error <= surface.stiffness * result[:, 3] * (1.0 + 1e-9) + 1e-9).all()
-    assert error.max() > 1e-3  # the budget does change the force
 
 
 _STATES = """
@@ -92,7 +77,7 @@ def test_zeroed_state_equals_a_reset_state(
     make_texture: Callable[[str], Texture], tmp_path: Path
 ) -> None:
     """So does a state after a position beyond all bounds."""
-    surface = Surface(make_texture("map"), "H", clamp="backed")
+    surface = Surface(make_texture("map"), "D", clamp="backed")
     (tmp_path / "t.h").write_text(header(surface, "t", max_evaluations=SMALL_BUDGET))
     (tmp_path / "t.c").write_text(_STATES)
     program = compile_library(tmp_path, "gcc", tmp_path / "t.c")
@@ -106,8 +91,8 @@ def test_zeroed_state_equals_a_reset_state(
 @pytest.mark.parametrize(
     ("law", "budget", "number"),
     [
-        ("B", None, "1.0"), ("B", 50, "1.0"), ("D", None, "1500.0"), ("H", None, "2800.0"),
-        ("H", 50, "50"), ("E", np.inf, "HUGE_VAL"),
+        ("B", None, "1.0"), ("B", 50, "1.0"), ("D", None, "1500.0"), ("H", None, "1.0"),
+        ("H", 50, "1.0"), ("D", 50, "50"), ("E", np.inf, "HUGE_VAL"),
     ],
 )  # fmt: skip
 def test_header_states_the_evaluation_budget(

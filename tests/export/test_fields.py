@@ -7,19 +7,27 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bench.firmware import build_firmware, missing_tool
 from tests.helpers.c_programs import (
     COMPILERS,
+    STRICT,
     header,
     kernel_ticks,
     library,
     probes,
+    run_command,
     same_bits,
     ticks,
+    tool,
 )
 
 import asperity as asp
+from asperity.core.errors import ParameterError
+from asperity.export.c99 import c99_files
+from asperity.export.export_request import ExportRequest
 from asperity.surface import Surface
 from asperity.textures import Texture
+from asperity.textures.fields.field_file import save_field
 
 KINDS = ("fourier", "map", "periodic profile")
 
@@ -44,3 +52,149 @@ def test_field_in_the_source_gives_the_force_of_the_kernel(
             forces = ticks(program, name, points)
             assert same_bits(forces, kernel_ticks(surface, points)).all(), (compiler, name)
             assert np.any(forces[:, :3] != 0.0)
+
+
+# --- loaded from a file ---------------------------------------------------------------------------
+
+SANITIZE = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-O1", "-g")
+_LOADER = """
+#include <stdio.h>
+#include "t.h"
+
+int main(int count, char **names)
+{
+    const double outside[3] = {1e9, 0.0, 0.0};
+    double at[3], f[3];
+    t_state state;
+    FILE *in = fopen("points.bin", "rb");
+    const int result = t_load(names[count - 1]);
+    t_reset(&state);
+    if (in == NULL || result != 0) {
+        return 10 + result;
+    }
+    t_prepare();
+    t_force(&state, outside, f);
+    while (fread(at, sizeof at[0], 3, in) == 3) {
+        t_force(&state, at, f);
+        fwrite(f, sizeof f[0], 3, stdout);
+    }
+    fprintf(stderr, "%.17g", T_Q_UPPER);
+    t_load(NULL);
+    t_force(&state, at, f);
+    fclose(in);
+    return f[0] != 0.0 || f[1] != 0.0 || f[2] != 0.0 || t_q() != 0.0;
+}
+"""
+
+
+def build_loader(folder: Path, surface: Surface, compiler: str, *flags: str) -> None:
+    """Write a program that loads a field and writes the forces at the positions of a file."""
+    request = ExportRequest(surface, "t", loads_field=True)
+    for name, text in c99_files(request, "t").items():
+        (folder / name).write_text(text, encoding="utf-8")
+    (folder / "main.c").write_text(_LOADER)
+    command = (tool(compiler), *STRICT, *SANITIZE, *flags, "main.c", "-o", "main", "-lm")
+    run_command(*command, cwd=folder)
+
+
+def run_loader(folder: Path, field: str) -> np.ndarray:
+    (folder / "run.sh").write_text(f"./main {field} > forces.bin 2> q.txt\n")
+    run_command(tool("sh"), "run.sh", cwd=folder)
+    return np.fromfile(folder / "forces.bin").reshape(-1, 3)
+
+
+@pytest.mark.parametrize(
+    ("compiler", "flags"), [("gcc", ()), ("gcc", ("-DT_POSIX",)), ("clang", ("-DT_POSIX",))]
+)
+def test_loaded_field_gives_the_force_of_the_kernel(
+    make_texture: Callable[[str], Texture], compiler: str, flags: tuple[str, ...], tmp_path: Path
+) -> None:
+    """One program loads fields of another shape, too, and a profile."""
+    surfaces = {kind: bake(make_texture(kind)) for kind in KINDS}
+    build_loader(tmp_path, surfaces["map"], compiler, *flags)
+    for kind, surface in surfaces.items():
+        save_field(tmp_path / "a.field", surface.texture)
+        points = probes(surface.texture, surface.max_depth, 2000, 5)
+        points.tofile(tmp_path / "points.bin")
+        forces = run_loader(tmp_path, "a.field")
+        assert np.array_equal(forces, kernel_ticks(surface, points)[:, :3]), kind
+        q = float((tmp_path / "q.txt").read_text())
+        assert q == surface.texture.baked_numbers["norm"].upper
+    with pytest.raises(RuntimeError):  # TEXTURE_NO_FILE
+        run_loader(tmp_path, "none.field")
+
+
+@pytest.mark.parametrize("flags", [(), ("-DT_POSIX",)])
+def test_damaged_fields_are_refused(
+    make_texture: Callable[[str], Texture], flags: tuple[str, ...], tmp_path: Path
+) -> None:
+    surface = bake(make_texture("map"))
+    build_loader(tmp_path, surface, "gcc", *flags)
+    save_field(tmp_path / "whole.field", surface.texture)
+    probes(surface.texture, surface.max_depth, 8, 5).tofile(tmp_path / "points.bin")
+    whole = (tmp_path / "whole.field").read_bytes()
+    rng = np.random.default_rng(0)
+    damaged = [whole[:n] for n in (0, 8, 255, 256, 5000, len(whole) - 1)] + [whole + b"0"]
+    for place in (*rng.integers(256, len(whole), 6), 3, 9, 12, 24, 40, 100, 250):
+        changed = bytearray(whole)
+        changed[place] ^= 0x40
+        damaged.append(bytes(changed))
+    script = []
+    for i, content in enumerate(damaged):
+        (tmp_path / f"{i}.field").write_bytes(content)
+        script.append(f"./main {i}.field; case $? in 11|12|13) ;; *) exit 1;; esac")
+    (tmp_path / "run.sh").write_text("\n".join(script))
+    run_command(tool("sh"), "run.sh", cwd=tmp_path)
+    assert len(run_loader(tmp_path, "whole.field")) == 8
+
+
+def test_wrong_checksum_does_not_hide_a_table_that_points_outside(
+    make_texture: Callable[[str], Texture], tmp_path: Path
+) -> None:
+    """The checksums of a file can be right and its table wrong: it is refused all the same."""
+    import zlib
+
+    from asperity.textures.fields.field_file import HEADER
+
+    surface = bake(make_texture("map"))
+    build_loader(tmp_path, surface, "gcc")
+    save_field(tmp_path / "a.field", surface.texture)
+    content = bytearray((tmp_path / "a.field").read_bytes())
+    header = np.frombuffer(content, HEADER, 1)[0]
+    table = np.frombuffer(content, "<i4", 4, int(header["columns_offset"]))
+    table[0] += 10**6
+    header = np.frombuffer(content, HEADER, 1)
+    header["checksum"] = zlib.crc32(content[256:])
+    header["header_checksum"] = zlib.crc32(content[:252])
+    (tmp_path / "b.field").write_bytes(content)
+    (tmp_path / "run.sh").write_text("./main b.field; test $? -eq 13\n")
+    run_command(tool("sh"), "run.sh", cwd=tmp_path)
+
+
+def test_law_h_is_exported_baked_only(make_texture: Callable[[str], Texture]) -> None:
+    with pytest.raises(ParameterError, match="must be baked to export law H"):
+        ExportRequest(Surface(make_texture("map"), "H"))
+    with pytest.raises(ParameterError, match="load needs a baked field"):
+        ExportRequest(Surface(make_texture("map"), "B"), loads_field=True)
+    assert ExportRequest(bake(make_texture("map"))).evaluation_budget == 1.0
+
+
+# --- on a microcontroller -------------------------------------------------------------------------
+
+
+def test_field_of_256_kb_on_a_microcontroller(tmp_path: Path) -> None:
+    """A field of a periodic texture in flash, in single precision."""
+    missing = missing_tool()
+    if missing is not None:
+        pytest.skip(f"not run: no {missing} here")
+    waves = asp.Fourier([1e-4, 6e-5], [[2000.0, 0.0], [0.0, 3000.0]], [0.3, 1.1])
+    surface = asp.bake(Surface(waves, "H", 800.0, max_depth=3e-4), 45e-6, max_gain=None)
+    size = surface.texture.bytes
+    assert 200_000 < size < 262_144
+    firmware = build_firmware(surface, tmp_path)
+    points = np.column_stack([250e-6 * np.arange(8), np.zeros(8), np.full(8, -0.05e-3)])
+    forces = [[int(part) for part in line.split()[:3]] for line in firmware.output.splitlines()]
+    np.testing.assert_allclose(forces, 1e6 * surface.force(points), atol=20.0)
+    assert size < firmware.flash < size + 16_000
+    assert firmware.ram < 1_000
+    assert firmware.instructions < 3_000

@@ -96,6 +96,7 @@ def test_library_exports_only_its_public_functions(shared_library: Path) -> None
     ).split()
     assert {name for name in symbols if name.startswith("texture")} == {
         "texture_reset", "texture_force", "texture_gap", "texture_energy",
+        "texture_prepare",
     }  # fmt: skip
 
 

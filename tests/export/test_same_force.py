@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from tests.helpers.c_programs import (
     COMPILERS,
+    as_exported,
     header,
     kernel_ticks,
     library,
@@ -45,6 +46,7 @@ def _probe_count(law: Law) -> int:
 
 
 def _assert_equal_forces(folder: Path, surfaces: dict[str, Surface], *flags: str) -> None:
+    surfaces = {name: as_exported(surface) for name, surface in surfaces.items()}
     headers = {name: header(s, name, folder=folder) for name, s in surfaces.items()}
     paths = {
         name: probes(surface.texture, surface.max_depth, _probe_count(surface.law), 11)

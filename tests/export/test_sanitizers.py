@@ -11,6 +11,7 @@ import pytest
 from tests.helpers.c_programs import (
     COMPILERS,
     STRICT,
+    as_exported,
     header,
     kernel_ticks,
     probes,
@@ -57,7 +58,7 @@ def test_sanitizers_find_no_undefined_behaviour(
     texture = make_texture(kind)
     digest = hashlib.sha256()
     for x in LAWS:
-        surface = Surface(texture, x, clamp="backed")
+        surface = as_exported(Surface(texture, x, clamp="backed"))
         (tmp_path / f"{x}.h").write_text(header(surface, x))
         points = probes(texture, surface.max_depth, 80 if x == "H" else 400, 21)
         # Positions beyond all borders and positions that are not finite.

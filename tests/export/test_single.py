@@ -20,14 +20,14 @@ from asperity.textures import Texture
 def test_single_precision_force_is_close_to_double(
     kind: str, make_texture: Callable[[str], Texture]
 ) -> None:
-    """The error is below 1e-5, or explained by rounding of the position, a tie or the solver."""
+    """The error is below 1e-5, or explained by rounding of the position, or a tie."""
     for letter in LAWS:
         surface = Surface(make_texture(kind), letter, clamp="backed")
         counts = measure_single_precision(
             surface, 200 if surface.law.contact.requires_search else 1000
         )
         assert counts.unexplained == 0, letter
-        assert counts.near + counts.position >= 0.94 * sum(counts[:5]), letter
+        assert counts.near + counts.position >= 0.94 * sum(counts[:4]), letter
 
 
 def test_changed_force_is_not_explained(

@@ -11,6 +11,7 @@ import pytest
 from bench import c_programs
 from bench.c_programs import (
     STRICT,
+    as_exported,
     compile_library,
     energies,
     header,
@@ -25,6 +26,7 @@ from bench.c_programs import (
 __all__ = [
     "COMPILERS",
     "STRICT",
+    "as_exported",
     "compile_library",
     "energies",
     "header",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import click
 
@@ -19,6 +19,7 @@ from asperity.core.files import check_not_existing, write_bytes
 if TYPE_CHECKING:
     from asperity.devices import Device
     from asperity.export.surface_maps import SampledMap
+    from asperity.textures.fields.potential_field import PotentialField
     from asperity.textures.texture import Texture
 
 
@@ -36,6 +37,11 @@ _FORMER_NAMES = {"largest": "max-data", "looks": "max-evaluations"}
     is_flag=True,
     help="Search without an evaluation budget: exact, at unbounded cost per tick.",
 )
+@click.option(
+    "--load",
+    is_flag=True,
+    help="Load the field of law H at run time, from a .field file that is written as well.",
+)
 @click.option("--shared", is_flag=True, help="Write a library: header, source and CMakeLists.txt.")
 @click.option("--force", is_flag=True, help="Replace existing files.")
 @options.argument_options((_LANG, *_REQUEST_ARGUMENTS, _CLAMP))
@@ -49,6 +55,7 @@ def export_command(
     device: Device | None,
     *,
     exact: bool,
+    load: bool,
     shared: bool,
     force: bool,
     **values: Any,
@@ -60,6 +67,7 @@ def export_command(
     """
     from asperity.export import targets
     from asperity.export.export_request import ExportRequest
+    from asperity.textures.fields.field_file import is_field, save_field
 
     request = options.provided_values(values, _REQUEST_ARGUMENTS)
     if exact:
@@ -69,7 +77,9 @@ def export_command(
     target, path = targets.find_target(values["lang"] or "c99"), Path(output)
     targets.check_name(path, target)
     check_output("output", output)
-    check_not_existing("output", path, force=force)
+    field = path.with_suffix(".field") if load and not is_field(surface) else None
+    for file in filter(None, (path, field)):
+        check_not_existing("output", file, force=force)
     ExportRequest.validate(
         request.get("name", "texture"),
         request.get("precision", "double"),
@@ -90,9 +100,13 @@ def export_command(
         comment=header_comment_text(analysis, path.name),
         q_upper=analysis.q.upper,
         as_library=shared,
+        loads_field=load,
         **request,
     )
     files = targets.write_files(path, target, order, force=force)
+    if field is not None:
+        save_field(field, cast("PotentialField", analysis.surface.texture))
+        files.append(field)
     click.echo(f"Written: {', '.join(escape_unprintable(file) for file in files)}")
     for source in [file.name for file in files if file.name.endswith("_data.c")]:
         click.echo(f"To be compiled with the program: {escape_unprintable(source)}")

@@ -8,10 +8,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from asperity.contacts.contact import Contact
 from asperity.contacts.warm_start import BUDGET, ERROR_BOUND, UNLIMITED, WARM_START_SIZE
 from asperity.core.errors import ParameterError
-from asperity.export.export_request import ExportRequest
+from asperity.export.export_request import ExportRequest, is_searching
 from asperity.export.expressions import real_literal
 from asperity.export.program import block_comment
 from asperity.export.surface_functions import ProgramData, SurfaceFunctions, surface_functions
@@ -21,6 +20,11 @@ MAX_POSITION = 1000.0
 """Limit of the coordinates [m]; the force is zero beyond, where cell indices would overflow."""
 MAX_HEADER_DATA = 256 * 2**10
 """Size of the data [bytes] above which they are written to a source file."""
+_GAP_COMMENTS = {
+    False: "0, this law does not search.",
+    True: "no point of the surface is closer by more than this.\n"
+    " * 0 if the search converged within its limit of evaluations.",
+}
 _UNLIMITED_COMMENT = "\n * The search has no limit of evaluations: not for a real-time loop."
 
 
@@ -34,13 +38,22 @@ def c99_files(request: ExportRequest, stem: str) -> dict[str, str]:
     Raises:
         ParameterError: for a surface that cannot be exported, or would be too large.
     """
-    functions = surface_functions(request.surface, request.name, single=request.is_single_precision)
+    functions = surface_functions(
+        request.surface, request.name, single=request.is_single_precision,
+        loads_field=request.loads_field,
+    )  # fmt: skip
     store = functions.data
     places, records = store.used_by(functions.code)
     size = sum(map(store.size_in_bytes, places))
     if size > request.max_data_size:
         raise _size_error(request, store, places, size)
     words = _substitutions(request, functions, stem)
+    words["parts"] = "".join(f"{{{place}, sizeof {place}}}, " for place in places)
+    if request.loads_field:
+        words["parts"] = f"{{{request.name}_surface.file, {request.name}_surface.used}}, "
+        return _program_files(
+            request, functions, words, "\n".join([_render("field_data.c", words), *records])
+        )
     arrays = [store.definition(place) for place in places]
     if request.as_library or size <= MAX_HEADER_DATA:
         data = "\n".join(f"static {array}" for array in arrays)
@@ -70,6 +83,9 @@ def _program_files(
     link = f"{words['NAME']}_API" if request.as_library else "static inline"
     words = {**words, "link": link}
     contract, public = _render("contract.h", words), _render("public.c", words)
+    if request.loads_field:
+        contract += _render("field.h", words)
+        public += _render("field.c", words)
     if functions.energy_name:
         contract += _render("energy.h", words)
         public += _render("energy.c", words)
@@ -88,7 +104,9 @@ def _program_files(
 def _substitutions(
     request: ExportRequest, functions: SurfaceFunctions, stem: str
 ) -> dict[str, str]:
-    surface, single, law = request.surface, request.is_single_precision, request.surface.law
+    surface, single = request.surface, request.is_single_precision
+    searching = is_searching(surface.law.contact)
+    q_upper = f"{request.name}_q()" if request.loads_field else _bound_literal(request.q_upper)
     return {
         "name": request.name,
         "NAME": request.name.upper(),
@@ -102,27 +120,16 @@ def _substitutions(
         "at_budget": str(BUDGET),
         "at_gap": str(ERROR_BOUND),
         "budget": real_literal(min(request.evaluation_budget, UNLIMITED), single),
-        "gap": _gap_comment(law.contact),
-        "unlimited": _UNLIMITED_COMMENT if law.contact.has_warm_start else "",
+        "gap": _GAP_COMMENTS[searching],
+        "unlimited": _UNLIMITED_COMMENT if searching else "",
         "energy": functions.energy_name,
         "stiffness": repr(surface.stiffness),
         "max_depth": repr(surface.max_depth),
-        "q_upper": _bound_literal(request.q_upper),
+        "q_upper": q_upper,
         "max_evaluations": _bound_literal(request.evaluation_budget),
         "content": surface.digest,
         "note": block_comment(request.comment),
     }
-
-
-def _gap_comment(contact: Contact) -> str:
-    """Return the meaning of the error bound for the comment of ``texture_gap``."""
-    if not contact.has_warm_start:
-        return "0, this law does not search."
-    if contact.bounds_force_error:
-        bound = "the exact force differs by at most k times this."
-    else:
-        bound = "no point of the surface is closer by more than this."
-    return f"{bound}\n * 0 if the search converged within its limit of evaluations."
 
 
 def _bound_literal(value: float) -> str:
@@ -134,6 +141,9 @@ def _size_error(
     request: ExportRequest, store: ProgramData, names: Sequence[str], size: int
 ) -> ParameterError:
     """Return the error of a program that would be too large, with the resolution that fits."""
+    if request.surface.texture.baked_numbers:
+        words = f"must be at least {size} bytes, the size of this field: let the program load it"
+        return ParameterError("max_data", f"{words}, or bake it coarser", request.max_data_size)
     # Heights are double, in contrast to the search tree, which may be longer.
     arrays = [store.values[place] for place in names]
     doubles = [array for array in arrays if array.dtype.name == "float64"]

@@ -103,11 +103,19 @@ class ArrayType:
         shape: shape of the array.
         element: type of the elements.
         c_name: name of a constant array in the program; empty for a work array.
+        lengths: C expressions of the lengths of a constant array that is loaded at run time and
+            stored without gaps; empty for one of the given shape.
     """
 
     shape: tuple[int, ...]
     element: ScalarType = FLOAT
     c_name: str = ""
+    lengths: tuple[str, ...] = ()
+
+    @property
+    def length_expressions(self) -> list[str]:
+        """C expressions of the lengths."""
+        return list(self.lengths or map(str, self.shape))
 
 
 @dataclass(frozen=True)

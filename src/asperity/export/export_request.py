@@ -6,14 +6,21 @@ import math
 import re
 from dataclasses import dataclass
 
+from asperity.contacts.contact import Contact
 from asperity.core.checks import check_positive
 from asperity.core.errors import ParameterError
 from asperity.export.statements import RESERVED_WORDS
+from asperity.rendering import is_searched
 from asperity.surface import Surface
 
 PRECISIONS = ("double", "float")
 MAX_DATA_SIZE = 64 * 2**20
 """Default limit of the data of a program [bytes]."""
+
+
+def is_searching(contact: Contact) -> bool:
+    """Return whether exported laws on a contact search: not where a field or a formula is used."""
+    return contact.has_warm_start and not contact.has_potential_field
 
 
 @dataclass(frozen=True)
@@ -28,12 +35,15 @@ class ExportRequest:
         comment: comment at the top of the file, plain text.
         q_upper: upper bound of the characteristic number.
         max_data_size: limit of the data of the program [bytes].
+        loads_field: whether the program loads the baked field from its file; else the source holds
+            all data.
         max_evaluations: limit of evaluations of the surface per tick; infinite for an exact search;
             default: that of the contact of the law.
 
     Raises:
-        ParameterError: for a name that is not a C identifier, an unknown precision, or a number of
-            evaluations that is not positive.
+        ParameterError: for a name that is not a C identifier, an unknown precision, a number of
+            evaluations that is not positive, a surface with law H that is neither baked nor has a
+            closed form, or ``loads_field`` without a baked field.
     """
 
     surface: Surface
@@ -43,10 +53,16 @@ class ExportRequest:
     comment: str = ""
     q_upper: float = math.inf
     max_data_size: int = MAX_DATA_SIZE
+    loads_field: bool = False
     max_evaluations: float | None = None
 
     def __post_init__(self) -> None:
         self.validate(self.name, self.precision, self.max_evaluations)
+        if is_searched(self.surface):
+            words = "must be baked to export law H: asperity bake, with --extent without a period"
+            raise ParameterError("surface", words)
+        if self.loads_field and not self.surface.texture.baked_numbers:
+            raise ParameterError("load", "needs a baked field: law H without a closed form")
 
     @staticmethod
     def validate(name: str, precision: str, max_evaluations: float | None) -> None:
@@ -70,9 +86,9 @@ class ExportRequest:
     def evaluation_budget(self) -> float:
         """Limit of evaluations of the surface per tick; 1 for a law without a search."""
         contact = self.surface.law.contact
-        if self.max_evaluations is None or not contact.has_warm_start:
-            return contact.max_evaluations
-        return self.max_evaluations
+        if not is_searching(contact):
+            return 1.0
+        return self.max_evaluations or contact.max_evaluations
 
     @property
     def is_single_precision(self) -> bool:

@@ -122,12 +122,12 @@ class ExpressionTypes(ast.NodeVisitor):
             return None if value is None else -value
         if isinstance(node, ast.Attribute) and node.attr in {"size", "ndim"}:
             kind = self.infer(node.value)
-            if isinstance(kind, c.ArrayType):
+            if isinstance(kind, c.ArrayType) and not kind.lengths:
                 return math.prod(kind.shape) if node.attr == "size" else len(kind.shape)
         if isinstance(node, ast.Subscript) and getattr(node.value, "attr", "") == "shape":
             assert isinstance(node.value, ast.Attribute)  # only that has an attribute
             index, kind = self.constant_integer(node.slice), self.infer(node.value.value)
-            if index is not None and isinstance(kind, c.ArrayType):
+            if index is not None and isinstance(kind, c.ArrayType) and not kind.lengths:
                 return kind.shape[index] if -len(kind.shape) <= index < len(kind.shape) else None
         return None
 

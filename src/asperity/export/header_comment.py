@@ -13,6 +13,7 @@ from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.surface_sentences import depth_range_text, leak_energy_text
 from asperity.core.units import format_quantity
 from asperity.core.version import __version__
+from asperity.export.export_request import is_searching
 from asperity.laws import Law
 from asperity.textures.texture import Texture
 
@@ -47,7 +48,7 @@ def header_comment_text(analysis: Analysis, file_name: str) -> str:
 def _usage(law: Law) -> list[str]:
     """Return the lines on the use of the program."""
     state = "This law stores nothing in it"
-    if law.contact.has_warm_start:
+    if is_searching(law.contact):
         state = "It stores the closest point for a warm start"
     if law.stateful:
         state = "It stores the anchor of friction"

@@ -112,7 +112,13 @@ class ProgramData:
         return real_literal(float(value), self.single or value_type == c.SINGLE)
 
 
-def make_program_data(surface: Surface, prefix: str, *, single: bool) -> ProgramData:
+# Lengths of the arrays of a field that a program loads, in its record: template field_data.c.
+_LOADED_LENGTHS = {"c": ("{0}.count",), "columns": ("{0}.rows", "{0}.width", "4")}
+
+
+def make_program_data(
+    surface: Surface, prefix: str, *, single: bool, loads_field: bool = False
+) -> ProgramData:
     """Return the data of a surface.
 
     Raises:
@@ -121,6 +127,9 @@ def make_program_data(surface: Surface, prefix: str, *, single: bool) -> Program
     arguments: Any = surface.texture.arguments
     values: dict[str, Any] = {}
     texture = _constant_record(f"{prefix}_surface", arguments._fields, arguments, prefix, values)
+    if loads_field:
+        texture = _loaded_record(texture)
+        values.clear()
     names = (*SHARED_PARAMETERS, *map(parameter_name, surface.law.parameters))
     numbers = [float(value) for value in surface.law_arguments]
     law = _constant_record(f"{prefix}_law", names, numbers, prefix, values)
@@ -145,6 +154,18 @@ def _constant_record(
             values[f"{c_name}.{name}"] = item
             kinds.append(kind)
     return c.ConstantRecord(tuple(kinds), tuple(names), c_name)
+
+
+def _loaded_record(record: c.ConstantRecord) -> c.ConstantRecord:
+    """Return the record of a baked field that the program loads."""
+
+    def loaded(name: str, kind: ValueType) -> ValueType:
+        if not isinstance(kind, c.ArrayType):
+            return kind
+        lengths = tuple(text.format(record.c_name) for text in _LOADED_LENGTHS[name])
+        return replace(kind, c_name=f"{record.c_name}.{name}", lengths=lengths)
+
+    return replace(record, items=tuple(map(loaded, record.names, record.items)))
 
 
 def _element_type(values: NDArray[Any]) -> c.ScalarType:
@@ -225,13 +246,16 @@ class SurfaceFunctions:
     data: ProgramData
 
 
-def surface_functions(surface: Surface, prefix: str, *, single: bool) -> SurfaceFunctions:
+def surface_functions(
+    surface: Surface, prefix: str, *, single: bool, loads_field: bool = False
+) -> SurfaceFunctions:
     """Return the C functions of a surface.
 
     Args:
         surface: the surface.
         prefix: prefix of all names.
         single: whether real numbers are of single precision.
+        loads_field: whether the program loads the baked field.
 
     Raises:
         ParameterError: for a law or a texture that cannot be exported.
@@ -243,7 +267,7 @@ def surface_functions(surface: Surface, prefix: str, *, single: bool) -> Surface
     brought = [*map(unit_from_module, law.contact.kernels()), *energy]
     text = link_on_texture(law, surface.texture.sampler, clamp, roots, brought)
     program = Program(LinkedSource(text), prefix, single=single, reserved=_RESERVED_NAMES)
-    store = make_program_data(surface, prefix, single=single)
+    store = make_program_data(surface, prefix, single=single, loads_field=loads_field)
     constants: tuple[ValueType, ValueType] = (store.texture, store.law)
     place = (c.FLOAT, c.FLOAT, c.FLOAT)
     kinds = (*place, c.FLOAT, c.FLOAT, c.BOOL, c.ArrayType((WARM_START_SIZE,)), *constants)

@@ -24,3 +24,10 @@ typedef struct @name@_state {
  * Return the error bound of the last search [m]: @gap@
  */
 @link@ @real@ @name@_gap(const @name@_state *state);
+
+/*
+ * Touch all data of the surface, so that no tick waits for a page of memory. Call it before the
+ * loop. Returns 1 if the data are locked in memory as well, else 0: locking takes @NAME@_POSIX,
+ * defined before this header, and a sufficient limit of the system (ulimit -l).
+ */
+@link@ int @name@_prepare(void);

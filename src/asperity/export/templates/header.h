@@ -2,7 +2,11 @@
 #define @NAME@_H
 
 #include <math.h>
+#include <stddef.h>
 #include <stdint.h>
+#if defined(@NAME@_POSIX)
+#include <sys/mman.h>
+#endif
 
 @guards@
 @contract@

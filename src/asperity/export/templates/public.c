@@ -35,3 +35,26 @@
 {
     return state->memory[@at_gap@];
 }
+
+@link@ int @name@_prepare(void)
+{
+    const struct {
+        const void *data;
+        size_t size;
+    } parts[] = {@parts@{NULL, 0}};
+    int locked = 1, k;
+    for (k = 0; parts[k].data != NULL; k++) {
+        const volatile unsigned char *bytes = (const volatile unsigned char *)parts[k].data;
+        size_t i;
+        for (i = 0; i < parts[k].size; i += 4096) {
+            (void)bytes[i];
+        }
+        (void)bytes[parts[k].size - 1];
+#if defined(@NAME@_POSIX)
+        locked = mlock(parts[k].data, parts[k].size) == 0 && locked;
+#else
+        locked = 0;
+#endif
+    }
+    return locked;
+}

@@ -1,0 +1,203 @@
+
+/* The header of a .field file. */
+typedef struct {
+    char magic[8];
+    uint32_t version, byte_order;
+    uint64_t file_bytes;
+    uint32_t rows, width;
+    uint64_t columns_offset, count, values_offset, heights_offset, json_offset;
+    double x0, y0, z0, m00, m01, m10, m11, iz;
+    int32_t levels, border;
+    double q, floor;
+    unsigned char reserved[88];
+    uint32_t checksum, header_checksum;
+} @name@_field_header;
+
+typedef char @name@_header_has_256_bytes[sizeof(@name@_field_header) == 256 ? 1 : -1];
+
+static inline void *@name@_read_file(const char *path, size_t *size)
+{
+#if defined(@NAME@_POSIX)
+    struct stat status;
+    void *memory = MAP_FAILED;
+    const int file = open(path, O_RDONLY);
+    if (file < 0) {
+        return NULL;
+    }
+    if (fstat(file, &status) == 0 && status.st_size > 0
+        && (uint64_t)status.st_size <= (uint64_t)SIZE_MAX) {
+        *size = (size_t)status.st_size;
+        memory = mmap(NULL, *size, PROT_READ, MAP_PRIVATE, file, 0);
+    }
+    close(file);
+    return memory == MAP_FAILED ? NULL : memory;
+#else
+    void *memory = NULL;
+    long end = -1;
+    FILE *file = fopen(path, "rb");
+    if (file == NULL) {
+        return NULL;
+    }
+    if (fseek(file, 0, SEEK_END) == 0) {
+        end = ftell(file);
+    }
+    if (end > 0 && fseek(file, 0, SEEK_SET) == 0) {
+        *size = (size_t)end;
+        memory = malloc(*size);
+        if (memory != NULL && fread(memory, 1, *size, file) != *size) {
+            free(memory);
+            memory = NULL;
+        }
+    }
+    fclose(file);
+    return memory;
+#endif
+}
+
+static inline void @name@_release_file(void *memory, size_t size)
+{
+#if defined(@NAME@_POSIX)
+    if (memory != NULL) {
+        munmap(memory, size);
+    }
+#else
+    (void)size;
+    free(memory);
+#endif
+}
+
+/* CRC-32 of ISO-HDLC: polynomial 0x04C11DB7, reflected, inverted before and after. */
+static inline uint32_t @name@_checksum(const unsigned char *bytes, size_t size)
+{
+    uint32_t table[256], value = 0xFFFFFFFFu, k;
+    size_t i;
+    int bit;
+    for (k = 0; k < 256; k++) {
+        table[k] = k;
+        for (bit = 0; bit < 8; bit++) {
+            table[k] = table[k] & 1u ? 0xEDB88320u ^ (table[k] >> 1) : table[k] >> 1;
+        }
+    }
+    for (i = 0; i < size; i++) {
+        value = table[(value ^ bytes[i]) & 255u] ^ (value >> 8);
+    }
+    return value ^ 0xFFFFFFFFu;
+}
+
+/* Whether the header describes arrays inside the file and a grid whose indices fit. */
+static inline int @name@_fits(const @name@_field_header *head, size_t size)
+{
+    const double numbers[] = {head->m00, head->m01, head->m10, head->m11, head->iz,
+                              head->z0, 1e7 * head->x0, 1e7 * head->y0};
+    const uint64_t places = (uint64_t)head->rows * head->width;
+    size_t i;
+    for (i = 0; i < sizeof numbers / sizeof numbers[0]; i++) {
+        if (!(fabs(numbers[i]) <= 1e12)) {
+            return 0;
+        }
+    }
+    return (head->rows == 1 || head->rows >= 4) && head->width >= 4 && head->iz > 0
+        && places <= 0x7FFFFFFFu && head->levels >= 3 && head->border >= 0 && head->border <= 2
+        && head->columns_offset <= size && head->columns_offset % 4 == 0
+        && places <= (size - head->columns_offset) / 16
+        && head->values_offset <= size && head->values_offset % 4 == 0
+        && head->count <= (size - head->values_offset) / 4 && head->heights_offset <= size;
+}
+
+/* Whether every column lies inside the coefficients, and these are finite. */
+static inline int @name@_is_consistent(
+    const @name@_field_header *head, const int32_t *columns, const float *c)
+{
+    const size_t places = (size_t)head->rows * head->width;
+    size_t i;
+    for (i = 0; i < places; i++) {
+        const int64_t offset = columns[4 * i], first = columns[4 * i + 1];
+        const int64_t end = columns[4 * i + 2], reach = columns[4 * i + 3];
+        if (first < 0 || end < first || reach < end || reach > head->levels) {
+            return 0;
+        }
+        if (first < end && (offset + first < 0 || offset + end > (int64_t)head->count)) {
+            return 0;
+        }
+    }
+    for (i = 0; i < head->count; i++) {
+        if (!(fabs((double)c[i]) <= 1e30)) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+static inline int @name@_check_file(const unsigned char *bytes, size_t size, @name@_field_header *head)
+{
+    if (size < sizeof *head) {
+        return @NAME@_NO_FIELD;
+    }
+    memcpy(head, bytes, sizeof *head);
+    if (memcmp(head->magic, "ASPFIELD", 8) != 0 || head->version != 1
+        || head->byte_order != 0x01020304u) {
+        return @NAME@_NO_FIELD;
+    }
+    if (head->file_bytes != size || head->header_checksum != @name@_checksum(bytes, 252)
+        || head->checksum != @name@_checksum(bytes + sizeof *head, size - sizeof *head)
+        || !@name@_fits(head, size)
+        || !@name@_is_consistent(
+            head, (const int32_t *)(const void *)(bytes + head->columns_offset),
+            (const float *)(const void *)(bytes + head->values_offset))) {
+        return @NAME@_DAMAGED;
+    }
+    return @NAME@_LOADED;
+}
+
+static inline void @name@_use(const @name@_field_header *head, const unsigned char *bytes)
+{
+    @name@_surface.columns = (const int32_t *)(const void *)(bytes + head->columns_offset);
+    @name@_surface.c = (const float *)(const void *)(bytes + head->values_offset);
+    @name@_surface.rows = head->rows;
+    @name@_surface.width = head->width;
+    @name@_surface.count = (int64_t)head->count;
+    @name@_surface.x0 = (@real@)head->x0;
+    @name@_surface.y0 = (@real@)head->y0;
+    @name@_surface.z0 = (@real@)head->z0;
+    @name@_surface.m00 = (@real@)head->m00;
+    @name@_surface.m01 = (@real@)head->m01;
+    @name@_surface.m10 = (@real@)head->m10;
+    @name@_surface.m11 = (@real@)head->m11;
+    @name@_surface.iz = (@real@)head->iz;
+    @name@_surface.levels = head->levels;
+    @name@_surface.border = head->border;
+    @name@_surface.q = head->q;
+}
+
+@link@ int @name@_load(const char *path)
+{
+    @name@_field_header head;
+    size_t size = 0;
+    void *memory = NULL;
+    if (path != NULL) {
+        int result;
+        memory = @name@_read_file(path, &size);
+        if (memory == NULL) {
+            return @NAME@_NO_FILE;
+        }
+        result = @name@_check_file((const unsigned char *)memory, size, &head);
+        if (result != @NAME@_LOADED) {
+            @name@_release_file(memory, size);
+            return result;
+        }
+    }
+    @name@_release_file(@name@_surface.file, @name@_surface.size);
+    @name@_surface = @name@_no_field;
+    if (memory != NULL) {
+        @name@_use(&head, (const unsigned char *)memory);
+        @name@_surface.file = memory;
+        @name@_surface.size = size;
+        @name@_surface.used = (size_t)head.heights_offset;
+    }
+    return @NAME@_LOADED;
+}
+
+@link@ double @name@_q(void)
+{
+    return @name@_surface.q;
+}

@@ -1,0 +1,17 @@
+
+/* Results of @name@_load. */
+#define @NAME@_LOADED 0
+#define @NAME@_NO_FILE 1  /* cannot be read, or is larger than memory */
+#define @NAME@_NO_FIELD 2 /* not a baked field, or of another version or byte order */
+#define @NAME@_DAMAGED 3  /* cut or damaged */
+
+/*
+ * Load the field of a .field file, not while the loop runs; before it the force is zero. Another
+ * result than @NAME@_LOADED leaves everything as it was; NULL unloads the field.
+ * With @NAME@_POSIX defined the file is mapped (mmap) and must not be changed while in use;
+ * otherwise it is read into memory.
+ */
+@link@ int @name@_load(const char *path);
+
+/* Return the certified characteristic number q of the field that is loaded, 0 without one. */
+@link@ double @name@_q(void);
