@@ -3,7 +3,7 @@
 //     auto *surface = new chai3d::cShapeBox(0.2, 0.2, 0.02);   // or any object of the scene
 //     surface->addEffect(new TextureEffect(surface));
 //
-// CHAI3D hands positions over in the frame of the object: metres and newtons, as here. Turn and
+// CHAI3D hands positions over in the frame of the object, in the unit of the scene. Turn and
 // place the object so that its z comes out of the textured wall and its origin lies on it. The
 // effect knows by itself where contact begins; remove the object's effect of a plain surface.
 #pragma once
@@ -15,7 +15,9 @@
 class TextureEffect : public chai3d::cGenericEffect
 {
 public:
-    explicit TextureEffect(chai3d::cGenericObject *a_parent) : chai3d::cGenericEffect(a_parent)
+    // a_metresPerUnit: 1 if the scene is in metres, 1e-3 if it is in millimetres.
+    explicit TextureEffect(chai3d::cGenericObject *a_parent, double a_metresPerUnit = 1.0)
+        : chai3d::cGenericEffect(a_parent), m_metresPerUnit(a_metresPerUnit)
     {
         for (texture_state &state : m_states) {
             texture_reset(&state);
@@ -29,7 +31,9 @@ public:
             a_reactionForce.zero();
             return false;
         }
-        const double position[3] = {a_toolPos.x(), a_toolPos.y(), a_toolPos.z()};
+        const double position[3] = {m_metresPerUnit * a_toolPos.x(),
+                                    m_metresPerUnit * a_toolPos.y(),
+                                    m_metresPerUnit * a_toolPos.z()};
         double force[3];
         texture_force(&m_states[a_toolID], position, force);
         a_reactionForce.set(force[0], force[1], force[2]);
@@ -38,5 +42,6 @@ public:
 
 private:
     static constexpr unsigned int c_tools = 16; // as many as CHAI3D's own effects know
+    double m_metresPerUnit;
     texture_state m_states[c_tools];
 };
