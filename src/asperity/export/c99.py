@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 
 from asperity.contacts.warm_start import BUDGET, ERROR_BOUND, UNLIMITED, WARM_START_SIZE
 from asperity.core.errors import ParameterError
-from asperity.export.export_request import ExportRequest, is_searching
+from asperity.export.export_request import ExportRequest
 from asperity.export.expressions import real_literal
 from asperity.export.program import block_comment
 from asperity.export.surface_functions import ProgramData, SurfaceFunctions, surface_functions
@@ -20,12 +20,6 @@ MAX_POSITION = 1000.0
 """Limit of the coordinates [m]; the force is zero beyond, where cell indices would overflow."""
 MAX_HEADER_DATA = 256 * 2**10
 """Size of the data [bytes] above which they are written to a source file."""
-_GAP_COMMENTS = {
-    False: "0, this law does not search.",
-    True: "no point of the surface is closer by more than this.\n"
-    " * 0 if the search converged within its limit of evaluations.",
-}
-_UNLIMITED_COMMENT = "\n * The search has no limit of evaluations: not for a real-time loop."
 
 
 def c99_files(request: ExportRequest, stem: str) -> dict[str, str]:
@@ -38,10 +32,7 @@ def c99_files(request: ExportRequest, stem: str) -> dict[str, str]:
     Raises:
         ParameterError: for a surface that cannot be exported, or would be too large.
     """
-    functions = surface_functions(
-        request.surface, request.name, single=request.is_single_precision,
-        loads_field=request.loads_field,
-    )  # fmt: skip
+    functions = surface_functions(request)
     store = functions.data
     places, records = store.used_by(functions.code)
     size = sum(map(store.size_in_bytes, places))
@@ -51,9 +42,8 @@ def c99_files(request: ExportRequest, stem: str) -> dict[str, str]:
     words["parts"] = "".join(f"{{{place}, sizeof {place}}}, " for place in places)
     if request.loads_field:
         words["parts"] = f"{{{request.name}_surface.file, {request.name}_surface.used}}, "
-        return _program_files(
-            request, functions, words, "\n".join([_render("field_data.c", words), *records])
-        )
+        records.insert(0, _render("field_data.c", words))
+        return _program_files(request, functions, words, "\n".join(records))
     arrays = [store.definition(place) for place in places]
     if request.as_library or size <= MAX_HEADER_DATA:
         data = "\n".join(f"static {array}" for array in arrays)
@@ -105,7 +95,6 @@ def _substitutions(
     request: ExportRequest, functions: SurfaceFunctions, stem: str
 ) -> dict[str, str]:
     surface, single = request.surface, request.is_single_precision
-    searching = is_searching(surface.law.contact)
     q_upper = f"{request.name}_q()" if request.loads_field else _bound_literal(request.q_upper)
     return {
         "name": request.name,
@@ -120,8 +109,6 @@ def _substitutions(
         "at_budget": str(BUDGET),
         "at_gap": str(ERROR_BOUND),
         "budget": real_literal(min(request.evaluation_budget, UNLIMITED), single),
-        "gap": _GAP_COMMENTS[searching],
-        "unlimited": _UNLIMITED_COMMENT if searching else "",
         "energy": functions.energy_name,
         "stiffness": repr(surface.stiffness),
         "max_depth": repr(surface.max_depth),
@@ -141,9 +128,6 @@ def _size_error(
     request: ExportRequest, store: ProgramData, names: Sequence[str], size: int
 ) -> ParameterError:
     """Return the error of a program that would be too large, with the resolution that fits."""
-    if request.surface.texture.baked_numbers:
-        words = f"must be at least {size} bytes, the size of this field: let the program load it"
-        return ParameterError("max_data", f"{words}, or bake it coarser", request.max_data_size)
     # Heights are double, in contrast to the search tree, which may be longer.
     arrays = [store.values[place] for place in names]
     doubles = [array for array in arrays if array.dtype.name == "float64"]
@@ -153,6 +137,5 @@ def _size_error(
     fits = [int(n * (math.sqrt(share) if flat else share)) for n in shape]
     points = " x ".join(str(max(n, 1)) for n in fits[: 2 if flat else 1])
     words = f"must be at least {size} bytes, the data of this surface; at most {points} points fit"
-    return ParameterError(
-        "max_data", f"{words}: crop it, or prepare it with fewer", request.max_data_size
-    )
+    words += ": crop it, or prepare it with fewer; a field may be loaded"
+    return ParameterError("max_data", words, request.max_data_size)

@@ -112,11 +112,6 @@ class ArrayType:
     c_name: str = ""
     lengths: tuple[str, ...] = ()
 
-    @property
-    def length_expressions(self) -> list[str]:
-        """C expressions of the lengths."""
-        return list(self.lengths or map(str, self.shape))
-
 
 @dataclass(frozen=True)
 class VoidType:

@@ -116,7 +116,7 @@ class ExpressionPrinter(ast.NodeVisitor):
         kind = self.types.infer(node.value)
         if isinstance(kind, c.ArrayType):
             lengths = c.TupleType((c.INT,) * len(kind.shape))
-            return self._constructor_call(lengths, kind.length_expressions)
+            return self._constructor_call(lengths, list(kind.lengths or map(str, kind.shape)))
         assert isinstance(kind, c.TupleType)  # no other type has attributes
         return self._item(node.value, kind, kind.names.index(node.attr))
 
@@ -153,20 +153,15 @@ class ExpressionPrinter(ast.NodeVisitor):
             return CExpression(f"{base}.v[{self.text(node.slice)}]")
         assert isinstance(kind, c.ArrayType)  # checked by the type inference
         text = c.constant_name(kind) or self.text(node.value, _PRIMARY)
-        if kind.lengths:
-            return CExpression(f"{text}[{self._flat_index(indices_of(node), kind)}]")
+        if kind.lengths:  # stored without gaps
+            place, *others = [self.text(index, _SUM) for index in indices_of(node)]
+            for other, size in zip(others, kind.lengths[1:], strict=True):
+                place = f"({place}) * {size} + {other}"
+            return CExpression(f"{text}[{place}]")
         for index_node, length in zip(indices_of(node), kind.shape, strict=True):
             fixed = self.types.constant_integer(index_node)
             text += f"[{self.text(index_node) if fixed is None else fixed % max(length, 1)}]"
         return CExpression(text)
-
-    def _flat_index(self, indices: list[ast.expr], kind: c.ArrayType) -> str:
-        """Return the place of an element in an array that is loaded at run time."""
-        place = self.to_c(indices[0])
-        for index, length in zip(indices[1:], kind.lengths[1:], strict=True):
-            start = place.text if place.precedence >= _PRODUCT else f"({place.text})"
-            place = CExpression(f"{start} * {length} + {self.text(index, _SUM)}", _SUM)
-        return place.text
 
     # --- operators -------------------------------------------------------------------------------
 

@@ -13,7 +13,6 @@ from asperity.export.liveness import (
     declaring_statements,
     expressions_in,
     live_names,
-    names_in,
     self_declaring_loops,
     sequenced_parts,
     stored_names,
@@ -212,8 +211,6 @@ class FunctionPrinter(ast.NodeVisitor):
         if isinstance(first, ast.Tuple):
             if others:
                 raise self.types.not_exportable("assigns a tuple to several targets", value)
-            if isinstance(value, ast.Tuple):
-                return self._assign_each(node, first.elts, value.elts)
             return self._unpack(node, first.elts, value)
         if len(targets) > 1 and not isinstance(value, ast.Constant):
             lines = self._store(node, first, value)
@@ -251,31 +248,6 @@ class FunctionPrinter(ast.NodeVisitor):
             kind = self.types.types[target.id]
             return f"{self._declaration(kind, self.names[target.id])} = {text};"
         return f"{self.expressions.text(target)} = {text};"
-
-    def _assign_each(
-        self, node: ast.stmt, targets: Sequence[ast.expr], values: Sequence[ast.expr]
-    ) -> list[str]:
-        """Return the lines of a simultaneous assignment."""
-        stored: set[str] = set()
-        clash = False
-        for target, value in zip(targets, values, strict=True):
-            read = {part.id for part in ast.walk(value) if isinstance(part, ast.Name)}
-            clash = clash or bool(read & stored) or self.types.writes_arrays(value)
-            stored |= set(names_in(target))
-        if not clash:
-            pairs = zip(targets, values, strict=True)
-            return [line for one, value in pairs for line in self._store(node, one, value)]
-        lines, later = [], []
-        for target, value in zip(targets, values, strict=True):
-            if isinstance(target, ast.Name) and target.id not in self._live:
-                continue
-            kind = self.types.infer(target)
-            name = self._temporary("new")
-            lines.append(
-                f"const {self._declaration(kind, name)} = {self.expressions.as_type(value, kind)};"
-            )
-            later.append(self._assignment_line(node, target, name))
-        return lines + later
 
     def _unpack(self, node: ast.stmt, targets: Sequence[ast.expr], value: ast.expr) -> list[str]:
         kind = self.types.infer_tuple(value)

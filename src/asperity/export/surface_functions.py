@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -18,6 +18,7 @@ from asperity.core.errors import ParameterError
 from asperity.derive.facts import clamped_facts
 from asperity.export import c_language as c
 from asperity.export.c_language import ValueType
+from asperity.export.export_request import ExportRequest
 from asperity.export.expressions import real_literal
 from asperity.export.program import LinkedSource, Program
 from asperity.kernels.fuse import law_units, link_on_texture
@@ -27,12 +28,8 @@ from asperity.laws import Law
 from asperity.surface import Surface
 
 _SCALAR_TYPES = {
-    "float64": c.FLOAT,
-    "float32": c.SINGLE,
-    "int64": c.INT,
-    "int32": c.INT,
-    "bool": c.BOOL,
-}
+    "float64": c.FLOAT, "float32": c.SINGLE, "int64": c.INT, "int32": c.INT, "bool": c.BOOL,
+}  # fmt: skip
 _WIDTH = 100
 
 
@@ -87,12 +84,8 @@ class ProgramData:
     def size_in_bytes(self, name: str) -> int:
         """Return the size of an array in the program [bytes]."""
         values = self.values[name]
-        wide = {
-            c.FLOAT: 4 if self.single else 8,
-            c.SINGLE: 4,
-            c.INT: 4 if _fits_32_bits(values) else 8,
-        }
-        return int(values.size) * wide.get(_element_type(values), 4)
+        narrow = {c.FLOAT: self.single, c.INT: _fits_32_bits(values)}
+        return int(values.size) * (4 if narrow.get(_element_type(values), True) else 8)
 
     def _initializer(self, values: NDArray[Any]) -> str:
         if values.size == 0:
@@ -126,10 +119,10 @@ def make_program_data(
     """
     arguments: Any = surface.texture.arguments
     values: dict[str, Any] = {}
-    texture = _constant_record(f"{prefix}_surface", arguments._fields, arguments, prefix, values)
-    if loads_field:
-        texture = _loaded_record(texture)
-        values.clear()
+    lengths, stored = (_LOADED_LENGTHS, {}) if loads_field else ({}, values)
+    texture = _constant_record(
+        f"{prefix}_surface", arguments._fields, arguments, prefix, stored, lengths
+    )
     names = (*SHARED_PARAMETERS, *map(parameter_name, surface.law.parameters))
     numbers = [float(value) for value in surface.law_arguments]
     law = _constant_record(f"{prefix}_law", names, numbers, prefix, values)
@@ -138,7 +131,12 @@ def make_program_data(
 
 
 def _constant_record(
-    c_name: str, names: Sequence[str], items: Sequence[Any], prefix: str, values: dict[str, Any]
+    c_name: str,
+    names: Sequence[str],
+    items: Sequence[Any],
+    prefix: str,
+    values: dict[str, Any],
+    lengths: Mapping[str, tuple[str, ...]] = {},
 ) -> c.ConstantRecord:
     kinds: list[ValueType] = []
     for name, item in zip(names, items, strict=True):
@@ -147,25 +145,14 @@ def _constant_record(
             words = f"cannot be exported: its record holds {name!r}, a {type(item).__name__}"
             raise ParameterError("texture", words)
         if isinstance(item, np.ndarray):
-            array = f"{prefix}_data_{name}"
+            array = f"{c_name}.{name}" if lengths else f"{prefix}_data_{name}"
             values[array] = item
-            kinds.append(c.ArrayType(item.shape, kind, array))
+            expressions = tuple(text.format(c_name) for text in lengths.get(name, ()))
+            kinds.append(c.ArrayType(item.shape, kind, array, expressions))
         else:
             values[f"{c_name}.{name}"] = item
             kinds.append(kind)
     return c.ConstantRecord(tuple(kinds), tuple(names), c_name)
-
-
-def _loaded_record(record: c.ConstantRecord) -> c.ConstantRecord:
-    """Return the record of a baked field that the program loads."""
-
-    def loaded(name: str, kind: ValueType) -> ValueType:
-        if not isinstance(kind, c.ArrayType):
-            return kind
-        lengths = tuple(text.format(record.c_name) for text in _LOADED_LENGTHS[name])
-        return replace(kind, c_name=f"{record.c_name}.{name}", lengths=lengths)
-
-    return replace(record, items=tuple(map(loaded, record.names, record.items)))
 
 
 def _element_type(values: NDArray[Any]) -> c.ScalarType:
@@ -246,20 +233,13 @@ class SurfaceFunctions:
     data: ProgramData
 
 
-def surface_functions(
-    surface: Surface, prefix: str, *, single: bool, loads_field: bool = False
-) -> SurfaceFunctions:
+def surface_functions(request: ExportRequest) -> SurfaceFunctions:
     """Return the C functions of a surface.
-
-    Args:
-        surface: the surface.
-        prefix: prefix of all names.
-        single: whether real numbers are of single precision.
-        loads_field: whether the program loads the baked field.
 
     Raises:
         ParameterError: for a law or a texture that cannot be exported.
     """
+    surface, prefix, single = request.surface, request.name, request.is_single_precision
     law, clamp = surface.law, surface.effective_clamp
     probe = next(unit for unit in law_units(law, clamp) if "probe_tick" in unit.sources)
     energy = energy_units(law, clamp)
@@ -267,7 +247,7 @@ def surface_functions(
     brought = [*map(unit_from_module, law.contact.kernels()), *energy]
     text = link_on_texture(law, surface.texture.sampler, clamp, roots, brought)
     program = Program(LinkedSource(text), prefix, single=single, reserved=_RESERVED_NAMES)
-    store = make_program_data(surface, prefix, single=single, loads_field=loads_field)
+    store = make_program_data(surface, prefix, single=single, loads_field=request.loads_field)
     constants: tuple[ValueType, ValueType] = (store.texture, store.law)
     place = (c.FLOAT, c.FLOAT, c.FLOAT)
     kinds = (*place, c.FLOAT, c.FLOAT, c.BOOL, c.ArrayType((WARM_START_SIZE,)), *constants)

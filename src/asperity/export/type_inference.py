@@ -92,13 +92,7 @@ class FunctionTypes(ExpressionTypes):
             raise self.not_exportable(f"uses {type(node).__name__}", node)
 
     def _assign(self, target: ast.expr, value: ast.expr) -> None:
-        value_type = self.infer(value)
-        parts = target.elts if isinstance(target, ast.Tuple) else []
-        if isinstance(value, ast.Tuple) and len(value.elts) == len(parts):
-            for part, item in zip(parts, value.elts, strict=True):
-                self._assign(part, item)
-        else:
-            self._assign_type(target, value_type, value)
+        self._assign_type(target, self.infer(value), value)
 
     def _assign_type(self, target: ast.expr, value_type: ValueType, value: ast.expr) -> None:
         if isinstance(target, ast.Tuple):

@@ -21,7 +21,8 @@ typedef struct @name@_state {
 @link@ void @name@_force(@name@_state *state, const @real@ position[3], @real@ force[3]);
 
 /*
- * Return the error bound of the last search [m]: @gap@
+ * Return the error bound of the last search [m]: no point of the surface is closer by more than
+ * this. 0 if the search converged within its limit of evaluations, or if the law does not search.
  */
 @link@ @real@ @name@_gap(const @name@_state *state);
 
