@@ -3,6 +3,7 @@
 ``python -m bench.export --ticks 10000000`` looks for the longest tick of that many, and
 ``python -m bench.export --points 1000000`` compares that many ticks of every law and texture kind
 with the kernel, bit by bit: minutes for each law with a search; ``--laws D`` takes one of them.
+``--first`` prints the first ticks of a process with a baked field.
 """
 
 from __future__ import annotations
@@ -22,9 +23,13 @@ from rich.console import Console
 from rich.table import Table
 
 from asperity.contacts.warm_start import EVALUATIONS
+from asperity.export.c99 import c99_files
+from asperity.export.export_request import ExportRequest
 from asperity.laws import LAWS
+from asperity.rendering import bake
 from asperity.surface import Surface
-from asperity.textures import HeightMap
+from asperity.textures import Fourier, HeightMap
+from asperity.textures.fields.field_file import save_field
 from bench import cases
 from bench.c_programs import (
     STRICT,
@@ -35,6 +40,7 @@ from bench.c_programs import (
     library,
     probes,
     program_ticks,
+    run_command,
     same_bits,
     surface_ticks,
     ticks,
@@ -52,6 +58,7 @@ SIDE = 1024
 TICKS = 100_000
 # Of the longest ticks so many are timed again: the shortest of all times is the tick's own.
 AGAIN, TIMES = 200, 30
+FIRST_TICKS, PROCESSES = 1000, 21
 
 _CLOCK = """
 #define _POSIX_C_SOURCE 199309L
@@ -76,14 +83,52 @@ void {name}_clocked(const double *at, double *took, double *looks, int64_t n)
 """
 
 
+_FIRST = """
+#define _POSIX_C_SOURCE 199309L
+#define T_POSIX
+#include <stdio.h>
+#include <time.h>
+#include "t.h"
+int main(int count, char **words)
+{{
+    static double took[{ticks}];
+    volatile double used;
+    t_state state;
+    t_reset(&state);
+#if defined(T_LOADED)
+    if (t_load("t.field") != T_LOADED) {{
+        return 1;
+    }}
+#endif
+    if (count > 1) {{
+        t_prepare();
+    }}
+    for (int i = 0; i < {ticks}; i++) {{
+        struct timespec begin, end;
+        double f[3], at[3] = {{2.5e-5 * i, 1.7e-5 * i, {z:.17g}}};
+        clock_gettime(CLOCK_MONOTONIC, &begin);
+        t_force(&state, at, f);
+        used = f[0] + f[1] + f[2];
+        clock_gettime(CLOCK_MONOTONIC, &end);
+        took[i] = 1e9 * (double)(end.tv_sec - begin.tv_sec) + (double)(end.tv_nsec - begin.tv_nsec);
+    }}
+    for (int i = 0; i < {ticks}; i++) {{
+        printf("%.0f\\n", took[i]);
+    }}
+    return words == NULL && used != 0.0;
+}}
+"""
+
+
 def run(console: Console) -> None:
-    """Print speed, longest ticks and what the sketch of a microcontroller takes."""
+    """Print speed, longest and first ticks and what the sketch of a microcontroller takes."""
     if shutil.which("gcc") is None:
         console.print("not run: no gcc here")
         return
     with tempfile.TemporaryDirectory() as directory:
         _speed(console, Path(directory))
     _ticks(console, TICKS)
+    print_first_ticks(console)
     _micro(console)
 
 
@@ -182,6 +227,57 @@ def _time_ticks(program: ctypes.CDLL, at: Any) -> tuple[Any, Any]:
     return took, looks
 
 
+def print_first_ticks(console: Console) -> None:
+    """Print the first ticks of fresh processes that render a baked field of some megabytes."""
+    waves = Fourier([1e-4, 6e-5], [[2000.0, 0.0], [0.0, 3000.0]], [0.3, 1.1])
+    surface = bake(Surface(waves, "H", 800.0, max_depth=3e-4), 15e-6, max_gain=None)
+    head = f"First {FIRST_TICKS} ticks, median of {PROCESSES} processes, gcc -O2"
+    console.print(f"{head}: a field of {surface.texture.bytes / 1e6:.1f} MB")
+    table = Table(box=None, pad_edge=False)
+    for heading in (
+        "field",
+        "prepared",
+        "first [ns]",
+        "median [ns]",
+        "99 % [ns]",
+        "longest [ns]",
+        "sum [us]",
+    ):
+        table.add_column(heading, justify="left" if heading in {"field", "prepared"} else "right")
+    for loads_field in (False, True):
+        with tempfile.TemporaryDirectory() as directory:
+            _write_first_ticks(surface, Path(directory), loads_field=loads_field)
+            for words in ((), ("prepare",)):
+                runs = [_run_first_ticks(Path(directory), words) for _ in range(PROCESSES)]
+                took = np.median(runs, axis=0)
+                numbers = (
+                    took[0],
+                    np.median(took),
+                    np.quantile(took, 0.99),
+                    took.max(),
+                    1e-3 * took.sum(),
+                )
+                place = "loaded" if loads_field else "in the source"
+                table.add_row(place, "yes" if words else "no", *(f"{n:.0f}" for n in numbers))
+    console.print(table)
+
+
+def _write_first_ticks(surface: Surface, folder: Path, *, loads_field: bool) -> None:
+    request = ExportRequest(surface, "t", loads_field=loads_field)
+    for name, text in c99_files(request, "t").items():
+        (folder / name).write_text(text, encoding="utf-8")
+    save_field(folder / "t.field", surface.texture)
+    z = surface.texture.extremes[0] - 0.5 * surface.max_depth
+    (folder / "first.c").write_text(_FIRST.format(ticks=FIRST_TICKS, z=z), encoding="utf-8")
+    sources = ["first.c", *(path.name for path in folder.glob("t_data.c"))]
+    run_command("gcc", *STRICT, "-O2", *sources, "-o", "first", "-lm", cwd=folder)
+
+
+def _run_first_ticks(folder: Path, words: tuple[str, ...]) -> Any:
+    """Return the times of the first ticks of a process [ns]."""
+    return np.array([float(part) for part in run_command("./first", *words, cwd=folder).split()])
+
+
 def _micro(console: Console) -> None:
     lacking = missing_tool()
     if lacking is not None:
@@ -234,9 +330,12 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--ticks", type=int, default=0)
     parser.add_argument("--points", type=int, default=0)
+    parser.add_argument("--first", action="store_true", help="print the first ticks")
     parser.add_argument("--laws", default="".join(LAWS), help="of --points; default: all of them")
     asked = parser.parse_args()
     console = Console(width=100, highlight=False)
+    if asked.first:
+        print_first_ticks(console)
     if asked.ticks:
         _ticks(console, asked.ticks)
     return int(bool(asked.points and compare_bits(console, asked.points, asked.laws)))
