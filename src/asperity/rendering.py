@@ -5,15 +5,20 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from asperity.contacts.warm_start import MAX_ERROR_BOUND, TRUNCATED_TICKS, new_warm_start
 from asperity.core.arguments import DEFAULT_STIFFNESS, FIELD, RENDERING, SEARCH
 from asperity.core.cache import get_or_compute
 from asperity.core.checks import check_positive
 from asperity.core.digests import content_digest
 from asperity.core.errors import ParameterError
+from asperity.core.files import Serializable
+from asperity.core.units import format_quantity
+from asperity.laws import Law
 from asperity.surface import Surface
 from asperity.textures.fields.bake import BakeGoal, bake_texture
 from asperity.textures.fields.field_certificate import Progress
@@ -25,6 +30,10 @@ from asperity.textures.texture import Texture
 
 Extent = Sequence[float]
 _NODES_PER_WAVE = 16
+DEFAULT_SPEED = 0.1  # [m/s]
+_UPDATE_RATE = 1000.0
+_STROKE_SAMPLES = 4000
+FORMULA = "formula"
 # Greatest size of a field that is baked without being asked for: some ten seconds.
 _AUTOMATIC_BYTES = 2**26
 
@@ -157,7 +166,7 @@ def _goal(share: float, max_gain: float | None, max_bytes: int) -> BakeGoal:
 
 def is_searched(surface: Surface) -> bool:
     """Return whether law H is rendered by a search: the texture has no closed form of it."""
-    return surface.law.contact.has_potential_field and not surface.texture.has_split_formula
+    return surface.law.contact.has_potential_field and not surface.texture.finds_contacts
 
 
 def rendered_surface(
@@ -196,6 +205,81 @@ def rendered_surface(
         lambda: bake_field(surface, extent=extent, max_bytes=_AUTOMATIC_BYTES, progress=progress),
     )
     return surface.to_texture(field)
+
+
+@dataclass(frozen=True)
+class Rendering(Serializable):
+    """How a loop renders a law, and how far that may be from the law.
+
+    Attributes:
+        method: ``"formula"``, ``"field"`` or ``"search"``.
+        samples: samples of the stroke on which a search was tried; 0 for none.
+        truncated: samples in which it was truncated.
+        error_bound: greatest error bound of a truncated search [m]; of the force over the
+            stiffness for H, of the distance to the closest point for D and E.
+        speed: of the stroke [m/s].
+        update_rate: of the loop [Hz].
+    """
+
+    serialized_attributes = "method samples truncated error_bound speed update_rate"
+
+    method: str
+    samples: int = 0
+    truncated: int = 0
+    error_bound: float = 0.0
+    speed: float = 0.0
+    update_rate: float = 0.0
+
+    def sentence(self, law: Law) -> str:
+        """Return what the search does to statements about the law; empty for no search."""
+        if self.method != SEARCH:
+            return ""
+        stroke = f"{self.samples} samples of a stroke at {format_quantity(self.speed, 'm/s')}"
+        text = f"Law {law.letter} finds its contact by a search within the time of a sample:"
+        if not self.truncated:
+            return f"{text} it was complete in all of {stroke}"
+        part, bound = self.truncated / self.samples, format_quantity(self.error_bound, "m")
+        return (
+            f"{text} it was truncated in {100.0 * part:.2g} % of {stroke}, with an error of up to "
+            f"{bound} in the contact; there, statements about the law do not hold for its rendering"
+        )
+
+
+def assess_rendering(
+    surface: Surface, speed: float = DEFAULT_SPEED, update_rate: float | None = None
+) -> Rendering:
+    """Return how a loop renders a surface; a search is tried on a stroke.
+
+    The stroke runs along the scan line of the texture at the greatest height minus ``max_depth``.
+
+    Args:
+        surface: the surface as it is rendered.
+        speed: of the stroke [m/s].
+        update_rate: of the loop [Hz]; 1 kHz where it is not known.
+    """
+    texture, contact = surface.texture, surface.law.contact
+    if texture.baked_numbers:
+        return Rendering(FIELD)
+    if not contact.has_warm_start or texture.finds_contacts:
+        return Rendering(FORMULA)
+    update_rate = update_rate or _UPDATE_RATE
+    shape = surface.max_depth, *surface.law_parameters.values(), speed, update_rate
+    content = texture.digest and content_digest(texture.digest, contact.name, *shape)
+    samples, truncated, bound = get_or_compute(
+        "search", content, lambda: _try_search(surface, speed / update_rate)
+    )
+    return Rendering(SEARCH, samples, truncated, bound, speed, update_rate)
+
+
+def _try_search(surface: Surface, step: float) -> tuple[int, int, float]:
+    """Return the samples of a stroke, those with a truncated search, and its error bound [m]."""
+    line, top = surface.texture.scan_line(), surface.texture.extremes[1]
+    along = step * np.arange(_STROKE_SAMPLES)
+    path = np.full((_STROKE_SAMPLES, 3), top - surface.max_depth)
+    path[:, :2] = line.start + along[:, None] * line.direction
+    state = new_warm_start(surface.law.contact.max_evaluations)
+    surface.trace(path, state)
+    return _STROKE_SAMPLES, int(state[TRUNCATED_TICKS]), float(state[MAX_ERROR_BOUND])
 
 
 def rendering_sentences(surface: Surface) -> list[str]:

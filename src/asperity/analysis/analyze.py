@@ -41,7 +41,7 @@ from asperity.core.errors import ParameterError
 from asperity.core.files import attributes_to_dict, to_plain_data
 from asperity.core.units import format_quantity
 from asperity.devices import Device, load_device
-from asperity.rendering import rendered_surface
+from asperity.rendering import Rendering, assess_rendering, rendered_surface
 from asperity.surface import Surface, default_max_depth
 from asperity.textures.catalogue import TextureLike, as_texture
 from asperity.textures.texture import Texture
@@ -103,6 +103,12 @@ class Analysis(Plottable, Reportable):
         return self.passivity.critical_speed
 
     @cached_property
+    def rendering(self) -> Rendering:
+        """How a loop renders the law, at 0.1 m/s."""
+        rate = self.device.value("update_rate")
+        return assess_rendering(self.surface, update_rate=rate)
+
+    @cached_property
     def answer(self) -> str:
         """The verdict in one sentence."""
         surface, passivity = self.surface, self.passivity
@@ -135,7 +141,8 @@ class Analysis(Plottable, Reportable):
         """Used defaults, unverified device data and preparation of the surface, in sentences."""
         surface, leak = self.surface, self.leak
         texture, depth = surface.texture, format_quantity(surface.max_depth, "m")
-        sentences = [*texture.preparation, *_default_sentences(surface)]
+        searched = self.rendering.sentence(surface.law)
+        sentences = [*texture.preparation, *filter(None, [searched]), *_default_sentences(surface)]
         region = texture.domain.description
         if self.extent is not None:
             sides = " x ".join(format_quantity(side, "m") for side in self.extent)
@@ -168,7 +175,7 @@ class Analysis(Plottable, Reportable):
         surface = self.surface
         fields = (
             "device q one_sided curl curl_density conservative conservative_reason leak v_star "
-            "continuity passivity merit assumptions"
+            "continuity passivity merit rendering assumptions"
         )
         return {
             "schema": SCHEMA,

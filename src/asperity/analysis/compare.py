@@ -26,7 +26,7 @@ from asperity.core.files import attributes_to_dict, to_plain_data
 from asperity.core.processes import precompute
 from asperity.devices import Device, load_device
 from asperity.laws import LAWS, Law, distribute_parameters, find_laws
-from asperity.rendering import rendered_surface
+from asperity.rendering import assess_rendering, rendered_surface
 from asperity.surface import Surface
 from asperity.textures.catalogue import TextureLike, as_texture
 from asperity.textures.texture import Texture, TexturePart
@@ -292,4 +292,5 @@ def _compute_row(surface: Surface, query: _ComparisonQuery) -> LawRow:
         support=merit.support,
         contact_lost=merit.contact_lost,
         ripple=merit.ripple,
+        rendering=assess_rendering(surface, query.speed, device.value("update_rate")),
     )

@@ -274,8 +274,9 @@ def comparison_assumptions(
     first = rows[0].surface
     texture = next((row.perceptibility for row in rows if row.perceptibility is not None), None)
     rendered = [text for row in rows for text in rendering_sentences(row.surface)]
+    searched = [row.rendering.sentence(row.law) for row in rows]
     steps = dict.fromkeys((*first.texture.preparation, *rendered))
-    sentences = [*steps, *_default_sentences(rows, defaults)]
+    sentences = [*steps, *filter(None, searched), *_default_sentences(rows, defaults)]
     sentences += form_removal_sentences(texture, part.form, part.waviness)
     sentences += _wall_assumptions(rows, device)
     sentences += _margin_assumptions(rows)

@@ -20,6 +20,7 @@ from asperity.analysis.passivity.verdict import Margin, StabilityLimit
 from asperity.analysis.surface_sentences import leak_energy_text
 from asperity.core.files import attributes_to_dict, to_plain_data
 from asperity.laws import Law
+from asperity.rendering import Rendering
 from asperity.surface import Surface
 
 
@@ -47,6 +48,7 @@ class LawRow:
         support: S, slope of the mean normal force over sup‖J‖ [1].
         contact_lost: fraction of the scan without contact.
         ripple: RMS of the oscillating force per stiffness [m].
+        rendering: how a loop renders the law.
     """
 
     surface: Surface
@@ -64,6 +66,7 @@ class LawRow:
     support: float
     contact_lost: float
     ripple: float
+    rendering: Rendering
 
     def __repr__(self) -> str:
         start = f"start at {self.recommended_stiffness:g} N/m"
@@ -146,6 +149,9 @@ class LawRow:
             parts.append("no texture")
         elif self.perceptibility is not None and self.tier != "felt":
             parts.append(f"{self.tier}: {texture_amount_text(self.perceptibility)}")
+        if self.rendering.truncated:
+            part = 100.0 * self.rendering.truncated / self.rendering.samples
+            parts.append(f"search truncated in {part:.2g} % of samples")
         if self.loses_contact:
             parts.append(f"no contact on {100.0 * self.contact_lost:.0f} % of the scan")
         return "; ".join(parts)
@@ -155,7 +161,7 @@ class LawRow:
         before = "q one_sided stability_limit margin recommended_stiffness"
         after = (
             "conservative conservative_reason leak continuous continuous_reason strength support "
-            "contact_lost texture_force verdict"
+            "contact_lost texture_force rendering verdict"
         )
         return {
             "law": self.law.letter,

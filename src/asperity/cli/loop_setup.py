@@ -79,7 +79,7 @@ def load_setup(
     Raises:
         ParameterError: for a missing, unknown or invalid value.
     """
-    from asperity.rendering import rendered_surface, rendering_sentences
+    from asperity.rendering import assess_rendering, rendered_surface, rendering_sentences
     from asperity.scene import load_scene
     from asperity.scene.setup import make_setup
 
@@ -114,7 +114,8 @@ def load_setup(
     )
     with progress_bar("baking the field") as update:
         rendered = rendered_surface(setup.surface, setup.rendering, progress=update)
-    notes = (*([note] if note else []), *rendering_sentences(rendered))
+    searched = assess_rendering(rendered, update_rate=1.0 / setup.servo.period)
+    notes = filter(None, (note, *rendering_sentences(rendered), searched.sentence(rendered.law)))
     setup = replace(setup, assumptions=(*notes, *setup.assumptions))
     vars(setup)["rendered"] = rendered  # also where nothing is kept in the cache
     return setup

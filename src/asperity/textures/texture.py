@@ -89,7 +89,8 @@ class Texture(Plottable, ABC):
         kind: name of the kind.
         constructor_arguments: declarations of the arguments of the constructor, which are stored as
             attributes of the same names.
-        has_split_formula: whether the sampler evaluates law H without a search.
+        finds_contacts: whether the sampler finds closest points and evaluates law H without a
+            search.
         sample_offset: position of a sample in its cell: 0 at the nodes of a spline, where second
             derivatives are extreme.
         preparation: steps of the preparation of measured heights, as sentences for reports.
@@ -99,7 +100,7 @@ class Texture(Plottable, ABC):
 
     kind: ClassVar[str]
     constructor_arguments: ClassVar[tuple[Argument, ...]] = ()
-    has_split_formula: ClassVar[bool] = False
+    finds_contacts: ClassVar[bool] = False
     sample_offset: ClassVar[float] = 0.5
     preparation: tuple[str, ...] = ()
     filled_mask: NDArray[np.bool_] | None = None

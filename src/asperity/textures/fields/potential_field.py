@@ -95,7 +95,7 @@ class PotentialField(Texture):
     """
 
     kind: ClassVar[str] = "field"
-    has_split_formula: ClassVar[bool] = True
+    finds_contacts: ClassVar[bool] = True
     thin_regions: tuple[ThinRegion, ...] = ()
 
     def __init__(

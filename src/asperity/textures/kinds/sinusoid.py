@@ -42,7 +42,7 @@ class Sinusoid(Texture):
     """
 
     kind: ClassVar[str] = "sinusoid"
-    has_split_formula: ClassVar[bool] = True
+    finds_contacts: ClassVar[bool] = True
     constructor_arguments: ClassVar[tuple[Argument, ...]] = (
         Argument("amplitude", "half of the peak-to-valley height", "m", required=True),
         Argument("period", "wavelength", "m", required=True),
