@@ -9,20 +9,15 @@ from types import ModuleType
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from asperity.contacts.contact import Contact
-from asperity.core.checks import FloatArray, Points
+from asperity.core.checks import FloatArray
 from asperity.core.digests import content_digest
 from asperity.core.errors import ParameterError
 from asperity.core.files import to_plain_data
-from asperity.enclosures.cells import Cells
-from asperity.textures.bounds.bounded_cells import LineSegments
-from asperity.textures.domain import Domain, GridValues, ScanLine
 from asperity.textures.fields.field_grid import FieldGrid
 from asperity.textures.fields.field_sampler import FieldArguments
-from asperity.textures.plane_waves import PlaneWaves
-from asperity.textures.texture import CertifiedNumber, ExactHeight, Texture, TexturePart
+from asperity.textures.texture import CertifiedNumber, Texture
 
 
 @dataclass(frozen=True)
@@ -65,6 +60,11 @@ class ThinRegion:
     at: tuple[float, float, float]
     half_thickness: float
     columns: int
+
+
+def _of_source(name: str) -> property:
+    """Return a property: an attribute or a method of the texture that was baked."""
+    return property(lambda self: getattr(self.source, name), doc="See :class:`Texture`.")
 
 
 class PotentialField(Texture):
@@ -174,80 +174,25 @@ class PotentialField(Texture):
             "periodic": source.domain.periodic,
         }
 
-    def stored_heights(self) -> FloatArray:
-        """See :class:`Texture`: the heights of a spline that was baked [m]."""
-        return self.source.stored_heights()
-
     # --- the texture that was baked ---------------------------------------------------------------
 
-    @cached_property
-    def extremes(self) -> tuple[float, float]:
-        """See :class:`Texture`."""
-        return self.source.extremes
-
-    @cached_property
-    def bounds(self) -> tuple[float, float]:
-        """See :class:`Texture`."""
-        return self.source.bounds
-
-    @cached_property
-    def domain(self) -> Domain:
-        """See :class:`Texture`."""
-        return self.source.domain
-
-    @property
-    def third_derivative_bound(self) -> float:
-        """See :class:`Texture`."""
-        return self.source.third_derivative_bound
-
-    @property
-    def waves(self) -> PlaneWaves | None:
-        """See :class:`Texture`."""
-        return self.source.waves
-
-    @property
-    def is_mirrored(self) -> bool:
-        """See :class:`Texture`."""
-        return self.source.is_mirrored
-
-    def scan_line(self) -> ScanLine:
-        """See :class:`Texture`."""
-        return self.source.scan_line()
-
-    def exact_height(self) -> ExactHeight:
-        """See :class:`Texture`."""
-        return self.source.exact_height()
-
-    def cells(self, extent: tuple[float, float] | None = None, margin: float = 0.0) -> Cells | None:
-        """See :class:`Texture`."""
-        return self.source.cells(extent, margin)
-
-    def line_segments(self, line: ScanLine, min_count: int) -> LineSegments | None:
-        """See :class:`Texture`."""
-        return self.source.line_segments(line, min_count)
-
-    def sample_counts(self) -> list[int]:
-        """See :class:`Texture`."""
-        return self.source.sample_counts()
-
-    def grid_counts(self) -> list[int]:
-        """See :class:`Texture`."""
-        return self.source.grid_counts()
-
-    def samples(self, dense: bool = False) -> GridValues:
-        """See :class:`Texture`."""
-        return self.source.samples(dense)
-
-    def texture_part(self) -> TexturePart:
-        """See :class:`Texture`."""
-        return self.source.texture_part()
-
-    def nearest(self, points: ArrayLike) -> FloatArray:
-        """See :class:`Texture`."""
-        return self.source.nearest(points)
-
-    def _evaluate(self, loop_name: str, xy: ArrayLike, width: int) -> tuple[Points, FloatArray]:
-        return self.source._evaluate(loop_name, xy, width)
+    extremes: Any = _of_source("extremes")
+    bounds: Any = _of_source("bounds")
+    domain: Any = _of_source("domain")
+    third_derivative_bound: Any = _of_source("third_derivative_bound")
+    waves: Any = _of_source("waves")
+    is_mirrored: Any = _of_source("is_mirrored")
+    scan_line: Any = _of_source("scan_line")
+    exact_height: Any = _of_source("exact_height")
+    cells: Any = _of_source("cells")
+    line_segments: Any = _of_source("line_segments")
+    sample_counts: Any = _of_source("sample_counts")
+    grid_counts: Any = _of_source("grid_counts")
+    samples: Any = _of_source("samples")
+    texture_part: Any = _of_source("texture_part")
+    nearest: Any = _of_source("nearest")
+    stored_heights: Any = _of_source("stored_heights")
+    _evaluate: Any = _of_source("_evaluate")
 
     # --- the force that is rendered ---------------------------------------------------------------
 
