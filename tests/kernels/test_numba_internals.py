@@ -38,9 +38,6 @@ USED: dict[str, tuple[Any, str, tuple[str, ...] | None, str]] = {
     "save": (caching._Cache, "save_overload", ("self", "sig", "data"), "MachineCodeCache"),
     "rebuild": (compiler.CompileResult, "_rebuild", None, "MachineCodeCache._load_cached"),
     "reduce": (compiler.CompileResult, "_reduce", ("self",), "MachineCodeCache.save_overload"),
-    "types": (
-        numba_internals, "_compute_call_type", ("self", "context", "args", "kws"), "_get_call_type",
-    ),
     "magic": (codegen.CPUCodegen, "magic_tuple", ("self",), "MachineCodeCache._key"),
 }  # fmt: skip
 
@@ -74,24 +71,6 @@ def test_pipeline_has_one_lowering_pass() -> None:
         steps = [step for step, _description in manager.passes]
         assert steps.count(kind.lowering) == 1, message
         assert typed_passes.NativeLowering not in steps, message
-
-
-def test_types_of_operations_on_numbers_are_computed_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    compute, calls = numba_internals._compute_call_type, []
-
-    def compute_and_count(function: Any, context: Any, args: Any, kws: Any) -> Any:
-        calls.append((str(function), *map(str, args)))
-        return compute(function, context, args, kws)
-
-    monkeypatch.setattr(numba_internals, "_compute_call_type", compute_and_count)
-    monkeypatch.setattr(numba_internals, "_SIGNATURES", {})
-    for text in ("lambda x, y: x * y", "lambda x, y: x * y * y"):
-        function = numba.njit(eval(text))
-        assert type(function(2, 3)) is int
-        assert type(function(2, 0.5)) is float
-    products = [call for call in calls if "mul" in call[0]]
-    assert sorted(map(len, products)) == [3, 3, 3]  # int · int, int · float, float · float
-    assert len(set(products)) == 3
 
 
 def test_numba_dependency_has_an_upper_bound() -> None:

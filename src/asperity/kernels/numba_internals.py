@@ -1,20 +1,16 @@
-"""Everything that uses private parts of Numba: compilers, and caches of types and machine code.
+"""Everything that uses private parts of Numba: two compilers, and a cache of machine code.
 
-Private names: ``BaseFunction.get_call_type``, ``JITCodeLibrary`` with its methods
-``_optimize_final_module``, ``_finalize_final_module``, ``_finalize_dynamic_globals`` and
-``_verify_declare_only_symbols``, ``_dynfunc.make_function``, ``caching._Cache``,
-``Dispatcher._cache`` and ``_compiler``, ``CompileResult._rebuild`` and ``_reduce``. The
-dependency on Numba has an upper bound for their sake, and ``tests/kernels/test_numba_internals.py``
-says which of them a new version changes.
+Private names: ``JITCodeLibrary`` with its methods ``_optimize_final_module``,
+``_finalize_final_module``, ``_finalize_dynamic_globals`` and ``_verify_declare_only_symbols``,
+``_dynfunc.make_function``, ``caching._Cache``, ``Dispatcher._cache`` and ``_compiler``,
+``CompileResult._rebuild`` and ``_reduce``. The dependency on Numba has an upper bound for their
+sake, and ``tests/kernels/test_numba_internals.py`` says which of them a new version changes.
 
 Compilers. Numba optimises each function and generates machine code for it with everything that it
 calls, again at each level of a chain of calls. Only functions that Python calls need that. The
 others are link-only: their code is optimised once, in the loop that they are linked into. Identical
 link-only functions of several modules are lowered once. Loops are compiled for the widest vector
 registers of the processor.
-
-Types. For each operation of a function, Numba tries all declarations of its operator, most of them
-for arrays. The result for numbers depends only on their types, so it is computed once per process.
 
 Cache. Numba's own cache unpickles an index and code without verification: a flipped bit crashes
 every start, a planted file is executed. Here each compiled overload is one entry of
@@ -42,7 +38,6 @@ from numba.core import (
     serialize,
     typed_passes,
 )
-from numba.core import types as numba_types
 
 from asperity.core.cache import (
     cache_folder,
@@ -60,24 +55,6 @@ _Lowering: Any = typed_passes.NativeLowering
 _Compiler: Any = compiler.Compiler
 _Dispatcher: Any = dispatcher.Dispatcher
 _register: Any = compiler_machinery.register_pass
-_BaseFunction: Any = numba_types.BaseFunction
-
-
-_SIGNATURES: dict[tuple[object, ...], Any] = {}
-_compute_call_type = _BaseFunction.get_call_type
-
-
-def _get_call_type(function: Any, context: Any, args: Any, kws: Any) -> Any:
-    """Return the signature of a call of an operator or built-in function; numbers are cached."""
-    if kws or not all(isinstance(kind, (numba_types.Number, numba_types.Boolean)) for kind in args):
-        return _compute_call_type(function, context, args, kws)
-    key = (function, *args)
-    if key not in _SIGNATURES:
-        _SIGNATURES[key] = _compute_call_type(function, context, args, kws)
-    return _SIGNATURES[key]
-
-
-_BaseFunction.get_call_type = _get_call_type
 
 
 class LinkOnlyLibrary(_Library):  # type: ignore[misc]  # see above
