@@ -44,4 +44,5 @@ from asperity.textures import Sinusoid as Sinusoid
 from asperity.textures import load_texture as load_texture
 from asperity.textures import named_surface as named_surface
 from asperity.textures import surface_names as surface_names
+from asperity.textures.fields.field_file import save_field as save_field
 from asperity.textures.fields.potential_field import PotentialField as PotentialField

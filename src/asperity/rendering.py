@@ -22,7 +22,6 @@ from asperity.laws import Law
 from asperity.surface import Surface
 from asperity.textures.fields.bake import BakeGoal, bake_texture
 from asperity.textures.fields.field_certificate import Progress
-from asperity.textures.fields.potential_field import PotentialField
 from asperity.textures.meshes.bake_body import bake_body
 from asperity.textures.meshes.mesh_body import load_mesh
 from asperity.textures.spline.spline_texture import HeightMap
@@ -38,41 +37,15 @@ FORMULA = "formula"
 _AUTOMATIC_BYTES = 2**26
 
 
-def bake(surface: Surface, resolution: float | None = None, **options: Any) -> Surface:
-    """Bake law H of a surface as a potential field: nothing is searched when it is rendered.
-
-    Args:
-        surface: a surface with law H; the field extends down to min h - max_depth.
-        resolution: greatest distance of the nodes [m]; see :func:`bake_field`.
-        **options: of :func:`bake_field`: extent, share, max_gain, max_bytes, progress.
-
-    Returns:
-        The same surface with a :class:`~asperity.textures.fields.potential_field.PotentialField`
-        as its texture.
-
-    Raises:
-        ParameterError: see :func:`bake_field`.
-
-    Example:
-        >>> from asperity.textures.kinds.sinusoid import Sinusoid
-        >>> steep = Surface(Sinusoid(amplitude=0.4e-3, period=1e-3), "H", max_depth=0.5e-3)
-        >>> bake(steep, resolution=10e-6, max_gain=1.1).texture.resolution
-        1e-05
-    """
-    return surface.to_texture(bake_field(surface, resolution, **options))
-
-
-def bake_field(
+def bake(
     surface: Surface,
     resolution: float | None = None,
     *,
     extent: Extent | None = None,
-    share: float = BakeGoal.share,
-    max_gain: float | None = BakeGoal.max_gain,
-    max_bytes: int = BakeGoal.max_bytes,
     progress: Progress | None = None,
-) -> PotentialField:
-    """Return the potential field of law H of a surface.
+    **goal: Any,
+) -> Surface:
+    """Bake law H of a surface as a potential field: nothing is searched when it is rendered.
 
     Args:
         surface: a surface with law H; the field extends down to min h - max_depth.
@@ -80,11 +53,14 @@ def bake_field(
             force differs from exact H by the share, within the size.
         extent: width and depth [m], from the origin, of the part of a texture that never repeats;
             it is mirrored at its border.
-        share: RMS difference from the exact force, over the RMS of the texture's force.
-        max_gain: certified q over max(1, c) at which smoothing of the nodes stops; ``None`` for
-            no smoothing.
-        max_bytes: greatest size of the coefficients.
         progress: called with the finished fraction, from 0 to 1.
+        **goal: ``share``, RMS difference from the exact force over the RMS of the texture's force,
+            0.05; ``max_gain``, certified q over max(1, c) at which smoothing of the nodes stops,
+            1.15, or ``None`` for no smoothing; ``max_bytes``, greatest size, 256 MB.
+
+    Returns:
+        The same surface with a :class:`~asperity.textures.fields.potential_field.PotentialField`
+        as its texture; :func:`asperity.save_field` writes it to a file.
 
     Raises:
         ParameterError: for another law, a texture that neither repeats nor has a border if no
@@ -95,15 +71,16 @@ def bake_field(
     """
     if not surface.law.contact.has_potential_field:
         raise ParameterError("surface", f"must have law H to be baked, not {surface.law}")
-    goal = _goal(share, max_gain, max_bytes)
-    return bake_texture(
+    wanted = _goal(**goal)
+    field = bake_texture(
         surface.texture if extent is None else _finite_part(surface.texture, extent),
         surface.max_depth,
         surface.parameter("continuity"),
         resolution=resolution,
-        goal=goal,
+        goal=wanted,
         progress=progress,
     )
+    return surface.to_texture(field)
 
 
 def bake_mesh(
@@ -115,10 +92,8 @@ def bake_mesh(
     continuity: float = 1.0,
     stiffness: float = DEFAULT_STIFFNESS,
     repair: bool = False,
-    share: float = BakeGoal.share,
-    max_gain: float | None = BakeGoal.max_gain,
-    max_bytes: int = BakeGoal.max_bytes,
     progress: Progress | None = None,
+    **goal: Any,
 ) -> Surface:
     """Bake law H of a closed body as a potential field.
 
@@ -132,10 +107,8 @@ def bake_mesh(
         continuity: c of law H, at least 1.
         stiffness: [N/m].
         repair: whether faults that leave the inside undefined are repaired.
-        share: RMS difference from the exact force, over the RMS force.
-        max_gain: certified q over c at which smoothing stops; ``None`` for no smoothing.
-        max_bytes: greatest size of the coefficients.
         progress: called with the finished fraction, from 0 to 1.
+        **goal: share, max_gain and max_bytes of :func:`bake`; the share is that of the RMS force.
 
     Returns:
         A surface with law H. The heights of its texture are those of the body seen from above, and
@@ -148,20 +121,21 @@ def bake_mesh(
     Reference:
         MATH section 9.
     """
-    goal = _goal(share, max_gain, max_bytes)
+    body, wanted = load_mesh(path, unit, repair=repair), _goal(**goal)
     field = bake_body(
-        load_mesh(path, unit, repair=repair), max_depth, continuity,
-        resolution=resolution, goal=goal, progress=progress,
-    )  # fmt: skip
+        body, max_depth, continuity, resolution=resolution, goal=wanted, progress=progress
+    )
     return Surface(field, "H", stiffness, field.max_depth, continuity=continuity)
 
 
-def _goal(share: float, max_gain: float | None, max_bytes: int) -> BakeGoal:
-    return BakeGoal(
-        check_positive("share", share),
-        math.inf if max_gain is None else check_positive("max_gain", max_gain),
-        int(check_positive("max_bytes", max_bytes, "byte")),
-    )
+def _goal(
+    share: float = BakeGoal.share,
+    max_gain: float | None = BakeGoal.max_gain,
+    max_bytes: int = BakeGoal.max_bytes,
+) -> BakeGoal:
+    gain = math.inf if max_gain is None else check_positive("max_gain", max_gain)
+    size = int(check_positive("max_bytes", max_bytes, "byte"))
+    return BakeGoal(check_positive("share", share), gain, size)
 
 
 def is_searched(surface: Surface) -> bool:
@@ -199,12 +173,15 @@ def rendered_surface(
     content = texture.digest and content_digest(
         texture.digest, surface.max_depth, surface.parameter("continuity"), *(extent or ())
     )
-    field: Texture = get_or_compute(
-        "field",
-        content,
-        lambda: bake_field(surface, extent=extent, max_bytes=_AUTOMATIC_BYTES, progress=progress),
+    return surface.to_texture(
+        get_or_compute(
+            "field",
+            content,
+            lambda: (
+                bake(surface, extent=extent, max_bytes=_AUTOMATIC_BYTES, progress=progress).texture
+            ),
+        )
     )
-    return surface.to_texture(field)
 
 
 @dataclass(frozen=True)

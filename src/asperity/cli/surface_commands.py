@@ -113,7 +113,7 @@ def bake_command(
     The rendered force is the negative gradient of the field. It is conservative and continuous,
     has a certified gain, and needs no search. Other commands accept the file as SURFACE.
     """
-    from asperity.rendering import bake_field
+    from asperity.rendering import bake
     from asperity.scene import load_scene
     from asperity.surface import Surface
     from asperity.textures.fields.field_file import save_field
@@ -124,8 +124,8 @@ def bake_command(
         scene = load_scene(surface, file_values(values))
         given = provided_values(values, (MAX_DEPTH, SHIPPED_LAW_ARGUMENTS["continuity"]))
         options = provided_values(values, _BAKE)
-        field = bake_field(Surface(scene.texture, "H", **given), progress=update, **options)
-        save_field(output, field)
+        baked = bake(Surface(scene.texture, "H", **given), progress=update, **options)
+        field = save_field(output, baked.texture)
     from asperity.report.measured_report import field_page
 
     outputs.write(field.describe(), field_page(field, output))

@@ -294,18 +294,11 @@ def removed_text(stage: PreparationStage) -> str:
 
 def field_page(field: PotentialField, path: str) -> page.Page:
     """Return the numbers of a baked field, for a terminal, and the path of its file."""
-    accuracy, spacing = field.accuracy, max(field.grid.spacing)
-    smoothing = f"smoothed {field.passes} times" if field.passes else "not smoothed"
-    facts = [
-        ("Nodes", f"{field.arguments.c.size}, {format_quantity(spacing, 'm')} apart, {smoothing}"),
-        ("Size", f"{field.bytes / 1e6:.3g} MB"),
-        ("q", f"at most {field.gain.upper:.4g}, certified; attained {field.gain.lower:.4g}"),
-        ("q⁺", f"at most {field.one_sided.upper:.4g}"),
-        ("Difference", f"{100.0 * accuracy.share:.2g} % RMS of the texture's force, measured"),
-        ("", f"at most {format_quantity(accuracy.bound, 'm')} times the stiffness, proved"),
-        ("Valid", f"down to z = {format_quantity(field.grid.floor, 'm')}"),
-        ("Saved", escape_unprintable(path)),
-    ]
-    width = max(len(name) for name, _text in facts)
-    blocks = [page.Paragraph(f"{name:<{width}}  {text}", "code") for name, text in facts]
-    return page.Page("", "", (), [page.terminal_section(*blocks)])
+    size, floor = f"{field.bytes / 1e6:.3g} MB", format_quantity(field.grid.floor, "m")
+    bound = format_quantity(field.accuracy.bound, "m")
+    texts = (
+        f"{field.preparation[-1]}; at most {bound} times the stiffness from it, proved.",
+        f"q⁺ at most {field.one_sided.upper:.4g}. The numbers hold down to z = {floor}. {size}.",
+        f"Saved: {escape_unprintable(path)}",
+    )
+    return page.Page("", "", (), [page.terminal_section(*map(page.Paragraph, texts))])

@@ -62,16 +62,21 @@ BuildTexture = Callable[[Mapping[str, Any]], Texture]
 """Builds the texture of a description; see :meth:`Texture.describe`."""
 
 
-def save_field(path: str | os.PathLike[str], field: PotentialField) -> None:
+def save_field(path: str | os.PathLike[str], field: Texture) -> PotentialField:
     """Save a baked field; the file is written atomically.
 
     Args:
         path: the file to write; an existing one is replaced.
-        field: the field.
+        field: the texture of a baked surface.
+
+    Returns:
+        The field.
 
     Raises:
-        ParameterError: if it cannot be written.
+        ParameterError: if it is no baked field, or cannot be written.
     """
+    if not isinstance(field, PotentialField):
+        raise ParameterError("field", "must be the texture of a baked surface", field)
     header, sections = _encode(field)
     try:
         with open_atomic(path, durable=True) as stream:
@@ -82,6 +87,7 @@ def save_field(path: str | os.PathLike[str], field: PotentialField) -> None:
     except OSError as error:
         reason = f"cannot be written: {error.strerror or error}"
         raise ParameterError("output", reason, os.fspath(path)) from None
+    return field
 
 
 def _encode(field: PotentialField) -> tuple[NDArray[Any], list[tuple[int, bytes]]]:
