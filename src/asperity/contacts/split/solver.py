@@ -418,14 +418,38 @@ def split_compute_atoms(
         The number of atoms, the duality gap [m²], the evaluations, and whether the search was
         truncated: the force is exact to k √(2 (1 + c) gap).
     """
-    mu = 1.0 / (1.0 + continuity)
-    a = local_array((7, 10))
-    at = local_array((3,))
     p[0] = x
     p[1] = y
     p[2] = z
+    count, gap, evaluations, truncated, failed = split_iterate(
+        p, atoms, offset, continuity, warm_count, budget, True, texture
+    )
+    if failed and evaluations < budget:
+        # Newton's method moved the atoms to where no weights are better: again without it.
+        none: Any = np.int64(0)
+        count, gap, taken, truncated, failed = split_iterate(
+            p, atoms, offset, continuity, none, budget - evaluations, False, texture
+        )
+        evaluations += taken
+    return count, gap, evaluations, truncated or failed
+
+
+def split_iterate(
+    p: FloatArray, atoms: FloatArray, offset: FloatArray, continuity: float, warm_count: int,
+    budget: float, newton: bool, texture: object,
+) -> tuple[int, float, float, bool, bool]:  # fmt: skip
+    """Write atoms and z̄ - p at p, with or without Newton's method; see ``split_compute_atoms``.
+
+    Returns:
+        The number of atoms, the duality gap [m²], the evaluations, whether the search was
+        truncated, and whether it ended without convergence.
+    """
+    mu = 1.0 / (1.0 + continuity)
+    a = local_array((7, 10))
+    at = local_array((3,))
     scale = abs(p[0]) + abs(p[1]) + abs(p[2])
     reserve = 2.0 * SHORT_SEARCH * evaluation_cost(texture)
+    share = 0.1 * budget if newton else 0.0
     doubts = 0
     stuck = False
     count, solved, evaluations = split_initialize(
@@ -445,22 +469,21 @@ def split_compute_atoms(
         if converged:
             doubts += 1
             if solved > 0 or doubts > 6 or single or error_bound > 0.0:
-                return count, gap, evaluations, error_bound > 0.0
+                return count, gap, evaluations, error_bound > 0.0, False
         if is_last:
-            return count, gap, evaluations, True
+            return count, gap, evaluations, True, False
         left = split_solve_weights(atoms, count + 1, p, mu, a)
         if left == 0 and is_final:
             break  # by rounding: there are no better weights
         stuck = left == 0
-        if stuck:
-            continue
-        count = left
-        solved, taken = split_update_dual(
-            atoms, count, p, at, offset, continuity, a, 0.1 * budget, texture
-        )
-        evaluations += taken
-        count = solved if solved > 0 else count
-    return count, gap, evaluations, gap > 1e3 * rounding
+        if not stuck:
+            count = left
+            solved, taken = split_update_dual(
+                atoms, count, p, at, offset, continuity, a, share, texture
+            )
+            evaluations += taken
+            count = solved if solved > 0 else count
+    return count, gap, evaluations, False, gap > 1e3 * rounding
 
 
 def split_query_error(
