@@ -13,6 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 
 from asperity.analysis import characteristic_number, loop_work, one_sided_number
 from asperity.analysis.split.split_state import pop_through, split_state
@@ -20,7 +21,7 @@ from asperity.core.errors import ParameterError
 from asperity.laws import Law
 from asperity.surface import Surface
 from asperity.textures.kinds.sinusoid import Sinusoid
-from asperity.textures.spline.spline_texture import Profile
+from asperity.textures.spline.spline_texture import HeightMap, Profile
 from asperity.textures.texture import Texture
 
 K, PERIOD = 800.0, 1e-3
@@ -386,3 +387,12 @@ def test_probe_is_beyond_the_pop_through_depth_of_a_plate() -> None:
     points = [[x, y, plate.highest - share * plate.depth]
               for x, y in ((-5e-3, 0.0), (5e-3, -1.0)) for share in (0.999, 1.001)]  # fmt: skip
     assert plate.beyond(points).tolist() == [False, True, False, True]
+
+
+def test_search_that_newtons_method_leads_astray_converges() -> None:
+    """Once the solver ended here with a duality gap of 2.6 % of the potential."""
+    noise = gaussian_filter(np.random.default_rng(20240607).standard_normal((1024, 1024)), 6.0)
+    part = (0.1e-3 * noise / noise.std())[180:330, 150:320]
+    texture = HeightMap(part, (50e-6, 50e-6), origin=(150 * 50e-6, 180 * 50e-6))
+    state = split_state(Surface(texture, "H", 1.0), [[0.0117, 0.01265, -0.00048646]])
+    assert state.potential[0] == pytest.approx(1.5423771349e-07, rel=1e-9)
