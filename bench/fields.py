@@ -42,7 +42,7 @@ def surfaces() -> dict[str, tuple[Texture, float]]:
     }
     for count in (8, 32):
         cells = rng.integers(-6, 7, (count, 2))
-        waves = 2.0 * np.pi / 8e-3 * np.where(cells.any(axis=1)[:, None], cells, [1, 2])
+        waves = 2.0 * np.pi / 8e-3 * np.where(np.any(cells, axis=1, keepdims=True), cells, [1, 2])
         amplitudes = np.full(count, 1.6e-4 / np.sqrt(count))
         result[f"{count} waves"] = (Fourier(amplitudes, waves, rng.uniform(0, 6, count)), 40e-6)
     return result

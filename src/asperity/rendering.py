@@ -173,15 +173,12 @@ def rendered_surface(
     content = texture.digest and content_digest(
         texture.digest, surface.max_depth, surface.parameter("continuity"), *(extent or ())
     )
-    return surface.to_texture(
-        get_or_compute(
-            "field",
-            content,
-            lambda: (
-                bake(surface, extent=extent, max_bytes=_AUTOMATIC_BYTES, progress=progress).texture
-            ),
-        )
-    )
+
+    def compute() -> Texture:
+        options: Any = {"extent": extent, "progress": progress, "max_bytes": _AUTOMATIC_BYTES}
+        return bake(surface, **options).texture
+
+    return surface.to_texture(get_or_compute("field", content, compute))
 
 
 @dataclass(frozen=True)
@@ -259,9 +256,9 @@ def _try_search(surface: Surface, step: float) -> tuple[int, int, float]:
     return _STROKE_SAMPLES, int(state[TRUNCATED_TICKS]), float(state[MAX_ERROR_BOUND])
 
 
-def rendering_sentences(surface: Surface) -> list[str]:
+def rendering_sentences(surface: Surface) -> tuple[str, ...]:
     """Return how a surface is rendered, in one sentence, where law H was baked."""
-    return [surface.texture.preparation[-1]] if surface.texture.baked_numbers else []
+    return surface.texture.preparation[-1:] if surface.texture.baked_numbers else ()
 
 
 def _finite_part(texture: Texture, extent: Extent) -> Texture:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import sys
 import warnings
+from pathlib import Path
 from typing import Any, NoReturn
 
 import click
@@ -13,6 +14,7 @@ import asperity
 from asperity.cli.plugins import plugin_error_text
 from asperity.core.cache import CacheWarning, size_limit
 from asperity.core.errors import AsperityError, ParameterError, print_message
+from asperity.core.files import read_toml
 
 
 def check_not_repeated(
@@ -54,29 +56,7 @@ class StrictGroup(click.Group):
 
 BAD_INPUT = AsperityError.exit_code
 
-COMMANDS = {
-    "analyze": ("analysis", "Analyze one law on a surface and a device."),
-    "bake": ("surface", "Bake law H of a surface as a potential field."),
-    "cache": ("setup", "Show or clear the cache."),
-    "calibrate": ("device", "Calibrate a device: stiffest wall, resolution, delay, damping."),
-    "compare": ("analysis", "Compare all laws on a surface and recommend one with its stiffness."),
-    "devices": ("device", "List devices and the source of each value."),
-    "export": ("export", "Export a surface and its law as C code."),
-    "init": ("setup", "Write a template scene file."),
-    "lab": ("servo", "Run a texture interactively in a browser."),
-    "limits": ("analysis", "Report which wavelengths of a surface are perceptible on a device."),
-    "maps": ("export", "Write a height map or a normal map."),
-    "onset": ("simulation", "Simulate the onset of limit cycles for each law and delay."),
-    "prepare": ("surface", "Prepare a measured surface and write it to a file."),
-    "recording": ("recording", "Show, plot, export or replay a recording."),
-    "reproduce": ("paper", "Report which claims of the paper hold, with their evidence."),
-    "run": ("servo", "Run a surface in real time on a simulated or real device."),
-    "scan": ("simulation", "Simulate strokes and report their energy by speed and depth."),
-    "show": ("surface", "Report roughness parameters after each preparation step."),
-    "simulate": ("simulation", "Simulate texture, device and hand in a closed loop."),
-    "surfaces": ("surface", "List texture kinds and named surfaces."),
-    "warm": ("setup", "Compile the shipped laws in advance."),
-}
+COMMANDS = read_toml("commands", Path(__file__).with_name("commands.toml"))
 """Each command's module ``cli/MODULE_commands.py`` and summary; it is ``NAME_command`` there."""
 
 

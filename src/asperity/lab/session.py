@@ -335,12 +335,9 @@ class Session:
         Raises:
             ParameterError: for a surface that cannot be baked.
         """
-        if "rendered" in vars(setup) or not setup.is_baked:
-            return True
         with ThreadPoolExecutor(1) as pool:
-            baking = pool.submit(lambda: setup.rendered)
-            done = self._is_done(baking, "baking law H as a potential field")
-        return done and baking.result() is setup.rendered
+            baking = pool.submit(getattr, setup, "rendered")
+            return self._is_done(baking, "baking law H") and bool(baking.result())
 
     def _is_done(self, work: Future[Any], text: str) -> bool:
         """Wait for work in the background while polling the loop; false if the loop ended."""

@@ -19,7 +19,7 @@ from asperity.devices import Device, load_device
 from asperity.devices.device_file import to_device_toml
 from asperity.laws import Law, distribute_parameters, find_law
 from asperity.recording.replay import file_digest
-from asperity.rendering import is_searched, rendered_surface
+from asperity.rendering import rendered_surface
 from asperity.scene import scene_defaults, sections
 from asperity.scene.scene_file import Scene
 from asperity.servo import safety
@@ -69,11 +69,6 @@ class Setup:
     files: tuple[Path, ...] = ()
     safety: Safety = safety.DEFAULT_SAFETY
     rendering: str = FIELD
-
-    @property
-    def is_baked(self) -> bool:
-        """Whether the loop renders law H as a baked field."""
-        return self.rendering == FIELD and is_searched(self.surface)
 
     @cached_property
     def rendered(self) -> Surface:

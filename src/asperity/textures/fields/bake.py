@@ -23,10 +23,6 @@ from asperity.textures.fields.node_potentials import (
 from asperity.textures.fields.potential_field import FieldAccuracy, PotentialField, certified_number
 from asperity.textures.texture import Texture
 
-DEFAULT_MAX_BYTES = 2**28
-DEFAULT_SHARE = 0.05
-"""Default of the RMS difference from exact H, over the RMS of the texture's force."""
-DEFAULT_MAX_GAIN = 1.15
 _MAX_PASSES = 4
 PROBES = 1024
 """Number of probes at which the difference from exact H is measured."""
@@ -45,9 +41,9 @@ class BakeGoal:
         max_bytes: greatest size of the coefficients.
     """
 
-    share: float = DEFAULT_SHARE
-    max_gain: float = DEFAULT_MAX_GAIN
-    max_bytes: int = DEFAULT_MAX_BYTES
+    share: float = 0.05
+    max_gain: float = 1.15
+    max_bytes: int = 2**28
 
     @property
     def passes(self) -> int:
