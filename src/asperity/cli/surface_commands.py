@@ -97,23 +97,22 @@ _BAKE = command_arguments("bake")
 
 @click.command("bake")
 @click.argument("surface")
-@click.option(
-    "-o", "--output", metavar="PATH", required=True, help="File to write ('surface.field')."
-)
+@click.option("-o", "--output", metavar="PATH", required=True, help="File to write.")
+@click.option("--body", is_flag=True, help="SURFACE is the mesh of a closed body; needs --unit.")
 @click.option("--force", is_flag=True, help="Replace an existing file.")
 @argument_options((*_BAKE, MAX_DEPTH, SHIPPED_LAW_ARGUMENTS["continuity"]))
 @plugin_option
 @file_options
 @output_options(html=False)
 def bake_command(
-    surface: str, output: str, *, force: bool, outputs: Outputs, **values: Any
+    surface: str, output: str, *, body: bool, force: bool, outputs: Outputs, **values: Any
 ) -> None:
     """Bake law H of SURFACE as a potential field, and write it to a file.
 
     The rendered force is the negative gradient of the field. It is conservative and continuous,
     has a certified gain, and needs no search. Other commands accept the file as SURFACE.
     """
-    from asperity.rendering import bake
+    from asperity.rendering import bake, bake_mesh
     from asperity.scene import load_scene
     from asperity.surface import Surface
     from asperity.textures.fields.field_file import save_field
@@ -121,10 +120,13 @@ def bake_command(
     check_outputs(output=output, json=outputs.json)
     check_not_existing("output", output, force=force)
     with progress_bar("baking the field") as update:
-        scene = load_scene(surface, file_values(values))
         given = provided_values(values, (MAX_DEPTH, SHIPPED_LAW_ARGUMENTS["continuity"]))
         options = provided_values(values, _BAKE)
-        baked = bake(Surface(scene.texture, "H", **given), progress=update, **options)
+        if body:
+            baked = bake_mesh(surface, progress=update, **file_values(values), **given, **options)
+        else:
+            texture = load_scene(surface, file_values(values)).texture
+            baked = bake(Surface(texture, "H", **given), progress=update, **options)
         field = save_field(output, baked.texture)
     from asperity.report.measured_report import field_page
 

@@ -294,11 +294,10 @@ def removed_text(stage: PreparationStage) -> str:
 
 def field_page(field: PotentialField, path: str) -> page.Page:
     """Return the numbers of a baked field, for a terminal, and the path of its file."""
-    size, floor = f"{field.bytes / 1e6:.3g} MB", format_quantity(field.grid.floor, "m")
-    bound = format_quantity(field.accuracy.bound, "m")
+    floor, bound = (format_quantity(x, "m") for x in (field.grid.floor, field.accuracy.bound))
     texts = (
         f"{field.preparation[-1]}; at most {bound} times the stiffness from it, proved.",
-        f"q⁺ at most {field.one_sided.upper:.4g}. The numbers hold down to z = {floor}. {size}.",
+        f"q⁺ at most {field.one_sided.upper:.4g}. Valid down to z = {floor}. {field.bytes} bytes.",
         f"Saved: {escape_unprintable(path)}",
     )
     return page.Page("", "", (), [page.terminal_section(*map(page.Paragraph, texts))])

@@ -1,0 +1,63 @@
+"""The command ``bake``: a field of a surface or a body, and what other commands make of it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+import trimesh
+from click.testing import CliRunner, Result
+
+from asperity.cli.main import cli
+from asperity.surface import Surface
+
+SURFACE = "fourier:amplitudes=40um;30um,wavevectors=6000rad/m 0;0 5000rad/m"
+
+
+def call(*arguments: object) -> Result:
+    return CliRunner().invoke(cli, [str(one) for one in arguments])
+
+
+def test_field_of_a_surface_is_accepted_by_other_commands(tmp_path: Path) -> None:
+    path = tmp_path / "waves.field"
+    result = call("bake", SURFACE, "-o", path, "--resolution", "40um", "--json", "-")
+    assert result.exit_code == 0, result.output
+    numbers = json.loads(result.output)
+    assert numbers["kind"] == "field"
+    analysis = call("analyze", path, "--law", "H", "--json", "-")
+    assert json.loads(analysis.output)["q"]["upper"] == numbers["gain"]["upper"] > 1.0
+    comparison = call("compare", path, "--json", "-")
+    assert comparison.exit_code == 0
+    assert '"law": "H"' in comparison.output
+    assert '"law": "A"' not in comparison.output
+
+
+def test_existing_file_is_kept(tmp_path: Path) -> None:
+    path = tmp_path / "waves.field"
+    path.write_text("mine")
+    result = call("bake", SURFACE, "-o", path)
+    assert isinstance(result.exception, ValueError)
+    assert "--force" in str(result.exception)
+    assert path.read_text() == "mine"
+
+
+def test_body_needs_a_unit_and_renders_its_side(tmp_path: Path) -> None:
+    mesh, path = tmp_path / "box.stl", tmp_path / "box.field"
+    trimesh.creation.box((10.0, 8.0, 6.0)).export(mesh)
+    refused = call("bake", mesh, "--body", "-o", path)
+    assert "unit" in str(refused.exception)
+    assert not path.exists()
+    options = ["--unit", "mm", "--resolution", "0.25mm", "--max-depth", "0.5mm"]
+    result = call("bake", mesh, "--body", *options, "-o", path)
+    assert result.exit_code == 0, result.output
+    force = Surface(path, "H", 1000.0).force([[5e-3 - 0.4e-3, 0.0, 0.0]])[0]
+    assert force == pytest.approx([0.4, 0.0, 0.0], abs=0.02)
+
+
+@pytest.mark.parametrize("content", [b"ASPFIELD", b"ASPFIELD" + bytes(400)])
+def test_damaged_field_is_refused(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "bad.field"
+    path.write_bytes(content)
+    result = call("compare", path)
+    assert "bad.field" in str(result.exception)
