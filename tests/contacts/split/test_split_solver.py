@@ -7,9 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from asperity.clamps import NONE
 from asperity.contacts.split import solver
 from asperity.core.checks import FloatArray
 from asperity.core.compiled import EPS
+from asperity.kernels.fuse import fuse_surface
+from asperity.laws import LAWS
+from asperity.textures.library import named_surface
 
 RNG = np.random.default_rng(33)
 P, Y = np.array([0.1, 0.2, -0.9]), np.array([0.3, -0.2, -0.5])
@@ -238,3 +242,18 @@ def test_search_for_a_closer_point_ends_with_the_first(
         count = 1 if is_final else stage_with_progress + 1
         assert calls == expected[:count]
         assert error_bound == (0.0 if is_final else (np.inf, 0.5, 0.0)[stage_with_progress])
+
+
+def test_steps_of_newtons_method_that_do_not_shrink_are_not_a_solution() -> None:
+    """At this probe on cloth Newton's method stalls far from the solution.
+
+    Accepted, its y led to atoms without weight, and the search ended with 4 % too much potential.
+    """
+    texture = named_surface("cloth")
+    z = -7.171628434352647e-05
+    points, out = np.array([[1.2e-3, 8.8e-4, z], [1.2e-3, 8.8e-4, z - 1e-7]]), np.empty((2, 3))
+    loops = fuse_surface(LAWS["H"], texture.sampler, NONE)
+    loops.split_batch(points, out, 1.0, texture.arguments)
+    assert (out[:, 1] == 3).all()
+    assert (out[:, 2] < 1e-12 * out[:, 0]).all()
+    assert out[0, 0] == pytest.approx(7.63001e-9, rel=1e-5)
