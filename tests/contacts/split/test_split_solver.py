@@ -142,7 +142,7 @@ def test_dual_point_and_mean_follow_from_each_other(
         (0, True, ["query", "settle 1"], (1, 0, 9.0)),
         (1, True, ["follow", "settle 1"], (1, 0, 4.0)),
         (1, False, ["follow", "query", "settle 1"], (1, 0, 13.0)),
-        (3, True, ["weights 3", "settle 3"], (3, 2, 6.0)),
+        (3, True, ["weights 3", "settle 3"], (2, 2, 6.0)),
         (3, False, ["weights 3", "settle 3"], (3, 0, 6.0)),
         (2, True, ["weights 2", "settle 2"], (2, 2, 6.0)),
     ],

@@ -320,7 +320,7 @@ def split_initialize(
         solved, evaluations = split_update_dual(
             atoms, warm_count, p, y, offset, continuity, a, 0.25 * budget, texture
         )
-        return warm_count, solved, evaluations
+        return (solved if solved > 0 else warm_count), solved, evaluations
     found = False
     evaluations = 0.0
     max_steps: Any = np.int64(25)
