@@ -266,8 +266,8 @@ def test_certificates_of_a_user_defined_kind_are_not_cached(texture: Any) -> Non
 
 
 def test_comparison_analysis_and_limits_in_python(texture: Any) -> None:
-    result = asp.compare(texture, device="omega.3", laws="WABCDEFG", max_depth=DEPTH)
-    assert [row.law.letter for row in result.rows] == list("WABCDEFG")
+    result = asp.compare(texture, device="omega.3", laws="WCDF", max_depth=DEPTH)
+    assert [row.law.letter for row in result.rows] == list("WCDF")
     data = json.loads(json.dumps(result.to_dict(), allow_nan=False))
     assert data["texture"]["kind"] == "egg-box"
     assert "egg-box" in html_text(result)
@@ -319,7 +319,7 @@ MODULE = ("--plugin", str(EXAMPLE))
 
 def test_every_command_accepts_the_kind(read_json: Answer, call: Call, tmp_path: Path) -> None:
     page = tmp_path / "report.html"
-    arguments = ("compare", SPECIFICATION, "--laws", "AC", "--html", str(page))
+    arguments = ("compare", SPECIFICATION, "--laws", "C", "--html", str(page))
     assert read_json(*arguments, *MODULE)["texture"]["kind"] == "egg-box"
     assert "egg-box" in page.read_text(encoding="utf-8")
     surfaces = read_json("surfaces", "egg-box", *MODULE)["surfaces"]
