@@ -30,7 +30,6 @@ from asperity.textures.texture import Texture
 Extent = Sequence[float]
 _NODES_PER_WAVE = 16
 DEFAULT_SPEED = 0.1  # [m/s]
-_UPDATE_RATE = 1000.0
 _STROKE_SAMPLES = 4000
 FORMULA = "formula"
 # Greatest size of a field that is baked without being asked for: some ten seconds.
@@ -236,7 +235,7 @@ def assess_rendering(
         return Rendering(FIELD)
     if not contact.has_warm_start or texture.finds_contacts:
         return Rendering(FORMULA)
-    update_rate = update_rate or _UPDATE_RATE
+    update_rate = update_rate or 1000.0
     shape = surface.max_depth, *surface.law_parameters.values(), speed, update_rate
     content = texture.digest and content_digest(texture.digest, contact.name, *shape)
     samples, truncated, bound = get_or_compute(
