@@ -73,7 +73,9 @@ def test_headline_of_a_sinusoid(amplitude: float, period: float, name: str, expe
 
 @pytest.mark.parametrize(("spec", "name"), OTHERS)
 def test_headline_of_a_library_surface(spec: str, name: str) -> None:
-    result = compare(load_scene(spec).texture, name, "CH")
+    # The rough ones take long to bake, and bake to the same headline.
+    rendering = "field" if spec == "knurl" else "search"
+    result = compare(load_scene(spec).texture, name, "CH", rendering=rendering)
     assert headline(result) == OTHERS[spec, name]
 
 
@@ -135,7 +137,8 @@ REAL = [
 def test_headline_of_a_measured_surface(
     name: str, magnify: float, device: str, expected: str
 ) -> None:
-    result = compare(load_texture(DATA / name, magnify=magnify), device, "CH")
+    texture = load_texture(DATA / name, magnify=magnify)
+    result = compare(texture, device, "CH", rendering="search")
     assert headline(result) == expected
     row = result.recommended_row or result.nearest_row
     assert row is not None

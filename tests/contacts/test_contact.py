@@ -97,7 +97,7 @@ def test_depth_code_uses_half_the_budget_of_a_tick() -> None:
     """It searches the closest point from below the probe; a tick has 1500 evaluations."""
     assert LAWS["D"].contact.max_evaluations == 1500.0
     code = LAWS["D"].contact.depth_code()
-    assert code[-2].endswith("= closest_point_within_budget(x, y, z, x, y, 300.0, texture)")
+    assert code[-2].endswith("= closest_point_within_budget(x, y, z, x, y, 750.0, texture)")
     assert code[:2] == ["if not sample_height(x, y, texture) - z > 0.0:", "    return 0.0"]
     assert LAWS["A"].contact.depth_code()[-1] == "return depth"
 
@@ -347,11 +347,11 @@ def test_line_search_out_of_budget_relaxes_its_accuracy(monkeypatch: pytest.Monk
     np.testing.assert_allclose(shares[1:], [(1.0 - 0.25**n) ** 2 for n in (1, 2, 3)], rtol=1e-15)
     assert (best[1], gap, evaluations) == (4.0, 2.0 / 16.0, 100.0)
     monkeypatch.setattr(line_search, "search_line", lambda *_arguments: ((0.0, 4.0, 0.0, 0.0), 7.0))
-    assert line_search.search_line_within_budget(0.0, 2.0, 0.0, 100.0, None)[1:] == (0.0, 43.0)
+    assert line_search.search_line_within_budget(0.0, 2.0, 0.0, 100.0, None)[1:] == (0.0, 68.0)
 
 
 def test_plane_search_out_of_budget_relaxes_its_accuracy(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The first search has half of the budget; the following ones share the rest."""
+    """The first search has three quarters of the budget; the following ones share the rest."""
     searches: list[tuple[float, float]] = []
     point = (0.1, 0.2, 4.0, 0.3, 0.4, 0.5)
     remaining = [0.0, 20.0, 10.0, 0.0]
@@ -367,11 +367,11 @@ def test_plane_search_out_of_budget_relaxes_its_accuracy(monkeypatch: pytest.Mon
     result = plane_within.closest_point_within_budget(0.0, 0.0, 2.0, 0.0, 0.0, 100.0, None)
     shares = [(1.0 - 0.25**n) ** 2 for n in (1, 2, 3)]
     np.testing.assert_allclose([share for share, _ in searches[1:]], shares, rtol=1e-15)
-    assert [budget for _, budget in searches] == [50.0, 50.0, 20.0, 10.0]
+    assert [budget for _, budget in searches] == [75.0, 25.0, 20.0, 10.0]
     assert result == (0.1, 0.2, 0.3, 0.4, 0.5, 2.0 / 16.0, 100.0)
     searches, remaining = [], [7.0]
     result = plane_within.closest_point_within_budget(0.0, 0.0, 2.0, 0.0, 0.0, 100.0, None)
-    assert result == (0.1, 0.2, 0.3, 0.4, 0.5, 0.0, 43.0)
+    assert result == (0.1, 0.2, 0.3, 0.4, 0.5, 0.0, 68.0)
     assert len(searches) == 1
 
 
