@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import itertools
+import math
 
+import numba
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from asperity.core.checks import FloatArray
 from asperity.textures.fields import field_sampler as kernels
 from asperity.textures.fields.field_grid import FieldGrid, SingleArray
 from asperity.textures.fields.field_sampler import MIRRORED, PERIODIC, ZERO, FieldArguments
+from asperity.textures.spline.bspline_kernels import fold_coordinate
 
 STEPS = np.array([[1.1e-5, 0.3e-5], [-0.2e-5, 0.9e-5]])
 BORDERS = [PERIODIC, MIRRORED, ZERO]
@@ -164,6 +167,22 @@ def test_force_is_zero_above_the_height_of_the_sampler(border: int) -> None:
         assert not any(kernels.field_gradient(x, y, top + 1e-15, arguments))
         forces.append(kernels.field_gradient(x, y, top - 1e-8, arguments))
     assert np.any(forces)
+
+
+@pytest.mark.parametrize("border", BORDERS)
+def test_no_place_however_far_is_outside_of_the_table(border: int) -> None:
+    """Rounding may leave nothing of a place far away: its force is that of some place inside."""
+    for u in [sign * m * 10.0**e for sign in (-1, 1) for m in (1.2345, 7.1) for e in range(308)]:
+        assert 0.0 <= kernels.field_fold(u, 7, border)[0] <= 7.0
+    near, sign = kernels.field_fold(-0.25, 7, border)
+    assert (near, sign) == {PERIODIC: (6.75, 1.0), MIRRORED: (0.25, -1.0), ZERO: (0.0, 0.0)}[border]
+
+
+def test_compiled_places_that_are_not_numbers_are_inside_of_the_table() -> None:
+    fold = numba.njit(fold_coordinate)
+    for u in (math.nan, math.inf, -math.inf):
+        for periodic in (True, False):
+            assert fold(u, 7, periodic)[0] == 0.0
 
 
 def test_functions_of_the_contact_repeat_gradient_and_potential() -> None:

@@ -12,6 +12,7 @@ from scipy.ndimage import map_coordinates
 
 from asperity.core.errors import ParameterError
 from asperity.textures import HeightMap, Profile
+from asperity.textures.spline.bspline_kernels import find_cell
 
 Check = Callable[..., Any]
 MAPS = ["map", "steep map", "periodic map"]
@@ -245,3 +246,12 @@ def test_description_has_size_and_preparation():
         "preparation": ["levelled"],
     }
     assert "6 x 4" in repr(texture)
+
+
+@pytest.mark.parametrize("periodic", [True, False])
+def test_no_place_however_far_is_outside_of_the_map(periodic: bool) -> None:
+    """Rounding may leave nothing of a place far away: it is then some place inside."""
+    for u in [sign * m * 10.0**e for sign in (-1, 1) for m in (1.2345, 7.1) for e in range(308)]:
+        cell, place, _sign = find_cell(u, 0.0, 1.0, 7, periodic)
+        assert 0 <= cell < 7
+        assert 0.0 <= place <= 1.0

@@ -10,7 +10,6 @@ value and slope there and the curvature of the flat wall. The field of a closed 
 grid.
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 
 from asperity.core.checks import FloatArray
 from asperity.core.compiled import EVERY_FUNCTION, Kernels
+from asperity.textures.spline.bspline_kernels import fold_coordinate
 
 KERNELS = Kernels(provides=EVERY_FUNCTION)
 
@@ -73,16 +73,9 @@ class FieldArguments(NamedTuple):
 
 def field_fold(u: float, cells: int, border: int) -> tuple[float, float]:
     """Return the coordinate inside [0, cells] and the sign of its derivative, 0 outside."""
-    if 0.0 <= u <= cells:
-        return u, 1.0
-    if border == PERIODIC:
-        return min(u - cells * math.floor(u / cells), float(cells)), 1.0
-    if border == ZERO:
-        return 0.0, 0.0
-    u -= 2.0 * cells * math.floor(u / (2.0 * cells))
-    if u > cells:
-        return max(2.0 * cells - u, 0.0), -1.0
-    return u, 1.0
+    if border != ZERO:
+        return fold_coordinate(u, cells, border == PERIODIC)
+    return (u, 1.0) if 0.0 <= u <= cells else (0.0, 0.0)
 
 
 def field_coordinates(

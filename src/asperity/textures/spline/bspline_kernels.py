@@ -15,22 +15,28 @@ SIXTH = 1.0 / 6.0
 Vector4 = tuple[float, float, float, float]
 
 
+def fold_coordinate(u: float, cells: int, periodic: bool) -> tuple[float, float]:
+    """Return the coordinate inside [0, cells], in cells, and the sign of its derivative.
+
+    Periodic maps repeat; finite ones are mirrored at their border nodes. Where rounding leaves
+    nothing of a place far away, and for NaN, the coordinate is 0: never outside of a table.
+    """
+    if 0.0 <= u <= cells:
+        return u, 1.0
+    sign = 1.0
+    length = float(cells) if periodic else 2.0 * cells
+    u -= length * math.floor(u / length)
+    if u > cells and not periodic:
+        u = length - u
+        sign = -1.0
+    return u if 0.0 <= u <= cells else 0.0, sign
+
+
 def find_cell(
     x: float, start: float, per_metre: float, cells: int, periodic: bool
 ) -> tuple[int, float, float]:
-    """Return the cell index of x, the position in the cell, in [0, 1], and the sign of derivatives.
-
-    Periodic maps repeat; finite ones are mirrored at their border nodes.
-    """
-    u = (x - start) * per_metre
-    sign = 1.0
-    if periodic and not 0.0 <= u <= cells:
-        u = min(u - cells * math.floor(u / cells), float(cells))
-    elif not 0.0 <= u <= cells:
-        u -= 2.0 * cells * math.floor(u / (2.0 * cells))
-        if u > cells:
-            u = max(2.0 * cells - u, 0.0)
-            sign = -1.0
+    """Return the cell of x, the position in it, in [0, 1], and the sign of derivatives by x."""
+    u, sign = fold_coordinate((x - start) * per_metre, cells, periodic)
     i = min(int(u), cells - 1)
     return i, u - i, sign
 
