@@ -147,8 +147,9 @@ class PotentialField(Texture):
     def sampler(self) -> tuple[ModuleType, ...]:
         """See :class:`Texture`."""
         from asperity.textures.fields import field_sampler
+        from asperity.textures.spline import bspline_kernels
 
-        return (field_sampler,)
+        return field_sampler, bspline_kernels
 
     @cached_property
     def arguments(self) -> FieldArguments:
