@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -27,7 +28,8 @@ def test_curvature_bounds_are_the_maximum_over_all_batches(
     """Every column is searched once; positive and negative eigenvalues each by their maximum."""
     seen: list[int] = []
 
-    def hull_batch(first: int, last: int, out: np.ndarray, _field: object) -> None:
+    def hull_batch(first: int, last: int, *rest: Any) -> None:
+        out = rest[2]
         seen.extend(range(first, last))
         for side in range(2):
             size = (3.0 if side == stiffer else 1.0) + (1.0 if first == 16 else 0.0)

@@ -9,6 +9,7 @@ import pytest
 
 from asperity.core.checks import FloatArray
 from asperity.textures.fields import field_curvature as hull
+from asperity.textures.fields.field_certificate import hull_weights
 from asperity.textures.fields.field_grid import FieldGrid
 from asperity.textures.fields.field_sampler import MIRRORED, PERIODIC
 
@@ -65,7 +66,7 @@ def test_hull_bounds_are_the_greatest_bernstein_coefficients(axes: int, border: 
     if axes == 2:
         stored = stored[grid.stored_nodes(1)]
     found = np.zeros((2, 5))
-    hull.hull_batch(0, 4, found, field)
+    hull.hull_batch(0, 4, *hull_weights(field), found, field)
     for sign, result in zip((1.0, -1.0), found, strict=True):
         best, attained = 0.0, {}
         for i, j, m in np.ndindex(max(len(stored) - 2, 1), 4, grid.levels - 2):
@@ -86,9 +87,9 @@ def test_cells_outside_of_the_body_and_of_other_columns_are_skipped() -> None:
     grid, c, _rates = random_grid(2, MIRRORED)
     c[:4] = 0.0
     field, empty = grid.arguments(c), np.full((2, 5), 0.125)
-    hull.hull_batch(0, 2, empty, field)
+    hull.hull_batch(0, 2, *hull_weights(field), empty, field)
     assert (empty == 0.125).all()
-    hull.hull_batch(2, 4, empty, field)
+    hull.hull_batch(2, 4, *hull_weights(field), empty, field)
     assert (empty[:, :2] > 0.125).all()
 
 
@@ -99,12 +100,15 @@ def test_bernstein_coefficients_reproduce_the_spline() -> None:
     basis = np.stack([(1 - u) ** 2, 2 * u * (1 - u), u * u])
     spline = 0.5 * (c0 * (1 - u) ** 2 + c1 * (1 + 2 * u - 2 * u * u) + c2 * u * u)
     slope = c0 * (u - 1) + c1 * (1 - 2 * u) + c2 * u
+    grid, c, _rates = random_grid(1, PERIODIC)
+    field = grid.arguments(c)
+    _plane, upward = hull_weights(field)
     for order, expected in enumerate((spline, slope, np.full(7, c0 - 2 * c1 + c2))):
-        found = [hull.bernstein_coefficient(c0, c1, c2, order, i) for i in range(3)]
-        np.testing.assert_allclose(np.array(found) @ basis, expected, rtol=1e-12, atol=1e-14)
+        found = upward[:, order] @ (c0, c1, c2) / field.iz**order
+        np.testing.assert_allclose(found @ basis, expected, rtol=1e-12, atol=1e-14)
 
 
-def test_eigenvalues_and_pivots_agree_with_lapack() -> None:
+def test_eigenvalues_and_minors_agree_with_lapack() -> None:
     for _ in range(200):
         m = RNG.normal(size=(3, 3))
         m = m + m.T
@@ -112,11 +116,11 @@ def test_eigenvalues_and_pivots_agree_with_lapack() -> None:
         top = float(np.linalg.eigvalsh(m)[-1])
         assert hull.largest_eigenvalue_3x3(*entries) == pytest.approx(top, rel=1e-7)
         for margin, is_below in ((1e-6, True), (-1e-6, False), (-2.0, False), (5.0, True)):
-            assert hull.eigenvalues_below(top + margin * (1.0 + abs(top)), *entries) == is_below
+            assert (hull.least_minor(top + margin * (1.0 + abs(top)), *entries) > 0.0) == is_below
     assert hull.largest_eigenvalue_3x3(2.0, 0.0, 0.0, 2.0, 0.0, 2.0) == 2.0
     diagonal: Any = (1.0, 0.0, 0.0, 1.0, 0.0, 1.0)
-    assert not hull.eigenvalues_below(1.0, *diagonal)
-    assert not hull.eigenvalues_below(1.5, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0)
+    assert hull.least_minor(1.0, *diagonal) <= 0.0
+    assert hull.least_minor(1.5, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0) <= 0.0
 
 
 def test_raise_bound_never_lowers_a_bound() -> None:

@@ -233,8 +233,9 @@ class BakePlan:
         passes, most = 0, self.goal.passes
         while True:
             arguments = grid.arguments(potentials[..., most - passes :])
-            upper, attained = curvature_bounds(grid, arguments, progress)
-            if passes == most or max(upper) <= self.goal.max_gain * self.gain:
+            limit = math.inf if passes == most else self.goal.max_gain * self.gain
+            upper, attained = curvature_bounds(grid, arguments, progress, limit)
+            if max(upper) <= limit:
                 break
             potentials, passes = smooth(potentials, grid), passes + 1
         numbers = [certified_number(float(upper[i]), attained[i]) for i in range(2)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from typing import Any
@@ -20,12 +21,30 @@ CurvatureBounds = tuple[FloatArray, FloatArray]
 # Rounding of a second difference of coefficients, in units of their size, counted generously.
 _DIFFERENCE_ROUNDING = 32.0 * float(np.finfo(np.float64).eps)
 _COLUMNS_PER_PART = 16
+# Weights of three nodes in the Bernstein coefficients of derivatives of order 0, 1, 2.
+_BERNSTEIN = np.array(
+    [
+        [[0.5, 0.5, 0.0], [0.0, 1.0, 0.0], [0.0, 0.5, 0.5]],
+        [[-1.0, 1.0, 0.0], [-0.5, 0.0, 0.5], [0.0, -1.0, 1.0]],
+        [[1.0, -2.0, 1.0]] * 3,
+    ]
+)
 
 
 def curvature_bounds(
-    grid: FieldGrid, field: FieldArguments, progress: Progress | None = None
+    grid: FieldGrid,
+    field: FieldArguments,
+    progress: Progress | None = None,
+    limit: float = math.inf,
 ) -> CurvatureBounds:
     """Return certified bounds of the eigenvalues of Hess T over the whole field.
+
+    Args:
+        grid: the nodes.
+        field: the coefficients.
+        progress: called with the finished fraction.
+        limit: the search ends once an eigenvalue above it is found; then the bounds are those of
+            a part of the field.
 
     Returns:
         Two arrays of shape (2,), for Hess T and for -Hess T: upper bounds of the greatest
@@ -33,14 +52,17 @@ def curvature_bounds(
     """
     from asperity.kernels.fuse import fuse_module
 
-    loops = fuse_module(field_curvature, field_sampler)
+    loops, weights = fuse_module(field_curvature, field_sampler), hull_weights(field)
     width = grid.cells[0] + (0 if grid.border == PERIODIC else 1)
     firsts = range(0, width, _COLUMNS_PER_PART)
     parts = [(first, min(first + _COLUMNS_PER_PART, width)) for first in firsts]
     found = np.zeros((len(parts), 2, 5))
 
     def search(part: int) -> None:
-        loops.hull_batch(*parts[part], found[part], field)
+        # Starting from the bounds of the first part, the others evaluate few cells.
+        found[part] = found[0]
+        if found[:, :, 1].max() <= limit:
+            loops.hull_batch(*parts[part], *weights, found[part], field)
 
     run_in_threads(search, range(len(parts)), progress)
     largest = float(field.c.max()) if field.c.size else 0.0
@@ -49,6 +71,33 @@ def curvature_bounds(
     at = grid.positions(best[:, 2 : 2 + len(grid.cells)])
     attained = np.column_stack([best[:, 1], at, grid.height(best[:, 4])])
     return found[:, :, 0].max(axis=0) + rounding, attained
+
+
+def hull_weights(field: FieldArguments) -> tuple[FloatArray, FloatArray]:
+    """Return the weights of nodes in the Bernstein coefficients of derivatives of T on a cell.
+
+    A derivative of a quadratic B-spline is represented as a polynomial of degree 2 along each axis,
+    whatever its order, so that hulls can be combined.
+
+    Returns:
+        Weights of the 9 columns in ∂xx, ∂xy, ∂yy, ∂x, ∂y and 1 at the 9 coefficients in the plane,
+        (9, 6, 9), those along the second axis first, or (3, 6, 3) for a profile; and of the 3
+        levels in 1, ∂z, ∂zz at the 3 coefficients along z, (3, 3, 3).
+    """
+    along, iz = _BERNSTEIN, field.iz
+    across = along if field.columns.shape[0] > 1 else np.array([1.0, 0.0, 0.0]).reshape(3, 1, 1)
+    size = 3 * across.shape[1]
+
+    def product(v: int, u: int) -> FloatArray:
+        return np.asarray(np.einsum("ea,fb->efab", across[v], along[u])).reshape(size, size)
+
+    rates = np.array([[field.m00, field.m01], [field.m10, field.m11]])
+    second = np.array([[product(0, 2), product(1, 1)], [product(1, 1), product(2, 0)]])
+    second = np.einsum("ra,rs...,sb->ab...", rates, second, rates)
+    first = np.einsum("ra,r...->a...", rates, np.array([product(0, 1), product(1, 0)]))
+    plane = np.stack([second[0, 0], second[0, 1], second[1, 1], *first, product(0, 0)], axis=1)
+    upward = np.stack([along[0], iz * along[1], iz * iz * along[2]], axis=1)
+    return np.ascontiguousarray(plane), upward
 
 
 def run_in_threads(

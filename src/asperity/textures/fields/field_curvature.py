@@ -4,31 +4,30 @@ On each cell a second derivative of the spline is a polynomial of degree 2, whic
 of its Bernstein coefficients, and so does the matrix of them. The greatest eigenvalue is a convex
 function, so no matrix of the hull has a greater one than the coefficients have. A coefficient at a
 corner of the cell is the second derivative there, from inside the cell: it is attained.
+
+The matrices of a run of cells of one column are computed together in vector registers. Most have
+eigenvalues below the bounds found before, which the signs of their leading minors show; only of the
+others are the eigenvalues computed.
+
+The weights of coefficients are those of :func:`field_certificate.hull_weights`.
 """
 
 import math
 
 from asperity.core.checks import FloatArray
 from asperity.core.compiled import Kernels, local_array
-from asperity.textures.fields.field_sampler import FieldArguments, field_hessian, field_triple
+from asperity.textures.fields.field_sampler import END, FIRST, OFFSET, REACH, FieldArguments
 
 KERNELS = Kernels(loops=("hull_batch",), iterates=True)
 
+# Bounds are raised by 2 SLACK above an eigenvalue, and cells tested against bounds SLACK lower, but
+# attained values SLACK higher: equal eigenvalues are not evaluated again.
+SLACK = 1e-7
+# Rounding error of a minor, for second derivatives of about 1.
+MINOR_ROUNDING = 1e-14
 
-def bernstein_coefficient(c0: float, c1: float, c2: float, order: int, index: int) -> float:
-    """Return a Bernstein coefficient of a derivative of a quadratic B-spline on its middle cell.
-
-    All orders are represented as polynomials of degree 2, so that their hulls can be combined.
-    """
-    if order == 2:
-        return c0 - 2.0 * c1 + c2
-    if order == 1:
-        if index == 1:
-            return 0.5 * (c2 - c0)
-        return c1 - c0 if index == 0 else c2 - c1
-    if index == 1:
-        return c1
-    return 0.5 * (c0 + c1) if index == 0 else 0.5 * (c1 + c2)
+# xx, xy, xz, yy, yz, zz.
+Hessian = tuple[float, float, float, float, float, float]
 
 
 def largest_eigenvalue_3x3(
@@ -47,109 +46,120 @@ def largest_eigenvalue_3x3(
     return mean + 2.0 * size * math.cos(math.acos(cosine) / 3.0)
 
 
-def eigenvalues_below(
+def least_minor(
     bound: float, xx: float, xy: float, xz: float, yy: float, yz: float, zz: float
-) -> bool:
-    """Return whether all eigenvalues are below the bound: bound I - H has positive pivots."""
-    p0 = bound - xx
-    if p0 <= 0.0:
-        return False
-    p1 = bound - yy - xy * xy / p0
-    if p1 <= 0.0:
-        return False
-    mixed = -yz - xy * xz / p0
-    return bound - zz - xz * xz / p0 - mixed * mixed / p1 > 0.0
-
-
-def load_coefficients(
-    i: int, j: int, m: int, rows: int, c: FloatArray, field: FieldArguments
-) -> bool:
-    """Write the coefficients around a node (3, 3, 3); return whether any is not zero."""
-    some = False
-    for a in range(rows):
-        for b in range(3):
-            c[a, b, 0], c[a, b, 1], c[a, b, 2] = field_triple(i + a, j + b, m, field)
-            some = some or c[a, b, 0] != 0.0 or c[a, b, 1] != 0.0 or c[a, b, 2] != 0.0
-    return some
-
-
-def hull_entry(
-    c: FloatArray, rows: int, order: tuple[int, int, int], e: int, f: int, g: int
 ) -> float:
-    """Return a Bernstein coefficient of a derivative on a cell."""
-    order_v, order_u, order_w = order
-    columns = (0.0, 0.0, 0.0)
-    for a in range(rows):
-        lines = (0.0, 0.0, 0.0)
-        for b in range(3):
-            value = bernstein_coefficient(c[a, b, 0], c[a, b, 1], c[a, b, 2], order_w, g)
-            lines = (lines[1], lines[2], value)
-        column = bernstein_coefficient(lines[0], lines[1], lines[2], order_u, f)
-        columns = (columns[1], columns[2], column)
-    if rows == 1:
-        return columns[2] if order_v == 0 else 0.0
-    return bernstein_coefficient(columns[0], columns[1], columns[2], order_v, e)
-
-
-def hull_matrix(
-    c: FloatArray, rows: int, e: int, f: int, g: int, field: FieldArguments
-) -> tuple[float, float, float, float, float, float]:
-    """Return one matrix of the Bernstein hull of Hess T on a cell: xx, xy, xz, yy, yz, zz."""
-    vv = hull_entry(c, rows, (2, 0, 0), e, f, g)
-    uv = hull_entry(c, rows, (1, 1, 0), e, f, g)
-    vw = hull_entry(c, rows, (1, 0, 1), e, f, g)
-    uu = hull_entry(c, rows, (0, 2, 0), e, f, g)
-    uw = hull_entry(c, rows, (0, 1, 1), e, f, g)
-    ww = hull_entry(c, rows, (0, 0, 2), e, f, g)
-    return field_hessian(uu, uv, uw, vv, vw, ww, field)
+    """Return the least leading minor of bound I - H: positive if all eigenvalues are below."""
+    a = bound - xx
+    b = bound - yy
+    c = bound - zz
+    middle = a * b - xy * xy
+    return min(a, middle, c * middle - a * yz * yz - b * xz * xz - 2.0 * xy * xz * yz)
 
 
 def raise_bound(
     bound: FloatArray, row: int, corner: bool,
-    hessian: tuple[float, float, float, float, float, float], position: tuple[float, float, float],
+    hessian: Hessian, position: tuple[float, float, float],
 ) -> None:  # fmt: skip
     """Raise the bounds of the greatest eigenvalue in a row of ``bound`` by one matrix of a hull.
 
     It holds the upper bound, the greatest value at a corner of a cell, and that corner.
     """
-    if eigenvalues_below(bound[row, 1] if corner else bound[row, 0], *hessian):
+    if least_minor(bound[row, 1] if corner else bound[row, 0], *hessian) > MINOR_ROUNDING:
         return
     top = largest_eigenvalue_3x3(*hessian)
-    bound[row, 0] = max(bound[row, 0], top * (1.0 + 1e-7))
+    bound[row, 0] = max(bound[row, 0], top * (1.0 + 2.0 * SLACK))
     if corner and top > bound[row, 1]:
         bound[row, 1] = top
         for d in range(3):
             bound[row, 2 + d] = position[d]
 
 
-def hull_cell(
-    i: int, j: int, m: int, c: FloatArray, out: FloatArray, field: FieldArguments
+def load_nodes(
+    i: int, j: int, m: int, count: int, rows: int, nodes: FloatArray, field: FieldArguments
 ) -> None:
-    """Raise the bounds of the eigenvalues of Hess T by one cell; see ``hull_batch``."""
-    rows = min(field.columns.shape[0], 3)
-    for n in range(9 * rows):
-        e, f, g = n // 9, n // 3 % 3, n % 3
-        xx, xy, xz, yy, yz, zz = hull_matrix(c, rows, e, f, g, field)
-        corner = (rows == 1 or e != 1) and f != 1 and g != 1
-        place = (j + 0.5 * f - 0.5, i + (0.5 * e - 0.5 if rows > 1 else 0.0), m + 0.5 * g - 0.5)
-        raise_bound(out, 0, corner, (xx, xy, xz, yy, yz, zz), place)
-        raise_bound(out, 1, corner, (-xx, -xy, -xz, -yy, -yz, -zz), place)
+    """Write the coefficients of the columns around a cell from level m on, (3 rows, count)."""
+    for q in range(3 * rows):
+        a = i + q // 3
+        b = j + q % 3
+        start = field.columns[a, b, OFFSET] + m
+        low = field.columns[a, b, FIRST] - m
+        high = field.columns[a, b, END] - m
+        for k in range(count):
+            nodes[q, k] = field.c[start + k] if low <= k < high else 0.0
 
 
-def hull_batch(first: int, last: int, out: FloatArray, field: FieldArguments) -> None:
-    """Write bounds of the eigenvalues of Hess T over the cells of nodes first to last along x.
+def mix_nodes(nodes: FloatArray, count: int, n: int, plane: FloatArray, mixed: FloatArray) -> None:
+    """Write the weighted sums (6, count) of columns of nodes for coefficient n in the plane."""
+    for t in range(6):
+        for k in range(count):
+            mixed[t, k] = 0.0
+        for q in range(plane.shape[2]):
+            w = plane[n, t, q]
+            if w != 0.0:
+                for k in range(count):
+                    mixed[t, k] += w * nodes[q, k]
+
+
+def hull_matrix(mixed: FloatArray, k: int, w: FloatArray, g: int) -> Hessian:
+    """Return the matrix of coefficient g along z of cell k of a run."""
+    xx = w[g, 0, 0] * mixed[0, k] + w[g, 0, 1] * mixed[0, k + 1] + w[g, 0, 2] * mixed[0, k + 2]
+    xy = w[g, 0, 0] * mixed[1, k] + w[g, 0, 1] * mixed[1, k + 1] + w[g, 0, 2] * mixed[1, k + 2]
+    yy = w[g, 0, 0] * mixed[2, k] + w[g, 0, 1] * mixed[2, k + 1] + w[g, 0, 2] * mixed[2, k + 2]
+    xz = w[g, 1, 0] * mixed[3, k] + w[g, 1, 1] * mixed[3, k + 1] + w[g, 1, 2] * mixed[3, k + 2]
+    yz = w[g, 1, 0] * mixed[4, k] + w[g, 1, 1] * mixed[4, k + 1] + w[g, 1, 2] * mixed[4, k + 2]
+    zz = w[g, 2, 0] * mixed[5, k] + w[g, 2, 1] * mixed[5, k + 1] + w[g, 2, 2] * mixed[5, k + 2]
+    return xx, xy, xz, yy, yz, zz
+
+
+def hull_run(
+    i: int, j: int, m: int, count: int, nodes: FloatArray, plane: FloatArray, upward: FloatArray,
+    mixed: FloatArray, minors: FloatArray, bounds: FloatArray,
+) -> None:  # fmt: skip
+    """Raise the bounds of the eigenvalues of Hess T by a run of cells; see ``hull_batch``."""
+    for n in range(plane.shape[0]):
+        e = 0.5 * (n // 3) - 0.5 if plane.shape[0] > 3 else 0.0
+        f = 0.5 * (n % 3) - 0.5
+        mix_nodes(nodes, count + 2, n, plane, mixed)
+        for g in range(3):
+            corner = g != 1 and f != 0.0 and (e != 0.0 or plane.shape[0] == 3)
+            above = bounds[0, 1] * (1.0 + SLACK) if corner else bounds[0, 0] * (1.0 - SLACK)
+            below = bounds[1, 1] * (1.0 + SLACK) if corner else bounds[1, 0] * (1.0 - SLACK)
+            for k in range(count):
+                xx, xy, xz, yy, yz, zz = hull_matrix(mixed, k, upward, g)
+                other = least_minor(below, -xx, -xy, -xz, -yy, -yz, -zz)
+                minors[k] = min(other, least_minor(above, xx, xy, xz, yy, yz, zz))
+            for k in range(count):
+                if not minors[k] > MINOR_ROUNDING:
+                    xx, xy, xz, yy, yz, zz = hull_matrix(mixed, k, upward, g)
+                    at = (j + f, i + e, m + k + 0.5 * g - 0.5)
+                    raise_bound(bounds, 0, corner, (xx, xy, xz, yy, yz, zz), at)
+                    raise_bound(bounds, 1, corner, (-xx, -xy, -xz, -yy, -yz, -zz), at)
+
+
+def hull_batch(
+    first: int, last: int, plane: FloatArray, upward: FloatArray, bounds: FloatArray,
+    field: FieldArguments,
+) -> None:  # fmt: skip
+    """Raise bounds of the eigenvalues of Hess T by the cells of nodes first to last along x.
 
     Args:
         first: first node along x.
         last: node after the last.
-        out: (2, 5), for Hess T and for its negative: an upper bound of the greatest eigenvalue,
+        plane: weights of the columns around a cell, (9, 6, 9); (3, 6, 3) for a profile.
+        upward: weights along z, (3, 3, 3).
+        bounds: (2, 5), for Hess T and for its negative: an upper bound of the greatest eigenvalue,
             the greatest value at a corner of a cell, and that corner in nodes along x, y, z.
         field: the field.
     """
     rows = min(field.columns.shape[0], 3)
-    c = local_array((3, 3, 3))
+    nodes = local_array((9, 66))
+    mixed = local_array((6, 66))
+    minors = local_array((64,))
     for i in range(field.columns.shape[0] - rows + 1):
         for j in range(first, last):
-            for m in range(1, field.levels - 1):
-                if load_coefficients(i, j, m, rows, c, field):
-                    hull_cell(i, j, m, c, out, field)
+            end = min(int(field.columns[i + rows // 2, j + 1, REACH]) + 1, field.levels - 1)
+            for m in range(1, end, 64):
+                count = min(64, end - m)
+                load_nodes(i, j, m - 1, count + 2, rows, nodes, field)
+                hull_run(i, j, m, count, nodes, plane, upward, mixed, minors, bounds)
