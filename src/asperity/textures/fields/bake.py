@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from asperity.core.units import round_up
 from asperity.laws import LAWS
 from asperity.textures.fields.field_certificate import Progress, curvature_bounds, run_in_threads
 from asperity.textures.fields.field_grid import FieldGrid, SingleArray
+from asperity.textures.fields.field_sampler import quadratic_weight_slopes, quadratic_weights
 from asperity.textures.fields.node_potentials import (
     ColumnFunction,
     compute_potentials,
@@ -26,8 +28,9 @@ from asperity.textures.texture import Texture
 _MAX_PASSES = 4
 PROBES = 1024
 """Number of probes at which the difference from exact H is measured."""
-_TRIAL_PROBES = 100
-_TRIAL_PASSES = 1
+_TRIAL_PROBES = 128
+_TRIAL_COARSENING = 2.5
+_MAX_TRIALS = 12
 _BYTES_PER_NODE = 4
 
 
@@ -78,16 +81,12 @@ def bake_texture(
     if isinstance(texture, PotentialField):
         raise ParameterError("texture", "is a baked field already")
     if not (texture.domain.periodic or texture.is_mirrored):
-        raise ParameterError(
-            "texture", "never repeats: no finite field represents it; give an extent"
-        )
+        reason = "never repeats: no finite field represents it; give an extent"
+        raise ParameterError("texture", reason)
     plan = BakePlan(texture, max_depth, continuity, goal)
-    chosen = plan.choose() if resolution is None else check_positive("resolution", resolution, "m")
-    grid = plan.grid(chosen)
-    plan.check_size(grid)
-    deep = grid.extend_down(goal.passes)
-    potentials = compute_potentials(plan.columns, deep, scale_progress(progress, 0.0, 0.9))
-    return plan.certify(potentials, grid, scale_progress(progress, 0.9, 0.1))
+    if resolution is not None:
+        return plan.bake(check_positive("resolution", resolution, "m"), progress)
+    return plan.bake_coarsest(progress)
 
 
 def scale_progress(progress: Progress | None, start: float, size: float) -> Progress | None:
@@ -102,26 +101,27 @@ class BakePlan:
         self, texture: Texture, max_depth: float, continuity: float, goal: BakeGoal
     ) -> None:
         self.texture, self.max_depth, self.continuity = texture, max_depth, continuity
-        self.goal, self.gain = goal, max(1.0, continuity)
-        self.lipschitz = self.gain
+        self.goal = goal
+        self.gain = self.lipschitz = max(1.0, continuity)
         self.columns: ColumnFunction = split_columns(texture, continuity)
         self._law_arguments = (1.0, 0.0, 1.0, max_depth, 0.0, continuity)
         self.probes = self._random_probes(PROBES)
-        self.force = self._exact_force(self.probes)
-        self.texture_rms = self._texture_force()
+        self.force = self._force(texture, self.probes)
+        level = np.column_stack([self.probes[:, :2], np.full(PROBES, texture.extremes[0])])
+        force = self._force(texture, level)
+        self.texture_rms = float(np.sqrt(np.square(force - force.mean(axis=0)).sum(axis=1).mean()))
 
     def grid(self, resolution: float) -> FieldGrid:
         """Return the coarsest grid of a resolution [m]."""
-        texture = self.texture
-        heights, passes = texture.extremes, self.goal.passes
-        return FieldGrid.fit(texture.domain, heights, self.max_depth, resolution, passes)
+        heights, domain = self.texture.extremes, self.texture.domain
+        return FieldGrid.fit(domain, heights, self.max_depth, resolution, self.goal.passes)
 
-    def _exact_force(self, points: FloatArray) -> FloatArray:
-        """Return the exact force over the stiffness [m], (n, 3)."""
+    def _force(self, texture: Texture, points: FloatArray) -> FloatArray:
+        """Return the force over the stiffness [m], (n, 3)."""
         from asperity.kernels.fuse import fuse_surface
 
-        loops, out = fuse_surface(LAWS["H"], self.texture.sampler, NONE), np.empty(points.shape)
-        loops.force_batch(points, out, self.texture.arguments, self._law_arguments)
+        loops, out = fuse_surface(LAWS["H"], texture.sampler, NONE), np.empty(points.shape)
+        loops.force_batch(points, out, texture.arguments, self._law_arguments)
         return out
 
     def _random_probes(self, count: int) -> FloatArray:
@@ -132,64 +132,85 @@ class BakePlan:
         top = self.texture.height(xy)
         return np.column_stack([xy, low + (top - low) * rng.uniform(size=count)])
 
-    def _texture_force(self) -> float:
-        """Return the RMS of the force about its mean at the least height [m]."""
-        points = self.probes.copy()
-        points[:, 2] = self.texture.extremes[0]
-        force = self._exact_force(points)
-        return float(np.sqrt(np.square(force - force.mean(axis=0)).sum(axis=1).mean()))
+    def bake(self, resolution: float, progress: Progress | None) -> PotentialField:
+        """Return the field of a resolution [m]."""
+        grid = self.grid(resolution)
+        self.check_size(grid)
+        deep, first_part = grid.extend_down(self.goal.passes), scale_progress(progress, 0.0, 0.9)
+        potentials = compute_potentials(self.columns, deep, first_part)
+        return self.certify(potentials, grid, scale_progress(progress, 0.9, 0.1))
 
-    def choose(self) -> float:
-        """Return the coarsest resolution whose estimated difference is below the goal [m]."""
-        coarse = max(self.grid(math.inf).spacing)
-        fits = self.finest_resolution()
-        fine = coarse
-        while fine > fits and self._estimate(fine) > self.goal.share * self.texture_rms:
-            coarse, fine = fine, 0.5 * fine
-        while coarse > 1.03 * fine and fine < coarse:
-            middle = math.sqrt(fine * coarse)
-            if self._estimate(middle) > self.goal.share * self.texture_rms:
-                coarse = middle
-            else:
-                fine = middle
-        return max(fine, fits)
+    def bake_coarsest(self, progress: Progress | None) -> PotentialField:
+        """Return the field of the coarsest resolution that reaches the goal.
 
-    def _estimate(self, resolution: float) -> float:
-        """Return the RMS difference of a field of a resolution from the exact force [m].
-
-        The force at a few probes, at random places among the nodes, is computed from the potentials
-        at the nodes around each of them.
+        How many smoothing passes the gain needs hardly depends on the resolution: a field of a few
+        nodes shows it. If the final one needs more, it is baked again.
         """
-        steps = _step_vectors(self.grid(resolution))
-        points, exact = self.probes[:_TRIAL_PROBES], self.force[:_TRIAL_PROBES]
-        place = np.random.default_rng(1).uniform(-0.5, 0.5, (len(points), len(steps)))
-        reach = 1 + _TRIAL_PASSES
-        ticks = [np.arange(-reach, reach + 1.0)] * len(steps)
-        plane = np.stack(np.meshgrid(*ticks[1:], indexing="ij"), axis=-1).reshape(
-            -1, len(steps) - 1
-        )
+        passes = 0
+        if self.goal.passes:
+            trial = max(_TRIAL_COARSENING * self.choose(1, _TRIAL_PROBES), self.finest_resolution())
+            passes = self.bake(trial, scale_progress(progress, 0.0, 0.1)).passes
+        while True:
+            resolution = self.choose(passes)
+            field = self.bake(resolution, scale_progress(progress, 0.1, 0.9))
+            if field.passes <= passes or field.accuracy.share <= self.goal.share:
+                return field
+            passes, progress = field.passes, None
+
+    def choose(self, passes: int = 2, probes: int = PROBES) -> float:
+        """Return the coarsest resolution at which the difference is below the goal [m].
+
+        Args:
+            passes: number of smoothing passes that the gain will need.
+            probes: number of probes at which the difference is estimated in the end.
+        """
+        coarsest, finest = max(self.grid(math.inf).spacing), self.finest_resolution()
+        goal, count, resolution = self.goal.share * self.texture_rms, _TRIAL_PROBES, coarsest
+        for _ in range(_MAX_TRIALS):
+            ratio = goal / max(self.estimate(resolution, passes, count), 1e-6 * goal)
+            changed = min(max(resolution * (0.98 * ratio) ** 0.8, finest), coarsest)
+            if changed != resolution and not 1.0 <= ratio <= 1.1:
+                resolution = changed
+            elif count == probes:
+                break
+            else:
+                count = probes
+        return resolution
+
+    def estimate(self, resolution: float, passes: int, count: int) -> float:
+        """Return the RMS difference of a field from the exact force at the first probes [m].
+
+        The force is computed from the potentials at the nodes around each probe.
+        """
+        grid, points = self.grid(resolution), self.probes[:count]
+        axes = len(grid.steps) + 1
+        steps = np.vstack([np.pad(grid.steps, [(0, 0), (0, 1)]), [0.0, 0.0, grid.level_spacing]])
+        inverse = np.linalg.pinv(steps)
+        place = (points - [*grid.start, grid.height(0)]) @ inverse
+        place -= np.rint(place)
+        ticks = [np.arange(-1.0 - passes, 2.0 + passes)] * axes
+        plane = np.stack(np.meshgrid(*ticks[1:], indexing="ij"), axis=-1).reshape(-1, axes - 1)
         xy = points[:, None, :2] + (plane - place[:, None, :-1]) @ steps[:-1, :2]
         z = points[:, 2:] + (ticks[0] - place[:, -1:]) * steps[-1, 2]
         values = np.empty((len(points), len(plane), len(ticks[0])), np.float32)
         run_in_threads(lambda i: self.columns(xy[i], z[i], values[i]), range(len(points)), None)
-        values = values.reshape(len(points), *map(len, ticks))
-        weights, slopes = _smoothed_weights(place, _TRIAL_PASSES)
-        gradient = np.empty((len(points), len(steps)))
-        for axis in range(len(steps)):
-            rest = values
-            for other in range(len(steps)):
-                factor = slopes if other == axis else weights
-                rest = np.einsum("nk...,nk->n...", rest, factor[:, other])
-            gradient[:, axis] = rest
-        difference = exact + gradient @ np.linalg.pinv(steps).T
+        functions: list[Any] = [quadratic_weights, quadratic_weight_slopes]
+        weights = np.stack([np.stack(function(place), axis=-1) for function in functions])
+        for _ in range(passes):
+            wide = np.pad(weights, [(0, 0), (0, 0), (0, 0), (2, 2)])
+            weights = 0.25 * (wide[..., :-2] + wide[..., 2:]) + 0.5 * wide[..., 1:-1]
+        difference = self.force[:count].copy()
+        for axis in range(axes):
+            rest = values.reshape(len(points), *map(len, ticks))
+            for other in range(axes):
+                rest = np.einsum("nk...,nk->n...", rest, weights[int(other == axis)][:, other])
+            difference += rest[:, None] * inverse[:, axis]
         return float(np.sqrt(np.square(difference).sum(axis=1).mean()))
 
     def finest_resolution(self) -> float:
         """Return the finest resolution [m] of a field within the size allowed, to three digits."""
         coarse = max(self.grid(math.inf).spacing)
-        while self._bytes(0.5 * coarse) <= self.goal.max_bytes and coarse > 1e-12:
-            coarse *= 0.5
-        fine = 0.5 * coarse
+        fine = 1e-5 * coarse
         while coarse > 1.001 * fine:
             middle = math.sqrt(fine * coarse)
             fits = self._bytes(middle) <= self.goal.max_bytes
@@ -206,19 +227,16 @@ class BakePlan:
             ParameterError: it states a resolution that fits.
         """
         size, limit = _BYTES_PER_NODE * math.prod(grid.node_counts), self.goal.max_bytes
-        if size <= limit:
-            return
-        nodes = " x ".join(str(count) for count in grid.node_counts)
-        least = self._bytes(math.inf)
-        fits = f"even the coarsest one takes {least} byte"
-        if least <= limit:  # rounded up, so that the resolution in the message fits
-            fits = f"{round_up(self.finest_resolution()):.3g} m fits"
-        raise ParameterError(
-            "resolution",
-            f"would need a field of {nodes} nodes, {size / 1e6:,.1f} MB, more than max_bytes = "
-            f"{limit / 1e6:,.1f} MB; {fits}",
-            max(grid.spacing),
-        )
+        if size > limit:
+            nodes, least = " x ".join(map(str, grid.node_counts)), self._bytes(math.inf)
+            fits = f"even the coarsest one takes {least} byte"
+            if least <= limit:  # rounded up, so that the resolution in the message fits
+                fits = f"{round_up(self.finest_resolution()):.3g} m fits"
+            words = (
+                f"would need a field of {nodes} nodes, {size / 1e6:,.1f} MB, more than max_bytes"
+            )
+            words += f" = {limit / 1e6:,.1f} MB; {fits}"
+            raise ParameterError("resolution", words, max(grid.spacing))
 
     def certify(
         self, potentials: SingleArray, grid: FieldGrid, progress: Progress | None
@@ -238,9 +256,8 @@ class BakePlan:
             if max(upper) <= limit:
                 break
             potentials, passes = smooth(potentials, grid), passes + 1
-        numbers = [certified_number(float(upper[i]), attained[i]) for i in range(2)]
-        one_sided, other = numbers
-        larger = max(numbers, key=lambda number: number.lower)
+        one_sided, other = (certified_number(float(upper[i]), attained[i]) for i in range(2))
+        larger = max(one_sided, other, key=lambda number: number.lower)
         largest = float(arguments.c.max(initial=0.0))
         force, energy = grid.error_bounds(self.lipschitz, passes, largest)
         accuracy = FieldAccuracy(math.nan, math.nan, force, energy, self.texture_rms, PROBES)
@@ -249,47 +266,7 @@ class BakePlan:
             passes=passes, gain=replace(larger, upper=max(one_sided.upper, other.upper)),
             one_sided=one_sided, accuracy=accuracy,
         )  # fmt: skip
-        return self._measure(field)
-
-    def _measure(self, field: PotentialField) -> PotentialField:
-        """Return the field with its measured difference from exact H."""
-        from asperity.kernels.fuse import fuse_surface
-
-        loops, out = fuse_surface(LAWS["H"], field.sampler, NONE), np.empty(self.probes.shape)
-        loops.force_batch(self.probes, out, field.arguments, self._law_arguments)
-        distance = np.linalg.norm(out - self.force, axis=1)
+        distance = np.linalg.norm(self._force(field, self.probes) - self.force, axis=1)
         rms, largest = float(np.sqrt(np.square(distance).mean())), float(distance.max())
         field.accuracy = replace(field.accuracy, rms=rms, largest=largest)
         return field
-
-
-def _step_vectors(grid: FieldGrid) -> FloatArray:
-    """Return the vectors from node to node [m], (d + 1, 3)."""
-    steps = np.zeros((len(grid.steps) + 1, 3))
-    steps[:-1, :2] = grid.steps
-    steps[-1, 2] = grid.level_spacing
-    return steps
-
-
-def _smoothed_weights(place: FloatArray, passes: int) -> tuple[FloatArray, FloatArray]:
-    """Return weights of nodes around probes along each axis, and their derivatives.
-
-    Args:
-        place: of the probes from their nearest node, in nodes, shape (n, d).
-        passes: number of smoothing passes.
-
-    Returns:
-        Two arrays of shape (n, d, 3 + 2 passes).
-    """
-    t = place
-    found = []
-    for parts in (
-        (0.5 * (0.5 - t) ** 2, 0.75 - t * t, 0.5 * (0.5 + t) ** 2),
-        (t - 0.5, -2.0 * t, t + 0.5),
-    ):
-        weights = np.stack(parts, axis=-1)
-        for _ in range(passes):
-            wide = np.pad(weights, [(0, 0), (0, 0), (2, 2)])
-            weights = 0.25 * (wide[..., :-2] + wide[..., 2:]) + 0.5 * wide[..., 1:-1]
-        found.append(weights)
-    return found[0], found[1]

@@ -22,13 +22,11 @@ CurvatureBounds = tuple[FloatArray, FloatArray]
 _DIFFERENCE_ROUNDING = 32.0 * float(np.finfo(np.float64).eps)
 _COLUMNS_PER_PART = 16
 # Weights of three nodes in the Bernstein coefficients of derivatives of order 0, 1, 2.
-_BERNSTEIN = np.array(
-    [
-        [[0.5, 0.5, 0.0], [0.0, 1.0, 0.0], [0.0, 0.5, 0.5]],
-        [[-1.0, 1.0, 0.0], [-0.5, 0.0, 0.5], [0.0, -1.0, 1.0]],
-        [[1.0, -2.0, 1.0]] * 3,
-    ]
-)
+_BERNSTEIN = np.array([
+    [[0.5, 0.5, 0.0], [0.0, 1.0, 0.0], [0.0, 0.5, 0.5]],
+    [[-1.0, 1.0, 0.0], [-0.5, 0.0, 0.5], [0.0, -1.0, 1.0]],
+    [[1.0, -2.0, 1.0], [1.0, -2.0, 1.0], [1.0, -2.0, 1.0]],
+])  # fmt: skip
 
 
 def curvature_bounds(
@@ -53,9 +51,8 @@ def curvature_bounds(
     from asperity.kernels.fuse import fuse_module
 
     loops, weights = fuse_module(field_curvature, field_sampler), hull_weights(field)
-    width = grid.cells[0] + (0 if grid.border == PERIODIC else 1)
-    firsts = range(0, width, _COLUMNS_PER_PART)
-    parts = [(first, min(first + _COLUMNS_PER_PART, width)) for first in firsts]
+    width = field.columns.shape[1] - 3 + (grid.border != PERIODIC)
+    parts = [(k, min(k + _COLUMNS_PER_PART, width)) for k in range(0, width, _COLUMNS_PER_PART)]
     found = np.zeros((len(parts), 2, 5))
 
     def search(part: int) -> None:
@@ -65,8 +62,7 @@ def curvature_bounds(
             loops.hull_batch(*parts[part], *weights, found[part], field)
 
     run_in_threads(search, range(len(parts)), progress)
-    largest = float(field.c.max()) if field.c.size else 0.0
-    rounding = _DIFFERENCE_ROUNDING * largest / min(grid.spacing) ** 2
+    rounding = _DIFFERENCE_ROUNDING * float(field.c.max(initial=0.0)) / min(grid.spacing) ** 2
     best = found[np.argmax(found[:, :, 1], axis=0), [0, 1]]
     at = grid.positions(best[:, 2 : 2 + len(grid.cells)])
     attained = np.column_stack([best[:, 1], at, grid.height(best[:, 4])])

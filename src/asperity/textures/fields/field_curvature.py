@@ -16,7 +16,13 @@ import math
 
 from asperity.core.checks import FloatArray
 from asperity.core.compiled import Kernels, local_array
-from asperity.textures.fields.field_sampler import END, FIRST, OFFSET, REACH, FieldArguments
+from asperity.textures.fields.field_sampler import (
+    REACH,
+    FieldArguments,
+    SixEntries,
+    Vector,
+    field_triple,
+)
 
 KERNELS = Kernels(loops=("hull_batch",), iterates=True)
 
@@ -25,9 +31,6 @@ KERNELS = Kernels(loops=("hull_batch",), iterates=True)
 SLACK = 1e-7
 # Rounding error of a minor, for second derivatives of about 1.
 MINOR_ROUNDING = 1e-14
-
-# xx, xy, xz, yy, yz, zz.
-Hessian = tuple[float, float, float, float, float, float]
 
 
 def largest_eigenvalue_3x3(
@@ -57,10 +60,7 @@ def least_minor(
     return min(a, middle, c * middle - a * yz * yz - b * xz * xz - 2.0 * xy * xz * yz)
 
 
-def raise_bound(
-    bound: FloatArray, row: int, corner: bool,
-    hessian: Hessian, position: tuple[float, float, float],
-) -> None:  # fmt: skip
+def raise_bound(bound: FloatArray, row: int, corner: bool, hessian: SixEntries, at: Vector) -> None:
     """Raise the bounds of the greatest eigenvalue in a row of ``bound`` by one matrix of a hull.
 
     It holds the upper bound, the greatest value at a corner of a cell, and that corner.
@@ -72,7 +72,7 @@ def raise_bound(
     if corner and top > bound[row, 1]:
         bound[row, 1] = top
         for d in range(3):
-            bound[row, 2 + d] = position[d]
+            bound[row, 2 + d] = at[d]
 
 
 def load_nodes(
@@ -80,13 +80,8 @@ def load_nodes(
 ) -> None:
     """Write the coefficients of the columns around a cell from level m on, (3 rows, count)."""
     for q in range(3 * rows):
-        a = i + q // 3
-        b = j + q % 3
-        start = field.columns[a, b, OFFSET] + m
-        low = field.columns[a, b, FIRST] - m
-        high = field.columns[a, b, END] - m
         for k in range(count):
-            nodes[q, k] = field.c[start + k] if low <= k < high else 0.0
+            nodes[q, k] = field_triple(i + q // 3, j + q % 3, m + k, field)[1]
 
 
 def mix_nodes(nodes: FloatArray, count: int, n: int, plane: FloatArray, mixed: FloatArray) -> None:
@@ -101,7 +96,7 @@ def mix_nodes(nodes: FloatArray, count: int, n: int, plane: FloatArray, mixed: F
                     mixed[t, k] += w * nodes[q, k]
 
 
-def hull_matrix(mixed: FloatArray, k: int, w: FloatArray, g: int) -> Hessian:
+def hull_matrix(mixed: FloatArray, k: int, w: FloatArray, g: int) -> SixEntries:
     """Return the matrix of coefficient g along z of cell k of a run."""
     xx = w[g, 0, 0] * mixed[0, k] + w[g, 0, 1] * mixed[0, k + 1] + w[g, 0, 2] * mixed[0, k + 2]
     xy = w[g, 0, 0] * mixed[1, k] + w[g, 0, 1] * mixed[1, k + 1] + w[g, 0, 2] * mixed[1, k + 2]
@@ -113,10 +108,13 @@ def hull_matrix(mixed: FloatArray, k: int, w: FloatArray, g: int) -> Hessian:
 
 
 def hull_run(
-    i: int, j: int, m: int, count: int, nodes: FloatArray, plane: FloatArray, upward: FloatArray,
-    mixed: FloatArray, minors: FloatArray, bounds: FloatArray,
+    place: tuple[int, int, int], count: int, nodes: FloatArray, plane: FloatArray,
+    upward: FloatArray, mixed: FloatArray, bounds: FloatArray,
 ) -> None:  # fmt: skip
-    """Raise the bounds of the eigenvalues of Hess T by a run of cells; see ``hull_batch``."""
+    """Raise the bounds of the eigenvalues of Hess T by a run of cells; see ``hull_batch``.
+
+    The last row of ``mixed`` is for the least leading minor of each cell.
+    """
     for n in range(plane.shape[0]):
         e = 0.5 * (n // 3) - 0.5 if plane.shape[0] > 3 else 0.0
         f = 0.5 * (n % 3) - 0.5
@@ -128,11 +126,11 @@ def hull_run(
             for k in range(count):
                 xx, xy, xz, yy, yz, zz = hull_matrix(mixed, k, upward, g)
                 other = least_minor(below, -xx, -xy, -xz, -yy, -yz, -zz)
-                minors[k] = min(other, least_minor(above, xx, xy, xz, yy, yz, zz))
+                mixed[6, k] = min(other, least_minor(above, xx, xy, xz, yy, yz, zz))
             for k in range(count):
-                if not minors[k] > MINOR_ROUNDING:
+                if not mixed[6, k] > MINOR_ROUNDING:
                     xx, xy, xz, yy, yz, zz = hull_matrix(mixed, k, upward, g)
-                    at = (j + f, i + e, m + k + 0.5 * g - 0.5)
+                    at = (place[0] + f, place[1] + e, place[2] + k + 0.5 * g - 0.5)
                     raise_bound(bounds, 0, corner, (xx, xy, xz, yy, yz, zz), at)
                     raise_bound(bounds, 1, corner, (-xx, -xy, -xz, -yy, -yz, -zz), at)
 
@@ -154,12 +152,11 @@ def hull_batch(
     """
     rows = min(field.columns.shape[0], 3)
     nodes = local_array((9, 66))
-    mixed = local_array((6, 66))
-    minors = local_array((64,))
+    mixed = local_array((7, 66))
     for i in range(field.columns.shape[0] - rows + 1):
         for j in range(first, last):
             end = min(int(field.columns[i + rows // 2, j + 1, REACH]) + 1, field.levels - 1)
             for m in range(1, end, 64):
                 count = min(64, end - m)
                 load_nodes(i, j, m - 1, count + 2, rows, nodes, field)
-                hull_run(i, j, m, count, nodes, plane, upward, mixed, minors, bounds)
+                hull_run((j, i, m), count, nodes, plane, upward, mixed, bounds)

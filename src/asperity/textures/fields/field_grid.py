@@ -166,14 +166,16 @@ class FieldGrid:
         Args:
             potentials: [m²], shape ``node_counts``: first axis, second axis, z.
         """
-        rows = potentials if len(self.cells) == 2 else potentials[:, None]
-        first, end = _column_limits(rows)
-        counts = (end - first).T.ravel()  # column after column along the first axis
-        keep = np.arange(self.levels) >= first.T[..., None]
-        keep &= np.arange(self.levels) < end.T[..., None]
-        values = np.swapaxes(rows, 0, 1)[keep]
-        starts = (np.cumsum(counts) - counts).reshape(first.T.shape)
-        table = np.stack([starts - first.T, first.T, end.T, end.T], axis=-1).astype(np.int32)
+        rows = np.swapaxes(potentials if len(self.cells) == 2 else potentials[:, None], 0, 1)
+        # One row after the other, since masks of a large field would take more memory than it does.
+        first, end = np.stack([_column_limits(row) for row in rows], axis=1)
+        starts = (np.cumsum(end - first) - (end - first).ravel()).reshape(first.shape)
+        values = np.empty(int((end - first).sum()), np.float32)
+        level = np.arange(self.levels)
+        for row, low, high, start in zip(rows, first, end, starts[:, 0], strict=True):
+            part = row[(level >= low[:, None]) & (level < high[:, None])]
+            values[start : start + len(part)] = part
+        table = np.stack([starts - first, first, end, end], axis=-1).astype(np.int32)
         table = self._with_borders(table)
         x0, y0 = (float(value) for value in self.start)
         rates = np.zeros((2, 2))
@@ -181,7 +183,7 @@ class FieldGrid:
         rates[: len(self.cells)] = np.linalg.pinv(self.steps).T
         (m00, m01), (m10, m11) = rates.tolist()
         return FieldArguments(
-            np.ascontiguousarray(values), table, x0, y0, float(self.height(0)),
+            values, table, x0, y0, float(self.height(0)),
             m00, m01, m10, m11, 1.0 / self.level_spacing, self.levels, self.border,
         )  # fmt: skip
 
@@ -202,11 +204,8 @@ class FieldGrid:
         return np.ascontiguousarray(table)
 
 
-def _column_limits(potentials: SingleArray) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _column_limits(row: SingleArray) -> NDArray[np.intp]:
     """Return the first level of each column that is not zero, and the one after the last."""
-    inside = potentials > 0.0
-    levels = potentials.shape[-1]
-    some = inside.any(axis=-1)
-    first = np.where(some, inside.argmax(axis=-1), 0)
-    end = np.where(some, levels - inside[..., ::-1].argmax(axis=-1), 0)
-    return first, end
+    inside = row > 0.0
+    end = inside.shape[-1] - inside[:, ::-1].argmax(axis=-1)
+    return np.where(inside.any(axis=-1), [inside.argmax(axis=-1), end], 0)
