@@ -273,11 +273,15 @@ class Surface(Plottable):
     def clamped_depth(self) -> float:
         """Depth [m] at which the probe is below z_b everywhere; max_depth without a clamp.
 
-        Statements about a clamped field hold at least down to this depth.
+        Statements about a clamped field hold at least down to this depth. Where a clamp holds only
+        a part of the force it is max_depth below the lowest point of the texture, whatever the
+        contact: the other part changes further with depth.
         """
-        if not self.effective_clamp.changes_force:
+        clamp = self.effective_clamp
+        if not clamp.changes_force:
             return self.max_depth
-        low, high = self.law.contact.extremes(self.texture)
+        whole, texture = clamp.holds_whole_force, self.texture
+        low, high = self.law.contact.extremes(texture) if whole else texture.extremes
         return self.max_depth + (high - low)
 
     @property

@@ -114,6 +114,20 @@ def test_bound_that_ignores_the_clamp_zone_is_exceeded(
     assert ignored * (1 + 1e-2) < largest_secants(surface)[0] <= correct * (1 + 1e-6)
 
 
+def test_lateral_clamp_of_law_g_is_certified_below_max_depth() -> None:
+    """Its vertical force changes with x and y the more, the deeper the probe is."""
+    texture = Fourier([1e-4, 0.6e-4], [[6283.0, 0.0], [6283.0 * 2**0.5, 0.0]], [0.3, 1.1])
+    surface = Surface(texture, "G", 1.0, 9.6e-5, clamp="lateral")
+    low, high = texture.extremes
+    assert surface.clamped_depth == pytest.approx(9.6e-5 + high - low, rel=1e-12)
+    rng = np.random.default_rng(0)
+    points = np.column_stack([*rng.uniform(0.0, 0.01, (2, 20_000)), np.full(20_000, -3 * 9.6e-5)])
+    worst = float(np.linalg.norm(surface.jacobian(points), 2, axis=(1, 2)).max())
+    assert 1.2 < worst <= characteristic_number(surface).upper
+    # Negative control: the number of the law above max_depth.
+    assert characteristic_number(Surface(texture, "G", 1.0, 9.6e-5)).upper < worst
+
+
 @pytest.mark.parametrize(("name", "letter", "clamp"), spread("ABCFG", ("wave", "sum")))
 def test_jacobians_in_the_clamp_zone_do_not_exceed_the_numbers(
     name: str, letter: str, clamp: str
