@@ -163,7 +163,7 @@ class Analysis(Plottable, Reportable):
             sentences.append(
                 "Jumps are located where contact begins and below the sharpest crest only"
             )
-        sentences += unverified_sentences(self.device, _PASSIVITY_FIELDS)
+        sentences += unverified_sentences(self.device, PASSIVITY_FIELDS)
         return (*sentences, SCOPE_SENTENCE)
 
     def __repr__(self) -> str:
@@ -315,11 +315,11 @@ def _check_depth(surface: Surface) -> None:
         raise ParameterError("max_depth", f"{limit}: {reason} [m]", surface.max_depth)
 
 
-# Device data used by the criteria of passivity.
-_PASSIVITY_FIELDS = (
+PASSIVITY_FIELDS = (
     *("max_stiffness", "update_rate", "damping", "delay_samples", "virtual_damping"),
     *("position_resolution", "force_resolution", "least_friction"),
 )
+"""Device data used by the criteria of passivity."""
 
 
 def surface_width(texture: Texture) -> float:

@@ -133,16 +133,12 @@ def _parse_section(box: object, y: object) -> ViewRequest:
     return ViewRequest("section", (*sides, _parse_number("y", y, -1.0, 1.0)))
 
 
-def _parse_frame(frame: object) -> float:
-    return _parse_number("frame", frame, 0.0, math.inf)
-
-
 _PARSERS: dict[str, tuple[tuple[str, ...], Callable[..., Any]]] = {
     "steer": (("target", "cosine", "sine", "speed"), _parse_steer),
     "change": (("changes",), _parse_change),
     "relief": (("x", "y", "size"), _parse_relief),
     "section": (("box", "y"), _parse_section),
-    "acknowledge": (("frame",), _parse_frame),
+    "acknowledge": (("frame",), lambda frame: _parse_number("frame", frame, 0.0, math.inf)),
     **{kind: ((), lambda: None) for kind in ("take_control", "start", "stop", "save_clip")},
 }
 

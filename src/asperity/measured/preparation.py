@@ -104,9 +104,6 @@ def mean_slope(heights: FloatArray, pitch: Pitch) -> float:
     return max(slopes)
 
 
-STAGES = ("outliers", "form", "fill", "filter", "tip", "repeat", "magnify")
-"""Names that :func:`prepare` passes to ``progress`` before each part."""
-
 _MIN_POINTS = 4
 MAX_MISSING = 0.25
 """Default for the greatest share of missing points."""

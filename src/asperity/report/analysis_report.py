@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from asperity.analysis.analyze import Analysis
+from asperity.analysis.analyze import PASSIVITY_FIELDS, Analysis
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.passivity.assess_passivity import Passivity, stability_limit_text
 from asperity.clamps import NONE
@@ -37,17 +37,6 @@ _BOUND_HEADINGS = ("number", "lower", "upper", "method", "attained at")
 _CRITERIA_HEADINGS = ("criterion", "condition", "holds", "limit", "margin", "conclusion, premises")
 _JUMP_HEADINGS = ("at depth", "jumps by", "near (both witnesses are in the JSON)")
 _MEDIA = HEADED | Media.HTML
-# Data of the device that the criteria of passivity use.
-_CRITERIA_FIELDS = (
-    "max_stiffness",
-    "update_rate",
-    "damping",
-    "virtual_damping",
-    "delay_samples",
-    "position_resolution",
-    "force_resolution",
-    "least_friction",
-)
 
 
 def _computed_bounds(analysis: Analysis) -> list[tuple[str, Bound]]:
@@ -212,7 +201,7 @@ def analysis_page(analysis: Analysis, texture_code: str = "") -> page.Page:
             Section("Reproduce q", [page.Paragraph(code, "code")], media=_MEDIA),
             *page.user_sections(Analysis, analysis),
             *page.assumption_sections(
-                analysis.assumptions, device_numbers_table(analysis.device, _CRITERIA_FIELDS)
+                analysis.assumptions, device_numbers_table(analysis.device, PASSIVITY_FIELDS)
             ),
             Section("How to read it", [page.DefinitionList(glossary("analysis"))]),
         ],

@@ -118,16 +118,7 @@ def _stroke_numbers(strokes: tuple[Stroke, ...]) -> dict[str, float]:
     return numbers
 
 
-EnergyPair = tuple[float, float]
-
-
-def _energies_by_measure(strokes: tuple[Stroke, ...]) -> tuple[list[EnergyPair], list[EnergyPair]]:
-    """Return the energies along x and z by the paper's sum and by the exact ledger [mJ]."""
-    paper = [(1e3 * one.same_sample[0], 1e3 * one.same_sample[2]) for one in strokes]
-    return paper, [(1e3 * one.energy[0], 1e3 * one.energy[2]) for one in strokes]
-
-
-def _format_ranges(energies: list[EnergyPair]) -> str:
+def _format_ranges(energies: list[tuple[float, float]]) -> str:
     return ", ".join(
         f"{min(along):+.3g} to {max(along):+.3g} mJ along {axis}"
         for axis, along in zip("xz", zip(*energies, strict=True), strict=True)
@@ -138,7 +129,8 @@ def _check_strokes(
     strokes: tuple[Stroke, ...], predicate: Callable[[float, float], bool], suffix: str = ""
 ) -> Check:
     """Check the energies along x and z of all hands and speeds by both measures."""
-    paper, exact = _energies_by_measure(strokes)
+    paper = [(1e3 * one.same_sample[0], 1e3 * one.same_sample[2]) for one in strokes]  # [mJ]
+    exact = [(1e3 * one.energy[0], 1e3 * one.energy[2]) for one in strokes]
     return check_over_assumptions(
         f"the paper's sum {_format_ranges(paper)}; exact ledger {_format_ranges(exact)}{suffix}",
         [predicate(*one) for one in paper],

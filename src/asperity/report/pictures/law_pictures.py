@@ -87,7 +87,7 @@ def field_segment(surfaces: Sequence[Surface]) -> ScanSegment:
 def field_size(surfaces: Sequence[Surface]) -> tuple[float, float]:
     """Return width and height of the figure [inch]."""
     columns = _column_count(len(surfaces))
-    ratio = _panel_ratio(surfaces)
+    ratio = min(max(field_window(surfaces).aspect, _MIN_ASPECT), _MAX_ASPECT)
     panel = (_WIDTH - 1.0) / columns
     rows = math.ceil(len(surfaces) / columns)
     return _WIDTH, rows * (panel / ratio + 0.5) + 1.2
@@ -95,10 +95,6 @@ def field_size(surfaces: Sequence[Surface]) -> tuple[float, float]:
 
 def _column_count(count: int) -> int:
     return min(count, _MAX_COLUMNS if count > 4 else 2)
-
-
-def _panel_ratio(surfaces: Sequence[Surface]) -> float:
-    return min(max(field_window(surfaces).aspect, _MIN_ASPECT), _MAX_ASPECT)
 
 
 def field_window(surfaces: Sequence[Surface]) -> Window:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Sequence
 from functools import cached_property
@@ -78,8 +79,21 @@ class Spline(Texture):
     @abstractmethod
     def _compute_extremes(self) -> tuple[float, float]: ...
 
-    @abstractmethod
-    def _compute_bounds(self) -> tuple[float, float]: ...
+    def _compute_bounds(self) -> tuple[float, float]:
+        c, pitches = self.coefficients, self._pitches
+
+        def greatest(values: FloatArray) -> float:
+            return max(float(values.max()), -float(values.min()))
+
+        axes = range(c.ndim)[::-1]  # x first, as the pitches
+        slopes = [greatest(np.diff(c, axis=i)) / p for i, p in zip(axes, pitches, strict=True)]
+        second = max(
+            greatest(np.diff(c, 2, axis=i)) / p**2 for i, p in zip(axes, pitches, strict=True)
+        )
+        if c.ndim == 2:
+            second += greatest(np.diff(np.diff(c, axis=0), axis=1)) / math.prod(pitches)
+        inflate = 1.0 + 1e-12  # the rounding of the differences
+        return inflate * float(np.hypot.reduce(slopes)), inflate * second
 
     @cached_property
     def extremes(self) -> tuple[float, float]:
@@ -293,12 +307,6 @@ class Profile(Spline):
         h = (c0 + 4 * c1 + c2) / 6 + t * (d + t * (b / 2 + t * a / 3))
         return float(h.min()), float(h.max())
 
-    def _compute_bounds(self) -> tuple[float, float]:
-        inflate = 1.0 + 1e-12
-        slope = float(np.abs(np.diff(self.coefficients)).max()) / self.pitch
-        second = float(np.abs(np.diff(self.coefficients, 2)).max()) / self.pitch**2
-        return inflate * slope, inflate * second
-
     def sample_counts(self) -> list[int]:
         """See :class:`Texture`; a whole number per cell."""
         cells = len(self.heights) - self.is_mirrored
@@ -372,19 +380,6 @@ class HeightMap(Spline):
 
     def _compute_extremes(self) -> tuple[float, float]:
         return -max_height(-self.coefficients), max_height(self.coefficients)
-
-    def _compute_bounds(self) -> tuple[float, float]:
-        c, (px, py) = self.coefficients, self.pitch
-
-        def greatest(values: FloatArray) -> float:
-            return max(float(values.max()), -float(values.min()))
-
-        gx, gy = greatest(np.diff(c, axis=1)) / px, greatest(np.diff(c, axis=0)) / py
-        hxx = greatest(np.diff(c, 2, axis=1)) / px**2
-        hyy = greatest(np.diff(c, 2, axis=0)) / py**2
-        hxy = greatest(np.diff(np.diff(c, axis=0), axis=1)) / (px * py)
-        inflate = 1.0 + 1e-12  # the rounding of the differences
-        return inflate * float(np.hypot(gx, gy)), inflate * (max(hxx, hyy) + hxy)
 
     def sample_counts(self) -> list[int]:
         """See :class:`Texture`; whole cells, or equal parts of them."""
