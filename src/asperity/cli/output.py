@@ -135,7 +135,8 @@ class Outputs:
         if self.html is not None:
             from asperity.report.html import Origin, render_page
 
-            origin = Origin(_command_line(), text_digest(json_text(data)))
+            command_line = escape_unprintable(shlex.join(["asperity", *sys.argv[1:]]))
+            origin = Origin(command_line, text_digest(json_text(data)))
             with progress_bar("drawing the report"):
                 text = render_page(page, origin)
             write_output("html", self.html, text)
@@ -152,11 +153,6 @@ class Outputs:
         for words, path in ((page_label, self.html), ("Trace", self.trace)):
             if path is not None:
                 console.print(f"{words}: {escape_unprintable(path)}", soft_wrap=True, markup=False)
-
-
-def _command_line() -> str:
-    """Return the command line as typed in a shell."""
-    return escape_unprintable(shlex.join(["asperity", *sys.argv[1:]]))
 
 
 def output_options(

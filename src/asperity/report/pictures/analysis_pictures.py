@@ -113,16 +113,12 @@ def draw_field(figure: FigureArea, analysis: Analysis) -> None:
         _draw_loop(axes, along * wide.scale, leak.vertices[:, 2] * high.scale)
 
 
-def _is_true_to_scale(window: Window) -> bool:
-    """Return whether a figure true to scale fills its panel well."""
-    return _PANEL_WIDTH / _MAX_PANEL_HEIGHT <= window.aspect <= _MAX_ASPECT
-
-
 def _scale_axes(axes: Axes, window: Window) -> None:
     """Limit and label axes in the units of a window, true to scale where that fills the panel."""
     wide, high = window.units
     window.limit_axes(axes)
-    axes.set_aspect("equal" if wide == high and _is_true_to_scale(window) else "auto")
+    fills_panel = _PANEL_WIDTH / _MAX_PANEL_HEIGHT <= window.aspect <= _MAX_ASPECT
+    axes.set_aspect("equal" if wide == high and fills_panel else "auto")
     style.label_axes(axes, f"{_horizontal_axis_text(window)} [{wide.name}]", f"z [{high.name}]")
 
 

@@ -184,7 +184,9 @@ def onset_figure(predictions: Sequence[Prediction]) -> Figure:
             ("K₀/q", [one.wall_rule or math.nan for one in mine], _line_style(style.ORANGE, "-.")),
         ]
         for name, values, options in lines:
-            axes.plot(delays, _mask_nonpositive(values), label=name, **options)
+            # A logarithmic axis cannot show other values.
+            shown = [v if math.isfinite(v) and v > 0.0 else math.nan for v in values]
+            axes.plot(delays, shown, label=name, **options)
         if any(one.onset.quiet == 0.0 for one in predictions):
             below = [math.nan if one.onset.quiet else one.onset.cycling for one in mine]
             options = _line_style(style.BLUE, "", marker="v") | {"ms": 8.0, "mfc": style.BACKGROUND}
@@ -197,11 +199,6 @@ def onset_figure(predictions: Sequence[Prediction]) -> Figure:
 
 def _line_style(colour: str, dashes: str, width: float = 1.1, marker: str = "") -> dict[str, Any]:
     return {"color": colour, "ls": dashes, "lw": width, "marker": marker, "ms": 4.0}
-
-
-def _mask_nonpositive(values: Sequence[float]) -> list[float]:
-    """Return the values, with NaN for those that a logarithmic axis cannot show."""
-    return [value if math.isfinite(value) and value > 0.0 else math.nan for value in values]
 
 
 def strokes_figure(strokes: Sequence[Stroke]) -> Figure:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -139,7 +139,8 @@ class Calibrator:
                 pushes[axis] = found
         if not pushes:
             raise CalibrationError("the handle does not move: is its force switched on?")
-        step = _largest_step(position_step(one.positions) for one in pushes.values())
+        steps = (position_step(one.positions) for one in pushes.values())
+        step = max(filter(None, steps), key=lambda step: step.value, default=None)
         noise = max((rest_noise(rest[:, 1 + axis]) for axis in pushes), key=lambda one: one.value)
         delay, motions = fit_dynamics(list(pushes.values()), self._period)
         self._noise_floor = FLOOR_STEPS * max(step.value if step else 0.0, noise.value)
@@ -246,11 +247,6 @@ class Calibrator:
         way = rows[after, 1 + axis]
         amplitudes = oscillation_amplitudes(way, self._period, 1.0 / wave)
         return is_limit_cycle(*amplitudes, self._noise_floor)
-
-
-def _largest_step(steps: Iterable[Estimate | None]) -> Estimate | None:
-    """Return the largest step, if there is any."""
-    return max(filter(None, steps), key=lambda step: step.value, default=None)
 
 
 def _tripped(rows: FloatArray) -> bool:
