@@ -110,11 +110,11 @@ def test_extending_down_moves_the_floor_and_keeps_the_upper_levels() -> None:
 
 @pytest.mark.parametrize("passes", [0, 1, 3])
 def test_error_bounds_by_hand(passes: int) -> None:
-    """Variances: a quarter of a squared step and half of it a pass, and a twelfth along it."""
+    """Variances: a quarter of a squared step, as much for each pass, and a twelfth along it."""
     fitted = grid([[0.3, 0.0], [0.0, 0.2]], (4, 4))
     gradient, potential = fitted.error_bounds(2.0, passes)
     squares = np.array([0.09, 0.04, 0.01])
-    spread = (0.25 + 0.5 * passes) * 0.14
+    spread = (0.25 + 0.25 * passes) * 0.14
     assert potential == pytest.approx(0.5 * 2.0 * spread, rel=1e-12)
     parts = 2.0 * np.sqrt(spread + squares / 12.0)
     assert gradient == pytest.approx(math.sqrt(float(parts @ parts)), rel=1e-12)

@@ -65,7 +65,7 @@ def test_second_differences_stay_within_the_bounds_of_the_law(name: str, c: floa
 
 @pytest.mark.parametrize("border", [PERIODIC, MIRRORED, ZERO])
 @pytest.mark.parametrize("axes", [1, 2])
-def test_a_pass_is_a_mean_with_binomial_weights(axes: int, border: int) -> None:
+def test_a_pass_is_a_mean_of_a_node_and_its_neighbours(axes: int, border: int) -> None:
     """Against a plain sum; the lowest level is lost, and zero is above the highest."""
     steps = np.array([[1.0, 0.2], [0.0, 1.0]])[:axes]
     grid = FieldGrid(steps, (5, 4)[:axes], np.zeros(2), 6, 1.0, 0.0, border)
@@ -77,9 +77,9 @@ def test_a_pass_is_a_mean_with_binomial_weights(axes: int, border: int) -> None:
         missing = [-1 if k == axis else 1 for k in range(expected.ndim)]
         wide = np.where((places < 0).reshape(missing), 0.0, wide)
         a, b, d = (np.take(wide, np.arange(k, wide.shape[axis] - 2 + k), axis) for k in range(3))
-        expected = 0.25 * a + 0.5 * b + 0.25 * d
+        expected = 0.125 * a + 0.75 * b + 0.125 * d
     wide = np.concatenate([expected, np.zeros_like(expected[..., :1])], axis=-1)
-    expected = 0.25 * wide[..., :-2] + 0.5 * wide[..., 1:-1] + 0.25 * wide[..., 2:]
+    expected = 0.125 * wide[..., :-2] + 0.75 * wide[..., 1:-1] + 0.125 * wide[..., 2:]
     np.testing.assert_allclose(smooth(values, grid), expected, rtol=1e-6)
 
 

@@ -14,7 +14,7 @@ from asperity.core.errors import ParameterError
 from asperity.core.units import round_up
 from asperity.laws import LAWS
 from asperity.textures.fields.field_certificate import Progress, curvature_bounds, run_in_threads
-from asperity.textures.fields.field_grid import FieldGrid, SingleArray
+from asperity.textures.fields.field_grid import NEIGHBOUR_WEIGHT, FieldGrid, SingleArray
 from asperity.textures.fields.field_sampler import quadratic_weight_slopes, quadratic_weights
 from asperity.textures.fields.node_potentials import (
     ColumnFunction,
@@ -25,11 +25,12 @@ from asperity.textures.fields.node_potentials import (
 from asperity.textures.fields.potential_field import FieldAccuracy, PotentialField, certified_number
 from asperity.textures.texture import Texture
 
-_MAX_PASSES = 4
+_MAX_PASSES = 6
 PROBES = 1024
 """Number of probes at which the difference from exact H is measured."""
 _TRIAL_PROBES = 128
-_TRIAL_COARSENING = 2.5
+_TRIAL_COARSENING = 2.0
+_TRIAL_MARGIN = 0.985
 _MAX_TRIALS = 12
 _BYTES_PER_NODE = 4
 
@@ -143,38 +144,36 @@ class BakePlan:
     def bake_coarsest(self, progress: Progress | None) -> PotentialField:
         """Return the field of the coarsest resolution that reaches the goal.
 
-        How many smoothing passes the gain needs hardly depends on the resolution: a field of a few
-        nodes shows it. If the final one needs more, it is baked again.
+        The resolution is corrected by the measured difference, first of a field of few nodes.
         """
-        passes = 0
-        if self.goal.passes:
-            trial = max(_TRIAL_COARSENING * self.choose(1, _TRIAL_PROBES), self.finest_resolution())
-            passes = self.bake(trial, scale_progress(progress, 0.0, 0.1)).passes
-        while True:
-            resolution = self.choose(passes)
-            field = self.bake(resolution, scale_progress(progress, 0.1, 0.9))
-            if field.passes <= passes or field.accuracy.share <= self.goal.share:
-                return field
-            passes, progress = field.passes, None
-
-    def choose(self, passes: int = 2, probes: int = PROBES) -> float:
-        """Return the coarsest resolution at which the difference is below the goal [m].
-
-        Args:
-            passes: number of smoothing passes that the gain will need.
-            probes: number of probes at which the difference is estimated in the end.
-        """
-        coarsest, finest = max(self.grid(math.inf).spacing), self.finest_resolution()
-        goal, count, resolution = self.goal.share * self.texture_rms, _TRIAL_PROBES, coarsest
+        finest, coarsest = self.finest_resolution(), max(self.grid(math.inf).spacing)
+        resolution = min(max(_TRIAL_COARSENING * self.choose(), finest), coarsest)
+        part = scale_progress(progress, 0.0, 0.1)
         for _ in range(_MAX_TRIALS):
-            ratio = goal / max(self.estimate(resolution, passes, count), 1e-6 * goal)
-            changed = min(max(resolution * (0.98 * ratio) ** 0.8, finest), coarsest)
-            if changed != resolution and not 1.0 <= ratio <= 1.1:
-                resolution = changed
-            elif count == probes:
+            field = self.bake(resolution, part)
+            share, goal = field.accuracy.share, self.goal.share
+            if resolution == (coarsest if share <= goal else finest) or 0.7 * goal <= share <= goal:
                 break
-            else:
-                count = probes
+            # A finer field may need one more smoothing pass.
+            close = field.gain.upper > _TRIAL_MARGIN * self.goal.max_gain * self.gain
+            ratio = 0.92 * goal / max(share * (1.2 if close else 1.0), 0.01 * goal)
+            resolution = min(max(resolution * ratio**0.77, finest), coarsest)
+            part = scale_progress(progress, 0.1, 0.9)
+        return field
+
+    def choose(self) -> float:
+        """Return a resolution [m] at which a field that is smoothed once meets the goal.
+
+        It is the coarsest one by an estimate at few probes.
+        """
+        resolution = coarsest = max(self.grid(math.inf).spacing)
+        finest, goal = self.finest_resolution(), self.goal.share * self.texture_rms
+        for _ in range(_MAX_TRIALS):
+            ratio = goal / max(self.estimate(resolution, 1, _TRIAL_PROBES), 1e-6 * goal)
+            changed = min(max(resolution * (0.98 * ratio) ** 0.8, finest), coarsest)
+            if changed == resolution or 1.0 <= ratio <= 1.1:
+                break
+            resolution = changed
         return resolution
 
     def estimate(self, resolution: float, passes: int, count: int) -> float:
@@ -198,7 +197,8 @@ class BakePlan:
         weights = np.stack([np.stack(function(place), axis=-1) for function in functions])
         for _ in range(passes):
             wide = np.pad(weights, [(0, 0), (0, 0), (0, 0), (2, 2)])
-            weights = 0.25 * (wide[..., :-2] + wide[..., 2:]) + 0.5 * wide[..., 1:-1]
+            sides = NEIGHBOUR_WEIGHT * (wide[..., :-2] + wide[..., 2:])
+            weights = sides + (1.0 - 2.0 * NEIGHBOUR_WEIGHT) * wide[..., 1:-1]
         difference = self.force[:count].copy()
         for axis in range(axes):
             rest = values.reshape(len(points), *map(len, ticks))

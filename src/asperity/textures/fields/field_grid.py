@@ -13,6 +13,8 @@ from asperity.core.checks import FloatArray
 from asperity.textures.domain import Domain
 from asperity.textures.fields.field_sampler import MIRRORED, PERIODIC, ZERO, FieldArguments
 
+NEIGHBOUR_WEIGHT = 0.125
+"""Weight of both neighbours of a node along an axis in a smoothing pass."""
 _MIN_STEPS = 4
 
 SingleArray = NDArray[np.float32]
@@ -131,9 +133,9 @@ class FieldGrid:
         """Return the variance [m²] of the points of which T is the mean of U.
 
         A quadratic B-spline has the variance 1/4 of a squared step along each axis, and a smoothing
-        pass with weights 1/4, 1/2, 1/4 adds 1/2.
+        pass adds 1/4.
         """
-        return (0.25 + 0.5 * passes) * float(np.square(self.spacing).sum())
+        return (0.25 + 2.0 * NEIGHBOUR_WEIGHT * passes) * float(np.square(self.spacing).sum())
 
     def error_bounds(
         self, gain: float, passes: int = 0, largest: float = 0.0

@@ -12,7 +12,7 @@ from asperity.core.checks import FloatArray
 from asperity.laws import LAWS
 from asperity.textures.fields import node_loop
 from asperity.textures.fields.field_certificate import Progress, run_in_threads
-from asperity.textures.fields.field_grid import FieldGrid, SingleArray
+from asperity.textures.fields.field_grid import NEIGHBOUR_WEIGHT, FieldGrid, SingleArray
 from asperity.textures.fields.field_sampler import PERIODIC, ZERO
 from asperity.textures.texture import Texture
 
@@ -50,7 +50,7 @@ def compute_potentials(
 
 
 def smooth(potentials: SingleArray, grid: FieldGrid) -> SingleArray:
-    """Return means of potentials with weights 1/4, 1/2, 1/4 along each axis.
+    """Return means of potentials with weights 1/8, 3/4, 1/8 along each axis.
 
     A mean of exact potentials over shifted copies keeps the bounds -c <= Hess U <= 1 (MATH
     section 10). The lowest level is lost, since it has no neighbour.
@@ -74,5 +74,5 @@ def _smooth_axis(rows: SingleArray, border: int) -> None:
     for k in range(len(rows)):
         here = rows[k].copy()
         beyond = rows[k + 1] if k + 1 < len(rows) else after
-        rows[k] = 0.5 * here + 0.25 * (before + beyond)
+        rows[k] = (1.0 - 2.0 * NEIGHBOUR_WEIGHT) * here + NEIGHBOUR_WEIGHT * (before + beyond)
         before = here

@@ -84,7 +84,7 @@ class PotentialField(Texture):
         grid: the nodes.
         max_depth: depth below the least height down to which the numbers hold [m].
         continuity: c of law H.
-        passes: number of smoothing passes with weights 1/4, 1/2, 1/4 along each axis.
+        passes: number of smoothing passes with weights 1/8, 3/4, 1/8 along each axis.
         gain: certified sup ‖Hess T‖, the characteristic number q.
         one_sided: certified sup λ_max(Hess T), the one-sided number q⁺.
         accuracy: difference from exact law H.

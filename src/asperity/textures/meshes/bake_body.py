@@ -171,11 +171,11 @@ class _BodyLoops:
         return envelope, deepest
 
     def thin_regions(self, max_depth: float) -> tuple[ThinRegion, ...]:
-        """Return the parts thinner than twice the depth, the thinnest first."""
+        """Return the parts thinner than twice the depth, but for rounding, the thinnest first."""
         from scipy import ndimage
 
         half = self._summary[:, 2].reshape(self.grid.node_counts[:2])
-        labels, count = ndimage.label(half < max_depth, structure=np.ones((3, 3)))
+        labels, count = ndimage.label(half < (1.0 - 1e-9) * max_depth, structure=np.ones((3, 3)))
         found = []
         for label in range(1, count + 1):
             rows = np.flatnonzero(labels.ravel() == label)
