@@ -12,33 +12,18 @@ from numpy.typing import ArrayLike
 
 from asperity.clamps import CLAMPS, NONE, Clamp, find_clamp
 from asperity.contacts.warm_start import UNLIMITED, check_warm_start, new_warm_start
-from asperity.core.arguments import DEFAULT_STIFFNESS, MAX_DEPTH, STIFFNESS, Argument
+from asperity.core.arguments import DEFAULT_STIFFNESS, MAX_DEPTH, STIFFNESS
 from asperity.core.checks import FloatArray, Points, check_array, check_points, check_positive
 from asperity.core.digests import content_digest
 from asperity.core.display import Plottable
 from asperity.core.errors import ParameterError, suggest_names
 from asperity.derive.facts import LawFacts, clamped_facts
-from asperity.laws import LAWS, REGISTERED_LAWS, SHIPPED_LAW_ARGUMENTS, Law, find_law
+from asperity.laws import REGISTERED_LAWS, SHIPPED_LAW_ARGUMENTS, Law, find_law
 from asperity.textures.catalogue import TextureLike, as_texture
 from asperity.textures.texture import Texture
 
 MAX_DEFAULT_DEPTH = 1e-3
 """Upper limit of the default of max_depth [m]."""
-
-LAW = Argument("law", "letter or name of the law", default="C", form="text")
-CLAMP = Argument(
-    "clamp",
-    "how the force is limited below max_depth",
-    default=NONE.name,
-    form="text",
-    choices=tuple(CLAMPS),
-)
-
-DEFAULT_PARAMETERS = {
-    name: default for law in LAWS.values() for name, default in law.parameters.items()
-}
-"""Defaults of the parameters of the shipped laws."""
-
 
 _Optional = ArrayLike | None
 
@@ -50,16 +35,12 @@ def default_max_depth(texture: Texture) -> float:
     return min(depth, texture.depth_limit)
 
 
-def _depth_or(max_depth: float | None, default: float) -> float:
-    return default if max_depth is None else MAX_DEPTH.validate(max_depth)
-
-
 def _law_parameter(name: str, text: str) -> property:
     """Return a property: the value of this law, otherwise the one that ``to_law`` passes on."""
 
     def value(self: Surface) -> float:
-        given = {**DEFAULT_PARAMETERS, **self._explicit_parameters, **self.law_parameters}
-        return given[name]
+        default: Any = SHIPPED_LAW_ARGUMENTS[name].default
+        return float({name: default, **self._explicit_parameters, **self.law_parameters}[name])
 
     return property(value, doc=text)
 
@@ -140,7 +121,9 @@ class Surface(Plottable):
                 "texture": texture,
                 "law": law,
                 "stiffness": STIFFNESS.validate(stiffness),
-                "max_depth": _depth_or(max_depth, default_max_depth(texture)),
+                "max_depth": MAX_DEPTH.validate(
+                    default_max_depth(texture) if max_depth is None else max_depth
+                ),
                 "clamp": find_clamp(clamp).name,
                 "_explicit_parameters": keywords | named,
             }
@@ -210,7 +193,7 @@ class Surface(Plottable):
         Raises:
             ParameterError: for a depth that is not positive.
         """
-        depth = _depth_or(max_depth, self.max_depth)
+        depth = self.max_depth if max_depth is None else MAX_DEPTH.validate(max_depth)
         return self._replace(texture=as_texture(texture), max_depth=depth)
 
     def to_stiffness(self, stiffness: float) -> Surface:

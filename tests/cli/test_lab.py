@@ -36,7 +36,7 @@ def test_recording_cannot_be_played_back_on_another_driver(name: str) -> None:
 def test_address_is_printed_when_no_browser_is_found(
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    def run_lab(
+    async def serve_lab(
         _stage: object,
         server_socket: socket,
         ready: Callable[[str], None],
@@ -46,7 +46,7 @@ def test_address_is_printed_when_no_browser_is_found(
         server_socket.close()
         ready("http://127.0.0.1:1/token/")
 
-    monkeypatch.setattr("asperity.lab.launch.run_lab", run_lab)
+    monkeypatch.setattr("asperity.lab.launch.serve_lab", serve_lab)
     monkeypatch.setattr("webbrowser.open", lambda _address: False)
     result = CliRunner().invoke(cli, ["lab", "--port", "0"])
     assert result.exit_code == 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import signal
 import sys
 import time
@@ -235,7 +236,7 @@ def lab_command(
     """
     # Started first, since it takes long in another process.
     process = prestart_process()
-    from asperity.lab.launch import bind_socket, run_lab
+    from asperity.lab.launch import bind_socket, serve_lab
     from asperity.lab.scene_state import DEFAULT_SURFACE
     from asperity.lab.server import LabOptions
 
@@ -254,7 +255,7 @@ def lab_command(
 
     load = partial(load_plugin_files, plugin_files())
     options = LabOptions(load, process, playback, handle, accept_risk)
-    run_lab(scene, bind_socket(port), open_page, options)
+    asyncio.run(serve_lab(scene, bind_socket(port), open_page, options))
 
 
 def _simulated_scene(source: str, values: dict[str, Any]) -> tuple[SceneState, Playback | None]:

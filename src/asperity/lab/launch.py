@@ -51,13 +51,13 @@ def bind_socket(port: int | None) -> socket.socket:
     raise ParameterError("port", "is not available, nor are the next ones", wanted)
 
 
-def run_lab(
+async def serve_lab(
     scene_state: SceneState,
     listener: socket.socket,
     on_ready: Callable[[str], None],
     options: LabOptions,
 ) -> None:
-    """Serve the lab until Ctrl-C.
+    """Serve the lab until a signal arrives, or the task is cancelled.
 
     Args:
         scene_state: the initial scene.
@@ -65,16 +65,6 @@ def run_lab(
         on_ready: called with the address once the server answers.
         options: see :class:`LabOptions`.
     """
-    asyncio.run(_serve(scene_state, listener, on_ready, options))
-
-
-async def _serve(
-    scene_state: SceneState,
-    listener: socket.socket,
-    on_ready: Callable[[str], None],
-    options: LabOptions,
-) -> None:
-    """Serve the lab until a signal arrives, or the task is cancelled; see :func:`run_lab`."""
     token = AccessToken(listener.getsockname()[1])
     stopped = asyncio.Event()
     for number in (signal.SIGINT, signal.SIGTERM):

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from asperity.core.checks import FloatArray
 from asperity.core.errors import AsperityError
-from asperity.core.files import Serializable, attributes_to_dict, to_plain_data
+from asperity.core.files import Serializable, to_plain_data
 
 Verdict = Literal["holds", "holds with correction", "does not hold", "undecided"]
 VERDICTS: tuple[Verdict, ...] = ("holds", "holds with correction", "does not hold", "undecided")
@@ -48,11 +48,8 @@ class Evidence:
             name: value if isinstance(value, str) else to_plain_data(np.asarray(value, dtype=float))
             for name, value in self.numbers.items()
         }
-        return {
-            **attributes_to_dict(self, "summary"),
-            "numbers": numbers,
-            **attributes_to_dict(self, "correction", "fitted"),
-        }
+        texts = {"correction": self.correction, "fitted": self.fitted}
+        return {"summary": self.summary, "numbers": numbers, **texts}
 
 
 @dataclass(frozen=True)

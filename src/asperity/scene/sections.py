@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from asperity.clamps import CLAMPS, NONE
 from asperity.core.arguments import MAX_DEPTH, RENDERING, STIFFNESS, Argument, parse_arguments
 from asperity.core.errors import ParameterError, suggest_names
 from asperity.core.files import open_input, to_plain_data
@@ -19,7 +20,6 @@ from asperity.recording.recording import is_recording, open_recording
 from asperity.scene.scene_defaults import BRAKE_MODES
 from asperity.simulation import BandHand, PrescribedHand, SpringHand, Stationary, Strokes
 from asperity.simulation import Waypoints as PathMotion
-from asperity.surface import CLAMP, LAW
 
 PATH_COLUMNS = ("time [s]", "x [m]", "y [m]", "z [m]")
 
@@ -63,6 +63,14 @@ def _column(names: list[str], name: str, file: str) -> int:
     return names.index(name)
 
 
+LAW = Argument("law", "letter or name of the law", default="C", form="text")
+CLAMP = Argument(
+    "clamp",
+    "how the force is limited below max_depth",
+    default=NONE.name,
+    form="text",
+    choices=tuple(CLAMPS),
+)
 SURFACE_FIELDS = (LAW, STIFFNESS, MAX_DEPTH, CLAMP, RENDERING)
 """Arguments of [surface] besides the parameters of its law."""
 
