@@ -49,7 +49,7 @@ MASS = 'id = "touch-x"\napparent_mass = "60 g"\n'
 FIVE = 'id = "pantograph"\njoint_damping = "4 mN*m*s"\nupdate_rate = "1 kHz"\n'
 PLACE = '[run]\ncentre = ["-10 mm", "95 mm"]\nbrakes = "always"\nvelocity_share = 0.4\n'
 KINDS = {
-    "kind": "sinusoid:amplitude=0.2mm,period=2mm", "knurl": "knurl",
+    "kind": "sinusoid:amplitude=0.2mm,period=2mm", "knurl": "knurl:profile_angle=150deg,flat=0.5",
     "band": SCENES + MASS + BAND,
     "five-bar": SCENES + FIVE + SPRING + PLACE, "five-bar and band": SCENES + FIVE + BAND,
     "measured": "map.png",
