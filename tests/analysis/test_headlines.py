@@ -9,7 +9,9 @@ position steps are distorted and at best borderline; with fewer than two they ar
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -71,6 +73,25 @@ def test_headline_of_a_sinusoid(amplitude: float, period: float, name: str, expe
         assert row.tier == tier_by_hand(row, result.device, amplitude, period)
 
 
+@pytest.fixture(scope="module")
+def fields() -> dict[tuple[str, str | None], Any]:
+    return {}
+
+
+@pytest.fixture
+def baked_once(fields: dict[tuple[str, str | None], Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Bake the same field once for all devices, as the cache of results does."""
+
+    def get(name: str, content: str | None, compute: Callable[[], Any]) -> Any:
+        key = (name, content)
+        if content is None or key not in fields:
+            fields[key] = compute()
+        return fields[key]
+
+    monkeypatch.setattr("asperity.rendering.get_or_compute", get)
+
+
+@pytest.mark.usefixtures("baked_once")
 @pytest.mark.parametrize(("spec", "name"), OTHERS)
 def test_headline_of_a_library_surface(spec: str, name: str) -> None:
     # The rough ones take long to bake, and bake to the same headline.
