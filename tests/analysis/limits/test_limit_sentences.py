@@ -4,43 +4,16 @@ from __future__ import annotations
 
 import json
 import math
-from typing import Any
 
 import numpy as np
 import pytest
+from tests.analysis.limits.bench_limits import NUMBERS, A, L, V, default_limits, device, verdicts
 
 from asperity.analysis.check_limits import limits
-from asperity.analysis.limits.limit_result import Limits
-from asperity.devices import Device, parse_device
-from asperity.textures import Fourier, HeightMap, Sinusoid, Texture
+from asperity.textures import Fourier, HeightMap, Sinusoid
 
-NUMBERS = {
-    "update_rate": 2000.0,
-    "position_resolution": 20e-6,
-    "force_resolution": 2e-3,
-    "max_stiffness": 900.0,
-    "bandwidth": 300.0,
-    "friction": 5e-3,
-}
-A, L, V, D = 5e-5, 0.8e-3, 0.12, 2e-4
 TWO = Fourier([5e-5, 2.4e-5], [2 * math.pi / 0.8e-3, 2 * math.pi / 0.32e-3], [0.2, 1.0])
 LONG = 5.0**2 / (5.0**2 + 2.4**2)  # share of the long wave
-
-
-def device(**changes: float | None) -> Device:
-    """Return a device with all data; None omits a value."""
-    content = {field: value for field, value in {**NUMBERS, **changes}.items() if value is not None}
-    return parse_device(content, "bench")
-
-
-def default_limits(texture: Texture | None = None, **arguments: Any) -> Limits:
-    """Return the limits, by default of law A at 500 N/m on the bench device."""
-    defaults = {"device": device(), "speed": V, "law": "A", "stiffness": 500.0, "max_depth": D}
-    return limits(texture or Sinusoid(A, L), **{**defaults, **arguments})
-
-
-def verdicts(result: Limits) -> dict[int, bool | None]:
-    return {limit.number: limit.holds for limit in result.limits}
 
 
 @pytest.mark.parametrize(
