@@ -16,7 +16,7 @@ from image_writer import write_tiff
 from asperity.core.errors import ParameterError
 from asperity.measured.preparation import prepare
 from asperity.measured.reading import read_surface
-from asperity.measured.reading.images.pixels import NO_SCALE, imagej_scale, ome_scale
+from asperity.measured.reading.images.pixels import ImageScale, imagej_scale, ome_scale
 
 HEIGHTS = (np.random.default_rng(2).normal(size=(6, 9)) * 3).astype(np.float32)
 RELATIVE = "an image has no unit: heights are pixel values, y runs down the image"
@@ -130,7 +130,7 @@ def test_pitch_of_an_ome_tiff(
     raw = read_surface(write_tiff(tmp_path / "a.tif", HEIGHTS, tags={270: (2, text)}))
     assert raw.pitch == (pitch if pitch is None else pytest.approx(pitch, rel=1e-15))
     assert raw.relative
-    assert ome_scale("nothing of this kind") == NO_SCALE
+    assert ome_scale("nothing of this kind") == ImageScale()
 
 
 @pytest.mark.parametrize(

@@ -43,10 +43,6 @@ class ImageScale:
     notes: tuple[str, ...] = ()
 
 
-NO_SCALE = ImageScale()
-"""Scale of an image without lengths in its metadata."""
-
-
 def imagej_scale(metadata: Mapping[str, Any], resolution: tuple[float, float] | None) -> ImageScale:
     """Return the lengths in the metadata that ImageJ writes into a TIFF.
 
