@@ -58,7 +58,6 @@ def texts(prefix: str) -> Iterator[str]:
     length = (MAX_LENGTH - len(prefix.encode())) // 2
     for piece in PIECES:
         repeated = piece * (length // len(piece.encode()))
-        yield prefix + repeated
         yield f"{prefix}x{repeated}x\n1 2 3 4\n5 6 7 8\n"
         yield prefix + repeated + repeated
     rng = random.Random(prefix)
