@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from asperity.analysis.bounds.bound import Bound
+from asperity.rendering import bake
 from asperity.simulation import BandHand, Cartesian, Pantograph, Resonance, Servo, SpringHand
 from asperity.simulation.limit_cycles import onset as onset_module
 from asperity.simulation.limit_cycles.onset import Onset, predict, smooth_wall_onset
 from asperity.surface import Surface
-from asperity.textures import Fourier, Sinusoid
+from asperity.textures import Fourier, HeightMap, Sinusoid
 
 PERIOD = 1e-3
 HAND = SpringHand(stiffness=(100.0, 100.0, 0.0), damping=(1.0, 2.0, 3.0), force=(0.0, 0.0, -1.0))
@@ -215,3 +216,16 @@ def test_expected_onset_is_the_limit_of_the_delay_rule(
     expected = onset_module.expected_onset(surface, PLANT, HAND, servo, start)
     assert expected == (rule if rule is None else pytest.approx(rule, rel=1e-12))
     assert calls == [(PLANT, start, start, HAND, pytest.approx(TOP))]
+
+
+def test_nothing_is_predicted_below_the_floor_of_a_baked_field() -> None:
+    """A run may press deeper than the field was baked; down to there its numbers hold."""
+    heights = 2e-5 * np.random.default_rng(0).normal(size=(6, 6))
+    surface = bake(Surface(HeightMap(heights, 1e-4, periodic=True), "H", max_depth=1e-4), 2e-5)
+    servo, floor = Servo(PERIOD, delay=1), surface.texture.extremes[0] - 1e-4
+    inside = predict(surface, PLANT, HAND, servo, onset("H", 1, low=floor + 1e-6))
+    assert inside.depth > surface.max_depth
+    assert inside.q == pytest.approx(surface.texture.baked_numbers["norm"].upper)
+    assert inside.delay_rule > 0.0
+    below = predict(surface, PLANT, HAND, servo, onset("H", 1, low=floor - 1e-6))
+    assert (below.q, below.one_sided, below.delay_rule) == (math.inf, math.inf, 0.0)

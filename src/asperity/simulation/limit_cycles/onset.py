@@ -361,14 +361,16 @@ def predict(
     Reference:
         The paper's (1) and III.B; the delay rule is derived on the page "Passivity".
     """
-    top = surface.law.contact.extremes(surface.texture)[1]
-    depth = max(top - onset.low[2], 0.0)
+    bottom, top = surface.law.contact.extremes(surface.texture)
+    depth, limit = max(top - onset.low[2], 0.0), surface.texture.depth_limit
     damping = plant.min_damping(onset.low, onset.high, hand, top)
     q = plus = 0.0
-    if depth > 0.0:
+    if onset.low[2] < bottom - limit:  # below a baked field nothing is certified
+        q = plus = math.inf
+    elif depth > 0.0:
         # Below the depth of a clamp the numbers are those of the clamped force.
         clamped = surface.effective_clamp.changes_force and depth > surface.max_depth
-        pressed = surface if clamped else surface.to_depth(depth)
+        pressed = surface if clamped else surface.to_depth(min(depth, limit))
         q = characteristic_number(pressed, TOLERANCE).value
         plus = one_sided_number(pressed, TOLERANCE).value
     budget = damping / servo.period
