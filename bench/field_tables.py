@@ -46,8 +46,8 @@ def trade_table() -> Table:
             found[field.passes] = field
         for field in (found[passes] for passes in PASSES if passes in found):
             share, size = f"{field.accuracy.share:.1%}", f"{field.bytes / 1e6:.1f} MB"
-            spacing, gain = f"{1e6 * resolution:.0f} µm", f"{field.gain.upper:.3f}"
-            table.add_row(name, spacing, str(field.passes), gain, share, size)
+            spacing, q = f"{1e6 * resolution:.0f} µm", f"{field.gain.upper:.3f}"
+            table.add_row(name, spacing, str(field.passes), q, share, size)
     return table
 
 
