@@ -13,7 +13,8 @@ import pytest
 
 from asperity import load_texture
 from asperity.core.errors import ParameterError, SurfaceFileError
-from asperity.measured.reading import read_surface
+from asperity.measured.reading import ReadingOptions, SurfaceFile, read_surface
+from asperity.measured.reading.plain_text.text_reader import read_text
 from asperity.measured.reading.resampling import (
     _describe_holdout_error,
     resample_points,
@@ -84,9 +85,12 @@ def test_invalid_points_and_pitches_are_refused(tmp_path: Path) -> None:
     with pytest.raises(SurfaceFileError, match="same position"):
         read_surface(write(tmp_path, duplicated, wave(duplicated)), resample=1e-5)
     path = write(tmp_path, POSITIONS, wave(POSITIONS))
-    for pitch in (1e-12, 1e-29, 2e-6):
-        with pytest.raises(ParameterError, match="resample is too fine for 1500 points"):
-            read_surface(path, resample=pitch)
+    too_fine = "resample is too fine for 1500 points"
+    with pytest.raises(ParameterError, match=too_fine):
+        read_surface(path, resample=2e-6)  # other readers are tried before the refusal
+    for pitch in (1e-12, 1e-29):
+        with pytest.raises(ParameterError, match=too_fine):
+            read_text(SurfaceFile.open(path), ReadingOptions(resample=pitch))
     for wrong in (0.0, -1e-5, np.nan, "5um"):
         with pytest.raises(ParameterError, match=r"resample must be (positive|finite|a number)"):
             read_surface(path, resample=wrong)  # wrong type on purpose
