@@ -294,7 +294,8 @@ def removed_text(stage: PreparationStage) -> str:
 
 def field_page(field: PotentialField, path: str) -> page.Page:
     """Return the numbers of a baked field, for a terminal, and the path of its file."""
-    floor, bound = (format_quantity(x, "m") for x in (field.grid.floor, field.accuracy.bound))
+    lowest = max(field.grid.floor, field.extremes[0] - field.max_depth)
+    floor, bound = (format_quantity(x, "m") for x in (lowest, field.accuracy.bound))
     texts = (
         f"{field.preparation[-1]}; at most {bound} times the stiffness from it, proved.",
         f"q⁺ at most {field.one_sided.upper:.4g}. Valid down to z = {floor}. {field.bytes} bytes.",

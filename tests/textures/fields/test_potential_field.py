@@ -14,6 +14,7 @@ from asperity.analysis.split.split_state import split_state
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
 from asperity.surface import Surface
+from asperity.textures.fields.bake import BakePlan
 from asperity.textures.fields.potential_field import PotentialField
 from asperity.textures.kinds.fourier import Fourier
 from asperity.textures.kinds.sinusoid import Sinusoid
@@ -54,7 +55,7 @@ def probes(surface: Surface, count: int, seed: int = 0) -> FloatArray:
         across = np.array([-spans[0, 1], spans[0, 0]])
         xy = xy + rng.uniform(-1.0, 1.0, (count, 1)) * across
     top = texture.extremes[1] + 5e-5
-    return np.column_stack([xy, rng.uniform(texture.grid.floor, top, count)])
+    return np.column_stack([xy, rng.uniform(texture.extremes[0] - texture.max_depth, top, count)])
 
 
 NAMES = list(_TEXTURES)
@@ -236,3 +237,41 @@ def test_other_laws_depths_and_continuities_are_refused() -> None:
     assert surface.to_depth(1.4e-4).max_depth == 1.4e-4
     with pytest.raises(ParameterError, match="is a baked field already"):
         asp.bake(surface)
+
+
+# --- below the floor ------------------------------------------------------------------------------
+
+
+def gains_below_the_floor(field: PotentialField) -> tuple[float, float]:
+    """Return the greatest ‖Hess T‖ within 0.1 mm below the floor, and about 1 mm below it."""
+    surface, rng = Surface(field, "H", 1.0, field.max_depth), np.random.default_rng(3)
+    xy = field.domain.points(rng.uniform(size=(4000, len(field.domain.spans))))
+    gains = []
+    for depth in (0.0, 1e-3):
+        z = field.extremes[0] - field.max_depth - depth - rng.uniform(0.0, 1e-4, len(xy))
+        jacobians = surface.jacobian(np.column_stack([xy, z]))
+        gains.append(float(np.linalg.norm(jacobians, 2, axis=(1, 2)).max()))
+    return gains[0], gains[1]
+
+
+@pytest.mark.parametrize("name", ["profile", "map", "finite map"])
+def test_gain_below_the_floor_is_certified(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    field = field_of(baked(name)[0])
+    near, far = gains_below_the_floor(field)
+    assert near <= field.gain.upper * (1.0 + 1e-9)
+    assert far <= field.gain.upper * (1.0 + 1e-3)
+    # Negative control: a field that continues with the slope that it has at the floor.
+    monkeypatch.setattr(BakePlan, "columns", lambda plan, *args: plan._exact_columns(*args))
+    continued = field_of(baked.__wrapped__(name)[0])
+    assert gains_below_the_floor(continued)[1] > 2.0 * field.gain.upper
+
+
+def test_lateral_force_does_not_grow_below_the_floor() -> None:
+    field = field_of(baked("map")[0])
+    surface, floor = Surface(field, "H", 1.0, field.max_depth), field.extremes[0] - field.max_depth
+    xy = field.domain.points(np.random.default_rng(4).uniform(size=(2000, 2)))
+    forces = [surface.force(np.column_stack([xy, np.full(2000, floor - d)])) for d in (0.0, 5e-3)]
+    lateral = [float(np.abs(force[:, :2]).max()) for force in forces]
+    assert 0.0 < lateral[1] < 1.2 * lateral[0]
+    # Along z it is the wall's.
+    assert np.ptp(forces[1][:, 2]) < 1e-3 * np.ptp(forces[0][:, 2])

@@ -110,7 +110,7 @@ def test_smoothed_fields_keep_their_bounds_and_stay_inside_their_grid(name: str)
         spans = texture.domain.spans
         xy = texture.domain.points(rng.uniform(-1.0, 2.0, (4000, len(spans))))
         top = texture.extremes[1] + (passes + 1) * field.grid.level_spacing
-        points = np.column_stack([xy, rng.uniform(field.grid.floor, top, len(xy))])
+        points = np.column_stack([xy, rng.uniform(texture.extremes[0] - DEPTH, top, len(xy))])
         error = np.linalg.norm(surface.force(points) - exact.force(points), axis=1) / K
         assert error.max() <= field.accuracy.bound
         states = [split_state(each, points).potential / K for each in (surface, exact)]

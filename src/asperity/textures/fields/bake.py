@@ -16,12 +16,7 @@ from asperity.laws import LAWS
 from asperity.textures.fields.field_certificate import Progress, curvature_bounds, run_in_threads
 from asperity.textures.fields.field_grid import NEIGHBOUR_WEIGHT, FieldGrid, SingleArray
 from asperity.textures.fields.field_sampler import quadratic_weight_slopes, quadratic_weights
-from asperity.textures.fields.node_potentials import (
-    ColumnFunction,
-    compute_potentials,
-    smooth,
-    split_columns,
-)
+from asperity.textures.fields.node_potentials import compute_potentials, smooth, split_columns
 from asperity.textures.fields.potential_field import FieldAccuracy, PotentialField, certified_number
 from asperity.textures.texture import Texture
 
@@ -33,6 +28,8 @@ _TRIAL_COARSENING = 2.0
 _TRIAL_MARGIN = 0.985
 _MAX_TRIALS = 12
 _BYTES_PER_NODE = 4
+# Depth in which a field fades below its floor, over half the range of the vertical force there.
+_FADE_DEPTH = 2.0
 
 
 @dataclass(frozen=True)
@@ -104,18 +101,39 @@ class BakePlan:
         self.texture, self.max_depth, self.continuity = texture, max_depth, continuity
         self.goal = goal
         self.gain = self.lipschitz = max(1.0, continuity)
-        self.columns: ColumnFunction = split_columns(texture, continuity)
+        self._exact_columns = split_columns(texture, continuity)
         self._law_arguments = (1.0, 0.0, 1.0, max_depth, 0.0, continuity)
         self.probes = self._random_probes(PROBES)
         self.force = self._force(texture, self.probes)
         level = np.column_stack([self.probes[:, :2], np.full(PROBES, texture.extremes[0])])
         force = self._force(texture, level)
         self.texture_rms = float(np.sqrt(np.square(force - force.mean(axis=0)).sum(axis=1).mean()))
+        level[:, 2] = self.floor = texture.extremes[0] - max_depth
+        lifts = self._force(texture, level)[:, 2]
+        self.lift, self.lift_range = 0.5 * (lifts.max() + lifts.min()), 0.5 * np.ptp(lifts)
+        self.fade = max(_FADE_DEPTH * self.lift_range, 1e-9 * max_depth)
+
+    def columns(self, xy: FloatArray, z: FloatArray, out: SingleArray) -> None:
+        """Write the potential at columns of nodes; see :data:`ColumnFunction`.
+
+        Below the floor it is U(floor - ψ) + g: with r = depth/fade below it, ψ' = 1 - r falls to
+        zero, and so does the variation of the force along z; g makes up for its mean, so that the
+        second derivative along z is at most 1 and that of the flat wall in the end.
+        """
+        depth = np.maximum(self.floor - z, 0.0)
+        r = np.minimum(depth / self.fade, 1.0)
+        beyond = np.maximum(depth - self.fade, 0.0)
+        warped = np.maximum(z, self.floor) - self.fade * (r - 0.5 * r * r)
+        self._exact_columns(xy, warped, out)
+        slope = self.lift - self.lift_range
+        gained = self.fade**2 * (0.5 - 0.125 * r) * r**3 + 0.5 * self.fade * slope * r * r
+        out += (gained + (self.fade + slope + 0.5 * beyond) * beyond).astype(np.float32)
 
     def grid(self, resolution: float) -> FieldGrid:
         """Return the coarsest grid of a resolution [m]."""
         heights, domain = self.texture.extremes, self.texture.domain
-        return FieldGrid.fit(domain, heights, self.max_depth, resolution, self.goal.passes)
+        fitted = FieldGrid.fit(domain, heights, self.max_depth, resolution, self.goal.passes)
+        return fitted.extend_down(math.ceil(self.fade / fitted.level_spacing) + 2)
 
     def _force(self, texture: Texture, points: FloatArray) -> FloatArray:
         """Return the force over the stiffness [m], (n, 3)."""

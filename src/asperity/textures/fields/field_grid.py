@@ -146,15 +146,15 @@ class FieldGrid:
         probe, its potential the mean of U over other points. Both have the probe as their mean;
         :meth:`spread` is the variance of the latter, and in the former the variance along the step
         itself is at most 1/12 of its square greater (a linear B-spline, at most 1/4, and the
-        step's own 1/12, for 1/4). Single precision rounds a potential once, and less than 5 times
-        in a smoothing pass; a slope takes at most twice that over a step.
+        step's own 1/12, for 1/4). Single precision rounds a potential at most twice, and less than
+        5 times in a smoothing pass; a slope takes at most twice that over a step.
 
         Args:
             gain: Lipschitz constant of ∇U [1].
             passes: number of smoothing passes.
             largest: greatest potential that is stored in single precision [m²].
         """
-        rounding = (1.0 + 5.0 * passes) * largest * 0.5 * float(np.finfo(np.float32).eps)
+        rounding = (2.0 + 5.0 * passes) * largest * 0.5 * float(np.finfo(np.float32).eps)
         square, spread = np.square(self.spacing), self.spread(passes)
         components = gain * np.sqrt(spread + square / 12.0) + 2.0 * rounding / np.sqrt(square)
         rates = np.linalg.pinv(self.steps).T * np.hypot(*self.steps.T)[:, None]

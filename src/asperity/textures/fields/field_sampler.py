@@ -5,7 +5,7 @@ evaluated as written: it is conservative and continuous whatever the coefficient
 of them (MATH section 10). Coefficients are stored by columns of nodes along z, each from its first
 to its last coefficient that is not zero; outside of a column they are zero.
 
-Below the floor, halfway between the two lowest levels, the field of a surface continues with its
+Below the bottom, halfway between the two lowest levels, the field of a surface continues with its
 value and slope there and the curvature of the flat wall. The field of a closed body ends inside its
 grid.
 """

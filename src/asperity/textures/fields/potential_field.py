@@ -73,9 +73,11 @@ class PotentialField(Texture):
     T(p) = Σ c_n Π β((p - p_n)_i/h_i), β the quadratic B-spline, c_n the exact potential U of law H
     at nodes p_n, or its mean over neighbouring nodes; the force is -k ∇T. So the force that is
     rendered is conservative and continuous, and its gain is certified from the coefficients. There
-    is no force farther than 2 nodes outside of the body. Below the floor, the least height minus
-    ``max_depth``, the field continues with its value and slope there and the curvature of the flat
-    wall: still conservative and continuous, but without a bound.
+    is no force farther outside of the body than 2 nodes and one for each smoothing pass.
+
+    Below the floor, the least height minus ``max_depth``, the variation of the force with depth
+    fades within a few nodes, which the certified gain covers. Farther below, the field continues
+    with the curvature of the flat wall; its gain changes by rounding only.
 
     Heights, slopes and the domain are those of the texture that was baked.
 
