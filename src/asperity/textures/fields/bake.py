@@ -167,7 +167,7 @@ class BakePlan:
         finest, coarsest = self.finest_resolution(), max(self.grid(math.inf).spacing)
         resolution = min(max(_TRIAL_COARSENING * self.choose(), finest), coarsest)
         part = scale_progress(progress, 0.0, 0.1)
-        for _ in range(_MAX_TRIALS):
+        for trial in range(_MAX_TRIALS):
             field = self.bake(resolution, part)
             share, goal = field.accuracy.share, self.goal.share
             if resolution == (coarsest if share <= goal else finest) or 0.7 * goal <= share <= goal:
@@ -175,7 +175,8 @@ class BakePlan:
             # A finer field may need one more smoothing pass.
             close = field.gain.upper > _TRIAL_MARGIN * self.goal.max_gain * self.gain
             ratio = 0.92 * goal / max(share * (1.2 if close else 1.0), 0.01 * goal)
-            resolution = min(max(resolution * ratio**0.77, finest), coarsest)
+            power = 0.77 if trial == 0 else 1.0  # near the goal rather too fine than once more
+            resolution = min(max(resolution * ratio**power, finest), coarsest)
             part = scale_progress(progress, 0.1, 0.9)
         return field
 
