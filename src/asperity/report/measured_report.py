@@ -296,8 +296,10 @@ def field_page(field: PotentialField, path: str) -> page.Page:
     """Return the numbers of a baked field, for a terminal, and the path of its file."""
     lowest = max(field.grid.floor, field.extremes[0] - field.max_depth)
     floor, bound = (format_quantity(x, "m") for x in (lowest, field.accuracy.bound))
+    *others, baked = field.preparation
     texts = (
-        f"{field.preparation[-1]}; at most {bound} times the stiffness from it, proved.",
+        *(f"{text}." for text in others),
+        f"{baked}; at most {bound} times the stiffness from it, proved.",
         f"q⁺ at most {field.one_sided.upper:.4g}. Valid down to z = {floor}. {field.bytes} bytes.",
         f"Saved: {escape_unprintable(path)}",
     )

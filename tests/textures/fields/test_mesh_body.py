@@ -14,10 +14,13 @@ import trimesh
 
 import asperity as asp
 from asperity.core.errors import ParameterError, SurfaceFileError
+from asperity.textures.catalogue import as_texture
+from asperity.textures.fields.field_file import save_field
 from asperity.textures.fields.potential_field import PotentialField
 from asperity.textures.meshes.bake_body import _BodyLoops, bake_body
 from asperity.textures.meshes.mesh_body import MeshBody, load_mesh
 from asperity.textures.meshes.mesh_potential import BodyLaw
+from asperity.textures.texture import Texture
 
 MM = 1e-3
 
@@ -173,7 +176,7 @@ def test_force_is_close_to_exact_h() -> None:
     assert not surface.force(outside).any()
 
 
-def test_heights_are_those_seen_from_above() -> None:
+def test_heights_are_those_seen_from_above(tmp_path: Path) -> None:
     body = to_body(trimesh.creation.icosphere(4, radius=2 * MM))
     field = bake_body(body, 0.5 * MM, resolution=0.2 * MM)
     nodes = field.grid.positions(np.array([[12, 12], [10, 15]]))
@@ -182,13 +185,22 @@ def test_heights_are_those_seen_from_above() -> None:
     np.testing.assert_allclose(heights, expected, atol=0.02 * MM)
     assert field.filled_mask is not None
     assert field.filled_mask[0, 0]
+    assert not field.filled_mask.all()
     assert "seen from above" in field.preparation[0]
+    loaded = _saved(field, tmp_path / "ball.field")
+    np.testing.assert_array_equal(loaded.filled_mask, field.filled_mask)
 
 
-def test_thin_parts_are_reported() -> None:
+def _saved(field: PotentialField, path: Path) -> Texture:
+    save_field(path, field)
+    return as_texture(path)
+
+
+def test_thin_parts_are_reported(tmp_path: Path) -> None:
     plate = trimesh.creation.box((6 * MM, 6 * MM, 0.6 * MM))
     field = bake_body(to_body(plate), 0.3 * MM, resolution=0.1 * MM)
     assert field.thin_regions == ()
+    assert _saved(field, tmp_path / "plate.field").thin_regions == ()
     dumbbell = trimesh.creation.box((6 * MM, 2 * MM, 2 * MM))
     vertices = dumbbell.subdivide().subdivide().vertices.copy()
     waist = np.abs(vertices[:, 0]) < 1 * MM
@@ -199,6 +211,9 @@ def test_thin_parts_are_reported() -> None:
     assert region.half_thickness == pytest.approx(0.25 * MM, rel=0.05)
     assert abs(region.at[0]) < 1.5 * MM
     assert abs(region.at[2]) < 0.1 * MM
+    loaded = _saved(field, tmp_path / "dumbbell.field")
+    assert loaded.thin_regions == field.thin_regions
+    assert "thinner than twice the depth: 1, the thinnest at (" in loaded.preparation[-2]
 
 
 # --- bad input ------------------------------------------------------------------------------------

@@ -23,7 +23,7 @@ from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.core.files import json_text, open_atomic, open_input
 from asperity.textures.fields.field_grid import FieldGrid
 from asperity.textures.fields.field_sampler import MIRRORED, PERIODIC, ZERO, FieldArguments
-from asperity.textures.fields.potential_field import FieldAccuracy, PotentialField
+from asperity.textures.fields.potential_field import FieldAccuracy, PotentialField, ThinRegion
 from asperity.textures.spline.spline_texture import fit_spline
 from asperity.textures.texture import CertifiedNumber, Texture
 
@@ -93,7 +93,9 @@ def save_field(path: str | os.PathLike[str], field: Texture) -> PotentialField:
 def _encode(field: PotentialField) -> tuple[NDArray[Any], list[tuple[int, bytes]]]:
     record = field.arguments
     heights = field.stored_heights()
-    description = json_text(field.describe()).encode()
+    description = json_text(
+        field.describe() | {"filled": _mask_changes(field.filled_mask)}
+    ).encode()
     parts = [
         np.ascontiguousarray(record.columns, "<i4").tobytes(),
         np.ascontiguousarray(record.c, "<f4").tobytes(),
@@ -207,9 +209,11 @@ def assemble_field(
         for name in ("gain", "one_sided")
     )
     names = ("max_depth", "continuity", "passes")
+    regions = described.get("thin_regions", ())
     return PotentialField(
         _source(described, heights, build_texture), grid, record, gain=gain, one_sided=one_sided,
         accuracy=FieldAccuracy(**described["accuracy"]),
+        thin_regions=tuple(ThinRegion(**row | {"at": tuple(row["at"])}) for row in regions),
         **{name: described[name] for name in names},
     )  # fmt: skip
 
@@ -269,4 +273,20 @@ def _source(described: Mapping[str, Any], heights: FloatArray, build: BuildTextu
     return fit_spline(
         heights.reshape(described["shape"]), described["pitch"], periodic=described["periodic"],
         origin=origin, preparation=described["preparation"],
+        filled_mask=_mask_from_changes(described.get("filled"), described["shape"]),
     )  # fmt: skip
+
+
+def _mask_changes(mask: NDArray[np.bool_] | None) -> list[int] | None:
+    """Return the indices at which a mask changes, row by row; the first is where it is true."""
+    if mask is None:
+        return None
+    return np.flatnonzero(np.diff(mask.ravel(), prepend=False)).tolist()
+
+
+def _mask_from_changes(changes: list[int] | None, shape: list[int]) -> NDArray[np.bool_] | None:
+    if changes is None:
+        return None
+    flips = np.zeros(math.prod(shape), dtype=bool)
+    flips[changes] = True
+    return np.logical_xor.accumulate(flips).reshape(shape)

@@ -98,7 +98,6 @@ class PotentialField(Texture):
 
     kind: ClassVar[str] = "field"
     finds_contacts: ClassVar[bool] = True
-    thin_regions: tuple[ThinRegion, ...] = ()
 
     def __init__(
         self,
@@ -112,8 +111,10 @@ class PotentialField(Texture):
         gain: CertifiedNumber,
         one_sided: CertifiedNumber,
         accuracy: FieldAccuracy,
+        thin_regions: tuple[ThinRegion, ...] = (),
     ) -> None:
         self.source, self.grid, self.max_depth = source, grid, max_depth
+        self.thin_regions = thin_regions
         self.continuity, self.passes = continuity, passes
         self.gain, self.one_sided, self.accuracy = gain, one_sided, accuracy
         self.filled_mask, self.history = source.filled_mask, source.history
@@ -161,7 +162,8 @@ class PotentialField(Texture):
     def describe(self) -> dict[str, Any]:
         """See :class:`Texture`; the whole field but for its record and the stored heights."""
         grid, source, heights = self.grid, self.source, self.stored_heights()
-        numbers = {name: getattr(self, name) for name in ("max_depth", "continuity", "passes")}
+        names = ("max_depth", "continuity", "passes", "thin_regions")
+        numbers = {name: getattr(self, name) for name in names}
         parts = {name: vars(getattr(self, name)) for name in ("gain", "one_sided", "accuracy")}
         nodes = {name: getattr(grid, name) for name in ("cells", "level_spacing", "floor")}
         nodes |= {"steps": grid.steps.tolist(), "start": grid.start.tolist()}

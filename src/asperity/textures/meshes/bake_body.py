@@ -71,12 +71,13 @@ def bake_body(
     potentials = compute_potentials(
         plan.columns, plan.loops.grid, scale_progress(progress, 0.05, 0.85)
     )
-    plan.texture, found = plan.loops.upper_envelope(body)
+    thin = plan.loops.thin_regions(depth)
+    plan.texture, found = plan.loops.upper_envelope(body, thin)
     if depth > (deepest := max(deepest, found)):
         reason = f"must be at most {format_length(deepest)}, the greatest depth of the body"
         raise ParameterError("max_depth", reason, depth)
     field = plan.certify(potentials, grid, scale_progress(progress, 0.9, 0.1))
-    field.thin_regions = plan.loops.thin_regions(depth)
+    field.thin_regions = thin
     return field
 
 
@@ -152,7 +153,9 @@ class _BodyLoops:
         steps = np.rint((xy - self.grid.start) / self.grid.spacing[0]).astype(np.intp)
         return np.asarray(steps[:, 0] * self.grid.node_counts[1] + steps[:, 1])
 
-    def upper_envelope(self, body: MeshBody) -> tuple[HeightMap, float]:
+    def upper_envelope(
+        self, body: MeshBody, thin: tuple[ThinRegion, ...]
+    ) -> tuple[HeightMap, float]:
         """Return the body seen from above, its least height around it, and its greatest depth."""
         deepest = float(self._summary[:, 1].max())
         heights = self._summary[:, 0].reshape(self.grid.node_counts[:2]).T
@@ -162,11 +165,18 @@ class _BodyLoops:
         filled = np.where(missing, heights[~missing].min(), heights)
         sides = format_lengths([float(side) for side in np.ptp(np.array(body.box), axis=0)])
         text = f"body {body.name}, seen from above: {len(body.triangles)} triangles, {sides}"
-        faults = [f"accepted: {fault}" for fault in body.faults]
-        faults += [f"repaired: {fault}" for fault in body.repaired]
+        notes = [f"accepted: {fault}" for fault in body.faults]
+        notes += [f"repaired: {fault}" for fault in body.repaired]
+        if thin:
+            half = format_length(thin[0].half_thickness)
+            place = ", ".join(map(format_length, thin[0].at))
+            notes.append(
+                f"parts thinner than twice the depth: {len(thin)}, the thinnest at ({place});"
+                f" pressed deeper than {half} there, the probe is pulled to the other side"
+            )
         envelope = HeightMap(
             filled, self.grid.spacing[:2], origin=self.grid.start.tolist(),
-            preparation=(text, *faults), filled_mask=missing if missing.any() else None,
+            preparation=(text, *notes), filled_mask=missing if missing.any() else None,
         )  # fmt: skip
         return envelope, deepest
 
