@@ -10,8 +10,10 @@ import pytest
 
 import asperity as asp
 from asperity.core.errors import ParameterError
+from asperity.core.units import format_quantity
 from asperity.devices import parse_device
 from asperity.laws import Law
+from asperity.report.comparison_columns import FULL_COLUMNS, SUMMARY_COLUMNS
 from asperity.report.sentences.number_text import limit_text
 
 PAPER = asp.Sinusoid(amplitude=0.8e-3, period=1e-3)
@@ -30,7 +32,7 @@ def test_stability_limit_without_known_delay_is_k0_over_q(result: asp.Comparison
     """Every law has K₀/q, since q⁺ does not limit a loop with delay; D at large depth has zero."""
     for row in result.rows:
         assert row.stability_limit.stiffness == pytest.approx(5000.0 / row.q.value, rel=1e-15)
-        basis = "plausible" if row.conservative else "quiet against buzz"
+        basis = "plausible" if row.conservative else "wall gain"
         assert row.stability_limit.basis == (basis if row.stability_limit.stiffness else "none")
     assert result.row("D").stability_limit.stiffness == 0.0
 
@@ -66,18 +68,52 @@ def test_verdicts_describe_the_artefacts(result: asp.Comparison) -> None:
     assert "buzz at" not in result.row("A").verdict  # each law at its recommended stiffness
     assert "feels alive" in result.row("E").verdict
     assert "clicks" in result.row("D").verdict
-    assert result.row("W").verdict == "plausible up to 5000 N/m, for any delay; no texture"
     assert (
-        "no buzz expected up to 975 N/m, delivers energy below the speed v*"
-        in result.row("A").verdict
+        result.row("W").verdict
+        == "plausible up to 5000 N/m at the delay of the wall test; no texture"
     )
+    assert "; delivers energy below v* = " in result.row("A").verdict
+
+
+FORBIDDEN_FOR_CURL = ("quiet", "no buzz", "any delay", "stable up to", "stable in", "plausible")
+
+
+@pytest.mark.parametrize("letter", "ABEFG")
+@pytest.mark.parametrize("more", [{}, {"damping": "0.625 N*s/m", "delay_samples": 0}])
+def test_no_stiffness_of_a_law_with_curl_is_called_quiet(
+    letter: str, more: dict[str, object]
+) -> None:
+    """Its field delivers energy at any stiffness: v* and power, or what is missing, are printed."""
+    rig = parse_device({"max_stiffness": "5 kN/m", "update_rate": "4 kHz", **more}, "mine")
+    result = asp.compare(asp.Sinusoid(0.3e-3, 2.3e-3), device=rig, laws=letter)
+    row = result.row(letter)
+    for text in (row.verdict, result.recommendation, " ".join(page_texts(result))):
+        assert not [words for words in FORBIDDEN_FOR_CURL if words in text.lower()]
+        assert "delivers energy" in text
+    speed = row.passivity.critical_speed
+    if more:
+        assert speed is not None
+        power = format_quantity(0.625 * speed**2 / 4.0, "W")
+        expected = f"v* = {format_quantity(speed, 'm/s')}, at most {power}"
+    else:
+        force = row.leak.energy / row.leak.length
+        expected = f"v* = {format_quantity(force, 'N')} / damping (missing)"
+    assert expected in row.verdict
+    assert expected in result.recommendation
+
+
+def page_texts(result: asp.Comparison) -> list[str]:
+    """Return the cells and notes of the row of a law in the full table."""
+    columns = (*SUMMARY_COLUMNS, *FULL_COLUMNS)
+    cells = [column.cell(result.rows[0], result) for column in columns]
+    return [text for cell in cells for text in (cell.text, cell.note)]
 
 
 def test_recommends_a_sound_law_that_is_felt(result: asp.Comparison) -> None:
     assert result.recommended == "H"
     assert "gives net energy, and its force does not jump" in result.recommendation
     for part in (": felt.", "The stiffest wall known to be stable on this device is 5000 N/m.",
-                 "for any delay", "simulated loops"):  # fmt: skip
+                 "at the delay of the wall test", "a longer delay", "simulated loops"):  # fmt: skip
         assert part in result.recommendation
     assert asp.compare(PAPER, laws="WABCDEFG").recommended == "C"
 
@@ -115,7 +151,7 @@ def test_assumptions_state_every_default(result: asp.Comparison) -> None:
 def test_to_dict_is_json_without_nan(result: asp.Comparison) -> None:
     text = json.dumps(result.to_dict(), allow_nan=False)
     data = json.loads(text)
-    assert data["schema"] == 3
+    assert data["schema"] == 4
     god_object = data["laws"][4]
     assert god_object["law"] == "D"
     assert god_object["q"]["value"] == "inf"

@@ -109,7 +109,7 @@ def test_json_and_html_files_are_complete(call: Call, tmp_path: Path) -> None:
     json_path, html_path = tmp_path / "a.json", tmp_path / "a.html"
     code, out, _err = call(SPEC, "--json", str(json_path), "--html", str(html_path))
     assert code == 0
-    assert json.loads(json_path.read_text("utf-8"))["schema"] == 3
+    assert json.loads(json_path.read_text("utf-8"))["schema"] == 4
     assert "</html>" in html_path.read_text("utf-8")
     assert html_path.stat().st_size < 500_000
     assert str(html_path) in out.replace("\n", "")

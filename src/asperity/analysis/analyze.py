@@ -23,7 +23,6 @@ from asperity.analysis.passivity.assess_passivity import (
     buzz_text,
     energy_gained_text,
     passivity,
-    stability_limit_text,
     stiffness_limit_text,
 )
 from asperity.analysis.passivity.criteria import LEAK
@@ -49,7 +48,7 @@ from asperity.textures.texture import Texture
 STEPS = ("q", "q⁺", "curl", "worst loop", "continuity", "strength and support", "passivity")
 
 Progress = Callable[[str], None]
-SCHEMA = 3
+SCHEMA = 4
 
 
 @dataclass(frozen=True)
@@ -128,9 +127,7 @@ class Analysis(Plottable, Reportable):
         elif passivity.verdict == "not passive":
             reason = passivity.reason
             if rule.name == LEAK:
-                speed = passivity.critical_speed
-                gain = energy_gained_text(self.leak.energy, speed)
-                reason = f"{gain}; {stability_limit_text(passivity.stability_limit, speed)}"
+                reason = energy_gained_text(passivity.loop)
             text = f"{title} is not passive: {reason}"
         else:
             text = f"Whether {subject} is passive is undecided: {passivity.reason}"

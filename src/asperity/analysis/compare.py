@@ -31,7 +31,7 @@ from asperity.surface import Surface
 from asperity.textures.catalogue import TextureLike, as_texture
 from asperity.textures.texture import Texture, TexturePart
 
-SCHEMA = 3
+SCHEMA = 4
 DEFAULT_DEVICE = "omega.3"
 ALL_LAWS = "".join(LAWS)
 

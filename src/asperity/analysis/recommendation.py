@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -19,8 +20,8 @@ from asperity.analysis.limits.perceptibility import (
 )
 from asperity.analysis.passivity.assess_passivity import (
     buzz_text,
-    critical_speed_text,
     delay_clause,
+    delivery_text,
     stiffness_limit_text,
 )
 from asperity.analysis.passivity.criteria import damping_assumption
@@ -175,14 +176,15 @@ def _limit_basis_text(row: LawRow, device: Device) -> str:
     if limit.basis == "bounded":
         buzz = "" if passivity.buzz is None else f": {buzz_text(passivity.buzz)}"
         return f"It is passive there but for the steps of positions and forces{buzz}."
-    if limit.basis == "quiet against buzz":
-        speed = critical_speed_text(passivity.critical_speed)
-        delivers = f"below the speed {speed} its field delivers energy"
-        return f"No buzz is expected up to {at_most}; {delivers}. {_margin_text(row)}"
+    if limit.basis == "wall gain":
+        delivers = delivery_text(passivity.loop)
+        return f"No stiffness is stable: its field {delivers}. {_margin_text(row)}"
     proved = "not proved"
     if limit.proved_stiffness:
         proved = f"proved only up to {stiffness_limit_text(limit.proved_stiffness)}"
     plausible = f"is therefore plausible{delay_clause(limit.delay)}, but {proved}"
+    if limit.delay == math.inf:
+        plausible += "; a longer delay than in that test lowers it"
     return (
         f"{_wall_text(device)} A limit of {at_most} for law {row.law.letter} {plausible}. "
         f"{_margin_text(row)}"
@@ -205,11 +207,12 @@ def _margin_text(row: LawRow) -> str:
     margin = row.margin
     if not margin.cases:
         return "The recommended stiffness equals this limit."
-    stable = f"law {margin.law} was stable in all {margin.cases} simulated loops"
-    if margin.factor == 1.0:
-        return f"The recommended stiffness equals this limit; up to it {stable}."
-    start = f"The recommended stiffness is {margin.factor:g} times this limit"
-    return f"{start}; at this ratio {stable}."
+    of = "K₀/q" if not row.conservative else "this limit"
+    stable = (
+        f"law {margin.law} did not cycle in {margin.cases} simulated loops "
+        "(a pantograph and a free mass on three sinusoids, not this device and surface)"
+    )
+    return f"The recommended stiffness is {margin.factor:g} times {of}; at this ratio {stable}."
 
 
 _SOUND_REASON = "No closed path of its field gives net energy, and its force does not jump."

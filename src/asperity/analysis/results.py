@@ -13,6 +13,7 @@ from asperity.analysis.limits.perceptibility import Perceptibility, Tier, textur
 from asperity.analysis.passivity.assess_passivity import (
     Passivity,
     buzz_text,
+    delivery_text,
     stability_limit_text,
     stiffness_limit_text,
 )
@@ -131,18 +132,18 @@ class LawRow:
     def verdict(self) -> str:
         """Artefacts to expect from the law, in one line."""
         k, parts = stiffness_limit_text(self.surface.stiffness), []
-        stability = stability_limit_text(self.stability_limit, self.passivity.critical_speed)
+        stability = stability_limit_text(self.stability_limit, self.passivity.loop)
         if self.passivity.verdict == "not passive" and self.conservative:
             parts.append(f"not passive at {k}; {stability}")
         elif not self.recommended_stiffness:
             parts.append(stability)
         elif self.may_buzz:
-            parts.append(f"may buzz at {k}; {stability}")
+            parts.append(f"may buzz at {k}" + (f"; {stability}" if self.conservative else ""))
         elif self.conservative:
             parts.append(_passivity_text(self, k, stability))
         if not self.conservative:
-            quiet = f"; {stability}" if self.recommended_stiffness and not self.may_buzz else ""
-            parts.append(f"feels alive: gains up to {leak_energy_text(self.leak)}{quiet}")
+            gain = f"feels alive: gains up to {leak_energy_text(self.leak)}"
+            parts.append(f"{gain}; {delivery_text(self.passivity.loop)}")
         if not self.continuous:
             parts.append("clicks: " + self.continuous_reason)
         if self.is_textureless:

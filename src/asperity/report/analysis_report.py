@@ -241,7 +241,7 @@ def _criteria_sections(analysis: Analysis) -> list[Section]:
     marked = [replace(one, cells=["→" if one.kind else "", *one.cells]) for one in table.rows]
     layout = TableLayout(wrap=(1,), max_widths={1: 18}, omit=(6,))
     short = Table(("", *table.headings), marked, (4, 5), layout)
-    limit = stability_limit_text(passivity.stability_limit, passivity.critical_speed)
+    limit = stability_limit_text(passivity.stability_limit, passivity.loop)
     stiffness = f"Stiffness: {limit}"
     caption = (
         f"Verdict: {passivity.verdict}. It rests on: {passivity.decided_by}. {stiffness}. T is the "

@@ -62,7 +62,7 @@ _BASIS_TEXT: dict[Basis, str] = {
     "proved": "proved",
     "plausible": "plausible",
     "bounded": "bounded",
-    "quiet against buzz": "quiet",
+    "wall gain": "no limit",
     "none": "–",
 }
 # Lengths of maps and profiles, which are not arguments of a kind.
@@ -76,7 +76,7 @@ _OMITTED_NAMES = {"kind", "preparation", "phase", "direction", "phases", "waveve
 def row_limit_text(row: LawRow) -> str:
     """Return the stability limit of the stiffness on the device: "995 N/m", or "none"."""
     limit = row.stability_limit
-    if not limit.stiffness:
+    if not limit.stiffness or not row.conservative:
         return "none"
     mark = SAMPLED_MARK if limit.sampled else ""
     return f"{mark}{format_quantity(round_down(limit.stiffness), 'N/m')}"
@@ -130,7 +130,10 @@ def recommended_stiffness_text(row: LawRow) -> str:
 
 
 def _recommendation_cell(row: LawRow, _comparison: Comparison) -> Cell:
-    return Cell(recommended_stiffness_text(row), note=stability_limit_text(row.stability_limit))
+    return Cell(
+        recommended_stiffness_text(row),
+        note=stability_limit_text(row.stability_limit, row.passivity.loop),
+    )
 
 
 def _texture_force_cell(row: LawRow, comparison: Comparison) -> Cell:
@@ -155,7 +158,7 @@ def _conservation_cell(row: LawRow, _comparison: Comparison) -> Cell:
 
 def _basis_cell(row: LawRow, _comparison: Comparison) -> Cell:
     limit = row.stability_limit
-    return Cell(_BASIS_TEXT[limit.basis], note=stability_limit_text(limit))
+    return Cell(_BASIS_TEXT[limit.basis], note=stability_limit_text(limit, row.passivity.loop))
 
 
 def _oscillation_cell(row: LawRow, _comparison: Comparison) -> Cell:

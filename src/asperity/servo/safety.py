@@ -152,7 +152,7 @@ def excess_stiffness_reason(surface: Surface, device: Device) -> str:
     allowed = recommend_stiffness(surface, device, q, one_sided_number(surface)).stability_limit
     context = f"for law {surface.law.letter} on {device.id}"
     if not allowed.stiffness:
-        return f"no stiffness is known to be quiet {context}: asperity analyze says what is missing"
+        return f"no stable stiffness is known {context}: asperity analyze says what is missing"
     if surface.stiffness <= allowed.stiffness:
         return ""
     limit = format_quantity(allowed.stiffness, "N/m", digits=3)

@@ -31,7 +31,7 @@ def test_answer_lists_the_limits_that_hold(changes: dict[str, None], words: str)
 def test_limits_to_dict_is_complete() -> None:
     result = default_limits(TWO)
     content = json.loads(json.dumps(result.to_dict(), allow_nan=False))
-    assert content["schema"] == 3
+    assert content["schema"] == 4
     assert [limit["number"] for limit in content["limits"]] == [1, 2, 3, 4, 5, 6]
     assert content["limits"][1]["speeds"] == [0.0, "inf"]
     assert content["waves"][0]["holds"] == {"1": True, "2": True, "3": True, "4": True, "6": True}

@@ -285,10 +285,7 @@ def test_leaking_law_is_never_passive(letter: str) -> None:
     assert result.criterion("smooth-wall rule").holds is True
     assert "curl" in result.criterion("paper (1)").assumptions
     assert (result.verdict, result.decided_by) == ("not passive", "leak")
-    assert (result.stability_limit.basis, result.stability_limit.delay) == (
-        "quiet against buzz",
-        None,
-    )
+    assert (result.stability_limit.basis, result.stability_limit.delay) == ("wall gain", None)
     assert result.stability_limit.stiffness == result.criterion("smooth-wall rule").limit
     for name in ("one-sided", "delay", "virtual damping", "wall test"):
         assert (result.criterion(name).holds, result.criterion(name).missing) == (None, ())
@@ -312,7 +309,7 @@ def test_missing_damping_leaves_a_leaking_law_not_passive() -> None:
     result = assess(Surface(WAVE, "A"), {"max_stiffness": "5000 N/m"})
     assert (result.verdict, result.critical_speed) == ("not passive", None)
     assert result.criterion("leak").missing == ("damping",)
-    assert "not decidable: needs damping" in result.criterion("leak").conclusion
+    assert "/ damping (missing)" in result.criterion("leak").conclusion
 
 
 def test_zero_damping_gives_an_infinite_critical_speed() -> None:

@@ -283,7 +283,7 @@ def test_wall_test_sets_the_limit_when_no_rule_does(more: dict[str, Any]) -> Non
         nonconservative,
         by_name | {WALL: make_criterion("k", 0.75), WALL_TEST: make_criterion("w", 9.0)},
     )
-    assert limit == StabilityLimit(0.75, "quiet against buzz", "k")
+    assert limit == StabilityLimit(0.75, "wall gain", "k")
 
 
 # --- verdicts -------------------------------------------------------------------------------------

@@ -32,7 +32,7 @@ from asperity.devices import Device
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
 
-SCHEMA = 3
+SCHEMA = 4
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from asperity.analysis.passivity.device_loop import (
     DeviceLoop,
     Obstacle,
     critical_speed,
+    has_known_leak,
     make_device_loop,
     max_proved_delay,
 )
@@ -91,21 +92,43 @@ def buzz_text(buzz: BuzzBound) -> str:
     return f"a sustained buzz moves at {speed} RMS and draws {power} at most"
 
 
-def critical_speed_text(speed: float | None) -> str:
-    """Return v* [m/s] with its value, where it is known."""
-    return "v*" if speed is None else f"v* = {format_quantity(speed, 'm/s')}"
+def delivery_text(loop: DeviceLoop) -> str:
+    """Return below which speed the field of a law with curl delivers energy, and at which power.
+
+    On its worst loop the field does the work W over the length ℓ, a mean force W/ℓ; at the speed v
+    damping absorbs σ₀ v of it. So it delivers energy below v* = W/(σ₀ ℓ), at most σ₀ v*²/4 at v*/2.
+    """
+    speed = critical_speed(loop)
+    if speed is None and (loop.leak is None or not has_known_leak(loop)):
+        return "may deliver energy at any stiffness: the law has curl"
+    if speed is None or loop.damping is None or loop.leak is None:
+        force = 0.0 if loop.leak is None else loop.leak.energy / loop.leak.length
+        mean = format_quantity(force, "N")
+        return f"delivers energy below v* = {mean} / damping (missing)"
+    if math.isinf(speed):
+        return "delivers energy at any speed: the device has no damping"
+    power = format_quantity(float(loop.damping) * speed**2 / 4.0, "W")
+    return f"delivers energy below v* = {format_quantity(speed, 'm/s')}, at most {power}"
 
 
-def stability_limit_text(limit: StabilityLimit, speed: float | None = None) -> str:
+def energy_gained_text(loop: DeviceLoop) -> str:
+    """Return the energy gained on the worst loop, and the speed below which it is delivered."""
+    energy = 0.0 if loop.leak is None else loop.leak.energy
+    return f"a loop gains {format_quantity(energy, 'J')}; it {delivery_text(loop)}"
+
+
+def stability_limit_text(limit: StabilityLimit, loop: DeviceLoop | None = None) -> str:
     """Return the stability limit and its basis.
 
     Args:
         limit: the limit.
-        speed: v* [m/s] of a law with curl, where it is known.
+        loop: the surface on the device, for v* and power of a law with curl.
 
     Example:
         >>> stability_limit_text(StabilityLimit(1999.9, "plausible", "wall test", math.inf))
-        'plausible up to 1990 N/m, for any delay'
+        'plausible up to 1990 N/m at the delay of the wall test'
+        >>> stability_limit_text(StabilityLimit(1999.9, "wall gain"))
+        'no stable stiffness: below a speed v* the field delivers energy at any stiffness'
         >>> stability_limit_text(StabilityLimit(None, "none"))
         'no stable stiffness is known: the device data are insufficient'
         >>> stability_limit_text(StabilityLimit(0.0, "none"))
@@ -115,18 +138,25 @@ def stability_limit_text(limit: StabilityLimit, speed: float | None = None) -> s
         return "no stable stiffness is known: the device data are insufficient"
     if limit.basis == "none":
         return "no stable stiffness is known"
+    if limit.basis == "wall gain" and loop is not None:
+        return delivery_text(loop)
+    if limit.basis == "wall gain":
+        return "no stable stiffness: below a speed v* the field delivers energy at any stiffness"
     at_most = f"{'at most ' if limit.sampled else ''}{stiffness_limit_text(limit.stiffness)}"
-    if limit.basis == "quiet against buzz":
-        delivers = f"delivers energy below the speed {critical_speed_text(speed)}"
-        return f"no buzz expected up to {at_most}, {delivers}"
     return f"{limit.basis} up to {at_most}{delay_clause(limit.delay)}"
 
 
 def delay_clause(delay: float | None) -> str:
-    """Return the admissible delay [samples], to be appended to a limit; empty for ``None``."""
+    """Return the admissible delay [samples], to be appended to a limit; empty for ``None``.
+
+    Infinity: the limit holds whatever the delay of the wall test was; it is not a limit for a loop
+    with a longer delay than that of the test.
+    """
     if delay is None:
         return ""
-    return ", for any delay" if math.isinf(delay) else f", for a delay up to {delay:.3g} samples"
+    if math.isinf(delay):
+        return " at the delay of the wall test"
+    return f", for a delay up to {delay:.3g} samples"
 
 
 def stiffness_limit_text(stiffness: float) -> str:
@@ -137,14 +167,6 @@ def stiffness_limit_text(stiffness: float) -> str:
         ('1230 N/m', 'infinite')
     """
     return "infinite" if stiffness == math.inf else f"{round_down(stiffness):.10g} N/m"
-
-
-def energy_gained_text(energy: float, speed: float | None) -> str:
-    """Return the energy gained on a loop, and the speed [m/s] above which damping absorbs it."""
-    absorbed = "the speed below which damping does not absorb it is not decidable: needs damping"
-    if speed is not None:
-        absorbed = f"damping absorbs it only above {format_quantity(speed, 'm/s')}"
-    return f"a loop gains {format_quantity(energy, 'J')}, in proportion to k; {absorbed}"
 
 
 _HOLDS_TEXT = {True: "holds", False: "does not hold", None: "not decidable"}
@@ -191,8 +213,7 @@ def _leak_conclusion(loop: DeviceLoop, criterion: Criterion) -> str:
         return "not decidable: no loop found that gains energy, and no proof that none does"
     if criterion.holds:
         return "holds: no loop gains"
-    energy = 0.0 if loop.leak is None else loop.leak.energy
-    return f"does not hold: {energy_gained_text(energy, critical_speed(loop))}"
+    return f"does not hold: {energy_gained_text(loop)}"
 
 
 def _criterion_assumptions(loop: DeviceLoop, criterion: Criterion) -> str:
@@ -281,9 +302,8 @@ class Passivity(Serializable, Displayable):
         return with_sentences(self.loop, self.evaluated[name])
 
     def __repr__(self) -> str:
-        stiffness = self.stability_limit.stiffness
-        limit = "not known" if stiffness is None else f"{stiffness:.4g} N/m"
-        return f"<Passivity: {self.verdict}, decided by {self.decided_by}, stiffness up to {limit}>"
+        limit = stability_limit_text(self.stability_limit, self.loop)
+        return f"<Passivity: {self.verdict}, decided by {self.decided_by}; {limit}>"
 
 
 def passivity(

@@ -40,7 +40,7 @@ from asperity.laws import LAWS, Law
 from asperity.surface import Surface
 
 Verdict = Literal["passive", "bounded", "plausible", "not passive", "undecided"]
-Basis = Literal["proved", "plausible", "bounded", "quiet against buzz", "none"]
+Basis = Literal["proved", "plausible", "bounded", "wall gain", "none"]
 
 
 class Ground(Enum):
@@ -77,8 +77,8 @@ class StabilityLimit(Serializable):
         basis: ``"proved"``: passive up to the limit, under the assumptions of the criterion.
             ``"plausible"``: a smooth wall of that gain did not cycle. ``"bounded"``: half of the
             limit of the delay rule, where quantisation leaves a buzz with a bound.
-            ``"quiet against buzz"``: a wall of that gain did not cycle, but the law has curl and
-            gains energy below v* at any stiffness. ``"none"``.
+            ``"wall gain"``: a wall of that gain did not cycle; no stability limit, since the law
+            has curl and delivers energy below v* at any stiffness. ``"none"``.
         criterion: name of the criterion that gives the limit; empty for none.
         delay: delay of the binding pair of damping and delay, in samples; infinity where any delay
             is admissible, ``None`` where the limit has no such pair.
@@ -134,7 +134,7 @@ def stability_limit(loop: DeviceLoop, by_name: Mapping[str, Criterion]) -> Stabi
     """
     main, steps = by_name[_main_rule(loop)], by_name[QUANTIZATION]
     if not loop.conservative:
-        return _limit_from_criterion("quiet against buzz", by_name[WALL])
+        return _limit_from_criterion("wall gain", by_name[WALL])
     plausible = _limit_from_criterion("plausible", by_name[WALL_TEST], loop.longest_delay)
     if loop.obstacle is not None or loop.delay is None or is_contradictory(loop):
         return plausible

@@ -18,6 +18,9 @@ export function showLimit({ stiffness, law }, limit) {
 }
 
 function limitText(stiffness, law, limit, isKnown) {
+  if (limit.basis === "wall gain") {
+    return `No stiffness is stable: below a speed v* law ${law} delivers energy. ▲ marks the gain of the tested wall, ${formatQuantity(limit.stiffness, "N/m")}`;
+  }
   if (isKnown) {
     const side = stiffness > limit.stiffness ? "▲ above" : "below";
     return `${side} the limit of ${formatQuantity(limit.stiffness, "N/m")} for law ${law}: ${limit.criterion} (${limit.basis})`;
