@@ -157,7 +157,7 @@ def test_law_d_has_jumps_and_its_infinite_number_is_a_string_in_json(rig: Device
         forces = result.surface.force([jump.before, jump.after])
         assert np.linalg.norm(forces[1] - forces[0]) == pytest.approx(jump.size, rel=1e-12)
     data = json.loads(json.dumps(result.to_dict(), allow_nan=False))
-    assert (data["schema"], data["q"]["value"], data["merit"]["gain"]) == (3, "inf", "inf")
+    assert (data["schema"], data["q"]["value"], data["merit"]["gain"]) == (4, "inf", "inf")
     assert data["continuity"]["jumps"][0]["size"] == result.continuity.jumps[0].size
     assert data["law_parameters"] == {}
 

@@ -130,7 +130,7 @@ def test_json_is_the_only_output_on_stdout(call: Call) -> None:
     code, out, err = call(SPEC, "--law", "D", "--json", "-")
     data = json.loads(out)
     assert (code, err) == (0, "")
-    assert (data["schema"], data["law"], data["device"]["id"]) == (3, "D", "omega.3")
+    assert (data["schema"], data["law"], data["device"]["id"]) == (4, "D", "omega.3")
     assert data["q"]["upper"] == "inf"
 
 
