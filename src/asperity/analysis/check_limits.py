@@ -37,6 +37,7 @@ from asperity.core.checks import FloatArray, check_positive, check_real
 from asperity.core.errors import ParameterError
 from asperity.devices import Device, load_device
 from asperity.laws import Law
+from asperity.perception.grip import DEFAULT_GRIP, Grip, load_grip
 from asperity.rendering import rendered_surface
 from asperity.surface import Surface
 from asperity.textures.catalogue import TextureLike, as_texture
@@ -54,6 +55,7 @@ def limits(
     position_samples: float | None = None,
     force_steps: float | None = None,
     rendering: str = FIELD,
+    grip: str | os.PathLike[str] | Grip = DEFAULT_GRIP,
     **surface_arguments: Any,
 ) -> Limits:
     """Check the six limits of haptic texture synthesis for a surface on a device.
@@ -75,6 +77,7 @@ def limits(
         position_samples: β, position steps that a wave needs; at least 2, default 5.
         force_steps: γ, force steps that an amplitude needs; at least 1, default 5.
         rendering: see :func:`~asperity.analysis.analyze.analyze`.
+        grip: see :func:`~asperity.analysis.compare.compare`.
         **surface_arguments: further arguments of :class:`~asperity.surface.Surface`.
 
     Raises:
@@ -94,7 +97,7 @@ def limits(
     """
     device, texture = load_device(device), as_texture(texture)
     v = DEFAULT_SPEED if speed is None else check_positive("speed", speed, "m/s")
-    settings = {
+    settings: dict[str, Any] = {
         "speed": v,
         "time_samples": _check_sample_count("time_samples", time_samples, 2.0),
         "position_samples": _check_sample_count("position_samples", position_samples, 2.0),
@@ -111,17 +114,18 @@ def limits(
     recommended = recommend_stiffness(surface, device, q, one_sided)
     if stiffness is None:
         surface = at_recommended_stiffness(surface, device, recommended)
-    scan = merit(surface)
+    scan, hand = merit(surface), load_grip(grip)
     perceptibility = assess_perceptibility(
         surface,
         device,
         texture.texture_part(),
         rms=scan.ripple * surface.stiffness,
         explicit_depth=max_depth is not None,
+        grip=hand,
         **settings,
     )
     gain = _limiting_number(q, one_sided, recommended.stability_limit)
-    result = _evaluate_limits(surface, device, recommended, *gain, perceptibility, settings)
+    result = _evaluate_limits(surface, device, recommended, *gain, perceptibility, hand, settings)
     given = {"speed": speed, "stiffness": stiffness, "max_depth": max_depth}
     defaults = {name: value is None for name, value in given.items()}
     defaults["samples"] = None in {time_samples, position_samples, force_steps}
@@ -136,6 +140,7 @@ def _evaluate_limits(
     gain: Bound,
     gain_symbol: str,
     perceptibility: Perceptibility,
+    grip: Grip,
     settings: dict[str, float],
 ) -> Limits:
     """Return the six limits, without sentences."""
@@ -171,6 +176,7 @@ def _evaluate_limits(
         waves=_rendered_waves(spectrum, is_significant, case, decisions),
         spectrum=spectrum,
         perceptibility=perceptibility,
+        grip=grip,
         speeds=(0.0, top),
         assumptions=(),
         **settings,

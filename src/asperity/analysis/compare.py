@@ -26,6 +26,7 @@ from asperity.core.files import attributes_to_dict, to_plain_data
 from asperity.core.processes import precompute
 from asperity.devices import Device, load_device
 from asperity.laws import LAWS, Law, distribute_parameters, find_laws
+from asperity.perception.grip import DEFAULT_GRIP, Grip, load_grip
 from asperity.rendering import assess_rendering, rendered_surface
 from asperity.surface import Surface
 from asperity.textures.catalogue import TextureLike, as_texture
@@ -108,16 +109,17 @@ def compare(
     progress: Progress | None = None,
     law_parameters: Mapping[str, float] | None = None,
     rendering: str = FIELD,
+    grip: str | os.PathLike[str] | Grip = DEFAULT_GRIP,
     **surface_arguments: Any,
 ) -> Comparison:
     """Compare laws on a surface and a device: stability, perceptibility and artefacts.
 
-    For every law: the perceptibility of its texture at the recommended stiffness
+    For every law: the perceptibility of its texture
     (:func:`~asperity.analysis.limits.perceptibility.assess_perceptibility`); q and q⁺; the
     stability limit and its basis
     (:func:`~asperity.analysis.passivity.assess_passivity.passivity`); whether the field is
     conservative, and the energy gained on its worst loop; whether the force is continuous;
-    strength and support; and a verdict.
+    strength and support; and a verdict. All numbers of a law are those of one stiffness.
 
     Args:
         texture: the surface, or what names it on the command line: "sandpaper:grit=P60", "cloth",
@@ -133,6 +135,8 @@ def compare(
         law_parameters: parameters of laws by name; each goes to the laws that declare it.
         rendering: how law H is rendered: ``"field"`` or ``"search"``; see
             :func:`~asperity.rendering.rendered_surface`.
+        grip: the hand that holds the device: an id, a TOML file, or a
+            :class:`~asperity.perception.grip.Grip`.
         **surface_arguments: further arguments of :class:`~asperity.surface.Surface`.
 
     Raises:
@@ -161,14 +165,16 @@ def compare(
         for law, own in zip(laws, parameters, strict=True)
     ]
     part, explicit_depth = texture.texture_part(), max_depth is not None
-    query = _ComparisonQuery(device, stiffness, scan_speed, part, explicit_depth, rendering)
+    query = _ComparisonQuery(
+        device, stiffness, scan_speed, part, explicit_depth, rendering, load_grip(grip)
+    )
     rows = []
     with precompute(precompute_row, _precompute_tasks(surfaces, query)) as precomputed:
         for surface, _ in zip(surfaces, precomputed, strict=True):
             if progress is not None:
                 progress(surface.law.letter)
             rows.append(_compute_row(surface, query))
-    recommended = recommend(rows)
+    recommended = recommend(rows, stiffness)
     defaults = {"max_depth": not explicit_depth, "speed": speed is None}
     return Comparison(
         texture=texture,
@@ -180,7 +186,7 @@ def compare(
         recommended_row=recommended.row,
         nearest_row=recommended.nearest,
         recommendation=recommendation_text(recommended, device),
-        assumptions=comparison_assumptions(rows, part, device, defaults),
+        assumptions=comparison_assumptions(rows, part, device, query.grip, defaults),
     )
 
 
@@ -238,6 +244,7 @@ class _ComparisonQuery:
     part: TexturePart
     explicit_depth: bool
     rendering: str
+    grip: Grip
 
 
 Task = tuple[Surface, _ComparisonQuery]
@@ -267,14 +274,15 @@ def _compute_row(surface: Surface, query: _ComparisonQuery) -> LawRow:
         surface = at_recommended_stiffness(surface, device, recommended)
     leak, merit = worst_loop(surface), compute_merit(surface)
     perceptibility = None
-    if recommended.stiffness:
+    if query.stiffness or recommended.stiffness:
         perceptibility = assess_perceptibility(
-            surface.to_stiffness(recommended.stiffness),
+            surface,
             device,
             query.part,
-            rms=merit.ripple * recommended.stiffness,
+            rms=merit.ripple * surface.stiffness,
             speed=query.speed,
             explicit_depth=query.explicit_depth,
+            grip=query.grip,
         )
     return LawRow(
         surface=surface,

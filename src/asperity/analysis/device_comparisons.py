@@ -37,7 +37,9 @@ def _best_case_text(comparisons: Sequence[Comparison]) -> str:
     cases = [(one.recommended_row, one) for one in comparisons if one.recommended_row is not None]
     row, best = max(cases, key=lambda case: (case[0].tier == "felt", case[0].resolved_force))
     law = f"law {row.law.letter}"
-    if row.recommended_stiffness:
+    if best.stiffness is not None:
+        law += f" at {format_quantity(best.stiffness, 'N/m')}"
+    elif row.recommended_stiffness:
         law += f" from {format_quantity(row.recommended_stiffness, 'N/m')}"
     if row.perceptibility is not None:
         law += f", {row.tier}, {texture_amount_text(row.perceptibility)}"

@@ -6,17 +6,19 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from asperity.analysis.limits.limit_rules import DEFAULT_SAMPLES, DEFAULT_SPEED
+import numpy as np
+
+from asperity.analysis.limits.limit_rules import DEFAULT_SPEED
 from asperity.analysis.limits.perceptibility import (
-    CLEAR_RATIO,
-    HAND_THRESHOLD,
     Perceptibility,
     force_magnitude_text,
     form_removal_sentences,
     masking_text,
+    perceptibility_assumptions,
     remedies_text,
     speed_text,
     texture_amount_text,
+    unverified_text,
 )
 from asperity.analysis.passivity.assess_passivity import (
     buzz_text,
@@ -31,8 +33,9 @@ from asperity.analysis.surface_sentences import (
     default_depth_text,
     law_parameter_sentences,
 )
-from asperity.core.units import format_quantity
+from asperity.core.units import format_quantity, round_down, round_up
 from asperity.devices import Device
+from asperity.perception.grip import Grip
 from asperity.rendering import rendering_sentences
 from asperity.textures.texture import TexturePart
 
@@ -46,6 +49,7 @@ class Recommendation:
 
     Attributes:
         row: row of the recommended law; ``None`` if no law has a texture that is felt.
+        stiffness: the stiffness that was given for all laws [N/m]; ``None`` for that of each law.
         rows: rows of all laws compared.
         is_sound: whether the recommended law is conservative and continuous; else it leaks least.
         textured_rows: rows of the laws with a texture and a known stable stiffness.
@@ -57,29 +61,40 @@ class Recommendation:
     is_sound: bool
     textured_rows: tuple[LawRow, ...]
     nearest: LawRow | None = None
+    stiffness: float | None = None
 
 
-def recommend(rows: Sequence[LawRow]) -> Recommendation:
+def recommend(rows: Sequence[LawRow], stiffness: float | None = None) -> Recommendation:
     """Return the recommended law.
 
     A conservative and continuous law gains no energy on any closed path, and its force does not
     jump. Of such laws whose texture is felt (else: borderline), the one with the strongest texture
     at its recommended stiffness is chosen; of nearly equal ones the stiffest. Without such a law,
     the continuous law that is felt (else: borderline) and leaks least for its texture force is
-    chosen. A law that is not felt, or without a known stable stiffness, is never recommended.
+    chosen. A law that is not felt, without a known stable stiffness, or with a stability limit
+    below the given stiffness, is never recommended.
+
+    Args:
+        rows: the laws, with their numbers at the given stiffness or each at its recommended one.
+        stiffness: the given stiffness [N/m].
     """
     textured = tuple(
-        row for row in rows if row.perceptibility is not None and not row.is_textureless
+        row
+        for row in rows
+        if row.perceptibility is not None and not row.is_textureless and not row.may_buzz
     )
     by_tier = [[row for row in textured if row.tier == tier] for tier in ("felt", "borderline")]
     for candidates in by_tier:
         if sound := _sound_rows(candidates):
-            return Recommendation(_strongest(sound), tuple(rows), True, textured)
+            return Recommendation(
+                _strongest(sound), tuple(rows), True, textured, stiffness=stiffness
+            )
     for candidates in filter(None, by_tier):
         smooth = [row for row in candidates if row.continuous]
         best = min(smooth or candidates, key=_relative_leak)
-        return Recommendation(best, tuple(rows), False, textured)
-    return Recommendation(None, tuple(rows), False, textured, _nearest_to_perceptible(textured))
+        return Recommendation(best, tuple(rows), False, textured, stiffness=stiffness)
+    nearest = _nearest_to_perceptible(textured)
+    return Recommendation(None, tuple(rows), False, textured, nearest, stiffness)
 
 
 def _sound_rows(rows: Sequence[LawRow]) -> list[LawRow]:
@@ -100,8 +115,8 @@ def _strongest(rows: Sequence[LawRow]) -> LawRow:
 
 
 def _relative_leak(row: LawRow) -> float:
-    """Return the leak over texture force times length [1], at the recommended stiffness."""
-    return row.recommended_leak / (row.texture_force * row.leak.line.length)
+    """Return the leak over texture force times length [1]."""
+    return row.leak.worst_per_period / (row.texture_force * row.leak.line.length)
 
 
 def recommendation_text(recommended: Recommendation, device: Device) -> str:
@@ -109,22 +124,35 @@ def recommendation_text(recommended: Recommendation, device: Device) -> str:
     best = recommended.row
     if best is None or best.perceptibility is None:
         return _no_recommendation_text(recommended, device)
-    texture, start = best.perceptibility, stiffness_limit_text(best.recommended_stiffness)
+    texture = best.perceptibility
     gives = f"{texture_amount_text(texture)}: {best.tier}"
     if best.tier != "felt":
-        gives += f"; {masking_text(texture, device)}"
+        gives += f"; {masking_text(texture)}"
     sentences = [
-        f"Use law {_law_title(best)} on the {device.name} "
-        f"and start at {start}, which gives {gives}.",
-        "" if best.tier == "felt" else remedies_text(texture),
+        f"{_choice_text(best, recommended, device)}, which gives {gives}.",
+        unverified_text(texture),
+        remedies_text(texture),
         _form_advice(texture),
         _contact_loss_text(best),
+        _size_text(best, device),
         _SOUND_REASON if recommended.is_sound else _least_leak_reason(best, recommended),
         _limit_basis_text(best, device),
-        _trade_off_text(best, recommended.textured_rows),
+        _trade_off_text(best, recommended),
         _saturation_warning(best, device),
     ]
     return " ".join(filter(None, sentences))
+
+
+def _choice_text(row: LawRow, recommended: Recommendation, device: Device) -> str:
+    """Return the recommended law and its stiffness."""
+    law, start = _law_title(row), stiffness_limit_text(row.recommended_stiffness)
+    if recommended.stiffness is None:
+        return f"Use law {law} on the {device.name} and start at {start}"
+    given = format_quantity(recommended.stiffness, "N/m")
+    room = (
+        f"recommended is a start at {start}" if row.recommended_stiffness else "no start is known"
+    )
+    return f"At {given} use law {law} on the {device.name} ({room})"
 
 
 def _law_title(row: LawRow) -> str:
@@ -142,7 +170,27 @@ def _contact_loss_text(row: LawRow) -> str:
     if not row.loses_contact:
         return ""
     depth = format_quantity(row.surface.max_depth, "m")
-    return f"Pressed to {depth} it loses contact on {100.0 * row.contact_lost:.0f} % of the scan."
+    kept = format_quantity(round_up(row.surface.texture.peak_to_valley), "m")
+    return (
+        f"Pressed to {depth} it loses contact on {100.0 * row.contact_lost:.0f} % of the scan; "
+        f"pressed to {kept} it keeps contact (--max-depth)."
+    )
+
+
+def _size_text(row: LawRow, device: Device) -> str:
+    """Return a warning where the surface is larger than the workspace, and what fits."""
+    domain = row.surface.texture.domain
+    sides = [device.value("workspace_diameter"), device.value("workspace_length")]
+    widths = [2.0 * (device.value("workspace_radius") or 0.0), *filter(None, sides)]
+    size, room = float(np.hypot(*domain.spans.T).max()), max(widths)
+    if domain.periodic or not 0.0 < room < size:
+        return ""
+    length, width = format_quantity(size, "m"), format_quantity(room, "m")
+    factor = round_down(room / size, 2)
+    return (
+        f"The surface is {length} long and the workspace {width}: only a part can be touched, "
+        f"or all of it magnified {factor:g} times more."
+    )
 
 
 def _no_recommendation_text(recommended: Recommendation, device: Device) -> str:
@@ -151,16 +199,33 @@ def _no_recommendation_text(recommended: Recommendation, device: Device) -> str:
         return "None of the laws compared renders a texture on this surface."
     row = recommended.nearest
     if row is None or row.perceptibility is None:
+        if recommended.stiffness is not None:
+            return _too_stiff_text(recommended, recommended.stiffness, device)
         return (
             f"No stable stiffness is known on the {device.name} for any of the laws compared: "
             "they need a known delay, or have no bound at this depth."
         )
-    texture, start = row.perceptibility, stiffness_limit_text(row.recommended_stiffness)
-    return (
+    texture, at = row.perceptibility, stiffness_limit_text(row.surface.stiffness)
+    sentences = [
         f"Nothing of this texture will be felt on the {device.name}: law {_law_title(row)}, which "
-        f"comes nearest, gives at {start} {texture_amount_text(texture)}; "
-        f"{masking_text(texture, device)}. {remedies_text(texture)} {_form_advice(texture)}"
-    ).rstrip()
+        f"comes nearest, gives at {at} {texture_amount_text(texture)}; {masking_text(texture)}.",
+        remedies_text(texture),
+        _form_advice(texture),
+        _contact_loss_text(row),
+        _size_text(row, device),
+    ]
+    return " ".join(filter(None, sentences))
+
+
+def _too_stiff_text(recommended: Recommendation, stiffness: float, device: Device) -> str:
+    """Return that no law is stable at the given stiffness, with the law that may be stiffest."""
+    row = max(recommended.rows, key=lambda row: row.recommended_stiffness)
+    given = format_quantity(stiffness, "N/m")
+    text = f"No law that renders this texture is known to be stable at {given} on the {device.name}"
+    if not row.recommended_stiffness:
+        return f"{text}."
+    start = stiffness_limit_text(row.recommended_stiffness)
+    return f"{text}; law {_law_title(row)} can start at {start}."
 
 
 def _limit_basis_text(row: LawRow, device: Device) -> str:
@@ -219,7 +284,7 @@ _SOUND_REASON = "No closed path of its field gives net energy, and its force doe
 
 
 def _least_leak_reason(best: LawRow, recommended: Recommendation) -> str:
-    gain = format_quantity(best.recommended_leak, "J")
+    gain = format_quantity(best.leak.worst_per_period, "J")
     faint = [row for row in recommended.textured_rows if row.conservative and row.continuous]
     reason = "None of the laws compared is conservative, continuous and known to work here"
     if faint:
@@ -227,7 +292,7 @@ def _least_leak_reason(best: LawRow, recommended: Recommendation) -> str:
         force = force_magnitude_text(rival.resolved_force)
         reason = (
             f"Law {rival.law.letter}, conservative and continuous, gives only {force} RMS at its "
-            f"{stiffness_limit_text(rival.recommended_stiffness)}, which is not felt"
+            f"{stiffness_limit_text(rival.surface.stiffness)}, which is not felt"
         )
     return (
         f"{reason}; of the continuous laws this one leaks least for its texture force, "
@@ -235,15 +300,16 @@ def _least_leak_reason(best: LawRow, recommended: Recommendation) -> str:
     )
 
 
-def _trade_off_text(best: LawRow, rows: Sequence[LawRow]) -> str:
+def _trade_off_text(best: LawRow, recommended: Recommendation) -> str:
     """Return the stiffness that the recommended law gives up against a stiffer one."""
+    rows = recommended.textured_rows if recommended.stiffness is None else ()
     stiffer = [row for row in rows if row.recommended_stiffness > 1.5 * best.recommended_stiffness]
     if not stiffer:
         return ""
     rival = max(stiffer, key=lambda row: row.recommended_stiffness)
     drawbacks = []
     if not rival.conservative:
-        gain = format_quantity(rival.recommended_leak, "J")
+        gain = format_quantity(rival.leak.worst_per_period, "J")
         drawbacks.append(f"gains up to {gain} per loop there")
     if not rival.continuous:
         drawbacks.append("its force jumps")
@@ -255,7 +321,7 @@ def _trade_off_text(best: LawRow, rows: Sequence[LawRow]) -> str:
 def _saturation_warning(best: LawRow, device: Device) -> str:
     """Return a warning if the force at full depth exceeds the device's maximum force."""
     limit = device.value("max_force")
-    force = best.recommended_stiffness * best.surface.max_depth
+    force = best.surface.stiffness * best.surface.max_depth
     if limit is None or force <= limit:
         return ""
     depth = format_quantity(best.surface.max_depth, "m")
@@ -264,7 +330,11 @@ def _saturation_warning(best: LawRow, device: Device) -> str:
 
 
 def comparison_assumptions(
-    rows: Sequence[LawRow], part: TexturePart, device: Device, defaults: Mapping[str, bool]
+    rows: Sequence[LawRow],
+    part: TexturePart,
+    device: Device,
+    grip: Grip,
+    defaults: Mapping[str, bool],
 ) -> tuple[str, ...]:
     """Return the assumptions of a comparison, in sentences.
 
@@ -272,6 +342,7 @@ def comparison_assumptions(
         rows: the laws compared.
         part: the part of the surface that is texture.
         device: the device.
+        grip: the hand.
         defaults: whether max_depth and speed are defaults.
     """
     first = rows[0].surface
@@ -291,7 +362,7 @@ def comparison_assumptions(
     if unverified:
         sentences.append(f"Not verified for the {device.name}: {', '.join(unverified)}")
     if texture is not None:
-        sentences.append(_perceptibility_assumption(texture))
+        sentences += perceptibility_assumptions(texture, device, grip)
     if any("sampled" in (row.q.method, row.one_sided.method) for row in rows):
         sentences.append(
             "Numbers marked sampled are the greatest found over "
@@ -303,17 +374,6 @@ def comparison_assumptions(
         "delay, quantisation and friction of the device"
     )
     return (*sentences, SCOPE_SENTENCE)
-
-
-def _perceptibility_assumption(texture: Perceptibility) -> str:
-    unknown = ", ".join(field.replace("_", " ") for field in texture.missing_data)
-    hand, speed = force_magnitude_text(HAND_THRESHOLD), speed_text(texture.speed)
-    return (
-        f"Felt: an amplitude of {CLEAR_RATIO:g} times the {hand} that a hand is assumed to "
-        f"notice, {CLEAR_RATIO:g} times the dry friction and {DEFAULT_SAMPLES:g} steps of force, "
-        f"in waves that the device resolves at {speed}"
-        + (f"; unknown and assumed to mask nothing: {unknown}" if unknown else "")
-    )
 
 
 def _margin_assumptions(rows: Sequence[LawRow]) -> list[str]:

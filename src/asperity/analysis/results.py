@@ -39,7 +39,8 @@ class LawRow:
         margin: safety margin below the stability limit.
         recommended_stiffness: margin times stability limit [N/m]; 0 if no stable stiffness is
             known.
-        perceptibility: perceptibility at ``recommended_stiffness``; ``None`` if that is 0.
+        perceptibility: perceptibility at the stiffness of ``surface``; ``None`` where none was
+            given and no stable one is known.
         conservative: whether the work around every closed path is zero.
         conservative_reason: one sentence.
         leak: the worst simple loop at the stiffness of ``surface``.
@@ -95,17 +96,17 @@ class LawRow:
 
     @property
     def texture_force(self) -> float:
-        """RMS of the oscillating force at ``recommended_stiffness`` [N]."""
-        return self.ripple * self.recommended_stiffness
+        """RMS of the oscillating force [N]; 0 where no stiffness was given and none is known."""
+        return 0.0 if self.perceptibility is None else self.ripple * self.surface.stiffness
 
     @property
     def tier(self) -> Tier | None:
-        """Perceptibility tier at ``recommended_stiffness``; ``None`` where that is 0."""
+        """Perceptibility tier; ``None`` where no stiffness was given and none is known."""
         return None if self.perceptibility is None else self.perceptibility.tier
 
     @property
     def resolved_force(self) -> float:
-        """RMS of the resolved texture force at ``recommended_stiffness`` [N]."""
+        """RMS of the resolved texture force [N]."""
         return 0.0 if self.perceptibility is None else self.perceptibility.resolved_rms
 
     @property
@@ -122,11 +123,6 @@ class LawRow:
     def loses_contact(self) -> bool:
         """Whether contact is lost on a part of the scan."""
         return self.contact_lost > 0.0 and self.law.contact.begins_on_texture
-
-    @property
-    def recommended_leak(self) -> float:
-        """Energy gained on the worst loop of one period at ``recommended_stiffness`` [J]."""
-        return self.leak.worst_per_period * self.recommended_stiffness / self.surface.stiffness
 
     @cached_property
     def verdict(self) -> str:

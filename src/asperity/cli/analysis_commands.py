@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from asperity.cli import options
-from asperity.cli.options import REQUESTED_STIFFNESS, SPEED
+from asperity.cli.options import GRIP, REQUESTED_STIFFNESS, SPEED
 from asperity.cli.output import Outputs, output_options, step_bar
 from asperity.core.arguments import MAX_DEPTH, Argument
 from asperity.core.errors import ParameterError
@@ -82,7 +82,7 @@ _MAX_DEPTHS = replace(MAX_DEPTH, form="items", example="0.1mm; 0.5mm")
     "Devices of the catalogue, or TOML files, 'touch,mine.toml'.  [default: omega.3]",
     options.parse_devices,
 )
-@options.argument_options([SPEED])
+@options.argument_options([SPEED, GRIP])
 @options.laws_option("Laws to compare, 'WAC' or names with commas.  [default: all]")
 @options.law_options((_STIFFNESS, _MAX_DEPTHS, *options.LAW_OPTIONS[2:]))
 @options.file_options
@@ -122,7 +122,7 @@ def compare_command(
             [depths] if isinstance(depths, float) else depths,
             chosen,
             progress=lambda on, _depth, law: step(f"{on.id}, law {law}"),
-            **options.provided_values(values, [SPEED]),
+            **options.provided_values(values, [SPEED, GRIP]),
             **arguments,
         )
     _write_comparisons(result, outputs, full)
@@ -152,7 +152,7 @@ _SAMPLING = options.command_arguments("limits")
 
 @click.command("limits")
 @options.surface_options("Law, by letter or name.  [default: the recommended law]")
-@options.argument_options((SPEED, *_SAMPLING))
+@options.argument_options((SPEED, GRIP, *_SAMPLING))
 @output_options()
 def limits_command(surface: str, device: Device | None, outputs: Outputs, **values: Any) -> None:
     """Report which wavelengths of SURFACE are perceptible, and up to which scanning speed.
@@ -166,7 +166,7 @@ def limits_command(surface: str, device: Device | None, outputs: Outputs, **valu
         step("reading the surface")
         texture, device, arguments = options.load_surface(surface, device, values)
         step("analyzing the waves")
-        sampling = options.provided_values(values, (SPEED, *_SAMPLING))
+        sampling = options.provided_values(values, (SPEED, GRIP, *_SAMPLING))
         result = limits(texture, device, **sampling, **arguments)
 
     from asperity.report.limits_report import limits_page

@@ -108,7 +108,7 @@ def command_arguments(command: str) -> tuple[Argument, ...]:
     return tuple(read_arguments(path, command).values())
 
 
-REQUESTED_STIFFNESS, SPEED, MEMORY, JOBS = command_arguments("shared")
+REQUESTED_STIFFNESS, SPEED, GRIP, MEMORY, JOBS = command_arguments("shared")
 LAW_OPTIONS = (STIFFNESS, MAX_DEPTH, RENDERING, *SHIPPED_LAW_ARGUMENTS.values())
 
 

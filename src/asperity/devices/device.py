@@ -19,6 +19,9 @@ FIELD_TABLE = read_arguments(Path(__file__).with_name("device_fields.toml"))
 FIELD_UNITS = {name: field.unit or "1" for name, field in FIELD_TABLE.items()}
 """SI unit of each field; "1" for a plain number."""
 
+USER_SOURCE = "given by the user"
+"""Source of a number that a user gives without one."""
+
 TEXT_FIELDS = ("id", "name", "axes", "driver", "notes")
 """Fields of a device file that are text."""
 

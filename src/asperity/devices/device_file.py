@@ -17,7 +17,15 @@ from asperity.core.arguments import Argument
 from asperity.core.errors import ParameterError, suggest_names
 from asperity.core.files import read_toml
 from asperity.core.units import parse_quantity
-from asperity.devices.device import FIELD_TABLE, TEXT_FIELDS, WALL_KEYS, Datum, Device, WallTest
+from asperity.devices.device import (
+    FIELD_TABLE,
+    TEXT_FIELDS,
+    USER_SOURCE,
+    WALL_KEYS,
+    Datum,
+    Device,
+    WallTest,
+)
 
 Table = Mapping[str, Any]
 _FOLDER = Path(__file__).parent
@@ -160,7 +168,7 @@ def _parse_datum(field: str, value: Any, from_file: bool, is_nested: bool = Fals
         quantity = _append_unit(name, quantity, table["unit"], argument.unit)
     value = argument.validate(_parse_quantity(name, quantity, argument.unit, from_file))
     verified, measured = _parse_verified(name, table.get("verified", False))
-    source = _check_text(f"{name}.source", table.get("source", "given by the user"))
+    source = _check_text(f"{name}.source", table.get("source", USER_SOURCE))
     others = table.get("also", [])
     if not isinstance(others, list) or not all(isinstance(other, dict) for other in others):
         raise ParameterError(f"{name}.also", "must be a list of tables with value and unit", others)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -52,7 +53,7 @@ class Grip(Serializable):
         """Return the thresholds at frequencies [Hz]: amplitudes unnoticed and felt [m].
 
         Interpolated linearly in the logarithms of both; constant beyond the frequencies of the
-        data, see :meth:`covers`.
+        data.
         """
         f, known = np.log(np.asarray(frequency, dtype=float)), np.log(self.frequency)
         lower, upper = (
@@ -60,20 +61,10 @@ class Grip(Serializable):
         )
         return lower, upper
 
-    def covers(self, frequency: FloatArray | float) -> bool:
-        """Return whether thresholds are known at all of these frequencies [Hz]."""
-        f = np.asarray(frequency)
-        return bool(np.all((f >= self.frequency[0]) & (f <= self.frequency[-1])))
-
-    def force_ratio(self, frequency: FloatArray) -> FloatArray:
-        """Return ω|Z|, the amplitude of the force on the hand per amplitude of motion [N/m]."""
-        omega = 2.0 * np.pi * frequency
-        return np.abs(self.stiffness - self.mass * omega**2 + 1j * omega * self.damping)
-
     def compliance(
         self,
         frequency: FloatArray,
-        device_mass: float,
+        device_mass: float = 0.0,
         device_damping: float = 0.0,
         contact_stiffness: float = 0.0,
     ) -> FloatArray:
@@ -81,6 +72,7 @@ class Grip(Serializable):
 
         X/F = 1/|K + k - (M + m) ω² + jω (B + b)|, for a force at the motors on the apparent mass M
         and damping B of the device, held by this grip, and pressed on a wall of stiffness k.
+        Without them it is 1/(ω|Z|), motion per force on the hand itself.
 
         Args:
             frequency: shape (n,) [Hz].
@@ -151,22 +143,29 @@ def parse_grip(table: Mapping[str, Any], source: str) -> Grip:
             raise ParameterError("grip", f"{source}: {name} must be {least}", entry["value"])
     thresholds = table.get("thresholds", {})
     sources["thresholds"] = str(thresholds.get("source", source))
-    points = _parse_points(thresholds.get("points", ()), source)
-    return Grip(str(table.get("name", source)), **numbers, **points, sources=sources)
+    frequency, unnoticed, felt = _parse_points(thresholds.get("points", ()), source)
+    return Grip(
+        name=str(table.get("name", source)),
+        frequency=frequency,
+        unnoticed=unnoticed,
+        felt=felt,
+        sources=sources,
+        **numbers,
+    )
 
 
-def _parse_points(points: list[Mapping[str, Any]], source: str) -> dict[str, tuple[float, ...]]:
-    """Return the thresholds by name, checked."""
+def _parse_points(points: Sequence[Mapping[str, Any]], source: str) -> list[tuple[float, ...]]:
+    """Return frequencies, unnoticed and felt amplitudes, checked."""
     try:
-        columns = {
-            name: tuple(parse_quantity(name, point[name], unit) for point in points)
+        columns = [
+            tuple(parse_quantity(name, point[name], unit) for point in points)
             for name, unit in _POINT_UNITS.items()
-        }
+        ]
     except (KeyError, TypeError):
         needs = ", ".join(_POINT_UNITS)
         raise ParameterError("grip", f"{source}: each threshold needs {needs}") from None
-    frequency, unnoticed, felt = (columns[name] for name in _POINT_UNITS)
-    ordered = all(a < b for a, b in zip(frequency, frequency[1:], strict=False))
+    frequency, unnoticed, felt = columns
+    ordered = all(a < b for a, b in pairwise(frequency))
     if len(frequency) < 2 or not ordered or frequency[0] <= 0.0:
         raise ParameterError("grip", f"{source}: thresholds need two or more ascending frequencies")
     if any(not 0.0 < low <= high for low, high in zip(unnoticed, felt, strict=True)):

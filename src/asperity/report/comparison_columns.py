@@ -136,6 +136,11 @@ def _recommendation_cell(row: LawRow, _comparison: Comparison) -> Cell:
     )
 
 
+def _given_stiffness_cell(row: LawRow, _comparison: Comparison) -> Cell:
+    limit = stability_limit_text(row.stability_limit)
+    return Cell(limit_text(row.surface.stiffness), note=limit)
+
+
 def _texture_force_cell(row: LawRow, comparison: Comparison) -> Cell:
     """Return the RMS texture force that the device resolves, all laws in one unit."""
     if row.perceptibility is None:
@@ -162,7 +167,7 @@ def _basis_cell(row: LawRow, _comparison: Comparison) -> Cell:
 
 
 def _oscillation_cell(row: LawRow, _comparison: Comparison) -> Cell:
-    has_force = row.recommended_stiffness or row.is_textureless
+    has_force = row.perceptibility is not None or row.is_textureless
     return Cell(force_text(row.texture_force) if has_force else NOT_AVAILABLE)
 
 
@@ -173,10 +178,12 @@ def _bound_cell(bound: Bound) -> Cell:
 _LETTER_COLUMN = LawColumn("law", lambda row, _: Cell(row.law.letter, "l"))
 NAME_COLUMN = LawColumn("name", lambda row, _: Cell(readable_name(row.law.name)), False, 112)
 VERDICT_COLUMN = LawColumn("verdict", lambda row, _: Cell(row.verdict), False, VERDICT_MIN_CONSOLE)
+_START_COLUMN = LawColumn("start at", _recommendation_cell, True)
+_GIVEN_COLUMN = LawColumn("at", _given_stiffness_cell, True)
 SUMMARY_COLUMNS = (
     _LETTER_COLUMN,
     NAME_COLUMN,
-    LawColumn("start at", _recommendation_cell, True),
+    _START_COLUMN,
     LawColumn("texture", _texture_force_cell, True, 44),
     LawColumn("felt?", lambda row, _: Cell(tier_text(row.perceptibility))),
     LawColumn("leak", _leak_cell, True, 44),
@@ -220,6 +227,8 @@ def law_rows(comparison: Comparison, cells: Callable[[LawRow], Sequence[str | Ce
 
 def laws_table(comparison: Comparison, columns: Sequence[LawColumn]) -> Table:
     """Return one row per law with these columns."""
+    if comparison.stiffness is not None:
+        columns = [_GIVEN_COLUMN if one is _START_COLUMN else one for one in columns]
     rows = law_rows(comparison, lambda row: [one.cell(row, comparison) for one in columns])
     names = [single_line(one.heading) for one in columns]
     meanings = dict(column_meanings("laws"))

@@ -141,7 +141,7 @@ def _case_row(comparison: Comparison) -> Row:
             comparison.device.name,
             depth,
             Cell(text, "l", note=comparison.recommendation),
-            limit_text(best.recommended_stiffness),
+            limit_text(comparison.stiffness or best.recommended_stiffness),
             force_magnitude_text(best.resolved_force),
             tier_text(best.perceptibility),
         ]

@@ -124,6 +124,7 @@ def test_device_without_data_decides_no_limit() -> None:
     assert result.stability_limit.stiffness is None
     assert result.perceptibility.missing_data == (
         "force_resolution", "friction", "bandwidth", "update_rate", "position_resolution",
+        "apparent_mass", "damping",
     )  # fmt: skip
 
 
@@ -278,14 +279,13 @@ def test_perceptibility_of_a_sum_of_two_waves() -> None:
     assert perceptibility.rms == pytest.approx(500.0 * merit(Surface(TWO, "A", 500.0, D)).ripple)
     assert perceptibility.resolved == pytest.approx(LONG, rel=1e-6)
     assert perceptibility.resolved_rms == pytest.approx(500.0 * 5e-5 / math.sqrt(2), rel=1e-3)
-    assert perceptibility.missing_data == ()
+    assert perceptibility.missing_data == ("apparent_mass", "damping")
     assert default_limits(TWO).answer.endswith("20 mN RMS of texture: felt.")
 
 
-@pytest.mark.parametrize("field", ["force_resolution", "friction"])
-def test_force_below_resolution_or_friction_is_not_felt(field: str) -> None:
+def test_force_below_a_step_is_not_felt() -> None:
     for factor, hidden in ((0.999, False), (1.001, True)):
-        result = default_limits(device=device(**{field: 500.0 * A * factor}))
+        result = default_limits(device=device(force_resolution=500.0 * A * factor))
         assert (result.perceptibility.tier == "not felt") is hidden
         assert (": not felt;" in result.answer) is hidden
 

@@ -16,11 +16,16 @@ from asperity.analysis.limits.limit_rules import LIMIT_RULES, LimitCase, evaluat
 from asperity.analysis.limits.perceptibility import (
     MaskingSource,
     Perceptibility,
+    WaveScan,
     classify_perceptibility,
+    respond,
+    unverified_text,
 )
 from asperity.analysis.limits.spectrum import Spectrum, Wave
 from asperity.analysis.passivity.verdict import StabilityLimit
 from asperity.core.errors import ParameterError
+from asperity.devices import parse_device
+from asperity.perception.grip import Grip
 from asperity.textures import Fourier, Profile
 
 LENGTHS, FORCES = np.array([4.0, 2.0, 1.0]), np.array([3.0, 2.0, 1.0])
@@ -151,107 +156,98 @@ def test_waves_with_significant_height_or_force_are_reported() -> None:
 
 # --- tiers ----------------------------------------------------------------------------------------
 
-
-def assess_share(share: float, data: dict[str, float], **more: Any) -> Perceptibility:
-    """Return the perceptibility of a texture whose force amplitude is ``share`` times 16 N."""
-    rms = 16.0 * share / math.sqrt(2.0)
-    while math.sqrt(2.0) * rms < 16.0 * share:
-        rms = math.nextafter(rms, math.inf)
-    return classify_perceptibility(make_case(data, **more), 99.0, rms, None)
+FLAT = Grip("flat", 1.0, 0.0, 0.0, (1e-3, 1e3), (1.0, 1.0), (4.0, 4.0), {})
+"""At low frequencies one metre per newton; one metre is noticed and four metres are felt."""
 
 
-def test_tier_thresholds_are_inclusive() -> None:
-    """With friction of 8 N (or force steps of 2 N): borderline from 8 N on, felt from 16 N on."""
-    levels: list[tuple[dict[str, float], MaskingSource]] = [
-        ({"friction": 8.0}, MaskingSource.FRICTION),
-        ({"least_friction": 8.0}, MaskingSource.FRICTION),
-        ({"force_resolution": 2.0, "friction": 7.5}, MaskingSource.STEPS),
-    ]
-    for data, masking_source in levels:
-        result = assess_share(1.0, data)
-        assert (result.tier, result.masked_by, result.clear_threshold, result.remedies) == (
-            "felt",
-            masking_source,
-            16.0,
-            (),
-        )
-        assert assess_share(1.0 - 1e-12, data).tier == "borderline"
-    assert assess_share(0.5, {"friction": 8.0}).tier == "borderline"
-    assert assess_share(0.5 - 1e-12, {"friction": 8.0}).tier == "not felt"
-    # Of equal masking sources the first is reported: the hand, then friction.
-    even = {"force_resolution": 2.0, "friction": 8.0}
-    assert assess_share(1.0, even).masked_by is MaskingSource.FRICTION
-    assert assess_share(1.0, {}).missing_data == perceptibility._MASKING_FIELDS
-    assert assess_share(1.0, dict.fromkeys(perceptibility._MASKING_FIELDS, 1e-9)).missing_data == ()
+def scan_waves(forces: float, data: dict[str, float], **more: Any) -> WaveScan:
+    """Return a scan, slow enough for statics, of three equal waves along the wall."""
+    each = np.full(3, forces / math.sqrt(3.0))
+    case = make_case(data, forces=each, **({"speed": 1e-6} | more))
+    return WaveScan(case, np.column_stack([each, np.zeros(3)]), FLAT, 16.0)
+
+
+def assess_forces(forces: float, data: dict[str, float], **more: Any) -> Perceptibility:
+    waves = scan_waves(forces, data, **more)
+    return classify_perceptibility(waves, 99.0, forces / math.sqrt(2.0), None, DEVICE)
+
+
+DEVICE = parse_device({"max_stiffness": "1000 N/m"}, "mine")
+ABOVE, BELOW = 1.0 + 1e-9, 1.0 - 1e-9
+
+
+def test_tiers_change_at_the_thresholds_of_the_hand() -> None:
+    for force, tier in ((4.0 * ABOVE, "felt"), (4.0 * BELOW, "borderline"),
+                        (ABOVE, "borderline"), (BELOW, "not felt")):  # fmt: skip
+        result = assess_forces(force, {})
+        assert (result.tier, result.masked_by) == (tier, MaskingSource.HAND)
+        assert result.level == pytest.approx(force / 4.0)
+        assert result.hand_motion == pytest.approx(force)
+        assert result.hand_force == pytest.approx(force)  # 1 N/m
+
+
+def test_force_steps_need_their_number_for_each_tier() -> None:
+    """With γ = 8 steps of 2 N: felt from 16 N on, not felt below 2 N."""
+    for force, tier in ((16.0 * ABOVE, "felt"), (16.0 * BELOW, "borderline"),
+                        (2.0 * ABOVE, "borderline"), (2.0 * BELOW, "not felt")):  # fmt: skip
+        result = assess_forces(force, {"force_resolution": 2.0})
+        assert result.tier == tier
+        assert (result.masked_by is MaskingSource.STEPS) is (force < 16.0)
+
+
+def test_contact_stiffness_holds_the_tool_along_the_normal_alone() -> None:
+    waves = scan_waves(17.0, {})
+    normal = replace(waves, components=waves.components[:, ::-1])
+    assert respond(waves).motions == pytest.approx(17.0 / math.sqrt(3.0), rel=1e-6)
+    assert respond(normal).motions == pytest.approx(1.0 / math.sqrt(3.0), rel=1e-6)
+
+
+def test_dry_friction_damps_across_the_stroke() -> None:
+    speed, friction = 2.0, 30.0
+    normal = scan_waves(1.0, {"friction": friction}, speed=speed)
+    normal = replace(normal, components=normal.components[:, ::-1])
+    omega = 2.0 * math.pi * speed / LENGTHS
+    impedance = np.abs(17.0 - 0.1 * omega**2 + 1j * omega * friction / speed)
+    np.testing.assert_allclose(respond(normal).motions, 1.0 / math.sqrt(3.0) / impedance)
+
+
+def test_waves_beyond_the_device_are_not_felt() -> None:
+    """A bandwidth below the frequency of two waves leaves a third of the variance."""
+    result = assess_forces(9.0, {"bandwidth": 0.3e-6})
+    assert result.resolved == pytest.approx(1.0 / 3.0)
+    assert result.level == pytest.approx(9.0 / 4.0 / math.sqrt(3.0))
+    assert not assess_forces(9.0, {"bandwidth": 1e-7}).level
+
+
+def test_missing_and_unverified_data_are_listed() -> None:
+    fields = (*perceptibility._MASKING_FIELDS, *perceptibility._HAND_FIELDS)
+    assert assess_forces(1.0, {}).missing_data == fields
+    assert assess_forces(1.0, dict.fromkeys(fields, 1e-9)).missing_data == ()
+
+
+@pytest.mark.parametrize(
+    ("step", "tier"),
+    [
+        ({"value": 9.0, "unit": "N", "verified": True, "source": "test"}, "not felt"),
+        ("9 N", "not felt"),  # the user's own
+        ({"value": 9.0, "unit": "N", "verified": False, "source": "remembered"}, "felt"),
+    ],
+)
+def test_a_number_from_an_unverified_source_never_hides_a_texture(step: Any, tier: str) -> None:
+    rig = parse_device({"max_stiffness": "1000 N/m", "force_resolution": step}, "mine")
+    waves = scan_waves(8.0, {"force_resolution": 9.0})
+    result = classify_perceptibility(waves, 99.0, 8.0, None, rig)
+    assert result.tier == tier
+    assert result.unverified == (("force_resolution",) if tier == "felt" else ())
+    words = "If the unverified force resolution of this device is right, less is felt."
+    assert unverified_text(result) == (words if tier == "felt" else "")
 
 
 def test_mostly_form_requires_more_than_half_of_the_force() -> None:
-    result = replace(assess_share(1.0, {}), rms=2.0, texture_rms=1.0)
+    result = replace(assess_forces(1.0, {}), rms=2.0, texture_rms=1.0)
     assert not result.is_mostly_form
     assert replace(result, texture_rms=math.nextafter(1.0, 0.0)).is_mostly_form
     assert result.resolved_rms == pytest.approx(result.amplitude / math.sqrt(2.0), rel=1e-15)
-
-
-def test_remedies_of_a_masked_texture() -> None:
-    """A better device is a remedy if the next masking source permits it; the hand has none."""
-    for data, kind, value in (
-        ({"friction": 8.0}, "friction", 4.0),
-        ({"force_resolution": 2.0}, "force_resolution", 1.0),
-        ({"friction": 8.0, "force_resolution": 1.0}, "friction", 4.0),
-        ({"friction": 4.0, "force_resolution": 2.0}, "force_resolution", 1.0),
-    ):
-        remedies = {one.kind: one.value for one in assess_share(0.5, data).remedies}
-        assert remedies[kind] == pytest.approx(value, rel=1e-12)  # type: ignore[index]  # a kind
-        assert remedies["magnify"] == pytest.approx(2.0, rel=0.01)
-        assert len(remedies) == 2
-    both = {"friction": 8.0, "force_resolution": 1.5}
-    assert [one.kind for one in assess_share(0.5, both).remedies] == ["magnify"]
-    assert [one.kind for one in assess_share(1e-4, {}).remedies] == ["magnify"]
-
-
-def test_required_magnification_just_reaches_the_threshold() -> None:
-    for share in (0.9, 0.5, 0.01, 1e-6, 1.0 / 5e8):
-        texture = 16.0 * share / math.sqrt(2.0)
-        times = perceptibility._required_magnification(make_case({"friction": 8.0}), texture, 16.0)
-        assert times is not None
-        assert math.sqrt(2.0) * times * texture >= 16.0
-        assert times == pytest.approx(1.0 / share, rel=2e-13)
-    for texture in (16.0 / 2e9 / math.sqrt(2.0), 0.0):
-        assert (
-            perceptibility._required_magnification(make_case({"friction": 8.0}), texture, 16.0)
-            is None
-        )
-    # A bandwidth of 0.25 Hz: magnified four times, all waves are long enough.
-    slow = make_case({"bandwidth": 0.25, "friction": 8.0}, wavelengths=np.array([1.0, 1.0, 1.0]))
-    times = perceptibility._required_magnification(slow, 1e3, 16.0)
-    assert times == pytest.approx(4.0, rel=1e-12)
-
-
-def test_weighted_quantile_is_the_value_that_completes_the_share() -> None:
-    values, squares = np.array([1.0, 4.0, 2.0]), np.array([1.0, 2.0, 1.0])
-    for share, expected in ((0.0, 4.0), (0.5, 4.0), (0.5000001, 2.0), (0.75, 2.0), (0.76, 1.0),
-                            (1.0, 1.0), (1.0 + 1e-12, 1.0)):  # fmt: skip
-        assert perceptibility._weighted_quantile(values, squares, share) == expected
-
-
-def test_resolution_remedy_is_a_slower_scan_only_if_speed_matters() -> None:
-    """Limits independent of speed hold for a wave at every speed or at none."""
-    steps = make_case(
-        {"position_resolution": 0.6}, speed=1.0, position_samples=4.0, time_samples=5.0
-    )
-    remedy = perceptibility._resolution_remedy(
-        steps, 0.9
-    )  # 2.4 m and 3 m are required: only the 4 m wave is resolved
-    assert (remedy.kind, remedy.value) == ("position_resolution", 2.0 / 5.0)
-    slower = perceptibility._resolution_remedy(make_case({"bandwidth": 0.125}), 0.9)
-    assert (slower.kind, slower.value) == ("slower", 0.25)
-    slowest = perceptibility._resolution_remedy(
-        make_case({"bandwidth": 0.125, "update_rate": 0.5}), 1.0
-    )
-    assert (slowest.kind, slowest.value) == ("slower", pytest.approx(0.1))
-    # The force is just sufficient if all of it is resolved.
-    enough = assess_share(1.0, {"friction": 8.0, "bandwidth": 0.125})
-    assert ("slower", 0.125) in [(one.kind, one.value) for one in enough.remedies]
 
 
 # --- waves ----------------------------------------------------------------------------------------

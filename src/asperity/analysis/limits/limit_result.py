@@ -13,6 +13,7 @@ from asperity.analysis.limits.limit_rules import Limit
 from asperity.analysis.limits.perceptibility import (
     Perceptibility,
     masking_text,
+    perceptibility_assumptions,
     remedies_text,
     speed_text,
     texture_amount_text,
@@ -29,6 +30,7 @@ from asperity.core.display import Plottable, Reportable
 from asperity.core.files import Serializable, attributes_to_dict
 from asperity.core.units import format_quantity, round_down
 from asperity.devices import Device
+from asperity.perception.grip import Grip
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
 
@@ -78,6 +80,7 @@ class Limits(Plottable, Reportable):
         waves: the significant waves of the texture, the longest first.
         spectrum: all waves, also insignificant ones.
         perceptibility: perceptibility at this stiffness and speed.
+        grip: the hand that holds the device.
         speeds: scanning speeds [m/s] at which all decidable limits hold, from the first up to but
             excluding the second.
         assumptions: the assumptions, in sentences.
@@ -97,6 +100,7 @@ class Limits(Plottable, Reportable):
     waves: tuple[RenderedWave, ...]
     spectrum: Spectrum
     perceptibility: Perceptibility
+    grip: Grip
     speeds: tuple[float, float]
     assumptions: tuple[str, ...] = ()
 
@@ -218,8 +222,7 @@ def texture_force_text(result: Limits) -> str:
     text = f"At {stiffness_text(result)} law {law} gives {texture_amount_text(texture)}: "
     if texture.tier == "felt":
         return f"{text}felt."
-    masking = masking_text(texture, result.device)
-    return f"{text}{texture.tier}; {masking}. {remedies_text(texture)}".rstrip()
+    return f"{text}{texture.tier}; {masking_text(texture)}. {remedies_text(texture)}".rstrip()
 
 
 def stiffness_text(result: Limits) -> str:
@@ -276,6 +279,7 @@ def limits_assumptions(
     if result.gain.method == "sampled":
         sentences.append(f"{result.gain_symbol} = {result.gain.value:.4g} is sampled, not proved")
     used = [*dict.fromkeys(limit.device_field for limit in result.limits), "friction"]
+    sentences += perceptibility_assumptions(result.perceptibility, result.device, result.grip)
     sentences += unverified_sentences(result.device, used)
     sentences.append("The limits are necessary, not sufficient; they were not tested with people")
     return tuple(sentences)

@@ -1,67 +1,75 @@
-"""Perceptibility of a texture: its force against the thresholds that mask it, and remedies.
+"""Perceptibility of a texture: the motion of the held tool against what a hand notices.
 
 The texture force is the oscillating force of a straight scan, without form and waviness, in the
-waves that the device resolves at that speed. It is masked by the device's force resolution, by its
-dry friction, and by the threshold of the hand.
+waves that the device resolves at that speed. Each wave moves the apparent mass of the device and
+the hand that holds it (MATH section 11); the amplitude of this motion is compared with the
+detection thresholds of the grip at the frequency of the wave.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
+from functools import partial
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from asperity.analysis.energy.merit import merit
 from asperity.analysis.limits.limit_rules import LIMIT_RULES, LimitCase, evaluate_limit
-from asperity.analysis.limits.spectrum import compute_spectrum, wave_forces
+from asperity.analysis.limits.spectrum import compute_spectrum, wave_force_components
 from asperity.core.checks import FloatArray
 from asperity.core.files import Serializable
 from asperity.core.units import format_quantity, round_down, round_up
 from asperity.devices import Device
+from asperity.devices.device import USER_SOURCE
+from asperity.perception.grip import Grip, grip_text, load_grip
 from asperity.surface import Surface, default_max_depth
+from asperity.textures.synthetic import prepare_texture
 from asperity.textures.texture import TexturePart
 
 MIN_SAMPLES = 2.0
 """Least samples of a wave by the sampling theorem; with more, but fewer than α and β, the wave is
 distorted and borderline at best."""
 
-HAND_THRESHOLD = 0.01
-"""Amplitude of an oscillating force [N] below which a hand is assumed to notice nothing.
+DEFAULT_APPARENT_MASS = 0.1
+"""Apparent mass [kg] assumed for a device that does not state it."""
 
-A choice: thresholds measured with a stylus depend on frequency, direction and grip (Israr, Choi
-and Tan, IROS 2006).
-"""
-
-CLEAR_RATIO = 2.0
-"""An amplitude counts as felt, not borderline, at this multiple of the threshold of the hand and of
-the dry friction. Of force steps it needs γ, as in the paper's limit 4."""
+MAX_SPEED = 0.5
+"""Greatest scanning speed [m/s] that a remedy asks for."""
 
 # The limits that decide whether a wave is resolved: all limits on waves but that on its force.
 _SAMPLING_RULES = tuple(rule for rule in LIMIT_RULES if rule.number in {1, 2, 3, 6})
-_MAX_MAGNIFICATION = 1e9
 _MASKING_FIELDS = "force_resolution", "friction", "bandwidth", "update_rate", "position_resolution"
+_HAND_FIELDS = "apparent_mass", "damping"
+# Factors by which a quantity is changed in the search for a remedy.
+_FACTORS = 1.05 ** np.arange(1, 189)
+# A magnification found by scaling is confirmed, and increased by these factors where depth or form
+# do not scale with it.
+_MAGNIFICATION_TRIES = 1.0, 1.5, 2.5
+MAX_CONTACT_LOST = 0.5
+"""Greatest share of the scan without contact of a magnified texture that counts as a remedy."""
 
 Tier = Literal["felt", "borderline", "not felt"]
 
 
 class MaskingSource(Enum):
-    """The source with the highest threshold that the force of a texture has to exceed."""
+    """What a texture has to exceed to be felt."""
 
     HAND = "hand"
-    FRICTION = "friction"
     STEPS = "force_resolution"
 
 
 @dataclass(frozen=True)
 class Remedy(Serializable):
-    """A change that would make the texture felt.
+    """A change that makes the texture felt.
 
     Attributes:
-        kind: ``"magnify"``: magnification in all directions by a factor; ``"slower"``: a scan
-            below a speed [m/s]; ``"friction"``, ``"force_resolution"`` or
+        kind: ``"magnify"``: magnification in all directions by a further factor; ``"speed"``: a
+            scan at a speed [m/s]; ``"apparent_mass"``, ``"force_resolution"`` or
             ``"position_resolution"``: a device with at most that value [SI].
         value: the factor, speed or device value.
     """
@@ -83,13 +91,20 @@ class Perceptibility(Serializable):
         resolved: share of the texture force's variance in waves that the device resolves at this
             speed: limits 1, 2, 3 and 6, as far as they can be decided.
         amplitude: √2 RMS of the resolved part [N].
-        clear_threshold: amplitude from which the texture is felt [N].
-        detection_threshold: amplitude below which the texture is not felt [N], of waves with at
-            least two samples; in between it is borderline.
-        masked_by: the source that sets ``clear_threshold``.
+        hand_motion: amplitude of the motion of the held tool, √2 RMS, of the resolved part [m].
+        hand_force: amplitude of the force on the hand, √2 RMS, of the resolved part [N].
+        level: that motion over the amplitude that is felt, wave by wave, root of the sum of
+            squares [1]; felt from 1 on.
+        frequency: frequency of the wave that contributes most to ``level`` [Hz].
+        masked_by: whether the hand or the force steps of the device hide the texture.
+        force_step: force steps of the device [N], γ of which are needed; 0 if unknown.
         speed: speed of the scan [m/s].
+        apparent_mass: mass of the device that was used [kg].
+        extrapolated: whether waves are outside of the frequencies of the thresholds.
         missing_data: unknown fields of the device that could mask the texture.
-        remedies: changes that would make it felt; empty where it is felt.
+        unverified: fields of the device from unverified sources that would mask the texture; the
+            tier leaves them out.
+        remedies: changes that make it felt; empty where it is felt.
     """
 
     tier: Tier
@@ -98,11 +113,17 @@ class Perceptibility(Serializable):
     nesting_index: float | None
     resolved: float
     amplitude: float
-    clear_threshold: float
-    detection_threshold: float
+    hand_motion: float
+    hand_force: float
+    level: float
+    frequency: float
     masked_by: MaskingSource
+    force_step: float
     speed: float
+    apparent_mass: float
+    extrapolated: bool
     missing_data: tuple[str, ...]
+    unverified: tuple[str, ...]
     remedies: tuple[Remedy, ...]
 
     @property
@@ -116,6 +137,33 @@ class Perceptibility(Serializable):
         return self.texture_rms < 0.5 * self.rms
 
 
+@dataclass(frozen=True)
+class WaveScan:
+    """The waves of a texture on a scan, with the device and the hand that they move.
+
+    Attributes:
+        case: device, speed, samples, and the waves.
+        components: amplitudes of the force along the wall and along its normal [N], shape (n, 2).
+        grip: the hand.
+        contact_stiffness: stiffness of the wall along its normal [N/m].
+    """
+
+    case: LimitCase
+    components: FloatArray
+    grip: Grip
+    contact_stiffness: float
+
+    def magnified(self, factor: float) -> WaveScan:
+        """Return the scan of the texture magnified in all directions, as deep in proportion."""
+        wavelengths = factor * self.case.wavelengths
+        case = replace(self.case, wavelengths=wavelengths, forces=factor * self.case.forces)
+        return replace(self, case=case, components=factor * self.components)
+
+    def with_device(self, field: str, value: float) -> WaveScan:
+        """Return the scan on a device with another value of a field."""
+        return replace(self, case=replace(self.case, device={**self.case.device, field: value}))
+
+
 def assess_perceptibility(
     surface: Surface,
     device: Device,
@@ -123,161 +171,243 @@ def assess_perceptibility(
     *,
     rms: float,
     explicit_depth: bool = False,
+    grip: Grip | None = None,
+    find_remedies: bool = True,
     **scan: float,
 ) -> Perceptibility:
     """Assess whether the texture of a surface is felt on a device.
 
     Args:
         surface: texture, law and stiffness.
-        device: device with force and position resolution, update rate, friction and bandwidth;
-            unknown data mask nothing.
+        device: device with apparent mass, damping, force and position resolution, update rate and
+            bandwidth; unknown data mask nothing, an unknown mass is assumed.
         part: the part of the surface that is texture, not form.
         rms: RMS of the oscillating force of the surface [N].
         explicit_depth: whether max_depth was given; by default the texture without form is
             pressed as deep as it is high.
+        grip: the hand; by default a tool held like a pen.
+        find_remedies: whether to search for changes that make it felt.
         **scan: speed [m/s], time_samples, position_samples and force_steps, as in
             :class:`~asperity.analysis.limits.limit_rules.LimitCase`.
 
     Example:
         >>> from asperity.devices import load_device
         >>> from asperity.textures.kinds.sinusoid import Sinusoid
-        >>> wave = Sinusoid(amplitude=1e-4, period=1e-3)
+        >>> wave = Sinusoid(amplitude=5e-6, period=1e-3)
         >>> surface = Surface(wave, "A", stiffness=500.0)
         >>> part, touch = TexturePart(wave), load_device("touch")
-        >>> result = assess_perceptibility(surface, touch, part, rms=0.035)
-        >>> result.tier, result.masked_by.value
-        ('not felt', 'friction')
+        >>> result = assess_perceptibility(surface, touch, part, rms=0.00177)
+        >>> result.tier, f"{result.level:.2f}", f"{result.frequency:.0f} Hz"
+        ('borderline', '0.37', '100 Hz')
         >>> [f"{remedy.kind} {remedy.value:.3g}" for remedy in result.remedies]
-        ['magnify 11', 'friction 0.0247']
+        ['magnify 2', 'speed 0.053', 'apparent_mass 0.016']
     """
-    texture_rms = rms
+    hand = load_grip() if grip is None else grip
+    texture_rms, scanned = rms, surface
     if part.nesting is not None:
         depth = surface.max_depth if explicit_depth else default_max_depth(part.texture)
-        surface = surface.to_texture(part.texture, depth)
-        texture_rms = merit(surface).ripple * surface.stiffness
+        scanned = surface.to_texture(part.texture, depth)
+        texture_rms = merit(scanned).ripple * surface.stiffness
     spectrum = compute_spectrum(part.texture)
-    case = LimitCase(
-        {field: datum.value for field, datum in device.data.items()},
-        spectrum.wavelengths,
-        wave_forces(surface, spectrum),
-        spectrum.shares,
+    components = wave_force_components(scanned, spectrum)
+    forces = np.hypot(*components.T)
+    # The waves share the RMS of the scan; their sum differs by what is not periodic in the scan.
+    total = math.sqrt(float(forces @ forces))
+    scale = math.sqrt(2.0) * texture_rms / total if total > 0.0 else 0.0
+    data = {field: datum.value for field, datum in device.data.items()}
+    case = LimitCase(data, spectrum.wavelengths, scale * forces, spectrum.shares, **scan)
+    waves = WaveScan(case, scale * components, hand, surface.stiffness)
+    result = classify_perceptibility(waves, rms, texture_rms, part.nesting, device)
+    if not find_remedies or result.tier == "felt" or texture_rms == 0.0:
+        return result
+    is_felt = partial(_is_felt_magnified, surface, device, hand, explicit_depth, scan)
+    return replace(result, remedies=tuple(_find_remedies(waves, is_felt)))
+
+
+def _is_felt_magnified(
+    surface: Surface,
+    device: Device,
+    grip: Grip,
+    explicit_depth: bool,
+    scan: Mapping[str, float],
+    factor: float,
+) -> bool:
+    """Return whether the surface is felt and touched when its texture is magnified by a factor."""
+    texture = prepare_texture(surface.texture, magnify=factor)
+    larger = surface.to_texture(
+        texture, factor * surface.max_depth if explicit_depth else default_max_depth(texture)
+    )
+    strokes = merit(larger)
+    assessed = assess_perceptibility(
+        larger,
+        device,
+        texture.texture_part(),
+        rms=strokes.ripple * larger.stiffness,
+        explicit_depth=explicit_depth,
+        grip=grip,
+        find_remedies=False,
         **scan,
     )
-    return classify_perceptibility(case, rms, texture_rms, part.nesting)
+    return assessed.tier == "felt" and strokes.contact_lost <= MAX_CONTACT_LOST
 
 
 def classify_perceptibility(
-    case: LimitCase, rms: float, texture_rms: float, nesting_index: float | None
+    waves: WaveScan, rms: float, texture_rms: float, nesting_index: float | None, device: Device
 ) -> Perceptibility:
     """Return the perceptibility of a texture from the forces of its waves.
 
     Args:
-        case: device, speed, samples, and the waves of the texture with their forces.
+        waves: the waves of the texture on a scan.
         rms: RMS of the oscillating force of the whole surface [N].
         texture_rms: RMS of the force of its texture [N].
         nesting_index: wavelength that separates texture from waviness [m].
+        device: tells which of its numbers are verified.
     """
-    friction = max(case.device.get("friction", 0.0), case.device.get("least_friction", 0.0))
-    step = case.device.get("force_resolution", 0.0)
-    clear_by_source = {
-        MaskingSource.HAND: CLEAR_RATIO * HAND_THRESHOLD,
-        MaskingSource.FRICTION: CLEAR_RATIO * friction,
-        MaskingSource.STEPS: case.force_steps * step,
-    }
-    masked_by = max(clear_by_source, key=lambda source: clear_by_source[source])
-    clear, detection = clear_by_source[masked_by], max(HAND_THRESHOLD, friction, step)
-    resolved = _resolved_share(case)
-    amplitude = math.sqrt(2.0 * resolved) * texture_rms
-    coarse = replace(case, time_samples=MIN_SAMPLES, position_samples=MIN_SAMPLES)
-    coarse_amplitude = math.sqrt(2.0 * _resolved_share(coarse)) * texture_rms
-    tier: Tier = "not felt" if coarse_amplitude < detection else "borderline"
-    tier = "felt" if amplitude >= clear else tier
-    remedies = []
-    if tier != "felt" and texture_rms > 0.0:
-        remedies = _find_remedies(case, amplitude, texture_rms, clear_by_source)
+    data = waves.case.device
+    doubtful = [
+        field
+        for field in _MASKING_FIELDS
+        if (datum := device.data.get(field)) and not datum.verified and datum.source != USER_SOURCE
+    ]
+    known = {field: value for field, value in data.items() if field not in doubtful}
+    trusted = replace(waves, case=replace(waves.case, device=known))
+    response, complete = respond(trusted), respond(waves)
+    masking = [
+        field
+        for field in (doubtful if complete.tier != response.tier else ())
+        if respond(trusted.with_device(field, data[field])).tier != response.tier
+    ]
+    if not masking:
+        response = complete
+    forces, resolved = waves.case.forces, response.is_resolved
+    motions, total = np.where(resolved, response.motions, 0.0), float(forces @ forces)
+    levels = motions / response.felt
+    step = known.get("force_resolution", 0.0)
+    amplitude = math.sqrt(float(np.square(forces[resolved]).sum()))
+    rendered = response.frequencies[resolved & (forces > 0.0)]
+    ends = waves.grip.frequency[0], waves.grip.frequency[-1]
+    is_stepped = amplitude < waves.case.force_steps * step
     return Perceptibility(
-        tier=tier,
+        tier=response.tier,
         rms=rms,
         texture_rms=texture_rms,
         nesting_index=nesting_index,
-        resolved=resolved,
+        resolved=amplitude**2 / total if total > 0.0 else 1.0,
         amplitude=amplitude,
-        clear_threshold=clear,
-        detection_threshold=detection,
-        masked_by=masked_by,
-        speed=case.speed,
-        missing_data=tuple(field for field in _MASKING_FIELDS if field not in case.device),
-        remedies=tuple(remedies),
+        hand_motion=float(np.linalg.norm(motions)),
+        hand_force=float(np.linalg.norm(motions / waves.grip.compliance(response.frequencies))),
+        level=float(np.linalg.norm(levels)),
+        frequency=float(response.frequencies[np.argmax(levels)]) if len(levels) else 0.0,
+        masked_by=MaskingSource.STEPS if is_stepped else MaskingSource.HAND,
+        force_step=step,
+        speed=waves.case.speed,
+        apparent_mass=response.apparent_mass,
+        extrapolated=bool(np.any((rendered < ends[0]) | (rendered > ends[1]))),
+        missing_data=tuple(one for one in (*_MASKING_FIELDS, *_HAND_FIELDS) if one not in data),
+        unverified=tuple(masking),
+        remedies=(),
     )
 
 
-def _resolved_share(case: LimitCase) -> float:
-    """Return the share of the force's variance that the device resolves; 1 without force."""
-    squares = case.forces**2
-    total = float(squares.sum())
-    is_resolved = np.all([evaluate_limit(rule, case).holds for rule in _SAMPLING_RULES], axis=0)
-    return float(squares[is_resolved].sum()) / total if total > 0.0 else 1.0
+@dataclass(frozen=True)
+class Response:
+    """What reaches the hand of each wave, and whether it is felt.
 
-
-def _find_remedies(
-    case: LimitCase, amplitude: float, texture_rms: float, clear: dict[MaskingSource, float]
-) -> list[Remedy]:
-    """Return the changes that would make a texture felt, each by itself."""
-    masked_by = max(clear, key=lambda source: clear[source])
-    remedies = []
-    magnification = _required_magnification(case, texture_rms, clear[masked_by])
-    if magnification is not None:
-        remedies.append(Remedy("magnify", round_up(magnification, 2)))
-    whole = math.sqrt(2.0) * texture_rms
-    if whole >= clear[masked_by]:  # strong enough, if the device resolved it
-        remedies.append(_resolution_remedy(case, (clear[masked_by] / whole) ** 2))
-    elif masked_by is not MaskingSource.HAND:
-        others = max(clear[source] for source in clear if source is not masked_by)
-        ratio = CLEAR_RATIO if masked_by is MaskingSource.FRICTION else case.force_steps
-        if amplitude >= others:
-            remedies.append(Remedy(masked_by.value, amplitude / ratio))
-    return remedies
-
-
-def _required_magnification(case: LimitCase, texture_rms: float, clear: float) -> float | None:
-    """Return the magnification from which a texture is felt; ``None`` without texture.
-
-    Magnified g times in all directions, slopes and with them q stay the same; the force at the
-    same stiffness grows g times, and every wave is g times longer, so no fewer are resolved.
+    Attributes:
+        tier: whether the texture is felt.
+        frequencies: v/l [Hz], shape (n,).
+        motions: amplitudes of the motion of the held tool [m], shape (n,).
+        felt: amplitudes that are felt [m], shape (n,).
+        is_resolved: whether the device resolves the wave, shape (n,).
+        apparent_mass: of the device, or the assumed one [kg].
     """
 
-    def is_felt(factor: float) -> bool:
-        larger = replace(case, wavelengths=factor * case.wavelengths)
-        return math.sqrt(2.0 * _resolved_share(larger)) * factor * texture_rms >= clear
-
-    high = 1.0
-    while not is_felt(high):
-        high *= 2.0
-        if high > _MAX_MAGNIFICATION:
-            return None
-    low = 0.5 * high
-    while high > (1.0 + 1e-13) * low:
-        middle = math.sqrt(low * high)
-        low, high = (low, middle) if is_felt(middle) else (middle, high)
-    return high
+    tier: Tier
+    frequencies: FloatArray
+    motions: FloatArray
+    felt: FloatArray
+    is_resolved: NDArray[np.bool_]
+    apparent_mass: float
 
 
-def _resolution_remedy(case: LimitCase, share: float) -> Remedy:
-    """Return the scan speed, or the position resolution, that resolves a share of the force."""
-    squares = case.forces**2
-    tops = [evaluate_limit(rule, case).top_speeds for rule in _SAMPLING_RULES]
-    speed = _weighted_quantile(np.min(tops, axis=0), squares, share)
-    if speed > 0.0:
-        return Remedy("slower", speed)
-    longest = _weighted_quantile(case.wavelengths, squares, share)
-    return Remedy("position_resolution", longest / max(case.position_samples, case.time_samples))
+def respond(waves: WaveScan) -> Response:
+    """Return what reaches the hand on a scan.
+
+    The contact stiffness acts along the normal of the wall alone, and dry friction F_c there as
+    damping F_c/v; see :meth:`~asperity.perception.grip.Grip.compliance`.
+
+    Felt: root of the sum of squares of motion over the felt amplitude at least 1, and an amplitude of force of at least γ steps. Not felt:
+    the same with the unnoticed amplitude below 1, or less than one step of force, in waves with at
+    least two samples.
+    """
+    case, grip = waves.case, waves.grip
+    frequencies, damping = case.speed / case.wavelengths, case.device.get("damping", 0.0)
+    # To a motion across the stroke, dry friction of constant size is viscous.
+    across = damping + case.device.get("friction", 0.0) / case.speed
+    mass = case.device.get("apparent_mass", DEFAULT_APPARENT_MASS)
+    along, normal = (
+        grip.compliance(frequencies, mass, resistance, stiffness)
+        for resistance, stiffness in ((damping, 0.0), (across, waves.contact_stiffness))
+    )
+    motions = np.hypot(waves.components[:, 0] * along, waves.components[:, 1] * normal)
+    unnoticed, felt = grip.threshold(frequencies)
+    coarse = replace(case, time_samples=MIN_SAMPLES, position_samples=MIN_SAMPLES)
+    resolved, sampled = (
+        np.all([evaluate_limit(rule, one).holds for rule in _SAMPLING_RULES], axis=0)
+        for one in (case, coarse)
+    )
+    step, (amplitude, sampled_amplitude) = (
+        case.device.get("force_resolution", 0.0),
+        (math.sqrt(float(np.square(case.forces[which]).sum())) for which in (resolved, sampled)),
+    )
+    tier: Tier = "not felt"
+    if np.linalg.norm((motions / unnoticed)[sampled]) >= 1.0 and sampled_amplitude >= step:
+        tier = "borderline"
+    is_strong = amplitude >= case.force_steps * step
+    if np.linalg.norm((motions / felt)[resolved]) >= 1.0 and is_strong:
+        tier = "felt"
+    return Response(tier, frequencies, motions, felt, resolved, mass)
 
 
-def _weighted_quantile(values: FloatArray, squares: FloatArray, share: float) -> float:
-    """Return the value at or above which that share of the squares lies."""
-    order = np.argsort(-values)
-    sums = np.cumsum(squares[order]) / squares.sum()
-    return float(values[order][min(int(np.searchsorted(sums, share)), len(order) - 1)])
+def _find_remedies(waves: WaveScan, is_felt_magnified: Callable[[float], bool]) -> list[Remedy]:
+    """Return the changes that make a texture felt, each by itself and confirmed."""
+    case, found = waves.case, []
+    first = _first_felt(waves.magnified)
+    if first is not None:
+        tries = (round_up(first * share, 2) for share in _MAGNIFICATION_TRIES)
+        if factor := next((factor for factor in tries if is_felt_magnified(factor)), None):
+            found.append(Remedy("magnify", factor))
+    speeds = [
+        _first_felt(lambda factor: replace(waves, case=replace(case, speed=case.speed / factor))),
+        _first_felt(
+            lambda factor: replace(
+                waves, case=replace(case, speed=min(case.speed * factor, MAX_SPEED))
+            )
+        ),
+    ]
+    slower, faster = (math.inf if factor is None else factor for factor in speeds)
+    if min(slower, faster) < math.inf:
+        speed = round_down(case.speed / slower, 2) if slower <= faster else case.speed * faster
+        found.append(Remedy("speed", min(speed, MAX_SPEED)))
+    for field in ("apparent_mass", "force_resolution", "position_resolution"):
+        assumed = DEFAULT_APPARENT_MASS if field == "apparent_mass" else 0.0
+        value = case.device.get(field, assumed)
+        factor = _first_felt(partial(_with_finer_device, waves, field, value)) if value else None
+        if factor is not None:
+            found.append(Remedy(field, round_down(value / factor, 2)))
+    return found
+
+
+def _with_finer_device(waves: WaveScan, field: str, value: float, factor: float) -> WaveScan:
+    """Return the scan on a device with a value divided by a factor."""
+    return waves.with_device(field, value / factor)
+
+
+def _first_felt(change: Callable[[float], WaveScan]) -> float | None:
+    """Return the least factor of a change at which a texture is felt; ``None`` if none is."""
+    return next(
+        (float(one) for one in _FACTORS if respond(change(float(one))).tier == "felt"), None
+    )
 
 
 _ZERO_HEIGHT = 1e-12  # [m], far below the size of an atom: rounding
@@ -304,13 +434,7 @@ def force_magnitude_text(force: float) -> str:
 
 
 def texture_amount_text(texture: Perceptibility) -> str:
-    """Return the RMS of the oscillating force, and the part of it that is texture.
-
-    Example:
-        >>> forces = ("felt", 0.139, 0.0116, 8e-3, 1.0, 0.0164, 0.02, 0.01)
-        >>> texture_amount_text(Perceptibility(*forces, MaskingSource.HAND, 0.1, (), ()))
-        '140 mN RMS, of which 12 mN is texture'
-    """
+    """Return the RMS of the oscillating force, and the part of it that is texture."""
     texture_force = force_magnitude_text(texture.texture_rms)
     text = f"{texture_force} RMS of texture"
     if texture.is_mostly_form:
@@ -321,39 +445,66 @@ def texture_amount_text(texture: Perceptibility) -> str:
     return text
 
 
-def masking_text(texture: Perceptibility, device: Device) -> str:
-    """Return the force [RMS] from which a texture is felt, and the source that masks it below."""
-    needed = f"felt from {force_magnitude_text(texture.clear_threshold / 2**0.5)} RMS on"
-    if texture.masked_by is MaskingSource.HAND:
-        return f"{needed}, the threshold of the hand"
-    if texture.masked_by is MaskingSource.FRICTION:
-        friction = max(device.value(field) or 0.0 for field in ("friction", "least_friction"))
-        return f"{needed}, for the device's dry friction of {force_magnitude_text(friction)}"
-    step = force_magnitude_text(device.value("force_resolution") or 0.0)
-    return f"{needed}, for the device's force steps of {step}"
+def masking_text(texture: Perceptibility) -> str:
+    """Return what hides a texture, with the motion of the held tool or the force that is needed."""
+    if texture.masked_by is MaskingSource.STEPS:
+        step = force_magnitude_text(texture.force_step)
+        return f"the device's force steps of {step} hide it"
+    motion = format_quantity(texture.hand_motion, "m", digits=2)
+    at = f"at {texture.frequency:.3g} Hz" if texture.frequency else "in waves that it resolves"
+    share = f"{texture.level:.2g} of the amplitude that is felt"
+    mass = format_quantity(1e3 * texture.apparent_mass, "g")
+    return f"it moves the held tool ({mass}) by {motion} {at}, {share}"
+
+
+def unverified_text(texture: Perceptibility) -> str:
+    """Return which unverified numbers of the device would hide the texture; empty without any."""
+    if not texture.unverified:
+        return ""
+    names = " and ".join(field.replace("_", " ") for field in texture.unverified)
+    return f"If the unverified {names} of this device is right, less is felt."
+
+
+def perceptibility_assumptions(texture: Perceptibility, device: Device, grip: Grip) -> list[str]:
+    """Return what a tier of perceptibility assumes of the hand and of the device, in sentences."""
+    mass = format_quantity(1e3 * texture.apparent_mass, "g")
+    assumed = "" if "apparent_mass" in device.data else ", assumed"
+    limited = "; thresholds are extrapolated" if texture.extrapolated else ""
+    sentences = [
+        f"Felt: the texture moves the held tool, at {speed_text(texture.speed)}, by more than a "
+        f"person notices at its frequencies{limited}; apparent mass {mass}{assumed}, "
+        f"{grip_text(grip)}",
+        f"Thresholds of the hand: {grip.sources['thresholds']}",
+    ]
+    if unknown := [one for one in texture.missing_data if one != "apparent_mass"]:
+        names = ", ".join(field.replace("_", " ") for field in unknown)
+        sentences.append(f"Unknown and assumed to hide nothing: {names}")
+    friction = max(device.value(field) or 0.0 for field in ("friction", "least_friction"))
+    if friction:
+        sentences.append(
+            f"The device's dry friction of {force_magnitude_text(friction)} only damps the tool "
+            "while it slides; near rest, at reversals and under a lighter push it holds the tool"
+        )
+    return sentences
 
 
 def remedies_text(texture: Perceptibility) -> str:
-    """Return the changes that would make a texture felt, in a sentence; empty without any.
-
-    Example:
-        >>> remedies = (Remedy("magnify", 11.0), Remedy("friction", 0.025))
-        >>> forces = ("not felt", 0.1, 0.1, None, 1.0, 0.1, 2.0, 1.0)
-        >>> remedies_text(Perceptibility(*forces, MaskingSource.FRICTION, 0.1, (), remedies))
-        'To feel it, magnify 11 times, or use a device with less than 25 mN of dry friction.'
-    """
-    if not texture.remedies:
+    """Return the changes that make a texture felt, in a sentence; says so if there are none."""
+    if texture.tier == "felt" or texture.texture_rms == 0.0:
         return ""
+    if not texture.remedies:
+        return "No magnification, speed or finer device alone makes it felt."
     return f"To feel it, {', or '.join(_remedy_text(remedy) for remedy in texture.remedies)}."
 
 
 def _remedy_text(remedy: Remedy) -> str:
-    value, force = remedy.value, force_magnitude_text(remedy.value)
+    value = remedy.value
     return {
-        "magnify": f"magnify {value:.10g} times",
-        "slower": f"scan slower than {speed_text(round_down(value))}",
-        "friction": f"use a device with less than {force} of dry friction",
-        "force_resolution": f"use a device with force steps below {force}",
+        "magnify": f"magnify it {value:.10g} times more",
+        "speed": f"scan at {speed_text(value)}",
+        "apparent_mass": f"use a device with less than {format_quantity(1e3 * value, 'g')} of "
+        "apparent mass",
+        "force_resolution": f"use a device with force steps below {force_magnitude_text(value)}",
         "position_resolution": f"use a device with position steps below "
         f"{format_quantity(value, 'm')}",
     }[remedy.kind]

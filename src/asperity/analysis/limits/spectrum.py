@@ -255,11 +255,7 @@ _GOLDEN_RATIO = 0.5 * (math.sqrt(5.0) - 1.0)
 def wave_forces(surface: Surface, spectrum: Spectrum) -> FloatArray:
     """Return the force amplitude of every wave of a texture.
 
-    The probe moves at constant height, as deep as
-    :func:`~asperity.analysis.energy.merit.merit` scans; a law with state slides at full
-    deflection. For a sum of waves the force is fitted by the same waves (least squares). For bands
-    it is the amplitude of the band times the square root of the ratio of force variance to height
-    variance on the same patch. The squares of the force components are added.
+    The squares of the components of :func:`wave_force_components` are added.
 
     Args:
         surface: texture, law and stiffness.
@@ -275,12 +271,28 @@ def wave_forces(surface: Surface, spectrum: Spectrum) -> FloatArray:
         >>> wave_forces(Surface(texture, "A", stiffness=500.0), compute_spectrum(texture)).round(9)
         array([0.05])
     """
+    return np.asarray(np.hypot(*wave_force_components(surface, spectrum).T))
+
+
+def wave_force_components(surface: Surface, spectrum: Spectrum) -> FloatArray:
+    """Return the force amplitude of every wave of a texture, along the wall and along its normal.
+
+    The probe moves at constant height, as deep as
+    :func:`~asperity.analysis.energy.merit.merit` scans; a law with state slides at full
+    deflection. For a sum of waves the force is fitted by the same waves (least squares). For bands
+    it is the amplitude of the band times the square root of the ratio of force variance to height
+    variance on the same patch.
+
+    Returns:
+        Amplitudes [N], shape (n, 2): of the components along x and y, their squares added; and of
+        the component along z.
+    """
     if not spectrum.waves:
-        return np.zeros(0)
+        return np.zeros((0, 2))
     compute = _fit_waves if spectrum.exact else _band_force_amplitudes
     key = repr((spectrum.exact, spectrum.waves))
     forces = cached_result("wave forces", surface, lambda unit: compute(unit, spectrum), key)
-    return forces * (surface.stiffness if is_shipped_law(surface.law) else 1.0)
+    return np.asarray(forces) * (surface.stiffness if is_shipped_law(surface.law) else 1.0)
 
 
 def scan_forces(surface: Surface, xy: FloatArray) -> FloatArray:
@@ -301,8 +313,9 @@ def _fit_waves(surface: Surface, spectrum: Spectrum) -> FloatArray:
     angles = xy @ vectors.T + np.array([wave.phase for wave in spectrum.waves])
     columns = np.hstack([np.ones((len(xy), 1)), np.sin(angles), np.cos(angles)])
     fit = np.linalg.lstsq(columns, scan_forces(surface, xy), rcond=None)[0][1:]
-    squares = np.sum(fit**2, axis=1)
-    return np.asarray(np.sqrt(squares[: len(vectors)] + squares[len(vectors) :]))
+    squares = fit[: len(vectors)] ** 2 + fit[len(vectors) :] ** 2
+    pairs = np.column_stack([squares[:, 0] + squares[:, 1], squares[:, 2]])
+    return np.asarray(np.sqrt(pairs))
 
 
 def _fit_points(texture: Texture, spectrum: Spectrum, count: int) -> FloatArray:
@@ -325,11 +338,12 @@ def _band_force_amplitudes(surface: Surface, spectrum: Spectrum) -> FloatArray:
     flat = points.reshape(-1, 2)
     shape = points.shape[:2]
     heights = band_variances(texture.height(flat).reshape(1, *shape), spacing, repeats)
-    forces = scan_forces(surface, flat).T.reshape(3, *shape)
-    pushed = band_variances(np.ascontiguousarray(forces), spacing, repeats)
+    forces = np.ascontiguousarray(scan_forces(surface, flat).T).reshape(3, *shape)
+    along, normal = (band_variances(part, spacing, repeats) for part in (forces[:2], forces[2:]))
     known = heights.variance > 1e-12 * heights.variance.max()
-    ratio = np.sqrt(pushed.variance[known] / heights.variance[known])
+    variances = np.column_stack([along.variance, normal.variance])
+    ratio = np.sqrt(variances[known] / heights.variance[known, None])
     wanted = np.floor(BANDS_PER_OCTAVE * np.log2(1.0 / spectrum.wavelengths))
     # A wave longer than the patch has the force ratio of the longest wave in it.
     nearest = np.abs(heights.number[known] - wanted[:, None]).argmin(axis=1)
-    return np.asarray(spectrum.amplitudes * ratio[nearest])
+    return np.asarray(spectrum.amplitudes[:, None] * ratio[nearest])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -187,23 +186,28 @@ def _draw_wavelength_limits(result: Limits, panels: Sequence[Axes]) -> list[floa
 
 
 def _draw_force_limits(result: Limits, axes: Axes, scale: float) -> None:
-    """Draw the forces below which a wave is not rendered, or masked by friction."""
-    device = result.device
-    step, friction = device.value("force_resolution"), device.value("friction")
-    steps, lines = result.force_steps, []
-    if step is not None:
-        lines.append((steps * step, f"4: {steps:g} steps of force", style.ORANGE))
-    if friction:
-        lines.append((friction, "dry friction of the device", style.GREEN))
-    for force, words, colour in lines:
-        axes.axhline(force * scale, color=colour, lw=1.0, ls="--", zorder=1.0)
-        place = {"xycoords": ("axes fraction", "data"), "xytext": (0, 4), "color": colour}
-        text = f"{words}, {format_quantity(force, 'N')}"
-        style.add_note(axes, text, (0.005, force * scale), **place)
+    """Draw the force that each wave needs to be felt, and the force steps of the device."""
+    step, steps = result.device.value("force_resolution"), result.force_steps
+    texture = result.perceptibility
     low, high = axes.get_ylim()
-    values = [force * scale for force, _words, _colour in lines]
-    if values:
-        axes.set_ylim(min(low, min(values) / 3.0), max(high, max(values) * 4.0))
-    if not lines and math.isfinite(low):
-        words = "no data on force steps and friction of the device"
-        style.add_note(axes, words, (0.995, 0.94), ha="right", va="top")
+    lengths = np.geomspace(*axes.get_xlim(), 200) / _MILLI
+    frequencies = result.speed / lengths
+    damping = result.device.value("damping") or 0.0
+    compliance = result.grip.compliance(
+        frequencies, texture.apparent_mass, damping, result.surface.stiffness
+    )
+    for level, words, line in zip(
+        result.grip.threshold(frequencies), ("unnoticed below", "felt above"), (":", "--"),
+        strict=True,
+    ):  # fmt: skip
+        axes.plot(
+            lengths * _MILLI, level / compliance * scale, color=style.GREEN, lw=1.0, ls=line,
+            label=f"{words}, force along the normal", zorder=1.0,
+        )  # fmt: skip
+    if step is not None:
+        axes.axhline(steps * step * scale, color=style.ORANGE, lw=1.0, ls="--", zorder=1.0)
+        place = {"xycoords": ("axes fraction", "data"), "xytext": (0, 4), "color": style.ORANGE}
+        text = f"4: {steps:g} steps of force, {format_quantity(steps * step, 'N')}"
+        style.add_note(axes, text, (0.005, steps * step * scale), **place)
+        low, high = min(low, steps * step * scale / 3.0), max(high, steps * step * scale * 4.0)
+    axes.set_ylim(low, high)
