@@ -198,7 +198,7 @@ def assess_perceptibility(
         >>> part, touch = TexturePart(wave), load_device("touch")
         >>> result = assess_perceptibility(surface, touch, part, rms=0.00177)
         >>> result.tier, f"{result.level:.2f}", f"{result.frequency:.0f} Hz"
-        ('borderline', '0.37', '100 Hz')
+        ('borderline', '0.36', '100 Hz')
         >>> [f"{remedy.kind} {remedy.value:.3g}" for remedy in result.remedies]
         ['magnify 2', 'speed 0.053', 'apparent_mass 0.016']
     """
@@ -336,9 +336,9 @@ def respond(waves: WaveScan) -> Response:
     The contact stiffness acts along the normal of the wall alone, and dry friction F_c there as
     damping F_c/v; see :meth:`~asperity.perception.grip.Grip.compliance`.
 
-    Felt: root of the sum of squares of motion over the felt amplitude at least 1, and an amplitude of force of at least γ steps. Not felt:
-    the same with the unnoticed amplitude below 1, or less than one step of force, in waves with at
-    least two samples.
+    Felt: root of the sum of squares of motion over the felt amplitude at least 1, and an amplitude
+    of force of at least γ steps. Not felt: the same with the unnoticed amplitude below 1, or less
+    than one step of force, in waves with at least two samples.
     """
     case, grip = waves.case, waves.grip
     frequencies, damping = case.speed / case.wavelengths, case.device.get("damping", 0.0)
