@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 
 import asperity as asp
+from asperity.analysis.limits.perceptibility import texture_amount_text
+from asperity.analysis.passivity.assess_passivity import stiffness_limit_text
 from asperity.core.errors import ParameterError
 from asperity.core.units import format_quantity
 from asperity.devices import parse_device
 from asperity.laws import Law
-from asperity.report.comparison_columns import FULL_COLUMNS, SUMMARY_COLUMNS
+from asperity.report.comparison_columns import FULL_COLUMNS, SUMMARY_COLUMNS, comparison_table
 from asperity.report.sentences.number_text import limit_text
 
 PAPER = asp.Sinusoid(amplitude=0.8e-3, period=1e-3)
@@ -223,3 +225,53 @@ def test_error_names_the_invalid_argument(arguments: dict[str, object], name: st
 def test_device_without_max_stiffness_raises() -> None:
     with pytest.raises(ParameterError, match="max_stiffness"):
         asp.compare(PAPER, device=parse_device({"max_force": "3 N"}, "mine"))
+
+
+# --- an answer at the given stiffness, size and contact ------------------------------------------
+
+
+def test_all_numbers_of_a_row_are_at_the_given_stiffness() -> None:
+    result = asp.compare(PAPER, laws="CH", stiffness=400.0)
+    for row in result.rows:
+        assert row.surface.stiffness == 400.0
+        assert row.texture_force == pytest.approx(400.0 * row.ripple)
+        assert row.perceptibility is not None
+        assert row.perceptibility.texture_rms == pytest.approx(row.texture_force)
+    best = result.recommended_row
+    assert best is not None
+    start = stiffness_limit_text(best.recommended_stiffness)
+    assert result.recommendation.startswith(
+        f"At 400 N/m use law {best.law.letter} ({best.law.name.replace('-', ' ')}) on the Force "
+        f"Dimension omega.3 (recommended is a start at {start}), which gives "
+        f"{texture_amount_text(best.perceptibility)}"
+    )
+    headings = [str(column.header) for column in comparison_table(result, 120).columns]
+    assert "at" in headings
+    assert "start at" not in headings
+
+
+def test_a_law_above_its_limit_is_not_recommended() -> None:
+    result = asp.compare(PAPER, laws="BC", stiffness=3000.0)
+    assert all(row.may_buzz for row in result.rows)
+    assert result.recommended == ""
+    assert "is known to be stable at 3000 N/m" in result.recommendation
+    assert "can start at" in result.recommendation
+
+
+def test_a_surface_larger_than_the_workspace_is_named() -> None:
+    x = np.linspace(0.0, 0.5, 1001)
+    wide = asp.Profile(2e-4 * np.sin(2 * np.pi * x / 2e-3), 0.5 / 1000)
+    rig = parse_device({"max_stiffness": "1000 N/m", "workspace_radius": "50 mm"}, "mine")
+    text = asp.compare(wide, rig, "C").recommendation
+    assert "The surface is 500 mm long and the workspace 100 mm" in text
+    assert "magnified 0.2 times more" in text
+    narrow = asp.Profile(2e-4 * np.sin(2 * np.pi * x[:161] / 2e-3), 0.5 / 1000)
+    assert "workspace" not in asp.compare(narrow, rig, "C").recommendation
+
+
+def test_loss_of_contact_names_the_depth_that_keeps_it() -> None:
+    wave = asp.Sinusoid(4e-4, 2e-3)
+    lost = asp.compare(wave, "omega.3", "C", max_depth=3e-4)
+    assert lost.rows[0].loses_contact
+    assert "pressed to 800 µm it keeps contact" in lost.recommendation
+    assert not asp.compare(wave, "omega.3", "C", max_depth=8e-4).rows[0].loses_contact

@@ -170,10 +170,10 @@ def _contact_loss_text(row: LawRow) -> str:
     if not row.loses_contact:
         return ""
     depth = format_quantity(row.surface.max_depth, "m")
-    kept = format_quantity(round_up(row.surface.texture.peak_to_valley), "m")
+    full_depth = format_quantity(round_up(row.surface.texture.peak_to_valley), "m")
     return (
         f"Pressed to {depth} it loses contact on {100.0 * row.contact_lost:.0f} % of the scan; "
-        f"pressed to {kept} it keeps contact (--max-depth)."
+        f"pressed to {full_depth} it keeps contact (--max-depth)."
     )
 
 
