@@ -170,7 +170,7 @@ def _contact_loss_text(row: LawRow) -> str:
     if not row.loses_contact:
         return ""
     depth = format_quantity(row.surface.max_depth, "m")
-    full_depth = format_quantity(round_up(row.surface.texture.peak_to_valley), "m")
+    full_depth = format_quantity(round_up((1.0 - 1e-9) * row.surface.texture.peak_to_valley), "m")
     return (
         f"Pressed to {depth} it loses contact on {100.0 * row.contact_lost:.0f} % of the scan; "
         f"pressed to {full_depth} it keeps contact (--max-depth)."
