@@ -87,9 +87,10 @@ def test_foreign_pickle_is_not_loaded(folder: Path, monkeypatch: pytest.MonkeyPa
 
 
 @pytest.mark.parametrize(
-    ("mode", "reason"), [(0o777, "everybody may write"), (0o1777, "everybody may write")]
+    ("mode", "reason"),
+    [(0o777, "others may write"), (0o1777, "others may write"), (0o775, "others may write")],
 )
-def test_world_writable_folder_is_not_used(folder: Path, mode: int, reason: str):
+def test_folder_that_others_may_write_is_not_used(folder: Path, mode: int, reason: str):
     cache.put_entry(NAMESPACE, KEY, CONTENT)
     folder.chmod(mode)
     with pytest.warns(cache.CacheWarning, match=reason):
@@ -101,7 +102,7 @@ def test_world_writable_folder_is_not_used(folder: Path, mode: int, reason: str)
 def test_nothing_is_written_to_an_untrusted_folder(folder: Path):
     folder.mkdir()
     folder.chmod(0o777)
-    with pytest.warns(cache.CacheWarning, match="everybody may write"):
+    with pytest.warns(cache.CacheWarning, match="others may write"):
         cache.put_entry(NAMESPACE, KEY, CONTENT)
     assert list(folder.iterdir()) == []
 
@@ -111,10 +112,10 @@ def test_nothing_is_written_to_an_untrusted_folder(folder: Path):
     [
         (4321, 4321, 0o755, "somebody else"),
         (4321, None, 0o775, "somebody else"),
-        (4321, None, 0o2775, ""),  # a shared group folder
-        (4321, 4321, 0o2775, "somebody else"),
-        (None, 4321, 0o775, "another group"),
-        (None, None, 0o775, ""),  # a private group
+        (4321, None, 0o2775, "somebody else"),
+        (None, 4321, 0o775, "others"),
+        (None, None, 0o775, "others"),  # its group may have other members
+        (None, None, 0o755, ""),
         (0, 0, 0o755, ""),  # owned by root
     ],
 )
@@ -127,6 +128,20 @@ def test_trust_depends_on_owner_group_and_mode(
     numbers = (stat.S_IFDIR | mode, 0, 0, 0, 77 if uid is None else uid, 88 if gid is None else gid)
     assert cache._distrust_reason(os.stat_result((*numbers, 0, 0, 0, 0))).startswith(reason)
     assert bool(cache._distrust_reason(os.stat_result((*numbers, 0, 0, 0, 0)))) == bool(reason)
+
+
+def test_entry_that_others_may_write_is_not_used(folder: Path):
+    before = os.umask(0o002)
+    try:
+        cache.put_entry(NAMESPACE, KEY, CONTENT)
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE(entry_path(folder).stat().st_mode) == 0o644
+    entry_path(folder).chmod(0o664)
+    with pytest.warns(cache.CacheWarning, match="others may write"):
+        assert cache.get_entry(NAMESPACE, KEY) is None
+    cache.put_entry(NAMESPACE, KEY, CONTENT)  # computed again
+    assert cache.get_entry(NAMESPACE, KEY) == CONTENT
 
 
 def test_cache_path_that_is_a_file_gives_a_warning(folder: Path):
@@ -155,7 +170,7 @@ def test_pipe_in_place_of_an_entry_does_not_block(folder: Path):
     assert cache.get_entry(NAMESPACE, KEY) is None
 
 
-@pytest.mark.parametrize("mode", [0o700, 0o755, 0o2775])
+@pytest.mark.parametrize("mode", [0o700, 0o755])
 def test_namespace_has_the_mode_of_the_cache_folder(folder: Path, mode: int):
     folder.mkdir()
     folder.chmod(mode)

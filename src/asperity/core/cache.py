@@ -2,8 +2,9 @@
 
 Each entry is a file in a namespace (a folder) of the cache folder: ``ASPERITY_CACHE_DIR`` if set,
 else the user's cache directory. A file starts with a digest of its key and content; a damaged or
-exchanged file is moved aside before its content is used. Since entries hold code that is executed,
-a folder that is owned or writable by other users is not used. A cache that cannot be used costs
+exchanged file is moved aside before its content is used. Since entries hold machine code, no format
+could make foreign ones harmless: a folder or a file that another user owns or may write, other than
+root, is not used. A cache that cannot be used costs
 time only. The total size is limited, see :func:`size_limit`; the least recently used entries are
 deleted first.
 
@@ -151,6 +152,9 @@ def get_entry(namespace: str, key: str) -> bytes | None:
             return None
         with open_input(path) as stream:
             data = stream.read()
+            if reason := _distrust_reason(os.fstat(stream.fileno())):
+                _warn_about_folder(f"has an entry that is not used: {reason}")
+                return None
     except (FileNotFoundError, NotADirectoryError):  # reported when an entry is written
         return None
     except (OSError, ValueError) as error:
@@ -175,6 +179,8 @@ def put_entry(namespace: str, key: str, content: bytes) -> None:
     try:
         if _ensure_folder(path.parent):
             with open_atomic(path) as stream:
+                if hasattr(os, "fchmod"):
+                    os.fchmod(stream.fileno(), 0o644)  # whatever the umask
                 stream.write(_MAGIC + _entry_digest(key, content) + content)
             _evict(_HEADER_SIZE + len(content))
     except (OSError, ValueError) as error:
@@ -276,8 +282,7 @@ def _ensure_folder(folder: Path) -> bool:
     if not _is_trusted(folder.parent):
         return False
     if not folder.exists():
-        folder.mkdir(exist_ok=True)
-        folder.chmod(stat.S_IMODE(folder.parent.stat().st_mode))  # also for a group
+        folder.mkdir(mode=stat.S_IMODE(folder.parent.stat().st_mode), exist_ok=True)
     return _is_trusted(folder)
 
 
@@ -295,18 +300,13 @@ def _is_trusted(folder: Path) -> bool:
 
 
 def _distrust_reason(status: os.stat_result) -> str:
-    """Return why the content of a folder cannot be trusted; empty if it can."""
+    """Return why a folder or a file cannot be trusted; empty if it can."""
     if not hasattr(os, "geteuid"):
         return ""  # a system without owners and modes
-    mode, groups = status.st_mode, {os.getegid(), *os.getgroups()}
-    for_group = bool(mode & stat.S_ISGID) and status.st_gid in groups
-    if mode & stat.S_IWOTH:
-        return "everybody may write there"
-    if status.st_uid not in {os.geteuid(), 0} and not for_group:
+    if status.st_uid not in {os.geteuid(), 0}:
         return "somebody else owns it"
-    # Systems with a private group per user create folders that the group may write.
-    if mode & stat.S_IWGRP and not for_group and status.st_gid != os.getegid():
-        return "another group may write there"
+    if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        return "others may write there"
     return ""
 
 
