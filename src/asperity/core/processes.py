@@ -70,7 +70,7 @@ def make_pool(
 
 def _start_worker(prepare: Callable[[], None] | None, niceness: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process ends its workers
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    end_with_parent()
     os.environ |= SINGLE_THREADED
     null = os.open(os.devnull, os.O_WRONLY)
     for stream in (1, 2):  # output of libraries
@@ -81,13 +81,42 @@ def _start_worker(prepare: Callable[[], None] | None, niceness: int) -> None:
         prepare()
 
 
-def _end_with_parent() -> None:
+def end_with_parent(release: Callable[[], None] = lambda: None) -> None:
+    """Let this process end when the one that started it has ended, however that was.
+
+    A thread waits for the end of a pipe. The signal that Linux sends at the death of a parent
+    (``PR_SET_PDEATHSIG``) would come when the parent's *thread* ends.
+
+    Args:
+        release: called first.
+    """
     from multiprocessing import parent_process
 
-    parent = parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(0)  # a task may take long
+    def wait() -> None:
+        parent = parent_process()
+        if parent is not None:
+            parent.join()
+            release()
+            os._exit(0)  # a task may take long
+
+    threading.Thread(target=wait, daemon=True).start()
+
+
+@contextmanager
+def defer_interrupt() -> Iterator[None]:
+    """Handle Ctrl-C after a block that must not end half-way."""
+    previous = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or previous is None:
+        yield  # only the main thread is interrupted, by a handler of Python
+        return
+    received: list[int] = []
+    signal.signal(signal.SIGINT, lambda number, _frame: received.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, previous)
+        if received:
+            signal.raise_signal(signal.SIGINT)
 
 
 @contextmanager

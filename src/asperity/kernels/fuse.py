@@ -20,6 +20,7 @@ from types import ModuleType
 from asperity.clamps import NONE, Clamp
 from asperity.contacts.sampler_interface import SAMPLER_FUNCTIONS
 from asperity.core.errors import ParameterError
+from asperity.core.processes import defer_interrupt
 from asperity.derive.facts import generated_kernel_path, law_facts
 from asperity.kernels.law_codegen import LawCode, contact_source, probe_source
 from asperity.kernels.link import (
@@ -311,7 +312,7 @@ def load_fused(source: str) -> ModuleType:
 
     The machine code of its loops, and of the shared functions that they call, is cached.
     """
-    with _LOAD_LOCK:
+    with defer_interrupt(), _LOAD_LOCK:
         return [_load_module(text) for text in source.split(_MODULE_SEPARATOR)][-1]
 
 

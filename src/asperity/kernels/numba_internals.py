@@ -48,6 +48,7 @@ from asperity.core.cache import (
     wait_and_lock,
 )
 from asperity.core.compiled import COMPILE_CALLBACKS
+from asperity.core.processes import defer_interrupt
 
 # Numba is untyped.
 _Library: Any = codegen.JITCodeLibrary
@@ -271,10 +272,20 @@ def _record_fields(numba_type: Any) -> tuple[Any, ...]:
 
 
 def cache_machine_code(decorator: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a decorator of Numba whose functions cache their machine code between runs."""
+    """Return a decorator of Numba whose functions cache their machine code between runs.
+
+    Ctrl-C waits for the compiler, which would leave functions half compiled.
+    """
 
     def decorate(function: FunctionType) -> Any:
         dispatcher = decorator(function)
+        compile_overload = dispatcher.compile
+
+        def compile_whole(signature: Any) -> Any:
+            with defer_interrupt():
+                return compile_overload(signature)
+
+        dispatcher.compile = compile_whole
         dispatcher._cache = MachineCodeCache(function)
         return dispatcher
 
