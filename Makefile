@@ -28,7 +28,7 @@ $(VENV)/development: requirements-dev.lock | $(VENV)/runtime
 	touch $@
 
 demo: $(VENV)/runtime  ## Set up, compare the laws on a bundled surface, write report.html
-	$(BIN)/asperity compare examples/demo.toml --html report.html
+	$(BIN)/asperity compare examples/demo.toml --html report.html --force
 
 test: $(VENV)/development  ## Set up and run the whole test suite
 	$(BIN)/python -m pytest -n auto

@@ -54,6 +54,18 @@ def still(tmp_path: Path) -> str:
     return str(path)
 
 
+def test_long_simulation_needs_confirmation(call: Call, still: str, tmp_path: Path) -> None:
+    trace = tmp_path / "run.mcap"
+    code, _out, err = call("simulate", still, "--duration", "1e9s", "--trace", str(trace))
+    assert code == 2
+    assert "duration of 1e+09 s is 4e+12 samples, which take about 32 days" in " ".join(err.split())
+    assert "a trace of 1.2e+06 GB; --yes simulates it" in " ".join(err.split())
+    assert not trace.exists()
+    trace.write_text("kept")
+    code, _out, err = call("simulate", still, "--trace", str(trace))
+    assert (code, "trace exists" in err, trace.read_text()) == (2, True, "kept")
+
+
 @pytest.fixture
 def strokes(tmp_path: Path) -> str:
     path = tmp_path / "strokes.toml"

@@ -211,7 +211,7 @@ def test_prepared_file_can_only_be_magnified(call: Call, source: str, tmp_path: 
     assert call("prepare", first, "-o", second, "--magnify", "3")[0] == 0
     assert load_texture(second).periodic
     assert load_texture(second).pitch == pytest.approx((6e-6, 6e-6))
-    code, _out, err = call("prepare", first, "-o", second, "--periodic")
+    code, _out, err = call("prepare", first, "-o", second, "--periodic", "--force")
     assert code == 2
     assert "periodic cannot be applied" in err
 

@@ -140,11 +140,14 @@ def test_prepare_prints_the_same_table_and_json(call: Call, source: str, tmp_pat
         "holes filled",
         "S-filter 8 µm",
     ]
-    code, out, _ = call("prepare", source, *PLAIN, "-o", target, "--json", "-")
+    code, out, _ = call("prepare", source, *PLAIN, "-o", target, "--json", "-", "--force")
     assert json.loads(out)["stages"][0]["name"] == "as read"
-    code, _, err = call("prepare", source, *PLAIN, "-o", target, "--json", target)
+    code, _, err = call("prepare", source, *PLAIN, "-o", target, "--json", target, "--force")
     assert code == 2
     assert "cannot both be written to" in err
+    before = Path(target).read_bytes()
+    code, _, err = call("prepare", source, "-o", target)
+    assert (code, "output exists" in err, Path(target).read_bytes() == before) == (2, True, True)
 
 
 def test_texture_specification_is_refused(call: Call) -> None:

@@ -14,7 +14,7 @@ from asperity.cli import options
 from asperity.cli.output import check_output, progress_bar, step_bar
 from asperity.core.arguments import STIFFNESS
 from asperity.core.errors import ParameterError, escape_unprintable
-from asperity.core.files import check_not_existing, write_bytes
+from asperity.core.files import write_bytes
 
 if TYPE_CHECKING:
     from asperity.devices import Device
@@ -72,10 +72,9 @@ def export_command(
         request["max_evaluations"] = math.inf
     target, path = targets.find_target(values["lang"] or "c99"), Path(output)
     targets.check_name(path, target)
-    check_output("output", output)
+    check_output("output", output, force=force)
     field = path.with_suffix(".field") if load and not is_field(surface) else None
-    for file in filter(None, (path, field)):
-        check_not_existing("output", file, force=force)
+    check_output("output", str(field) if field else None, force=force)
     ExportRequest.validate(
         request.get("name", "texture"),
         request.get("precision", "double"),
@@ -146,8 +145,7 @@ def maps_command(
         find_convention(normals)
     if suffix not in suffixes:
         raise ParameterError("output", f"must end in {', '.join(suffixes)}", output)
-    check_output("output", output)
-    check_not_existing("output", path, force=force)
+    check_output("output", output, force=force)
     with progress_bar("reading the surface"):
         texture = load_scene(surface, options.file_values(values)).texture
         sampled = sample_map(texture, **options.provided_values(values, _GRID_ARGUMENTS))

@@ -18,7 +18,13 @@ import click
 
 from asperity.core.cache import bypass
 from asperity.core.errors import ParameterError, escape_unprintable
-from asperity.core.files import is_special_file, json_text, text_digest, write_bytes
+from asperity.core.files import (
+    check_not_existing,
+    is_special_file,
+    json_text,
+    text_digest,
+    write_bytes,
+)
 
 if TYPE_CHECKING:
     from asperity.report.page import Page
@@ -113,11 +119,13 @@ class Outputs:
         json: path of the result as JSON, "-" for standard output, ``None`` for none.
         html: path of the report, likewise.
         trace: path of the samples of a run, for commands with a trace.
+        force: whether existing files are replaced.
     """
 
     json: str | None = None
     html: str | None = None
     trace: str | None = None
+    force: bool = False
 
     def write(
         self, data: Any, page: Page, page_label: str = "Report", extra_line: str = ""
@@ -156,9 +164,9 @@ class Outputs:
 
 
 def output_options(
-    *, html: bool = True, uses_cache: bool = True
+    *, html: bool = True, uses_cache: bool = True, keeps: bool = True
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Return a decorator that adds ``--json``, ``--html`` and ``--no-cache``.
+    """Return a decorator that adds ``--json``, ``--html``, ``--force`` and ``--no-cache``.
 
     The command receives :class:`Outputs` as ``outputs``, whose paths, including that of a
     ``--trace`` option, are checked before the command runs.
@@ -166,14 +174,16 @@ def output_options(
     Args:
         html: whether the command writes a report.
         uses_cache: whether the command computes anything that is cached.
+        keeps: whether existing files are kept without ``--force``.
     """
 
     def decorate(command: Callable[..., None]) -> Callable[..., None]:
         @functools.wraps(command)
         def run(**values: Any) -> None:
             paths = {name: values.pop(f"{name}_path", None) for name in ("json", "html", "trace")}
-            check_outputs(**paths)
-            command(outputs=Outputs(**paths), **values)
+            force = values.pop("force") if keeps else True
+            check_outputs(force=force, **paths)
+            command(outputs=Outputs(**paths, force=force), **values)
 
         if html:
             words = "Write a report with figures (HTML); - writes to standard output."
@@ -186,10 +196,15 @@ def output_options(
                 callback=_apply_bypass,
                 help="Compute everything without the cache, and store nothing.",
             )(run)
+        run = force_option(run) if keeps else run
         words = "Write the result as JSON; - writes to standard output."
         return click.option("--json", "json_path", metavar="PATH", help=words)(run)
 
     return decorate
+
+
+force_option = click.option("--force", is_flag=True, help="Replace existing files.")
+"""Adds ``--force``."""
 
 
 def _apply_bypass(context: click.Context, _option: click.Parameter, enabled: bool) -> None:
@@ -198,10 +213,11 @@ def _apply_bypass(context: click.Context, _option: click.Parameter, enabled: boo
         context.with_resource(bypass())
 
 
-def check_outputs(**paths: str | None) -> None:
+def check_outputs(*, force: bool, **paths: str | None) -> None:
     """Check before a computation that all paths can be written and differ from each other.
 
     Args:
+        force: whether existing files are replaced.
         paths: paths by the names of their options; ``None`` for an absent option.
 
     Raises:
@@ -216,18 +232,26 @@ def check_outputs(**paths: str | None) -> None:
             place = "go to standard output" if path == STANDARD_OUTPUT else f"be written to {path}"
             raise ParameterError(taken[target], f"and {name} cannot both {place}")
         taken[target] = name
-        check_output(name, path)
+        check_output(name, path, force=force)
 
 
-def check_output(name: str, path: str | None) -> None:
+def check_output(name: str, path: str | None, *, force: bool) -> None:
     """Check before a computation that a path can be written.
 
     Raises:
-        ParameterError: if the folder does not exist or is not writable, or the path is a folder, a
-            link to itself, or a device or a pipe that is not writable.
+        ParameterError: if the file exists and ``force`` is false, the folder does not exist or is
+            not writable, or the path is too long, a folder, a link to itself, or a device or a pipe
+            that is not writable.
     """
     if path is None or path == STANDARD_OUTPUT:
         return
+    try:
+        os.lstat(path)
+    except (FileNotFoundError, NotADirectoryError):
+        pass
+    except (OSError, ValueError) as error:  # the name is too long
+        reason = getattr(error, "strerror", None) or str(error)
+        raise ParameterError(name, f"cannot be written: {reason}", path) from None
     if Path(path).is_dir():
         raise ParameterError(name, "must be a file, not a folder", path)
     if is_special_file(path):
@@ -242,6 +266,7 @@ def check_output(name: str, path: str | None) -> None:
         raise ParameterError(name, f"must lie in a folder that exists, {folder} does not")
     if not os.access(folder, os.W_OK):
         raise ParameterError(name, f"must lie in a folder that can be written, not {folder}")
+    check_not_existing(name, path, force=force)
 
 
 def write_output(name: str, path: str, text: str) -> None:

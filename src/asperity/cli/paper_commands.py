@@ -75,7 +75,9 @@ def reproduce_command(
 
         figures = find_figures(names, include_simulated=not skip_experiments)
         create_folder(folder)
-        check_outputs(json=outputs.json, html=outputs.html)  # the folder may be one of the files
+        check_outputs(
+            force=outputs.force, json=outputs.json, html=outputs.html
+        )  # the folder may be one of the files
     elif values["format"] is not None:
         raise ParameterError(_FORMAT.name, "applies to figures: give --figures DIR")
     results, experiments = _reproduce(

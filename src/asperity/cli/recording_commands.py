@@ -10,7 +10,7 @@ import click
 
 from asperity.cli.main import StrictGroup
 from asperity.cli.options import plugin_option
-from asperity.cli.output import Outputs, check_outputs, output_options, progress_bar
+from asperity.cli.output import Outputs, check_output, force_option, output_options, progress_bar
 from asperity.core.errors import ParameterError, escape_unprintable
 
 
@@ -47,14 +47,15 @@ def _output_option(help_text: str) -> Callable[[Callable[..., None]], Callable[.
 
     def decorate(function: Callable[..., None]) -> Callable[..., None]:
         @functools.wraps(function)
-        def run(file: str, output: str) -> None:
-            check_outputs(output=output)
+        def run(file: str, output: str, *, force: bool) -> None:
             if os.path.exists(output) and os.path.exists(file) and os.path.samefile(output, file):
                 raise ParameterError("output", "must be another file than the recording", output)
+            check_output("output", output, force=force)
             function(file, output)
             click.echo(f"Saved: {escape_unprintable(output)}")
 
-        return click.option("-o", "--output", metavar="PATH", required=True, help=help_text)(run)
+        out = click.option("-o", "--output", metavar="PATH", required=True, help=help_text)
+        return out(force_option(run))
 
     return decorate
 

@@ -12,7 +12,6 @@ from asperity.cli import output
 from asperity.cli.options import jobs_option
 from asperity.core import cache
 from asperity.core.errors import AsperityError, ParameterError, escape_unprintable
-from asperity.core.files import check_not_existing
 
 if TYPE_CHECKING:
     from asperity.laws import Law
@@ -32,8 +31,7 @@ def init_command(scene: str, *, force: bool) -> None:
     path = Path(scene)
     if path.suffix.lower() != ".toml":
         raise ParameterError("scene", "must be a file that ends in .toml", scene)
-    output.check_output("scene", scene)
-    check_not_existing("scene", path, force=force)
+    output.check_output("scene", scene, force=force)
     output.write_output("scene", scene, scene_template(path.name))
     name = escape_unprintable(scene)
     click.echo(f"Written: {name}; now: asperity simulate {name}")

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
+from datetime import timedelta
 from itertools import count
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +17,7 @@ from asperity.core.errors import ParameterError
 
 if TYPE_CHECKING:
     from asperity.laws import Law
+    from asperity.scene.setup import Setup
 
 
 _STIFFNESS = stiffness_option("the scene's, else 1000 N/m")
@@ -30,10 +33,12 @@ _SIMULATE_ARGUMENTS = options.command_arguments("simulate")
     metavar="PATH",
     help="Write the samples to a recording ('run.mcap') or to a text table ('run.csv').",
 )
+@click.option("--yes", is_flag=True, help="Simulate a long duration without confirmation.")
 @output_options()
 def simulate_command(
-    scene: str, outputs: Outputs, duration: float | None, every: int | None, **values: Any
-) -> None:
+    scene: str, outputs: Outputs, duration: float | None, every: int | None, *, yes: bool,
+    **values: Any,
+) -> None:  # fmt: skip
     """Simulate the closed loop of SCENE (TOML) and report its energy balance.
 
     A scene has the sections [texture], [surface], [device], [hand], [motion] and [run];
@@ -42,6 +47,8 @@ def simulate_command(
     """
     setup = load_setup(scene, values, duration)
     setup = setup if every is None else replace(setup, every=every)
+    if not yes:
+        _confirm_long_run(setup, has_trace=outputs.trace is not None)
     from asperity.report.loop.run_report import run_page
     from asperity.simulation.trace import MAX_ROWS
 
@@ -51,6 +58,29 @@ def simulate_command(
         run = setup.simulate(trace=outputs.trace or True, progress=update, max_rows=max_rows)
 
     outputs.write({"schema": 2, "scene": setup, "run": run}, run_page(setup, run))
+
+
+_SAMPLE_TIME, _ROW_TIME, _ROW_BYTES = 2e-7, 5e-7, 300  # [s], [s], [bytes], about
+_MAX_UNASKED_TIME, _MAX_UNASKED_SIZE = 600.0, 1e10
+"""Estimated time [s] and trace [bytes] of a simulation above which it is asked for."""
+
+
+def _confirm_long_run(setup: Setup, *, has_trace: bool) -> None:
+    """Ask the user to confirm a simulation that takes long or fills the disk.
+
+    Raises:
+        ParameterError: without a confirmation.
+    """
+    samples = setup.duration / setup.servo.period
+    rows = samples / setup.every if has_trace else 0.0
+    seconds, size = samples * _SAMPLE_TIME + rows * _ROW_TIME, rows * _ROW_BYTES
+    if seconds <= _MAX_UNASKED_TIME and size <= _MAX_UNASKED_SIZE:
+        return
+    words = f"{samples:.3g} samples, which take about {timedelta(seconds=round(seconds))} here"
+    words += f" and a trace of {1e-9 * size:.3g} GB" if has_trace else ""
+    if not (sys.stdin.isatty() and click.confirm(f"{words}. Simulate?", err=True)):
+        words = f"of {setup.duration:g} s is {words}; --yes simulates it"
+        raise ParameterError("duration", words)
 
 
 _DELAYS, *_ONSET_SEARCH, _DURATION = options.command_arguments("onset")

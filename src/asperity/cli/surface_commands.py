@@ -19,7 +19,6 @@ from asperity.cli.options import (
 )
 from asperity.cli.output import Outputs, check_outputs, output_options, progress_bar
 from asperity.core.arguments import MAX_DEPTH
-from asperity.core.files import check_not_existing
 from asperity.laws import SHIPPED_LAW_ARGUMENTS
 
 
@@ -82,7 +81,7 @@ def prepare_command(file: str, output: str, outputs: Outputs, **values: Any) -> 
     from asperity.textures.texture_loading import prepare_file
 
     check_output_path(Path(output), Path(file))
-    check_outputs(output=output, json=outputs.json)
+    check_outputs(force=outputs.force, output=output, json=outputs.json)
     with preparation_progress() as start_stage:
         prepared = prepare_file(file, progress=start_stage, **file_values(values))
         start_stage("write")
@@ -99,14 +98,11 @@ _BAKE = command_arguments("bake")
 @click.argument("surface")
 @click.option("-o", "--output", metavar="PATH", required=True, help="File to write.")
 @click.option("--body", is_flag=True, help="SURFACE is the mesh of a closed body; needs --unit.")
-@click.option("--force", is_flag=True, help="Replace an existing file.")
 @argument_options((*_BAKE, MAX_DEPTH, SHIPPED_LAW_ARGUMENTS["continuity"]))
 @plugin_option
 @file_options
 @output_options(html=False)
-def bake_command(
-    surface: str, output: str, *, body: bool, force: bool, outputs: Outputs, **values: Any
-) -> None:
+def bake_command(surface: str, output: str, *, body: bool, outputs: Outputs, **values: Any) -> None:
     """Bake law H of SURFACE as a potential field, and write it to a file.
 
     The rendered force is the negative gradient of the field. It is conservative and continuous,
@@ -117,8 +113,7 @@ def bake_command(
     from asperity.surface import Surface
     from asperity.textures.fields.field_file import save_field
 
-    check_outputs(output=output, json=outputs.json)
-    check_not_existing("output", output, force=force)
+    check_outputs(force=outputs.force, output=output, json=outputs.json)
     with progress_bar("baking the field") as update:
         given = provided_values(values, (MAX_DEPTH, SHIPPED_LAW_ARGUMENTS["continuity"]))
         options = provided_values(values, _BAKE)
