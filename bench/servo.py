@@ -43,7 +43,7 @@ RATES = (1e3, 4e3, 10e3)  # [Hz]
 SAMPLES = 200_000
 TEXTURE = Sinusoid(0.1e-3, 2e-3)
 # Nothing but lateness is to be counted, and a busy machine ends nothing.
-PATIENT = Safety(lateness=60.0, misses=10**9, silence=60.0, beyond_depth="warn")
+PATIENT = Safety(lateness=60.0, silence=60.0, beyond_depth="warn")
 _NOTHING = """
 int asperity_open(void) { return 0; }
 int asperity_read(double p[3]) { p[0] = p[1] = 0.0; p[2] = 1e-3; return 0; }

@@ -88,7 +88,7 @@ def _inject_fault(rig: DriverRig, fault: str, at: int, path: Path, outcome: Faul
     """Let a driver fail, look at what it did, and start it again."""
     surface = SURFACE.to_depth(0.2e-3) if fault == DEEP else SURFACE
     safety = Safety(
-        ramp=0.005, lateness=0.1, misses=10**6, silence=WATCHED if fault == UNWATCHED else 60.0
+        ramp=0.005, lateness=0.1, silence=WATCHED if fault == UNWATCHED else 60.0
     )  # fmt: skip
     with rig.failing_driver("" if fault in ANY else fault, at) as driver:
         shared = LoopMemory()
@@ -132,7 +132,7 @@ def _is_recording_complete(recording: Recording, rows: np.ndarray) -> bool:
 
 
 def _can_restart(rig: DriverRig) -> bool:
-    safety = Safety(ramp=0.0, lateness=60.0, misses=10**6, silence=60.0)
+    safety = Safety(ramp=0.0, lateness=60.0, silence=60.0)
     with rig.failing_driver("", 0) as driver:
         loop = DriverLoop(driver, SERVO, safety, 1.0, LoopMemory().block(), system_clock())
         shown = build_program(SURFACE, driver)
@@ -147,7 +147,7 @@ def _can_restart(rig: DriverRig) -> bool:
 def kill_processes(rig: DriverRig, count: int, seed: int = 0) -> tuple[Counter[str], list[str]]:
     """Return how loops ended whose processes were killed, and what must not be."""
     draw, ends, wrong = random.Random(seed), Counter[str](), list[str]()
-    safety = Safety(ramp=0.005, lateness=60.0, misses=10**6, silence=2.0)
+    safety = Safety(ramp=0.005, lateness=60.0, silence=2.0)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "run.mcap"
         for index in range(count):

@@ -4,6 +4,8 @@
 #include <math.h>
 #include <time.h>
 
+#include "fake_log.h"
+
 enum { NOTHING, READ_ONCE, READ_EVER, WRITE_ONCE, NOT_A_NUMBER, FAR, SLOW };
 
 static double place[3], force[3];
@@ -29,7 +31,13 @@ int fake_state(int which) { return which == 0 ? opened : which == 1 ? enabled : 
 int dhdGetDeviceCount(void) { return count; }
 int dhdOpenID(char id) { return id < count ? (opened = id) : -1; }
 int dhdEnableForce(unsigned char on, char id) { enabled = on; return id == opened ? 0 : -1; }
-int dhdClose(char id) { if (id == opened) opened = -1; return 0; }
+int dhdClose(char id)
+{
+    fake_log()->closed++;
+    if (id == opened)
+        opened = -1;
+    return 0;
+}
 const char *dhdErrorGetLastStr(void) { return "communication error"; }
 
 int dhdGetPosition(double *x, double *y, double *z, char id)
@@ -54,5 +62,6 @@ int dhdSetForce(double x, double y, double z, char id)
     force[0] = x;
     force[1] = y;
     force[2] = z;
+    fake_log_force(x, y, z);
     return 2; /* a motor is saturated: no error */
 }

@@ -7,6 +7,8 @@
 #include <string.h>
 #include <time.h>
 
+#include "fake_log.h"
+
 typedef unsigned int HHD, HDenum, HDerror;
 typedef struct { HDerror errorCode; int internalErrorCode; HHD hHD; } HDErrorInfo;
 typedef unsigned int (*Callback)(void *);
@@ -70,7 +72,12 @@ HHD hdInitDevice(const char *name)
     opened = 1;
     return HANDLE;
 }
-void hdDisableDevice(HHD device) { if (device == HANDLE) opened = 0; }
+void hdDisableDevice(HHD device)
+{
+    fake_log()->closed++;
+    if (device == HANDLE)
+        opened = 0;
+}
 void hdEnable(HDenum what) { if (what == 0x4000) enabled = 1; }
 void hdDisable(HDenum what) { if (what == 0x4000) enabled = 0; }
 HDenum hdCheckCalibration(void) { return fault == NOT_CALIBRATED ? 0x5002 : 0x5000; }
@@ -127,6 +134,7 @@ void hdEndFrame(HHD device)
     if (fault == ERROR && frames >= at)
         fail(COMM_ERROR);
     memcpy(held, wanted, sizeof held);
+    fake_log_force(held[0], held[1], held[2]);
     forced |= held[0] != 0.0 || held[1] != 0.0 || held[2] != 0.0;
     in_frame = 0;
     frames++;

@@ -4,6 +4,8 @@
 #include <math.h>
 #include <time.h>
 
+#include "fake_log.h"
+
 enum { NOTHING, READ_ONCE, READ_EVER, WRITE_ONCE, NOT_A_NUMBER, FAR, SLOW };
 
 static double force[3];
@@ -18,8 +20,16 @@ void fake_reset(int kind, int number)
 }
 double fake_force(int axis) { return force[axis]; }
 
-int asperity_open(void) { return opened++; }
-int asperity_close(void) { return opened = 0; }
+int asperity_open(void)
+{
+    fake_log();
+    return opened++;
+}
+int asperity_close(void)
+{
+    fake_log()->closed++;
+    return opened = 0;
+}
 
 int asperity_read(double position[3])
 {
@@ -45,5 +55,6 @@ int asperity_write(const double commanded[3], int contact)
         return 18;
     for (int i = 0; i < 3; i++)
         force[i] = commanded[i];
+    fake_log_force(force[0], force[1], force[2]);
     return 0;
 }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from socket import socket
 
 import pytest
@@ -47,8 +48,21 @@ def test_address_is_printed_when_no_browser_is_found(
         ready("http://127.0.0.1:1/token/")
 
     monkeypatch.setattr("asperity.lab.launch.serve_lab", serve_lab)
-    monkeypatch.setattr("webbrowser.open", lambda _address: False)
+    opened = []
+
+    def open_browser(address: str) -> bool:
+        path = Path(address.removeprefix("file://"))
+        opened.append((address, path.read_text(), path.stat().st_mode & 0o777))
+        opened.append(path.parent.stat().st_mode & 0o777)
+        return False
+
+    monkeypatch.setattr("webbrowser.open", open_browser)
     result = CliRunner().invoke(cli, ["lab", "--port", "0"])
     assert result.exit_code == 0
     assert "the lab is at http://127.0.0.1:1/token/" in result.output + capfd.readouterr().err
     assert "no browser was found: open the address in a browser of this machine" in result.output
+    # The address on the command line of the browser holds no token.
+    (address, text, mode), folder_mode = opened
+    assert "token" not in address
+    assert "url=http://127.0.0.1:1/token/" in text
+    assert (mode, folder_mode) == (0o600, 0o700)

@@ -29,7 +29,7 @@ Call = Callable[..., tuple[int, str, str]]
 
 DRIVER = page_example("howto/extend.md", "A driver in Python")
 DEVICE = 'max_force = "3 N"\nmax_stiffness = "500 N/m"\nupdate_rate = "1 kHz"\ndriver = "rig"\n'
-SERVO = '[servo]\nramp = "0 s"\nlateness = "60 s"\nmisses = 1000000\nsilence = "30 s"\n'
+SERVO = '[servo]\nramp = "0 s"\nlateness = "60 s"\nsilence = "30 s"\n'
 
 
 def test_user_defined_driver_in_one_file(call: Call, tmp_path: Path) -> None:

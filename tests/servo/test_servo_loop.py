@@ -254,13 +254,13 @@ def test_late_ticks_and_jitter_are_counted(run_loop: RunLoop) -> None:
     ("lateness", "cause", "rows"),
     [
         (lambda k: 60_000_000 if k == 30 else 0, EndReason.LATE_SAMPLE, 31),
-        (lambda k: 1_100_000 if k >= 30 else 0, EndReason.MISSED_SAMPLES, 30 + 8),
+        (lambda k: 1_100_000 if k >= 30 else 0, EndReason.LATE_SAMPLE, 30 + 4),
     ],
 )
 def test_excessive_lateness_is_a_fault(
     run_loop: RunLoop, lateness: Any, cause: EndReason, rows: int
 ) -> None:
-    safety = Safety(misses=6)
+    safety = Safety(lateness=4e-3)
     result = run_loop(
         PythonDevice(slide_at_depth(1e-3)), 500, safety=safety, clock=PythonClock(lateness)
     )

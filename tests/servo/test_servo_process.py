@@ -14,6 +14,7 @@ import pytest
 from asperity.core.errors import ParameterError
 from asperity.devices import load_device
 from asperity.loop.shared_trace import COLUMNS
+from asperity.servo import process
 from asperity.servo.drivers.simulated import simulated_driver
 from asperity.servo.fault import FAULT_SAMPLES, DeviceFault, EndReason
 from asperity.servo.process import PrestartedProcess, ServoProcess
@@ -26,7 +27,7 @@ SURFACE = Surface(Sinusoid(0.1e-3, 2e-3), "C", stiffness=300.0, max_depth=5e-3)
 HAND = SpringHand(stiffness=300.0, damping=3.0, mass=0.05, force=(0.0, 0.0, -0.6))
 SERVO = Servo(1e-3, max_force=3.0)
 # Generous limits: lateness on a busy machine is not under test here.
-PATIENT = Safety(ramp=0.02, lateness=60.0, misses=10**6, silence=30.0)
+PATIENT = Safety(ramp=0.02, lateness=60.0, silence=30.0)
 
 
 def servo_process(
@@ -115,9 +116,30 @@ def test_killed_loop_process_is_a_fault(loop: ServoProcess) -> None:
     assert caught.value.cause is EndReason.DIED
 
 
-def test_unresponsive_loop_process_is_a_fault() -> None:
-    with servo_process(Safety(ramp=0.02, lateness=60.0, misses=10**6, silence=2.0)) as loop:
+def test_suspended_loop_process_goes_on(loop: ServoProcess) -> None:
+    assert wait_until(lambda: loop.memory.row_count > 20)
+    os.kill(int(loop.process.pid or 0), signal.SIGSTOP)
+    row_count = loop.memory.row_count
+    assert wait_until(lambda: loop.memory.row_count > row_count + 20)
+
+
+def test_signals_do_not_end_the_process_of_a_loop(loop: ServoProcess) -> None:
+    assert wait_until(lambda: loop.memory.row_count > 20)
+    pid = int(loop.process.pid or 0)
+    assert os.getsid(pid) == pid
+    for number in (1, 2, 3, 10, 12, 14, 15, 20):
+        os.kill(pid, number)
+    row_count = loop.memory.row_count
+    assert wait_until(lambda: loop.memory.row_count > row_count + 20)
+    loop.memory.request_stop(now=True)
+    assert wait_until(lambda: loop.poll() is EndReason.STOPPED)
+
+
+def test_unresponsive_loop_process_is_a_fault(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(process, "MAX_CALL_TIME", 0.5)
+    with servo_process(Safety(ramp=0.02, lateness=60.0, silence=2.0)) as loop:
         assert wait_until(lambda: loop.memory.row_count > 20)
+        loop._heartbeat_stop.set()  # the supervising program would let it go on
         os.kill(int(loop.process.pid or 0), signal.SIGSTOP)  # like a hanging driver
         with pytest.raises(DeviceFault, match="does not answer") as caught:
             wait_until(lambda: loop.poll() is not EndReason.RUNNING)
@@ -126,7 +148,7 @@ def test_unresponsive_loop_process_is_a_fault() -> None:
 
 
 def test_loop_releases_the_force_without_heartbeat() -> None:
-    with servo_process(Safety(ramp=0.02, lateness=60.0, misses=10**6, silence=2.0)) as loop:
+    with servo_process(Safety(ramp=0.02, lateness=60.0, silence=2.0)) as loop:
         assert wait_until(lambda: loop.memory.row_count > 20)
         loop._heartbeat_stop.set()  # stop the heartbeat
         with pytest.raises(DeviceFault, match="no heartbeat"):

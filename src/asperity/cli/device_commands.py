@@ -14,7 +14,7 @@ import click
 from asperity.cli import options
 from asperity.cli.loop_setup import SIMULATED
 from asperity.cli.output import Outputs, check_outputs, output_options, progress_bar, write_output
-from asperity.cli.servo_commands import collect_signals
+from asperity.cli.servo_commands import stop_on_signals, suspend_if_requested
 from asperity.core.errors import ParameterError, print_message
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ _CALIBRATE = options.command_arguments("calibrate")
 @options.plugin_option
 @click.option("-o", "--output", metavar="FILE", required=True, help="Device file (TOML) to write.")
 @click.option("--yes", is_flag=True, help="Start without confirmation: the handle will move.")
-@output_options(html=False)
+@output_options(html=False, keeps=False)
 def calibrate_command(
     outputs: Outputs, device: Device | None, driver: str, force: float | None,
     settings: options.Overrides, output: str, *, yes: bool,
@@ -88,7 +88,7 @@ def calibrate_command(
     from asperity.servo.calibration.calibrator import Calibrator
     from asperity.servo.calibration.measured_device import measured_device
 
-    check_outputs(json=outputs.json, output=output)
+    check_outputs(force=outputs.force, json=outputs.json, output=output)
     if Path(output).suffix.lower() != ".toml":
         raise ParameterError("output", "must be a device file that ends in .toml", output)
     if device is None:
@@ -99,11 +99,12 @@ def calibrate_command(
     simulated = driver == SIMULATED
     max_force = force or default_force(base, real=not simulated)
     with (
-        collect_signals() as signals,
+        stop_on_signals() as signals,
         calibration_rig(base, driver, max_force, signals, yes=yes) as rig,
         progress_bar("compiling the loop") as update,
     ):
         result = Calibrator(rig, RAMP_TIME, lambda step: update(0.0, step)).run()
+    suspend_if_requested(signals)
     date, stem = time.strftime("%Y-%m-%d"), Path(output).stem
     calibrated = measured_device(base, result, stem, date, simulated=simulated)
     write_output("output", output, to_device_toml(calibrated))

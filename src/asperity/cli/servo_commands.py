@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import os
+import select
 import signal
+import stat
 import sys
 import time
 import webbrowser
@@ -43,6 +46,7 @@ if TYPE_CHECKING:
     from asperity.scene.setup import Setup
     from asperity.servo.drivers.driver import Driver
     from asperity.servo.fault import EndReason
+    from asperity.servo.loop_memory import LoopMemory
     from asperity.servo.process import PrestartedProcess, ServoProcess
 
 
@@ -78,7 +82,7 @@ def run_command(
     and stops; a fault sets the force to zero and ends with exit code 3. Read docs/howto/safety.md
     before using a real device.
     """
-    check_outputs(json=outputs.json, record=record)
+    check_outputs(force=outputs.force, json=outputs.json, record=record)
     process = prestart_process()
     setup, _servo = driver_setup(scene, values, driver, duration)
     hashes = setup.file_hashes()
@@ -87,13 +91,16 @@ def run_command(
     from asperity.report.loop.servo_report import device_run_page
 
     loop = make_loop(setup, driver, duration, process)
-    with collect_signals() as signals, record_loop(record, loop, setup) as write_rows:
-        with progress_bar("compiling the loop"):
-            loop.start()
+    with stop_on_signals(loop.memory) as signals:
         try:
-            reason = watch_loop(loop, signals, write_rows)
+            with progress_bar("compiling the loop"):
+                loop.start()
+            with record_loop(record, loop, setup) as write_rows:
+                reason = watch_loop(loop, signals, write_rows)
+                loop.stop()
         finally:
             loop.stop()
+    suspend_if_requested(signals)
     for path, current in setup.file_hashes().items():
         if hashes.get(path, current) != current:
             print_message(f"{path} was changed during the run, which used the earlier content")
@@ -131,20 +138,45 @@ def make_loop(
     )
 
 
+STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)
+"""Signals that end a loop: SIGQUIT without a ramp, the others with one."""
+
+
 @contextmanager
-def collect_signals() -> Iterator[list[int]]:
-    """Collect SIGINT and SIGTERM in a list."""
+def stop_on_signals(memory: LoopMemory | None = None) -> Iterator[list[int]]:
+    """Stop the loop of a memory at each of ``STOP_SIGNALS``; yield the list of those received."""
     received: list[int] = []
 
     def collect(number: int, _frame: FrameType | None) -> None:
+        if memory is not None:
+            memory.request_stop(now=number == signal.SIGQUIT)
         received.append(number)
 
-    handlers = {one: signal.signal(one, collect) for one in (signal.SIGINT, signal.SIGTERM)}
+    handlers = {one: signal.signal(one, collect) for one in STOP_SIGNALS}
     try:
         yield received
     finally:
         for number, handler in handlers.items():
             signal.signal(number, handler)
+
+
+def suspend_if_requested(signals: list[int]) -> None:
+    """Suspend this program if Ctrl-Z ended its loop, which does not start again by itself."""
+    if signal.SIGTSTP in signals:
+        os.kill(os.getpid(), signal.SIGSTOP)
+
+
+def leave_lost_terminal() -> bool:
+    """Return whether the terminal of this program is gone; its output then goes nowhere."""
+    poller, is_lost = select.poll(), False
+    for stream in range(3):
+        poller.register(stream, 0)
+    for stream, event in poller.poll(0):
+        # A pipe whose reader has ended is no terminal.
+        if event & select.POLLHUP and stat.S_ISCHR(os.fstat(stream).st_mode):
+            os.dup2(os.open(os.devnull, os.O_RDWR), stream)
+            is_lost = True
+    return is_lost
 
 
 @contextmanager
@@ -179,7 +211,7 @@ def watch_loop(loop: ServoProcess, signals: list[int], write_rows: Callable[[], 
         print_message(note)
     with show_live_state() as show:
         while (reason := loop.poll()) is EndReason.RUNNING:
-            if signals:
+            if leave_lost_terminal() or signals:
                 loop.stop()
                 continue
             write_rows()
@@ -250,7 +282,7 @@ def lab_command(
 
     def open_page(address: str) -> None:
         print_message(f"the lab is at {address}")
-        if not no_browser and not webbrowser.open(address):
+        if not no_browser and not webbrowser.open(_write_redirect(address, _temporary_folder())):
             print_message("no browser was found: open the address in a browser of this machine")
 
     load = partial(load_plugin_files, plugin_files())
@@ -274,6 +306,17 @@ def _simulated_scene(source: str, values: dict[str, Any]) -> tuple[SceneState, P
         scene = load_scene(source, file_options)
         device = values["device"] or scene.device or load_device(DEFAULT_DEVICE)
         return make_scene_state(scene, source, own, settings.apply_to(device), file_options), None
+
+
+def _write_redirect(address: str, folder: Path) -> str:
+    """Return the address of a file that leads to the page and that only this user can read.
+
+    The command line of the browser, which every user of the machine sees, then holds no token.
+    """
+    path = folder / "asperity-lab.html"
+    path.write_text(f'<!DOCTYPE html><meta http-equiv="refresh" content="0; url={address}">')
+    path.chmod(0o600)
+    return path.as_uri()
 
 
 def _temporary_folder() -> Path:

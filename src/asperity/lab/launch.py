@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import signal
 import socket
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from multiprocessing import active_children
 
 from websockets.asyncio.server import serve
@@ -16,6 +18,7 @@ from asperity.lab.access import MAX_MESSAGE_BYTES, AccessToken, respond
 from asperity.lab.background import BackgroundWorker
 from asperity.lab.scene_state import SceneState
 from asperity.lab.server import LabOptions, LabServer
+from asperity.lab.session import Session
 
 LOOPBACK_ADDRESS = "127.0.0.1"
 DEFAULT_PORT = 8137
@@ -67,15 +70,12 @@ async def serve_lab(
     """
     token = AccessToken(listener.getsockname()[1])
     stopped = asyncio.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        # Without support by system or thread, Ctrl-C cancels the task.
-        with suppress(NotImplementedError, RuntimeError, ValueError):
-            asyncio.get_running_loop().add_signal_handler(number, stopped.set)
     plugins = options.load_plugins
     with BackgroundWorker(plugins) as pictures, BackgroundWorker(plugins) as limits:
         lab = LabServer(scene_state, pictures, limits, options)
         tasks = [asyncio.create_task(work()) for work in (lab.watch_session, lab.watch_steering)]
         fetch = lab.clip_store.fetch
+        _handle_signals(lab.session, stopped)
         try:
             with lab.session:
                 async with serve(
@@ -94,3 +94,31 @@ async def serve_lab(
             # The loop has ended; remaining processes compute pictures and limits, maybe for long.
             for child in active_children():
                 child.terminate()
+
+
+def _handle_signals(session: Session, stopped: asyncio.Event) -> None:
+    """Release the force and stop at a signal; at Ctrl-Z release it, then suspend this process."""
+    events = asyncio.get_running_loop()
+
+    def stop(*, now: bool = False) -> None:
+        session.release_force("", now=now)
+        stopped.set()
+
+    def suspend() -> None:
+        if session.is_ended:
+            os.kill(os.getpid(), signal.SIGSTOP)
+        else:
+            events.call_later(0.01, suspend)
+
+    def release_and_suspend() -> None:
+        session.release_force("stopped by Ctrl-Z; Start runs it again")
+        suspend()
+
+    handlers: dict[int, Callable[[], None]] = dict.fromkeys(
+        (signal.SIGINT, signal.SIGTERM, signal.SIGHUP), stop
+    )
+    handlers |= {signal.SIGQUIT: partial(stop, now=True), signal.SIGTSTP: release_and_suspend}
+    for number, handler in handlers.items():
+        # Without support by system or thread, Ctrl-C cancels the task.
+        with suppress(NotImplementedError, RuntimeError, ValueError):
+            events.add_signal_handler(number, handler)

@@ -30,7 +30,7 @@ _DEFAULT_STIFFNESS = 250.0  # [N/m]
 _DEFAULT_HAND = {"kind": "spring", "stiffness": "800 N/m", "damping": "5 N*s/m", "mass": "50 g"}
 _STILL_MOTION = {"kind": "still", "point": [0, 0, 0]}
 # A simulated device is harmless: late samples do not end its loop.
-_RELAXED_GUARDS = {"misses": 10**9, "lateness": 60.0, "silence": 10.0, "ramp": 0.1}
+_RELAXED_GUARDS = {"lateness": 60.0, "silence": 10.0, "ramp": 0.1}
 
 MAX_DELAY = 100
 RANGES: dict[str, tuple[float, float]] = {

@@ -30,7 +30,6 @@ _RECOVERY_ADVICE = {
     EndReason.NOT_FINITE: "Check the device, its power and its cable",
     EndReason.WORKSPACE: "Move the handle to its centre, and calibrate the device if it asks",
     EndReason.DEPTH: "Lift the handle out of the surface, or set a greater depth",
-    EndReason.MISSED_SAMPLES: "Close other programs on this machine",
     EndReason.LATE_SAMPLE: "Close other programs on this machine, and check the cable",
     EndReason.NO_HEARTBEAT: "Close other programs on this machine",
     EndReason.UNRESPONSIVE: "Switch off the force at the device before you touch it",
@@ -176,6 +175,11 @@ class Session:
         return self._active_shared is not None
 
     @property
+    def is_ended(self) -> bool:
+        """Whether no loop runs, nor ends."""
+        return self._loop is None and self._active_shared is None
+
+    @property
     def steering_progress(self) -> dict[str, int]:
         """Numbers of the newest request for the hand, and of the newest acknowledged one."""
         hand = self.pointer_hand
@@ -206,12 +210,12 @@ class Session:
         """Request the start of a stopped loop."""
         self._requests.put(_StartRequest(self._stop_count))
 
-    def release_force(self, reason: str) -> None:
-        """Ramp the force down and stop the loop at once, whatever the thread is doing."""
+    def release_force(self, reason: str, *, now: bool = False) -> None:
+        """Stop the loop at once, whatever the thread is doing: by a ramp, or with no force now."""
         self._stop_count += 1  # makes earlier start requests stale
         active, self._active_shared = self._active_shared, None
         if active is not None:
-            active.request_stop()
+            active.request_stop(now=now)
         self._requests.put(_StopRequest(reason))
 
     def _set_state(self, state: LoopState, message: str = "") -> None:
@@ -250,13 +254,14 @@ class Session:
             function(*arguments)
         except AsperityError as error:
             fault = error if isinstance(error, DeviceFault) else None
+            message = str(error) if self.handle is None else f"{error}{recovery_advice(fault)}"
             runs = self._loop is not None and fault is None and self._loop.process.is_alive()
             if not runs:
+                self._set_state("stopped", message)  # a device may keep the process waiting
                 self._stop()
             stops = any(isinstance(request, _StopRequest) for request in self._requests.queue)
             if fault is None and stops:
                 return  # the pending stop request sets the state
-            message = str(error) if self.handle is None else f"{error}{recovery_advice(fault)}"
             self._set_state("running" if runs else "stopped", message)
 
     def _handle_request(self, request: _Request) -> None:

@@ -1,5 +1,9 @@
-"""The clock of a servo loop: that of the system, or none for a loop that runs unpaced."""
+"""The clock of a servo loop: that of the system, or none for a loop that runs unpaced.
 
+It counts the time in which the machine sleeps, so that the sample after it is late.
+"""
+
+import time
 from typing import NamedTuple
 
 from asperity.core.checks import IntArray
@@ -7,8 +11,9 @@ from asperity.core.compiled import Kernels, call_address
 
 KERNELS = Kernels(provides=("clock_now", "clock_wait_until"), native=("call_address",))
 
-# Linux: the monotonic clock, absolute times, and the answer of a wait that a signal interrupted.
-CLOCK_MONOTONIC = 1
+# Linux: the monotonic clock that goes on while the machine sleeps, absolute times, and the answer
+# of a wait that a signal interrupted.
+CLOCK_BOOTTIME = 7
 TIMER_ABSTIME = 1
 EINTR = 4
 NANOSECONDS = 1_000_000_000
@@ -32,7 +37,7 @@ def clock_now(due: int, clock: Clock) -> int:
     """Return the time [ns]."""
     if clock.gettime == 0:
         return due
-    call_address(clock.gettime, CLOCK_MONOTONIC, clock.timespec)
+    call_address(clock.gettime, CLOCK_BOOTTIME, clock.timespec)
     return int(clock.timespec[0]) * NANOSECONDS + int(clock.timespec[1])
 
 
@@ -44,5 +49,10 @@ def clock_wait_until(due: int, clock: Clock) -> int:
     while answer == EINTR:
         clock.timespec[0] = due // NANOSECONDS
         clock.timespec[1] = due % NANOSECONDS
-        answer = call_address(clock.nanosleep, CLOCK_MONOTONIC, TIMER_ABSTIME, clock.timespec, 0)
+        answer = call_address(clock.nanosleep, CLOCK_BOOTTIME, TIMER_ABSTIME, clock.timespec, 0)
     return clock_now(due, clock)
+
+
+def system_time() -> int:
+    """Return the system's time as the loop reads it [ns]."""
+    return time.clock_gettime_ns(CLOCK_BOOTTIME)

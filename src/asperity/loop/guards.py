@@ -25,11 +25,11 @@ from asperity.loop.interface import (
     DEVICE,
     FINISHED,
     LATE_SAMPLE,
-    MISSED_SAMPLES,
     NO_HEARTBEAT,
     NOT_FINITE,
     OK,
     RUNNING,
+    STOP_NOW,
     STOPPED,
     SWAP,
     WORKSPACE,
@@ -66,8 +66,7 @@ class LoopLimits(NamedTuple):
         max_change: largest change of the force in a sample [N].
         ramp_step: share of the force added in a sample after the start, removed after a stop [1].
         max_damping: largest damping of the passivity controller [N s/m]; 0 for none.
-        max_misses: consecutive samples that may be late.
-        max_lateness: largest lateness [ns].
+        max_lateness: time for which all samples may be late, or a single one [ns].
         max_silence: longest time without a heartbeat [ns]; 0 for no heartbeat.
         max_reach: distance of the handle from the middle of its workspace [m].
         centre_x: middle of the workspace, in the surface's frame [m].
@@ -82,7 +81,6 @@ class LoopLimits(NamedTuple):
     max_change: float
     ramp_step: float
     max_damping: float
-    max_misses: int
     max_lateness: int
     max_silence: int
     max_reach: float
@@ -174,7 +172,10 @@ def requested_end(
 ) -> tuple[int, bool]:
     """Return the requested end cause, or ``RUNNING``, and whether the force is released for it."""
     block, end = guards.block, RUNNING
-    if load_acquire(block.control, STOP_WORD) != 0:
+    stop = load_acquire(block.control, STOP_WORD)
+    if stop == STOP_NOW:
+        return STOPPED, True
+    if stop != 0:
         end = STOPPED
     elif sample >= end_sample:
         end = FINISHED
@@ -195,8 +196,11 @@ def to_surface(position: FloatArray, row: int, frame: FloatArray) -> float:
     return value
 
 
-def read_position(position: FloatArray, guards: Guards, device: object) -> Reading:
-    """Read the position of the handle; report a reading that is not finite or out of reach."""
+def read_position(position: FloatArray, late: int, guards: Guards, device: object) -> Reading:
+    """Read the position of the handle; report one that is not finite, out of reach, or too late.
+
+    A late start [ns] is a fault before a force is computed: the loop may have been suspended.
+    """
     limits, frame, _block = guards
     code = device_read(position, device)
     if code != OK:
@@ -210,7 +214,8 @@ def read_position(position: FloatArray, guards: Guards, device: object) -> Readi
     ay = y - limits.centre_y
     az = z - limits.centre_z
     far = ax * ax + ay * ay + az * az > limits.max_reach * limits.max_reach
-    return Reading(x, y, z, WORKSPACE if far else RUNNING, OK)
+    cause = LATE_SAMPLE if late > limits.max_lateness else RUNNING
+    return Reading(x, y, z, WORKSPACE if far else cause, OK)
 
 
 def write_force(
@@ -287,12 +292,13 @@ def finish_timing(
     """
     limits = guards.limits
     late = end_time - timing.due
+    late_since = 0
+    if late > limits.period:
+        late_since = timing.late_since if timing.late_since != 0 else timing.due
     count_timing(guards.block, timing.due, start_time, end_time, limits.period)
     fault = RUNNING
-    if late > limits.max_lateness:
+    if max(late, end_time - late_since if late_since != 0 else 0) > limits.max_lateness:
         fault = LATE_SAMPLE
-    elif timing.misses > limits.max_misses:
-        fault = MISSED_SAMPLES
     elif 0 < limits.max_silence < end_time - timing.heartbeat_time:
         fault = NO_HEARTBEAT
     over = max(late // limits.period - 1, 0)
@@ -300,7 +306,7 @@ def finish_timing(
     return fault, LoopTiming(
         timing.sample + 1 + over,
         timing.due + (1 + over) * limits.period,
-        timing.misses + 1 if late > limits.period else 0,
+        late_since,
         beat,
         start_time if beat != timing.heartbeat else timing.heartbeat_time,
     )

@@ -13,7 +13,9 @@ from asperity.kernels.tick import ServoSettings, ServoState
 OK = 0
 # What ends the loop.
 RUNNING, STOPPED, SWAP, FINISHED, NOT_FINITE, DEVICE, WORKSPACE, DEPTH = range(8)
-MISSED_SAMPLES, LATE_SAMPLE, NO_HEARTBEAT = range(8, 11)
+LATE_SAMPLE, NO_HEARTBEAT = range(8, 10)
+# Requests to stop: with a ramp, or with the next sample.
+STOP_RAMPED, STOP_NOW = 1, 2
 
 
 class Reading(NamedTuple):
@@ -60,14 +62,14 @@ class LoopTiming(NamedTuple):
     Attributes:
         sample: number of the sample.
         due: time at which it is due [ns].
-        misses: consecutive late samples.
+        late_since: time at which the first of consecutive late samples was due [ns]; 0 for none.
         heartbeat: newest heartbeat.
         heartbeat_time: time of that heartbeat [ns].
     """
 
     sample: int = 0
     due: int = 0
-    misses: int = 0
+    late_since: int = 0
     heartbeat: int = 0
     heartbeat_time: int = 0
 

@@ -42,7 +42,7 @@ def requested_end(
     return (FINISHED, True) if sample >= end_sample else (RUNNING, False)
 
 
-def read_position(position: FloatArray, guards: object, device: object) -> Reading:
+def read_position(position: FloatArray, late: int, guards: object, device: object) -> Reading:
     """Return the position of the handle."""
     code = device_read(position, device)
     cause = RUNNING if code == OK else DEVICE

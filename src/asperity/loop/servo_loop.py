@@ -76,7 +76,7 @@ def servo_loop(
             cause = end
             break
         start = clock_wait_until(timing.due, clock)
-        reading = read_position(position, guards, device)
+        reading = read_position(position, start - timing.due, guards, device)
         cause, code, in_contact, before = reading.cause, reading.code, False, servo
         if cause == RUNNING:
             x, y, z = reading.x, reading.y, reading.z

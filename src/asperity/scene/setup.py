@@ -174,6 +174,8 @@ def make_setup(
         brakes=brakes, needs_dynamics=needs_plant,
     )  # fmt: skip
     servo, notes = scene_defaults.make_servo(chosen, uses_delay=uses_delay)
+    guards = Safety(**limits)
+    safety.check_passivity_damping(guards, chosen, servo)
     rendering = merged.pop("rendering", FIELD)
     if share is not None:
         servo = replace(servo, velocity_share=share)
@@ -186,7 +188,7 @@ def make_setup(
     return Setup(
         whole, chosen, plant, hand, servo, motion, span,
         assumptions=(*assumed, *notes, *default, *_leaving_warnings(scene.texture, motion, span)),
-        files=scene.files, safety=Safety(**limits), rendering=rendering, **run,
+        files=scene.files, safety=guards, rendering=rendering, **run,
     )  # fmt: skip
 
 

@@ -11,6 +11,7 @@ import resource
 import signal
 import sys
 import threading
+import time
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -22,6 +23,7 @@ import numpy as np
 from asperity.contacts.warm_start import BUDGET, POINT_COUNT, UNLIMITED, new_warm_start
 from asperity.core.checks import FloatArray
 from asperity.core.errors import AsperityError
+from asperity.core.processes import end_with_parent
 from asperity.kernels.fuse import load_fused, source_on_texture
 from asperity.kernels.tick import ServoState
 from asperity.loop import clock, guards, servo_loop, shared_trace
@@ -29,6 +31,7 @@ from asperity.loop.clock import Clock
 from asperity.loop.guards import Guards, LoopLimits
 from asperity.loop.interface import LoopState
 from asperity.loop.shared_trace import SharedBlock
+from asperity.servo.device_lock import lock_device
 from asperity.servo.drivers.driver import Driver
 from asperity.servo.fault import EndReason
 from asperity.servo.loop_memory import LoopMemory
@@ -99,7 +102,7 @@ def loop_limits(
     x, y, z = map(float, centre)
     return LoopLimits(
         round(1e9 * period), safety.slew_limit(servo.max_force) * period, share,
-        float(safety.passivity_damping), int(safety.misses), round(1e9 * safety.lateness),
+        float(safety.passivity_damping), round(1e9 * safety.lateness_limit(period)),
         round(1e9 * safety.silence), float(reach), x, y, z, program.safe_height, program.max_depth,
         safety.beyond_depth == "fault",
     )  # fmt: skip
@@ -259,7 +262,8 @@ class _LoopServer:
     """A running loop, and the thread that compiles the next surface for it."""
 
     def __init__(self, connection: Connection, memory: LoopMemory, job: LoopJob) -> None:
-        self._connection, self._job, self._block = connection, job, memory.block()
+        self._connection, self._job, self._memory = connection, job, memory
+        self._block = memory.block()
         self._loop = DriverLoop(
             job.driver, job.servo, job.safety, job.reach, self._block, system_clock()
         )
@@ -269,6 +273,10 @@ class _LoopServer:
         """Run until the loop ends, and report why."""
         driver = self._job.driver
         self._loop.compile(self._program)
+        with lock_device(driver):
+            self._serve(driver)
+
+    def _serve(self, driver: Driver) -> None:
         device = driver.open()
         try:
             threading.Thread(target=self._receive_programs, daemon=True).start()
@@ -283,7 +291,7 @@ class _LoopServer:
         self._connection.send(("ended", (cause, driver.describe_error(code))))
 
     def _receive_programs(self) -> None:
-        """Compile surfaces as they arrive, until the connection closes."""
+        """Compile surfaces as they arrive, until the connection closes; then the loop ends."""
         with suppress(EOFError, OSError):
             while True:
                 modules, data = self._connection.recv()
@@ -295,6 +303,33 @@ class _LoopServer:
                     continue
                 self._next_program, self._block.swap[0] = program, 1
                 self._connection.send(("loaded", None))
+        self._memory.request_stop(now=True)
+
+
+_IGNORED_SIGNALS = (
+    signal.SIGINT, signal.SIGHUP, signal.SIGTERM, signal.SIGQUIT, signal.SIGTSTP, signal.SIGTTIN,
+    signal.SIGTTOU, signal.SIGUSR1, signal.SIGUSR2, signal.SIGALRM,
+)  # fmt: skip
+MAX_CALL_TIME = 10.0
+"""Time for a call of a device to return before the process that waits in it is killed [s]."""
+
+
+def _leave_to_supervisor(memory: LoopMemory) -> None:
+    """Let the supervising process decide how the loop ends, and end with it.
+
+    In a session of its own, the process gets no signals of the terminal or to the process group,
+    not even a SIGKILL or SIGSTOP. If the supervising process dies, the force is released.
+    """
+    with suppress(OSError):  # it has a session already
+        os.setsid()
+    for number in _IGNORED_SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
+
+    def release() -> None:
+        memory.request_stop(now=True)
+        time.sleep(MAX_CALL_TIME)
+
+    end_with_parent(release)
 
 
 def run_loop_process(connection: Connection, memory: LoopMemory) -> None:
@@ -304,8 +339,7 @@ def run_loop_process(connection: Connection, memory: LoopMemory) -> None:
         connection: messages go out here; the job and further surfaces come in.
         memory: rows and counts.
     """
-    # Ctrl-C goes to all processes of a terminal: the supervising one decides how the loop ends.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _leave_to_supervisor(memory)
     importlib.import_module("numba")  # the slowest import, done while the job is prepared
     try:
         job = unpickle(*connection.recv())

@@ -32,15 +32,13 @@ class EndReason(Enum):
     """The handle was read outside its workspace."""
     DEPTH = 7
     """The probe is deeper than the analysed depth."""
-    MISSED_SAMPLES = 8
-    """Too many consecutive samples were late."""
-    LATE_SAMPLE = 9
-    """A sample was later than the limit."""
-    NO_HEARTBEAT = 10
+    LATE_SAMPLE = 8
+    """The loop was late for longer than the limit."""
+    NO_HEARTBEAT = 9
     """The supervising process sent no heartbeat."""
-    UNRESPONSIVE = 11
+    UNRESPONSIVE = 10
     """The loop made no progress: the device does not answer."""
-    DIED = 12
+    DIED = 11
     """The process of the loop ended."""
 
     @property
@@ -53,8 +51,7 @@ FAULT_DESCRIPTIONS = {
     EndReason.NOT_FINITE: "a position or a force is not a number",
     EndReason.WORKSPACE: "the handle was read outside its workspace",
     EndReason.DEPTH: "the probe is deeper than max_depth, for which the surface was analysed",
-    EndReason.MISSED_SAMPLES: "too many samples in a row were late",
-    EndReason.LATE_SAMPLE: "a sample was too late",
+    EndReason.LATE_SAMPLE: "the loop was late for too long",
     EndReason.NO_HEARTBEAT: "the supervising program sent no heartbeat",
     EndReason.UNRESPONSIVE: "the device does not answer",
     EndReason.DIED: "the process of the loop ended",

@@ -13,6 +13,7 @@ import numpy as np
 from asperity.core.checks import FloatArray
 from asperity.core.files import Serializable
 from asperity.loop import shared_trace as words
+from asperity.loop.interface import STOP_NOW, STOP_RAMPED
 from asperity.loop.shared_trace import COLUMNS, SharedBlock
 
 BUFFER_ROWS = 40_000
@@ -53,9 +54,10 @@ class LoopMemory:
         """Send a heartbeat."""
         self._control[words.HEARTBEAT_WORD] += 1
 
-    def request_stop(self) -> None:
-        """Request the loop to release the force and end."""
-        self._control[words.STOP_WORD] = 1
+    def request_stop(self, *, now: bool = False) -> None:
+        """Request the loop to release the force, by a ramp or now, and to end."""
+        wanted = STOP_NOW if now else STOP_RAMPED
+        self._control[words.STOP_WORD] = max(wanted, self._control[words.STOP_WORD])
 
     def rows(self, first_row: int) -> tuple[FloatArray, int]:
         """Return the available rows from a number on, and the number of the first."""

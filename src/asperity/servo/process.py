@@ -5,13 +5,17 @@ from __future__ import annotations
 import math
 import os
 import pickle
+import signal
 import sys
 import threading
 import time
 from collections.abc import Mapping
 from contextlib import suppress
 from importlib.util import find_spec
+from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnContext
+from multiprocessing.process import BaseProcess
+from multiprocessing.util import Finalize
 from typing import Any, Self
 
 from asperity.core.checks import FloatArray
@@ -22,6 +26,7 @@ from asperity.loop.shared_trace import COLUMNS
 from asperity.recording.recorded_field import field_attachments, field_metadata
 from asperity.recording.writer import RecordingWriter
 from asperity.servo.driver_loop import (
+    MAX_CALL_TIME,
     NO_END,
     LoopJob,
     LoopProgram,
@@ -40,6 +45,7 @@ START_TIMEOUT = 120.0
 """Time until the loop must run [s]: compiling for the first time takes most of it."""
 _ENDED_MESSAGE = "comes too late: the loop has ended"
 _EXIT_TIMEOUT = 2.0  # [s] for a process to report its end
+_HEARTBEAT_PERIOD = 0.01  # [s] at most
 
 
 class PrestartedProcess:
@@ -60,14 +66,21 @@ class PrestartedProcess:
         )
         self.process.start()
         theirs.close()
+        # Otherwise Python would wait at its end for a process that ignores SIGTERM.
+        what = self.connection, self.process, _EXIT_TIMEOUT
+        Finalize(self, _end_process, what, exitpriority=1)
 
     def terminate(self, timeout: float = 0.0) -> None:
         """End the process, after a time to finish [s]."""
-        self.connection.close()
-        self.process.join(timeout)
-        if self.process.is_alive():
-            self.process.kill()
-            self.process.join()
+        _end_process(self.connection, self.process, timeout)
+
+
+def _end_process(connection: Connection, process: BaseProcess, timeout: float) -> None:
+    connection.close()
+    process.join(timeout)
+    if process.is_alive():
+        process.kill()
+        process.join()
 
 
 class ServoProcess:
@@ -221,7 +234,10 @@ class ServoProcess:
         return self.memory.rows(first)
 
     def stop(self) -> None:
-        """Release the force, and end the loop and its process."""
+        """Release the force, and end the loop and its process.
+
+        A process that waits for its device is killed after ``MAX_CALL_TIME``.
+        """
         if self._end_reason is EndReason.RUNNING:
             self.memory.request_stop()
             deadline = time.monotonic() + self._safety.ramp + _EXIT_TIMEOUT
@@ -233,11 +249,17 @@ class ServoProcess:
         """End the process, which has closed the device unless it hangs."""
         self._heartbeat_stop.set()
         assert self._prestarted is not None
-        self._prestarted.terminate(_EXIT_TIMEOUT)
+        waits = self._end_reason in {EndReason.RUNNING, EndReason.UNRESPONSIVE}
+        self._prestarted.terminate(MAX_CALL_TIME if waits else _EXIT_TIMEOUT)
 
     def _send_heartbeats(self) -> None:
-        while not self._heartbeat_stop.wait(0.1 * self._safety.silence):
+        count = -1
+        while not self._heartbeat_stop.wait(min(0.1 * self._safety.silence, _HEARTBEAT_PERIOD)):
             self.memory.send_heartbeat()
+            if count == (count := self.memory.row_count):
+                # If it is suspended: its next sample is late, and releases the force.
+                with suppress(OSError):
+                    os.kill(self.process.pid or os.getpid(), signal.SIGCONT)
 
     def _receive(self, timeout: float = 0.0) -> None:
         """Receive messages, and check that the loop makes progress."""
@@ -255,7 +277,7 @@ class ServoProcess:
             and now - self._last_progress > self._safety.silence
         ):
             self._end_reason = EndReason.UNRESPONSIVE
-            self.process.kill()
+            self.memory.request_stop(now=True)
 
     def _handle_message(self, kind: str, content: Any) -> None:
         if kind == "ended":
@@ -315,6 +337,8 @@ def _is_importable(name: str) -> bool:
 class LoopRecorder:
     """Records every sample of a loop, if called often enough; use it in a ``with``.
 
+    The file is created when the ``with`` begins, so begin it when the loop runs.
+
     Args:
         path: path of the recording.
         loop: the loop, or its memory.
@@ -335,7 +359,7 @@ class LoopRecorder:
     ) -> None:  # fmt: skip
         about: dict[str, Any] = {"made_by": "run", "surface": field_metadata(surface)}
         about |= {"servo": to_plain_data(servo), "every": 1, **metadata}
-        self._writer = RecordingWriter(path, COLUMNS, about, field_attachments(surface), "record")
+        self._what = path, COLUMNS, about, field_attachments(surface), "record"
         self._loop, self._next_row, self.lost_rows = loop, 0, 0
 
     def write_new_rows(self) -> None:
@@ -350,6 +374,7 @@ class LoopRecorder:
         self._writer.append(rows)
 
     def __enter__(self) -> Self:
+        self._writer = RecordingWriter(*self._what)
         return self
 
     def __exit__(self, *_error: object) -> None:

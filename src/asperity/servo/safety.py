@@ -8,16 +8,19 @@ from typing import Literal
 
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
 from asperity.analysis.passivity.verdict import recommend_stiffness
-from asperity.core.arguments import Argument, check_integer
+from asperity.core.arguments import Argument
 from asperity.core.checks import check_positive, check_real
 from asperity.core.errors import ParameterError
 from asperity.core.files import Serializable
 from asperity.core.units import format_quantity
 from asperity.devices import Device
+from asperity.simulation.servo import Servo
 from asperity.surface import Surface
 
 DEFAULT_RISE_TIME = 5e-3
 """Time for the force to rise from zero to its maximum, unless a slew limit is given [s]."""
+LATE_PERIODS, MIN_LATENESS = 10, 0.02
+"""Time for which the loop may be late unless one is given: in periods, and at least [s]."""
 DEPTH_ACTIONS = ("fault", "warn")
 WALL_ORIENTATIONS = ("lying", "standing")
 
@@ -33,8 +36,9 @@ class Safety(Serializable):
         ramp: time in which the force rises after the start, and falls before the end [s].
         max_slew: largest change of the force [N/s]; ``None`` for zero to the maximum force in
             ``DEFAULT_RISE_TIME``.
-        misses: consecutive samples that may be late: not finished when the next one is due.
-        lateness: largest delay of a sample, from its due time to its end [s].
+        lateness: longest time for which the loop may be late, whether in one sample or in many in a
+            row: from the due time of the first sample that is not finished when the next one is
+            due [s]; ``None`` for ``LATE_PERIODS`` periods, at least ``MIN_LATENESS``.
         silence: longest time without a heartbeat of the supervising process [s].
         beyond_depth: whether a probe deeper than the surface's ``max_depth`` is a "fault", or is
             counted and reported, "warn". It is neither under a clamp that bounds every depth.
@@ -50,8 +54,7 @@ class Safety(Serializable):
 
     ramp: float = 0.25
     max_slew: float | None = None
-    misses: int = 100
-    lateness: float = 0.05
+    lateness: float | None = None
     silence: float = 1.0
     beyond_depth: Literal["fault", "warn"] = "fault"
     passivity_damping: float = 0.0
@@ -63,12 +66,10 @@ class Safety(Serializable):
         for name in ("ramp", "passivity_damping"):
             if check_real(name, getattr(self, name)) < 0.0:
                 raise ParameterError(name, "must not be negative", getattr(self, name))
-        for name in ("lateness", "silence"):
-            check_positive(name, getattr(self, name), "s")
-        for name in ("max_slew", "reach"):
+        check_positive("silence", self.silence, "s")
+        for name in ("lateness", "max_slew", "reach"):
             if getattr(self, name) is not None:
                 check_positive(name, getattr(self, name))
-        check_integer("misses", self.misses)
         if self.wall not in WALL_ORIENTATIONS:
             raise ParameterError("wall", "must be 'lying' or 'standing'", self.wall)
         if self.beyond_depth not in DEPTH_ACTIONS:
@@ -79,6 +80,10 @@ class Safety(Serializable):
         if self.max_slew is not None:
             return self.max_slew
         return max_force / DEFAULT_RISE_TIME if math.isfinite(max_force) else math.inf
+
+    def lateness_limit(self, period: float) -> float:
+        """Return the longest time for which a loop of a period [s] may be late [s]."""
+        return max(LATE_PERIODS * period, MIN_LATENESS) if self.lateness is None else self.lateness
 
     def reach_limit(self, device: Device) -> float:
         """Return the largest distance of a reading from the middle of the workspace [m].
@@ -95,14 +100,47 @@ class Safety(Serializable):
         return math.inf if radius is None else REACH_FACTOR * radius
 
 
+def check_passivity_damping(safety: Safety, device: Device, servo: Servo) -> None:
+    """Check that the passivity controller cannot feed energy into the handle.
+
+    A damping b acts by the displacement in the last sample, d samples of delay later. On a mass m
+    the velocity then obeys v' = v - (b T/m) (v₋ + v₋₋)/2, which grows above b T/m = 2, 0.83, 0.54,
+    0.40 for d = 0, 1, 2, 3. The bound m/((1 + d) T) is half to two thirds of that.
+
+    Args:
+        safety: limits of the loop.
+        device: device, whose apparent mass is the least that the handle has; a hand adds to it.
+        servo: period T and delay d.
+
+    Raises:
+        ParameterError: for a damping above the bound, or a device whose mass is not known.
+    """
+    mass, given = device.value("apparent_mass"), safety.passivity_damping
+    if not given:
+        return
+    if mass is None:
+        words = f"needs the apparent_mass of {device.id}, which bounds it: --set apparent_mass=50g"
+        raise ParameterError("passivity_damping", words)
+    bound = mass / ((1 + servo.delay) * servo.period)
+    if given > bound:
+        words = (
+            f"must be at most m/((1 + d) T) = {format_quantity(bound, 'N*s/m', digits=3)}, with the"
+            f" apparent mass m of {device.id}, the period T and a delay of d = {servo.delay}"
+            " samples: above it the controller may feed energy into the handle"
+        )
+        raise ParameterError("passivity_damping", words, given)
+
+
 ARGUMENTS: tuple[Argument, ...] = (
     Argument("ramp", "time in which the force rises, and falls at the end", "s", Safety.ramp),
     Argument(
         "max_slew", "largest change of the force", "N/s", must_be_positive=True, example="2000N/s",
         default_description="to the maximum force in 5 ms",
     ),
-    Argument("misses", "consecutive samples that may be late", "", Safety.misses, form="integer"),
-    Argument("lateness", "maximum delay of a sample", "s", Safety.lateness, must_be_positive=True),
+    Argument(
+        "lateness", "maximum time for which the loop may be late", "s", must_be_positive=True,
+        example="20ms", default_description="10 periods, at least 20 ms",
+    ),
     Argument(
         "silence", "maximum silence of the supervising process", "s", Safety.silence,
         must_be_positive=True,

@@ -36,7 +36,6 @@ stiffness = "150 N/m"
 [device]
 id = "touch"
 [servo]
-misses = 1000000
 lateness = "60 s"
 silence = "30 s"
 """

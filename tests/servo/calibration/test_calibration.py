@@ -277,7 +277,7 @@ def test_clocked_calibration_ends_without_force_on_interrupt() -> None:
     driver = simulated_driver(
         Cartesian(0.08, 1.0), SpringHand(), servo, ORIGIN, 1e-3, device_resolution=True
     )
-    patient = Safety(ramp=0.02, lateness=60.0, misses=10**6, silence=30.0)
+    patient = Safety(ramp=0.02, lateness=60.0, silence=30.0)
     interrupts = []
 
     def poll() -> None:

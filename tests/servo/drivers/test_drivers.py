@@ -32,7 +32,7 @@ EXAMPLE = ROOT / "examples" / "own_device.c"
 FAKES = ROOT / "bench" / "c"
 NOTHING, READ_ONCE, _READ_EVER, WRITE_ONCE = range(4)
 # Generous limits: lateness on a busy machine is not under test here.
-NO_RAMP = Safety(ramp=0.0, max_slew=1e9, silence=60.0, lateness=60.0, misses=10**6)
+NO_RAMP = Safety(ramp=0.0, max_slew=1e9, silence=60.0, lateness=60.0)
 
 
 @pytest.fixture(scope="module")

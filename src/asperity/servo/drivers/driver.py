@@ -101,6 +101,11 @@ class Driver(ABC):
         return frame
 
     @property
+    def device_name(self) -> str:
+        """Name of the device among those of its kind, for its lock; empty for any."""
+        return ""
+
+    @property
     def max_readings(self) -> int | None:
         """Number of readings; ``None`` for any number."""
         return None

@@ -45,6 +45,11 @@ class ForceDimensionDriver(Driver):
     surface_frame: driver.Frame = driver.IDENTITY_FRAME
     _device_id: int = field(default=-1, init=False, repr=False)
 
+    @property
+    def device_name(self) -> str:
+        """Name of the device for its lock."""
+        return str(self.number or 0)
+
     def kernel_modules(self) -> tuple[ModuleType, ...]:
         """Return the module that calls libdhd."""
         return (force_dimension_device,)

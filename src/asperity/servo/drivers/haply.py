@@ -11,7 +11,6 @@ import os
 import select
 import sys
 import threading
-import time
 from collections import deque
 from collections.abc import Sequence
 from contextlib import suppress
@@ -19,6 +18,7 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 from asperity.core.errors import ParameterError
+from asperity.loop.clock import system_time
 from asperity.servo.driver_loop import PRIORITY
 from asperity.servo.drivers.driver import AWAY, RIGHT, UP, DriverKind
 from asperity.servo.drivers.threaded import (
@@ -154,7 +154,7 @@ class HaplyThread(threading.Thread):
         x, y, z, given = self.buffer.latest_force()
         force = (x, y, z)
         timeout = self.buffer.ring.words[FORCE_TIMEOUT]
-        if force != _ZERO_FORCE and time.monotonic_ns() - given > timeout:
+        if force != _ZERO_FORCE and system_time() - given > timeout:
             self._fail(LOOP_SILENT, "its force was released")
             return
         is_due = (resend or given != self._last_force_time) and len(self._pending) < MAX_PENDING
@@ -164,7 +164,7 @@ class HaplyThread(threading.Thread):
 
     def _send(self, force: Force) -> None:
         x, y, z = force
-        self._pending.append(time.monotonic_ns())
+        self._pending.append(system_time())
         commands = {"set_cursor_force": {"values": {"x": x, "y": y, "z": z}}}
         message = {"inverse3": [{"device_id": self._device_id, "commands": commands}]}
         self._connection.send(json.dumps(message))
@@ -198,6 +198,11 @@ class HaplyDriver(ThreadedDriver):
     device: str = ""
     _exchange: HaplyThread | None = field(default=None, init=False, repr=False)
     _previous_switch_interval: float = field(default=0.0, init=False, repr=False)
+
+    @property
+    def device_name(self) -> str:
+        """Name of the device for its lock."""
+        return self.device.lower()
 
     def open(self) -> ThreadedDevice:
         """Find the device, start the thread, and wait for the first state."""

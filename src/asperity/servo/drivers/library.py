@@ -85,6 +85,11 @@ class LibraryDriver(Driver):
     path: str
     surface_frame: Frame = IDENTITY_FRAME
 
+    @property
+    def device_name(self) -> str:
+        """Name of the device for its lock."""
+        return str(Path(self.path).resolve())
+
     def kernel_modules(self) -> tuple[ModuleType, ...]:
         """Return the module that calls the library."""
         return (library_device,)

@@ -76,6 +76,11 @@ class OpenHapticsDriver(ThreadedDriver):
     _scheduled: int = field(default=0, init=False, repr=False)
     _callback: Any = field(default=None, init=False, repr=False)
 
+    @property
+    def device_name(self) -> str:
+        """Name of the device for its lock."""
+        return self.device
+
     def open(self) -> ThreadedDevice:
         """Open the device, start the scheduler, and wait for the first frame."""
         library = _library()
