@@ -261,14 +261,34 @@ def test_lower_bound_of_a_box_is_the_distance_to_its_plane() -> None:
 
 
 def test_box_is_pruned_by_the_taylor_bound() -> None:
-    """Above its centre only the change of Q counts: φ ≥ φ₀ - 2∫(1 - t) t dt · change r²."""
+    """Above its centre only Q counts: φ ≥ φ₀ + d·Q d - 2∫(1 - t) t dt · change |d|²."""
 
     def is_pruned(enough: float) -> bool:
-        arguments = (0.0, 0.0, 1.0), 0.0, 0.0, (2.0, 0.0, 2.0)
-        return plane_search.can_prune(*arguments, 2.0, 0.6, 2.0, 0.3, 0.4, enough)
+        arguments = (0.0, 0.0, 1.0), 0.0, 0.0, (0.1, 0.0, 0.1)
+        return plane_search.can_prune(*arguments, 0.1, 0.6, 2.0, 0.3, 0.4, enough)
 
-    assert is_pruned(0.95 * (1.0 - 1e-12))
-    assert not is_pruned(0.95 * (1.0 + 1e-12))
+    assert is_pruned(0.975 * (1.0 - 1e-12))
+    assert not is_pruned(0.975 * (1.0 + 1e-12))
+
+
+def test_minimum_of_a_quadratic_over_a_box() -> None:
+    """Never above a fine lattice, and below it by no more than its pitch explains."""
+    rng = np.random.default_rng(2)
+    s, t = np.meshgrid(np.linspace(-1.0, 1.0, 401), np.linspace(-1.0, 1.0, 401))
+    inside = 0
+    scale = [0.3, 0.3, 1.0, 1.0, 1.0, 1.0, 1.0]
+    for px, py, qxx, qxy, qyy, *sides in scale * rng.normal(size=(300, 7)):
+        a, b = np.abs(sides)
+        x, y = a * s, b * t
+        lattice = 2.0 * (px * x + py * y) + qxx * x * x + 2.0 * qxy * x * y + qyy * y * y
+        least = plane_search.min_quadratic(px, py, qxx, qxy, qyy, a, b)
+        # Beside a point of the lattice a side's parabola is lower by at most its slope.
+        slack = 5e-3 * (abs(px) + abs(py) + (abs(qxx) + 2.0 * abs(qxy) + abs(qyy)) * (a + b))
+        slack *= a + b
+        assert lattice.min() - slack <= least + 1e-12 <= lattice.min() + 2e-12
+        row, column = np.unravel_index(lattice.argmin(), lattice.shape)
+        inside += 0 < row < 400 and 0 < column < 400
+    assert inside > 10
 
 
 @pytest.mark.parametrize("hessian_bound", [0.3, 1.4, 9.0])

@@ -178,14 +178,16 @@ def test_evaluation_cost_grows_with_the_number_of_waves(law: str, direction: tup
     )
     xy = RNG.uniform(0.0, EXTENT, (60, 2))
     probes = np.column_stack([xy, two_waves.height(xy) - RNG.uniform(2e-4, 2e-2, 60)])
-    expected, budget = surface.force(probes), 600.0 if law == "D" else 1800.0
+    expected, budget = surface.force(probes), 300.0 if law == "D" else 900.0
     _force, unlimited = trace_with_bounds(surface, probes, UNLIMITED, cold=True)
     force, bounds = trace_with_bounds(split_surface, probes, budget, cold=True)
     cost = 32.0  # 0.4 per wave
+    # Boxes of the plane search cost 1 and 0.1 per wave: 9.0 in place of 1.2.
+    least_cost = cost if direction[1] == 0.0 else 9.0 / 1.2
     assert (bounds[:, 1] - budget).max() <= 12.0 * cost
     truncated = bounds[:, 0] > 0.0
     # These searches need more evaluations than the budget allows.
-    assert truncated[unlimited[:, 1] > 2.0 * budget / cost].all()
+    assert truncated[unlimited[:, 1] > 2.0 * budget / least_cost].all()
     assert truncated.mean() > 0.2
     error = np.linalg.norm(force - expected, axis=1) / STIFFNESS
     distance = np.abs(np.linalg.norm(force, axis=1) - np.linalg.norm(expected, axis=1)) / STIFFNESS

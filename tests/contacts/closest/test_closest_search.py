@@ -414,3 +414,47 @@ def test_next_box_visits_every_box_once():
             level, side, i, j = search.next_box(level > 0, level, side, i, j, 3, u, v)
         assert sorted(visited) == [(i, j) for i in range(8) for j in range(8)]
         assert visited[0] == (int(v), int(u))
+
+
+def test_supporting_bound_holds_on_random_boxes_and_is_sharp_on_a_plane():
+    """φ is nowhere below it; on a plane, however steep, it is the squared distance."""
+    rng = np.random.default_rng(11)
+    for _ in range(200):
+        c = cubic(rng, rng.choice([0.1, 1.0, 10.0]))
+        c[1, 0] *= rng.choice([1.0, 30.0])
+        probe, (a, b) = rng.normal(size=3), rng.uniform(0.05, 0.5, 2)
+        h, *_rest = derivatives = curvature(0.0, 0.0, c)
+        offset = (-probe[0], -probe[1], h - probe[2])
+        _k, t = bounds(c, a, b)
+        bound = search.supporting_bound(offset, derivatives, t, a, b)
+        phi, _p, _q = expansion(c, probe, box_points(a, b, 41))
+        assert bound <= phi.min() * (1.0 + 1e-12)
+    plane = (0.0, 40.0, -9.0, 0.0, 0.0, 0.0)
+    normal = np.array([-40.0, 9.0, 1.0]) / np.sqrt(1682.0)
+    offset = tuple(0.3 * normal + 0.2 * np.array([1.0, 0.0, 40.0]) / np.sqrt(1601.0))
+    bound = search.supporting_bound(offset, plane, 0.0, 0.1, 0.1)
+    assert bound == pytest.approx(0.09, rel=1e-10)
+
+
+def test_minimum_is_least_where_its_supporting_function_is_convex(monkeypatch: pytest.MonkeyPatch):
+    """Wherever it says so, no sampled point within reach is closer; it does for many minima."""
+    monkeypatch.setattr(search, "sample_hessian", curvature)
+    rng = np.random.default_rng(12)
+    answers = []
+    for _ in range(300):
+        c = cubic(rng, rng.choice([0.1, 0.3]))
+        probe = stationary_probe(c, 0.0, 0.0, rng.uniform(0.1, 2.0))
+        h, hx, hy, *_rest = curvature(0.0, 0.0, c)
+        best = (0.0, 0.0, float(probe @ probe - 2 * h * probe[2] + h * h), h, hx, hy)
+        reach = rng.uniform(0.1, 1.0)
+        side = reach / np.sqrt(2.0)
+        _k, t = bounds(c, side, side)
+        least = search.is_least_within(*probe, best, t, reach, c)
+        phi, _p, _q = expansion(c, probe, box_points(side, side, 41))
+        assert not least or phi.min() >= best[2] * (1.0 - 1e-12)
+        answers.append((least, bool(phi.min() >= best[2] * (1.0 - 1e-12))))
+    certified, true = np.array(answers).T
+    assert certified.sum() > 0.3 * true.sum()
+    assert not true.all()
+    moved = search.is_least_within(0.1, 0.0, -1.0, (0.0, 0.0, 1.01, 0.0, 0.0, 0.0), 0.0, 1.0, 0 * c)
+    assert not moved  # the point is no minimum

@@ -13,6 +13,7 @@ from scipy.optimize import minimize
 
 from asperity.core.errors import ParameterError
 from asperity.textures import Fourier, Sinusoid
+from asperity.textures.kinds.fourier_sampler import expand_waves
 
 Check = Callable[..., Any]
 ROOT2 = math.sqrt(2.0)
@@ -253,3 +254,39 @@ def test_description_and_repr_give_the_same_texture():
     xy = [[1e-4, 2e-4]]
     assert Fourier(**description).height(xy) == texture.height(xy)
     assert eval(repr(texture)).height(xy) == texture.height(xy)
+
+
+# --- bounds of the search -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("reach", [0.05, 0.4, 1.5])
+@pytest.mark.parametrize("count", [3, 20])
+def test_expansion_bounds_the_change_of_q_over_a_box(count: int, reach: float):
+    """Q differs from its value at the centre, and h from its tangent plane, by no more."""
+    rng = np.random.default_rng(count)
+    k = rng.uniform(0.3, 1.5, count)
+    turn = rng.uniform(0.0, 7.0, count)
+    waves = k[:, None] * np.column_stack([np.cos(turn), np.sin(turn)])
+    texture = Fourier(rng.uniform(0.1, 0.5, count), waves, turn)
+    largest = []
+    for x, y, gap in rng.normal(size=(40, 3)) * [20.0, 20.0, 2.0]:
+        height = float(texture.height(np.array([[x, y]]))[0])
+        derivatives, (change, lift, _third) = expand_waves(
+            x, y, height - gap, reach, texture.arguments
+        )
+        expected = texture.derivatives(np.array([[x, y]]))[0]
+        np.testing.assert_allclose(derivatives, expected, rtol=0, atol=1e-13 * count)
+        step = rng.uniform(-1.0, 1.0, (400, 2)) * reach / math.sqrt(2.0)
+        step[::4] *= reach / np.linalg.norm(step[::4], axis=1)[:, None]
+        h, hx, hy, hxx, hxy, hyy = texture.derivatives(step + np.array([x, y])).T
+        h0, ax, ay, axx, axy, ayy = expected
+        above = h - height + gap
+        xx = hx * hx + above * hxx - ax * ax - gap * axx
+        xy = hx * hy + above * hxy - ax * ay - gap * axy
+        yy = hy * hy + above * hyy - ay * ay - gap * ayy
+        norm = np.abs(0.5 * (xx + yy)) + np.hypot(0.5 * (xx - yy), xy)
+        assert norm.max() <= change * (1.0 + 1e-9) + 1e-12
+        assert np.abs(h - h0 - step @ [ax, ay]).max() <= lift * (1.0 + 1e-9) + 1e-12
+        largest.append(norm.max() / change)
+    if reach < 0.1:  # to first order the bound is attained up to the norm of a cubic form
+        assert max(largest) > 0.7

@@ -18,13 +18,13 @@ import math
 
 import numpy as np
 
+from asperity.contacts.sampler_interface import Derivatives, sample_hessian
 from asperity.contacts.sampler_interface import PlanePoint as Point
-from asperity.contacts.sampler_interface import sample_hessian
 from asperity.core.compiled import EPS, EVERY_FUNCTION, SQRT_EPS, Kernels
 
 KERNELS = Kernels(
     provides=EVERY_FUNCTION,
-    not_inlined=("evaluate_box", "newton_step"),
+    not_inlined=("evaluate_box", "newton_step", "search_box"),
     shared=("descend_within_budget",),
 )
 
@@ -139,6 +139,33 @@ def distance_lower_bound(
     return max(math.sqrt(straight + aside * aside) - tangent_error, 0.0)
 
 
+def min_parabola(p: float, q: float, a: float) -> float:
+    """Return the minimum of 2 p s + q s² over |s| <= a."""
+    p = abs(p)
+    return -p * p / q if q * a > p else (q * a - 2.0 * p) * a
+
+
+def min_quadratic(
+    px: float, py: float, qxx: float, qxy: float, qyy: float, a: float, b: float
+) -> float:
+    """Return the minimum of 2 p · d + d · Q d over |d_x| <= a, |d_y| <= b.
+
+    It is on the border, or where the gradient is zero.
+    """
+    det = qxx * qyy - qxy * qxy
+    if det > 0.0 and qxx > 0.0:
+        sx = qxy * py - qyy * px
+        sy = qxy * px - qxx * py
+        if abs(sx) <= a * det and abs(sy) <= b * det:
+            return (px * sx + py * sy) / det
+    return min(
+        (qxx * a - 2.0 * px) * a + min_parabola(py - qxy * a, qyy, b),
+        (qxx * a + 2.0 * px) * a + min_parabola(py + qxy * a, qyy, b),
+        (qyy * b - 2.0 * py) * b + min_parabola(px - qxy * b, qxx, a),
+        (qyy * b + 2.0 * py) * b + min_parabola(px + qxy * b, qxx, a),
+    )
+
+
 def can_prune(
     offset: tuple[float, float, float],
     hx: float,
@@ -162,11 +189,12 @@ def can_prune(
     r = math.sqrt(a * a + b * b)
     margin = 1e-6 * (abs(qxx) + abs(qyy))
     # Nowhere convex, so without a minimum; or too far by Taylor's formula.
-    bound = dx * dx + dy * dy + gap * gap - 2.0 * (abs(px) * a + abs(py) * b)
-    if (
-        smallest_eigenvalue + hessian_change < -margin
-        or bound + (min(smallest_eigenvalue, 0.0) - hessian_change / 3.0) * r * r >= threshold
-    ):
+    if smallest_eigenvalue + hessian_change < -margin:
+        return True
+    rest = hessian_change / 3.0
+    bound = dx * dx + dy * dy + gap * gap
+    bound += min_quadratic(px, py, qxx - rest, qxy, qyy - rest, a, b)
+    if bound - 16.0 * EPS * (abs(px) * a + abs(py) * b + 1e6 * margin * r * r) >= threshold:
         return True
     # φ is too steep at the centre to be stationary in the box; or too far by the tangent plane.
     fall = math.sqrt(px * px + py * py)
@@ -175,6 +203,47 @@ def can_prune(
         return True
     clear = distance_lower_bound(offset, hx, hy, r, tangent_error)
     return clear * clear >= threshold
+
+
+def supporting_bound(
+    offset: tuple[float, float, float], derivatives: Derivatives, t: float, a: float, b: float
+) -> float:
+    """Return a lower bound of φ in a box with half-widths a, b from the derivatives at its centre.
+
+    For every g, (h - z)² >= 2 g (h - z) - g². With this, φ is bounded without products of slopes
+    and curvatures, which makes the bound sharp on steep surfaces. Here g is the height above the
+    probe of the point of the tangent plane that is closest to it.
+    """
+    dx, dy, gap = offset
+    _h, hx, hy, hxx, hxy, hyy = derivatives
+    g = (gap - hx * dx - hy * dy) / (1.0 + hx * hx + hy * hy)
+    px = dx + g * hx
+    py = dy + g * hy
+    r = math.sqrt(a * a + b * b)
+    rest = abs(g) * t * r / 3.0
+    xx = g * hxx
+    yy = g * hyy
+    least = min_quadratic(px, py, 1.0 + xx - rest, g * hxy, 1.0 + yy - rest, a, b)
+    size = dx * dx + dy * dy + abs(g) * (abs(g) + 2.0 * abs(gap))
+    size += abs(px) * a + abs(py) * b + (1.0 + abs(xx) + abs(yy)) * r * r
+    return dx * dx + dy * dy + g * (2.0 * gap - g) + least - 16.0 * EPS * size
+
+
+def is_least_within(
+    x: float, y: float, z: float, best: Point, t: float, reach: float, texture: object
+) -> bool:
+    """Return whether no point within reach of a minimum of φ, where ‖D³h‖ <= T, is closer.
+
+    With g = h - z at the minimum the supporting function of ``supporting_bound`` equals φ there,
+    and its gradient is zero too; it suffices that it is convex enough.
+    """
+    gap = best[3] - z
+    px = best[0] - x + gap * best[4]
+    py = best[1] - y + gap * best[5]
+    _h, _hx, _hy, hxx, hxy, hyy = sample_hessian(best[0], best[1], texture)
+    low, high = symmetric_eigenvalues(1.0 + gap * hxx, gap * hxy, 1.0 + gap * hyy)
+    stationary = 10.0 * (px * px + py * py) <= EPS * best[2]
+    return stationary and low - abs(gap) * t * reach / 3.0 > 1e-6 * abs(high)
 
 
 def evaluate_box(
@@ -197,18 +266,53 @@ def evaluate_box(
     The box is (cx, cy) ± (a, b) [m], with bounds K [1/m] and T [1/m²].
     """
     evaluations_left -= evaluation_cost(texture)
-    h, hx, hy, hxx, hxy, hyy = sample_hessian(cx, cy, texture)
+    derivatives = sample_hessian(cx, cy, texture)
+    h, hx, hy, hxx, hxy, hyy = derivatives
+    r = math.sqrt(a * a + b * b)
+    norm = math.sqrt(hxx * hxx + 2.0 * hxy * hxy + hyy * hyy)
+    change, lift = taylor_remainders(r, h - z, math.sqrt(hx * hx + hy * hy), norm, k, t)
+    return search_box(
+        (x, y, z), cx, cy, a, b, derivatives, (change, lift, t), best, pruning_factor,
+        evaluations_left, texture,
+    )  # fmt: skip
+
+
+def search_box(
+    probe: tuple[float, float, float],
+    cx: float,
+    cy: float,
+    a: float,
+    b: float,
+    derivatives: Derivatives,
+    remainders: tuple[float, float, float],
+    best: Point,
+    pruning_factor: float,
+    evaluations_left: float,
+    texture: object,
+) -> tuple[Point, bool, float]:
+    """Search one box from the derivatives at its centre; see ``evaluate_box``.
+
+    The remainders are those of ``taylor_remainders``, and T.
+    """
+    x, y, z = probe
+    h, hx, hy, hxx, hxy, hyy = derivatives
+    change, lift, third = remainders
     gap = h - z
     offset = (cx - x, cy - y, gap)
     q = (1.0 + hx * hx + gap * hxx, hx * hy + gap * hxy, 1.0 + hy * hy + gap * hyy)
     low, _high = symmetric_eigenvalues(q[0], q[1], q[2])
-    r = math.sqrt(a * a + b * b)
-    norm = math.sqrt(hxx * hxx + 2.0 * hxy * hxy + hyy * hyy)
-    change, lift = taylor_remainders(r, gap, math.sqrt(hx * hx + hy * hy), norm, k, t)
-    if can_prune(offset, hx, hy, q, low, change, lift, a, b, best[2] * pruning_factor):
+    threshold = best[2] * pruning_factor
+    if can_prune(offset, hx, hy, q, low, change, lift, a, b, threshold) or (
+        supporting_bound(offset, derivatives, third, a, b) >= threshold
+    ):
         return best, False, evaluations_left
     if low <= change:
-        return best, True, evaluations_left
+        if max(abs(best[0] - cx) - a, abs(best[1] - cy) - b) > 0.0:
+            return best, True, evaluations_left
+        evaluations_left -= evaluation_cost(texture)
+        reach = 2.0 * math.sqrt(a * a + b * b)
+        return best, not is_least_within(x, y, z, best, third, reach, texture), evaluations_left
+    r = math.sqrt(a * a + b * b)
     det = q[0] * q[2] - q[1] * q[1]
     sx = (q[1] * (offset[1] + gap * hy) - q[2] * (offset[0] + gap * hx)) / det
     sy = (q[1] * (offset[0] + gap * hx) - q[0] * (offset[1] + gap * hy)) / det

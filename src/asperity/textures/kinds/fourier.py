@@ -99,12 +99,13 @@ class Fourier(Texture):
         length = np.hypot(*self.wavevectors.T)
         inflate = 1.0 + 1e-14 * len(length)
         third = inflate * float(np.abs(self.amplitudes) @ length**3)
+        fourth = inflate * float(np.abs(self.amplitudes) @ length**4)
         kx, ky = (np.ascontiguousarray(column) for column in self.wavevectors.T)
         low, high = self.extremes
         ux, uy = self._directions[0].tolist()
         return FourierArguments(
             self.amplitudes, kx, ky, self.phases,
-            self.bounds[1], third, low, high, float(length.max()), ux, uy,
+            self.bounds[1], third, fourth, low, high, float(length.max()), ux, uy,
         )  # fmt: skip
 
     @cached_property

@@ -3,18 +3,20 @@
 import math
 from typing import NamedTuple
 
-from asperity.contacts.closest.plane_search import evaluate_box, next_box
+from asperity.contacts.closest.plane_search import next_box, search_box
 from asperity.contacts.sampler_interface import PRUNED_BOX_COST, Derivatives
 from asperity.contacts.sampler_interface import PlanePoint as Point
 from asperity.core.checks import FloatArray
-from asperity.core.compiled import EVERY_FUNCTION, Kernels
-from asperity.textures.kinds.sine import cosine, sine
+from asperity.core.compiled import EVERY_FUNCTION, Kernels, local_array
+from asperity.textures.kinds.sine import cosine, sine, sine_and_cosine
 
 KERNELS = Kernels(provides=EVERY_FUNCTION, shared=("search_plane",))
 
 
-# Cost of a wave, in evaluations.
+# Cost of a wave, in evaluations; of a box, and of a wave in its expansion.
 WAVE_COST = 0.4
+BOX_COST = 1.0
+BOX_WAVE_COST = 0.1
 
 
 class FourierArguments(NamedTuple):
@@ -27,6 +29,7 @@ class FourierArguments(NamedTuple):
         phases: [rad].
         hessian_bound: bound of the second derivatives [1/m].
         third_derivative_bound: bound of the third derivatives [1/m²].
+        fourth_derivative_bound: bound of the fourth derivatives [1/m³].
         min_height: least height [m].
         max_height: greatest height [m].
         wave_number: the greatest one [rad/m].
@@ -40,6 +43,7 @@ class FourierArguments(NamedTuple):
     phases: FloatArray
     hessian_bound: float
     third_derivative_bound: float
+    fourth_derivative_bound: float
     min_height: float
     max_height: float
     wave_number: float
@@ -89,6 +93,59 @@ def sample_hessian(x: float, y: float, texture: FourierArguments) -> Derivatives
     return h, hx, hy, hxx, hxy, hyy
 
 
+def expand_waves(
+    x: float, y: float, z: float, r: float, texture: FourierArguments
+) -> tuple[Derivatives, tuple[float, float, float]]:
+    """Return height and derivatives at the centre of a box of half-diagonal r, and remainders.
+
+    The remainders are those of ``search_box``, from the third derivatives at the centre and
+    a bound of the fourth ones: waves of several directions add up to less than their sizes.
+    """
+    h = hx = hy = hxx = hxy = hyy = xxx = xxy = xyy = yyy = 0.0
+    s = local_array((16,))
+    c = local_array((16,))
+    for first in range(0, texture.amplitudes.size, 16):
+        count = min(texture.amplitudes.size - first, 16)
+        for i in range(count):  # without sums, so that the loop vectorizes
+            k = first + i
+            angle = texture.kx[k] * x + texture.ky[k] * y + texture.phases[k]
+            sx, cx = sine_and_cosine(angle)
+            s[i] = texture.amplitudes[k] * sx
+            c[i] = texture.amplitudes[k] * cx
+        for i in range(count):
+            kx = texture.kx[first + i]
+            ky = texture.ky[first + i]
+            cx = kx * c[i]
+            cy = ky * c[i]
+            sx = kx * s[i]
+            sy = ky * s[i]
+            h += s[i]
+            hx += cx
+            hy += cy
+            hxx -= kx * sx
+            hxy -= kx * sy
+            hyy -= ky * sy
+            xxx -= kx * kx * cx
+            xxy -= kx * kx * cy
+            xyy -= ky * ky * cx
+            yyy -= ky * ky * cy
+    gap = h - z
+    third = math.sqrt(xxx * xxx + 3.0 * (xxy * xxy + xyy * xyy) + yyy * yyy)
+    third = min(texture.third_derivative_bound, third + texture.fourth_derivative_bound * r)
+    norm = math.sqrt(hxx * hxx + 2.0 * hxy * hxy + hyy * hyy)
+    hessian = min(texture.hessian_bound, norm + third * r)
+    slope = math.sqrt(hx * hx + hy * hy) + hessian * r
+    xxx = 3.0 * hx * hxx + gap * xxx
+    xxy = 2.0 * hx * hxy + hy * hxx + gap * xxy
+    xyy = 2.0 * hy * hxy + hx * hyy + gap * xyy
+    yyy = 3.0 * hy * hyy + gap * yyy
+    change = math.sqrt(xxx * xxx + 3.0 * (xxy * xxy + xyy * xyy) + yyy * yyy)
+    rate = (abs(gap) + slope * r) * texture.fourth_derivative_bound
+    rate += 4.0 * slope * third + 3.0 * hessian * hessian
+    tangent_error = (0.5 * norm + third * r / 6.0) * r * r
+    return (h, hx, hy, hxx, hxy, hyy), ((change + 0.5 * rate * r) * r, tangent_error, third)
+
+
 def search_plane(
     x: float, y: float, z: float, best: Point, pruning_factor: float, budget: float,
     texture: FourierArguments,
@@ -115,9 +172,11 @@ def search_plane(
         deeper = near_x * near_x + near_y * near_y + gap * gap < best[2] * pruning_factor
         # Taylor's formula cannot decide a box of several waves.
         if deeper and half * texture.wave_number < 1.5:
-            best, deeper, budget = evaluate_box(
-                x, y, z, x + cx, y + cy, half, half,
-                texture.hessian_bound, texture.third_derivative_bound,
+            budget -= BOX_COST + BOX_WAVE_COST * texture.amplitudes.size
+            r = math.sqrt(2.0) * half
+            derivatives, remainders = expand_waves(x + cx, y + cy, z, r, texture)
+            best, deeper, budget = search_box(
+                (x, y, z), x + cx, y + cy, half, half, derivatives, remainders,
                 best, pruning_factor, budget, texture,
             )  # fmt: skip
             deeper = deeper and level > -48
