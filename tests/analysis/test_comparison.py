@@ -273,5 +273,5 @@ def test_loss_of_contact_names_the_depth_that_keeps_it() -> None:
     wave = asp.Sinusoid(4e-4, 2e-3)
     lost = asp.compare(wave, "omega.3", "C", max_depth=3e-4)
     assert lost.rows[0].loses_contact
-    assert "pressed to 800 µm it keeps contact" in lost.recommendation
+    assert "pressed to 0.8 mm it keeps contact" in lost.recommendation
     assert not asp.compare(wave, "omega.3", "C", max_depth=8e-4).rows[0].loses_contact
