@@ -50,6 +50,7 @@ class Comparison(Plottable, Reportable):
             stiffness.
         max_depth: depth to which the surface is pressed [m].
         speed: speed of the scan for which perceptibility is assessed [m/s].
+        grip: the hand that holds the device.
         rows: one per law, in the given order.
         recommended_row: row of the recommended law; ``None`` if none can be recommended.
         nearest_row: where no texture is felt, row of the law that comes nearest; else ``None``.
@@ -63,6 +64,7 @@ class Comparison(Plottable, Reportable):
     stiffness: float | None
     max_depth: float
     speed: float
+    grip: Grip
     rows: tuple[LawRow, ...]
     recommended_row: LawRow | None
     nearest_row: LawRow | None
@@ -92,7 +94,7 @@ class Comparison(Plottable, Reportable):
         return {
             "schema": SCHEMA,
             "texture": self.texture.describe(),
-            **attributes_to_dict(self, "device", "stiffness", "max_depth", "speed"),
+            **attributes_to_dict(self, "device", "stiffness", "max_depth", "speed", "grip"),
             "laws": to_plain_data(self.rows),
             **attributes_to_dict(self, "recommended", "recommendation", "assumptions"),
         }
@@ -182,6 +184,7 @@ def compare(
         stiffness=stiffness,
         max_depth=surfaces[0].max_depth,
         speed=scan_speed,
+        grip=query.grip,
         rows=tuple(rows),
         recommended_row=recommended.row,
         nearest_row=recommended.nearest,

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
 from asperity.analysis.check_limits import limits
+from asperity.analysis.compare import compare
 from asperity.analysis.limits.limit_result import Limits
 from asperity.devices import parse_device
-from asperity.report.pictures.spectrum_pictures import limits_figure, shortest_wavelengths
+from asperity.report.pictures.spectrum_pictures import (
+    hand_figure,
+    limits_figure,
+    shortest_wavelengths,
+)
 from asperity.textures import Fourier, HeightMap, Sinusoid
 
 BENCH = {
@@ -92,3 +99,24 @@ def test_force_axis_of_other_laws_is_positive(law: str) -> None:
     figure.canvas.draw()
     low, high = figure.axes[1].get_ylim()
     assert 0.0 < low < high
+
+
+def test_picture_of_the_hand_shows_the_waves_of_the_best_law() -> None:
+    comparison = compare(Sinusoid(1e-6, 1e-3), "touch", "CH")
+    (axes,) = hand_figure(comparison).axes
+    row = comparison.recommended_row or comparison.nearest_row
+    assert row is not None
+    assert row.perceptibility is not None
+    lines = {str(line.get_label()): line.get_data() for line in axes.lines}
+    x, y = lines[f"law {row.law.letter}, {row.tier}"]
+    assert list(x) == pytest.approx([100.0])
+    assert list(y) == pytest.approx([1e6 * row.perceptibility.hand_motion])
+    for label, threshold in zip(
+        ("nobody notices below", "felt above"), comparison.grip.threshold(50.0), strict=True
+    ):
+        x, y = lines[label]
+        assert np.interp(np.log(50.0), np.log(x), np.log(y)) == pytest.approx(
+            math.log(1e6 * threshold), abs=1e-3
+        )
+    none = compare(Sinusoid(1e-6, 1e-3), "touch", "W")
+    assert "no texture" in hand_figure(none).axes[0].texts[-1].get_text()

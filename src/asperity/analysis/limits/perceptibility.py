@@ -79,6 +79,25 @@ class Remedy(Serializable):
 
 
 @dataclass(frozen=True)
+class HandSpectrum(Serializable):
+    """What reaches the hand of each wave, in the order of the waves.
+
+    Attributes:
+        frequencies: v/l [Hz].
+        motions: amplitudes of the motion of the held tool [m].
+        unnoticed: amplitudes that nobody notices below [m].
+        felt: amplitudes that are felt [m].
+        resolved: whether the device resolves the wave.
+    """
+
+    frequencies: tuple[float, ...]
+    motions: tuple[float, ...]
+    unnoticed: tuple[float, ...]
+    felt: tuple[float, ...]
+    resolved: tuple[bool, ...]
+
+
+@dataclass(frozen=True)
 class Perceptibility(Serializable):
     """Perceptibility of a texture on a device.
 
@@ -105,6 +124,7 @@ class Perceptibility(Serializable):
         unverified: fields of the device from unverified sources that would mask the texture; the
             tier leaves them out.
         remedies: changes that make it felt; empty where it is felt.
+        spectrum: what reaches the hand of each wave.
     """
 
     tier: Tier
@@ -125,6 +145,7 @@ class Perceptibility(Serializable):
     missing_data: tuple[str, ...]
     unverified: tuple[str, ...]
     remedies: tuple[Remedy, ...]
+    spectrum: HandSpectrum
 
     @property
     def resolved_rms(self) -> float:
@@ -306,6 +327,13 @@ def classify_perceptibility(
         missing_data=tuple(one for one in (*_MASKING_FIELDS, *_HAND_FIELDS) if one not in data),
         unverified=tuple(masking),
         remedies=(),
+        spectrum=HandSpectrum(
+            tuple(response.frequencies.tolist()),
+            tuple(response.motions.tolist()),
+            tuple(response.unnoticed.tolist()),
+            tuple(response.felt.tolist()),
+            tuple(resolved.tolist()),
+        ),
     )
 
 
@@ -317,6 +345,7 @@ class Response:
         tier: whether the texture is felt.
         frequencies: v/l [Hz], shape (n,).
         motions: amplitudes of the motion of the held tool [m], shape (n,).
+        unnoticed: amplitudes that nobody notices below [m], shape (n,).
         felt: amplitudes that are felt [m], shape (n,).
         is_resolved: whether the device resolves the wave, shape (n,).
         apparent_mass: of the device, or the assumed one [kg].
@@ -325,6 +354,7 @@ class Response:
     tier: Tier
     frequencies: FloatArray
     motions: FloatArray
+    unnoticed: FloatArray
     felt: FloatArray
     is_resolved: NDArray[np.bool_]
     apparent_mass: float
@@ -366,7 +396,7 @@ def respond(waves: WaveScan) -> Response:
     is_strong = amplitude >= case.force_steps * step
     if np.linalg.norm((motions / felt)[resolved]) >= 1.0 and is_strong:
         tier = "felt"
-    return Response(tier, frequencies, motions, felt, resolved, mass)
+    return Response(tier, frequencies, motions, unnoticed, felt, resolved, mass)
 
 
 def _find_remedies(waves: WaveScan, is_felt_magnified: Callable[[float], bool]) -> list[Remedy]:

@@ -24,7 +24,7 @@ from asperity.report.pictures.law_pictures import (
     merit_figure,
 )
 from asperity.report.pictures.loop_pictures import recording_figure, run_figure
-from asperity.report.pictures.spectrum_pictures import limits_figure, spectrum_figure
+from asperity.report.pictures.spectrum_pictures import hand_figure, limits_figure, spectrum_figure
 from asperity.report.pictures.surface_pictures import draw_surface, surface_size
 from asperity.report.sentences.number_text import leak_text
 from asperity.simulation import Run
@@ -44,9 +44,9 @@ def plot(result: Any, picture: str | None = None) -> Figure:
             :class:`~asperity.analysis.limits.limit_result.Limits` (waves and their forces), a
             :class:`~asperity.simulation.Run` or a :class:`~asperity.Recording` (motion, force,
             energy, phase).
-        picture: name of one figure of the report: of a comparison "surface", "spectrum", "force",
-            "field", "gain" or "merit", of an analysis "field", "gain", "depth", for a map also
-            "top", and where the force jumps "jumps".
+        picture: name of one figure of the report: of a comparison "surface", "spectrum", "hand",
+            "force", "field", "gain" or "merit", of an analysis "field", "gain", "depth", for a
+            map also "top", and where the force jumps "jumps".
 
     Returns:
         A figure; ``figure.savefig(path)`` writes it, as PNG or SVG by the path.
@@ -159,6 +159,7 @@ def _check_picture_name(picture: str | None, *names: str) -> None:
 COMPARISON_PICTURES: dict[str, Callable[[Comparison], Figure]] = {
     "surface": lambda result: _stacked_figure(_texture_drawing(result.texture)),
     "spectrum": lambda result: spectrum_figure(result.texture, result.device),
+    "hand": hand_figure,
     "force": lambda result: _stacked_figure(_forces_drawing([row.surface for row in result.rows])),
     "field": lambda result: _stacked_figure(
         _fields_drawing([row.surface for row in result.rows], _conservation_remarks(result))

@@ -9,12 +9,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
+from asperity.analysis.compare import Comparison
 from asperity.analysis.energy.scan_lines import parallel_line_points
 from asperity.analysis.limits.limit_result import Limits, stiffness_text
 from asperity.analysis.limits.perceptibility import speed_text
 from asperity.core.checks import FloatArray
 from asperity.core.units import format_quantity
 from asperity.devices import Device
+from asperity.perception.grip import grip_text
 from asperity.report.pictures import style
 from asperity.textures.texture import Texture
 
@@ -96,6 +98,47 @@ def spectrum_figure(texture: Texture, device: Device) -> Figure:
     return figure
 
 
+def hand_figure(comparison: Comparison) -> Figure:
+    """Return the motion of the held tool against frequency, with the thresholds of the hand.
+
+    Drawn for the recommended law, or for the one that comes nearest to being felt. Hollow waves
+    are not resolved by the device.
+    """
+    figure = style.new_figure(10.0, 3.4)
+    axes = style.single_axes(figure)
+    row = comparison.recommended_row or comparison.nearest_row
+    if row is None or row.perceptibility is None or not row.perceptibility.spectrum.frequencies:
+        style.add_note(axes, "no texture at a known stiffness", (0.5, 0.5), ha="center")
+        return figure
+    found, waves = row.perceptibility, row.perceptibility.spectrum
+    frequencies, motions = np.array(waves.frequencies), np.array(waves.motions) * _MICRO
+    span = np.geomspace(min(5.0, frequencies.min() / 1.5), max(600.0, frequencies.max() * 1.5), 300)
+    unnoticed, felt = (level * _MICRO for level in comparison.grip.threshold(span))
+    axes.plot(span, felt, color=style.GREEN, lw=1.2, ls="--", label="felt above")
+    axes.plot(span, unnoticed, color=style.GREEN, lw=1.2, ls=":", label="nobody notices below")
+    resolved, moving = np.array(waves.resolved), motions > 1e-3 * unnoticed.min()
+    for which, face, name in (
+        (resolved, style.BLUE, f"law {row.law.letter}, {found.tier}"),
+        (~resolved, style.BACKGROUND, "beyond the device"),
+    ):
+        chosen = which & moving
+        if chosen.any():
+            axes.plot(
+                frequencies[chosen], motions[chosen], "o", ms=5.0, mfc=face, mec=style.BLUE,
+                label=name, zorder=4.0,
+            )  # fmt: skip
+    axes.set(xscale="log", yscale="log", xlim=(span[0], span[-1]))
+    plain = FuncFormatter(lambda value, _place: f"{value:g}")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter(plain)
+    mass = format_quantity(1e3 * found.apparent_mass, "g")
+    held = f"{comparison.device.name}, {mass}, {grip_text(comparison.grip)}"
+    style.set_panel_title(axes, "Motion of the held tool", held)
+    style.label_axes(axes, "frequency [Hz]", "amplitude [µm]")
+    style.add_legend(axes, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return figure
+
+
 def _draw_wavelength_limit(
     panels: Sequence[Axes], wavelength: float, text: str, height: float
 ) -> None:
@@ -106,6 +149,7 @@ def _draw_wavelength_limit(
     style.add_note(panels[0], text, (wavelength * _MILLI, height), color=style.ORANGE, **place)
 
 
+_MICRO = 1e6
 _MILLI = 1e3  # wavelengths are in mm: the axis is logarithmic
 
 
@@ -196,14 +240,12 @@ def _draw_force_limits(result: Limits, axes: Axes, scale: float) -> None:
     compliance = result.grip.compliance(
         frequencies, texture.apparent_mass, damping, result.surface.stiffness
     )
-    for level, words, line in zip(
-        result.grip.threshold(frequencies), ("unnoticed below", "felt above"), (":", "--"),
-        strict=True,
-    ):  # fmt: skip
-        axes.plot(
-            lengths * _MILLI, level / compliance * scale, color=style.GREEN, lw=1.0, ls=line,
-            label=f"{words}, force along the normal", zorder=1.0,
-        )  # fmt: skip
+    names = "unnoticed below, along the normal", "felt above, along the normal"
+    for level, words, line in zip(result.grip.threshold(frequencies), names, ":-", strict=True):
+        needed = level / compliance * scale
+        axes.plot(lengths * _MILLI, needed, color=style.GREEN, lw=1.0, ls=line, label=words)
+    lines = [line for line in axes.lines if line.get_label() in names]
+    style.add_legend(axes, handles=lines, loc="upper left")
     if step is not None:
         axes.axhline(steps * step * scale, color=style.ORANGE, lw=1.0, ls="--", zorder=1.0)
         place = {"xycoords": ("axes fraction", "data"), "xytext": (0, 4), "color": style.ORANGE}

@@ -49,6 +49,19 @@ def spectrum_alt_text(comparison: Comparison) -> str:
     return text
 
 
+def hand_alt_text(comparison: Comparison) -> str:
+    """Return the law, how much of what is felt its texture reaches, and at which frequency."""
+    row = comparison.recommended_row or comparison.nearest_row
+    if row is None or row.perceptibility is None:
+        return "Thresholds of the hand; no law has a known stiffness."
+    found = row.perceptibility
+    return (
+        f"Motion of the held tool under law {row.law.letter} against frequency, with what nobody "
+        f"notices and what is felt: {found.tier}, {found.level:.2g} times what is felt, most of "
+        f"it at {found.frequency:.3g} Hz."
+    )
+
+
 def force_alt_text(comparison: Comparison) -> str:
     """Return length and number of the force curves."""
     from asperity.report.pictures.law_pictures import force_segment
@@ -93,6 +106,7 @@ def _law_count_text(comparison: Comparison) -> str:
 _COMPARISON_ALT_TEXTS: dict[str, Callable[[Comparison], str]] = {
     "surface": lambda comparison: surface_alt_text(comparison.texture),
     "spectrum": spectrum_alt_text,
+    "hand": hand_alt_text,
     "force": force_alt_text,
     "field": field_alt_text,
     "gain": gain_alt_text,
