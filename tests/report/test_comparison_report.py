@@ -84,7 +84,7 @@ def test_page_has_a_row_per_law_with_the_letter_alone(page: str) -> None:
 
 def test_page_is_self_contained(page: str) -> None:
     reader = check_alone(page)
-    assert len(reader.alts) == 6
+    assert len(reader.alts) == 7
     check_alts(reader, page)
 
 
@@ -100,7 +100,7 @@ def test_hostile_names_are_escaped() -> None:
     device = parse_device({"name": hostile, "max_stiffness": 1000.0}, "mine")
     text = html_text(asp.compare(TEXTURE, device=device, laws="WA"))
     assert hostile not in text
-    assert Reader(text).tags.count("script") == 1 + 6
+    assert Reader(text).tags.count("script") == 1 + 7
     check_alone(text)
     assert "&lt;script&gt;" in text
 

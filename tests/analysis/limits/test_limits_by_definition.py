@@ -17,6 +17,7 @@ from asperity.analysis.limits.perceptibility import (
     MaskingSource,
     Perceptibility,
     WaveScan,
+    assess_perceptibility,
     classify_perceptibility,
     respond,
     unverified_text,
@@ -26,7 +27,9 @@ from asperity.analysis.passivity.verdict import StabilityLimit
 from asperity.core.errors import ParameterError
 from asperity.devices import parse_device
 from asperity.perception.grip import Grip
-from asperity.textures import Fourier, Profile
+from asperity.surface import Surface
+from asperity.textures import Fourier, Profile, Sinusoid
+from asperity.textures.texture import TexturePart
 
 LENGTHS, FORCES = np.array([4.0, 2.0, 1.0]), np.array([3.0, 2.0, 1.0])
 SHARES = np.array([0.5, 0.3, 0.2])
@@ -169,10 +172,9 @@ def scan_waves(forces: float, data: dict[str, float], **more: Any) -> WaveScan:
 
 def assess_forces(forces: float, data: dict[str, float], **more: Any) -> Perceptibility:
     waves = scan_waves(forces, data, **more)
-    return classify_perceptibility(waves, 99.0, forces / math.sqrt(2.0), None, DEVICE)
+    return classify_perceptibility(waves, {}, 99.0, forces / math.sqrt(2.0), None)
 
 
-DEVICE = parse_device({"max_stiffness": "1000 N/m"}, "mine")
 ABOVE, BELOW = 1.0 + 1e-9, 1.0 - 1e-9
 
 
@@ -225,22 +227,30 @@ def test_missing_and_unverified_data_are_listed() -> None:
     assert assess_forces(1.0, dict.fromkeys(fields, 1e-9)).missing_data == ()
 
 
+def test_doubtful_numbers_never_hide_a_texture() -> None:
+    doubtful = {"force_resolution": 9.0, "bandwidth": 1e3}
+    result = classify_perceptibility(scan_waves(8.0, {}), doubtful, 99.0, 8.0, None)
+    assert (result.tier, result.unverified) == ("felt", ("force_resolution",))
+    words = "If the unverified force resolution of this device is right, less is felt."
+    assert unverified_text(result) == words
+    trusted = classify_perceptibility(scan_waves(8.0, doubtful), {}, 99.0, 8.0, None)
+    assert (trusted.tier, unverified_text(trusted)) == ("not felt", "")
+
+
 @pytest.mark.parametrize(
     ("step", "tier"),
     [
-        ({"value": 9.0, "unit": "N", "verified": True, "source": "test"}, "not felt"),
-        ("9 N", "not felt"),  # the user's own
-        ({"value": 9.0, "unit": "N", "verified": False, "source": "remembered"}, "felt"),
+        ({"value": 90.0, "unit": "mN", "verified": True, "source": "test"}, "not felt"),
+        ("90 mN", "not felt"),  # the user's own
+        ({"value": 90.0, "unit": "mN", "verified": False, "source": "remembered"}, "felt"),
     ],
 )
-def test_a_number_from_an_unverified_source_never_hides_a_texture(step: Any, tier: str) -> None:
+def test_only_numbers_from_unverified_sources_are_doubtful(step: Any, tier: str) -> None:
     rig = parse_device({"max_stiffness": "1000 N/m", "force_resolution": step}, "mine")
-    waves = scan_waves(8.0, {"force_resolution": 9.0})
-    result = classify_perceptibility(waves, 99.0, 8.0, None, rig)
-    assert result.tier == tier
-    assert result.unverified == (("force_resolution",) if tier == "felt" else ())
-    words = "If the unverified force resolution of this device is right, less is felt."
-    assert unverified_text(result) == (words if tier == "felt" else "")
+    wave = Sinusoid(8e-5, 2e-3)
+    surface = Surface(wave, "A", 1000.0, 1e-3)
+    rms = 0.08 / math.sqrt(2.0)
+    assert assess_perceptibility(surface, rig, TexturePart(wave), rms=rms).tier == tier
 
 
 def test_mostly_form_requires_more_than_half_of_the_force() -> None:

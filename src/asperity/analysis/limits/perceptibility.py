@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import partial
 from typing import Literal
@@ -80,21 +80,25 @@ class Remedy(Serializable):
 
 @dataclass(frozen=True)
 class HandSpectrum(Serializable):
-    """What reaches the hand of each wave, in the order of the waves.
+    """What reaches the hand of each wave, and whether it is felt.
 
     Attributes:
-        frequencies: v/l [Hz].
-        motions: amplitudes of the motion of the held tool [m].
-        unnoticed: amplitudes that nobody notices below [m].
-        felt: amplitudes that are felt [m].
-        resolved: whether the device resolves the wave.
+        tier: whether the texture is felt.
+        frequencies: v/l [Hz], shape (n,).
+        motions: amplitudes of the motion of the held tool [m], shape (n,).
+        unnoticed: amplitudes that nobody notices below [m], shape (n,).
+        felt: amplitudes that are felt [m], shape (n,).
+        is_resolved: whether the device resolves the wave, shape (n,).
+        apparent_mass: of the device, or the assumed one [kg].
     """
 
-    frequencies: tuple[float, ...]
-    motions: tuple[float, ...]
-    unnoticed: tuple[float, ...]
-    felt: tuple[float, ...]
-    resolved: tuple[bool, ...]
+    tier: Tier
+    frequencies: FloatArray
+    motions: FloatArray
+    unnoticed: FloatArray
+    felt: FloatArray
+    is_resolved: NDArray[np.bool_]
+    apparent_mass: float
 
 
 @dataclass(frozen=True)
@@ -145,7 +149,7 @@ class Perceptibility(Serializable):
     missing_data: tuple[str, ...]
     unverified: tuple[str, ...]
     remedies: tuple[Remedy, ...]
-    spectrum: HandSpectrum
+    spectrum: HandSpectrum = field(compare=False)
 
     @property
     def resolved_rms(self) -> float:
@@ -221,7 +225,7 @@ def assess_perceptibility(
         >>> result.tier, f"{result.level:.2f}", f"{result.frequency:.0f} Hz"
         ('borderline', '0.36', '100 Hz')
         >>> [f"{remedy.kind} {remedy.value:.3g}" for remedy in result.remedies]
-        ['magnify 2', 'speed 0.053', 'apparent_mass 0.016']
+        ['magnify 2.5', 'speed 0.029', 'apparent_mass 0.016']
     """
     hand = load_grip() if grip is None else grip
     texture_rms, scanned = rms, surface
@@ -235,10 +239,15 @@ def assess_perceptibility(
     # The waves share the RMS of the scan; their sum differs by what is not periodic in the scan.
     total = math.sqrt(float(forces @ forces))
     scale = math.sqrt(2.0) * texture_rms / total if total > 0.0 else 0.0
-    data = {field: datum.value for field, datum in device.data.items()}
+    data = {name: datum.value for name, datum in device.data.items()}
+    doubtful = {
+        name: data.pop(name)
+        for name in _MASKING_FIELDS
+        if (datum := device.data.get(name)) and not datum.verified and datum.source != USER_SOURCE
+    }
     case = LimitCase(data, spectrum.wavelengths, scale * forces, spectrum.shares, **scan)
     waves = WaveScan(case, scale * components, hand, surface.stiffness)
-    result = classify_perceptibility(waves, rms, texture_rms, part.nesting, device)
+    result = classify_perceptibility(waves, doubtful, rms, texture_rms, part.nesting)
     if not find_remedies or result.tier == "felt" or texture_rms == 0.0:
         return result
     is_felt = partial(_is_felt_magnified, surface, device, hand, explicit_depth, scan)
@@ -273,30 +282,29 @@ def _is_felt_magnified(
 
 
 def classify_perceptibility(
-    waves: WaveScan, rms: float, texture_rms: float, nesting_index: float | None, device: Device
+    waves: WaveScan,
+    doubtful: Mapping[str, float],
+    rms: float,
+    texture_rms: float,
+    nesting_index: float | None,
 ) -> Perceptibility:
     """Return the perceptibility of a texture from the forces of its waves.
 
     Args:
-        waves: the waves of the texture on a scan.
+        waves: the waves of the texture on a scan, with the trusted numbers of the device.
+        doubtful: numbers of the device from unverified sources; they never hide a texture.
         rms: RMS of the oscillating force of the whole surface [N].
         texture_rms: RMS of the force of its texture [N].
         nesting_index: wavelength that separates texture from waviness [m].
-        device: tells which of its numbers are verified.
     """
-    data = waves.case.device
-    doubtful = [
-        field
-        for field in _MASKING_FIELDS
-        if (datum := device.data.get(field)) and not datum.verified and datum.source != USER_SOURCE
-    ]
-    known = {field: value for field, value in data.items() if field not in doubtful}
-    trusted = replace(waves, case=replace(waves.case, device=known))
-    response, complete = respond(trusted), respond(waves)
+    known = waves.case.device
+    data = {**known, **doubtful}
+    response = respond(waves)
+    complete = respond(replace(waves, case=replace(waves.case, device=data)))
     masking = [
-        field
-        for field in (doubtful if complete.tier != response.tier else ())
-        if respond(trusted.with_device(field, data[field])).tier != response.tier
+        name
+        for name in (doubtful if complete.tier != response.tier else ())
+        if respond(waves.with_device(name, data[name])).tier != response.tier
     ]
     if not masking:
         response = complete
@@ -327,40 +335,11 @@ def classify_perceptibility(
         missing_data=tuple(one for one in (*_MASKING_FIELDS, *_HAND_FIELDS) if one not in data),
         unverified=tuple(masking),
         remedies=(),
-        spectrum=HandSpectrum(
-            tuple(response.frequencies.tolist()),
-            tuple(response.motions.tolist()),
-            tuple(response.unnoticed.tolist()),
-            tuple(response.felt.tolist()),
-            tuple(resolved.tolist()),
-        ),
+        spectrum=response,
     )
 
 
-@dataclass(frozen=True)
-class Response:
-    """What reaches the hand of each wave, and whether it is felt.
-
-    Attributes:
-        tier: whether the texture is felt.
-        frequencies: v/l [Hz], shape (n,).
-        motions: amplitudes of the motion of the held tool [m], shape (n,).
-        unnoticed: amplitudes that nobody notices below [m], shape (n,).
-        felt: amplitudes that are felt [m], shape (n,).
-        is_resolved: whether the device resolves the wave, shape (n,).
-        apparent_mass: of the device, or the assumed one [kg].
-    """
-
-    tier: Tier
-    frequencies: FloatArray
-    motions: FloatArray
-    unnoticed: FloatArray
-    felt: FloatArray
-    is_resolved: NDArray[np.bool_]
-    apparent_mass: float
-
-
-def respond(waves: WaveScan) -> Response:
+def respond(waves: WaveScan) -> HandSpectrum:
     """Return what reaches the hand on a scan.
 
     The contact stiffness acts along the normal of the wall alone, and dry friction F_c there as
@@ -396,7 +375,7 @@ def respond(waves: WaveScan) -> Response:
     is_strong = amplitude >= case.force_steps * step
     if np.linalg.norm((motions / felt)[resolved]) >= 1.0 and is_strong:
         tier = "felt"
-    return Response(tier, frequencies, motions, unnoticed, felt, resolved, mass)
+    return HandSpectrum(tier, frequencies, motions, unnoticed, felt, resolved, mass)
 
 
 def _find_remedies(waves: WaveScan, is_felt_magnified: Callable[[float], bool]) -> list[Remedy]:
@@ -419,12 +398,12 @@ def _find_remedies(waves: WaveScan, is_felt_magnified: Callable[[float], bool]) 
     if min(slower, faster) < math.inf:
         speed = round_down(case.speed / slower, 2) if slower <= faster else case.speed * faster
         found.append(Remedy("speed", min(speed, MAX_SPEED)))
-    for field in ("apparent_mass", "force_resolution", "position_resolution"):
-        assumed = DEFAULT_APPARENT_MASS if field == "apparent_mass" else 0.0
-        value = case.device.get(field, assumed)
-        factor = _first_felt(partial(_with_finer_device, waves, field, value)) if value else None
+    for name in ("apparent_mass", "force_resolution", "position_resolution"):
+        assumed = DEFAULT_APPARENT_MASS if name == "apparent_mass" else 0.0
+        value = case.device.get(name, assumed)
+        factor = _first_felt(partial(_with_finer_device, waves, name, value)) if value else None
         if factor is not None:
-            found.append(Remedy(field, round_down(value / factor, 2)))
+            found.append(Remedy(name, round_down(value / factor, 2)))
     return found
 
 

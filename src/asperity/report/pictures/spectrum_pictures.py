@@ -8,11 +8,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
+from numpy.typing import NDArray
 
 from asperity.analysis.compare import Comparison
 from asperity.analysis.energy.scan_lines import parallel_line_points
 from asperity.analysis.limits.limit_result import Limits, stiffness_text
-from asperity.analysis.limits.perceptibility import speed_text
+from asperity.analysis.limits.perceptibility import HandSpectrum, speed_text
 from asperity.core.checks import FloatArray
 from asperity.core.units import format_quantity
 from asperity.devices import Device
@@ -107,26 +108,17 @@ def hand_figure(comparison: Comparison) -> Figure:
     figure = style.new_figure(10.0, 3.4)
     axes = style.single_axes(figure)
     row = comparison.recommended_row or comparison.nearest_row
-    if row is None or row.perceptibility is None or not row.perceptibility.spectrum.frequencies:
+    if row is None or row.perceptibility is None or not len(row.perceptibility.spectrum.motions):
         style.add_note(axes, "no texture at a known stiffness", (0.5, 0.5), ha="center")
         return figure
     found, waves = row.perceptibility, row.perceptibility.spectrum
-    frequencies, motions = np.array(waves.frequencies), np.array(waves.motions) * _MICRO
+    frequencies, motions = waves.frequencies, waves.motions * _MICRO
     span = np.geomspace(min(5.0, frequencies.min() / 1.5), max(600.0, frequencies.max() * 1.5), 300)
     unnoticed, felt = (level * _MICRO for level in comparison.grip.threshold(span))
     axes.plot(span, felt, color=style.GREEN, lw=1.2, ls="--", label="felt above")
     axes.plot(span, unnoticed, color=style.GREEN, lw=1.2, ls=":", label="nobody notices below")
-    resolved, moving = np.array(waves.resolved), motions > 1e-3 * unnoticed.min()
-    for which, face, name in (
-        (resolved, style.BLUE, f"law {row.law.letter}, {found.tier}"),
-        (~resolved, style.BACKGROUND, "beyond the device"),
-    ):
-        chosen = which & moving
-        if chosen.any():
-            axes.plot(
-                frequencies[chosen], motions[chosen], "o", ms=5.0, mfc=face, mec=style.BLUE,
-                label=name, zorder=4.0,
-            )  # fmt: skip
+    title = f"law {row.law.letter}, {found.tier}"
+    _draw_hand_waves(axes, waves, motions > 1e-3 * unnoticed.min(), title)
     axes.set(xscale="log", yscale="log", xlim=(span[0], span[-1]))
     plain = FuncFormatter(lambda value, _place: f"{value:g}")
     for axis in (axes.xaxis, axes.yaxis):
@@ -137,6 +129,20 @@ def hand_figure(comparison: Comparison) -> Figure:
     style.label_axes(axes, "frequency [Hz]", "amplitude [µm]")
     style.add_legend(axes, loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure
+
+
+def _draw_hand_waves(
+    axes: Axes, waves: HandSpectrum, is_drawn: NDArray[np.bool_], title: str
+) -> None:
+    """Draw the waves, those beyond the device hollow."""
+    x, y, resolved = waves.frequencies, waves.motions * _MICRO, waves.is_resolved
+    for which, face, name in (
+        (resolved & is_drawn, style.BLUE, title),
+        (~resolved & is_drawn, style.BACKGROUND, "beyond the device"),
+    ):
+        if which.any():
+            (line,) = axes.plot(x[which], y[which], "o", ms=5.0, label=name, zorder=4.0)
+            line.set(markerfacecolor=face, markeredgecolor=style.BLUE)
 
 
 def _draw_wavelength_limit(
