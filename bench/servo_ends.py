@@ -1,9 +1,10 @@
 """Ends of `asperity run` at random: what force was commanded last, when, and what is left behind.
 
-``python -m bench.servo_ends [COUNT] [DRIVER ...]`` (200 by default). Each end is one command on a
-pseudo-terminal of its own, with a device that stands in for a vendor's and writes down what it is
-told. While it holds a force, a signal comes, the terminal closes, a process is killed or suspended,
-or a call of the device takes long. ``python -m bench.servo_ends table`` tries each end once.
+``python -m bench.servo_ends [COUNT [SEED]] [DRIVER ...]`` (200 by default). Each end is one command
+on a pseudo-terminal of its own, with a device that stands in for a vendor's and writes down what it
+is told. While it holds a force, a signal comes, the terminal closes, a process is killed or
+suspended, or a call of the device takes long. ``python -m bench.servo_ends table`` tries each end
+once.
 """
 
 from __future__ import annotations
@@ -202,7 +203,7 @@ class Run:
         while time.monotonic() < end and self.parent.poll() is None:
             self.drain()
             log = self.device.read()
-            self.children |= set(_descendants(self.parent.pid))
+            self.children |= set(descendants(self.parent.pid))
             held = any(log.force)
             if isinstance(self.device, SimulatedStandIn):
                 held = b" N" in self.said
@@ -236,7 +237,7 @@ class Run:
         ended = self.parent.poll() is not None
         known = self.children | ({self.loop} if self.loop else set())
         end = time.monotonic() + 3.0 + (PATIENCE if ended else 0.0)
-        while (left := [one for one in known if _is_alive(one)]) and time.monotonic() < end:
+        while (left := [one for one in known if is_alive(one)]) and time.monotonic() < end:
             time.sleep(0.02)
         left += [] if ended else [self.parent.pid]
         for one in left:
@@ -248,12 +249,13 @@ class Run:
         return left
 
 
-def _descendants(pid: int) -> Iterator[int]:
+def descendants(pid: int) -> Iterator[int]:
+    """Yield the processes that a process started, directly or not."""
     with suppress(OSError):
         for task in Path(f"/proc/{pid}/task").iterdir():
             for child in map(int, (task / "children").read_text().split()):
                 yield child
-                yield from _descendants(child)
+                yield from descendants(child)
 
 
 def _command(pid: int) -> bytes:
@@ -262,7 +264,8 @@ def _command(pid: int) -> bytes:
     return b""
 
 
-def _is_alive(pid: int) -> bool:
+def is_alive(pid: int) -> bool:
+    """Return whether a process runs or is suspended."""
     with suppress(OSError):
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     return False
@@ -348,8 +351,10 @@ LOSSES = ("KILL of the loop",)
 """Ends after which nobody can command anything, but the device's own library."""
 
 
-MAY_GO_ON = ("loop suspended (STOP)",)
-"""Events after which a loop that was late for less than its limit goes on."""
+MAY_GO_ON = ("loop suspended (STOP)", "group suspended (STOP)")
+"""Events after which a loop goes on that was late, or not supervised, for less than its limit."""
+SILENCE = {"group suspended (STOP)": 1.0}
+"""Events that the loop notices by a missing heartbeat, and after which time [s]."""
 
 
 def _end_if_it_goes_on(run: Run) -> int:
@@ -386,7 +391,8 @@ class End:
     @property
     def is_right(self) -> bool:
         """Whether the force was zero in time, and nothing is left."""
-        allowed = RELEASE + (RAMP if self.event in RAMPED else 0.0)
+        ramp = RAMP if self.event in RAMPED else 0.0
+        allowed = RELEASE + ramp + SILENCE.get(self.event, 0.0)
         released = (self.is_zero and self.delay <= allowed) or self.event in LOSSES
         return (released or self.driver == "simulated") and not self.left
 
@@ -399,7 +405,7 @@ def try_end(driver: str, event: str, draw: random.Random) -> End:
             begun = time.monotonic_ns()
             counted = begun + round(NANO * EVENTS[event](run, draw))
             if "suspended" in event:
-                counted = time.monotonic_ns() if "group" in event else begun
+                counted = begun
             if event in MAY_GO_ON:
                 counted = _end_if_it_goes_on(run) or counted
             if "TSTP" in event:
@@ -439,19 +445,25 @@ def run(arguments: Sequence[str], console: Console) -> int:
     wanted = list(arguments)
     table = bool(wanted) and wanted[0] == "table"
     count = int(wanted[0]) if wanted and wanted[0].isdecimal() else COUNT
+    seed = int(wanted[1]) if len(wanted) > 1 and wanted[1].isdecimal() else 0
     drivers = [name for name in wanted if name in DEVICES] or list(DEVICES)
-    draw, ends = random.Random(0), list[End]()
+    draw, ends = random.Random(seed), list[End]()
     pairs = [(driver, event) for event in EVENTS for driver in drivers]
     if not table:
         pairs = [(draw.choice(drivers), draw.choice(list(EVENTS))) for _ in range(count)]
     with _printed(console, ends):
         for driver, event in pairs:
             silent = "call" in event and driver in {"haply", "simulated"}
-            try:
-                ends.append(try_end("own" if silent else driver, event, draw))
-            except AssertionError as error:
-                console.print(f"{driver}, {event}: {error}", markup=False)
-                continue
+            for _attempt in range(5):  # a busy machine may be too late to start
+                try:
+                    ends.append(try_end("own" if silent else driver, event, draw))
+                    break
+                except AssertionError as error:
+                    words = str(error).splitlines()[-1][-100:]
+                    console.print(f"  not started: {driver}, {event}: {words}", markup=False)
+            else:
+                return 1
+            console.file.flush()
             if not ends[-1].is_right:
                 console.print(f"  wrong: {ends[-1]}", markup=False)
     return sum(not end.is_right for end in ends)

@@ -9,7 +9,7 @@
 enum { NOTHING, READ_ONCE, READ_EVER, WRITE_ONCE, NOT_A_NUMBER, FAR, SLOW };
 
 static double place[3], force[3];
-static int count = 1, opened = -1, enabled, reads, writes, fault, at;
+static int count = 1, opened = -1, enabled, reads, writes, fault, at, watchdog;
 
 void fake_devices(int devices) { count = devices; }
 void fake_reset(int kind, int number)
@@ -26,11 +26,19 @@ void fake_reset(int kind, int number)
 }
 void fake_place(double x, double y, double z) { place[0] = x; place[1] = y; place[2] = z; }
 double fake_force(int axis) { return force[axis]; }
-int fake_state(int which) { return which == 0 ? opened : which == 1 ? enabled : reads; }
+int fake_state(int which)
+{
+    return which == 0 ? opened : which == 1 ? enabled : which == 2 ? reads : watchdog;
+}
 
 int dhdGetDeviceCount(void) { return count; }
 int dhdOpenID(char id) { return id < count ? (opened = id) : -1; }
 int dhdEnableForce(unsigned char on, char id) { enabled = on; return id == opened ? 0 : -1; }
+int dhdSetWatchdog(unsigned char duration, char id)
+{
+    watchdog = duration;
+    return id == opened ? 0 : -1;
+}
 int dhdClose(char id)
 {
     fake_log()->closed++;
@@ -59,6 +67,7 @@ int dhdSetForce(double x, double y, double z, char id)
 {
     if (id != opened || (fault == WRITE_ONCE && writes++ == at))
         return -1;
+    fake_log_wait();
     force[0] = x;
     force[1] = y;
     force[2] = z;

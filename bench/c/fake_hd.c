@@ -79,7 +79,13 @@ void hdDisableDevice(HHD device)
         opened = 0;
 }
 void hdEnable(HDenum what) { if (what == 0x4000) enabled = 1; }
-void hdDisable(HDenum what) { if (what == 0x4000) enabled = 0; }
+void hdDisable(HDenum what)
+{
+    if (what == 0x4000) {
+        enabled = 0;
+        fake_log_force(0.0, 0.0, 0.0);
+    }
+}
 HDenum hdCheckCalibration(void) { return fault == NOT_CALIBRATED ? 0x5002 : 0x5000; }
 
 unsigned long hdScheduleAsynchronous(Callback callback, void *memory, unsigned short priority)
@@ -133,8 +139,9 @@ void hdEndFrame(HHD device)
         fail(ILLEGAL_END);
     if (fault == ERROR && frames >= at)
         fail(COMM_ERROR);
+    fake_log_wait();
     memcpy(held, wanted, sizeof held);
-    fake_log_force(held[0], held[1], held[2]);
+    fake_log_force(fake_force(0), fake_force(1), fake_force(2));
     forced |= held[0] != 0.0 || held[1] != 0.0 || held[2] != 0.0;
     in_frame = 0;
     frames++;

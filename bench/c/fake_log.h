@@ -29,15 +29,22 @@ static struct fake_log *fake_log(void)
     return seen;
 }
 
-static void fake_log_force(double x, double y, double z)
+static void fake_log_wait(void)
 {
     struct fake_log *log = fake_log();
-    struct timespec now, wait = {log->stall / 1000000000, log->stall % 1000000000};
-    const int zero = x == 0.0 && y == 0.0 && z == 0.0;
+    struct timespec wait = {log->stall / 1000000000, log->stall % 1000000000};
 
     log->stall = 0;
     while (nanosleep(&wait, &wait)) {
     }
+}
+
+static void fake_log_force(double x, double y, double z)
+{
+    struct fake_log *log = fake_log();
+    struct timespec now;
+    const int zero = x == 0.0 && y == 0.0 && z == 0.0;
+
     clock_gettime(CLOCK_MONOTONIC, &now);
     log->force[0] = x;
     log->force[1] = y;

@@ -53,6 +53,7 @@ int asperity_write(const double commanded[3], int contact)
     (void)contact;
     if (fault == WRITE_ONCE && writes++ == at)
         return 18;
+    fake_log_wait();
     for (int i = 0; i < 3; i++)
         force[i] = commanded[i];
     fake_log_force(force[0], force[1], force[2]);

@@ -37,7 +37,7 @@ from asperity.servo.driver_loop import (
 from asperity.servo.drivers.driver import Driver
 from asperity.servo.fault import FAULT_DESCRIPTIONS, FAULT_SAMPLES, DeviceFault, EndReason
 from asperity.servo.loop_memory import LoopMemory, LoopStatistics
-from asperity.servo.safety import Safety
+from asperity.servo.safety import Safety, check_passivity_damping
 from asperity.simulation.servo import Servo
 from asperity.surface import Surface
 
@@ -104,7 +104,7 @@ class ServoProcess:
 
     Raises:
         ParameterError: for a surface that cannot be rendered, or a moving device without a known
-            maximum force.
+            maximum force; for a passivity damping above its bound, if the device is given.
 
     Example:
         Not run as a test: it starts a process on a device; ``tests/servo/test_servo_process.py``
@@ -122,6 +122,8 @@ class ServoProcess:
     ) -> None:  # fmt: skip
         require_max_force(driver, servo)
         self.driver, self._safety, self._device = driver, safety or Safety(), device
+        if device is not None:
+            check_passivity_damping(self._safety, device, servo)
         last = NO_END if duration is None else round(duration / servo.period)
         program = surface if isinstance(surface, LoopProgram) else build_program(surface, driver)
         self._job = LoopJob(program, driver, servo, self._safety, reach, last)
@@ -129,7 +131,7 @@ class ServoProcess:
         self.memory = LoopMemory() if prestarted is None else prestarted.memory
         self.notes: tuple[str, ...] = ()
         self._end_reason, self._driver_message = EndReason.RUNNING, ""
-        self._last_row_count, self._last_progress = 0, 0.0
+        self._last_row_count, self._last_progress, self._was_released = 0, 0.0, False
         self._heartbeat_stop = threading.Event()
 
     def __enter__(self) -> Self:
@@ -251,6 +253,10 @@ class ServoProcess:
         assert self._prestarted is not None
         waits = self._end_reason in {EndReason.RUNNING, EndReason.UNRESPONSIVE}
         self._prestarted.terminate(MAX_CALL_TIME if waits else _EXIT_TIMEOUT)
+        if self._end_reason is EndReason.DIED and not self._was_released:
+            self._was_released = True
+            with suppress(AsperityError, OSError):
+                self.driver.release_lost_device()
 
     def _send_heartbeats(self) -> None:
         count = -1

@@ -134,8 +134,12 @@ def test_ambiguous_or_absent_device_is_an_error(dhd: Any) -> None:
     dhd.fake_devices(2)
     with pytest.raises(ParameterError, match="2 devices: choose one, forcedimension:0, "):
         ForceDimensionDriver().open()
-    ForceDimensionDriver(1).open()
+    second = ForceDimensionDriver(1)
+    second.open()
     assert dhd.fake_state(0) == 1
+    assert dhd.fake_state(3) == 255  # without commands for 32 ms the device disables its force
+    second.close()
+    assert dhd.fake_state(3) == 0
     with pytest.raises(ParameterError, match="finds 2 devices"):
         ForceDimensionDriver(2).open()
     dhd.fake_devices(0)

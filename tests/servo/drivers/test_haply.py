@@ -94,6 +94,13 @@ def test_final_zero_force_reaches_a_slow_service(start: Start) -> None:
         assert service.last_force() == ZERO
 
 
+def test_force_of_a_lost_loop_is_released_by_another_connection(start: Start) -> None:
+    with start() as service:
+        HaplyDriver().release_lost_device()
+        assert wait_until(lambda: bool(service.forces))
+    assert [force for _time, force in service.forces] == [ZERO]
+
+
 def test_age_of_a_state_counts_from_its_request(start: Start) -> None:
     """A service that answers regularly but with old states is stale."""
     with start(late=0.05):

@@ -130,6 +130,16 @@ class Driver(ABC):
         """Close the device, without force; called however the loop ended."""
         return
 
+    def release_lost_device(self) -> None:
+        """Release the force after the loop's process has died, in the supervising process.
+
+        Nothing happens where that might move the device, or is not possible.
+
+        Raises:
+            ParameterError: if the device cannot be opened.
+        """
+        return
+
     def describe_error(self, code: int) -> str:
         """Return the meaning of an error code of the driver, in words."""
         return f"error {code}"

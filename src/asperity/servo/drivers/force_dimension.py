@@ -19,6 +19,11 @@ from asperity.servo.kernels.force_dimension_device import ForceDimensionDevice
 
 LIBRARY = "ASPERITY_LIBDHD"
 """Environment variable of the path of the library."""
+WATCHDOG = 255
+"""Time without a command after which compatible devices disable their force [125 µs]: the longest.
+
+The loop ends before, when it is late for 20 ms.
+"""
 _LIBRARY_NAMES = ("libdhd.so.3", "libdhd.so", "dhd64.dll")
 _FUNCTIONS = (
     "dhdGetDeviceCount", "dhdOpenID", "dhdEnableForce", "dhdClose", "dhdErrorGetLastStr",
@@ -70,6 +75,7 @@ class ForceDimensionDriver(Driver):
             library.dhdClose(opened)
             raise ParameterError("driver", f"cannot switch the force on: {_last_error(library)}")
         self._device_id = opened
+        _set_watchdog(library, WATCHDOG, opened)
         return ForceDimensionDevice(get_position, set_force, opened)
 
     def _choose_device(self, count: int) -> int:
@@ -89,11 +95,24 @@ class ForceDimensionDriver(Driver):
         set_force.argtypes = [ctypes.c_double] * 3 + [ctypes.c_byte]
         set_force(0.0, 0.0, 0.0, self._device_id)
         library.dhdEnableForce(0, self._device_id)
+        _set_watchdog(library, 0, self._device_id)
         library.dhdClose(self._device_id)
+
+    def release_lost_device(self) -> None:
+        """Open the device again and close it, which commands no force."""
+        self.open()
+        self.close()
 
     def describe_error(self, code: int) -> str:
         """Return the last error of libdhd."""
         return f"libdhd: {_last_error(_library())} ({code})"
+
+
+def _set_watchdog(library: ctypes.CDLL, duration: int, device: int) -> None:
+    """Set the watchdog, where library and device have one; 0 for none."""
+    if hasattr(library, "dhdSetWatchdog"):
+        library.dhdSetWatchdog.argtypes = [ctypes.c_ubyte, ctypes.c_byte]
+        library.dhdSetWatchdog(duration, device)
 
 
 def _library() -> ctypes.CDLL:

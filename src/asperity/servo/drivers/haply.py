@@ -74,6 +74,12 @@ def cursor_position(state: dict[str, Any]) -> Force:
     raise ValueError(f"a state without a position: {str(state)[:60]}")
 
 
+def force_message(device: str, force: Force) -> str:
+    """Return the message that commands a force [N]."""
+    commands = {"set_cursor_force": {"values": dict(zip("xyz", force, strict=True))}}
+    return json.dumps({"inverse3": [{"device_id": device, "commands": commands}]})
+
+
 class HaplyThread(threading.Thread):
     """The thread of a device; it ends with the connection, or by :meth:`stop`.
 
@@ -163,11 +169,8 @@ class HaplyThread(threading.Thread):
             self._send(force)
 
     def _send(self, force: Force) -> None:
-        x, y, z = force
         self._pending.append(system_time())
-        commands = {"set_cursor_force": {"values": {"x": x, "y": y, "z": z}}}
-        message = {"inverse3": [{"device_id": self._device_id, "commands": commands}]}
-        self._connection.send(json.dumps(message))
+        self._connection.send(force_message(self._device_id, force))
         self._last_force = force
 
     def _fail(self, code: int, reason: str) -> None:
@@ -228,6 +231,15 @@ class HaplyDriver(ThreadedDriver):
         if self._exchange is not None:
             self._exchange.stop(OPEN_TIMEOUT)
             sys.setswitchinterval(self._previous_switch_interval)
+
+    def release_lost_device(self) -> None:
+        """Send no force to the service by another connection."""
+        connection = _connect()
+        try:
+            device = _choose_device(_list_devices(connection), self.device)
+            connection.send(force_message(device, _ZERO_FORCE))
+        finally:
+            connection.close()
 
     def describe_error(self, code: int) -> str:
         """Return what failed in the thread."""

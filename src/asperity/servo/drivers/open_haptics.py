@@ -120,6 +120,11 @@ class OpenHapticsDriver(ThreadedDriver):
         library.hdUnschedule(self._scheduled)
         library.hdDisableDevice(self._handle)
 
+    def release_lost_device(self) -> None:
+        """Open the device again, whose frames command no force, and close it."""
+        self.open()
+        self.close()
+
     def describe_error(self, code: int) -> str:
         """Return an error of libHD in words."""
         if code in {slot.STALE, slot.LOOP_SILENT}:
