@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+import os
 import socket
 import struct
 import threading
@@ -83,6 +84,8 @@ class FakeHaply:
         return self.forces[-1][1]
 
     def _serve(self) -> None:
+        with suppress(OSError, AttributeError):  # not permitted, or not supported
+            os.sched_setscheduler(threading.get_native_id(), os.SCHED_FIFO, os.sched_param(50))
         with suppress(OSError):
             while True:
                 line, _who = self._listening.accept()

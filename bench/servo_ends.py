@@ -462,7 +462,7 @@ def run(arguments: Sequence[str], console: Console) -> int:
                     words = str(error).splitlines()[-1][-100:]
                     console.print(f"  not started: {driver}, {event}: {words}", markup=False)
             else:
-                return 1
+                continue
             console.file.flush()
             if not ends[-1].is_right:
                 console.print(f"  wrong: {ends[-1]}", markup=False)

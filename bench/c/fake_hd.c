@@ -50,7 +50,10 @@ static void fail(HDerror code) { last_error = code; }
 
 static void *schedule(void *unused)
 {
+    const struct sched_param priority = {.sched_priority = 70};
+
     (void)unused;
+    pthread_setschedparam(pthread_self(), SCHED_FIFO, &priority); /* if it is permitted */
     scheduler = pthread_self(); /* before the first callback, wherever the starting thread is */
     running = 1;
     while (!stopping) {
