@@ -59,8 +59,8 @@ def simulate_scan(
     """Return the amplitudes (√2 RMS) of motion and of force on the hand of scans, integrated.
 
     The hand moves at constant speed and pressed position; the tool of the given mass is held by the
-    grip, and dry friction acts against its velocity. Runge-Kutta in 80 steps per period, from
-    sliding at rest relative to the hand; the last 10 of 300 periods count. One row per scan,
+    grip, and dry friction acts against its velocity. Runge-Kutta in 40 steps per period, from
+    sliding at rest relative to the hand; the last 10 of 200 periods count. One row per scan,
     surfaces of stiffness 1.
     """
     period = surface.texture.period
@@ -68,7 +68,7 @@ def simulate_scan(
     x = np.linspace(0.0, period, 200, endpoint=False)
     level = np.column_stack([x, 0 * x, np.full(200, height)])
     mean = surface.force(level).mean(axis=0)
-    count, steps = len(mass), 80
+    count, steps = len(mass), 40
     base = np.column_stack([0 * mass, 0 * mass, height - stiffness * mean[2] / grip.stiffness])
     drift = np.column_stack([speed, 0 * speed, 0 * speed])
     dragged = -(friction + damping * speed) / grip.stiffness
@@ -82,14 +82,14 @@ def simulate_scan(
         return force / (mass + grip.mass)[:, None]
 
     motions, forces = [], []
-    for i in range(300 * steps):
+    for i in range(200 * steps):
         t = i * dt
         a1 = rate(t, p, v)
         a2 = rate(t + dt / 2, p + dt / 2 * v, v + dt / 2 * a1)
         a3 = rate(t + dt / 2, p + dt / 2 * v + dt**2 / 4 * a1, v + dt / 2 * a2)
         a4 = rate(t + dt, p + dt * v + dt**2 / 2 * a2, v + dt * a3)
         p, v = p + dt * v + dt**2 / 6 * (a1 + a2 + a3), v + dt / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
-        if i >= 290 * steps:
+        if i >= 190 * steps:
             moved = p - base - drift * (t + dt)
             motions.append(moved)
             inertia = grip.mass * rate(t + dt, p, v)

@@ -169,3 +169,18 @@ def test_scan_forces_are_evaluated_at_the_scan_height() -> None:
     probes[:, 2] = -DEPTH
     expected = sliding.force(probes, np.tile(along, (2, 1)))
     np.testing.assert_array_equal(scan_forces(sliding, xy), expected)
+
+
+def test_patch_without_contact_moves_to_the_highest_point() -> None:
+    """Waves far below a ridge: the first patch of a law that searches touches nothing."""
+    x = np.arange(400) * 50e-6
+    waves = 5e-6 * np.sin(2 * np.pi * x / 1e-3)
+    ridge = 300e-6 * np.exp(-(((x - 16e-3) / 2e-3) ** 2))
+    texture = HeightMap(np.tile(waves + ridge, (120, 1)), 50e-6)
+    for law in "DH":
+        surface = Surface(texture, law, 500.0, max_depth=20e-6)
+        points = texture.domain.grid(texture.grid_counts(), 96)[0].reshape(-1, 2)
+        assert not scan_forces(surface, points).any()  # the premise
+        forces = wave_forces(surface, compute_spectrum(texture))
+        assert np.isfinite(forces).all()
+        assert forces.max() > 0.0

@@ -335,10 +335,13 @@ def _band_force_amplitudes(surface: Surface, spectrum: Spectrum) -> FloatArray:
     texture, costly = surface.texture, surface.law.contact.requires_search
     max_count = (_LINE_POINTS if texture.is_profile else _SIDE_POINTS)[costly]
     points, spacing, repeats = texture.domain.grid(texture.grid_counts(), max_count)
-    flat = points.reshape(-1, 2)
-    shape = points.shape[:2]
+    flat, shape = points.reshape(-1, 2), points.shape[:2]
+    pushed = scan_forces(surface, flat)
+    if not pushed.any():  # nothing is touched here: take the patch around the highest point
+        flat = flat + _highest_point(texture) - flat.mean(axis=0)
+        pushed = scan_forces(surface, flat)
     heights = band_variances(texture.height(flat).reshape(1, *shape), spacing, repeats)
-    forces = np.ascontiguousarray(scan_forces(surface, flat).T).reshape(3, *shape)
+    forces = np.ascontiguousarray(pushed.T).reshape(3, *shape)
     along, normal = (band_variances(part, spacing, repeats) for part in (forces[:2], forces[2:]))
     known = heights.variance > 1e-12 * heights.variance.max()
     variances = np.column_stack([along.variance, normal.variance])
@@ -347,3 +350,10 @@ def _band_force_amplitudes(surface: Surface, spectrum: Spectrum) -> FloatArray:
     # A wave longer than the patch has the force ratio of the longest wave in it.
     nearest = np.abs(heights.number[known] - wanted[:, None]).argmin(axis=1)
     return np.asarray(spectrum.amplitudes[:, None] * ratio[nearest])
+
+
+def _highest_point(texture: Texture) -> FloatArray:
+    """Return the highest sample (x, y) [m] of a texture."""
+    counts = texture.grid_counts()
+    points = texture.domain.grid(counts, max(counts))[0].reshape(-1, 2)
+    return np.asarray(points[np.argmax(texture.height(points))])
