@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ import asperity as asp
 from asperity.analysis import loop_work
 from asperity.analysis.split.split_state import split_state
 from asperity.core.checks import FloatArray
-from asperity.core.errors import ParameterError
+from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.surface import Surface
 from asperity.textures.fields.bake import BakePlan
 from asperity.textures.fields.potential_field import PotentialField
@@ -237,6 +238,16 @@ def test_other_laws_depths_and_continuities_are_refused() -> None:
     assert surface.to_depth(1.4e-4).max_depth == 1.4e-4
     with pytest.raises(ParameterError, match="is a baked field already"):
         asp.bake(surface)
+
+
+def test_file_of_another_version_is_refused_with_the_remedy(tmp_path: Path) -> None:
+    path = tmp_path / "map.field"
+    asp.save_field(path, field_of(baked("map")[0]))
+    content = bytearray(path.read_bytes())
+    content[8] += 1
+    path.write_bytes(content)
+    with pytest.raises(SurfaceFileError, match=r"map\.field: is a \.field file of version 2.*bake"):
+        Surface(path, "H")
 
 
 # --- below the floor ------------------------------------------------------------------------------

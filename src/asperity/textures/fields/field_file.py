@@ -230,7 +230,8 @@ def _read_header(data: NDArray[np.uint8]) -> Any:
     if header["byte_order"] != _BYTE_ORDER:
         raise SurfaceFileError("has another byte order, or is damaged")
     if header["version"] != VERSION:
-        raise SurfaceFileError(f"has version {header['version']}; version {VERSION} is read")
+        words = f"is a .field file of version {header['version']}, of which {VERSION} is read"
+        raise SurfaceFileError(f"{words}; repeat: asperity bake SURFACE -o FILE")
     if header["header_checksum"] != zlib.crc32(data[: HEADER.itemsize - 4].data):
         raise SurfaceFileError("has a damaged header")
     if header["file_bytes"] != len(data):
