@@ -61,8 +61,8 @@ def test_profile_of_many_metres_without_a_unit_is_refused() -> None:
     """Slopes do not depend on the unit of a point list, so the span is checked instead."""
     far = RawSurface(np.linspace(0.0, 15.0, 50), (1.0,), "part.txt", (), has_units=False)
     with pytest.raises(ParameterError, match=r"span 15 m look not to be in metres.*--unit mm"):
-        prepare(far)
-    prepare(RawSurface(far.heights, (1.0,), "part.txt", (), has_units=True))
+        prepare(far, pitch=1.0)
+    prepare(RawSurface(far.heights, (1.0,), "part.txt", (), has_units=True), pitch=1.0)
 
 
 def test_mean_slope_overflow_is_refused() -> None:

@@ -31,6 +31,11 @@ slopes of 1.7 and 3.1; the mean slopes of 30 real surfaces of all kinds are up t
 changes the slope by a factor of a thousand.
 """
 
+MIN_MEAN_SLOPE = 1e-6
+"""Least plausible mean slope unless flat: 0.1 nm of noise at a pitch of 0.1 mm."""
+PITCH_LIMITS = (1e-11, 0.1)
+"""Plausible pitches of a file [m]; the argument ``pitch`` confirms others."""
+
 GivenPitch = float | Sequence[float] | None
 _MAX_SPAN = 10.0  # [m]; greater heights have probably another unit
 _MAX_LINES = 1024  # lines sampled along each axis
@@ -62,6 +67,14 @@ def check_plausible(raw: RawSurface, heights: FloatArray, pitch: Pitch) -> None:
             f"must be given: heights that span {format_length(span)} at a pitch of"
             f" {format_lengths(pitch)} have a mean slope of {slope:.3g}, and no instrument measures"
             f" {MAX_MEAN_SLOPE:g}; {_suggest_fixes(raw, span, slope)}",
+        )
+    if 0.0 < slope < MIN_MEAN_SLOPE:
+        raise ParameterError(
+            "height_range",
+            f"must be given: heights that span {format_length(span)} at a pitch of"
+            f" {format_lengths(pitch)} have a mean slope of {slope:.3g}, less than"
+            f" {MIN_MEAN_SLOPE:g}: heights or pitch may be in another unit (--pitch); if they are"
+            f" right: height_range={span:.6g} (--height-range {span:.6g}m)",
         )
     if span > _MAX_SPAN and not raw.has_units:
         raise ParameterError(
@@ -317,6 +330,12 @@ def _resolve_pitch(raw: RawSurface, pitch: GivenPitch, steps: list[str]) -> Pitc
     if pitch is not None:
         before = "" if raw.pitch is None else f" instead of the file's {format_lengths(raw.pitch)}"
         steps.append(f"pitch {format_lengths(lateral)} as given{before}")
+    elif not PITCH_LIMITS[0] <= min(lateral) <= max(lateral) <= PITCH_LIMITS[1]:
+        raise ParameterError(
+            "pitch",
+            f"must be given: {raw.source} says {format_lengths(lateral)}, which no instrument has;"
+            f" if it is right: pitch={lateral[0]:g} (--pitch {lateral[0]:g}m)",
+        )
     return lateral
 
 

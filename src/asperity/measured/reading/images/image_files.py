@@ -138,6 +138,7 @@ _MAX_TIFF_RATIO = 2000  # no compression that is read packs more bytes into one
 _MINISWHITE, _RGB = 0, 2
 _GREY = (0, 1)
 _REDUCED, _MASK = 1, 4
+_ORIENTATION = 274
 _NODATA = 42113  # GDAL's tag for the value of a missing point
 
 
@@ -201,6 +202,11 @@ def _check_page(page: Any, size: int) -> None:
     check_image_size(int(page.imagelength), int(page.imagewidth))
     if int(page.photometric) == _PALETTE:
         raise SurfaceFileError(_PALETTE_FAULT)
+    orientation = page.tags.get(_ORIENTATION)
+    if orientation is not None and int(orientation.value) != 1:
+        raise SurfaceFileError(
+            f"is stored turned or mirrored (Orientation {int(orientation.value)}); save it upright"
+        )
     if int(page.imagedepth) != 1:
         raise SurfaceFileError(f"has {page.imagedepth} layers; one is expected")
     if int(page.photometric) not in (*_GREY, _RGB):

@@ -24,6 +24,8 @@ LIBRARY = "SurfaceTopography"
 
 # Formats that asperity reads itself, or refuses; HGT accepts any file of a square size.
 _OWN_FORMATS = frozenset(("sdf", "xyz", "asc", "npy", "npz", "x3p", "hgt"))
+# Formats whose lengths the library gets wrong, with the fault.
+_WRONG_FORMATS = {"nms": "its pitch in nanometres is taken for millimetres"}
 _MAX_COMPRESSION_RATIO = 1032  # of deflate, which all compressed formats use
 
 
@@ -48,12 +50,22 @@ def read_instrument(file: SurfaceFile, options: ReadingOptions) -> RawSurface | 
             with contextlib.closing(reader), _reject_damaged(reader):
                 channel = _select_channel(reader, file.name, options.channel)
                 if channel is not None:
+                    _reject_wrong_format(reader)
                     return _to_surface(reader, channel, file, options)
                 names = [f"{c.name!r} ({c.data_kind.value})" for c in reader.channels]
                 channels = channels or ", ".join(names) or "none"
     if channels:
         raise SurfaceFileError(f"no height channel; the file has: {channels}")
     return None
+
+
+def _reject_wrong_format(reader: Any) -> None:
+    """Refuse a format whose lengths the library gets wrong."""
+    fault = _WRONG_FORMATS.get(reader.format())
+    if fault is not None:
+        raise SurfaceFileError(
+            f"a {reader.name()} file, which {LIBRARY} misreads: {fault}; export it as X3P or SDF"
+        )
 
 
 def _reject_damaged(reader: Any) -> contextlib.AbstractContextManager[None]:
