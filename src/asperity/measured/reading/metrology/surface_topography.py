@@ -24,8 +24,13 @@ LIBRARY = "SurfaceTopography"
 
 # Formats that asperity reads itself, or refuses; HGT accepts any file of a square size.
 _OWN_FORMATS = frozenset(("sdf", "xyz", "asc", "npy", "npz", "x3p", "hgt"))
-# Formats whose lengths the library gets wrong, with the fault.
-_WRONG_FORMATS = {"nms": "its pitch in nanometres is taken for millimetres"}
+# Formats of which a second library (surfalize) reads other lengths, with the difference.
+_WRONG_FORMATS = {
+    "nms": "its pitch in nanometres is taken for millimetres",
+    "tmd": "surfalize reads all its lengths 1000 times smaller",
+    "metropro": "surfalize reads its heights 8 times greater",
+    "plu": "surfalize reads some of its heights 11 times greater",
+}
 _MAX_COMPRESSION_RATIO = 1032  # of deflate, which all compressed formats use
 
 
@@ -64,7 +69,7 @@ def _reject_wrong_format(reader: Any) -> None:
     fault = _WRONG_FORMATS.get(reader.format())
     if fault is not None:
         raise SurfaceFileError(
-            f"a {reader.name()} file, which {LIBRARY} misreads: {fault}; export it as X3P or SDF"
+            f"a {reader.name()} file, which {LIBRARY} may misread: {fault}; export it as X3P or SDF"
         )
 
 
