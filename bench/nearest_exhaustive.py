@@ -22,9 +22,9 @@ from rich.table import Table
 
 from asperity.core.checks import FloatArray
 from asperity.textures import Fourier, HeightMap, Profile, Sinusoid
+from asperity.textures.catalogue import load_texture
 from asperity.textures.kinds.noise import Noise, NoiseProfile
 from asperity.textures.texture import Texture
-from asperity.textures.texture_loading import load_texture
 
 COUNT = 100_000
 REAL = Path(__file__).parent.parent.parent / "shared" / "data" / "sample-land.x3p"

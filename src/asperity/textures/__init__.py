@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from asperity.textures.catalogue import load_texture
 from asperity.textures.domain import Domain, ScanLine
 from asperity.textures.kinds.fourier import Fourier
 from asperity.textures.kinds.grating import Grating
@@ -10,7 +11,6 @@ from asperity.textures.kinds.sinusoid import Sinusoid
 from asperity.textures.library import LIBRARY, NamedSurface, named_surface, surface_names
 from asperity.textures.spline.spline_texture import HeightMap, Profile
 from asperity.textures.texture import Texture
-from asperity.textures.texture_loading import load_texture
 
 __all__ = [
     "LIBRARY",

@@ -5,14 +5,14 @@ from __future__ import annotations
 import os
 import re
 from collections import ChainMap
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import Any, cast
 
 import numpy as np
 
-from asperity.core.arguments import Argument, parse_arguments
+from asperity.core.arguments import Argument, document_arguments, parse_arguments
 from asperity.core.checks import FloatArray
 from asperity.core.digests import content_digest
 from asperity.core.errors import ParameterError, suggest_names
@@ -29,7 +29,7 @@ from asperity.textures.spline.profile_sampler import ProfileArguments
 from asperity.textures.spline.spline_texture import fit_spline
 from asperity.textures.synthetic import prepare_texture
 from asperity.textures.texture import Texture, TextureKind
-from asperity.textures.texture_loading import load_texture
+from asperity.textures.texture_loading import prepare_file, texture_from_prepared
 
 _KINDS = SINUSOID, FOURIER, GRATING, NOISE, NOISE_PROFILE
 CATALOGUE: dict[str, TextureKind] = {kind.name: kind for kind in _KINDS} | LIBRARY
@@ -66,17 +66,53 @@ TextureLike = Texture | str | os.PathLike[str]
 
 
 def _load_file(path: str | os.PathLike[str], **values: Any) -> Texture:
-    """Return the texture of a measured file, or a baked field; see :func:`load_texture`.
-
-    Raises:
-        SurfaceFileError: for a file that cannot be read.
-        ParameterError: for an argument that cannot be used; nothing can be done to a baked field.
-    """
+    """Return the texture of a measured file, or a baked field; see :func:`load_texture`."""
     if not is_field(path):
-        return load_texture(path, **values)
+        return texture_from_prepared(prepare_file(path, **values))
     for name in values:
         raise ParameterError(name, f"cannot be applied: {os.fspath(path)} was baked already")
     return load_field(path, _build_described)
+
+
+@document_arguments(FILE_ARGUMENTS)
+def load_texture(  # noqa: D417 - the others are described where they are declared
+    path: str | os.PathLike[str],
+    *,
+    channel: str | int | None = None,
+    unit: str | None = None,
+    integrate_normals: bool = False,
+    resample: float | None = None,
+    pitch: float | Sequence[float] | None = None,
+    height_range: float | None = None,
+    outliers: float | None = None,
+    max_missing: float | None = None,
+    form: int | None = None,
+    cutoff: float | None = None,
+    l_cutoff: float | None = None,
+    tip_radius: float | None = None,
+    periodic: bool = False,
+    blend: float | None = None,
+    magnify: float = 1.0,
+    magnify_height: float | None = None,
+) -> Texture:
+    """Load a measured surface as a texture.
+
+    Reads the file and prepares it: remove outliers, fill missing points, level, Gaussian band
+    limit, stylus tip, periodic continuation, magnify. The ``preparation`` of the result lists the
+    steps. A file written by ``asperity prepare`` is used as it is, and so is a baked field.
+
+    Args:
+        path: the file; its format is recognised by its content.
+        {arguments}
+
+    Raises:
+        SurfaceFileError: for a file that cannot be read, with the reason.
+        ParameterError: for an argument that cannot be used; nothing can be done to a baked field.
+    """
+    values = dict(locals())  # every argument under its own name
+    defaults = load_texture.__kwdefaults__ or {}
+    given = {name: x for name, x in values.items() if x is not defaults.get(name, ...)}
+    return _load_file(**given)
 
 
 def _build_described(description: Mapping[str, Any]) -> Texture:

@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from asperity.core.arguments import document_arguments
 from asperity.core.cache import get_or_compute
 from asperity.core.checks import FloatArray
 from asperity.core.digests import content_digest
 from asperity.core.display import Reportable
 from asperity.core.errors import ParameterError
 from asperity.core.files import open_input, to_plain_data
-from asperity.measured.file_arguments import FILE_ARGUMENTS, READING_ARGUMENTS
+from asperity.measured.file_arguments import READING_ARGUMENTS
 from asperity.measured.form import SurfaceDecomposition, decompose_surface
 from asperity.measured.parameters import correlation_parameters
 from asperity.measured.prepared import (
@@ -28,44 +27,6 @@ from asperity.measured.prepared import (
     load_prepared,
 )
 from asperity.textures.spline.spline_texture import HeightMap, Profile, fit_spline
-
-
-@document_arguments(FILE_ARGUMENTS)
-def load_texture(  # noqa: D417 - the others are described where they are declared
-    path: str | os.PathLike[str],
-    *,
-    channel: str | int | None = None,
-    unit: str | None = None,
-    integrate_normals: bool = False,
-    resample: float | None = None,
-    pitch: float | Sequence[float] | None = None,
-    height_range: float | None = None,
-    outliers: float | None = None,
-    max_missing: float | None = None,
-    form: int | None = None,
-    cutoff: float | None = None,
-    l_cutoff: float | None = None,
-    tip_radius: float | None = None,
-    periodic: bool = False,
-    blend: float | None = None,
-    magnify: float = 1.0,
-    magnify_height: float | None = None,
-) -> HeightMap | Profile:
-    """Load a measured surface as a texture.
-
-    Reads the file and prepares it: remove outliers, fill missing points, level, Gaussian band
-    limit, stylus tip, periodic continuation, magnify. The ``preparation`` of the result lists the
-    steps. A file written by ``asperity prepare`` is used as it is.
-
-    Args:
-        path: the file; its format is recognised by its content.
-        {arguments}
-
-    Raises:
-        SurfaceFileError: for a file that cannot be read, with the reason.
-        ParameterError: for an argument that cannot be used.
-    """
-    return texture_from_prepared(prepare_file(**locals()))  # every argument under its own name
 
 
 def prepare_file(

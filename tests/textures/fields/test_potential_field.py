@@ -286,3 +286,15 @@ def test_lateral_force_does_not_grow_below_the_floor() -> None:
     assert 0.0 < lateral[1] < 1.2 * lateral[0]
     # Along z it is the wall's.
     assert np.ptp(forces[1][:, 2]) < 1e-3 * np.ptp(forces[0][:, 2])
+
+
+def test_load_texture_takes_a_field(tmp_path: Path) -> None:
+    path = tmp_path / "wave.field"
+    field = asp.bake(asp.Sinusoid(1e-4, 1e-3), max_depth=1e-4, resolution=50e-6)
+    asp.save_field(path, field)
+    loaded = asp.load_texture(path)
+    assert isinstance(loaded, PotentialField)
+    assert loaded.digest == asp.Surface(path, "H").texture.digest
+    assert asp.load_texture(path, magnify=1.0).digest == loaded.digest
+    with pytest.raises(ParameterError, match=r"magnify cannot be applied: .* was baked already"):
+        asp.load_texture(path, magnify=2.0)
