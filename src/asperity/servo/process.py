@@ -19,7 +19,7 @@ from multiprocessing.util import Finalize
 from typing import Any, Self
 
 from asperity.core.checks import FloatArray
-from asperity.core.errors import AsperityError, ParameterError
+from asperity.core.errors import AsperityError, ParameterError, print_message
 from asperity.core.files import to_plain_data
 from asperity.devices import Device
 from asperity.loop.shared_trace import COLUMNS
@@ -284,6 +284,7 @@ class ServoProcess:
         ):
             self._end_reason = EndReason.UNRESPONSIVE
             self.memory.request_stop(now=True)
+            print_message(f"{self.fault()} Waiting for its call to return")
 
     def _handle_message(self, kind: str, content: Any) -> None:
         if kind == "ended":

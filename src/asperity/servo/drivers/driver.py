@@ -87,11 +87,14 @@ class Driver(ABC):
     Attributes:
         name: name on the command line.
         has_moving_handle: whether a real handle moves.
+        can_reopen: whether opening the device moves nothing and closing it leaves no force, so that
+            both release a force that a dead process has left.
         loss_notice: what the device does if the process of the loop dies, in a sentence.
     """
 
     name: ClassVar[str]
     has_moving_handle: ClassVar[bool] = True
+    can_reopen: ClassVar[bool] = False
     loss_notice: ClassVar[str]
 
     @property
@@ -133,12 +136,12 @@ class Driver(ABC):
     def release_lost_device(self) -> None:
         """Release the force after the loop's process has died, in the supervising process.
 
-        Nothing happens where that might move the device, or is not possible.
-
         Raises:
             ParameterError: if the device cannot be opened.
         """
-        return
+        if self.can_reopen:
+            self.open()
+            self.close()
 
     def describe_error(self, code: int) -> str:
         """Return the meaning of an error code of the driver, in words."""

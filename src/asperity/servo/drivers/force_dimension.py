@@ -41,6 +41,7 @@ class ForceDimensionDriver(Driver):
     """
 
     name: ClassVar[str] = "forcedimension"
+    can_reopen: ClassVar[bool] = True
     loss_notice: ClassVar[str] = (
         "The device receives no further commands and may hold the last force: cut it with the force"
         " switch."
@@ -97,11 +98,6 @@ class ForceDimensionDriver(Driver):
         library.dhdEnableForce(0, self._device_id)
         _set_watchdog(library, 0, self._device_id)
         library.dhdClose(self._device_id)
-
-    def release_lost_device(self) -> None:
-        """Open the device again and close it, which commands no force."""
-        self.open()
-        self.close()
 
     def describe_error(self, code: int) -> str:
         """Return the last error of libdhd."""

@@ -65,6 +65,7 @@ class OpenHapticsDriver(ThreadedDriver):
     """
 
     name: ClassVar[str] = "openhaptics"
+    can_reopen: ClassVar[bool] = True
     loss_notice: ClassVar[str] = (
         "The device receives no further commands and may hold the last force: unplug the device."
     )
@@ -119,11 +120,6 @@ class OpenHapticsDriver(ThreadedDriver):
         library.hdStopScheduler()
         library.hdUnschedule(self._scheduled)
         library.hdDisableDevice(self._handle)
-
-    def release_lost_device(self) -> None:
-        """Open the device again, whose frames command no force, and close it."""
-        self.open()
-        self.close()
 
     def describe_error(self, code: int) -> str:
         """Return an error of libHD in words."""
