@@ -138,8 +138,11 @@ def make_loop(
     )
 
 
-STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)
-"""Signals that end a loop: SIGQUIT without a ramp, the others with one."""
+_STOP_NOW_SIGNALS = (signal.SIGQUIT, signal.SIGUSR1)
+STOP_SIGNALS = (
+    signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGTSTP, *_STOP_NOW_SIGNALS
+)  # fmt: skip
+"""Signals that end a loop: SIGQUIT and SIGUSR1 without a ramp, the others with one."""
 
 
 @contextmanager
@@ -149,7 +152,7 @@ def stop_on_signals(memory: LoopMemory | None = None) -> Iterator[list[int]]:
 
     def collect(number: int, _frame: FrameType | None) -> None:
         if memory is not None:
-            memory.request_stop(now=number == signal.SIGQUIT)
+            memory.request_stop(now=number in _STOP_NOW_SIGNALS)
         received.append(number)
 
     handlers = {one: signal.signal(one, collect) for one in STOP_SIGNALS}
