@@ -48,7 +48,7 @@ def test_at_most_one_percent_of_the_loops_cycle_or_the_factor_is_the_least() -> 
         margins = load_margins(along_lightest=along)
         assert {law.letter for law in margins} == set(LAWS) - {"W"}
         for margin in margins.values():
-            assert margin.factor in {*FACTORS, CEILINGS.get(letter, 1.0)}
+            assert margin.factor in {*FACTORS, CEILINGS.get(margin.law, 1.0)}
             assert margin.loops == LOOPS
             assert margin.cycles <= MAX_SHARE * margin.loops or margin.factor == FACTORS[0]
 
