@@ -23,7 +23,6 @@ from asperity.analysis.passivity.criteria import (
     WALL_TEST,
     BuzzBound,
     Criterion,
-    buzz_limited_stiffness,
     evaluate_criteria,
 )
 from asperity.analysis.passivity.device_loop import (
@@ -76,8 +75,8 @@ class StabilityLimit(Serializable):
     Attributes:
         stiffness: the limit [N/m]; 0 if no stable stiffness is known, ``None`` if undecidable.
         basis: ``"proved"``: passive up to the limit, under the assumptions of the criterion.
-            ``"plausible"``: a smooth wall of that gain did not cycle. ``"bounded"``:
-            passive but for quantisation, whose buzz moves at ``BUZZ_SPEED`` at most.
+            ``"plausible"``: a smooth wall of that gain did not cycle. ``"bounded"``: half of the
+            limit of the delay rule, where quantisation leaves a buzz with a bound.
             ``"wall gain"``: a wall of that gain did not cycle; no stability limit, since the law
             has curl and delivers energy below v* at any stiffness. ``"none"``.
         criterion: name of the criterion that gives the limit; empty for none.
@@ -140,17 +139,12 @@ def stability_limit(loop: DeviceLoop, by_name: Mapping[str, Criterion]) -> Stabi
     if loop.obstacle is not None or loop.delay is None or is_contradictory(loop):
         return plausible
     proved = _proved_limit(main, steps)
-    silent = proved.stiffness or 0.0
-    calm = None if steps.missing else buzz_limited_stiffness(loop)
-    if main.limit and calm is not None:
-        # Steps of force may exceed the bound at any stiffness: half of the limit is left.
-        bounded = min(calm or 0.5 * main.limit, main.limit)
-        if bounded > silent:
-            return StabilityLimit(bounded, "bounded", QUANTIZATION, proved_stiffness=silent)
     if (plausible.stiffness or 0.0) > (proved.stiffness or 0.0):
         return replace(plausible, proved_stiffness=proved.proved_stiffness)
     if proved.stiffness is None:
         return plausible
+    if proved.stiffness == 0.0 and main.limit:
+        return StabilityLimit(0.5 * main.limit, "bounded", QUANTIZATION)
     return proved
 
 
@@ -229,35 +223,32 @@ def _assess_wall_test(
 
 
 _MARGINS_FILE = Path(__file__).with_name("margins.toml")
-# Limits that need no margin: they are proved, or bound the buzz.
+# Limits that need no margin: they are proved, or half of what is proved.
 _BASES_WITHOUT_MARGIN = ("proved", "bounded")
 
 
 @dataclass(frozen=True)
 class Margin(Serializable):
-    """Safety margin: the recommended stiffness over K₀/q, from random admissible loops.
+    """Safety margin: the recommended stiffness over the stability limit.
 
     Attributes:
         factor: recommended stiffness over stability limit, at most 1.
         law: letter of the simulated law; for a user-defined law the shipped law with the least
             factor.
-        loops: number of random loops simulated at that factor of K₀/q; 0 without simulation.
-        cycles: in how many of them a motion lasts, without steps, that a hand feels.
-        speed: RMS speed of the fastest of these motions, summed over the axes [m/s].
-        extent: its RMS displacement [m].
+        loop: simulated loop in which the law began to cycle first; empty without simulation.
+        surface: surface of that loop.
+        delay: delay of that loop, in samples.
+        below: number of loops in which the law began to cycle below K₀/q.
+        cases: number of simulated loops.
     """
 
     factor: float
     law: str = ""
-    loops: int = 0
-    cycles: int = 0
-    speed: float = 0.0
-    extent: float = 0.0
-
-    @property
-    def frequency(self) -> float:
-        """Frequency of a sinusoid of that speed and displacement [Hz]."""
-        return self.speed / (2.0 * math.pi * self.extent) if self.extent else 0.0
+    loop: str = ""
+    surface: str = ""
+    delay: int = 0
+    below: int = 0
+    cases: int = 0
 
 
 NO_MARGIN = Margin(1.0)
@@ -271,11 +262,11 @@ def load_margins(along_lightest: bool = False) -> dict[Law, Margin]:
         along_lightest: whether K₀ is that of the lightest direction.
     """
     table = tomllib.loads(_MARGINS_FILE.read_text(encoding="utf-8"))
-    fields = ("loops", "cycles", "speed", "extent")
+    name = "along_lightest" if along_lightest else "factor"
+    fields = ("loop", "surface", "delay", "below", "cases")
     return {
-        LAWS[law]: Margin(part["factor"], law, *(part[field] for field in fields))
+        LAWS[law]: Margin(entry[name], law, *(entry[field] for field in fields))
         for law, entry in table.items()
-        for part in ([entry["lightest"]] if along_lightest else [entry])
     }
 
 

@@ -109,10 +109,9 @@ _CLOSED_FORMS = {"B": q_b, "C": q_c, "G": q_g}
 
 @declare_claim("sentence-IV-closed-form")
 def closed_forms() -> Check:
-    """The numbers of B, C and G have no closed form, not even on a sinusoid: a search gives them.
+    """No manageable closed form was found for the numbers of B, C and G: they are evaluated.
 
-    The paper says that none was found, which cannot be judged; that there is none can. A search
-    over Jacobians, as in the paper, is compared with closed forms.
+    A search over Jacobians, as in the paper, is compared with closed forms that exist.
     """
     cases = [PASSIVITY, SCANNING, *random_settings(6)]
     checks = []
