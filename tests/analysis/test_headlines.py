@@ -160,8 +160,8 @@ def test_headlines_cover_at_least_sixty_cases() -> None:
 
 REAL = [
     ("sample-land.x3p", 1.0, "omega.3", "H?"),  # large force, but undersampled at 0.1 m/s
-    ("sample-land.x3p", 20.0, "touch", "-"),
-    ("sample-land.x3p", 20.0, "inverse3", "-"),  # force steps of 14 mN
+    ("sample-land.x3p", 20.0, "touch", "H"),
+    ("sample-land.x3p", 20.0, "inverse3", "H?"),  # force steps of 14 mN
     ("dektak-1.csv", 20.0, "touch", "-"),
 ]
 

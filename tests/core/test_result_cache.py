@@ -103,7 +103,7 @@ def test_cached_comparison_equals_a_computed_one(
 
 def test_another_device_or_stiffness_uses_cached_results(monkeypatch: pytest.MonkeyPatch) -> None:
     wave = Sinusoid(0.31e-3, 1.1e-3, phase=0.4)
-    compare(wave, laws="AD")
+    compare(wave, laws="AD", stiffness=1000.0)
     stored = []
     monkeypatch.setattr(cache, "put_entry", lambda _namespace, key, _content: stored.append(key))
     equal_wave = Sinusoid(0.31e-3, 1.1e-3, phase=0.4)

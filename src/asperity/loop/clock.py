@@ -3,7 +3,6 @@
 It counts the time in which the machine sleeps, so that the sample after it is late.
 """
 
-import time
 from typing import NamedTuple
 
 from asperity.core.checks import IntArray
@@ -51,8 +50,3 @@ def clock_wait_until(due: int, clock: Clock) -> int:
         clock.timespec[1] = due % NANOSECONDS
         answer = call_address(clock.nanosleep, CLOCK_BOOTTIME, TIMER_ABSTIME, clock.timespec, 0)
     return clock_now(due, clock)
-
-
-def system_time() -> int:
-    """Return the system's time as the loop reads it [ns]."""
-    return time.clock_gettime_ns(CLOCK_BOOTTIME)

@@ -290,8 +290,8 @@ def test_lateral_force_does_not_grow_below_the_floor() -> None:
 
 def test_load_texture_takes_a_field(tmp_path: Path) -> None:
     path = tmp_path / "wave.field"
-    field = asp.bake(asp.Sinusoid(1e-4, 1e-3), max_depth=1e-4, resolution=50e-6)
-    asp.save_field(path, field)
+    surface = asp.Surface(asp.Sinusoid(1e-4, 1e-3), "H", max_depth=1e-4)
+    asp.save_field(path, asp.bake(surface, resolution=50e-6).texture)
     loaded = asp.load_texture(path)
     assert isinstance(loaded, PotentialField)
     assert loaded.digest == asp.Surface(path, "H").texture.digest

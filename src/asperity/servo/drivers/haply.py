@@ -11,6 +11,7 @@ import os
 import select
 import sys
 import threading
+import time
 from collections import deque
 from collections.abc import Sequence
 from contextlib import suppress
@@ -18,7 +19,7 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 from asperity.core.errors import ParameterError
-from asperity.loop.clock import system_time
+from asperity.loop.clock import CLOCK_BOOTTIME
 from asperity.servo.driver_loop import PRIORITY
 from asperity.servo.drivers.driver import AWAY, RIGHT, UP, DriverKind
 from asperity.servo.drivers.threaded import (
@@ -78,6 +79,11 @@ def force_message(device: str, force: Force) -> str:
     """Return the message that commands a force [N]."""
     commands = {"set_cursor_force": {"values": dict(zip("xyz", force, strict=True))}}
     return json.dumps({"inverse3": [{"device_id": device, "commands": commands}]})
+
+
+def _system_time() -> int:
+    """Return the system's time as the loop reads it [ns]."""
+    return time.clock_gettime_ns(CLOCK_BOOTTIME)
 
 
 class HaplyThread(threading.Thread):
@@ -160,7 +166,7 @@ class HaplyThread(threading.Thread):
         x, y, z, given = self.buffer.latest_force()
         force = (x, y, z)
         timeout = self.buffer.ring.words[FORCE_TIMEOUT]
-        if force != _ZERO_FORCE and system_time() - given > timeout:
+        if force != _ZERO_FORCE and _system_time() - given > timeout:
             self._fail(LOOP_SILENT, "its force was released")
             return
         is_due = (resend or given != self._last_force_time) and len(self._pending) < MAX_PENDING
@@ -169,7 +175,7 @@ class HaplyThread(threading.Thread):
             self._send(force)
 
     def _send(self, force: Force) -> None:
-        self._pending.append(system_time())
+        self._pending.append(_system_time())
         self._connection.send(force_message(self._device_id, force))
         self._last_force = force
 

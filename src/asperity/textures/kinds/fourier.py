@@ -105,7 +105,7 @@ class Fourier(Texture):
         ux, uy = self._directions[0].tolist()
         return FourierArguments(
             self.amplitudes, kx, ky, self.phases,
-            self.bounds[1], third, fourth, low, high, float(length.max()), ux, uy,
+            self.bounds[1], third, low, high, float(length.max()), ux, uy, fourth,
         )  # fmt: skip
 
     @cached_property

@@ -29,12 +29,13 @@ class FourierArguments(NamedTuple):
         phases: [rad].
         hessian_bound: bound of the second derivatives [1/m].
         third_derivative_bound: bound of the third derivatives [1/m²].
-        fourth_derivative_bound: bound of the fourth derivatives [1/m³].
         min_height: least height [m].
         max_height: greatest height [m].
         wave_number: the greatest one [rad/m].
         ux: direction of the first wave.
         uy: likewise.
+        fourth_derivative_bound: bound of the fourth derivatives [1/m³]; without one, as in earlier
+            recordings, a number that prunes nothing.
     """
 
     amplitudes: FloatArray
@@ -43,12 +44,12 @@ class FourierArguments(NamedTuple):
     phases: FloatArray
     hessian_bound: float
     third_derivative_bound: float
-    fourth_derivative_bound: float
     min_height: float
     max_height: float
     wave_number: float
     ux: float
     uy: float
+    fourth_derivative_bound: float = 1e300
 
 
 def evaluation_cost(texture: FourierArguments) -> float:
