@@ -68,14 +68,14 @@ def page() -> str:
 def test_content_security_policy_allows_only_the_own_script(page: str, tmp_path: Path) -> None:
     injected = page.replace("</body>", "<script>document.title = 'taken'</script></body>")
     dom = dump_dom(injected, tmp_path / "page.html")
-    assert dom.count('class="tools"') == 6
+    assert dom.count('class="tools"') == 7
     assert dom.count('type="checkbox"') == 3
     assert "<title>taken" not in dom
     assert "<title>Haptic texture on" in dom
 
 
 POINTER = """
-const figure = document.querySelectorAll("figure")[2], svg = figure.querySelector("svg");
+const figure = document.querySelectorAll("figure")[3], svg = figure.querySelector("svg");
 const panels = JSON.parse(figure.querySelector("script").textContent), panel = panels[1];
 const [x, y] = toSvgPoint(panel, expandValues(panel.series[0].x)[100], panel.series[0].y[100]);
 const at = new DOMPoint(x, y).matrixTransform(svg.getScreenCTM());
@@ -151,7 +151,7 @@ const others = [...document.querySelectorAll('[data-law="C"]')].map((one) =>
 const csv = figures.map((figure) => csvFile(of(figure)));
 const svg = figures.map((figure) => svgFile(figure.querySelector("svg"), "0 0 72 36"));
 document.querySelectorAll(".laws button")[0].click();
-return { hidden, axes, others, csv, svg, again: csvFile(of(figures[2])) };
+return { hidden, axes, others, csv, svg, again: csvFile(of(figures[3])) };
 """
 
 
@@ -162,7 +162,7 @@ def test_hidden_laws_are_left_out_of_saved_files(page: str, tmp_path: Path) -> N
     assert all(result["hidden"])
     assert not any(result["others"])
     assert set(result["axes"]) == {"visible"}
-    forces = [*csv.reader(io.StringIO(result["csv"][2]))]
+    forces = [*csv.reader(io.StringIO(result["csv"][3]))]
     assert not [name for name in forces[0] if name.startswith("A")]
     unit = forces[0][1].split()[-1]
     assert forces[0][3:] == [
@@ -170,12 +170,12 @@ def test_hidden_laws_are_left_out_of_saved_files(page: str, tmp_path: Path) -> N
         f"C, change of height: normal {unit}",
         f"C, change of height: tangential {unit}",
     ]
-    series = Reader(page).numbers[2][2]["series"]
+    series = Reader(page).numbers[3][2]["series"]
     assert [float(row[4]) for row in forces[1:]] == series[0]["y"]
     digits = [len(row[3].replace(".", "").lstrip("0")) for row in forces[1:]]
     assert max(digits) <= 8  # no rounding noise
     assert "A, groove" in result["again"]
-    fields = [*csv.reader(io.StringIO(result["csv"][3]))]
+    fields = [*csv.reader(io.StringIO(result["csv"][4]))]
     assert fields[0][2].endswith("curl [N/m]")
     assert all(np.isfinite([float(cell) for cell in fields[1][:3]]))
     for text in result["svg"]:
