@@ -7,10 +7,10 @@ ifeq ($(shell command -v $(PYTHON) 2>/dev/null),)
 PYTHON := python3
 endif
 
-.PHONY: demo test check compatibility docs bench mutants kernels lock clean help
+.PHONY: demo test check compatibility dist dist-test docs bench mutants kernels lock clean help
 
 help:  ## List the commands
-	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 10
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 15
 
 $(VENV)/installer: bootstrap.lock
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "asperity needs Python 3.11 or newer")'
@@ -46,6 +46,14 @@ docs: $(VENV)/development  ## Build the documentation into docs/_build/html
 
 compatibility: $(VENV)/installer  ## Tests with the lowest and the newest versions, on each Python
 	bash .ci/compatibility
+
+dist: $(VENV)/runtime  ## Build the wheel and the source distribution into dist/
+	@git diff --quiet HEAD 2>/dev/null || echo "note: not a commit: uncommitted changes are packed, too"
+	rm -rf dist
+	$(BIN)/python -m hatchling build
+
+dist-test: $(VENV)/development  ## Install the wheel on Python 3.11 to 3.13 without a compiler, run it
+	ASPERITY_DIST_TEST=yes $(BIN)/python -m pytest -n 0 tests/test_distribution.py
 
 bench: $(VENV)/development  ## Speed and memory, as ratios against C and peers
 	$(BIN)/python -m bench

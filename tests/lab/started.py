@@ -6,20 +6,36 @@ import re
 import signal
 import subprocess
 import sys
+from collections.abc import Mapping, Sequence
+
+LAB = (sys.executable, "-m", "asperity", "lab", "--no-browser")
 
 
 class Started:
     """A lab.
+
+    Args:
+        arguments: further arguments of the command.
+        command: starts the lab; this Python's by default.
+        environment: its variables; those of this process by default.
 
     Attributes:
         address: of its page.
         process: that serves it.
     """
 
-    def __init__(self, *arguments: str) -> None:
-        command = [sys.executable, "-m", "asperity", "lab", "--no-browser", *arguments]
+    def __init__(
+        self,
+        *arguments: str,
+        command: Sequence[str] = LAB,
+        environment: Mapping[str, str] | None = None,
+    ) -> None:
         self.process = subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+            [*command, *arguments],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=environment,
         )
         assert self.process.stderr is not None
         said = ""

@@ -145,7 +145,7 @@ def test_changed_version_formula_and_files_are_noted(
     monkeypatch.setattr(replay, "__version__", "9.9")
     monkeypatch.setattr(replay, "formula_digest", lambda _law: "another")
     notes = asp.replay(recording).notes
-    assert notes[0] == "Recorded by asperity 0.1.0; this is 9.9."
+    assert notes[0] == f"Recorded by asperity {asp.__version__}; this is 9.9."
     assert notes[1] == "The formula of law F is another one than it was."
     assert notes[2].startswith(f"The file {scene} has changed since")
     assert len(notes) == 3
