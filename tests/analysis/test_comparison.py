@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import asperity as asp
-from asperity.analysis.limits.perceptibility import texture_amount_text
+from asperity.analysis.limits.perceptibility_sentences import texture_amount_text
 from asperity.analysis.passivity.assess_passivity import stiffness_limit_text
 from asperity.core.errors import ParameterError
 from asperity.core.units import format_quantity

@@ -33,12 +33,12 @@ DEVICES = ("touch", "touch-x", "inverse3", "omega.3", "pantograph", "falcon", "p
 SINUSOIDS = """
     0.001 0.1    -    -    -    -    -    -    -
     0.005 0.5    C?   C?   -    C    C?   C?   C?
-    0.02  1      C    C    C?   C    C    C    C
+    0.02  1      C?   C    C?   C    C    C    C
     0.05  0.3    C?   C?   C?   C    C?   H?   C?
     0.1   2      C    C    C    C    C    C    C
     0.4   1.5    H    H    H    H    H    H    H
     0.8   1      H    H    H?   H    H    H    H
-    1     8      H    H    H    H    H    H    H
+    1     8      C    C    C    C    C    C    C
 """
 OTHERS = {
     ("sandpaper:grit=P60", "touch"): "H",

@@ -147,6 +147,21 @@ def scale_jacobians(factor: float) -> Perturbation:
     return Perturbation(f"compiled Jacobians times {factor:g}", replacements)
 
 
+def _stiffen(original: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function of a surface whose result grows faster than the stiffness."""
+
+    def stiffened(surface: Surface, *arguments: Any, **keywords: Any) -> Any:
+        factor = 1.0 + 1e-6 * surface.stiffness
+        return factor * original(surface, *arguments, **keywords)
+
+    return stiffened
+
+
+STIFFENED_JACOBIANS = replace_name(
+    "searched Jacobians times 1 + κ₀/(1 MN/m)", "find_max_norm", _stiffen
+)
+
+
 def substitute_laws(**substitutes: str) -> Perturbation:
     """Replace laws by others, by letter."""
 
@@ -273,6 +288,7 @@ _ALL = (
     scale_forces(1.1),
     scale_jacobians(1.2),
     scale_numbers(0.99),
+    STIFFENED_JACOBIANS,
     scale_numbers(0.999),
     scale_numbers(1.02),
     scale_numbers(1.1),

@@ -32,7 +32,7 @@ from asperity.simulation import (
     simulate,
     simulate_many,
 )
-from asperity.simulation.limit_cycles.onset_search import CYCLE_SPEED
+from asperity.simulation.limit_cycles.onset_search import felt_speed
 from asperity.simulation.trace import HEADER, DecimatedTrace, load_trace
 from asperity.surface import Surface
 from asperity.textures.kinds.sinusoid import Sinusoid
@@ -106,9 +106,10 @@ def test_tail_statistics_do_not_depend_on_decimation(every: int) -> None:
     assert untraced.tail.velocity_spread == whole.tail.velocity_spread
     assert whole.tail.velocity_spread == pytest.approx(velocity_spread(whole), rel=1e-12)
     assert whole.tail.velocity_spread > 1e-9  # the handle swings
-    assert (whole.tail.velocity_spread > CYCLE_SPEED and whole.tail.gains_energy) == is_cycling(
-        whole
-    )
+    extent = np.array_split(whole.position, 4)[3].std(axis=0).sum()
+    assert whole.tail.position_spread == pytest.approx(extent, rel=1e-12)
+    felt = felt_speed(whole.tail.velocity_spread, whole.tail.position_spread)
+    assert (whole.tail.velocity_spread > felt and whole.tail.gains_energy) == is_cycling(whole)
 
 
 def test_tail_statistics_need_enough_rows() -> None:

@@ -100,8 +100,8 @@ def test_row_values_match_their_column_names(monkeypatch: pytest.MonkeyPatch) ->
     assert undelayed == (1.0, 2.0, 3.0)
 
 
-def test_lane_statistics_are_bounds_and_velocity_sums() -> None:
-    """Position bounds since the start, velocity sums since the last segment."""
+def test_lane_statistics_are_bounds_and_sums() -> None:
+    """Bounds since the start; sums of velocity and position since the last segment."""
     rows, ledgers = RNG.normal(size=(12, 6)), RNG.normal(size=(12, LEDGER_SIZE))
     statistics = np.full((2, batch_loop.STATISTICS_SIZE), np.nan)
     statistics[1, batch_loop.LOW : batch_loop.SAMPLE_COUNT] = [np.inf] * 3 + [-np.inf] * 3
@@ -115,7 +115,9 @@ def test_lane_statistics_are_bounds_and_velocity_sums() -> None:
             statistics, 1, np.stack([-x, x]), np.stack([-ledger, ledger])
         )
     assert np.isnan(statistics[0]).all()
-    low, high, (count,), base, total, squares, last = np.split(statistics[1], [3, 6, 7, 10, 13, 16])
+    low, high, (count,), base, total, squares, last, *positions = np.split(
+        statistics[1], [3, 6, 7, 10, 13, 16, 18, 21, 24]
+    )
     np.testing.assert_array_equal(low, rows[:, :3].min(axis=0))
     np.testing.assert_array_equal(high, rows[:, :3].max(axis=0))
     deviations = rows[5:, 3:] - rows[5, 3:]
@@ -125,6 +127,10 @@ def test_lane_statistics_are_bounds_and_velocity_sums() -> None:
     np.testing.assert_allclose(squares, (deviations**2).sum(axis=0), rtol=1e-14)
     expected = [ledgers[-1, :3].sum(), ledgers[-1, LOST] - ledgers[-1, FRICTION]]
     np.testing.assert_allclose(last, expected, rtol=1e-14)
+    offsets = rows[5:, :3] - rows[5, :3]
+    np.testing.assert_array_equal(positions[0], rows[5, :3])
+    np.testing.assert_allclose(positions[1], offsets.sum(axis=0), rtol=1e-14)
+    np.testing.assert_allclose(positions[2], (offsets**2).sum(axis=0), rtol=1e-14)
 
 
 class Recorder:

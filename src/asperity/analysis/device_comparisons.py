@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from asperity.analysis.compare import SCHEMA, Comparison, compare, missing_data_hint
-from asperity.analysis.limits.perceptibility import texture_amount_text
+from asperity.analysis.limits.perceptibility_sentences import texture_amount_text
 from asperity.core.display import Reportable
 from asperity.core.errors import ParameterError
 from asperity.core.files import Serializable, to_plain_data

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from asperity.analysis.limits.limit_rules import DEFAULT_SPEED
-from asperity.analysis.limits.perceptibility import (
-    Perceptibility,
+from asperity.analysis.limits.perceptibility import Perceptibility
+from asperity.analysis.limits.perceptibility_sentences import (
     force_magnitude_text,
     form_removal_sentences,
     masking_text,
@@ -26,7 +26,8 @@ from asperity.analysis.passivity.assess_passivity import (
     delivery_text,
     stiffness_limit_text,
 )
-from asperity.analysis.passivity.criteria import damping_assumption
+from asperity.analysis.passivity.criteria import BUZZ_SPEED, damping_assumption
+from asperity.analysis.passivity.verdict import Margin
 from asperity.analysis.results import LawRow
 from asperity.analysis.surface_sentences import (
     SCOPE_SENTENCE,
@@ -239,11 +240,16 @@ def _limit_basis_text(row: LawRow, device: Device) -> str:
         reach = f"{delay:.0f}" if most is None or most < delay else f"up to {most}"
         return f"It is proved passive up to {at_most}, at the start with {reach} samples of delay."
     if limit.basis == "bounded":
-        buzz = "" if passivity.buzz is None else f": {buzz_text(passivity.buzz)}"
-        return f"It is passive there but for the steps of positions and forces{buzz}."
+        text = "It is passive there but for the steps of positions and forces"
+        if passivity.buzz is None:
+            return f"{text}."
+        goal = f"{format_quantity(BUZZ_SPEED, 'm/s')} for which starts are chosen"
+        relation = "within" if passivity.buzz.speed <= BUZZ_SPEED else "more than"
+        return f"{text}: {buzz_text(passivity.buzz)}, {relation} the {goal}."
     if limit.basis == "wall gain":
         delivers = delivery_text(passivity.loop)
-        return f"No stiffness is stable: its field {delivers}. {_margin_text(row)}"
+        wall = _wall_text(device)
+        return f"No stiffness is stable: its field {delivers}. {wall} {_margin_text(row)}"
     proved = "not proved"
     if limit.proved_stiffness:
         proved = f"proved only up to {stiffness_limit_text(limit.proved_stiffness)}"
@@ -270,14 +276,20 @@ def _wall_text(device: Device) -> str:
 def _margin_text(row: LawRow) -> str:
     """Return the safety margin below the stability limit and its reason, in a sentence."""
     margin = row.margin
-    if not margin.cases:
+    if not margin.loops:
         return "The recommended stiffness equals this limit."
-    of = "K₀/q" if not row.conservative else "this limit"
-    stable = (
-        f"law {margin.law} did not cycle in {margin.cases} simulated loops "
-        "(a pantograph and a free mass on three sinusoids, not this device and surface)"
-    )
-    return f"The recommended stiffness is {margin.factor:g} times {of}; at this ratio {stable}."
+    start = f"The recommended stiffness is {margin.factor:g} times "
+    start += "this limit" if row.conservative else "K₀/q, the gain of that wall"
+    return f"{start}: there {_simulated_loops_text(margin)}."
+
+
+def _simulated_loops_text(margin: Margin) -> str:
+    """Return how many simulated loops cycle, and how large a motion."""
+    text = f"{margin.cycles} of {margin.loops} simulated loops cycle"
+    if not margin.cycles:
+        return text
+    speed = format_quantity(margin.speed, "m/s", digits=2)
+    return f"{text}, at up to {speed} RMS and {margin.frequency:.2g} Hz"
 
 
 _SOUND_REASON = "No closed path of its field gives net energy, and its force does not jump."
@@ -378,16 +390,17 @@ def comparison_assumptions(
 
 def _margin_assumptions(rows: Sequence[LawRow]) -> list[str]:
     """Return the basis of the safety margins."""
-    margins = [row.margin for row in rows if row.margin.cases]
+    # A user-defined law borrows the margin of a shipped one, which may be compared too.
+    margins = {row.margin.law: row.margin for row in rows if row.margin.loops}
     if not margins:
         return []
-    # A user-defined law borrows the margin of a shipped one, which may be compared too.
-    factors = dict.fromkeys(f"{one.law} {one.factor:g}" for one in margins if one.factor < 1.0)
-    listed = ", ".join(factors) or "no law below 1"
+    listed = "; ".join(
+        f"{law} {one.factor:g}: {_simulated_loops_text(one)}" for law, one in margins.items()
+    )
     return [
-        f"Safety margins from simulation ({listed}): "
-        "pantograph and point mass, the paper's brakes, two hands, delays of 0 to 6 samples, "
-        "three sinusoids; other devices may need lower values"
+        f"Safety margins from simulation ({listed}): random loops in which a smooth wall of K₀ is "
+        "just passive, over masses, damping per direction, grips up to 500 N/m, delays of 0 to 6 "
+        "samples and places on random profiles; not this surface on this device"
     ]
 
 

@@ -10,7 +10,7 @@ from rich.table import Table as RichTable
 
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.compare import Comparison
-from asperity.analysis.limits.perceptibility import tier_text
+from asperity.analysis.limits.perceptibility_sentences import tier_text
 from asperity.analysis.passivity.assess_passivity import stability_limit_text
 from asperity.analysis.passivity.verdict import Basis
 from asperity.analysis.results import LawRow

@@ -7,7 +7,11 @@ from functools import partial
 from asperity.analysis.compare import Comparison
 from asperity.analysis.device_comparisons import DeviceComparisons
 from asperity.analysis.gain.characteristic import surface_content
-from asperity.analysis.limits.perceptibility import force_magnitude_text, speed_text, tier_text
+from asperity.analysis.limits.perceptibility_sentences import (
+    force_magnitude_text,
+    speed_text,
+    tier_text,
+)
 from asperity.analysis.results import LawRow
 from asperity.core.digests import content_digest
 from asperity.core.files import json_text

@@ -10,7 +10,7 @@ from asperity.analysis.limits.limit_result import (
     stiffness_text,
 )
 from asperity.analysis.limits.limit_rules import LIMIT_RULES
-from asperity.analysis.limits.perceptibility import speed_text, texture_amount_text
+from asperity.analysis.limits.perceptibility_sentences import speed_text, texture_amount_text
 from asperity.core.units import format_quantity
 from asperity.report import page
 from asperity.report.device_report import device_numbers_table

@@ -52,6 +52,7 @@ class SegmentStatistics:
             evaluation, summed over the axes [m/s].
         energies: energy supplied by the texture, and dissipated by damping and dry friction [J].
         previous_energies: the same before the last sample.
+        position_spread: standard deviations of the position, as those of the velocity [m].
     """
 
     samples: int
@@ -59,6 +60,7 @@ class SegmentStatistics:
     velocity_spread: float
     energies: tuple[float, float]
     previous_energies: tuple[float, float]
+    position_spread: float = 0.0
 
 
 StopRule = Generator[int, SegmentStatistics, bool]
@@ -109,6 +111,12 @@ class Trajectory:
     def _statistic(self, first: int) -> FloatArray:
         return self.statistics[first : first + 3]
 
+    def _spread(self, sums: int, squares: int) -> float:
+        """Return the standard deviations since the last evaluation, summed over the axes."""
+        count = self.statistics[batch_loop.SAMPLE_COUNT]
+        variance = self._statistic(squares) / count - (self._statistic(sums) / count) ** 2
+        return float(np.sqrt(np.maximum(variance, 0.0)).sum())
+
     @property
     def samples(self) -> int:
         """Samples done."""
@@ -124,16 +132,13 @@ class Trajectory:
         stop = STOP_REASONS[self.progress[STOP]]
         if not stop and self.samples < self.next_evaluation:
             return
-        count = self.statistics[batch_loop.SAMPLE_COUNT]
-        mean = self._statistic(batch_loop.VELOCITY_SUM) / count
-        variance = self._statistic(batch_loop.VELOCITY_SQUARES) / count - mean**2
         supplied = self.ledger[SUPPLIED] + self.ledger[SUPPLIED + 1] + self.ledger[SUPPLIED + 2]
         taken = self.ledger[LOST] - self.ledger[FRICTION]
         before = self.statistics[batch_loop.PREVIOUS_ENERGIES :].tolist()
-        spread = float(np.sqrt(np.maximum(variance, 0.0)).sum())
-        segment = SegmentStatistics(
-            self.samples, stop, spread, (float(supplied), float(taken)), (before[0], before[1])
-        )
+        spread = self._spread(batch_loop.VELOCITY_SUM, batch_loop.VELOCITY_SQUARES)
+        extent = self._spread(batch_loop.POSITION_SUM, batch_loop.POSITION_SQUARES)
+        energies = (float(supplied), float(taken)), (before[0], before[1])
+        segment = SegmentStatistics(self.samples, stop, spread, *energies, extent)
         self.statistics[batch_loop.SAMPLE_COUNT] = 0.0
         try:
             self.next_evaluation = self._stop_rule.send(segment)

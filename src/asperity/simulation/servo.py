@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -53,6 +53,10 @@ class Servo(Serializable):
         check_real("virtual_damping", self.virtual_damping, "N s/m")
         if not 0.0 < check_real("velocity_share", self.velocity_share) <= 1.0:
             raise ParameterError("velocity_share", "must be in (0, 1]", self.velocity_share)
+
+    def without_steps(self) -> Servo:
+        """Return the servo with exact positions and forces."""
+        return replace(self, position_resolution=0.0, force_resolution=0.0)
 
     @property
     def settings(self) -> ServoSettings:

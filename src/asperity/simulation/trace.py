@@ -146,6 +146,7 @@ TraceWriter = DecimatedTrace | TextTrace | RecordingWriter
 """What takes the rows of a run, chunk by chunk."""
 _MIN_ROWS = 4
 _NAMES = [name for name, _unit in COLUMNS]
+_POSITION = slice(_NAMES.index("x"), _NAMES.index("z") + 1)
 _VELOCITY = slice(_NAMES.index("vx"), _NAMES.index("vz") + 1)
 _SUPPLIED = slice(_NAMES.index("supplied x"), _NAMES.index("supplied z") + 1)
 _LOST, _FRICTION = _NAMES.index("lost"), _NAMES.index("friction")
@@ -165,7 +166,7 @@ class TailStatistics:
         self._tail_start = rows - rows // 4
         self._energy_start = rows - max(rows // 4, 2)
         self._rows_total, self._rows_seen, self._count_in_tail = rows, 0, 0
-        self._mean, self._squares = np.zeros(3), np.zeros(3)
+        self._mean, self._squares = np.zeros((2, 3)), np.zeros((2, 3))
         self._first_row = self._last_row = np.zeros(len(COLUMNS))
 
     @property
@@ -176,7 +177,12 @@ class TailStatistics:
     @property
     def velocity_spread(self) -> float:
         """Standard deviations of the velocity, summed over the axes [m/s]."""
-        return float(np.sqrt(self._squares / self._count_in_tail).sum())
+        return float(np.sqrt(self._squares[1] / self._count_in_tail).sum())
+
+    @property
+    def position_spread(self) -> float:
+        """Standard deviations of the position, summed over the axes [m]."""
+        return float(np.sqrt(self._squares[0] / self._count_in_tail).sum())
 
     @property
     def gains_energy(self) -> bool:
@@ -190,17 +196,20 @@ class TailStatistics:
         first, self._rows_seen = self._rows_seen, self._rows_seen + len(rows)
         if first <= self._energy_start < self._rows_seen:
             self._first_row = rows[self._energy_start - first].copy()
-        part = rows[max(self._tail_start - first, 0) :, _VELOCITY]
+        part = rows[max(self._tail_start - first, 0) :]
         if len(rows):
             self._last_row = rows[-1].copy()
         if not len(part):
             return
         # Mean and squares of two parts are merged without a difference of large numbers.
-        mean, total = part.mean(axis=0), self._count_in_tail + len(part)
-        change = mean - self._mean
-        self._squares += ((part - mean) ** 2).sum(axis=0)
-        self._squares += change**2 * (self._count_in_tail * len(part) / total)
-        self._mean = self._mean + change * (len(part) / total)
+        total = self._count_in_tail + len(part)
+        for i, columns in enumerate((_POSITION, _VELOCITY)):
+            values = part[:, columns]
+            mean = values.mean(axis=0)
+            change = mean - self._mean[i]
+            self._squares[i] += ((values - mean) ** 2).sum(axis=0)
+            self._squares[i] += change**2 * (self._count_in_tail * len(part) / total)
+            self._mean[i] += change * (len(part) / total)
         self._count_in_tail = total
 
 

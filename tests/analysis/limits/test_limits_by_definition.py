@@ -20,8 +20,8 @@ from asperity.analysis.limits.perceptibility import (
     assess_perceptibility,
     classify_perceptibility,
     respond,
-    unverified_text,
 )
+from asperity.analysis.limits.perceptibility_sentences import unverified_text
 from asperity.analysis.limits.spectrum import Spectrum, Wave
 from asperity.analysis.passivity.verdict import StabilityLimit
 from asperity.core.errors import ParameterError

@@ -227,8 +227,15 @@ def make_criterion(name: str, limit: float | None, at_most: float | None = None)
 
 
 def test_stability_limit_is_the_larger_of_plausible_and_proved() -> None:
-    """Ties are proved; if quantization always leaves a buzz, it is half the delay limit."""
-    loop = make_loop(damping=Fraction(1), delay=2)
+    """Ties are proved. Where the buzz is bounded, the limit is that of its bound."""
+    unbounded = make_loop(damping=Fraction(1), delay=2, rate=None)
+    bounded = make_loop(damping=Fraction(1), delay=2, force_step=Fraction(1, 1000))
+    check_stability_limits(unbounded, None)
+    check_stability_limits(bounded, criteria.buzz_limited_stiffness(bounded))
+
+
+def check_stability_limits(loop: DeviceLoop, calm: float | None) -> None:
+    """Compare limits with their definition; ``calm`` is the one that bounds the buzz."""
     for main, steps, wall in product(LIMITS, (*LIMITS, INF), LIMITS):
         by_name = {
             DELAY: make_criterion(DELAY, main),
@@ -237,14 +244,17 @@ def test_stability_limit_is_the_larger_of_plausible_and_proved() -> None:
         }
         limit = judgement.stability_limit(loop, by_name)
         both = None if None in (main, steps) else min(main or 0.0, steps or 0.0)
-        if (wall or 0.0) > (both or 0.0):
+        quiet = 0.0 if calm is None or not main else min(calm or 0.5 * main, main)
+        if quiet > (both or 0.0):
+            assert limit == StabilityLimit(
+                quiet, "bounded", QUANTIZATION, proved_stiffness=both or 0.0
+            )
+        elif (wall or 0.0) > (both or 0.0):
             assert limit == StabilityLimit(
                 wall, "plausible", "w", 2.0, proved_stiffness=both or 0.0
             )
         elif both is None:
             assert limit == StabilityLimit(wall, "none")
-        elif both == 0.0 and main:
-            assert limit == StabilityLimit(0.5 * main, "bounded", QUANTIZATION)
         else:
             assert limit == StabilityLimit(
                 both, "proved" if both else "none", DELAY if both else "", proved_stiffness=both

@@ -238,24 +238,22 @@ def test_steps_give_a_bounded_buzz_that_friction_silences() -> None:
 
 
 def test_proved_stiffness_has_a_passive_verdict() -> None:
-    """It includes quantization; a stable wall gives a larger limit where friction is small."""
+    """It includes quantization; above it the bound of the buzz is the limit, whatever the wall."""
     rig = {**RIG, "position_resolution": 2e-5, "least_friction": 0.02}
     stability_limit = assess(rig, 100.0, 2.0, 1.5).stability_limit
-    assert (stability_limit.basis, stability_limit.proved_stiffness) == (
-        "proved",
-        stability_limit.stiffness,
-    )
-    assert stability_limit.stiffness == pytest.approx(
-        0.02 / (2.0 * math.sqrt(3.0) * 1e-5), rel=1e-9
-    )
-    assert assess(rig, stability_limit.stiffness, 2.0, 1.5).verdict == "passive"
-    assert assess(rig, 1.000001 * stability_limit.stiffness, 2.0, 1.5).verdict == "bounded"
+    assert stability_limit.basis == "bounded"
+    proved = stability_limit.proved_stiffness
+    assert proved == pytest.approx(0.02 / (2.0 * math.sqrt(3.0) * 1e-5), rel=1e-9)
+    assert assess(rig, proved, 2.0, 1.5).verdict == "passive"
+    assert assess(rig, 1.000001 * proved, 2.0, 1.5).verdict == "bounded"
     more = assess({**rig, "max_stiffness": 3000}, 100.0, 2.0, 1.5).stability_limit
-    assert (more.basis, more.proved_stiffness) == ("plausible", stability_limit.stiffness)
-    assert more.stiffness == pytest.approx(3000 * 1.5 / 2.75, rel=1e-12)
+    assert more == stability_limit
+    firm = assess({**rig, "least_friction": 0.2}, 100.0, 2.0, 1.5).stability_limit
+    assert (firm.basis, firm.stiffness) == ("proved", pytest.approx(8000.0 / 2.75, rel=1e-12))
     silent = assess({**RIG, "position_resolution": 2e-5}, 100.0, 2.0, 1.5).stability_limit
     assert (silent.basis, silent.proved_stiffness) == ("bounded", 0.0)
-    assert silent.stiffness == pytest.approx(8000.0 / 2.75 / 2.0, rel=1e-12)
+    slope = 2.0 * math.sqrt(3.0) * 1e-5 * 4000.0 + 0.01 * 2.75
+    assert silent.stiffness == pytest.approx(0.01 * 8000.0 / slope, rel=1e-9)
 
 
 def test_stepped_positions_in_the_wall_test_require_the_resolution() -> None:

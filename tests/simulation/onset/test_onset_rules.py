@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,14 +13,15 @@ import pytest
 
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
+from asperity.perception.grip import load_grip
 from asperity.simulation import Cartesian, Servo, SpringHand, Stationary, Strokes, find_onset
 from asperity.simulation.batch import SegmentStatistics
 from asperity.simulation.kernels.body_interface import LANES
 from asperity.simulation.limit_cycles import onset
 from asperity.simulation.limit_cycles.onset import Onset, find_onsets, is_at_rest, start_offsets
 from asperity.simulation.limit_cycles.onset_search import (
-    CYCLE_SPEED,
     bracket_onset,
+    felt_speed,
     limit_cycle_rule,
 )
 from asperity.simulation.trace import StopReason
@@ -30,7 +32,7 @@ SURFACE = Surface(Sinusoid(0.2e-3, 2e-3), "A", max_depth=1e-3)
 
 
 def apply_rule(
-    *segments: SegmentStatistics, first: int = 16, threshold: float = 1.0
+    *segments: SegmentStatistics, first: int = 16, threshold: float | None = 1.0
 ) -> tuple[bool, list[int]]:
     """Return the verdict of the rule on these segments, and the sample counts it requested.
 
@@ -112,7 +114,25 @@ def test_run_that_leaves_at_once_is_not_a_cycle() -> None:
 def test_velocity_spread_of_a_cycle_exceeds_the_threshold() -> None:
     assert apply_rule(*quarters(2.0, 1.0)) == (False, [8, 12, 16])
     assert apply_rule(*CYCLING, *quarters(1.0, math.nextafter(1.0, 2.0)))[0]
-    assert CYCLE_SPEED == 15e-3
+
+
+@pytest.mark.parametrize("frequency", [24.0, 100.0, 300.0])
+def test_default_threshold_is_what_a_hand_feels_at_the_frequency(frequency: float) -> None:
+    """An amplitude of the threshold curve: 13 mm/s at 24 Hz is no rest."""
+    amplitude = float(load_grip().threshold(frequency)[1])
+    for factor, ends in ((0.99, False), (1.01, True)):
+        extent = factor * amplitude / math.sqrt(2.0)
+        speed = 2.0 * math.pi * frequency * extent
+        segments = [replace(one, position_spread=extent) for one in quarters(speed, speed)]
+        assert apply_rule(*segments, *(segments if ends else []), threshold=None)[0] is ends
+
+
+def test_felt_speed_beyond_the_curve_is_that_of_its_ends() -> None:
+    grip = load_grip()
+    ends = [math.sqrt(2.0) * math.pi * f * float(grip.threshold(f)[1]) for f in (10.0, 500.0)]
+    assert felt_speed(1e-9, 1.0) == pytest.approx(ends[0])
+    assert felt_speed(1.0, 1e-9) == pytest.approx(ends[1])
+    assert felt_speed(1.0, 0.0) == pytest.approx(ends[1])
 
 
 @pytest.mark.parametrize(("supplied", "ends"), [(0.2, False), (0.21, True), (-1.0, False)])
@@ -139,9 +159,12 @@ def test_quarters_are_split_as_by_numpy(rows: int) -> None:
         (
             ((9.0, 2.0), (2.0, 1.79), (2.0, 1.79)),
             (16, 64, 256),
-            True,
-        ),  # settling up to the longest run
-        (((9.0, 2.0), (2.0, 1.8)), (16, 64), True),  # a decrease of exactly a tenth does not count
+            False,
+        ),  # settling up to the longest run: it does not last
+        # A decrease of exactly a tenth does not count, nor one that would be it in a longer run.
+        (((9.0, 2.0), (2.0, 1.9), (2.0, 1.8)), (16, 64, 256), True),
+        (((9.0, 2.0), (2.0, 0.9**0.25 * 2.0)), (16, 64), True),
+        (((9.0, 2.0), (2.0, 0.973 * 2.0), (2.0, 1.79)), (16, 64, 256), False),
         (((9.0, 2.0), (2.0, 1.5), (1.2, 0.9)), (16, 64, 256), False),
     ],
 )

@@ -270,20 +270,56 @@ def buzz_bound(loop: DeviceLoop) -> BuzzBound | None:
     Reference:
         MATH section 7.
     """
-    if loop.obstacle or loop.damping_gain is None or loop.delay is None or loop.rate is None:
+    terms = None if loop.damping_gain is None else _buzz_terms(loop)
+    if terms is None or loop.rate is None:
+        return None
+    per_stiffness, fixed, gain, budget = terms
+    margin = budget - loop.stiffness * gain
+    if margin <= 0:
+        return None
+    excess = max(loop.stiffness * per_stiffness + fixed, _ZERO)
+    speed, power = excess * loop.rate / margin, excess**2 * loop.rate / (4 * margin)
+    return BuzzBound(_round_up(speed), _round_up(power))
+
+
+BUZZ_SPEED = 0.010
+"""Bound of the buzz [m/s] for which a start is chosen where damping and delay are known."""
+
+
+def buzz_limited_stiffness(loop: DeviceLoop, speed: float = BUZZ_SPEED) -> float | None:
+    """Return the greatest stiffness [N/m] at which :func:`buzz_bound` is at most a speed.
+
+    With φ - f_c = a k + c and m = (G - g k)/T it is (v G - c/T)/(a/T + v g). Errors of force that
+    do not scale with k let it be c/(T G) at any stiffness: v is at least twice that.
+
+    Args:
+        loop: the surface on the device; its stiffness does not count.
+        speed: v [m/s].
+
+    Returns:
+        The stiffness; ``None`` if there is no bound at any.
+    """
+    terms = _buzz_terms(loop)
+    if terms is None or loop.rate is None or terms[-1] <= 0:
+        return None
+    per_stiffness, fixed, gain, budget = terms
+    v = max(Fraction(speed), 2 * fixed * loop.rate / budget)
+    slope = per_stiffness * loop.rate + v * gain
+    return math.inf if slope == 0 else _round_down((v * budget - fixed * loop.rate) / slope)
+
+
+def _buzz_terms(loop: DeviceLoop) -> tuple[Fraction, Fraction, Fraction, Fraction] | None:
+    """Return (φ - f_c per stiffness, its fixed part, q⁺/2 + d q, the budget [N/m]), if known."""
+    if loop.obstacle or loop.damping_gain is None or loop.delay is None:
         return None
     q = loop.weighted_gain(_ZERO, _ONE, "upper")
     gain = loop.weighted_gain(HALF, loop.known_delay, "upper")
     if math.inf in (q, gain):
         return None
     virtual = abs(loop.virtual_damping_gain)
-    margin = loop.damping_gain - virtual - loop.stiffness * Fraction(gain)
-    if margin <= 0:
-        return None
-    force = loop.stiffness * Fraction(q) * loop.position_step / 2 + loop.force_step / 2
-    excess = max(force + virtual * loop.position_step - loop.friction, _ZERO)
-    speed, power = excess * loop.rate / margin, excess**2 * loop.rate / (4 * margin)
-    return BuzzBound(_round_up(speed), _round_up(power))
+    fixed = loop.force_step / 2 + virtual * loop.position_step - loop.friction
+    per_stiffness = Fraction(q) * loop.position_step / 2
+    return per_stiffness, fixed, Fraction(gain), loop.damping_gain - virtual
 
 
 def _round_up(value: Fraction) -> float:

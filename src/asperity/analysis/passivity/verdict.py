@@ -23,6 +23,7 @@ from asperity.analysis.passivity.criteria import (
     WALL_TEST,
     BuzzBound,
     Criterion,
+    buzz_limited_stiffness,
     evaluate_criteria,
 )
 from asperity.analysis.passivity.device_loop import (
@@ -75,8 +76,9 @@ class StabilityLimit(Serializable):
     Attributes:
         stiffness: the limit [N/m]; 0 if no stable stiffness is known, ``None`` if undecidable.
         basis: ``"proved"``: passive up to the limit, under the assumptions of the criterion.
-            ``"plausible"``: a smooth wall of that gain did not cycle. ``"bounded"``: half of the
-            limit of the delay rule, where quantisation leaves a buzz with a bound.
+            ``"plausible"``: a smooth wall of that gain did not cycle. ``"bounded"``:
+            passive but for quantisation, whose buzz moves at ``BUZZ_SPEED`` at most, or at twice
+            what steps of force cause at any stiffness.
             ``"wall gain"``: a wall of that gain did not cycle; no stability limit, since the law
             has curl and delivers energy below v* at any stiffness. ``"none"``.
         criterion: name of the criterion that gives the limit; empty for none.
@@ -139,12 +141,15 @@ def stability_limit(loop: DeviceLoop, by_name: Mapping[str, Criterion]) -> Stabi
     if loop.obstacle is not None or loop.delay is None or is_contradictory(loop):
         return plausible
     proved = _proved_limit(main, steps)
+    silent = proved.stiffness or 0.0
+    if main.limit and not steps.missing and (calm := buzz_limited_stiffness(loop)) is not None:
+        bounded = min(calm, main.limit)
+        if bounded > silent:
+            return StabilityLimit(bounded, "bounded", QUANTIZATION, proved_stiffness=silent)
     if (plausible.stiffness or 0.0) > (proved.stiffness or 0.0):
         return replace(plausible, proved_stiffness=proved.proved_stiffness)
     if proved.stiffness is None:
         return plausible
-    if proved.stiffness == 0.0 and main.limit:
-        return StabilityLimit(0.5 * main.limit, "bounded", QUANTIZATION)
     return proved
 
 
@@ -223,32 +228,35 @@ def _assess_wall_test(
 
 
 _MARGINS_FILE = Path(__file__).with_name("margins.toml")
-# Limits that need no margin: they are proved, or half of what is proved.
+# Limits that need no margin: they are proved, or bound the buzz.
 _BASES_WITHOUT_MARGIN = ("proved", "bounded")
 
 
 @dataclass(frozen=True)
 class Margin(Serializable):
-    """Safety margin: the recommended stiffness over the stability limit.
+    """Safety margin: the recommended stiffness over K₀/q, from random admissible loops.
 
     Attributes:
         factor: recommended stiffness over stability limit, at most 1.
         law: letter of the simulated law; for a user-defined law the shipped law with the least
             factor.
-        loop: simulated loop in which the law began to cycle first; empty without simulation.
-        surface: surface of that loop.
-        delay: delay of that loop, in samples.
-        below: number of loops in which the law began to cycle below K₀/q.
-        cases: number of simulated loops.
+        loops: number of random loops simulated at that factor of K₀/q; 0 without simulation.
+        cycles: in how many of them a motion lasts, without steps, that a hand feels.
+        speed: RMS speed of the fastest of these motions, summed over the axes [m/s].
+        extent: its RMS displacement [m].
     """
 
     factor: float
     law: str = ""
-    loop: str = ""
-    surface: str = ""
-    delay: int = 0
-    below: int = 0
-    cases: int = 0
+    loops: int = 0
+    cycles: int = 0
+    speed: float = 0.0
+    extent: float = 0.0
+
+    @property
+    def frequency(self) -> float:
+        """Frequency of a sinusoid of that speed and displacement [Hz]."""
+        return self.speed / (2.0 * math.pi * self.extent) if self.extent else 0.0
 
 
 NO_MARGIN = Margin(1.0)
@@ -262,11 +270,11 @@ def load_margins(along_lightest: bool = False) -> dict[Law, Margin]:
         along_lightest: whether K₀ is that of the lightest direction.
     """
     table = tomllib.loads(_MARGINS_FILE.read_text(encoding="utf-8"))
-    name = "along_lightest" if along_lightest else "factor"
-    fields = ("loop", "surface", "delay", "below", "cases")
+    fields = ("loops", "cycles", "speed", "extent")
     return {
-        LAWS[law]: Margin(entry[name], law, *(entry[field] for field in fields))
+        LAWS[law]: Margin(part["factor"], law, *(part[field] for field in fields))
         for law, entry in table.items()
+        for part in ([entry["lightest"]] if along_lightest else [entry])
     }
 
 

@@ -109,9 +109,10 @@ _CLOSED_FORMS = {"B": q_b, "C": q_c, "G": q_g}
 
 @declare_claim("sentence-IV-closed-form")
 def closed_forms() -> Check:
-    """No manageable closed form was found for the numbers of B, C and G: they are evaluated.
+    """The numbers of B, C and G have no closed form, not even on a sinusoid: a search gives them.
 
-    A search over Jacobians, as in the paper, is compared with closed forms that exist.
+    The paper says that none was found, which cannot be judged; that there is none can. A search
+    over Jacobians, as in the paper, is compared with closed forms.
     """
     cases = [PASSIVITY, SCANNING, *random_settings(6)]
     checks = []

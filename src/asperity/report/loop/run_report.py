@@ -23,7 +23,7 @@ from asperity.report.sentences.number_text import readable_name
 from asperity.scene.setup import Setup
 from asperity.simulation import Run
 from asperity.simulation.limit_cycles.onset import is_at_rest
-from asperity.simulation.limit_cycles.onset_search import CYCLE_SPEED
+from asperity.simulation.limit_cycles.onset_search import felt_speed
 from asperity.simulation.trace import load_trace
 from asperity.surface import Surface
 
@@ -92,12 +92,17 @@ def rest_text(setup: Setup, run: Run) -> str:
     if run.tail is None or not run.tail.is_complete:
         return "Too few samples were traced to decide whether the handle came to rest"
     speed = run.tail.velocity_spread
-    cycles = speed > CYCLE_SPEED and run.tail.gains_energy
-    verdict = "keeps moving: a limit cycle" if cycles else "comes to rest"
-    limit, spread = (format_quantity(one, "m/s", digits=3) for one in (CYCLE_SPEED, speed))
+    felt = felt_speed(speed, run.tail.position_spread)
+    verdict = "comes to rest"
+    if speed > felt and run.tail.gains_energy:
+        servo = setup.servo
+        has_steps = servo.position_resolution or servo.force_resolution
+        verdict = "keeps moving: a limit cycle"
+        verdict += ", or the chatter of steps" if has_steps else ""
+    limit, spread = (format_quantity(one, "m/s", digits=3) for one in (felt, speed))
     return (
-        f"The handle {verdict} (velocity varies by {spread} in the last quarter; above {limit} "
-        "counts as a cycle)"
+        f"The handle {verdict} (velocity varies by {spread} in the last quarter; a hand feels "
+        f"{limit} at that frequency)"
     )
 
 

@@ -16,7 +16,6 @@ from asperity.report.sentences.number_text import INFINITY_SIGN, NOT_AVAILABLE
 from asperity.report.sentences.texts import table_notes
 from asperity.scene.setup import Setup
 from asperity.simulation.limit_cycles.onset import Prediction
-from asperity.simulation.limit_cycles.onset_search import CYCLE_SPEED
 from asperity.simulation.scan import Stroke
 
 if TYPE_CHECKING:
@@ -106,8 +105,7 @@ def _case_name(prediction: Prediction) -> str:
 
 def onset_page(setup: Setup, predictions: Sequence[Prediction]) -> Page:
     """Return the report of the onsets."""
-    limit = format_quantity(CYCLE_SPEED, "m/s")
-    cycle = f"A limit cycle: the velocity varies by more than {limit} RMS in the last quarter."
+    cycle = "A limit cycle: motion that lasts without steps of position and force and is felt."
     in_numbers = onset_section("In numbers, N/m", predictions, cycle)
     return Page(
         title=f"Onset of limit cycles, {setup.device.name}",

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from asperity.analysis.compare import Comparison
 from asperity.analysis.energy.scan_lines import parallel_line_points
 from asperity.analysis.limits.limit_result import Limits, stiffness_text
-from asperity.analysis.limits.perceptibility import HandSpectrum, speed_text
+from asperity.analysis.limits.perceptibility import HandSpectrum
+from asperity.analysis.limits.perceptibility_sentences import speed_text
 from asperity.core.checks import FloatArray
 from asperity.core.units import format_quantity
 from asperity.devices import Device

@@ -30,9 +30,11 @@ SERVO_STATE_SIZE = 12
 DELAY = 2
 # Statistics of a run: least and greatest position since the start; since ``SAMPLE_COUNT`` was reset
 # the number of samples, the first velocity, and the sums of the deviations from it and of their
-# squares; energies supplied by the texture and dissipated, before the last sample.
+# squares; energies supplied by the texture and dissipated, before the last sample; the same sums
+# of positions.
 LOW, HIGH, SAMPLE_COUNT, BASE_VELOCITY = 0, 3, 6, 7
-VELOCITY_SUM, VELOCITY_SQUARES, PREVIOUS_ENERGIES, STATISTICS_SIZE = 10, 13, 16, 18
+VELOCITY_SUM, VELOCITY_SQUARES, PREVIOUS_ENERGIES = 10, 13, 16
+BASE_POSITION, POSITION_SUM, POSITION_SQUARES, STATISTICS_SIZE = 18, 21, 24, 27
 
 
 def load_servo_state(states: FloatArray, lane: int) -> ServoState:
@@ -131,9 +133,15 @@ def update_lane_statistics(
             statistics[lane, BASE_VELOCITY + i] = x[lane, 3 + i]
             statistics[lane, VELOCITY_SUM + i] = 0.0
             statistics[lane, VELOCITY_SQUARES + i] = 0.0
+            statistics[lane, BASE_POSITION + i] = x[lane, i]
+            statistics[lane, POSITION_SUM + i] = 0.0
+            statistics[lane, POSITION_SQUARES + i] = 0.0
         deviation = x[lane, 3 + i] - statistics[lane, BASE_VELOCITY + i]
         statistics[lane, VELOCITY_SUM + i] += deviation
         statistics[lane, VELOCITY_SQUARES + i] += deviation * deviation
+        offset = x[lane, i] - statistics[lane, BASE_POSITION + i]
+        statistics[lane, POSITION_SUM + i] += offset
+        statistics[lane, POSITION_SQUARES + i] += offset * offset
     statistics[lane, PREVIOUS_ENERGIES] = (
         ledger[lane, SUPPLIED] + ledger[lane, SUPPLIED + 1] + ledger[lane, SUPPLIED + 2]
     )

@@ -25,7 +25,6 @@ from asperity.simulation.batch import BatchSimulation, Trajectory
 from asperity.simulation.hands import Hand
 from asperity.simulation.kernels.body_interface import LANES
 from asperity.simulation.limit_cycles.onset_search import (
-    CYCLE_SPEED,
     OnsetSearch,
     bracket_onset,
     limit_cycle_rule,
@@ -131,7 +130,7 @@ def find_onset(
     duration: float = 0.5,
     starts: int = 24,
     tolerance: float = 0.02,
-    threshold: float = CYCLE_SPEED,
+    threshold: float | None = None,
     lowest: float = MIN_STIFFNESS,
     highest: float = MAX_STIFFNESS,
     near: float | None = None,
@@ -152,7 +151,9 @@ def find_onset(
         starts: number of phases of the texture at which the handle starts.
         tolerance: width of the bracket over its lower end.
         threshold: sum over the axes of the standard deviations of the velocity above which an
-            oscillation counts as a limit cycle [m/s].
+            oscillation counts as a limit cycle [m/s]. By default an oscillation counts that a hand
+            feels (:func:`~asperity.simulation.limit_cycles.onset_search.felt_speed`) and that lasts
+            without steps of position and force, whose chatter belongs to the encoder.
         lowest: stiffness at which the search starts [N/m]; a surface too soft for the hand's force
             lets the handle sink to depths at which the numbers of the law do not hold.
         highest: stiffness at which the search ends [N/m].
@@ -188,7 +189,7 @@ def find_onsets(
     duration: float = 0.5,
     starts: int = 24,
     tolerance: float = 0.02,
-    threshold: float = CYCLE_SPEED,
+    threshold: float | None = None,
     lowest: float = MIN_STIFFNESS,
     highest: float = MAX_STIFFNESS,
     progress: Callable[[], None] | None = None,
@@ -205,7 +206,8 @@ def find_onsets(
         raise ParameterError("tolerance", f"must be at least {_MIN_TOLERANCE:g}", tolerance)
     if not check_positive("lowest", lowest, "N/m") < check_positive("highest", highest, "N/m"):
         raise ParameterError("lowest", f"must be below the highest, {highest:g} N/m", lowest)
-    limit = check_positive("threshold", threshold, "m/s")
+    limit = None if threshold is None else check_positive("threshold", threshold, "m/s")
+    servo = servo if limit else servo.without_steps()
     origin = motion.at(np.zeros(1))[0] if start is None else check_array("start", start, (3,), "m")
     samples = _samples_for(duration, servo)
 

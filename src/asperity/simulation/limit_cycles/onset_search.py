@@ -7,42 +7,72 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator, Iterator, Mapping
+from functools import cache
 from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
 
 from asperity.core.checks import FloatArray
+from asperity.perception.grip import Grip, load_grip
 from asperity.simulation.batch import BatchSimulation, SegmentStatistics, StopRule, Trajectory
 from asperity.simulation.kernels.body_interface import LANES
 from asperity.simulation.trace import SUPPLY_SHARE, StopReason
 
-# Spread of the velocity above which an oscillation counts; the paper gives none [m/s].
-CYCLE_SPEED = 15e-3
 # A run that still oscillates is extended by these factors, up to the last one.
 DURATION_FACTORS = (1.0, 4.0, 16.0)
-# A motion whose spread is below this share of the spread one quarter before is decaying.
+# A motion whose spread in the last quarter of the longest run is below this share of that in the
+# quarter before is decaying; in a shorter run it is one that decays as fast.
 _DECAY_RATIO = 0.9
 # With fewer samples a quarter is a single sample, without spread.
 _MIN_SAMPLES = 8
 
 
-def limit_cycle_rule(samples: Callable[[float], int], threshold: float = CYCLE_SPEED) -> StopRule:
+def felt_speed(speed: float, extent: float, grip: Grip | None = None) -> float:
+    """Return the RMS speed [m/s] above which a hand feels an oscillation, at its frequency.
+
+    An oscillation of RMS speed v and RMS displacement x has the frequency f = v/(2π x). A hand
+    feels amplitudes above a(f), which is the RMS speed √2 π f a(f). Beyond the frequencies of the
+    thresholds the speed at the nearest of them counts.
+
+    Args:
+        speed: RMS speed of the oscillation [m/s].
+        extent: RMS displacement [m].
+        grip: grip with its thresholds; default: a tool held like a pen.
+
+    Example:
+        >>> round(felt_speed(0.1, 0.1 / (2 * math.pi * 24)) * 1e3, 3)  # 24 Hz, in mm/s
+        0.267
+    """
+    held = _default_grip() if grip is None else grip
+    lowest, highest = held.frequency[0], held.frequency[-1]
+    frequency = speed / (2.0 * math.pi * extent) if extent > 0.0 else highest
+    frequency = min(max(frequency, lowest), highest)
+    return math.sqrt(2.0) * math.pi * frequency * float(held.threshold(frequency)[1])
+
+
+@cache
+def _default_grip() -> Grip:
+    return load_grip()
+
+
+def limit_cycle_rule(samples: Callable[[float], int], threshold: float | None = None) -> StopRule:
     """Return the stop rule that detects a limit cycle: an oscillation fed by the texture.
 
     A run oscillates if, in its last quarter, the standard deviations of the velocity, summed over
-    the axes, exceed the threshold. For a cycle in place this sum is rms(vx) + rms(vy) + rms(vz);
-    sinking at constant speed does not count. It is fed if in that quarter the texture supplies at
-    least a fifth of the loss in damping and dry friction; on average it supplies all of it. A
-    handle that swings or falls by itself is no limit cycle; a handle that leaves the workspace
-    while it is fed is one, and so is a diverged run.
+    the axes, exceed the threshold: by default what a hand feels, :func:`felt_speed`. For a cycle in
+    place this sum is rms(vx) + rms(vy) + rms(vz); sinking at constant speed does not count. It is
+    fed if in that quarter the texture supplies at least a fifth of the loss in damping and dry
+    friction; on average it supplies all of it. A handle that swings or falls by itself is no limit
+    cycle; a handle that leaves the workspace while it is fed is one, and so is a diverged run.
 
     A run that still oscillates is extended, to 4 and 16 times its duration, until the oscillation
-    no longer decays by a tenth or more from one quarter to the next.
+    decays by less than a tenth per quarter of the longest run; if it still decays faster, it does
+    not last.
 
     Args:
         samples: number of samples of a run, by the factor of its duration.
-        threshold: [m/s].
+        threshold: [m/s]; ``None``: what a hand feels.
     """
     for factor in DURATION_FACTORS:
         rows = samples(factor)
@@ -55,15 +85,16 @@ def limit_cycle_rule(samples: Callable[[float], int], threshold: float = CYCLE_S
             if segments[-1].stop:
                 return (yield from _judge_stopped_run(segments[-1], threshold))
         _, before, last = segments
-        if last.velocity_spread <= threshold:
+        if not _oscillates(last, threshold):
             return False
-        if factor > 1.0 and not last.velocity_spread < _DECAY_RATIO * before.velocity_spread:
-            break
-    return _gains_energy(before, last)
+        lasting = _DECAY_RATIO ** (factor / DURATION_FACTORS[-1]) * before.velocity_spread
+        if factor > 1.0 and not last.velocity_spread < lasting:
+            return _gains_energy(before, last)
+    return False
 
 
 def _judge_stopped_run(
-    segment: SegmentStatistics, threshold: float
+    segment: SegmentStatistics, threshold: float | None
 ) -> Generator[int, SegmentStatistics, bool]:
     """Return the verdict on a run that stopped; its last quarter is run again."""
     if segment.stop is StopReason.DIVERGED:
@@ -73,7 +104,13 @@ def _judge_stopped_run(
         return False
     first = yield rows - rows // 4
     last = yield rows
-    return last.velocity_spread > threshold and _gains_energy(first, last)
+    return _oscillates(last, threshold) and _gains_energy(first, last)
+
+
+def _oscillates(segment: SegmentStatistics, threshold: float | None) -> bool:
+    speed = segment.velocity_spread
+    limit = felt_speed(speed, segment.position_spread) if threshold is None else threshold
+    return speed > limit
 
 
 def _gains_energy(first: SegmentStatistics, last: SegmentStatistics) -> bool:
