@@ -18,6 +18,7 @@ from bench.fakes import compile_library
 from tests.servo.drivers.test_drivers import EXAMPLE
 
 import asperity as asp
+from asperity.cli import loop_setup
 from asperity.cli import servo_commands as run
 from asperity.core.units import format_quantity
 from asperity.recording.recording import open_recording
@@ -187,6 +188,21 @@ def test_motion_outside_the_plane_of_the_device_is_refused(
     code, _out, err = call(path, "--device", "pantograph", "--accept-risk")
     assert code == 2
     assert "a pantograph moves in the x-z plane" in err
+
+
+@pytest.mark.parametrize("name", ["nosuch", "real"])
+def test_unusable_driver_is_refused_before_the_laws_are_compared(
+    call: Call, monkeypatch: pytest.MonkeyPatch, name: str, tmp_path: Path
+) -> None:
+    """A comparison takes a minute; an existing recording is left as it is."""
+    monkeypatch.setattr(loop_setup, "_recommend_law_and_stiffness", lambda *_args: 1 / 0)
+    recording = tmp_path / "run.mcap"
+    recording.write_text("precious")
+    arguments = ("--device", "pantograph" if name == "real" else "touch", "--driver", name)
+    code, out, err = call("cloth", *arguments, "--record", str(recording), "--force")
+    assert (code, out) == (2, "")
+    assert "driver" in err
+    assert recording.read_text() == "precious"
 
 
 def test_stiffness_above_the_limit_is_refused(call: Call, scene: Callable[..., str]) -> None:

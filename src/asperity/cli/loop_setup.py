@@ -94,6 +94,7 @@ def load_setup(
     device, note = options.select_device(values["device"], scene, values), ""
     surface = {**scene.surface, **requested}
     if driver is not None:
+        _check_driver(driver, device)
         # A clamp bounds the force, and the analysis then holds at every depth.
         surface = {"clamp": BACKED.name, **surface}
         if not {"law", "stiffness"} <= surface.keys() and "hand" not in scene.loop:
@@ -119,6 +120,14 @@ def load_setup(
     setup = replace(setup, assumptions=(*notes, *setup.assumptions))
     vars(setup)["rendered"] = rendered  # also where nothing is kept in the cache
     return setup
+
+
+def _check_driver(name: str, device: Device) -> None:
+    """Check the name of a driver before the laws are compared, which takes long."""
+    from asperity.servo.drivers.driver_registry import find_driver
+
+    if name != SIMULATED and not name.startswith(REPLAY_PREFIX):
+        find_driver(name, device)
 
 
 def _recommend_law_and_stiffness(

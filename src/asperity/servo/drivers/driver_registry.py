@@ -28,14 +28,12 @@ def register_driver(kind: DriverKind) -> DriverKind:
     return kind
 
 
-def hardware_driver(text: str, wall: str, origin: Vector, device: Device | None = None) -> Driver:
-    """Return the driver of a real device.
+def find_driver(text: str, device: Device | None = None) -> tuple[DriverKind, str]:
+    """Return the kind of a real device's driver, and its argument.
 
     Args:
         text: a name, with an argument after a colon (``forcedimension:1``, ``haply:049D``); the
             path of a shared library; or ``real`` for the driver in the device's entry.
-        wall: orientation of the surface, "lying" or "standing".
-        origin: origin of the surface, in the device's axes [m].
         device: device whose entry applies.
 
     Raises:
@@ -50,6 +48,22 @@ def hardware_driver(text: str, wall: str, origin: Vector, device: Device | None 
     if kind is None:
         choices = [*_OTHER_DRIVERS, *(known.example for known in DRIVER_KINDS.values())]
         raise ParameterError("driver", f"is unknown: {text!r}; {suggest_names(name, choices)}")
+    return kind, argument
+
+
+def hardware_driver(text: str, wall: str, origin: Vector, device: Device | None = None) -> Driver:
+    """Return the driver of a real device.
+
+    Args:
+        text: the driver, as :func:`find_driver` takes it.
+        wall: orientation of the surface, "lying" or "standing".
+        origin: origin of the surface, in the device's axes [m].
+        device: device whose entry applies.
+
+    Raises:
+        ParameterError: for an unknown driver.
+    """
+    kind, argument = find_driver(text, device)
     return kind.create(argument, surface_frame(kind.axes, wall, origin, kind.unit))
 
 
