@@ -44,13 +44,13 @@ def bake(
     progress: Progress | None = None,
     **goal: Any,
 ) -> Surface:
-    """Bake law H of a surface as a potential field: nothing is searched when it is rendered.
+    """Bake law H of a surface as a potential field, which is rendered without a search.
 
     Args:
         surface: a surface with law H; the field extends down to min h - max_depth.
-        resolution: greatest distance of the nodes [m]; by default the coarsest one at which the
+        resolution: maximum spacing of the nodes [m]; by default the coarsest one at which the
             force differs from exact H by the share, within the size.
-        extent: width and depth [m], from the origin, of the part of a texture that never repeats;
+        extent: width and depth [m], from the origin, of the part of a non-periodic texture to bake;
             it is mirrored at its border.
         progress: called with the finished fraction, from 0 to 1.
         **goal: ``share``, RMS difference from the exact force over the RMS of the texture's force,
@@ -66,7 +66,7 @@ def bake(
             extent is given, or a field larger than ``max_bytes``; the message states what fits.
 
     Reference:
-        MATH section 10.
+        docs/theory/split.md.
     """
     if not surface.law.contact.has_potential_field:
         raise ParameterError("surface", f"must have law H to be baked, not {surface.law}")
@@ -101,7 +101,7 @@ def bake_mesh(
         unit: unit of its coordinates, such as ``"mm"``.
         max_depth: depth down to which the force is that of law H [m]; deeper inside it falls to
             zero. By default 1 mm, or the greatest depth of the body if that is less.
-        resolution: distance of the nodes [m]; by default the coarsest one at which the force
+        resolution: spacing of the nodes [m]; by default the coarsest one at which the force
             differs from exact H by the share, within the size.
         continuity: c of law H, at least 1.
         stiffness: [N/m].
@@ -118,7 +118,7 @@ def bake_mesh(
         SurfaceFileError: a file that cannot be read, or a mesh whose inside is undefined.
 
     Reference:
-        MATH section 9.
+        docs/theory/split.md.
     """
     body, wanted = load_mesh(path, unit, repair=repair), _goal(**goal)
     field = bake_body(

@@ -229,7 +229,7 @@ def analyze(
             measured surface pressed deeper than it is wide.
 
     Reference:
-        Campion and Hayward, (1), (5), III.B and III.C; MATH sections 3 and 4.
+        Campion and Hayward, (1), (5), III.B and III.C; docs/theory/jacobians.md and numbers.md.
 
     Example:
         >>> from asperity.textures.kinds.sinusoid import Sinusoid

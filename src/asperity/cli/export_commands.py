@@ -37,7 +37,7 @@ _FORMER_NAMES = {"largest": "max-data", "looks": "max-evaluations"}
     is_flag=True,
     help="Search without an evaluation budget: exact, at unbounded cost per tick.",
 )
-@click.option("--load", is_flag=True, help="Load the field of law H, which is written too.")
+@click.option("--load", is_flag=True, help="Load the field of law H at run time from a file.")
 @click.option("--shared", is_flag=True, help="Write a library: header, source and CMakeLists.txt.")
 @click.option("--force", is_flag=True, help="Replace existing files.")
 @options.argument_options((_LANG, *_REQUEST_ARGUMENTS, _CLAMP))

@@ -4,7 +4,7 @@ New here, not in the paper. With F the free set, c > 0 (``continuity``) and μ =
 potential is U(p) = (1 - μ) sup_y [dist²(y, F)/2 - |p - y|²/(2μ)] and the force -k ∇U, a spring to
 the mean z̄ of a god-object that has split where several surface points are about equally near. For
 any surface: conservative, continuous, q = max(1, c), q⁺ = 1, no force outside; it equals law D up
-to the fraction c/(1 + c) of the way to the medial axis (MATH section 6).
+to the fraction c/(1 + c) of the way to the medial axis (docs/theory/split.md).
 
 The mathematics is the upper compensated convex transform of Zhang, Crooks and Orlando
 (arXiv:1508.05522) and C^{1,1} extension (Azagra, Le Gruyer and Mudarra, arXiv:1706.02235); its use

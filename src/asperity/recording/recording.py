@@ -199,10 +199,10 @@ def is_recording(path: str | os.PathLike[str]) -> bool:
 
 
 def open_recording(path: str | os.PathLike[str]) -> Recording:
-    """Open a recording, also one that ends where its process was killed.
+    """Open a recording, complete or truncated.
 
     Args:
-        path: of the file.
+        path: path of the file.
 
     Raises:
         ParameterError: for a file that cannot be read, is no recording, or one of a later version.

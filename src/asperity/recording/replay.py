@@ -100,12 +100,11 @@ def replay(recording: Recording, surface: Surface | None = None) -> Replay:
     limit and steps of the force, with the law's and the servo's state carried from the first row.
 
     Args:
-        recording: of every sample of a loop.
-        surface: another one to compare with; by default the one that the recording holds.
+        recording: a recording with every sample of a loop.
+        surface: surface to evaluate in place of the recorded one.
 
     Raises:
-        ParameterError: for a recording without rows, one that lacks a column, leaves samples out or
-            holds no surface.
+        ParameterError: for a recording without rows, a column, a sample or the surface.
     """
     surface_data = _surface_metadata(recording)
     if not recording.rows:

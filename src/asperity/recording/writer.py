@@ -43,13 +43,13 @@ _BLOCK_ROWS = 4096
 class RecordingWriter:
     """Writes a recording.
 
-    The file appears with its complete head, and replaces an existing one. Rows are numbers in
-    columns; a loop that has stopped calls :meth:`flush`, since rows are buffered.
+    The file is created with a complete header and replaces an existing one. Rows are buffered: call
+    :meth:`flush` when the loop pauses.
 
     Args:
-        path: of the file.
+        path: path of the file.
         columns: names and units; the first is ``("time", "s")``.
-        metadata: what the recording says of itself, plain data; see
+        metadata: metadata of the recording as plain data; see
             :func:`asperity.core.files.to_plain_data`.
         attachments: files inside it, by name.
         argument: name of the path in messages.

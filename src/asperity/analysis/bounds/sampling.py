@@ -71,7 +71,7 @@ def worst_deflection(surface: Surface, slope: FloatArray) -> FloatArray:
     """Return the deflection that maximises every norm of law F, (n, 2) [m], for slopes (n, 2).
 
     ‖J‖ and λ_max are convex in d, hence greatest for |d| = d_max, and there for d against
-    the slope of the height: the friction then falls along d fastest (MATH section 3).
+    the slope of the height: the friction then falls along d fastest (docs/theory/jacobians.md).
     """
     length = np.hypot(*slope.T)[:, None]
     unit = np.where(length > 0.0, slope / np.where(length > 0.0, length, 1.0), [1.0, 0.0])

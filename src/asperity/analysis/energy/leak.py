@@ -40,7 +40,7 @@ _THRUST_STEPS = 512
 
 @dataclass(frozen=True)
 class Leak(Serializable):
-    """The worst simple loop, turned once, in a vertical plane along a scan line.
+    """The worst simple loop, traversed once, in a vertical plane along a scan line.
 
     Its energy is the larger of ∬curl⁺ and ∬curl⁻ over the length of the line and the depth range,
     curl = ∂f_t/∂z - ∂f_z/∂t, t along the line. For a law with state loops in a plane of constant
@@ -134,7 +134,7 @@ def worst_loop(surface: Surface, direction: tuple[float, float] | None = None) -
         ParameterError: for a direction without length.
 
     Reference:
-        The paper's section III.C and (27); MATH section 4.
+        The paper's section III.C and (27); docs/theory/numbers.md.
 
     Example:
         >>> from asperity.textures.kinds.sinusoid import Sinusoid

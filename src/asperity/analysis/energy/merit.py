@@ -43,7 +43,7 @@ class Merit:
 
 
 def merit(surface: Surface) -> Merit:
-    """Return strength and support (MATH section 6), sampled.
+    """Return strength and support (docs/theory/merit.md), sampled.
 
     The scan runs at z = max h - max_depth (vertical and nearest contact) or z = -max_depth
     (nominal contact), along the texture's scan line; on a map along parallel lines, each with

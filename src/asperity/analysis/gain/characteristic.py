@@ -65,7 +65,7 @@ def characteristic_number(
             user-defined law on the split contact.
 
     Reference:
-        The paper's (5), (10) and Table II; MATH section 4 for the rest.
+        The paper's (5), (10) and Table II; docs/theory/numbers.md for the rest.
 
     Example:
         >>> from asperity.textures.kinds.sinusoid import Sinusoid

@@ -1,7 +1,7 @@
 """Characteristic numbers in closed form, for h = A sin(2πx/l) and depths in [0, D].
 
 G₁ = 2πA/l is the greatest slope, y = 4π²AD/l² the greatest curvature times the depth. All are
-proved in MATH section 4; the tests compare them with the symbolic definition.
+proved in docs/theory/numbers.md; the tests compare them with the symbolic definition.
 """
 
 from __future__ import annotations

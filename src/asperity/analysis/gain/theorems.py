@@ -127,7 +127,7 @@ def _slope_problem(offset: float) -> Callable[[Surface, Cells], Problem]:
 
 
 def _norm_bound_from(bound: Callable[[float, float], float]) -> Callable[[Surface], float]:
-    """Return a bound of q from M >= |∇h| and DK, D the depth, K >= ‖Hess h‖ (MATH section 4)."""
+    """Return a bound of q from M >= |∇h| and DK, D the depth, K >= ‖Hess h‖."""
 
     def of(surface: Surface) -> float:
         slope, hessian = surface.texture.bounds

@@ -2,7 +2,7 @@
 
 The texture force is the oscillating force of a straight scan, without form and waviness, in the
 waves that the device resolves at that speed. Each wave moves the apparent mass of the device and
-the hand that holds it (MATH section 11); the amplitude of this motion is compared with the
+the hand that holds it (docs/theory/limits.md); the amplitude of this motion is compared with the
 detection thresholds of the grip at the frequency of the wave.
 """
 

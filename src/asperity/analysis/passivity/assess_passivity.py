@@ -342,7 +342,8 @@ def passivity(
         ParameterError: for another type, or device data out of range.
 
     Reference:
-        The paper's (1) and III.B; Colgate and Schenkel (the paper's [25]); MATH section 4.
+        The paper's (1) and III.B; Colgate and Schenkel (the paper's [25]);
+        docs/theory/passivity.md.
 
     Example:
         >>> from asperity.analysis import characteristic_number, one_sided_number

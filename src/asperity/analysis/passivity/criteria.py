@@ -218,7 +218,7 @@ def damping_assumption(wall_test: WallTest | None) -> str:
 
 
 def _quantization_criterion(loop: DeviceLoop) -> Criterion:
-    """Energy added by quantisation against energy dissipated by dry friction (MATH section 7).
+    """Energy added by quantisation against energy dissipated by dry friction.
 
     A quantised position is off by at most |δ|/2, so a held force is off by φ = k q |δ|/2 + |b|/2,
     and by |b_v| |δ|/T more with virtual damping; friction dissipates f_c per metre.
@@ -268,7 +268,7 @@ def buzz_bound(loop: DeviceLoop) -> BuzzBound | None:
     periodic motion has RMS speed (φ - f_c)/(m T) and draws (φ - f_c)²/(4 m T) at most.
 
     Reference:
-        MATH section 7.
+        docs/theory/passivity.md.
     """
     terms = None if loop.damping_gain is None else _buzz_terms(loop)
     if terms is None or loop.rate is None:

@@ -46,7 +46,7 @@ def split_state(surface: Surface, points: ArrayLike) -> SplitState:
         ParameterError: for another law, another shape, or positions that are not finite.
 
     Reference:
-        MATH section 6, item 2.
+        docs/theory/split.md.
 
     Example:
         >>> from asperity.textures.kinds.sinusoid import Sinusoid

@@ -24,7 +24,7 @@ class NearestContact(Contact):
         """Return ∇depth = -n and, by the implicit function theorem, ∂(X, Y)/∂p = Q⁻¹ [I g].
 
         Q = I + g gᵀ + (h - z) H, where h - z = depth / s because p_h - p is along the normal
-        (MATH section 3).
+        (docs/theory/jacobians.md).
         """
         import sympy as sp
 

@@ -4,7 +4,7 @@ With F the free set (outside of the body), c > 0 and μ = 1/(1 + c), law H's pot
 
     U(p) = min over weights m on F of ½ [|p - z̄|² + (1 - μ) Σ λ_i |w_i - z̄|²],  z̄ = Σ λ_i w_i
 
-and its force is k (z̄ - p) (MATH section 6, item 2). At the optimum every atom w_i is a closest
+and its force is k (z̄ - p) (docs/theory/split.md). At the optimum every atom w_i is a closest
 point of y = p - (z̄ - p)/c, the maximiser of the dual
 U(p) = (1 - μ) max_y [dist²(y)/2 - |p - y|²/(2μ)].
 

@@ -13,7 +13,7 @@ class SplitContact(NearestContact):
     """A law receives the vector to the mean and its derivative.
 
     Down to the fraction c/(1 + c) of the distance to the medial axis the mean is the closest point,
-    and has its properties (MATH section 6, item 3).
+    and has its properties (docs/theory/split.md).
     """
 
     name = "split"

@@ -239,7 +239,7 @@ class HaplyDriver(ThreadedDriver):
             sys.setswitchinterval(self._previous_switch_interval)
 
     def release_lost_device(self) -> None:
-        """Send no force to the service by another connection."""
+        """Send zero force to the service through another connection."""
         connection = _connect()
         try:
             device = _choose_device(_list_devices(connection), self.device)

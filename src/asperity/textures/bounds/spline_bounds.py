@@ -90,7 +90,7 @@ class SplineCells(Cells):
     Args:
         coefficients: B-spline coefficients [m], along each axis one before the first cell and two
             after the last; shape (n + 3,) for a profile along x.
-        pitch: distance of the nodes [m], (p_x, p_y) or (p_x,).
+        pitch: spacing of the nodes [m], (p_x, p_y) or (p_x,).
         origin: the first node [m], shape (2,) or (1,).
         derivatives: function returning h, h_x, h_y, h_xx, h_xy, h_yy, (n, 6), at points (n, 2)
             [m].

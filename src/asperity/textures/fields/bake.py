@@ -67,7 +67,7 @@ def bake_texture(
         texture: a texture that repeats, or is mirrored at its border.
         max_depth: depth below the least height down to which the field extends [m].
         continuity: c of law H.
-        resolution: greatest distance of the nodes [m]; by default the coarsest one that reaches
+        resolution: maximum spacing of the nodes [m]; by default the coarsest one that reaches
             the goal.
         goal: what the field must reach.
         progress: called with the finished fraction, from 0 to 1.

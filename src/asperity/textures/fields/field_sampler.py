@@ -2,8 +2,8 @@
 
 The potential is T(p) = Σ c_n Π β((p - p_n)_i/h_i), β the quadratic B-spline, and the force -k ∇T,
 evaluated as written: it is conservative and continuous whatever the coefficients are, and takes 27
-of them (MATH section 10). Coefficients are stored by columns of nodes along z, each from its first
-to its last coefficient that is not zero; outside of a column they are zero.
+of them (docs/theory/split.md). Coefficients are stored by columns of nodes along z, each from its
+first to its last coefficient that is not zero; outside of a column they are zero.
 
 Below the bottom, halfway between the two lowest levels, the field of a surface continues with its
 value and slope there and the curvature of the flat wall. The field of a closed body ends inside its
@@ -266,7 +266,7 @@ def split_contact_warm(
     x: float, y: float, z: float, _continuity: float, _warm_start: FloatArray,
     field: FieldArguments,
 ) -> Vector:  # fmt: skip
-    """Return -∇T [m]: nothing is searched."""
+    """Return -∇T [m], without a search."""
     gx, gy, gz = field_gradient(x, y, z, field)
     return -gx, -gy, -gz
 

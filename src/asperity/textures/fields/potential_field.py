@@ -68,7 +68,7 @@ def _of_source(name: str) -> property:
 
 
 class PotentialField(Texture):
-    """A potential field baked from law H of a texture: nothing is searched when it is rendered.
+    """A potential field baked from law H of a texture, which is rendered without a search.
 
     T(p) = Σ c_n Π β((p - p_n)_i/h_i), β the quadratic B-spline, c_n the exact potential U of law H
     at nodes p_n, or its mean over neighbouring nodes; the force is -k ∇T. So the force that is
@@ -93,7 +93,7 @@ class PotentialField(Texture):
         thin_regions: where a body can be pressed less deep than ``max_depth``, the thinnest first.
 
     Reference:
-        MATH section 10.
+        docs/theory/split.md.
     """
 
     kind: ClassVar[str] = "field"

@@ -36,7 +36,7 @@ def _noise_arguments(size: Argument) -> tuple[Argument, ...]:
     return (
         Argument("rms", "root mean square height", "m", required=True),
         size,
-        Argument("pitch", "greatest distance of the nodes", "m", default_description="cutoff/8"),
+        Argument("pitch", "maximum spacing of the nodes", "m", default_description="cutoff/8"),
         Argument("hurst", "Hurst exponent", default=DEFAULT_HURST, maximum=1.0),
         Argument("rolloff", "flat spectrum beyond it", "m", default_description="size/4"),
         Argument("cutoff", "shortest wavelength", "m", default_description="size/32"),
@@ -120,7 +120,7 @@ class Noise(_SelfAffine, HeightMap):
     Args:
         rms: root mean square of the heights [m], exact over the nodes (their mean is zero).
         size: the period [m], one number or (L_x, L_y).
-        pitch: greatest distance of the nodes [m]; reduced so that each side has a whole number of
+        pitch: maximum spacing of the nodes [m]; reduced so that each side has a whole number of
             nodes. At most a quarter of the cut-off; by default an eighth.
         hurst: Hurst exponent H, 0 to 1; towards 0 is rougher.
         rolloff: wavelength [m] beyond which the spectrum is flat; by default a quarter of the

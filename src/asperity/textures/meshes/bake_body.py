@@ -48,7 +48,7 @@ def bake_body(
         body: the body.
         max_depth: [m]; by default 1 mm, or the greatest depth of the body if that is less.
         continuity: c of law H, at least 1.
-        resolution: distance of the nodes [m]; by default the coarsest one that reaches the goal,
+        resolution: spacing of the nodes [m]; by default the coarsest one that reaches the goal,
             where the share is that of the RMS force.
         goal: what the field must reach.
         progress: called with the finished fraction, from 0 to 1.

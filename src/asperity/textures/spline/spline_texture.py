@@ -37,7 +37,7 @@ class Spline(Texture):
 
     Attributes:
         heights: heights at the nodes [m], shape (n,) or (ny, nx).
-        pitch: distance of the nodes [m], a number for a profile, (p_x, p_y) for a map.
+        pitch: spacing of the nodes [m], a number for a profile, (p_x, p_y) for a map.
         origin: position of the first node [m], likewise.
         periodic: whether the spline repeats.
     """
@@ -253,7 +253,7 @@ class Profile(Spline):
 
     Args:
         heights: [m], shape (n,), at least 4.
-        pitch: distance of the nodes [m].
+        pitch: spacing of the nodes [m].
         periodic: whether the profile repeats.
         origin: position of heights[0] [m].
         preparation: steps of the preparation of the heights, for reports.
@@ -325,7 +325,7 @@ class HeightMap(Spline):
 
     Args:
         heights: [m], shape (ny, nx), at least 4 × 4.
-        pitch: distance of the nodes [m], one number or (p_x, p_y).
+        pitch: spacing of the nodes [m], one number or (p_x, p_y).
         periodic: whether the map repeats.
         origin: position of heights[0, 0] [m].
         preparation: steps of the preparation of the heights, for reports.
