@@ -45,6 +45,7 @@ PHRASES = {
     "subnormal": r"\bnext to nothing\b",
     "user-defined": r"\bof one's own\b",
     "request": r"\bwish(?:es|ed)?\b",
+    "docs/theory/PAGE.md, as the file is not in the repository": r"\bMATH(?:\.md)? sections?\b",
     "message, result": r"\bwhat (?:is|was|were|has been) (?:said|told|asked|wished|meant|given)\b",
 }
 """Retired phrases in text, by what to write instead."""
