@@ -150,7 +150,7 @@ def test_help_is_imperative_and_in_current_terms(name: str) -> None:
     assert command is not None
     assert COMMANDS[name][1].split()[0].strip(",") in SUMMARY_VERBS
     for subcommand in (command, *getattr(command, "commands", {}).values()):
-        text = subcommand.get_help(click.Context(subcommand))
+        text = subcommand.get_help(click.Context(subcommand, **cli.context_settings))
         assert retired_phrases(text) == []
 
 
