@@ -60,13 +60,14 @@ _UNIT_NAMES = {
 METRES_PER_UNIT = {name: metres for metres, names in _UNIT_NAMES.items() for name in names.split()}
 """Lengths of the units [m] by name in lower case."""
 _EXPLICIT_UNITS = {"Å": 1e-10, "in": 0.0254, "inch": 0.0254, "km": 1e3, "dm": 0.1}
+_MULTIPLE = re.compile(r"((?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\D+)")
 
 
 def unit_to_metres(unit: str) -> float:
     """Return the length of a unit [m].
 
     Args:
-        unit: its symbol or English name, such as "mm".
+        unit: its symbol or English name, such as "mm", or a multiple, such as "0.5 nm".
 
     Raises:
         ParameterError: not a known unit of length.
@@ -75,11 +76,13 @@ def unit_to_metres(unit: str) -> float:
         >>> unit_to_metres("um")
         1e-06
     """
-    name = unit.strip() if isinstance(unit, str) else ""
+    given = unit.strip() if isinstance(unit, str) else ""
+    multiple = _MULTIPLE.fullmatch(given)
+    factor, name = (float(multiple.group(1)), multiple.group(2)) if multiple else (1.0, given)
     plural = name[:-1] if len(name) > 3 and name.endswith("s") else name
     for key in (name, plural):
         if key in METRES_PER_UNIT or key in _EXPLICIT_UNITS:
-            return METRES_PER_UNIT.get(key) or _EXPLICIT_UNITS[key]
+            return factor * (METRES_PER_UNIT.get(key) or _EXPLICIT_UNITS[key])
     raise ParameterError("unit", "must be a unit of length: m, cm, mm, um, nm, angstrom, in", unit)
 
 

@@ -57,7 +57,7 @@ def check_plausible(raw: RawSurface, heights: FloatArray, pitch: Pitch) -> None:
         raise ParameterError(
             "height_range",
             f"is required: the values of {raw.source} have no unit; give the peak-to-valley"
-            " height [m]",
+            f" height [m]{raw.unit_question}",
         )
     span = float(np.nanmax(heights)) - float(np.nanmin(heights))
     slope = mean_slope(heights, pitch)

@@ -58,7 +58,7 @@ def test_points_with_a_validity_column(tmp_path: Path, header: str) -> None:
 
 def test_unnamed_third_column_is_a_height(tmp_path: Path) -> None:
     """Three columns ending in 0 or 1 are points x, y, z unless the header names a validity."""
-    raw = read_text(tmp_path, "0 0 1\n1 0 0\n0 1 1\n1 1 1\n")
+    raw = read_text(tmp_path, "0 0 1\n1 0 0\n0 1 1\n1 1 1\n", unit="m")
     np.testing.assert_array_equal(raw.heights, [[1, 0], [1, 1]])
 
 
@@ -75,7 +75,7 @@ def test_index_column_is_dropped(tmp_path: Path) -> None:
     assert raw.notes == ("the first column numbers the points: left out",)
     later = "".join(f"{k + 5},{-9 + 0.5 * k},{k % 3}\n" for k in range(6))
     for other in (rows.replace("3,", "8,", 1), later):  # not consecutive from 0: columns x, y, z
-        with pytest.raises(SurfaceFileError, match="unit of all 3 columns or of none"):
+        with pytest.raises(SurfaceFileError, match="are not x and z, or x, y and z"):
             read_text(tmp_path, "index,x in µm,y in µm\n" + other, "utf-16")
 
 

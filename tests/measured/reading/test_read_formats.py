@@ -269,7 +269,8 @@ def test_random_bytes_are_not_read_as_a_surface(tmp_path: Path, size: int) -> No
 @needs_library
 def test_text_is_not_passed_to_the_library(tmp_path: Path) -> None:
     path = tmp_path / "points.txt"
-    path.write_text("".join(f"{x + y / 100} {y} {x * y}\n" for x in range(5) for y in range(5)))
+    rows = "".join(f"{x + y / 100} {y} {x * y}\n" for x in range(5) for y in range(5))
+    path.write_text(f"x [m] y [m] z [m]\n{rows}")
     with pytest.raises(SurfaceFileError, match="three columns"):
         read_surface(path)
 
@@ -289,3 +290,56 @@ def test_optional_libraries_are_imported_lazily() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+# --- second witnesses ----------------------------------------------------------------------------
+
+FILES_PAGE = Path(__file__).parents[3] / "docs" / "howto" / "files.md"
+
+
+@pytest.mark.parametrize("format_name", ["opd", "made-up"])
+def test_a_format_without_a_witness_has_a_note(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, format_name: str
+) -> None:
+    monkeypatch.setattr(Library, "format", lambda _: format_name)
+    notes = read(tmp_path, monkeypatch, Channel(0, "Z")).notes
+    assert (instruments.NO_WITNESS in notes) == (format_name == "made-up")
+    assert instruments.NO_WITNESS.startswith("no second witness for this format: check the lateral")
+
+
+@pytest.mark.parametrize("format_name", ["nms", "tmd", "metropro", "plu"])
+def test_formats_of_which_two_readers_differ_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, format_name: str
+) -> None:
+    monkeypatch.setattr(Library, "format", lambda _: format_name)
+    with pytest.raises(SurfaceFileError, match=r"may misread: .*; export it as X3P or SDF"):
+        read(tmp_path, monkeypatch, Channel(0, "Z"))
+
+
+@needs_library
+@pytest.mark.filterwarnings("ignore::ImportWarning")
+def test_page_on_files_lists_the_witness_of_each_format() -> None:
+    from SurfaceTopography.IO import readers
+
+    rows = [line for line in FILES_PAGE.read_text("utf-8").splitlines() if line.startswith("|")]
+    own = {*instruments._OWN_FORMATS}
+    for format_name in {reader.format() for reader in readers} - own:
+        (row,) = [line for line in rows if f"`{format_name}`" in line]
+        assert ("| refused |" in row) == (format_name in instruments._WRONG_FORMATS)
+        is_read = format_name not in instruments._WRONG_FORMATS
+        has_witness = format_name in instruments.WITNESSED_FORMATS
+        assert ("no second witness" in row) == (is_read and not has_witness)
+
+
+@pytest.mark.parametrize("name", ["Deflection", "AmplitudeError", "PeakForceError", "Phase"])
+def test_channels_of_other_quantities_are_no_heights(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    """SurfaceTopography lists them among the heights."""
+    other = Channel(1, name, stored=np.zeros((3, 2)))
+    raw = read(tmp_path, monkeypatch, Channel(0, "ZSensor"), other)
+    assert raw.heights.max() > 0.0
+    with pytest.raises(ParameterError, match="must be one of the height channels 0: 'ZSensor'"):
+        read(tmp_path, monkeypatch, Channel(0, "ZSensor"), other, channel=1)
+    with pytest.raises(SurfaceFileError, match="no height channel"):
+        read(tmp_path, monkeypatch, other)

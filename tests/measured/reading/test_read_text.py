@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 import time
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 from asperity.core.errors import AsperityError, ParameterError, SurfaceFileError
+from asperity.measured.preparation import check_plausible
 from asperity.measured.reading import RawSurface, read_surface
 from asperity.measured.reading import readers as registry
 from asperity.measured.reading.resampling import measure_spacing
@@ -37,6 +39,21 @@ def assert_refused(tmp_path: Path, text: str | bytes, match: str) -> None:
         read_text(tmp_path, text)
     assert "\n" not in str(caught.value)
     assert str(caught.value).startswith("test.txt")
+
+
+def assert_asked(tmp_path: Path, text: str, match: str) -> None:
+    with pytest.raises(ParameterError, match=match):
+        read_text(tmp_path, text)
+
+
+def assert_unit_is_open(raw: RawSurface, question: str = "") -> None:
+    """The numbers are those of the file, and the preparation asks for their unit."""
+    assert raw.relative
+    assert not raw.has_units
+    options = r", or their unit, such as unit='um' \(--unit um\)"
+    assert re.fullmatch(f"{options}.*{question}.*", raw.unit_question)
+    with pytest.raises(ParameterError, match=f"have no unit.*{question}"):
+        check_plausible(raw, raw.heights, (1e-6, 1e-6)[: raw.heights.ndim])
 
 
 def matrix_text(separator: str, decimal: str = ".", end: str = "\n") -> str:
@@ -67,7 +84,7 @@ def test_unit_for_a_file_without_units(tmp_path: Path) -> None:
     assert raw.has_units
     assert raw.notes == ("no unit in the file: 1e-09 m as given",)
     path.write_text("0 5\n20 6\n40 8\n60 5\n")
-    with pytest.raises(SurfaceFileError, match="look not to be in metres"):
+    with pytest.raises(ParameterError, match="does not state the unit of its positions and height"):
         read_surface(path)
     raw = read_surface(path, unit="um")
     assert raw.pitch == pytest.approx((20e-6,), rel=1e-12)
@@ -75,6 +92,12 @@ def test_unit_for_a_file_without_units(tmp_path: Path) -> None:
     path.write_text("x [um],z [nm]\n0,1\n1,2\n2,3\n3,1\n")
     with pytest.raises(ParameterError, match=r"unit must not be given: test\.txt names its unit"):
         read_surface(path, unit="um")
+    path.write_text(matrix_text(","))  # numbers that are multiples of a step
+    np.testing.assert_allclose(
+        read_surface(path, unit="0.5 nm").heights, HEIGHTS * 0.5e-9, rtol=1e-15
+    )
+    with pytest.raises(ParameterError, match="must be a unit of length"):
+        read_surface(path, unit="0.5 V")
 
 
 def test_oversized_text_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -89,8 +112,8 @@ def test_separators_and_line_ends(tmp_path: Path, separator: str, end: str) -> N
     raw = read_text(tmp_path, matrix_text(separator, end=end))
     np.testing.assert_array_equal(raw.heights, HEIGHTS)
     assert raw.pitch is None
-    assert raw.notes == ("no unit in the file: taken as metres",)
-    assert not raw.has_units
+    assert raw.notes == ()
+    assert_unit_is_open(raw)
 
 
 @pytest.mark.parametrize("separator", ["\t", ";", " ", "; "])
@@ -105,7 +128,7 @@ def test_decimal_comma(tmp_path: Path, separator: str) -> None:
 def test_encodings_and_micro_signs(tmp_path: Path, encoding: str) -> None:
     raw = read_text(tmp_path, f"# Höhe [µm]\n{matrix_text(' ')}".encode(encoding))
     np.testing.assert_allclose(raw.heights, HEIGHTS * 1e-6, rtol=1e-14)
-    assert raw.notes == ()
+    assert raw.notes == ("heights in units of 1e-06 m: header 'Höhe [µm]'",)
 
 
 def test_comments_blank_lines_and_missing_points(tmp_path: Path) -> None:
@@ -153,28 +176,40 @@ def test_units_of_a_profile(tmp_path: Path, header: str, x: float, z: float) -> 
 @pytest.mark.parametrize(
     ("header", "match"),
     [
-        ("x [um],height", "unit of all 2 columns or of none"),
         ("x [inch],z [inch]", "names the unit 'inch'"),
         ("x [um],z [V]", "names the unit 'V'"),
-        ("x [um] or [nm],z [nm]", "unit of all 2 columns"),
+        ("x [um] or [nm],z [nm]", r"'x \[um\] or \[nm\]' names several units"),
     ],
 )
 def test_unusable_units_are_refused(tmp_path: Path, header: str, match: str) -> None:
     assert_refused(tmp_path, f"{header}\n0.0,1\n0.5,2\n1.0,4\n1.5,7\n", match)
 
 
-def test_missing_unit_means_metres_unless_implausible(tmp_path: Path) -> None:
-    raw = read_text(tmp_path, "0.0 1e-6\n1e-6 2e-6\n2e-6 3e-6\n3e-6 2e-6\n")
-    assert raw.pitch == pytest.approx((1e-6,))
-    assert not raw.has_units
-    assert "metres" in raw.notes[0]
-    assert_refused(tmp_path, "0 1\n5 2\n10 3\n15 4\n", "span 15 and look not to be in metres")
+@pytest.mark.parametrize(
+    ("header", "what"),
+    [
+        ("", "positions and heights"),
+        ("x,z", "positions and heights"),
+        ("x [um],height", "heights"),
+        ("x,height [um]", "positions"),
+        ("x z [nm]", "positions"),
+        ("Z unit: nm\nx,z", "positions"),
+    ],
+)
+def test_each_column_needs_a_unit(tmp_path: Path, header: str, what: str) -> None:
+    """A unit stated once is not applied to the other column."""
+    text = f"{header}\n0.0,1e-6\n1e-6,2e-6\n2e-6,3e-6\n3e-6,2e-6\n"
+    assert_asked(tmp_path, text, f"does not state the unit of its {what}; give it")
+    raw = read_surface(tmp_path / "test.txt", unit="mm")  # for each column that has none
+    assert raw.pitch == pytest.approx((1e-12 if "x [um]" in header else 1e-9,), rel=1e-12)
+    height = 1e-6 * (1e-9 if "nm" in header else 1e-6 if "height [um]" in header else 1e-3)
+    assert raw.heights[0] == pytest.approx(height, rel=1e-12)
 
 
 def test_two_columns_are_a_profile_or_a_matrix(tmp_path: Path) -> None:
-    assert read_text(tmp_path, "1 5\n2 6\n3 7\n4 8\n").is_profile
+    assert read_text(tmp_path, "x [um] z [um]\n1 5\n2 6\n3 7\n4 8\n").is_profile
     assert read_text(tmp_path, "1 5\n0 6\n3 7\n2 8\n").heights.shape == (4, 2)
-    reverse = read_text(tmp_path, "4 5\n3 6\n2 7\n1 8\n")
+    reverse = read_text(tmp_path, "x [m] z [m]\n4 5\n3 6\n2 7\n1 8\n")
     assert reverse.heights.tolist() == [8, 7, 6, 5]
     assert any("reversed" in note for note in reverse.notes)
     many = [f"{k} 1" for k in range(9)] + ["7 1"] + [f"{k} 1" for k in range(10, 30)]
@@ -195,12 +230,12 @@ def test_nonuniform_sampling_is_refused(tmp_path: Path) -> None:
     true[150:] += 0.3  # a gap of three digits
     text = "x [mm],z [um]\n" + "".join(f"{x:.1f},{k}\n" for k, x in enumerate(true))
     assert_refused(tmp_path, text, r"not uniform: line 1[45]. is .* m from a grid")
-    assert_refused(
-        tmp_path, "0.000 1\n0.100 1\n0.203 1\n0.300 1\n", "not uniform: line 3 is 0.003 m"
-    )
+    text = "x [m] z [m]\n0.000 1\n0.100 1\n0.203 1\n0.300 1\n"
+    assert_refused(tmp_path, text, "not uniform: line 4 is 0.003 m")
     # A lost sample is not rounding, even if positions are printed as coarsely as the step.
     indices = [k for k in range(8) if k != 4]
-    assert_refused(tmp_path, "\n".join(f"{k} 1" for k in indices), "not uniform")
+    text = "x [m] z [m]\n" + "\n".join(f"{k} 1" for k in indices)
+    assert_refused(tmp_path, text, "not uniform")
 
 
 def test_spacing_accepts_rounded_grids_and_refuses_gaps() -> None:
@@ -228,11 +263,11 @@ def test_spacing_accepts_rounded_grids_and_refuses_gaps() -> None:
         ("1 2 3 4\n1 2 1e999 4\n1 2 3 4\n", "line 2 has an infinite number"),
         ("1 2\n3 4\n5 6\n", "3 rows of 2 numbers"),
         ("1\n2\n3\n", "at least 4 points"),
-        ("1 2 3\n1 2 3\n1 2 3\n1 2 3\n", "three columns"),
+        ("x [m] y [m] z [m]\n1 2 3\n1 2 3\n1 2 3\n1 2 3\n", "three columns"),
         ("nothing here\n", "no row of numbers"),
         ("\n\n \n", "no row of numbers"),
         ("a,b\nc,d\n", "no row of numbers"),
-        (",0,1,2\n0,5,6,7\n1,5,6,7\n", "number the others"),
+        (",0,1,2\n0,5,3,7\n1,5,6,9\n2,5,2,1\n", "looks like positions or numbers of the others"),
         ("1_0 2 3 4\n1_0 2 3 4\n", "no row of numbers"),
     ],
 )
@@ -328,7 +363,10 @@ def test_conversion_factor_of_the_header_is_applied(tmp_path: Path) -> None:
     assert raw.heights[2, 3] == 12 * 6.3e-8
     assert raw.pitch == (3.69862e-7, 3.69862e-7)
     assert raw.has_units
-    assert raw.notes == ("heights multiplied by the header's factor, 6.3e-08 m",)
+    assert raw.notes == (
+        "heights in units of 6.3e-08 m: header 'height conversion factor (-> m)=6.3e-008'",
+        "pitch 369.9 nm from the header",
+    )
 
 
 @pytest.mark.parametrize(
@@ -336,12 +374,133 @@ def test_conversion_factor_of_the_header_is_applied(tmp_path: Path) -> None:
     [
         ("data unit=rad", "no unit of length"),
         ("data unit=V\npixel size=1e-6 m", "no unit of length|unit 'V'"),
-        ("height conversion factor=6.3e-8", "a number and a unit of length"),
-        ("z factor (-> m)=many", "a number and a unit of length"),
     ],
 )
 def test_unusable_header_values_are_refused(tmp_path: Path, header: str, match: str) -> None:
     assert_refused(tmp_path, f"{header}\n{MAP}", match)
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        *("LSB = 0.5 nm", "Z step 0.1 nm", "Z-scale = 1e-9 m", "height conversion factor=6.3e-8"),
+        *("z factor (-> m)=many", "Z unit: nm\nZ factor: 0.001", "1 count = 2 nm of height"),
+        *("Z unit: nm\nheight unit: um", "Z Calibration (nm/digit),0.1", "Z resolution: 0.1 nm"),
+        *("Z unit: nm\nScale: 2", "heights are multiplied by 1000"),
+    ],
+)
+def test_factors_and_contradictions_leave_the_unit_open(tmp_path: Path, header: str) -> None:
+    last = re.escape(header.splitlines()[-1])
+    assert_unit_is_open(read_text(tmp_path, f"{header}\n{MAP}"), f"the header says .*{last}")
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        *("Lateral sampling (um)", "Tip radius: 2 um", "Cutoff: 0.8mm", "Wavelength: 633 nm"),
+        *("Sample: 5 mm steel plate", r"File: C:\nm\um.txt", "Height of fixture: 4 mm", "Unit,um"),
+        *("Scan size: 10 um", "Stylus,Radius: 2.5 um", "Z range: 80 um", "Sa = 12 nm", "in um"),
+        *("Roughness (nm)", "x y z [nm]", "Unit X = um", "Stage z position: 3 mm", "Dx=2um"),
+    ],
+)
+def test_units_of_other_lengths_are_not_those_of_the_heights(tmp_path: Path, header: str) -> None:
+    assert_unit_is_open(read_text(tmp_path, f"{header}\n{MAP}"))
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        *("Z unit: um", "z [um]", "# heights in um", "Unit Z = um", "Height unit,um"),
+        *("Z-axis unit: µm", "Data unit: microns", "Value units: um", "Höhe (µm)"),
+        "z scale factor = 1e-6 m",
+    ],
+)
+def test_keys_of_heights_state_their_unit(tmp_path: Path, header: str) -> None:
+    raw = read_text(tmp_path, f"Cutoff: 0.8 mm\n{header}\n{MAP}")
+    np.testing.assert_allclose(raw.heights[0], np.array([1e-6, -2e-6, 3e-6, 4e-6]), rtol=1e-14)
+    assert raw.notes[0].startswith("heights in units of 1e-06 m: header ")
+
+
+@pytest.mark.parametrize(
+    ("header", "pitch"),
+    [
+        ("Pixel size: 2 um", (2e-6, 2e-6)),
+        ("X spacing: 2 um\nY spacing: 3 um", (2e-6, 3e-6)),
+        ("Dx=2um\nDy=3um", (2e-6, 3e-6)),
+        ("Pixel width (um),2\nPixel height (um),3", (2e-6, 3e-6)),
+        ("Sampling interval: 2 um", (2e-6, 2e-6)),
+        ("Dx=2um", None),
+        ("Pixel size: 2 um\nDx=3um", None),
+        ("Pixel size: 2 um\nPixel pitch: 3 um", None),
+        ("Pixel size: 2 um\nCamera pixel size: 7 um", None),
+        ("Pitch: 2 um", None),
+        ("Sampling length: 800 um", None),
+        ("Z spacing: 2 um", None),
+        ("Width: 8 um\nHeight: 9 um\nPixel size: 1 um", None),
+    ],
+)
+def test_pitch_of_a_matrix_is_applied_or_asked(
+    tmp_path: Path, header: str, pitch: tuple[float, float] | None
+) -> None:
+    found = read_text(tmp_path, f"Z unit: nm\n{header}\n{MAP}").pitch
+    assert found == (None if pitch is None else pytest.approx(pitch, rel=1e-12))
+
+
+def test_pixel_size_does_not_turn_points_into_a_matrix(tmp_path: Path) -> None:
+    text = "Pixel size: 1 um\nx [um] y [um] z [nm]\n" + "\n".join(point_lines())
+    assert read_text(tmp_path, text).heights.shape == (4, 5)
+
+
+@pytest.mark.parametrize("order", ["yxz", "zyx", "xzy", "xyz"])
+def test_order_of_named_columns_is_honoured(tmp_path: Path, order: str) -> None:
+    units = {"x": "um", "y": "mm", "z": "nm"}
+    head = ",".join(f"{name} [{units[name]}]" for name in order)
+    points = [{"x": i, "y": j, "z": 10 * i + j} for i in range(3) for j in range(4)]
+    rows = "\n".join(",".join(str(point[name]) for name in order) for point in points)
+    raw = read_text(tmp_path, f"{head}\n{rows}\n")
+    assert raw.pitch == pytest.approx((1e-6, 1e-3), rel=1e-12)
+    assert raw.heights[3, 1] == pytest.approx(13e-9, rel=1e-12)
+    assert any(note.startswith("columns taken: ") for note in raw.notes) == (order != "xyz")
+
+
+@pytest.mark.parametrize(
+    "header", ["Channel: Deflection", "# AmplitudeError", "Deflection [nm]", "Image type,Phase"]
+)
+def test_other_channels_are_no_heights(tmp_path: Path, header: str) -> None:
+    assert_refused(tmp_path, f"{header}\nValue units: nm\n{MAP}", "names '.*', which is no height")
+    assert_refused(
+        tmp_path, "x [um],Deflection [nm]\n0,1\n1,5\n2,3\n3,1\n", "are not x and z, or x, y and z"
+    )
+
+
+@pytest.mark.parametrize("code", ["-9999", "-32768", "1.70141e38", "1.70141E+38", "-99999.0"])
+def test_codes_of_missing_points_are_missing(tmp_path: Path, code: str) -> None:
+    raw = read_text(tmp_path, f"z [nm]\n1 2 {code} 4\n5 3 7 8\n")
+    assert np.argwhere(np.isnan(raw.heights)).tolist() == [[0, 2]]
+    assert any("which marks a missing point" in note for note in raw.notes)
+
+
+def test_codes_among_the_heights_are_asked_about(tmp_path: Path) -> None:
+    text = "z [nm]\n-9000 2 -9999 4\n5 3 7 8000\n"
+    assert_refused(
+        tmp_path, text, r"hold -9999, which may be a height or mark a missing point: decl"
+    )
+    for declared, missing in (("-9999", 1), ("nan", 0)):
+        raw = read_text(tmp_path, f"nodata: {declared}\n{text}")
+        assert int(np.isnan(raw.heights).sum()) == missing
+
+
+def test_positions_around_a_matrix_are_refused(tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    heights = rng.normal(size=(7, 5)).round(3)
+    rows = [[f"{0.5 * i:g}", *map(str, row)] for i, row in enumerate(heights)]
+    framed = [["0", *(f"{0.2 * j:g}" for j in range(5))], *rows]
+    for lines in (framed, rows, [["y\\x", *framed[0][1:]], *rows], np.array(rows).T.tolist()):
+        text = "z [nm]\n" + "\n".join(",".join(line) for line in lines)
+        assert_refused(tmp_path, text, "looks like positions or numbers of the others")
+    plane = np.add.outer(np.arange(6.0), 2.0 * np.arange(8.0))  # heights in equal steps
+    text = "z [nm]\n" + "\n".join(" ".join(map(str, row)) for row in plane)
+    np.testing.assert_allclose(read_text(tmp_path, text).heights, 1e-9 * plane, rtol=1e-12)
 
 
 def test_value_unit_is_found_anywhere_in_the_header(tmp_path: Path) -> None:
@@ -374,7 +533,8 @@ def test_map_exported_by_gwyddion(tmp_path: Path, decimal: str, columns: int) ->
     assert raw.pitch == pytest.approx((10e-6 / columns, 4e-6 / 6), rel=1e-14)
     assert raw.has_units
     raw = read_text(tmp_path, f"{head}{rows}\n")
-    assert raw.notes == ("no unit in the file: taken as metres",)  # of the heights
+    assert raw.notes[0].startswith("pitch ")
+    assert_unit_is_open(raw)
     assert_refused(tmp_path, f"{head}# Value units: V\n{rows}\n", "no unit of length")
 
 
@@ -386,7 +546,7 @@ def test_points_exported_by_gwyddion(tmp_path: Path) -> None:
     assert raw.pitch == pytest.approx((0.5e-6, 1e-6), rel=1e-14)
     assert raw.heights[3, 4] == pytest.approx(12e-9, rel=1e-14)
     assert_refused(tmp_path, head.replace("nm", "V") + rows, "no unit of length")
-    assert_refused(tmp_path, head.replace("µm", "deg") + rows, "no unit of length")
+    assert_asked(tmp_path, head.replace("µm", "deg") + rows, "state the unit of its positions;")
 
 
 # --- lists of points ------------------------------------------------------------------------------
@@ -411,13 +571,13 @@ def test_grid_points_in_any_order_are_a_map(tmp_path: Path, seed: int | None) ->
 
 
 def test_absent_grid_point_is_missing(tmp_path: Path) -> None:
-    raw = read_text(tmp_path, "\n".join(point_lines(left_out=(7,))))
+    raw = read_text(tmp_path, "x [m] y [m] z [m]\n" + "\n".join(point_lines(left_out=(7,))))
     assert np.argwhere(np.isnan(raw.heights)).tolist() == [[1, 2]]
-    assert raw.notes == ("no unit in the file: taken as metres",)
+    assert raw.notes == ()
 
 
 def test_points_on_one_line_are_a_profile(tmp_path: Path) -> None:
-    raw = read_text(tmp_path, "0 3 1\n0 1 2\n0 2 5\n0 4 7\n")
+    raw = read_text(tmp_path, "x [m] y [m] z [m]\n0 3 1\n0 1 2\n0 2 5\n0 4 7\n")
     assert raw.heights.tolist() == [2.0, 5.0, 1.0, 7.0]
     assert raw.pitch == (1.0,)
 
@@ -432,7 +592,7 @@ def test_points_on_one_line_are_a_profile(tmp_path: Path) -> None:
     ],
 )
 def test_points_off_a_grid_are_refused(tmp_path: Path, rows: list[str], match: str) -> None:
-    assert_refused(tmp_path, "\n".join(rows) + "\n", match)
+    assert_refused(tmp_path, "\n".join(["x [m] y [m] z [m]", *rows]) + "\n", match)
 
 
 @pytest.mark.parametrize(

@@ -40,6 +40,7 @@ class RawSurface:
         per_pitch: whether the heights are multiples of the pitch (an integrated normal map,
             whose slopes have no unit): ``in_metres`` converts them to lengths. Such a surface
             is ``relative`` until then.
+        unit_question: how to state the unit of relative heights, to end a sentence.
 
     Example:
         >>> flat = RawSurface(np.zeros((4, 5)), (1e-6, 1e-6), "flat.npy", ())
@@ -54,6 +55,7 @@ class RawSurface:
     has_units: bool = True
     relative: bool = False
     per_pitch: bool = False
+    unit_question: str = ""
 
     @property
     def is_profile(self) -> bool:

@@ -204,7 +204,8 @@ def read_surface(
         path: the file.
         channel: name or number (from 0) of the height channel, for a file with several.
         unit: unit of length of a file that has none, such as "mm": required for STL and OBJ,
-            optional for NPY and text (metres if not given).
+            optional for NPY (metres if not given)
+            and for text that does not state it.
         integrate_normals: integrate a normal map (an image of slopes) to heights.
         resample: pitch [m] of the map interpolated through a list of x, y, z points that are on no
             regular grid, or of the profile through unevenly spaced ones; the interpolation error

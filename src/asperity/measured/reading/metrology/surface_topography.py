@@ -16,6 +16,7 @@ from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.measured.lengths import unit_to_metres
 from asperity.measured.reading.isolation import reject_on_error
+from asperity.measured.reading.plain_text.text_header import WORDS, split_words
 from asperity.measured.reading.reader import MAX_POINTS, RawSurface, ReadingOptions, SurfaceFile
 from asperity.measured.reading.resampling import resample_profile, resampling_hint
 
@@ -31,6 +32,10 @@ _WRONG_FORMATS = {
     "metropro": "surfalize reads its heights 8 times greater",
     "plu": "surfalize reads some of its heights 11 times greater",
 }
+WITNESSED_FORMATS = {"al3d", "bcr", "di", "ezd", "ibw", "mnt", "opd", "opdx", "sur", "wsxm"}
+"""Formats of which a second reader finds the same lengths (table in ``docs/howto/files.md``)."""
+NO_WITNESS = "no second witness for this format: check the lateral scale"
+"""The note on a file of any other format."""
 _MAX_COMPRESSION_RATIO = 1032  # of deflate, which all compressed formats use
 
 
@@ -135,6 +140,7 @@ def _to_surface(
         raise ParameterError("unit", requirement)
     heights, pitch, found = _read_channel(channel, unit, options.resample)
     notes = [f"{reader.name()} file, read by SurfaceTopography", *found]
+    notes += [] if reader.format() in WITNESSED_FORMATS else [NO_WITNESS]
     if len(reader.channels) > 1:
         notes.append(f"channel {channel.name!r} of {len(reader.channels)}")
     with np.errstate(over="ignore"):
@@ -148,6 +154,7 @@ def _to_surface(
 def _select_channel(reader: Any, name: str, channel: str | int | None) -> Any | None:
     """Return the named height channel, or the only one; None if there is none."""
     heights = [c for c in reader.channels if c.data_kind.value == "height" and c.dim in (1, 2)]
+    heights = [c for c in heights if not split_words(str(c.name)) & WORDS["quantities"]]
     if not heights:
         return None
     if channel is None and len(heights) == 1:

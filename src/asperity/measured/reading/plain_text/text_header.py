@@ -1,218 +1,95 @@
-"""The header of a text file: units, pixel size, missing values, columns that are no lengths."""
+"""The header of a text file: what it says of heights, pitch and missing points.
+
+Only entries whose words are known to be of the heights state their unit: a header names many other
+lengths. An entry that may be a factor of the heights, or contradicts another, leaves the unit open.
+"""
 
 from __future__ import annotations
 
 import re
+import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from textwrap import shorten
 
-import numpy as np
-
-from asperity.core.errors import ParameterError, SurfaceFileError
-from asperity.measured.lengths import METRES_PER_UNIT, parse_number
-from asperity.measured.reading.plain_text.text_table import TextTable
+from asperity.core.errors import SurfaceFileError
+from asperity.measured.lengths import METRES_PER_UNIT, format_lengths
 
 _MAX_LINE = 1000  # a longer line is a row of data rather than a header
-_BRACKETED = re.compile(r"[\[(]([^\[\]()]*)[\])]")
-_QUANTITY = re.compile(r"([+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?)\s*(\S*)")
-# Gwyddion writes its header in the language of its user.
-_WIDTH_KEYS = ("width", "breite", "largeur", "larghezza", "ancho", "šířka", "largura")
-_HEIGHT_KEYS = ("height", "höhe", "hauteur", "altezza", "alto", "výška", "altura")
-_PIXEL_KEYS = ("pixel size", "pixel width", "pixel pitch", "pixel spacing", "point spacing")
-_LATERAL_KEYS = ("lateral unit", "lateral units", "xy unit", "xy units")
-_UNIT_KEYS = tuple(f"{of} unit{s}" for of in ("data", "value", "z", "height") for s in ("", "s"))
-_NODATA_KEYS = ("nodata", "nodata_value", "nodatavalue")
+BRACKETED = re.compile(r"[\[(]([^\[\]()]*)[\])]")
+_QUANTITY = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\s\d/]*)")
+_CAMEL = re.compile(r"(?<=[^\W\d_])(?=[A-Z][a-z])")
+_WORD = re.compile(r"[^\W\d_]+")
 # Units of other quantities or systems; the second set are words as well, outside of brackets.
 _OTHER_UNITS = {"inch", "inche", "thou", "feet", "volt", "pixel", "kå"}
 _AMBIGUOUS_UNITS = {"in", "mil", "px", "mv", "ft"}
 
 
-@dataclass(frozen=True)
-class MapHeader:
-    """The entries of a header that describe the heights; None for each that it lacks.
-
-    Attributes:
-        unit: metres per height.
-        pitch: distance of the points [m].
-        size: (width, height) of the map [m].
-        lateral_unit: metres per position in a list of points.
-        missing_code: number that marks a missing point.
-        notes: the entries applied, one sentence each.
-    """
-
-    unit: float | None = None
-    pitch: float | None = None
-    size: tuple[float, float] | None = None
-    lateral_unit: float | None = None
-    missing_code: float | None = None
-    notes: tuple[str, ...] = ()
-
-    @property
-    def describes_map(self) -> bool:
-        """Whether the header is that of a map, whatever the number of its columns."""
-        return self.pitch is not None or self.size is not None
-
-    def find_pitch(self, rows: int, columns: int) -> tuple[float, float] | None:
-        """Return the pitch [m] of a matrix with these numbers of rows and columns."""
-        if self.pitch is not None:
-            return self.pitch, self.pitch
-        if self.size is None:
-            return None
-        return self.size[0] / columns, self.size[1] / rows
-
-
-def parse_map_header(lines: Sequence[str]) -> MapHeader:
-    """Return the entries "key=value" or "key: value" of a header.
-
-    Raises:
-        SurfaceFileError: a factor or a unit of the heights cannot be applied; ignoring it would
-            give wrong heights without notice.
+def split_words(text: str) -> frozenset[str]:
+    """Return the words of a text in lower case and singular, without what is in brackets.
 
     Example:
-        >>> header = parse_map_header(["pixel size=3.7e-007 m", "z factor (-> m)=6e-8"])
-        >>> header.unit, header.pitch
-        (6e-08, 3.7e-07)
+        >>> sorted(split_words("XYPixelSize [um]")), sorted(split_words("NODATA_values"))
+        (['pixel', 'size', 'xy'], ['nodata', 'value'])
     """
-    entries = dict(_split_entry(line) for line in lines if len(line) <= _MAX_LINE)
-    factor = _find_factor(entries)
-    note = f"heights multiplied by the header's factor, {factor or 0.0:g} m"
-    width, height = (_find_length(entries, keys) for keys in (_WIDTH_KEYS, _HEIGHT_KEYS))
-    codes = [parse_number(entries[key], key) for key in _NODATA_KEYS if key in entries]
-    return MapHeader(
-        unit=factor or _find_unit(entries, _UNIT_KEYS),
-        pitch=_find_length(entries, _PIXEL_KEYS),
-        size=None if width is None or height is None else (width, height),
-        lateral_unit=_find_unit(entries, _LATERAL_KEYS),
-        missing_code=codes[0] if codes else None,
-        notes=(note,) if factor else (),
-    )
+    words = _WORD.findall(_CAMEL.sub(" ", BRACKETED.sub(" ", text)).lower())
+    return frozenset(word.removesuffix("s") if len(word) > 3 else word for word in words)
 
 
-def is_lateral_entry(line: str) -> bool:
-    """Whether a header line describes lengths along the surface rather than heights.
+_TABLE = tomllib.loads(Path(__file__).with_name("text_words.toml").read_text("utf-8"))
+ROLES = {role: split_words(words) for role, words in _TABLE.pop("columns").items()}
+"""Words that name a column, by its role."""
+WORDS = {name: split_words(words) for name, words in _TABLE.items()}
+"""Words in headers, by what they are of."""
+
+
+def parse_quantity(text: str) -> tuple[float, float | None] | None:
+    """Return a number and the length of its unit [m] (None without a unit); None for other text.
 
     Example:
-        >>> is_lateral_entry("Height: 4.00 µm"), is_lateral_entry("Value units: m")
-        (True, False)
+        >>> parse_quantity("0.5 um"), parse_quantity("3"), parse_quantity("2 nm/V")
+        ((0.5, 1e-06), (3.0, None), None)
     """
-    return _split_entry(line)[0] in (*_WIDTH_KEYS, *_HEIGHT_KEYS, *_PIXEL_KEYS, *_LATERAL_KEYS)
+    match = _QUANTITY.fullmatch(text.strip().replace(",", "."))
+    if match is None or not match.group(2):
+        return None if match is None else (float(match.group(1)), None)
+    unit = parse_unit(match.group(2), is_bracketed=False)
+    return None if unit is None else (float(match.group(1)), unit)
 
 
-def _split_entry(line: str) -> tuple[str, str]:
-    """Return key and value of "key=value", "key: value" or "nodata value"."""
-    sign = min((s for s in "=:" if s in line), key=line.index, default="=")
-    key, found, value = line.partition(sign)
-    words = key.lower().split() if found else re.split(r"[,;\s]+", line.lower().strip())
-    if not found and len(words) == 2 and words[0] in _NODATA_KEYS:
-        return words[0], words[1]
-    return " ".join(words), value.strip()
+def find_single_unit(name: str) -> float | None:
+    """Return the unit of length [m] that the name of a column or an entry states, None if none.
 
-
-def _find_length(entries: dict[str, str], keys: Sequence[str]) -> float | None:
-    """Return the positive length [m] under the first of the keys that has one."""
-    for key in keys:
-        match = _QUANTITY.fullmatch(entries.get(key, "").replace(",", "."))
-        if match is None:
-            continue
-        unit, number = find_single_unit(match.group(2)), parse_number(match.group(1), key)
-        if unit is not None and number > 0.0:
-            return number * unit
-    return None
-
-
-def _find_factor(entries: dict[str, str]) -> float | None:
-    """Return the metres per number of a conversion factor of the heights."""
-    for key, value in entries.items():
-        words = set(_BRACKETED.sub(" ", key).split())
-        if "factor" not in words or not words & {"height", "z", "data", "value", "conversion"}:
-            continue
-        match = _QUANTITY.fullmatch(value)
-        unit = find_single_unit(key) or (find_single_unit(match.group(2)) if match else None)
-        if match is None or unit is None:
-            raise SurfaceFileError(
-                f"the header's {key!r} is {value[:40]!r}; a number and a unit of length, such as "
-                "'(-> m)=6.3e-8', are expected: without them the heights are not known"
-            )
-        return parse_number(match.group(1), key) * unit
-    return None
-
-
-def _find_unit(entries: dict[str, str], keys: Sequence[str]) -> float | None:
-    """Return the unit [m] under one of the keys."""
-    for key in keys:
-        if key not in entries:
-            continue
-        unit = find_single_unit(entries[key])
-        if unit is None:
-            raise SurfaceFileError(
-                f"the header's {key!r} is {entries[key][:40]!r}, no unit of length, and there is "
-                "no conversion factor: the lengths are not known"
-            )
-        return unit
-    return None
-
-
-# --- units --------------------------------------------------------------------------------------
-
-
-def find_units(cells: Sequence[str]) -> list[float]:
-    """Return the units of length [m] that the cells of a header line name, in order.
-
-    A unit stands in brackets ("z [nm]"), after a slash ("z/nm"), or is the last word of a cell
-    ("Lateral um").
+    It stands in brackets ("z [nm]"), after a slash ("z/nm"), or is the last word ("Lateral um").
 
     Raises:
-        SurfaceFileError: a unit is no length known here.
+        SurfaceFileError: there are several units, or one that is no length known here.
 
     Example:
-        >>> find_units(["Lateral um", "Raw Micrometer"])
-        [1e-06, 1e-06]
-        >>> find_units(["height"])
-        []
+        >>> find_single_unit("Lateral um"), find_single_unit("z (-> nm)"), find_single_unit("z")
+        (1e-06, 1e-09, None)
     """
-    units: list[float] = []
-    for cell in cells:
-        names = _BRACKETED.findall(cell)
-        found = [_parse_unit(name.strip(" ->"), is_bracketed=True) for name in names]
-        if not any(found):
-            last = re.split(r"[\s/]+", cell.rstrip(" .:\r"))[-1:]
-            found = [_parse_unit(name, is_bracketed=False) for name in last if not names]
-            for name in names:  # "[V]" and the like
-                if 0 < len(name.strip()) <= 3:
-                    raise _unknown_unit_error(name.strip())
-        units.extend(unit for unit in found if unit is not None)
-    return units
-
-
-def find_single_unit(*cells: str) -> float | None:
-    """Return the only unit [m] that the cells of a header line name, None if they name none.
-
-    Raises:
-        SurfaceFileError: the cells name several units.
-    """
-    units = set(find_units(cells))
+    names = [inside.strip(" ->") for inside in BRACKETED.findall(name)]
+    units = {parse_unit(unit, is_bracketed=True) for unit in names} - {None}
+    short = [unit for unit in names if 0 < len(unit) <= 3]
+    if short and not units:  # "[V]" and the like
+        raise _unknown_unit_error(short[0])
+    if not names:
+        last = re.split(r"[\s/]+", name.rstrip(" .:\r"))[-1]
+        units = {parse_unit(last, is_bracketed=False)}
     if len(units) > 1:
-        raise SurfaceFileError(f"the header {_shorten(' '.join(cells))!r} names several units")
+        raise SurfaceFileError(f"the header {shorten(name, 60)!r} names several units")
     return units.pop() if units else None
 
 
-def require_unit(line: str) -> None:
-    """Ask for the unit if a header line holds the name of one in a place that is not understood.
+def parse_unit(name: str, *, is_bracketed: bool) -> float | None:
+    """Return the length of a unit [m]; None for any other word, without brackets for "A" too.
 
     Raises:
-        ParameterError: the line holds the name of a unit of length.
+        SurfaceFileError: the unit is of another quantity or system.
     """
-    for word in re.findall(r"[^\W\d_]{2,}", line):
-        if _parse_unit(word, is_bracketed=False) is not None:
-            raise ParameterError(
-                "unit",
-                f"is required: the header {_shorten(line)!r} does not say in brackets, such as"
-                " 'z [nm]', what is in which unit",
-            )
-
-
-def _parse_unit(name: str, *, is_bracketed: bool) -> float | None:
-    """Return the length of a unit [m]; None for any other word, without brackets for "A" too."""
     key = name.lower()
     key = key[:-1] if key.endswith("s") and len(key) > 3 else key
     if is_bracketed and name == "A":
@@ -227,87 +104,175 @@ def _parse_unit(name: str, *, is_bracketed: bool) -> float | None:
 
 def _unknown_unit_error(name: str) -> SurfaceFileError:
     return SurfaceFileError(
-        f"the header names the unit {_shorten(name)!r};"
+        f"the header names the unit {shorten(name, 60)!r};"
         " m, mm, µm (um, micron), nm or [A] (angstrom) is expected"
     )
 
 
-def _shorten(text: str) -> str:
-    text = " ".join(text.split())
-    return text if len(text) <= 60 else text[:57] + "..."
+@dataclass(frozen=True)
+class MapHeader:
+    """The entries of a header that describe the heights; None for each that it lacks.
+
+    Attributes:
+        unit: metres per height.
+        question: why the unit is open although the header says something of it; else empty.
+        pitch: distance of the points along x and y [m]; None along an axis not named.
+        lateral_unit: metres per position in a list of points.
+        missing_code: number that marks a missing point; NaN if all are heights.
+        describes_map: whether the header is that of a map, even of two or three columns.
+        notes: the entries applied, one sentence each.
+    """
+
+    unit: float | None
+    question: str
+    pitch: tuple[float | None, float | None]
+    lateral_unit: float | None
+    missing_code: float | None
+    describes_map: bool
+    notes: tuple[str, ...]
 
 
-# --- columns that are no lengths ----------------------------------------------------------------
+def parse_map_header(lines: Sequence[str], shape: tuple[int, ...] = (1, 1)) -> MapHeader:
+    """Return what a header says.
 
-_VALIDITY_NAMES = {"valid", "validity", "mask", "isvalid", "[1/0]", "[0/1]", "(1/0)", "(0/1)"}
-_NUMBERING_NAMES = {"index", "idx", "no", "no.", "nr", "nr.", "point", "#"}
-_MAX_COLUMNS = 6
-_MAX_HEADER_LINES = 3  # number of lines above the numbers that may name the columns
-
-
-def drop_auxiliary_columns(table: TextTable) -> tuple[TextTable, list[str]]:
-    """Return a table without its column of validity and its column of row numbers.
-
-    A validity column has a header such as "valid" or "[1/0]": where it is 0, the height (the last
-    of the other columns) becomes missing. A column of row numbers is the first, with a header such
-    as "index", and counts the rows.
-
-    Returns:
-        The table, and what was done, one sentence each.
+    Args:
+        lines: its lines, without comment signs.
+        shape: number of rows and columns of the numbers.
 
     Raises:
-        SurfaceFileError: the validity column has other values than 0 and 1.
+        SurfaceFileError: the values are no heights, or their unit is no length.
+
+    Example:
+        >>> header = parse_map_header(["pixel size=3.7e-007 m", "z factor (-> m)=6e-8"])
+        >>> header.unit, header.pitch
+        (6e-08, (3.7e-07, 3.7e-07))
     """
-    notes = []
-    names = _column_names(table)
-    validity = next((k for k, found in enumerate(names) if found & _VALIDITY_NAMES), None)
-    if validity is not None:
-        valid = table.values[:, validity]
-        wrong = ~np.isin(valid, (0.0, 1.0))
-        if wrong.any():
-            line = table.line_numbers[int(np.argmax(wrong))]
-            raise SurfaceFileError(f"line {line}: validity must be 0 or 1")
-        table = _drop_column(table, validity)
-        table.values[valid == 0.0, -1] = np.nan
-        count = int((valid == 0.0).sum())
-        notes.append(f"{count} of {len(valid)} points are marked as not valid: missing")
-        names = _column_names(table)
-    first = table.values[:, 0]
-    is_numbering = first[0] in (0.0, 1.0) and np.all(np.diff(first) == 1.0)
-    if is_numbering and names[0] & _NUMBERING_NAMES:
-        table = _drop_column(table, 0)
-        notes.append("the first column numbers the points: left out")
-    return table, notes
-
-
-def _column_names(table: TextTable) -> list[set[str]]:
-    """Return the lower-case names of each column of a list of points."""
-    columns = table.values.shape[1]
-    names: list[set[str]] = [set() for _ in range(columns)]
-    lines = [line for line in table.header if line.strip(" \t,;")]
-    for line in lines[-_MAX_HEADER_LINES:] if 3 <= columns <= _MAX_COLUMNS else ():
-        cells = [cell.strip("\"' ").lower() for cell in table.dialect.cells(line[:_MAX_LINE])]
-        if len(cells) == columns:
-            for known, cell in zip(names, cells, strict=True):
-                known.add(cell)
-        elif table.dialect.separator is None:  # a name such as "x [um]" is two cells
-            names[-1].add(cells[-1])
-    return names
-
-
-def _drop_column(table: TextTable, column: int) -> TextTable:
-    """Return a table without a column, in its rows and its header."""
-    columns = table.values.shape[1]
-
-    def drop_cell(line: str) -> str:
-        cells = table.dialect.cells(line)
-        if len(cells) != columns:
-            return line
-        return (table.dialect.separator or " ").join(cells[:column] + cells[column + 1 :])
-
-    return replace(
-        table,
-        values=np.delete(table.values, column, axis=1),
-        header=[drop_cell(line) for line in table.header],
-        row_texts=[drop_cell(line) for line in table.row_texts],
+    entries = [HeaderEntry.parse(line) for line in lines if len(line) <= _MAX_LINE]
+    _reject_other_quantities(entries)
+    unit, sources = _find_height_unit(entries)
+    width, height = (
+        _single({e.length() for e in entries if e.words and e.words <= WORDS[side]})
+        for side in ("width", "height")
     )
+    pitch = _find_pitch(entries)
+    if width and height:
+        pitch = (None, None) if any(pitch) else (width / shape[1], height / shape[0])
+    notes = [] if unit is None else [f"heights in units of {unit:g} m: header {sources[0]!r}"]
+    if any(pitch):
+        notes.append(f"pitch {format_lengths([p for p in pitch if p])} from the header")
+    lateral = _single({e.unit() for e in entries if e.states_unit(WORDS["positions"])})
+    is_map = bool(width and height) and any(e.words & WORDS["channels"] for e in entries)
+    texts = " and ".join(map(repr, sources[:3])) if unit is None else ""
+    question = f": the header says {texts}" if texts else ""
+    missing = _find_missing_code(entries)
+    return MapHeader(unit, question, pitch, lateral, missing, is_map, tuple(notes))
+
+
+def _single(values: set[float | None]) -> float | None:
+    """Return the only value; None if there is none, or several."""
+    found = values - {None}
+    return found.pop() if len(found) == 1 else None
+
+
+@dataclass(frozen=True)
+class HeaderEntry:
+    """A line of a header: its key, the words of the key, the value, and the whole line."""
+
+    key: str
+    words: frozenset[str]
+    value: str
+    line: str
+
+    @classmethod
+    def parse(cls, line: str) -> HeaderEntry:
+        """Split "key=value", "key: value", "key,value,unit", "key 1 nm" or a line without value."""
+        line = " ".join(line.replace('"', " ").strip(" \t,;").split(" "))
+        sign = min((s for s in "=:" if s in line), key=line.index, default=None)
+        sign = sign or next((s for s in "\t;," if s in line), None)
+        key, _, value = line.partition(sign) if sign else (line, "", "")
+        found = None if sign else re.search(r"(?<=[^\d\s])\s(?=[+-]?[0-9])", line)
+        if found:
+            key, value = line[: found.start()], line[found.end() :]
+        value = re.sub(r"[\s;,](?=\S*$)" if sign in ("\t", ";", ",") else r"\s+", " ", value)
+        return cls(key, split_words(key), value.strip(), shorten(line, 60))
+
+    def length(self) -> float | None:
+        """Return the value [m] with its unit, which may stand beside the key in brackets."""
+        beside = find_single_unit(self.key) if BRACKETED.search(self.key) else None
+        number, unit = parse_quantity(self.value) or (0.0, None)
+        unit = beside if unit is None else unit
+        return number * unit if unit and number > 0.0 and beside in (None, unit) else None
+
+    def unit(self) -> float | None:
+        """Return the unit [m] that is the whole value, or stands in a line without a value."""
+        if not self.value:
+            return None if re.search(r"\d", self.key) else find_single_unit(self.key)
+        return parse_unit(self.value.strip("[]()' "), is_bracketed=True)
+
+    def states_unit(self, owners: frozenset[str]) -> bool:
+        """Whether this is "Z unit: nm", "z [nm]" or "heights in um" for one of the owners."""
+        words = self.words - WORDS["fillers"]
+        if not self.value:  # a sentence, whose unit is among its words
+            words = frozenset(w for w in words if parse_unit(w, is_bracketed=False) is None)
+        has_key = bool("unit" in self.words and self.value)
+        return bool(words) and words <= owners and (has_key or self.unit() is not None)
+
+    def may_scale_heights(self) -> bool:
+        """Whether the numbers may have to be multiplied by the value."""
+        words = self.words | split_words(self.value)
+        is_lateral = self.words & WORDS["positions"] and not self.words & WORDS["heights"]
+        is_step = words & WORDS["steps"] and words & (WORDS["heights"] | {"vertical", "lsb"})
+        return bool((words & WORDS["factors"] and not is_lateral) or is_step)
+
+
+def _reject_other_quantities(entries: Sequence[HeaderEntry]) -> None:
+    """Refuse a channel whose name is that of another quantity."""
+    for entry in entries:
+        alone = entry.words if not entry.value and len(entry.words) <= 3 else frozenset[str]()
+        named = split_words(entry.value) if entry.words & WORDS["channels"] else alone
+        if named & WORDS["quantities"]:
+            what = f"{min(named & WORDS['quantities'])!r}, which is no height"
+            raise SurfaceFileError(f"the header {entry.line!r} names {what}; export the heights")
+
+
+def _find_height_unit(entries: Sequence[HeaderEntry]) -> tuple[float | None, list[str]]:
+    """Return the unit of the heights [m], None if open, and the lines that say something of it."""
+    stated = {e.line: e.unit() for e in entries if e.states_unit(WORDS["heights"])}
+    scaling = [e for e in entries if e.may_scale_heights()]
+    factors = {e.line: e.length() for e in scaling if "factor" in e.words and e.length()}
+    doubts = [e.line for e in scaling if e.line not in factors]
+    units = {**factors, **stated}
+    unit = _single(set(units.values()))
+    if unit is not None and not doubts:
+        return unit, [line for line, value in units.items() if value]
+    if stated and not doubts and not any(units.values()):
+        fault = "is no unit of length, and there is no conversion factor"
+        raise SurfaceFileError(f"the header {min(stated)!r} {fault}")
+    return None, [*doubts, *units]
+
+
+def _find_pitch(entries: Sequence[HeaderEntry]) -> tuple[float | None, float | None]:
+    """Return the pitch along x and y [m]; none if another entry may name a different one."""
+    found: dict[str, set[float | None]] = {"x": set(), "y": set()}
+    for entry in entries:
+        words = entry.words
+        is_lateral = words & WORDS["spacing"] and not words & WORDS["vertical"]
+        length = entry.length() if is_lateral else None
+        if length is None:
+            continue
+        axes = [axis for axis in found if words & WORDS[axis]]
+        is_known = words <= WORDS["pitch"] and len(axes) <= 1 and (axes or len(words) > 1)
+        if not is_known:  # perhaps the camera's, or a period of the sample
+            return None, None
+        for axis in axes or found:
+            found[axis].add(length)
+    return _single(found["x"]), _single(found["y"])
+
+
+def _find_missing_code(entries: Sequence[HeaderEntry]) -> float | None:
+    """Return the only number that the header declares to mark missing points."""
+    fillers, known = WORDS["missing_fillers"], WORDS["missing"]
+    texts = {e.value for e in entries if e.words - fillers and e.words - fillers <= known}
+    with suppress(ValueError):
+        return _single({float(text) for text in texts})
+    return None

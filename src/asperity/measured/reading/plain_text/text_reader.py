@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import codecs
-import math
-from collections.abc import Sequence
 from dataclasses import replace
 from decimal import Decimal, InvalidOperation
 
@@ -13,19 +11,21 @@ import numpy as np
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.measured.reading import resampling
-from asperity.measured.reading.plain_text import text_header
+from asperity.measured.reading.plain_text import text_columns
+from asperity.measured.reading.plain_text.text_header import (
+    MapHeader,
+    find_single_unit,
+    parse_map_header,
+)
 from asperity.measured.reading.plain_text.text_table import TextTable, find_table
 from asperity.measured.reading.reader import (
     RawSurface,
     ReadingOptions,
     SurfaceFile,
     check_point_count,
-    mask_missing,
 )
 
 _MIN_POINTS = 4
-_MAX_HEADER_LINE = 1000
-_MAX_LENGTH = 10.0  # [m]; a longer measurement has probably another unit
 
 
 def read_text(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
@@ -45,20 +45,28 @@ def read_text(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
     """
     table = find_table(_decode(file.content))
     _check_table(table)
-    table, found = text_header.drop_auxiliary_columns(table)
-    header = text_header.parse_map_header(table.header)
-    if text_header.parse_map_header(table.comments).describes_map:
+    header = parse_map_header(table.header, table.values.shape)
+    if parse_map_header(table.comments).describes_map:
         raise SurfaceFileError("several maps in one file: save each in a file of its own")
+    table, names, found = text_columns.select_columns(table)
     rows, columns = table.values.shape
-    if columns == 2 and not header.describes_map and _is_monotonic(table):
-        raw = _read_profile(table, file.name, options)
-    elif columns == 3 and rows > 3 and not header.describes_map:
-        raw = _read_points(table, header, file.name, options)
+    is_list = (columns == 2 and _is_monotonic(table)) or (columns == 3 and rows > 3)
+    is_list = is_list and not header.describes_map
+    heights = table.values[:, -1:] if is_list else table.values
+    heights[:], marked = text_columns.mask_codes(heights, header.missing_code)
+    if is_list:
+        units, assumed = _find_units(names, header, file.name, options)
+        read = _read_profile if columns == 2 else _read_points
+        raw = read(table, units, file.name, options.resample)
+        marked = (*marked, *assumed)
     elif options.resample is not None:
         raise ParameterError("resample", f"must not be given: {file.name} is no list of points")
     else:
         raw = _read_matrix(table, header, file.name, options)
-    return replace(raw, notes=(*found, *raw.notes))
+    found += ["a comma is read as the decimal sign"] * (table.dialect.decimal == ",")
+    if table.n_footer_lines:
+        found.append(f"{table.n_footer_lines} lines of text after the numbers ignored")
+    return replace(raw, notes=(*header.notes, *marked, *raw.notes, *found))
 
 
 def _decode(content: bytes) -> str:
@@ -99,57 +107,67 @@ def _is_monotonic(table: TextTable) -> bool:
     )
 
 
-def _read_profile(table: TextTable, name: str, options: ReadingOptions) -> RawSurface:
-    units, notes = _resolve_units(table, _column_units(table, options), name, options)
-    unit_x, unit_z = units or (1.0, 1.0)
-    positions, heights = table.values[:, 0], table.values[:, 1] * unit_z
+def _find_units(
+    names: list[str], header: MapHeader, name: str, options: ReadingOptions
+) -> tuple[list[float], tuple[str, ...]]:
+    """Return the units of the columns [m], the given one for each without, and the note.
+
+    Raises:
+        ParameterError: a unit is missing, or given although the file names all.
+        SurfaceFileError: the column of heights and the rest of the header name different units.
+    """
+    own = [find_single_unit(column) for column in names] or [None] * 3
+    if own[-1] is not None and header.unit not in (None, own[-1]):
+        raise SurfaceFileError(
+            f"the column {names[-1]!r} and {header.notes[0]!r} differ: correct the header"
+        )
+    height = None if header.question else own[-1] or header.unit
+    own = [*(unit or header.lateral_unit for unit in own[:-1]), height]
+    given, notes = options.resolve_unit(name, None if None in own else own[0])
+    if given is None:
+        what = "positions" if height else "heights" if any(own) else "positions and heights"
+        raise ParameterError(
+            "unit",
+            f"is required: {name} does not state the unit of its {what}{header.question}; give it,"
+            " such as unit='um' (--unit um), or name it for each column, such as 'x [um], z [nm]'",
+        )
+    return [unit or given for unit in own], notes
+
+
+def _read_profile(
+    table: TextTable, units: list[float], name: str, resample: float | None
+) -> RawSurface:
+    positions, heights = table.values[:, 0], table.values[:, 1] * units[-1]
     resolution, lines = _printed_resolution(table, 0), table.line_numbers
+    notes: tuple[str, ...] = ()
     if positions[0] > positions[-1]:
         positions, heights = positions[::-1], heights[::-1]
         resolution, lines = resolution[::-1], lines[::-1]
-        notes = (*notes, "positions decrease: the profile is reversed")
+        notes = ("positions decrease: the profile is reversed",)
     result = resampling.measure_spacing(positions, resolution)
-    pitch = result.step * unit_x
-    _check_length(pitch * (len(heights) - 1), has_units=units is not None)
-    if options.resample is not None:
-        heights, note = resampling.resample_profile(positions * unit_x, heights, options.resample)
-        notes, pitch = (*notes, note), options.resample
-    elif not result.is_uniform:
+    pitch = result.step * units[0]
+    if resample is not None:
+        heights, note = resampling.resample_profile(positions * units[0], heights, resample)
+        return RawSurface(heights, (resample,), name, (*notes, note))
+    if not result.is_uniform:
         raise SurfaceFileError(
             f"sampling is not uniform: line {lines[result.index]} is"
-            f" {result.deviation * unit_x:.3g} m from a grid of {pitch:.3g} m;"
+            f" {result.deviation * units[0]:.3g} m from a grid of {pitch:.3g} m;"
             f" {resampling.resampling_hint(pitch)}"
         )
-    heights = np.ascontiguousarray(heights)
-    return RawSurface(heights, (pitch,), name, notes, has_units=units is not None)
-
-
-def _check_length(length: float, *, has_units: bool) -> None:
-    if not has_units and length > _MAX_LENGTH:
-        raise SurfaceFileError(
-            f"positions span {length:.4g} and look not to be in metres; name the units in the"
-            " column header, such as 'x [um], z [nm]', or give unit='mm'"
-        )
+    return RawSurface(np.ascontiguousarray(heights), (pitch,), name, notes)
 
 
 def _read_points(
-    table: TextTable, header: text_header.MapHeader, name: str, options: ReadingOptions
+    table: TextTable, units: list[float], name: str, resample: float | None
 ) -> RawSurface:
     """Return the map, or the profile along one axis, of a list of points."""
-    if header.lateral_unit is None or header.unit is None:
-        own = _column_units(table, options)
-    else:
-        own = header.lateral_unit, header.lateral_unit, header.unit
-    units, notes = _resolve_units(table, own, name, options)
     if np.isnan(table.values[:, :2]).any():
         raise SurfaceFileError(f"a position is missing; {_EXPECTED_LAYOUT}")
-    scale = np.array(units or (1.0, 1.0, 1.0))
-    points, has_units = table.values * scale, units is not None
-    _check_length(float(np.ptp(points[:, :2], axis=0).max()), has_units=has_units)
-    if options.resample is not None:
-        heights, note = resampling.resample_points(points, options.resample)
-        pitch = (options.resample, options.resample)
-        return RawSurface(heights, pitch, name, (*notes, note), has_units=has_units)
+    points = table.values * np.array(units)
+    if resample is not None:
+        heights, note = resampling.resample_points(points, resample)
+        return RawSurface(heights, (resample, resample), name, (note,))
     try:
         resolution = _printed_resolution(table, 0), _printed_resolution(table, 1)
         heights, steps = points_to_grid(table.values, resolution)
@@ -159,100 +177,31 @@ def _read_points(
         if suited is not None:
             hint += f"; {resampling.resampling_hint(suited)}, one grid point for each of theirs"
         raise SurfaceFileError(hint) from None
-    pitch = (steps[0] * float(scale[0]), steps[1] * float(scale[1]))
-    raw = RawSurface(heights * scale[2], pitch, name, notes, has_units=has_units)
+    heights, pitch = heights * units[2], (steps[0] * units[0], steps[1] * units[1])
     if 1 not in heights.shape:
-        return raw
-    axis = 0 if heights.shape[0] == 1 else 1
-    return replace(raw, heights=raw.heights.ravel(), pitch=(pitch[axis],))
+        return RawSurface(heights, pitch, name, ())
+    return RawSurface(heights.ravel(), (pitch[0 if heights.shape[0] == 1 else 1],), name, ())
 
 
 def _read_matrix(
-    table: TextTable, header: text_header.MapHeader, name: str, options: ReadingOptions
+    table: TextTable, header: MapHeader, name: str, options: ReadingOptions
 ) -> RawSurface:
-    _reject_numbering(table.values)
-    # NaN is no code: it equals nothing.
-    code = math.nan if header.missing_code is None else header.missing_code
-    values, marked = mask_missing(table.values, code)
-    own = [] if header.unit is None else [header.unit]
-    if not own and not text_header.is_lateral_entry(_last_header_line(table)):
-        own = sorted(set(_named_units(table, options)))
-    if len(own) > 1:
-        line = " ".join(_last_header_line(table).split())
-        raise SurfaceFileError(f"the header {line[:60]!r} names several units")
-    units, notes = _resolve_units(table, own, name, options)
-    heights = np.ascontiguousarray(values * (units or (1.0,))[0])
-    pitch: tuple[float, ...] | None = header.find_pitch(*values.shape)
+    """Return the map, or the profile of one column; heights without a unit are relative."""
+    text_columns.reject_positions(table)
+    unit, notes = options.resolve_unit(name, header.unit)
+    heights = np.ascontiguousarray(table.values * (unit or 1.0))
+    pitch = tuple(p for p in header.pitch if p is not None)
     if heights.shape[1] == 1:
-        heights, pitch = heights[:, 0], None if pitch is None else pitch[1:]
-    notes = (*header.notes, *marked, *notes)
-    return RawSurface(heights, pitch, name, notes, has_units=units is not None)
-
-
-def _header_cells(table: TextTable) -> list[str]:
-    """Return the cells of the last header line; one if it is not split as the numbers are."""
-    line = _last_header_line(table)
-    cells, words = table.dialect.cells(line), line.split()
-    if len(cells) == 1 and len(words) == table.values.shape[1]:
-        return words
-    return cells if table.dialect.separator or len(cells) == table.values.shape[1] else [line]
-
-
-def _resolve_units(
-    table: TextTable, own: Sequence[float], name: str, options: ReadingOptions
-) -> tuple[tuple[float, ...] | None, tuple[str, ...]]:
-    """Return the units of the columns [m], None if unknown, and the notes on reading."""
-    unit, assumed = options.resolve_unit(name, own[0] if own else None)
-    notes = list(assumed)
-    if table.n_footer_lines:
-        notes.append(f"{table.n_footer_lines} lines of text after the numbers ignored")
-    if table.dialect.decimal == ",":
-        notes.append("a comma is read as the decimal sign")
-    if own or unit is None:
-        return tuple(own) or None, tuple(notes)
-    return (unit,) * table.values.shape[1], tuple(notes)
-
-
-def _named_units(table: TextTable, options: ReadingOptions) -> list[float]:
-    """Return the units [m] that the last header line names; ask for one that is not clear."""
-    found = text_header.find_units(_header_cells(table))
-    if not found and options.unit is None:
-        text_header.require_unit(_last_header_line(table))
-    return found
-
-
-def _column_units(table: TextTable, options: ReadingOptions) -> Sequence[float]:
-    """Return the units of the columns [m] in the last header line, none if it names none."""
-    found, count = _named_units(table, options), table.values.shape[1]
-    if count == 3 and len(found) == 1:
-        return found * 3
-    if len(found) not in (0, count):
-        line, columns = _last_header_line(table), f"all {count} columns or of none"
-        raise SurfaceFileError(f"the header {line[:60]!r} must name the unit of {columns}")
-    return found
+        heights, pitch = heights[:, 0], tuple(set(pitch))
+    known = pitch if len(pitch) == heights.ndim else None
+    question = "" if unit else f", or their unit, such as unit='um' (--unit um){header.question}"
+    return RawSurface(
+        heights, known, name, notes, not question, bool(question), unit_question=question
+    )
 
 
 class _NoGridError(SurfaceFileError):
     """Points that are on no regular grid, but may be interpolated."""
-
-
-def _reject_numbering(values: FloatArray) -> None:
-    """Refuse numbers of rows and columns around the heights, as written by data-frame programs."""
-    rows, columns = values.shape
-    if rows < 3 or columns < 3 or not np.isnan(values[0, 0]):
-        return
-    down, across = values[1:, 0], values[0, 1:]
-    for first in (0, 1):
-        if np.array_equal(down, np.arange(first, first + rows - 1)) and np.array_equal(
-            across, np.arange(first, first + columns - 1)
-        ):
-            raise SurfaceFileError("the first row and column number the others; remove them")
-
-
-def _last_header_line(table: TextTable) -> str:
-    """Return the last header line that is not empty."""
-    line = next((line for line in reversed(table.header) if line.strip(" \t,;")), "")
-    return line if len(line) <= _MAX_HEADER_LINE else ""
 
 
 def _printed_resolution(table: TextTable, column: int) -> FloatArray:
@@ -261,7 +210,8 @@ def _printed_resolution(table: TextTable, column: int) -> FloatArray:
     Fixed notation prints a constant number of decimals, "%g" a constant number of digits without
     trailing zeros; the coarser of both bounds the rounding in either case.
     """
-    cells = [_cell_text(table, text, column) for text in table.row_texts]
+    sign = table.dialect.decimal
+    cells = [table.dialect.cells(text)[column].replace(sign, ".") for text in table.row_texts]
     decimals = {len(cell.partition(".")[2]) for cell in cells}
     if len(decimals) == 1 and not any("e" in cell.lower() for cell in cells):
         return np.full(len(cells), 10.0 ** -min(decimals.pop(), 300))
@@ -279,17 +229,8 @@ def _to_decimal(text: str) -> Decimal:
         return Decimal(0)
 
 
-def _cell_text(table: TextTable, text: str, column: int) -> str:
-    if table.dialect.decimal == ",":
-        text = text.replace(",", ".")
-    return table.dialect.cells(text)[column]
-
-
 _MAX_SPARSITY = 4  # grid points for each point of the list, beyond which there is no grid
-_EXPECTED_LAYOUT = (
-    "three columns: a list of x, y, z points must lie on a regular grid, in any order; a matrix of"
-    " heights or two columns (position, height) are read, too"
-)
+_EXPECTED_LAYOUT = "three columns are x, y, z of points on a regular grid, in any order"
 
 
 def points_to_grid(
