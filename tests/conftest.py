@@ -5,7 +5,8 @@ from __future__ import annotations
 import gc
 import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from types import SimpleNamespace
 from typing import Any
 
@@ -72,6 +73,41 @@ def uncached_results(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyP
 def one_process(monkeypatch: pytest.MonkeyPatch) -> None:
     """Start no worker processes in commands, since the tests run in parallel."""
     monkeypatch.setattr("asperity.cli.options.available_cores", lambda: 1)
+
+
+@pytest.fixture(scope="session")
+def reading_worker() -> Iterator[Callable[..., int]]:
+    """Replace ``isolation.run_subprocess`` by a process that reads one file after the other.
+
+    Third-party readers take two seconds to import, which each file would cost. The limits are those
+    of a process for each file. The process starts with the first file.
+    """
+    from bench.fuzz_child import ReadingWorker
+
+    with ExitStack() as stack:
+        workers: list[ReadingWorker] = []
+
+        def read(*task: Any) -> int:
+            if not workers:
+                workers.append(stack.enter_context(ReadingWorker()))
+            return workers[0].start(*task)
+
+        yield read
+
+
+@pytest.fixture(autouse=True)
+def shared_reading_process(
+    request: pytest.FixtureRequest,
+    monkeypatch: pytest.MonkeyPatch,
+    reading_worker: Callable[..., int],
+) -> None:
+    """Read all files of third-party readers in one process.
+
+    Tests with the marker ``@pytest.mark.starts_readers`` start a process for each file, as the
+    program does.
+    """
+    if request.node.get_closest_marker("starts_readers") is None:
+        monkeypatch.setattr("asperity.measured.reading.isolation.run_subprocess", reading_worker)
 
 
 @pytest.fixture(params=list(TEXTURES))

@@ -112,6 +112,7 @@ def read(
 
 @needs_data
 @needs_library
+@pytest.mark.starts_readers
 def test_real_file_of_an_frt_instrument() -> None:
     raw = read_surface(DATA / "frt-2.frt")
     # The README of the folder states 30 x 60 mm at 0.2 mm.
@@ -276,6 +277,7 @@ def test_text_is_not_passed_to_the_library(tmp_path: Path) -> None:
 
 
 @needs_library
+@pytest.mark.starts_readers
 def test_instrument_tiff_is_recognised(tmp_path: Path) -> None:
     path = write_tiff(tmp_path / "park.tiff", np.eye(4), tags={50432: (4, struct.pack("<I", 1))})
     with pytest.raises(SurfaceFileError, match="no height channel"):

@@ -18,6 +18,8 @@ from bench.fuzz_child import ReadingWorker
 from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.measured.reading import RawSurface, ReadingOptions, SurfaceFile, isolation
 
+pytestmark = pytest.mark.starts_readers
+
 READERS = '''
 """Readers as third-party libraries may be."""
 

@@ -65,6 +65,7 @@ def assert_relief(raw: RawSurface, tolerance: float = 3e-3) -> None:
     assert not raw.relative
 
 
+@pytest.mark.starts_readers
 def test_level_patch_is_sampled_at_its_vertices(tmp_path: Path) -> None:
     vertices, faces = grid_mesh(relief() - fitted_plane(relief()), PITCH)
     for path in (

@@ -40,6 +40,7 @@ def write_imagej_tiff(
     return write_tiff(path, values, tags=tags)
 
 
+@pytest.mark.starts_readers
 def test_float_heights_in_a_given_unit(tmp_path: Path) -> None:
     raw = read_surface(write_tiff(tmp_path / "a.tif", HEIGHTS), unit="um")
     np.testing.assert_allclose(raw.heights, 1e-6 * HEIGHTS.astype(float), rtol=1e-15)
