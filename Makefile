@@ -21,6 +21,7 @@ $(VENV)/installer: bootstrap.lock
 $(VENV)/runtime: requirements.lock pyproject.toml | $(VENV)/installer
 	$(BIN)/uv pip install --quiet --compile-bytecode --python $(BIN)/python --require-hashes -r requirements.lock
 	$(BIN)/uv pip install --quiet --compile-bytecode --python $(BIN)/python --no-deps --no-build-isolation --editable .
+	$(BIN)/python -m compileall -q src/asperity
 	touch $@
 
 $(VENV)/development: requirements-dev.lock | $(VENV)/runtime
