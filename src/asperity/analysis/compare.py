@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from asperity.analysis.bounds.bound import NORM, ONE_SIDED
@@ -20,9 +21,10 @@ from asperity.analysis.recommendation import comparison_assumptions, recommend, 
 from asperity.analysis.results import LawRow
 from asperity.core.arguments import DEFAULT_STIFFNESS, FIELD
 from asperity.core.checks import check_positive
+from asperity.core.digests import content_digest
 from asperity.core.display import Plottable, Reportable
 from asperity.core.errors import ParameterError
-from asperity.core.files import attributes_to_dict, to_plain_data
+from asperity.core.files import attributes_to_dict, json_text, to_plain_data
 from asperity.core.processes import precompute
 from asperity.devices import Device, load_device
 from asperity.laws import LAWS, Law, distribute_parameters, find_laws
@@ -75,6 +77,14 @@ class Comparison(Plottable, Reportable):
     def recommended(self) -> str:
         """Letter of the recommended law; empty if none can be recommended."""
         return "" if self.recommended_row is None else self.recommended_row.law.letter
+
+    @cached_property
+    def content_digest(self) -> str | None:
+        """Digest of the numbers, the texture and the laws; ``None`` if a law is user-defined."""
+        contents = [surface_content(row.surface) for row in self.rows]
+        if None in contents:
+            return None
+        return content_digest(json_text(self), self.texture.filled_mask, tuple(contents))
 
     def row(self, letter: str) -> LawRow:
         """Return the row of a law by its letter.

@@ -28,13 +28,14 @@ from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
-
-from filelock import FileLock, Timeout
+from typing import TYPE_CHECKING, TypeVar
 
 from asperity.core.digests import package_digest
 from asperity.core.files import open_atomic, open_input
 from asperity.core.units import parse_size
+
+if TYPE_CHECKING:
+    from filelock import FileLock
 
 _MAGIC = b"asperity cache 1\n"
 _HEADER_SIZE = len(_MAGIC) + 32
@@ -244,6 +245,8 @@ def wait_and_lock(namespace: str, key: str) -> bool:
     path = _entry_path(namespace, key).with_suffix(_LOCK_SUFFIX)
     if path in _locks or path.parent in _unresponsive or not size_limit():
         return False
+    from filelock import FileLock  # 80 modules, for a result that is not in the cache
+
     lock = FileLock(path, thread_local=False)
     try:
         if not _ensure_folder(path.parent):
@@ -259,7 +262,7 @@ def wait_and_lock(namespace: str, key: str) -> bool:
 
 
 def _acquire(lock: FileLock, timeout: float) -> bool:
-    with suppress(Timeout):
+    with suppress(TimeoutError):
         lock.acquire(timeout=timeout, poll_interval=0.02)
     return lock.is_locked
 

@@ -7,7 +7,6 @@ import hashlib
 import json
 import math
 import os
-import secrets
 import stat
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -104,7 +103,7 @@ def open_atomic(path: str | os.PathLike[str], *, durable: bool = False) -> Itera
             yield stream
         return
     target = Path(os.path.realpath(path))
-    beside = target.with_name(f".{secrets.token_hex(8)}.tmp")
+    beside = target.with_name(f".{os.urandom(8).hex()}.tmp")
     try:
         with _open_unnamed(target.parent) or beside.open("xb") as stream:
             yield stream

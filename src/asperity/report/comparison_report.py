@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from functools import partial
+from operator import attrgetter
 
 from asperity.analysis.compare import Comparison
 from asperity.analysis.device_comparisons import DeviceComparisons
-from asperity.analysis.gain.characteristic import surface_content
 from asperity.analysis.limits.perceptibility_sentences import (
     force_magnitude_text,
     speed_text,
     tier_text,
 )
 from asperity.analysis.results import LawRow
-from asperity.core.digests import content_digest
-from asperity.core.files import json_text
 from asperity.core.units import format_quantity
 from asperity.report import page
 from asperity.report.comparison_columns import (
@@ -89,23 +87,15 @@ def _requested_stiffness_text(comparison: Comparison) -> str:
 def _figure_sections(comparison: Comparison) -> list[Section]:
     depth = format_quantity(comparison.max_depth, "m")
     stiffness = _requested_stiffness_text(comparison)
-    digest = _figure_digest(comparison)
+    find_digest = partial(attrgetter("content_digest"), comparison)  # slow, for a page alone
     sections = []
     for name in COMPARISON_FIGURES:
         text = partial(comparison_alt_text, comparison, name)
-        picture = page.Picture(page.plot_later(comparison, name), text, name, digest)
+        picture = page.Picture(page.plot_later(comparison, name), text, name, find_digest)
         media = Media.HTML | Media.NOTEBOOK if name == "merit" else Media.HTML
         title, caption, _ = figure_text(f"comparison.{name}", depth=depth, stiffness=stiffness)
         sections.append(Section(title, [picture], caption, media=media))
     return sections
-
-
-def _figure_digest(comparison: Comparison) -> str | None:
-    """Return a digest of everything that the figures depend on; ``None`` if it is not known."""
-    contents = [surface_content(row.surface) for row in comparison.rows]
-    if None in contents:
-        return None
-    return content_digest(json_text(comparison), comparison.texture.filled_mask, tuple(contents))
 
 
 def _provenance_section(comparison: Comparison) -> Section:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import lru_cache, partial
 from importlib import resources
 from importlib.metadata import version
+from operator import itemgetter
 from typing import TYPE_CHECKING
 
 from asperity.core.cache import get_or_compute
@@ -79,13 +80,13 @@ def _render_pictures(sections: Sequence[Section]) -> dict[int, RenderedPicture]:
 
     Those with a digest are shared out among helper processes, and cached.
     """
-    pictures = list(_pictures_in(sections))
-    shared = [picture for picture in pictures if picture.digest is not None]
-    rendered = {id(one): render_picture(one) for one in pictures if one.digest is None}
+    digests = [(picture, picture.digest()) for picture in _pictures_in(sections)]
+    shared = [picture for picture, digest in digests if digest is not None]
+    rendered = {id(one): render_picture(one) for one, digest in digests if digest is None}
     with precompute(render_picture, shared) as results:
-        for picture, result in zip(shared, results, strict=True):
+        for (picture, digest), result in zip(filter(itemgetter(1), digests), results, strict=True):
             compute = partial(_result_or_render, result, picture)
-            key = content_digest(picture.digest, version("matplotlib"))
+            key = content_digest(digest, version("matplotlib"))
             rendered[id(picture)] = get_or_compute(f"picture {picture.name}", key, compute)
     return rendered
 

@@ -77,9 +77,9 @@ class Picture:
         description: what the figure shows, in a sentence or two for readers who cannot see it, or
             a function that returns it; the ranges of lines and colours are appended.
         name: namespace of the rendered figure in the cache.
-        digest: content digest of everything the figure depends on; with a digest the rendered
-            figure is cached, and drawn in a helper process if one is available, so functions
-            must then be such that can be pickled.
+        find_digest: returns the content digest of everything the figure depends on; with a digest
+            the rendered figure is cached, and drawn in a helper process if one is available, so
+            functions must then be such that can be pickled. ``None``: it depends on more.
         dpi: resolution of the parts drawn as pixels.
     """
 
@@ -87,12 +87,16 @@ class Picture:
     figure: Figure | Callable[[], Figure]
     description: str | Callable[[], str]
     name: str = ""
-    digest: str | None = None
+    find_digest: Callable[[], str | None] | None = None
     dpi: int = 160
 
     def draw(self) -> Figure:
         """Return the figure."""
         return self.figure() if callable(self.figure) else self.figure
+
+    def digest(self) -> str | None:
+        """Return the content digest of everything the figure depends on, if it is known."""
+        return None if self.find_digest is None else self.find_digest()
 
     def describe(self) -> str:
         """Return what the figure shows."""
@@ -264,6 +268,11 @@ def terminal_section(*blocks: Block, notes: Sequence[str] = ()) -> Section:
 def terminal_page(*blocks: Block) -> Page:
     """Return a page of one section that only a terminal shows."""
     return Page("", "", (), [terminal_section(*blocks)])
+
+
+def notebook_page(answer: str, *blocks: Block) -> Page:
+    """Return a page without a title, which only a notebook shows."""
+    return Page("", answer, (), [Section("", blocks, media=Media.NOTEBOOK)])
 
 
 def plot_later(result: Any, picture: str | None = None) -> Callable[[], Figure]:

@@ -16,27 +16,16 @@ from asperity.analysis.passivity.assess_passivity import Passivity
 from asperity.core.files import json_text, text_digest
 from asperity.core.units import format_quantity
 from asperity.devices import Device
-from asperity.paper.table_two import TableTwo
-from asperity.recording.recording import Recording
-from asperity.recording.replay import Replay
 from asperity.report.analysis_report import analysis_page, criteria_table
 from asperity.report.comparison_columns import describe_texture
 from asperity.report.comparison_report import comparison_page, comparisons_page
 from asperity.report.device_report import device_page
 from asperity.report.html import Origin, render_notebook, render_page
 from asperity.report.limits_report import limits_page
-from asperity.report.loop.run_report import (
-    figure_sections,
-    ledger_table,
-    recording_page,
-    replay_page,
-    work_text,
-)
 from asperity.report.measured_report import surface_summary_page
-from asperity.report.page import Block, Media, Page, Picture, Row, Section, Table, plot_later
+from asperity.report.page import Page, Picture, notebook_page, plot_later
 from asperity.report.sentences.number_text import interval_text, readable_name, witness_text
 from asperity.report.terminal import page_renderables
-from asperity.simulation import Run
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
 from asperity.textures.texture_loading import MeasurementSummary
@@ -45,8 +34,9 @@ from asperity.textures.texture_loading import MeasurementSummary
 @singledispatch
 def find_page(result: Any) -> Page | None:
     """Return the page of a result; ``None`` for a result without one."""
-    del result  # used by the registered functions
-    return None
+    from asperity.report.loop.loop_pages import find_loop_page  # needs the simulation and the paper
+
+    return find_loop_page(result)
 
 
 find_page.register(Analysis, analysis_page)
@@ -55,33 +45,26 @@ find_page.register(Device, device_page)
 find_page.register(DeviceComparisons, comparisons_page)
 find_page.register(Limits, limits_page)
 find_page.register(MeasurementSummary, surface_summary_page)
-find_page.register(Recording, recording_page)
-find_page.register(Replay, replay_page)
-
-
-def _notebook_page(answer: str, *blocks: Block) -> Page:
-    """Return a page without a title, which only a notebook shows."""
-    return Page("", answer, (), [Section("", blocks, media=Media.NOTEBOOK)])
 
 
 @find_page.register
 def _passivity_page(result: Passivity) -> Page:
     answer = f"{result.verdict}, decided by {result.decided_by}: {result.reason}"
-    return _notebook_page(answer, criteria_table(result))
+    return notebook_page(answer, criteria_table(result))
 
 
 @find_page.register
 def _bound_page(result: Bound) -> Page:
     note = f": {result.note}" if result.note else ""
     where = "" if result.at is None else f"; lower end at {witness_text(result)}"
-    return _notebook_page(f"{interval_text(result)}, {result.method}{note}{where}")
+    return notebook_page(f"{interval_text(result)}, {result.method}{note}{where}")
 
 
 @find_page.register
 def _texture_page(result: Texture) -> Page:
     height = format_quantity(result.peak_to_valley, "m")
     text = f"{describe_texture(result.describe())}; {height} high"
-    return _notebook_page(text, Picture(plot_later(result), f"The surface: {text}"))
+    return notebook_page(text, Picture(plot_later(result), f"The surface: {text}"))
 
 
 @find_page.register
@@ -91,19 +74,7 @@ def _surface_page(result: Surface) -> Page:
     depth = format_quantity(result.max_depth, "m")
     name = f"law {law.letter}, {readable_name(law.name)}"
     answer = f"{name}, at {stiffness}, pressed to {depth}: {texture}"
-    return _notebook_page(answer, Picture(plot_later(result.texture), f"The surface: {texture}"))
-
-
-@find_page.register
-def _run_page(result: Run) -> Page:
-    page = _notebook_page(f"{work_text(result.surface, result)}.", ledger_table(result))
-    return Page("", page.answer, (), [*page.sections, *figure_sections(result)])
-
-
-@find_page.register
-def _table_two_page(result: TableTwo) -> Page:
-    head, *rows = result.cells()
-    return _notebook_page(result.parameters, Table(head, [Row(cells) for cells in rows]))
+    return notebook_page(answer, Picture(plot_later(result.texture), f"The surface: {texture}"))
 
 
 def html_text(result: Any) -> str:
