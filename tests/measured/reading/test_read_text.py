@@ -387,6 +387,7 @@ def test_unusable_header_values_are_refused(tmp_path: Path, header: str, match: 
         *("z factor (-> m)=many", "Z unit: nm\nZ factor: 0.001", "1 count = 2 nm of height"),
         *("Z unit: nm\nheight unit: um", "Z Calibration (nm/digit),0.1", "Z resolution: 0.1 nm"),
         *("Z unit: nm\nScale: 2", "heights are multiplied by 1000"),
+        *("Z unit: nm\nZ magnification: 20", "Z unit: nm\nZ axis: inverted"),
     ],
 )
 def test_factors_and_contradictions_leave_the_unit_open(tmp_path: Path, header: str) -> None:
@@ -464,7 +465,14 @@ def test_order_of_named_columns_is_honoured(tmp_path: Path, order: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "header", ["Channel: Deflection", "# AmplitudeError", "Deflection [nm]", "Image type,Phase"]
+    "header",
+    [
+        "Channel: Deflection",
+        "Channel: Z-Axis (Deflection)",
+        "# AmplitudeError",
+        "Deflection [nm]",
+        "Image type,Phase",
+    ],
 )
 def test_other_channels_are_no_heights(tmp_path: Path, header: str) -> None:
     assert_refused(tmp_path, f"{header}\nValue units: nm\n{MAP}", "names '.*', which is no height")

@@ -228,11 +228,12 @@ class HeaderEntry:
 def _reject_other_quantities(entries: Sequence[HeaderEntry]) -> None:
     """Refuse a channel whose name is that of another quantity."""
     for entry in entries:
-        alone = entry.words if not entry.value and len(entry.words) <= 3 else frozenset[str]()
-        named = split_words(entry.value) if entry.words & WORDS["channels"] else alone
-        if named & WORDS["quantities"]:
-            what = f"{min(named & WORDS['quantities'])!r}, which is no height"
-            raise SurfaceFileError(f"the header {entry.line!r} names {what}; export the heights")
+        is_alone = not entry.value and len(entry.words) <= 3
+        text = entry.value if entry.words & WORDS["channels"] else entry.key * is_alone
+        found = split_words(re.sub(r"[\[\]()]", " ", text)) & WORDS["quantities"]
+        if found:
+            what = f"{min(found)!r}, which is no height; export the heights"
+            raise SurfaceFileError(f"the header {entry.line!r} names {what}")
 
 
 def _find_height_unit(entries: Sequence[HeaderEntry]) -> tuple[float | None, list[str]]:
