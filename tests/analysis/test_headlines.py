@@ -21,9 +21,11 @@ import pytest
 from asperity.analysis.check_limits import limits
 from asperity.analysis.compare import Comparison, compare
 from asperity.analysis.results import LawRow
-from asperity.devices import Device, load_device
+from asperity.core.errors import ParameterError
+from asperity.devices import Device, device_names, load_device
 from asperity.scene import load_scene
 from asperity.textures import Sinusoid, load_texture
+from asperity.textures.synthetic import prepare_texture
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
 needs_data = pytest.mark.skipif(not DATA.is_dir(), reason=f"no sample surfaces in {DATA}")
@@ -100,6 +102,25 @@ def test_headline_of_a_library_surface(spec: str, name: str) -> None:
     rendering = "field" if spec == "knurl" else "search"
     result = compare(load_scene(spec).texture, name, "CH", rendering=rendering)
     assert headline(result) == OTHERS[spec, name]
+
+
+@pytest.mark.parametrize("name", device_names())
+def test_every_device_renders_a_library_surface_that_is_felt_or_says_why_not(name: str) -> None:
+    """A knurl, at the magnification that the answer asks for."""
+    knurl = load_scene("knurl").texture
+    if load_device(name).wall_test is None:
+        with pytest.raises(ParameterError, match="needs max_stiffness to compare laws"):
+            compare(knurl, name, "CH", rendering="search")
+        return
+    result = compare(knurl, name, "CH", rendering="search")
+    row = result.recommended_row
+    assert row is not None
+    assert row.perceptibility is not None
+    larger = [one.value for one in row.perceptibility.remedies if one.kind == "magnify"]
+    if larger:
+        magnified = prepare_texture(knurl, magnify=larger[0])
+        result = compare(magnified, name, "CH", rendering="search")
+    assert headline(result) in {"C", "H"}
 
 
 def test_limits_have_the_tier_of_the_headline() -> None:

@@ -85,6 +85,17 @@ PEN_FILE = Path(__file__).parents[2] / "src/asperity/perception/grips/pen_grip.t
         ({"stifness": "1 N/m"}, "unknown keys: stifness"),
         ({"thresholds": {}}, "two or more ascending frequencies"),
         ({"thresholds": {"points": [{"frequency": "1 Hz"}]}}, "each threshold needs"),
+        (
+            {
+                "thresholds": {
+                    "points": [
+                        {"frequency": "0 Hz", "unnoticed": "1 um", "felt": "1 um"},
+                        {"frequency": "2 Hz", "unnoticed": "1 um", "felt": "1 um"},
+                    ]
+                }
+            },
+            "ascending frequencies",
+        ),
         ({"thresholds": {"points": TABLE["thresholds"]["points"][::-1]}}, "ascending frequencies"),
         (
             {

@@ -21,6 +21,7 @@ from asperity.analysis.limits.perceptibility_sentences import (
     texture_amount_text,
 )
 from asperity.core.checks import FloatArray
+from asperity.core.errors import ParameterError
 from asperity.devices import Device, parse_device
 from asperity.devices.device import Datum
 from asperity.perception.grip import Grip, load_grip
@@ -192,6 +193,30 @@ def test_only_waves_within_the_bandwidth_are_resolved() -> None:
     assert result.resolved_rms == pytest.approx(rms * RMS, rel=1e-6)
 
 
+def test_unverified_numbers_that_hide_only_together_hide_nothing() -> None:
+    """Friction damps both waves a little, steps of position hide the weaker one."""
+    waves = [[2 * math.pi / LONG, 0.0], [2 * math.pi / SHORT, 0.0]]
+    numbers = {"friction": "0.2 N", "position_resolution": "100 um"}
+
+    def assess(scale: float, own_device: Device) -> Perceptibility:
+        wave = Fourier([scale * 1e-6, scale * 1e-6], waves)
+        surface = Surface(wave, "A", 500.0, 1e-3)
+        return assess_perceptibility(
+            surface, own_device, TexturePart(wave), rms=merit(surface).ripple * 500.0
+        )
+
+    alone = [assess(1.0, device(**{name: numbers[name]})).level for name in numbers]
+    together = assess(1.0, device(**numbers)).level
+    assert together < 0.999 * min(alone)
+    scale = 1.0 / math.sqrt(together * min(alone))
+    data = device(**numbers).data
+    remembered = {name: replace(data[name], source="memory", verified=False) for name in numbers}
+    doubtful = replace(device(), data={**device().data, **remembered})
+    result = assess(scale, doubtful)
+    assert assess(scale, device(**numbers)).tier == "borderline"
+    assert (result.tier, set(result.unverified)) == ("felt", set(numbers))
+
+
 def test_form_is_separated_from_texture() -> None:
     """A 2 mm deep bowl with waves of 20 µm has mostly form and little texture."""
     x = np.linspace(0.0, 40e-3, 400)
@@ -224,7 +249,7 @@ def test_sentences_name_the_motion_and_the_remedies() -> None:
     assert re.fullmatch(r"To feel it, magnify it \d+ times more(, or .*)?\.", remedies_text(result))
     steps = assess_wave(80e-6, device(force_resolution="20 mN"))
     assert masking_text(steps) == "the device's force steps of 20 mN hide it"
-    assert "use a device with force steps below 15 mN" in remedies_text(steps)
+    assert "use a device with force steps below 16 mN" in remedies_text(steps)
 
 
 def test_says_so_where_no_remedy_helps() -> None:
@@ -270,3 +295,36 @@ def test_waviness_of_rounding_size_is_reported_as_none() -> None:
     (text,) = form_removal_sentences(own_device, 3e-6, 1.8e-21)
     assert text.endswith("L-filter of 8 mm; they take form 3 µm high and no waviness")
     assert form_removal_sentences(replace(result, nesting_index=None), 3e-6, 1e-6) == []
+
+
+@pytest.mark.parametrize(
+    ("period", "extrapolates"), [(9e-3, False), (10.5e-3, True), (0.21e-3, False), (0.19e-3, True)]
+)
+def test_thresholds_beyond_their_frequencies_are_reported(
+    period: float, extrapolates: bool
+) -> None:
+    """At 0.1 m/s these waves are at 11, 9.5, 476 and 526 Hz; the thresholds cover 10 to 500 Hz."""
+    result = compare(Sinusoid(period / 20.0, period), device(), "C")
+    perceptibility = result.row("C").perceptibility
+    assert perceptibility is not None
+    assert perceptibility.extrapolated is extrapolates
+    assert ("thresholds are extrapolated" in " ".join(result.assumptions)) is extrapolates
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"speed": 0.0}, r"speed must be positive \[m/s\], got 0.0"),
+        ({"speed": -0.1}, "speed must be positive"),
+    ],
+)
+def test_scan_without_speed_is_refused(options: dict[str, float], message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        compare(Sinusoid(1e-4, 2e-3), device(), "C", **options)
+
+
+@pytest.mark.parametrize("field", ["apparent_mass", "damping"])
+@pytest.mark.parametrize("value", [0.0, -0.05])
+def test_mass_and_damping_of_a_device_are_positive(field: str, value: float) -> None:
+    with pytest.raises(ParameterError, match=f"{field} must be positive"):
+        device(**{field: value})

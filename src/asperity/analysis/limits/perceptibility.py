@@ -9,7 +9,7 @@ detection thresholds of the grip at the frequency of the wave.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import partial
@@ -184,6 +184,10 @@ class WaveScan:
         case = replace(self.case, wavelengths=wavelengths, forces=factor * self.case.forces)
         return replace(self, case=case, components=factor * self.components)
 
+    def at_speed(self, speed: float) -> WaveScan:
+        """Return the scan at another speed [m/s]."""
+        return replace(self, case=replace(self.case, speed=speed))
+
     def with_device(self, field: str, value: float) -> WaveScan:
         """Return the scan on a device with another value of a field."""
         return replace(self, case=replace(self.case, device={**self.case.device, field: value}))
@@ -225,7 +229,7 @@ def assess_perceptibility(
         >>> result.tier, f"{result.level:.2f}", f"{result.frequency:.0f} Hz"
         ('borderline', '0.36', '100 Hz')
         >>> [f"{remedy.kind} {remedy.value:.3g}" for remedy in result.remedies]
-        ['magnify 2.5', 'speed 0.029', 'apparent_mass 0.016']
+        ['magnify 2.5', 'speed 0.029', 'apparent_mass 0.017']
     """
     hand = load_grip() if grip is None else grip
     texture_rms, scanned = rms, surface
@@ -301,13 +305,13 @@ def classify_perceptibility(
     data = {**known, **doubtful}
     response = respond(waves)
     complete = respond(replace(waves, case=replace(waves.case, device=data)))
-    masking = [
-        name
-        for name in (doubtful if complete.tier != response.tier else ())
-        if respond(waves.with_device(name, data[name])).tier != response.tier
-    ]
-    if not masking:
+    masking: list[str] = []
+    if complete.tier == response.tier:
         response = complete
+    else:
+        tiers = {name: respond(waves.with_device(name, data[name])).tier for name in doubtful}
+        # Numbers may hide a texture together that none of them hides alone.
+        masking = [one for one in doubtful if tiers[one] != response.tier] or list(doubtful)
     forces, resolved = waves.case.forces, response.is_resolved
     motions, total = np.where(resolved, response.motions, 0.0), float(forces @ forces)
     levels = motions / response.felt
@@ -381,39 +385,29 @@ def respond(waves: WaveScan) -> HandSpectrum:
 def _find_remedies(waves: WaveScan, is_felt_magnified: Callable[[float], bool]) -> list[Remedy]:
     """Return the changes that make a texture felt, each by itself and confirmed."""
     case, found = waves.case, []
-    first = _first_felt(waves.magnified)
+    first = _first_felt(_FACTORS, waves.magnified)
     if first is not None:
         tries = (round_up(first * share, 2) for share in _MAGNIFICATION_TRIES)
         if factor := next((factor for factor in tries if is_felt_magnified(factor)), None):
             found.append(Remedy("magnify", factor))
-    speeds = [
-        _first_felt(lambda factor: replace(waves, case=replace(case, speed=case.speed / factor))),
-        _first_felt(
-            lambda factor: replace(
-                waves, case=replace(case, speed=min(case.speed * factor, MAX_SPEED))
-            )
-        ),
-    ]
-    slower, faster = (math.inf if factor is None else factor for factor in speeds)
-    if min(slower, faster) < math.inf:
-        speed = round_down(case.speed / slower, 2) if slower <= faster else case.speed * faster
-        found.append(Remedy("speed", min(speed, MAX_SPEED)))
+    # What is printed is confirmed: values are rounded before they are tried.
+    slower = _first_felt((round_down(case.speed / one, 2) for one in _FACTORS), waves.at_speed)
+    faster = _first_felt(
+        (min(round_up(case.speed * one, 2), MAX_SPEED) for one in _FACTORS), waves.at_speed
+    )
+    speeds = [one for one in (slower, faster) if one is not None]
+    if speeds:
+        nearest = min(speeds, key=lambda speed: abs(math.log(speed / case.speed)))
+        found.append(Remedy("speed", nearest))
     for name in ("apparent_mass", "force_resolution", "position_resolution"):
         assumed = DEFAULT_APPARENT_MASS if name == "apparent_mass" else 0.0
         value = case.device.get(name, assumed)
-        factor = _first_felt(partial(_with_finer_device, waves, name, value)) if value else None
-        if factor is not None:
-            found.append(Remedy(name, round_down(value / factor, 2)))
+        finer = (round_down(value / one, 2) for one in _FACTORS if value)
+        if (enough := _first_felt(finer, partial(waves.with_device, name))) is not None:
+            found.append(Remedy(name, enough))
     return found
 
 
-def _with_finer_device(waves: WaveScan, field: str, value: float, factor: float) -> WaveScan:
-    """Return the scan on a device with a value divided by a factor."""
-    return waves.with_device(field, value / factor)
-
-
-def _first_felt(change: Callable[[float], WaveScan]) -> float | None:
-    """Return the least factor of a change at which a texture is felt; ``None`` if none is."""
-    return next(
-        (float(one) for one in _FACTORS if respond(change(float(one))).tier == "felt"), None
-    )
+def _first_felt(values: Iterable[float], change: Callable[[float], WaveScan]) -> float | None:
+    """Return the first value of a change at which a texture is felt; ``None`` if there is none."""
+    return next((float(one) for one in values if respond(change(one)).tier == "felt"), None)
