@@ -275,3 +275,18 @@ def test_loss_of_contact_names_the_depth_that_keeps_it() -> None:
     assert lost.rows[0].loses_contact
     assert "pressed to 0.8 mm it keeps contact" in lost.recommendation
     assert not asp.compare(wave, "omega.3", "C", max_depth=8e-4).rows[0].loses_contact
+
+
+def test_answer_says_how_much_calibrating_gains() -> None:
+    """For law H twice: K₀ along the lightest direction needs no margin; for A and G nothing."""
+    texture = asp.Sinusoid(amplitude=0.3e-3, period=2.3e-3)
+    rig = {"max_stiffness": "2000 N/m", "update_rate": "1 kHz"}
+    calibrated = {**rig, "max_stiffness": {"value": 2000.0, "lightest": 1.0}}
+    before, after = (
+        asp.compare(texture, parse_device(one, "mine"), "H") for one in (rig, calibrated)
+    )
+    assert "the factor is 1: up to 2 times stiffer (asperity calibrate)." in before.recommendation
+    ratio = after.row("H").recommended_stiffness / before.row("H").recommended_stiffness
+    assert ratio == pytest.approx(2.0, rel=1e-2)
+    assert "calibrated" not in after.recommendation
+    assert "calibrated" not in asp.compare(texture, parse_device(rig, "mine"), "G").recommendation

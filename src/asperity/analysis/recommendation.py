@@ -27,7 +27,7 @@ from asperity.analysis.passivity.assess_passivity import (
     stiffness_limit_text,
 )
 from asperity.analysis.passivity.criteria import BUZZ_SPEED, damping_assumption
-from asperity.analysis.passivity.verdict import Margin
+from asperity.analysis.passivity.verdict import Margin, load_margins
 from asperity.analysis.results import LawRow
 from asperity.analysis.surface_sentences import (
     SCOPE_SENTENCE,
@@ -280,7 +280,17 @@ def _margin_text(row: LawRow) -> str:
         return "The recommended stiffness equals this limit."
     start = f"The recommended stiffness is {margin.factor:g} times "
     start += "this limit" if row.conservative else "K₀/q, the gain of that wall"
-    return f"{start}: there {_simulated_loops_text(margin)}."
+    calibrated = max(
+        one.factor for one in load_margins(along_lightest=True).values() if one.law == margin.law
+    )
+    text = f"{start}: there {_simulated_loops_text(margin)}."
+    if calibrated <= margin.factor:
+        return text
+    gain = f"up to {calibrated / margin.factor:.2g} times stiffer (asperity calibrate)"
+    return (
+        f"{text} On a calibrated device, whose lightest damping is known, the factor is "
+        f"{calibrated:g}: {gain}."
+    )
 
 
 def _simulated_loops_text(margin: Margin) -> str:

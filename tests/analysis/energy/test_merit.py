@@ -146,3 +146,14 @@ def test_parallel_lines_are_evenly_spaced_over_the_domain() -> None:
     upward = ScanLine(np.array([0.4e-3, 0.2e-3]), np.array([0.0, 1.0]), 2.4e-3, periodic=False)
     lines = parallel_line_points(SLOPED, upward, 8)
     np.testing.assert_allclose(lines[:, 0, 0], (np.arange(16) + 0.5) / 16 * 3.2e-3, atol=1e-12)
+
+
+def test_numbers_of_a_user_defined_law_do_not_depend_on_its_stiffness() -> None:
+    """Shipped laws are scanned at unit stiffness, a law of unknown formula at its own."""
+    user_law = Law("V", "own", "vertical", lambda c: c.k * c.depth * c.w)
+    own, shipped = (
+        merit(Surface(WAVE, law, stiffness, BELOW_CREST))
+        for law, stiffness in ((user_law, 700.0), ("C", 1.0))
+    )
+    for name in ("strength", "support", "ripple", "gain"):
+        assert getattr(own, name) == pytest.approx(getattr(shipped, name), rel=2e-3), name

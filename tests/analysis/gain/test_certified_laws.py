@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import mpmath
 import numpy as np
 import pytest
 import sympy as sp
@@ -27,7 +28,7 @@ from asperity.analysis.gain.medial_axis import crest_curvature, gain_above_crest
 from asperity.core.errors import ParameterError
 from asperity.laws import Law
 from asperity.surface import Surface
-from asperity.textures import Profile, Sinusoid
+from asperity.textures import HeightMap, Profile, Sinusoid
 
 # --- the medial axis ------------------------------------------------------------------------------
 
@@ -83,6 +84,34 @@ def test_worst_deflection_has_maximum_length_against_the_slope() -> None:
     deflection = worst_deflection(surface, np.array([[3.0, -4.0], [0.0, 2e-9], [0.0, 0.0]]))
     np.testing.assert_allclose(deflection[:2] / 0.3e-3, [[-0.6, 0.8], [0.0, -1.0]], rtol=1e-15)
     assert np.hypot(*deflection[2]) == pytest.approx(0.3e-3, rel=1e-15)
+
+
+@pytest.mark.parametrize(("friction", "depth"), [(0.8, 1e-3), (0.3, 0.2e-3), (1.7, 0.4e-3)])
+def test_certificate_of_law_f_is_rounded_outwards(friction: float, depth: float) -> None:
+    """Without modulation every point attains the number, so the bound leaves no room inwards."""
+    flat = Surface(
+        WAVE, "F", max_depth=depth, friction=friction, max_deflection=0.3e-3, modulation_depth=0.0
+    )
+    bound = characteristic_number(flat)
+    with mpmath.workdps(40):
+        a, b = (
+            mpmath.mpf(friction) * mpmath.mpf(depth) / 2 / mpmath.mpf(0.3e-3),
+            mpmath.mpf(friction) / 2,
+        )
+        t = 1 + a**2 + b**2
+        exact = mpmath.sqrt((t + mpmath.sqrt(t**2 - 4 * a**2)) / 2)
+        assert mpmath.mpf(bound.upper) >= exact
+    assert bound.upper == pytest.approx(float(exact), rel=1e-12)
+
+
+def test_shallow_map_of_law_g_needs_few_cells() -> None:
+    """Nowhere above the floor q = 1, which every point attains: 95 s before, 1 s since."""
+    heights = 1e-8 * np.random.default_rng(1).normal(size=(650, 650))
+    shallow = HeightMap(heights, 5e-6, periodic=True)
+    surface = Surface(shallow, "G", max_depth=shallow.peak_to_valley)
+    bound = characteristic_number(surface, work_limit=20_000)  # of 422 500 cells
+    assert (bound.lower, bound.method) == (1.0, "certified")
+    assert bound.upper == pytest.approx(1.0, rel=1e-12)
 
 
 def test_gain_of_law_d_above_a_height() -> None:

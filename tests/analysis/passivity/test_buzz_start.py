@@ -59,6 +59,26 @@ def test_bound_at_the_limit_is_the_speed_asked_for(law: str, changes: dict[str, 
         assert above.speed > speed
 
 
+def test_start_is_that_of_the_formula_by_hand() -> None:
+    """φ = k q |δ|/2 + |b|/2 - f_c, m = (2 σ₀ - k q⁺)/(2 T) without delay: law C, all terms."""
+    changes = {"force_resolution": "2 mN", "least_friction": "1.2 mN"}
+    result = assess("C", 100.0, **changes)
+    q, one_sided = result.loop.q.upper, result.loop.one_sided.upper
+    rate, step, force = 4000.0, 3.0**0.5 * 10e-6 / 2.0, 3.0**0.5 * 2e-3 / 2.0 - 1.2e-3
+    budget = 0.625 * rate
+    expected = (BUZZ_SPEED * budget - force * rate) / (
+        q * step * rate + BUZZ_SPEED * 0.5 * one_sided
+    )
+    assert force > 0.0
+    assert result.stability_limit.stiffness == pytest.approx(expected, rel=1e-9)
+    assert result.stability_limit.proved_stiffness == 0.0
+
+
+def test_device_that_feeds_more_than_it_damps_has_no_bound() -> None:
+    fed = {"virtual_damping": "0.625 N*s/m"}
+    assert buzz_limited_stiffness(assess("C", 100.0, **fed).loop) is None
+
+
 def test_limit_without_steps_or_with_friction_is_the_proof() -> None:
     exact = assess("H", 100.0, position_resolution="1e-15 m")
     assert exact.stability_limit.stiffness == pytest.approx(5000.0, rel=1e-6)
