@@ -280,17 +280,13 @@ def _margin_text(row: LawRow) -> str:
         return "The recommended stiffness equals this limit."
     start = f"The recommended stiffness is {margin.factor:g} times "
     start += "this limit" if row.conservative else "K₀/q, the gain of that wall"
-    calibrated = max(
-        one.factor for one in load_margins(along_lightest=True).values() if one.law == margin.law
-    )
+    calibrated = {one.law: one.factor for one in load_margins(True).values()}[margin.law]
     text = f"{start}: there {_simulated_loops_text(margin)}."
     if calibrated <= margin.factor:
         return text
-    gain = f"up to {calibrated / margin.factor:.2g} times stiffer (asperity calibrate)"
-    return (
-        f"{text} On a calibrated device, whose lightest damping is known, the factor is "
-        f"{calibrated:g}: {gain}."
-    )
+    gain = f"{calibrated:g}: up to {calibrated / margin.factor:.2g} times stiffer"
+    whose = "On a calibrated device, whose lightest damping is known, the factor is"
+    return f"{text} {whose} {gain} (asperity calibrate)."
 
 
 def _simulated_loops_text(margin: Margin) -> str:

@@ -391,12 +391,10 @@ def _find_remedies(waves: WaveScan, is_felt_magnified: Callable[[float], bool]) 
         if factor := next((factor for factor in tries if is_felt_magnified(factor)), None):
             found.append(Remedy("magnify", factor))
     # What is printed is confirmed: values are rounded before they are tried.
-    slower = _first_felt((round_down(case.speed / one, 2) for one in _FACTORS), waves.at_speed)
-    faster = _first_felt(
-        (min(round_up(case.speed * one, 2), MAX_SPEED) for one in _FACTORS), waves.at_speed
-    )
-    speeds = [one for one in (slower, faster) if one is not None]
-    if speeds:
+    slower = (round_down(case.speed / one, 2) for one in _FACTORS)
+    faster = (min(round_up(case.speed * one, 2), MAX_SPEED) for one in _FACTORS)
+    tried = (_first_felt(values, waves.at_speed) for values in (slower, faster))
+    if speeds := [one for one in tried if one is not None]:
         nearest = min(speeds, key=lambda speed: abs(math.log(speed / case.speed)))
         found.append(Remedy("speed", nearest))
     for name in ("apparent_mass", "force_resolution", "position_resolution"):
