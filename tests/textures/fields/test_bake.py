@@ -108,3 +108,15 @@ def test_default_spacing_reaches_the_share_that_was_asked_for(texture: Texture) 
     assert rms == pytest.approx(field.accuracy.rms, rel=0.15)
     coarse = asp.bake(exact, 3.0 * field.resolution).texture
     assert coarse.accuracy.share > 0.05
+
+
+@pytest.mark.parametrize("texture", [WAVE, MAP])
+def test_levels_below_the_fade_are_those_computed_one_by_one(texture: Texture) -> None:
+    plan = BakePlan(texture, 1.5e-4, 1.0, BakeGoal())
+    xy = texture.domain.points(np.full((1, len(texture.domain.spans)), 0.3))
+    z = plan.floor - plan.fade * np.array([3.0, 2.0, 1.001, 0.9, 0.3, 0.0, -0.2])
+    together, single = np.empty((1, len(z)), np.float32), np.empty((1, 1), np.float32)
+    plan.columns(xy, z, together)
+    for level, height in enumerate(z):
+        plan.columns(xy, np.array([height]), single)
+        assert together[0, level] == pytest.approx(single[0, 0], rel=2.0**-22)

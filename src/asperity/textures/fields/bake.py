@@ -21,11 +21,11 @@ from asperity.textures.fields.potential_field import FieldAccuracy, PotentialFie
 from asperity.textures.texture import Texture
 
 _MAX_PASSES = 6
+# Number of probes at which the difference from exact H is measured.
 PROBES = 1024
-"""Number of probes at which the difference from exact H is measured."""
 _TRIAL_PROBES = 128
 _TRIAL_COARSENING = 2.0
-_TRIAL_MARGIN = 0.985
+_TRIAL_MARGIN = 0.95
 _MAX_TRIALS = 12
 _BYTES_PER_NODE = 4
 # Depth in which a field fades below its floor, over half the range of the vertical force there.
@@ -124,7 +124,11 @@ class BakePlan:
         r = np.minimum(depth / self.fade, 1.0)
         beyond = np.maximum(depth - self.fade, 0.0)
         warped = np.maximum(z, self.floor) - self.fade * (r - 0.5 * r * r)
-        self._exact_columns(xy, warped, out)
+        # All levels that are deeper than the fade have the potential of one place.
+        same = max(int(np.count_nonzero(r >= 1.0)) - 1, 0)
+        exact = np.empty((len(xy), len(z) - same), np.float32)
+        self._exact_columns(xy, warped[same:], exact)
+        out[:, same:], out[:, :same] = exact, exact[:, :1]
         slope = self.lift - self.lift_range
         gained = self.fade**2 * (0.5 - 0.125 * r) * r**3 + 0.5 * self.fade * slope * r * r
         out += (gained + (self.fade + slope + 0.5 * beyond) * beyond).astype(np.float32)
@@ -170,11 +174,12 @@ class BakePlan:
         for trial in range(_MAX_TRIALS):
             field = self.bake(resolution, part)
             share, goal = field.accuracy.share, self.goal.share
-            if resolution == (coarsest if share <= goal else finest) or 0.7 * goal <= share <= goal:
+            if resolution == (coarsest if share <= goal else finest) or 0.5 * goal <= share <= goal:
                 break
-            # A finer field may need one more smoothing pass.
-            close = field.gain.upper > _TRIAL_MARGIN * self.goal.max_gain * self.gain
-            ratio = 0.92 * goal / max(share * (1.2 if close else 1.0), 0.01 * goal)
+            if field.gain.upper > _TRIAL_MARGIN * self.goal.max_gain * self.gain:
+                # A finer field may need one more smoothing pass: about this power of the variance.
+                share *= ((2.0 + field.passes) / (1.0 + field.passes)) ** 0.65
+            ratio = 0.92 * goal / max(share, 0.01 * goal)
             power = 0.77 if trial == 0 else 1.0  # near the goal rather too fine than once more
             resolution = min(max(resolution * ratio**power, finest), coarsest)
             part = scale_progress(progress, 0.1, 0.9)

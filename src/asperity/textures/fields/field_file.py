@@ -56,10 +56,9 @@ HEADER = np.dtype(
         ("header_checksum", "<u4"),  # CRC-32 of the header before this entry
     ]
 )
-"""The header of a file."""
 
+# Builds the texture of a description; see :meth:`Texture.describe`.
 BuildTexture = Callable[[Mapping[str, Any]], Texture]
-"""Builds the texture of a description; see :meth:`Texture.describe`."""
 
 
 def save_field(path: str | os.PathLike[str], field: Texture) -> PotentialField:

@@ -13,8 +13,8 @@ from asperity.core.checks import FloatArray
 from asperity.textures.domain import Domain
 from asperity.textures.fields.field_sampler import MIRRORED, PERIODIC, ZERO, FieldArguments
 
+# Weight of both neighbours of a node along an axis in a smoothing pass.
 NEIGHBOUR_WEIGHT = 0.125
-"""Weight of both neighbours of a node along an axis in a smoothing pass."""
 _MIN_STEPS = 4
 
 SingleArray = NDArray[np.float32]

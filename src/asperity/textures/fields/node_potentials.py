@@ -18,9 +18,9 @@ from asperity.textures.texture import Texture
 
 _NODES_PER_BLOCK = 10_000
 
+# Writes U [m²] in single precision, (n, levels), at columns of nodes at x, y (n, 2) and rising z
+# (levels,) [m]; called by several threads at once.
 ColumnFunction = Callable[[FloatArray, FloatArray, SingleArray], None]
-"""Writes U [m²] in single precision, (n, levels), at columns of nodes at x, y (n, 2) and rising z
-(levels,) [m]; called by several threads at once."""
 
 
 def split_columns(texture: Texture, continuity: float) -> ColumnFunction:

@@ -20,8 +20,8 @@ from asperity.textures.meshes.mesh_faults import INTERSECTING, make_fault
 from asperity.textures.meshes.mesh_potential import BodyLaw
 from asperity.textures.spline.spline_texture import HeightMap
 
+# Greatest default of the depth to which the field of a body is exact [m].
 DEFAULT_DEPTH = 1e-3
-"""Greatest default of the depth to which the field of a body is exact [m]."""
 DEFAULT_GOAL = BakeGoal()
 _MOST_CROSSINGS = 4096
 _LEAST_CELLS = 4
