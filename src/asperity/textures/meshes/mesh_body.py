@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import os
+import re
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -59,7 +61,7 @@ class MeshBody:
 
     @classmethod
     def from_arrays(
-        cls, vertices: FloatArray, faces: NDArray[np.int64], name: str = "mesh",
+        cls, vertices: FloatArray, faces: NDArray[np.integer[Any]], name: str = "mesh",
         repair: bool = False,
     ) -> MeshBody:  # fmt: skip
         """Return the body with the given vertices (m, 3) [m] and faces (n, 3), if it is sound.
@@ -82,8 +84,7 @@ class MeshBody:
             tried = " after the repair" if repaired else "; repair=True may close and turn it"
             faults = "; ".join(map(str, wrong))
             raise SurfaceFileError(f"{name} has no defined inside{tried}: {faults}")
-        sound = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
-        triangles = vertices[faces[sound]]
+        triangles = vertices[faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]]
         if not np.ptp(triangles.reshape(-1, 3), axis=0).all():
             raise SurfaceFileError(f"{name} is flat: it encloses no volume")
         return cls(triangles, name, tuple(after), tuple(before if repaired else ()))
@@ -122,6 +123,7 @@ def load_mesh(
     metres = unit_to_metres(unit)
     _check_count(path, suffix)
     vertices, faces = _parse(path, suffix)
+    gc.collect()  # trimesh's objects refer to each other, and hold several copies
     np.multiply(vertices, metres, out=vertices)
     return MeshBody.from_arrays(vertices, faces, path.name, repair)
 
@@ -149,30 +151,28 @@ def _stated_count(head: bytes, suffix: str) -> int | None:
     if suffix == "stl" and len(head) >= _STL_HEADER:
         return int(struct.unpack_from("<I", head, 80)[0])
     if suffix == "ply":
-        for line in head.splitlines():
-            words = line.split()
-            if words[:2] == [b"element", b"face"] and len(words) == 3 and words[2].isdigit():
-                return int(words[2])
+        stated = re.search(rb"^element\s+face\s+(\d+)\s*$", head, re.MULTILINE)
+        return None if stated is None else int(stated[1])
     return None
 
 
-def _parse(path: Path, suffix: str) -> tuple[FloatArray, NDArray[np.int64]]:
+def _parse(path: Path, suffix: str) -> tuple[FloatArray, NDArray[np.int32]]:
     """Return vertices in the file's unit, and faces."""
     import trimesh
 
     with reject_on_error(f"damaged mesh {path.name}"):
         loaded: Any = trimesh.load(path, file_type=suffix, process=False, skip_materials=True)
         mesh = loaded.to_mesh() if isinstance(loaded, trimesh.Scene) else loaded
-        vertices = np.array(mesh.vertices, dtype=np.float64)
-        faces = np.array(mesh.faces, dtype=np.int64).reshape(-1, 3)
+        vertices = np.asarray(mesh.vertices, dtype=np.float64).view(np.ndarray)
+        faces = np.asarray(mesh.faces, dtype=np.int64).view(np.ndarray).reshape(-1, 3)
     if len(faces) and not (faces.min() >= 0 and faces.max() < len(vertices)):
         raise SurfaceFileError(f"damaged mesh {path.name} (a triangle has a corner that is none)")
-    return vertices, faces
+    return vertices, faces.astype(np.int32)
 
 
 def _merge_vertices(
-    vertices: FloatArray, faces: NDArray[np.int64]
-) -> tuple[FloatArray, NDArray[np.int64]]:
+    vertices: FloatArray, faces: NDArray[np.integer[Any]]
+) -> tuple[FloatArray, NDArray[np.int32]]:
     """Return each vertex once: files repeat them for each triangle, or along seams."""
     order = np.lexsort(vertices.T).astype(np.int32)
     new = np.zeros(len(order), dtype=bool)
@@ -182,10 +182,10 @@ def _merge_vertices(
         new[1:] |= values[1:] != values[:-1]
     index = np.empty(len(order), np.int32)
     index[order] = np.cumsum(new, dtype=np.int32) - 1
-    return vertices[order[new]], index[faces].astype(np.int64)
+    return vertices[order[new]], index[faces]
 
 
-def _repair(vertices: FloatArray, faces: NDArray[np.int64]) -> tuple[FloatArray, NDArray[np.int64]]:
+def _repair(vertices: FloatArray, faces: NDArray[np.int32]) -> tuple[FloatArray, NDArray[np.int32]]:
     """Return the mesh with holes filled and triangles turned by trimesh."""
     import trimesh
 
@@ -199,4 +199,4 @@ def _repair(vertices: FloatArray, faces: NDArray[np.int64]) -> tuple[FloatArray,
         repair.fix_winding(mesh)
         repair.fill_holes(mesh)
         repair.fix_normals(mesh, multibody=True)
-    return size * np.array(mesh.vertices), np.array(mesh.faces, dtype=np.int64)
+    return size * np.array(mesh.vertices), np.array(mesh.faces, dtype=np.int32)

@@ -47,7 +47,7 @@ def make_fault(kind: str, places: FloatArray) -> list[MeshFault]:
     return [MeshFault(kind, len(places), (x, y, z))]
 
 
-def find_faults(vertices: FloatArray, faces: NDArray[np.int64]) -> list[MeshFault]:
+def find_faults(vertices: FloatArray, faces: NDArray[np.int32]) -> list[MeshFault]:
     """Return the faults of the edges, degenerate triangles, and an inverted mesh.
 
     Args:
@@ -74,21 +74,20 @@ def find_faults(vertices: FloatArray, faces: NDArray[np.int64]) -> list[MeshFaul
 
 
 def _edges(
-    faces: NDArray[np.int64], vertex_count: int
+    faces: NDArray[np.int32], vertex_count: int
 ) -> tuple[NDArray[np.int64], NDArray[np.intp], NDArray[np.intp], NDArray[np.int64]]:
     """Return the sorted edges; where each begins, how often it occurs, and the sum of its signs."""
     ends = np.roll(faces, -1, axis=1).ravel()
     starts = faces.ravel()
-    keys = np.minimum(starts, ends) * vertex_count + np.maximum(starts, ends)
-    order = np.argsort(keys)
-    signs = np.where(starts < ends, 1, -1)[order]
-    keys = keys[order]
+    keys = np.minimum(starts, ends).astype(np.int64) * vertex_count + np.maximum(starts, ends)
+    keys = np.sort(2 * keys + (starts < ends))  # the sign is the last digit: one array is sorted
+    keys, signs = keys >> 1, 2 * (keys & 1) - 1
     first = np.flatnonzero(np.r_[True, keys[1:] != keys[:-1]]) if len(keys) else np.empty(0, int)
     counts = np.diff(np.r_[first, len(keys)])
     return keys, first, counts, np.add.reduceat(signs, first) if len(first) else signs
 
 
-def signed_volume(vertices: FloatArray, faces: NDArray[np.int64]) -> float:
+def signed_volume(vertices: FloatArray, faces: NDArray[np.int32]) -> float:
     """Return the enclosed volume [m³]; negative where the triangles point inwards."""
     a, b, c = (vertices[faces[:, k]] - vertices[0] for k in range(3))
     return float(np.einsum("ni,ni->", a, np.cross(b, c))) / 6.0
