@@ -134,7 +134,7 @@ def default_force(device: Device, *, real: bool) -> float:
 @contextmanager
 def calibration_rig(
     device: Device, driver: str, force: float, signals: list[int], *, yes: bool
-) -> Iterator[CalibrationRig]:  # fmt: skip
+) -> Iterator[CalibrationRig]:
     """Yield the rig of a calibration.
 
     Args:

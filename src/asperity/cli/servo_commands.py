@@ -139,9 +139,7 @@ def make_loop(
 
 
 _STOP_NOW_SIGNALS = (signal.SIGQUIT, signal.SIGUSR1)
-STOP_SIGNALS = (
-    signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGTSTP, *_STOP_NOW_SIGNALS
-)  # fmt: skip
+STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGTSTP, *_STOP_NOW_SIGNALS)
 """Signals that end a loop: SIGQUIT and SIGUSR1 without a ramp, the others with one."""
 
 

@@ -80,7 +80,7 @@ def _render_pictures(sections: Sequence[Section]) -> dict[int, RenderedPicture]:
 
     Those with a digest are shared out among helper processes, and cached.
     """
-    digests = [(picture, picture.digest()) for picture in _pictures_in(sections)]
+    digests = [(one, one.find_digest and one.find_digest()) for one in _pictures_in(sections)]
     shared = [picture for picture, digest in digests if digest is not None]
     rendered = {id(one): render_picture(one) for one, digest in digests if digest is None}
     with precompute(render_picture, shared) as results:

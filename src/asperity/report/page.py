@@ -94,10 +94,6 @@ class Picture:
         """Return the figure."""
         return self.figure() if callable(self.figure) else self.figure
 
-    def digest(self) -> str | None:
-        """Return the content digest of everything the figure depends on, if it is known."""
-        return None if self.find_digest is None else self.find_digest()
-
     def describe(self) -> str:
         """Return what the figure shows."""
         return self.description() if callable(self.description) else self.description

@@ -263,9 +263,8 @@ def split_contact(
 
 
 def split_contact_warm(
-    x: float, y: float, z: float, _continuity: float, _warm_start: FloatArray,
-    field: FieldArguments,
-) -> Vector:  # fmt: skip
+    x: float, y: float, z: float, _continuity: float, _warm_start: FloatArray, field: FieldArguments
+) -> Vector:
     """Return -∇T [m], without a search."""
     gx, gy, gz = field_gradient(x, y, z, field)
     return -gx, -gy, -gz

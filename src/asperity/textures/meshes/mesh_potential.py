@@ -191,9 +191,8 @@ def column_batch(
 
 
 def point_batch(
-    points: FloatArray, law: BodyLaw, out: FloatArray, crossings: FloatArray,
-    tree: TriangleTree,
-) -> None:  # fmt: skip
+    points: FloatArray, law: BodyLaw, out: FloatArray, crossings: FloatArray, tree: TriangleTree
+) -> None:
     """Write law H at points (n, 3) [m].
 
     Args:

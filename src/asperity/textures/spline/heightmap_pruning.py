@@ -338,15 +338,15 @@ def can_prune_cell(
     for m in range(4):
         h0, h1, h2, h3 = row_bernstein(across, m, 0)
         mixed = b * (v - m / 3.0)
-        (
-            cut[0, m], cut[1, m], cut[2, m], cut[3, m], cut[4, m], cut[5, m], cut[6, m],
-        ) = subdivide_cubic(
-            min(max(u, 0.0), 1.0),
-            g * h0 + a0 + rows[m] - mixed * u,
-            g * h1 + a1 + rows[m] - mixed * (u - 1.0 / 3.0),
-            g * h2 + a2 + rows[m] - mixed * (u - 2.0 / 3.0),
-            g * h3 + a3 + rows[m] - mixed * (u - 1.0),
-        )  # fmt: skip
+        (cut[0, m], cut[1, m], cut[2, m], cut[3, m], cut[4, m], cut[5, m], cut[6, m]) = (
+            subdivide_cubic(
+                min(max(u, 0.0), 1.0),
+                g * h0 + a0 + rows[m] - mixed * u,
+                g * h1 + a1 + rows[m] - mixed * (u - 1.0 / 3.0),
+                g * h2 + a2 + rows[m] - mixed * (u - 2.0 / 3.0),
+                g * h3 + a3 + rows[m] - mixed * (u - 1.0),
+            )
+        )
     least = np.inf
     for m in range(7):
         q0, q1, q2, q3, q4, q5, q6 = subdivide_cubic(
