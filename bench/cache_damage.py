@@ -83,8 +83,9 @@ def run(count: int, unchecked: bool, console: Console) -> bool:
         warm = [_cpu_time(filled, unchecked) for unchecked in (False, True) * _STARTS]
         _FORKS.set_forkserver_preload(modules.split())
         with ThreadPoolExecutor(os.cpu_count()) as pool:
-            rounds = pool.map(lambda seed: _round(folder, filled, expected, seed, unchecked),
-                              range(count))  # fmt: skip
+            rounds = pool.map(
+                lambda seed: _round(folder, filled, expected, seed, unchecked), range(count)
+            )
             found = Counter(track(rounds, "damages", total=count, console=console, transient=True))
     said = ", ".join(f"{words}: {number}" for words, number in sorted(found.items()))
     console.print(f"{count} damages{' without the check' if unchecked else ''}: {said}")
@@ -181,9 +182,12 @@ def _compute(cache: Path, output_folder: Path, unchecked: bool) -> None:
 def _compute_in_process(cache: Path, program: str = _CHILD, *options: str) -> str:
     done = subprocess.run(
         [sys.executable, "-c", program, *options],
-        capture_output=True, text=True, check=True, timeout=_SECONDS,
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=_SECONDS,
         env=os.environ | {"ASPERITY_CACHE_DIR": str(cache)},
-    )  # fmt: skip
+    )
     return done.stdout
 
 

@@ -173,10 +173,12 @@ def run(console: Console, count: int = 10, seed: int = 1) -> None:
             for axis in found.axes
         ]
         off = [
-            max(abs(getattr(axis.dynamics, name).value / true - 1.0)
-                for axis, true in zip(found.axes, trues, strict=True))
+            max(
+                abs(getattr(axis.dynamics, name).value / true - 1.0)
+                for axis, true in zip(found.axes, trues, strict=True)
+            )
             for name, trues in (("damping", device.damping), ("mass", device.mass))
-        ]  # fmt: skip
+        ]
         rub = max(abs(axis.dynamics.friction.value - device.friction) for axis in found.axes)
         wrong = list_misses(device, found)
         missed += bool(wrong)

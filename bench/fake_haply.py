@@ -27,8 +27,9 @@ GARBAGE: dict[str, bytes] = {
     "no id": b'{"inverse3": [{"state": {"cursor_position": {"x": 0.0}}}]}',
     "unplugged": b'{"inverse3": []}',
     "too large": b'{"inverse3": [{"device_id": "049D", "state": {"cursor_position": {"x": 1'
-    + 400 * b"0" + b"}}}]}",
-}  # fmt: skip
+    + 400 * b"0"
+    + b"}}}]}",
+}
 """Messages that are no state."""
 BROKEN: dict[str, bytes] = {
     "masked": b"\x81\x82abcdef",
@@ -36,8 +37,18 @@ BROKEN: dict[str, bytes] = {
     "endless": b"\x81\x7f\x7f\xff\xff\xff\xff\xff\xff\xff",
 }
 """Bytes that are no frame."""
-FAULTS = (*GARBAGE, *BROKEN, "closed", "good-bye", "half a frame", "mute", "nan", "far", "twice",
-          "reserved bits")  # fmt: skip
+FAULTS = (
+    *GARBAGE,
+    *BROKEN,
+    "closed",
+    "good-bye",
+    "half a frame",
+    "mute",
+    "nan",
+    "far",
+    "twice",
+    "reserved bits",
+)
 
 
 class FakeHaply:
@@ -56,10 +67,14 @@ class FakeHaply:
     """
 
     def __init__(
-        self, devices: Sequence[str] = ("049D",), fault: str = "", at: int = 0,
+        self,
+        devices: Sequence[str] = ("049D",),
+        fault: str = "",
+        at: int = 0,
         place: Callable[[int], Force] = lambda _k: (0.7e-3, 0.4e-3, -1e-3),
-        hello: bytes | None = None, late: float = 0.0,
-    ) -> None:  # fmt: skip
+        hello: bytes | None = None,
+        late: float = 0.0,
+    ) -> None:
         self.devices, self.fault, self.at, self.place = devices, fault, at, place
         self.hello, self.late, self.forces = hello, late, list[tuple[int, Force]]()
         self._listening = socket.create_server(("127.0.0.1", 0))
@@ -128,8 +143,12 @@ class FakeHaply:
         if fault in {"nan", "far"}:
             states[0]["state"]["cursor_position"]["z"] = float("nan") if fault == "nan" else 1e3
             return frame(json.dumps({"inverse3": states}).encode())
-        others = {"good-bye": b"\x88\x02\x03\xe8", "half a frame": whole[:20], "mute": b"",
-                  "reserved bits": bytes((whole[0] | 0x40,)) + whole[1:]}  # fmt: skip
+        others = {
+            "good-bye": b"\x88\x02\x03\xe8",
+            "half a frame": whole[:20],
+            "mute": b"",
+            "reserved bits": bytes((whole[0] | 0x40,)) + whole[1:],
+        }
         return {**BROKEN, **others, "twice": 2 * whole}.get(fault, whole)
 
     def _state(self, device: str, number: int) -> dict[str, Any]:
@@ -142,8 +161,14 @@ def frame(content: bytes) -> bytes:
     """Return a text message as one frame of a server, or as two with a ping between them."""
     if len(content) < 126:
         return bytes((0x81, len(content))) + content
-    return (b"\x01\x7d" + content[:125] + b"\x89\x02hi" + b"\x80\x7e"
-            + struct.pack(">H", len(content) - 125) + content[125:])  # fmt: skip
+    return (
+        b"\x01\x7d"
+        + content[:125]
+        + b"\x89\x02hi"
+        + b"\x80\x7e"
+        + struct.pack(">H", len(content) - 125)
+        + content[125:]
+    )
 
 
 def read_frame(stream: Any) -> bytes | None:

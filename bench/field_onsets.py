@@ -22,8 +22,13 @@ from asperity.surface import Surface
 from asperity.textures.catalogue import as_texture
 
 SCENE = Path(__file__).parents[1] / "examples" / "press.toml"
-SURFACES = ("cloth", "knurl", "brushed-metal", "sinusoid:amplitude=0.2mm,period=1mm",
-            "sinusoid:amplitude=0.4mm,period=2mm")  # fmt: skip
+SURFACES = (
+    "cloth",
+    "knurl",
+    "brushed-metal",
+    "sinusoid:amplitude=0.2mm,period=1mm",
+    "sinusoid:amplitude=0.4mm,period=2mm",
+)
 DELAYS = (1, 2, 4, 6)
 MAX_DEPTH = 0.3e-3
 TOLERANCE = 0.01

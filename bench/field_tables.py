@@ -23,8 +23,12 @@ from asperity.textures.fields.potential_field import PotentialField
 SURFACES = ("cloth", "knurl", "wood")
 DEPTHS = (0.1, 0.2, 0.3, 0.5, 0.8, 1.0)
 PLACES = 3000
-TRADE = (("cloth", 40e-6), ("cloth", 20e-6), ("sandpaper:grit=P120", 20e-6),
-         ("sandpaper:grit=P120", 10e-6))  # fmt: skip
+TRADE = (
+    ("cloth", 40e-6),
+    ("cloth", 20e-6),
+    ("sandpaper:grit=P120", 20e-6),
+    ("sandpaper:grit=P120", 10e-6),
+)
 PASSES = (0, 1, 2, 4)
 GAINS = (None, 1.35, 1.3, 1.25, 1.2, 1.17, 1.15, 1.13, 1.11, 1.09, 0.5)
 
@@ -54,9 +58,15 @@ def trade_table() -> Table:
 def depths_table(names: Sequence[str]) -> Table:
     """Return the table of the difference by depth."""
     table = Table(
-        "surface", "pressed", "texture", "difference RMS", "greatest", "share", box=None,
+        "surface",
+        "pressed",
+        "texture",
+        "difference RMS",
+        "greatest",
+        "share",
+        box=None,
         caption="forces over the stiffness, at random places of one height",
-    )  # fmt: skip
+    )
     for name in names:
         exact = Surface(name, "H", 1.0)
         for row in compare_depths(exact, rendered_surface(exact)):

@@ -131,15 +131,21 @@ def main() -> None:
             time = min(seconds(partial(force, paths[0])) for _turn in range(5))
             gains = found[:, 1] / DEPTH**2
             table.add_row(
-                name, law, f"{found[:, 0].max():.1f}", f"{gains.mean():.1e}", f"{gains.max():.1e}",
+                name,
+                law,
+                f"{found[:, 0].max():.1f}",
+                f"{gains.mean():.1e}",
+                f"{gains.max():.1e}",
                 f"{time / len(paths[0]) * 1e6:.2f}",
-            )  # fmt: skip
+            )
         pressed = np.column_stack([np.zeros((TICKS, 2)), np.linspace(0.3e-3, -1e-3, TICKS)])
         pressed[:, 2] += 0.5 * sides[2]
         down = [force(pressed)[:, 2] for force in (proxy, surface.force)]
         text = [f"{np.min(values) * 1e6:.0f}" for values in down]
-        print(f"{name}, pressed through from above: least vertical force over k [um]: "
-              f"proxy {text[0]}, H {text[1]}")  # fmt: skip
+        print(
+            f"{name}, pressed through from above: least vertical force over k [um]: "
+            f"proxy {text[0]}, H {text[1]}"
+        )
     console = Console(width=100, highlight=False)
     console.print(table)
     console.print(f"gain: work on the hand per closed path over k·({DEPTH * 1e3:g} mm)²")

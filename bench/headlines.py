@@ -31,11 +31,15 @@ from asperity.surface import Surface
 from bench.margins import HANDS, press_with
 
 SURFACES = (
-    "sinusoid:amplitude=20um,period=1mm", "sinusoid:amplitude=50um,period=0.3mm",
-    "sinusoid:amplitude=0.1mm,period=2mm", "sinusoid:amplitude=0.4mm,period=1.5mm",
-    "sinusoid:amplitude=0.8mm,period=1mm", "sinusoid:amplitude=1mm,period=8mm",
-    "knurl", "sandpaper:grit=P60",
-)  # fmt: skip
+    "sinusoid:amplitude=20um,period=1mm",
+    "sinusoid:amplitude=50um,period=0.3mm",
+    "sinusoid:amplitude=0.1mm,period=2mm",
+    "sinusoid:amplitude=0.4mm,period=1.5mm",
+    "sinusoid:amplitude=0.8mm,period=1mm",
+    "sinusoid:amplitude=1mm,period=8mm",
+    "knurl",
+    "sandpaper:grit=P60",
+)
 LAWS = "WABCDEFGH"
 DELAYS = (0, 2)
 STARTS = 6

@@ -85,9 +85,12 @@ def start(command: str, folder: Path, cache: Path) -> subprocess.Popen[bytes]:
     """Start a command in a folder, in a group of processes of its own."""
     return subprocess.Popen(
         [sys.executable, "-m", "asperity", *command.split()],
-        cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True,
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        start_new_session=True,
         env=os.environ | {"ASPERITY_CACHE_DIR": str(cache)},
-    )  # fmt: skip
+    )
 
 
 def disturb_command(command: str, folder: Path, cache: Path, after: float, by: int) -> list[str]:

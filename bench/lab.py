@@ -168,9 +168,13 @@ def _late_share(lab: Started, seconds: float, page: Browser | None = None) -> fl
             turn = 2.0 * math.pi * time.monotonic()
             # Waiting for the answer would keep step with the page's pictures, as no hand does.
             page.post(
-                "Input.dispatchMouseEvent", type="mouseMoved", button="left", buttons=1,
-                x=300 + 60 * math.cos(turn), y=250 + 40 * math.sin(turn),
-            )  # fmt: skip
+                "Input.dispatchMouseEvent",
+                type="mouseMoved",
+                button="left",
+                buttons=1,
+                x=300 + 60 * math.cos(turn),
+                y=250 + 40 * math.sin(turn),
+            )
         time.sleep(0.016)
     late, samples = np.subtract(_counts(lab), before)
     return float(late / samples)

@@ -188,7 +188,9 @@ def random_loop(seed: int, number: int) -> RandomLoop:
     firm = np.exp(rng.uniform(math.log(5.0), math.log(500.0), 3))
     firm *= rng.random(3) < (0.9, 0.9, 0.5)
     return RandomLoop(
-        number, texture, min(texture.peak_to_valley, 1e-3),
+        number,
+        texture,
+        min(texture.peak_to_valley, 1e-3),
         wall=_log_uniform(rng, 500.0, 10_000.0),
         period=float(rng.choice([1e-3, 2.5e-4])),
         delay=int(rng.choice(DELAYS)),
@@ -200,7 +202,7 @@ def random_loop(seed: int, number: int) -> RandomLoop:
         press=float(rng.uniform(0.05, 0.7)),
         place=float(rng.random()),
         velocity=tuple((rng.uniform(0.0, 0.1) * _random_axes(rng)[0]).tolist()),
-    )  # fmt: skip
+    )
 
 
 def _random_axes(rng: np.random.Generator) -> np.ndarray:
@@ -354,9 +356,14 @@ def table(found: dict[tuple[str, bool], MarginResult]) -> Table:
     for (law, along), one in found.items():
         worst = max(one.motions, key=lambda motion: motion.speed, default=AT_REST)
         shown.add_row(
-            law, "lightest" if along else "normal", f"{one.factor:g}", str(one.cycles),
-            str(one.loops), f"{worst.speed * 1e3:.3g} mm/s", f"{worst.frequency:.3g} Hz",
-        )  # fmt: skip
+            law,
+            "lightest" if along else "normal",
+            f"{one.factor:g}",
+            str(one.cycles),
+            str(one.loops),
+            f"{worst.speed * 1e3:.3g} mm/s",
+            f"{worst.frequency:.3g} Hz",
+        )
     return shown
 
 
@@ -373,10 +380,14 @@ def write_margins(found: dict[tuple[str, bool], MarginResult], path: Path = TARG
     for (law, along), one in found.items():
         worst = max(one.motions, key=lambda motion: motion.speed, default=AT_REST)
         lines += [
-            "", f"[{law}{'.lightest' if along else ''}]", f"factor = {one.factor:g}",
-            f"loops = {one.loops}", f"cycles = {one.cycles}", f"speed = {worst.speed:.3g}",
+            "",
+            f"[{law}{'.lightest' if along else ''}]",
+            f"factor = {one.factor:g}",
+            f"loops = {one.loops}",
+            f"cycles = {one.cycles}",
+            f"speed = {worst.speed:.3g}",
             f"extent = {worst.extent:.3g}",
-        ]  # fmt: skip
+        ]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 

@@ -61,88 +61,132 @@ class Room:
 ROOMS = {
     "derive": Room(("derive",), ("tests/laws", "tests/derive")),
     "contacts": Room(
-        ("contacts/contact.py", "contacts/closest", "contacts/height_contacts.py",
-         "contacts/sampler_interface.py",
-         "contacts/symbols.py", "contacts/warm_start.py"),
-        ("tests/contacts",
-         "tests/test_reference.py", "tests/derive", "tests/laws",
-         "tests/seams/test_user_contact.py"),
+        (
+            "contacts/contact.py",
+            "contacts/closest",
+            "contacts/height_contacts.py",
+            "contacts/sampler_interface.py",
+            "contacts/symbols.py",
+            "contacts/warm_start.py",
+        ),
+        (
+            "tests/contacts",
+            "tests/test_reference.py",
+            "tests/derive",
+            "tests/laws",
+            "tests/seams/test_user_contact.py",
+        ),
     ),
     "kernels": Room(
         ("kernels",),
-        ("tests/kernels/test_loops_by_definition.py",
-         "tests/kernels/test_link.py", "tests/kernels/test_fuse.py", "tests/kernels/test_tick.py",
-         "tests/kernels/test_interfaces.py", "tests/kernels/test_native.py",
-         "tests/textures/kinds/test_sinusoid.py",
-         "tests/test_surface.py", "tests/test_reference.py", "tests/core/test_cache.py",
-         "tests/kernels/test_batch_sine.py", "tests/kernels/test_block_loops.py",
-         "tests/enclosures/test_taylor.py"),
+        (
+            "tests/kernels/test_loops_by_definition.py",
+            "tests/kernels/test_link.py",
+            "tests/kernels/test_fuse.py",
+            "tests/kernels/test_tick.py",
+            "tests/kernels/test_interfaces.py",
+            "tests/kernels/test_native.py",
+            "tests/textures/kinds/test_sinusoid.py",
+            "tests/test_surface.py",
+            "tests/test_reference.py",
+            "tests/core/test_cache.py",
+            "tests/kernels/test_batch_sine.py",
+            "tests/kernels/test_block_loops.py",
+            "tests/enclosures/test_taylor.py",
+        ),
     ),
     "passivity": Room(
         ("analysis/passivity",),
-        ("tests/analysis/passivity/test_passivity_by_definition.py",
-         "tests/analysis/passivity/test_passivity.py",
-         "tests/analysis/passivity/test_wall_test_criterion.py",
-         "tests/analysis/passivity/test_passivity_theorems.py",
-         "tests/seams/test_user_criterion.py",
-         "tests/analysis/passivity/test_margins.py"),
+        (
+            "tests/analysis/passivity/test_passivity_by_definition.py",
+            "tests/analysis/passivity/test_passivity.py",
+            "tests/analysis/passivity/test_wall_test_criterion.py",
+            "tests/analysis/passivity/test_passivity_theorems.py",
+            "tests/seams/test_user_criterion.py",
+            "tests/analysis/passivity/test_margins.py",
+        ),
     ),
     "limits": Room(
         ("analysis/limits", "analysis/check_limits.py"),
-        ("tests/analysis/limits/test_limits_by_definition.py",
-         "tests/analysis/limits/test_limits.py", "tests/analysis/limits/test_spectrum.py",
-         "tests/analysis/limits/test_wave_force.py", "tests/analysis/limits/test_perceptibility.py",
-         "tests/analysis/limits/test_limit_sentences.py"),
+        (
+            "tests/analysis/limits/test_limits_by_definition.py",
+            "tests/analysis/limits/test_limits.py",
+            "tests/analysis/limits/test_spectrum.py",
+            "tests/analysis/limits/test_wave_force.py",
+            "tests/analysis/limits/test_perceptibility.py",
+            "tests/analysis/limits/test_limit_sentences.py",
+        ),
     ),
     "bounds": Room(
         ("analysis/bounds",),
-        ("tests/analysis/bounds/test_branch_and_bound.py",
-         "tests/analysis/bounds/test_bounds_by_definition.py",
-         "tests/analysis/gain/test_gain_by_definition.py",
-         "tests/analysis/bounds/test_contradictions.py",
-         "tests/analysis/energy/test_merit.py", "tests/analysis/gain/test_clamps.py",
-         "tests/enclosures/test_taylor.py", "tests/analysis/gain/test_certified.py",
-         "tests/analysis/gain/test_certified_laws.py"),
+        (
+            "tests/analysis/bounds/test_branch_and_bound.py",
+            "tests/analysis/bounds/test_bounds_by_definition.py",
+            "tests/analysis/gain/test_gain_by_definition.py",
+            "tests/analysis/bounds/test_contradictions.py",
+            "tests/analysis/energy/test_merit.py",
+            "tests/analysis/gain/test_clamps.py",
+            "tests/enclosures/test_taylor.py",
+            "tests/analysis/gain/test_certified.py",
+            "tests/analysis/gain/test_certified_laws.py",
+        ),
     ),
     "gain": Room(
         ("analysis/gain",),
-        ("tests/analysis/gain/test_gain_by_definition.py", "tests/analysis/gain/test_theorems.py",
-         "tests/analysis/bounds/test_bounds_by_definition.py",
-         "tests/analysis/bounds/test_branch_and_bound.py",
-         "tests/analysis/gain/test_closed_forms.py",
-         "tests/analysis/gain/test_surface_cache.py",
-         "tests/analysis/gain/test_clamps.py", "tests/analysis/gain/test_certified.py",
-         "tests/analysis/gain/test_certified_laws.py"),
+        (
+            "tests/analysis/gain/test_gain_by_definition.py",
+            "tests/analysis/gain/test_theorems.py",
+            "tests/analysis/bounds/test_bounds_by_definition.py",
+            "tests/analysis/bounds/test_branch_and_bound.py",
+            "tests/analysis/gain/test_closed_forms.py",
+            "tests/analysis/gain/test_surface_cache.py",
+            "tests/analysis/gain/test_clamps.py",
+            "tests/analysis/gain/test_certified.py",
+            "tests/analysis/gain/test_certified_laws.py",
+        ),
     ),
     "energy": Room(
         ("analysis/energy",),
-        ("tests/analysis/energy/test_anchor.py", "tests/analysis/energy/test_curl_integral.py",
-         "tests/analysis/energy/test_thrust.py", "tests/analysis/energy/test_loops.py",
-         "tests/analysis/energy/test_energy_by_definition.py",
-         "tests/analysis/energy/test_merit.py", "tests/analysis/energy/test_leak.py",
-         "tests/analysis/energy/test_continuity.py", "tests/analysis/energy/test_ridges.py",
-         "tests/analysis/bounds/test_contradictions.py"),
+        (
+            "tests/analysis/energy/test_anchor.py",
+            "tests/analysis/energy/test_curl_integral.py",
+            "tests/analysis/energy/test_thrust.py",
+            "tests/analysis/energy/test_loops.py",
+            "tests/analysis/energy/test_energy_by_definition.py",
+            "tests/analysis/energy/test_merit.py",
+            "tests/analysis/energy/test_leak.py",
+            "tests/analysis/energy/test_continuity.py",
+            "tests/analysis/energy/test_ridges.py",
+            "tests/analysis/bounds/test_contradictions.py",
+        ),
     ),
     "split": Room(
         ("analysis/split", "contacts/split"),
-        ("tests/contacts/split/test_split_kernels.py", "tests/contacts/split/test_split_hull.py",
-         "tests/contacts/split/test_split_solver.py",
-         "tests/analysis/split/test_potential_grid.py", "tests/analysis/split/test_split.py",
-         "tests/analysis/split/test_split_map.py", "tests/analysis/split/test_split_definition.py",
-         "tests/analysis/split/test_split_table.py",
-         "tests/analysis/split/test_split_closed_form.py"),
+        (
+            "tests/contacts/split/test_split_kernels.py",
+            "tests/contacts/split/test_split_hull.py",
+            "tests/contacts/split/test_split_solver.py",
+            "tests/analysis/split/test_potential_grid.py",
+            "tests/analysis/split/test_split.py",
+            "tests/analysis/split/test_split_map.py",
+            "tests/analysis/split/test_split_definition.py",
+            "tests/analysis/split/test_split_table.py",
+            "tests/analysis/split/test_split_closed_form.py",
+        ),
     ),
     "simulation": Room(
         ("simulation",),
-        ("tests/simulation/test_simulation_loop_by_definition.py",
-         "tests/simulation/onset/test_prediction.py",
-         "tests/simulation/onset/test_onset_rules.py",
-         "tests/simulation/plants/test_bodies_by_definition.py",
-         "tests/simulation/plants/test_hands.py",
-         "tests/simulation/plants/test_exact.py",
-         "tests/simulation"),
+        (
+            "tests/simulation/test_simulation_loop_by_definition.py",
+            "tests/simulation/onset/test_prediction.py",
+            "tests/simulation/onset/test_onset_rules.py",
+            "tests/simulation/plants/test_bodies_by_definition.py",
+            "tests/simulation/plants/test_hands.py",
+            "tests/simulation/plants/test_exact.py",
+            "tests/simulation",
+        ),
     ),
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True)
@@ -165,8 +209,10 @@ def copy_tree(folder: Path) -> Path:
     tree = folder / "tree"
     known = subprocess.run(
         ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
-        cwd=ROOT, check=True, capture_output=True,
-    ).stdout.decode()  # fmt: skip
+        cwd=ROOT,
+        check=True,
+        capture_output=True,
+    ).stdout.decode()
     for name in filter(None, known.split("\0")):
         if (ROOT / name).is_file():
             (tree / name).parent.mkdir(parents=True, exist_ok=True)
@@ -196,8 +242,12 @@ def plan_mutants(tree: Path, name: str, room: Room, python: str) -> tuple[Path, 
 
 
 def _cosmic_ray(tree: Path, *arguments: str) -> None:
-    environment = {**os.environ, "PYTHONPATH": "src", "PYTHONDONTWRITEBYTECODE": "1",
-                   "ASPERITY_CACHE_DIR": str(tree.parent / "cache")}  # fmt: skip
+    environment = {
+        **os.environ,
+        "PYTHONPATH": "src",
+        "PYTHONDONTWRITEBYTECODE": "1",
+        "ASPERITY_CACHE_DIR": str(tree.parent / "cache"),
+    }
     command = [str(Path(sys.executable).with_name("cosmic-ray")), *arguments]
     subprocess.run(command, cwd=tree, check=True, env=environment)
 
@@ -234,8 +284,11 @@ def read_outcomes(session: Path) -> list[Mutant]:
         for job, result in work.results:
             if result.worker_outcome == WorkerOutcome.SKIPPED:
                 continue
-            lines = [line for line in (result.diff or "").splitlines()
-                     if line[:1] in "+-" and line[:3] not in ("+++", "---")]  # fmt: skip
+            lines = [
+                line
+                for line in (result.diff or "").splitlines()
+                if line[:1] in "+-" and line[:3] not in ("+++", "---")
+            ]
             module = str(modules[job]).removeprefix("src/asperity/")
             found.append(
                 Mutant(module, "\n".join(lines), result.test_outcome == TestOutcome.SURVIVED)

@@ -262,8 +262,15 @@ def run(console: Console, count: int = COUNT, kinds: list[str] | None = None) ->
         wrong = int((np.abs(excess) > TOLERANCE).sum())
         failed += int((excess > TOLERANCE).sum())
         lost = int(((local - found) / extent > TOLERANCE).sum())
-        table.add_row(kind, f"{1e3 * extent:.2f}", f"{excess.max():.1e}", f"{-excess.min():.1e}",
-                      str(wrong), str(lost), f"{perf_counter() - start:.0f}")  # fmt: skip
+        table.add_row(
+            kind,
+            f"{1e3 * extent:.2f}",
+            f"{excess.max():.1e}",
+            f"{-excess.min():.1e}",
+            str(wrong),
+            str(lost),
+            f"{perf_counter() - start:.0f}",
+        )
     console.print(table)
     console.print(
         "farther, nearer: distance found less the exhaustive one, in extents; wrong: differs by"

@@ -96,9 +96,11 @@ def _scene(rng: np.random.Generator, factor: tuple[float, float] | None) -> Scen
     )
     length = float(rng.uniform(0.5e-3, 4e-3))
     texture = Sinusoid(
-        length * float(rng.uniform(0.02, 0.3)), length, float(rng.uniform(0.0, 6.0)),
+        length * float(rng.uniform(0.02, 0.3)),
+        length,
+        float(rng.uniform(0.0, 6.0)),
         (1.0, float(rng.normal())),
-    )  # fmt: skip
+    )
     depth = float(rng.uniform(0.2e-3, 2e-3))
     unit = Surface(texture, law, 1.0, depth)
     share = float(rng.uniform(*(factor or (0.9, 1.0))))
@@ -119,12 +121,15 @@ def _scene(rng: np.random.Generator, factor: tuple[float, float] | None) -> Scen
     surface = Surface(texture, law, stiffness, depth)
     judged = passivity(surface, parse_device(rig, "drawn"), *numbers, worst_loop(surface))
     job = {
-        "surface": surface, "plant": plant, "hand": _hand(rng, surface, depth),
-        "servo": Servo(period, delay=delay), "motion": Stationary((0.0, 0.0, 0.0)),
+        "surface": surface,
+        "plant": plant,
+        "hand": _hand(rng, surface, depth),
+        "servo": Servo(period, delay=delay),
+        "motion": Stationary((0.0, 0.0, 0.0)),
         "duration": SAMPLES * period,
         "start": (0.0, 0.0, texture.amplitude + float(rng.uniform(0.0, 0.5e-3))),
         "velocity": depth / period * 0.02 * rng.normal(size=3) * [1.0, 1.0, 0.5],
-    }  # fmt: skip
+    }
     return Scene(job, judged.verdict == "passive")
 
 

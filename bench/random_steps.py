@@ -84,32 +84,38 @@ def _scene(rng: np.random.Generator, *, is_halved: bool) -> QuantisedScene:
     if is_halved:
         force_step, friction = 0.0, 0.505 * 0.5 * along * k * numbers[0].upper * step
     rig = {
-        "damping": damping, "update_rate": 1.0 / period, "delay_samples": delay,
-        "position_resolution": 0.5 * step if is_halved else step, "force_resolution": force_step,
+        "damping": damping,
+        "update_rate": 1.0 / period,
+        "delay_samples": delay,
+        "position_resolution": 0.5 * step if is_halved else step,
+        "force_resolution": force_step,
         "least_friction": friction,
-    }  # fmt: skip
+    }
     known = {name: value for name, value in rig.items() if value}
     judged = passivity(
-        surface, parse_device({"delay_samples": delay, **known}, "drawn"), *numbers,
+        surface,
+        parse_device({"delay_samples": delay, **known}, "drawn"),
+        *numbers,
         worst_loop(surface),
-    )  # fmt: skip
+    )
     assert judged.criterion(DELAY).holds or judged.criterion("one-sided").holds
     press = k * depth * float(rng.uniform(0.05, 0.4))
     # A spring that ends a slide of the hand within the longer run: the bound is of what repeats.
     hand = SpringHand(
-        k * float(rng.uniform(0.02, 0.1)), mass=float(rng.uniform(0.0, 0.1)),
+        k * float(rng.uniform(0.02, 0.1)),
+        mass=float(rng.uniform(0.0, 0.1)),
         force=(*(0.2 * press * rng.normal(size=2)), -press),
-    )  # fmt: skip
+    )
     job = {
-        "surface": surface, "hand": hand,
+        "surface": surface,
+        "hand": hand,
         "plant": Cartesian(rng.uniform(0.01, 0.2, 3), damping, friction=friction),
-        "servo": Servo(
-            period, delay=delay, position_resolution=step, force_resolution=force_step
-        ),
-        "motion": Stationary((0.0, 0.0, 0.0)), "duration": SAMPLES * period,
+        "servo": Servo(period, delay=delay, position_resolution=step, force_resolution=force_step),
+        "motion": Stationary((0.0, 0.0, 0.0)),
+        "duration": SAMPLES * period,
         "start": (0.0, 0.0, texture.amplitude + float(rng.uniform(0.0, 0.3e-3))),
         "velocity": 0.02 * depth / period * rng.normal(size=3),
-    }  # fmt: skip
+    }
     silent = bool(judged.criterion(QUANTIZATION).holds)
     bound = 0.0 if silent or judged.buzz is None else judged.buzz.speed
     # C's numbers hold down to its depth, those of W and H at any.

@@ -90,7 +90,7 @@ REMEDIES: tuple[tuple[str, str, str, Callable[[Answer], bool]], ...] = (
     (r"position steps below ([\d.]+ \S+?)[,.]", "--set", "position_resolution={}", is_felt),
     (r"pressed to ([\d.]+ \S+) it keeps contact", "--max-depth", "{}", keeps_contact),
     (r"all of it magnified ([\d.e-]+) times more", "--magnify", "{}", fits),
-)  # fmt: skip
+)
 
 
 def typed_remedies(

@@ -128,9 +128,23 @@ def _loop(rate: float, seconds: float, beside: list[str]) -> tuple[LoopStatistic
 
 def first_force(console: Console) -> None:
     """Print how long the command takes with 0.1 s of rendering: its first force comes before."""
-    words = [sys.executable, "-m", "asperity", "run", "sinusoid:amplitude=0.1mm,period=2mm",
-             "--device", "touch", "--law", "C", "--stiffness", "300N/m", "--duration", "0.1s",
-             "--json", os.devnull]  # fmt: skip
+    words = [
+        sys.executable,
+        "-m",
+        "asperity",
+        "run",
+        "sinusoid:amplitude=0.1mm,period=2mm",
+        "--device",
+        "touch",
+        "--law",
+        "C",
+        "--stiffness",
+        "300N/m",
+        "--duration",
+        "0.1s",
+        "--json",
+        os.devnull,
+    ]
     subprocess.run(words, capture_output=True, check=True)  # compiles, where nothing is kept
     took = []
     for _ in range(5):

@@ -344,8 +344,15 @@ EVENTS: dict[str, Event] = {
     "call of 1 to 5 s": _stall(1.0, 5.0),
 }
 """What may happen."""
-RAMPED = ("Ctrl-C", "Ctrl-Z (TSTP)", "terminal closed", "HUP", "TERM", "TERM to the group",
-          "HUP to the group")  # fmt: skip
+RAMPED = (
+    "Ctrl-C",
+    "Ctrl-Z (TSTP)",
+    "terminal closed",
+    "HUP",
+    "TERM",
+    "TERM to the group",
+    "HUP to the group",
+)
 """Ends that ramp the force down first."""
 LOSSES = ("KILL of the loop",)
 """Ends after which nobody can command anything, but the device's own library."""

@@ -87,9 +87,7 @@ def inject_faults(rig: DriverRig, count: int, seed: int = 0) -> FaultOutcome:
 def _inject_fault(rig: DriverRig, fault: str, at: int, path: Path, outcome: FaultOutcome) -> None:
     """Let a driver fail, look at what it did, and start it again."""
     surface = SURFACE.to_depth(0.2e-3) if fault == DEEP else SURFACE
-    safety = Safety(
-        ramp=0.005, lateness=0.1, silence=WATCHED if fault == UNWATCHED else 60.0
-    )  # fmt: skip
+    safety = Safety(ramp=0.005, lateness=0.1, silence=WATCHED if fault == UNWATCHED else 60.0)
     with rig.failing_driver("" if fault in ANY else fault, at) as driver:
         shared = LoopMemory()
         loop = DriverLoop(driver, SERVO, safety, 1.0, shared.block(), system_clock())

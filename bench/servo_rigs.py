@@ -109,9 +109,13 @@ class LibraryRig(DriverRig):
     """
 
     def __init__(
-        self, source: str, kinds: tuple[str, ...], driver: Callable[[str, str], Driver],
-        variable: str, deaf: tuple[str, ...] = (),
-    ) -> None:  # fmt: skip
+        self,
+        source: str,
+        kinds: tuple[str, ...],
+        driver: Callable[[str, str], Driver],
+        variable: str,
+        deaf: tuple[str, ...] = (),
+    ) -> None:
         super().__init__()
         self.faults, self.deaf = kinds, deaf
         folder = Path(self.kept.enter_context(tempfile.TemporaryDirectory()))

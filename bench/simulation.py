@@ -49,9 +49,14 @@ TOLERANCE = 1e-9  # of the ledger's exchanged energy and of the state's size
 
 _SOURCE = Path(__file__).parent / "c" / "servo.c"
 _SERVO = Servo(
-    PERIOD, delay=1, position_resolution=15e-6, force_resolution=1e-3, max_force=8.0,
-    virtual_damping=0.1, velocity_share=0.2,
-)  # fmt: skip
+    PERIOD,
+    delay=1,
+    position_resolution=15e-6,
+    force_resolution=1e-3,
+    max_force=8.0,
+    virtual_damping=0.1,
+    velocity_share=0.2,
+)
 _HAND = SpringHand(stiffness=300.0, damping=3.0, mass=0.05, force=(0.0, 0.0, -1.0))
 _TEXTURE = Sinusoid(amplitude=0.8e-3, period=2e-3)
 _STROKES = Strokes((-0.01, 0.0, 0.0), (0.01, 0.0, 0.0), speed=0.1, count=10_000)
@@ -60,11 +65,18 @@ _PLANTS: dict[str, Plant] = {"Cartesian": Cartesian(0.02, 1.0), "Pantograph": Pa
 
 class _Loop(ctypes.Structure):
     _fields_ = [
-        *((name, ctypes.c_double * count) for name, count in (
-            ("x", 6), ("measured", 3), ("filtered", 3), ("commanded", 3), ("sums", 11),
-        )),
+        *(
+            (name, ctypes.c_double * count)
+            for name, count in (
+                ("x", 6),
+                ("measured", 3),
+                ("filtered", 3),
+                ("commanded", 3),
+                ("sums", 11),
+            )
+        ),
         *((name, ctypes.c_long) for name in ("begun", "head", "done")),
-    ]  # fmt: skip
+    ]
 
 
 @dataclass
@@ -124,11 +136,16 @@ class _CLoop:
         """Run the anchor's way once."""
         count = len(self.anchor) - 1
         done = self._function(
-            ctypes.byref(self.loop), ctypes.c_void_p(self._queue.ctypes.data),
-            ctypes.c_long(len(self._queue)), ctypes.c_void_p(self.anchor.ctypes.data),
-            ctypes.c_long(count), self._set, self._texture, ctypes.c_double(1000.0),
+            ctypes.byref(self.loop),
+            ctypes.c_void_p(self._queue.ctypes.data),
+            ctypes.c_long(len(self._queue)),
+            ctypes.c_void_p(self.anchor.ctypes.data),
+            ctypes.c_long(count),
+            self._set,
+            self._texture,
+            ctypes.c_double(1000.0),
             ctypes.c_void_p(self._numbers.ctypes.data),
-        )  # fmt: skip
+        )
         if done != count:
             raise DisagreementError("the loop in C stopped")
 
@@ -222,13 +239,18 @@ def _two_cores(console: Console) -> None:
         return
     jobs = [
         {
-            "surface": Surface(_TEXTURE, law, 1000.0), "plant": plant, "hand": hand,
-            "servo": _SERVO, "motion": _STROKES, "duration": 10.0, "trace": False,
+            "surface": Surface(_TEXTURE, law, 1000.0),
+            "plant": plant,
+            "hand": hand,
+            "servo": _SERVO,
+            "motion": _STROKES,
+            "duration": 10.0,
+            "trace": False,
         }
         for law in "WACF"
         for plant in _PLANTS.values()
         for hand in (_HAND, BandHand())
-    ]  # fmt: skip
+    ]
     batches: list[Callable[[], object]] = [
         lambda: simulate_many(jobs, workers=1),
         lambda: simulate_many(jobs, workers=2),

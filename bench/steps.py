@@ -108,14 +108,19 @@ def main(arguments: list[str]) -> int:
         motions = measure(law, options.loops)
         shares = [one.speed / one.bound for one in motions if one.bound]
         above += (wrong := sum(share > 1.0 for share in shares))
-        at = [[one.speed > 0.0 for one in motions if one.position_step == step]
-              for step in POSITION_STEPS]  # fmt: skip
+        at = [
+            [one.speed > 0.0 for one in motions if one.position_step == step]
+            for step in POSITION_STEPS
+        ]
         shown.add_row(
-            law, str(len(motions)), str(wrong), f"{max(shares):.2f}",
+            law,
+            str(len(motions)),
+            str(wrong),
+            f"{max(shares):.2f}",
             f"{1e3 * max(one.bound for one in motions):.3g} mm/s",
             f"{np.mean([one.speed > 0.0 for one in motions]):.1%}",
             *(f"{np.mean(one):.0%}" for one in at),
-        )  # fmt: skip
+        )
     console.print(shown)
     return int(above > 0)
 

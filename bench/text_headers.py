@@ -36,7 +36,7 @@ DISTRACTIONS = (
     *("Speed 1 mm/s", "Notes: none", "Tilt removed", "Unit,um", "in mm", "Sampling length,0.8,mm"),
     *("Scan size: 20 um", "Z range: 80 um", "Sa = 12 nm", "Height of fixture 40 mm", "Gain 4"),
     *("Measurement Range,524 um", "Force,3.00 mg", "Roughness (nm)", "Stage z position: 3.2 mm"),
-)  # fmt: skip
+)
 
 
 @dataclass

@@ -218,9 +218,12 @@ def _longest(surface: Surface, probes: FloatArray) -> tuple[float, list[str]]:
         surface._loops.force_batch(probe[None], out, *arguments)
         exact.append((perf_counter() - start) * 1e6)
     cells = [
-        f"{times_.max():.1f}", f"{looks.max():.0f}", f"{np.mean(gaps > 0.0):.0%}",
-        f"{gaps.max() * 1e6:.3g}", f"{max(exact):.0f}",
-    ]  # fmt: skip
+        f"{times_.max():.1f}",
+        f"{looks.max():.0f}",
+        f"{np.mean(gaps > 0.0):.0%}",
+        f"{gaps.max() * 1e6:.3g}",
+        f"{max(exact):.0f}",
+    ]
     return float(times_.max()), cells
 
 

@@ -83,10 +83,12 @@ def _time_comparisons(table: Table, words: tuple[str, ...], name: str, cache: Pa
     try:
         first = _time_command(words, cache)
         _time_command((*words, *html), cache)
-        found = np.array([
-            [_time_command((*words, *more), cache).processor for more in ((), CHANGED, html)]
-            for _ in range(ROUNDS)
-        ])  # fmt: skip
+        found = np.array(
+            [
+                [_time_command((*words, *more), cache).processor for more in ((), CHANGED, html)]
+                for _ in range(ROUNDS)
+            ]
+        )
     except _NotRunError as reason:
         return [f"{name}: not run: {reason}"]
     again, changed, report = np.median(found, axis=0)
@@ -126,9 +128,14 @@ def _time_command(words: tuple[str, ...], cache: Path) -> Times:
     before, start = os.times(), perf_counter()
     try:
         done = subprocess.run(
-            [*PROGRAM, *words], cwd=ROOT, check=False, capture_output=True, text=True,
-            timeout=LIMIT, env=os.environ | {"ASPERITY_CACHE_DIR": str(cache)},
-        )  # fmt: skip
+            [*PROGRAM, *words],
+            cwd=ROOT,
+            check=False,
+            capture_output=True,
+            text=True,
+            timeout=LIMIT,
+            env=os.environ | {"ASPERITY_CACHE_DIR": str(cache)},
+        )
     except subprocess.TimeoutExpired:
         raise _NotRunError(f"took longer than {LIMIT:.0f} s") from None
     wall, after = perf_counter() - start, os.times()

@@ -159,9 +159,16 @@ def inside() -> Callable[..., np.ndarray]:
 
 
 def _force_by_hand(
-    letter: str, *, k: float, depth: float, g: Any, d: Any = (0.0, 0.0),
-    m: float = 0.0, friction: float = 0.8, max_deflection: float = 1e-3,
-) -> np.ndarray:  # fmt: skip
+    letter: str,
+    *,
+    k: float,
+    depth: float,
+    g: Any,
+    d: Any = (0.0, 0.0),
+    m: float = 0.0,
+    friction: float = 0.8,
+    max_deflection: float = 1e-3,
+) -> np.ndarray:
     """Return the force from the depth, the slope g, the deflection d and the modulation m."""
     hx, hy = g
     s = math.sqrt(1.0 + hx * hx + hy * hy)
@@ -186,7 +193,7 @@ def _normal_derivative(g: Any, hessian: np.ndarray) -> np.ndarray:
 
 def _jacobian_by_hand(
     letter: str, *, k: float, depth: float, g: Any, hessian: np.ndarray, **state: Any
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """Return ∂f/∂p of MATH section 3; D by the principal curvatures of the surface."""
     g, up = np.asarray(g, float), np.array([0.0, 0.0, 1.0])
     w = np.array([-g[0], -g[1], 1.0])
@@ -209,9 +216,16 @@ def _jacobian_by_hand(
 
 
 def _friction_by_hand(
-    k: float, depth: float, *, d: Any, m: float, m_slope: Any, sliding: bool = False,
-    friction: float = 0.8, max_deflection: float = 1e-3,
-) -> np.ndarray:  # fmt: skip
+    k: float,
+    depth: float,
+    *,
+    d: Any,
+    m: float,
+    m_slope: Any,
+    sliding: bool = False,
+    friction: float = 0.8,
+    max_deflection: float = 1e-3,
+) -> np.ndarray:
     d = np.asarray(d, float)
     follow = np.eye(2)
     if sliding and d.any():

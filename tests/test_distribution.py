@@ -28,11 +28,22 @@ ROOT = Path(__file__).parents[1]
 VERSION = asperity.__version__
 PYTHONS = ("3.11", "3.12", "3.13")
 JUNK = (
-    ".mypy_cache/x.json", ".pytest_cache/x", ".venv/bin/x", "build/x", "dist/x.whl", "uv.lock",
-    "report.html", "scratch.txt", "docs/_build/x.html", "docs/_generated/x.md", "docs/gallery/x.md",
-    "src/asperity/__pycache__/x.pyc", "src/asperity/laws/__pycache__/x.pyc",
-    "tests/__pycache__/x.pyc", "src/asperity.egg-info/PKG-INFO",
-)  # fmt: skip
+    ".mypy_cache/x.json",
+    ".pytest_cache/x",
+    ".venv/bin/x",
+    "build/x",
+    "dist/x.whl",
+    "uv.lock",
+    "report.html",
+    "scratch.txt",
+    "docs/_build/x.html",
+    "docs/_generated/x.md",
+    "docs/gallery/x.md",
+    "src/asperity/__pycache__/x.pyc",
+    "src/asperity/laws/__pycache__/x.pyc",
+    "tests/__pycache__/x.pyc",
+    "src/asperity.egg-info/PKG-INFO",
+)
 RUNS_ALL = "ASPERITY_DIST_TEST" in os.environ
 
 
@@ -176,8 +187,16 @@ def install(wheel: Path, python: str, folder: Path) -> None:
     environment of the tests was installed on this machine.
     """
     subprocess.run([python, "-m", "venv", "--without-pip", folder], check=True)
-    command = [find_uv(), "pip", "install", "--only-binary", ":all:", "--python",
-               folder / "bin" / "python", wheel]  # fmt: skip
+    command = [
+        find_uv(),
+        "pip",
+        "install",
+        "--only-binary",
+        ":all:",
+        "--python",
+        folder / "bin" / "python",
+        wheel,
+    ]
     locked = [] if RUNS_ALL else ["--constraints", ROOT / "requirements.lock"]
     results = []
     for options in ([] if RUNS_ALL else ["--offline"], []):

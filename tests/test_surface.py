@@ -75,11 +75,13 @@ def contact_arguments(surface: Surface, p: np.ndarray) -> dict[str, Any]:
         "nearest": float(np.linalg.norm([*(xy[0] - p[:2]), h - p[2]])),
     }[surface.law.contact.name]
     return {
-        "k": surface.stiffness, "depth": depth, "g": (hx, hy),
+        "k": surface.stiffness,
+        "depth": depth,
+        "g": (hx, hy),
         "hessian": np.array([[hxx, hxy], [hxy, hyy]]),
         "m": (1 + surface.modulation_depth * (h - (low + high) / 2) / half) / 2,
         "m_slope": surface.modulation_depth * np.array([hx, hy]) / half / 2,
-    }  # fmt: skip
+    }
 
 
 def expected_force(surface: Surface, p: np.ndarray, d: np.ndarray, by_hand: Check) -> np.ndarray:
@@ -224,9 +226,8 @@ def shallow_and_deep(texture: Texture, nominal: bool, scatter: Check) -> np.ndar
 @pytest.mark.parametrize("clamp", CLAMPS)
 @pytest.mark.parametrize("letter", "ABCFG")
 def test_clamped_force_equals_the_formula(
-    letter: str, clamp: Any, make_texture: Check, scatter: Check, plain: Check,
-    force_by_hand: Check,
-):  # fmt: skip
+    letter: str, clamp: Any, make_texture: Check, scatter: Check, plain: Check, force_by_hand: Check
+):
     texture = make_texture("fourier")
     surface = plain(Surface(texture, letter, max_depth=D, clamp=clamp, **STATE))
     points, d = shallow_and_deep(texture, letter in NOMINAL, scatter), deflections(9, 9)
@@ -289,9 +290,13 @@ def curl(surface: Surface, points: np.ndarray, differences: Check) -> np.ndarray
     [("none", True), ("whole", True), ("backed", True), ("lateral", False)],
 )
 def test_only_the_lateral_clamp_gives_law_c_a_curl(
-    clamp: Any, conservative: bool, make_texture: Check, scatter: Check, plain: Check,
+    clamp: Any,
+    conservative: bool,
+    make_texture: Check,
+    scatter: Check,
+    plain: Check,
     differences: Check,
-):  # fmt: skip
+):
     texture = make_texture("fourier")
     surface = plain(Surface(texture, "C", max_depth=D, clamp=clamp))
     deep = shallow_and_deep(texture, False, scatter)[2:]

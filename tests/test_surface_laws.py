@@ -48,9 +48,12 @@ def test_compiled_plain_and_reference_values_agree(
     size = compiled.texture.peak_to_valley
 
     @settings(
-        max_examples=25, deadline=None, derandomize=True, database=None,
+        max_examples=25,
+        deadline=None,
+        derandomize=True,
+        database=None,
         suppress_health_check=list(HealthCheck),
-    )  # fmt: skip
+    )
     @given(any_place)
     def check_agreement(place: tuple[float, float, float]) -> None:
         xy = origin + np.array(place[: len(spans)]) @ spans

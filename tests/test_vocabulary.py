@@ -21,15 +21,38 @@ from asperity.cli.main import COMMANDS, cli
 
 ROOT = Path(__file__).parents[1]
 RETIRED = {
-    "foot": "closest point", "feet": "closest points", "look": "evaluation", "looks": "evaluations",
-    "hopeless": "can_prune", "bend": "hessian_bound", "twist": "third_derivative_bound",
-    "kept": "cached, stored", "anew": "again", "wish": "request", "wished": "requested",
-    "wishes": "requests", "said": "message", "told": "reported", "asked": "requested",
-    "heard": "acknowledged", "shelf": "clip store", "reel": "playback", "backdrop": "background",
-    "workshop": "worker", "brisk": "speed", "restless": "cycling", "restlessness": "cycling",
-    "shaken": "feels alive", "begun": "started", "stretch": "segment", "lacking": "missing",
-    "spare": "prestarted", "bell": "wake-up pipe", "beginnings": "due times", "remade": "rebuilt",
-}  # fmt: skip
+    "foot": "closest point",
+    "feet": "closest points",
+    "look": "evaluation",
+    "looks": "evaluations",
+    "hopeless": "can_prune",
+    "bend": "hessian_bound",
+    "twist": "third_derivative_bound",
+    "kept": "cached, stored",
+    "anew": "again",
+    "wish": "request",
+    "wished": "requested",
+    "wishes": "requests",
+    "said": "message",
+    "told": "reported",
+    "asked": "requested",
+    "heard": "acknowledged",
+    "shelf": "clip store",
+    "reel": "playback",
+    "backdrop": "background",
+    "workshop": "worker",
+    "brisk": "speed",
+    "restless": "cycling",
+    "restlessness": "cycling",
+    "shaken": "feels alive",
+    "begun": "started",
+    "stretch": "segment",
+    "lacking": "missing",
+    "spare": "prestarted",
+    "bell": "wake-up pipe",
+    "beginnings": "due times",
+    "remade": "rebuilt",
+}
 """Retired words in identifiers, whatever stands beside them: ``foot`` in ``next_foot``."""
 
 PARTICIPLES = {"asked", "drawn", "given", "kept", "known", "made", "said", "shown", "told"}
@@ -139,9 +162,25 @@ def test_no_page_has_a_retired_phrase(page: Path) -> None:
 
 
 SUMMARY_VERBS = {
-    "Analyze", "Bake", "Calibrate", "Compare", "Compile", "Compute", "Convert", "Export",
-    "Find", "List", "Measure", "Prepare", "Render", "Report", "Run", "Show", "Simulate", "Write",
-}  # fmt: skip
+    "Analyze",
+    "Bake",
+    "Calibrate",
+    "Compare",
+    "Compile",
+    "Compute",
+    "Convert",
+    "Export",
+    "Find",
+    "List",
+    "Measure",
+    "Prepare",
+    "Render",
+    "Report",
+    "Run",
+    "Show",
+    "Simulate",
+    "Write",
+}
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -162,8 +201,10 @@ def test_retired_name_is_detected(name: str) -> None:
 
 def test_participle_is_detected_unless_it_is_a_local_name() -> None:
     assert retired_names("GIVEN = 1\ndef known(drawn):\n    made = drawn\n") == [
-        "known (2)", "GIVEN (1)", "drawn (2)",
-    ]  # fmt: skip
+        "known (2)",
+        "GIVEN (1)",
+        "drawn (2)",
+    ]
 
 
 @pytest.mark.parametrize("name", ["outlook", "given_argument", "footer", "unknown_fields"])

@@ -114,8 +114,13 @@ def page_texts(result: asp.Comparison) -> list[str]:
 def test_recommends_a_sound_law_that_is_felt(result: asp.Comparison) -> None:
     assert result.recommended == "H"
     assert "gives net energy, and its force does not jump" in result.recommendation
-    for part in (": felt.", "The stiffest wall known to be stable on this device is 5000 N/m.",
-                 "at the delay of the wall test", "a longer delay", "simulated loops"):  # fmt: skip
+    for part in (
+        ": felt.",
+        "The stiffest wall known to be stable on this device is 5000 N/m.",
+        "at the delay of the wall test",
+        "a longer delay",
+        "simulated loops",
+    ):
         assert part in result.recommendation
     assert asp.compare(PAPER, laws="WABCDEFG").recommended == "C"
 
@@ -140,8 +145,15 @@ def test_no_recommendation_without_a_textured_law() -> None:
 
 def test_assumptions_state_every_default(result: asp.Comparison) -> None:
     text = " ".join(result.assumptions)
-    for part in ("scanning speed 0.1 m/s", "max depth 1 mm", "friction 0.8", "max deflection 1 mm",
-                 "modulation depth 0.8", "K₀ = 5000", "update rate"):  # fmt: skip
+    for part in (
+        "scanning speed 0.1 m/s",
+        "max depth 1 mm",
+        "friction 0.8",
+        "max deflection 1 mm",
+        "modulation depth 0.8",
+        "K₀ = 5000",
+        "update rate",
+    ):
         assert part in text
     explicit = asp.compare(PAPER, laws="F", stiffness=500.0, max_depth=1e-4, friction=0.5)
     text = " ".join(explicit.assumptions)
@@ -162,10 +174,12 @@ def test_to_dict_is_json_without_nan(result: asp.Comparison) -> None:
 
 def test_user_defined_law_has_a_row() -> None:
     stiffening = Law(
-        "S", "stiffening", "vertical",
+        "S",
+        "stiffening",
+        "vertical",
         lambda c: c.k * c.depth**3 / c.parameter("reference") ** 2 * c.w,
         parameters={"reference": 0.3e-3},
-    )  # fmt: skip
+    )
     gentle = asp.Sinusoid(amplitude=0.1e-3, period=2e-3)
     row = asp.compare(gentle, laws=["C", stiffening], max_depth=0.3e-3).row("S")
     assert row.conservative

@@ -159,8 +159,10 @@ def test_options_reach_the_result(call: Call) -> None:
     data = json.loads(out)
     assert (data["law"], data["stiffness"], data["max_depth"]) == ("F", 500.0, 0.0002)
     assert data["law_parameters"] == {
-        "friction": 0.3, "max_deflection": 0.0005, "modulation_depth": 0.5,
-    }  # fmt: skip
+        "friction": 0.3,
+        "max_deflection": 0.0005,
+        "modulation_depth": 0.5,
+    }
     assert data["device"]["id"] == "touch"
     assert not any("Default" in sentence for sentence in data["assumptions"])
 
@@ -172,8 +174,9 @@ def test_options_reach_the_result(call: Call) -> None:
 def test_direction_option_sets_the_direction_of_the_leak(
     call: Call, direction: str, expected: list[float]
 ) -> None:
-    _code, out, _err = call("tile:", "--law", "A", "--direction", direction, "--json", "-",
-                            "--tolerance", "0.5")  # fmt: skip
+    _code, out, _err = call(
+        "tile:", "--law", "A", "--direction", direction, "--json", "-", "--tolerance", "0.5"
+    )
     line = json.loads(out)["leak"]["line"]
     assert line["direction"] == pytest.approx(expected, abs=1e-12)
 

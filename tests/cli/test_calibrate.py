@@ -41,11 +41,15 @@ def test_devices_that_cannot_be_measured_are_refused(call: Call, tmp_path: Path)
         (["-o", device_path], "device is missing"),
         (["--device", "touch", "-o", device_path, "--force", "9N"], "force must be at most"),
         (["--device", "touch", "--driver", str(library), "-o", device_path], "--yes starts it"),
-        (["--device", "pantograph", "--driver", str(library), "-o", device_path, "--yes"],
-         "max_force is unknown"),
-        (["--device", "touch", "--driver", "forcedimension", "-o", device_path, "--yes"],
-         "install the SDK"),
-    ):  # fmt: skip
+        (
+            ["--device", "pantograph", "--driver", str(library), "-o", device_path, "--yes"],
+            "max_force is unknown",
+        ),
+        (
+            ["--device", "touch", "--driver", "forcedimension", "-o", device_path, "--yes"],
+            "install the SDK",
+        ),
+    ):
         code, out, err = call(*options)
         assert (code, out) == (2, "")
         assert message in err

@@ -117,8 +117,18 @@ def test_options_override_the_scene_file(call: Call, tmp_path: Path) -> None:
     _code, out, _err = call("compare", str(scene), "--laws", "A", "--json", "-")
     data = json.loads(out)
     assert (data["stiffness"], data["device"]["id"]) == (800.0, "pantograph")
-    _code, out, _err = call("compare", str(scene), "--laws", "A", "--json", "-",
-                            "--stiffness", "300N/m", "--device", "inverse3")  # fmt: skip
+    _code, out, _err = call(
+        "compare",
+        str(scene),
+        "--laws",
+        "A",
+        "--json",
+        "-",
+        "--stiffness",
+        "300N/m",
+        "--device",
+        "inverse3",
+    )
     data = json.loads(out)
     assert (data["stiffness"], data["device"]["id"]) == (300.0, "inverse3")
 
@@ -198,9 +208,13 @@ def _write_invalid_maps(folder: Path) -> dict[str, list[str]]:
     holes = good.copy()
     holes[:3] = np.nan
     for name, array in {
-        "row.npy": good[:1], "small.npy": good[:3, :3], "missing.npy": good * np.nan,
-        "holes.npy": holes, "infinite.npy": np.where(good > 1e-5, np.inf, good), "good.npy": good,
-    }.items():  # fmt: skip
+        "row.npy": good[:1],
+        "small.npy": good[:3, :3],
+        "missing.npy": good * np.nan,
+        "holes.npy": holes,
+        "infinite.npy": np.where(good > 1e-5, np.inf, good),
+        "good.npy": good,
+    }.items():
         np.save(folder / name, array)
     (folder / "empty.x3p").write_bytes(b"")
     (folder / "cut.npy").write_bytes((folder / "good.npy").read_bytes()[:200])
@@ -222,9 +236,17 @@ def test_invalid_files_give_a_one_line_error(call: Call, tmp_path: Path) -> None
 
 @pytest.mark.parametrize(
     "options",
-    [["--magnify", "0"], ["--magnify", "-2"], ["--magnify", "nan"], ["--cutoff", "5um"],
-     ["--cutoff", "-1mm"], ["--pitch", "0"], ["--height-range", "-1mm"], ["--magnify-height", "0"]],
-)  # fmt: skip
+    [
+        ["--magnify", "0"],
+        ["--magnify", "-2"],
+        ["--magnify", "nan"],
+        ["--cutoff", "5um"],
+        ["--cutoff", "-1mm"],
+        ["--pitch", "0"],
+        ["--height-range", "-1mm"],
+        ["--magnify-height", "0"],
+    ],
+)
 def test_invalid_preparation_options_name_the_option(
     call: Call, tmp_path: Path, options: list[str]
 ) -> None:

@@ -112,9 +112,7 @@ def test_json_is_written_to_a_file(call: Call, tmp_path: Path) -> None:
 BAD_FILES = {
     "unknown.toml": ("max_stifness = 3", "did you mean 'max_stiffness'"),
     "dimension.toml": ('max_stiffness = "3 N"', "another dimension"),
-    "contradiction.toml": (
-        '[max_force]\nvalue = "12 N"\nunit = "mm"', "is of another dimension",
-    ),
+    "contradiction.toml": ('[max_force]\nvalue = "12 N"\nunit = "mm"', "is of another dimension"),
     "factor.toml": ('[max_stiffness]\nvalue = "5 N/mm"\nunit = "N/m"', "must be a number"),
     "damping.toml": ("damping = 0", "must be positive"),
     "negative.toml": ("damping = '-1 N*s/m'", "must be positive"),
@@ -125,7 +123,7 @@ BAD_FILES = {
     "bool.toml": ("max_force = true", "quantity"),
     "date.toml": ("max_force = 2020-01-01", "quantity"),
     "empty.toml": ("max_force =", "not valid TOML"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", list(BAD_FILES))

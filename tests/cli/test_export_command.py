@@ -56,8 +56,17 @@ def test_exported_header_gives_the_force_of_the_surface(call: Call, tmp_path: Pa
 def test_header_comment_describes_the_law_and_the_device(call: Call, tmp_path: Path) -> None:
     call("export", WAVE, "--law", "C", "--device", "touch", "-o", str(tmp_path / "t.h"))
     comment = (tmp_path / "t.h").read_text().split("#ifndef")[0]
-    for words in ("f = k δ w", "closed form", "backed", "Touch", asp.__version__, "0 J per period",
-                  "every depth", "period = 0.002", "heights -200 µm to 200 µm"):  # fmt: skip
+    for words in (
+        "f = k δ w",
+        "closed form",
+        "backed",
+        "Touch",
+        asp.__version__,
+        "0 J per period",
+        "every depth",
+        "period = 0.002",
+        "heights -200 µm to 200 µm",
+    ):
         assert words in comment, words
 
 

@@ -16,11 +16,16 @@ from asperity.core.errors import ParameterError, SurfaceFileError
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["nothing.png"], "nothing.png"), (["velvet"], "velvet"), (["--law", "Q"], "law"),
-        (["--device", "none"], "none"), (["--port", "-1"], "port"), (["--port", "x"], "port"),
-        (["--stiffness=-1N/m"], "stiffness"), (["--port", "70000"], "port"),
+        (["nothing.png"], "nothing.png"),
+        (["velvet"], "velvet"),
+        (["--law", "Q"], "law"),
+        (["--device", "none"], "none"),
+        (["--port", "-1"], "port"),
+        (["--port", "x"], "port"),
+        (["--stiffness=-1N/m"], "stiffness"),
+        (["--port", "70000"], "port"),
     ],
-)  # fmt: skip
+)
 def test_invalid_input_is_named_in_the_error(arguments: list[str], words: str) -> None:
     result = CliRunner().invoke(cli, ["lab", "--no-browser", *arguments])
     assert isinstance(result.exception, ParameterError | SurfaceFileError)

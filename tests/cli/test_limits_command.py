@@ -69,9 +69,13 @@ def test_options_reach_the_result(call: Call, device_path: str) -> None:
     sides = {limit["number"]: (limit["left"], limit["right"]) for limit in data["limits"]}
     q = math.hypot(1.0, 2 * math.pi * 0.1)
     expected = {
-        1: (8 * 0.3 / 1e4, 1e-3), 2: (7 * 15e-6, 1e-3), 3: (8 * 15e-6, 1e-3),
-        4: (6 * 2e-3, 0.04), 5: (q * 400.0, 2000.0), 6: (300.0, 400.0),
-    }  # fmt: skip
+        1: (8 * 0.3 / 1e4, 1e-3),
+        2: (7 * 15e-6, 1e-3),
+        3: (8 * 15e-6, 1e-3),
+        4: (6 * 2e-3, 0.04),
+        5: (q * 400.0, 2000.0),
+        6: (300.0, 400.0),
+    }
     for number, pair in expected.items():
         assert sides[number] == (pytest.approx(pair[0]), pytest.approx(pair[1], rel=1e-6))
 

@@ -145,8 +145,9 @@ def test_recorded_run_is_replayed_bit_for_bit_and_exported(
     assert out.startswith("800 rows, 200 ms at 4 kHz: law A at 400 N/m on sinusoid")
     assert re.search(r"commanded z +[-0-9.]+ +[0-9.]+ +N", out)
     assert call("recording", "replay", path)[:2] == (
-        0, "All 800 rows are reproduced bit for bit.\n",
-    )  # fmt: skip
+        0,
+        "All 800 rows are reproduced bit for bit.\n",
+    )
     Path(still).write_text(Path(still).read_text(encoding="utf-8") + "\n", encoding="utf-8")
     code, out, _err = call(
         "recording", "replay", path, "--surface", "sinusoid:amplitude=0.3mm,period=2mm,phase=30deg"
@@ -293,8 +294,10 @@ def test_scan_separates_energy_gain_from_loss(call: Call, strokes: str, tmp_path
     code, out, _err = call("scan", strokes, *options, "--depths", "0.2mm;0.4mm", "--json", "-")
     results = json.loads(out)["strokes"]
     assert [(stroke["law"], stroke["speed"], stroke["depth"]) for stroke in results[:3]] == [
-        ("A", 0.05, 2e-4), ("A", 0.05, 4e-4), ("A", 0.1, 2e-4),
-    ]  # fmt: skip
+        ("A", 0.05, 2e-4),
+        ("A", 0.05, 4e-4),
+        ("A", 0.1, 2e-4),
+    ]
     assert len(results) == 8
     code, _out, _err = call("scan", strokes, *options, "--html", str(tmp_path / "s.html"))
     text = (tmp_path / "s.html").read_text(encoding="utf-8")
@@ -339,9 +342,14 @@ BAD = [
 
 @pytest.mark.parametrize(("arguments", "message"), BAD, ids=[" ".join(a)[:60] for a, _m in BAD])
 def test_invalid_input_gives_a_one_line_error_and_writes_no_file(
-    call: Call, still: str, strokes: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-    arguments: list[str], message: str,
-) -> None:  # fmt: skip
+    call: Call,
+    still: str,
+    strokes: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str],
+    message: str,
+) -> None:
     monkeypatch.chdir(tmp_path)
     before = sorted(tmp_path.iterdir())
     filled = [text.format(still=still, strokes=strokes) for text in arguments]

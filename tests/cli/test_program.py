@@ -18,9 +18,13 @@ def run(command: str, **options: object) -> subprocess.CompletedProcess[str]:
     """Run a shell command in which ``asperity`` is the program."""
     program = f'asperity() {{ {sys.executable} -m asperity "$@"; }}\n'
     return subprocess.run(
-        ["bash", "-c", program + command], capture_output=True, text=True, timeout=120, check=False,
+        ["bash", "-c", program + command],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
         **options,
-    )  # fmt: skip  # options are those of run
+    )  # options are those of run
 
 
 def one_line(text: str) -> str:
@@ -106,9 +110,12 @@ def test_internal_error_is_one_line_with_command_exception_and_line() -> None:
 
 def test_internal_error_shows_its_traceback_on_request() -> None:
     process = subprocess.run(
-        [sys.executable, "-c", _FAULT], capture_output=True, text=True, check=False,
+        [sys.executable, "-c", _FAULT],
+        capture_output=True,
+        text=True,
+        check=False,
         env=os.environ | {"ASPERITY_TRACEBACK": "1"},
-    )  # fmt: skip
+    )
     assert process.returncode == 70
     assert "Traceback" in process.stderr
 
@@ -198,9 +205,12 @@ main()
 """
     process = subprocess.run(
         [sys.executable, "-c", script, "compare", "sinusoid:amplitude=0.8mm,period=1mm"],
-        capture_output=True, text=True, check=False, timeout=120,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
         env=os.environ | {"ASPERITY_CACHE_DIR": str(tmp_path)},
-    )  # fmt: skip
+    )
     assert process.returncode == 130
     assert one_line(process.stderr.strip()) == "asperity: interrupted"
     assert not process.stdout

@@ -90,8 +90,19 @@ def test_run_prints_its_result_and_statistics(
 def test_surface_without_a_scene_uses_the_recommended_stiffness(call: Call, tmp_path: Path) -> None:
     wave = "sinusoid:amplitude=0.1mm,period=2mm"
     path = tmp_path / "run.mcap"
-    code, out, err = call(wave, "--device", "touch", "--law", "D", "--duration", "0.3s",
-                          "--set", "update_rate=500Hz", "--record", str(path))  # fmt: skip
+    code, out, err = call(
+        wave,
+        "--device",
+        "touch",
+        "--law",
+        "D",
+        "--duration",
+        "0.3s",
+        "--set",
+        "update_rate=500Hz",
+        "--record",
+        str(path),
+    )
     assert code == 0, err
     stiffness = (
         asp.compare(wave, device="touch", laws="D", clamp="backed").rows[0].recommended_stiffness
@@ -140,8 +151,17 @@ def test_killed_program_leaves_a_readable_recording_and_no_process(
 ) -> None:
     path = tmp_path / "run.mcap"
     scene_path = scene('silence = "30 s"', 'silence = "2 s"')
-    program = [sys.executable, "-m", "asperity", "run", scene_path, "--duration", "3600s",
-               "--record", str(path)]  # fmt: skip
+    program = [
+        sys.executable,
+        "-m",
+        "asperity",
+        "run",
+        scene_path,
+        "--duration",
+        "3600s",
+        "--record",
+        str(path),
+    ]
     with subprocess.Popen(program, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
         assert wait_until(lambda: path.exists() and path.stat().st_size > 100_000)
         # The servo process is a child of the program.
@@ -243,8 +263,9 @@ def test_interrupt_stops_the_run_with_a_result(
     out = tmp_path / "result.json"
     arguments = ["run", scene(), "--duration", "3600s", "--json", str(out)]
     program = [sys.executable, "-c", _REPORTING_PROGRAM, *arguments]
-    with subprocess.Popen(program, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-                          start_new_session=True) as process:  # fmt: skip
+    with subprocess.Popen(
+        program, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    ) as process:
         assert process.stderr is not None
         for line in process.stderr:
             if "watching" in line:

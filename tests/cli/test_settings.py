@@ -62,10 +62,14 @@ WRONG = [
     (["--set", "hand.friction=1N"], "set names 'hand.friction', which is a parameter of no law"),
     (["--set", "device.continuity=1"], "set names 'continuity'"),
     (["--set", "max_stiffness"], "must be NAME=VALUE"),
-    (["--set", "max_force=1N", "--set", "device.max_force=2N"],
-     "set is given twice for max_force: 'max_force=1N' and 'device.max_force=2N'"),
-    (["--set", "continuity=1", "--set", "continuity=2"],
-     "set is given twice for continuity: 'continuity=1' and 'continuity=2'"),
+    (
+        ["--set", "max_force=1N", "--set", "device.max_force=2N"],
+        "set is given twice for max_force: 'max_force=1N' and 'device.max_force=2N'",
+    ),
+    (
+        ["--set", "continuity=1", "--set", "continuity=2"],
+        "set is given twice for continuity: 'continuity=1' and 'continuity=2'",
+    ),
     (["--friction", "1", "--set", "friction=2"], "given twice: by --friction and by --set"),
     (["--device", "touch", "--set", "continuous_force=9N"], "not be greater than max_force, 3.3 N"),
     (["--stiffness", "500"], "stiffness needs a unit: write 500N/m, got '500'"),
@@ -73,7 +77,7 @@ WRONG = [
     (["--stiffness", "1N/m", "--stiffness=2N/m"], "stiffness is given twice: give --"),
     (["--law", "F", "--law", "F"], "law is given twice"),
     (["--json", "-", "--json", "-"], "json is given twice"),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("options", "message"), WRONG, ids=lambda value: " ".join(value)[:50])

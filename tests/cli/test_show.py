@@ -52,8 +52,12 @@ def test_surface_parameters_are_listed_after_each_step(call: Call, source: str) 
     assert (code, err) == (0, "")
     rows = first_table(out)
     assert [row[0] for row in rows] == [
-        "as read", "levelled", "holes filled", "S-filter 8 µm", "L-filter 80 µm",
-    ]  # fmt: skip
+        "as read",
+        "levelled",
+        "holes filled",
+        "S-filter 8 µm",
+        "L-filter 80 µm",
+    ]
     assert all(len(row) == 12 for row in rows)
     assert re.search(r"^Sdr\s+developed interfacial area ratio", out, re.MULTILINE)
     assert re.search(r"Sal \d.* µm \(autocorrelation length\)", out)
@@ -104,10 +108,14 @@ def test_html_page_shows_each_step_and_what_it_removed(
     assert f"Report: {page}" in out.replace("\n", "")
     text = page.read_text(encoding="utf-8")
     for words in (
-        "After each step", "Levelled", "S-filter 8 µm", "L-filter 80 µm", "Form, waviness and "
-        "texture",
-        "ISO 25178-2:2021, 4.4.3", "what the step removed",
-    ):  # fmt: skip
+        "After each step",
+        "Levelled",
+        "S-filter 8 µm",
+        "L-filter 80 µm",
+        "Form, waviness and texture",
+        "ISO 25178-2:2021, 4.4.3",
+        "what the step removed",
+    ):
         assert words in text
     assert text.count("<svg") == 3
     check_alts(check_alone(text), text)

@@ -82,9 +82,15 @@ def test_json_has_all_data_of_the_catalogue():
     assert paper["arguments"][0]["choices"][0] == "P60"
     assert content["sinusoid"]["peak_to_valley"] == pytest.approx(0.8e-3)
     assert content["noise"]["arguments"][0] == {
-        "name": "rms", "description": "root mean square height", "unit": "m", "default": None,
-        "default_description": "", "form": "quantity", "required": True, "choices": [],
-    }  # fmt: skip
+        "name": "rms",
+        "description": "root mean square height",
+        "unit": "m",
+        "default": None,
+        "default_description": "",
+        "form": "quantity",
+        "required": True,
+        "choices": [],
+    }
 
 
 def test_specification_matches_the_example_arguments():

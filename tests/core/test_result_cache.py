@@ -117,14 +117,20 @@ def test_another_device_or_stiffness_uses_cached_results(monkeypatch: pytest.Mon
 
 WAVE = Sinusoid(0.31e-3, 1.1e-3)
 FIELDS: dict[int, tuple[str, Callable[[], Surface], Callable[[], Surface]]] = {
-    0: ("texture", lambda: Surface(WAVE, "A", max_depth=2e-4),
-        lambda: Surface(Sinusoid(0.32e-3, 1.1e-3), "A", max_depth=2e-4)),
+    0: (
+        "texture",
+        lambda: Surface(WAVE, "A", max_depth=2e-4),
+        lambda: Surface(Sinusoid(0.32e-3, 1.1e-3), "A", max_depth=2e-4),
+    ),
     1: ("law", lambda: Surface(WAVE, "A"), lambda: Surface(WAVE, "D")),
-    2: ("depth", lambda: Surface(WAVE, "A", max_depth=2e-4),
-        lambda: Surface(WAVE, "A", max_depth=2.1e-4)),
+    2: (
+        "depth",
+        lambda: Surface(WAVE, "A", max_depth=2e-4),
+        lambda: Surface(WAVE, "A", max_depth=2.1e-4),
+    ),
     3: ("clamp", lambda: Surface(WAVE, "A"), lambda: Surface(WAVE, "A", clamp="whole")),
     4: ("parameters", lambda: Surface(WAVE, "F"), lambda: Surface(WAVE, "F", friction=0.5)),
-}  # fmt: skip
+}
 
 
 def numbers(surface: Surface) -> str:
@@ -341,9 +347,11 @@ def test_report_draws_each_picture_once(monkeypatch: pytest.MonkeyPatch) -> None
     def record_draw(name: str, draw: Callable[[Any], Any]) -> Callable[[Any], Any]:
         return lambda result: drawn.append(name) or draw(result)
 
-    monkeypatch.setattr(plots, "COMPARISON_PICTURES", {
-        name: record_draw(name, draw) for name, draw in plots.COMPARISON_PICTURES.items()
-    })  # fmt: skip
+    monkeypatch.setattr(
+        plots,
+        "COMPARISON_PICTURES",
+        {name: record_draw(name, draw) for name, draw in plots.COMPARISON_PICTURES.items()},
+    )
     first = html_text(compare(WAVE, laws="WA"))
     assert sorted(drawn) == sorted(plots.COMPARISON_PICTURES)
     assert html_text(compare(WAVE, laws="WA")) == first

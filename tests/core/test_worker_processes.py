@@ -275,7 +275,10 @@ print(*(os.environ[name] for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")
 def test_command_uses_one_thread_of_linear_algebra() -> None:
     """Workers use one thread, and with two a form fitted to a map differs in the last digit."""
     process = subprocess.run(
-        [sys.executable, "-c", _THREADS], capture_output=True, text=True, check=True,
+        [sys.executable, "-c", _THREADS],
+        capture_output=True,
+        text=True,
+        check=True,
         env=os.environ | {"OPENBLAS_NUM_THREADS": "7"},
-    )  # fmt: skip
+    )
     assert process.stdout.split() == ["1", "1"]

@@ -47,9 +47,11 @@ def test_facts_of_user_defined_laws_are_derived():
 def test_piecewise_law_is_not_affine_in_the_depth():
     """Each piece may be affine, but the greatest Jacobian may be where they meet."""
     law = Law(
-        "P", "pieces", "vertical",
+        "P",
+        "pieces",
+        "vertical",
         lambda c: c.k * sp.Piecewise((c.depth**2, c.depth < 1e-4), (0, True)) * c.e_z,
-    )  # fmt: skip
+    )
     assert not law_facts(law).affine_in_depth
 
 

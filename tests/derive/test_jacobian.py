@@ -76,13 +76,25 @@ def contact_values(patch: Patch, depth: float, sliding: bool) -> dict[str, float
     if sliding:
         follow -= np.outer(DEFLECTION, DEFLECTION) / (DEFLECTION @ DEFLECTION)
     return {
-        "depth": depth, "h": h, "hx": g[0], "hy": g[1],
-        "hxx": hessian[0, 0], "hxy": hessian[0, 1], "hyy": hessian[1, 1],
-        "dx": DEFLECTION[0], "dy": DEFLECTION[1],
-        "sxx": follow[0, 0], "sxy": follow[0, 1], "syy": follow[1, 1],
-        "k": STIFFNESS, "h_mid": H_MID, "h_half": H_HALF, "friction": FRICTION,
-        "max_deflection": MAX_DEFLECTION, "modulation_depth": MODULATION,
-    }  # fmt: skip
+        "depth": depth,
+        "h": h,
+        "hx": g[0],
+        "hy": g[1],
+        "hxx": hessian[0, 0],
+        "hxy": hessian[0, 1],
+        "hyy": hessian[1, 1],
+        "dx": DEFLECTION[0],
+        "dy": DEFLECTION[1],
+        "sxx": follow[0, 0],
+        "sxy": follow[0, 1],
+        "syy": follow[1, 1],
+        "k": STIFFNESS,
+        "h_mid": H_MID,
+        "h_half": H_HALF,
+        "friction": FRICTION,
+        "max_deflection": MAX_DEFLECTION,
+        "modulation_depth": MODULATION,
+    }
 
 
 def modulation(h: float) -> float:
@@ -105,10 +117,13 @@ def closed_form_jacobian(
     state: dict[str, Any] = {}
     if letter == "F":
         state = {
-            "d": DEFLECTION, "m": modulation(patch.h0), "sliding": sliding,
+            "d": DEFLECTION,
+            "m": modulation(patch.h0),
+            "sliding": sliding,
             "m_slope": MODULATION * patch.g / (2.0 * H_HALF),
-            "friction": FRICTION, "max_deflection": MAX_DEFLECTION,
-        }  # fmt: skip
+            "friction": FRICTION,
+            "max_deflection": MAX_DEFLECTION,
+        }
     return jacobian_by_hand(
         letter, k=STIFFNESS, depth=depth, g=patch.g, hessian=patch.hessian, **state
     )
@@ -144,9 +159,15 @@ def force_on_patch(
         if sliding:
             d = d * np.hypot(*DEFLECTION) / np.hypot(*d)
         return force_by_hand(
-            letter, k=STIFFNESS, depth=depth, g=g, d=d, m=modulation(h), friction=FRICTION,
+            letter,
+            k=STIFFNESS,
+            depth=depth,
+            g=g,
+            d=d,
+            m=modulation(h),
+            friction=FRICTION,
             max_deflection=MAX_DEFLECTION,
-        )  # fmt: skip
+        )
 
     return lambda points: np.array([force_at(p) for p in points])
 

@@ -16,12 +16,37 @@ from asperity.derive.python_source import law_source
 from asperity.laws import LAWS, Law
 
 VALUES = {
-    "x": 1e-3, "y": -2e-3, "z": -0.4e-3, "depth": 0.4e-3, "h": 0.25e-3, "hx": 0.6, "hy": -1.1,
-    "hxx": -900.0, "hxy": 350.0, "hyy": 500.0, "dx": 0.3e-3, "dy": -0.5e-3, "sxx": 0.7,
-    "sxy": -0.2, "syy": 0.4, "k": 700.0, "h_mid": 0.1e-3, "h_half": 0.5e-3, "friction": 0.7,
-    "max_deflection": 0.8e-3, "modulation_depth": 0.9, "tx": 0.2e-3, "ty": -0.1e-3, "tz": 0.3e-3,
-    "mxx": -0.3, "mxy": 0.2, "mxz": 0.15, "myy": -0.5, "myz": -0.25, "mzz": -0.8,
-}  # fmt: skip
+    "x": 1e-3,
+    "y": -2e-3,
+    "z": -0.4e-3,
+    "depth": 0.4e-3,
+    "h": 0.25e-3,
+    "hx": 0.6,
+    "hy": -1.1,
+    "hxx": -900.0,
+    "hxy": 350.0,
+    "hyy": 500.0,
+    "dx": 0.3e-3,
+    "dy": -0.5e-3,
+    "sxx": 0.7,
+    "sxy": -0.2,
+    "syy": 0.4,
+    "k": 700.0,
+    "h_mid": 0.1e-3,
+    "h_half": 0.5e-3,
+    "friction": 0.7,
+    "max_deflection": 0.8e-3,
+    "modulation_depth": 0.9,
+    "tx": 0.2e-3,
+    "ty": -0.1e-3,
+    "tz": 0.3e-3,
+    "mxx": -0.3,
+    "mxy": 0.2,
+    "mxz": 0.15,
+    "myy": -0.5,
+    "myz": -0.25,
+    "mzz": -0.8,
+}
 
 
 def functions(law: Law) -> dict[str, Any]:

@@ -7,14 +7,7 @@ import math
 import pytest
 
 from asperity.core.errors import ParameterError
-from asperity.devices import (
-    FIELD_UNITS,
-    Datum,
-    Device,
-    device_names,
-    load_device,
-    parse_device,
-)  # fmt: skip
+from asperity.devices import FIELD_UNITS, Datum, Device, device_names, load_device, parse_device
 from asperity.devices.five_bar import FiveBar, handle_damping
 
 # Read (True) or remembered (False) values, recorded independently of the catalogue.
@@ -251,11 +244,17 @@ def test_device_to_dict_is_complete() -> None:
 @pytest.mark.parametrize(
     ("value", "unit", "text"),
     [
-        (0.0, "1", "0"), (10752.0, "1", "10752"), (0.045, "kg", "45 g"), (1.2, "kg", "1.2 kg"),
-        (0.0047, "N*m*s", "4.7 mN·m·s"), (30.0, "N*s/m", "30 N·s/m"), (14500.0, "N/m", "14500 N/m"),
-        (4000.0, "Hz", "4 kHz"), (1.5e-6, "m", "1.5 µm"),
+        (0.0, "1", "0"),
+        (10752.0, "1", "10752"),
+        (0.045, "kg", "45 g"),
+        (1.2, "kg", "1.2 kg"),
+        (0.0047, "N*m*s", "4.7 mN·m·s"),
+        (30.0, "N*s/m", "30 N·s/m"),
+        (14500.0, "N/m", "14500 N/m"),
+        (4000.0, "Hz", "4 kHz"),
+        (1.5e-6, "m", "1.5 µm"),
     ],
-)  # fmt: skip
+)
 def test_values_are_formatted_with_units(value: float, unit: str, text: str) -> None:
     assert Datum(value, unit, "", True).text == text
 

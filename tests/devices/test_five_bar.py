@@ -19,8 +19,9 @@ POINTS = [(-0.0125, 0.1), (0.0375, 0.1), (-0.05, 0.07), (0.01, 0.12)]
 def test_link_lengths_are_preserved(point: tuple[float, float]) -> None:
     angles = joint_angles(LINKAGE, point)
     for angle, motor in zip(angles, (0.0, -LINKAGE.base), strict=True):
-        elbow = np.array([motor + LINKAGE.proximal * math.cos(angle),
-                          LINKAGE.proximal * math.sin(angle)])  # fmt: skip
+        elbow = np.array(
+            [motor + LINKAGE.proximal * math.cos(angle), LINKAGE.proximal * math.sin(angle)]
+        )
         assert np.hypot(*(point - elbow)) == pytest.approx(LINKAGE.distal, rel=1e-12)
 
 

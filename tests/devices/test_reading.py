@@ -62,7 +62,7 @@ def test_byte_order_mark_is_ignored(tmp_path: Path, mark: bytes) -> None:
         ({"max_stiffness": {"value": "5", "unit": "N/mm"}}, "max_stiffness", 5000.0),
         ({"position_resolution": {"value": 55, "unit": "um"}}, "position_resolution", 5.5e-5),
     ],
-)  # fmt: skip
+)
 def test_valid_values_are_parsed(content: dict[str, object], field: str, value: float) -> None:
     assert parse_device(content, "mine").value(field) == value
 

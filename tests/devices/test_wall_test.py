@@ -8,9 +8,15 @@ from asperity.core.errors import ParameterError
 from asperity.devices import Datum, Device, WallTest, load_device, parse_device
 
 FULL = {
-    "value": "1.8 N/mm", "directions": ["x", "z", "x"], "cycled": "2 N/mm", "update_rate": "1 kHz",
-    "positions": "stepped", "lightest": 0.7, "source": "tried", "verified": "measured",
-}  # fmt: skip
+    "value": "1.8 N/mm",
+    "directions": ["x", "z", "x"],
+    "cycled": "2 N/mm",
+    "update_rate": "1 kHz",
+    "positions": "stepped",
+    "lightest": 0.7,
+    "source": "tried",
+    "verified": "measured",
+}
 
 
 def test_all_fields_of_a_wall_test_are_parsed() -> None:
@@ -19,10 +25,17 @@ def test_all_fields_of_a_wall_test_are_parsed() -> None:
         1800.0, "N/m", "tried", True, (), True, ("x", "z"), 2000.0, 1000.0, "stepped", 0.7
     )
     assert test.to_dict() == {
-        "value": 1800.0, "unit": "N/m", "source": "tried", "verified": "measured", "also": [],
-        "directions": ["x", "z"], "cycled": 2000.0, "update_rate": 1000.0, "positions": "stepped",
+        "value": 1800.0,
+        "unit": "N/m",
+        "source": "tried",
+        "verified": "measured",
+        "also": [],
+        "directions": ["x", "z"],
+        "cycled": 2000.0,
+        "update_rate": 1000.0,
+        "positions": "stepped",
         "lightest": 0.7,
-    }  # fmt: skip
+    }
 
 
 def test_plain_stiffness_is_a_wall_test_without_details() -> None:
@@ -39,8 +52,11 @@ def test_only_the_papers_wall_was_measured() -> None:
         for name in ("omega.3", "touch", "inverse3", "pantograph")
     }
     assert pedigrees == {
-        "omega.3": "read", "touch": "read", "inverse3": "read", "pantograph": "measured",
-    }  # fmt: skip
+        "omega.3": "read",
+        "touch": "read",
+        "inverse3": "read",
+        "pantograph": "measured",
+    }
 
 
 @pytest.mark.parametrize(

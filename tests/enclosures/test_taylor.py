@@ -225,9 +225,16 @@ def test_abs_and_copysign_across_zero_enclose_all_values() -> None:
 def test_comparisons_and_truth_values_of_models_raise() -> None:
     x, y = interval_model(-1.0, 1.0), interval_model(3.0, 4.0)
     for compare in (
-        lambda: x > 0.0, lambda: x < y, lambda: x <= y, lambda: y >= x, lambda: x == 0.0,
-        lambda: x != y, lambda: bool(x), lambda: max(x, 0.0), lambda: hash(x),
-    ):  # fmt: skip
+        lambda: x > 0.0,
+        lambda: x < y,
+        lambda: x <= y,
+        lambda: y >= x,
+        lambda: x == 0.0,
+        lambda: x != y,
+        lambda: bool(x),
+        lambda: max(x, 0.0),
+        lambda: hash(x),
+    ):
         with pytest.raises(TypeError):
             compare()
     with pytest.raises(TypeError, match="atan2"):

@@ -91,10 +91,15 @@ def test_zeroed_state_equals_a_reset_state(
 @pytest.mark.parametrize(
     ("law", "budget", "number"),
     [
-        ("B", None, "1.0"), ("B", 50, "1.0"), ("D", None, "1500.0"), ("H", None, "1.0"),
-        ("H", 50, "1.0"), ("D", 50, "50"), ("E", np.inf, "HUGE_VAL"),
+        ("B", None, "1.0"),
+        ("B", 50, "1.0"),
+        ("D", None, "1500.0"),
+        ("H", None, "1.0"),
+        ("H", 50, "1.0"),
+        ("D", 50, "50"),
+        ("E", np.inf, "HUGE_VAL"),
     ],
-)  # fmt: skip
+)
 def test_header_states_the_evaluation_budget(
     law: str, budget: float | None, number: str, wave: Texture
 ) -> None:

@@ -164,11 +164,8 @@ def test_pillow_and_tifffile_read_the_files() -> None:
 
 @pytest.mark.parametrize(
     "chunk",
-    [
-        b"\x011e-5", b"\x011e-5\x00-1", b"\x02" + b"1\x001", b"\x01nan\x001", b"",
-        b"\x011\x001\x001",
-    ],
-)  # fmt: skip
+    [b"\x011e-5", b"\x011e-5\x00-1", b"\x02" + b"1\x001", b"\x01nan\x001", b"", b"\x011\x001\x001"],
+)
 def test_invalid_png_sizes_are_ignored(chunk: bytes) -> None:
     from asperity.measured.reading.images.pixels import png_scale
 
@@ -176,11 +173,8 @@ def test_invalid_png_sizes_are_ignored(chunk: bytes) -> None:
 
 
 @pytest.mark.parametrize(
-    "rest",
-    [
-        b"", b"m\x001", b"V\x000\x001", b"m\x000\x00nan", b"m\x000\x000", b"m\x000\x001\x002",
-    ],
-)  # fmt: skip
+    "rest", [b"", b"m\x001", b"V\x000\x001", b"m\x000\x00nan", b"m\x000\x000", b"m\x000\x001\x002"]
+)
 def test_invalid_png_calibrations_are_ignored(rest: bytes) -> None:
     from asperity.measured.reading.images.pixels import png_scale
 

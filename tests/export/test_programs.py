@@ -95,9 +95,12 @@ def test_library_exports_only_its_public_functions(shared_library: Path) -> None
         tool("nm"), "-D", "--defined-only", shared_library / "libtexture.so"
     ).split()
     assert {name for name in symbols if name.startswith("texture")} == {
-        "texture_reset", "texture_force", "texture_gap", "texture_energy",
+        "texture_reset",
+        "texture_force",
+        "texture_gap",
+        "texture_energy",
         "texture_prepare",
-    }  # fmt: skip
+    }
 
 
 def test_microcontroller_gives_the_force_within_its_budget(tmp_path: Path) -> None:

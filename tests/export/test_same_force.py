@@ -30,9 +30,13 @@ from asperity.textures.catalogue import as_texture
 # suffice: most of the time is the text of the coefficients, and its compilation.
 PART = slice(60, 160)  # of the nodes along both axes; it contains a joint between tiles
 LIBRARY = {
-    "sandpaper:grit=P60": "BH", "tile:": "H", "cloth:": "B", "knurl:": "B", "wood:": "B",
+    "sandpaper:grit=P60": "BH",
+    "tile:": "H",
+    "cloth:": "B",
+    "knurl:": "B",
+    "wood:": "B",
     "brushed-metal:": "B",
-}  # fmt: skip
+}
 SAME_MACHINE = platform.machine() == "x86_64"
 
 

@@ -98,9 +98,13 @@ def shifted(x):
 SCALE = 2.5
 '''
 ARGUMENT_TYPES: dict[str, tuple[ValueType, ...]] = {
-    "whole": (INT, INT), "real": (FLOAT, FLOAT), "rounding": (FLOAT, FLOAT),
-    "choice": (FLOAT, FLOAT), "loops": (INT, FLOAT), "arrays": (INT, FLOAT),
-}  # fmt: skip
+    "whole": (INT, INT),
+    "real": (FLOAT, FLOAT),
+    "rounding": (FLOAT, FLOAT),
+    "choice": (FLOAT, FLOAT),
+    "loops": (INT, FLOAT),
+    "arrays": (INT, FLOAT),
+}
 HEAD = "#include <math.h>\n#include <stdint.h>\n#define T_INLINE static inline\n"
 
 

@@ -46,9 +46,12 @@ def compute_concurrently(how: str, count: int, folder: Path) -> list[list[str]]:
     script.write_text(_SCRIPT)
     process = subprocess.run(
         [sys.executable, str(script), how, str(count)],
-        capture_output=True, text=True, check=True, timeout=300,
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=300,
         env=os.environ | {"ASPERITY_CACHE_DIR": str(folder / f"cache-{how}")},
-    )  # fmt: skip
+    )
     assert not process.stderr
     results: list[list[str]] = json.loads(process.stdout)
     return results
@@ -82,9 +85,12 @@ surface.to_law("D").jacobian([[0.0, 0.0, 0.0]])
 def test_concurrent_processes_compile_everything_once(tmp_path: Path) -> None:
     def start_process(cache: str) -> subprocess.Popen[str]:
         return subprocess.Popen(
-            [sys.executable, "-c", _COMPILING], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-            text=True, env=os.environ | {"ASPERITY_CACHE_DIR": str(tmp_path / cache)},
-        )  # fmt: skip
+            [sys.executable, "-c", _COMPILING],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            env=os.environ | {"ASPERITY_CACHE_DIR": str(tmp_path / cache)},
+        )
 
     def compiled_names(cache: str, count: int) -> list[str]:
         processes = [start_process(cache) for _ in range(count)]

@@ -138,9 +138,15 @@ def test_contact_batch_agrees_with_closed_forms(
     shared = (700.0, 1e-4, 5e-4, 1.0, 0.0)
     law_parameters = (0.7, 0.8e-3, 0.9) if letter == "F" else ()
     module.contact_batch(
-        rng.normal(size=(7, 3)), depths, derivatives, deflection, sliding, force, jacobian,
+        rng.normal(size=(7, 3)),
+        depths,
+        derivatives,
+        deflection,
+        sliding,
+        force,
+        jacobian,
         shared + law_parameters,
-    )  # fmt: skip
+    )
     for i in range(7):
         h, hx, hy, hxx, hxy, hyy = derivatives[i]
         values: dict[str, Any] = {"k": 700.0, "depth": depths[i]}

@@ -50,9 +50,13 @@ def test_modules_share_identical_functions() -> None:
 
 @pytest.mark.parametrize(
     ("changes", "value"),
-    [({"number": "4.0"}, 30.0), ({"factor": "2.5"}, 23.5), ({"factor": "2"}, 23.0),
-     ({"head": HEAD.replace('"numpy", _nrt', '"python", _nrt')}, 23.0)],
-)  # fmt: skip
+    [
+        ({"number": "4.0"}, 30.0),
+        ({"factor": "2.5"}, 23.5),
+        ({"factor": "2"}, 23.0),
+        ({"head": HEAD.replace('"numpy", _nrt', '"python", _nrt')}, 23.0),
+    ],
+)
 def test_function_with_a_different_dependency_is_not_shared(
     changes: dict[str, str], value: float
 ) -> None:

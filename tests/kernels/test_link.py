@@ -155,8 +155,9 @@ def test_private_function_is_not_replaced() -> None:
 
 
 def test_name_conflict_of_required_functions_is_an_error() -> None:
-    one = unit("m1", "def one(x): return two(x) + helper(x)\ndef helper(x): return 1",
-               provides=("one",))  # fmt: skip
+    one = unit(
+        "m1", "def one(x): return two(x) + helper(x)\ndef helper(x): return 1", provides=("one",)
+    )
     two = unit("m2", "def two(x): return helper(x)\ndef helper(x): return 2", provides=("two",))
     with pytest.raises(ParameterError, match="function 'helper' is defined by both m"):
         link_and_run(one, two)

@@ -191,8 +191,14 @@ def test_anchor_sticks_up_to_the_maximum_deflection() -> None:
 
 
 def settings(**more: float) -> tick.ServoSettings:
-    defaults = {"position_step": 0.0, "force_step": 0.0, "max_force": 1e9, "virtual_damping": 0.0,
-             "velocity_share": 1.0, "period": 0.5}  # fmt: skip
+    defaults = {
+        "position_step": 0.0,
+        "force_step": 0.0,
+        "max_force": 1e9,
+        "virtual_damping": 0.0,
+        "velocity_share": 1.0,
+        "period": 0.5,
+    }
     return tick.ServoSettings(**(defaults | more))
 
 

@@ -26,20 +26,26 @@ USED: dict[str, tuple[Any, str, tuple[str, ...] | None, str]] = {
     "finalize": (codegen.JITCodeLibrary, "_finalize_final_module", ("self",), "LinkOnlyLibrary"),
     "globals": (codegen.JITCodeLibrary, "_finalize_dynamic_globals", ("self",), "LinkOnlyLibrary"),
     "verify": (
-        codegen.CPUCodeLibrary, "_verify_declare_only_symbols", ("self",), "LinkOnlyLibrary",
+        codegen.CPUCodeLibrary,
+        "_verify_declare_only_symbols",
+        ("self",),
+        "LinkOnlyLibrary",
     ),
     "add": (codegen.CodeLibrary, "add_ir_module", ("self", "ir_module"), "WideVectorLibrary"),
     "lower": (typed_passes.NativeLowering, "run_pass", ("self", "state"), "LinkOnlyLowering"),
     "pipeline": (compiler.Compiler, "define_pipelines", ("self",), "LoopCompiler"),
     "function": (_dynfunc, "make_function", None, "LinkOnlyLowering"),
     "load": (
-        caching._Cache, "load_overload", ("self", "sig", "target_context"), "MachineCodeCache",
+        caching._Cache,
+        "load_overload",
+        ("self", "sig", "target_context"),
+        "MachineCodeCache",
     ),
     "save": (caching._Cache, "save_overload", ("self", "sig", "data"), "MachineCodeCache"),
     "rebuild": (compiler.CompileResult, "_rebuild", None, "MachineCodeCache._load_cached"),
     "reduce": (compiler.CompileResult, "_reduce", ("self",), "MachineCodeCache.save_overload"),
     "magic": (codegen.CPUCodegen, "magic_tuple", ("self",), "MachineCodeCache._key"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("case", USED)

@@ -29,8 +29,7 @@ def unit(
 
 
 PROVIDER = unit("finds", SEARCH, {"FAR": 100.0}, provides=("search", "step"), shared=("search",))
-TIMES = unit("times", "def times(x): return search(x) * step(3.0 * x)",
-             loops=("times",))  # fmt: skip
+TIMES = unit("times", "def times(x): return search(x) * step(3.0 * x)", loops=("times",))
 MINUS = unit("minus", "def minus(x): return -search(x)", loops=("minus",))
 
 
@@ -54,8 +53,12 @@ def test_shared_function_is_a_separate_part() -> None:
 
 
 def test_parts_are_sorted_after_their_imports() -> None:
-    provider = unit("deep", "def a(x): return b(x)\ndef b(x): return c(x)\ndef c(x): return x",
-                provides=("a", "b", "c"), shared=("a", "b", "c"))  # fmt: skip
+    provider = unit(
+        "deep",
+        "def a(x): return b(x)\ndef b(x): return c(x)\ndef c(x): return x",
+        provides=("a", "b", "c"),
+        shared=("a", "b", "c"),
+    )
     loop = unit("loop", "def run(x): return a(x) + c(x)", loops=("run",))
     parts = link_modules(loops_of(loop), (provider, loop))
     assert sorted(part.name for part in parts) == ["", "a", "b", "c"]
@@ -65,8 +68,12 @@ def test_parts_are_sorted_after_their_imports() -> None:
 
 
 def test_recursive_shared_function_is_an_error() -> None:
-    ring = unit("ring", "def a(x): return b(x)\ndef b(x): return a(x)",
-                provides=("a", "b"), shared=("a", "b"))  # fmt: skip
+    ring = unit(
+        "ring",
+        "def a(x): return b(x)\ndef b(x): return a(x)",
+        provides=("a", "b"),
+        shared=("a", "b"),
+    )
     loop = unit("loop", "def run(x): return a(x)", loops=("run",))
     with pytest.raises(ParameterError, match="ring: the shared function 'a' calls itself"):
         link_modules(loops_of(loop), (ring, loop))
@@ -114,8 +121,7 @@ def test_shared_function_is_compiled_once(monkeypatch: pytest.MonkeyPatch) -> No
     assert sum(search.stats.cache_misses.values()) == 1
     fuse._load_module.cache_clear()  # as in a new process
     assert load(MINUS).minus(2.0) == -106.0
-    other = unit("other", "def other(x): return search(x) + 1.0",
-                 loops=("other",))  # fmt: skip
+    other = unit("other", "def other(x): return search(x) + 1.0", loops=("other",))
     assert load(other).other(2.0) == 107.0
     assert not load(other).search.stats.cache_misses
     assert sum(load(other).search.stats.cache_hits.values()) == 1

@@ -19,9 +19,13 @@ from asperity.surface import Surface
 from asperity.textures import HeightMap, Sinusoid
 
 SERVO = Servo(
-    1e-4, position_resolution=5e-6, force_resolution=5e-3, max_force=0.4, virtual_damping=0.3,
+    1e-4,
+    position_resolution=5e-6,
+    force_resolution=5e-3,
+    max_force=0.4,
+    virtual_damping=0.3,
     velocity_share=0.2,
-)  # fmt: skip
+)
 STROKES = Strokes((0.1e-3, 0.0, -0.05e-3), (7e-3, 3e-3, -0.25e-3), speed=0.05, count=3)
 
 DEVICE = """

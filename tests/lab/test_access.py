@@ -58,8 +58,14 @@ def test_who_knows_address_and_token_is_let_in(path: str, hosts: list[str], name
 
 def test_a_live_connection_is_for_our_page_alone() -> None:
     assert DOOR.is_same_origin([f"http://{OURS}"])
-    for other in ([], ["null"], ["http://evil.example"], [f"https://{OURS}"],
-                  [f"http://{OURS}", "http://evil.example"], ["http://127.0.0.1"]):  # fmt: skip
+    for other in (
+        [],
+        ["null"],
+        ["http://evil.example"],
+        [f"https://{OURS}"],
+        [f"http://{OURS}", "http://evil.example"],
+        ["http://127.0.0.1"],
+    ):
         assert not DOOR.is_same_origin(other)
 
 
@@ -104,18 +110,30 @@ def test_what_our_page_says_is_understood() -> None:
 @pytest.mark.parametrize(
     "content",
     [
-        b"\x00\x01", "", "{", "[]", "7", "null", "{}", said(type="fly"),
+        b"\x00\x01",
+        "",
+        "{",
+        "[]",
+        "7",
+        "null",
+        "{}",
+        said(type="fly"),
         said(type=["take_control"]),
-        said(type="take_control", more=1), said(type="steer", target=[0, 0, 0]),
-        said(type="relief", x="0", y=0, size=0.01), said(type="relief", x=True, y=0, size=0.01),
-        said(type="change", changes=[]), said(type="change", changes={"law": ["B"]}),
-        said(type="section", box=[0, 1, 2], y=0), said(type="acknowledge", frame="7"),
+        said(type="take_control", more=1),
+        said(type="steer", target=[0, 0, 0]),
+        said(type="relief", x="0", y=0, size=0.01),
+        said(type="relief", x=True, y=0, size=0.01),
+        said(type="change", changes=[]),
+        said(type="change", changes={"law": ["B"]}),
+        said(type="section", box=[0, 1, 2], y=0),
+        said(type="acknowledge", frame="7"),
         said(type="acknowledge"),
         '{"type": "relief", "x": NaN, "y": 0, "size": 0.01}',
-        '{"type": "relief", "x": Infinity, "y": 0, "size": 0.01}', "[" * 4000,
+        '{"type": "relief", "x": Infinity, "y": 0, "size": 0.01}',
+        "[" * 4000,
         '{"type": "relief", "x": ' + "9" * 5000 + "}",
     ],
-)  # fmt: skip
+)
 def test_what_no_page_of_ours_says_is_malformed(content: str | bytes) -> None:
     with pytest.raises(MalformedMessageError):
         parse_message(content)
@@ -125,13 +143,14 @@ def test_what_no_page_of_ours_says_is_malformed(content: str | bytes) -> None:
     "content",
     [
         '{"type": "relief", "x": 1e999, "y": 0, "size": 0.01}',
-        said(type="relief", x=0, y=0, size=0), said(type="relief", x=0, y=0, size=1),
+        said(type="relief", x=0, y=0, size=0),
+        said(type="relief", x=0, y=0, size=1),
         said(type="steer", target=[0, 0, 1], cosine=[0, 0, 0], sine=[0, 0, 0], speed=0),
         said(type="steer", target=[0, 0, 0], cosine=[0, 0, 0], sine=[0, 0, 0], speed=1e4),
         said(type="section", box=[0.1, 0.0, 0, 0.1], y=0),
         said(type="section", box=[0, 0.1, 0, 1e-9], y=0),
     ],
-)  # fmt: skip
+)
 def test_a_number_out_of_its_range_is_refused(content: str) -> None:
     with pytest.raises(ParameterError):
         parse_message(content)
@@ -139,11 +158,31 @@ def test_a_number_out_of_its_range_is_refused(content: str) -> None:
 
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
-    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(
-        st.sampled_from(["type", "target", "cosine", "sine", "speed", "changes", "x", "y", "size",
-                         "box", "take", "frame"]), inner, max_size=5),
+    lambda inner: (
+        st.lists(inner, max_size=4)
+        | st.dictionaries(
+            st.sampled_from(
+                [
+                    "type",
+                    "target",
+                    "cosine",
+                    "sine",
+                    "speed",
+                    "changes",
+                    "x",
+                    "y",
+                    "size",
+                    "box",
+                    "take",
+                    "frame",
+                ]
+            ),
+            inner,
+            max_size=5,
+        )
+    ),
     max_leaves=8,
-)  # fmt: skip
+)
 KINDS = st.sampled_from(["steer", "change", "relief", "section", "take_control", "acknowledge"])
 
 

@@ -16,8 +16,12 @@ def rows(**columns: list[float]) -> np.ndarray:
 
 
 def test_the_greatest_jump_is_found_with_the_way_that_goes_with_it() -> None:
-    table = rows(x=[0.0, 3e-3, 3e-3], z=[0.0, 4e-3, 3e-3], commanded_x=[0.0, 1.0, 1.0],
-                 commanded_z=[0.0, 0.0, -2.0])  # fmt: skip
+    table = rows(
+        x=[0.0, 3e-3, 3e-3],
+        z=[0.0, 4e-3, 3e-3],
+        commanded_x=[0.0, 1.0, 1.0],
+        commanded_z=[0.0, 0.0, -2.0],
+    )
     found = step_statistics(table)
     assert found == pytest.approx(
         {"path_length": 6e-3, "squared_steps": 26e-6, "max_force_step": 2.0, "position_step": 1e-3}

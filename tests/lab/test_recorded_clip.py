@@ -65,8 +65,11 @@ mass = "50 g"
 force = ["0 N", "0 N", "-0.2 N"]"""
 BAND = 'kind = "band"\nstiffness = "150 N/m"'
 TOUCH = ("touch-x", 'apparent_mass = "60 g"\ndelay_samples = 2\nforce_resolution = "2 mN"', "")
-FIVE = ("pantograph", 'joint_damping = "4 mN*m*s"',
-        '[run]\ncentre = ["-10 mm", "95 mm"]\nbrakes = "always"\nvelocity_share = 0.4')  # fmt: skip
+FIVE = (
+    "pantograph",
+    'joint_damping = "4 mN*m*s"',
+    '[run]\ncentre = ["-10 mm", "95 mm"]\nbrakes = "always"\nvelocity_share = 0.4',
+)
 
 
 def scene(
@@ -194,10 +197,12 @@ def spoilt(kind: str, data: bytes) -> bytes:
     """Return the bytes of a recording with something wrong in them."""
     place = len(data) * 9 // 10
     return {
-        "empty": b"", "text": b"time,x\n0,0\n", "cut head": data[:500],
+        "empty": b"",
+        "text": b"time,x\n0,0\n",
+        "cut head": data[:500],
         "later format": data.replace(b"format\1\0\0\x001", b"format\1\0\0\x002"),
         "damaged block": data[:place] + bytes([data[place] ^ 255]) + data[place + 1 :],
-    }[kind]  # fmt: skip
+    }[kind]
 
 
 def lacking(kind: str, recording: Recording) -> dict[str, Any]:
@@ -214,25 +219,31 @@ def lacking(kind: str, recording: Recording) -> dict[str, Any]:
         "no energy": {"rows": rows[:, kept], "columns": [columns[k] for k in kept]},
         "no surface": {"about": {"made_by": "my loop"}},
         "no servo": {"about": {"surface": about["surface"]}},
-        "another law": {"about": {**about, "surface": law}}, "one row": {"rows": rows[:1]},
-    }  # fmt: skip
+        "another law": {"about": {**about, "surface": law}},
+        "one row": {"rows": rows[:1]},
+    }
     return others.get(kind, {"rows": rows})
 
 
 @pytest.mark.parametrize(
     ("kind", "words"),
     [
-        ("gone", "No such file"), ("empty", "it is empty"), ("text", "not an MCAP recording"),
+        ("gone", "No such file"),
+        ("empty", "it is empty"),
+        ("text", "not an MCAP recording"),
         ("cut head", "it ends before its first row|does not say what its rows are"),
         ("later format", "it is of format 2"),
         ("damaged block", "the block after row .* is damaged"),
         ("foreign columns", "has no column 'applied x'"),
         ("no energy", "has no column of the energy"),
-        ("no surface", "does not say which surface"), ("no servo", "has no settings of its servo"),
-        ("another law", "law is unknown: 'Q'"), ("one row", "has 1 rows, too few"),
-        ("no numbers", "values that are not finite"), ("times", "times that do not increase"),
+        ("no surface", "does not say which surface"),
+        ("no servo", "has no settings of its servo"),
+        ("another law", "law is unknown: 'Q'"),
+        ("one row", "has 1 rows, too few"),
+        ("no numbers", "values that are not finite"),
+        ("times", "times that do not increase"),
     ],
-)  # fmt: skip
+)
 def test_what_a_recording_lacks_is_said(tmp_path: Path, kind: str, words: str) -> None:
     recording, path = simulated(tmp_path), tmp_path / "bad.mcap"
     if kind in {"empty", "text", "cut head", "later format", "damaged block"}:
@@ -272,8 +283,10 @@ def test_a_device_that_is_not_known_is_replaced_and_said(tmp_path: Path) -> None
     )
     assert "names no known device" in stage.setup.assumptions[0]
     assert stage.setup.device.id == "touch-x"
-    assert load_recorded_clip(recording.path, "", {}, asp.load_device("omega.3"))[0].settings[
-        "device"] == "omega.3"  # fmt: skip
+    assert (
+        load_recorded_clip(recording.path, "", {}, asp.load_device("omega.3"))[0].settings["device"]
+        == "omega.3"
+    )
 
 
 def test_archives_of_others_are_left_to_who_reads_surfaces(tmp_path: Path) -> None:
@@ -332,8 +345,10 @@ def shown(
 
 
 def go_to(page: Browser, row: int) -> None:
-    page.ask(f"(() => {{ const at = document.getElementById('playback-time'); at.value = {row};"
-             "at.dispatchEvent(new Event('input')); })()")  # fmt: skip
+    page.ask(
+        f"(() => {{ const at = document.getElementById('playback-time'); at.value = {row};"
+        "at.dispatchEvent(new Event('input')); })()"
+    )
     page.until(f"lab.player.targetRow === null && lab.player.row === {row}")
 
 

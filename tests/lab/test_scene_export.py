@@ -49,11 +49,13 @@ MASS = 'id = "touch-x"\napparent_mass = "60 g"\n'
 FIVE = 'id = "pantograph"\njoint_damping = "4 mN*m*s"\nupdate_rate = "1 kHz"\n'
 PLACE = '[run]\ncentre = ["-10 mm", "95 mm"]\nbrakes = "always"\nvelocity_share = 0.4\n'
 KINDS = {
-    "kind": "sinusoid:amplitude=0.2mm,period=2mm", "knurl": "knurl:profile_angle=150deg,flat=0.5",
+    "kind": "sinusoid:amplitude=0.2mm,period=2mm",
+    "knurl": "knurl:profile_angle=150deg,flat=0.5",
     "band": SCENES + MASS + BAND,
-    "five-bar": SCENES + FIVE + SPRING + PLACE, "five-bar and band": SCENES + FIVE + BAND,
+    "five-bar": SCENES + FIVE + SPRING + PLACE,
+    "five-bar and band": SCENES + FIVE + BAND,
     "measured": "map.png",
-}  # fmt: skip
+}
 LAST_BIT = 1e-15  # m or N: law H searches from where it was, and may end in another last bit
 
 

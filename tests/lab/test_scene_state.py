@@ -22,11 +22,15 @@ def stage() -> SceneState:
 @pytest.mark.parametrize(
     "changes",
     [
-        {"law": "H"}, {"stiffness": 700.0}, {"max_depth": 1e-3}, {"continuity": 0.5, "law": "H"},
+        {"law": "H"},
+        {"stiffness": 700.0},
+        {"max_depth": 1e-3},
+        {"continuity": 0.5, "law": "H"},
         {"magnify_height": 2.0, "magnify": 3.0},
-        {"texture": "grating:height=100um,period=3mm"}, {"law": "B", "stiffness": 50.0},
+        {"texture": "grating:height=100um,period=3mm"},
+        {"law": "B", "stiffness": 50.0},
     ],
-)  # fmt: skip
+)
 def test_a_surface_changes_while_the_loop_runs(stage: SceneState, changes: dict[str, Any]) -> None:
     changed = stage.with_changes(changes)
     assert not stage.needs_restart(changed)

@@ -82,8 +82,14 @@ def test_the_hand_is_steered_the_law_changes_and_the_loop_goes_on(lab: Started) 
         assert changed["settings"]["stiffness"] == 200.0
         assert changed["start_count"] == first["start_count"]
         heard(page, lambda m: frames(m) and column(m, "newest", "share") == 1.0)
-        for changes in ({"stiffness": 1e9}, {"colour": "red"}, {"law": "Q"}, {"texture": "/etc/x"},
-                       {"device": "x.toml"}, {"delay": -1}):  # fmt: skip
+        for changes in (
+            {"stiffness": 1e9},
+            {"colour": "red"},
+            {"law": "Q"},
+            {"texture": "/etc/x"},
+            {"device": "x.toml"},
+            {"delay": -1},
+        ):
             say(page, "change", changes=changes)
             told = heard(page, lambda m: news(state="running")(m) and bool(m["message"]))
             assert next(iter(changes)) in told["message"]
@@ -98,8 +104,11 @@ def test_one_page_steers_and_others_watch(lab: Started) -> None:
         with joined(lab) as second:
             assert heard(second, news())["has_control"] is False
             heard(second, frames)
-            for what, content in (("steer", {"target": [0, 0, 0], **STILL}), ("take_control", {}),
-                                  ("change", {"changes": {"law": "A"}})):  # fmt: skip
+            for what, content in (
+                ("steer", {"target": [0, 0, 0], **STILL}),
+                ("take_control", {}),
+                ("change", {"changes": {"law": "A"}}),
+            ):
                 say(second, what, **content)
                 assert "steering" in heard(second, refused)["message"]
             first.close()
@@ -110,10 +119,14 @@ def test_one_page_steers_and_others_watch(lab: Started) -> None:
 
 @pytest.mark.parametrize(
     ("content", "code"),
-    [("{}", 1008), (b"\x00\xff", 1008), ('{"type": "steer"}', 1008),
-     ('{"type": "acknowledge", "frame": 1e9}', 1008),
-     ('{"type": "take_control"}' + " " * MAX_MESSAGE_BYTES, 1009)],
-)  # fmt: skip
+    [
+        ("{}", 1008),
+        (b"\x00\xff", 1008),
+        ('{"type": "steer"}', 1008),
+        ('{"type": "acknowledge", "frame": 1e9}', 1008),
+        ('{"type": "take_control"}' + " " * MAX_MESSAGE_BYTES, 1009),
+    ],
+)
 def test_a_malformed_frame_ends_the_connection_and_not_the_loop(
     lab: Started, content: str | bytes, code: int
 ) -> None:

@@ -93,9 +93,15 @@ def test_a_pen_presses_as_hard_as_it_is_pressed(page: Browser) -> None:
 
     def pen(kind: str, force: float, buttons: int) -> None:
         page.call(
-            "Input.dispatchMouseEvent", type=kind, button="left", buttons=buttons, force=force,
-            clickCount=1, pointerType="pen", **at,
-        )  # fmt: skip
+            "Input.dispatchMouseEvent",
+            type=kind,
+            button="left",
+            buttons=buttons,
+            force=force,
+            clickCount=1,
+            pointerType="pen",
+            **at,
+        )
 
     depths = []
     for force in (0.25, 0.75):
@@ -136,8 +142,10 @@ def test_a_loop_that_has_stopped_is_said_with_its_reason_and_starts_again(
 @needs_browser
 def test_a_surface_that_cannot_be_is_said_and_the_former_stays(page: Browser) -> None:
     before = page.ask("lab.status.settings.texture")
-    page.ask("{ const field = document.getElementById('texture'); field.value = 'velvet';"
-             "field.dispatchEvent(new Event('change')); }")  # fmt: skip
+    page.ask(
+        "{ const field = document.getElementById('texture'); field.value = 'velvet';"
+        "field.dispatchEvent(new Event('change')); }"
+    )
     page.until("/velvet/.test(document.getElementById('alarm').innerText)")
     assert page.ask("lab.status.settings.texture") == before
     rows = page.ask("lab.frame.firstRow")

@@ -15,10 +15,22 @@ from asperity.laws import LAWS
 
 # Generic values without symmetry, so that exchanged terms are detected.
 VALUES = {
-    "k": 700.0, "depth": 0.4e-3, "h": 0.25e-3, "hx": 0.6, "hy": -1.1, "dx": 0.3e-3, "dy": -0.5e-3,
-    "h_mid": 0.1e-3, "h_half": 0.5e-3, "friction": 0.7, "max_deflection": 0.8e-3,
-    "modulation_depth": 0.9, "x": 1e-3, "y": -2e-3, "z": -0.15e-3,
-}  # fmt: skip
+    "k": 700.0,
+    "depth": 0.4e-3,
+    "h": 0.25e-3,
+    "hx": 0.6,
+    "hy": -1.1,
+    "dx": 0.3e-3,
+    "dy": -0.5e-3,
+    "h_mid": 0.1e-3,
+    "h_half": 0.5e-3,
+    "friction": 0.7,
+    "max_deflection": 0.8e-3,
+    "modulation_depth": 0.9,
+    "x": 1e-3,
+    "y": -2e-3,
+    "z": -0.15e-3,
+}
 S = np.sqrt(1 + 0.6**2 + 1.1**2)
 M = (1 + 0.9 * (0.25 - 0.1) / 0.5) / 2  # modulation, 0.635
 SPRING = 700.0 * 0.4e-3  # k times depth, 0.28 N

@@ -39,12 +39,21 @@ def test_every_step_is_recorded() -> None:
     arguments: dict[str, Any] = {"cutoff": 2e-5, "l_cutoff": 1e-4, "tip_radius": 1e-5}
     ready = prepare(surface(), outliers=9.0, periodic=True, blend=5e-5, magnify=3.0, **arguments)
     assert stage_names(ready.history) == [
-        "as read", "without outliers", "levelled", "holes filled", "S-filter 20 µm",
-        "L-filter 100 µm", "tip 10 µm", "periodic", "magnified",
-    ]  # fmt: skip
+        "as read",
+        "without outliers",
+        "levelled",
+        "holes filled",
+        "S-filter 20 µm",
+        "L-filter 100 µm",
+        "tip 10 µm",
+        "periodic",
+        "magnified",
+    ]
     assert stage_names(prepare(surface(hole=False)).history) == [
-        "as read", "levelled", "S-filter 20 µm",
-    ]  # fmt: skip
+        "as read",
+        "levelled",
+        "S-filter 20 µm",
+    ]
     with_form = prepare(surface(), height_range=1e-3, form=2, max_missing=0.5)
     assert stage_names(with_form.history)[:2] == ["as read", "form removed"]
     assert texture_from_prepared(ready).history == ready.history
@@ -62,8 +71,10 @@ def test_stages_state_the_removed_heights_of_each_filter() -> None:
     assert short is not None
     assert long is not None
     # The S-filter removes half of the shortest wave and 3 % of the middle one ...
-    removed = [(1 - 2.0 ** -((2e-5 / length) ** 2)) * h * MICRO for h, length in
-            ((4, 1e-3), (2, 1e-4), (1, 2e-5))]  # fmt: skip
+    removed = [
+        (1 - 2.0 ** -((2e-5 / length) ** 2)) * h * MICRO
+        for h, length in ((4, 1e-3), (2, 1e-4), (1, 2e-5))
+    ]
     assert short.rms == pytest.approx(math.hypot(*removed) / math.sqrt(2), rel=0.01)
     # ... the L-filter nearly all of the longest, half of the middle one, and the tilt.
     passed = math.hypot(4 * MICRO * 2.0 ** -(0.1**2), MICRO * 2.0 ** -(0.2**2)) / math.sqrt(2)

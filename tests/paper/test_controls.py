@@ -34,16 +34,37 @@ def replace_everywhere(monkeypatch: pytest.MonkeyPatch, name: str, replacement: 
 # A relative change of 1e-6 of a law's formula is detected.
 _FACTOR = 1.0 + 1e-6
 _SCALED_LAWS = replace_name(
-    "definitions of laws times 1 + 1e-6", "symbolic_force",
-    lambda original: lambda law: _FACTOR * original(law), asperity.reference,
-)  # fmt: skip
+    "definitions of laws times 1 + 1e-6",
+    "symbolic_force",
+    lambda original: lambda law: _FACTOR * original(law),
+    asperity.reference,
+)
 
 
 @pytest.mark.parametrize(
     "name",
-    ["eq-6", "eq-7", "eq-8", "eq-11", "eq-14", "eq-15", "eq-17", "eq-18", "eq-19", "eq-20", "eq-21",
-     "eq-22", "eq-28", "eq-38", "eq-39", "eq-44", "table-1-A", "table-1-BG", "table-1-F"],
-)  # fmt: skip
+    [
+        "eq-6",
+        "eq-7",
+        "eq-8",
+        "eq-11",
+        "eq-14",
+        "eq-15",
+        "eq-17",
+        "eq-18",
+        "eq-19",
+        "eq-20",
+        "eq-21",
+        "eq-22",
+        "eq-28",
+        "eq-38",
+        "eq-39",
+        "eq-44",
+        "table-1-A",
+        "table-1-BG",
+        "table-1-F",
+    ],
+)
 def test_scaled_law_changes_the_verdict(name: str) -> None:
     assert get_claim(name).run().verdict in {"holds", "holds with correction"}
     with _SCALED_LAWS.apply():
@@ -61,9 +82,14 @@ def test_scaled_work_changes_the_verdict(name: str, monkeypatch: pytest.MonkeyPa
 
 @pytest.mark.parametrize(
     ("name", "factor"),
-    [("sentence-V.A-qA", 1.02), ("eq-21", 1.001), ("sentence-VI-increase", 0.99),
-     ("sentence-V.B-margin", -1.0), ("limit-5", 0.9)],
-)  # fmt: skip
+    [
+        ("sentence-V.A-qA", 1.02),
+        ("eq-21", 1.001),
+        ("sentence-VI-increase", 0.99),
+        ("sentence-V.B-margin", -1.0),
+        ("limit-5", 0.9),
+    ],
+)
 def test_scaled_number_changes_the_verdict(
     name: str, factor: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -187,9 +187,13 @@ def test_energy_trace_agrees_with_a_simulated_stroke() -> None:
     trace = energy_trace("A")
     setup = experiment_setups.stroke_setup("A")
     run = simulate(
-        setup.surface, setup.plant, setup.hand, setup.servo, setup.motion,
+        setup.surface,
+        setup.plant,
+        setup.hand,
+        setup.servo,
+        setup.motion,
         float(trace.time[-1]) + SAMPLING_PERIOD,
-    )  # fmt: skip
+    )
     supplied = run.energies["supplied"][-1]
     np.testing.assert_allclose(trace.exact[-1], supplied[[0, 2]], rtol=1e-12, atol=1e-18)
 

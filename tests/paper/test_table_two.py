@@ -40,10 +40,13 @@ def test_agreement_of_each_row(table: TableTwo) -> None:
     """Number, conservativity, continuity and energy are compared separately."""
     verdicts = {
         row.law: (
-            row.number_agrees, row.conservativity_agrees, row.continuity_agrees, row.energy_agrees
+            row.number_agrees,
+            row.conservativity_agrees,
+            row.continuity_agrees,
+            row.energy_agrees,
         )
         for row in table.rows
-    }  # fmt: skip
+    }
     unknown = (None, True, True, True)
     assert verdicts == {
         "A": (True, True, True, True),

@@ -367,8 +367,10 @@ def test_public_interface_of_recordings(tmp_path: Path) -> None:
     assert repr(recording) == "<Recording run.mcap, 3 rows, 0.0002 s>"
     data = recording.to_dict()
     assert (data["rows"], data["whole"], data["columns"][2]) == (
-        3, True, {"name": "applied x", "unit": "N"},
-    )  # fmt: skip
+        3,
+        True,
+        {"name": "applied x", "unit": "N"},
+    )
     link = tmp_path / "link.mcap"
     os.symlink(path, link)
     RecordingWriter(link, COLUMNS).close()

@@ -25,9 +25,14 @@ WAVE = asp.Sinusoid(amplitude=0.3e-3, period=2e-3, direction=(1.0, 0.3))
 X, Y = np.meshgrid(np.arange(24), np.arange(20))
 MAP = asp.HeightMap(1e-4 * np.sin(0.7 * X + 0.2) * np.cos(0.9 * Y) ** 3, 1e-4)
 SERVO = Servo(
-    1e-4, delay=1, position_resolution=1e-6, force_resolution=1e-3, max_force=2.0,
-    virtual_damping=0.2, velocity_share=0.3,
-)  # fmt: skip
+    1e-4,
+    delay=1,
+    position_resolution=1e-6,
+    force_resolution=1e-3,
+    max_force=2.0,
+    virtual_damping=0.2,
+    velocity_share=0.3,
+)
 HAND = SpringHand(stiffness=(300.0, 300.0, 0.0), damping=2.0, mass=0.05, force=(0.0, 0.0, -1.0))
 STROKES = Strokes((-0.005, 0.0, -1e-3), (0.005, 0.002, -1e-3), speed=0.05, count=5)
 

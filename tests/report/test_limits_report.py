@@ -15,9 +15,13 @@ from asperity.report.limits_report import MAX_WAVES, limits_page, listed_waves
 from asperity.textures import Fourier, HeightMap, Sinusoid
 
 BENCH = {
-    "max_stiffness": 2000.0, "position_resolution": 15e-6, "force_resolution": 2e-3,
-    "bandwidth": 400.0, "update_rate": 1e4, "friction": 0.03,
-}  # fmt: skip
+    "max_stiffness": 2000.0,
+    "position_resolution": 15e-6,
+    "force_resolution": 2e-3,
+    "bandwidth": 400.0,
+    "update_rate": 1e4,
+    "friction": 0.03,
+}
 MANY = Fourier(np.geomspace(1e-5, 1e-6, 20), 2 * np.pi / np.geomspace(2e-3, 2e-4, 20))
 
 

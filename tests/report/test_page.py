@@ -34,10 +34,15 @@ def all_blocks(text: str) -> list[Section]:
     cell = Cell(text, "no", note=text, subtext=text, summary=text, details=[(text, text)])
     table = Table((text, "n"), [Row([text, cell], "best", id="row")], numeric_columns=(1,))
     blocks = [
-        Paragraph(text), Paragraph(text, "code"), Paragraph(text, "mono"), BulletList([text]),
-        DefinitionList([(text, text)]), Picture(Figure((1.0, 1.0)), text), table,
+        Paragraph(text),
+        Paragraph(text, "code"),
+        Paragraph(text, "mono"),
+        BulletList([text]),
+        DefinitionList([(text, text)]),
+        Picture(Figure((1.0, 1.0)), text),
+        table,
         Cards([Section(text, [table], level=3, id="card")]),
-    ]  # fmt: skip
+    ]
     return [Section(text, blocks, text, [text]), *assumption_sections([text], table)]
 
 

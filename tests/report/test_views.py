@@ -112,8 +112,13 @@ def test_notebook_view_is_well_formed_and_self_contained(name: str) -> None:
     tags = Tags(text)
     assert tags.open == []
     assert tags.seen <= {"div", "p", "strong", "small", "img", "br"} | {
-        "table", "thead", "tbody", "tr", "th", "td",
-    }  # fmt: skip
+        "table",
+        "thead",
+        "tbody",
+        "tr",
+        "th",
+        "td",
+    }
     assert ("img" in tags.seen) == (name in WITH_PICTURE)
     assert 60 < len(text) < 400_000
     assert "http" not in re.sub(r'base64,[^"]+', "", text)

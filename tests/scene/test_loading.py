@@ -85,20 +85,29 @@ def test_invalid_specifications_are_refused(source: str, argument: str, message:
     [
         ("[texure]\n", "did you mean 'texture'"),
         ("[texture]\namplitude = 1\n", "needs .texture. with kind"),
-        ('[texture]\nkind = "sinusoid"\namplitude = 1\nperiod = 1\n[surface]\nstifness = 3\n',
-         "did you mean 'stiffness'"),
-        ('[texture]\nkind = "sinusoid"\namplitude = 1\nperiod = 1\n[device]\nid = "tuch"\n',
-         "did you mean 'touch'"),
-        ('[texture]\nkind = "sinusoid"\namplitude = 1\nperiod = "1 mm"\n',
-         "amplitude needs a unit: write 1mm or 1um or 1m, got 1"),
-        ('[texture]\nkind = "sinusoid"\namplitude = "1 mm"\nperiod = "1 mm"\n'
-         '[surface]\nstiffness = 800\n', "stiffness needs a unit: write 800N/m"),
+        (
+            '[texture]\nkind = "sinusoid"\namplitude = 1\nperiod = 1\n[surface]\nstifness = 3\n',
+            "did you mean 'stiffness'",
+        ),
+        (
+            '[texture]\nkind = "sinusoid"\namplitude = 1\nperiod = 1\n[device]\nid = "tuch"\n',
+            "did you mean 'touch'",
+        ),
+        (
+            '[texture]\nkind = "sinusoid"\namplitude = 1\nperiod = "1 mm"\n',
+            "amplitude needs a unit: write 1mm or 1um or 1m, got 1",
+        ),
+        (
+            '[texture]\nkind = "sinusoid"\namplitude = "1 mm"\nperiod = "1 mm"\n'
+            "[surface]\nstiffness = 800\n",
+            "stiffness needs a unit: write 800N/m",
+        ),
         ("texture = 3\n", "must be a section"),
         ("[texture\n", "not valid TOML"),
         ("[surface]\nstiffness = 1" + "0" * 5000, "not valid TOML"),
         ("a = " + "[" * 3000, "nested too deeply"),
     ],
-)  # fmt: skip
+)
 def test_invalid_scenes_are_refused(tmp_path: Path, content: str, message: str) -> None:
     (tmp_path / "scene.toml").write_text(content)
     with pytest.raises(ParameterError, match=message):

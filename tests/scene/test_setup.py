@@ -98,8 +98,9 @@ def test_trace_of_one_scene_is_the_path_of_another(tmp_path: Path, name: str) ->
     first = make_scene_setup(tmp_path, MASS, SPRING, STILL, '[run]\nduration = "0.05 s"\n')
     run = first.simulate(trace=str(tmp_path / name))
     assert run.path
-    second = make_scene_setup(tmp_path, MASS, '[hand]\nkind = "moved"\n[motion]\nkind = "path"\n'
-                  f'file = "{name}"\n')  # fmt: skip
+    second = make_scene_setup(
+        tmp_path, MASS, f'[hand]\nkind = "moved"\n[motion]\nkind = "path"\nfile = "{name}"\n'
+    )
     trace = first.simulate()
     at = second.motion.at(trace.time)
     np.testing.assert_allclose(at, trace.position, rtol=1e-9, atol=1e-15)
@@ -151,7 +152,7 @@ BAD = [
     (('[device]\nid = "pantagraph"\n', SPRING, STILL), r"did you mean 'pantograph'"),
     (('[device]\nid = "pantograph"\njoint_dampng = "1 N*m*s"\n', SPRING, STILL), "joint_damping"),
     ((MASS, SPRING, STILL, "[runs]\nevery = 1\n"), r"unknown section \[runs\]"),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("parts", "message"), BAD, ids=[message for _parts, message in BAD])

@@ -22,9 +22,7 @@ from asperity.report import html_text
 Call = Callable[..., tuple[int, str, str]]
 
 MODULE = page_example("howto/extend.md", "A passivity criterion")
-RIG = {
-    "damping": "2 N*s/m", "update_rate": "4 kHz", "delay_samples": 0, "max_force": "0.5 N",
-}  # fmt: skip
+RIG = {"damping": "2 N*s/m", "update_rate": "4 kHz", "delay_samples": 0, "max_force": "0.5 N"}
 SURFACE = asp.Surface(asp.Sinusoid(amplitude=0.1e-3, period=2e-3), "C", 1500.0)
 NAMES = ("half the loss", "clipping")
 

@@ -37,8 +37,18 @@ def test_user_defined_driver_in_one_file(call: Call, tmp_path: Path) -> None:
     (tmp_path / "rig.toml").write_text(DEVICE)
     scene = tmp_path / "scene.toml"
     scene.write_text(f'[texture]\nkind = "sinusoid"\namplitude = "0.1mm"\nperiod = "2mm"\n{SERVO}')
-    arguments = ["--plugin", str(tmp_path / "rig.py"), "--device", str(tmp_path / "rig.toml"),
-            "--law", "W", "--stiffness", "100 N/m", "--max-depth", "2mm"]  # fmt: skip
+    arguments = [
+        "--plugin",
+        str(tmp_path / "rig.py"),
+        "--device",
+        str(tmp_path / "rig.toml"),
+        "--law",
+        "W",
+        "--stiffness",
+        "100 N/m",
+        "--max-depth",
+        "2mm",
+    ]
     path = str(tmp_path / "run.mcap")
     outputs = ["--duration", "0.05s", "--record", path, "--accept-risk"]
     code, out, err = call("run", str(scene), *arguments, "--driver", "real", *outputs)

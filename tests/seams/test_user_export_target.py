@@ -106,9 +106,10 @@ def test_exported_code_is_generated_from_the_compiled_source(
     before = header(surface)
     original = LinkedSource.__init__
     monkeypatch.setattr(
-        LinkedSource, "__init__",
+        LinkedSource,
+        "__init__",
         lambda self, text: original(self, text.replace("depth*k", "2.0*depth*k")),
-    )  # fmt: skip
+    )
     assert "2.0 * depth * k" not in before
     assert "2.0 * depth * k" in header(surface)
 

@@ -47,8 +47,11 @@ def run_asperity(package: Path | None, *arguments: str) -> subprocess.CompletedP
     path = os.pathsep.join([*package_paths, *([inherited] if inherited else [])])
     return subprocess.run(
         [sys.executable, "-c", "from asperity.cli.main import main; main()", *arguments],
-        env=os.environ | {"PYTHONPATH": path}, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        env=os.environ | {"PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
 
 
 def test_every_command_reads_the_file(package: Path, tmp_path: Path) -> None:

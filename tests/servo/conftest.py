@@ -39,8 +39,13 @@ def run_loop() -> Callable[..., SimpleNamespace]:
         cause, code = loop.run(program_for(surface), device.open(), samples)
         rows, first = shared.rows(0)
         return SimpleNamespace(
-            cause=cause, code=code, forces=np.array(device.forces), rows=rows, first=first,
-            shared=shared, loop=loop,
-        )  # fmt: skip
+            cause=cause,
+            code=code,
+            forces=np.array(device.forces),
+            rows=rows,
+            first=first,
+            shared=shared,
+            loop=loop,
+        )
 
     return run

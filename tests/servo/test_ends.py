@@ -48,9 +48,12 @@ def test_second_run_on_a_device_is_refused_and_keeps_the_recording(tmp_path: Pat
     with DEVICES["own"]() as device:
         first = Run(device, tmp_path)
         second = subprocess.run(
-            [*first.command, "--record", str(kept)], env=first.environment, capture_output=True,
-            text=True, check=False,
-        )  # fmt: skip
+            [*first.command, "--record", str(kept)],
+            env=first.environment,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
         first.parent.terminate()
         assert first.end() == []
     assert second.returncode == 2

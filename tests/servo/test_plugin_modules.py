@@ -42,8 +42,10 @@ def test_pickled_object_carries_only_its_own_plugin_module(
         (tmp_path / f"{name}.py").write_text(source)
         monkeypatch.setitem(sys.modules, f"plugin_{name}", None)  # removed again at teardown
     monkeypatch.delitem(sys.modules, "beside_it", raising=False)
-    thing, _ = (_execute(str(tmp_path / f"{name}.py"), source.encode())
-                for name, source in (("thing", PLUGIN), ("unneeded", "")))  # fmt: skip
+    thing, _ = (
+        _execute(str(tmp_path / f"{name}.py"), source.encode())
+        for name, source in (("thing", PLUGIN), ("unneeded", ""))
+    )
     packed = _pickle(thing.Thing(2.0))
     assert packed[0] == (("plugin_thing", str(tmp_path / "thing.py")),)
     child = subprocess.run(

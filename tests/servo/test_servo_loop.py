@@ -36,19 +36,34 @@ RunLoop = Callable[..., SimpleNamespace]
 PRESSED = SpringHand(stiffness=300.0, damping=3.0, mass=0.05, force=(0.0, 0.0, -0.6))
 STROKES = Strokes((-2e-3, 0.3e-3, 0.0), (2e-3, 0.3e-3, 0.0), 0.05, 2)
 SERVO = Servo(
-    2.5e-4, delay=2, position_resolution=1e-5, force_resolution=0.01, max_force=2.0,
-    virtual_damping=0.3, velocity_share=0.3,
-)  # fmt: skip
+    2.5e-4,
+    delay=2,
+    position_resolution=1e-5,
+    force_resolution=0.01,
+    max_force=2.0,
+    virtual_damping=0.3,
+    velocity_share=0.3,
+)
 OPEN = Safety(ramp=0.0, max_slew=1e9, beyond_depth="warn")
 PLANE = Strokes((-2e-3, 0.0, 0.0), (2e-3, 0.0, 0.0), 0.05, 2)
 CASES = {
-    "C in space, delay, steps, damping": ("C", Cartesian(0.05, 0.5, friction=0.05), PRESSED, SERVO,
-                                          STROKES),
+    "C in space, delay, steps, damping": (
+        "C",
+        Cartesian(0.05, 0.5, friction=0.05),
+        PRESSED,
+        SERVO,
+        STROKES,
+    ),
     "F, which has state": ("F", Cartesian(0.05, 0.5), PRESSED, Servo(1e-3), STROKES),
-    "D, moved": ("D", Cartesian(0.05), PrescribedHand(), Servo(1e-3, delay=1),
-                 Strokes((-2e-3, 0.3e-3, -3e-4), (2e-3, 0.3e-3, -2e-4), 0.05, 2)),
+    "D, moved": (
+        "D",
+        Cartesian(0.05),
+        PrescribedHand(),
+        Servo(1e-3, delay=1),
+        Strokes((-2e-3, 0.3e-3, -3e-4), (2e-3, 0.3e-3, -2e-4), 0.05, 2),
+    ),
     "A on a pantograph, on a band": ("A", Pantograph(), BandHand(), Servo(1e-4, delay=3), PLANE),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -65,8 +80,9 @@ def test_loop_trace_equals_simulation(case: str) -> None:
     np.testing.assert_array_equal(rows[:700, 7:10], run.commanded)
 
 
-def run_simulated_device(surface: Surface, plant: Any, hand: Any, servo: Servo, motion: Any,
-           duration: float) -> np.ndarray:  # fmt: skip
+def run_simulated_device(
+    surface: Surface, plant: Any, hand: Any, servo: Servo, motion: Any, duration: float
+) -> np.ndarray:
     """Return the rows of an unclocked loop on a simulated device."""
     driver = simulated_driver(plant, hand, servo, motion, duration)
     shared = LoopMemory()
@@ -156,8 +172,9 @@ def test_excess_depth_can_be_reported_without_stopping(run_loop: RunLoop) -> Non
     )
 
 
-@pytest.mark.parametrize(("law", "cause"), [("H", EndReason.FINISHED), ("W", EndReason.FINISHED),
-                                           ("D", EndReason.DEPTH)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("law", "cause"), [("H", EndReason.FINISHED), ("W", EndReason.FINISHED), ("D", EndReason.DEPTH)]
+)
 def test_only_laws_certified_at_any_depth_run_beyond_max_depth(
     run_loop: RunLoop, law: str, cause: EndReason
 ) -> None:
@@ -170,16 +187,25 @@ def test_only_laws_certified_at_any_depth_run_beyond_max_depth(
 
 @given(
     seed=st.integers(0, 2**32 - 1),
-    changes=st.lists(st.tuples(st.sampled_from("WBCF"), st.floats(10.0, 2e4)), min_size=1,
-                     max_size=4),
-    max_force=st.floats(0.1, 20.0), slew=st.floats(1.0, 1e5),
-    ramp=st.floats(0.0, 0.05), damping=st.floats(0.0, 5.0), virtual=st.floats(-1.0, 5.0),
-)  # fmt: skip
+    changes=st.lists(
+        st.tuples(st.sampled_from("WBCF"), st.floats(10.0, 2e4)), min_size=1, max_size=4
+    ),
+    max_force=st.floats(0.1, 20.0),
+    slew=st.floats(1.0, 1e5),
+    ramp=st.floats(0.0, 0.05),
+    damping=st.floats(0.0, 5.0),
+    virtual=st.floats(-1.0, 5.0),
+)
 @settings(max_examples=100, deadline=None)
 def test_force_and_slew_rate_never_exceed_their_limits(
-    seed: int, changes: list[tuple[str, float]], max_force: float, slew: float, ramp: float,
-    damping: float, virtual: float,
-) -> None:  # fmt: skip
+    seed: int,
+    changes: list[tuple[str, float]],
+    max_force: float,
+    slew: float,
+    ramp: float,
+    damping: float,
+    virtual: float,
+) -> None:
     rng = np.random.default_rng(seed)
     positions = np.cumsum(rng.normal(scale=10.0 ** rng.uniform(-6, -3), size=(80, 3)), axis=0)
     device = PythonDevice(lambda k: positions[min(k, 79)])
@@ -219,8 +245,10 @@ def test_passivity_controller_dissipates_the_gained_energy(
     surface = Surface(SURFACE.texture, "A", 900.0, 5e-3)
     safety = Safety(ramp=0.0, max_slew=1e9, passivity_damping=damping)
     reverse = PythonDevice(lambda k: move_on_circle(-k))
-    energies = [run_loop(device, 2000, safety=safety, surface=surface).rows[-2, 11]
-            for device in (PythonDevice(move_on_circle), reverse)]  # fmt: skip
+    energies = [
+        run_loop(device, 2000, safety=safety, surface=surface).rows[-2, 11]
+        for device in (PythonDevice(move_on_circle), reverse)
+    ]
     gained = max(energies)
     assert gained > 1e-4 if damping == 0.0 else gained < 1e-5
 

@@ -72,9 +72,15 @@ def simulate_alone(
     delayed = replace(servo, delay=start.delay)
     shifted = definition.ShiftedMotion(motion, start.offset)
     return simulate(
-        surface.to_stiffness(start.stiffness), plant, hand, delayed, shifted,
-        samples * servo.period, start=np.array(start_position) + start.offset, velocity=velocity,
-    )  # fmt: skip
+        surface.to_stiffness(start.stiffness),
+        plant,
+        hand,
+        delayed,
+        shifted,
+        samples * servo.period,
+        start=np.array(start_position) + start.offset,
+        velocity=velocity,
+    )
 
 
 def assert_same(start: Trajectory, watcher: SegmentRecorder, run: Run) -> None:
@@ -145,8 +151,10 @@ def test_ended_run_is_not_continued() -> None:
     servo = Servo(1e-3, virtual_damping=-400.0)
     loop = BatchSimulation(SURFACE, PLANT, HAND, servo, MOTION, None, (0.0, 0.0, -1.0))
     watchers = SegmentRecorder(1000, 4000), SegmentRecorder(1000)
-    starts = [loop.new_trajectory(900.0, 0, np.array([0.0, 0.0, z]), w.judge())
-              for z, w in zip((0.0, 1.0), watchers, strict=True)]  # fmt: skip
+    starts = [
+        loop.new_trajectory(900.0, 0, np.array([0.0, 0.0, z]), w.judge())
+        for z, w in zip((0.0, 1.0), watchers, strict=True)
+    ]
     run_all(loop, starts)
     (segment,) = watchers[0].segments
     assert segment.stop is StopReason.DIVERGED
@@ -224,8 +232,10 @@ def test_vectorized_pantographs_equal_single_runs(
     parts = surface, plant, hand, Servo(period, position_resolution=15e-6)
     start_position = (0.0, 0.0, above)
     loop = BatchSimulation(*parts, STILL, start_position, velocity)
-    goals = [(round(0.05 / period), round((0.12 if i in {1, 2, 7} else 0.06) / period))
-             for i in range(LANES)]  # fmt: skip
+    goals = [
+        (round(0.05 / period), round((0.12 if i in {1, 2, 7} else 0.06) / period))
+        for i in range(LANES)
+    ]
     watchers = [SegmentRecorder(*goal) for goal in goals]
     starts = [
         loop.new_trajectory(900.0 + 10.0 * i, i % 3, OFFSETS[i], watcher.judge())
@@ -251,11 +261,13 @@ def test_batch_verdicts_equal_those_of_whole_traces(law: str) -> None:
     for factor in (0.9, 0.98, 1.04, 8.0):
         starts = [
             loop.new_trajectory(
-                middle * factor, 2, np.array([shift, 0.0, 0.0]),
+                middle * factor,
+                2,
+                np.array([shift, 0.0, 0.0]),
                 limit_cycle_rule(lambda times: round(times * span / 1e-4)),
             )
             for shift in (0.0, 0.3e-3, 0.6e-3)
-        ]  # fmt: skip
+        ]
         run_all(loop, starts)
         for start in starts:
 

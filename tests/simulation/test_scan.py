@@ -50,9 +50,14 @@ def test_stroke_energies_sum_to_the_ledger() -> None:
     )
     # Of four strokes the last two count, one in each direction.
     (scan_of_three,) = scan_strokes(
-        surface, PLANT, HAND, SERVO, Strokes(STROKES.start, STROKES.end, 0.1, 3), speeds=[0.1],
+        surface,
+        PLANT,
+        HAND,
+        SERVO,
+        Strokes(STROKES.start, STROKES.end, 0.1, 3),
+        speeds=[0.1],
         depths=[1e-3],
-    )  # fmt: skip
+    )
     half = simulate(surface, PLANT, HAND, SERVO, STROKES, 2 * STROKES.period)
     summed = np.array(half.ledger.supplied) + 2 * np.array(scan_of_four.energy)
     np.testing.assert_allclose(summed, run.ledger.supplied, rtol=1e-9, atol=1e-15)
@@ -84,9 +89,14 @@ def test_prescribed_motion_gains_the_work_of_the_field() -> None:
     work = np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(x))
     assert abs(work) > 1e-5
     (single,) = scan_strokes(
-        lateral, PLANT, PrescribedHand(), Servo(1e-5),
-        Strokes(strokes.start, strokes.end, 0.05), speeds=[0.05], depths=[0.7e-3],
-    )  # fmt: skip
+        lateral,
+        PLANT,
+        PrescribedHand(),
+        Servo(1e-5),
+        Strokes(strokes.start, strokes.end, 0.05),
+        speeds=[0.05],
+        depths=[0.7e-3],
+    )
     assert single.field == pytest.approx(work, rel=1e-6)
     assert single.total == pytest.approx(work, rel=1e-2)
     assert abs(stroke.field) < 1e-9 * abs(work)  # out and back on the same line
@@ -101,11 +111,16 @@ def test_law_a_gains_energy_and_f_dissipates() -> None:
     servo, texture = Servo(1e-4, position_resolution=15e-6), Sinusoid(0.8e-3, 2e-3)
     scans = {
         law: scan_strokes(
-            Surface(texture, law, max_depth=1e-3), plant, hand, servo, strokes, speeds=[0.1],
+            Surface(texture, law, max_depth=1e-3),
+            plant,
+            hand,
+            servo,
+            strokes,
+            speeds=[0.1],
             depths=[1e-3],
         )[0]
         for law in "WAFDH"
-    }  # fmt: skip
+    }
     assert scans["A"].gains_energy
     assert scans["A"].energy[0] == 0.0
     assert scans["A"].energy[2] > 1e-3

@@ -42,9 +42,13 @@ WALL = Surface(WAVE, "W", 500.0)
 HAND = SpringHand(300.0, 3.0, mass=0.03, force=(0.0, 0.0, -0.5))
 STROKES = Strokes((0.0, 0.0, -1e-3), (8e-3, 0.0, -1e-3), speed=0.08, count=3)
 JOB: dict[str, Any] = {
-    "surface": WALL, "plant": Cartesian(0.05, 1.0), "hand": HAND, "servo": Servo(1e-3, delay=1),
-    "motion": STROKES, "duration": 0.4,
-}  # fmt: skip
+    "surface": WALL,
+    "plant": Cartesian(0.05, 1.0),
+    "hand": HAND,
+    "servo": Servo(1e-3, delay=1),
+    "motion": STROKES,
+    "duration": 0.4,
+}
 
 
 def run_of(**changes: Any) -> Run:
@@ -280,9 +284,11 @@ def test_unbalanced_energy_ledger_is_detected() -> None:
     assert run_of().is_energy_balanced
     # Friction holds the handle: the exchanged energy is rounding of the band's stored energy.
     sticking = run_of(
-        plant=Cartesian(0.05, 1.0, friction=5.0), hand=BandHand(),
-        motion=Stationary((0.0, 0.0, 0.01)), start=(0.0, 0.0, 1e-3),
-    )  # fmt: skip
+        plant=Cartesian(0.05, 1.0, friction=5.0),
+        hand=BandHand(),
+        motion=Stationary((0.0, 0.0, 0.01)),
+        start=(0.0, 0.0, 1e-3),
+    )
     assert abs(sticking.ledger.closure) > 1e-9 * sticking.ledger.exchanged
     assert sticking.ledger.exchanged < 1e-15 * sticking.ledger.stored_before
     assert sticking.is_energy_balanced

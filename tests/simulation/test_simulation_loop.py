@@ -103,9 +103,14 @@ def _response(surface: Surface, delay: int, rest: FloatArray, column: int) -> Fl
 
 
 FULL = Servo(
-    1e-4, delay=1, position_resolution=5e-6, force_resolution=5e-3, max_force=3.0,
-    virtual_damping=0.2, velocity_share=0.3,
-)  # fmt: skip
+    1e-4,
+    delay=1,
+    position_resolution=5e-6,
+    force_resolution=5e-3,
+    max_force=3.0,
+    virtual_damping=0.2,
+    velocity_share=0.3,
+)
 HAND = SpringHand([300.0, 200.0, 250.0], 2.0, mass=0.02, force=(0.1, -0.2, -0.3))
 STROKES = Strokes((0.0, 0.0, -1e-3), (7e-3, 3e-3, -1e-3), speed=0.05, count=9)
 BODY = Cartesian((0.05, 0.04, 0.03), (0.5, 0.3, 0.4))
@@ -150,9 +155,15 @@ def test_energy_drift_is_of_first_order_in_the_period(letter: str) -> None:
 
     def drift(period: float) -> float:
         run = simulate(
-            surface, Cartesian(0.05), SpringHand(), Servo(period), Stationary((0.0, 0.0, 0.0)),
-            4e-3, start=start, trace=False,
-        )  # fmt: skip
+            surface,
+            Cartesian(0.05),
+            SpringHand(),
+            Servo(period),
+            Stationary((0.0, 0.0, 0.0)),
+            4e-3,
+            start=start,
+            trace=False,
+        )
         kinetic = 0.5 * 0.05 * float(run.state[3:6] @ run.state[3:6])
         return kinetic + _potential(surface, run.state[:3]) - _potential(surface, start)
 
@@ -202,9 +213,14 @@ def test_handle_beyond_all_bounds_has_diverged(axis: int, sign: float) -> None:
     """At 6e5 m/s along an axis, distance and speed sum to the bound of 1e6 after 2/3 s."""
     soft_wall = Surface(WAVE, "W", 1e-9)
     run = simulate(
-        soft_wall, Cartesian(1.0), SpringHand(1e-9), Servo(1e-2), Stationary((0.0, 0.0, 1.0)), 2.0,
+        soft_wall,
+        Cartesian(1.0),
+        SpringHand(1e-9),
+        Servo(1e-2),
+        Stationary((0.0, 0.0, 1.0)),
+        2.0,
         velocity=sign * 6e5 * np.eye(3)[axis],
-    )  # fmt: skip
+    )
     assert run.stop_message == "diverged"
     assert run.samples == pytest.approx(67, abs=1)
 
@@ -223,10 +239,13 @@ def commanded_force(force: tuple[float, float, float], step: float, limit: float
     start, period = np.array([0.0, 0.0, 1.0]), 0.25
     end = start - period * np.array(force)
     run = simulate(
-        Surface(WAVE, "W", 1.0), PLANT, PrescribedHand(),
+        Surface(WAVE, "W", 1.0),
+        PLANT,
+        PrescribedHand(),
         Servo(period, force_resolution=step, max_force=limit, virtual_damping=1.0),
-        Waypoints(np.array([0.0, period]), np.array([start, end])), 2.0 * period,
-    )  # fmt: skip
+        Waypoints(np.array([0.0, period]), np.array([start, end])),
+        2.0 * period,
+    )
     return np.asarray(run.commanded[1])
 
 

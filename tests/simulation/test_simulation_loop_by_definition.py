@@ -80,10 +80,14 @@ def test_row_values_match_their_column_names(monkeypatch: pytest.MonkeyPatch) ->
     body.counters[:] = 2, 6, 4
     (ax, ay, az), due = body.anchor[2], body.queue[0]
     expected: dict[str, Any] = {
-        "time": 0.25, **dict(zip(["x", "y", "z", "vx", "vy", "vz"], x, strict=False)),
-        "anchor x": ax, "anchor y": ay, "anchor z": az,
-        "lost": ledger[LOST], "friction": ledger[FRICTION],
-    }  # fmt: skip
+        "time": 0.25,
+        **dict(zip(["x", "y", "z", "vx", "vy", "vz"], x, strict=False)),
+        "anchor x": ax,
+        "anchor y": ay,
+        "anchor z": az,
+        "lost": ledger[LOST],
+        "friction": ledger[FRICTION],
+    }
     for held in (True, False):
         trace = np.full((3, len(COLUMNS)), np.nan)
         servo = SERVO._replace(held=held)
@@ -149,8 +153,9 @@ class Recorder:
         patches = {
             "servo_tick": self.servo_tick,
             "probe_in_contact": lambda x, y, z, _t: x > y + z,
-            "trace_sample": energy_trace.trace_sample, "trace_timing": energy_trace.trace_timing,
-        }  # fmt: skip
+            "trace_sample": energy_trace.trace_sample,
+            "trace_timing": energy_trace.trace_timing,
+        }
         for name in no_guards.KERNELS.provides:
             patches[name] = getattr(no_guards, name)
         for name, function in patches.items():
@@ -191,9 +196,17 @@ def run(samples: int, *, every: int = 1, done: int = 1, rows: int = 99, x: Any =
     settings: Any = SimpleNamespace(period=0.5)
     none: Any = ()
     _cause, stop, state = servo_loop.servo_loop(
-        LoopState(SERVO, timing=LoopTiming(sample=done)), done + samples, settings, none, none,
-        body, trace, np.zeros(3), "texture", "law",
-    )  # fmt: skip
+        LoopState(SERVO, timing=LoopTiming(sample=done)),
+        done + samples,
+        settings,
+        none,
+        none,
+        body,
+        trace,
+        np.zeros(3),
+        "texture",
+        "law",
+    )
     finished = state.timing.sample - (stop == LEFT_WORKSPACE)
     return stop, trace.counters[0], state, finished, body.counters[0], anchor
 
@@ -226,9 +239,15 @@ def test_first_sample_reads_the_initial_state(monkeypatch: pytest.MonkeyPatch) -
 
 @pytest.mark.parametrize(
     ("every", "done", "expected"),
-    [(1, 0, [0, 1, 2, 3, 4, 5, 6]), (3, 0, [0, 3, 6]), (3, 1, [3, 6]), (3, 2, [3, 6]),
-     (3, 3, [3, 6, 9]), (10, 1, [])],
-)  # fmt: skip
+    [
+        (1, 0, [0, 1, 2, 3, 4, 5, 6]),
+        (3, 0, [0, 3, 6]),
+        (3, 1, [3, 6]),
+        (3, 2, [3, 6]),
+        (3, 3, [3, 6, 9]),
+        (10, 1, []),
+    ],
+)
 def test_rows_are_written_at_multiples_of_every(
     every: int, done: int, expected: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:

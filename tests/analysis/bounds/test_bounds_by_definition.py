@@ -287,10 +287,15 @@ def no_limit(surface: Surface) -> dense.DepthLimit:
 
 @pytest.mark.parametrize(
     ("letter", "measure", "form"),
-    [("A", spectral_norm, forms.q_a), ("B", spectral_norm, forms.q_b),
-     ("C", spectral_norm, forms.q_c), ("G", spectral_norm, forms.q_g),
-     ("A", one_sided, forms.one_sided_a), ("C", one_sided, forms.q_c)],
-)  # fmt: skip
+    [
+        ("A", spectral_norm, forms.q_a),
+        ("B", spectral_norm, forms.q_b),
+        ("C", spectral_norm, forms.q_c),
+        ("G", spectral_norm, forms.q_g),
+        ("A", one_sided, forms.one_sided_a),
+        ("C", one_sided, forms.q_c),
+    ],
+)
 def test_dense_maximum_equals_the_closed_forms(letter: str, measure: Any, form: Any) -> None:
     surface = Surface(WAVE, letter, max_depth=0.3e-3)
     result = dense.dense_maximum(surface, measure, no_limit(surface))
@@ -325,8 +330,10 @@ def test_samples_lie_at_cell_centres_or_on_grid_nodes() -> None:
         np.testing.assert_allclose(points[0], 0.5 * spacing, rtol=1e-12)
         np.testing.assert_allclose(points[-1], 1.0 - 0.5 * spacing, rtol=1e-12)
     heights = 1e-4 * np.random.default_rng(2).normal(size=9)
-    for line, last in ((Profile(heights, 3e-4, periodic=False), 1.0),
-                       (Profile(heights, 3e-4, periodic=True), None)):  # fmt: skip
+    for line, last in (
+        (Profile(heights, 3e-4, periodic=False), 1.0),
+        (Profile(heights, 3e-4, periodic=True), None),
+    ):
         points, spacing = dense.sample_fractions(line)
         assert points[0, 0] == 0.0
         assert points[-1, 0] == (last or pytest.approx(1.0 - spacing[0], rel=1e-12))

@@ -29,11 +29,13 @@ class StatefulVerticalContact(VerticalContact):
 
 
 PULLED = Law(
-    "pull", "pulled-back", StatefulVerticalContact(),
+    "pull",
+    "pulled-back",
+    StatefulVerticalContact(),
     lambda c: c.k * c.depth * (c.e_z - c.tangential(c.deflection) / c.parameter("max_deflection")),
     stateful=True,
     parameters={"max_deflection": Argument("max_deflection", "of the anchor", "m", LONGEST)},
-)  # fmt: skip
+)
 SURFACES = {
     law.letter: Surface(WAVE, law, K, law_parameters={"max_deflection": LONGEST})
     for law in (*LAWS.values(), PULLED)

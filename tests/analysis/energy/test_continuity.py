@@ -38,9 +38,14 @@ def min_span(texture: Texture) -> float:
 
 @pytest.mark.parametrize(
     ("amplitude", "period", "depth"),
-    [(0.2e-3, 1e-3, 0.4e-3), (0.2e-3, 1e-3, 20e-3), (3e-3, 1e-3, 1e-3), (1e-6, 1e-3, 0.1),
-     (0.1e-3, 2e-3, 1.001 * RADIUS)],
-)  # fmt: skip
+    [
+        (0.2e-3, 1e-3, 0.4e-3),
+        (0.2e-3, 1e-3, 20e-3),
+        (3e-3, 1e-3, 1e-3),
+        (1e-6, 1e-3, 0.1),
+        (0.1e-3, 2e-3, 1.001 * RADIUS),
+    ],
+)
 def test_jumps_of_law_d_on_a_sinusoid_equal_the_distance_of_the_closest_points(
     amplitude: float, period: float, depth: float
 ) -> None:
@@ -59,8 +64,13 @@ def test_jumps_of_law_d_on_a_sinusoid_equal_the_distance_of_the_closest_points(
     assert [jump.depth for jump in jumps] == pytest.approx(expected, rel=2e-9)
     for jump in jumps:
         target = jump.depth
-        s = brentq(lambda s, d=target: depth_of(s) - d, 1e-9 * period, 0.5 * period * (1 - 1e-12),
-                   xtol=1e-22, rtol=1e-14)  # fmt: skip
+        s = brentq(
+            lambda s, d=target: depth_of(s) - d,
+            1e-9 * period,
+            0.5 * period * (1 - 1e-12),
+            xtol=1e-22,
+            rtol=1e-14,
+        )
         assert jump.size == pytest.approx(2.0 * 700.0 * s, rel=1e-5)
         # Below the crest: on the line where the phase is a quarter turn.
         along = np.dot(jump.before[:2], texture.direction)
@@ -198,8 +208,10 @@ def test_jumps_are_located_on_first_access(monkeypatch: pytest.MonkeyPatch) -> N
 # --- Lipschitz ------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("letter", "depth"), [("B", 0.2e-3), ("C", 0.2e-3), ("E", 5e-3),
-                                               ("D", 0.8 * RADIUS), ("H", 5e-3)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("letter", "depth"),
+    [("B", 0.2e-3), ("C", 0.2e-3), ("E", 5e-3), ("D", 0.8 * RADIUS), ("H", 5e-3)],
+)
 def test_lipschitz_constant_bounds_force_changes_and_is_attained(letter: str, depth: float) -> None:
     surface = Surface(WAVE, letter, 1000.0, depth)
     slope = analyze_continuity(surface).lipschitz
@@ -237,8 +249,13 @@ def test_lipschitz_constant_is_k_q_rounded_outwards() -> None:
 
 
 def step_law(contact: Any) -> Law:
-    return Law("J", "step", contact, lambda c: c.k * (c.depth + c.parameter("preload")) * c.e_z,
-               parameters={"preload": 1e-4})  # fmt: skip
+    return Law(
+        "J",
+        "step",
+        contact,
+        lambda c: c.k * (c.depth + c.parameter("preload")) * c.e_z,
+        parameters={"preload": 1e-4},
+    )
 
 
 @pytest.mark.parametrize("contact", ["nominal", "vertical"])

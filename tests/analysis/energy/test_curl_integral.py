@@ -18,8 +18,13 @@ from asperity.textures.kinds.sinusoid import Sinusoid
 
 K, L, D = 1000.0, 2e-3, 0.3e-3
 SAW = Fourier([0.1e-3, 0.05e-3], [2 * math.pi / L, 4 * math.pi / L], [0.3, 1.0])
-SQUARE = Law("Q", "square", "vertical", lambda c: c.k * c.depth**2 / c.parameter("size") * c.normal,
-             parameters={"size": D})  # fmt: skip
+SQUARE = Law(
+    "Q",
+    "square",
+    "vertical",
+    lambda c: c.k * c.depth**2 / c.parameter("size") * c.normal,
+    parameters={"size": D},
+)
 
 
 def taylor_model(c: float, t: float, d: float, e: float) -> TaylorModel:
@@ -150,12 +155,14 @@ def test_depth_layers_are_contiguous_down_to_the_depth() -> None:
 def test_curl_integral_of_a_constant_curl() -> None:
     """The curl of k (δ e_x + δ³ e_z/s²) on the smooth wall is -k; J is not affine in δ."""
     law = Law(
-        "P", "pushed", "nominal",
-        lambda c: c.k * (
-            c.depth * c.tangential((1, 0)) + c.depth**3 / c.parameter("size") ** 2 * c.e_z
+        "P",
+        "pushed",
+        "nominal",
+        lambda c: (
+            c.k * (c.depth * c.tangential((1, 0)) + c.depth**3 / c.parameter("size") ** 2 * c.e_z)
         ),
         parameters={"size": D},
-    )  # fmt: skip
+    )
     surface = Surface(SAW, law, K, D)
     assert not surface.facts.affine_in_depth
     bounds = columns.curl_integral_bounds(surface, SAW.scan_line())

@@ -26,8 +26,14 @@ from asperity.textures.domain import ScanLine
 K, L, D = 1000.0, 2e-3, 0.3e-3
 ACROSS = np.array([0.6, 0.8])
 SAW = Fourier([0.05e-3, 0.025e-3], np.outer([2 * math.pi / L, 4 * math.pi / L], ACROSS), [0, 0.4])
-SQUARE = Law("Q", "square", "vertical", lambda c: c.k * c.depth**2 / c.parameter("size") * c.normal,
-             clampable=True, parameters={"size": D})  # fmt: skip
+SQUARE = Law(
+    "Q",
+    "square",
+    "vertical",
+    lambda c: c.k * c.depth**2 / c.parameter("size") * c.normal,
+    clampable=True,
+    parameters={"size": D},
+)
 RNG = np.random.default_rng(21)
 LUMPS = HeightMap(2e-5 * RNG.normal(size=(12, 16)), 1e-4, periodic=True)
 
@@ -42,12 +48,19 @@ def equal_layers(top: float, bottom: float, count: int, *, held: bool = False) -
 @pytest.mark.parametrize(
     ("law", "clamp", "free", "held"),
     [
-        ("A", "none", 1, 0), ("A", "whole", 1, 1), ("A", "lateral", 1, 1), ("A", "backed", 1, 1),
-        (SQUARE, "none", 64, 0), (SQUARE, "whole", 64, 1), (SQUARE, "lateral", 64, 64),
-        (SQUARE, "backed", 64, 1), ("C", "lateral", 0, 1), ("C", "whole", 0, 1),
+        ("A", "none", 1, 0),
+        ("A", "whole", 1, 1),
+        ("A", "lateral", 1, 1),
+        ("A", "backed", 1, 1),
+        (SQUARE, "none", 64, 0),
+        (SQUARE, "whole", 64, 1),
+        (SQUARE, "lateral", 64, 64),
+        (SQUARE, "backed", 64, 1),
+        ("C", "lateral", 0, 1),
+        ("C", "whole", 0, 1),
     ],
     ids=str,
-)  # fmt: skip
+)
 def test_layers_extend_from_the_surface_to_the_last_change_of_force(
     law: Any, clamp: Any, free: int, held: int
 ) -> None:
@@ -321,9 +334,7 @@ def test_friction_paths_are_those_of_the_paper() -> None:
     start, along = np.array([1e-4, 2e-4]), np.array([0.6, 0.8])
     end = start + 0.5e-3 * along
     above, light = 0.1 * D, 1e-6 * D
-    expected = [
-        [*start, above], [*start, -light], [*end, -light], [*end, -D], [*start, -D],
-    ]  # fmt: skip
+    expected = [[*start, above], [*start, -light], [*end, -light], [*end, -D], [*start, -D]]
     np.testing.assert_allclose(leak.friction_path(FRICTION, start, along), expected)
     line = FRICTION.texture.scan_line()
     loop = leak.light_then_deep_loop(FRICTION, line)
@@ -412,8 +423,9 @@ def test_ripple_below_rounding_is_zero(stiffness: float, monkeypatch: pytest.Mon
     for part, is_counted in ((1e-13, False), (1e-11, True)):
         for size in (1e-6, 1.0, 1e6):
 
-            def scan(_s: Surface, _l: ScanLine, _h: float, part: float = part,
-                     size: float = size) -> Any:  # fmt: skip
+            def scan(
+                _s: Surface, _l: ScanLine, _h: float, part: float = part, size: float = size
+            ) -> Any:
                 forces = np.zeros((1, 4, 3))
                 forces[0, :, 2] = size * (1.0 + part * np.array([1.0, -1.0, 1.0, -1.0]))
                 return forces, np.ones((1, 4)), 0.0

@@ -173,10 +173,12 @@ def test_leak_of_a_law_not_affine_in_depth_is_certified(power: int) -> None:
     from asperity.laws import Law
 
     law = Law(
-        "Q", "power", "vertical",
+        "Q",
+        "power",
+        "vertical",
         lambda c: c.k * c.depth * (c.depth / c.parameter("size")) ** (power - 1) * c.e_z,
         parameters={"size": D},
-    )  # fmt: skip
+    )
     loop = worst_loop(Surface(Sinusoid(A, L), law, K, D))
     exact = 2 * K * D * A
     assert loop.method == "certified"

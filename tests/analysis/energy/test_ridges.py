@@ -100,8 +100,13 @@ def test_force_of_law_d_jumps_only_below_the_onset() -> None:
 def test_law_with_a_preload_is_not_continuous() -> None:
     from asperity.laws import Law
 
-    step = Law("J", "step", "nominal", lambda c: c.k * (c.depth + c.parameter("preload")) * c.e_z,
-               parameters={"preload": 1e-4})  # fmt: skip
+    step = Law(
+        "J",
+        "step",
+        "nominal",
+        lambda c: c.k * (c.depth + c.parameter("preload")) * c.e_z,
+        parameters={"preload": 1e-4},
+    )
     surface = Surface(WAVE, step)
     result = continuity(surface, characteristic_number(surface))
     assert not result.continuous

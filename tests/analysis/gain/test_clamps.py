@@ -37,15 +37,24 @@ TEXTURES: dict[str, Texture] = {"wave": WAVE, "sum": SUM, "eggs": EGGS, "map": M
 NUMBERS = {NORM: characteristic_number, ONE_SIDED: one_sided_number, CURL: curl_number}
 # A potential k δ²/2 (1 + h/s): conservative, but its z component varies with position.
 WEIGHTED = Law(
-    "V", "weighted", "vertical",
+    "V",
+    "weighted",
+    "vertical",
     lambda c: (
         c.k * c.depth * (1 + c.h / c.parameter("size")) * c.w
         - c.k * c.depth**2 / (2 * c.parameter("size")) * c.tangential(c.slope)
     ),
-    clampable=True, parameters={"size": 1e-3},
-)  # fmt: skip
-CUBED = Law("Q", "cubed", "vertical", lambda c: c.k * c.depth**3 / c.parameter("size") ** 2 * c.w,
-            clampable=True, parameters={"size": 1e-3})  # fmt: skip
+    clampable=True,
+    parameters={"size": 1e-3},
+)
+CUBED = Law(
+    "Q",
+    "cubed",
+    "vertical",
+    lambda c: c.k * c.depth**3 / c.parameter("size") ** 2 * c.w,
+    clampable=True,
+    parameters={"size": 1e-3},
+)
 
 
 def spread(letters: str, names: tuple[str, ...]) -> list[tuple[str, str, str]]:
@@ -274,9 +283,15 @@ def test_witness_lies_just_below_the_start_of_the_clamp() -> None:
         assert shallow < -bound.at[2] < shallow * (1.0 + 1e-8)
 
 
-PULLED = Law("S", "pulled", "nominal",
-             lambda c: c.k * c.depth * (c.e_z - c.tangential(c.deflection) / 1e-3),
-             clampable=True, stateful=True, parameters={"max_deflection": 1e-3})  # fmt: skip
+PULLED = Law(
+    "S",
+    "pulled",
+    "nominal",
+    lambda c: c.k * c.depth * (c.e_z - c.tangential(c.deflection) / 1e-3),
+    clampable=True,
+    stateful=True,
+    parameters={"max_deflection": 1e-3},
+)
 
 
 def test_user_defined_law_with_state_under_a_clamp_is_sampled() -> None:

@@ -39,9 +39,18 @@ WAVE = Sinusoid(0.13e-3, 0.9e-3, 0.4, (1.0, 2.0))
 
 @pytest.mark.parametrize(
     ("letter", "name"),
-    [("A", "norm"), ("A", "one-sided"), ("A", "curl"), ("E", "norm"), ("E", "one-sided"),
-     ("E", "curl"), ("G", "norm"), ("W", "norm"), ("W", "one-sided")],
-)  # fmt: skip
+    [
+        ("A", "norm"),
+        ("A", "one-sided"),
+        ("A", "curl"),
+        ("E", "norm"),
+        ("E", "one-sided"),
+        ("E", "curl"),
+        ("G", "norm"),
+        ("W", "norm"),
+        ("W", "one-sided"),
+    ],
+)
 @pytest.mark.parametrize("depth", [0.02e-3, 0.4e-3])
 def test_number_by_theorem_equals_branch_and_bound_over_the_jacobian(
     letter: str, name: str, depth: float
@@ -90,9 +99,11 @@ def test_derivative_bound_of_friction_uses_the_largest_entries() -> None:
 def test_gain_above_height_is_constant_for_laws_w_e_and_h() -> None:
     """W and E have 1 at every height; H has the larger of 1 and its continuity."""
     for letter, options, expected in (
-        ("W", {}, 1.0), ("E", {}, 1.0), ("H", {"continuity": 0.4}, 1.0),
+        ("W", {}, 1.0),
+        ("E", {}, 1.0),
+        ("H", {"continuity": 0.4}, 1.0),
         ("H", {"continuity": 2.5}, 2.5),
-    ):  # fmt: skip
+    ):
         surface = Surface(WAVE, letter, **options)
         above = theorem_on(surface).gain_above_height
         assert above is not None
@@ -129,9 +140,8 @@ def test_direct_bound_of_law_f_is_accurate_and_tight(
 ) -> None:
     """Covers maxima from the trough (short deflections) to the flank; the bound is tight."""
     surface = Surface(
-        WAVE, "F", max_depth=0.5e-3, friction=0.7, max_deflection=deflection,
-        modulation_depth=swing,
-    )  # fmt: skip
+        WAVE, "F", max_depth=0.5e-3, friction=0.7, max_deflection=deflection, modulation_depth=swing
+    )
     at = law_f_number_of_phase(surface, number)
     phases = np.linspace(-0.5 * math.pi, 0.5 * math.pi, 4001)
     start = phases[int(np.argmax(at(phases)))]
@@ -270,8 +280,10 @@ def test_q_of_law_c_is_the_largest_eigenvalue_of_its_jacobian() -> None:
         for part in (0.0, 1.0):
             a, d = slope * slope + part * hessian, 1.0
             root = np.hypot(0.5 * (a - d), slope)
-            best = max(best, float(np.maximum(np.abs(0.5 * (a + d) + root),
-                                              np.abs(0.5 * (a + d) - root)).max()))  # fmt: skip
+            best = max(
+                best,
+                float(np.maximum(np.abs(0.5 * (a + d) + root), np.abs(0.5 * (a + d) - root)).max()),
+            )
         value = forms.q_c(wave, depth)
         assert best <= value * (1.0 + 1e-12)
         assert value <= best * (1.0 + 1e-4)

@@ -34,9 +34,13 @@ def _dragged(c: Any) -> Any:
 
 
 DRAGGED = Law(
-    "dragged", "dragged", "nominal", _dragged, stateful=True,
+    "dragged",
+    "dragged",
+    "nominal",
+    _dragged,
+    stateful=True,
     parameters={"grip": 0.5, "max_deflection": 1e-3},
-)  # fmt: skip
+)
 SURFACES = {
     "F": Surface(WAVE, "F", law_parameters=RUBBING),
     "user-defined": Surface(WAVE, DRAGGED, law_parameters={"grip": 2.0, "max_deflection": 5e-5}),

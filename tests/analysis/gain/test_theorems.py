@@ -34,8 +34,9 @@ def law_with_formula_of(letter: str, formula_of: str, factor: float = 1.0) -> La
     def force(c: Any) -> Any:
         return factor * law.force(c)
 
-    return Law(letter, "borrowed", law.contact, force, parameters=law.arguments,
-               stateful=law.stateful)  # fmt: skip
+    return Law(
+        letter, "borrowed", law.contact, force, parameters=law.arguments, stateful=law.stateful
+    )
 
 
 @pytest.mark.parametrize("letter", ["E", "D", "H"])

@@ -48,36 +48,57 @@ def test_both_sides_of_each_limit_by_hand() -> None:
 # the limit, the change, and the value at which the two sides are equal.
 CROSSINGS: dict[str, tuple[int, Any, float]] = {
     # A short wave is too short for the updates at this speed: l = α v T.
-    "texture: updates": (1, lambda x: ({"texture": Sinusoid(A, 1 / x)}, {"bandwidth": 1e5}),
-                         1.0 / (5 * V / 2000.0)),
+    "texture: updates": (
+        1,
+        lambda x: ({"texture": Sinusoid(A, 1 / x)}, {"bandwidth": 1e5}),
+        1.0 / (5 * V / 2000.0),
+    ),
     "speed: updates": (1, lambda x: ({"speed": x}, {"bandwidth": 1e5}), L * 2000.0 / 5),
     "device: updates": (1, lambda x: ({}, {"update_rate": 1 / x}), L / (5 * V)),
     # A short wave is too short for the position steps: l = β δ, with fewer samples in time.
-    "texture: position": (2, lambda x: ({"texture": Sinusoid(A, 1 / x), "time_samples": 4.0},
-                                        {"bandwidth": 1e5, "update_rate": 1e5,
-                                         "max_stiffness": 1e4}), 1.0 / (5 * 20e-6)),
+    "texture: position": (
+        2,
+        lambda x: (
+            {"texture": Sinusoid(A, 1 / x), "time_samples": 4.0},
+            {"bandwidth": 1e5, "update_rate": 1e5, "max_stiffness": 1e4},
+        ),
+        1.0 / (5 * 20e-6),
+    ),
     "samples: position": (2, lambda x: ({"position_samples": x}, {}), L / 20e-6),
     # l = α δ, slow enough for the updates.
-    "texture: fast position": (3, lambda x: ({"texture": Sinusoid(A, 1 / x),
-                                              "position_samples": 4.0},
-                                             {"bandwidth": 1e5, "update_rate": 1e5,
-                                              "max_stiffness": 1e4}), 1.0 / (5 * 20e-6)),
+    "texture: fast position": (
+        3,
+        lambda x: (
+            {"texture": Sinusoid(A, 1 / x), "position_samples": 4.0},
+            {"bandwidth": 1e5, "update_rate": 1e5, "max_stiffness": 1e4},
+        ),
+        1.0 / (5 * 20e-6),
+    ),
     "samples: fast position": (3, lambda x: ({"time_samples": x}, {"update_rate": 1e5}), L / 20e-6),
     # The force of a small wave is below γ force steps: k A = γ b.
     "texture: force": (4, lambda x: ({"texture": Sinusoid(1 / x, L)}, {}), 500.0 / (5 * 2e-3)),
     "device: force": (4, lambda x: ({}, {"force_resolution": x}), 500.0 * A / 5),
     "samples: force": (4, lambda x: ({"force_steps": x}, {}), 500.0 * A / 2e-3),
     # A steep texture multiplies the stiffness too much: √(1 + (2πA/l)²) k = K₀.
-    "texture: gain": (5, lambda x: ({"texture": Sinusoid(x, L), "max_depth": 1e-3}, {}),
-                      math.sqrt((900.0 / 500.0) ** 2 - 1) * L / (2 * math.pi)),
-    "stiffness: gain": (5, lambda x: ({"stiffness": x}, {}),
-                        900.0 / math.hypot(1.0, 2 * math.pi * A / L)),
+    "texture: gain": (
+        5,
+        lambda x: ({"texture": Sinusoid(x, L), "max_depth": 1e-3}, {}),
+        math.sqrt((900.0 / 500.0) ** 2 - 1) * L / (2 * math.pi),
+    ),
+    "stiffness: gain": (
+        5,
+        lambda x: ({"stiffness": x}, {}),
+        900.0 / math.hypot(1.0, 2 * math.pi * A / L),
+    ),
     # A short wave is too fast for the structure: v/l = F₀.
-    "texture: bandwidth": (6, lambda x: ({"texture": Sinusoid(A, 1 / x)}, {"update_rate": 1e4}),
-                           300.0 / V),
+    "texture: bandwidth": (
+        6,
+        lambda x: ({"texture": Sinusoid(A, 1 / x)}, {"update_rate": 1e4}),
+        300.0 / V,
+    ),
     "speed: bandwidth": (6, lambda x: ({"speed": x}, {"update_rate": 1e4}), 300.0 * L),
     "device: bandwidth": (6, lambda x: ({}, {"bandwidth": 1 / x}), L / V),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", list(CROSSINGS))
@@ -123,9 +144,14 @@ def test_device_without_data_decides_no_limit() -> None:
     assert result.answer.startswith("No limit can be decided.")
     assert result.stability_limit.stiffness is None
     assert result.perceptibility.missing_data == (
-        "force_resolution", "friction", "bandwidth", "update_rate", "position_resolution",
-        "apparent_mass", "damping",
-    )  # fmt: skip
+        "force_resolution",
+        "friction",
+        "bandwidth",
+        "update_rate",
+        "position_resolution",
+        "apparent_mass",
+        "damping",
+    )
 
 
 def test_speed_range_of_each_limit() -> None:
@@ -201,14 +227,13 @@ def test_verdicts_do_not_depend_on_the_unit_of_length(
     bench = device(
         position_resolution=20e-6 * scale, force_resolution=2e-3 * scale, friction=5e-3 * scale
     )
-    other = default_limits(Fourier(scale * a, k / scale), device=bench, speed=V * scale,
-                max_depth=3e-4 * scale)  # fmt: skip
+    other = default_limits(
+        Fourier(scale * a, k / scale), device=bench, speed=V * scale, max_depth=3e-4 * scale
+    )
     for first, second in zip(one.limits, other.limits, strict=True):
         assert first.left is not None
         assert second.left is not None
-        assert first.left / first.right == pytest.approx(
-            second.left / second.right, rel=1e-4
-        )  # fmt: skip
+        assert first.left / first.right == pytest.approx(second.left / second.right, rel=1e-4)
 
 
 def test_default_stiffness_is_the_recommended_stiffness() -> None:

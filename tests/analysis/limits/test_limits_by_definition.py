@@ -38,9 +38,16 @@ SMALLEST = math.nextafter(1.0, 2.0)
 
 def make_case(data: dict[str, float] | None = None, **more: Any) -> LimitCase:
     plain: dict[str, Any] = {
-        "speed": 1.0, "time_samples": 5.0, "position_samples": 4.0, "force_steps": 8.0,
-        "wavelengths": LENGTHS, "forces": FORCES, "shares": SHARES, "gain": 2.0, "stiffness": 16.0,
-    }  # fmt: skip
+        "speed": 1.0,
+        "time_samples": 5.0,
+        "position_samples": 4.0,
+        "force_steps": 8.0,
+        "wavelengths": LENGTHS,
+        "forces": FORCES,
+        "shares": SHARES,
+        "gain": 2.0,
+        "stiffness": 16.0,
+    }
     return LimitCase(data or {}, **(plain | more))
 
 
@@ -112,11 +119,13 @@ def test_sample_count_accepts_its_minimum() -> None:
 @pytest.mark.parametrize(
     ("delay", "lower", "upper", "symbol"),
     [
-        (None, 3.0, 4.0, "q"), (math.inf, 3.0, 4.0, "q"), (0.0, 1.0, 2.0, "q⁺"),
+        (None, 3.0, 4.0, "q"),
+        (math.inf, 3.0, 4.0, "q"),
+        (0.0, 1.0, 2.0, "q⁺"),
         (1.0, 3.5 / 1.5, 5.0 / 1.5, "(q⁺/2 + d q)/(1/2 + d)"),
         (3.0, 9.5 / 3.5, 13.0 / 3.5, "(q⁺/2 + d q)/(1/2 + d)"),
     ],
-)  # fmt: skip
+)
 def test_limiting_number_for_a_delay(
     delay: float | None, lower: float, upper: float, symbol: str
 ) -> None:
@@ -142,15 +151,20 @@ def test_waves_with_significant_height_or_force_are_reported() -> None:
     assert check_limits._significant_waves(bands, np.zeros(3)).tolist() == [False, True, False]
     assert check_limits._significant_waves(exact, np.zeros(3)).tolist() == [True] * 3
     remaining = np.array([True, False, True])
-    two = {"wavelengths": np.array([3.0, 1.0]), "forces": np.array([7.0, 8.0]),
-           "shares": np.array([low, low]), "speed": 6.0}  # fmt: skip
+    two = {
+        "wavelengths": np.array([3.0, 1.0]),
+        "forces": np.array([7.0, 8.0]),
+        "shares": np.array([low, low]),
+        "speed": 6.0,
+    }
     limit_case = make_case({"update_rate": 16.0, "bandwidth": 4.0, "max_stiffness": 1.0}, **two)
     rendered = check_limits._rendered_waves(
         bands, remaining, limit_case, [evaluate_limit(rule, limit_case) for rule in LIMIT_RULES]
     )
     assert [(one.wavelength, one.share, one.frequency, one.force) for one in rendered] == [
-        (3.0, low, 2.0, 7.0), (1.0, low, 6.0, 8.0),
-    ]  # fmt: skip
+        (3.0, low, 2.0, 7.0),
+        (1.0, low, 6.0, 8.0),
+    ]
     assert [one.holds for one in rendered] == [{1: True, 6: True}, {1: False, 6: False}]
     assert [one.top_speed for one in rendered] == pytest.approx([48.0 / 5.0, 16.0 / 5.0])
     (alone, _short) = check_limits._rendered_waves(bands, remaining, limit_case, [])
@@ -179,8 +193,12 @@ ABOVE, BELOW = 1.0 + 1e-9, 1.0 - 1e-9
 
 
 def test_tiers_change_at_the_thresholds_of_the_hand() -> None:
-    for force, tier in ((4.0 * ABOVE, "felt"), (4.0 * BELOW, "borderline"),
-                        (ABOVE, "borderline"), (BELOW, "not felt")):  # fmt: skip
+    for force, tier in (
+        (4.0 * ABOVE, "felt"),
+        (4.0 * BELOW, "borderline"),
+        (ABOVE, "borderline"),
+        (BELOW, "not felt"),
+    ):
         result = assess_forces(force, {})
         assert (result.tier, result.masked_by) == (tier, MaskingSource.HAND)
         assert result.level == pytest.approx(force / 4.0)
@@ -190,8 +208,12 @@ def test_tiers_change_at_the_thresholds_of_the_hand() -> None:
 
 def test_force_steps_need_their_number_for_each_tier() -> None:
     """With γ = 8 steps of 2 N: felt from 16 N on, not felt below 2 N."""
-    for force, tier in ((16.0 * ABOVE, "felt"), (16.0 * BELOW, "borderline"),
-                        (2.0 * ABOVE, "borderline"), (2.0 * BELOW, "not felt")):  # fmt: skip
+    for force, tier in (
+        (16.0 * ABOVE, "felt"),
+        (16.0 * BELOW, "borderline"),
+        (2.0 * ABOVE, "borderline"),
+        (2.0 * BELOW, "not felt"),
+    ):
         result = assess_forces(force, {"force_resolution": 2.0})
         assert result.tier == tier
         assert (result.masked_by is MaskingSource.STEPS) is (force < 16.0)

@@ -52,9 +52,14 @@ def assess_wave(
 
 
 def simulate_scan(
-    surface: Surface, mass: FloatArray, damping: FloatArray, friction: FloatArray,
-    stiffness: FloatArray, speed: FloatArray, grip: Grip,
-) -> tuple[FloatArray, FloatArray]:  # fmt: skip
+    surface: Surface,
+    mass: FloatArray,
+    damping: FloatArray,
+    friction: FloatArray,
+    stiffness: FloatArray,
+    speed: FloatArray,
+    grip: Grip,
+) -> tuple[FloatArray, FloatArray]:
     """Return the amplitudes (√2 RMS) of motion and of force on the hand of scans, integrated.
 
     The hand moves at constant speed and pressed position; the tool of the given mass is held by the
@@ -113,12 +118,20 @@ def test_motion_at_the_hand_is_that_of_a_direct_simulation(law: str, grip: Grip)
     motions, forces = simulate_scan(surface, mass, damping, friction, stiffness, speed, grip)
     rms = merit(surface).ripple
     for i in range(count):
-        fields = {"apparent_mass": f"{mass[i]:.17g} kg", "damping": f"{damping[i]:.17g} N*s/m",
-                  "friction": f"{friction[i]:.17g} N"}  # fmt: skip
+        fields = {
+            "apparent_mass": f"{mass[i]:.17g} kg",
+            "damping": f"{damping[i]:.17g} N*s/m",
+            "friction": f"{friction[i]:.17g} N",
+        }
         result = assess_perceptibility(
-            surface.to_stiffness(stiffness[i]), device(**fields), TexturePart(wave),
-            rms=rms * stiffness[i], grip=grip, speed=speed[i], find_remedies=False,
-        )  # fmt: skip
+            surface.to_stiffness(stiffness[i]),
+            device(**fields),
+            TexturePart(wave),
+            rms=rms * stiffness[i],
+            grip=grip,
+            speed=speed[i],
+            find_remedies=False,
+        )
         assert result.hand_motion == pytest.approx(motions[i], rel=0.05)
         assert result.hand_force == pytest.approx(forces[i], rel=0.05)
 

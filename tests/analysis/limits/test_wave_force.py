@@ -130,8 +130,9 @@ def test_each_band_has_its_own_force_ratio(periodic: bool) -> None:
     x = np.arange(256) / 256
     texture = HeightMap(
         np.tile(1e-7 * np.sin(4 * np.pi * x) + 1e-8 * np.sin(32 * np.pi * x), (8, 1)),
-        5e-6, periodic=periodic,
-    )  # fmt: skip
+        5e-6,
+        periodic=periodic,
+    )
     surface = Surface(texture, "C", stiffness=500.0, max_depth=1e-4)
     assert scan_height(surface) == pytest.approx(height, rel=1e-2)
     lengths = np.array([256, 128, 50, 38, 16, 11]) * 5e-6

@@ -14,9 +14,12 @@ from asperity.surface import Surface
 
 TEXTURE = asp.Sinusoid(0.3e-3, 2.3e-3)
 RIG = {
-    "damping": "0.625 N*s/m", "delay_samples": 0, "update_rate": "4 kHz",
-    "max_stiffness": "5 kN/m", "position_resolution": "10 um",
-}  # fmt: skip
+    "damping": "0.625 N*s/m",
+    "delay_samples": 0,
+    "update_rate": "4 kHz",
+    "max_stiffness": "5 kN/m",
+    "position_resolution": "10 um",
+}
 
 
 def assess(law: str, stiffness: float, **changes: object) -> Passivity:
@@ -42,10 +45,13 @@ def test_omega_with_known_damping_starts_where_the_buzz_is_bounded_by_10_mm_per_
 @pytest.mark.parametrize(
     "changes",
     [
-        {}, {"delay_samples": 2}, {"force_resolution": "0.01 mN"},
-        {"virtual_damping": "0.02 N*s/m"}, {"least_friction": "1 mN"},
+        {},
+        {"delay_samples": 2},
+        {"force_resolution": "0.01 mN"},
+        {"virtual_damping": "0.02 N*s/m"},
+        {"least_friction": "1 mN"},
     ],
-)  # fmt: skip
+)
 def test_bound_at_the_limit_is_the_speed_asked_for(law: str, changes: dict[str, object]) -> None:
     loop = assess(law, 100.0, **changes).loop
     for speed in (BUZZ_SPEED, 0.1):

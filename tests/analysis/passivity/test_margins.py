@@ -83,10 +83,12 @@ def test_no_loop_with_steps_moves_above_the_bound_of_its_steps(letter: str) -> N
     for loop, q in (next(loops) for _ in range(60)):
         surface = loop.surface(letter).to_stiffness(0.3 * loop.lightest * loop.wall / q)
         data = {
-            "damping": float(np.linalg.eigvalsh(loop.damping)[0]), "delay_samples": loop.delay,
-            "update_rate": 1.0 / loop.period, "position_resolution": steps[0],
+            "damping": float(np.linalg.eigvalsh(loop.damping)[0]),
+            "delay_samples": loop.delay,
+            "update_rate": 1.0 / loop.period,
+            "position_resolution": steps[0],
             "force_resolution": steps[1],
-        }  # fmt: skip
+        }
         numbers = characteristic_number(surface), one_sided_number(surface)
         device = parse_device(data, "random")
         buzz = passivity(surface, device, *numbers, worst_loop(surface)).buzz

@@ -203,9 +203,15 @@ def test_virtual_damping_does_not_replace_a_known_delay() -> None:
 def test_slack_direction_refutes_passivity_with_delay() -> None:
     """At d = 1, q⁺ = 1, q = 4: proved up to 8000/4.5 N/m, refuted by k q/2 > σ₀/T + b_v/T."""
     numbers = {"q": exact_bound(4.0), "plus": exact_bound(1.0)}
-    cases = [(1777.0, 0.0, "passive"), (1778.0, 0.0, "undecided"), (3999.0, 0.0, "undecided"),
-             (4001.0, 0.0, "not passive"), (4001.0, 0.5, "undecided"), (4999.0, 0.5, "undecided"),
-             (5001.0, 0.5, "not passive")]  # fmt: skip
+    cases = [
+        (1777.0, 0.0, "passive"),
+        (1778.0, 0.0, "undecided"),
+        (3999.0, 0.0, "undecided"),
+        (4001.0, 0.0, "not passive"),
+        (4001.0, 0.5, "undecided"),
+        (4999.0, 0.5, "undecided"),
+        (5001.0, 0.5, "not passive"),
+    ]
     for stiffness, virtual, verdict in cases:
         rig = {**RIG, "delay_samples": 1, "virtual_damping": virtual}
         assert assess(Surface(WAVE, "C", stiffness), rig, **numbers).verdict == verdict
@@ -250,9 +256,15 @@ def test_unverified_data_are_marked_in_the_assumptions() -> None:
 
 @pytest.mark.parametrize(
     ("field", "value"),
-    [("update_rate", 0.0), ("damping", -1.0), ("damping", math.nan), ("delay_samples", 0.5),
-     ("virtual_damping", math.inf), ("max_stiffness", -5.0)],
-)  # fmt: skip
+    [
+        ("update_rate", 0.0),
+        ("damping", -1.0),
+        ("damping", math.nan),
+        ("delay_samples", 0.5),
+        ("virtual_damping", math.inf),
+        ("max_stiffness", -5.0),
+    ],
+)
 def test_invalid_data_of_a_device_object_raise(field: str, value: float) -> None:
     device = Device("x", "x", {field: Datum(value, "1", "", verified=True)})
     surface = Surface(WAVE, "W")
@@ -338,8 +350,13 @@ def test_law_c_under_a_lateral_clamp_is_not_passive() -> None:
 
 def test_conservative_law_with_a_jump_is_undecided() -> None:
     """A force k (depth + preload) e_z is a gradient; oscillations across its step gain energy."""
-    jump = Law("J", "step", "nominal", lambda c: c.k * (c.depth + c.parameter("preload")) * c.e_z,
-               parameters={"preload": 1e-4})  # fmt: skip
+    jump = Law(
+        "J",
+        "step",
+        "nominal",
+        lambda c: c.k * (c.depth + c.parameter("preload")) * c.e_z,
+        parameters={"preload": 1e-4},
+    )
     surface = Surface(WAVE, jump, 1.0)
     assert law_facts(jump).conservative
     result = assess(surface, {**RIG, "delay_samples": 0, "max_stiffness": 1e9})
@@ -358,11 +375,14 @@ def test_wall_test_makes_limits_plausible_but_not_proved() -> None:
     """The limit K₀/q covers any delay; for a known delay it lies between K₀/q⁺ and K₀/q."""
     wall = {"max_stiffness": "5000 N/m"}
     numbers = {"q": exact_bound(4.0), "plus": exact_bound(2.0)}
-    cases = [(1250.0, wall, "plausible"), (1251.0, wall, "undecided"),
-             (2500.0, {**wall, "delay_samples": 0}, "plausible"),
-             (2501.0, {**wall, "delay_samples": 0}, "undecided"),
-             (1500.0, {**wall, "delay_samples": 1}, "plausible"),
-             (1501.0, {**wall, "delay_samples": 1}, "undecided")]  # fmt: skip
+    cases = [
+        (1250.0, wall, "plausible"),
+        (1251.0, wall, "undecided"),
+        (2500.0, {**wall, "delay_samples": 0}, "plausible"),
+        (2501.0, {**wall, "delay_samples": 0}, "undecided"),
+        (1500.0, {**wall, "delay_samples": 1}, "plausible"),
+        (1501.0, {**wall, "delay_samples": 1}, "undecided"),
+    ]
     for stiffness, device, verdict in cases:
         result = assess(Surface(WAVE, "C", stiffness), device, **numbers)
         assert result.verdict == verdict, (stiffness, device)

@@ -49,11 +49,22 @@ def make_loop(stiffness: float = 1.0, **more: Any) -> DeviceLoop:
     """Return a device loop at 1 Hz with the given data."""
     plain: dict[str, Any] = {
         "surface": SimpleNamespace(stiffness=stiffness, max_depth=2.0, depends_on_texture=True),
-        "device": DEVICE, "q": number(1.0), "one_sided": number(1.0), "leak": None,
-        "conservative": True, "obstacle": None, "reason": "", "rate": Fraction(1),
-        "damping": None, "virtual_damping": None, "delay": None, "wall_test": None,
-        "friction": Fraction(0), "position_step": Fraction(0), "force_step": Fraction(0),
-    } | more  # fmt: skip
+        "device": DEVICE,
+        "q": number(1.0),
+        "one_sided": number(1.0),
+        "leak": None,
+        "conservative": True,
+        "obstacle": None,
+        "reason": "",
+        "rate": Fraction(1),
+        "damping": None,
+        "virtual_damping": None,
+        "delay": None,
+        "wall_test": None,
+        "friction": Fraction(0),
+        "position_step": Fraction(0),
+        "force_step": Fraction(0),
+    } | more
     rate, damping, virtual = plain["rate"] or 0, plain["damping"], plain["virtual_damping"] or 0
     return DeviceLoop(
         **plain,
@@ -98,8 +109,9 @@ def test_rule_holds_by_the_upper_bound_and_fails_by_the_lower_bound(
             return budget / total if total else INF
 
         proved, possible = largest_stiffness(high, high_plus), largest_stiffness(low, low_plus)
-        assert criterion.holds is (True if stiffness <= proved else
-                               False if stiffness > possible else None)  # fmt: skip
+        assert criterion.holds is (
+            True if stiffness <= proved else False if stiffness > possible else None
+        )
         sampled = possible > 0.0 == proved and budget > 0.0
         if sampled:
             assert (criterion.limit, criterion.margin) == (None, None)
@@ -135,19 +147,29 @@ def test_rule_without_its_data_lists_missing_fields() -> None:
 def test_max_proved_delay_is_the_largest_allowed_delay() -> None:
     seen = set()
     for loss, virtual, stiffness, q, share in product(
-        (None, 0.0, 0.5, 1.0, 3.0, 7.0), (None, -1.0, 1.0), (1.0, 2.0),
-        (0.0, 0.5, 1.0, 2.0, INF), (0.0, 0.5, 1.0),
-    ):  # fmt: skip
+        (None, 0.0, 0.5, 1.0, 3.0, 7.0),
+        (None, -1.0, 1.0),
+        (1.0, 2.0),
+        (0.0, 0.5, 1.0, 2.0, INF),
+        (0.0, 0.5, 1.0),
+    ):
         plus = share * q if share else 0.0
         loop = make_loop(
-            stiffness, damping=to_fraction(loss), virtual_damping=to_fraction(virtual), q=number(q),
+            stiffness,
+            damping=to_fraction(loss),
+            virtual_damping=to_fraction(virtual),
+            q=number(q),
             one_sided=number(plus),
-        )  # fmt: skip
+        )
 
         def allows(
-            d: int, k: float = stiffness, q: float = q, plus: float = plus,
-            loss: float | None = loss, virtual: float | None = virtual,
-        ) -> bool:  # fmt: skip
+            d: int,
+            k: float = stiffness,
+            q: float = q,
+            plus: float = plus,
+            loss: float | None = loss,
+            virtual: float | None = virtual,
+        ) -> bool:
             total = plus / 2 + (d * q if d else 0.0)
             return loss is not None and k * total + abs(virtual or 0.0) <= loss
 
@@ -192,10 +214,16 @@ def test_buzz_bound_equals_its_formula() -> None:
         (1.0, 3.0, INF), (1.0, INF), (None, 0.5, 1.0, 6.0), (None, -1.0), (None, 0, 1), (0.0, 9.0)
     ):
         loop = make_loop(
-            2.0, q=number(q), one_sided=number(plus), damping=to_fraction(loss),
-            virtual_damping=to_fraction(virtual), delay=delay, friction=Fraction(friction),
-            position_step=Fraction(3), force_step=Fraction(5),
-        )  # fmt: skip
+            2.0,
+            q=number(q),
+            one_sided=number(plus),
+            damping=to_fraction(loss),
+            virtual_damping=to_fraction(virtual),
+            delay=delay,
+            friction=Fraction(friction),
+            position_step=Fraction(3),
+            force_step=Fraction(5),
+        )
         result, b = criteria.buzz_bound(loop), abs(virtual or 0.0)
         if loss is None or delay is None or INF in (q, plus):
             assert result is None
@@ -279,9 +307,12 @@ def test_sampled_number_gives_no_proved_limit() -> None:
 
 @pytest.mark.parametrize(
     "more",
-    [{"obstacle": Obstacle.JUMPS, "delay": 0}, {"delay": None},
-     {"delay": 0, "wall_test": make_wall_test(2.0)}],
-)  # fmt: skip
+    [
+        {"obstacle": Obstacle.JUMPS, "delay": 0},
+        {"delay": None},
+        {"delay": 0, "wall_test": make_wall_test(2.0)},
+    ],
+)
 def test_wall_test_sets_the_limit_when_no_rule_does(more: dict[str, Any]) -> None:
     """Covers an obstacle, an unknown delay, and a cycling wall that contradicts the damping."""
     loop = make_loop(damping=Fraction(1), **more)
@@ -322,13 +353,21 @@ def max_oscillation_gain(k: float, slack: float | None, damper: float, delay: in
 def test_oscillation_that_gains_energy_refutes_passivity() -> None:
     seen = set()
     for k, q, plus, virtual, delay, loss in product(
-        (1.0, 2.0), (1.0, 4.0), (1.0, 3.0), (None, -1.0, 1.0), (None, 0, 1, 2, 3),
+        (1.0, 2.0),
+        (1.0, 4.0),
+        (1.0, 3.0),
+        (None, -1.0, 1.0),
+        (None, 0, 1, 2, 3),
         (None, 0.0, 0.5, 1.0, 1.5, 2.5, 4.0, 9.0),
-    ):  # fmt: skip
+    ):
         loop = make_loop(
-            k, q=number(max(q, plus)), one_sided=number(plus), virtual_damping=to_fraction(virtual),
-            delay=delay, damping=to_fraction(loss),
-        )  # fmt: skip
+            k,
+            q=number(max(q, plus)),
+            one_sided=number(plus),
+            virtual_damping=to_fraction(virtual),
+            delay=delay,
+            damping=to_fraction(loss),
+        )
         slack = k * q if q > plus and delay else None
         gain = max_oscillation_gain(k * plus, slack, virtual or 0.0, delay)
         is_unstable = loss is not None and gain > loss + 1e-9
@@ -345,8 +384,12 @@ def test_cycling_wall_and_unbounded_slack_refute_without_damping_data() -> None:
         ground = judgement._find_unstable_motion(make_loop(stiffness, wall_test=test))
         assert ground is (Ground.WALL_CYCLED if refuted else None)
     slack = number(INF)
-    for delay, plus, refuted in ((None, 1.0, False), (0, 1.0, False), (1, 1.0, True),
-                                 (1, INF, False)):  # fmt: skip
+    for delay, plus, refuted in (
+        (None, 1.0, False),
+        (0, 1.0, False),
+        (1, 1.0, True),
+        (1, INF, False),
+    ):
         ground = judgement._find_unstable_motion(
             make_loop(q=slack, one_sided=number(plus), delay=delay)
         )
@@ -357,29 +400,45 @@ def test_damping_that_proves_a_cycling_wall_passive_is_contradictory() -> None:
     """The contradiction is σ₀/T >= K (1/2 + d) for a cycling wall of K; all data must be known."""
     test = make_wall_test(0.5)
     for loss, delay, contradictory in (
-        (0.74, 1, False), (0.75, 1, True), (0.75, 2, False), (0.25, 0, True), (None, 1, False),
+        (0.74, 1, False),
+        (0.75, 1, True),
+        (0.75, 2, False),
+        (0.25, 0, True),
+        (None, 1, False),
         (9.0, None, False),
-    ):  # fmt: skip
+    ):
         loop = make_loop(wall_test=test, delay=delay, damping=to_fraction(loss))
         assert is_contradictory(loop) is contradictory
     assert not is_contradictory(make_loop(delay=0, damping=Fraction(9)))
     others: list[dict[str, Any]] = [
-        {"virtual_damping": Fraction(1)}, {"wall_test": replace(test, positions="stepped")},
-        {"wall_test": replace(test, update_rate=2.0)}, {"wall_test": replace(test, positions=None)},
-    ]  # fmt: skip
+        {"virtual_damping": Fraction(1)},
+        {"wall_test": replace(test, positions="stepped")},
+        {"wall_test": replace(test, update_rate=2.0)},
+        {"wall_test": replace(test, positions=None)},
+    ]
     for more in others:
         assert make_loop(**{"wall_test": test, **more}).cycling_stiffness is None
     assert make_loop(wall_test=replace(test, update_rate=1.0)).cycling_stiffness == Fraction(1, 2)
 
 
 def decide(loop: DeviceLoop, buzz: BuzzBound | None = None, **holds: bool | None) -> Any:
-    names = {"main": (DELAY, VIRTUAL, ONE_SIDED), "steps": (QUANTIZATION,), "wall": (WALL_TEST,),
-             "leak": (LEAK,)}  # fmt: skip
+    names = {
+        "main": (DELAY, VIRTUAL, ONE_SIDED),
+        "steps": (QUANTIZATION,),
+        "wall": (WALL_TEST,),
+        "leak": (LEAK,),
+    }
     by_name = {
-        name: Criterion(name, "", holds=holds.get(key), limit=holds.get(f"{key}_limit"),
-                        missing=("mass",) if key == "steps" and holds.get("missing") else ())
-        for key, group in names.items() for name in group
-    }  # fmt: skip
+        name: Criterion(
+            name,
+            "",
+            holds=holds.get(key),
+            limit=holds.get(f"{key}_limit"),
+            missing=("mass",) if key == "steps" and holds.get("missing") else (),
+        )
+        for key, group in names.items()
+        for name in group
+    }
     return judgement.decide_verdict(loop, by_name, buzz)
 
 
@@ -403,8 +462,10 @@ def test_deciding_criterion_and_ground_of_each_verdict() -> None:
         Ground.WALL_CYCLED,
     )
     assert decide(make_loop(wall_test=test, delay=1, damping=Fraction(1)), main=True) == (
-        "undecided", DELAY, Ground.CONTRADICTION,
-    )  # fmt: skip
+        "undecided",
+        DELAY,
+        Ground.CONTRADICTION,
+    )
     assert decide(make_loop(damping=Fraction(9)), wall=True)[0] == "plausible"
     barred = make_loop(obstacle=Obstacle.JUMPS)
     assert decide(barred) == ("undecided", DELAY, Ground.CRITERION)
@@ -416,5 +477,7 @@ def test_deciding_criterion_and_ground_of_each_verdict() -> None:
     assert decide(make_loop(**damped)) == ("undecided", DELAY, Ground.CRITERION)
     assert decide(make_loop(**damped, delay=1)) == ("undecided", VIRTUAL, Ground.CRITERION)
     assert decide(make_loop(damping=Fraction(9), delay=0)) == (
-        "undecided", ONE_SIDED, Ground.CRITERION,
-    )  # fmt: skip
+        "undecided",
+        ONE_SIDED,
+        Ground.CRITERION,
+    )

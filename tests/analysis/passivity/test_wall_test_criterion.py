@@ -169,9 +169,10 @@ ZERO_BY_DEFAULT: dict[str, st.SearchStrategy[Any]] = {
     "least_friction": st.floats(0.0, 1.0),
 }
 OPPOSITE = {
-    "passive": {"not passive"}, "bounded": {"not passive"},
+    "passive": {"not passive"},
+    "bounded": {"not passive"},
     "not passive": {"passive", "bounded", "plausible"},
-}  # fmt: skip
+}
 
 
 @settings(max_examples=400, deadline=None)

@@ -384,8 +384,11 @@ def test_probe_is_beyond_the_pop_through_depth_of_a_plate() -> None:
     surface = Surface(Sinusoid(0.1e-3, PERIOD), "H", K, continuity=0.5)
     plate = pop_through(surface, 2e-3)
     assert plate.depth == pytest.approx(1e-3 / 3.0)
-    points = [[x, y, plate.highest - share * plate.depth]
-              for x, y in ((-5e-3, 0.0), (5e-3, -1.0)) for share in (0.999, 1.001)]  # fmt: skip
+    points = [
+        [x, y, plate.highest - share * plate.depth]
+        for x, y in ((-5e-3, 0.0), (5e-3, -1.0))
+        for share in (0.999, 1.001)
+    ]
     assert plate.beyond(points).tolist() == [False, True, False, True]
 
 

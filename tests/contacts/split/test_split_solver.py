@@ -148,9 +148,12 @@ def test_dual_point_and_mean_follow_from_each_other(
     ],
 )
 def test_initialization_from_known_atoms(
-    known_count: int, succeeds: bool, expected_calls: list[str], expected: tuple[float, ...],
+    known_count: int,
+    succeeds: bool,
+    expected_calls: list[str],
+    expected: tuple[float, ...],
     monkeypatch: pytest.MonkeyPatch,
-) -> None:  # fmt: skip
+) -> None:
     """Atoms of a nearby probe, with optimal weights if all are positive: here two have them."""
     calls = replace_parts(monkeypatch, succeeds)
     atoms, y, pull = random_atoms(4), np.zeros(3), np.zeros(3)
@@ -203,9 +206,11 @@ def replace_parts(
         return 0.0, 9.0
 
     stand_ins = (
-        ("update_dual", update_dual), ("track_point", track_point), ("query", query),
+        ("update_dual", update_dual),
+        ("track_point", track_point),
+        ("query", query),
         ("solve_subset", solve_subset),
-    )  # fmt: skip
+    )
     for name, function in stand_ins:
         monkeypatch.setattr(solver, f"split_{name}", function)
     monkeypatch.setattr(solver, "sample_height", lambda *_: height)

@@ -7,10 +7,30 @@ import random
 
 from tests.lab.browser import Browser
 
-KEYS = (*"wabcdefghxmrskjltnpv+- ", "ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "PageUp",
-        "PageDown", "Tab", "Enter", "Escape")  # fmt: skip
-TEXTS = ("sinusoid:amplitude=0.2mm,period=2mm", "grating:height=100um,period=3mm", "velvet", "",
-         "/etc/passwd", "sinusoid:amplitude=-1mm,period=2mm", "1e3", "-5", "0", "NaN")  # fmt: skip
+KEYS = (
+    *"wabcdefghxmrskjltnpv+- ",
+    "ArrowLeft",
+    "ArrowRight",
+    "ArrowUp",
+    "ArrowDown",
+    "PageUp",
+    "PageDown",
+    "Tab",
+    "Enter",
+    "Escape",
+)
+TEXTS = (
+    "sinusoid:amplitude=0.2mm,period=2mm",
+    "grating:height=100um,period=3mm",
+    "velvet",
+    "",
+    "/etc/passwd",
+    "sinusoid:amplitude=-1mm,period=2mm",
+    "1e3",
+    "-5",
+    "0",
+    "NaN",
+)
 SIZES = ((1280, 900), (360, 700), (1920, 1080))
 # What is there to be used, and a control that is used: clicked, or given one of the values.
 _SEEN = """[...document.querySelectorAll("button, summary, select, input")]
@@ -51,8 +71,15 @@ class Monkey:
 
     def act(self) -> None:
         """Do one thing."""
-        acts = {self._key: 25, self._move: 25, self._press: 10, self._wheel: 8, self._touch: 7,
-                self._control: 23, self._resize: 2}  # fmt: skip
+        acts = {
+            self._key: 25,
+            self._move: 25,
+            self._press: 10,
+            self._wheel: 8,
+            self._touch: 7,
+            self._control: 23,
+            self._resize: 2,
+        }
         act = self._chance.choices(list(acts), list(acts.values()))[0]
         act()
         name = act.__name__.strip("_")

@@ -151,8 +151,13 @@ def test_the_pointer_moves_nothing_and_the_device_stays(page: Any, device: Devic
     settings = begin(page, device)["settings"]
     say(page, "steer", target=[0, 0, 0], **STILL)
     assert "done by the user of the handle" in heard(page, refused)["message"]
-    for changes in ({"device": "omega.3"}, {"delay": 3}, {"hand_stiffness": 100.0},
-                   {"saved_scene": "tour"}, {"saved_scene": "previous"}):  # fmt: skip
+    for changes in (
+        {"device": "omega.3"},
+        {"delay": 3},
+        {"hand_stiffness": 100.0},
+        {"saved_scene": "tour"},
+        {"saved_scene": "previous"},
+    ):
         say(page, "change", changes=changes)
         name = next(iter(changes))
         words = f"{name} needs the simulated device" if name == "saved_scene" else f"{name} is "

@@ -43,12 +43,14 @@ def test_the_last_seconds_are_kept_and_shown_again(page: Browser) -> None:
     assert not page.ask("lab.player.isPlaying")
     # By the slider, to the moment of the greatest force: it is what was felt.
     page.until("lab.player.playback.ensureLoaded(0, lab.player.playback.rowCount)")
-    page.ask("(() => { const at = document.getElementById('playback-time');"
-             "const { playback } = lab.player;"
-             "const z = row => playback.row(row)[playback.columns['applied z']]; let most = 1;"
-             "for (let k = 1; k < playback.rowCount; k++) if (z(k) > z(most)) most = k;"
-             "at.value = most + 1;"
-             "at.dispatchEvent(new Event('input')); })()")  # fmt: skip
+    page.ask(
+        "(() => { const at = document.getElementById('playback-time');"
+        "const { playback } = lab.player;"
+        "const z = row => playback.row(row)[playback.columns['applied z']]; let most = 1;"
+        "for (let k = 1; k < playback.rowCount; k++) if (z(k) > z(most)) most = k;"
+        "at.value = most + 1;"
+        "at.dispatchEvent(new Event('input')); })()"
+    )
     assert page.ask("lab.probeState().force[2]") > 0.01
     assert page.ask("Number.isFinite(lab.frame.closest[2])")
     page.press("l")
@@ -62,8 +64,10 @@ def test_the_picture_is_saved_as_lines_and_as_points(page: Browser) -> None:
     page.until("lab.probeState().force[2] > 0.02 && lab.hasCurrentPictures")
     root = ElementTree.fromstring(page.ask("lab.toSvg()"))
     views = root.findall(f"{SVG}svg")
-    counts = [{name: len(view.findall(f"{SVG}{name}")) for name in ("path", "image", "text")}
-              for view in views]  # fmt: skip
+    counts = [
+        {name: len(view.findall(f"{SVG}{name}")) for name in ("path", "image", "text")}
+        for view in views
+    ]
     relief, cut, traces, spectrum = counts
     assert relief["image"] == 1
     assert cut["image"] == 1  # the colours of the curl; field, outline, probe and force are paths

@@ -53,10 +53,13 @@ def test_the_pointer_presses_and_the_force_is_drawn(page: Browser) -> None:
 @needs_browser
 def test_all_is_done_by_keyboard(page: Browser) -> None:
     for key, reached in (
-        (" ", "lab.probeState().force[2] > 0.02"), (" ", "lab.probeState().probe[2] > 2e-4"),
-        ("ArrowRight", "lab.hand.x != 0"), ("x", "lab.status.settings.law == 'A'"),
-        ("m", "lab.hand.motion == 'stroke'"), ("m", "lab.hand.motion == 'loop'"),
-    ):  # fmt: skip
+        (" ", "lab.probeState().force[2] > 0.02"),
+        (" ", "lab.probeState().probe[2] > 2e-4"),
+        ("ArrowRight", "lab.hand.x != 0"),
+        ("x", "lab.status.settings.law == 'A'"),
+        ("m", "lab.hand.motion == 'stroke'"),
+        ("m", "lab.hand.motion == 'loop'"),
+    ):
         page.press(key)
         page.until(f"{reached} && lab.status.state == 'running'")
     assert "law=A" in page.ask("location.hash")

@@ -35,8 +35,10 @@ def colour(page: Browser, name: str) -> FloatArray:
 def change(page: Browser, name: str, value: str) -> None:
     """Type a value into a field, and wait until the page shows what it does."""
     version = page.ask("lab.status.surface_version")
-    page.ask(f"{{ const field = document.getElementById('{name}'); field.value = '{value}';"
-             "field.dispatchEvent(new Event('change')); }")  # fmt: skip
+    page.ask(
+        f"{{ const field = document.getElementById('{name}'); field.value = '{value}';"
+        "field.dispatchEvent(new Event('change')); }"
+    )
     page.until(f"lab.status.settings['{name}'] == '{value}' && lab.status.state == 'running'")
     page.until(f"lab.status.surface_version > {version} && lab.hasCurrentPictures")
 
@@ -61,9 +63,10 @@ def relief(page: Browser, height: Heights, wide: int, high: int) -> FloatArray:
     lift = min(rise / most, 40.0 * across / seen["size"])
     v = np.linspace(0.0, 1.0, 2000)[:, None]
     u = (np.arange(wide) + 0.5 - left - v * skew) / across
-    x, y = seen["x"] + (u - 0.5) * seen["size"], np.broadcast_to(
-        seen["y"] + (v - 0.5) * seen["size"], u.shape
-    )  # fmt: skip
+    x, y = (
+        seen["x"] + (u - 0.5) * seen["size"],
+        np.broadcast_to(seen["y"] + (v - 0.5) * seen["size"], u.shape),
+    )
     step, steep = 1e-7, lift * seen["size"] / across
     sx = (height(x + step, y) - height(x - step, y)) / (2.0 * step) * steep
     sy = (height(x, y + step) - height(x, y - step)) / (2.0 * step) * steep

@@ -47,8 +47,12 @@ force = ["0 N", "0 N", "-1 N"]
 OWN = 'id = "touch-x"\napparent_mass = "33 g"\nmax_force = "3 N"\ndelay_samples = 2\n'
 FIVE = 'id = "pantograph"\njoint_damping = "4 mN*m*s"\n'
 PLACE = '[run]\ncentre = ["-10 mm", "95 mm"]\nbrakes = "always"\n'
-SCENES = {"band": OWN + BAND, "spring with a force": OWN + SPRING,
-          "five-bar": FIVE + SPRING + PLACE, "five-bar and band": FIVE + BAND}  # fmt: skip
+SCENES = {
+    "band": OWN + BAND,
+    "spring with a force": OWN + SPRING,
+    "five-bar": FIVE + SPRING + PLACE,
+    "five-bar and band": FIVE + BAND,
+}
 
 
 def stage_of(name: str, folder: Path) -> SceneState:
@@ -99,8 +103,13 @@ def test_wishes_for_the_stage_before_are_not_made_of_the_next(tmp_path: Path) ->
     session = Session(stage_of("band", tmp_path), lambda: None)
     try:
         session._requests = Queue()
-        for changes in ({"law": "A"}, {"saved_scene": TOUR_SCENE, "law": "W"}, {"stiffness": 9.0},
-                       {"saved_scene": PREVIOUS_SCENE}, {"law": "H"}):  # fmt: skip
+        for changes in (
+            {"law": "A"},
+            {"saved_scene": TOUR_SCENE, "law": "W"},
+            {"stiffness": 9.0},
+            {"saved_scene": PREVIOUS_SCENE},
+            {"law": "H"},
+        ):
             session.change(changes)
         assert session._next_requests() == [
             {"law": "A"},

@@ -8,8 +8,14 @@ import re
 import pytest
 from tests.lab.browser import Browser, needs_browser
 
-TITLES = ("W is quiet", "A feels alive", "B buzzes above its limit", "D clicks", "C is soft",
-          "H avoids all of these")  # fmt: skip
+TITLES = (
+    "W is quiet",
+    "A feels alive",
+    "B buzzes above its limit",
+    "D clicks",
+    "C is soft",
+    "H avoids all of these",
+)
 
 
 def text(page: Browser, name: str) -> str:

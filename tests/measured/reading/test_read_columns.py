@@ -166,8 +166,10 @@ def test_header_variants_of_esri_grids(tmp_path: Path) -> None:
         (GRID.replace("ncols 4", "ncols 0") + NUMBERS, "ncols must be a whole number from 1"),
         (GRID.replace("ncols 4", "ncols 4.5") + NUMBERS, "ncols must be a whole number from 1"),
         (GRID.replace("ncols 4", "ncols 999999999") + NUMBERS, "999999999 x 3 points; at most"),
-        (GRID.replace("ncols 4", "ncols 99999").replace("nrows 3", "nrows 99999") + NUMBERS,
-         "at most"),
+        (
+            GRID.replace("ncols 4", "ncols 99999").replace("nrows 3", "nrows 99999") + NUMBERS,
+            "at most",
+        ),
         (GRID.replace("size 30", "size 0") + NUMBERS, "must be positive"),
         (GRID.replace("cellsize 30\n", "") + NUMBERS, "must be positive"),
         (GRID.replace("size 30", "size thirty") + NUMBERS, "a finite number is expected"),
@@ -176,7 +178,7 @@ def test_header_variants_of_esri_grids(tmp_path: Path) -> None:
         (GRID + NUMBERS.replace("7", "7_0"), "height 6 is '-327_068'"),
         (GRID + NUMBERS.replace("11", "inf"), "infinite height"),
     ],
-)  # fmt: skip
+)
 def test_invalid_esri_grids_are_refused(tmp_path: Path, text: str, match: str) -> None:
     with pytest.raises(SurfaceFileError, match=match):
         read_text(tmp_path, text)

@@ -119,8 +119,10 @@ def test_resample_works_in_library_scene_and_command_line(tmp_path: Path) -> Non
     for arguments in ([str(path), "--resample", "25um"], [str(scene)]):
         process = subprocess.run(
             [sys.executable, "-c", MAIN, "compare", *arguments, "--laws", "W"],
-            capture_output=True, text=True, check=False,
-        )  # fmt: skip
+            capture_output=True,
+            text=True,
+            check=False,
+        )
         assert process.returncode == 0, process.stderr
         assert "interpolated" in process.stdout
 

@@ -102,8 +102,12 @@ def test_imagej_and_ome_files_of_tifffile(tmp_path: Path) -> None:
     )
     assert read_surface(path).pitch == pytest.approx((0.5e-6, 0.5e-6), rel=1e-6)
     path = tmp_path / "a.ome.tif"
-    sizes = {"PhysicalSizeX": 0.7, "PhysicalSizeXUnit": "µm", "PhysicalSizeY": 0.9,
-             "PhysicalSizeYUnit": "mm"}  # fmt: skip
+    sizes = {
+        "PhysicalSizeX": 0.7,
+        "PhysicalSizeXUnit": "µm",
+        "PhysicalSizeY": 0.9,
+        "PhysicalSizeYUnit": "mm",
+    }
     tifffile.imwrite(path, HEIGHTS, ome=True, metadata={"axes": "YX", **sizes})
     raw = read_surface(path, unit="nm")
     assert raw.pitch == pytest.approx((0.7e-6, 0.9e-3), rel=1e-12)

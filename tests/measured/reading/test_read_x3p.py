@@ -206,9 +206,14 @@ def test_profile(tmp_path: Path) -> None:
 def test_absolute_lateral_axes(tmp_path: Path) -> None:
     y, x = np.mgrid[:3, :5].astype(float)
     spec = replace(
-        SPEC, x_type="A", y_type="A", x_positions=0.1 + 4e-6 * x, y_positions=5e-6 * y,
-        x_increment="1", y_increment="1",
-    )  # fmt: skip
+        SPEC,
+        x_type="A",
+        y_type="A",
+        x_positions=0.1 + 4e-6 * x,
+        y_positions=5e-6 * y,
+        x_increment="1",
+        y_increment="1",
+    )
     raw = read_spec(tmp_path, spec)
     np.testing.assert_array_equal(raw.heights, SPEC.stored)
     assert raw.pitch == pytest.approx((4e-6, 5e-6), rel=1e-9)

@@ -17,8 +17,15 @@ from asperity.report.pictures.paper_pictures import cycles_figure, devices_figur
 def test_sections_are_in_the_order_of_the_paper(experiments: Experiments) -> None:
     sections = experiment_sections(experiments)
     assert [section.title.split(",")[0] for section in sections] == [
-        "V.A", "V.A", "V.A", "V.B", "V.B", "V.C", "Predicted and simulated", "Devices in numbers",
-    ]  # fmt: skip
+        "V.A",
+        "V.A",
+        "V.A",
+        "V.B",
+        "V.B",
+        "V.C",
+        "Predicted and simulated",
+        "Devices in numbers",
+    ]
     with_picture = [section for section in sections if isinstance(section.blocks[0], Picture)]
     for section in with_picture:
         assert isinstance(section.blocks[0], Picture)
@@ -34,9 +41,11 @@ def test_sections_are_in_the_order_of_the_paper(experiments: Experiments) -> Non
 
 def test_every_table_row_has_one_cell_per_heading(experiments: Experiments) -> None:
     tables = [
-        block for section in experiment_sections(experiments) for block in section.blocks
+        block
+        for section in experiment_sections(experiments)
+        for block in section.blocks
         if isinstance(block, Table)
-    ]  # fmt: skip
+    ]
     assert len(tables) == 3
     for table in tables:
         assert table.rows
@@ -61,5 +70,6 @@ def test_figures_show_the_experiment_results(experiments: Experiments) -> None:
     assert "2000 N/m" in titles
     rules = devices_figure(experiments)
     assert [axes.get_xlabel() for axes in rules.axes] == [
-        "allowed by K₀/q [N/m]", "allowed by delay rule [N/m]",
-    ]  # fmt: skip
+        "allowed by K₀/q [N/m]",
+        "allowed by delay rule [N/m]",
+    ]

@@ -19,9 +19,13 @@ from asperity.report.pictures.spectrum_pictures import (
 from asperity.textures import Fourier, HeightMap, Sinusoid
 
 BENCH = {
-    "max_stiffness": 2000.0, "position_resolution": 15e-6, "force_resolution": 2e-3,
-    "bandwidth": 400.0, "update_rate": 1e4, "friction": 0.03,
-}  # fmt: skip
+    "max_stiffness": 2000.0,
+    "position_resolution": 15e-6,
+    "force_resolution": 2e-3,
+    "bandwidth": 400.0,
+    "update_rate": 1e4,
+    "friction": 0.03,
+}
 
 
 @pytest.fixture(scope="module")
@@ -39,12 +43,17 @@ def shortest_of(result: Limits) -> list[tuple[float, int, str]]:
 def test_shortest_wavelengths_match_hand_calculation(result: Limits) -> None:
     """Limits are α v T, β δ and v/F₀; α δ is listed only where it differs from β δ."""
     assert [(number, round(least, 9)) for least, number, _words in shortest_of(result)] == [
-        (1, 50e-6), (2, 75e-6), (6, 250e-6),
-    ]  # fmt: skip
+        (1, 50e-6),
+        (2, 75e-6),
+        (6, 250e-6),
+    ]
     other = limits(Sinusoid(5e-5, 1e-3), result.device, law="A", time_samples=8.0)
     assert [(number, round(least, 9)) for least, number, _words in shortest_of(other)] == [
-        (2, 75e-6), (1, 80e-6), (3, 120e-6), (6, 250e-6),
-    ]  # fmt: skip
+        (2, 75e-6),
+        (1, 80e-6),
+        (3, 120e-6),
+        (6, 250e-6),
+    ]
 
 
 def test_picture_shows_waves_forces_and_limits(result: Limits) -> None:
@@ -56,9 +65,10 @@ def test_picture_shows_waves_forces_and_limits(result: Limits) -> None:
         scale = 1e3 if axes.get_ylabel() == "force [mN]" else 1.0
         points = {
             (round(float(x), 9), round(float(y), 9))
-            for line in axes.lines if line.get_marker() == "o"
+            for line in axes.lines
+            if line.get_marker() == "o"
             for x, y in zip(*line.get_data(), strict=True)
-        }  # fmt: skip
+        }
         expected = zip([1.0, 0.2], values, strict=True)
         assert points == {(x, round(y * scale, 9)) for x, y in expected}
     dashed = {

@@ -83,9 +83,7 @@ def test_json_of_panels_cannot_close_a_script_element(rendered: tuple[str, Figur
     assert "<" not in text
     left, right = json.loads(text)
     assert left["series"][0]["x"] == {"from": 0, "to": 2, "count": 9}
-    assert left["series"][1] == {
-        "name": HOSTILE, "law": "A", "x": [0, 0.3, 2], "y": [0, None, 5],
-    }  # fmt: skip
+    assert left["series"][1] == {"name": HOSTILE, "law": "A", "x": [0, 0.3, 2], "y": [0, None, 5]}
     assert left["x"]["scale"] == "linear"
     assert len(right["field"]["values"]) % right["field"]["columns"] == 0
 

@@ -25,9 +25,13 @@ def result() -> asp.Comparison:
 def test_every_picture_has_axes_with_units(result: asp.Comparison) -> None:
     surface = Surface(TEXTURE, "A", max_depth=0.3e-3)
     for figure in (
-        plot(result), plot(surface), plot(TEXTURE),
-        merit_figure(result), gain_figure(result), spectrum_figure(TEXTURE, result.device),
-    ):  # fmt: skip
+        plot(result),
+        plot(surface),
+        plot(TEXTURE),
+        merit_figure(result),
+        gain_figure(result),
+        spectrum_figure(TEXTURE, result.device),
+    ):
         labels = [axes.get_xlabel() + axes.get_ylabel() for axes in figure.axes]
         labels += [axes.get_ylabel() for part in figure.subfigs for axes in part.axes]
         assert any("[" in label or "strength" in label for label in labels)

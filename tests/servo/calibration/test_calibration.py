@@ -74,8 +74,11 @@ def test_parameters_of_random_devices_are_recovered(
             calibration.axes, device.mass, device.damping, strict=True
         ):
             dynamics = axis_calibration.dynamics
-            pairs = (dynamics.mass, mass), (dynamics.damping, damping), (
-                dynamics.friction, device.friction)  # fmt: skip
+            pairs = (
+                (dynamics.mass, mass),
+                (dynamics.damping, damping),
+                (dynamics.friction, device.friction),
+            )
             for estimate, true in pairs:
                 assert abs(estimate.value - true) < 4.0 * estimate.uncertainty
             assert dynamics.mass.value == pytest.approx(mass, rel=0.02)
@@ -174,8 +177,9 @@ def test_oscillation_is_a_limit_cycle_unless_it_decays(growth: float, cycles: bo
 
 def make_excitation(kind: float, samples: int, **more: float) -> Excitation:
     nan = math.nan
-    default = Excitation(1, kind, 2, 30.0, 0.0, 1.0, 1e3, nan, nan, nan, 0.0, 0.0, 0.0, 0.0, 5.0,
-                       1e-3, samples)  # fmt: skip
+    default = Excitation(
+        1, kind, 2, 30.0, 0.0, 1.0, 1e3, nan, nan, nan, 0.0, 0.0, 0.0, 0.0, 5.0, 1e-3, samples
+    )
     return default._replace(**more)
 
 
@@ -313,10 +317,17 @@ def axis_calibration(
 
 
 CALIBRATION = Calibration(
-    Estimate(1000.0, 0.01), Estimate(3e-5, 1e-9), Estimate(2e-6, 1e-7), DelayEstimate(2, ()), 1.0,
-    (axis_calibration("x", 812.3456, 830.0, 0.5), axis_calibration("y", 640.0, 655.0, 0.4),
-     axis_calibration("z", 700.0, None, 0.6)),
-)  # fmt: skip
+    Estimate(1000.0, 0.01),
+    Estimate(3e-5, 1e-9),
+    Estimate(2e-6, 1e-7),
+    DelayEstimate(2, ()),
+    1.0,
+    (
+        axis_calibration("x", 812.3456, 830.0, 0.5),
+        axis_calibration("y", 640.0, 655.0, 0.4),
+        axis_calibration("z", 700.0, None, 0.6),
+    ),
+)
 
 
 def test_calibration_file_is_a_device_for_comparisons(tmp_path: Path) -> None:
@@ -352,9 +363,12 @@ def test_device_file_round_trip(name: str, tmp_path: Path) -> None:
 
 def test_uncertain_values_are_not_written() -> None:
     uncertain = dataclasses.replace(
-        CALIBRATION, delay=DelayEstimate(2, (1,)), position_step=None, noise=Estimate(0.0, 0.0),
+        CALIBRATION,
+        delay=DelayEstimate(2, (1,)),
+        position_step=None,
+        noise=Estimate(0.0, 0.0),
         axes=(axis_calibration("x", 0.0, 50.0, 0.015), *CALIBRATION.axes[1:]),
-    )  # fmt: skip
+    )
     device = measured_device(load_device("touch"), uncertain, "mine", "2026-11-23", simulated=True)
     absent = {"delay_samples", "position_resolution", "damping", "max_stiffness"}
     assert not absent & device.data.keys()

@@ -121,8 +121,9 @@ def test_random_libdhd_failures_leave_zero_force(dhd: Any) -> None:
         sample, fault = int(rng.integers(0, 10)), (READ_ONCE, WRITE_ONCE)[rng.integers(0, 2)]
         dhd.fake_reset(fault, sample)
         dhd.fake_place(0.0, 0.0, -rng.uniform(0.5e-3, 3e-3))
-        loop = DriverLoop(driver, Servo(1e-3, max_force=3.0), NO_RAMP, 1.0, LoopMemory().block(),
-                    no_clock())  # fmt: skip
+        loop = DriverLoop(
+            driver, Servo(1e-3, max_force=3.0), NO_RAMP, 1.0, LoopMemory().block(), no_clock()
+        )
         cause, _code = loop.run(program, driver.open(), 40)
         assert cause is EndReason.DEVICE
         assert [dhd.fake_force(axis) for axis in range(3)] == [0.0, 0.0, 0.0]

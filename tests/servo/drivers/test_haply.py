@@ -81,8 +81,13 @@ def test_failure_zeroes_the_force_and_a_restart_works(start: Start, fault: str) 
         assert np.abs(rows[:-1, 7:10]).max(axis=1).all()
         if fault != "closed":  # a closed service receives no last force
             assert service.last_force() == ZERO
-    messages = {"mute": "older than 200 ms", "unplugged": "unplugged?", "closed": "is lost",
-            "twice": "without a request", "no JSON": "another format"}  # fmt: skip
+    messages = {
+        "mute": "older than 200 ms",
+        "unplugged": "unplugged?",
+        "closed": "is lost",
+        "twice": "without a request",
+        "no JSON": "another format",
+    }
     assert messages.get(fault, "") in driver.describe_error(code)
     with start():
         assert run(tolerant_driver(), 5, system_clock)[0] is EndReason.FINISHED

@@ -81,8 +81,14 @@ def test_loop_follows_an_ellipse_on_its_own(pointer: PointerHand) -> None:
     assert np.ptp(points[:, 0]) == pytest.approx(4e-3 * gain, rel=0.01)
 
 
-@pytest.mark.parametrize("arguments", [{"target": (np.nan, 0, 0)}, {"target": (0, 0)},
-                                   {"target": (0, 0, 0), "angular_velocity": np.inf}])  # fmt: skip
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {"target": (np.nan, 0, 0)},
+        {"target": (0, 0)},
+        {"target": (0, 0, 0), "angular_velocity": np.inf},
+    ],
+)
 def test_invalid_request_is_rejected_and_changes_nothing(
     pointer: PointerHand, arguments: Any
 ) -> None:

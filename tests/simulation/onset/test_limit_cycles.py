@@ -29,9 +29,15 @@ def test_damping_behind_a_resonance_does_not_damp_the_handle() -> None:
     """The hand's damper acts on the far mass: counting it would make W violate the delay rule."""
     plant, servo = Cartesian(0.1, 1.0, Resonance(100.0, 0.02)), Servo(1e-3, delay=1)
     onset = find_onset(
-        WALL, plant, PRESS, servo, Stationary((0.0, 0.0, 0.0)), start=(0.0, 0.0, 1e-3), starts=1,
+        WALL,
+        plant,
+        PRESS,
+        servo,
+        Stationary((0.0, 0.0, 0.0)),
+        start=(0.0, 0.0, 1e-3),
+        starts=1,
         duration=1.0,
-    )  # fmt: skip
+    )
     prediction = predict(WALL, plant, PRESS, servo, onset)
     assert prediction.damping == pytest.approx(1.0)
     assert not prediction.violates_delay_rule
@@ -60,9 +66,15 @@ def test_cycle_with_unequal_last_quarters_is_a_cycle() -> None:
 def test_handle_without_contact_has_no_limit_cycle() -> None:
     """It swings on the hand's spring in the air, whatever the stiffness of the wall."""
     onset = find_onset(
-        WALL, Cartesian(0.05, 0.01), SpringHand(100.0), Servo(2.5e-4), Stationary((0.0, 0.0, 0.02)),
-        start=(0.0, 0.0, 0.025), starts=1, duration=0.5,
-    )  # fmt: skip
+        WALL,
+        Cartesian(0.05, 0.01),
+        SpringHand(100.0),
+        Servo(2.5e-4),
+        Stationary((0.0, 0.0, 0.02)),
+        start=(0.0, 0.0, 0.025),
+        starts=1,
+        duration=0.5,
+    )
     assert math.isinf(onset.cycling)
 
 
@@ -75,9 +87,12 @@ def test_loop_that_never_cycles_violates_no_rule() -> None:
 
 def test_search_reaches_the_highest_stiffness() -> None:
     loop = (
-        WALL, Cartesian(0.1, 1.0, Resonance(100.0, 0.02)), PRESS, Servo(1e-3, delay=1),
+        WALL,
+        Cartesian(0.1, 1.0, Resonance(100.0, 0.02)),
+        PRESS,
+        Servo(1e-3, delay=1),
         Stationary((0.0, 0.0, 0.0)),
-    )  # fmt: skip
+    )
     options = {"start": (0.0, 0.0, 1e-3), "starts": 1, "duration": 1.0}
     onset = find_onset(*loop, **options)
     limited = find_onset(*loop, highest=1.2 * onset.cycling, **options)

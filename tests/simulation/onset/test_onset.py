@@ -73,9 +73,17 @@ def test_wall_onset_agrees_with_eigenvalues(delay: int) -> None:
     """A wall that is left only by rebounding has the linear threshold, approached from below."""
     servo = replace(SERVO, delay=delay)
     onset = find_onset(
-        WALL, PLANT, HAND, servo, REST, start=(0.0, 0.0, -1e-3), duration=1.5, starts=2,
-        tolerance=0.01, lowest=100.0,
-    )  # fmt: skip
+        WALL,
+        PLANT,
+        HAND,
+        servo,
+        REST,
+        start=(0.0, 0.0, -1e-3),
+        duration=1.5,
+        starts=2,
+        tolerance=0.01,
+        lowest=100.0,
+    )
     assert onset.quiet < onset.cycling <= onset.quiet * 1.01 * (1.0 + 1e-12)
     assert 0.97 * stability_threshold(delay) < onset.value < 1.03 * stability_threshold(delay)
     assert (onset.law, onset.delay, onset.starts) == ("W", delay, 2)
@@ -196,9 +204,19 @@ def test_encoder_steps_can_violate_the_delay_rule() -> None:
     for step, threshold in ((0.0, 15e-3), (15e-6, 15e-3), (15e-6, None)):
         servo = Servo(1e-4, position_resolution=step)
         onset = find_onset(
-            surface, plant, hand, servo, REST, start=start, duration=0.5, starts=24,
-            tolerance=0.1, lowest=18_221.0, highest=18.5e3, threshold=threshold,
-        )  # fmt: skip
+            surface,
+            plant,
+            hand,
+            servo,
+            REST,
+            start=start,
+            duration=0.5,
+            starts=24,
+            tolerance=0.1,
+            lowest=18_221.0,
+            highest=18.5e3,
+            threshold=threshold,
+        )
         predictions[step, threshold] = predict(surface, plant, hand, servo, onset)
     for quiet in (predictions[0.0, 15e-3], predictions[15e-6, None]):
         assert math.isinf(quiet.onset.cycling)
@@ -219,8 +237,13 @@ def test_search_from_the_predicted_onset_finds_the_same_onset(seed: int) -> None
     start = (0.0, 0.0, texture.amplitude + 1e-3)
     near = expected_onset(surface, plant, HAND, servo, start)
     assert near is not None
-    options: dict[str, Any] = {"start": start, "duration": 0.4, "starts": 2, "tolerance": 0.05,
-                            "lowest": 20.0}  # fmt: skip
+    options: dict[str, Any] = {
+        "start": start,
+        "duration": 0.4,
+        "starts": 2,
+        "tolerance": 0.05,
+        "lowest": 20.0,
+    }
     expected = find_onset(surface, plant, HAND, servo, REST, **options)
     assert find_onset(surface, plant, HAND, servo, REST, near=near, **options) == expected
 

@@ -53,9 +53,8 @@ def apply_rule(
 
 
 def make_segment(
-    spread: float = 0.0, supplied: float = 0.0, taken: float = 0.0, stop: str = "",
-    samples: int = 0,
-) -> SegmentStatistics:  # fmt: skip
+    spread: float = 0.0, supplied: float = 0.0, taken: float = 0.0, stop: str = "", samples: int = 0
+) -> SegmentStatistics:
     """Return statistics of a segment, with the same energies one sample earlier."""
     energies = supplied, taken
     return SegmentStatistics(samples, StopReason(stop), spread, energies, energies)

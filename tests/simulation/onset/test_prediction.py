@@ -169,8 +169,9 @@ def test_pantograph_brakes_count_up_to_the_highest_contact() -> None:
 def test_pantograph_damping_is_the_least_in_the_box() -> None:
     plant = Pantograph(centre=(0.0375, 0.1))
     in_box = plant.min_damping((-0.03, 0.0, -0.03), (0.03, 0.0, 0.0))
-    corners = [plant.min_damping((x, 0.0, -0.03), (x, 0.0, -0.03), None, -0.03)
-               for x in (-0.03, 0.03)]  # fmt: skip
+    corners = [
+        plant.min_damping((x, 0.0, -0.03), (x, 0.0, -0.03), None, -0.03) for x in (-0.03, 0.03)
+    ]
     assert in_box <= min(corners) < max(corners)
     assert plant.min_damping((-0.03, 0.0, -0.03), (0.03, 0.0, 0.0), HAND) == in_box
     # Corners outside the workspace are ignored.
@@ -191,16 +192,23 @@ def test_brakes_act_up_to_the_top_of_the_texture() -> None:
 @pytest.mark.parametrize(
     ("q", "plus", "delay", "damping", "rule"),
     [
-        (3.0, 2.0, 0, 5.0, 5.0 / PERIOD), (3.0, 2.0, 2, 5.0, 5.0 / PERIOD / 7.0),
+        (3.0, 2.0, 0, 5.0, 5.0 / PERIOD),
+        (3.0, 2.0, 2, 5.0, 5.0 / PERIOD / 7.0),
         (math.inf, 2.0, 2, 5.0, 5.0 / PERIOD / 5.0),  # below a medial axis q⁺ replaces q
-        (math.inf, 2.0, 0, 5.0, 5.0 / PERIOD), (3.0, 2.0, 2, 0.0, None), (0.0, 0.0, 2, 5.0, None),
+        (math.inf, 2.0, 0, 5.0, 5.0 / PERIOD),
+        (3.0, 2.0, 2, 0.0, None),
+        (0.0, 0.0, 2, 5.0, None),
         (1e-4, 0.0, 1, 5.0, 5e7),
     ],
-)  # fmt: skip
+)
 def test_expected_onset_is_the_limit_of_the_delay_rule(
-    q: float, plus: float, delay: int, damping: float, rule: float | None,
+    q: float,
+    plus: float,
+    delay: int,
+    damping: float,
+    rule: float | None,
     monkeypatch: pytest.MonkeyPatch,
-) -> None:  # fmt: skip
+) -> None:
     """For a wave below z = 0.16 m, with the damping at the handle's start."""
     calls: list[object] = []
 

@@ -22,9 +22,14 @@ from asperity.textures.kinds.sinusoid import Sinusoid
 
 WAVE = Sinusoid(amplitude=0.2e-3, period=2e-3, phase=0.3, direction=(2.0, 1.0))
 FULL = Servo(
-    1e-4, delay=1, position_resolution=5e-6, force_resolution=5e-3, max_force=3.0,
-    virtual_damping=0.2, velocity_share=0.3,
-)  # fmt: skip
+    1e-4,
+    delay=1,
+    position_resolution=5e-6,
+    force_resolution=5e-3,
+    max_force=3.0,
+    virtual_damping=0.2,
+    velocity_share=0.3,
+)
 HAND = SpringHand([300.0, 200.0, 250.0], 2.0, mass=0.02, force=(0.1, -0.2, -0.3))
 STROKES = Strokes((0.0, 0.0, -1e-3), (7e-3, 3e-3, -1e-3), speed=0.05, count=9)
 COUPLED = [[2.0, 0.5, 0.1], [0.5, 1.0, -0.2], [0.1, -0.2, 0.7]]
@@ -107,9 +112,11 @@ def test_body_slips_when_the_push_exceeds_dry_friction() -> None:
 def test_friction_holds_a_body_of_anisotropic_mass(kind: str) -> None:
     """Light along one axis, heavy along another: it neither creeps nor vibrates."""
     plant = Cartesian(
-        (0.01, 0.05, 0.5), COUPLED if kind == "coupled" else 0.0,
-        Resonance(300.0) if kind == "mode" else None, friction=0.5,
-    )  # fmt: skip
+        (0.01, 0.05, 0.5),
+        COUPLED if kind == "coupled" else 0.0,
+        Resonance(300.0) if kind == "mode" else None,
+        friction=0.5,
+    )
     # A mass swinging on the spring of a mode pulls with up to twice the push.
     share = 0.5 if kind == "mode" else 1.0
     push = SpringHand(force=(0.2 * share, 0.3 * share, 0.3 * share))
@@ -125,9 +132,14 @@ def test_friction_holds_a_body_of_anisotropic_mass(kind: str) -> None:
 def test_sliding_body_stops_when_friction_has_dissipated_its_energy() -> None:
     surface, plant = Surface(WAVE, "W", 500.0), Cartesian(0.05, friction=0.5)
     run = simulate(
-        surface, plant, SpringHand(), Servo(1e-4), Stationary((0.0, 0.0, 0.1)), 0.2,
+        surface,
+        plant,
+        SpringHand(),
+        Servo(1e-4),
+        Stationary((0.0, 0.0, 0.1)),
+        0.2,
         velocity=(0.6, 0.8, 0.0),
-    )  # fmt: skip
+    )
     assert np.abs(run.state[3:6]).max() < 1e-15
     distance = float(np.hypot(run.state[0], run.state[1]))
     assert distance == pytest.approx(0.5 * 0.05 / 0.5, rel=1e-3)

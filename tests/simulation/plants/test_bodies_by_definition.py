@@ -83,9 +83,14 @@ def hand_energy(hand: Hand, stretch: FloatArray) -> float:
 def integrate_motion(accelerate: Any, x: FloatArray, span: float = PERIOD) -> FloatArray:
     """Return the final state, loss and work of the hand; ``accelerate`` gives (x', loss, work)."""
     solution = solve_ivp(
-        lambda t, y: np.append(*accelerate(t, y[:-2])), (0.0, span), [*x, 0.0, 0.0], "DOP853",
-        rtol=1e-12, atol=1e-14, max_step=span / 50.0,
-    )  # fmt: skip
+        lambda t, y: np.append(*accelerate(t, y[:-2])),
+        (0.0, span),
+        [*x, 0.0, 0.0],
+        "DOP853",
+        rtol=1e-12,
+        atol=1e-14,
+        max_step=span / 50.0,
+    )
     return np.asarray(solution.y[:, -1])
 
 
@@ -264,8 +269,11 @@ def test_stored_energy_sums_masses_and_springs(kind: str) -> None:
 def test_dry_friction_opposes_and_stops_the_motion(kind: str, limit: float, linked: Any) -> None:
     """A limit that no force exceeds stops the handle within the sample; a smaller one slows it."""
     module, smooth, hand, _equations = CASES[kind]
-    parameters = {name: getattr(smooth, name) for name in ("mass", "damping", "resonance")
-             if hasattr(smooth, name)}  # fmt: skip
+    parameters = {
+        name: getattr(smooth, name)
+        for name in ("mass", "damping", "resonance")
+        if hasattr(smooth, name)
+    }
     if isinstance(smooth, Pantograph):
         plant: Any = Pantograph(smooth.linkage, smooth.masses, centre=smooth.centre, friction=limit)
         smooth = Pantograph(smooth.linkage, smooth.masses, centre=smooth.centre)
@@ -383,9 +391,11 @@ def test_substeps_are_a_hundredth_of_a_time_constant() -> None:
             assert substep_count(friction, rate, 1e-3) == max(least, count)
     record = linkage_record(HEAVY)
     for vx, vz, rate, expected in (
-        (0.0, 0.0, 0.0, 1), (0.0, 0.0, 7.3, 8), (0.3, -0.4, 7.3, 8 + int(0.3 + 2.0 / 0.063)),
+        (0.0, 0.0, 0.0, 1),
+        (0.0, 0.0, 7.3, 8),
+        (0.3, -0.4, 7.3, 8 + int(0.3 + 2.0 / 0.063)),
         (1e9, 0.0, 0.0, 1_000_000),
-    ):  # fmt: skip
+    ):
         assert five_bar.linkage_step_count(vx, vz, rate, 1.0, record) == expected
 
 

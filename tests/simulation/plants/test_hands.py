@@ -24,11 +24,12 @@ from asperity.textures.kinds.sinusoid import Sinusoid
 
 WAVE = Sinusoid(amplitude=0.3e-3, period=2e-3, phase=0.3)
 JOB: dict[str, Any] = {
-    "surface": Surface(WAVE, "W", 500.0), "plant": Cartesian(0.05, 1.0),
+    "surface": Surface(WAVE, "W", 500.0),
+    "plant": Cartesian(0.05, 1.0),
     "servo": Servo(1e-3, delay=1),
     "motion": Strokes((0.0, 0.0, -1e-3), (8e-3, 3e-3, -1e-3), 0.08, 3),
     "duration": 0.4,
-}  # fmt: skip
+}
 
 
 def run_of(**changes: Any) -> Run:
@@ -81,10 +82,14 @@ def test_band_is_in_static_equilibrium_with_the_wall() -> None:
 def test_band_force_is_nonlinear_in_direction() -> None:
     """Displaced sideways by a similar length, the force follows the sides of the triangle."""
     run = run_of(
-        hand=BandHand(damping=0.0), motion=Stationary((0.0, 0.0, 0.0)), plant=Cartesian(1.0),
-        start=(0.06, 0.0, 0.0), duration=1e-3, surface=Surface(WAVE, "W", 1e-6),
+        hand=BandHand(damping=0.0),
+        motion=Stationary((0.0, 0.0, 0.0)),
+        plant=Cartesian(1.0),
+        start=(0.06, 0.0, 0.0),
+        duration=1e-3,
+        surface=Surface(WAVE, "W", 1e-6),
         servo=Servo(1e-3),
-    )  # fmt: skip
+    )
     pull = 200.0 * (0.1 - 0.065)  # sides of 0.06, 0.08 and 0.1 m
     np.testing.assert_allclose(
         run.state[3:6], 1e-3 * pull * np.array([-0.6, 0.0, -0.8]), rtol=1e-4, atol=1e-12
@@ -99,9 +104,12 @@ def test_energy_ledger_of_a_mass_on_a_band_closes(
 ) -> None:
     coupled = [[0.5, 0.1, 0.0], [0.1, 0.4, 0.0], [0.0, 0.0, 0.3]]
     run = run_of(
-        hand=band, plant=Cartesian((0.05, 0.04, 0.06), coupled, friction=friction),
-        servo=Servo(period, delay=1), start=(1e-3, 2e-3, 3e-3), surface=Surface(WAVE, "C", 200.0),
-    )  # fmt: skip
+        hand=band,
+        plant=Cartesian((0.05, 0.04, 0.06), coupled, friction=friction),
+        servo=Servo(period, delay=1),
+        start=(1e-3, 2e-3, 3e-3),
+        surface=Surface(WAVE, "C", 200.0),
+    )
     assert not run.stop_message
     assert abs(run.ledger.closure) < 1e-9 * run.ledger.exchanged
     assert (run.ledger.friction < 0.0) == (friction > 0.0)

@@ -149,9 +149,15 @@ def run_of(
     surface = Surface(WAVE, letter, 600.0, max_depth=0.3e-3)
     servo = Servo(period, delay=1, position_resolution=15e-6)
     return simulate(
-        surface, plant, hand, servo, STROKES, duration, start=(0.0, 0.0, 2e-3),
+        surface,
+        plant,
+        hand,
+        servo,
+        STROKES,
+        duration,
+        start=(0.0, 0.0, 2e-3),
         velocity=(0.1, 0.0, -0.1),
-    )  # fmt: skip
+    )
 
 
 SLACK = BandHand(stiffness=400.0, tension=0.2)
@@ -252,9 +258,15 @@ def test_inside_only_brakes_act_in_contact_only() -> None:
     for inside_only in (True, False):
         plant = Pantograph(inside_only=inside_only)
         run = simulate(
-            surface, plant, SpringHand(), Servo(1e-4), motion, 0.05, start=(0.0, 0.0, 0.5e-3),
+            surface,
+            plant,
+            SpringHand(),
+            Servo(1e-4),
+            motion,
+            0.05,
+            start=(0.0, 0.0, 0.5e-3),
             velocity=(0.0, 0.0, -0.1),
-        )  # fmt: skip
+        )
         lost = run.energies["lost"]
         outside = run.position[:, 2] > 0.0
         contact = int(np.argmin(outside))
@@ -272,9 +284,14 @@ def test_brakes_of_a_textured_law_act_below_the_texture() -> None:
     losses = {}
     for letter in "WC":
         run = simulate(
-            Surface(WAVE, letter, 600.0), Pantograph(), SpringHand(), Servo(1e-4),
-            Stationary((0.42e-3, 0.0, 0.5 * crest)), 1e-3, velocity=(0.0, 0.0, -0.01),
-        )  # fmt: skip
+            Surface(WAVE, letter, 600.0),
+            Pantograph(),
+            SpringHand(),
+            Servo(1e-4),
+            Stationary((0.42e-3, 0.0, 0.5 * crest)),
+            1e-3,
+            velocity=(0.0, 0.0, -0.01),
+        )
         assert run.position[:, 2].min() > 0.0
         losses[letter] = run.ledger.dissipated
     assert losses["W"] == 0.0

@@ -79,9 +79,14 @@ def test_at_most_ten_thousand_substeps_are_allowed() -> None:
 @pytest.mark.parametrize("speed", [1e9, 1e30])
 def test_pantograph_at_extreme_speed_ends_the_run(speed: float) -> None:
     run = simulate(
-        Surface(Sinusoid(0.4e-3, 1e-3), "W", 800.0), Pantograph(), SpringHand(100.0), MILLISECOND,
-        Stationary((0.0, 0.0, 0.0)), 0.1, velocity=(speed, 0.0, 0.0),
-    )  # fmt: skip
+        Surface(Sinusoid(0.4e-3, 1e-3), "W", 800.0),
+        Pantograph(),
+        SpringHand(100.0),
+        MILLISECOND,
+        Stationary((0.0, 0.0, 0.0)),
+        0.1,
+        velocity=(speed, 0.0, 0.0),
+    )
     assert run.stop_message.startswith("left the workspace")
     assert run.samples == 0
     assert (

@@ -24,9 +24,7 @@ def random_field(axes: int, border: int) -> tuple[FieldGrid, SingleArray, FieldA
     """Return a grid of random potentials in columns of random ends, some of them empty."""
     rng = np.random.default_rng(10 * axes + border)
     cells = (7, 5)[:axes]
-    grid = FieldGrid(
-        STEPS[:axes], cells, np.array([2e-5, -1e-5]), 9, 0.8e-5, -3e-5, border,
-    )  # fmt: skip
+    grid = FieldGrid(STEPS[:axes], cells, np.array([2e-5, -1e-5]), 9, 0.8e-5, -3e-5, border)
     dense = rng.uniform(1e-10, 2e-10, grid.node_counts).astype(np.float32)
     levels = np.arange(grid.levels)
     plane = grid.node_counts[:-1]

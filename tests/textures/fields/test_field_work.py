@@ -36,9 +36,11 @@ def node_coordinates(points: FloatArray, field: FieldArguments) -> FloatArray:
 
 
 def edge_work(
-    force: Callable[[FloatArray], FloatArray], start: FloatArray, end: FloatArray,
+    force: Callable[[FloatArray], FloatArray],
+    start: FloatArray,
+    end: FloatArray,
     field: FieldArguments,
-) -> FloatArray:  # fmt: skip
+) -> FloatArray:
     """Return the work along edges (n, 3), each split at the knots that it crosses."""
     a, b = node_coordinates(start, field), node_coordinates(end, field)
     knots = np.floor(np.minimum(a, b) + 0.5)[..., None] + 0.5 + np.arange(MAX_CROSSINGS)

@@ -46,10 +46,12 @@ def baked(name: str) -> PotentialField:
         "cube": cube,
         "torus": lambda: to_body(trimesh.creation.torus(3 * MM, 1 * MM)),
         "tetrahedron": lambda: to_body(
-            trimesh.Trimesh(4 * MM * np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]),
-                            [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])
+            trimesh.Trimesh(
+                4 * MM * np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]),
+                [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]],
+            )
         ),
-    }  # fmt: skip
+    }
     return bake_body(makers[name](), 0.6 * MM, resolution=0.15 * MM)
 
 
@@ -312,9 +314,11 @@ def shipped_meshes() -> list[Path]:
     """Return meshes that ship with installed packages."""
     roots = [Path(root) for root in sys.path if root.endswith("site-packages")]
     found = (
-        path for root in roots for path in root.rglob("*")
+        path
+        for root in roots
+        for path in root.rglob("*")
         if path.suffix.lower() in (".stl", ".ply", ".obj", ".glb") and path.stat().st_size < 2e6
-    )  # fmt: skip
+    )
     return sorted(islice(found, 200))
 
 

@@ -86,9 +86,12 @@ def test_jacobian_against_differences(name: str, max_gain: float | None) -> None
     points, step = probes(surface, 800), 1e-9
     points[:100, 2] = field_of(surface).grid.floor - 3e-5
     numeric = np.stack(
-        [(surface.force(points + step * v) - surface.force(points - step * v)) / (2 * step)
-         for v in np.eye(3)], axis=-1,
-    )  # fmt: skip
+        [
+            (surface.force(points + step * v) - surface.force(points - step * v)) / (2 * step)
+            for v in np.eye(3)
+        ],
+        axis=-1,
+    )
     error = np.linalg.norm(numeric - surface.jacobian(points), axis=(1, 2)) / K
     # Pairs that straddle a knot have two second derivatives.
     assert np.quantile(error, 0.99) < 1e-5

@@ -125,9 +125,12 @@ def test_smoothed_fields_keep_their_bounds_and_stay_inside_their_grid(name: str)
         points[:, 2] = top - rng.uniform(0.0, 2.0, len(points)) * field.grid.level_spacing
         step = 1e-9
         numeric = np.stack(
-            [(surface.force(points + step * v) - surface.force(points - step * v)) / (2 * step)
-             for v in np.eye(3)], axis=-1,
-        )  # fmt: skip
+            [
+                (surface.force(points + step * v) - surface.force(points - step * v)) / (2 * step)
+                for v in np.eye(3)
+            ],
+            axis=-1,
+        )
         error = np.linalg.norm(numeric - surface.jacobian(points), axis=(1, 2)) / K
         assert np.quantile(error, 0.99) < 1e-5
         gains.append(field.gain.upper)

@@ -114,10 +114,14 @@ def test_closed_form_is_twice_differentiable():
     step = 1e-3 * grating.edge
     ends = 0.4e-3 + np.array([-0.5, 0.5]) * grating.edge
     second = [
-        (grating.closed_form(ends + (i + 1) * step) - 2 * grating.closed_form(ends + i * step)
-         + grating.closed_form(ends + (i - 1) * step)) / step**2
+        (
+            grating.closed_form(ends + (i + 1) * step)
+            - 2 * grating.closed_form(ends + i * step)
+            + grating.closed_form(ends + (i - 1) * step)
+        )
+        / step**2
         for i in (-3, -1, 0, 1, 3)
-    ]  # fmt: skip
+    ]
     assert np.abs(second).max() < 0.03 * 2 * np.pi * grating.ridge_height / grating.edge**2
 
 

@@ -161,8 +161,9 @@ def test_spline_error_for_nodes_per_cut_off(nodes: int, error: float):
 )
 def test_spectrum_is_isotropic(hurst: float, seed: int, rolloff: float, aspect: int):
     """The power depends only on |q|, along x, along y and diagonally, for any period."""
-    noise = Noise(1e-5, (3e-3 * aspect, 3e-3), hurst=hurst, cutoff=0.3e-3,
-                  rolloff=rolloff * 0.3e-3, seed=seed)  # fmt: skip
+    noise = Noise(
+        1e-5, (3e-3 * aspect, 3e-3), hurst=hurst, cutoff=0.3e-3, rolloff=rolloff * 0.3e-3, seed=seed
+    )
     qx, qy, p = power_spectrum(noise)
     length = np.hypot(qx, qy) * 3e-3 / (2.0 * np.pi)
     for ring in (5.0, 10.0):  # |(3, 4)| = |(5, 0)|, |(6, 8)| = |(10, 0)|
@@ -206,8 +207,16 @@ def test_description_has_every_parameter():
     noise = Noise(1e-5, (5e-3, 4e-3), hurst=0.5, cutoff=0.4e-3, seed=9)
     description = noise.describe()
     assert description["kind"] == "noise"
-    expected = {"rms": 1e-5, "size": [5e-3, 4e-3], "hurst": 0.5, "rolloff": 1e-3, "cutoff": 0.4e-3,
-              "seed": 9, "points": [100, 80], "periodic": True}  # fmt: skip
+    expected = {
+        "rms": 1e-5,
+        "size": [5e-3, 4e-3],
+        "hurst": 0.5,
+        "rolloff": 1e-3,
+        "cutoff": 0.4e-3,
+        "seed": 9,
+        "points": [100, 80],
+        "periodic": True,
+    }
     assert {name: description[name] for name in expected} == expected
     assert NoiseProfile(1e-5, 5e-3, seed=9).describe()["seed"] == 9
     assert NoiseProfile(1e-5, 5e-3).describe()["kind"] == "noise-profile"
@@ -253,8 +262,13 @@ def test_invalid_arguments_are_refused(argument: str, changed: dict[str, Any]):
     assert caught.value.argument == argument
     if not isinstance(changed.get("size"), tuple):
         with pytest.raises(ParameterError, match=f"^{argument} "):
-            NoiseProfile(**({"rms": 1e-5, "size": 10e-3} | changed | (
-                {"size": 1e6} if changed.get("size") == 100.0 else {})))  # fmt: skip
+            NoiseProfile(
+                **(
+                    {"rms": 1e-5, "size": 10e-3}
+                    | changed
+                    | ({"size": 1e6} if changed.get("size") == 100.0 else {})
+                )
+            )
 
 
 def test_aspect_ratio_of_a_map_is_limited():

@@ -114,9 +114,11 @@ def test_unique_minimum_is_the_closest_point() -> None:
             i = math.floor((best[1] - record.y0) * record.iy)
             wide = rng.integers(1, 9, 4)
             part = (
-                max(j - wide[0], 0), min(j + wide[1], nx - 1),
-                max(i - wide[2], 0), min(i + wide[3], ny - 1),
-            )  # fmt: skip
+                max(j - wide[0], 0),
+                min(j + wide[1], nx - 1),
+                max(i - wide[2], 0),
+                min(i + wide[3], ny - 1),
+            )
             west, east, south, north = part
             phi = min_squared_distances(texture, probe)[south : north + 1, west : east + 1]
             inside = west <= j <= east and south <= i <= north
