@@ -61,3 +61,40 @@ def test_damaged_field_is_refused(tmp_path: Path, content: bytes) -> None:
     path.write_bytes(content)
     result = call("compare", path)
     assert "bad.field" in str(result.exception)
+
+
+def test_thin_parts_are_drawn_in_reports(tmp_path: Path) -> None:
+    """Of the bake and a comparison of its file; a thick body has no such picture."""
+    mesh, path, report = (tmp_path / name for name in ("box.stl", "box.field", "box.html"))
+    trimesh.creation.box((8.0, 8.0, 0.8)).export(mesh)
+    options = ["--unit", "mm", "--resolution", "0.2mm", "--max-depth", "0.3mm"]
+    waist = trimesh.load(mesh).subdivide().subdivide()
+    waist.vertices[:, 2] *= 0.5 + 0.5 * (abs(waist.vertices[:, 0]) > 2.5)
+    waist.export(mesh)
+    made = call("bake", mesh, "--body", *options, "-o", path, "--html", report)
+    assert made.exit_code == 0, made.output
+    assert "Thin parts" in report.read_text()
+    result = call("compare", path, "--html", report, "--force")
+    assert result.exit_code == 0, result.output
+    assert "1 thin parts, the thinnest with a depth of 200" in report.read_text()
+    options[-1] = "0.15mm"
+    call("bake", mesh, "--body", *options, "-o", path, "--html", report, "--force")
+    assert "Thin parts" not in report.read_text()
+
+
+def test_repair_is_an_option(tmp_path: Path) -> None:
+    pytest.importorskip("networkx")
+    mesh, path = tmp_path / "open.stl", tmp_path / "box.field"
+    box = trimesh.creation.box((10.0, 8.0, 6.0))
+    box.update_faces([face != 3 for face in range(12)])
+    box.export(mesh)
+    options = ["--body", "--unit", "mm", "--resolution", "0.5mm", "--max-depth", "0.5mm"]
+    refused = call("bake", mesh, *options, "-o", path)
+    assert "3 open edges, one at (" in str(refused.exception)
+    assert "repair" in str(refused.exception)
+    assert not path.exists()
+    result = call("bake", mesh, *options, "--repair", "-o", path)
+    assert result.exit_code == 0, result.output
+    assert "repaired: 3 open edges" in " ".join(result.output.split())
+    alone = call("bake", SURFACE, "--repair", "-o", path, "--force")
+    assert "--body" in str(alone.exception)

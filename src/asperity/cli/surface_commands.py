@@ -19,6 +19,7 @@ from asperity.cli.options import (
 )
 from asperity.cli.output import Outputs, check_outputs, output_options, progress_bar
 from asperity.core.arguments import MAX_DEPTH
+from asperity.core.errors import ParameterError
 from asperity.laws import SHIPPED_LAW_ARGUMENTS
 
 
@@ -98,10 +99,13 @@ _BAKE = command_arguments("bake")
 @click.argument("surface")
 @click.option("-o", "--output", metavar="PATH", required=True, help="File to write.")
 @click.option("--body", is_flag=True, help="SURFACE is the mesh of a closed body; needs --unit.")
+@click.option(
+    "--repair", is_flag=True, help="With --body, fill open edges and turn triangles of the mesh."
+)
 @argument_options((*_BAKE, MAX_DEPTH, SHIPPED_LAW_ARGUMENTS["continuity"]))
 @plugin_option
 @file_options
-@output_options(html=False)
+@output_options()
 def bake_command(surface: str, output: str, *, body: bool, outputs: Outputs, **values: Any) -> None:
     """Bake law H of SURFACE as a potential field, and write it to a file.
 
@@ -113,12 +117,15 @@ def bake_command(surface: str, output: str, *, body: bool, outputs: Outputs, **v
     from asperity.surface import Surface
     from asperity.textures.fields.field_file import save_field
 
+    if (repair := values.pop("repair")) and not body:
+        raise ParameterError("repair", "requires --body: only a mesh is repaired")
     check_outputs(force=outputs.force, output=output, json=outputs.json)
     with progress_bar("baking the field") as update:
         given = provided_values(values, (MAX_DEPTH, SHIPPED_LAW_ARGUMENTS["continuity"]))
         options = provided_values(values, _BAKE)
         if body:
-            baked = bake_mesh(surface, progress=update, **file_values(values), **given, **options)
+            options |= {"repair": repair, **file_values(values)}
+            baked = bake_mesh(surface, progress=update, **given, **options)
         else:
             texture = load_scene(surface, file_values(values)).texture
             baked = bake(Surface(texture, "H", **given), progress=update, **options)

@@ -68,6 +68,7 @@ _BASIS_TEXT: dict[Basis, str] = {
 # Lengths of maps and profiles, which are not arguments of a kind.
 _LENGTH_NAMES = {"pitch", "cutoff"}
 _OMITTED_NAMES = {"kind", "preparation", "phase", "direction", "phases", "wavevectors"}
+_OMITTED_NAMES |= {"thin_regions", "gain", "one_sided", "accuracy", "grid", "source"}  # of fields
 
 
 # --- cells ----------------------------------------------------------------------------------------

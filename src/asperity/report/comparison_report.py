@@ -23,7 +23,7 @@ from asperity.report.comparison_columns import (
     terminal_sections,
 )
 from asperity.report.device_report import datum_text, device_numbers_table
-from asperity.report.measured_report import measured_sections
+from asperity.report.measured_report import measured_sections, thin_sections
 from asperity.report.page import Cell, Media, Page, Row, Section, Table, TableLayout
 from asperity.report.sentences.alt_text import COMPARISON_FIGURES, comparison_alt_text
 from asperity.report.sentences.number_text import (
@@ -52,6 +52,7 @@ def comparison_page(comparison: Comparison, full: bool = False) -> Page:
             *terminal_sections(comparison, full),
             *law_sections(comparison),
             *_figure_sections(comparison),
+            *thin_sections(comparison.texture),
             *measured_sections(comparison.texture),
             *page.user_sections(Comparison, comparison),
             *page.assumption_sections(

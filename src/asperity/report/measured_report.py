@@ -303,4 +303,17 @@ def field_page(field: PotentialField, path: str) -> page.Page:
         f"q⁺ at most {field.one_sided.upper:.4g}. Valid down to z = {floor}. {field.bytes} bytes.",
         f"Saved: {escape_unprintable(path)}",
     )
-    return page.Page("", "", (), [page.terminal_section(*map(page.Paragraph, texts))])
+    numbers = Section("", [page.Paragraph(text) for text in texts], media=SCREEN)
+    return page.Page("Baked field", "", (), [numbers, *thin_sections(field)])
+
+
+def thin_sections(texture: Texture) -> list[Section]:
+    """Return the picture of the thin parts of a body; none without any."""
+    if texture.thin_map is None:
+        return []
+    from asperity.report.pictures.surface_pictures import thin_parts_figure
+
+    depth = format_quantity(texture.depth_limit, "m")
+    half = format_quantity(texture.thin_regions[0].half_thickness, "m")
+    figure, count = partial(thin_parts_figure, texture, texture.thin_map), len(texture.thin_regions)
+    return [page.figure_section("field.thin", figure, depth=depth, count=count, half=half)]

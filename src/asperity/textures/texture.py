@@ -96,6 +96,8 @@ class Texture(Plottable, ABC):
         preparation: steps of the preparation of measured heights, as sentences for reports.
         filled_mask: where missing heights have been interpolated; ``None`` for nowhere.
         history: surface parameters as read and after each step of the preparation.
+        thin_regions: parts of a baked body that are thinner than twice the depth of its field.
+        thin_map: a map of half of their thickness [m]; ``None`` without any.
     """
 
     kind: ClassVar[str]
@@ -105,6 +107,8 @@ class Texture(Plottable, ABC):
     preparation: tuple[str, ...] = ()
     filled_mask: NDArray[np.bool_] | None = None
     history: tuple[PreparationStage, ...] = ()
+    thin_regions: tuple[Any, ...] = ()
+    thin_map: FloatArray | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state to pickle, without the compiled loops."""

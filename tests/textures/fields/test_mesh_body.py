@@ -215,7 +215,31 @@ def test_thin_parts_are_reported(tmp_path: Path) -> None:
     assert abs(region.at[2]) < 0.1 * MM
     loaded = _saved(field, tmp_path / "dumbbell.field")
     assert loaded.thin_regions == field.thin_regions
+    shown, kept = field.thin_map, loaded.thin_map
+    assert shown is not None
+    assert kept is not None
+    np.testing.assert_array_equal(kept, shown)
+    assert np.nanmin(shown) == region.half_thickness
+    x, y = field.grid.positions(np.argwhere(np.isfinite(shown.T))).T
+    assert np.abs(x).max() < 2.0 * MM  # the waist, and not the thick ends
+    assert 0.7 * MM < np.abs(y).max() < 1.0 * MM
     assert "thinner than twice the depth: 1, the thinnest at (" in loaded.preparation[-2]
+
+
+def test_thin_parts_between_nodes_are_found() -> None:
+    """A fin of 0.1 mm between levels of nodes 0.3 mm apart; the rim of a lens is not thin."""
+    block = trimesh.creation.box((2 * MM, 2 * MM, 2 * MM))
+    fin = trimesh.creation.box((2 * MM, 2 * MM, 0.1 * MM))
+    fin.apply_translation((3 * MM, 0.0, 0.13 * MM))
+    field = bake_body(
+        to_body(trimesh.util.concatenate([block, fin])), 0.5 * MM, resolution=0.3 * MM
+    )
+    (region,) = field.thin_regions
+    assert region.half_thickness == pytest.approx(0.05 * MM, rel=1e-9)
+    assert region.at[2] == pytest.approx(0.13 * MM, abs=1e-6 * MM)
+    assert 2 * MM < region.at[0] < 4 * MM
+    ball = to_body(trimesh.creation.icosphere(4, radius=2 * MM))
+    assert bake_body(ball, 0.5 * MM, resolution=0.2 * MM).thin_regions == ()
 
 
 # --- bad input ------------------------------------------------------------------------------------

@@ -194,6 +194,29 @@ def _draw_scale_bar(axes: Axes, width: float) -> None:
     style.add_note(axes, text, (middle, 0.085), ha="center", va="bottom", color=style.INK)
 
 
+# --- thin parts of a body -------------------------------------------------------------------------
+
+
+def thin_parts_figure(texture: Texture, half: FloatArray) -> Figure:
+    """Return a map of half of the thickness of a baked body where it is thin, from above."""
+    wide, frame = map_grid(texture, max(half.shape)).frame
+    deep = style.length_unit(float(np.nanmax(half)))
+    figure = style.new_figure(8.0, min(max(6.4 * half.shape[0] / half.shape[1], 1.6), 6.4) + 0.8)
+    axes = figure.subplots()
+    options: dict[str, Any] = {"origin": "lower", "extent": frame, "interpolation": "nearest"}
+    body = np.full((*half.shape, 4), matplotlib.colors.to_rgba(style.BODY))
+    if texture.filled_mask is not None:
+        body[texture.filled_mask] = 0.0
+    axes.imshow(body, **options)
+    image = axes.imshow(half * deep.scale, style.HEIGHTS, vmin=0.0, **options)
+    x, y, _z = texture.thin_regions[0].at
+    axes.plot(x * wide.scale, y * wide.scale, "x", color=style.ORANGE, markersize=9.0, mew=2.0)
+    style.style_axes(axes)
+    style.label_axes(axes, f"x [{wide.name}]", f"y [{wide.name}]")
+    style.add_colorbar(figure, image, axes, f"depth [{deep.name}]")
+    return figure
+
+
 # --- cards of the catalogue -----------------------------------------------------------------------
 
 _CARD_MAP_POINTS = 420

@@ -92,9 +92,8 @@ def save_field(path: str | os.PathLike[str], field: Texture) -> PotentialField:
 def _encode(field: PotentialField) -> tuple[NDArray[Any], list[tuple[int, bytes]]]:
     record = field.arguments
     heights = field.stored_heights()
-    description = json_text(
-        field.describe() | {"filled": _mask_changes(field.filled_mask)}
-    ).encode()
+    stored = {"filled": _mask_changes(field.filled_mask), "thin_map": field.thin_map}
+    description = json_text(field.describe() | stored).encode()
     parts = [
         np.ascontiguousarray(record.columns, "<i4").tobytes(),
         np.ascontiguousarray(record.c, "<f4").tobytes(),
@@ -208,11 +207,12 @@ def assemble_field(
         for name in ("gain", "one_sided")
     )
     names = ("max_depth", "continuity", "passes")
-    regions = described.get("thin_regions", ())
+    regions, thin_map = described.get("thin_regions", ()), described.get("thin_map")
     return PotentialField(
         _source(described, heights, build_texture), grid, record, gain=gain, one_sided=one_sided,
         accuracy=FieldAccuracy(**described["accuracy"]),
         thin_regions=tuple(ThinRegion(**row | {"at": tuple(row["at"])}) for row in regions),
+        thin_map=None if thin_map is None else np.array(thin_map, float),
         **{name: described[name] for name in names},
     )  # fmt: skip
 

@@ -91,6 +91,8 @@ class PotentialField(Texture):
         one_sided: certified sup λ_max(Hess T), the one-sided number q⁺.
         accuracy: difference from exact law H.
         thin_regions: where a body can be pressed less deep than ``max_depth``, the thinnest first.
+        thin_map: half of the thickness there [m] at the nodes of ``source``, NaN elsewhere;
+            ``None`` without thin parts.
 
     Reference:
         docs/theory/split.md.
@@ -112,9 +114,10 @@ class PotentialField(Texture):
         one_sided: CertifiedNumber,
         accuracy: FieldAccuracy,
         thin_regions: tuple[ThinRegion, ...] = (),
+        thin_map: FloatArray | None = None,
     ) -> None:
         self.source, self.grid, self.max_depth = source, grid, max_depth
-        self.thin_regions = thin_regions
+        self.thin_regions, self.thin_map = thin_regions, thin_map
         self.continuity, self.passes = continuity, passes
         self.gain, self.one_sided, self.accuracy = gain, one_sided, accuracy
         self.filled_mask, self.history = source.filled_mask, source.history

@@ -25,6 +25,7 @@ DEFAULT_DEPTH = 1e-3
 DEFAULT_GOAL = BakeGoal()
 _MOST_CROSSINGS = 4096
 _LEAST_CELLS = 4
+_DIGITS = 12  # of places and thickness of thin parts [m]
 # Duality gap in squared spacings: it adds less than 4 times as much to the gain.
 _GAP = 1e-4
 
@@ -71,13 +72,14 @@ def bake_body(
     potentials = compute_potentials(
         plan.columns, plan.loops.grid, scale_progress(progress, 0.05, 0.85)
     )
-    thin = plan.loops.thin_regions(depth)
+    thin_map = plan.loops.thin_map(depth)
+    thin = plan.loops.thin_regions(thin_map)
     plan.texture, found = plan.loops.upper_envelope(body, thin)
     if depth > (deepest := max(deepest, found)):
         reason = f"must be at most {format_length(deepest)}, the greatest depth of the body"
         raise ParameterError("max_depth", reason, depth)
     field = plan.certify(potentials, grid, scale_progress(progress, 0.9, 0.1))
-    field.thin_regions = thin
+    field.thin_regions, field.thin_map = thin, thin_map if thin else None
     return field
 
 
@@ -182,17 +184,21 @@ class _BodyLoops:
         )  # fmt: skip
         return envelope, deepest
 
-    def thin_regions(self, max_depth: float) -> tuple[ThinRegion, ...]:
-        """Return the parts thinner than twice the depth, but for rounding, the thinnest first."""
+    def thin_map(self, max_depth: float) -> FloatArray:
+        """Return half thickness [m] below the depth, but for rounding; NaN elsewhere."""
+        half = self._summary[:, 2].reshape(self.grid.node_counts[:2]).T
+        return np.where(half < (1.0 - 1e-9) * max_depth, np.round(half, _DIGITS), np.nan)
+
+    def thin_regions(self, thin_map: FloatArray) -> tuple[ThinRegion, ...]:
+        """Return the connected parts of a map, the thinnest first."""
         from scipy import ndimage
 
-        half = self._summary[:, 2].reshape(self.grid.node_counts[:2])
-        labels, count = ndimage.label(half < (1.0 - 1e-9) * max_depth, structure=np.ones((3, 3)))
+        labels, count = ndimage.label(np.isfinite(thin_map.T), structure=np.ones((3, 3)))
         found = []
         for label in range(1, count + 1):
             rows = np.flatnonzero(labels.ravel() == label)
             best = rows[np.argmin(self._summary[rows, 2])]
-            x, y, thin, z = map(float, (*self._xy[best], *self._summary[best, 2:4]))
+            x, y, thin, z = np.round([*self._xy[best], *self._summary[best, 2:4]], _DIGITS).tolist()
             found.append(ThinRegion((x, y, z), thin, len(rows)))
         return tuple(sorted(found, key=lambda region: region.half_thickness))
 

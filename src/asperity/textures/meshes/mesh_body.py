@@ -81,7 +81,7 @@ class MeshBody:
             vertices, faces = _repair(vertices, faces)
             after, repaired = find_faults(vertices, faces), True
         if wrong := _unsound(after):
-            tried = " after the repair" if repaired else "; repair=True may close and turn it"
+            tried = " after the repair" if repaired else "; the repair option may close and turn it"
             faults = "; ".join(map(str, wrong))
             raise SurfaceFileError(f"{name} has no defined inside{tried}: {faults}")
         triangles = vertices[faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]]

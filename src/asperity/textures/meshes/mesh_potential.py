@@ -32,6 +32,8 @@ _MAX_QUERIES = 60
 _UNLIMITED = 1e300
 # Atoms farther apart than 120 degrees, seen from their common centre, are on opposite walls.
 _OPPOSITE = -0.5
+# Cosine of 30 degrees: so far may walls on opposite sides of a vertical span be tilted.
+_PARALLEL = 0.866
 
 # Depths, in units of max_depth, beyond which the potential is constant: e.
 CORE = math.e
@@ -149,6 +151,26 @@ def note_thin_part(atoms: FloatArray, count: int, y: FloatArray, row: int, out: 
         out[row, THIN_Z] = y[2]
 
 
+def note_thin_spans(
+    p: FloatArray, count: int, crossings: FloatArray, lengths: tuple[float, float], row: int,
+    out: FloatArray, tree: TriangleTree,
+) -> None:  # fmt: skip
+    """Write the least half thickness of spans between opposite walls, if between two lengths.
+
+    It is the distance of the middle of a span from the mesh. Parts that lie between two nodes are
+    found by this alone.
+    """
+    total = 0.0
+    for k in range(count - 1):
+        total += crossings[k, 1]
+        half = 0.5 * (crossings[k, 0] - crossings[k + 1, 0])
+        if total > 0.0 and lengths[0] < half < lengths[1]:
+            z = crossings[k, 0] - half
+            distance = math.sqrt(tree_closest(p[0], p[1], z, half * half, 0, tree)[0])
+            if _PARALLEL * half <= distance < out[row, THIN]:
+                out[row, THIN], out[row, THIN_Z] = distance, z
+
+
 def column_batch(
     columns: FloatArray, z: FloatArray, law: BodyLaw, tolerance: float,
     out: NDArray[np.float32], summary: FloatArray, crossings: FloatArray, tree: TriangleTree,
@@ -179,6 +201,8 @@ def column_batch(
         summarize_column(min(total, crossings.shape[0]), crossings, tolerance, i, summary)
         if total > crossings.shape[0]:
             summary[i, GREATEST_WINDING] = np.inf
+        count, spans = min(total, crossings.shape[0]), (tolerance, law.max_depth)
+        note_thin_spans(p, count, crossings, spans, i, summary, tree)
         for m in range(out.shape[1]):
             p[2] = z[m]
             if winding_above(p[2], total, crossings) <= 0:
