@@ -149,12 +149,23 @@ class Argument:
         return attributes_to_dict(self, exclude=excluded)
 
 
-def read_arguments(path: Path, table: str = "") -> dict[str, Argument]:
-    """Return the declarations in a TOML file of this package, or in one of its tables, by name."""
+def read_arguments(
+    path: Path, table: str = "", defaults: type | None = None
+) -> dict[str, Argument]:
+    """Return the declarations in a TOML file of this package, or in one of its tables, by name.
+
+    Args:
+        path: the file.
+        table: name of the table; empty for the whole file.
+        defaults: class whose attributes are the defaults of arguments that state none.
+    """
     import tomllib
 
     content = tomllib.loads(path.read_text("utf-8"))
     declarations = content[table] if table else content
+    for name, fields in declarations.items():
+        if "default" not in fields and "default_description" not in fields:
+            fields["default"] = getattr(defaults, name, None)
     return {name: Argument(name, **fields) for name, fields in declarations.items()}
 
 

@@ -12,12 +12,18 @@ from typing import Any
 import numpy as np
 
 from asperity.clamps import CLAMPS, NONE
-from asperity.core.arguments import MAX_DEPTH, RENDERING, STIFFNESS, Argument, parse_arguments
+from asperity.core.arguments import (
+    MAX_DEPTH,
+    RENDERING,
+    STIFFNESS,
+    Argument,
+    parse_arguments,
+    read_arguments,
+)
 from asperity.core.errors import ParameterError, suggest_names
 from asperity.core.files import open_input, to_plain_data
 from asperity.laws import SHIPPED_LAW_ARGUMENTS, Law, registered_arguments
 from asperity.recording.recording import is_recording, open_recording
-from asperity.scene.scene_defaults import BRAKE_MODES
 from asperity.simulation import BandHand, PrescribedHand, SpringHand, Stationary, Strokes
 from asperity.simulation import Waypoints as PathMotion
 
@@ -65,11 +71,7 @@ def _column(names: list[str], name: str, file: str) -> int:
 
 LAW = Argument("law", "letter or name of the law", default="C", form="text")
 CLAMP = Argument(
-    "clamp",
-    "how the force is limited below max_depth",
-    default=NONE.name,
-    form="text",
-    choices=tuple(CLAMPS),
+    "clamp", "limit of the force below max_depth", "", NONE.name, form="text", choices=tuple(CLAMPS)
 )
 SURFACE_FIELDS = (LAW, STIFFNESS, MAX_DEPTH, CLAMP, RENDERING)
 """Arguments of [surface] besides the parameters of its law."""
@@ -108,61 +110,34 @@ class SectionKind:
     arguments: tuple[Argument, ...] = ()
 
 
-def _kind(description: str, make: Callable[..., Any], *arguments: Argument) -> SectionKind:
+def _kind(description: str, make: Callable[..., Any], table: str = "") -> SectionKind:
+    arguments = _read(table, make if isinstance(make, type) else None) if table else ()
     return SectionKind(description, make, arguments)
 
 
-_POINT = Argument("point", "position", "m", form="space", required=True)
-_FILE = Argument("file", "positions, relative to the scene", form="path", required=True)
+def _read(table: str, defaults: type | None = None) -> tuple[Argument, ...]:
+    return tuple(read_arguments(Path(__file__).with_suffix(".toml"), table, defaults).values())
+
+
 HANDS: dict[str, SectionKind] = {
     "spring": _kind(
-        "a spring and a damper from the handle to the moving anchor",
-        SpringHand,
-        Argument("stiffness", "one for all axes, or three", "N/m", 0.0, form="axes"),
-        Argument("damping", "one for all axes, or three", "N*s/m", 0.0, form="axes"),
-        Argument("mass", "mass of the hand, moving with the handle", "kg", 0.0),
-        Argument("force", "constant force, (0, 0, -1) presses with 1 N", "N", form="space"),
+        "a spring and a damper from the handle to the moving anchor", SpringHand, "spring"
     ),
-    "band": _kind(
-        "an elastic band that pulls the handle into the wall",
-        BandHand,
-        Argument("stiffness", "stiffness", "N/m", BandHand.stiffness, must_be_positive=True),
-        Argument("tension", "tension at z = 0", "N", BandHand.tension),
-        Argument("length", "length at z = 0", "m", BandHand.length, must_be_positive=True),
-        Argument("damping", "damping of band and hand", "N*s/m", BandHand.damping),
-    ),
+    "band": _kind("an elastic band that pulls the handle into the wall", BandHand, "band"),
     "moved": _kind("the handle follows the motion, whatever the force", PrescribedHand),
 }
 """Kinds of [hand]."""
 
 MOTIONS: dict[str, SectionKind] = {
-    "still": _kind("the anchor does not move", Stationary, _POINT),
-    "strokes": _kind(
-        "the anchor moves to and fro at constant speed",
-        Strokes,
-        Argument("start", "start of the first stroke", "m", form="space", required=True),
-        Argument("end", "end of the first stroke", "m", form="space", required=True),
-        Argument("speed", "speed of the anchor", "m/s", required=True, must_be_positive=True),
-        Argument("count", "number of strokes", default=1, form="integer"),
-    ),
-    "path": _kind("the anchor follows the positions in a file", read_path, _FILE),
+    "still": _kind("the anchor does not move", Stationary, "still"),
+    "strokes": _kind("the anchor moves to and fro at constant speed", Strokes, "strokes"),
+    "path": _kind("the anchor follows the positions in a file", read_path, "path"),
 }
 """Kinds of [motion]."""
 
-DURATION = Argument(
-    "duration", "duration of the run", "s", None, "the motion's, else 1 s", must_be_positive=True
-)
-RUN_ARGUMENTS: tuple[Argument, ...] = (
-    DURATION,
-    Argument("start", "position of the handle", "m", None, "start of the motion", form="space"),
-    Argument("velocity", "velocity of the handle at the start", "m/s", None, "rest", form="space"),
-    Argument("every", "write every N-th sample to the trace", default=1, form="integer"),
-    Argument("velocity_share", "weight of the last difference in the velocity", maximum=1.0),
-    Argument("centre", "position of the origin in a five-bar's plane", "m", form="plane"),
-    Argument("resonance", "simulate the first structural mode of the device", form="switch"),
-    Argument("brakes", "brakes of a five-bar", "", "inside", form="text", choices=BRAKE_MODES),
-)
+RUN_ARGUMENTS = _read("run")
 """Arguments of [run]."""
+DURATION = next(one for one in RUN_ARGUMENTS if one.name == "duration")
 
 
 def build_section(

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
 from asperity.analysis.passivity.verdict import recommend_stiffness
-from asperity.core.arguments import Argument
-from asperity.core.checks import check_positive, check_real
+from asperity.core.arguments import read_arguments
 from asperity.core.errors import ParameterError
 from asperity.core.files import Serializable
 from asperity.core.units import format_quantity
@@ -21,9 +21,6 @@ DEFAULT_RISE_TIME = 5e-3
 """Time for the force to rise from zero to its maximum, unless a slew limit is given [s]."""
 LATE_PERIODS, MIN_LATENESS = 10, 0.02
 """Time for which the loop may be late unless one is given: in periods, and at least [s]."""
-DEPTH_ACTIONS = ("fault", "warn")
-WALL_ORIENTATIONS = ("lying", "standing")
-
 REACH_FACTOR = 1.5
 """Largest distance of a reading, over the radius of the device's workspace."""
 
@@ -63,17 +60,9 @@ class Safety(Serializable):
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        for name in ("ramp", "passivity_damping"):
-            if check_real(name, getattr(self, name)) < 0.0:
-                raise ParameterError(name, "must not be negative", getattr(self, name))
-        check_positive("silence", self.silence, "s")
-        for name in ("lateness", "max_slew", "reach"):
-            if getattr(self, name) is not None:
-                check_positive(name, getattr(self, name))
-        if self.wall not in WALL_ORIENTATIONS:
-            raise ParameterError("wall", "must be 'lying' or 'standing'", self.wall)
-        if self.beyond_depth not in DEPTH_ACTIONS:
-            raise ParameterError("beyond_depth", "must be 'fault' or 'warn'", self.beyond_depth)
+        for argument in ARGUMENTS:
+            if (value := getattr(self, argument.name)) is not None:
+                object.__setattr__(self, argument.name, argument.validate(value))
 
     def slew_limit(self, max_force: float) -> float:
         """Return the largest change of the force [N/s]; infinite if neither number is known."""
@@ -98,6 +87,10 @@ class Safety(Serializable):
         if radius is None and None not in sides:
             radius = 0.5 * math.hypot(*(side or 0.0 for side in sides))
         return math.inf if radius is None else REACH_FACTOR * radius
+
+
+ARGUMENTS = tuple(read_arguments(Path(__file__).with_suffix(".toml"), defaults=Safety).values())
+"""Arguments of the section [servo]."""
 
 
 def check_passivity_damping(safety: Safety, device: Device, servo: Servo) -> None:
@@ -130,43 +123,6 @@ def check_passivity_damping(safety: Safety, device: Device, servo: Servo) -> Non
         )
         raise ParameterError("passivity_damping", words, given)
 
-
-ARGUMENTS: tuple[Argument, ...] = (
-    Argument("ramp", "time in which the force rises, and falls at the end", "s", Safety.ramp),
-    Argument(
-        "max_slew", "largest change of the force", "N/s", must_be_positive=True, example="2000N/s",
-        default_description="to the maximum force in 5 ms",
-    ),
-    Argument(
-        "lateness", "maximum time for which the loop may be late", "s", must_be_positive=True,
-        example="20ms", default_description="10 periods, at least 20 ms",
-    ),
-    Argument(
-        "silence", "maximum silence of the supervising process", "s", Safety.silence,
-        must_be_positive=True,
-    ),
-    Argument(
-        "beyond_depth", "how a probe below max_depth is treated", "", Safety.beyond_depth,
-        form="text", choices=DEPTH_ACTIONS,
-    ),
-    Argument(
-        "passivity_damping", "maximum damping of the passivity controller, 0 for none", "N*s/m",
-        Safety.passivity_damping,
-    ),
-    Argument(
-        "reach", "maximum distance of a reading from the middle of the workspace", "m",
-        must_be_positive=True, example="100mm", default_description="1.5 times the device's",
-    ),
-    Argument(
-        "wall", "orientation of the surface: lying (table) or standing (wall)", "", Safety.wall,
-        form="text", choices=WALL_ORIENTATIONS,
-    ),
-    Argument(
-        "origin", "origin of the surface, in the device's axes", "m", form="space",
-        default_description="the device's",
-    ),
-)  # fmt: skip
-"""Arguments of the section [servo]."""
 
 DEFAULT_SAFETY = Safety()
 """Limits by default."""

@@ -67,15 +67,12 @@ class Stroke:
         """Energy per stroke, all axes [J]; > 0: the hand gains energy."""
         return float(sum(self.energy))
 
+    energy_sum = total  # its name in JSON
+
     @property
     def gains_energy(self) -> bool:
         """Whether the law itself delivers energy, by more than its spread and its error."""
         return self.field > self.spread + self.error
-
-    @property
-    def energy_sum(self) -> float:
-        """Energy per stroke, all axes [J]."""
-        return self.total
 
     @property
     def same_sample_sum(self) -> float:
