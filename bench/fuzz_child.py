@@ -7,6 +7,7 @@ import io
 import multiprocessing
 import pickle
 import time
+from dataclasses import replace
 from multiprocessing.connection import Connection
 from multiprocessing.context import ForkServerProcess
 from typing import IO, Any, Self
@@ -52,7 +53,10 @@ class ReadingWorker:
             self._start_process()
         self._left -= 1
         try:
-            self._pipe.send((read, file, options, limits))
+            absolute = replace(
+                file, path=file.path.absolute()
+            )  # the server has a folder of its own
+            self._pipe.send((read, absolute, options, limits))
             result = self._pipe.recv_bytes()
         except EOFError:
             self._left = 0

@@ -294,7 +294,7 @@ def removed_text(stage: PreparationStage) -> str:
 
 def field_page(field: PotentialField, path: str) -> page.Page:
     """Return the numbers of a baked field, for a terminal, and the path of its file."""
-    lowest = max(field.grid.floor, field.extremes[0] - field.max_depth)
+    lowest = round(max(field.grid.floor, field.extremes[0] - field.max_depth), 12)
     floor, bound = (format_quantity(x, "m") for x in (lowest, field.accuracy.bound))
     *others, baked = field.preparation
     texts = (
