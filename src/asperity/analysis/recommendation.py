@@ -26,7 +26,7 @@ from asperity.analysis.passivity.assess_passivity import (
     delivery_text,
     stiffness_limit_text,
 )
-from asperity.analysis.passivity.criteria import BUZZ_SPEED, damping_assumption
+from asperity.analysis.passivity.criteria import buzz_goal, damping_assumption
 from asperity.analysis.passivity.verdict import Margin, load_margins
 from asperity.analysis.results import LawRow
 from asperity.analysis.surface_sentences import (
@@ -243,8 +243,9 @@ def _limit_basis_text(row: LawRow, device: Device) -> str:
         text = "It is passive there but for the steps of positions and forces"
         if passivity.buzz is None:
             return f"{text}."
-        goal = f"{format_quantity(BUZZ_SPEED, 'm/s')} for which starts are chosen"
-        relation = "within" if passivity.buzz.speed <= BUZZ_SPEED else "more than"
+        bound = buzz_goal(device)
+        goal = f"{format_quantity(bound, 'm/s')} for which starts are chosen"
+        relation = "within" if passivity.buzz.speed <= bound else "more than"
         return f"{text}: {buzz_text(passivity.buzz)}, {relation} the {goal}."
     if limit.basis == "wall gain":
         delivers = delivery_text(passivity.loop)

@@ -41,6 +41,15 @@ def test_omega_with_known_damping_starts_where_the_buzz_is_bounded_by_10_mm_per_
     assert row.recommended_stiffness <= (row.stability_limit.stiffness or 0.0) < 1300.0
 
 
+def test_start_is_chosen_for_the_speed_that_the_user_sets() -> None:
+    changes = {"damping": "0.625 N*s/m", "delay_samples": 0, "max_buzz": "50 mm/s"}
+    result = asp.compare(TEXTURE, device=override_device(load_device("omega.3"), changes), laws="C")
+    buzz = result.row("C").passivity.buzz
+    assert buzz is not None
+    assert 0.97 * 0.05 < buzz.speed <= 0.05
+    assert "within the 50 mm/s for which starts are chosen" in result.recommendation
+
+
 @pytest.mark.parametrize("law", "CH")
 @pytest.mark.parametrize(
     "changes",

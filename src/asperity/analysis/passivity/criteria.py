@@ -24,7 +24,7 @@ from asperity.analysis.passivity.device_loop import (
 )
 from asperity.core.errors import ParameterError
 from asperity.core.files import attributes_to_dict
-from asperity.devices import WallTest
+from asperity.devices import Device, WallTest
 
 PAPER = "paper (1)"
 ONE_SIDED = "one-sided"
@@ -283,10 +283,18 @@ def buzz_bound(loop: DeviceLoop) -> BuzzBound | None:
 
 
 BUZZ_SPEED = 0.010
-"""Bound of the buzz [m/s] for which a start is chosen where damping and delay are known."""
+"""Bound of the buzz [m/s] for which a start is chosen where damping and delay are known.
+
+The field ``max_buzz`` of a device replaces it.
+"""
 
 
-def buzz_limited_stiffness(loop: DeviceLoop, speed: float = BUZZ_SPEED) -> float | None:
+def buzz_goal(device: Device) -> float:
+    """Return the bound of the buzz for which starts are chosen on a device [m/s]."""
+    return device.value("max_buzz") or BUZZ_SPEED
+
+
+def buzz_limited_stiffness(loop: DeviceLoop, speed: float | None = None) -> float | None:
     """Return the greatest stiffness [N/m] at which :func:`buzz_bound` is at most a speed.
 
     With φ - f_c = a k + c and m = (G - g k)/T it is (v G - c/T)/(a/T + v g). Errors of force that
@@ -294,7 +302,7 @@ def buzz_limited_stiffness(loop: DeviceLoop, speed: float = BUZZ_SPEED) -> float
 
     Args:
         loop: the surface on the device; its stiffness does not count.
-        speed: v [m/s].
+        speed: v [m/s]; :func:`buzz_goal` by default.
 
     Returns:
         The stiffness; ``None`` if there is no bound at any.
@@ -303,7 +311,7 @@ def buzz_limited_stiffness(loop: DeviceLoop, speed: float = BUZZ_SPEED) -> float
     if terms is None or loop.rate is None or terms[-1] <= 0:
         return None
     per_stiffness, fixed, gain, budget = terms
-    v = max(Fraction(speed), 2 * fixed * loop.rate / budget)
+    v = max(Fraction(speed or buzz_goal(loop.device)), 2 * fixed * loop.rate / budget)
     slope = per_stiffness * loop.rate + v * gain
     return math.inf if slope == 0 else _round_down((v * budget - fixed * loop.rate) / slope)
 
