@@ -230,8 +230,6 @@ def document_arguments(arguments: Iterable[Argument]) -> Callable[[Function], Fu
     return describe
 
 
-SEED = Argument("seed", "of the random numbers", default=0, form="integer")
-
 DEFAULT_STIFFNESS = 1000.0
 STIFFNESS = Argument(
     "stiffness",
@@ -241,23 +239,8 @@ STIFFNESS = Argument(
     must_be_positive=True,
     example="500N/m",
 )
-MAX_DEPTH = Argument(
-    "max_depth",
-    "maximum penetration depth",
-    "m",
-    default_description="peak-to-valley height, at most 1 mm",
-    must_be_positive=True,
-    example="0.5mm",
-)
-FIELD, SEARCH = "field", "search"
-RENDERING = Argument(
-    "rendering",
-    "rendering of law H where it has no closed form: field (a baked potential field) or search "
-    "(with an evaluation budget)",
-    default=FIELD,
-    form="text",
-    choices=(FIELD, SEARCH),
-)
+SEED, MAX_DEPTH, RENDERING = read_arguments(Path(__file__).with_suffix(".toml")).values()
+FIELD, SEARCH = RENDERING.choices
 
 
 # --- parsers of the forms: name of the argument, value, unit --------------------------------------

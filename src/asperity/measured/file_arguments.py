@@ -6,26 +6,20 @@ All lengths are in the surface's own metres, before magnification. The arguments
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import replace
 from pathlib import Path
 
-from asperity.core.arguments import Argument
+from asperity.core.arguments import read_arguments
 
-_TABLES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
+_TABLES = Path(__file__).with_suffix(".toml")
 
-
-def _arguments(table: str) -> tuple[Argument, ...]:
-    return tuple(Argument(name, **entry) for name, entry in _TABLES[table].items())
-
-
-READING_ARGUMENTS = _arguments("reading")
+READING_ARGUMENTS = tuple(read_arguments(_TABLES, "reading").values())
 """Arguments of reading."""
 
-MAGNIFICATION_ARGUMENTS = _arguments("magnification")
+MAGNIFICATION_ARGUMENTS = tuple(read_arguments(_TABLES, "magnification").values())
 """Arguments for a surface that is already prepared."""
 
-PREPARATION_ARGUMENTS = (*_arguments("preparation"), *MAGNIFICATION_ARGUMENTS)
+PREPARATION_ARGUMENTS = (*read_arguments(_TABLES, "preparation").values(), *MAGNIFICATION_ARGUMENTS)
 """Arguments of the preparation."""
 
 FILE_ARGUMENTS = (*READING_ARGUMENTS, *PREPARATION_ARGUMENTS)

@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -310,6 +311,7 @@ _IGNORED_SIGNALS = (
     signal.SIGINT, signal.SIGHUP, signal.SIGTERM, signal.SIGQUIT, signal.SIGTSTP, signal.SIGTTIN,
     signal.SIGTTOU, signal.SIGUSR1, signal.SIGUSR2, signal.SIGALRM,
 )  # fmt: skip
+_WATCH_PERIOD = 0.003  # [s]
 MAX_CALL_TIME = 10.0
 """Time for a call of a device to return before the process that waits in it is killed [s]."""
 
@@ -329,6 +331,15 @@ def _leave_to_supervisor(memory: LoopMemory) -> None:
         memory.request_stop(now=True)
         time.sleep(MAX_CALL_TIME)
 
+    def watch_memory() -> None:
+        """A killed process loses its memory first, which can take longer than all that follows."""
+        with suppress(OSError):  # it has ended, or this is not Linux
+            while not memory_of_parent.read_bytes().startswith(b"0 "):
+                time.sleep(_WATCH_PERIOD)
+            memory.request_stop(now=True)
+
+    memory_of_parent = Path(f"/proc/{os.getppid()}/statm")
+    threading.Thread(target=watch_memory, daemon=True).start()
     end_with_parent(release)
 
 
