@@ -279,6 +279,11 @@ def test_a_surface_larger_than_the_workspace_is_named() -> None:
     text = asp.compare(wide, rig, "C").recommendation
     assert "The surface is 500 mm long and the workspace 100 mm" in text
     assert "magnified 0.2 times more" in text
+    tube = {"workspace_diameter": "120 mm", "workspace_length": "30 mm"}
+    text = asp.compare(
+        wide, parse_device({"max_stiffness": "1000 N/m", **tube}, "mine"), "C"
+    ).recommendation
+    assert "The surface is 500 mm long and the workspace 120 mm" in text
     narrow = asp.Profile(2e-4 * np.sin(2 * np.pi * x[:161] / 2e-3), 0.5 / 1000)
     assert "workspace" not in asp.compare(narrow, rig, "C").recommendation
 
