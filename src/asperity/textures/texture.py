@@ -108,7 +108,7 @@ class Texture(Plottable, ABC):
     filled_mask: NDArray[np.bool_] | None = None
     history: tuple[PreparationStage, ...] = ()
     thin_regions: tuple[Any, ...] = ()
-    thin_map: FloatArray | None = None
+    thin_map: NDArray[np.float64] | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state to pickle, without the compiled loops."""
