@@ -83,7 +83,7 @@ def test_thin_parts_are_drawn_in_reports(tmp_path: Path) -> None:
 
 
 def test_repair_is_an_option(tmp_path: Path) -> None:
-    pytest.importorskip("networkx")
+    pytest.importorskip("networkx", reason="not run: the extra 'meshes' is not installed")
     mesh, path = tmp_path / "open.stl", tmp_path / "box.field"
     box = trimesh.creation.box((10.0, 8.0, 6.0))
     box.update_faces([face != 3 for face in range(12)])

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import random
 import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -87,3 +89,47 @@ def test_passivity_damping_is_bounded_by_the_mass() -> None:
     check_passivity_damping(Safety(), unknown, Servo(1e-3))
     with pytest.raises(ParameterError, match=r"needs the apparent_mass of omega\.3"):
         check_passivity_damping(Safety(passivity_damping=1.0), unknown, Servo(1e-3))
+
+
+_WATCHED_LOOP = """
+import sys, time
+from multiprocessing import get_context
+from pathlib import Path
+
+from asperity.servo import driver_loop
+
+
+class Memory:
+    def request_stop(self, now):
+        Path(sys.argv[1]).write_text(str(now))
+
+
+def loop():
+    driver_loop.end_with_parent = lambda release: None  # the pipe, which closes later
+    driver_loop._leave_to_supervisor(Memory())
+    time.sleep(0.3)
+    print("watching" if not Path(sys.argv[1]).exists() else "stopped at once", flush=True)
+    time.sleep(20.0)
+
+
+if __name__ == "__main__":
+    get_context("spawn").Process(target=loop).start()
+    time.sleep(60.0)
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="not run: needs /proc")
+def test_loop_stops_when_the_program_loses_its_memory(tmp_path: Path) -> None:
+    """A killed program closes its pipes last; until it is waited for, it has no memory."""
+    script, stopped = tmp_path / "program.py", tmp_path / "stopped"
+    script.write_text(_WATCHED_LOOP)
+    command = [sys.executable, str(script), str(stopped)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as program:
+        assert program.stdout is not None
+        assert program.stdout.readline() == "watching\n"
+        program.kill()
+        deadline = time.monotonic() + 10.0
+        while not stopped.exists() and time.monotonic() < deadline:
+            time.sleep(0.01)
+        assert stopped.exists()
+        assert stopped.read_text() == "True"

@@ -267,7 +267,7 @@ def test_faults_are_counted_with_their_place() -> None:
 
 
 def test_repair_on_request() -> None:
-    pytest.importorskip("networkx")
+    pytest.importorskip("networkx", reason="not run: the extra 'meshes' is not installed")
     mesh = trimesh.creation.icosphere(2, radius=1 * MM)
     faces = np.array(mesh.faces, dtype=np.int64)[1:]
     faces[::4] = faces[::4, ::-1]
@@ -350,7 +350,7 @@ def test_meshes_of_installed_packages() -> None:
     """Each is refused with a reason, or baked with secants below its certified gain."""
     paths, count = shipped_meshes(), 0
     if not paths:
-        pytest.skip("no installed package ships a mesh")
+        pytest.skip("not run: no installed package ships a mesh")
     for path in paths:
         try:
             body = load_mesh(path, "mm")

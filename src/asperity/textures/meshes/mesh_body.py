@@ -109,6 +109,8 @@ def load_mesh(
         SurfaceFileError: the file is damaged or too large, or its inside is undefined.
 
     Example:
+        Not run as a test: it needs a file.
+
         >>> load_mesh("part.stl", "mm").triangles.shape  # doctest: +SKIP
         (12, 3, 3)
     """
