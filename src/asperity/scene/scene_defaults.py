@@ -12,13 +12,13 @@ from asperity.core.errors import ParameterError
 from asperity.core.units import format_quantity
 from asperity.devices import Device, override_device
 from asperity.devices.five_bar import FiveBar
+from asperity.scene.sections import BRAKES
 from asperity.simulation import Cartesian, Pantograph, Plant, Resonance, Servo
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
 
 LINK_FIELDS = ("proximal_link", "distal_link", "base_distance")
 DEFAULT_RATE = 1000.0
-BRAKE_MODES = ("inside", "always")
 
 
 def make_plant(
@@ -45,7 +45,7 @@ def make_plant(
     Raises:
         ParameterError: the device lacks a number, or an argument does not apply to it.
     """
-    if brakes is not None and brakes not in BRAKE_MODES:
+    if brakes is not None and brakes not in BRAKES.choices:
         raise ParameterError("run.brakes", "must be 'inside' or 'always'", brakes)
     if needs_dynamics and _is_five_bar(device):
         return _make_five_bar(device, centre, has_resonance, brakes)

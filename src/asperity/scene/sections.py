@@ -137,7 +137,8 @@ MOTIONS: dict[str, SectionKind] = {
 
 RUN_ARGUMENTS = _read("run")
 """Arguments of [run]."""
-DURATION = next(one for one in RUN_ARGUMENTS if one.name == "duration")
+_RUN = {argument.name: argument for argument in RUN_ARGUMENTS}
+DURATION, BRAKES = _RUN["duration"], _RUN["brakes"]
 
 
 def build_section(

@@ -77,7 +77,7 @@ class StabilityLimit(Serializable):
         stiffness: the limit [N/m]; 0 if no stable stiffness is known, ``None`` if undecidable.
         basis: ``"proved"``: passive up to the limit, under the assumptions of the criterion.
             ``"plausible"``: a smooth wall of that gain did not cycle. ``"bounded"``:
-            passive but for quantisation, whose buzz moves at ``BUZZ_SPEED`` at most, or at twice
+            passive but for quantisation, whose buzz moves at ``buzz_goal`` at most, or at twice
             what steps of force cause at any stiffness.
             ``"wall gain"``: a wall of that gain did not cycle; no stability limit, since the law
             has curl and delivers energy below v* at any stiffness. ``"none"``.
