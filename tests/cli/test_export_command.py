@@ -83,12 +83,7 @@ def test_content_digest_depends_on_the_law_and_not_on_the_name(call: Call, tmp_p
 
 @pytest.mark.parametrize(
     ("options", "budget"),
-    [
-        ((), "1500.0"),
-        (("--max-evaluations", "90"), "90"),
-        (("--looks", "90"), "90"),  # the former name
-        (("--exact",), "HUGE_VAL"),
-    ],
+    [((), "1500.0"), (("--max-evaluations", "90"), "90"), (("--exact",), "HUGE_VAL")],
 )
 def test_evaluation_budget_is_written_to_the_header(
     options: tuple[str, ...], budget: str, call: Call, tmp_path: Path
@@ -201,7 +196,6 @@ BAD = {
     ("-o", "wall.txt"): "output must be a file that ends in .h",
     ("-o", "no/such/folder/wall.h"): "output must lie in a folder that exists",
     ("--law", "Z"): "law",
-    ("--largest", "soft"): "max_data",
     ("--max-data", "soft"): "max_data",
     ("--max-evaluations", "0"): "max_evaluations must be positive, got 0",
     ("--max-evaluations", "many"): "max_evaluations must be a number, got 'many'",

@@ -24,13 +24,9 @@ if TYPE_CHECKING:
 
 
 _LANG, *_REQUEST_ARGUMENTS, _CLAMP = options.command_arguments("export")
-# Former names of options are accepted, but not shown.
-_FORMER_NAMES = {"largest": "max-data", "looks": "max-evaluations"}
 
 
-@click.command(
-    "export", context_settings={"token_normalize_func": lambda name: _FORMER_NAMES.get(name, name)}
-)
+@click.command("export")
 @click.option("-o", "--output", metavar="PATH", required=True, help="File to write ('texture.h').")
 @click.option(
     "--exact",
