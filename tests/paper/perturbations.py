@@ -16,10 +16,9 @@ from types import ModuleType
 from typing import Any
 
 import asperity.surface
-from asperity.paper.cases import SCANNING, ExperimentCase
+from asperity.paper.cases import SCANNING, ExperimentCase, FrictionCase
 from asperity.paper.claim import Check, check_statement
 from asperity.paper.claims.design_limits import CORRECTED_LIMITS, Inequality
-from asperity.paper.friction_case import FrictionCase
 from asperity.paper.probes import ProbePoint
 from asperity.surface import Surface
 

@@ -16,11 +16,11 @@ from asperity.analysis.energy.loop_integral import loop_work
 from asperity.analysis.gain.characteristic import characteristic_number
 from asperity.laws import find_law
 from asperity.paper import CLAIMS, Claim, get_claim
+from asperity.paper.cases import PAPER_CASE, matrix_norm, random_friction_cases
 from asperity.paper.claims import design_limits as claims_limits
 from asperity.paper.claims import friction_law as claims_appendix
 from asperity.paper.claims import passivity_condition as claims_passivity
 from asperity.paper.claims.formula_claims import FormulaRow
-from asperity.paper.friction_case import PAPER_CASE, matrix_norm, random_friction_cases
 from asperity.paper.probes import closest_point_derivatives, find_closest_point, generic_probes
 
 

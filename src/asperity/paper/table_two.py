@@ -13,8 +13,7 @@ from asperity.analysis.energy.loop_integral import loop_work
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
 from asperity.core.display import Displayable
 from asperity.core.files import Serializable
-from asperity.paper.cases import PAPER_LAWS, PASSIVITY, SCANNING, TURNING_DEPTH
-from asperity.paper.friction_case import PAPER_CASE
+from asperity.paper.cases import PAPER_CASE, PAPER_LAWS, PASSIVITY, SCANNING, TURNING_DEPTH
 
 _ENERGY_TOLERANCE = 1e-9  # relative to k A²
 TABLE_TWO: dict[str, dict[str, str]] = tomllib.loads(

@@ -15,49 +15,26 @@ from asperity.analysis.gain.characteristic import characteristic_number, one_sid
 from asperity.core.checks import FloatArray
 from asperity.devices import load_device
 from asperity.devices.five_bar import FiveBar, handle_damping
-from asperity.paper.cases import (
-    BUMP,
-    PAPER_LAWS,
-    PASSIVITY,
-    SAMPLING_PERIOD,
-    SCANNING,
-    SETTINGS,
-    ExperimentCase,
-    random_settings,
-)
-from asperity.paper.claim import (
-    Check,
-    check_observation,
-    check_statement,
-    check_values,
-    combine_checks,
-    declare_claim,
-)
+from asperity.paper import cases, claim, formula_checks
+from asperity.paper.cases import PAPER_CASE, SCANNING_CASE, FrictionCase
 from asperity.paper.claims.passivity_condition import energy_gained
-from asperity.paper.formula_checks import (
-    check_continuity,
-    check_curl,
-    check_zero_outside,
-    format_by_name,
-)
-from asperity.paper.friction_case import PAPER_CASE, SCANNING_CASE, FrictionCase
 
 _RESOLUTION = 15e-6  # [m]
 _SPEED = 0.2  # [m/s], greatest
 # --- V --------------------------------------------------------------------------------------------
 
 
-@declare_claim("sentence-V-samples")
-def samples_per_period() -> Check:
+@claim.declare_claim("sentence-V-samples")
+def samples_per_period() -> claim.Check:
     """With 1 mm, the highest period, there are 50 samples and more, and at most 200 Hz.
 
     The paper calls 1 mm the greatest period.
     """
-    periods = [case.period for case in SETTINGS.values()]
+    periods = [case.period for case in cases.SETTINGS.values()]
     length = 1e-3
-    alpha, beta = length / (_SPEED * SAMPLING_PERIOD), length / _RESOLUTION
-    return combine_checks(
-        check_statement(
+    alpha, beta = length / (_SPEED * cases.SAMPLING_PERIOD), length / _RESOLUTION
+    return claim.combine_checks(
+        claim.check_statement(
             f"at l = 1 mm and v = 0.2 m/s a period has {alpha:.1f} updates and {beta:.1f} steps of "
             f"position, and passes {_SPEED / length:.0f} times a second",
             printed=alpha >= 50.0 * (1 - 1e-12) and beta > 50.0 and _SPEED / length < 400.0,
@@ -65,7 +42,7 @@ def samples_per_period() -> Check:
             steps=beta,
             frequency=_SPEED / length,
         ),
-        check_statement(
+        claim.check_statement(
             "periods of sections V.A to V.C: " + ", ".join(f"{p * 1e3:g} mm" for p in periods),
             printed=math.isclose(max(periods), length),
             corrected=math.isclose(min(periods), length),
@@ -74,27 +51,27 @@ def samples_per_period() -> Check:
     )
 
 
-@declare_claim("eq-30")
-def force_w() -> Check:
+@claim.declare_claim("eq-30")
+def force_w() -> claim.Check:
     """Force of the smooth wall W."""
-    surface, rng = PASSIVITY.surface("W"), np.random.default_rng(1)
+    surface, rng = cases.PASSIVITY.surface("W"), np.random.default_rng(1)
     points = rng.uniform(-2e-3, 2e-3, (200, 3)) * [1, 0, 1]
     z = points[:, 2]
-    printed = np.column_stack([0 * z, np.where(z < 0.0, -PASSIVITY.stiffness * z, 0.0)])
-    return combine_checks(
-        check_values(
+    printed = np.column_stack([0 * z, np.where(z < 0.0, -cases.PASSIVITY.stiffness * z, 0.0)])
+    return claim.combine_checks(
+        claim.check_values(
             "force of W at 200 probes", printed=printed, reference=surface.force(points)[:, [0, 2]]
         ),
-        check_zero_outside("W"),
+        formula_checks.check_zero_outside("W"),
     )
 
 
-@declare_claim("sentence-V.A-qF")
-def number_f() -> Check:
+@claim.declare_claim("sentence-V.A-qF")
+def number_f() -> claim.Check:
     """q_F = 8.3 for the stated parameters."""
     own, true = PAPER_CASE.sticking_norm(), PAPER_CASE.max_norm_ratio()
-    package = PASSIVITY.q("F")
-    return check_statement(
+    package = cases.PASSIVITY.q("F")
+    return claim.check_statement(
         f"(26) gives {own:.4f}, √2 times that is {math.sqrt(2.0) * own:.4f}; the greatest "
         f"‖J‖/κ₀ of the paper's law is {true:.4f}, of the package's {package:.4f}",
         printed=any(round(value, 1) == 8.3 for value in (own, true, package)),
@@ -106,11 +83,11 @@ def number_f() -> Check:
     )
 
 
-@declare_claim("sentence-V.A-qA")
-def number_a() -> Check:
+@claim.declare_claim("sentence-V.A-qA")
+def number_a() -> claim.Check:
     """q_A = 5.1 for the stated parameters."""
-    q = PASSIVITY.q("A")
-    return check_statement(f"q_A = {q:.4f}", printed=round(q, 1) == 5.1, q=q)
+    q = cases.PASSIVITY.q("A")
+    return claim.check_statement(f"q_A = {q:.4f}", printed=round(q, 1) == 5.1, q=q)
 
 
 def _handle_damping(x: float) -> float:
@@ -118,20 +95,22 @@ def _handle_damping(x: float) -> float:
     device = load_device("pantograph")
     lengths = [device.value(field) for field in ("proximal_link", "distal_link", "base_distance")]
     proximal, distal, base = (math.nan if length is None else length for length in lengths)
-    matrix = handle_damping(FiveBar(proximal, distal, base), PASSIVITY.joint_damping, (x, 0.1))
+    matrix = handle_damping(
+        FiveBar(proximal, distal, base), cases.PASSIVITY.joint_damping, (x, 0.1)
+    )
     return float(np.linalg.svd(matrix, compute_uv=False)[-1])
 
 
-@declare_claim("sentence-V.A-rule")
-def stability_rule() -> Check:
+@claim.declare_claim("sentence-V.A-rule")
+def stability_rule() -> claim.Check:
     """At 2000 N/m W is within (1), A and F are not, and are when divided by their numbers."""
-    q_a, q_f = PASSIVITY.q("A"), PAPER_CASE.sticking_norm()
+    q_a, q_f = cases.PASSIVITY.q("A"), PAPER_CASE.sticking_norm()
     numbers = {"W": 1.0, "A": q_a, "F": q_f, "A/5.1": q_a / 5.1, "F/8.3": q_f / 8.3}
-    loads = {name: PASSIVITY.stiffness * number for name, number in numbers.items()}
-    limits = [_handle_damping(x) / (2 * SAMPLING_PERIOD) for x in (-0.0125, 0.0375)]
-    return check_statement(
-        f"κ₀ q [N/m]: {format_by_name(loads, '.0f')}; σ₀/(2T) is {min(limits):.0f} to "
-        f"{max(limits):.0f} (links not verified)",
+    loads = {name: cases.PASSIVITY.stiffness * number for name, number in numbers.items()}
+    limits = [_handle_damping(x) / (2 * cases.SAMPLING_PERIOD) for x in (-0.0125, 0.0375)]
+    return claim.check_statement(
+        f"κ₀ q [N/m]: {formula_checks.format_by_name(loads, '.0f')}; "
+        f"σ₀/(2T) is {min(limits):.0f} to {max(limits):.0f} (links not verified)",
         printed=all(
             (load <= limit) is (name not in "AF")
             for name, load in loads.items()
@@ -142,8 +121,8 @@ def stability_rule() -> Check:
     )
 
 
-@declare_claim("sentence-V.A-ensured")
-def division_ensures_passivity() -> Check:
+@claim.declare_claim("sentence-V.A-ensured")
+def division_ensures_passivity() -> claim.Check:
     """Dividing by the characteristic number ensures passivity for A and F.
 
     With divided stiffness, A and F still gain energy on a slow loop.
@@ -151,14 +130,14 @@ def division_ensures_passivity() -> Check:
     damping = _handle_damping(0.0375)
     speeds = {}
     for law, number in (("A", 5.1), ("F", 8.3)):
-        surface = PASSIVITY.surface(law, stiffness=PASSIVITY.stiffness / number)
-        loop = PASSIVITY.groove_path() if law == "A" else PASSIVITY.friction_path(1e-5)
+        surface = cases.PASSIVITY.surface(law, stiffness=cases.PASSIVITY.stiffness / number)
+        loop = cases.PASSIVITY.groove_path() if law == "A" else cases.PASSIVITY.friction_path(1e-5)
         length = float(np.linalg.norm(loop - np.roll(loop, 1, axis=0), axis=1).sum())
         speeds[law] = loop_work(surface, loop) / (damping * length)
-    return check_statement(
-        f"with κ₀/5.1 and κ₀/8.3 and σ₀ = {damping:.2f} N·s/m, the loops of Fig. 3 "
-        "supply energy to a hand slower than: "
-        f"{format_by_name({law: 1e3 * v for law, v in speeds.items()}, '.1f', ' mm/s')}",
+    in_mm = {law: 1e3 * speed for law, speed in speeds.items()}
+    return claim.check_statement(
+        f"with κ₀/5.1 and κ₀/8.3 and σ₀ = {damping:.2f} N·s/m, the loops of Fig. 3 supply energy "
+        f"to a hand slower than: {formula_checks.format_by_name(in_mm, '.1f', ' mm/s')}",
         printed=max(speeds.values()) <= 0.0,
         correction="it ends limit cycles at best; a loop that gains energy is only slowed down",
         numbers={f"speed for {law}": speed for law, speed in speeds.items()},
@@ -174,21 +153,21 @@ def held_force_work(path: FloatArray, force: FloatArray) -> float:
     )
 
 
-@declare_claim("sentence-V.B-sum")
-def energy_sums() -> Check:
+@claim.declare_claim("sentence-V.B-sum")
+def energy_sums() -> claim.Check:
     """Force times displacement of the same sample, summed, is the energy supplied.
 
     The paper's Σ f Δp is compared with the work of a held force.
     """
     rng = np.random.default_rng(23)
-    surface = SCANNING.surface("W")
+    surface = cases.SCANNING.surface("W")
     path = np.cumsum(rng.normal(size=(400, 3)), axis=0) * 1e-6 * [0, 0, 1] - [0, 0, 1e-3]
     force, step = surface.force(path), np.diff(path, axis=0)
     held = held_force_work(path, force[:-1])
     # The work of the field along the path is the change of its energy.
     stored = 0.5 * surface.stiffness * path[[0, -1], 2] ** 2
     field = float(stored[0] - stored[1])
-    return check_values(
+    return claim.check_values(
         "energy from sampling, beyond the change of the stored energy [J]",
         printed=float(np.sum(force[1:] * step)) - field,
         corrected=float(np.sum(force[:-1] * step)) - field,
@@ -196,28 +175,28 @@ def energy_sums() -> Check:
     )
 
 
-@declare_claim("sentence-V.B-margin")
-def passivity_margins() -> Check:
+@claim.declare_claim("sentence-V.B-margin")
+def passivity_margins() -> claim.Check:
     """The margin of passivity is larger than in section V.A."""
-    numbers = {law: [case.q(law) for case in (PASSIVITY, SCANNING)] for law in "WABCEG"}
+    numbers = {law: [case.q(law) for case in (cases.PASSIVITY, cases.SCANNING)] for law in "WABCEG"}
     numbers["F"] = [PAPER_CASE.sticking_norm(), SCANNING_CASE.sticking_norm()]
-    gain = SCANNING.joint_damping / SCANNING.stiffness
-    gain *= PASSIVITY.stiffness / PASSIVITY.joint_damping
+    gain = cases.SCANNING.joint_damping / cases.SCANNING.stiffness
+    gain *= cases.PASSIVITY.stiffness / cases.PASSIVITY.joint_damping
     ratios = {law: gain * before / after for law, (before, after) in numbers.items()}
-    return check_statement(
-        f"σ₀/(2T κ₀ q) of V.B over that of V.A: {format_by_name(ratios)}",
+    return claim.check_statement(
+        f"σ₀/(2T κ₀ q) of V.B over that of V.A: {formula_checks.format_by_name(ratios)}",
         printed=min(ratios.values()) > 1.0,
         numbers={f"ratio for {law}": ratio for law, ratio in ratios.items()},
     )
 
 
-@declare_claim("sentence-V.B-lateral")
-def no_lateral_energy() -> Check:
+@claim.declare_claim("sentence-V.B-lateral")
+def no_lateral_energy() -> claim.Check:
     """A exchanges no energy along the surface."""
-    surface, rng = SCANNING.surface("A"), np.random.default_rng(5)
+    surface, rng = cases.SCANNING.surface("A"), np.random.default_rng(5)
     force = surface.force(rng.uniform(-2e-3, 2e-3, (1000, 3)) * [1, 0, 1])
     lateral, normal = float(np.abs(force[:, 0]).max()), float(np.abs(force[:, 2]).max())
-    return check_statement(
+    return claim.check_statement(
         f"greatest |f_x| of A at 1000 probes {lateral:g} N, |f_z| {normal:.2f} N",
         printed=lateral == 0.0 < normal,
         lateral=lateral,
@@ -225,21 +204,23 @@ def no_lateral_energy() -> Check:
     )
 
 
-@declare_claim("sentence-V.C-alive")
-def nonconservative_feels_alive() -> Check:
+@claim.declare_claim("sentence-V.C-alive")
+def nonconservative_feels_alive() -> claim.Check:
     """Fields that are not conservative feel alive.
 
     The leak is computed; its perception is not.
     """
-    energies = {law: worst_loop(BUMP.surface(law)).energy for law in "ABD"}  # 1 mm deep [J]
-    summary = format_by_name({law: 1e3 * e for law, e in energies.items()}, ".3g", " mJ")
-    return check_observation(
+    energies = {law: worst_loop(cases.BUMP.surface(law)).energy for law in "ABD"}  # 1 mm deep [J]
+    summary = formula_checks.format_by_name(
+        {law: 1e3 * e for law, e in energies.items()}, ".3g", " mJ"
+    )
+    return claim.check_observation(
         f"worst loops in V.C's setting: {summary}; whether a hand notices is not computed",
         {f"worst loop of {law} [J]": energy for law, energy in energies.items()},
     )
 
 
-Case = TypeVar("Case", ExperimentCase, FrictionCase)
+Case = TypeVar("Case", cases.ExperimentCase, FrictionCase)
 
 
 def growth_exponents(case: Case, compute: Callable[..., float], *arguments: Any) -> list[float]:
@@ -251,14 +232,16 @@ def growth_exponents(case: Case, compute: Callable[..., float], *arguments: Any)
     return [math.log(ratio) / math.log(1.01) for ratio in ratios]
 
 
-@declare_claim("sentence-V.C-scaling")
-def scaling_with_texture() -> Check:
+@claim.declare_claim("sentence-V.C-scaling")
+def scaling_with_texture() -> claim.Check:
     """q_A is proportional to A/l, the energy gained on a horizontal path to A²."""
-    q_by_a, q_by_l = growth_exponents(BUMP, ExperimentCase.q, "A")
+    q_by_a, q_by_l = growth_exponents(cases.BUMP, cases.ExperimentCase.q, "A")
     energy_by_a, energy_by_l = growth_exponents(
-        BUMP, lambda case: loop_work(case.surface("A"), case.groove_path())
+        cases.BUMP, lambda case: loop_work(case.surface("A"), case.groove_path())
     )
-    straight = loop_work(BUMP.surface("A"), [[0.0, 0.0, 0.0], [0.37 * BUMP.period, 0.0, 0.0]])
+    straight = loop_work(
+        cases.BUMP.surface("A"), [[0.0, 0.0, 0.0], [0.37 * cases.BUMP.period, 0.0, 0.0]]
+    )
     exponents = {
         "q by A": q_by_a,
         "energy by A": energy_by_a,
@@ -267,23 +250,23 @@ def scaling_with_texture() -> Check:
     }
     q_error = max(abs(q_by_a - 1.0), abs(q_by_l + 1.0))
     energy_error = max(abs(energy_by_a - 2.0), abs(energy_by_l))
-    return check_statement(
-        f"exponents in V.C's setting: {format_by_name(exponents, '+.3f')}; along a horizontal path "
-        f"forth and back {straight:g} J",
+    return claim.check_statement(
+        f"exponents in V.C's setting: {formula_checks.format_by_name(exponents, '+.3f')}; "
+        f"along a horizontal path forth and back {straight:g} J",
         printed=q_error < 1e-6 and energy_error < 1e-6,
         corrected=q_error < 0.05 and energy_error < 1e-6 and straight == 0.0,
         numbers=exponents,
     )
 
 
-@declare_claim("sentence-V.C-perpendicular")
-def passive_along_normal() -> Check:
+@claim.declare_claim("sentence-V.C-perpendicular")
+def passive_along_normal() -> claim.Check:
     """A is passive to a probe that moves at right angles to the surface.
 
     As passive as a smooth wall, with the least damping that a wall requires: σ₀ = κ₀T/2.
     """
     rng, gains = np.random.default_rng(29), []
-    for case in [PASSIVITY, *random_settings()]:
+    for case in [cases.PASSIVITY, *cases.random_settings()]:
         surface = case.surface("A")
         for size in 10.0 ** rng.uniform(-3.0, 0.0, 20):
             x = rng.uniform(0.0, case.period)
@@ -294,7 +277,7 @@ def passive_along_normal() -> Check:
             stored = 0.5 * case.stiffness * depth[[0, -1]] ** 2
             net = energy_gained(surface, path, 0.5 * case.stiffness) + float(stored[1] - stored[0])
             gains.append(net / (case.stiffness * (size * case.depth) ** 2))
-    return check_statement(
+    return claim.check_statement(
         f"with σ₀ = κ₀T/2 the best of 80 vertical oscillations on A gains {max(gains):+.1e} κ₀ "
         "times its amplitude squared",
         printed=max(gains) < 1e-9,
@@ -305,56 +288,58 @@ def passive_along_normal() -> Check:
 # --- VI -------------------------------------------------------------------------------------------
 
 
-@declare_claim("sentence-VI-increase")
-def stiffness_is_raised() -> Check:
+@claim.declare_claim("sentence-VI-increase")
+def stiffness_is_raised() -> claim.Check:
     """Texturing generally raises the effective stiffness."""
-    cases = [*SETTINGS.values(), *random_settings(5)]
-    numbers = {law: [case.q(law) for case in cases] for law in PAPER_LAWS}
+    settings = [*cases.SETTINGS.values(), *cases.random_settings(5)]
+    numbers = {law: [case.q(law) for case in settings] for law in cases.PAPER_LAWS}
     least = min(min(values) for values in numbers.values())
     raised = [law for law, values in numbers.items() if max(values) > 1.0 + 1e-9]
-    return check_statement(
-        f"over {len(cases)} settings q >= {least:.6g}; above 1 for {', '.join(raised)}",
+    return claim.check_statement(
+        f"over {len(settings)} settings q >= {least:.6g}; above 1 for {', '.join(raised)}",
         printed=least >= 1.0 - 1e-6 and len(raised) >= 4,
         least=least,
         laws_above_1=", ".join(raised),
     )
 
 
-@declare_claim("sentence-VI-proportional")
-def number_is_proportional() -> Check:
+@claim.declare_claim("sentence-VI-proportional")
+def number_is_proportional() -> claim.Check:
     """The characteristic number is most frequently proportional to A/l."""
-    base = ExperimentCase(1000.0, 1e-3, 0.8e-3)
-    exponents = {law: growth_exponents(base, ExperimentCase.q, law) for law in "ABCEG"}
+    base = cases.ExperimentCase(1000.0, 1e-3, 0.8e-3)
+    exponents = {law: growth_exponents(base, cases.ExperimentCase.q, law) for law in "ABCEG"}
     # The package's law scales the heights; the paper's own bound does not.
     exponents["F"] = growth_exponents(PAPER_CASE, FrictionCase.sticking_norm)
     proportional = [
         law for law, (a, length) in exponents.items() if max(abs(a - 1.0), abs(length + 1.0)) < 0.3
     ]
     summary = ", ".join(f"{law} {a:+.2f} {length:+.2f}" for law, (a, length) in exponents.items())
-    return check_statement(
+    return claim.check_statement(
         f"exponents of A and l in V.A's setting: {summary}; D has no finite number",
-        printed=len(proportional) > len(PAPER_LAWS) / 2,
+        printed=len(proportional) > len(cases.PAPER_LAWS) / 2,
         correction="A's, and F's where the texture is steep; B's and G's go as A D/l² where it "
         "is pressed deep, C's in between, and E's is constant",
         numbers={f"exponents for {law}": pair for law, pair in exponents.items()},
     )
 
 
-@declare_claim("sentence-VI-always")
-def always_passive() -> Check:
+@claim.declare_claim("sentence-VI-always")
+def always_passive() -> claim.Check:
     """Passivity can always be had by less gain, faster sampling or more damping, for any law.
 
     At one gain it is the statement of V.A that dividing by the number ensures passivity.
     """
-    length = 2.0 * (0.25 * SCANNING.period + SCANNING.amplitude)
+    length = 2.0 * (0.25 * cases.SCANNING.period + cases.SCANNING.amplitude)
     speeds: dict[str, list[float]] = {}
     for law in "AC":
         speeds[law] = []
         for stiffness, damping in ((1000.0, 1.0), (10.0, 1.0), (1000.0, 100.0)):
-            work = loop_work(SCANNING.surface(law, stiffness=stiffness), SCANNING.groove_path())
+            work = loop_work(
+                cases.SCANNING.surface(law, stiffness=stiffness), cases.SCANNING.groove_path()
+            )
             speeds[law].append(max(work, 0.0) / (damping * length))
     greatest = {law: max(values) for law, values in speeds.items()}
-    return check_statement(
+    return claim.check_statement(
         "A gains energy below "
         + ", ".join(f"{speed * 1e3:.3g} mm/s" for speed in speeds["A"])
         + f" with κ₀ = 1000, 10, 1000 N/m and 1, 1, 100 N·s/m, C below {greatest['C']:.1g} m/s, "
@@ -367,35 +352,35 @@ def always_passive() -> Check:
     )
 
 
-@declare_claim("sentence-VI-D")
-def conclusion_d() -> Check:
+@claim.declare_claim("sentence-VI-D")
+def conclusion_d() -> claim.Check:
     """D is conservative and leaves the effective stiffness as it is, but jumps."""
-    surface = SCANNING.surface("D")
+    surface = cases.SCANNING.surface("D")
     q, plus = characteristic_number(surface).value, one_sided_number(surface).value
-    return combine_checks(
-        check_curl("D", is_conservative=True),
-        check_statement(
+    return claim.combine_checks(
+        formula_checks.check_curl("D", is_conservative=True),
+        claim.check_statement(
             f"D in V.B's setting: q = {q}, q⁺ = {plus:g}",
             printed=q == 1.0,
             corrected=plus == 1.0,
             q=q,
             one_sided=plus,
         ),
-        check_continuity("D", is_continuous=False),
+        formula_checks.check_continuity("D", is_continuous=False),
     )
 
 
-@declare_claim("sentence-VI-F")
-def conclusion_f() -> Check:
+@claim.declare_claim("sentence-VI-F")
+def conclusion_f() -> claim.Check:
     """F has no advantage in effective stiffness, but dissipates (its feel is left out).
 
     Its number is not small, but a stroke forth and back loses energy.
     """
-    numbers = {law: SCANNING.q(law) for law in "AEFG"}
+    numbers = {law: cases.SCANNING.q(law) for law in "AEFG"}
     bound = SCANNING_CASE.sticking_norm()
-    length, depth = 10.0 * SCANNING.deflection, -SCANNING.depth
-    work = loop_work(SCANNING.surface("F"), [[0, 0, depth], [length, 0, depth]])
-    return check_statement(
+    length, depth = 10.0 * cases.SCANNING.deflection, -cases.SCANNING.depth
+    work = loop_work(cases.SCANNING.surface("F"), [[0, 0, depth], [length, 0, depth]])
+    return claim.check_statement(
         f"q_F = {numbers['F']:.3f} ({bound:.3f} by (26)) against 1 for E and the wall; a "
         f"stroke of 10 mm forth and back gives {work * 1e3:+.2f} mJ",
         printed=min(numbers["F"], bound) > 1.1 * numbers["E"] and work < 0.0,

@@ -11,17 +11,15 @@ import numpy as np
 
 from asperity.analysis.energy.loop_integral import loop_work
 from asperity.core.checks import FloatArray
-from asperity.paper.cases import SCANNING, random_settings
-from asperity.paper.claim import (
-    Check,
-    check_observation,
-    check_statement,
-    check_values,
-    combine_checks,
-    declare_claim,
+from asperity.paper import claim
+from asperity.paper.cases import (
+    PAPER_CASE,
+    SCANNING,
+    FrictionCase,
+    random_friction_cases,
+    random_settings,
 )
 from asperity.paper.formula_checks import Potential, numerical_gradient
-from asperity.paper.friction_case import PAPER_CASE, FrictionCase, random_friction_cases
 from asperity.paper.probes import generic_probes
 
 _TWO_PI = 2.0 * math.pi
@@ -30,18 +28,18 @@ _TWO_PI = 2.0 * math.pi
 # --- field and Jacobian ---------------------------------------------------------------------------
 
 
-@declare_claim("eq-22")
-def field_f() -> Check:
+@claim.declare_claim("eq-22")
+def field_f() -> claim.Check:
     """Force of F: the wall, and friction that h modulates.
 
     Compared with the definition, and by the work of friction on a sliding probe.
     """
     force = _check_force(9, lambda pull, _share: -pull)
-    return combine_checks(force, _check_sliding_work())
+    return claim.combine_checks(force, _check_sliding_work())
 
 
-@declare_claim("table-1-F")
-def table_one_f() -> Check:
+@claim.declare_claim("table-1-F")
+def table_one_f() -> claim.Check:
     """Force of F (Fig. 2): [-κ(x) d, -κ₀ d].
 
     With κ(x) = μκ₀(1 - h), d = p^z.
@@ -49,7 +47,7 @@ def table_one_f() -> Check:
     return _check_force(19, lambda pull, share: -pull / share)
 
 
-def _check_force(seed: int, printed: Callable[[float, float], float]) -> Check:
+def _check_force(seed: int, printed: Callable[[float, float], float]) -> claim.Check:
     """Compare a formula for f_x, and one that opposes the deflection, with definition and kernel.
 
     Its arguments are μκ₀(1 - m) p^z d/d_max and d/d_max.
@@ -69,7 +67,7 @@ def _check_force(seed: int, printed: Callable[[float, float], float]) -> Check:
         printed_forces += [[printed(pull, share), -k * spot.z]] * 2
         corrected_forces += [[pull, -k * spot.z]] * 2
         reference += [[float(exact[0]), float(exact[2])], [kernel[0], kernel[2]]]
-    return check_values(
+    return claim.check_values(
         "force of F at 4 generic probes, by definition and kernel",
         printed=printed_forces,
         corrected=corrected_forces,
@@ -77,10 +75,10 @@ def _check_force(seed: int, printed: Callable[[float, float], float]) -> Check:
     )
 
 
-def _check_sliding_work() -> Check:
+def _check_sliding_work() -> claim.Check:
     """Check the sign of friction by 1 mm of sliding with d = d_max at 1 mm depth and h = 0."""
     work = SCANNING.stiffness * SCANNING.friction * 1e-3 * 1e-3
-    return check_statement(
+    return claim.check_statement(
         f"work of the printed friction over 1 mm of sliding {work * 1e3:+.2f} mJ",
         printed=work < 0.0,
         corrected=-work < 0.0,
@@ -88,8 +86,8 @@ def _check_sliding_work() -> Check:
     )
 
 
-@declare_claim("eq-23")
-def jacobian_f() -> Check:
+@claim.declare_claim("eq-23")
+def jacobian_f() -> claim.Check:
     """Jacobian of F.
 
     Compared with differences of (22) as printed, and, with opposite friction, with the kernel.
@@ -108,7 +106,7 @@ def jacobian_f() -> Check:
             h, slope = float(case.modulation(x)), float(case.modulation(x, 1))
             printed += [_printed_jacobian(case, d, h, rate, slope)] * 2
             corrected += [_printed_jacobian(case, d, h, rate, slope * d)] * 2
-    return check_values(
+    return claim.check_values(
         "Jacobian of (22) and of its kernel at 12 random states",
         printed=printed,
         corrected=corrected,
@@ -134,8 +132,8 @@ def _printed_jacobian(
     return [[-first, -r.friction * (1.0 - h) * d / r.deflection], [0.0, -1.0]]
 
 
-@declare_claim("eq-24")
-def stick_slip_phases() -> Check:
+@claim.declare_claim("eq-24")
+def stick_slip_phases() -> claim.Check:
     """d follows the probe while d < d_max and does not change while d = d_max.
 
     Checked with the package's anchor on a path forth and back.
@@ -154,7 +152,7 @@ def stick_slip_phases() -> Check:
     is_sliding = np.abs(rate) < 0.5
     forward = is_sliding == (np.abs(end - reach) < 1e-9 * reach)
     both = is_sliding == (np.abs(np.abs(end) - reach) < 1e-9 * reach)
-    return check_statement(
+    return claim.check_statement(
         f"of {len(end)} steps forth and back d = d_max tells slip from stick in "
         f"{forward.mean():.3f}, |d| = d_max in {both.mean():.3f}",
         printed=bool(forward.all() and len(pure) - pure.sum() <= 3),
@@ -164,13 +162,13 @@ def stick_slip_phases() -> Check:
     )
 
 
-@declare_claim("eq-25")
-def sliding_entries_bound() -> Check:
+@claim.declare_claim("eq-25")
+def sliding_entries_bound() -> claim.Check:
     """Greatest entries of F's Jacobian while sliding."""
     cases = [PAPER_CASE, *random_friction_cases()]
     first = [_TWO_PI * r.friction * r.depth * r.amplitude / r.period for r in cases]
     second = [r.friction * (1.0 + r.amplitude) for r in cases]
-    return check_values(
+    return claim.check_values(
         "greatest entries while sliding, 5 parameter sets",
         printed=np.column_stack([first, [2.0 * r.friction for r in cases]]),
         corrected=np.column_stack([first, second]),
@@ -179,13 +177,13 @@ def sliding_entries_bound() -> Check:
     )
 
 
-@declare_claim("eq-26")
-def sticking_entries_bound() -> Check:
+@claim.declare_claim("eq-26")
+def sticking_entries_bound() -> claim.Check:
     """Greatest entries of F's Jacobian while sticking."""
     cases = [PAPER_CASE, *random_friction_cases()]
     printed = np.array([case.sticking_entries() for case in cases])
     reference = np.array([case.max_entries()[1] for case in cases])
-    entries = check_values(
+    entries = claim.check_values(
         "greatest entries while sticking, 5 parameter sets",
         printed=printed,
         corrected=[_corrected_sticking_entries(case) for case in cases],
@@ -193,12 +191,12 @@ def sticking_entries_bound() -> Check:
         tolerance=1e-8,
     )
     ratios = printed / reference
-    bound = check_statement(
+    bound = claim.check_statement(
         f"as bounds the entries exceed the greatest {ratios.min():.2f} to {ratios.max():.2f} times",
         printed=ratios.min() >= 1.0,
         ratios_to_the_greatest=ratios.ravel().tolist(),
     )
-    return combine_checks(entries, bound)
+    return claim.combine_checks(entries, bound)
 
 
 def _corrected_sticking_entries(r: FrictionCase) -> tuple[float, float]:
@@ -210,14 +208,14 @@ def _corrected_sticking_entries(r: FrictionCase) -> tuple[float, float]:
 # --- energy ---------------------------------------------------------------------------------------
 
 
-@declare_claim("sentence-IV.F-deflections")
-def deflection_range() -> Check:
+@claim.declare_claim("sentence-IV.F-deflections")
+def deflection_range() -> claim.Check:
     """Realistic d_max go from 1e-2 m (tissue) to 1e-6 m (metal)."""
-    return check_observation("a statement on real materials: nothing here can be computed")
+    return claim.check_observation("a statement on real materials: nothing here can be computed")
 
 
-@declare_claim("eq-27")
-def energy_f() -> Check:
+@claim.declare_claim("eq-27")
+def energy_f() -> claim.Check:
     """Energy of F without texture around its path of Fig. 3.
 
     Without texture, twice the friction makes the law's m = 1/2 equal to the paper's h = 0.
@@ -231,14 +229,14 @@ def energy_f() -> Check:
         reference.append(loop_work(surface, case.friction_path(share * case.depth)))
         shallow = loop_work(surface, case.friction_path(1e-7 * case.depth))
         limit = max(limit, abs(shallow / whole - 1.0))
-    return combine_checks(
-        check_values(
+    return claim.combine_checks(
+        claim.check_values(
             f"energy around the path with a = {share:g} d_max^z, {len(cases)} parameter sets",
             printed=printed,
             corrected=np.array(printed) * (1.0 - share),
             reference=reference,
         ),
-        check_statement(
+        claim.check_statement(
             f"with a = 1e-7 d_max^z the printed energy is off by {limit:.1e}",
             printed=limit < 1e-6,
             error_in_the_limit=limit,
@@ -246,8 +244,8 @@ def energy_f() -> Check:
     )
 
 
-@declare_claim("sentence-IV.F-stick")
-def sticking_generates_energy() -> Check:
+@claim.declare_claim("sentence-IV.F-stick")
+def sticking_generates_energy() -> claim.Check:
     """F generates energy while sticking only, which is at most 2 d_max wide."""
     case = SCANNING
     surface, reach = case.surface("F"), case.deflection
@@ -260,7 +258,7 @@ def sticking_generates_energy() -> Check:
     slip_gain, stick_gain = float(gain[sliding].max()), float(gain[~sliding].max())
     back = np.flatnonzero(~sliding & (np.arange(len(gain)) >= 8000))
     width = float(np.abs(np.diff(x)[back]).sum()) / reach
-    return check_statement(
+    return claim.check_statement(
         f"greatest gain of a sliding step {slip_gain * 1e9:+.3g} nJ, of a sticking step "
         f"{stick_gain * 1e9:+.3g} nJ; after turning it sticks over {width:.3f} d_max",
         printed=slip_gain < 0.0 < stick_gain and width <= 2.0 + 1e-3,
@@ -278,8 +276,8 @@ def _anchor_deflection(x: FloatArray, max_deflection: float) -> FloatArray:
     return d
 
 
-@declare_claim("sentence-IV.F-compliant")
-def compliant_materials() -> Check:
+@claim.declare_claim("sentence-IV.F-compliant")
+def compliant_materials() -> claim.Check:
     """The energy that is not conserved is proportional to d_max, as with d_max = 1 cm."""
     energies = []
     for deflection in (1e-3, 1e-2):
@@ -287,7 +285,7 @@ def compliant_materials() -> Check:
         path = case.friction_path(1e-7 * case.depth)
         energies.append(loop_work(case.untextured_friction(), path))
     ratio, energy = energies[1] / energies[0], energies[1] * 1e3
-    return check_statement(
+    return claim.check_statement(
         f"d_max from 1 mm to 1 cm multiplies the energy by {ratio:.6f}, to {energy:.2f} mJ",
         printed=abs(ratio - 10.0) < 1e-6,
         energies=energies,
@@ -327,22 +325,22 @@ def expand_bound(r: FrictionCase, *, as_printed: bool) -> float:
     return math.sqrt(2.0) / (2.0 * d) * math.sqrt(max(whole, 0.0))
 
 
-@declare_claim("eq-31")
-def friction_number_bound() -> Check:
+@claim.declare_claim("eq-31")
+def friction_number_bound() -> claim.Check:
     """An upper bound on q_F, and its expression written out."""
     cases = [PAPER_CASE, *random_friction_cases(6)]
     norms = [case.sticking_norm() for case in cases]
     ratios = [case.max_norm_ratio() / norm for case, norm in zip(cases, norms, strict=True)]
-    bound = check_statement(
+    bound = claim.check_statement(
         f"the greatest ‖J_F‖/κ₀ is {min(ratios):.3f} to {max(ratios):.3f} of the norm of (26)",
         printed=max(ratios) <= 1.0,
         shares_of_the_bound=ratios,
         norm_for_section_V_A=norms[0],
     )
-    written_out = check_values(
+    written_out = claim.check_values(
         f"expression written out against that norm, {len(cases)} parameter sets",
         printed=[expand_bound(case, as_printed=True) for case in cases],
         corrected=[expand_bound(case, as_printed=False) for case in cases],
         reference=norms,
     )
-    return combine_checks(bound, written_out)
+    return claim.combine_checks(bound, written_out)

@@ -9,23 +9,9 @@ import numpy as np
 from asperity.analysis.energy.continuity import continuity
 from asperity.analysis.energy.loop_integral import loop_work
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
-from asperity.paper.cases import (
-    BUMP,
-    PASSIVITY,
-    SCANNING,
-    SETTINGS,
-    ExperimentCase,
-    path_points,
-    random_settings,
-)
+from asperity.paper import cases, formula_checks
 from asperity.paper.claim import Check, check_statement, check_values, combine_checks, declare_claim
 from asperity.paper.claims.formula_claims import FormulaRow
-from asperity.paper.formula_checks import (
-    check_curl,
-    max_difference_quotient,
-    max_loop_share,
-    segment_work,
-)
 from asperity.paper.probes import generic_probes
 
 _LABEL = "f_x of D at generic probes, by definition and kernel"
@@ -39,7 +25,7 @@ def field_d() -> Check:
 
     Conservative also across the ridges where it jumps.
     """
-    energy = max_loop_share("D")
+    energy = formula_checks.max_loop_share("D")
     loops = check_statement(
         f"energy around the path {energy:.1e} of κ₀A²", printed=energy < 1e-7, loop=energy
     )
@@ -55,7 +41,7 @@ def force_x_of_d() -> Check:
     """
     row = FormulaRow(law="D", quantity="force", true="fx", printed="-k*rx", label=_LABEL)
     share = 0.0
-    for case in random_settings():
+    for case in cases.random_settings():
         for x, height in ((0.25, case.amplitude), (0.75, -case.amplitude)):
             probe = [[x * case.period, 0.0, height - 0.7 * case.crest_radius]]
             force = case.surface("D").force(probe)[0]
@@ -88,9 +74,11 @@ def singular_d() -> Check:
 def number_d() -> Check:
     """‖J_D‖ = κ₀ whatever the surface, and q_D = 1."""
     norms = [float(s.norms().max()) / s.k for s in generic_probes("D", 12)]
-    surface = PASSIVITY.surface("D")
+    surface = cases.PASSIVITY.surface("D")
     q, plus = characteristic_number(surface), one_sided_number(surface)
-    shallow = characteristic_number(BUMP.surface("D", max_depth=0.8 * BUMP.crest_radius))
+    shallow = characteristic_number(
+        cases.BUMP.surface("D", max_depth=0.8 * cases.BUMP.crest_radius)
+    )
     return check_statement(
         f"‖J‖/κ₀ up to {max(norms):.3f} at 12 generic probes; sup {q.value} in V.A's setting, "
         f"{shallow.value:.3f} at 0.8 of the crests' radius; q⁺ = {plus.value:g}",
@@ -107,11 +95,11 @@ def number_d() -> Check:
 @declare_claim("remark-6")
 def remark_6() -> Check:
     """D's force jumps, on a sinusoid below its maxima (Fig. 2); its potential has a kink there."""
-    checks = [_check_jumps(name, case) for name, case in SETTINGS.items()]
+    checks = [_check_jumps(name, case) for name, case in cases.SETTINGS.items()]
     return combine_checks(*checks, _check_potential_kink())
 
 
-def _check_jumps(name: str, case: ExperimentCase) -> Check:
+def _check_jumps(name: str, case: cases.ExperimentCase) -> Check:
     """Check that the force of D jumps below the maxima only."""
     surface = case.surface("D")
     result = continuity(surface, characteristic_number(surface))
@@ -133,10 +121,10 @@ def _check_jumps(name: str, case: ExperimentCase) -> Check:
 
 def _check_potential_kink() -> Check:
     """Check that the potential of D is continuous across the ridge but not differentiable."""
-    case = SCANNING
+    case = cases.SCANNING
     surface, crest = case.surface("D"), 0.25 * case.period
     level, step = case.amplitude - case.depth, 1e-9
-    points = path_points((crest - step, level), (crest, level), (crest + step, level))
+    points = cases.path_points((crest - step, level), (crest, level), (crest + step, level))
     energy = 0.5 * case.stiffness * ((surface.texture.nearest(points) - points) ** 2).sum(axis=1)
     left, right = np.diff(energy) / step
     change = float(abs(energy[2] - energy[0]) / energy[1])
@@ -160,18 +148,18 @@ def norm_e() -> Check:
         printed=[[probe.k, probe.k] for probe in probes],
         reference=[probe.norms() for probe in probes],
     )
-    q = PASSIVITY.q("E")
+    q = cases.PASSIVITY.q("E")
     number = check_values("q_E in V.A's setting", printed=1.0, reference=q)
     return combine_checks(norms, number, _check_lipschitz_e())
 
 
 def _check_lipschitz_e() -> Check:
     """Check |f(a) - f(b)| <= κ₀ |a - b| for pairs of probes, also across ridges."""
-    surface, rng = PASSIVITY.surface("E"), np.random.default_rng(3)
+    surface, rng = cases.PASSIVITY.surface("E"), np.random.default_rng(3)
     ends = rng.uniform(0.0, 1e-3, (2, 4000, 3)) - np.array([0.0, 0.0, 1e-3])
     ends[..., 1] = 0.0
     ends[1] = ends[0] + (ends[1] - ends[0]) * rng.uniform(1e-4, 1.0, (4000, 1))
-    ratio = max_difference_quotient(surface, ends) / surface.stiffness
+    ratio = formula_checks.max_difference_quotient(surface, ends) / surface.stiffness
     return check_statement(
         f"over 4000 pairs of probes the force changes by at most {ratio:.4f} κ₀ per length",
         printed=ratio <= 1.0 + 1e-9,
@@ -183,10 +171,10 @@ def _check_lipschitz_e() -> Check:
 def energy_e() -> Check:
     """Around the path of Fig. 3 E gains energy, on the rising leg only."""
     least, other = math.inf, 0.0
-    for case in [SCANNING, *random_settings()]:
+    for case in [cases.SCANNING, *cases.random_settings()]:
         surface, points = case.surface("E"), case.groove_path()
         scale = case.stiffness * case.amplitude**2
-        gain = segment_work(surface, points[1], points[2])
+        gain = formula_checks.segment_work(surface, points[1], points[2])
         total = loop_work(surface, points, 1e-9)
         least, other = min(least, total / scale), max(other, abs(total - gain) / scale)
     return combine_checks(
@@ -196,16 +184,16 @@ def energy_e() -> Check:
             least_gain=least,
             other_legs=other,
         ),
-        check_curl("E", is_conservative=False),
+        formula_checks.check_curl("E", is_conservative=False),
     )
 
 
 @declare_claim("remark-7")
 def remark_7() -> Check:
     """E is not conservative, but does not jump."""
-    surface = PASSIVITY.surface("E")
+    surface = cases.PASSIVITY.surface("E")
     result = continuity(surface, characteristic_number(surface))
-    across = path_points((0.25e-3 - 1e-12, 0.0), (0.25e-3 + 1e-12, 0.0))
+    across = cases.path_points((0.25e-3 - 1e-12, 0.0), (0.25e-3 + 1e-12, 0.0))
     jump = float(np.linalg.norm(np.diff(surface.force(across), axis=0)))
     return combine_checks(
         check_statement(
@@ -213,5 +201,5 @@ def remark_7() -> Check:
             printed=result.continuous and jump < 1e-6,
             change_across_a_ridge=jump,
         ),
-        check_curl("E", is_conservative=False),
+        formula_checks.check_curl("E", is_conservative=False),
     )

@@ -4,15 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
+from asperity.paper import claim
 from asperity.paper.cases import PAPER_LAWS
-from asperity.paper.claim import (
-    DECLARED_CLAIMS,
-    Check,
-    Number,
-    Verdict,
-    check_statement,
-    declare_claim,
-)
 from asperity.paper.experiments.cycle_counts import STARTS, count_cycles, passivity_onsets
 from asperity.paper.experiments.experiment_setups import ALL_LAWS
 from asperity.paper.experiments.strokes import BumpRun, bump_experiment, scanning_experiment
@@ -38,8 +31,8 @@ def check_over_assumptions(
     summary: str,
     by_paper_measure: Sequence[bool],
     by_exact_measure: Sequence[bool],
-    numbers: Mapping[str, Number],
-) -> Check:
+    numbers: Mapping[str, claim.Number],
+) -> claim.Check:
     """Judge an experiment for all guesses of what the paper leaves open.
 
     The claim holds if every guess confirms it by the paper's measure and by the exact one, and does
@@ -52,18 +45,18 @@ def check_over_assumptions(
         numbers: computed values by name.
     """
     outcomes = {*by_paper_measure, *by_exact_measure}
-    verdict: Verdict = "undecided"
+    verdict: claim.Verdict = "undecided"
     if len(outcomes) == 1:
         verdict = "holds" if True in outcomes else "does not hold"
     tally = (
         f"as printed in {sum(by_paper_measure)} of {len(by_paper_measure)} guesses by the paper's "
         f"measure, {sum(by_exact_measure)} by ours"
     )
-    return Check(f"{tally}: {summary}", numbers, verdict=verdict)
+    return claim.Check(f"{tally}: {summary}", numbers, verdict=verdict)
 
 
-@declare_claim("sentence-V.A-cycles")
-def textured_walls_cycle() -> Check:
+@claim.declare_claim("sentence-V.A-cycles")
+def textured_walls_cycle() -> claim.Check:
     """At 2000 N/m W settles; textured with A or F it enters a limit cycle (Fig. 5).
 
     W must settle from every start. A and F must end in a limit cycle: by the paper's measure from
@@ -80,7 +73,7 @@ def textured_walls_cycle() -> Check:
         f"lag {d}: {', '.join(f'{law} {counts[law, d].cycles}' for law in 'WAF')}"
         for d in TRIED_DELAYS
     )
-    numbers: dict[str, Number] = {}
+    numbers: dict[str, claim.Number] = {}
     for (law, d), one in counts.items():
         numbers[f"{law}, lag {d}: cycles"] = float(one.cycles)
         numbers[f"{law}, lag {d}: calms down slowly"] = float(one.slow)
@@ -92,8 +85,8 @@ def textured_walls_cycle() -> Check:
     )
 
 
-@declare_claim("sentence-V.A-settles")
-def divided_walls_settle() -> Check:
+@claim.declare_claim("sentence-V.A-settles")
+def divided_walls_settle() -> claim.Check:
     """Divided by 5.1 and 8.3 the stiffness of A and F lets them settle (Fig. 5).
 
     Judged where they cycle undivided; at other lags the division cures nothing.
@@ -133,7 +126,7 @@ def _format_ranges(energies: list[tuple[float, float]]) -> str:
 
 def _check_strokes(
     strokes: tuple[Stroke, ...], predicate: Callable[[float, float], bool], suffix: str = ""
-) -> Check:
+) -> claim.Check:
     """Check the energies along x and z of all hands and speeds by both measures."""
     paper = [(1e3 * one.same_sample[0], 1e3 * one.same_sample[2]) for one in strokes]  # [mJ]
     exact = [(1e3 * one.energy[0], 1e3 * one.energy[2]) for one in strokes]
@@ -150,8 +143,8 @@ def _format_gain_count(strokes: tuple[Stroke, ...]) -> str:
     return f"; its field supplies energy in {count} of {len(strokes)}"
 
 
-@declare_claim("sentence-V.B-decrease")
-def decrease_indicates_supply() -> Check:
+@claim.declare_claim("sentence-V.B-decrease")
+def decrease_indicates_supply() -> claim.Check:
     """A decreasing energy indicates that energy is supplied by the virtual environment.
 
     Checked with strokes in which the balance of the whole loop shows a supply.
@@ -159,7 +152,7 @@ def decrease_indicates_supply() -> Check:
     strokes = [one for law in "AE" for one in _simulated_strokes(law) if one.total > 0.0]
     rising = sum(sum(one.same_sample) > 0.0 for one in strokes)
     closure = max(one.closure for one in strokes)
-    return check_statement(
+    return claim.check_statement(
         f"of {len(strokes)} strokes in which A and E supply energy to the hand, by a balance of "
         f"all energies that closes within {closure:.0e}, the paper's sum of f Δp rises in {rising}",
         printed=rising == 0,
@@ -168,15 +161,15 @@ def decrease_indicates_supply() -> Check:
     )
 
 
-@declare_claim("sentence-V.B-A")
-def law_a_gains() -> Check:
+@claim.declare_claim("sentence-V.B-A")
+def law_a_gains() -> claim.Check:
     """On a stroke A gains energy along z, none along x (Fig. 6)."""
     strokes = _simulated_strokes("A")
     return _check_strokes(strokes, lambda x, z: z > 0.0 and x == 0.0, _format_gain_count(strokes))
 
 
-@declare_claim("sentence-V.B-G")
-def law_g_is_passive() -> Check:
+@claim.declare_claim("sentence-V.B-G")
+def law_g_is_passive() -> claim.Check:
     """On a stroke G is marginally passive along x and z (Fig. 6).
 
     Marginally: the energy supplied along one axis is at most a small share of the largest one.
@@ -189,8 +182,8 @@ def law_g_is_passive() -> Check:
     )
 
 
-@declare_claim("sentence-V.B-D")
-def law_d_is_passive() -> Check:
+@claim.declare_claim("sentence-V.B-D")
+def law_d_is_passive() -> claim.Check:
     """On a stroke D is marginally passive along z, clearly along x (Fig. 6)."""
     strokes = _simulated_strokes("D")
     field = max(abs(1e3 * one.field) for one in strokes)
@@ -201,16 +194,16 @@ def law_d_is_passive() -> Check:
     )
 
 
-@declare_claim("sentence-V.B-F")
-def law_f_is_passive() -> Check:
+@claim.declare_claim("sentence-V.B-F")
+def law_f_is_passive() -> claim.Check:
     """On a stroke F is marginally passive along z, passive along x (Fig. 6)."""
     return _check_strokes(
         _simulated_strokes("F"), lambda x, z: x < 0.0 and abs(z) <= MARGINAL_SHARE * abs(x)
     )
 
 
-@declare_claim("sentence-V.C-A")
-def law_a_loses_contact() -> Check:
+@claim.declare_claim("sentence-V.C-A")
+def law_a_loses_contact() -> claim.Check:
     """On a 20 mm bump A gains in jumps and loses contact (Fig. 7)."""
     bumps = _simulated_bumps("A")
     summary = "; ".join(
@@ -223,8 +216,8 @@ def law_a_loses_contact() -> Check:
     return check_over_assumptions(summary, confirmed, confirmed, _bump_numbers(bumps))
 
 
-@declare_claim("sentence-V.C-D")
-def law_d_is_balanced() -> Check:
+@claim.declare_claim("sentence-V.C-D")
+def law_d_is_balanced() -> claim.Check:
     """On a 20 mm bump D keeps its energy in balance (Fig. 7)."""
     bumps = _simulated_bumps("D")
     gains = [one.total for one in _simulated_bumps("A")]
@@ -250,8 +243,8 @@ def _bump_numbers(bumps: tuple[BumpRun, ...]) -> dict[str, float]:
     return numbers
 
 
-@declare_claim("sentence-III.B-reduced")
-def divided_walls_are_passive() -> Check:
+@claim.declare_claim("sentence-III.B-reduced")
+def divided_walls_are_passive() -> claim.Check:
     """κ₁ = κ₀/q preserves passivity, for any algorithm.
 
     κ₀ is the smooth wall's own onset of limit cycles in V.A's loop, q that of the depth reached.
@@ -266,11 +259,11 @@ def divided_walls_are_passive() -> Check:
         f"{law} from {one.onset.cycling:.0f} N/m on, where κ₀/q is {one.wall_rule:.0f}"
         for law, one in violating.items()
     )
-    numbers: dict[str, Number] = {"W: quiet to [N/m]": wall}
+    numbers: dict[str, claim.Number] = {"W: quiet to [N/m]": wall}
     for law, one in textured.items():
         numbers[f"{law}: cycles at [N/m]"] = one.onset.cycling
         numbers[f"{law}: κ₀/q [N/m]"] = one.wall_rule or 0.0
-    return check_statement(
+    return claim.check_statement(
         f"without lag W is quiet to {wall:.0f} N/m; of {', '.join(textured)} cycle below κ₀/q: "
         f"{summary or 'none'}; D has no finite q there",
         printed=not violating,
@@ -281,6 +274,6 @@ def divided_walls_are_passive() -> Check:
 
 
 SIMULATED_CLAIM_IDS = tuple(
-    claim.id for claim in DECLARED_CLAIMS if claim.compute.__module__ == __name__
+    one.id for one in claim.DECLARED_CLAIMS if one.compute.__module__ == __name__
 )
 """Ids of the claims that are judged in this module."""

@@ -11,21 +11,10 @@ import numpy as np
 from asperity.analysis.energy.loop_integral import loop_work
 from asperity.analysis.gain.characteristic import characteristic_number
 from asperity.laws import find_law
-from asperity.paper.cases import SCANNING, ExperimentCase
-from asperity.paper.claim import (
-    DECLARED_CLAIMS,
-    Check,
-    Claim,
-    check_observation,
-    check_statement,
-    check_values,
-    combine_checks,
-    declare_claim,
-    relative_error,
-)
+from asperity.paper import claim
+from asperity.paper.cases import PAPER_CASE, SCANNING, ExperimentCase
 from asperity.paper.figures import loop_energies
 from asperity.paper.formula_checks import format_by_name
-from asperity.paper.friction_case import PAPER_CASE
 from asperity.paper.probes import generic_profile
 from asperity.paper.table_two import TABLE_TWO, TableTwoRow, table_two
 from asperity.surface import Surface
@@ -38,14 +27,16 @@ from asperity.textures.kinds.sinusoid import Sinusoid
 _cached_table_two = lru_cache(maxsize=1)(table_two)
 
 
-def check_table_two_row(letter: str) -> Check:
+def check_table_two_row(letter: str) -> claim.Check:
     """Check the cells of a row of Table II."""
     row = _cached_table_two().row(letter)
-    return combine_checks(_check_number(row), _check_conservativity(row), _check_continuity(row))
+    return claim.combine_checks(
+        _check_number(row), _check_conservativity(row), _check_continuity(row)
+    )
 
 
-@declare_claim("sentence-IV-figure-3")
-def figure_three_energies() -> Check:
+@claim.declare_claim("sentence-IV-figure-3")
+def figure_three_energies() -> claim.Check:
     """Along the paths of Fig. 3 A, B, E, F and G gain energy.
 
     C and D, which the figure does not show, must not gain.
@@ -54,7 +45,7 @@ def figure_three_energies() -> Check:
     energies = {panel.law: panel.energy for panel in loop_energies()}
     gains = {law: energy * 1e6 for law, energy in energies.items() if law not in "CD"}
     rest = max(abs(energies[law]) for law in "CD") / scale
-    return check_statement(
+    return claim.check_statement(
         f"around their paths {format_by_name(gains, '.1f', ' µJ')}; C and D around that of A "
         f"{rest:.1e} κ₀A²",
         printed=min(gains.values()) > scale and rest < 1e-6,
@@ -62,18 +53,18 @@ def figure_three_energies() -> Check:
     )
 
 
-def _check_number(row: TableTwoRow) -> Check:
+def _check_number(row: TableTwoRow) -> claim.Check:
     if row.law == "F":
         return _check_appendix_bound(row)
     if row.printed.value is None:
         exists = row.q.method == "closed form"
-        return check_statement(
+        return claim.check_statement(
             f"q = {row.q.value:.4f} ({row.q.method})",
             printed=not exists,
             corrected=exists,
             q=row.q.value,
         )
-    return check_values(
+    return claim.check_values(
         f"q_{row.law} in V.A's setting",
         printed=row.printed.value,
         reference=row.q.value,
@@ -82,10 +73,10 @@ def _check_number(row: TableTwoRow) -> Check:
     )
 
 
-def _check_appendix_bound(row: TableTwoRow) -> Check:
+def _check_appendix_bound(row: TableTwoRow) -> claim.Check:
     """Check the bound of Appendix I on law F; the package's law has a number of its own."""
     bound, true = PAPER_CASE.sticking_norm(), PAPER_CASE.max_norm_ratio()
-    return check_statement(
+    return claim.check_statement(
         f"Appendix I gives {bound:.4f}; the greatest ‖J‖/κ₀ of the paper's law is {true:.4f}, of "
         f"the package's, whose modulation stays between 0 and 1, {row.q.value:.4f}",
         printed=abs(bound / true - 1.0) < 1e-6,
@@ -96,9 +87,9 @@ def _check_appendix_bound(row: TableTwoRow) -> Check:
     )
 
 
-def _check_conservativity(row: TableTwoRow) -> Check:
+def _check_conservativity(row: TableTwoRow) -> claim.Check:
     property_name = "conservative" if row.conservative else "not conservative"
-    return check_statement(
+    return claim.check_statement(
         f"{property_name}, the loop gives {row.energy * 1e6:+.1f} µJ",
         printed=row.conservativity_agrees,
         corrected=not row.conservative and row.energy > 0.0,
@@ -106,7 +97,7 @@ def _check_conservativity(row: TableTwoRow) -> Check:
     )
 
 
-def _check_continuity(row: TableTwoRow) -> Check:
+def _check_continuity(row: TableTwoRow) -> claim.Check:
     """Check the condition on h: a force that depends on h' jumps where h' jumps."""
     from asperity.contacts.symbols import HX
     from asperity.derive.jacobian import symbolic_force
@@ -114,7 +105,7 @@ def _check_continuity(row: TableTwoRow) -> Check:
     uses_slope = HX in symbolic_force(find_law(row.law)).free_symbols
     needs_slope = "h'" in row.printed.continuous
     is_unconditional = row.printed.continuous.startswith("No")
-    return check_statement(
+    return claim.check_statement(
         f"{'continuous' if row.continuous else 'jumps'} on a smooth surface, its formula "
         f"{'uses' if uses_slope else 'does not use'} h'",
         printed=row.continuity_agrees and (is_unconditional or uses_slope == needs_slope),
@@ -124,16 +115,16 @@ def _check_continuity(row: TableTwoRow) -> Check:
 # --- Remarks --------------------------------------------------------------------------------------
 
 
-@declare_claim("remark-1")
-def remark_1() -> Check:
+@claim.declare_claim("remark-1")
+def remark_1() -> claim.Check:
     """What a texture feels like depends on more than the algorithm."""
-    return check_observation(
+    return claim.check_observation(
         "a statement on perception and on real contacts: nothing here can be computed"
     )
 
 
-@declare_claim("remark-2")
-def remark_2() -> Check:
+@claim.declare_claim("remark-2")
+def remark_2() -> claim.Check:
     """The results hold for any texture with a Lipschitz bound M in the place of 2πA/l.
 
     Two textures of the same M and different curvatures are compared.
@@ -145,11 +136,11 @@ def remark_2() -> Check:
         replace(PAPER_CASE, amplitude=0.8 / n, period=1e-3 / n).sticking_norm()
         for n in (1.0, 100.0)
     ]
-    unchanged = [law for law, pair in numbers.items() if relative_error(*pair) < 1e-9]
+    unchanged = [law for law, pair in numbers.items() if claim.relative_error(*pair) < 1e-9]
     changed = [law for law in numbers if law not in unchanged]
     margin = _least_bound_ratio()
     growth = ", ".join(f"{law} {numbers[law][0]:.2f} to {numbers[law][1]:.2f}" for law in changed)
-    return check_statement(
+    return claim.check_statement(
         f"waves 100 times finer at the same M leave q of {', '.join(unchanged)} as it is and "
         f"change {growth}; bounds with K >= |h''| are at least {margin:.3f} times q",
         printed=not changed,
@@ -178,8 +169,8 @@ def _least_bound_ratio() -> float:
 _CLAMPS = ("none", "lateral", "whole")
 
 
-@declare_claim("remark-3")
-def remark_3() -> Check:
+@claim.declare_claim("remark-3")
+def remark_3() -> claim.Check:
     """Limiting the depth that the lateral force uses bounds the numbers of B, C, F and G."""
     growth, lateral, whole = (
         {
@@ -195,13 +186,13 @@ def remark_3() -> Check:
         for clamp in ("lateral", "whole")
     }
     bounded = "".join(law for law, ratio in lateral.items() if ratio <= 1.0 + 1e-6)
-    return combine_checks(
-        check_statement(
+    return claim.combine_checks(
+        claim.check_statement(
             f"50 times deeper ‖J‖ grows {format_by_name(growth)} times",
             printed=min(growth.values()) > 1.5,
             numbers={f"growth of {law}": value for law, value in growth.items()},
         ),
-        check_statement(
+        claim.check_statement(
             f"with the lateral force held it grows {format_by_name(lateral)} times, with the whole "
             f"force held {format_by_name(whole)} times; a loop of C then gives "
             f"{loops['lateral'] * 1e6:.2f} and {abs(loops['whole']) * 1e6:.2f} µJ",
@@ -214,14 +205,14 @@ def remark_3() -> Check:
     )
 
 
-@declare_claim("sentence-IV.F-clamp")
-def unbounded_friction() -> Check:
+@claim.declare_claim("sentence-IV.F-clamp")
+def unbounded_friction() -> claim.Check:
     """The gain of F grows with the depth without bound; clamping p^z bounds it."""
     free, clamped = (
         [_max_norm_at_depth("F", clamp, factor) / 1000.0 for factor in (1.0, 10.0, 1000.0)]
         for clamp in _CLAMPS[:2]
     )
-    return check_statement(
+    return claim.check_statement(
         "‖J_F‖/κ₀ at 1, 10, 1000 times the depth: "
         + ", ".join(f"{v:.3g}" for v in free)
         + "; with p^z clamped "
@@ -253,6 +244,6 @@ def _max_norm_at_depth(law: str, clamp: str, depth_factor: float) -> float:
 
 for _law, _row in TABLE_TWO.items():
     _check, _texts = partial(check_table_two_row, _law), (_row["flips_under"], _row["correction"])
-    DECLARED_CLAIMS.append(
-        Claim(f"table-2-{_law}", ("Table II",), "IV.H", _row["statement"], _check, *_texts)
+    claim.DECLARED_CLAIMS.append(
+        claim.Claim(f"table-2-{_law}", ("Table II",), "IV.H", _row["statement"], _check, *_texts)
     )

@@ -8,15 +8,10 @@ from typing import Any
 
 from asperity.core.files import to_plain_data
 from asperity.core.units import format_quantity
+from asperity.paper.experiments import strokes
 from asperity.paper.experiments.cycle_counts import PassivityExperiment, passivity_experiment
 from asperity.paper.experiments.device_onsets import DeviceExperiment, device_experiment
 from asperity.paper.experiments.experiment_setups import RESOLUTION
-from asperity.paper.experiments.strokes import (
-    BumpExperiment,
-    ScanningExperiment,
-    bump_experiment,
-    scanning_experiment,
-)
 from asperity.textures.texture import Texture
 
 STEPS = (
@@ -39,8 +34,8 @@ class Experiments:
     """
 
     passivity: PassivityExperiment
-    scanning: ScanningExperiment
-    bump: BumpExperiment
+    scanning: strokes.ScanningExperiment
+    bump: strokes.BumpExperiment
     devices: DeviceExperiment
 
     def to_dict(self) -> dict[str, Any]:
@@ -131,8 +126,8 @@ def run_experiments(
     report(STEPS[0])
     passivity = passivity_experiment()
     report(STEPS[1])
-    scanning = scanning_experiment()
+    scanning = strokes.scanning_experiment()
     report(STEPS[2])
-    bump = bump_experiment()
+    bump = strokes.bump_experiment()
     report(STEPS[3])
     return Experiments(passivity, scanning, bump, device_experiment(measured_texture))
