@@ -16,15 +16,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from asperity.core import files
 from asperity.core.cache import bypass
 from asperity.core.errors import ParameterError, escape_unprintable
-from asperity.core.files import (
-    check_not_existing,
-    is_special_file,
-    json_text,
-    text_digest,
-    write_bytes,
-)
 
 if TYPE_CHECKING:
     from asperity.report.page import Page
@@ -139,12 +133,12 @@ class Outputs:
             extra_line: printed after the result, if any.
         """
         if self.json is not None:
-            write_output("json", self.json, json_text(data))
+            write_output("json", self.json, files.json_text(data))
         if self.html is not None:
             from asperity.report.html import Origin, render_page
 
             command_line = escape_unprintable(shlex.join(["asperity", *sys.argv[1:]]))
-            origin = Origin(command_line, text_digest(json_text(data)))
+            origin = Origin(command_line, files.text_digest(files.json_text(data)))
             with progress_bar("drawing the report"):
                 text = render_page(page, origin)
             write_output("html", self.html, text)
@@ -254,7 +248,7 @@ def check_output(name: str, path: str | None, *, force: bool) -> None:
         raise ParameterError(name, f"cannot be written: {reason}", path) from None
     if Path(path).is_dir():
         raise ParameterError(name, "must be a file, not a folder", path)
-    if is_special_file(path):
+    if files.is_special_file(path):
         if not os.access(path, os.W_OK):
             raise ParameterError(name, "must be a file that can be written", path)
         return
@@ -266,7 +260,7 @@ def check_output(name: str, path: str | None, *, force: bool) -> None:
         raise ParameterError(name, f"must lie in a folder that exists, {folder} does not")
     if not os.access(folder, os.W_OK):
         raise ParameterError(name, f"must lie in a folder that can be written, not {folder}")
-    check_not_existing(name, path, force=force)
+    files.check_not_existing(name, path, force=force)
 
 
 def write_output(name: str, path: str, text: str) -> None:
@@ -274,4 +268,4 @@ def write_output(name: str, path: str, text: str) -> None:
     if path == STANDARD_OUTPUT:
         click.echo(text, nl=not text.endswith("\n"))
     else:
-        write_bytes(name, path, text.encode())
+        files.write_bytes(name, path, text.encode())

@@ -21,18 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cli import options
-from asperity.cli.loop_setup import (
-    REPLAY_PREFIX,
-    SIMULATED,
-    check_stiffness_limit,
-    driver_options,
-    driver_setup,
-    loop_options,
-    make_driver,
-    prestart_process,
-    stiffness_option,
-)
+from asperity.cli import loop_setup, options
 from asperity.cli.options import file_values, surface_values
 from asperity.cli.output import Outputs, check_outputs, output_options, progress_bar
 from asperity.cli.plugins import load_plugin_files, plugin_contents, plugin_files
@@ -57,9 +46,11 @@ _RUN_ARGUMENTS = options.command_arguments("run")
 
 
 @click.command("run")
-@loop_options(stiffness_option("the scene's; without a scene, the recommended stiffness"))
+@loop_setup.loop_options(
+    loop_setup.stiffness_option("the scene's; without a scene, the recommended stiffness")
+)
 @options.argument_options(_RUN_ARGUMENTS)
-@driver_options
+@loop_setup.driver_options
 @click.option("--record", metavar="PATH", help="Write every sample to a recording ('run.mcap').")
 @output_options(html=False)
 def run_command(
@@ -83,11 +74,11 @@ def run_command(
     before using a real device.
     """
     check_outputs(force=outputs.force, json=outputs.json, record=record)
-    process = prestart_process()
-    setup, _servo = driver_setup(scene, values, driver, duration)
+    process = loop_setup.prestart_process()
+    setup, _servo = loop_setup.driver_setup(scene, values, driver, duration)
     hashes = setup.file_hashes()
     if not accept_risk:
-        check_stiffness_limit(setup)
+        loop_setup.check_stiffness_limit(setup)
     from asperity.report.loop.servo_report import device_run_page
 
     loop = make_loop(setup, driver, duration, process)
@@ -122,14 +113,14 @@ def make_loop(
     from asperity.servo.drivers.simulated import simulated_driver
     from asperity.servo.process import ServoProcess
 
-    if driver_name == SIMULATED:
+    if driver_name == loop_setup.SIMULATED:
         duration = setup.duration
         driver: Driver = simulated_driver(
             setup.plant, setup.hand, setup.servo, setup.motion, duration, setup.start,
             setup.velocity,
         )  # fmt: skip
     else:
-        driver = make_driver(driver_name, setup)
+        driver = loop_setup.make_driver(driver_name, setup)
         if duration is None and driver.max_readings is not None:
             duration = setup.servo.period * driver.max_readings
     reach = setup.safety.reach_limit(setup.device)
@@ -246,13 +237,15 @@ _LAB_ARGUMENTS = options.command_arguments("lab")
 )
 @options.law_options(
     (
-        stiffness_option("the scene's, else 1000 N/m; with --driver the recommended stiffness"),
+        loop_setup.stiffness_option(
+            "the scene's, else 1000 N/m; with --driver the recommended stiffness"
+        ),
         *options.LAW_OPTIONS[1:],
     )
 )
 @options.file_options
 @options.device_option("Device.  [default: the scene's, else touch-x; with --driver omega.3]")
-@driver_options
+@loop_setup.driver_options
 @options.argument_options(_LAB_ARGUMENTS)
 @click.option("--no-browser", is_flag=True, help="Print the address without opening a browser.")
 def lab_command(
@@ -268,14 +261,14 @@ def lab_command(
     the printed address, and loads nothing from a network. Ctrl-C stops the lab.
     """
     # Started first, since it takes long in another process.
-    process = prestart_process()
+    process = loop_setup.prestart_process()
     from asperity.lab.launch import bind_socket, serve_lab
     from asperity.lab.scene_state import DEFAULT_SURFACE
     from asperity.lab.server import LabOptions
 
     source = surface or DEFAULT_SURFACE
     playback = handle = None
-    if driver == SIMULATED:
+    if driver == loop_setup.SIMULATED:
         scene, playback = _simulated_scene(source, values)
         scene = replace(scene, plugin_files=plugin_contents())
     else:
@@ -341,11 +334,11 @@ def _device_scene(
 
     if find_recording(source, _temporary_folder()) is not None:
         words = f"cannot play back the recording {source}: leave it out, or give a surface and"
-        raise ParameterError("driver", f"{words} --driver {REPLAY_PREFIX}run.mcap")
-    setup, servo = driver_setup(source, values, name)
-    driver = make_driver(name, setup)
+        raise ParameterError("driver", f"{words} --driver {loop_setup.REPLAY_PREFIX}run.mcap")
+    setup, servo = loop_setup.driver_setup(source, values, name)
+    driver = loop_setup.make_driver(name, setup)
     require_max_force(driver, setup.servo)
     if not accept_risk:
-        check_stiffness_limit(setup)
+        loop_setup.check_stiffness_limit(setup)
     scene = make_device_scene_state(setup, servo, source, file_values(values))
     return scene, make_handle(driver, setup)

@@ -9,10 +9,11 @@ from typing import Any, TypeVar, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from asperity.core import compiled
 from asperity.core.errors import ParameterError
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+FloatArray = compiled.FloatArray
+IntArray = compiled.IntArray
 Values = TypeVar("Values", bound=NDArray[Any])
 
 # Beyond these limits products of a few values leave the range of double precision.

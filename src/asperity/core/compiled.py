@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.core.checks import FloatArray
-
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 COMPILE_CALLBACKS: list[Callable[[str], None]] = []
 """Functions called with the name of a loop before it is compiled; not called for cached loops."""
 EPS = 2.0**-52

@@ -6,18 +6,10 @@ import ast
 from collections.abc import Iterator, Sequence
 
 from asperity.export import c_language as c
+from asperity.export import liveness
 from asperity.export.c_language import ValueType
 from asperity.export.expression_types import ProgramContext, called_name
 from asperity.export.expressions import BINARY_OPERATORS, ExpressionPrinter
-from asperity.export.liveness import (
-    declaring_statements,
-    expressions_in,
-    live_names,
-    self_declaring_loops,
-    sequenced_parts,
-    stored_names,
-    without_docstring,
-)
 from asperity.export.type_inference import FunctionTypes
 
 RESERVED_WORDS = frozenset(
@@ -53,9 +45,9 @@ class FunctionPrinter(ast.NodeVisitor):
         }
         self.expressions = ExpressionPrinter(types, program, self.names)
         self._temporaries = 0
-        self._live = live_names(types)
-        self._loop_variables = dict(self_declaring_loops(types.node))
-        self._declaring = declaring_statements(
+        self._live = liveness.live_names(types)
+        self._loop_variables = dict(liveness.self_declaring_loops(types.node))
+        self._declaring = liveness.declaring_statements(
             types, self._live, set(self._loop_variables.values())
         )
 
@@ -66,7 +58,7 @@ class FunctionPrinter(ast.NodeVisitor):
             for name in self.types.argument_names
             if name not in self._live and not c.is_constant(self.types.types[name])
         ]
-        body = without_docstring(self.types.node.body)
+        body = liveness.without_docstring(self.types.node.body)
         inside = [*self._argument_conversions(), *self._declarations(), *unused, *self._block(body)]
         return [signature, "{", *_indent(inside), "}"]
 
@@ -174,7 +166,7 @@ class FunctionPrinter(ast.NodeVisitor):
     def _loop_end(self, node: ast.For, end: ast.expr) -> tuple[str, list[str]]:
         """Return the end of a loop, and the line that stores it if the loop may change it."""
         text = self.expressions.as_type(end, c.INT, 8)
-        changed = set(stored_names(node))
+        changed = set(liveness.stored_names(node))
         read = {part.id for part in ast.walk(end) if isinstance(part, ast.Name)}
         calls = any(isinstance(part, (ast.Call, ast.Subscript)) for part in ast.walk(end))
         if self.types.constant_integer(end) is not None or not (read & changed or calls):
@@ -295,8 +287,8 @@ class FunctionPrinter(ast.NodeVisitor):
 
     def _check_evaluation_order(self, node: ast.stmt) -> None:
         """Check that the value does not depend on an evaluation order that C leaves open."""
-        for value in expressions_in(node):
-            for piece in sequenced_parts(value):
+        for value in liveness.expressions_in(node):
+            for piece in liveness.sequenced_parts(value):
                 calls = [part for part in ast.walk(piece) if isinstance(part, ast.Call)]
                 acting = [call for call in calls if self.types.written_arrays(call)]
                 written = {name for call in acting for name in self.types.written_arrays(call)}

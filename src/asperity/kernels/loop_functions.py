@@ -5,8 +5,7 @@ The anchor of a law with state sticks, and slips once its deflection would excee
 
 import math
 
-from asperity.core.checks import FloatArray
-from asperity.core.compiled import EVERY_FUNCTION, Kernels, multiply_add
+from asperity.core.compiled import EVERY_FUNCTION, FloatArray, Kernels, multiply_add
 from asperity.kernels.law_interface import Matrix3Rows, Vector3
 
 KERNELS = Kernels(provides=EVERY_FUNCTION)

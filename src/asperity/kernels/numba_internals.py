@@ -39,14 +39,7 @@ from numba.core import (
     typed_passes,
 )
 
-from asperity.core.cache import (
-    cache_folder,
-    get_entry,
-    put_entry,
-    quarantine,
-    unlock,
-    wait_and_lock,
-)
+from asperity.core import cache
 from asperity.core.compiled import COMPILE_CALLBACKS
 from asperity.core.processes import defer_interrupt
 
@@ -209,7 +202,7 @@ class MachineCodeCache(caching._Cache):
     @property
     def cache_path(self) -> str:
         """The folder of the entries."""
-        return str(cache_folder() / CODE_NAMESPACE)
+        return str(cache.cache_folder() / CODE_NAMESPACE)
 
     def enable(self) -> None:
         """Do nothing: the cache is always enabled."""
@@ -224,10 +217,10 @@ class MachineCodeCache(caching._Cache):
         """Return the compiled overload of a signature, or ``None`` to compile it."""
         key = self._key(sig, target_context.codegen())
         found = self._load_cached(key, target_context)
-        if found is None and wait_and_lock(CODE_NAMESPACE, key):
+        if found is None and cache.wait_and_lock(CODE_NAMESPACE, key):
             found = self._load_cached(key, target_context)
             if found is not None:
-                unlock(CODE_NAMESPACE, key)
+                cache.unlock(CODE_NAMESPACE, key)
         if found is None:
             for callback in COMPILE_CALLBACKS:
                 callback(self._function.__name__)
@@ -235,13 +228,13 @@ class MachineCodeCache(caching._Cache):
 
     def _load_cached(self, key: str, target_context: Any) -> Any:
         target_context.refresh()
-        content = get_entry(CODE_NAMESPACE, key)
+        content = cache.get_entry(CODE_NAMESPACE, key)
         if content is None:
             return None
         try:
             return _CompileResult._rebuild(target_context, *pickle.loads(content))
         except Exception:  # of another build of Numba: whatever it raises, compile again
-            quarantine(CODE_NAMESPACE, key)
+            cache.quarantine(CODE_NAMESPACE, key)
             return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
@@ -252,8 +245,8 @@ class MachineCodeCache(caching._Cache):
         own = self._function.__module__
         mine = tuple(one for one in environments if one.globals["__name__"] == own)
         key = self._key(sig, data.codegen)
-        put_entry(CODE_NAMESPACE, key, _serialize((*parts, mine)))
-        unlock(CODE_NAMESPACE, key)
+        cache.put_entry(CODE_NAMESPACE, key, _serialize((*parts, mine)))
+        cache.unlock(CODE_NAMESPACE, key)
 
     def _key(self, sig: Any, codegen: Any) -> str:
         """Return what the machine code depends on: source, types, processor and versions."""

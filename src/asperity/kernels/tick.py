@@ -8,8 +8,7 @@ tick.
 import math
 from typing import NamedTuple
 
-from asperity.core.checks import FloatArray
-from asperity.core.compiled import EVERY_FUNCTION, Kernels
+from asperity.core.compiled import EVERY_FUNCTION, FloatArray, Kernels
 from asperity.kernels.law_interface import probe_tick
 
 KERNELS = Kernels(provides=EVERY_FUNCTION)

@@ -19,16 +19,10 @@ from websockets.exceptions import ConnectionClosed
 from asperity.core.errors import ParameterError
 from asperity.core.files import to_plain_data
 from asperity.devices import device_names
+from asperity.lab import messages
 from asperity.lab.access import MalformedMessageError, RateLimit
 from asperity.lab.background import BackgroundRenderer, BackgroundWorker
 from asperity.lab.clips import ClipStore
-from asperity.lab.messages import (
-    SteerRequest,
-    ViewRequest,
-    encode_frame,
-    frame_layout,
-    parse_message,
-)
 from asperity.lab.playback import Playback
 from asperity.lab.scene_state import RANGES, SceneState
 from asperity.lab.session import Handle, Session
@@ -87,12 +81,12 @@ class Client:
 
     def __init__(self, connection: ServerConnection) -> None:
         self.connection = connection
-        self.view_requests: dict[str, ViewRequest] = {}
+        self.view_requests: dict[str, messages.ViewRequest] = {}
         self.view_requested, self.hand_moved = asyncio.Event(), asyncio.Event()
         self.last_sent = self._last_acknowledged = 0.0
         self._acknowledgement = asyncio.Event()
 
-    def request_view(self, request: ViewRequest) -> None:
+    def request_view(self, request: messages.ViewRequest) -> None:
         """Request a picture."""
         self.view_requests[request.kind] = request
         self.view_requested.set()
@@ -222,10 +216,10 @@ class LabServer:
                 await client.send("error", message=str(error))
 
     async def _handle_message(self, client: Client, message: str | bytes) -> None:
-        kind, content = parse_message(message)
+        kind, content = messages.parse_message(message)
         if self._controller is client:
             self._last_contact = self._loop.time()
-        if isinstance(content, ViewRequest):
+        if isinstance(content, messages.ViewRequest):
             client.request_view(content)
         elif kind == "acknowledge":
             client.acknowledge(content)
@@ -241,7 +235,7 @@ class LabServer:
 
     def _control(self, client: Client, kind: str, content: Any) -> None:
         """Handle a message that needs control."""
-        if isinstance(content, SteerRequest):
+        if isinstance(content, messages.SteerRequest):
             self.session.steer(content)
             client.hand_moved.set()
         elif kind == "change":
@@ -322,7 +316,7 @@ class LabServer:
             places = [self.background.nearest(rows[-1, 1:4]), session.anchor]
             async with asyncio.timeout(_SEND_TIMEOUT):
                 await client.connection.send(
-                    encode_frame(rows, first, counts, np.concatenate(places))
+                    messages.encode_frame(rows, first, counts, np.concatenate(places))
                 )
 
     async def _send_pictures(self, client: Client) -> None:
@@ -362,6 +356,9 @@ def _greeting() -> dict[str, Any]:
     ]
     kinds = [name for name, kind in KINDS.items() if not kind.required_arguments]
     return {
-        "layout": frame_layout(), "laws": laws, "devices": device_names(), "textures": kinds,
+        "layout": messages.frame_layout(),
+        "laws": laws,
+        "devices": device_names(),
+        "textures": kinds,
         "ranges": RANGES,
-    }  # fmt: skip
+    }

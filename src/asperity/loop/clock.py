@@ -5,8 +5,7 @@ It counts the time in which the machine sleeps, so that the sample after it is l
 
 from typing import NamedTuple
 
-from asperity.core.checks import IntArray
-from asperity.core.compiled import Kernels, call_address
+from asperity.core.compiled import IntArray, Kernels, call_address
 
 KERNELS = Kernels(provides=("clock_now", "clock_wait_until"), native=("call_address",))
 

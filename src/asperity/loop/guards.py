@@ -16,8 +16,7 @@ Reference:
 import math
 from typing import NamedTuple
 
-from asperity.core.checks import FloatArray
-from asperity.core.compiled import Kernels, load_acquire
+from asperity.core.compiled import FloatArray, Kernels, load_acquire
 from asperity.kernels.law_interface import probe_depth
 from asperity.kernels.tick import ServoSettings, ServoState
 from asperity.loop.interface import (

@@ -2,8 +2,7 @@
 
 # ruff: noqa: ARG001 - one signature for all guards
 
-from asperity.core.checks import FloatArray
-from asperity.core.compiled import Kernels
+from asperity.core.compiled import FloatArray, Kernels
 from asperity.kernels.tick import ServoSettings, ServoState
 from asperity.loop.interface import (
     DEVICE,

@@ -4,8 +4,7 @@
 
 from typing import NamedTuple
 
-from asperity.core.checks import FloatArray, IntArray
-from asperity.core.compiled import Kernels
+from asperity.core.compiled import FloatArray, IntArray, Kernels
 from asperity.loop.interface import OK
 
 KERNELS = Kernels(provides=("device_read", "device_write"))

@@ -5,8 +5,7 @@ Clock, guards, device and trace are functions that the linker binds, see
 within the same sample.
 """
 
-from asperity.core.checks import FloatArray
-from asperity.core.compiled import Kernels, local_array
+from asperity.core.compiled import FloatArray, Kernels, local_array
 from asperity.kernels.law_interface import probe_in_contact
 from asperity.kernels.tick import ServoSettings, servo_tick, state_before_tick
 from asperity.loop.clock import Clock, clock_now, clock_wait_until

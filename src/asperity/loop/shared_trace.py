@@ -10,8 +10,7 @@ of rows, so a reader that reads the count finds the row; see
 import math
 from typing import NamedTuple
 
-from asperity.core.checks import FloatArray, IntArray
-from asperity.core.compiled import Kernels, store_release
+from asperity.core.compiled import FloatArray, IntArray, Kernels, store_release
 from asperity.kernels.tick import ServoSettings, ServoState
 from asperity.loop.interface import GuardedForce, Reading
 

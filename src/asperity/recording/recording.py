@@ -18,15 +18,7 @@ from asperity.core.checks import FloatArray
 from asperity.core.display import Plottable
 from asperity.core.errors import ParameterError
 from asperity.core.files import open_input
-from asperity.recording import mcap
-from asperity.recording.row_encoding import (
-    Columns,
-    TraceTable,
-    find_column,
-    message_values,
-    row_type,
-    schema_columns,
-)
+from asperity.recording import mcap, row_encoding
 from asperity.recording.writer import FORMAT, SCHEMA_NAME
 
 # A day of a loop at 10 kHz, and more.
@@ -51,7 +43,7 @@ class Recording(Plottable):
     """
 
     path: Path
-    columns: Columns
+    columns: row_encoding.Columns
     rows: int
     metadata: Mapping[str, Any]
     version: str
@@ -106,7 +98,7 @@ class Recording(Plottable):
     @cached_property
     def _chunk_starts(self) -> NDArray[np.int64]:
         """Number of the first row of each block."""
-        size = row_type(len(self.columns)).itemsize
+        size = row_encoding.row_type(len(self.columns)).itemsize
         ends = np.cumsum([chunk.size // size for chunk in self._chunks], dtype=np.int64)
         return np.concatenate([np.zeros(1, np.int64), ends])[:-1]
 
@@ -118,7 +110,7 @@ class Recording(Plottable):
         if zlib.crc32(data) != chunk.checksum:
             raise _unreadable_error(self.path, f"the block after row {first_row} is damaged")
         try:
-            return message_values(data, len(self.columns))
+            return row_encoding.message_values(data, len(self.columns))
         except mcap.DamagedError as error:
             raise _unreadable_error(self.path, str(error)) from None
 
@@ -138,9 +130,9 @@ class Recording(Plottable):
             seen += len(block)
         return np.concatenate(parts)
 
-    def to_columns(self, max_rows: int | None = None) -> TraceTable:
+    def to_columns(self, max_rows: int | None = None) -> row_encoding.TraceTable:
         """Return the rows with their parts by name: time, position, forces; see :meth:`table`."""
-        return TraceTable(self.columns, self.table(max_rows))
+        return row_encoding.TraceTable(self.columns, self.table(max_rows))
 
     def __getitem__(self, name: str) -> FloatArray:
         """Return a column, shape (rows,).
@@ -148,7 +140,7 @@ class Recording(Plottable):
         Raises:
             ParameterError: for a name that there is not; the nearest are offered.
         """
-        at = find_column(self.columns, name)
+        at = row_encoding.find_column(self.columns, name)
         return np.concatenate([np.empty(0), *(block[:, at] for block in self.blocks())])
 
     def ranges(self) -> tuple[FloatArray, FloatArray]:
@@ -235,7 +227,7 @@ def open_recording(path: str | os.PathLike[str]) -> Recording:
 
 
 def _read(path: Path, stream: IO[bytes], size: int) -> Recording:
-    columns: Columns = ()
+    columns: row_encoding.Columns = ()
     texts: dict[str, str] = {}
     chunks: list[mcap.Chunk] = []
     attached: dict[str, tuple[int, int]] = {}
@@ -264,7 +256,7 @@ def _read(path: Path, stream: IO[bytes], size: int) -> Recording:
         raise mcap.DamagedError("it does not say what its rows are")
     if not whole and chunks and not _is_intact(stream, chunks[-1]):
         end = chunks.pop().start  # the remains of a loss of power
-    rows = sum(chunk.size for chunk in chunks) // row_type(len(columns)).itemsize
+    rows = sum(chunk.size for chunk in chunks) // row_encoding.row_type(len(columns)).itemsize
     unread = 0 if whole else size - end
     return Recording(
         path, columns, rows, about, texts["version"], whole, unread, tuple(chunks), attached
@@ -278,12 +270,12 @@ def _record_content(stream: IO[bytes], at: int, length: int) -> mcap.ContentRead
     return mcap.ContentReader(stream.read(length))
 
 
-def _columns(content: mcap.ContentReader) -> Columns:
+def _columns(content: mcap.ContentReader) -> row_encoding.Columns:
     content.read(2)
     name, encoding = content.text(), content.text()
     if encoding != "ros2msg":
         raise mcap.DamagedError(f"its rows are {name!r} in {encoding!r}, none that asperity writes")
-    return schema_columns(content.text())
+    return row_encoding.schema_columns(content.text())
 
 
 def _is_intact(stream: IO[bytes], chunk: mcap.Chunk) -> bool:

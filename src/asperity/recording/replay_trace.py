@@ -4,8 +4,7 @@
 
 from typing import NamedTuple
 
-from asperity.core.checks import FloatArray
-from asperity.core.compiled import Kernels
+from asperity.core.compiled import FloatArray, Kernels
 from asperity.kernels.tick import ServoSettings, ServoState
 from asperity.loop.interface import GuardedForce, Reading
 

@@ -21,14 +21,7 @@ from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
 from asperity.core.files import json_text, open_atomic
 from asperity.core.version import __version__
-from asperity.recording import mcap
-from asperity.recording.row_encoding import (
-    Columns,
-    check_table,
-    message_template,
-    schema_text,
-    write_messages,
-)
+from asperity.recording import mcap, row_encoding
 
 FORMAT = 1
 """Version of the metadata of a recording."""
@@ -71,7 +64,7 @@ class RecordingWriter:
     def __init__(
         self,
         path: str | os.PathLike[str],
-        columns: Columns,
+        columns: row_encoding.Columns,
         metadata: Mapping[str, Any] | None = None,
         attachments: Mapping[str, bytes] | None = None,
         argument: str = "path",
@@ -80,9 +73,9 @@ class RecordingWriter:
         texts = {"format": str(FORMAT), "version": __version__, "about": json_text(metadata or {})}
         library = f"asperity {__version__}"
         self._head = mcap.encode_head(
-            SCHEMA_NAME, library, schema_text(columns), texts, attachments or {}
+            SCHEMA_NAME, library, row_encoding.schema_text(columns), texts, attachments or {}
         )
-        self._messages = message_template(_BLOCK_ROWS, len(columns))
+        self._messages = row_encoding.message_template(_BLOCK_ROWS, len(columns))
         self._pending_rows, self._last_flush = 0, time.monotonic()
         self._chunks: list[mcap.Chunk] = []
         self.rows = 0
@@ -105,11 +98,11 @@ class RecordingWriter:
             ParameterError: for another shape; if the file cannot grow, which then ends with whole
                 blocks.
         """
-        table = check_table(block, self._columns)
+        table = row_encoding.check_table(block, self._columns)
         while len(table):
             room = min(len(table), len(self._messages) - self._pending_rows)
             rows = self._messages[self._pending_rows : self._pending_rows + room]
-            write_messages(rows, self.rows + self._pending_rows, table[:room])
+            row_encoding.write_messages(rows, self.rows + self._pending_rows, table[:room])
             self._pending_rows += room
             table = table[room:]
             if self._pending_rows == len(self._messages):

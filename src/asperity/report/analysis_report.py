@@ -16,20 +16,8 @@ from asperity.laws import LAWS, SHIPPED_LAW_ARGUMENTS
 from asperity.report import page
 from asperity.report.device_report import device_numbers_table
 from asperity.report.page import HEADED, Cell, Media, Row, Section, Table, TableLayout
+from asperity.report.sentences import number_text
 from asperity.report.sentences.alt_text import analysis_figure_names
-from asperity.report.sentences.number_text import (
-    NOT_AVAILABLE,
-    format_in_one_unit,
-    interval_text,
-    limit_text,
-    lower_bound_text,
-    merit_text,
-    position_text,
-    range_text,
-    readable_name,
-    upper_bound_text,
-    witness_text,
-)
 from asperity.report.sentences.texts import glossary
 from asperity.surface import Surface
 
@@ -97,7 +85,7 @@ def leak_facts(analysis: Analysis) -> list[tuple[str, str]]:
     x, y = (float(part) + 0.0 for part in line.direction)
     start = ", ".join(f"{1e3 * float(part) + 0.0:.6g}" for part in line.start)
     plane = f"vertical, along ({x:.6g}, {y:.6g}) through ({start}) mm"
-    energy = range_text(leak.energy, leak.upper_per_period, "J")
+    energy = number_text.range_text(leak.energy, leak.upper_per_period, "J")
     facts = [
         ("energy", f"{energy} per traversal ({leak.method})"),
         ("description", leak.description),
@@ -110,7 +98,7 @@ def leak_facts(analysis: Analysis) -> list[tuple[str, str]]:
         facts.append(("per length", f"{mean}: energy over the length of the line"))
     facts += [("v*", critical_speed_text(analysis)), ("thrust", thrust_text(analysis))]
     if density is not None and density.upper > 0.0:
-        area = range_text(density.lower, density.upper, "J/m²")
+        area = number_text.range_text(density.lower, density.upper, "J/m²")
         facts.append(("small loops", f"gain at most {area}: the greatest |curl f|"))
     return facts
 
@@ -120,8 +108,8 @@ def merit_facts(analysis: Analysis) -> list[tuple[str, str]]:
     scan, surface = analysis.merit, analysis.surface
     unit = "" if surface.texture.scan_line().periodic else " m"
     facts = [
-        ("strength T", f"{merit_text(scan.strength)}{unit}"),
-        ("support S", merit_text(scan.support)),
+        ("strength T", f"{number_text.merit_text(scan.strength)}{unit}"),
+        ("support S", number_text.merit_text(scan.support)),
         ("texture force", f"{format_quantity(scan.ripple * surface.stiffness, 'N')} RMS at this k"),
         ("height", f"z = {format_quantity(scan.height, 'm')}"),
     ]
@@ -140,8 +128,11 @@ def bounds_table(analysis: Analysis) -> Table:
         bounds.append(("|curl f| [N/m]", density))
     rows = []
     for name, bound in bounds:
-        ends = [lower_bound_text(bound.lower), upper_bound_text(bound.upper)]
-        rows.append(Row([Cell(name, "l"), *ends, bound.method, witness_text(bound)]))
+        ends = [
+            number_text.lower_bound_text(bound.lower),
+            number_text.upper_bound_text(bound.upper),
+        ]
+        rows.append(Row([Cell(name, "l"), *ends, bound.method, number_text.witness_text(bound)]))
     return Table(_BOUND_HEADINGS, rows, (1, 2), TableLayout(wrap=(4,)))
 
 
@@ -154,8 +145,10 @@ def criteria_table(passivity: Passivity) -> Table:
             Cell(criterion.name, "l"),
             Cell(criterion.formula, "line"),
             page.holds_cell(criterion.holds),
-            limit_text(criterion.limit),
-            NOT_AVAILABLE if criterion.margin is None else lower_bound_text(criterion.margin, 3),
+            number_text.limit_text(criterion.limit),
+            number_text.NOT_AVAILABLE
+            if criterion.margin is None
+            else number_text.lower_bound_text(criterion.margin, 3),
             Cell(criterion.conclusion, subtext=criterion.assumptions),
         ]
         style = "dim" if criterion.holds is None and not decides else ""
@@ -166,9 +159,9 @@ def criteria_table(passivity: Passivity) -> Table:
 def _jumps_table(analysis: Analysis) -> Table:
     """Return one row per depth at which a jump was located."""
     jumps = analysis.continuity.jumps
-    depths = format_in_one_unit([jump.depth for jump in jumps], "m")
-    sizes = format_in_one_unit([jump.size for jump in jumps], "N")
-    places = [position_text(jump.before) for jump in jumps]
+    depths = number_text.format_in_one_unit([jump.depth for jump in jumps], "m")
+    sizes = number_text.format_in_one_unit([jump.size for jump in jumps], "N")
+    places = [number_text.position_text(jump.before) for jump in jumps]
     rows = [Row(cells) for cells in zip(depths, sizes, places, strict=True)]
     return Table(_JUMP_HEADINGS, rows, (0, 1), TableLayout(wrap=(2,)))
 
@@ -215,19 +208,19 @@ def _facts(analysis: Analysis) -> list[tuple[str, str]]:
     return [
         ("Surface", str(surface.texture.describe()["kind"])),
         ("Peak to valley", format_quantity(surface.texture.peak_to_valley, "m")),
-        ("Law", f"{surface.law.letter}, {readable_name(surface.law.name)}"),
+        ("Law", f"{surface.law.letter}, {number_text.readable_name(surface.law.name)}"),
         ("Device", analysis.device.name),
         ("Stiffness", f"{surface.stiffness:g} N/m"),
         ("Pressed to", format_quantity(surface.max_depth, "m")),
-        ("Characteristic number q", interval_text(analysis.q)),
-        (f"Greatest stiffness by {decisive.name}", limit_text(decisive.limit)),
+        ("Characteristic number q", number_text.interval_text(analysis.q)),
+        (f"Greatest stiffness by {decisive.name}", number_text.limit_text(decisive.limit)),
     ]
 
 
 def _bounds_section(analysis: Analysis) -> Section:
     law = analysis.surface.law
     return Section(
-        f"Law {law.letter}, {readable_name(law.name)}: suprema over the working region",
+        f"Law {law.letter}, {number_text.readable_name(law.name)}: suprema over the working region",
         [bounds_table(analysis)],
         notes=bound_notes(analysis),
         media=_MEDIA | Media.NOTEBOOK,
@@ -267,10 +260,10 @@ def _continuity_section(analysis: Analysis) -> Section:
 def _figure_sections(analysis: Analysis, *names: str) -> list[Section]:
     """Return the figures of these names that the analysis has."""
     sections, leak = [], analysis.leak
-    gained = range_text(leak.energy, leak.upper_per_period, "J")
+    gained = number_text.range_text(leak.energy, leak.upper_per_period, "J")
     values: dict[str, object] = {
         "letter": analysis.surface.law.letter,
-        "q": interval_text(analysis.q),
+        "q": number_text.interval_text(analysis.q),
         "loop": f"; the worst loop gains {gained}" if len(leak.vertices) else "",
         "jumps": len(analysis.continuity.jumps),
     }
@@ -307,7 +300,7 @@ def reproduction_lines(analysis: Analysis, texture_code: str = "") -> list[str]:
     lines.append(f"s = asp.Surface({texture}, {_surface_arguments(surface)})")
     evaluation = _evaluate_witness(analysis)
     if evaluation is None:
-        q = interval_text(analysis.q)
+        q = number_text.interval_text(analysis.q)
         return [*lines, f"print(asp.characteristic_number(s))  # {q}, {analysis.q.method}"]
     point, value, remark = evaluation
     arguments = f"[{[float(v) for v in point]}]"

@@ -17,20 +17,7 @@ from asperity.analysis.results import LawRow
 from asperity.core.arguments import Argument
 from asperity.core.units import format_quantity, round_down
 from asperity.report.page import Cell, Media, Row, Section, Table, TableLayout, terminal_section
-from asperity.report.sentences.number_text import (
-    NOT_AVAILABLE,
-    SAMPLED_MARK,
-    bound_text,
-    force_text,
-    format_in_one_unit,
-    is_sampled,
-    leak_text,
-    limit_text,
-    merit_text,
-    readable_name,
-    strength_has_unit,
-    yes_no_text,
-)
+from asperity.report.sentences import number_text
 from asperity.report.sentences.texts import column_meanings, table_notes
 from asperity.report.terminal import rich_table
 from asperity.textures.catalogue import CATALOGUE
@@ -79,14 +66,16 @@ def row_limit_text(row: LawRow) -> str:
     limit = row.stability_limit
     if not limit.stiffness or not row.conservative:
         return "none"
-    mark = SAMPLED_MARK if limit.sampled else ""
+    mark = number_text.SAMPLED_MARK if limit.sampled else ""
     return f"{mark}{format_quantity(round_down(limit.stiffness), 'N/m')}"
 
 
 def has_sampled(comparison: Comparison) -> bool:
     """Return whether any number of the table is marked with ~."""
     return any(
-        is_sampled(row.q) or is_sampled(row.one_sided) or row.leak.method == "sampled"
+        number_text.is_sampled(row.q)
+        or number_text.is_sampled(row.one_sided)
+        or row.leak.method == "sampled"
         for row in comparison.rows
     )
 
@@ -109,13 +98,13 @@ def describe_texture(description: dict[str, Any]) -> str:
             parts.append(f"{len(values)} {name}")
             continue
         texts = [_value_text(name, one, declared.get(name)) for one in values]
-        parts.append(f"{readable_name(name)} {' × '.join(texts)}")
+        parts.append(f"{number_text.readable_name(name)} {' × '.join(texts)}")
     return f"{description['kind']}: {', '.join(parts)}"
 
 
 def _value_text(name: str, value: Any, argument: Argument | None) -> str:
     if isinstance(value, bool):
-        return yes_no_text(value)
+        return number_text.yes_no_text(value)
     if argument is not None:
         return argument.format_value(value)
     is_length = name in _LENGTH_NAMES and isinstance(value, float)
@@ -127,7 +116,9 @@ def _value_text(name: str, value: Any, argument: Argument | None) -> str:
 
 def recommended_stiffness_text(row: LawRow) -> str:
     """Return the recommended stiffness: "3050 N/m", or "none"."""
-    return limit_text(row.recommended_stiffness) if row.recommended_stiffness else "none"
+    return (
+        number_text.limit_text(row.recommended_stiffness) if row.recommended_stiffness else "none"
+    )
 
 
 def _recommendation_cell(row: LawRow, _comparison: Comparison) -> Cell:
@@ -139,27 +130,27 @@ def _recommendation_cell(row: LawRow, _comparison: Comparison) -> Cell:
 
 def _given_stiffness_cell(row: LawRow, _comparison: Comparison) -> Cell:
     limit = stability_limit_text(row.stability_limit)
-    return Cell(limit_text(row.surface.stiffness), note=limit)
+    return Cell(number_text.limit_text(row.surface.stiffness), note=limit)
 
 
 def _texture_force_cell(row: LawRow, comparison: Comparison) -> Cell:
     """Return the RMS texture force that the device resolves, all laws in one unit."""
     if row.perceptibility is None:
-        return Cell(NOT_AVAILABLE)
+        return Cell(number_text.NOT_AVAILABLE)
     forces = [row.resolved_force, *(other.resolved_force for other in comparison.rows)]
-    return Cell(format_in_one_unit(forces, "N", digits=2)[0])
+    return Cell(number_text.format_in_one_unit(forces, "N", digits=2)[0])
 
 
 def _leak_cell(row: LawRow, comparison: Comparison) -> Cell:
-    return Cell(leak_text(row, comparison), note=row.leak.description)
+    return Cell(number_text.leak_text(row, comparison), note=row.leak.description)
 
 
 def _continuity_cell(row: LawRow, value: bool | None) -> Cell:
-    return Cell(yes_no_text(value), note=row.continuous_reason)
+    return Cell(number_text.yes_no_text(value), note=row.continuous_reason)
 
 
 def _conservation_cell(row: LawRow, _comparison: Comparison) -> Cell:
-    return Cell(yes_no_text(row.conservative), note=row.conservative_reason)
+    return Cell(number_text.yes_no_text(row.conservative), note=row.conservative_reason)
 
 
 def _basis_cell(row: LawRow, _comparison: Comparison) -> Cell:
@@ -169,15 +160,19 @@ def _basis_cell(row: LawRow, _comparison: Comparison) -> Cell:
 
 def _oscillation_cell(row: LawRow, _comparison: Comparison) -> Cell:
     has_force = row.perceptibility is not None or row.is_textureless
-    return Cell(force_text(row.texture_force) if has_force else NOT_AVAILABLE)
+    return Cell(
+        number_text.force_text(row.texture_force) if has_force else number_text.NOT_AVAILABLE
+    )
 
 
 def _bound_cell(bound: Bound) -> Cell:
-    return Cell(bound_text(bound), note=f"{bound.method}: {bound.note}")
+    return Cell(number_text.bound_text(bound), note=f"{bound.method}: {bound.note}")
 
 
 _LETTER_COLUMN = LawColumn("law", lambda row, _: Cell(row.law.letter, "l"))
-NAME_COLUMN = LawColumn("name", lambda row, _: Cell(readable_name(row.law.name)), False, 112)
+NAME_COLUMN = LawColumn(
+    "name", lambda row, _: Cell(number_text.readable_name(row.law.name)), False, 112
+)
 VERDICT_COLUMN = LawColumn("verdict", lambda row, _: Cell(row.verdict), False, VERDICT_MIN_CONSOLE)
 _START_COLUMN = LawColumn("start at", _recommendation_cell, True)
 _GIVEN_COLUMN = LawColumn("at", _given_stiffness_cell, True)
@@ -201,14 +196,14 @@ FULL_COLUMNS = (
     LawColumn("conser-\nvative", _conservation_cell, False, 80),
     LawColumn("worst\nleak", _leak_cell, True, 60),
     LawColumn("contin-\nuous", lambda row, _: _continuity_cell(row, row.continuous), False, 80),
-    LawColumn("T", lambda row, _: Cell(merit_text(row.strength)), True, 80),
-    LawColumn("S", lambda row, _: Cell(merit_text(row.support)), True, 80),
+    LawColumn("T", lambda row, _: Cell(number_text.merit_text(row.strength)), True, 80),
+    LawColumn("S", lambda row, _: Cell(number_text.merit_text(row.support)), True, 80),
     LawColumn("texture\nforce", _oscillation_cell, True, 80),
 )
 
 
 def _heading(column: LawColumn, comparison: Comparison) -> str:
-    unit = " [m]" if column.heading == "T" and strength_has_unit(comparison) else ""
+    unit = " [m]" if column.heading == "T" and number_text.strength_has_unit(comparison) else ""
     return f"{column.heading}{unit}"
 
 

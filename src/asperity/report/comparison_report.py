@@ -7,11 +7,7 @@ from operator import attrgetter
 
 from asperity.analysis.compare import Comparison
 from asperity.analysis.device_comparisons import DeviceComparisons
-from asperity.analysis.limits.perceptibility_sentences import (
-    force_magnitude_text,
-    speed_text,
-    tier_text,
-)
+from asperity.analysis.limits import perceptibility_sentences
 from asperity.analysis.results import LawRow
 from asperity.core.units import format_quantity
 from asperity.report import page
@@ -75,7 +71,7 @@ def _facts(comparison: Comparison) -> list[tuple[str, str]]:
         ("K₀, stiffest smooth wall", datum_text(device.wall_test)),
         ("Stiffness", _requested_stiffness_text(comparison)),
         ("Pressed to", format_quantity(comparison.max_depth, "m")),
-        ("Scanned at", speed_text(comparison.speed)),
+        ("Scanned at", perceptibility_sentences.speed_text(comparison.speed)),
     ]
 
 
@@ -137,8 +133,8 @@ def _case_row(comparison: Comparison) -> Row:
             depth,
             Cell(text, "l", note=comparison.recommendation),
             limit_text(comparison.stiffness or best.recommended_stiffness),
-            force_magnitude_text(best.resolved_force),
-            tier_text(best.perceptibility),
+            perceptibility_sentences.force_magnitude_text(best.resolved_force),
+            perceptibility_sentences.tier_text(best.perceptibility),
         ]
     )
 
@@ -193,7 +189,7 @@ def _case_section(comparison: Comparison) -> Section:
     """Return answer, laws and assumptions of one device and depth."""
 
     def cells(row: LawRow) -> list[str | Cell]:
-        felt = tier_text(row.perceptibility)
+        felt = perceptibility_sentences.tier_text(row.perceptibility)
         return [Cell(row.law.letter, "l"), recommended_stiffness_text(row), felt, row.verdict]
 
     rows = law_rows(comparison, cells)

@@ -25,15 +25,7 @@ from asperity.devices import Device
 from asperity.loop.shared_trace import COLUMNS
 from asperity.recording.recorded_field import field_attachments, field_metadata
 from asperity.recording.writer import RecordingWriter
-from asperity.servo.driver_loop import (
-    MAX_CALL_TIME,
-    NO_END,
-    LoopJob,
-    LoopProgram,
-    ModuleFiles,
-    build_program,
-    run_loop_process,
-)
+from asperity.servo import driver_loop
 from asperity.servo.drivers.driver import Driver
 from asperity.servo.fault import FAULT_DESCRIPTIONS, FAULT_SAMPLES, DeviceFault, EndReason
 from asperity.servo.loop_memory import LoopMemory, LoopStatistics
@@ -62,7 +54,7 @@ class PrestartedProcess:
         self.memory = memory or LoopMemory()
         self.connection, theirs = context.Pipe()
         self.process = context.Process(
-            target=run_loop_process, args=(theirs, self.memory), daemon=True
+            target=driver_loop.run_loop_process, args=(theirs, self.memory), daemon=True
         )
         self.process.start()
         theirs.close()
@@ -116,7 +108,7 @@ class ServoProcess:
     """
 
     def __init__(
-        self, surface: Surface | LoopProgram, driver: Driver, servo: Servo,
+        self, surface: Surface | driver_loop.LoopProgram, driver: Driver, servo: Servo,
         safety: Safety | None = None, reach: float = math.inf, duration: float | None = None,
         device: Device | None = None, prestarted: PrestartedProcess | None = None,
     ) -> None:  # fmt: skip
@@ -124,9 +116,13 @@ class ServoProcess:
         self.driver, self._safety, self._device = driver, safety or Safety(), device
         if device is not None:
             check_passivity_damping(self._safety, device, servo)
-        last = NO_END if duration is None else round(duration / servo.period)
-        program = surface if isinstance(surface, LoopProgram) else build_program(surface, driver)
-        self._job = LoopJob(program, driver, servo, self._safety, reach, last)
+        last = driver_loop.NO_END if duration is None else round(duration / servo.period)
+        program = (
+            surface
+            if isinstance(surface, driver_loop.LoopProgram)
+            else driver_loop.build_program(surface, driver)
+        )
+        self._job = driver_loop.LoopJob(program, driver, servo, self._safety, reach, last)
         self._prestarted = prestarted
         self.memory = LoopMemory() if prestarted is None else prestarted.memory
         self.notes: tuple[str, ...] = ()
@@ -206,7 +202,7 @@ class ServoProcess:
         """
         if not accept_risk:
             self._check_stiffness(surface)
-        self.change_program(build_program(surface, self.driver))
+        self.change_program(driver_loop.build_program(surface, self.driver))
 
     def _check_stiffness(self, surface: Surface) -> None:
         from asperity.servo.safety import excess_stiffness_reason
@@ -217,7 +213,7 @@ class ServoProcess:
         if reason := excess_stiffness_reason(surface, self._device):
             raise ParameterError("stiffness", f"is refused: {reason}; accept_risk=True renders it")
 
-    def change_program(self, program: LoopProgram) -> None:
+    def change_program(self, program: driver_loop.LoopProgram) -> None:
         """Render another program, without analysis; see :meth:`change_surface`.
 
         Raises:
@@ -252,7 +248,7 @@ class ServoProcess:
         self._heartbeat_stop.set()
         assert self._prestarted is not None
         waits = self._end_reason in {EndReason.RUNNING, EndReason.UNRESPONSIVE}
-        self._prestarted.terminate(MAX_CALL_TIME if waits else _EXIT_TIMEOUT)
+        self._prestarted.terminate(driver_loop.MAX_CALL_TIME if waits else _EXIT_TIMEOUT)
         if self._end_reason is EndReason.DIED and not self._was_released:
             self._was_released = True
             with suppress(AsperityError, OSError):
@@ -320,7 +316,7 @@ def require_max_force(driver: Driver, servo: Servo) -> None:
         raise ParameterError("max_force", words)
 
 
-def _pickle(value: object) -> tuple[ModuleFiles, bytes]:
+def _pickle(value: object) -> tuple[driver_loop.ModuleFiles, bytes]:
     """Return a pickled value, and the files of the plugins that it needs."""
     try:
         data = pickle.dumps(value)

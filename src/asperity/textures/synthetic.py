@@ -15,14 +15,8 @@ import numpy as np
 from asperity.core.arguments import document_arguments
 from asperity.core.checks import FloatArray, check_positive
 from asperity.core.errors import ParameterError
+from asperity.measured import filters
 from asperity.measured.file_arguments import SYNTHETIC_ARGUMENTS
-from asperity.measured.filters import (
-    ALPHA,
-    apply_tip,
-    check_tip_radius,
-    find_cutoffs,
-    gaussian_filter,
-)
 from asperity.measured.lengths import format_length
 from asperity.measured.preparation import describe_magnification, magnification_factors
 from asperity.textures.kinds.fourier import Fourier
@@ -104,7 +98,7 @@ def _filter_amplitudes(
     amplitudes = waves.amplitudes * factor
     for name, length in (("cutoff", cutoff), ("l_cutoff", l_cutoff)):
         if length is not None:
-            short = ALPHA * check_positive(name, length, "m") * numbers / (2.0 * math.pi)
+            short = filters.ALPHA * check_positive(name, length, "m") * numbers / (2.0 * math.pi)
             transfer = np.exp(-math.pi * short**2)
             amplitudes = amplitudes * (transfer if name == "cutoff" else 1.0 - transfer)
     return amplitudes
@@ -138,11 +132,11 @@ def _filter_heights(
     if cutoff is not None or l_cutoff is not None:
         # Checks the cut-offs; the first node of the next period is one pitch from the last one.
         shape = tuple(count + periodic for count in heights.shape)
-        find_cutoffs(shape, pitch, cutoff, l_cutoff)
+        filters.find_cutoffs(shape, pitch, cutoff, l_cutoff)
     if cutoff is not None:
-        heights = gaussian_filter(heights, pitch, cutoff, periodic=periodic)
+        heights = filters.gaussian_filter(heights, pitch, cutoff, periodic=periodic)
     if l_cutoff is not None:
-        heights = heights - gaussian_filter(heights, pitch, l_cutoff, periodic=periodic)
+        heights = heights - filters.gaussian_filter(heights, pitch, l_cutoff, periodic=periodic)
     return heights
 
 
@@ -158,10 +152,10 @@ def _apply_periodic_tip(
 ) -> tuple[FloatArray, str]:
     """Return the heights scanned with a tip, which touches neighbouring periods too."""
     if not periodic:
-        return apply_tip(heights, pitch, radius)
-    check_tip_radius(heights.shape, pitch, radius)
+        return filters.apply_tip(heights, pitch, radius)
+    filters.check_tip_radius(heights.shape, pitch, radius)
     margins = [(math.ceil(radius / step),) * 2 for step in reversed(pitch)]
-    scanned, sentence = apply_tip(np.pad(heights, margins, mode="wrap"), pitch, radius)
+    scanned, sentence = filters.apply_tip(np.pad(heights, margins, mode="wrap"), pitch, radius)
     inner = tuple(slice(before, -after) for before, after in margins)
     return np.ascontiguousarray(scanned[inner]), sentence
 

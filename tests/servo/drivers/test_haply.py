@@ -16,7 +16,6 @@ from tests.servo.python_device import SURFACE
 
 from asperity.core.errors import ParameterError
 from asperity.servo.driver_loop import system_clock
-from asperity.servo.drivers import haply
 from asperity.servo.drivers import threaded as exchanged
 from asperity.servo.drivers.driver_registry import hardware_driver
 from asperity.servo.drivers.haply import MAX_PENDING, SERVICE, HaplyDriver
@@ -39,8 +38,7 @@ Start = Callable[..., FakeHaply]
 @pytest.fixture
 def start(monkeypatch: pytest.MonkeyPatch) -> Start:
     """``start(...)`` starts a fake service for the driver, with timeouts for a busy machine."""
-    for module in (exchanged, haply):
-        monkeypatch.setattr(module, "OPEN_TIMEOUT", 30.0)
+    monkeypatch.setattr(exchanged, "OPEN_TIMEOUT", 30.0)
 
     def start_service(**options: Any) -> FakeHaply:
         service = FakeHaply(**options)
@@ -199,7 +197,7 @@ def test_selected_device_of_several_is_opened(start: Start) -> None:
 def test_server_that_is_not_the_inverse_service_is_an_error(
     monkeypatch: pytest.MonkeyPatch, answer: bytes, message: str
 ) -> None:
-    monkeypatch.setattr(haply, "OPEN_TIMEOUT", 2.0)
+    monkeypatch.setattr(exchanged, "OPEN_TIMEOUT", 2.0)
     with socket.create_server(("127.0.0.1", 0)) as server:
         monkeypatch.setenv(SERVICE, f"127.0.0.1:{server.getsockname()[1]}")
 

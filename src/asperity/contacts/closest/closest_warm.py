@@ -16,8 +16,7 @@ from asperity.contacts.warm_start import (
     POINT_COUNT,
     TRUNCATED_TICKS,
 )
-from asperity.core.checks import FloatArray
-from asperity.core.compiled import EVERY_FUNCTION, Kernels
+from asperity.core.compiled import EVERY_FUNCTION, FloatArray, Kernels
 
 KERNELS = Kernels(provides=EVERY_FUNCTION, not_inlined=("closest_point_warm",))
 

@@ -7,8 +7,7 @@ sums and differences: near a crest the atoms are so close together that the squa
 import numpy as np
 
 from asperity.contacts.sampler_interface import evaluation_cost, sample_height, sample_hessian
-from asperity.core.checks import FloatArray
-from asperity.core.compiled import EPS, EVERY_FUNCTION, Kernels, local_array
+from asperity.core.compiled import EPS, EVERY_FUNCTION, FloatArray, Kernels, local_array
 
 KERNELS = Kernels(provides=EVERY_FUNCTION, iterates=True)
 

@@ -44,8 +44,7 @@ from asperity.contacts.split.optimality import (
     split_solve_linear,
     split_track_point,
 )
-from asperity.core.checks import FloatArray
-from asperity.core.compiled import EPS, Kernels, local_array
+from asperity.core.compiled import EPS, FloatArray, Kernels, local_array
 
 KERNELS = Kernels(
     provides=("split_compute_atoms", "split_solve_weights", "split_duality_gap"),

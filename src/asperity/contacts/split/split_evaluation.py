@@ -22,8 +22,7 @@ from asperity.contacts.split.optimality import (
 )
 from asperity.contacts.split.solver import split_compute_atoms
 from asperity.contacts.warm_start import BUDGET, FIRST_POINT, POINT_COUNT, UNLIMITED
-from asperity.core.checks import FloatArray
-from asperity.core.compiled import EVERY_FUNCTION, Kernels, local_array
+from asperity.core.compiled import EVERY_FUNCTION, FloatArray, Kernels, local_array
 
 KERNELS = Kernels(
     provides=EVERY_FUNCTION,

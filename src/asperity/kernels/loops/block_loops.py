@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from asperity.core.checks import FloatArray
-from asperity.core.compiled import Kernels, local_array
+from asperity.core.compiled import FloatArray, Kernels, local_array
 from asperity.kernels.law_interface import probe_force, probe_jacobian
 from asperity.kernels.loop_functions import load_point
 

@@ -1,8 +1,7 @@
 """The loop along a path, which carries the state of the law and the warm start of its contact."""
 
 from asperity.contacts.warm_start import ERROR_BOUND, EVALUATIONS
-from asperity.core.checks import FloatArray
-from asperity.core.compiled import Kernels
+from asperity.core.compiled import FloatArray, Kernels
 from asperity.kernels.law_interface import probe_tick
 from asperity.kernels.loop_functions import store_force
 

@@ -1,7 +1,6 @@
 """Loops over probe points of laws without state."""
 
-from asperity.core.checks import FloatArray
-from asperity.core.compiled import Kernels
+from asperity.core.compiled import FloatArray, Kernels
 from asperity.kernels.law_interface import probe_force, probe_jacobian
 from asperity.kernels.loop_functions import load_point, store_force, store_jacobian
 

@@ -6,8 +6,7 @@ from asperity.contacts.sampler_interface import (
     sample_height,
     sample_hessian,
 )
-from asperity.core.checks import FloatArray
-from asperity.core.compiled import Kernels
+from asperity.core.compiled import FloatArray, Kernels
 
 KERNELS = Kernels(loops=("curvature_batch", "height_batch", "nearest_batch", "slope_batch"))
 

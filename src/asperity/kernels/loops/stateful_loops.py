@@ -3,8 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.core.checks import FloatArray
-from asperity.core.compiled import Kernels
+from asperity.core.compiled import FloatArray, Kernels
 from asperity.kernels.law_interface import probe_force, probe_jacobian
 from asperity.kernels.loop_functions import sliding_derivative, store_force, store_jacobian
 

@@ -12,19 +12,13 @@ import numpy as np
 
 from asperity.core.errors import SurfaceFileError
 from asperity.measured.lengths import parse_heights, parse_number
+from asperity.measured.reading import reader
 from asperity.measured.reading.isolation import describe_exception
-from asperity.measured.reading.reader import (
-    RawSurface,
-    ReadingOptions,
-    SurfaceFile,
-    check_point_count,
-    mask_missing,
-)
 
 NPY_MAGIC = b"\x93NUMPY"
 
 
-def read_npy(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
+def read_npy(file: reader.SurfaceFile, options: reader.ReadingOptions) -> reader.RawSurface:
     """Read a real array, 1-D (profile) or 2-D (map); heights are metres if no unit is given.
 
     Returns:
@@ -39,7 +33,7 @@ def read_npy(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
     # A long double beyond float64 becomes inf, refused later; a signalling NaN is missing too.
     with np.errstate(over="ignore", invalid="ignore"):
         heights = np.array(array, dtype=np.float64, order="C") * (unit or 1.0)
-    return RawSurface(heights, None, file.name, notes, has_units=unit is not None)
+    return reader.RawSurface(heights, None, file.name, notes, has_units=unit is not None)
 
 
 def _map_file(path: Path) -> np.ndarray[Any, np.dtype[Any]]:
@@ -71,7 +65,7 @@ def _check_array(array: np.ndarray[Any, np.dtype[Any]]) -> None:
         raise SurfaceFileError(
             f"array of shape {array.shape}; (ny, nx) for a map or (n,) for a profile is expected"
         )
-    check_point_count(*array.shape[::-1])
+    reader.check_point_count(*array.shape[::-1])
 
 
 _SIGNATURE = re.compile(rb"\s{0,100}(?:ncols|nrows)\s{1,100}[0-9]")
@@ -81,13 +75,13 @@ _DEFAULT_NODATA = -9999.0
 _MAX_HEADER_LENGTH = 4000
 
 
-def is_esri(file: SurfaceFile) -> bool:
+def is_esri(file: reader.SurfaceFile) -> bool:
     """Whether a file starts with the header of an ESRI ASCII grid."""
     first = file.head[:1000].lower()
     return _SIGNATURE.match(first) is not None and b"ncols" in first and b"nrows" in first
 
 
-def read_esri(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
+def read_esri(file: reader.SurfaceFile, options: reader.ReadingOptions) -> reader.RawSurface:
     """Read an ESRI ASCII grid.
 
     The format has no unit: lengths and heights are in metres, or in the unit that is given. The
@@ -102,7 +96,7 @@ def read_esri(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
     text = file.content.decode("ascii", errors="replace")
     header, start = _parse_header(text)
     rows, columns = _header_count(header, "nrows"), _header_count(header, "ncols")
-    check_point_count(columns, rows)
+    reader.check_point_count(columns, rows)
     body = text[start:] if "." in text[start:] else text[start:].replace(",", ".")
     stored = parse_heights(body)
     if len(stored) != rows * columns:
@@ -110,12 +104,14 @@ def read_esri(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
             f"the header says {rows} rows of {columns} heights, there are {len(stored)} numbers"
         )
     code = header.get("nodata_value", _DEFAULT_NODATA)
-    heights, notes = mask_missing(stored.reshape(rows, columns), code)
+    heights, notes = reader.mask_missing(stored.reshape(rows, columns), code)
     unit, assumed = options.resolve_unit(file.name)
     scale = unit or 1.0
     pitch = (_header_cell_size(header, "dx") * scale, _header_cell_size(header, "dy") * scale)
     heights = np.ascontiguousarray(heights[::-1] * scale)
-    return RawSurface(heights, pitch, file.name, (*notes, *assumed), has_units=unit is not None)
+    return reader.RawSurface(
+        heights, pitch, file.name, (*notes, *assumed), has_units=unit is not None
+    )
 
 
 def _parse_header(text: str) -> tuple[dict[str, float], int]:

@@ -16,14 +16,8 @@ from asperity.paper.experiments.device_onsets import DeviceExperiment, DeviceOns
 from asperity.paper.experiments.strokes import BumpExperiment, ScanningExperiment
 from asperity.paper.figures import loop_energies
 from asperity.report import page
+from asperity.report.loop import sweep_report
 from asperity.report.loop.run_report import energy_text
-from asperity.report.loop.sweep_report import (
-    onset_cells,
-    onset_figure_section,
-    onset_section,
-    stiffness_number,
-    stroke_cells,
-)
 from asperity.report.page import HEADED, Cell, Cells, Media, Page, Row, Section, Table, TableLayout
 from asperity.report.pictures import paper_pictures
 from asperity.report.pictures.paper_pictures import loop_energy_text
@@ -176,8 +170,8 @@ def experiment_sections(experiments: Experiments) -> list[Section]:
     """Return the sections of the experiments in order."""
     return [
         _cycle_section(experiments.passivity),
-        onset_figure_section("paper.onsets", experiments.passivity.onsets),
-        onset_section("V.A, onsets in numbers", experiments.passivity.onsets),
+        sweep_report.onset_figure_section("paper.onsets", experiments.passivity.onsets),
+        sweep_report.onset_section("V.A, onsets in numbers", experiments.passivity.onsets),
         _energy_section(experiments.scanning),
         _stroke_section(experiments.scanning),
         _bump_section(experiments.bump),
@@ -213,7 +207,7 @@ def _stroke_section(experiment: ScanningExperiment) -> Section:
     headings = ("law", "hand", "speed", "x", "z", "sum", "field", "±", "paper's", "lost")
     rows = []
     for one in experiment.strokes:
-        law, speed, _depth, x, _y, *rest, _lost = stroke_cells(one.stroke)
+        law, speed, _depth, x, _y, *rest, _lost = sweep_report.stroke_cells(one.stroke)
         lost = f"{one.stroke.lost_contact:.1f}"
         rows.append(Row([law, one.hand, speed, x, *rest, lost], law=one.stroke.law))
     table = Table(headings, rows, numeric_columns=range(2, len(headings)))
@@ -249,10 +243,10 @@ def _device_table_section(experiment: DeviceExperiment) -> Section:
 
 
 def _device_cells(device_onset: DeviceOnset) -> Cells:
-    law, _delay, _quiet, cycling, starts, depth, q, _paper, rule, _wall = onset_cells(
+    law, _delay, _quiet, cycling, starts, depth, q, _paper, rule, _wall = sweep_report.onset_cells(
         device_onset.prediction
     )
     kind = "no" if device_onset.is_limit_violated else ""
-    allowed = Cell(stiffness_number(device_onset.catalogue_limit), kind)
+    allowed = Cell(sweep_report.stiffness_number(device_onset.catalogue_limit), kind)
     names = [device_onset.device, device_onset.surface]
     return [*names, law, q, allowed, rule, cycling, starts, depth]

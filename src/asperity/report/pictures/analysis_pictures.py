@@ -19,22 +19,7 @@ from asperity.analysis.analyze import Analysis
 from asperity.analysis.bounds.bound import Bound
 from asperity.core.checks import FloatArray
 from asperity.core.units import format_quantity
-from asperity.report.pictures import style
-from asperity.report.pictures.analysis_windows import (
-    gain_window,
-    loop_window,
-    project_on_window,
-    top_view,
-    witness_point,
-    witness_profile,
-    working_depth,
-)
-from asperity.report.pictures.law_pictures import (
-    Window,
-    add_gain_colorbar,
-    draw_fields,
-    draw_gain_field,
-)
+from asperity.report.pictures import analysis_windows, law_pictures, style
 from asperity.report.pictures.scan_plane import CurlField, curl_field
 from asperity.report.sentences.alt_text import analysis_figure_names
 from asperity.report.sentences.number_text import interval_text, range_text
@@ -60,8 +45,8 @@ _ARROW_COUNT = 5
 def available_pictures(analysis: Analysis) -> dict[str, style.SizedDrawing]:
     """Return size [inch] and drawing function of the figures of an analysis, by name."""
     drawings: dict[str, tuple[Callable[..., None], Callable[[], float]]] = {
-        "field": (draw_field, lambda: _plane_height(loop_window(analysis))),
-        "gain": (draw_gain, lambda: _plane_height(gain_window(analysis))),
+        "field": (draw_field, lambda: _plane_height(analysis_windows.loop_window(analysis))),
+        "gain": (draw_gain, lambda: _plane_height(analysis_windows.gain_window(analysis))),
         "top": (draw_top_view, lambda: _map_height(analysis)),
         "depth": (draw_depth, lambda: _GRAPH_HEIGHT),
         "jumps": (draw_jumps, lambda: _GRAPH_HEIGHT),
@@ -73,7 +58,7 @@ def available_pictures(analysis: Analysis) -> dict[str, style.SizedDrawing]:
     return pictures
 
 
-def _plane_height(window: Window) -> float:
+def _plane_height(window: law_pictures.Window) -> float:
     height = _PANEL_WIDTH / window.aspect
     return min(max(height, _MIN_PANEL_HEIGHT), _MAX_PANEL_HEIGHT) + _PANEL_MARGIN
 
@@ -92,14 +77,14 @@ def draw_field(figure: FigureArea, analysis: Analysis) -> None:
     Points deeper than the working region are faded; the vertices of the loop are projected on the
     plane.
     """
-    window, leak = loop_window(analysis), analysis.leak
+    window, leak = analysis_windows.loop_window(analysis), analysis.leak
     remark = "conservative: no loop gains energy"
     if len(leak.vertices):
         gain = range_text(leak.energy, leak.upper_per_period, "J")
         remark = f"the worst loop of one period gains {gain}"
     elif not analysis.conservative:
         remark = "no loop found that gains energy"
-    axes = draw_fields(figure, [analysis.surface], [remark], window)[0]
+    axes = law_pictures.draw_fields(figure, [analysis.surface], [remark], window)[0]
     for arrows in axes.findobj(Quiver):
         # A halo, for dark colours of the curl.
         arrows.set_path_effects([withStroke(linewidth=1.2, foreground=_WHITE)])
@@ -113,7 +98,7 @@ def draw_field(figure: FigureArea, analysis: Analysis) -> None:
         _draw_loop(axes, along * wide.scale, leak.vertices[:, 2] * high.scale)
 
 
-def _scale_axes(axes: Axes, window: Window) -> None:
+def _scale_axes(axes: Axes, window: law_pictures.Window) -> None:
     """Limit and label axes in the units of a window, true to scale where that fills the panel."""
     wide, high = window.units
     window.limit_axes(axes)
@@ -137,10 +122,12 @@ def _draw_loop(axes: Axes, x: FloatArray, z: FloatArray) -> None:
         axes.annotate("", end, start, arrowprops=arrow, zorder=6.0, annotation_clip=True)
 
 
-def _fade_beyond_depth(axes: Axes, analysis: Analysis, window: Window, field: CurlField) -> None:
+def _fade_beyond_depth(
+    axes: Axes, analysis: Analysis, window: law_pictures.Window, field: CurlField
+) -> None:
     """Fade the field below the working region, and draw the border of the region."""
     points = np.column_stack([window.segment.xy(field.along.ravel()), field.z.ravel()])
-    depth = working_depth(analysis.surface, points).reshape(field.z.shape)
+    depth = analysis_windows.working_depth(analysis.surface, points).reshape(field.z.shape)
     beyond = depth - analysis.surface.max_depth
     if beyond.max() <= 0.0:
         return
@@ -152,7 +139,7 @@ def _fade_beyond_depth(axes: Axes, analysis: Analysis, window: Window, field: Cu
     axes.contour(*places, beyond, [0.0], zorder=4.6, **border)
 
 
-def _horizontal_axis_text(window: Window) -> str:
+def _horizontal_axis_text(window: law_pictures.Window) -> str:
     """Return start and direction of the horizontal axis."""
     x, y = (format_quantity(float(v) + 0.0, "m") for v in window.segment.xy(np.zeros(1))[0])
     u, v = (float(part) for part in window.segment.line.direction)
@@ -174,19 +161,23 @@ def _gain_scale(analysis: Analysis, values: FloatArray) -> LogNorm:
 
 def draw_gain(figure: FigureArea, analysis: Analysis) -> None:
     """Draw ‖J‖/k in the vertical plane through the witness of q, and the witness."""
-    window, surface = gain_window(analysis), analysis.surface
+    window, surface = analysis_windows.gain_window(analysis), analysis.surface
     wide, high = window.units
     field = curl_field(surface, window.segment, window.bottom, *_GRID_CELLS)
     scale = _gain_scale(analysis, field.gain)
     axes = style.single_axes(figure)
-    mesh = draw_gain_field(axes, field, scale, window)
+    mesh = law_pictures.draw_gain_field(axes, field, scale, window)
     _fade_beyond_depth(axes, analysis, window, field)
-    at = project_on_window(window, witness_point(analysis)) if analysis.q.at is not None else None
+    at = (
+        analysis_windows.project_on_window(window, analysis_windows.witness_point(analysis))
+        if analysis.q.at is not None
+        else None
+    )
     if at is not None:
         _draw_cross(axes, at[0] * wide.scale, at[1] * high.scale)
     _scale_axes(axes, window)
     style.title_law(axes, surface.law, _gain_remark(analysis))
-    add_gain_colorbar(figure, mesh, axes, "‖J‖ / k [1]")
+    law_pictures.add_gain_colorbar(figure, mesh, axes, "‖J‖ / k [1]")
 
 
 def _gain_remark(analysis: Analysis) -> str:
@@ -205,7 +196,7 @@ def _draw_cross(axes: Axes, x: float, y: float) -> None:
 
 def draw_top_view(figure: FigureArea, analysis: Analysis) -> None:
     """Draw the greatest sampled ‖J‖/k over depth, from above, with the witness of q."""
-    (grid, gain), surface = top_view(analysis), analysis.surface
+    (grid, gain), surface = analysis_windows.top_view(analysis), analysis.surface
     scale = _gain_scale(analysis, gain)
     unit, (x0, x1, y0, y1) = grid.frame
     axes = style.single_axes(figure)
@@ -224,7 +215,7 @@ def draw_top_view(figure: FigureArea, analysis: Analysis) -> None:
     style.label_axes(axes, f"x [{unit.name}]", f"y [{unit.name}]")
     remark = "greatest of five depths, sampled; dotted: the vertical plane of the other figure"
     style.set_panel_title(axes, surface.law.letter, "seen from above", remark)
-    add_gain_colorbar(figure, mesh, axes, "‖J‖ / k [1]")
+    law_pictures.add_gain_colorbar(figure, mesh, axes, "‖J‖ / k [1]")
 
 
 def _wrap_into_domain(
@@ -240,7 +231,7 @@ def _wrap_into_domain(
 
 def draw_depth(figure: FigureArea, analysis: Analysis) -> None:
     """Draw the singular values of J/k over depth at the witness, with the bounds of q."""
-    column, surface = witness_profile(analysis), analysis.surface
+    column, surface = analysis_windows.witness_profile(analysis), analysis.surface
     unit = style.length_unit(surface.max_depth)
     axes = style.single_axes(figure)
     for index, colour in enumerate((style.BLUE, style.GREEN, style.MUTED)):

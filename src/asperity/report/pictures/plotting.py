@@ -13,16 +13,8 @@ from asperity.analysis.compare import Comparison
 from asperity.analysis.limits.limit_result import Limits
 from asperity.core.errors import ParameterError
 from asperity.recording.recording import Recording
-from asperity.report.pictures import style
+from asperity.report.pictures import law_pictures, style
 from asperity.report.pictures.analysis_pictures import available_pictures
-from asperity.report.pictures.law_pictures import (
-    draw_fields,
-    draw_forces,
-    field_size,
-    force_size,
-    gain_figure,
-    merit_figure,
-)
 from asperity.report.pictures.loop_pictures import recording_figure, run_figure
 from asperity.report.pictures.spectrum_pictures import hand_figure, limits_figure, spectrum_figure
 from asperity.report.pictures.surface_pictures import draw_surface, surface_size
@@ -120,12 +112,16 @@ def _texture_drawing(texture: Texture) -> style.SizedDrawing:
 
 def _forces_drawing(surfaces: Sequence[Surface]) -> style.SizedDrawing:
     """Return the forces along the scan, one panel per law, on shared axes."""
-    return force_size(len(surfaces)), partial(draw_forces, surfaces=surfaces)
+    return law_pictures.force_size(len(surfaces)), partial(
+        law_pictures.draw_forces, surfaces=surfaces
+    )
 
 
 def _fields_drawing(surfaces: Sequence[Surface], remarks: Sequence[str] = ()) -> style.SizedDrawing:
     """Return the force fields over their curl, one panel per law, on shared scales."""
-    return field_size(surfaces), partial(draw_fields, surfaces=surfaces, remarks=remarks)
+    return law_pictures.field_size(surfaces), partial(
+        law_pictures.draw_fields, surfaces=surfaces, remarks=remarks
+    )
 
 
 def _conservation_remarks(comparison: Comparison) -> list[str]:
@@ -164,6 +160,6 @@ COMPARISON_PICTURES: dict[str, Callable[[Comparison], Figure]] = {
     "field": lambda result: _stacked_figure(
         _fields_drawing([row.surface for row in result.rows], _conservation_remarks(result))
     ),
-    "gain": gain_figure,
-    "merit": merit_figure,
+    "gain": law_pictures.gain_figure,
+    "merit": law_pictures.merit_figure,
 }

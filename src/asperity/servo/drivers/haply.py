@@ -21,13 +21,8 @@ from typing import Any, ClassVar
 from asperity.core.errors import ParameterError
 from asperity.loop.clock import CLOCK_BOOTTIME
 from asperity.servo.driver_loop import PRIORITY
+from asperity.servo.drivers import threaded
 from asperity.servo.drivers.driver import AWAY, RIGHT, UP, DriverKind
-from asperity.servo.drivers.threaded import (
-    OPEN_TIMEOUT,
-    ThreadBuffer,
-    ThreadedDriver,
-    wait_for_position,
-)
 from asperity.servo.drivers.websocket_client import ProtocolError, WebSocketClient
 from asperity.servo.kernels.ring_buffer import FORCE_TIMEOUT, LOOP_SILENT, STALE
 from asperity.servo.kernels.threaded_device import ThreadedDevice
@@ -102,7 +97,7 @@ class HaplyThread(threading.Thread):
 
     def __init__(self, connection: WebSocketClient, device: str, force_timeout: float) -> None:
         super().__init__(daemon=True)
-        self.buffer, self.reason = ThreadBuffer(force_timeout), ""
+        self.buffer, self.reason = threaded.ThreadBuffer(force_timeout), ""
         self._connection, self._device_id = connection, device
         self._wakeup_reader, self.wakeup = os.pipe()
         for end in (self._wakeup_reader, self.wakeup):
@@ -191,7 +186,7 @@ _SWITCH_INTERVAL = 1e-4  # [s] after which Python switches to the exchange while
 
 
 @dataclass
-class HaplyDriver(ThreadedDriver):
+class HaplyDriver(threaded.ThreadedDriver):
     """An Inverse3.
 
     Attributes:
@@ -226,7 +221,7 @@ class HaplyDriver(ThreadedDriver):
         sys.setswitchinterval(_SWITCH_INTERVAL)
         exchange.start()
         try:
-            wait_for_position(exchange.buffer.ring, lambda: exchange.reason)
+            threaded.wait_for_position(exchange.buffer.ring, lambda: exchange.reason)
         except ParameterError:
             self.close()
             raise
@@ -235,7 +230,7 @@ class HaplyDriver(ThreadedDriver):
     def close(self) -> None:
         """Send no force to the service, and end the thread."""
         if self._exchange is not None:
-            self._exchange.stop(OPEN_TIMEOUT)
+            self._exchange.stop(threaded.OPEN_TIMEOUT)
             sys.setswitchinterval(self._previous_switch_interval)
 
     def release_lost_device(self) -> None:
@@ -265,7 +260,7 @@ def _connect() -> WebSocketClient:
     if not host or not port.isdecimal():
         raise ParameterError(SERVICE, "must be host and port, localhost:10001", where)
     try:
-        return WebSocketClient(host, int(port), OPEN_TIMEOUT)
+        return WebSocketClient(host, int(port), threaded.OPEN_TIMEOUT)
     except ProtocolError as error:
         raise ParameterError("driver", f"finds no Inverse Service at {where}: {error}") from None
     except OSError as error:

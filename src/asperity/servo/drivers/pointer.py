@@ -17,26 +17,15 @@ from asperity.core.checks import FloatArray, check_array, check_real
 from asperity.core.errors import ParameterError
 from asperity.servo.drivers.simulated import SimulatedDriver, simulated_driver
 from asperity.servo.kernels import pointer_anchor
-from asperity.servo.kernels.pointer_anchor import (
-    ANCHOR,
-    ANGLE,
-    COSINE,
-    HEADER_ROWS,
-    HISTORY_SAMPLES,
-    REQUEST_NUMBER,
-    REQUEST_ROW,
-    ROWS_PER_SAMPLE,
-    SINE,
-    STATE_ROW,
-    TARGET,
-)
 from asperity.simulation.hands import Hand
 from asperity.simulation.kernels.simulated_device import SimulatedDevice
 from asperity.simulation.motions import Stationary
 from asperity.simulation.plants import Plant
 from asperity.simulation.servo import Servo
 
-_ROW_COUNT = HEADER_ROWS + ROWS_PER_SAMPLE * HISTORY_SAMPLES
+_ROW_COUNT = (
+    pointer_anchor.HEADER_ROWS + pointer_anchor.ROWS_PER_SAMPLE * pointer_anchor.HISTORY_SAMPLES
+)
 _MEMORY_FOLDER = "/dev/shm" if Path("/dev/shm").is_dir() else None
 
 
@@ -60,7 +49,7 @@ class PointerHand:
         with open(descriptor, "wb") as file:
             file.write(bytes(8 * 3 * _ROW_COUNT))
         self._table: FloatArray | None = open_pointer_table(self.name)
-        self._table[TARGET] = self._table[ANCHOR] = position
+        self._table[pointer_anchor.TARGET] = self._table[pointer_anchor.ANCHOR] = position
 
     @property
     def table(self) -> FloatArray:
@@ -88,31 +77,35 @@ class PointerHand:
         Raises:
             ParameterError: for a number that is not finite.
         """
-        points = {TARGET: ("target", target), COSINE: ("cosine", cosine), SINE: ("sine", sine)}
+        points = {
+            pointer_anchor.TARGET: ("target", target),
+            pointer_anchor.COSINE: ("cosine", cosine),
+            pointer_anchor.SINE: ("sine", sine),
+        }
         rows = {row: check_array(*point, (3,), "m") for row, point in points.items()}
         velocity = check_real("angular_velocity", angular_velocity, "rad/s")
         table = self.table
         for row, values in rows.items():
             table[row] = values
-        table[REQUEST_ROW, ANGLE] = velocity
+        table[pointer_anchor.REQUEST_ROW, pointer_anchor.ANGLE] = velocity
         number = self.request_count + 1
-        table[REQUEST_ROW, REQUEST_NUMBER] = number
+        table[pointer_anchor.REQUEST_ROW, pointer_anchor.REQUEST_NUMBER] = number
         return number
 
     @property
     def request_count(self) -> int:
         """Number of the newest request."""
-        return int(self.table[REQUEST_ROW, REQUEST_NUMBER])
+        return int(self.table[pointer_anchor.REQUEST_ROW, pointer_anchor.REQUEST_NUMBER])
 
     @property
     def acknowledged_count(self) -> int:
         """Number of the newest acknowledged request."""
-        return int(self.table[STATE_ROW, REQUEST_NUMBER])
+        return int(self.table[pointer_anchor.STATE_ROW, pointer_anchor.REQUEST_NUMBER])
 
     @property
     def anchor(self) -> FloatArray:
         """Position of the anchor (3,) [m]."""
-        return np.array(self.table[ANCHOR])
+        return np.array(self.table[pointer_anchor.ANCHOR])
 
     @property
     def history(self) -> FloatArray:
@@ -121,7 +114,9 @@ class PointerHand:
         The k-th sample is at k modulo n, with n = ``HISTORY_SAMPLES``; none is counted twice or
         left out.
         """
-        return np.array(self.table[HEADER_ROWS:]).reshape(HISTORY_SAMPLES, ROWS_PER_SAMPLE, 3)
+        return np.array(self.table[pointer_anchor.HEADER_ROWS :]).reshape(
+            pointer_anchor.HISTORY_SAMPLES, pointer_anchor.ROWS_PER_SAMPLE, 3
+        )
 
     def close(self) -> None:
         """Release the memory; a running loop keeps its own mapping."""
@@ -171,7 +166,7 @@ class PointerDriver(SimulatedDriver):
             table = open_pointer_table(self.pointer_file)
         except FileNotFoundError:
             raise ParameterError("pointer", "is closed: nothing moves the hand") from None
-        table[STATE_ROW] = 0.0
+        table[pointer_anchor.STATE_ROW] = 0.0
         device = super().open()
         return SimulatedDevice(*device)._replace(anchor=table)
 

@@ -11,8 +11,7 @@ import math
 from typing import NamedTuple
 
 from asperity.contacts.warm_start import FIRST_POINT, POINT_COUNT
-from asperity.core.checks import FloatArray
-from asperity.core.compiled import Kernels
+from asperity.core.compiled import FloatArray, Kernels
 
 KERNELS = Kernels(provides=("probe_depth", "probe_in_contact", "probe_tick"))
 

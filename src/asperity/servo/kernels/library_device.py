@@ -2,8 +2,7 @@
 
 from typing import NamedTuple
 
-from asperity.core.checks import FloatArray
-from asperity.core.compiled import Kernels, call_address, local_array
+from asperity.core.compiled import FloatArray, Kernels, call_address, local_array
 
 KERNELS = Kernels(provides=("device_read", "device_write"), native=("call_address",))
 

@@ -5,8 +5,14 @@ this
 function, and the loop exchanges with it through a ring buffer.
 """
 
-from asperity.core.checks import FloatArray, IntArray
-from asperity.core.compiled import Kernels, call_address, local_array, store_release
+from asperity.core.compiled import (
+    FloatArray,
+    IntArray,
+    Kernels,
+    call_address,
+    local_array,
+    store_release,
+)
 from asperity.servo.kernels.ring_buffer import (
     DRIVER_WORDS,
     FAILURE_CODE,

@@ -10,8 +10,7 @@ address: first the words below, then the rows of a time [ns] and three numbers.
 
 from typing import NamedTuple
 
-from asperity.core.checks import FloatArray, IntArray
-from asperity.core.compiled import Kernels, load_acquire, store_release
+from asperity.core.compiled import FloatArray, IntArray, Kernels, load_acquire, store_release
 
 KERNELS = Kernels(
     provides=("set_failure", "failure_code", "latest_row", "push_row"),

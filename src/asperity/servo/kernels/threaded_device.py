@@ -7,8 +7,7 @@ A position that is too old is a fault in the sample that would have used it.
 
 from typing import NamedTuple
 
-from asperity.core.checks import FloatArray, IntArray
-from asperity.core.compiled import Kernels, call_address
+from asperity.core.compiled import FloatArray, IntArray, Kernels, call_address
 from asperity.loop.clock import Clock, clock_now
 from asperity.loop.interface import OK
 from asperity.servo.kernels.ring_buffer import (

@@ -13,8 +13,7 @@ over a part of a sample.
 
 from typing import NamedTuple
 
-from asperity.core.checks import FloatArray
-from asperity.core.compiled import Kernels
+from asperity.core.compiled import FloatArray, Kernels
 from asperity.simulation.kernels.body_interface import RUNNING, SampleInput
 from asperity.simulation.kernels.coupled_body import friction_force
 from asperity.simulation.kernels.energy_ledger import add_energies

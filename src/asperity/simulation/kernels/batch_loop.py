@@ -6,8 +6,7 @@ equals its run alone, bit for bit. No trace is written: a few sums are enough to
 cycle.
 """
 
-from asperity.core.checks import FloatArray, IntArray
-from asperity.core.compiled import Kernels, local_array
+from asperity.core.compiled import FloatArray, IntArray, Kernels, local_array
 from asperity.kernels.law_interface import probe_in_contact
 from asperity.kernels.tick import ServoSettings, ServoState, servo_tick, state_before_tick
 from asperity.simulation.kernels.body_interface import (

@@ -10,8 +10,7 @@ anchor's spring and damper is M Δw + M_r Δs - (F + g) T + B Δe.
 import math
 from typing import NamedTuple
 
-from asperity.core.checks import FloatArray
-from asperity.core.compiled import Kernels, local_array
+from asperity.core.compiled import FloatArray, Kernels, local_array
 from asperity.simulation.kernels.body_interface import RUNNING, SampleInput
 from asperity.simulation.kernels.energy_ledger import add_energies
 

@@ -2,8 +2,7 @@
 
 from typing import NamedTuple
 
-from asperity.core.checks import FloatArray
-from asperity.core.compiled import Kernels, local_array
+from asperity.core.compiled import FloatArray, Kernels, local_array
 from asperity.simulation.kernels.body_interface import RUNNING, SampleInput
 from asperity.simulation.kernels.coupled_body import friction_force
 from asperity.simulation.kernels.energy_ledger import add_energies

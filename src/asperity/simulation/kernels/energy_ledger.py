@@ -1,7 +1,6 @@
 """The ledger: sums of energies [J], and where each of them stands."""
 
-from asperity.core.checks import FloatArray
-from asperity.core.compiled import Kernels
+from asperity.core.compiled import FloatArray, Kernels
 
 KERNELS = Kernels(provides=("add_energies",))
 

@@ -4,8 +4,7 @@
 
 from typing import NamedTuple
 
-from asperity.core.checks import FloatArray, IntArray
-from asperity.core.compiled import Kernels
+from asperity.core.compiled import FloatArray, IntArray, Kernels
 from asperity.kernels.tick import ServoSettings, ServoState
 from asperity.loop.interface import GuardedForce, Reading
 from asperity.simulation.kernels.body_interface import stored_energy

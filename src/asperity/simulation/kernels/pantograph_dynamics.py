@@ -14,8 +14,7 @@ and c(p, p') is what the masses need to stay on their way while p'' = 0.
 import math
 from typing import NamedTuple
 
-from asperity.core.checks import FloatArray
-from asperity.core.compiled import Kernels
+from asperity.core.compiled import FloatArray, Kernels
 from asperity.simulation.kernels.body_interface import LEFT_WORKSPACE, RUNNING, SampleInput
 from asperity.simulation.kernels.energy_ledger import add_energies
 from asperity.simulation.kernels.hand_force import (

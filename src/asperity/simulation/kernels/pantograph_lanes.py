@@ -5,8 +5,7 @@ What needs more care (several steps, as with dry friction; a band that goes slac
 workspace) is computed again for that body alone, from where it was.
 """
 
-from asperity.core.checks import FloatArray, IntArray
-from asperity.core.compiled import Kernels, local_array
+from asperity.core.compiled import FloatArray, IntArray, Kernels, local_array
 from asperity.simulation.kernels.batch_loop import lane_input
 from asperity.simulation.kernels.body_interface import LANES, RUNNING, STOP, advance_body
 from asperity.simulation.kernels.energy_ledger import add_energies

@@ -4,8 +4,7 @@
 
 from typing import NamedTuple
 
-from asperity.core.checks import FloatArray
-from asperity.core.compiled import Kernels
+from asperity.core.compiled import FloatArray, Kernels
 from asperity.simulation.kernels.body_interface import RUNNING, SampleInput
 from asperity.simulation.kernels.energy_ledger import add_energies
 

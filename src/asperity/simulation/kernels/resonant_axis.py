@@ -5,8 +5,7 @@ spring and carries the hand, the changes of (e, w, r, s) are linear in themselve
 the constant force g of the hand.
 """
 
-from asperity.core.checks import FloatArray
-from asperity.core.compiled import Kernels, local_array
+from asperity.core.compiled import FloatArray, Kernels, local_array
 from asperity.simulation.kernels.axis_body import AxisBodyRecord
 
 KERNELS = Kernels(provides=("advance_axis", "final_velocity", "stored_energy"))

@@ -2,8 +2,7 @@
 
 from typing import NamedTuple
 
-from asperity.core.checks import FloatArray, IntArray
-from asperity.core.compiled import Kernels
+from asperity.core.compiled import FloatArray, IntArray, Kernels
 from asperity.kernels.tick import flush_subnormal, quantize
 from asperity.simulation.kernels.body_interface import DIVERGED, RUNNING, SampleInput, advance_body
 

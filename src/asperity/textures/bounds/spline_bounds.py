@@ -12,14 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.core.checks import FloatArray
-from asperity.enclosures.cells import (
-    DERIVATIVE_ORDERS,
-    EPS,
-    SAMPLE_COUNT,
-    Cells,
-    grid_index_chunks,
-    low_discrepancy_points,
-)
+from asperity.enclosures import cells
 from asperity.enclosures.taylor import TaylorModel, TaylorNumber
 
 # From uniform B-spline to Bernstein coefficients on one cell, by degree.
@@ -84,7 +77,7 @@ _BLOCK = 4
 _GAPS = {1: (1e-6, 1e-9), 2: (1e-3, 1e-6)}
 
 
-class SplineCells(Cells):
+class SplineCells(cells.Cells):
     """The cells of a spline, in units of its pitch; initially blocks of cells for a map.
 
     Args:
@@ -120,17 +113,19 @@ class SplineCells(Cells):
         shape = [len(first) for first in firsts[::-1]]
 
         def chunks() -> Iterator[FloatArray]:
-            for index in grid_index_chunks(shape):
+            for index in cells.grid_index_chunks(shape):
                 places = zip(firsts, index.T[::-1], strict=True)
                 yield np.stack([starts[k] for starts, k in places], axis=-1) + 0.5 * side
 
         return chunks(), np.full(self.dimensions, 0.5 * side)
 
-    def sample_coordinates(self, count: int = SAMPLE_COUNT) -> FloatArray:
+    def sample_coordinates(self, count: int = cells.SAMPLE_COUNT) -> FloatArray:
         """See :class:`Cells`; at nodes, where second derivatives of a spline are extreme."""
         if self.dimensions == 1:
             count = min(count, 4 * int(self._counts[0]))
-        return np.asarray(np.round(low_discrepancy_points(count, self.dimensions) * self._counts))
+        return np.asarray(
+            np.round(cells.low_discrepancy_points(count, self.dimensions) * self._counts)
+        )
 
     def enclosures(
         self, centres: FloatArray, half: FloatArray, names: Sequence[str]
@@ -141,11 +136,11 @@ class SplineCells(Cells):
         cell = np.minimum(np.floor(first).astype(np.int64), self._counts - side)
         patch = self._patches(cell, side + 3)
         matrices = _AxisMatrices(centres - half - cell, 2.0 * half)
-        slack = 256.0 * EPS * np.abs(patch).max(axis=(0, 1))
+        slack = 256.0 * cells.EPS * np.abs(patch).max(axis=(0, 1))
         per_x, per_y = (*self._nodes_per_metre, 1.0)[:2]
         result: dict[str, TaylorNumber] = {}
         for name in names:
-            nx, ny = DERIVATIVE_ORDERS[name]
+            nx, ny = cells.DERIVATIVE_ORDERS[name]
             if ny and self.dimensions == 1:
                 result[name] = 0.0
                 continue
@@ -268,5 +263,5 @@ def _enclose_remainder(
 ) -> TaylorModel:
     """Return ``scale`` times a linear function plus the hull of the remainder's coefficients."""
     low, high = rest.min(axis=(0, 1)), rest.max(axis=(0, 1))
-    c, e = 0.5 * (low + high), 0.5 * (high - low) * (1.0 + 8.0 * EPS) + slack
-    return TaylorModel(scale * c, scale * np.stack(slopes), scale * e * (1.0 + 8.0 * EPS))
+    c, e = 0.5 * (low + high), 0.5 * (high - low) * (1.0 + 8.0 * cells.EPS) + slack
+    return TaylorModel(scale * c, scale * np.stack(slopes), scale * e * (1.0 + 8.0 * cells.EPS))

@@ -11,18 +11,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from asperity.core.checks import FloatArray
-from asperity.enclosures.cells import (
-    CHUNK_SIZE,
-    DEFAULT_GAPS,
-    DERIVATIVE_NAMES,
-    DERIVATIVE_ORDERS,
-    EPS,
-    REFINED_GAPS,
-    SAMPLE_COUNT,
-    Cells,
-    grid_index_chunks,
-    low_discrepancy_points,
-)
+from asperity.enclosures import cells
 from asperity.enclosures.taylor import TaylorModel, TaylorNumber
 from asperity.textures.plane_waves import PlaneWaves
 
@@ -32,11 +21,13 @@ _SINES_PER_CHUNK = 2_000_000
 _MAX_CELLS = {4: 1_000_000}
 # Initial samples per wave of a profile.
 _SAMPLES_PER_WAVE = 64
-_ODD = [i for i, name in enumerate(DERIVATIVE_NAMES) if sum(DERIVATIVE_ORDERS[name]) == 1]
-_EVEN = [i for i in range(len(DERIVATIVE_NAMES)) if i not in _ODD]
+_ODD = [
+    i for i, name in enumerate(cells.DERIVATIVE_NAMES) if sum(cells.DERIVATIVE_ORDERS[name]) == 1
+]
+_EVEN = [i for i in range(len(cells.DERIVATIVE_NAMES)) if i not in _ODD]
 
 
-class WaveCells(Cells):
+class WaveCells(cells.Cells):
     """Cells on the torus of independent phases of a sum of waves, or on a rectangle.
 
     Args:
@@ -57,13 +48,15 @@ class WaveCells(Cells):
         else:
             self._basis, self._multiples = np.eye(2), self._waves
             self._phases = self._phases - self._waves.sum(axis=1) * margin
-        self._weights = {name: self._weight(*DERIVATIVE_ORDERS[name]) for name in DERIVATIVE_NAMES}
+        self._weights = {
+            name: self._weight(*cells.DERIVATIVE_ORDERS[name]) for name in cells.DERIVATIVE_NAMES
+        }
         every = np.stack(list(self._weights.values()), axis=-1)
         self._even, self._odd = every[:, _EVEN], every[:, _ODD]
         self.dimensions = self._multiples.shape[1]
         self.max_cells = _MAX_CELLS.get(self.dimensions)
-        self.default_gap = DEFAULT_GAPS.get(self.dimensions, 1e-3)
-        self.refined_gap = REFINED_GAPS.get(self.dimensions)
+        self.default_gap = cells.DEFAULT_GAPS.get(self.dimensions, 1e-3)
+        self.refined_gap = cells.REFINED_GAPS.get(self.dimensions)
 
     def initial_cells(self) -> tuple[Iterator[FloatArray], FloatArray]:
         """See :class:`Cells`."""
@@ -75,20 +68,20 @@ class WaveCells(Cells):
         limit = 4_000_000 ** (1.0 / self.dimensions)
         counts = [int(min(max(math.ceil(turn / 0.7), least), limit)) for turn in turns]
         half = 0.5 * np.asarray(sizes) / counts
-        chunks = grid_index_chunks(counts, self.chunk_size())
+        chunks = cells.grid_index_chunks(counts, self.chunk_size())
         return (half * (2.0 * index + 1.0) for index in chunks), half
 
-    def sample_coordinates(self, count: int = SAMPLE_COUNT) -> FloatArray:
+    def sample_coordinates(self, count: int = cells.SAMPLE_COUNT) -> FloatArray:
         """See :class:`Cells`."""
         sizes = np.full(self.dimensions, 2.0 * math.pi) if self._extent is None else self._extent
         count = min(count, max(64, _SINES_PER_CHUNK // len(self._amplitudes)))
         if self.dimensions == 1 and self._extent is None:
             count = min(count, _SAMPLES_PER_WAVE * (1 + int(np.abs(self._multiples).max())))
-        return np.asarray(low_discrepancy_points(count, self.dimensions) * np.asarray(sizes))
+        return np.asarray(cells.low_discrepancy_points(count, self.dimensions) * np.asarray(sizes))
 
     def chunk_size(self) -> int:
         """See :class:`Cells`."""
-        return max(256, min(CHUNK_SIZE, _SINES_PER_CHUNK // len(self._amplitudes)))
+        return max(256, min(cells.CHUNK_SIZE, _SINES_PER_CHUNK // len(self._amplitudes)))
 
     def enclosures(
         self, centres: FloatArray, half: FloatArray, names: Sequence[str]
@@ -105,17 +98,17 @@ class WaveCells(Cells):
         # Rounding errors of the phases.
         most = np.abs(centres).max(axis=0, initial=0.0) @ np.abs(self._multiples).T
         largest = float((most + np.abs(self._phases)).max())
-        slack = 16.0 * EPS * (1.0 + largest + len(sine[0]))
+        slack = 16.0 * cells.EPS * (1.0 + largest + len(sine[0]))
         result: dict[str, TaylorNumber] = {}
         for name in names:
-            weight, odd = self._weights[name], sum(DERIVATIVE_ORDERS[name]) % 2
+            weight, odd = self._weights[name], sum(cells.DERIVATIVE_ORDERS[name]) % 2
             values, slopes = (cosine, -sine) if odd else (sine, cosine)
             if not weight.any():
                 result[name] = 0.0
                 continue
             g = half[:, None] * (self._multiples.T @ (slopes * weight).T)
             size = np.abs(weight)
-            e = (rest[odd] @ size) * (1.0 + 16.0 * EPS) + slack * float(size.sum())
+            e = (rest[odd] @ size) * (1.0 + 16.0 * cells.EPS) + slack * float(size.sum())
             result[name] = TaylorModel(values @ weight, g, e)
         return result
 
@@ -127,7 +120,7 @@ class WaveCells(Cells):
     def derivatives(self, coordinates: FloatArray) -> FloatArray:
         """See :class:`Cells`."""
         angles = coordinates @ self._multiples.T + self._phases
-        result = np.empty((len(coordinates), len(DERIVATIVE_NAMES)))
+        result = np.empty((len(coordinates), len(cells.DERIVATIVE_NAMES)))
         result[:, _EVEN], result[:, _ODD] = np.sin(angles) @ self._even, np.cos(angles) @ self._odd
         return result
 

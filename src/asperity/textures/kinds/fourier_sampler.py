@@ -6,8 +6,7 @@ from typing import NamedTuple
 from asperity.contacts.closest.plane_search import next_box, search_box
 from asperity.contacts.sampler_interface import PRUNED_BOX_COST, Derivatives
 from asperity.contacts.sampler_interface import PlanePoint as Point
-from asperity.core.checks import FloatArray
-from asperity.core.compiled import EVERY_FUNCTION, Kernels, local_array
+from asperity.core.compiled import EVERY_FUNCTION, FloatArray, Kernels, local_array
 from asperity.textures.kinds.sine import cosine, sine, sine_and_cosine
 
 KERNELS = Kernels(provides=EVERY_FUNCTION, shared=("search_plane",))

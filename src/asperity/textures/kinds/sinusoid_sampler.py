@@ -17,8 +17,7 @@ import math
 from typing import NamedTuple
 
 from asperity.contacts.sampler_interface import ClosestPoint, Derivatives
-from asperity.core.checks import FloatArray
-from asperity.core.compiled import EPS, EVERY_FUNCTION, Kernels
+from asperity.core.compiled import EPS, EVERY_FUNCTION, FloatArray, Kernels
 from asperity.textures.kinds.sine import cosine, sine
 
 KERNELS = Kernels(provides=EVERY_FUNCTION, not_inlined=("closest_point",))

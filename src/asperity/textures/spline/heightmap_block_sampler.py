@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from asperity.core.checks import FloatArray
-from asperity.core.compiled import Kernels, load_unchecked, multiply_add
+from asperity.core.compiled import FloatArray, Kernels, load_unchecked, multiply_add
 from asperity.textures.spline.bspline_kernels import Vector4
 
 KERNELS = Kernels(provides=("find_cell", "dot4", "row_sums"), for_blocks=True)

@@ -35,8 +35,7 @@ import numpy as np
 from asperity.contacts.closest.plane_search import symmetric_eigenvalues
 from asperity.contacts.sampler_interface import PRUNED_BOX_COST
 from asperity.contacts.sampler_interface import PlanePoint as Point
-from asperity.core.checks import FloatArray
-from asperity.core.compiled import EPS, EVERY_FUNCTION, Kernels, local_array
+from asperity.core.compiled import EPS, EVERY_FUNCTION, FloatArray, Kernels, local_array
 from asperity.textures.spline.bspline_kernels import Vector4, box_bounds
 from asperity.textures.spline.heightmap_sampler import HeightMapArguments, sample_hessian
 

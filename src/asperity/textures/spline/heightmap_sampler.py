@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.contacts.sampler_interface import Derivatives
-from asperity.core.checks import FloatArray
-from asperity.core.compiled import EVERY_FUNCTION, Kernels
+from asperity.core.compiled import EVERY_FUNCTION, FloatArray, Kernels
 from asperity.textures.spline.bspline_kernels import (
     Vector4,
     bspline_first_weights,

@@ -19,8 +19,7 @@ from asperity.contacts.sampler_interface import (
     Derivatives,
 )
 from asperity.contacts.sampler_interface import LinePoint as Point
-from asperity.core.checks import FloatArray
-from asperity.core.compiled import EPS, EVERY_FUNCTION, Kernels
+from asperity.core.compiled import EPS, EVERY_FUNCTION, FloatArray, Kernels
 from asperity.textures.spline.bspline_kernels import (
     Vector4,
     box_bounds,

@@ -13,14 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.core.errors import SurfaceFileError
-from asperity.measured.reading.images.pixels import (
-    ImageScale,
-    check_image_size,
-    imagej_scale,
-    ome_scale,
-    pixels_to_surface,
-    png_scale,
-)
+from asperity.measured.reading.images import pixels
 from asperity.measured.reading.isolation import reject_on_error
 from asperity.measured.reading.reader import RawSurface, ReadingOptions, SurfaceFile, mask_missing
 
@@ -54,15 +47,15 @@ def read_png(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
         values, scale, has_alpha = _read_png(list(_iter_chunks(file.content)))
     except (struct.error, zlib.error) as error:
         raise SurfaceFileError(f"damaged PNG image ({error})") from error
-    return pixels_to_surface(values, scale, file.name, options, has_alpha=has_alpha)
+    return pixels.pixels_to_surface(values, scale, file.name, options, has_alpha=has_alpha)
 
 
-def _read_png(chunks: list[tuple[bytes, bytes]]) -> tuple[NDArray[Any], ImageScale, bool]:
+def _read_png(chunks: list[tuple[bytes, bytes]]) -> tuple[NDArray[Any], pixels.ImageScale, bool]:
     """Return the pixels, the lengths, and whether the last channel is opacity."""
     if chunks[0][0] != b"IHDR":
         raise SurfaceFileError("damaged PNG image (no header)")
     columns, rows, depth, colour, _, _, interlaced = struct.unpack(">IIBBBBB", chunks[0][1])
-    check_image_size(rows, columns)
+    pixels.check_image_size(rows, columns)
     by_kind = dict(chunks)
     if colour == _PALETTE:
         raise SurfaceFileError(_PALETTE_FAULT)
@@ -88,7 +81,7 @@ def _read_png(chunks: list[tuple[bytes, bytes]]) -> tuple[NDArray[Any], ImageSca
     with reject_on_error("damaged or truncated PNG image"):
         values = _decode_png(packed, (columns, rows), mode, depth, interlaced)
     values = values.reshape(rows, columns, channels)
-    return values, png_scale(by_kind, depth), mode.endswith("A")
+    return values, pixels.png_scale(by_kind, depth), mode.endswith("A")
 
 
 def _iter_chunks(content: bytes) -> Iterator[tuple[bytes, bytes]]:
@@ -171,14 +164,16 @@ def read_tiff(file: SurfaceFile, options: ReadingOptions) -> RawSurface | None:
         notes = (*notes, f"turned upright as the tag Orientation {orientation} says")
     colours = 3 if int(page.photometric) == _RGB else 1
     has_alpha = values.shape[-1] == colours + 1
-    return pixels_to_surface(values, scale, file.name, options, has_alpha=has_alpha, notes=notes)
+    return pixels.pixels_to_surface(
+        values, scale, file.name, options, has_alpha=has_alpha, notes=notes
+    )
 
 
-def _read_scale(file: Any, page: Any) -> ImageScale:
+def _read_scale(file: Any, page: Any) -> pixels.ImageScale:
     """Return the lengths in ImageJ's or OME's metadata; resolution tags alone describe printing."""
     if file.is_imagej:
-        return imagej_scale(file.imagej_metadata or {}, _resolution(page))
-    return ome_scale(str(page.description)) if file.is_ome else ImageScale()
+        return pixels.imagej_scale(file.imagej_metadata or {}, _resolution(page))
+    return pixels.ome_scale(str(page.description)) if file.is_ome else pixels.ImageScale()
 
 
 def _resolution(page: Any) -> tuple[float, float] | None:
@@ -203,7 +198,7 @@ def _single_page(file: Any, pages: list[Any]) -> Any:
 
 
 def _check_page(page: Any, size: int) -> None:
-    check_image_size(int(page.imagelength), int(page.imagewidth))
+    pixels.check_image_size(int(page.imagelength), int(page.imagewidth))
     if int(page.photometric) == _PALETTE:
         raise SurfaceFileError(_PALETTE_FAULT)
     if _orientation(page) not in range(1, 9):
@@ -234,8 +229,8 @@ def _orientation(page: Any) -> int:
 
 
 def _turn_upright(
-    values: NDArray[Any], scale: ImageScale, orientation: int
-) -> tuple[NDArray[Any], ImageScale]:
+    values: NDArray[Any], scale: pixels.ImageScale, orientation: int
+) -> tuple[NDArray[Any], pixels.ImageScale]:
     """Return the pixels with row 0 at the top and column 0 on the left, and their lengths."""
     if orientation > 4:  # stored rows are columns of the image
         values = values.swapaxes(0, 1)

@@ -18,13 +18,7 @@ import numpy as np
 from asperity.core.checks import FloatArray
 from asperity.core.errors import SurfaceFileError
 from asperity.measured.lengths import parse_heights, parse_number
-from asperity.measured.reading.reader import (
-    RawSurface,
-    ReadingOptions,
-    SurfaceFile,
-    check_point_count,
-    mask_missing,
-)
+from asperity.measured.reading import reader
 
 _TEXT_SIGNATURE = re.compile(
     rb"\s*a[A-Za-z0-9.\-]{2,15}[ \t]*\r*\n(?:[ \t]*(?:;[^\n]*)?\r*\n)*[ \t]*ManufacID\b"
@@ -75,7 +69,7 @@ def is_sdf(head: bytes) -> bool:
     return _TEXT_SIGNATURE.match(head) is not None or _BINARY_SIGNATURE.match(head) is not None
 
 
-def read_sdf(file: SurfaceFile, _options: ReadingOptions) -> RawSurface:
+def read_sdf(file: reader.SurfaceFile, _options: reader.ReadingOptions) -> reader.RawSurface:
     """Read a surface data file.
 
     A height is Zscale times the stored number. A point is missing if the text has "BAD" or the
@@ -90,20 +84,20 @@ def read_sdf(file: SurfaceFile, _options: ReadingOptions) -> RawSurface:
     content = file.content
     parse = _parse_binary if _BINARY_SIGNATURE.match(content) else _parse_text
     header, stored = parse(content)
-    stored, notes = mask_missing(stored, _DATA_TYPES[header.data_type][1])
+    stored, notes = reader.mask_missing(stored, _DATA_TYPES[header.data_type][1])
     with np.errstate(over="ignore", invalid="ignore"):  # infinities are refused by the caller
         heights = stored * header.z_scale
     if header.profiles == 1:
-        return RawSurface(heights, (header.x_scale,), file.name, notes)
+        return reader.RawSurface(heights, (header.x_scale,), file.name, notes)
     heights = heights.reshape(header.profiles, header.points)
-    return RawSurface(heights, (header.x_scale, header.y_scale), file.name, notes)
+    return reader.RawSurface(heights, (header.x_scale, header.y_scale), file.name, notes)
 
 
 def _check_header(header: _Header) -> _Header:
     points, profiles = header.points, header.profiles
     if points < 1 or profiles < 1:
         raise SurfaceFileError(f"NumPoints is {points}, NumProfiles {profiles}: both must be > 0")
-    check_point_count(points, profiles)
+    reader.check_point_count(points, profiles)
     if header.data_type not in _DATA_TYPES:
         raise SurfaceFileError(f"DataType is {header.data_type}; 0 to 7 are defined")
     for key, value in (("Compression", header.compression), ("CheckType", header.check_type)):

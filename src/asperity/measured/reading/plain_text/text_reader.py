@@ -10,25 +10,14 @@ import numpy as np
 
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError, SurfaceFileError
-from asperity.measured.reading import resampling
-from asperity.measured.reading.plain_text import text_columns
-from asperity.measured.reading.plain_text.text_header import (
-    MapHeader,
-    find_single_unit,
-    parse_map_header,
-)
+from asperity.measured.reading import reader, resampling
+from asperity.measured.reading.plain_text import text_columns, text_header
 from asperity.measured.reading.plain_text.text_table import TextTable, find_table
-from asperity.measured.reading.reader import (
-    RawSurface,
-    ReadingOptions,
-    SurfaceFile,
-    check_point_count,
-)
 
 _MIN_POINTS = 4
 
 
-def read_text(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
+def read_text(file: reader.SurfaceFile, options: reader.ReadingOptions) -> reader.RawSurface:
     """Read a matrix, a profile (position, height), a list of x, y, z, or a column of heights.
 
     Cells are separated by tabs, semicolons, commas or white space. Empty cells and "nan"
@@ -45,8 +34,8 @@ def read_text(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
     """
     table = find_table(_decode(file.content))
     _check_table(table)
-    header = parse_map_header(table.header, table.values.shape)
-    if parse_map_header(table.comments).describes_map:
+    header = text_header.parse_map_header(table.header, table.values.shape)
+    if text_header.parse_map_header(table.comments).describes_map:
         raise SurfaceFileError("several maps in one file: save each in a file of its own")
     table, names, found = text_columns.select_columns(table)
     rows, columns = table.values.shape
@@ -81,7 +70,7 @@ def _decode(content: bytes) -> str:
 
 def _check_table(table: TextTable) -> None:
     rows, columns = table.values.shape
-    check_point_count(columns, rows)
+    reader.check_point_count(columns, rows)
     if table.values.size < _MIN_POINTS or (columns <= 2 and rows < _MIN_POINTS):
         size = f"{rows} rows of {columns} numbers"
         raise SurfaceFileError(f"{size}; at least {_MIN_POINTS} points are expected")
@@ -108,7 +97,7 @@ def _is_monotonic(table: TextTable) -> bool:
 
 
 def _find_units(
-    names: list[str], header: MapHeader, name: str, options: ReadingOptions
+    names: list[str], header: text_header.MapHeader, name: str, options: reader.ReadingOptions
 ) -> tuple[list[float], tuple[str, ...]]:
     """Return the units of the columns [m], the given one for each without, and the note.
 
@@ -116,7 +105,7 @@ def _find_units(
         ParameterError: a unit is missing, or given although the file names all.
         SurfaceFileError: the column of heights and the rest of the header name different units.
     """
-    own = [find_single_unit(column) for column in names] or [None] * 3
+    own = [text_header.find_single_unit(column) for column in names] or [None] * 3
     if own[-1] is not None and header.unit not in (None, own[-1]):
         raise SurfaceFileError(
             f"the column {names[-1]!r} and {header.notes[0]!r} differ: correct the header"
@@ -136,7 +125,7 @@ def _find_units(
 
 def _read_profile(
     table: TextTable, units: list[float], name: str, resample: float | None
-) -> RawSurface:
+) -> reader.RawSurface:
     positions, heights = table.values[:, 0], table.values[:, 1] * units[-1]
     resolution, lines = _printed_resolution(table, 0), table.line_numbers
     notes: tuple[str, ...] = ()
@@ -148,26 +137,26 @@ def _read_profile(
     pitch = result.step * units[0]
     if resample is not None:
         heights, note = resampling.resample_profile(positions * units[0], heights, resample)
-        return RawSurface(heights, (resample,), name, (*notes, note))
+        return reader.RawSurface(heights, (resample,), name, (*notes, note))
     if not result.is_uniform:
         raise SurfaceFileError(
             f"sampling is not uniform: line {lines[result.index]} is"
             f" {result.deviation * units[0]:.3g} m from a grid of {pitch:.3g} m;"
             f" {resampling.resampling_hint(pitch)}"
         )
-    return RawSurface(np.ascontiguousarray(heights), (pitch,), name, notes)
+    return reader.RawSurface(np.ascontiguousarray(heights), (pitch,), name, notes)
 
 
 def _read_points(
     table: TextTable, units: list[float], name: str, resample: float | None
-) -> RawSurface:
+) -> reader.RawSurface:
     """Return the map, or the profile along one axis, of a list of points."""
     if np.isnan(table.values[:, :2]).any():
         raise SurfaceFileError(f"a position is missing; {_EXPECTED_LAYOUT}")
     points = table.values * np.array(units)
     if resample is not None:
         heights, note = resampling.resample_points(points, resample)
-        return RawSurface(heights, (resample, resample), name, (note,))
+        return reader.RawSurface(heights, (resample, resample), name, (note,))
     try:
         resolution = _printed_resolution(table, 0), _printed_resolution(table, 1)
         heights, steps = points_to_grid(table.values, resolution)
@@ -179,13 +168,13 @@ def _read_points(
         raise SurfaceFileError(hint) from None
     heights, pitch = heights * units[2], (steps[0] * units[0], steps[1] * units[1])
     if 1 not in heights.shape:
-        return RawSurface(heights, pitch, name, ())
-    return RawSurface(heights.ravel(), (pitch[0 if heights.shape[0] == 1 else 1],), name, ())
+        return reader.RawSurface(heights, pitch, name, ())
+    return reader.RawSurface(heights.ravel(), (pitch[0 if heights.shape[0] == 1 else 1],), name, ())
 
 
 def _read_matrix(
-    table: TextTable, header: MapHeader, name: str, options: ReadingOptions
-) -> RawSurface:
+    table: TextTable, header: text_header.MapHeader, name: str, options: reader.ReadingOptions
+) -> reader.RawSurface:
     """Return the map, or the profile of one column; heights without a unit are relative."""
     text_columns.reject_positions(table)
     unit, notes = options.resolve_unit(name, header.unit)
@@ -195,7 +184,7 @@ def _read_matrix(
         heights, pitch = heights[:, 0], tuple(set(pitch))
     known = pitch if len(pitch) == heights.ndim else None
     question = "" if unit else f", or their unit, such as unit='um' (--unit um){header.question}"
-    return RawSurface(
+    return reader.RawSurface(
         heights, known, name, notes, not question, bool(question), unit_question=question
     )
 
