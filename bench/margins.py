@@ -113,6 +113,12 @@ class RandomLoop:
         needed = self.wall * (0.5 + self.delay) * self.period
         return float(np.linalg.eigvalsh(self.damping)[0] / needed)
 
+    @property
+    def weakest_axis(self) -> float:
+        """Least damping that a wall along x, y or z feels, over that which the wall needs."""
+        needed = self.wall * (0.5 + self.delay) * self.period
+        return float(1.0 / np.linalg.inv(self.damping).diagonal().max() / needed)
+
     def surface(self, law: str) -> Surface:
         """Return the surface with a law, as a device renders it."""
         return Surface(self.texture, law, max_depth=self.depth)
@@ -309,12 +315,13 @@ def count_cycles(
         factor: stiffness over K₀/q.
         count: number of loops.
         seed: of the loops.
-        along_lightest: whether K₀ is that of the lightest direction.
+        along_lightest: whether K₀ is that of the weakest of the three axes, as a calibration
+            measures it.
     """
     loops = admissible_loops(law, seed, has_start)
 
     def motion(loop: RandomLoop, q: float) -> Motion | None:
-        wall = loop.wall * (loop.lightest if along_lightest else 1.0)
+        wall = loop.wall * (loop.weakest_axis if along_lightest else 1.0)
         return lasting_motion(loop, law, factor * wall / q)
 
     found = map_threads(motion, [next(loops) for _ in range(count)])
@@ -374,14 +381,15 @@ def write_margins(found: dict[tuple[str, bool], MarginResult], path: Path = TARG
         "# just passive. factor: stiffness over K₀/q at which at most 1 % of the loops cycle, of",
         "# the factors tried; loops, cycles: simulated there, and how many sustain a motion that a",
         "# hand feels; speed [m/s], extent [m]: RMS of the fastest of these. lightest: the same",
-        "# with K₀ along the lightest direction. A and E: at most the factor at which a pantograph",
-        "# held loosely cycles, which is not among the random loops.",
+        "# with K₀ along the weakest of three axes, as `asperity calibrate` measures it. A and E:",
+        "# at most the factor at which a pantograph held loosely cycles, which is not among the",
+        "# random loops.",
     ]
     for (law, along), one in found.items():
         worst = max(one.motions, key=lambda motion: motion.speed, default=AT_REST)
         lines += [
             "",
-            f"[{law}{'.lightest' if along else ''}]",
+            f"[{'lightest' if along else 'normal'}.{law}]",
             f"factor = {one.factor:g}",
             f"loops = {one.loops}",
             f"cycles = {one.cycles}",

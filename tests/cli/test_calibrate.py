@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from tests.servo.drivers.test_drivers import EXAMPLE, compile_library
 
+import asperity as asp
 from asperity.cli.device_commands import default_force
 from asperity.core.errors import ParameterError
 from asperity.devices import load_device
@@ -32,6 +33,15 @@ def test_simulated_device_is_measured_and_written(call: Call, tmp_path: Path) ->
     measured = json.loads(json_path.read_text())
     assert len(measured["measured"]["axes"]) == 3
     assert measured["device"]["data"]["max_stiffness"]["value"] == device.max_stiffness
+    # The printed change is the one that a comparison finds, here for law H, which has q = 1.
+    before, after = measured["unit_starts"]["H"]
+    assert f"H {before:>15g} N/m {after:>7.3g} N/m {after / before:.2g} times".split() in [
+        line.split() for line in out.splitlines()
+    ]
+    for name, start in (("touch", before), (device_path, after)):
+        row = asp.compare(asp.Sinusoid(1e-4, 2e-3), name, "H").rows[0]
+        assert row.recommended_stiffness == pytest.approx(start, rel=2e-3)
+    assert after > 2.0 * before
 
 
 def test_devices_that_cannot_be_measured_are_refused(call: Call, tmp_path: Path) -> None:

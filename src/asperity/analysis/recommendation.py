@@ -279,14 +279,14 @@ def _margin_text(row: LawRow) -> str:
     margin = row.margin
     if not margin.loops:
         return "The recommended stiffness equals this limit."
-    start = f"The recommended stiffness is {margin.factor:g} times "
-    start += "this limit" if row.conservative else "K₀/q, the gain of that wall"
-    calibrated = {one.law: one.factor for one in load_margins(True).values()}[margin.law]
-    text = f"{start}: there {_simulated_loops_text(margin)}."
+    start = "equals" if margin.factor == 1.0 else f"is {margin.factor:g} times"
+    whole = "this limit" if row.conservative else "K₀/q, the gain of that wall"
+    calibrated = next(o.factor for o in load_margins(True).values() if o.law == margin.law)
+    text = f"The recommended stiffness {start} {whole}: there {_simulated_loops_text(margin)}."
     if calibrated <= margin.factor:
         return text
     gain = f"{calibrated:g}: up to {calibrated / margin.factor:.2g} times stiffer"
-    whose = "On a calibrated device, whose lightest damping is known, the factor is"
+    whose = "On a calibrated device, where a wall was tried along every axis, the factor is"
     return f"{text} {whose} {gain} (asperity calibrate)."
 
 

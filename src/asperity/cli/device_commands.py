@@ -83,6 +83,7 @@ def calibrate_command(
     not touch the handle. Keep a hand near the power or force switch. Ctrl-C releases the force, and
     nothing is written. Read docs/howto/safety.md before using a real device.
     """
+    from asperity.analysis.passivity.verdict import unit_starts
     from asperity.devices import load_device
     from asperity.devices.device_file import to_device_toml
     from asperity.servo.calibration.calibrator import Calibrator
@@ -110,8 +111,10 @@ def calibrate_command(
     write_output("output", output, to_device_toml(calibrated))
     from asperity.report.loop.servo_report import calibration_page
 
-    data = {"schema": 1, "device": calibrated, "measured": result}
-    outputs.write(data, calibration_page(calibrated, result, output))
+    before, after = unit_starts(base), unit_starts(calibrated)
+    starts = {law: (before[law], after[law]) for law in after}
+    data = {"schema": 1, "device": calibrated, "measured": result, "unit_starts": starts}
+    outputs.write(data, calibration_page(calibrated, result, output, starts))
 
 
 RAMP_TIME = 0.02

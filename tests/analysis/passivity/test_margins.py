@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 from bench.margins import (
@@ -24,6 +26,7 @@ from asperity.analysis.passivity.verdict import (
     StabilityLimit,
     load_margins,
     safety_margin,
+    unit_starts,
 )
 from asperity.devices import parse_device
 from asperity.laws import LAWS, Law, find_law
@@ -123,3 +126,25 @@ def test_margins_of_proved_limits_the_wall_and_user_defined_laws() -> None:
     user_law = Law("V", "own", "vertical", lambda c: c.k * c.depth * c.w)
     least = min(one.factor for one in load_margins().values())
     assert safety_margin(Surface(texture, user_law), device, PLAUSIBLE).factor == least
+
+
+def test_unit_starts_are_the_factors_of_the_wall_and_what_calibrating_changes() -> None:
+    known = {"max_stiffness": {"value": 1000.0, "lightest": 1.0}}
+    blind, seen = (
+        unit_starts(parse_device(data, "mine")) for data in ({"max_stiffness": "1 kN/m"}, known)
+    )
+    assert blind.keys() == seen.keys() == set(LAWS)
+    assert blind["W"] == seen["W"] == 1000.0
+    for starts, along_lightest in ((blind, False), (seen, True)):
+        for law, margin in load_margins(along_lightest).items():
+            assert starts[law.letter] == pytest.approx(1000.0 * margin.factor, rel=1e-3)
+    assert not any(unit_starts(parse_device({"update_rate": "1 kHz"}, "mine")).values())
+
+
+def test_weakest_axis_is_what_walls_along_the_axes_feel() -> None:
+    """Between the lightest direction and the tested one; equal to the first along its axis."""
+    for loop in map(partial(random_loop, 7), range(50)):
+        needed = loop.wall * (0.5 + loop.delay) * loop.period
+        felt = [1.0 / (np.linalg.inv(loop.damping) @ axis @ axis) for axis in np.eye(3)]
+        assert loop.weakest_axis == pytest.approx(min(felt) / needed)
+        assert loop.lightest - 1e-12 <= loop.weakest_axis <= 1.0 + 1e-12

@@ -102,7 +102,10 @@ def test_limit_depends_on_lightest_direction_and_rate_of_the_test() -> None:
     fields = {"max_stiffness": wall, "update_rate": "2 kHz"}
     result = assess(fields, 100.0, 2.0, 2.0)
     assert result.stability_limit.stiffness == pytest.approx(2000.0 * 0.7 * 0.5 / 2.0, rel=1e-12)
-    assert "no direction is damped less than 0.7" in result.criterion("wall test").assumptions
+    assert (
+        "damping is at least 0.7 of the tested in all directions"
+        in result.criterion("wall test").assumptions
+    )
     # The force of the wall itself acts only along the tested direction.
     assert assess(fields, 100.0, law="W").stability_limit.stiffness == pytest.approx(
         1000.0, rel=1e-12

@@ -340,7 +340,7 @@ def test_calibration_file_is_a_device_for_comparisons(tmp_path: Path) -> None:
     test = loaded.wall_test
     assert test is not None
     assert (test.value, test.cycled, test.update_rate) == (640.0, 655.0, 1000.0)
-    assert (test.directions, test.positions) == (("x", "y", "z"), "stepped")
+    assert (test.directions, test.positions, test.lightest) == (("x", "y", "z"), "stepped", 1.0)
     assert [other.value for other in test.also] == [812.3, 700.0]
     assert {loaded.data[name].pedigree for name in ("max_stiffness", "damping")} == {"measured"}
     assert test.source.startswith("measured")

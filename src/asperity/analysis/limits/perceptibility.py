@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import partial
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -254,34 +254,22 @@ def assess_perceptibility(
     result = classify_perceptibility(waves, doubtful, rms, texture_rms, part.nesting)
     if not find_remedies or result.tier == "felt" or texture_rms == 0.0:
         return result
-    is_felt = partial(_is_felt_magnified, surface, device, hand, explicit_depth, scan)
+    options = {"explicit_depth": explicit_depth, "grip": grip, **scan}
+    is_felt = partial(_is_felt_magnified, surface, device, options)
     return replace(result, remedies=tuple(_find_remedies(waves, is_felt)))
 
 
 def _is_felt_magnified(
-    surface: Surface,
-    device: Device,
-    grip: Grip,
-    explicit_depth: bool,
-    scan: Mapping[str, float],
-    factor: float,
+    surface: Surface, device: Device, options: Mapping[str, Any], factor: float
 ) -> bool:
     """Return whether the surface is felt and touched when its texture is magnified by a factor."""
     texture = prepare_texture(surface.texture, magnify=factor)
-    larger = surface.to_texture(
-        texture, factor * surface.max_depth if explicit_depth else default_max_depth(texture)
-    )
-    strokes = merit(larger)
-    assessed = assess_perceptibility(
-        larger,
-        device,
-        texture.texture_part(),
-        rms=strokes.ripple * larger.stiffness,
-        explicit_depth=explicit_depth,
-        grip=grip,
-        find_remedies=False,
-        **scan,
-    )
+    scaled = factor * surface.max_depth
+    depth = scaled if options["explicit_depth"] else default_max_depth(texture)
+    larger = surface.to_texture(texture, depth)
+    strokes, part = merit(larger), texture.texture_part()
+    rms = strokes.ripple * larger.stiffness
+    assessed = assess_perceptibility(larger, device, part, rms=rms, find_remedies=False, **options)
     return assessed.tier == "felt" and strokes.contact_lost <= MAX_CONTACT_LOST
 
 
@@ -369,9 +357,9 @@ def respond(waves: WaveScan) -> HandSpectrum:
         np.all([evaluate_limit(rule, one).holds for rule in _SAMPLING_RULES], axis=0)
         for one in (case, coarse)
     )
-    step, (amplitude, sampled_amplitude) = (
-        case.device.get("force_resolution", 0.0),
-        (math.sqrt(float(np.square(case.forces[which]).sum())) for which in (resolved, sampled)),
+    step = case.device.get("force_resolution", 0.0)
+    amplitude, sampled_amplitude = (
+        float(np.linalg.norm(case.forces[which])) for which in (resolved, sampled)
     )
     tier: Tier = "not felt"
     if np.linalg.norm((motions / unnoticed)[sampled]) >= 1.0 and sampled_amplitude >= step:

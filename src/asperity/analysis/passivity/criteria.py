@@ -208,7 +208,7 @@ def _wall_test_rule(loop: DeviceLoop) -> StiffnessRule:
 def damping_assumption(wall_test: WallTest | None) -> str:
     """Return the assumption about the damping along directions in which no wall was tested."""
     if wall_test is not None and wall_test.lightest is not None:
-        return f"no direction is damped less than {wall_test.lightest:g} of the tested one"
+        return f"damping is at least {wall_test.lightest:g} of the tested in all directions"
     tested = ", ".join(wall_test.directions) if wall_test is not None else ""
     direction = f"tested along {tested}" if tested else "the direction of the test is not stated"
     return f"damping is equal in all directions, {direction}"

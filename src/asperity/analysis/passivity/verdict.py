@@ -39,6 +39,7 @@ from asperity.core.units import round_down
 from asperity.devices import Device
 from asperity.laws import LAWS, Law
 from asperity.surface import Surface
+from asperity.textures import Sinusoid
 
 Verdict = Literal["passive", "bounded", "plausible", "not passive", "undecided"]
 Basis = Literal["proved", "plausible", "bounded", "wall gain", "none"]
@@ -267,15 +268,11 @@ def load_margins(along_lightest: bool = False) -> dict[Law, Margin]:
     """Return the simulated margin of each law.
 
     Args:
-        along_lightest: whether K₀ is that of the lightest direction.
+        along_lightest: whether K₀ is that of the lightest direction, or of the weakest axis.
     """
     table = tomllib.loads(_MARGINS_FILE.read_text(encoding="utf-8"))
-    fields = ("loops", "cycles", "speed", "extent")
-    return {
-        LAWS[law]: Margin(part["factor"], law, *(part[field] for field in fields))
-        for law, entry in table.items()
-        for part in ([entry["lightest"]] if along_lightest else [entry])
-    }
+    entries = table["lightest" if along_lightest else "normal"]
+    return {LAWS[law]: Margin(law=law, **entry) for law, entry in entries.items()}
 
 
 def safety_margin(surface: Surface, device: Device, limit: StabilityLimit) -> Margin:
@@ -333,6 +330,23 @@ def recommend_stiffness(
     start = round_down(margin.factor * known) if math.isfinite(known) else 0.0
     wall = None if loop.wall_stiffness is None else float(loop.wall_stiffness)
     return StiffnessRecommendation(limit, margin, start, wall)
+
+
+_GENTLE_TEXTURE = Sinusoid(1e-6, 1e-2)
+_UNIT_GAIN = Bound(1.0, 1.0, "theorem")
+
+
+def unit_starts(device: Device) -> dict[str, float]:
+    """Return the recommended stiffness [N/m] of each law on a surface with q = q⁺ = 1, by letter.
+
+    On other surfaces it is smaller by the factor q; 0 if no stable stiffness is known.
+    """
+    return {
+        letter: recommend_stiffness(
+            Surface(_GENTLE_TEXTURE, letter), device, _UNIT_GAIN, _UNIT_GAIN
+        ).stiffness
+        for letter in LAWS
+    }
 
 
 def at_recommended_stiffness(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from asperity.core.errors import escape_unprintable
 from asperity.core.units import format_quantity
@@ -19,21 +19,41 @@ from asperity.servo.loop_memory import LoopStatistics
 from asperity.servo.process import ServoProcess
 
 _CALIBRATION_HEADINGS = ("axis", "wall held", "cycled at", "damping N·s/m", "friction mN", "mass g")
+_START_HEADINGS = ("law", "start before", "start now", "change")
+_START_NOTE = "start: for q = 1, else divided by q; known damping makes it limit buzz (max_buzz)"
 _QUANTILES = (0.5, 0.99, 0.999)
 _CAUSE_TEXT = {EndReason.STOPPED: "stopped", EndReason.FINISHED: "done"}
 
 
-def calibration_page(device: Device, calibration: Calibration, path: str) -> Page:
-    """Return the measured numbers with their uncertainties, for a terminal."""
+def calibration_page(
+    device: Device, calibration: Calibration, path: str, starts: Mapping[str, tuple[float, float]]
+) -> Page:
+    """Return the measured numbers with their uncertainties, for a terminal.
+
+    Args:
+        device: the calibrated device.
+        calibration: its calibration.
+        path: the device file.
+        starts: recommended stiffness [N/m] of each law before and after the calibration, see
+            :func:`~asperity.analysis.passivity.verdict.unit_starts`.
+    """
     force = format_quantity(calibration.max_force, "N")
     rows = [Row(_calibration_cells(axis)) for axis in calibration.axes]
+    changes = [Row(_start_cells(law, *pair)) for law, pair in starts.items()]
     numeric = range(1, len(_CALIBRATION_HEADINGS))
     return terminal_page(
         Paragraph(f"{device.name}: {len(calibration.axes)} axes, with up to {force}"),
         Table(_CALIBRATION_HEADINGS, rows, numeric),
         *map(Paragraph, _calibration_lines(calibration)),
+        Table(_START_HEADINGS, changes, (1, 2, 3)),
+        Paragraph(_START_NOTE),
         Paragraph(f"Written: {escape_unprintable(path)}", "code"),
     )
+
+
+def _start_cells(law: str, before: float, after: float) -> tuple[str, ...]:
+    cells = (format_quantity(one, "N/m") if one else "none" for one in (before, after))
+    return law, *cells, f"{after / before:.2g} times" if before and after else "–"
 
 
 def _calibration_cells(axis: AxisCalibration) -> tuple[str, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -215,18 +216,14 @@ class Calibrator:
 
     def _find_wall(self, axis: int, motion: AxisDynamics) -> WallOnset:
         """Find the stiffest wall along an axis."""
-        name = self._rig.axes[axis]
-
-        def cycles(stiffness: float) -> bool:
-            self._report_progress(f"a wall of {stiffness:.0f} N/m along {name}")
-            return self._wall_cycles(axis, motion, stiffness)
-
         # The step of a stiffer wall would be too few position steps to detect a cycle.
         finest = WALL_FORCE_FRACTION * self._max_force / max(2.0 * self._noise_floor, 1e-9)
+        cycles = partial(self._wall_cycles, axis, motion)
         return find_wall_onset(cycles, min(MAX_STIFFNESS, finest))
 
     def _wall_cycles(self, axis: int, motion: AxisDynamics, stiffness: float) -> bool:
         """Return whether a wall keeps oscillating after a step."""
+        self._report_progress(f"a wall of {stiffness:.0f} N/m along {self._rig.axes[axis]}")
         mass = max(motion.mass.value, 1e-3)
         angular_frequency = math.sqrt(stiffness / mass)
         wave = 2.0 * math.pi / angular_frequency

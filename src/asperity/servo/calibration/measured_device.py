@@ -56,9 +56,7 @@ def measured_device(
         words = "the delay that fits best whatever is left out"
         add("delay_samples", calibration.delay.samples, words)
     dynamics = [axis.dynamics for axis in calibration.axes]
-    damping = min(
-        axis.damping.value - SAFETY_SIGMAS * axis.damping.uncertainty for axis in dynamics
-    )
+    damping = min(d.damping.value - SAFETY_SIGMAS * d.damping.uncertainty for d in dynamics)
     if damping > 0.0:
         words = _describe_axes(calibration, "damping", "N*s/m")
         add("damping", damping, f"{words}; the least, less two uncertainties")
@@ -92,7 +90,7 @@ def _wall_test(calibration: Calibration, source: str) -> WallTest | None:
     cycled = weakest.wall.cycling_stiffness
     return WallTest(
         _round_to_four_digits(weakest.wall.stable_stiffness), "N/m", words[weakest.name], True,
-        others, True, directions=tuple(axis.name for axis in calibration.axes),
+        others, True, directions=tuple(axis.name for axis in calibration.axes), lightest=1.0,
         cycled=None if cycled is None else _round_to_four_digits(cycled),
         update_rate=_round_to_four_digits(calibration.update_rate.value),
         positions="stepped" if calibration.position_step else "exact",
