@@ -29,6 +29,8 @@ from asperity.textures.texture import Texture
 
 Extent = Sequence[float]
 _NODES_PER_WAVE = 16
+# Greatest RMS difference of a field whose resolution is given, over that of the texture's force.
+_MAX_SHARE = 0.5
 DEFAULT_SPEED = 0.1  # [m/s]
 _STROKE_SAMPLES = 4000
 FORMULA = "formula"
@@ -63,7 +65,8 @@ def bake(
 
     Raises:
         ParameterError: for another law, a texture that neither repeats nor has a border if no
-            extent is given, or a field larger than ``max_bytes``; the message states what fits.
+            extent is given, a resolution coarser than the texture, or a field larger than
+            ``max_bytes``; the message states what fits.
 
     Reference:
         docs/theory/split.md.
@@ -79,6 +82,9 @@ def bake(
         goal=wanted,
         progress=progress,
     )
+    if resolution is not None and field.accuracy.share > _MAX_SHARE:
+        lost = f"would differ from law H by {field.accuracy.share:.0%} of the texture's force"
+        raise ParameterError("resolution", f"is coarser than the texture: {lost}", resolution)
     return surface.to_texture(field)
 
 

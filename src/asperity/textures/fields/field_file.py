@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.core.files import json_text, open_atomic, open_input
+from asperity.core.memory import free_memory
 from asperity.textures.fields.field_grid import FieldGrid
 from asperity.textures.fields.field_sampler import MIRRORED, PERIODIC, ZERO, FieldArguments
 from asperity.textures.fields.potential_field import FieldAccuracy, PotentialField, ThinRegion
@@ -146,11 +147,14 @@ def load_field(path: str | os.PathLike[str], build_texture: BuildTexture) -> Pot
         build_texture: builds the texture that was baked, unless it is a spline.
 
     Raises:
-        SurfaceFileError: the file is damaged, cut, or of another version.
+        SurfaceFileError: the file is damaged, cut, of another version, or larger than the memory.
     """
     name = Path(path).name
     try:
         with open_input(path, 2**40) as stream:
+            size, free = os.fstat(stream.fileno()).st_size, free_memory()
+            if free is not None and size > free:
+                raise SurfaceFileError(f"its {size:,} bytes exceed the free memory, {free:,} bytes")
             data = np.memmap(stream, np.uint8, "c")
         return _decode(data, build_texture)
     except SurfaceFileError as error:
@@ -260,8 +264,14 @@ def _check_record(record: FieldArguments, grid: FieldGrid) -> None:
 
 
 def _section(data: NDArray[np.uint8], offset: Any, count: int, dtype: str) -> NDArray[Any]:
-    """Return an array of a file; writing to it would change a copy only."""
+    """Return an array of a file; writing to it would change a copy only.
+
+    Raises:
+        SurfaceFileError: the file ends before it.
+    """
     values = data[int(offset) : int(offset) + count * np.dtype(dtype).itemsize]
+    if len(values) < count * np.dtype(dtype).itemsize:
+        raise SurfaceFileError("has sections beyond its end")
     return values.view(np.ndarray).view(dtype)
 
 

@@ -140,7 +140,12 @@ def _check_count(path: Path, suffix: str) -> None:
         raise SurfaceFileError(f"cannot read {path.name}: {error.strerror or error}") from None
     count = size // _LEAST_BYTES[suffix]
     stated = _stated_count(head, suffix)
-    if stated is not None and (suffix == "ply" or size == _STL_HEADER + 50 * stated):
+    if stated is not None:
+        held = (size - _STL_HEADER) // 50
+        if suffix == "stl" and size != _STL_HEADER + 50 * stated:
+            raise SurfaceFileError(
+                f"{path.name} is damaged: it states {stated:,} triangles and holds {held:,}"
+            )
         count = stated
     if count > MAX_TRIANGLES:
         raise SurfaceFileError(
@@ -150,7 +155,7 @@ def _check_count(path: Path, suffix: str) -> None:
 
 def _stated_count(head: bytes, suffix: str) -> int | None:
     """Return the number of triangles in the header of a file; ``None`` if it states none."""
-    if suffix == "stl" and len(head) >= _STL_HEADER:
+    if suffix == "stl" and b"\0" in head[:_STL_HEADER] and len(head) >= _STL_HEADER:
         return int(struct.unpack_from("<I", head, 80)[0])
     if suffix == "ply":
         stated = re.search(rb"^element\s+face\s+(\d+)\s*$", head, re.MULTILINE)
@@ -166,7 +171,8 @@ def _parse(path: Path, suffix: str) -> tuple[FloatArray, NDArray[np.int32]]:
         loaded: Any = trimesh.load(path, file_type=suffix, process=False, skip_materials=True)
         mesh = loaded.to_mesh() if isinstance(loaded, trimesh.Scene) else loaded
         vertices = np.asarray(mesh.vertices, dtype=np.float64).view(np.ndarray)
-        faces = np.asarray(mesh.faces, dtype=np.int64).view(np.ndarray).reshape(-1, 3)
+        # A cloud of points has no faces.
+        faces = np.asarray(getattr(mesh, "faces", ()), np.int64).view(np.ndarray).reshape(-1, 3)
     if len(faces) and not (faces.min() >= 0 and faces.max() < len(vertices)):
         raise SurfaceFileError(f"damaged mesh {path.name} (a triangle has a corner that is none)")
     return vertices, faces.astype(np.int32)

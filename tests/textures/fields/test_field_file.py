@@ -1,0 +1,102 @@
+"""Damaged files of baked fields: each is refused with what is wrong, and nothing is written."""
+
+from __future__ import annotations
+
+import tempfile
+import zlib
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import asperity as asp
+from asperity.cli.main import cli
+from asperity.core.errors import SurfaceFileError
+from asperity.textures.fields import field_file
+from asperity.textures.fields.field_file import HEADER
+
+
+@cache
+def content() -> bytes:
+    surface = asp.Surface(asp.Sinusoid(1e-4, 1e-3), "H", max_depth=1e-4)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "wave.field"
+        asp.save_field(path, asp.bake(surface, resolution=50e-6).texture)
+        return path.read_bytes()
+
+
+def change_header(**values: int) -> bytes:
+    """Return the file with a header that is changed, and with the right checksum."""
+    header = np.frombuffer(content()[: HEADER.itemsize], HEADER).copy()
+    for name, value in values.items():
+        header[name] = value
+    header["header_checksum"] = zlib.crc32(header.tobytes()[:-4])
+    return header.tobytes() + content()[HEADER.itemsize :]
+
+
+def flip(place: int) -> bytes:
+    data = bytearray(content())
+    data[place] ^= 1
+    return bytes(data)
+
+
+def test_undamaged_file_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "wave.field"
+    path.write_bytes(change_header())
+    assert asp.load_texture(path).digest == asp.Surface(path, "H").texture.digest
+
+
+DAMAGES: dict[str, tuple[Callable[[], bytes], str]] = {
+    "coefficient": (lambda: flip(HEADER.itemsize + 5000), "is damaged: its checksum is wrong"),
+    "header": (lambda: flip(60), "has a damaged header"),
+    "cut": (lambda: content()[:-100], r"is cut: \d+ of \d+ bytes"),
+    "cut header": (lambda: content()[:100], "is cut: it has no whole header"),
+    "version": (lambda: change_header(version=2), r"is a \.field file of version 2, of which 1"),
+    "order": (lambda: change_header(byte_order=0x04030201), "has another byte order"),
+    "count": (lambda: change_header(count=2**40), "has sections beyond its end"),
+    "table": (lambda: change_header(rows=2**31, columns=2**31), "has sections beyond its end"),
+    "offset": (lambda: change_header(values_offset=2**50), "has sections beyond its end"),
+    "size": (lambda: change_header(file_bytes=2**43), f"is cut: .* of {2**43} bytes"),
+    "levels": (lambda: change_header(levels=2), "has a damaged table of columns"),
+}
+
+
+@pytest.mark.parametrize("name", DAMAGES)
+def test_damaged_file_is_refused(name: str, tmp_path: Path) -> None:
+    make, reason = DAMAGES[name]
+    path, output = tmp_path / "bad.field", tmp_path / "out.json"
+    path.write_bytes(make())
+    for load in (asp.load_texture, lambda file: asp.Surface(file, "H")):
+        with pytest.raises(SurfaceFileError, match=rf"bad\.field: {reason}"):
+            load(path)
+    result = CliRunner().invoke(cli, ["compare", str(path), "--json", str(output)])
+    assert isinstance(result.exception, SurfaceFileError)
+    assert result.exception.exit_code == 2
+    assert not output.exists()
+
+
+def test_file_larger_than_the_memory_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A sparse file of the size that its header states."""
+    path = tmp_path / "huge.field"
+    size = 50 * 2**20
+    path.write_bytes(change_header(file_bytes=size))
+    with path.open("r+b") as stream:
+        stream.truncate(size)
+    monkeypatch.setattr(field_file, "free_memory", lambda: size - 1)
+    with pytest.raises(SurfaceFileError, match="its 52,428,800 bytes exceed the free memory"):
+        asp.load_texture(path)
+    monkeypatch.setattr(field_file, "free_memory", lambda: size)
+    with pytest.raises(SurfaceFileError, match="checksum"):
+        asp.load_texture(path)
+
+
+def test_resolution_coarser_than_the_texture_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "cloth.field"
+    result = CliRunner().invoke(cli, ["bake", "cloth", "--resolution", "0.3mm", "-o", str(path)])
+    assert "resolution is coarser than the texture" in str(result.exception)
+    assert not path.exists()
