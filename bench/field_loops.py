@@ -151,7 +151,8 @@ def main(arguments: Sequence[str]) -> None:
         of_a = float((np.abs(control.sum(axis=1)) / scale).max())
         met = "met" if worst <= 1e-12 else "MISSED"
         print(
-            f"cloth, smoothed {texture.passes} times, {count:,} triangles: |work| / (k l²) <= {worst:.1e} "
+            f"cloth, smoothed {texture.passes} times, {count:,} triangles: "
+            f"|work| / (k l²) <= {worst:.1e} "
             f"(goal 1e-12: {met}); of one edge {largest:.2f}; law A {of_a:.2f}"
         )
         headings = "work over k l²", f"held at 4 kHz less {DAMPING} N·s/m [µJ]"
