@@ -84,9 +84,7 @@ def cold_times(field: PotentialField) -> FloatArray:
     points = np.column_stack([xy, field.height(xy) - rng.uniform(0.0, DEPTH, count)])
     gettime = ctypes.CDLL(None).clock_gettime
     gettime.argtypes, gettime.restype = (ctypes.c_int, ctypes.c_void_p), ctypes.c_int
-    from asperity.textures.fields import field_sampler
-
-    gradient = _compiled(field_gradient, vars(field_sampler))
+    gradient = _compiled(field_gradient)
 
     @numba.njit
     def measure(points: Any, arguments: Any, clock: Any, out: Any, with_force: Any) -> Any:
@@ -109,16 +107,16 @@ def cold_times(field: PotentialField) -> FloatArray:
     return np.asarray(out - np.median(empty))
 
 
-def _compiled(function: Any, names: dict[str, Any]) -> Any:
-    """Return a plain function compiled with the plain functions that it calls."""
+def _compiled(function: Any) -> Any:
+    """Return a plain function compiled with the plain functions that it calls, of any module."""
     import types
 
     import numba
 
-    scope = dict(names)
+    scope = dict(function.__globals__)
     for name in function.__code__.co_names:
         if isinstance(scope.get(name), types.FunctionType):
-            scope[name] = _compiled(scope[name], names)
+            scope[name] = _compiled(scope[name])
     return numba.njit(types.FunctionType(function.__code__, scope))
 
 
