@@ -20,9 +20,11 @@ from asperity.core.files import Serializable
 from asperity.core.units import format_quantity
 from asperity.laws import Law
 from asperity.surface import Surface
+from asperity.textures.catalogue import TextureLike, as_texture
 from asperity.textures.fields.bake import BakeGoal, bake_texture
 from asperity.textures.fields.field_certificate import Progress
 from asperity.textures.meshes.bake_body import bake_body
+from asperity.textures.meshes.lay_texture import lay_texture
 from asperity.textures.meshes.mesh_body import load_mesh
 from asperity.textures.spline.spline_texture import HeightMap
 from asperity.textures.texture import Texture
@@ -97,6 +99,8 @@ def bake_mesh(
     continuity: float = 1.0,
     stiffness: float = DEFAULT_STIFFNESS,
     repair: bool = False,
+    texture: TextureLike | None = None,
+    texture_side: str = "+z",
     progress: Progress | None = None,
     **goal: Any,
 ) -> Surface:
@@ -112,6 +116,9 @@ def bake_mesh(
         continuity: c of law H, at least 1.
         stiffness: [N/m].
         repair: whether faults that leave the inside undefined are repaired.
+        texture: a texture to lay on the body, by which its surface is displaced along its normals;
+            see :func:`~asperity.textures.meshes.lay_texture.lay_texture`.
+        texture_side: the side on which it lies, ``"+x"`` to ``"-z"``.
         progress: called with the finished fraction, from 0 to 1.
         **goal: share, max_gain and max_bytes of :func:`bake`; the share is that of the RMS force.
 
@@ -120,13 +127,16 @@ def bake_mesh(
         ``texture.thin_regions`` are its parts thinner than twice the depth.
 
     Raises:
-        ParameterError: a missing unit, or a depth or a resolution that does not fit the body.
+        ParameterError: a missing unit, or a depth, a resolution or a texture that does not fit the
+            body.
         SurfaceFileError: a file that cannot be read, or a mesh whose inside is undefined.
 
     Reference:
         docs/theory/split.md.
     """
     body, wanted = load_mesh(path, unit, repair=repair), _goal(**goal)
+    if texture is not None:
+        body = lay_texture(body, as_texture(texture), texture_side)
     field = bake_body(
         body, max_depth, continuity, resolution=resolution, goal=wanted, progress=progress
     )

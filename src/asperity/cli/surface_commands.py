@@ -119,6 +119,8 @@ def bake_command(surface: str, output: str, *, body: bool, outputs: Outputs, **v
 
     if (repair := values.pop("repair")) and not body:
         raise ParameterError("repair", "requires --body: only a mesh is repaired")
+    if values["texture"] is not None and not body:
+        raise ParameterError("texture", "requires --body: it is laid on a mesh")
     check_outputs(force=outputs.force, output=output, json=outputs.json)
     with progress_bar("baking the field") as update:
         given = provided_values(values, (MAX_DEPTH, SHIPPED_LAW_ARGUMENTS["continuity"]))

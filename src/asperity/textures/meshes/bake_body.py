@@ -169,7 +169,7 @@ class _BodyLoops:
         filled = np.where(missing, heights[~missing].min(), heights)
         sides = format_lengths([float(side) for side in np.ptp(np.array(body.box), axis=0)])
         text = f"body {body.name}, seen from above: {len(body.triangles)} triangles, {sides}"
-        notes = [f"accepted: {fault}" for fault in body.faults]
+        notes = [*body.notes, *(f"accepted: {fault}" for fault in body.faults)]
         notes += [f"repaired: {fault}" for fault in body.repaired]
         if thin:
             half = format_length(thin[0].half_thickness)
@@ -211,6 +211,8 @@ class _BodyPlan(BakePlan):
         self.gain, self.lipschitz = continuity, continuity + 1.0
         self._law_arguments = (1.0, 0.0, 1.0, max_depth, 0.0, continuity)
         self.loops = _BodyLoops(body, BodyLaw(continuity, max_depth, 0.0))
+        thinnest = float(np.ptp(np.array(body.box), axis=0).min())
+        self.coarsest = min(thinnest / _LEAST_CELLS, body.coarsest)
         self.probes = self.loops.surface_probes(PROBES)
         if len(self.probes) == 0:
             raise ParameterError("max_depth", "finds no point inside the body", max_depth)
@@ -227,16 +229,16 @@ class _BodyPlan(BakePlan):
     def grid(self, resolution: float) -> FieldGrid:
         """Return the grid around the body, with a margin for smoothing."""
         lower, upper = self.loops.body.box
-        spacing = min(resolution, float((upper - lower).min()) / _LEAST_CELLS)
+        spacing = min(resolution, self.coarsest)
         margin = self.goal.passes * spacing
         return FieldGrid.around(lower - margin, upper + margin, spacing)
 
     def checked_grid(self, resolution: float) -> FieldGrid:
         """Return the grid of a resolution that suits the body and the size allowed."""
-        lower, upper = self.loops.body.box
-        coarsest = float((upper - lower).min()) / _LEAST_CELLS
-        if resolution > coarsest * (1.0 + 1e-9):
-            reason = f"must be at most {coarsest:.3g} m, a quarter of the thinnest side of the body"
+        if resolution > self.coarsest * (1.0 + 1e-9):
+            textured = self.coarsest == self.loops.body.coarsest
+            what = "shortest wave of the texture" if textured else "thinnest side of the body"
+            reason = f"must be at most {self.coarsest:.3g} m, a quarter of the {what}"
             raise ParameterError("resolution", reason, resolution)
         grid = self.grid(resolution)
         self.check_size(grid)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import math
 import os
 import re
 import struct
@@ -41,12 +42,16 @@ class MeshBody:
         name: of the file.
         faults: faults found and not repaired, none of which leaves the inside undefined.
         repaired: the faults that were repaired.
+        notes: what was done to the mesh, for reports.
+        coarsest: the coarsest spacing of nodes [m] that resolves what was done.
     """
 
     triangles: FloatArray
     name: str = "mesh"
     faults: tuple[MeshFault, ...] = ()
     repaired: tuple[MeshFault, ...] = ()
+    notes: tuple[str, ...] = ()
+    coarsest: float = math.inf
 
     @cached_property
     def box(self) -> tuple[FloatArray, FloatArray]:
@@ -74,7 +79,7 @@ class MeshBody:
             raise SurfaceFileError(f"{name} has no triangles")
         if not np.isfinite(vertices).all():
             raise SurfaceFileError(f"{name} has corners that are not finite numbers")
-        vertices, faces = _merge_vertices(vertices, faces)
+        vertices, faces = merge_vertices(vertices, faces)
         before = find_faults(vertices, faces)
         after, repaired = before, False
         if repair and _unsound(before):
@@ -178,7 +183,7 @@ def _parse(path: Path, suffix: str) -> tuple[FloatArray, NDArray[np.int32]]:
     return vertices, faces.astype(np.int32)
 
 
-def _merge_vertices(
+def merge_vertices(
     vertices: FloatArray, faces: NDArray[np.integer[Any]]
 ) -> tuple[FloatArray, NDArray[np.int32]]:
     """Return each vertex once: files repeat them for each triangle, or along seams."""
