@@ -321,6 +321,15 @@ def test_continuity_to_dict_is_json_serializable() -> None:
     assert smooth["lipschitz"]["upper"] == pytest.approx(1000.0)
 
 
+def test_sharpest_direction_is_that_of_an_oblique_wave() -> None:
+    """Off the axes, where the mixed second derivative of the heights is not zero."""
+    wave = Sinusoid(0.2e-3, 1e-3, direction=(2.0, 1.0))
+    crest = module.sharpest_crest(wave)
+    assert crest is not None
+    found = module._sharpest_direction(wave, crest)
+    assert abs(found @ [2.0, 1.0, 0.0]) / math.sqrt(5.0) == pytest.approx(1.0, abs=1e-9)
+
+
 def test_no_ridge_is_found_where_the_closest_point_is_continuous() -> None:
     """A descent that starts half-way to the centre of curvature finds no ridge."""
     crest = module.sharpest_crest(WAVE)

@@ -409,3 +409,11 @@ def test_share_is_relative_to_the_significant_waves() -> None:
     assert remaining < 1.0
     assert result.limit(1).holds
     assert result.limit(1).share == pytest.approx(1.0, rel=1e-12)
+
+
+@pytest.mark.parametrize("depth", [0.3e-3, 0.8e-3])
+def test_loss_of_contact_on_the_scan_is_stated(depth: float) -> None:
+    """Pressed to less than its height of 0.8 mm, the scan is partly in the air."""
+    result = limits(Sinusoid(4e-4, 2e-3), "omega.3", max_depth=depth)
+    stated = [words for words in result.assumptions if words.startswith("No contact on")]
+    assert len(stated) == (depth < 0.8e-3)

@@ -336,6 +336,21 @@ def test_descent_starts_at_the_best_point_or_a_newton_step(monkeypatch: pytest.M
         assert starts.pop() == pytest.approx((0.45 if x == 0.45 else 0.52,), abs=1e-15)
 
 
+@pytest.mark.parametrize(("best_x", "evaluations"), [(0.05, 2), (0.5, 1)])
+def test_every_evaluation_of_an_undecided_box_is_charged(
+    monkeypatch: pytest.MonkeyPatch, best_x: float, evaluations: int
+):
+    """At the centre, and again where the best point lies in the box and is checked."""
+    monkeypatch.setattr(search, "sample_hessian", curvature)
+    monkeypatch.setattr(search, "evaluation_cost", lambda _texture: 7.0)
+    monkeypatch.setattr(search, "is_least_within", lambda *_arguments: True)
+    best, wide_bounds = (best_x, 0.0, 1e9, 0.0, 0.0, 0.0), (1e3, 1e3)
+    *_rest, left = search.evaluate_box(
+        0.0, 0.0, -1.0, 0.0, 0.0, 0.1, 0.1, *wide_bounds, best, *UNLIMITED, np.zeros((4, 4))
+    )
+    assert UNLIMITED[1] - left == 7.0 * evaluations
+
+
 def test_level_point_on_the_border_is_not_pruned_by_rounding(monkeypatch: pytest.MonkeyPatch):
     """On planes of any slope: the slack for rounding grows with Q."""
     monkeypatch.setattr(line, "sample_profile", profile)

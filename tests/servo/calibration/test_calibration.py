@@ -25,6 +25,7 @@ from asperity.servo.calibration.identification import (
     AxisDynamics,
     DelayEstimate,
     Estimate,
+    PushRecord,
     WallOnset,
     find_wall_onset,
     fresh_fraction,
@@ -120,6 +121,11 @@ def test_position_step_is_detected_in_quantised_readings() -> None:
     assert irregular is not None
     assert irregular.value == pytest.approx(step)
     assert position_step(positions) is None
+    # A change of the size of rounding is no reading, however often it occurs.
+    still = np.tile([0.0, 1e-10], 100)
+    moved = position_step(np.append(still, [1e-5, 3.7e-5, 9.1e-5, 1.93e-4]))
+    assert moved is not None
+    assert moved.value > 1e-6
     # Steps of a joint angle: the change between readings counts.
     angles = np.cumsum(rng.uniform(0.0, 4e-6, 4000))
     turning = 0.2 * np.sin(1e-4 * np.rint(angles / 2e-5))
@@ -207,13 +213,15 @@ def test_pushes_alternate_and_end_with_zero_force() -> None:
 
 
 class RecordingRig:
-    """A rig that records the rows of every excitation."""
+    """A rig that records every excitation and its rows."""
 
     def __init__(self, bench: UnclockedRig) -> None:
         self.servo, self.axes, self._bench = bench.servo, bench.axes, bench
         self.rows: list[FloatArray] = []
+        self.excitations: list[Excitation] = []
 
     def apply(self, excitation: Excitation) -> FloatArray:
+        self.excitations.append(excitation)
         self.rows.append(self._bench.apply(excitation))
         return self.rows[-1]
 
@@ -236,8 +244,31 @@ def test_forces_stay_below_limits_and_end_after_a_trip() -> None:
         first = int(np.argmax(tripped)) if tripped.any() else len(rows)
         assert (rows[first + 1 :, 7:10] == 0.0).all()
     assert calibration.weakest_axis.name == "x"
+    # A wall is observed until an oscillation has decayed by e^-π at the measured damping, for 15
+    # to 150 oscillations and 0.15 to 2.5 s, after 70 ms of ramp and rest.
+    walls = [one for one in rig.excitations if one.kind == WALL]
+    for wall in walls:
+        motion = calibration.axes[int(wall.axis)].dynamics
+        mass, frequency = motion.mass.value, math.sqrt(wall.stiffness / motion.mass.value)
+        waves = min(max(0.5 * mass * frequency / motion.damping.value, 15.0), 150.0)
+        watched = min(max(waves * 2.0 * math.pi / frequency, 0.15), 2.5)
+        assert wall.wait_samples == 70.0
+        assert wall.samples == pytest.approx((0.07 + watched) / 1e-3, abs=1.0)
+        assert wall.wall_step == min(1e-3, 0.35 * LOOP.max_force / wall.stiffness)
+    assert len({wall.samples for wall in walls}) > 10
     # The handle never moves far.
     assert max(np.abs(rows[:, 1:4]).max() for rows in rig.rows) < 0.02
+
+
+def test_uncertainty_of_the_rate_is_that_of_the_mean_period() -> None:
+    """σ_T/(T √n) of the rate; a gap between two loops is no period."""
+    calibrator = Calibrator(simulated_rig(0.7), SAFE.ramp)
+    periods = 1e-3 * (1.0 + 0.1 * np.resize([-1.0, 1.0], 400))
+    periods[200] = 5.0
+    calibrator._times = np.concatenate([[0.0], np.cumsum(periods)])
+    rate = calibrator._update_rate([PushRecord(np.arange(9.0), np.zeros(9), 1)], None)
+    assert rate.value == pytest.approx(1e3, rel=1e-3)
+    assert rate.uncertainty == pytest.approx(0.1 * 1e3 / math.sqrt(399.0), rel=1e-2)
 
 
 @pytest.mark.parametrize("name", [*DRIVER_KINDS, "pantograph"])

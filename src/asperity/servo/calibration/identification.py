@@ -212,7 +212,7 @@ def _segments(
     """
     signs = velocity_sign(record.positions, max(1, record.push_samples // smoothing_divisor))
     # The force held at sample k was commanded d samples before.
-    held = np.concatenate([np.zeros(delay), record.forces[: len(record.forces) - delay]])
+    held = np.concatenate([np.zeros(delay), record.forces])[: len(record.forces)]
     edges = np.linspace(MAX_DELAY, len(held), SEGMENTS + 3).astype(int)
     # The ends of the record have no velocity.
     parts = [slice(a, b) for a, b in pairwise(edges[1:-1])]
