@@ -291,8 +291,8 @@ def _margin_text(row: LawRow) -> str:
 
 
 def _simulated_loops_text(margin: Margin) -> str:
-    """Return how many simulated loops cycle, and how large a motion."""
-    text = f"{margin.cycles} of {margin.loops} simulated loops cycle"
+    """Return how many random simulated loops cycle, and how large a motion."""
+    text = f"{margin.cycles} of {margin.loops} random simulated loops cycle"
     if not margin.cycles:
         return text
     speed = format_quantity(margin.speed, "m/s", digits=2)

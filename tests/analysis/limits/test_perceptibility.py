@@ -255,8 +255,8 @@ def test_analytic_texture_has_no_nesting_index() -> None:
 def test_sentences_name_the_motion_and_the_remedies() -> None:
     result = assess_wave(1e-7, device())
     assert re.fullmatch(
-        r"it moves the held tool \(100 g\) by [\d.]+ nm at 50 Hz, 0\.\d+ of the amplitude that is "
-        "felt",
+        r"it moves the held tool \(100 g\) by [\d.]+ nm, 0\.\d+ of the amplitude that is felt, "
+        "above all at 50 Hz",
         masking_text(result),
     )
     assert re.fullmatch(r"To feel it, magnify it \d+ times more(, or .*)?\.", remedies_text(result))

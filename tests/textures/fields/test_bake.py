@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -89,6 +90,26 @@ def test_progress_rises_to_one() -> None:
     asp.bake(Surface(WAVE, "H", K), 8e-6, progress=seen.append)
     assert seen == sorted(seen)
     assert seen[-1] == 1.0
+
+
+def test_difference_that_falls_with_the_usual_power_needs_two_trials(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The first correction assumes h^1.3, between the powers of corners and of smooth surfaces."""
+    plan, tried = BakePlan(WAVE, 4e-4, 1.0, BakeGoal()), list[float]()
+
+    def bake(resolution: float, _progress: object) -> SimpleNamespace:
+        tried.append(resolution)
+        share = 8.0 * plan.goal.share * (resolution / tried[0]) ** 1.3
+        gain = SimpleNamespace(upper=1.0)
+        return SimpleNamespace(accuracy=SimpleNamespace(share=share), gain=gain, passes=1)
+
+    monkeypatch.setattr(plan, "bake", bake)
+    monkeypatch.setattr(plan, "choose", lambda: 1e-5)
+    monkeypatch.setattr(plan, "finest_resolution", lambda: 1e-8)
+    field = plan.bake_coarsest(None)
+    assert len(tried) == 2
+    assert field.accuracy.share == pytest.approx(0.92 * plan.goal.share, rel=5e-3)
 
 
 @pytest.mark.parametrize("texture", [WAVE, Profile(8e-5 * _ROUGH[0], 1e-4)])

@@ -212,6 +212,8 @@ def test_flat_wall_is_baked_exactly() -> None:
     )
     assert np.abs(surface.force(points)[:, :2]).max() < 1e-15 * K
     assert asp.characteristic_number(surface).upper == pytest.approx(1.0, abs=1e-5)
+    assert surface.texture.accuracy.texture_rms == 0.0
+    assert surface.texture.accuracy.share == 0.0
 
 
 def test_field_describes_itself_and_its_source() -> None:

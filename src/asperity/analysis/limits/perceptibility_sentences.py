@@ -48,10 +48,11 @@ def masking_text(texture: Perceptibility) -> str:
         step = force_magnitude_text(texture.force_step)
         return f"the device's force steps of {step} hide it"
     motion = format_quantity(texture.hand_motion, "m", digits=2)
-    at = f"at {texture.frequency:.3g} Hz" if texture.frequency else "in waves that it resolves"
+    frequency = texture.frequency
+    at = f"above all at {frequency:.3g} Hz" if frequency else "in waves that it resolves"
     share = f"{texture.level:.2g} of the amplitude that is felt"
     mass = format_quantity(1e3 * texture.apparent_mass, "g")
-    return f"it moves the held tool ({mass}) by {motion} {at}, {share}"
+    return f"it moves the held tool ({mass}) by {motion}, {share}, {at}"
 
 
 def unverified_text(texture: Perceptibility) -> str:
