@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -24,6 +25,7 @@ from asperity.core.units import format_quantity
 from asperity.recording.recording import open_recording
 from asperity.recording.replay import replay
 from asperity.report.pictures.loop_pictures import recording_figure
+from asperity.servo.drivers import force_dimension, open_haptics
 
 COMMAND = "run"
 Call = Callable[..., tuple[int, str, str]]
@@ -210,18 +212,31 @@ def test_motion_outside_the_plane_of_the_device_is_refused(
     assert "a pantograph moves in the x-z plane" in err
 
 
-@pytest.mark.parametrize("name", ["nosuch", "real"])
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("nosuch", "driver is unknown: 'nosuch'"),
+        ("real", "driver of the device is not known"),
+        ("replay:missing.mcap", "missing.mcap"),
+        ("./missing.so", "driver needs .*missing.so, which is not found"),
+        ("forcedimension", "driver needs /missing/libdhd.so, which is not found"),
+        ("forcedimension:first", "driver must have a number after the colon"),
+        ("openhaptics", "driver needs /missing/libHD.so, which is not found"),
+    ],
+)
 def test_unusable_driver_is_refused_before_the_laws_are_compared(
-    call: Call, monkeypatch: pytest.MonkeyPatch, name: str, tmp_path: Path
+    call: Call, monkeypatch: pytest.MonkeyPatch, name: str, message: str, tmp_path: Path
 ) -> None:
     """A comparison takes a minute; an existing recording is left as it is."""
     monkeypatch.setattr(loop_setup, "_recommend_law_and_stiffness", lambda *_args: 1 / 0)
+    monkeypatch.setenv(force_dimension.LIBRARY, "/missing/libdhd.so")
+    monkeypatch.setenv(open_haptics.LIBRARY, "/missing/libHD.so")
     recording = tmp_path / "run.mcap"
     recording.write_text("precious")
     arguments = ("--device", "pantograph" if name == "real" else "touch", "--driver", name)
     code, out, err = call("cloth", *arguments, "--record", str(recording), "--force")
     assert (code, out) == (2, "")
-    assert "driver" in err
+    assert re.search(message, err)
     assert recording.read_text() == "precious"
 
 

@@ -123,11 +123,16 @@ def load_setup(
 
 
 def _check_driver(name: str, device: Device) -> None:
-    """Check the name of a driver before the laws are compared, which takes long."""
+    """Check a driver and its files before the laws are compared, which takes long."""
+    from asperity.servo.drivers.driver import IDENTITY_FRAME
     from asperity.servo.drivers.driver_registry import find_driver
+    from asperity.servo.drivers.simulated import open_replay
 
-    if name != SIMULATED and not name.startswith(REPLAY_PREFIX):
-        find_driver(name, device)
+    if name.startswith(REPLAY_PREFIX):
+        open_replay(name.removeprefix(REPLAY_PREFIX))
+    elif name != SIMULATED:
+        kind, argument = find_driver(name, device)
+        kind.create(argument, IDENTITY_FRAME).check_library()
 
 
 def _recommend_law_and_stiffness(

@@ -121,6 +121,14 @@ class Driver(ABC):
     def placeholder_record(self) -> tuple[Any, ...]:
         """Return a record of the same type, to compile before the device is open."""
 
+    def check_library(self) -> None:
+        """Check that the library of the device can be loaded, whether or not there is a device.
+
+        Raises:
+            ParameterError: if it cannot, with a hint.
+        """
+        return
+
     @abstractmethod
     def open(self) -> tuple[Any, ...]:
         """Open the device, in the loop's process; return its record.

@@ -64,6 +64,10 @@ class ForceDimensionDriver(Driver):
         """Return a record of no device."""
         return ForceDimensionDevice(0, 0, 0)
 
+    def check_library(self) -> None:
+        """Load the library."""
+        _library()
+
     def open(self) -> ForceDimensionDevice:
         """Open the device and enable its force."""
         library = _library()

@@ -98,6 +98,10 @@ class LibraryDriver(Driver):
         """Return a record of no device."""
         return LibraryDevice(0, 0)
 
+    def check_library(self) -> None:
+        """Load the library."""
+        self._load()
+
     def open(self) -> LibraryDevice:
         """Load the library and open the device."""
         library = self._load()

@@ -82,6 +82,10 @@ class OpenHapticsDriver(ThreadedDriver):
         """Name of the device for its lock."""
         return self.device
 
+    def check_library(self) -> None:
+        """Load the library."""
+        _library()
+
     def open(self) -> ThreadedDevice:
         """Open the device, start the scheduler, and wait for the first frame."""
         library = _library()

@@ -14,7 +14,7 @@ from asperity.core.errors import ParameterError
 from asperity.core.units import format_quantity
 from asperity.loop import replayed_device
 from asperity.loop.replayed_device import ReplayedDevice
-from asperity.recording.recording import open_recording
+from asperity.recording.recording import Recording, open_recording
 from asperity.servo.drivers.driver import Driver
 from asperity.simulation.hands import Hand
 from asperity.simulation.kernels import simulated_device
@@ -141,6 +141,18 @@ class ReplayDriver(Driver):
         return ReplayedDevice(self.points, np.zeros(1, np.int64))
 
 
+def open_replay(path: str) -> Recording:
+    """Return a recording that has positions to follow.
+
+    Raises:
+        ParameterError: for a recording that cannot be read, or without rows.
+    """
+    recording = open_recording(path)
+    if recording.rows < 2:
+        raise ParameterError("driver", f"{path} has {recording.rows} rows: nothing to replay")
+    return recording
+
+
 def replay_driver(path: str, period: float) -> ReplayDriver:
     """Return a driver that follows the positions of a recording.
 
@@ -150,12 +162,9 @@ def replay_driver(path: str, period: float) -> ReplayDriver:
 
     Raises:
         ParameterError: for a recording that cannot be read, without rows or positions, or with
-        another
-            period.
+            another period.
     """
-    recording = open_recording(path)
-    if recording.rows < 2:
-        raise ParameterError("driver", f"{path} has {recording.rows} rows: nothing to replay")
+    recording = open_replay(path)
     steps = np.diff(recording["time"])
     if np.abs(steps - period).max() > 1e-3 * period:
         recorded, wanted = (format_quantity(1.0 / one, "Hz") for one in (np.median(steps), period))
