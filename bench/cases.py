@@ -15,6 +15,17 @@ from asperity.textures.texture import Texture
 LAWS = "WABCDEFG"
 STIFFNESS = 1000.0
 SEED = 20240607
+HELD_HANDLE = """
+[hand]
+kind = "spring"
+stiffness = "300 N/m"
+damping = "3 N*s/m"
+mass = "50 g"
+[motion]
+kind = "still"
+point = ["0 mm", "0 mm", "-2 mm"]
+"""
+"""Part of a scene: a hand of 50 g that holds the handle 2 mm below the surface."""
 
 
 def textures() -> dict[str, Texture]:

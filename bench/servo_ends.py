@@ -30,6 +30,7 @@ from typing import Self
 
 from rich.console import Console
 
+from bench.cases import HELD_HANDLE
 from bench.fake_haply import FakeHaply
 from bench.fakes import compile_library
 
@@ -37,7 +38,7 @@ HERE = Path(__file__).parent / "c"
 COUNT, PATIENCE = 200, 12.0
 RAMP, RELEASE = 0.25, 0.02
 """Time of the ramp, and of everything else until the force is zero [s]."""
-SCENE = """
+SCENE = f"""
 [texture]
 kind = "sinusoid"
 amplitude = "0.1 mm"
@@ -50,14 +51,7 @@ max_depth = "9 mm"
 id = "touch"
 update_rate = "1 kHz"
 max_force = "3 N"
-[hand]
-kind = "spring"
-stiffness = "300 N/m"
-damping = "3 N*s/m"
-mass = "50 g"
-[motion]
-kind = "still"
-point = ["0 mm", "0 mm", "-2 mm"]
+{HELD_HANDLE}
 [servo]
 origin = ["0.3 mm", "0.2 mm", "1 mm"]
 """

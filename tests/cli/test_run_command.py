@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bench.cases import HELD_HANDLE
 from bench.fakes import compile_library
 from tests.servo.drivers.test_drivers import EXAMPLE
 
@@ -30,7 +31,7 @@ from asperity.servo.drivers import force_dimension, open_haptics
 COMMAND = "run"
 Call = Callable[..., tuple[int, str, str]]
 
-SCENE = """
+SCENE = f"""
 [texture]
 kind = "sinusoid"
 amplitude = "0.1 mm"
@@ -42,14 +43,7 @@ max_depth = "3 mm"
 [device]
 id = "touch"
 update_rate = "1 kHz"
-[hand]
-kind = "spring"
-stiffness = "300 N/m"
-damping = "3 N*s/m"
-mass = "50 g"
-[motion]
-kind = "still"
-point = ["0 mm", "0 mm", "-2 mm"]
+{HELD_HANDLE}
 [servo]
 ramp = "20 ms"
 lateness = "60 s"

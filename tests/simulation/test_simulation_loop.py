@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.helpers.stroked_loops import FULL, HAND, STROKES
 
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
@@ -14,7 +15,6 @@ from asperity.simulation import (
     Servo,
     SpringHand,
     Stationary,
-    Strokes,
     Waypoints,
     simulate,
 )
@@ -102,17 +102,6 @@ def _response(surface: Surface, delay: int, rest: FloatArray, column: int) -> Fl
     return np.asarray(results[1] - results[0])
 
 
-FULL = Servo(
-    1e-4,
-    delay=1,
-    position_resolution=5e-6,
-    force_resolution=5e-3,
-    max_force=3.0,
-    virtual_damping=0.2,
-    velocity_share=0.3,
-)
-HAND = SpringHand([300.0, 200.0, 250.0], 2.0, mass=0.02, force=(0.1, -0.2, -0.3))
-STROKES = Strokes((0.0, 0.0, -1e-3), (7e-3, 3e-3, -1e-3), speed=0.05, count=9)
 BODY = Cartesian((0.05, 0.04, 0.03), (0.5, 0.3, 0.4))
 
 

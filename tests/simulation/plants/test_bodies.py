@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.helpers.stroked_loops import FULL, HAND, STROKES
 
 from asperity.simulation import (
     BandHand,
@@ -13,7 +14,6 @@ from asperity.simulation import (
     Servo,
     SpringHand,
     Stationary,
-    Strokes,
     simulate,
 )
 from asperity.simulation.plants import coupled_plant, sampled_plant
@@ -21,17 +21,6 @@ from asperity.surface import Surface
 from asperity.textures.kinds.sinusoid import Sinusoid
 
 WAVE = Sinusoid(amplitude=0.2e-3, period=2e-3, phase=0.3, direction=(2.0, 1.0))
-FULL = Servo(
-    1e-4,
-    delay=1,
-    position_resolution=5e-6,
-    force_resolution=5e-3,
-    max_force=3.0,
-    virtual_damping=0.2,
-    velocity_share=0.3,
-)
-HAND = SpringHand([300.0, 200.0, 250.0], 2.0, mass=0.02, force=(0.1, -0.2, -0.3))
-STROKES = Strokes((0.0, 0.0, -1e-3), (7e-3, 3e-3, -1e-3), speed=0.05, count=9)
 COUPLED = [[2.0, 0.5, 0.1], [0.5, 1.0, -0.2], [0.1, -0.2, 0.7]]
 BODIES = {
     "axes": Cartesian((0.05, 0.04, 0.03), (0.5, 0.3, 0.4)),
