@@ -103,8 +103,7 @@ def again(folder: Path) -> Setup:
     return make_setup(load_scene(str(folder / SCENE_FILE)))
 
 
-@pytest.mark.parametrize("magnified", [1.0, 1.7])
-@pytest.mark.parametrize("law", ["C", "H"])
+@pytest.mark.parametrize(("law", "magnified"), [("C", 1.7), ("H", 1.0)])
 @pytest.mark.parametrize("name", KINDS)
 def test_the_scene_does_the_same_again(
     tmp_path: Path, name: str, law: str, magnified: float

@@ -104,8 +104,11 @@ def simulate_scan(
 GRIPS = (load_grip(), Grip("firm", 450.0, 5.0, 0.01, (1.0, 1e3), (1e-7,) * 2, (1e-6,) * 2, {}))
 
 
-@pytest.mark.parametrize("grip", GRIPS, ids=["pen", "firm"])
-@pytest.mark.parametrize("law", ["A", "C", "G", "H"])
+@pytest.mark.parametrize(
+    ("law", "grip"),
+    list(zip("ACGH", GRIPS * 2, strict=True)),
+    ids=["A-pen", "C-firm", "G-pen", "H-firm"],
+)
 def test_motion_at_the_hand_is_that_of_a_direct_simulation(law: str, grip: Grip) -> None:
     """200 random devices, scans and stiffnesses, with dry friction, within 5 %."""
     rng = np.random.default_rng([ord(law), int(grip.stiffness)])

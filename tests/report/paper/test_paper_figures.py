@@ -37,12 +37,13 @@ def test_every_figure_is_written_to_a_file(pictures: tuple[Path, ...]) -> None:
 def test_figure_files_are_reproducible(
     experiments: Experiments, tmp_path: Path, ending: paper_figures.FileFormat
 ) -> None:
-    drawings, progress, texts = find_figures(["fig-5", "fig-7"]), list[str](), []
+    names = ["fig-5", "fig-7"] if ending == "svg" else ["fig-5"]
+    drawings, progress, texts = find_figures(names), list[str](), []
     for _ in range(2):
         paths = write_figures(drawings, tmp_path, ending, experiments, progress.append)
         texts.append([path.read_bytes() for path in paths])
     assert texts[0] == texts[1]
-    assert progress == ["fig-5", "fig-7"] * 2
+    assert progress == names * 2
 
 
 def test_svg_differs_without_the_hash_salt(

@@ -41,9 +41,10 @@ def test_every_picture_of_the_report_can_be_plotted_alone(
     result: asp.Comparison, tmp_path: Path
 ) -> None:
     for name in ("surface", "spectrum", "force", "field", "gain", "merit"):
+        figure = plot(result, picture=name)
         for ending in ("png", "svg"):
             path = tmp_path / f"{name}.{ending}"
-            plot(result, picture=name).savefig(path)
+            figure.savefig(path)
             assert path.stat().st_size > 3000
     with pytest.raises(ParameterError, match="one of surface, spectrum"):
         plot(result, picture="curl")
