@@ -15,7 +15,7 @@ from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.measured.reading import RawSurface, read_surface
 from asperity.measured.reading.images.normal_maps import is_normal_map
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "writers"))
+sys.path.insert(0, str(Path(__file__).parents[2] / "writers"))
 from image_writer import write_png, write_tiff
 
 Floats = NDArray[np.float64]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "writers"))
+sys.path.insert(0, str(Path(__file__).parents[2] / "writers"))
 from image_writer import write_tiff
 
 from asperity.core.errors import ParameterError
