@@ -60,6 +60,11 @@ class Sheet:
         """Number of columns."""
         return len(self.heights[0])
 
+    def keep_first_row(self) -> None:
+        """Make the surface a profile, its first row."""
+        self.heights = self.heights[:1]
+        self.pitch = (self.pitch[0], self.pitch[0])
+
     def z(self, unit: str = "", values: FloatArray | None = None) -> list[list[str]]:
         """Return the heights as text in a unit."""
         scale = UNITS[unit or self.unit]
@@ -207,8 +212,7 @@ def _mitutoyo(s: Sheet) -> tuple[str, str]:
 
 
 def _mitutoyo_column(s: Sheet) -> tuple[str, str]:
-    s.heights = s.heights[:1]
-    s.pitch = (s.pitch[0], s.pitch[0])
+    s.keep_first_row()
     head = f"Sampling pitch,{s.step(0)},{s.lateral}\nZ unit,{s.unit}\n"
     return head, lines(s.z()[0])
 
@@ -362,8 +366,7 @@ def _zygo_xyz(s: Sheet) -> tuple[str, str]:
 
 
 def _iso(s: Sheet) -> tuple[str, str]:
-    s.heights = s.heights[:1]
-    s.pitch = (s.pitch[0], s.pitch[0])
+    s.keep_first_row()
     head = f"ISO 5436-2\nCX M 10 MM {s.step(0)} D\nCZ M 10 {s.unit} 1.0 D\n"
     return head, lines(s.z()[0])
 
