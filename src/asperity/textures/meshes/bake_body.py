@@ -25,6 +25,7 @@ DEFAULT_DEPTH = 1e-3
 DEFAULT_GOAL = BakeGoal()
 _MOST_CROSSINGS = 4096
 _LEAST_CELLS = 4
+_MAX_BAKES = 3
 _DIGITS = 12  # of places and thickness of thin parts [m]
 # Duality gap in squared spacings: it adds less than 4 times as much to the gain.
 _GAP = 1e-4
@@ -66,20 +67,19 @@ def bake_body(
     if max_depth is None and deepest > 0.0:
         depth = min(depth, deepest)
     plan = _BodyPlan(body, depth, continuity, goal)
-    chosen = plan.choose() if resolution is None else check_positive("resolution", resolution, "m")
-    grid = plan.checked_grid(chosen)
-    plan.loops.prepare(grid.extend_down(goal.passes), _GAP * chosen**2)
-    potentials = compute_potentials(
-        plan.columns, plan.loops.grid, scale_progress(progress, 0.05, 0.85)
-    )
-    thin_map = plan.loops.thin_map(depth)
-    thin = plan.loops.thin_regions(thin_map)
-    plan.texture, found = plan.loops.upper_envelope(body, thin)
-    if depth > (deepest := max(deepest, found)):
-        reason = f"must be at most {format_length(deepest)}, the greatest depth of the body"
-        raise ParameterError("max_depth", reason, depth)
-    field = plan.certify(potentials, grid, scale_progress(progress, 0.9, 0.1))
-    field.thin_regions, field.thin_map = thin, thin_map if thin else None
+    plan.deepest = deepest
+    if resolution is not None:
+        return plan.bake(check_positive("resolution", resolution, "m"), progress)
+    chosen, finest = plan.choose(), plan.finest_resolution()
+    part = scale_progress(progress, 0.0, 0.5)
+    for _ in range(_MAX_BAKES):
+        field = plan.bake(chosen, part)
+        share = field.accuracy.share
+        if share <= goal.share or chosen <= finest:
+            break
+        # It is smoothed more often than the estimate assumes.
+        chosen = max(chosen * max(0.9 * goal.share / share, 0.5), finest)
+        part = scale_progress(progress, 0.5, 0.5)
     return field
 
 
@@ -204,7 +204,9 @@ class _BodyLoops:
 
 
 class _BodyPlan(BakePlan):
-    """A field of a body to bake."""
+    """A field of a body to bake; ``deepest`` is a depth [m] that it is known to have."""
+
+    deepest = 0.0
 
     def __init__(self, body: MeshBody, max_depth: float, continuity: float, goal: BakeGoal) -> None:
         self.max_depth, self.continuity, self.goal = max_depth, continuity, goal
@@ -225,6 +227,22 @@ class _BodyPlan(BakePlan):
             self.loops.record_columns(xy, z, out)
         else:
             self.loops.columns(xy, z, out)
+
+    def bake(self, resolution: float, progress: Progress | None) -> PotentialField:
+        """Return the field of a resolution [m], with the thin parts of the body."""
+        grid, body, depth = self.checked_grid(resolution), self.loops.body, self.max_depth
+        self.loops.prepare(grid.extend_down(self.goal.passes), _GAP * resolution**2)
+        first_part = scale_progress(progress, 0.05, 0.85)
+        potentials = compute_potentials(self.columns, self.loops.grid, first_part)
+        thin_map = self.loops.thin_map(depth)
+        thin = self.loops.thin_regions(thin_map)
+        self.texture, found = self.loops.upper_envelope(body, thin)
+        if depth > (deepest := max(self.deepest, found)):
+            reason = f"must be at most {format_length(deepest)}, the greatest depth of the body"
+            raise ParameterError("max_depth", reason, depth)
+        field = self.certify(potentials, grid, scale_progress(progress, 0.9, 0.1))
+        field.thin_regions, field.thin_map = thin, thin_map if thin else None
+        return field
 
     def grid(self, resolution: float) -> FieldGrid:
         """Return the grid around the body, with a margin for smoothing."""
