@@ -132,6 +132,16 @@ def test_maps_are_searched_along_parallel_lines() -> None:
     assert result.energy == pytest.approx(K * 1e-4 * 1e-4, rel=0.03)
 
 
+def test_worst_line_may_gain_in_one_direction_only() -> None:
+    """A step up of 100 µm, which has no way down, against a hump of 60 µm with both flanks."""
+    y, x = np.mgrid[:41, :41]
+    step = 1e-4 * 0.5 * (1.0 + np.tanh((x - 20.0) / 4.0)) * np.exp(-((y - 33.0) ** 2) / 18.0)
+    hump = 6e-5 * np.exp(-((x - 20.0) ** 2 + (y - 8.0) ** 2) / 18.0)
+    result = worst_loop(Surface(HeightMap(step + hump, 1e-4), "A", K, 1e-4))
+    assert 3.1e-3 < result.line.start[1] < 3.5e-3
+    assert result.energy == pytest.approx(K * 1e-4 * 1e-4, rel=0.05)
+
+
 def test_scan_direction_of_a_profile_is_its_own_direction() -> None:
     wave = Fourier([A, A / 2], [[0.0, 3000.0], [0.0, 6000.0]])
     line = worst_loop(Surface(wave, "A", K, D)).line

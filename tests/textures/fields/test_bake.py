@@ -92,6 +92,11 @@ def test_progress_rises_to_one() -> None:
     assert seen[-1] == 1.0
 
 
+def test_field_is_smoothed_only_towards_a_finite_gain() -> None:
+    assert BakeGoal(max_gain=math.inf).passes == 0
+    assert BakeGoal(max_gain=1e6).passes == BakeGoal().passes > 0
+
+
 def test_difference_that_falls_with_the_usual_power_needs_two_trials(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
