@@ -262,6 +262,8 @@ def test_sentences_name_the_motion_and_the_remedies() -> None:
         "above all at 50 Hz",
         masking_text(result),
     )
+    still = replace(result, level=0.0, hand_motion=0.0)
+    assert masking_text(still).endswith("in waves that it resolves")
     assert re.fullmatch(r"To feel it, magnify it \d+ times more(, or .*)?\.", remedies_text(result))
     steps = assess_wave(80e-6, device(force_resolution="20 mN"))
     assert masking_text(steps) == "the device's force steps of 20 mN hide it"

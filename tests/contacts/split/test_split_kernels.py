@@ -196,6 +196,24 @@ def test_tracked_point_follows_its_probe() -> None:
         assert conditions.split_track_point(deep_point, atoms, 0, 25, None)[0] is is_minimum
 
 
+def test_closest_minimum_near_the_atoms_is_tracked_from_them(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Atoms beside it, of which the first is far off; the row after them is written."""
+    monkeypatch.setattr(solver, "local_array", np.zeros)
+    y = np.array([0.1, -0.2, -0.4])
+    expected = closest_point(y)
+    atoms = np.zeros((5, 4))
+    for row, shift in enumerate(([0.2, 0.1], [0.03, -0.02], [-0.05, 0.04])):
+        xy = expected[:2] + shift
+        atoms[row, :3] = *xy, height(*xy, None)
+    before = atoms.copy()
+    evaluations = solver.split_query_nearby(y, atoms, 3, None)
+    np.testing.assert_allclose(atoms[3], [*expected, 0.0], atol=1e-9)
+    np.testing.assert_array_equal(atoms[[0, 1, 2, 4]], before[[0, 1, 2, 4]])
+    assert 3.0 <= evaluations <= 30.0
+
+
 # --- weights --------------------------------------------------------------------------------------
 
 
@@ -252,6 +270,13 @@ def test_subset_mask_selects_atoms() -> None:
         assert np.abs(residual(y, weights, atoms[rows, :3], p)).max() < 1e-12
     outside = np.array([9.0, 0.0, -1.0])
     assert solver.split_solve_subset(atoms, 3, 0b11, outside, MU, a, trial, y) == 0
+
+
+def test_subset_with_a_singular_system_has_no_weights(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(solver, "split_solve_linear", lambda *_arguments: False)
+    atoms, trial, y = random_atoms(3), np.zeros((4, 4)), np.zeros(3)
+    p, a = RNG.normal(size=3), np.zeros((7, 10))
+    assert solver.split_solve_subset(atoms, 3, 0b11, p, MU, a, trial, y) == 0
 
 
 def test_step_drops_atoms_without_weight() -> None:

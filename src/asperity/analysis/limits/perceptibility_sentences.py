@@ -49,7 +49,7 @@ def masking_text(texture: Perceptibility) -> str:
         return f"the device's force steps of {step} hide it"
     motion = format_quantity(texture.hand_motion, "m", digits=2)
     frequency = texture.frequency
-    at = f"above all at {frequency:.3g} Hz" if frequency else "in waves that it resolves"
+    at = f"above all at {frequency:.3g} Hz" if texture.level else "in waves that it resolves"
     share = f"{texture.level:.2g} of the amplitude that is felt"
     mass = format_quantity(1e3 * texture.apparent_mass, "g")
     return f"it moves the held tool ({mass}) by {motion}, {share}, {at}"
