@@ -36,7 +36,7 @@ def bake(texture: Texture, resolution: float | None = None) -> Surface:
     """Return a surface with law H of a texture, baked coarsely unless a resolution is given."""
     low, high = texture.extremes
     depth = max(high - low, 1e-5)
-    return asp.bake(Surface(texture, "H", 800.0, max_depth=depth), resolution or 0.5 * depth)
+    return asp.bake(Surface(texture, "H", 800.0, max_depth=depth), resolution or 0.25 * depth)
 
 
 @pytest.mark.parametrize("flags", [("-O1",), ("-O3", "-march=native"), ("-O2", "-std=gnu99")])
