@@ -21,7 +21,6 @@ from asperity.simulation.kernels import coupled_body as dense
 from asperity.simulation.kernels import elastic_band as banded
 from asperity.simulation.kernels import pantograph_dynamics as five_bar
 from asperity.simulation.kernels import prescribed_motion as prescribed
-from asperity.simulation.kernels import resonant_axis as resonant
 from asperity.textures.kinds import fourier_line_sampler as fourier_line
 from asperity.textures.kinds import fourier_sampler as fourier
 from asperity.textures.kinds import sinusoid_sampler as sinusoid
@@ -29,7 +28,7 @@ from asperity.textures.spline import heightmap_sampler as heightmap
 from asperity.textures.spline import profile_sampler as profile
 
 SAMPLERS = (sinusoid, fourier, fourier_line, profile, heightmap)
-BODIES = (axes, banded, dense, five_bar, prescribed, resonant)
+BODIES = (axes, banded, dense, five_bar, prescribed)
 PAIRS = [(sampler, one) for one in SAMPLERS] + [(body_functions, one) for one in BODIES]
 
 

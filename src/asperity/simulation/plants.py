@@ -24,7 +24,6 @@ from asperity.simulation.kernels import (
     energy_ledger,
     hand_force,
     prescribed_motion,
-    resonant_axis,
 )
 from asperity.simulation.motions import NamedPart
 from asperity.simulation.servo import Servo
@@ -250,8 +249,9 @@ class Cartesian(Plant):
         """Return the mass held by a hand, over one sample."""
         if not isinstance(hand, SpringHand):
             return _elastic_band_plant(self, hand, period)
-        has_coupling = np.abs(self.damping - np.diag(np.diag(self.damping))).max() > 0.0
-        return (coupled_plant if has_coupling else _axis_plant)(self, hand, period)
+        is_diagonal = not np.any(self.damping - np.diag(np.diag(self.damping)))
+        separate = is_diagonal and self.resonance is None
+        return (_axis_plant if separate else coupled_plant)(self, hand, period)
 
     def min_damping(
         self, low: ArrayLike, high: ArrayLike, hand: Hand | None = None, top: float = 0.0
@@ -271,27 +271,20 @@ class Cartesian(Plant):
 
 
 def _axis_plant(plant: Cartesian, hand: SpringHand, period: float) -> SampledPlant:
-    """Return a linear body without coupling between its axes."""
-    is_rigid, parts = plant.resonance is None, _substeps(plant)
-    body = linear_body(plant.mass, plant.damping, hand, plant.resonance)
+    """Return a rigid body without coupling between its axes."""
+    parts, body = _substeps(plant), linear_body(plant.mass, plant.damping, hand)
     span = period / parts
-    # Components of z of each axis: e, w and F of a rigid body, else all six.
-    used = np.arange(18).reshape(6, 3).T[:, [0, 1, 4] if is_rigid else slice(None)]
+    used = np.arange(18).reshape(6, 3).T[:, [0, 1, 4]]  # e, w and F of each axis
     axes = used[:, :, None], used[:, None, :]
     changes, losses = integrate(body.dynamics[axes], body.loss[axes], span)
-    states = 2 if is_rigid else 4
-    rows, columns = np.triu_indices(used.shape[1])
+    rows, columns = np.triu_indices(3)
     loss = losses[:, rows, columns] * np.where(rows == columns, 1.0, 2.0)
-    masses = [body.mass] if is_rigid else [body.mass, body.carrier_mass, body.coupling]
     force = np.array(hand.force)
-    numbers = [np.diag(plant.damping), *masses, body.stiffness, force, np.full(3, span)]
-    table = np.hstack([changes[:, :states].reshape(3, -1), loss, np.array(numbers).T])
-    stops = np.diag(span / changes[:, 1, states]) if plant.friction > 0.0 else np.zeros((3, 3))
+    numbers = [np.diag(plant.damping), body.mass, body.stiffness, force, np.full(3, span)]
+    table = np.hstack([changes[:, :2].reshape(3, -1), loss, np.array(numbers).T])
+    stops = np.diag(span / changes[:, 1, 2]) if plant.friction > 0.0 else np.zeros((3, 3))
     record = axis_body.AxisBodyRecord(table, plant.friction, stops, parts, span)
-    modules = (axis_body, coupled_body, energy_ledger)
-    if is_rigid:
-        return SampledPlant(modules, record, 6)
-    return SampledPlant((resonant_axis, *modules), record, 12)
+    return SampledPlant((axis_body, coupled_body, energy_ledger), record, 6)
 
 
 def coupled_plant(plant: Cartesian, hand: SpringHand, period: float) -> SampledPlant:

@@ -32,7 +32,6 @@ from asperity.simulation.kernels import elastic_band as banded
 from asperity.simulation.kernels import hand_force as hands
 from asperity.simulation.kernels import pantograph_dynamics as five_bar
 from asperity.simulation.kernels import prescribed_motion as prescribed
-from asperity.simulation.kernels import resonant_axis as resonant
 from asperity.simulation.kernels.body_interface import LEFT_WORKSPACE, RUNNING, SampleInput
 from asperity.simulation.kernels.energy_ledger import (
     EXCHANGED,
@@ -181,7 +180,7 @@ def initial_state(order: int, *, plane: bool = False) -> FloatArray:
 
 CASES: dict[str, tuple[Any, Any, Any, Any]] = {
     "axes": (axes, Cartesian(MASS, (0.5, 0.3, 0.4)), SPRING, single_mass),
-    "mode": (axes, Cartesian(MASS, (0.5, 0.3, 0.4), MODE), SPRING, double_mass),
+    "mode": (dense, Cartesian(MASS, (0.5, 0.3, 0.4), MODE), SPRING, double_mass),
     "coupled": (dense, Cartesian(MASS, COUPLED), SPRING, single_mass),
     "coupled mode": (dense, Cartesian(MASS, COUPLED, MODE), SPRING, double_mass),
     "band": (banded, Cartesian(MASS, COUPLED), BAND, single_mass),
@@ -192,31 +191,15 @@ CASES: dict[str, tuple[Any, Any, Any, Any]] = {
 }
 
 
-@pytest.fixture
-def linked(monkeypatch: pytest.MonkeyPatch) -> Any:
-    """Bind the calls of ``axes`` like the linker."""
-
-    def bind(plant: Any) -> None:
-        if not plant.resonance:
-            return
-        for name in ("advance_axis", "final_velocity"):
-            monkeypatch.setattr(axes, name, getattr(resonant, name))
-
-    return bind
-
-
 @pytest.mark.parametrize("kind", CASES)
-def test_sample_follows_the_differential_equation(kind: str, linked: Any) -> None:
+def test_sample_follows_the_differential_equation(kind: str) -> None:
     module, plant, hand, equations = CASES[kind]
     sampled = sampled_plant(plant, hand, Servo(PERIOD))
-    if module is axes:
-        linked(plant)
     is_planar = module is five_bar
     x, ledger = initial_state(sampled.order, plane=is_planar), np.arange(1.0, LEDGER_SIZE + 1.0)
     start = x.copy()
     expected = integrate_motion(equations(plant, hand), x)
-    store = module if module is not axes else (resonant if plant.resonance else axes)
-    before = store.stored_energy(x, *INPUT[3:6], sampled.record)
+    before = module.stored_energy(x, *INPUT[3:6], sampled.record)
     assert module.advance_body(x, ledger, INPUT, sampled.record) == RUNNING
     np.testing.assert_allclose(x, expected[:-2], rtol=2e-8, atol=1e-12)
     # Energies are added to the ledger's previous values.
@@ -229,7 +212,7 @@ def test_sample_follows_the_differential_equation(kind: str, linked: Any) -> Non
     assert entries[FRICTION] == 0.0
     size = np.abs(work).sum() + abs(lost) + abs(hand_work)
     assert entries[EXCHANGED] >= size * (1.0 - 1e-7)
-    after = store.stored_energy(x, *anchor(PERIOD), sampled.record)
+    after = module.stored_energy(x, *anchor(PERIOD), sampled.record)
     assert after - before == pytest.approx(work.sum() + hand_work - lost, rel=1e-6)
 
 
@@ -257,16 +240,13 @@ def test_stored_energy_sums_masses_and_springs(kind: str) -> None:
             spring = (2.0 * math.pi * mode.frequency) ** 2 * near * far / (near + far)
             energy += 0.5 * float(spring @ (x[6:9] - x[:3]) ** 2)
     energy += hand_energy(hand, stretch)
-    store = module
-    if module is axes:
-        store = resonant if plant.resonance else axes
-    result = store.stored_energy(x, *INPUT[3:6], sampled.record)
+    result = module.stored_energy(x, *INPUT[3:6], sampled.record)
     assert result == pytest.approx(energy, rel=1e-11)
 
 
 @pytest.mark.parametrize("kind", CASES)
 @pytest.mark.parametrize("limit", [0.3, 400.0])
-def test_dry_friction_opposes_and_stops_the_motion(kind: str, limit: float, linked: Any) -> None:
+def test_dry_friction_opposes_and_stops_the_motion(kind: str, limit: float) -> None:
     """A limit that no force exceeds stops the handle within the sample; a smaller one slows it."""
     module, smooth, hand, _equations = CASES[kind]
     parameters = {
@@ -279,7 +259,6 @@ def test_dry_friction_opposes_and_stops_the_motion(kind: str, limit: float, link
         smooth = Pantograph(smooth.linkage, smooth.masses, centre=smooth.centre)
     else:
         plant = Cartesian(**parameters, friction=limit)
-        linked(plant)
     results = []
     for body in (smooth, plant):
         sampled = sampled_plant(body, hand, Servo(PERIOD))
@@ -409,7 +388,9 @@ def test_linear_sample_has_substeps_only_with_friction(
             Cartesian(MASS, damping, mode, friction), SPRING, Servo(PERIOD)
         ).record
         assert (record.substeps, record.substep) == (count, PERIOD / count)  # type: ignore[attr-defined]  # of its own record
-        assert record.stopping_mass.any() == (friction > 0.0 or damping is COUPLED)  # type: ignore[attr-defined]  # of its own record
+        assert record.stopping_mass.any() == (
+            friction > 0.0 or damping is COUPLED or mode is not None
+        )  # type: ignore[attr-defined]  # of its own record
 
 
 def test_state_is_unchanged_when_the_sample_leaves_the_workspace() -> None:
@@ -444,13 +425,12 @@ def test_prescribed_handle_follows_its_anchor() -> None:
     assert prescribed.stored_energy(x, 1.0, 2.0, 3.0, sampled.record) == 0.0
 
 
-@pytest.mark.parametrize("mode", [None, MODE])
-def test_dense_form_of_an_uncoupled_body(mode: Resonance | None) -> None:
+def test_dense_form_of_an_uncoupled_body() -> None:
     """It solves the same equations as the per-axis kernels."""
-    plant = Cartesian(MASS, (0.5, 0.3, 0.4), mode)
+    plant = Cartesian(MASS, (0.5, 0.3, 0.4))
     sampled = coupled_plant(plant, SPRING, PERIOD)
     x, ledger = initial_state(sampled.order), np.zeros(LEDGER_SIZE)
-    expected = integrate_motion((double_mass if mode else single_mass)(plant, SPRING), x)
+    expected = integrate_motion(single_mass(plant, SPRING), x)
     assert dense.advance_body(x, ledger, INPUT, sampled.record) == RUNNING
     np.testing.assert_allclose(x, expected[:-2], rtol=1e-9)
     assert ledger[LOST] == pytest.approx(expected[-2], rel=1e-9)

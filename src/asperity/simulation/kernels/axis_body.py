@@ -1,7 +1,6 @@
-"""One sample of a body without coupling between its axes: small forms, written out.
+"""One sample of a rigid body without coupling between its axes: small forms, written out.
 
-The body is rigid unless ``resonant_axis`` replaces the functions of an axis. Along one axis,
-relative to the anchor, with e = p - a, w = p' - u, F = f + g - b u and
+Along one axis, relative to the anchor, with e = p - a, w = p' - u, F = f + g - b u and
 
     m w' = F - (b + b_h) w - K e,
 
@@ -18,7 +17,7 @@ from asperity.simulation.kernels.body_interface import RUNNING, SampleInput
 from asperity.simulation.kernels.coupled_body import friction_force
 from asperity.simulation.kernels.energy_ledger import add_energies
 
-KERNELS = Kernels(provides=("advance_axis", "advance_body", "final_velocity", "stored_energy"))
+KERNELS = Kernels(provides=("advance_body", "stored_energy"))
 
 # Columns of an axis after the changes of e and w and the loss: damping and mass of the device,
 # stiffness and constant force of the hand, and the duration of a part.
@@ -29,7 +28,7 @@ class AxisBodyRecord(NamedTuple):
     """A body without coupling between its axes but for dry friction, over a part of a sample.
 
     Attributes:
-        coefficients: of each axis (3, 17); with a resonance (3, 52).
+        coefficients: of each axis (3, 17).
         friction: dry friction [N].
         stopping_mass: mass that friction stops (3, 3) [kg].
         substeps: number of parts of a sample.

@@ -1,4 +1,4 @@
-"""One sample of a linear body with any coupling: matrices of ``discretization``, dry friction.
+"""One sample of a linear body with coupling or a resonance, by whole matrices, and dry friction.
 
 Relative to the anchor, with e = p - a, w = p' - u, the same (r, s) for a second mass that carries
 the hand, F = f - B u and the constant force g of the hand, the changes of (e, w, r, s) over a part
