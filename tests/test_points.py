@@ -36,7 +36,6 @@ FUNCTIONS: dict[str, tuple[Callable[[], Callable[[Any], Any]], tuple[float, ...]
     "baked jacobian": (lambda: baked().jacobian, PROBE),
     "baked split_state": (lambda: lambda at: parts(asp.split_state(baked(), at)), PROBE),
     "split_state": (lambda: lambda at: parts(asp.split_state(surface("H"), at)), PROBE),
-    "beyond": (lambda: asp.pop_through(surface("H"), 2e-3).beyond, PROBE),
 }
 
 

@@ -14,9 +14,7 @@ from asperity.analysis.analyze import analyze as analyze
 from asperity.analysis.check_limits import limits as limits
 from asperity.analysis.limits.limit_result import Limits as Limits
 from asperity.analysis.passivity.assess_passivity import passivity as passivity
-from asperity.analysis.split.split_state import PopThrough as PopThrough
 from asperity.analysis.split.split_state import SplitState as SplitState
-from asperity.analysis.split.split_state import pop_through as pop_through
 from asperity.analysis.split.split_state import split_state as split_state
 from asperity.core.errors import AsperityError as AsperityError
 from asperity.core.errors import LawError as LawError

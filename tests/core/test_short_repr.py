@@ -52,7 +52,6 @@ EXAMPLES: dict[str, Callable[[], Any]] = {
     "NoiseProfile": lambda: asp.NoiseProfile(rms=2e-5, size=5e-3),
     "Passivity": lambda: asp.analyze(surface("B"), "pantograph").passivity,
     "PotentialField": lambda: asp.bake(surface("H"), resolution=1e-4).texture,
-    "PopThrough": lambda: asp.pop_through(surface("H"), 2e-3),
     "Profile": lambda: asp.Profile(HEIGHTS[0], 5e-5),
     "Recording": lambda: asp.open_recording(record_run()),
     "RecordingWriter": closed_writer,

@@ -16,7 +16,7 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from asperity.analysis import characteristic_number, loop_work, one_sided_number
-from asperity.analysis.split.split_state import pop_through, split_state
+from asperity.analysis.split.split_state import split_state
 from asperity.core.errors import ParameterError
 from asperity.laws import Law
 from asperity.surface import Surface
@@ -377,19 +377,6 @@ def test_force_far_below_the_surface_at_extreme_continuity(name: str) -> None:
 def test_split_state_requires_the_split_contact() -> None:
     with pytest.raises(ParameterError, match="split contact"):
         split_state(Surface(TEXTURES["gentle"], "D"), [[0.0, 0.0, 0.0]])
-
-
-def test_probe_is_beyond_the_pop_through_depth_of_a_plate() -> None:
-    """That depth below the highest point is (1 - μ) t/2 everywhere, with 1 - μ = c/(1 + c)."""
-    surface = Surface(Sinusoid(0.1e-3, PERIOD), "H", K, continuity=0.5)
-    plate = pop_through(surface, 2e-3)
-    assert plate.depth == pytest.approx(1e-3 / 3.0)
-    points = [
-        [x, y, plate.highest - share * plate.depth]
-        for x, y in ((-5e-3, 0.0), (5e-3, -1.0))
-        for share in (0.999, 1.001)
-    ]
-    assert plate.beyond(points).tolist() == [False, True, False, True]
 
 
 def test_search_that_newtons_method_leads_astray_converges() -> None:
