@@ -197,7 +197,7 @@ def test_incompatible_parts_and_excess_sizes_are_errors() -> None:
         loop.run(starts)
 
 
-# --- pantographs, advanced together in vectorized batches -----------------------------------------
+# --- pantographs ----------------------------------------------------------------------------------
 
 
 BAND = BandHand(200.0, 3.0, 0.08, 0.02)
@@ -225,7 +225,7 @@ PUSHED_OUT = SpringHand(0.0, 0.1, 0.0, (0.0, 0.0, 1.0))
     ],
     ids=["plain", "friction", "slack", "fast", "leaves", "brakes always on", "slow servo"],
 )
-def test_vectorized_pantographs_equal_single_runs(
+def test_pantographs_equal_single_runs(
     plant: Pantograph, hand: Any, velocity: Any, above: float, period: float
 ) -> None:
     surface = Surface(Sinusoid(0.8e-3, 1e-3), "W", stiffness=900.0)

@@ -20,7 +20,7 @@ from asperity.core.errors import ParameterError
 from asperity.kernels import tick
 from asperity.kernels.fuse import fuse_on_texture
 from asperity.simulation.hands import Hand
-from asperity.simulation.kernels import batch_loop, pantograph_lanes, simulated_device
+from asperity.simulation.kernels import batch_loop, simulated_device
 from asperity.simulation.kernels.body_interface import LANES, SAMPLES, STOP
 from asperity.simulation.kernels.energy_ledger import FRICTION, LEDGER_SIZE, LOST, SUPPLIED
 from asperity.simulation.motions import Motion
@@ -177,11 +177,6 @@ class BatchSimulation:
         self._velocity, self._hand = velocity, hand
         self._body = sampled_plant(plant, hand, servo)
         self._anchor, self._anchor_count = np.empty((0, 3)), 0
-
-    @property
-    def is_vectorized(self) -> bool:
-        """Whether several bodies take hardly longer than one."""
-        return pantograph_lanes in self._body.modules
 
     @cached_property
     def _compiled(self) -> ModuleType:

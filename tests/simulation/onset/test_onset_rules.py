@@ -283,8 +283,8 @@ class StandInTrajectory:
 class StandInLoop:
     """The last start cycles from 100 N/m, all from 200 N/m; bounds grow with the stiffness."""
 
-    def __init__(self, is_vectorized: bool = False, times: int = 1) -> None:
-        self.is_vectorized, self.times = is_vectorized, times
+    def __init__(self, times: int = 1) -> None:
+        self.times = times
         self.seen: list[tuple[float, float]] = []
         self.together: list[list[StandInTrajectory]] = []
 
@@ -368,21 +368,15 @@ class WindowedLoop(StandInLoop):
         return in_window or start.stiffness >= 700.0
 
 
-@pytest.mark.parametrize("vectorized", [False, True])
-def test_bisection_finds_a_window_of_one_start(
-    monkeypatch: pytest.MonkeyPatch, vectorized: bool
-) -> None:
+def test_bisection_finds_a_window_of_one_start(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every stiffness that directs the search is run from all starts."""
-    monkeypatch.setattr(onset, "BatchSimulation", lambda *_parts: WindowedLoop(vectorized))
+    monkeypatch.setattr(onset, "BatchSimulation", lambda *_parts: WindowedLoop())
     result = search(lowest=100.0, near=400.0, tolerance=0.05)  # 400, 800, and 566 between them
     assert result.quiet < 560.0 <= result.cycling < 570.0
     assert result.cycles == 1
 
 
-@pytest.mark.parametrize("vectorized", [False, True])
-def test_joint_search_over_delays_equals_separate_searches(
-    monkeypatch: pytest.MonkeyPatch, vectorized: bool
-) -> None:
+def test_joint_search_over_delays_equals_separate_searches(monkeypatch: pytest.MonkeyPatch) -> None:
     """An onset does not depend on what else runs in the batch."""
     still, delays, guesses = Stationary((0.0, 0.0, 0.0)), (0, 1, 4), (None, 300.0, 20.0)
     monkeypatch.setattr(onset, "BatchSimulation", lambda *_parts: StandInLoop())
@@ -390,7 +384,7 @@ def test_joint_search_over_delays_equals_separate_searches(
         find_onset(SURFACE, PLANT, HAND, Servo(1e-3, d), still, starts=24, near=guess)
         for d, guess in zip(delays, guesses, strict=True)
     ]
-    loop = StandInLoop(vectorized, times=3)
+    loop = StandInLoop(times=3)
     monkeypatch.setattr(onset, "BatchSimulation", lambda *_parts: loop)
     finished: list[int] = []
     onsets = find_onsets(
@@ -408,9 +402,9 @@ def test_joint_search_over_delays_equals_separate_searches(
     assert len(finished) == 3
     assert len({result.cycling for result in onsets}) == 3
     first, *_ = loop.together
-    # First one start of each delay; in vectorized batches others fill the lanes.
+    # First one start of each delay.
     assert sorted(start.delay for start in first if start.shift == 0.0) == list(delays)
-    assert len(first) == (LANES if vectorized else 3)
+    assert len(first) == 3
 
 
 @pytest.mark.usefixtures("stand_in_runs")

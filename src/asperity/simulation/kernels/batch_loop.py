@@ -1,9 +1,8 @@
 """The closed loop of several runs at once: one surface, body and servo from several starts.
 
 Stiffness, delay and progress of the runs may differ. In each sample all runs tick, and then all
-bodies advance: one after the other, unless the body's module provides ``advance_lanes``. Each run
-equals its run alone, bit for bit. No trace is written: a few sums are enough to detect a limit
-cycle.
+bodies advance. Each run equals its run alone, bit for bit. No trace is written: a few sums are
+enough to detect a limit cycle.
 """
 
 from asperity.core.compiled import FloatArray, IntArray, Kernels, local_array
@@ -21,7 +20,7 @@ from asperity.simulation.kernels.body_interface import (
 from asperity.simulation.kernels.energy_ledger import FRICTION, LOST, SUPPLIED
 from asperity.simulation.kernels.simulated_device import flush_subnormals
 
-KERNELS = Kernels(provides=("advance_lanes", "lane_input"), loops=("simulate_lanes",))
+KERNELS = Kernels(loops=("simulate_lanes",))
 
 # Numbers of a servo's state.
 SERVO_STATE_SIZE = 12

@@ -12,7 +12,7 @@ from asperity.core.checks import FloatArray
 RUNNING, DIVERGED, LEFT_WORKSPACE = 0, 1, 2
 # Columns of the progress of several runs: stop reason and samples done.
 STOP, SAMPLES = 0, 1
-# Largest number of runs that advance together, the width of vectorized loops.
+# Largest number of runs that advance together.
 LANES = 8
 
 

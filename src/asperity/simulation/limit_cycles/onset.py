@@ -221,7 +221,7 @@ def find_onsets(
                 return batch.new_trajectory(stiffness, delays[number], offsets[start], rule)
 
             bracketing = bracket_onset(lowest, highest, width, nears[number])
-            return OnsetSearch(trajectory, len(offsets), bracketing, batch.is_vectorized, progress)
+            return OnsetSearch(trajectory, len(offsets), bracketing, progress)
 
         searches = {number: search(number) for number in numbers}
         for number in run_searches(batch, searches):

@@ -165,17 +165,16 @@ class OnsetSearch:
         start: returns the trajectory of a start, by number, at a stiffness [N/m].
         count: number of starts.
         bracketing: yields stiffnesses, receives whether any start cycles, returns the bracket.
-        speculative: whether to run starts that may not be needed, if lanes are free.
         progress: called after every stiffness.
     """
 
     def __init__(
         self, start: Callable[[float, int], Trajectory], count: int,
-        bracketing: Generator[float, bool, tuple[float, float]], speculative: bool,
+        bracketing: Generator[float, bool, tuple[float, float]],
         progress: Callable[[], None] | None,
     ) -> None:  # fmt: skip
-        self._start, self._count, self._bracketing = start, count, bracketing
-        self._speculative, self._progress = speculative, progress
+        self._start, self._count = start, count
+        self._bracketing, self._progress = bracketing, progress
         self._results: dict[tuple[float, int], tuple[bool, FloatArray]] = {}
         self._running: dict[tuple[float, int], Trajectory] = {}
         # The selection does not change until a run ends.
@@ -198,7 +197,7 @@ class OnsetSearch:
         new = list(islice((key for key in keys if key not in self._results), LANES))
         # The first one runs alone: if it cycles, the others are not needed.
         alone = self._bracket is None and new[0] == keys[0]
-        for key in new[: 1 if alone and not self._speculative else None]:
+        for key in new[: 1 if alone else None]:
             if key not in self._running:
                 self._running[key] = self._start(*key)
         running = [key for key in new if key in self._running]
