@@ -365,7 +365,9 @@ def comparison_assumptions(
         defaults: whether max_depth and speed are defaults.
     """
     first = rows[0].surface
-    texture = next((row.perceptibility for row in rows if row.perceptibility is not None), None)
+    assessed = [row.perceptibility for row in rows if row.perceptibility is not None]
+    # Laws differ in their waves, and the wall has none: one extrapolated law is enough to report.
+    texture = max(assessed, key=lambda one: one.extrapolated, default=None)
     rendered = [text for row in rows for text in rendering_sentences(row.surface)]
     searched = [row.rendering.sentence(row.law) for row in rows]
     steps = dict.fromkeys((*first.texture.preparation, *rendered))
