@@ -259,6 +259,51 @@ def test_invalid_preparation_options_name_the_option(
     assert options[0].removeprefix("--").replace("-", "_") in err
 
 
+LOOSE_GRIP = """stiffness = "0 N/m"
+damping = "2 N*s/m"
+mass = "0 g"
+[thresholds]
+points = [
+    { frequency = "10 Hz", unnoticed = "1 um", felt = "2 um" },
+    { frequency = "500 Hz", unnoticed = "0.1 um", felt = "0.2 um" },
+]
+"""
+
+
+@pytest.mark.parametrize("command", ["compare", "limits"])
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--speed", "0 m/s"], "speed must be positive [m/s], got 0.0"),
+        (["--speed=-0.1m/s"], "speed must be positive [m/s], got -0.1"),
+        (["--grip", "{grip}"], "stiffness must be positive [N/m], got 0.0"),
+        (["--set", "apparent_mass=0g"], "apparent_mass must be positive"),
+        (["--set", "apparent_mass=-45g"], "apparent_mass must be positive"),
+        (["--set", "damping=-0.5N*s/m"], "damping must be positive"),
+    ],
+)
+def test_zero_speeds_loose_grips_and_negative_masses_are_refused(
+    call: Call, tmp_path: Path, command: str, options: list[str], message: str
+) -> None:
+    grip, page = tmp_path / "grip.toml", tmp_path / "page.html"
+    grip.write_text(LOOSE_GRIP, "utf-8")
+    given = [one.format(grip=grip) for one in options]
+    code, out, err = call(command, SPEC, *given, "--html", str(page))
+    assert (code, out, page.exists()) == (2, "", False)
+    assert message in " ".join(err.split())
+    grip.write_text(LOOSE_GRIP.replace('"0 N/m"', '"1 N/m"'), "utf-8")
+    assert call(command, SPEC, "--grip", str(grip))[0] == 0
+
+
+def test_thresholds_beyond_their_frequencies_are_named_for_all_laws(call: Call) -> None:
+    """A wave of 0.1 mm at 0.1 m/s is at 1000 Hz; the thresholds end at 500 Hz."""
+    for speed, is_beyond in (("0.1m/s", True), ("0.02m/s", False)):
+        spec = "sinusoid:amplitude=20um,period=0.1mm"
+        code, out, _err = call("compare", spec, "--speed", speed, "--set", "update_rate=20kHz")
+        assert code == 0
+        assert ("thresholds are extrapolated" in " ".join(out.split())) is is_beyond
+
+
 def test_help_and_version_are_printed(call: Call) -> None:
     code, out, _err = call("--help")
     assert code == 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -113,6 +114,29 @@ PEN_FILE = Path(__file__).parents[2] / "src/asperity/perception/grips/pen_grip.t
 def test_wrong_grips_are_refused(change: dict[str, object], message: str) -> None:
     with pytest.raises(ParameterError, match=message):
         parse_grip(TABLE | change, "mine.toml")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"stiffness": 0.0}, r"grip mine: stiffness must be positive \[N/m\], got 0.0"),
+        ({"stiffness": math.inf}, "stiffness must be positive"),
+        ({"damping": math.nan}, "damping must be at least 0"),
+        ({"mass": -1e-9}, r"mass must be at least 0 \[kg\]"),
+        ({"frequency": (math.nan, 100.0)}, "ascending frequencies"),
+        ({"frequency": (10.0, 100.0, 200.0)}, "0 < unnoticed <= felt"),
+        ({"felt": (1e-6, math.nan)}, "0 < unnoticed <= felt"),
+    ],
+)
+def test_grip_of_zero_stiffness_is_refused_in_python_too(
+    change: dict[str, Any], message: str
+) -> None:
+    """A slow force would move such a hand without end, and NaN would read as "not felt"."""
+    levels = {"frequency": (10.0, 100.0), "unnoticed": (1e-7, 1e-8), "felt": (1e-7, 1e-7)}
+    numbers: dict[str, Any] = {"stiffness": 5e-324, "damping": 0.0, "mass": 0.0, **levels}
+    Grip("mine", **numbers, sources={})
+    with pytest.raises(ParameterError, match=message):
+        Grip("mine", **(numbers | change), sources={})
 
 
 def test_unknown_grip_is_refused_with_the_nearest() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -27,7 +28,8 @@ _POINT_UNITS = {"frequency": "Hz", "unnoticed": "m", "felt": "m"}
 class Grip(Serializable):
     """The hand that holds the tool.
 
-    Its impedance is Z(ω) = jωm + b + K/(jω), the same in all directions.
+    Its impedance is Z(ω) = jωm + b + K/(jω), the same in all directions. Without a stiffness a slow
+    force would move the hand without end.
 
     Attributes:
         name: name for reading.
@@ -38,6 +40,10 @@ class Grip(Serializable):
         unnoticed: amplitude of a sinusoidal motion of the tool that nobody notices below [m].
         felt: amplitude that is felt [m]; in between it depends on the person.
         sources: source of each number by name.
+
+    Raises:
+        ParameterError: for a stiffness that is not positive, negative damping or mass, or
+            thresholds without two ascending frequencies and 0 < unnoticed <= felt.
     """
 
     name: str
@@ -48,6 +54,23 @@ class Grip(Serializable):
     unnoticed: tuple[float, ...]
     felt: tuple[float, ...]
     sources: Mapping[str, str]
+
+    def __post_init__(self) -> None:
+        for name, unit in _UNITS.items():
+            number, above = getattr(self, name), name == "stiffness"
+            if not 0.0 <= number < math.inf or (above and number == 0.0):
+                least = "positive" if above else "at least 0"
+                raise ParameterError(
+                    "grip", f"{self.name}: {name} must be {least} [{unit}]", number
+                )
+        ordered = all(a < b for a, b in pairwise(self.frequency))
+        if len(self.frequency) < 2 or not ordered or not self.frequency[0] > 0.0:
+            needs = "thresholds need two or more ascending frequencies"
+            raise ParameterError("grip", f"{self.name}: {needs}")
+        sizes = {len(self.frequency), len(self.unnoticed), len(self.felt)}
+        levels = zip(self.unnoticed, self.felt, strict=False)
+        if len(sizes) > 1 or any(not 0.0 < low <= high for low, high in levels):
+            raise ParameterError("grip", f"{self.name}: thresholds need 0 < unnoticed <= felt")
 
     def threshold(self, frequency: FloatArray | float) -> tuple[FloatArray, FloatArray]:
         """Return the thresholds at frequencies [Hz]: amplitudes unnoticed and felt [m].
@@ -138,9 +161,6 @@ def parse_grip(table: Mapping[str, Any], source: str) -> Grip:
             raise ParameterError("grip", f"{source} needs {name} [{unit}]")
         numbers[name] = parse_quantity(f"{name} of the grip", entry["value"], unit)
         sources[name] = str(entry.get("source", source))
-        if numbers[name] < 0.0 or (name == "stiffness" and numbers[name] == 0.0):
-            least = "positive" if name == "stiffness" else "at least 0"
-            raise ParameterError("grip", f"{source}: {name} must be {least}", entry["value"])
     thresholds = table.get("thresholds", {})
     sources["thresholds"] = str(thresholds.get("source", source))
     frequency, unnoticed, felt = _parse_points(thresholds.get("points", ()), source)
@@ -155,7 +175,7 @@ def parse_grip(table: Mapping[str, Any], source: str) -> Grip:
 
 
 def _parse_points(points: Sequence[Mapping[str, Any]], source: str) -> list[tuple[float, ...]]:
-    """Return frequencies, unnoticed and felt amplitudes, checked."""
+    """Return frequencies, unnoticed and felt amplitudes."""
     try:
         columns = [
             tuple(parse_quantity(name, point[name], unit) for point in points)
@@ -164,12 +184,6 @@ def _parse_points(points: Sequence[Mapping[str, Any]], source: str) -> list[tupl
     except (KeyError, TypeError):
         needs = ", ".join(_POINT_UNITS)
         raise ParameterError("grip", f"{source}: each threshold needs {needs}") from None
-    frequency, unnoticed, felt = columns
-    ordered = all(a < b for a, b in pairwise(frequency))
-    if len(frequency) < 2 or not ordered or frequency[0] <= 0.0:
-        raise ParameterError("grip", f"{source}: thresholds need two or more ascending frequencies")
-    if any(not 0.0 < low <= high for low, high in zip(unnoticed, felt, strict=True)):
-        raise ParameterError("grip", f"{source}: thresholds need 0 < unnoticed <= felt")
     return columns
 
 

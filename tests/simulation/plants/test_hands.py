@@ -14,6 +14,7 @@ from asperity.simulation import (
     PrescribedHand,
     Run,
     Servo,
+    SpringHand,
     Stationary,
     Strokes,
     Waypoints,
@@ -113,3 +114,19 @@ def test_energy_ledger_of_a_mass_on_a_band_closes(
     assert not run.stop_message
     assert abs(run.ledger.closure) < 1e-9 * run.ledger.exchanged
     assert (run.ledger.friction < 0.0) == (friction > 0.0)
+
+
+def test_hand_of_zero_stiffness_leaves_a_free_mass() -> None:
+    """Above the wall, with no spring: p = f t²/2m, and the whole work of the hand is kinetic."""
+    pull, mass, time = np.array([0.3, -0.2, 0.1]), 0.05, 0.4
+    run = run_of(
+        hand=SpringHand(stiffness=0.0, force=pull),
+        plant=Cartesian(mass),
+        motion=Stationary((0.0, 0.0, 5e-3)),
+        duration=time,
+    )
+    np.testing.assert_allclose(
+        run.state[:3], [0.0, 0.0, 5e-3] + pull * time**2 / (2.0 * mass), rtol=1e-12
+    )
+    energy = 0.5 * mass * float(np.square(pull * time / mass).sum())
+    assert run.ledger.hand == pytest.approx(energy, rel=1e-12)
