@@ -150,6 +150,28 @@ def test_result_is_independent_of_the_block_size(monkeypatch: pytest.MonkeyPatch
     assert compute_parameters(heights, (1e-6, 2e-6)) == pytest.approx(whole, rel=1e-11)
 
 
+@pytest.mark.parametrize(
+    ("limit", "sizes"),
+    [
+        (6, [3, 3, 3, 1]),
+        (8, [3, 3, 3, 1]),
+        (5, [2] * 6 + [1]),
+        (3, [2] * 6 + [1]),
+        (1, [2] * 6 + [1]),
+    ],
+)
+def test_blocks_of_a_tall_map_are_whole_rows(
+    monkeypatch: pytest.MonkeyPatch, limit: int, sizes: list[int]
+) -> None:
+    """As many rows as fit into a block, at least one; with the first row of the next as overlap."""
+    rows = np.arange(21.0).reshape(7, 3)
+    monkeypatch.setattr(module, "_BLOCK", limit)
+    blocks = list(module._row_blocks(rows, overlap=1))
+    assert [len(block) for block in blocks] == sizes
+    assert np.concatenate([block[: max(1, limit // 3)] for block in blocks]) == pytest.approx(rows)
+    assert all(block.base is rows or block.base is rows.base for block in blocks)
+
+
 def test_undefined_parameters_are_none() -> None:
     flat = compute_parameters(np.full((5, 6), 0.1), (1e-6, 1e-6))
     assert (flat["Sq"], flat["Sz"], flat["Sdr"]) == (0.0, 0.0, 0.0)

@@ -242,6 +242,21 @@ def test_oversized_archives_are_refused(saved: Path, monkeypatch: pytest.MonkeyP
         load_prepared(saved)
 
 
+def test_archive_of_the_greatest_surface_is_not_oversized(
+    saved: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Heights of 8 bytes and a mask of one byte for each point, and 64 MiB for everything else."""
+    size = 2**27 * 8 + 2**27 + 64 * 1024**2
+    for excess in (0, 1):
+        whole = zipfile.ZipInfo("heights.npy")
+        whole.file_size = size + excess
+        monkeypatch.setattr(zipfile.ZipFile, "infolist", lambda _archive, whole=whole: [whole])
+        if not excess:
+            assert load_prepared(saved).heights.shape == (30, 40)
+    with pytest.raises(SurfaceFileError, match=f"unpacks to {size + 1} bytes; at most {size}"):
+        load_prepared(saved)
+
+
 def test_rewritten_copy_is_accepted(saved: Path) -> None:
     assert_same(load_prepared(rewrite_file(saved)), load_prepared(saved))
 

@@ -338,3 +338,32 @@ def test_no_ridge_is_found_where_the_closest_point_is_continuous() -> None:
     early = replace(crest, radius=0.5 * RADIUS, centre=middle)
     assert module._Ridge(WAVE, early).descend(0.9 * RADIUS) is None
     assert module._Ridge(WAVE, crest).descend(1.1 * RADIUS) is not None
+
+
+class ThreePoints:
+    """A surface of three points, which is all that the search for a ridge asks of a texture.
+
+    Its medial axis below the first two is the line x = 0; a second ridge, with a greater jump of
+    the closest point, is at ``offset``.
+    """
+
+    def __init__(self, offset: float) -> None:
+        self.points = 1e-3 * np.array([[-0.1, 0, 0], [0.1, 0, 0], [2.0 * offset - 0.1, 0, 0]])
+
+    def nearest(self, probes: Any) -> Any:
+        distances = np.linalg.norm(np.asarray(probes)[:, None] - self.points, axis=2)
+        return self.points[np.argmin(distances, axis=1)]
+
+
+@pytest.mark.parametrize("run", [0.0, 0.2, -0.2])
+def test_ridge_is_bracketed_within_twice_the_step(run: float) -> None:
+    """The ridge is near the end of the step: a greater jump farther away is another ridge."""
+    ridge: Any = object.__new__(module._Ridge)
+    ridge.texture = ThreePoints(offset=2.5 * abs(run) or 0.4)
+    ridge.extent, ridge.wavelength = 1e-3, 2e-3
+    ridge.position, ridge.across = np.array([0.0, 0.0, -2e-3]), np.array([1.0, 0.0, 0.0])
+    ridge._update_direction(np.array([0.0, 0.0, 1.0]))
+    pair = ridge._advance(1e-3 * run)
+    assert pair is not None
+    assert abs(pair.mean(axis=0)[0]) <= np.linalg.norm(pair[1] - pair[0]) <= 1e-14
+    assert ridge.depth == pytest.approx(1e-3 * math.hypot(2.0 + run, 0.1), rel=1e-9)
