@@ -49,8 +49,9 @@ TEXTURES: dict[str, Callable[[], Texture]] = {
 
 def pytest_configure(config: pytest.Config) -> None:
     """Use a cache of the test suite, in ``.pytest_cache``, instead of the user's cache."""
-    if config.cache is not None and "ASPERITY_CACHE_DIR" not in os.environ:
-        os.environ["ASPERITY_CACHE_DIR"] = str(config.cache.mkdir("asperity"))
+    cache = getattr(config, "cache", None)  # missing with -p no:cacheprovider
+    if cache is not None and "ASPERITY_CACHE_DIR" not in os.environ:
+        os.environ["ASPERITY_CACHE_DIR"] = str(cache.mkdir("asperity"))
 
 
 def pytest_collection_finish() -> None:
