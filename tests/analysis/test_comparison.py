@@ -286,6 +286,9 @@ def test_a_surface_larger_than_the_workspace_is_named() -> None:
     assert "The surface is 500 mm long and the workspace 120 mm" in text
     narrow = asp.Profile(2e-4 * np.sin(2 * np.pi * x[:161] / 2e-3), 0.5 / 1000)
     assert "workspace" not in asp.compare(narrow, rig, "C").recommendation
+    text = asp.compare(asp.Sinusoid(2e-3, 0.2), rig, "C").recommendation
+    assert "A period is 200 mm long and the workspace 100 mm" in text
+    assert "workspace" not in asp.compare(asp.Sinusoid(2e-3, 0.09), rig, "C").recommendation
 
 
 def test_loss_of_contact_names_the_depth_that_keeps_it() -> None:

@@ -179,17 +179,15 @@ def _contact_loss_text(row: LawRow) -> str:
 
 
 def _size_text(row: LawRow, device: Device) -> str:
-    """Return a warning where the surface is larger than the workspace, and what fits."""
+    """Return a warning where surface or period are larger than the workspace, and what fits."""
     domain = row.surface.texture.domain
-    sides = [device.value("workspace_diameter"), device.value("workspace_length")]
-    widths = [2.0 * (device.value("workspace_radius") or 0.0), *filter(None, sides)]
-    size, room = float(np.hypot(*domain.spans.T).max()), max(widths)
-    if domain.periodic or not 0.0 < room < size:
+    size, room = float(np.hypot(*domain.spans.T).max()), device.workspace_size
+    if size <= room:
         return ""
     length, width = format_quantity(size, "m"), format_quantity(room, "m")
-    factor = round_down(room / size, 2)
+    factor, whole = round_down(room / size, 2), "A period" if domain.periodic else "The surface"
     return (
-        f"The surface is {length} long and the workspace {width}: only a part can be touched, "
+        f"{whole} is {length} long and the workspace {width}: only a part can be touched, "
         f"or all of it magnified {factor:g} times more."
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -147,6 +148,13 @@ class Device(Serializable, Displayable):
     def value(self, field: str) -> float | None:
         """Return a number in SI units, ``None`` if it is unknown."""
         return self.data[field].value if field in self.data else None
+
+    @property
+    def workspace_size(self) -> float:
+        """Greatest known width of the workspace [m]; infinite if it is unknown."""
+        sides = [self.value("workspace_diameter"), self.value("workspace_length")]
+        widths = [2.0 * (self.value("workspace_radius") or 0.0), *filter(None, sides)]
+        return max(widths) or math.inf
 
     @property
     def wall_test(self) -> WallTest | None:

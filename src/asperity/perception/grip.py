@@ -63,8 +63,8 @@ class Grip(Serializable):
                 raise ParameterError(
                     "grip", f"{self.name}: {name} must be {least} [{unit}]", number
                 )
-        ordered = all(a < b for a, b in pairwise(self.frequency))
-        if len(self.frequency) < 2 or not ordered or not self.frequency[0] > 0.0:
+        rises = (a < b for a, b in pairwise((0.0, *self.frequency)))
+        if len(self.frequency) < 2 or not all(rises):
             needs = "thresholds need two or more ascending frequencies"
             raise ParameterError("grip", f"{self.name}: {needs}")
         sizes = {len(self.frequency), len(self.unnoticed), len(self.felt)}
@@ -153,7 +153,8 @@ def parse_grip(table: Mapping[str, Any], source: str) -> Grip:
     if unknown := set(table) - {*_UNITS, "thresholds", "id", "name"}:
         names = ", ".join(sorted(unknown))
         raise ParameterError("grip", f"{source} has unknown keys: {names}")
-    numbers, sources = {}, {}
+    numbers: dict[str, Any] = {}
+    sources = {}
     for name, unit in _UNITS.items():
         entry = table.get(name)
         entry = entry if isinstance(entry, Mapping) else {"value": entry}
@@ -163,28 +164,20 @@ def parse_grip(table: Mapping[str, Any], source: str) -> Grip:
         sources[name] = str(entry.get("source", source))
     thresholds = table.get("thresholds", {})
     sources["thresholds"] = str(thresholds.get("source", source))
-    frequency, unnoticed, felt = _parse_points(thresholds.get("points", ()), source)
-    return Grip(
-        name=str(table.get("name", source)),
-        frequency=frequency,
-        unnoticed=unnoticed,
-        felt=felt,
-        sources=sources,
-        **numbers,
-    )
+    points = _parse_points(thresholds.get("points", ()), source)
+    return Grip(name=str(table.get("name", source)), sources=sources, **numbers, **points)
 
 
-def _parse_points(points: Sequence[Mapping[str, Any]], source: str) -> list[tuple[float, ...]]:
-    """Return frequencies, unnoticed and felt amplitudes."""
+def _parse_points(points: Sequence[Mapping[str, Any]], source: str) -> dict[str, Any]:
+    """Return frequencies, unnoticed and felt amplitudes by name."""
     try:
-        columns = [
-            tuple(parse_quantity(name, point[name], unit) for point in points)
+        return {
+            name: tuple(parse_quantity(name, point[name], unit) for point in points)
             for name, unit in _POINT_UNITS.items()
-        ]
+        }
     except (KeyError, TypeError):
         needs = ", ".join(_POINT_UNITS)
         raise ParameterError("grip", f"{source}: each threshold needs {needs}") from None
-    return columns
 
 
 def grip_text(grip: Grip) -> str:

@@ -22,11 +22,13 @@ from asperity.analysis.limits.perceptibility_sentences import (
 )
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
-from asperity.devices import Device, parse_device
+from asperity.devices import Device, device_names, load_device, parse_device
 from asperity.devices.device import Datum
 from asperity.perception.grip import Grip, load_grip
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Sinusoid
+from asperity.textures.catalogue import as_texture
+from asperity.textures.synthetic import prepare_texture
 from asperity.textures.texture import TexturePart
 
 RMS = 1.0 / math.sqrt(2.0)
@@ -273,7 +275,8 @@ def test_sentences_name_the_motion_and_the_remedies() -> None:
 def test_says_so_where_no_remedy_helps() -> None:
     """A stiff contact law with steps of the force above all that magnifying 1 mm gives."""
     result = replace(assess_wave(1e-7, device()), remedies=())
-    assert remedies_text(result) == "No magnification, speed or finer device alone makes it felt."
+    text = "No magnification within the workspace, speed or finer device alone makes it felt."
+    assert remedies_text(result) == text
     assert remedies_text(assess_wave(1e-4, device())) == ""
 
 
@@ -288,14 +291,14 @@ def test_compare_and_limits_give_the_same_perceptibility() -> None:
 
 
 def test_imperceptible_laws_are_not_recommended() -> None:
-    result = compare(Sinusoid(1e-8, 1e-3), "touch")
+    result = compare(Sinusoid(1e-7, 1e-3), "touch")
     assert result.recommended == ""
     sound = [row for row in result.rows if row.conservative and row.continuous]
     assert result.nearest_row is max(sound, key=lambda row: row.resolved_force)
     assert result.recommendation.startswith("Nothing of this texture will be felt")
     assert "magnify" in result.recommendation
     # limits() uses the law nearest to being felt.
-    assert limits(Sinusoid(1e-8, 1e-3), "touch").surface.law is result.nearest_row.law
+    assert limits(Sinusoid(1e-7, 1e-3), "touch").surface.law is result.nearest_row.law
 
 
 def test_laws_continuous_at_every_depth_are_preferred() -> None:
@@ -328,6 +331,52 @@ def test_thresholds_beyond_their_frequencies_are_reported(
         assert perceptibility is not None
         assert perceptibility.extrapolated is extrapolates
         assert ("thresholds are extrapolated" in " ".join(result.assumptions)) is extrapolates
+
+
+def test_wave_longer_than_the_workspace_is_not_felt() -> None:
+    """4 µm on 8 m, at 13 mHz: a wave that no stroke passes through, only extrapolated as felt."""
+    width = 0.15
+    for period, tier in ((8.0, "not felt"), (1.001 * width, "not felt"), (0.999 * width, "felt")):
+        result = assess_wave(4e-3 * period / 8.0, device(workspace_radius=width / 2.0), period)
+        assert result.tier == tier
+        assert assess_wave(4e-3 * period / 8.0, device(), period).tier == "felt"
+
+
+@pytest.mark.parametrize("name", device_names())
+def test_wood_is_felt_on_every_device_of_the_catalogue(name: str) -> None:
+    """At three times its size; the wall test that the 2diy lacks is given."""
+    own_device = load_device(name)
+    if own_device.wall_test is None:
+        stable = Datum(1000.0, "N/m", "assumed", verified=True)
+        own_device = replace(own_device, data={**own_device.data, "max_stiffness": stable})
+    wood = prepare_texture(as_texture("wood"), magnify=3.0)
+    row = compare(wood, own_device, "H", rendering="search").row("H")
+    assert row.perceptibility is not None
+    assert row.perceptibility.tier == "felt"
+
+
+@pytest.mark.parametrize("make", ["wave", "map"])
+def test_magnification_stays_within_the_workspace(make: str) -> None:
+    """What is printed fits: one wave of an endless texture, the whole of a finite one."""
+    x = np.linspace(0.0, 0.9e-3, 40)
+    height = 1e-6 * np.sin(2.0 * np.pi / 0.2e-3 * x + 0.2 * np.arange(40)[:, None])
+    is_map = make == "map"
+    texture: Any = HeightMap(height, (x[1], x[1])) if is_map else Sinusoid(3e-9, 2e-3)
+    size = float(np.hypot(*texture.domain.spans.T).max())
+    surface = Surface(texture, "A", 1000.0)
+    rms = merit(surface).ripple * 1000.0
+
+    def magnification(own_device: Device) -> float | None:
+        part = TexturePart(texture)
+        found = assess_perceptibility(surface, own_device, part, rms=rms).remedies
+        return next((remedy.value for remedy in found if remedy.kind == "magnify"), None)
+
+    factor = magnification(device())
+    assert factor is not None
+    assert factor > 2.0
+    for room, is_printed in ((1.01, True), (0.99, False)):
+        own_device = device(workspace_diameter=room * factor * size)
+        assert (magnification(own_device) is not None) is is_printed
 
 
 @pytest.mark.parametrize(

@@ -88,7 +88,7 @@ class HandSpectrum(Serializable):
         motions: amplitudes of the motion of the held tool [m], shape (n,).
         unnoticed: amplitudes that nobody notices below [m], shape (n,).
         felt: amplitudes that are felt [m], shape (n,).
-        is_resolved: whether the device resolves the wave, shape (n,).
+        is_resolved: whether the device resolves the wave and is as wide, shape (n,).
         apparent_mass: of the device, or the assumed one [kg].
     """
 
@@ -112,7 +112,7 @@ class Perceptibility(Serializable):
         nesting_index: wavelength above which waves count as waviness [m]; ``None`` where nothing
             was removed.
         resolved: share of the texture force's variance in waves that the device resolves at this
-            speed: limits 1, 2, 3 and 6, as far as they can be decided.
+            speed: limits 1, 2, 3 and 6, as far as they can be decided, and the workspace's width.
         amplitude: √2 RMS of the resolved part [N].
         hand_motion: amplitude of the motion of the held tool, √2 RMS, of the resolved part [m].
         hand_force: amplitude of the force on the hand, √2 RMS, of the resolved part [N].
@@ -171,12 +171,14 @@ class WaveScan:
         components: amplitudes of the force along the wall and along its normal [N], shape (n, 2).
         grip: the hand.
         contact_stiffness: stiffness of the wall along its normal [N/m].
+        reach: width of the workspace [m]; longer waves are not felt as such.
     """
 
     case: LimitCase
     components: FloatArray
     grip: Grip
     contact_stiffness: float
+    reach: float = math.inf
 
     def magnified(self, factor: float) -> WaveScan:
         """Return the scan of the texture magnified in all directions, as deep in proportion."""
@@ -250,7 +252,7 @@ def assess_perceptibility(
         if (datum := device.data.get(name)) and not datum.verified and datum.source != USER_SOURCE
     }
     case = LimitCase(data, spectrum.wavelengths, scale * forces, spectrum.shares, **scan)
-    waves = WaveScan(case, scale * components, hand, surface.stiffness)
+    waves = WaveScan(case, scale * components, hand, surface.stiffness, device.workspace_size)
     result = classify_perceptibility(waves, doubtful, rms, texture_rms, part.nesting)
     if not find_remedies or result.tier == "felt" or texture_rms == 0.0:
         return result
@@ -262,9 +264,11 @@ def assess_perceptibility(
 def _is_felt_magnified(
     surface: Surface, device: Device, options: Mapping[str, Any], factor: float
 ) -> bool:
-    """Return whether the surface is felt and touched when its texture is magnified by a factor."""
+    """Return whether the surface, magnified by a factor, is felt, touched and within reach."""
     texture = prepare_texture(surface.texture, magnify=factor)
-    scaled = factor * surface.max_depth
+    domain, scaled = texture.domain, factor * surface.max_depth
+    if not domain.periodic and np.hypot(*domain.spans.T).max() > device.workspace_size:
+        return False
     depth = scaled if options["explicit_depth"] else default_max_depth(texture)
     larger = surface.to_texture(texture, depth)
     strokes, part = merit(larger), texture.texture_part()
@@ -355,6 +359,7 @@ def respond(waves: WaveScan) -> HandSpectrum:
     coarse = replace(case, time_samples=MIN_SAMPLES, position_samples=MIN_SAMPLES)
     resolved, sampled = (
         np.all([evaluate_limit(rule, one).holds for rule in _SAMPLING_RULES], axis=0)
+        & (case.wavelengths <= waves.reach)
         for one in (case, coarse)
     )
     step = case.device.get("force_resolution", 0.0)

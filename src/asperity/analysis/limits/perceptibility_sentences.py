@@ -91,7 +91,7 @@ def remedies_text(texture: Perceptibility) -> str:
     if texture.tier == "felt" or texture.texture_rms == 0.0:
         return ""
     if not texture.remedies:
-        return "No magnification, speed or finer device alone makes it felt."
+        return "No magnification within the workspace, speed or finer device alone makes it felt."
     return f"To feel it, {', or '.join(_remedy_text(remedy) for remedy in texture.remedies)}."
 
 
