@@ -122,6 +122,15 @@ def test_claims_that_do_not_hold(results: dict[str, Result], name: str) -> None:
     assert re.search(FAILS[name], results[name].evidence.summary), results[name].evidence.summary
 
 
+def test_energies_of_a_summary_are_its_numbers_in_millijoule(results: dict[str, Result]) -> None:
+    evidence = results["sentence-III.C-case-2"].evidence
+    printed = [float(text) for text in re.findall(r"[ABE] ([+-]\d+\.\d+)", evidence.summary)]
+    assert evidence.summary.endswith(" mJ")
+    gains = [1e3 * evidence.numbers[f"net gain of {law}"] for law in "ABE"]
+    assert printed == pytest.approx(gains, abs=6e-4)
+    assert max(gains) > 0.01
+
+
 def test_undecided_claims(results: dict[str, Result]) -> None:
     for name in UNDECIDED:
         assert results[name].verdict == "undecided"

@@ -19,7 +19,7 @@ from asperity.core.errors import ParameterError
 from asperity.surface import Surface
 from asperity.textures.kinds.fourier import Fourier
 from asperity.textures.kinds.sinusoid import Sinusoid
-from asperity.textures.spline.spline_texture import HeightMap
+from asperity.textures.spline.spline_texture import HeightMap, Profile
 
 K, A, L, D = 1000.0, 0.1e-3, 2e-3, 0.3e-3
 TEXTURE = Sinusoid(A, L, direction=(3.0, 4.0))
@@ -253,3 +253,12 @@ def test_upper_bound_is_per_period() -> None:
     energy = loop_work(surface, path)
     assert energy == pytest.approx(4.0 * loop.energy, rel=1e-6)
     assert loop.upper_per_period < energy <= 4.0 * loop.upper_per_period
+
+
+@pytest.mark.parametrize("periodic", [True, False])
+def test_mean_thrust_of_a_conservative_field_is_zero_over_a_period(periodic: bool) -> None:
+    """A finite line ends at another height than it begins: its mean force says nothing."""
+    x = np.arange(16) / 16
+    profile = Profile(A * np.sin(2 * np.pi * x + 0.4), L / 16, periodic=periodic)
+    loop = worst_loop(Surface(profile, "C", K, D))
+    assert (loop.energy, loop.thrust) == (0.0, 0.0 if periodic else None)
