@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,10 @@ from asperity.core.units import format_quantity
 from asperity.recording.recording import open_recording
 from asperity.recording.replay import replay
 from asperity.report.pictures.loop_pictures import recording_figure
+from asperity.scene.scene_file import load_scene
+from asperity.scene.setup import make_setup
 from asperity.servo.drivers import force_dimension, open_haptics
+from asperity.simulation import Servo
 
 COMMAND = "run"
 Call = Callable[..., tuple[int, str, str]]
@@ -62,6 +66,20 @@ def scene(tmp_path: Path) -> Callable[..., str]:
         return str(path)
 
     return write
+
+
+@pytest.mark.parametrize(
+    ("driver", "is_simulated"), [("simulated", True), ("replay:run.mcap", True), ("haply", False)]
+)
+def test_loop_adds_no_delay_and_steps_to_those_of_a_real_device(
+    scene: Callable[..., str], monkeypatch: pytest.MonkeyPatch, driver: str, is_simulated: bool
+) -> None:
+    loaded = make_setup(load_scene(scene(), None))
+    loaded = replace(loaded, servo=Servo(1e-3, 2, 50e-6, 5e-3))
+    monkeypatch.setattr(loop_setup, "load_setup", lambda *_args, **_options: loaded)
+    setup, servo = loop_setup.driver_setup("scene.toml", {}, driver)
+    assert servo == loaded.servo
+    assert setup.servo == (loaded.servo if is_simulated else Servo(1e-3))
 
 
 def test_run_prints_its_result_and_statistics(
