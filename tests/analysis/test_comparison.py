@@ -289,6 +289,9 @@ def test_a_surface_larger_than_the_workspace_is_named() -> None:
     text = asp.compare(asp.Sinusoid(2e-3, 0.2), rig, "C").recommendation
     assert "A period is 200 mm long and the workspace 100 mm" in text
     assert "workspace" not in asp.compare(asp.Sinusoid(2e-3, 0.09), rig, "C").recommendation
+    # A sum that never repeats has no end either.
+    endless = asp.Fourier([1e-4, 6e-5], [[628.0, 0.0], [628.0 * 2**0.5, 0.0]], [0.3, 1.1])
+    assert "workspace" not in asp.compare(endless, rig, "C").recommendation
 
 
 def test_loss_of_contact_names_the_depth_that_keeps_it() -> None:

@@ -182,7 +182,7 @@ def _size_text(row: LawRow, device: Device) -> str:
     """Return a warning where surface or period are larger than the workspace, and what fits."""
     domain = row.surface.texture.domain
     size, room = float(np.hypot(*domain.spans.T).max()), device.workspace_size
-    if size <= room:
+    if size <= room or not (domain.periodic or row.surface.texture.is_mirrored):
         return ""
     length, width = format_quantity(size, "m"), format_quantity(room, "m")
     factor, whole = round_down(room / size, 2), "A period" if domain.periodic else "The surface"

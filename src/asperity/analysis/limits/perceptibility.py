@@ -266,8 +266,8 @@ def _is_felt_magnified(
 ) -> bool:
     """Return whether the surface, magnified by a factor, is felt, touched and within reach."""
     texture = prepare_texture(surface.texture, magnify=factor)
-    domain, scaled = texture.domain, factor * surface.max_depth
-    if not domain.periodic and np.hypot(*domain.spans.T).max() > device.workspace_size:
+    size, scaled = np.hypot(*texture.domain.spans.T).max(), factor * surface.max_depth
+    if texture.is_mirrored and size > device.workspace_size:
         return False
     depth = scaled if options["explicit_depth"] else default_max_depth(texture)
     larger = surface.to_texture(texture, depth)
