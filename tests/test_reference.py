@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import map_coordinates
 
+from asperity.laws import Law
 from asperity.reference import exact_force, exact_jacobian
 from asperity.surface import Surface
 from asperity.textures import HeightMap, Profile, Sinusoid, Texture
@@ -109,6 +110,16 @@ def test_more_digits_give_the_same_force():
         )
         with mpmath.workdps(60):
             assert mpmath.norm(low_precision - high_precision) < 1e-19 * mpmath.norm(high_precision)
+
+
+def test_force_with_a_preload_is_zero_where_contact_begins():
+    """At depth 0 the probe touches without pressing, in the reference as in the kernel."""
+    law = Law("J", "step", "vertical", lambda c: c.k * (c.depth + 1e-4) * c.e_z)
+    surface = Surface(Sinusoid(1e-4, 2e-3), law, 1000.0)
+    for point, force in (([0.0, 0.0, 0.0], 0.0), ([0.0, 0.0, -1e-9], 0.1)):
+        (kernel,) = surface.force([point])
+        assert float(exact_force(surface, point)[2]) == pytest.approx(force, rel=1e-4)
+        assert kernel[2] == pytest.approx(force, rel=1e-4)
 
 
 def test_force_is_zero_outside():

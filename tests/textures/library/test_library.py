@@ -12,7 +12,13 @@ import asperity
 from asperity.core.errors import ParameterError
 from asperity.textures import HeightMap
 from asperity.textures.catalogue import CATALOGUE
-from asperity.textures.library import LIBRARY, NamedSurface, named_surface, surface_names
+from asperity.textures.library import (
+    LIBRARY,
+    NamedSurface,
+    named_surface,
+    random_surfaces,
+    surface_names,
+)
 from asperity.textures.library.random_surfaces import GRAIN_SIZES
 from asperity.textures.synthetic import low_pass
 
@@ -371,3 +377,17 @@ def test_limits_of_every_argument_give_finite_heights(name: str):
             except ParameterError:
                 continue
             assert np.isfinite(surface.heights).all()
+
+
+def test_grain_ends_within_its_sieve_to_the_sides_too() -> None:
+    """A grain covers 1.3 radii around its centre, whatever its facets are."""
+    for seed in range(5):
+        numbers = np.random.default_rng(seed).random(24)
+        numbers[:2] = 0.5
+        paper = np.full((random_surfaces._PAPER_NODES,) * 2, -np.inf)
+        random_surfaces._add_grain(paper, numbers)
+        reach = 1.3 * 0.5 * (0.75 + 0.5 * numbers[2]) * random_surfaces._NODES_PER_GRAIN
+        for axis in (0, 1):
+            covered = np.flatnonzero(np.isfinite(paper).any(axis=axis)) - 0.5 * len(paper)
+            assert reach - 1.0 <= -covered[0] <= reach + 1.0
+            assert reach - 1.0 <= covered[-1] <= reach + 1.0
