@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -45,6 +46,7 @@ from asperity.servo.calibration.test_rig import (
 from asperity.servo.drivers.driver import AWAY, RIGHT, TOWARDS, UP, surface_frame
 from asperity.servo.drivers.driver_registry import DRIVER_KINDS, hardware_driver
 from asperity.servo.drivers.simulated import simulated_driver
+from asperity.servo.fault import DeviceFault
 from asperity.servo.kernels.excitation import PUSHING, REST, WALL, Excitation
 from asperity.servo.safety import Safety
 from asperity.simulation import Cartesian, Pantograph, Servo, SpringHand, Stationary
@@ -210,6 +212,17 @@ def test_pushes_alternate_and_end_with_zero_force() -> None:
     assert (lengths.min(), lengths.max()) >= (5, 12)
     assert device.forces[-1] == (0.0, 0.0, 0.0)
     assert len(rows) == 400
+
+
+def test_fault_of_device_and_of_loop_are_described() -> None:
+    """The driver describes its own errors, the loop the others; the force ends at zero."""
+    lost = PythonDevice(lambda _k: (0.0, 0.0, 0.0), codes={("read", 40): 17})
+    wild = PythonDevice(lambda k: (math.nan if k > 40 else 0.0, 0.0, 0.0))
+    for device, words in ((lost, lost.describe_error(17)), (wild, "is not a number")):
+        bench = UnclockedRig(device, LOOP, Safety(ramp=0.0, max_slew=1e9))
+        with pytest.raises(DeviceFault, match=f"{re.escape(words)}; the force was made zero"):
+            bench.apply(make_excitation(PUSHING, 400, push_force=0.5, push_samples=10.0))
+        assert device.forces[-1] == (0.0, 0.0, 0.0)
 
 
 class RecordingRig:
