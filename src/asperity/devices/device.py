@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Literal
 
@@ -123,6 +123,7 @@ class Device(Serializable, Displayable):
         axes: directions of its own x, y and z; empty if unknown.
         driver: driver for ``--driver real``, such as ``haply``; empty if none is known.
         notes: further remarks, in sentences.
+        workspace_size: greatest known width of the workspace [m]; infinite if it is unknown.
 
     Example:
         >>> from asperity.devices import load_device
@@ -141,6 +142,12 @@ class Device(Serializable, Displayable):
     axes: str = ""
     notes: tuple[str, ...] = ()
     driver: str = ""
+    workspace_size: float = field(init=False, compare=False)
+
+    def __post_init__(self) -> None:
+        sides = [self.value("workspace_diameter"), self.value("workspace_length")]
+        widths = [2.0 * (self.value("workspace_radius") or 0.0), *filter(None, sides)]
+        object.__setattr__(self, "workspace_size", max(widths) or math.inf)
 
     def __repr__(self) -> str:
         return f"<Device {self.id}, {self.name}: {len(self.data)} numbers>"
@@ -148,13 +155,6 @@ class Device(Serializable, Displayable):
     def value(self, field: str) -> float | None:
         """Return a number in SI units, ``None`` if it is unknown."""
         return self.data[field].value if field in self.data else None
-
-    @property
-    def workspace_size(self) -> float:
-        """Greatest known width of the workspace [m]; infinite if it is unknown."""
-        sides = [self.value("workspace_diameter"), self.value("workspace_length")]
-        widths = [2.0 * (self.value("workspace_radius") or 0.0), *filter(None, sides)]
-        return max(widths) or math.inf
 
     @property
     def wall_test(self) -> WallTest | None:
