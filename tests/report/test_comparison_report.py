@@ -65,7 +65,7 @@ def test_recommendation_answers_the_questions_of_a_new_user(result: asp.Comparis
     missing = [question for question, words in checks.items() if words not in text]
     assert not missing
     # Ten times smaller, it would have to be 0.4 m long to be felt, on 0.15 m.
-    for height, cure in ((1e-7, "magnify it 39 times more"), (1e-8, "No magnification within")):
+    for height, cure in ((1e-7, "magnify it 41 times more"), (1e-8, "No magnification within")):
         faint = asp.compare(asp.Sinusoid(height, 1e-3), "touch", "CH").recommendation
         for words in ("Nothing of this texture will be felt", "moves the held tool", cure):
             assert words in faint
