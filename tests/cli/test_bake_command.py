@@ -48,7 +48,7 @@ def test_body_needs_a_unit_and_renders_its_side(tmp_path: Path) -> None:
     refused = call("bake", mesh, "--body", "-o", path)
     assert "unit" in str(refused.exception)
     assert not path.exists()
-    options = ["--unit", "mm", "--resolution", "0.25mm", "--max-depth", "0.5mm"]
+    options = ["--unit", "mm", "--resolution", "0.15mm", "--max-depth", "0.5mm"]
     result = call("bake", mesh, "--body", *options, "-o", path)
     assert result.exit_code == 0, result.output
     force = Surface(path, "H", 1000.0).force([[5e-3 - 0.4e-3, 0.0, 0.0]])[0]

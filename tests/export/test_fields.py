@@ -36,7 +36,7 @@ def bake(texture: Texture, resolution: float | None = None) -> Surface:
     """Return a surface with law H of a texture, baked coarsely unless a resolution is given."""
     low, high = texture.extremes
     depth = max(high - low, 1e-5)
-    return asp.bake(Surface(texture, "H", 800.0, max_depth=depth), resolution or 0.25 * depth)
+    return asp.bake(Surface(texture, "H", 800.0, max_depth=depth), resolution or 0.1 * depth)
 
 
 @pytest.mark.parametrize("flags", [("-O1",), ("-O3", "-march=native"), ("-O2", "-std=gnu99")])
@@ -188,7 +188,7 @@ def test_field_of_256_kb_on_a_microcontroller(tmp_path: Path) -> None:
     if missing is not None:
         pytest.skip(f"not run: no {missing} here")
     waves = asp.Fourier([1e-4, 6e-5], [[2000.0, 0.0], [0.0, 3000.0]], [0.3, 1.1])
-    surface = asp.bake(Surface(waves, "H", 800.0, max_depth=3e-4), 50e-6, max_gain=None)
+    surface = asp.bake(Surface(waves, "H", 800.0, max_depth=3e-4), 51e-6, max_gain=None)
     size = surface.texture.bytes
     assert 200_000 < size < 262_144
     firmware = build_firmware(surface, tmp_path)

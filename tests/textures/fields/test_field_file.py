@@ -54,7 +54,7 @@ DAMAGES: dict[str, tuple[Callable[[], bytes], str]] = {
     "header": (lambda: flip(60), "has a damaged header"),
     "cut": (lambda: content()[:-100], r"is cut: \d+ of \d+ bytes"),
     "cut header": (lambda: content()[:100], "is cut: it has no whole header"),
-    "version": (lambda: change_header(version=2), r"is a \.field file of version 2, of which 1"),
+    "version": (lambda: change_header(version=1), r"is a \.field file of version 1, of which 2"),
     "order": (lambda: change_header(byte_order=0x04030201), "has another byte order"),
     "count": (lambda: change_header(count=2**40), "has sections beyond its end"),
     "table": (lambda: change_header(rows=2**31, columns=2**31), "has sections beyond its end"),

@@ -17,42 +17,46 @@ SQUARE = [[0.1, 0.0], [0.0, 0.2]]
 
 
 def grid(steps: list[list[float]], cells: tuple[int, ...], border: int = PERIODIC) -> FieldGrid:
-    return FieldGrid(np.array(steps), cells, np.array([1e-3, 2e-3]), 6, 0.1, 5.0, border)
+    return FieldGrid(np.array(steps), cells, np.array([1e-3, 2e-3]), 6, 0.1, 5.0, 1, border)
 
 
-@pytest.mark.parametrize("margin", [0, 3])
+@pytest.mark.parametrize("fade", [0.0, 1e-4])
 @pytest.mark.parametrize("resolution", [0.7e-4, 1e-4, 3e-4, 1.0])
-def test_node_spacing_is_at_most_the_resolution(resolution: float, margin: int) -> None:
-    fitted = FieldGrid.fit(WAVE.domain, WAVE.extremes, 0.35e-3, resolution, margin)
+def test_node_spacing_is_at_most_the_resolution(resolution: float, fade: float) -> None:
+    fitted = FieldGrid.fit(WAVE.domain, WAVE.extremes, 0.35e-3, fade, resolution)
     along, rise = fitted.spacing
+    above = fitted.height(np.arange(fitted.levels)) > WAVE.extremes[1]
+    first_above = int(above.argmax())
     for spacing, length, count in (
         (along, 1e-3, fitted.cells[0]),
-        (rise, 0.55e-3, fitted.levels - 3 - margin),
+        (rise, 0.55e-3, first_above - fitted.below - 1),
     ):
         assert spacing <= resolution * (1 + 1e-12)
         assert count >= 4
         assert count == 4 or length / (count - 1) > resolution * (1 - 1e-12)
         assert spacing * count == pytest.approx(length, rel=1e-12)
-    # The floor is halfway between the two lowest levels; above the highest point are two levels
-    # and the margin.
-    low, next_one = fitted.height(0), fitted.height(1)
-    assert 0.5 * (low + next_one) == pytest.approx(-0.1e-3 - 0.35e-3, rel=1e-12)
-    first_above = fitted.levels - 2 - margin
-    above = fitted.height(np.arange(fitted.levels)) > WAVE.extremes[1]
-    np.testing.assert_array_equal(np.flatnonzero(above), np.arange(first_above, fitted.levels))
+    # The floor is halfway between two levels, above at least two cells and those of the fade.
+    around = fitted.height(fitted.below), fitted.height(fitted.below + 1)
+    assert 0.5 * sum(around) == pytest.approx(fitted.floor, rel=1e-12)
+    assert fitted.floor == pytest.approx(-0.1e-3 - 0.35e-3, rel=1e-12)
+    assert fitted.below == max(2, math.ceil(fade / rise))
+    # Above the highest point the levels reach the margin, in which the depth is negative.
+    assert fitted.margin == pytest.approx(2.75 * max(along, rise))
     assert fitted.height(first_above) == pytest.approx(0.1e-3 + 0.5 * rise, rel=1e-9)
+    highest = fitted.height(fitted.levels - 1)
+    assert 0.1e-3 + fitted.margin <= highest < 0.1e-3 + fitted.margin + 1.5 * rise
 
 
-def test_grid_of_a_closed_body_has_two_nodes_of_margin_around_its_box() -> None:
+def test_grid_of_a_closed_body_has_three_nodes_of_margin_around_its_box() -> None:
     lower, upper = np.array([-1.0, 2.0, 0.3]), np.array([0.5, 2.9, 1.27])
     fitted = FieldGrid.around(lower, upper, 0.1)
     assert fitted.border == ZERO
     assert fitted.spacing == pytest.approx((0.1, 0.1, 0.1), rel=1e-12)
     counts = np.array(fitted.node_counts) - 1
     first = np.array([*fitted.start, fitted.height(0)])
-    assert (lower - first > 0.1999).all()
-    assert (first + 0.1 * counts - upper > 0.1999).all()
-    assert (counts * 0.1 <= upper - lower + 0.5 + 1e-12).all()
+    assert (lower - first > 0.2999).all()
+    assert (first + 0.1 * counts - upper > 0.2999).all()
+    assert (counts * 0.1 <= upper - lower + 0.7 + 1e-12).all()
 
 
 def test_nodes_beyond_a_border_repeat_are_mirrored_or_missing() -> None:
@@ -64,42 +68,49 @@ def test_nodes_beyond_a_border_repeat_are_mirrored_or_missing() -> None:
     assert grid(SQUARE, (4, 5), MIRRORED).node_counts == (5, 6, 6)
 
 
-def test_columns_hold_only_what_is_between_their_first_and_last_potential() -> None:
-    """And the reach of a column is the greatest end among its neighbours and itself."""
+def test_columns_hold_only_what_is_inside_of_the_margin() -> None:
+    """And the reach of a column is the greatest end of positive depth around it."""
     fitted = grid(SQUARE, (5, 4), ZERO)
-    dense = np.zeros(fitted.node_counts, np.float32)
-    dense[2, 3, 1:4] = 1.0, 0.0, 2.0
-    dense[4, 0, :2] = 3.0
+    margin = fitted.margin
+    assert margin == pytest.approx(0.55)
+    dense = np.full(fitted.node_counts, -margin, np.float32)
+    dense[2, 3, 1:5] = 1.0, -0.3, 2.0, -0.5
+    dense[4, 0, :3] = 3.0, -0.4, -0.54
     arguments = fitted.arguments(dense)
     assert arguments.c.dtype == np.float32
-    assert sorted(arguments.c.tolist()) == [0.0, 1.0, 2.0, 3.0, 3.0]
+    # Of the margin a twentieth is cut off.
+    expected = margin + np.array([1.0, -0.3, 2.0, -0.5, 3.0, -0.4])
+    np.testing.assert_allclose(np.sort(arguments.c), np.sort(expected), rtol=1e-6)
     table = arguments.columns
     assert table.shape == (4 + 3, 5 + 3, 4)
     ends = np.zeros((7, 8))
-    ends[3 + 1, 2 + 1], ends[0 + 1, 4 + 1] = 4, 2
+    ends[3 + 1, 2 + 1], ends[0 + 1, 4 + 1] = 5, 2
     np.testing.assert_array_equal(table[..., END], ends)
     assert table[4, 3, FIRST] == 1
     reach = np.zeros((7, 8))
-    reach[0:3, 4:7], reach[3:6, 2:5] = 2, 4
+    reach[0:3, 4:7], reach[3:6, 2:5] = 1, 4
     np.testing.assert_array_equal(table[..., REACH], reach)
 
 
 def test_arguments_contain_the_position_of_the_first_node() -> None:
     fitted = grid(SQUARE, (4, 4), MIRRORED)
-    arguments = fitted.arguments(np.zeros((5, 5, 6), np.float32))
+    arguments = fitted.arguments(np.full((5, 5, 6), -1.0, np.float32))
     assert arguments.c.size == 0
     position = np.array([1e-3 + 0.25, 2e-3 + 0.3])
     rates = np.array([[arguments.m00, arguments.m01], [arguments.m10, arguments.m11]])
     place = rates @ (position - [arguments.x0, arguments.y0])
     np.testing.assert_allclose(place, [2.5, 1.5], rtol=1e-12)
-    assert arguments.z0 == pytest.approx(5.0 - 0.05)
+    assert arguments.z0 == pytest.approx(5.0 - 0.15)
+    assert arguments.below == 1
+    assert arguments.margin == pytest.approx(0.55)
     assert (arguments.levels, arguments.border) == (6, MIRRORED)
 
 
-def test_extending_down_moves_the_floor_and_keeps_the_upper_levels() -> None:
+def test_extending_down_keeps_the_floor_and_the_upper_levels() -> None:
     fitted = grid(SQUARE, (4, 4))
     deep = fitted.extend_down(3)
     assert deep.levels == fitted.levels + 3
+    assert (deep.floor, deep.below) == (fitted.floor, fitted.below + 3)
     np.testing.assert_allclose(
         deep.height(np.arange(3, deep.levels)), fitted.height(np.arange(fitted.levels)), rtol=1e-14
     )
@@ -110,13 +121,18 @@ def test_extending_down_moves_the_floor_and_keeps_the_upper_levels() -> None:
 
 @pytest.mark.parametrize("passes", [0, 1, 3])
 def test_error_bounds_by_hand(passes: int) -> None:
-    """Variances: a quarter of a squared step, as much for each pass, and a twelfth along it."""
+    """Variances: a quarter of a squared step, as much for each pass, and a quarter along it.
+
+    The slope of the depth grows by 2 (1/40 + 3/2040) 0.3/0.1 in a pass along each other axis.
+    """
     fitted = grid([[0.3, 0.0], [0.0, 0.2]], (4, 4))
     gradient, potential = fitted.error_bounds(2.0, passes)
     squares = np.array([0.09, 0.04, 0.01])
     spread = (0.25 + 0.25 * passes) * 0.14
-    assert potential == pytest.approx(0.5 * 2.0 * spread, rel=1e-12)
-    parts = 2.0 * np.sqrt(spread + squares / 12.0)
+    reach = (1.5 + passes) * math.sqrt(0.14)
+    assert potential == pytest.approx(max(1.5 * spread, reach * math.sqrt(spread)), rel=1e-12)
+    slope = (1.0 + 6.0 * (1.0 / 40.0 + 3.0 / 2040.0)) ** (2 * passes)
+    parts = 3.0 * (spread + squares / 4.0) / np.sqrt(squares) + slope * math.sqrt(spread)
     assert gradient == pytest.approx(math.sqrt(float(parts @ parts)), rel=1e-12)
 
 
@@ -125,8 +141,10 @@ def test_error_bounds_include_single_precision() -> None:
     rounding = 12.0 * 3.0 * 2.0**-24
     gradient, potential = fitted.error_bounds(1.0, 2, 3.0)
     exact_gradient, exact_potential = fitted.error_bounds(1.0, 2)
-    assert potential - exact_potential == pytest.approx(rounding, rel=1e-6)
-    assert 0.0 < gradient - exact_gradient <= 2.0 * rounding * math.sqrt(1 / 0.09 + 1 / 0.04 + 100)
+    assert potential - exact_potential == pytest.approx(3.0 * rounding, rel=1e-6)
+    slope = (1.0 + 6.0 * (1.0 / 40.0 + 3.0 / 2040.0)) ** 4
+    parts = rounding * (slope + 6.0 / np.array([0.3, 0.2, 0.1]))
+    assert 0.0 < gradient - exact_gradient <= math.sqrt(float(parts @ parts)) * (1.0 + 1e-6)
 
 
 def test_oblique_steps_increase_the_error_bound() -> None:
@@ -142,7 +160,7 @@ def test_oblique_steps_increase_the_error_bound() -> None:
 
 def test_grid_of_a_finite_map_starts_at_its_corner() -> None:
     texture = HeightMap(1e-5 * np.random.default_rng(0).normal(size=(9, 12)), 1e-4)
-    fitted = FieldGrid.fit(texture.domain, texture.extremes, 1e-4, 0.9e-4)
+    fitted = FieldGrid.fit(texture.domain, texture.extremes, 1e-4, 0.0, 0.9e-4)
     assert fitted.border == MIRRORED
     np.testing.assert_allclose(fitted.start, texture.domain.origin)
     ends = fitted.start + np.array(fitted.cells) @ fitted.steps

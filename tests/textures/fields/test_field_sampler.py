@@ -1,4 +1,4 @@
-"""The force kernels of a baked field against a B-spline of a dense array, evaluated plainly."""
+"""The force kernels of a baked field against half the square of a B-spline of a dense array."""
 
 from __future__ import annotations
 
@@ -21,18 +21,19 @@ AXES = [1, 2]
 
 
 def random_field(axes: int, border: int) -> tuple[FieldGrid, SingleArray, FieldArguments]:
-    """Return a grid of random potentials in columns of random ends, some of them empty."""
+    """Return a grid of random depths in columns of random ends, some of them empty."""
     rng = np.random.default_rng(10 * axes + border)
     cells = (7, 5)[:axes]
-    grid = FieldGrid(STEPS[:axes], cells, np.array([2e-5, -1e-5]), 9, 0.8e-5, -3e-5, border)
-    dense = rng.uniform(1e-10, 2e-10, grid.node_counts).astype(np.float32)
+    grid = FieldGrid(STEPS[:axes], cells, np.array([2e-5, -1e-5]), 12, 0.8e-5, -1.4e-5, 3, border)
+    dense = rng.uniform(1e-4, 3e-4, grid.node_counts).astype(np.float32)
     levels = np.arange(grid.levels)
     plane = grid.node_counts[:-1]
     first = rng.integers(0, 4, plane) if border == ZERO else np.zeros(plane, int)
     end = rng.integers(0, grid.levels - 1, plane)  # two levels are above every body
-    dense[(levels < first[..., None]) | (levels >= end[..., None])] = 0.0
-    dense[rng.uniform(size=dense.shape) < 0.1] = 0.0
-    return grid, dense, grid.arguments(dense)
+    outside = (levels < first[..., None]) | (levels >= end[..., None])
+    outside |= rng.uniform(size=dense.shape) < 0.1
+    dense[outside] = -np.float32(grid.margin)
+    return grid, dense, grid.arguments(dense)._replace(lift=0.7e-5)
 
 
 def basis(t: FloatArray, order: int) -> FloatArray:
@@ -78,12 +79,19 @@ def derivatives(
     rates[axes, 2] = 1.0 / grid.level_spacing
     nodes = (points - [*grid.start, grid.height(0)]) @ rates.T
     unit = np.eye(axes + 1, dtype=int)
-    value = dense_spline(grid, dense, nodes, (0,) * (axes + 1))
-    first = np.stack([dense_spline(grid, dense, nodes, tuple(row)) for row in unit], axis=-1)
+    coefficients = np.maximum(dense + grid.margin, 0.0).astype(float)  # summed in single precision
+    value = dense_spline(grid, coefficients, nodes, (0,) * (axes + 1)) - grid.margin
+    first = np.stack([dense_spline(grid, coefficients, nodes, tuple(row)) for row in unit], axis=-1)
     second = np.empty((len(points), axes + 1, axes + 1))
     for a, b in itertools.product(range(axes + 1), repeat=2):
-        second[:, a, b] = dense_spline(grid, dense, nodes, tuple(unit[a] + unit[b]))
-    return value, first @ rates, rates.T @ second @ rates
+        second[:, a, b] = dense_spline(grid, coefficients, nodes, tuple(unit[a] + unit[b]))
+    slope, inside = first @ rates, value > 0.0
+    hessian = slope[:, :, None] * slope[:, None] + value[:, None, None] * (rates.T @ second @ rates)
+    return (
+        np.where(inside, 0.5 * value**2, 0.0),
+        np.where(inside[:, None], value[:, None] * slope, 0.0),
+        np.where(inside[:, None, None], hessian, 0.0),
+    )
 
 
 def random_points(grid: FieldGrid, count: int) -> FloatArray:
@@ -107,63 +115,77 @@ def test_columns_equal_a_spline_of_the_dense_array(axes: int, border: int) -> No
         )
         dense = dense.copy()
         for axis in range(axes):
-            np.moveaxis(dense, axis, 0)[[0, 1, -2, -1]] = 0.0
+            np.moveaxis(dense, axis, 0)[[0, 1, -2, -1]] = -np.float32(grid.margin)
         arguments = grid.arguments(dense)
     value, slope, hessian = derivatives(grid, dense, points)
-    assert np.count_nonzero(value) > 50
+    assert np.count_nonzero(value) > (50 if border != ZERO else 4)
     found = np.array([kernels.field_expansion(*p, arguments) for p in points])
     gradient = np.array([kernels.field_gradient(*p, arguments) for p in points])
-    size, spacing = float(dense.max()), min(grid.spacing)
-    np.testing.assert_allclose(found[:, 0], value, atol=1e-14 * size)
-    np.testing.assert_allclose(gradient, slope, atol=1e-13 * size / spacing)
+    size, spacing = float(dense.max()) ** 2, min(grid.spacing)
+    np.testing.assert_allclose(found[:, 0], value, atol=1e-13 * size)
+    np.testing.assert_allclose(gradient, slope, atol=1e-12 * size / spacing)
     entries = hessian[:, [0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]]
-    np.testing.assert_allclose(found[:, 1:], entries, atol=1e-12 * size / spacing**2)
+    np.testing.assert_allclose(found[:, 1:], entries, atol=1e-11 * size / spacing**2)
 
 
 @pytest.mark.parametrize("border", [PERIODIC, MIRRORED])
 @pytest.mark.parametrize("axes", AXES)
-def test_field_continues_below_the_floor_with_the_curvature_of_the_wall(
-    axes: int, border: int
-) -> None:
-    """T(floor - d) = T + d |∂T/∂z| + d²/2, its slope along the plane continued linearly."""
+def test_field_below_the_floor_is_that_above_the_bottom(axes: int, border: int) -> None:
+    """T(floor - d) = T(floor - ψ) + g, by its definition with F = 6 spacings."""
     grid, dense, arguments = random_field(axes, border)
-    points = random_points(grid, 50)
-    points[:, 2] = grid.floor
-    value, slope, hessian = derivatives(grid, dense, points)
-    drop = 0.7e-5
-    below = points - [0.0, 0.0, drop]
+    points = random_points(grid, 300)
+    size, depth = 6.0 * grid.level_spacing, np.linspace(0.0, 9.0, 300) * grid.level_spacing
+    r = np.minimum(depth / size, 1.0)
+    rest = depth - size * r
+    points[:, 2] = grid.floor - size * (r - 0.5 * r * r)
+    value, slope, _hessian = derivatives(grid, dense, points)
+    below = points.copy()
+    below[:, 2] = grid.floor - depth
     found = np.array([kernels.field_expansion(*p, arguments) for p in below])
     gradient = np.array([kernels.field_gradient(*p, arguments) for p in below])
-    size, spacing = float(dense.max()), min(grid.spacing)
-    np.testing.assert_allclose(
-        found[:, 0], value - drop * slope[:, 2] + 0.5 * drop**2, atol=1e-14 * size
-    )
-    expected = slope - drop * np.column_stack([hessian[:, 0, 2], hessian[:, 1, 2], np.ones(50)])
-    np.testing.assert_allclose(gradient, expected, atol=1e-12 * size / spacing)
-    np.testing.assert_array_equal(found[:, 6], 1.0)
+    rate, lift = 1.0 - r, arguments.lift
+    added = size * r * r * (0.5 * lift + size * r * (0.5 - r / 8.0))
+    lower_slope = lift * r + size * (1.5 * r**2 - 0.5 * r**3)
+    inside, scale = value > 0.0, float(dense.max()) ** 2
+    assert 30 < np.count_nonzero(inside) <= 300
+    expected = np.where(inside, value + added + (lower_slope + 0.5 * rest) * rest, 0.0)
+    np.testing.assert_allclose(found[:, 0], expected, atol=1e-12 * scale)
+    slope[:, 2] = np.where(inside, rate * slope[:, 2] - lower_slope - rest, 0.0)
+    np.testing.assert_allclose(gradient, slope, atol=1e-11 * scale / min(grid.spacing))
+    # The second derivative along z is the difference of the slope, and 1 far below.
+    step = 1e-9
+    shift = np.array([0.0, 0.0, step])
+    ends = [
+        np.array([kernels.field_gradient(*p, arguments)[2] for p in below + sign * shift])
+        for sign in (1.0, -1.0)
+    ]
+    numeric = (ends[0] - ends[1]) / (2.0 * step)
+    assert np.quantile(np.abs(numeric - found[:, 6]), 0.95) < 1e-5
+    np.testing.assert_array_equal(found[(r == 1.0) & inside, 6], 1.0)
 
 
 def test_a_closed_body_has_no_force_beyond_its_last_node() -> None:
-    grid, _dense, arguments = random_field(2, ZERO)
+    grid, dense, arguments = random_field(2, ZERO)
     for u, v in ((-0.1, 2.0), (7.1, 2.0), (3.0, -0.1), (3.0, 5.1)):
         x, y = grid.positions(np.array([u, v]))
         assert kernels.field_gradient(x, y, 0.0, arguments) == (0.0, 0.0, 0.0)
         assert kernels.field_expansion(x, y, 0.0, arguments) == (0.0,) * 7
-    # Nor is its floor a wall.
+    # Nor is its floor a wall where the body ends above it.
     x, y = grid.positions(np.array([3.0, 2.0]))
-    assert kernels.field_expansion(x, y, grid.floor - 1e-3, arguments)[6] == 0.0
+    hollow = grid.arguments(np.where(np.arange(12) < 3, -grid.margin, dense).astype(np.float32))
+    assert kernels.field_expansion(x, y, grid.floor - 1e-3, hollow)[6] == 0.0
 
 
 @pytest.mark.parametrize("border", BORDERS)
 def test_force_is_zero_above_the_height_of_the_sampler(border: int) -> None:
-    """It is the least such height on the grid of the levels: just below it some force is not."""
+    """Two levels below it some force is not."""
     grid, _dense, arguments = random_field(2, border)
     forces = []
     for x, y, _z in random_points(grid, 200):
         top = kernels.sample_height(x, y, arguments)
         assert top <= grid.height(grid.levels - 0.5) + 1e-12
         assert not any(kernels.field_gradient(x, y, top + 1e-15, arguments))
-        forces.append(kernels.field_gradient(x, y, top - 1e-8, arguments))
+        forces.append(kernels.field_gradient(x, y, top - 2.0 * grid.level_spacing, arguments))
     assert np.any(forces)
 
 
@@ -214,15 +236,13 @@ def test_spline_weights_and_their_derivatives() -> None:
         assert slopes @ [1.0, 0.0, 1.0] == pytest.approx(2.0 * t, abs=1e-15)
 
 
-def test_weights_along_z_are_linear_below_the_floor() -> None:
-    for w, node in ((0.5, 1), (1.49, 1), (1.51, 2), (7.2, 7)):
-        expected = kernels.quadratic_weights(w - node), kernels.quadratic_weight_slopes(w - node)
-        assert kernels.field_z_weights(w) == (node, 0.0, *expected)
-    for w in (0.4, -3.0):
-        m, below, weights, slopes = kernels.field_z_weights(w)
-        assert (m, below) == (1, w - 0.5)
-        assert np.array(weights) @ [0.0, 1.0, 2.0] == pytest.approx(w, rel=1e-14)
-        assert slopes == (-1.0, 1.0, 0.0)
+def test_places_below_the_floor_are_above_the_bottom() -> None:
+    _grid, _dense, arguments = random_field(1, PERIODIC)
+    for w in (3.5, 4.0, 7.2):
+        assert kernels.field_level(w, arguments) == (w, 0.0)
+    assert kernels.field_level(3.5 - 3.0, arguments) == (3.5 - 3.0 * 0.75, 0.5)
+    for depth in (6.0, 7.5, 600.0):
+        assert kernels.field_level(3.5 - depth, arguments) == (0.5, depth / 6.0)
 
 
 @pytest.mark.parametrize("border", BORDERS)

@@ -15,6 +15,7 @@ import asperity as asp
 from asperity.cli.main import cli
 from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.textures.catalogue import as_texture
+from asperity.textures.fields import bake
 from asperity.textures.fields.bake import BakeGoal
 from asperity.textures.fields.field_file import save_field
 from asperity.textures.fields.potential_field import PotentialField
@@ -170,13 +171,33 @@ def test_force_is_close_to_exact_h() -> None:
     field, body = baked("cube"), cube()
     surface = asp.Surface(field, "H", 1.0)
     loops = _BodyLoops(body, BodyLaw(1.0, 0.6 * MM, 0.0))
-    probes = loops.surface_probes(500)
+    probes = loops.surface_probes(np.random.default_rng(5).uniform(0.0, 0.6 * MM, 2000))
+    probes = probes[loops.evaluate(probes)[:, 4] > 0.0]
     difference = surface.force(probes) - loops.evaluate(probes)[:, 1:4]
     largest = np.linalg.norm(difference, axis=1).max()
     assert largest <= field.accuracy.bound
     assert 0.05 * 0.6 * MM < largest < 0.2 * 0.6 * MM
     outside = np.array([[9.0, 0.0, 0.0], [0.0, 0.0, 4.0], [0.0, 0.0, -4.0]]) * MM
     assert not surface.force(outside).any()
+
+
+def test_contact_ends_within_half_a_spacing_after_all_passes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The grid needs no more room around a body however often its field is smoothed."""
+    monkeypatch.setattr(bake, "_STALLED", np.inf)
+    goal = BakeGoal(max_gain=0.5)  # cannot be reached
+    body = to_body(trimesh.creation.box((4 * MM, 3 * MM, 2 * MM)))
+    field = bake_body(body, 0.5 * MM, resolution=0.125 * MM, goal=goal)
+    assert field.passes == goal.passes
+    surface = asp.Surface(field, "H", max_depth=0.5 * MM)
+    places = np.random.default_rng(2).uniform(-1.0, 1.0, (4000, 3))
+    axis = np.arange(4000) % 3
+    places[np.arange(4000), axis] = np.sign(places[np.arange(4000), axis])
+    half = np.array([2.0, 1.5, 1.0]) * MM
+    assert not surface.force(places * (half + 0.5 * field.resolution)).any()
+    places[np.abs(places) < 1.0] *= 0.4  # away from the edges, which are rounded
+    assert surface.force(places * (half - 0.5 * field.resolution)).any(axis=1).all()
 
 
 def test_heights_are_those_seen_from_above(tmp_path: Path) -> None:

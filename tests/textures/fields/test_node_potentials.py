@@ -1,4 +1,4 @@
-"""Potentials at columns of nodes: those of a search from scratch, whatever came before."""
+"""Depths at columns of nodes: those of a search from scratch, whatever came before."""
 
 from __future__ import annotations
 
@@ -27,15 +27,18 @@ TEXTURES = {
     "waves": Fourier([5e-5, 4e-5, 3e-5], [[9e3, 0.0], [3e3, 8e3], [-6e3, 1.6e4]], [0.3, 1, 2]),
     "cloth": named_surface("cloth"),
 }
-DEPTH = 2e-4
+DEPTH, MARGIN = 2e-4, 6e-5
 
 
-def exact_potentials(texture: Texture, continuity: float, points: FloatArray) -> FloatArray:
-    """Return U [m²] and the number of atoms, (n, 2), of a search from scratch at each point."""
+def exact_depths(texture: Texture, continuity: float, points: FloatArray) -> FloatArray:
+    """Return √(2U), or the negative distance [m], and the number of atoms, (n, 2), from scratch."""
     out = np.empty((len(points), 3))
     loops = fuse_surface(LAWS["H"], texture.sampler, NONE)
     loops.split_batch(points, out, continuity, texture.arguments)
-    return out[:, :2]
+    distance = np.linalg.norm(texture.nearest(points) - points, axis=1)
+    outside = points[:, 2] >= texture.height(points[:, :2])
+    depth = np.where(outside, -np.minimum(distance, MARGIN), np.sqrt(2.0 * out[:, 0]))
+    return np.column_stack([depth, out[:, 1]])
 
 
 def random_columns(
@@ -49,7 +52,7 @@ def random_columns(
     parts[::3, -1] = 0.0
     xy = texture.domain.points(parts)
     low, high = texture.extremes
-    z = np.linspace(low - DEPTH, high + 1e-5, levels)
+    z = np.linspace(low - DEPTH, high + 8e-5, levels)
     points = np.empty((count, levels, 3))
     points[..., :2], points[..., 2] = xy[:, None], z
     return xy, z, points.reshape(-1, 3)
@@ -61,32 +64,33 @@ def test_columns_equal_searches_from_scratch(name: str, continuity: float) -> No
     texture = TEXTURES[name]
     xy, z, points = random_columns(texture, 60, 25)
     found = np.empty((len(xy), len(z)), np.float32)
-    split_columns(texture, continuity)(xy, z, found)
-    value, atoms = exact_potentials(texture, continuity, points).T
-    np.testing.assert_allclose(found.ravel(), value, rtol=2.0**-23, atol=1e-20)
-    assert (value == 0.0).any()
+    split_columns(texture, continuity)(xy, z, MARGIN, found)
+    value, atoms = exact_depths(texture, continuity, points).T
+    np.testing.assert_allclose(found.ravel(), value, rtol=2.0**-23, atol=1e-12)
+    assert (value == -MARGIN).any()
+    assert ((value < 0.0) & (value > -MARGIN)).any()
     if name in ("ridges", "waves", "cloth"):
         assert (atoms >= 3).mean() > 0.003
     # Negative control: the closest point alone, without a split, has another potential.
-    single = 0.5 * np.square(texture.nearest(points) - points).sum(axis=1)
-    assert np.abs(np.where(value > 0.0, single, 0.0) - value).max() > 1e-3 * value.max()
+    single = np.linalg.norm(texture.nearest(points) - points, axis=1)
+    assert np.abs(np.where(value > 0.0, single - value, 0.0)).max() > 1e-3 * value.max()
 
 
 def test_result_does_not_depend_on_the_levels_between() -> None:
-    """A start from far above leads to the same potential as one from the level above."""
+    """A start from far above leads to the same depth as one from the level above."""
     texture = TEXTURES["ridges"]
     xy, z, _points = random_columns(texture, 30, 41)
     fine, coarse = np.empty((30, 41), np.float32), np.empty((30, 5), np.float32)
     columns = split_columns(texture, 1.0)
-    columns(xy, z, fine)
-    columns(xy, np.ascontiguousarray(z[::10]), coarse)
-    np.testing.assert_allclose(fine[:, ::10], coarse, rtol=2.0**-23)
+    columns(xy, z, MARGIN, fine)
+    columns(xy, np.ascontiguousarray(z[::10]), MARGIN, coarse)
+    np.testing.assert_allclose(fine[:, ::10], coarse, rtol=2.0**-23, atol=1e-12)
 
 
 @pytest.mark.parametrize("name", ["profile", "finite map"])
-def test_grid_holds_the_potential_of_each_node(name: str) -> None:
+def test_grid_holds_the_depth_of_each_node(name: str) -> None:
     texture = TEXTURES[name]
-    grid = FieldGrid.fit(texture.domain, texture.extremes, DEPTH, 2.7e-5)
+    grid = FieldGrid.fit(texture.domain, texture.extremes, DEPTH, 0.0, MARGIN / 2.75)
     seen: list[float] = []
     found = compute_potentials(split_columns(texture, 1.0), grid, seen.append)
     assert found.shape == grid.node_counts
@@ -94,5 +98,5 @@ def test_grid_holds_the_potential_of_each_node(name: str) -> None:
     for index in RNG.integers(0, grid.node_counts, (50, len(grid.node_counts))):
         (xy,) = grid.positions(index[None, :-1])
         point = np.array([[*xy, grid.height(index[-1])]])
-        value = exact_potentials(texture, 1.0, point)[0, 0]
-        assert found[tuple(index)] == pytest.approx(value, rel=1e-6, abs=1e-18)
+        value = max(exact_depths(texture, 1.0, point)[0, 0], -grid.margin)
+        assert found[tuple(index)] == pytest.approx(value, rel=1e-6, abs=1e-12)

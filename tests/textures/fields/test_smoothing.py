@@ -1,18 +1,19 @@
-"""Smoothing of a field's nodes: a mean of shifted copies of the exact potential."""
+"""Smoothing of a field's nodes: means of the exact depth around cells of too great a gain."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.ndimage import maximum_filter
 
 import asperity as asp
 from asperity.analysis.split.split_state import split_state
-from asperity.core.checks import FloatArray
 from asperity.surface import Surface
+from asperity.textures.fields import bake
 from asperity.textures.fields.bake import BakeGoal, bake_texture
-from asperity.textures.fields.field_grid import FieldGrid, SingleArray
+from asperity.textures.fields.field_grid import RAMP, FieldGrid
 from asperity.textures.fields.field_sampler import MIRRORED, PERIODIC, ZERO
-from asperity.textures.fields.node_potentials import compute_potentials, smooth, split_columns
+from asperity.textures.fields.node_potentials import smooth, spread_marks
 from asperity.textures.fields.potential_field import PotentialField
 from asperity.textures.spline.spline_texture import HeightMap, Profile
 from asperity.textures.texture import Texture
@@ -27,60 +28,43 @@ TEXTURES: dict[str, Texture] = {
 }
 
 
-def potentials_of(name: str, c: float) -> tuple[FieldGrid, SingleArray]:
-    texture = TEXTURES[name]
-    grid = FieldGrid.fit(texture.domain, texture.extremes, DEPTH, 2.5e-5, 3).extend_down(3)
-    return grid, compute_potentials(split_columns(texture, c), grid)
-
-
-def second_differences(grid: FieldGrid, potentials: FloatArray) -> list[FloatArray]:
-    """Return those along each axis [1], also across the borders."""
-    result = []
-    for axis, spacing in enumerate(grid.spacing):
-        rows = np.moveaxis(potentials.astype(float), axis, 0)
-        if axis < len(grid.cells):
-            rows = rows[grid.stored_nodes(axis)]
-        result.append(np.diff(rows, 2, axis=0) / spacing**2)
-    return result
-
-
-@pytest.mark.parametrize("c", [1.0, 4.0])
-@pytest.mark.parametrize("name", TEXTURES)
-def test_second_differences_stay_within_the_bounds_of_the_law(name: str, c: float) -> None:
-    """-c <= second differences <= 1 after each pass, to single precision; both nearly attained."""
-    grid, potentials = potentials_of(name, c)
-    rounding = 4.0 * float(potentials.max()) * 2.0**-23 / min(grid.spacing) ** 2
-    lows = []
-    for passes in range(4):
-        parts = second_differences(grid, potentials)
-        low, high = min(part.min() for part in parts), max(part.max() for part in parts)
-        assert -c - rounding <= low
-        assert 0.98 < high <= 1.0 + rounding
-        lows.append(low)
-        if passes < 3:
-            potentials = smooth(potentials, grid)
-    assert lows[0] < -0.8 * c
-    assert (np.diff(lows) > -rounding).all()  # a mean is gentler than what it is of
-
-
 @pytest.mark.parametrize("border", [PERIODIC, MIRRORED, ZERO])
 @pytest.mark.parametrize("axes", [1, 2])
 def test_a_pass_is_a_mean_of_a_node_and_its_neighbours(axes: int, border: int) -> None:
-    """Against a plain sum; the lowest level is lost, and zero is above the highest."""
+    """Against plain sums; the lowest level is lost, and the highest continues."""
     steps = np.array([[1.0, 0.2], [0.0, 1.0]])[:axes]
-    grid = FieldGrid(steps, (5, 4)[:axes], np.zeros(2), 6, 1.0, 0.0, border)
+    grid = FieldGrid(steps, (5, 4)[:axes], np.zeros(2), 6, 1.0, 0.0, 1, border)
     values = np.random.default_rng(2).uniform(size=grid.node_counts).astype(np.float32)
-    expected = values.astype(float)
+    weights = np.random.default_rng(3).integers(0, 256, grid.node_counts, np.uint8)
+    expected, share = values.astype(float), weights / (8.0 * 255.0)
     for axis in range(axes):
         places = grid.stored_nodes(axis)[: expected.shape[axis] + 2]
-        wide = np.take(expected, places, axis=axis)
-        missing = [-1 if k == axis else 1 for k in range(expected.ndim)]
-        wide = np.where((places < 0).reshape(missing), 0.0, wide)
+        nearest = np.clip(np.arange(len(places)) - 1, 0, expected.shape[axis] - 1)
+        wide = np.take(expected, np.where(places < 0, nearest, places), axis=axis)
         a, b, d = (np.take(wide, np.arange(k, wide.shape[axis] - 2 + k), axis) for k in range(3))
-        expected = 0.125 * a + 0.75 * b + 0.125 * d
-    wide = np.concatenate([expected, np.zeros_like(expected[..., :1])], axis=-1)
-    expected = 0.125 * wide[..., :-2] + 0.75 * wide[..., 1:-1] + 0.125 * wide[..., 2:]
-    np.testing.assert_allclose(smooth(values, grid), expected, rtol=1e-6)
+        expected = b + share * (a - 2.0 * b + d)
+    wide = np.concatenate([expected, expected[..., -1:]], axis=-1)
+    change = wide[..., :-2] - 2.0 * wide[..., 1:-1] + wide[..., 2:]
+    expected = expected[..., 1:] + share[..., 1:] * change
+    np.testing.assert_allclose(smooth(values, weights, grid), expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize("border", [PERIODIC, MIRRORED, ZERO])
+def test_weights_fall_slowly_from_marked_nodes(border: int) -> None:
+    """The bound of the error relies on their differences; no node beyond the cells changes."""
+    marks = (np.random.default_rng(5).uniform(size=(40, 30, 20)) < 2e-4).astype(np.uint8)
+    marks[0, 3, 2] = marks[39, 20, 17] = 1
+    weights, cells = spread_marks(marks, border)
+    assert (weights[marks > 0] == 255).all()
+    assert (weights == 0).mean() > 0.5
+    wide = np.pad(weights.astype(int), [(1, 1)] * 3, "wrap" if border == PERIODIC else "edge")
+    for axis in range(3):
+        steps = np.abs(np.diff(wide, axis=axis))
+        if axis == 2:
+            steps = np.abs(np.diff(weights.astype(int), axis=axis))
+        assert steps.max() <= 255 / RAMP + 3
+    near = maximum_filter(weights > 0, 3, mode="wrap" if border == PERIODIC else "nearest")
+    assert (cells[..., 1:-1][near[..., 1:-1]] > 0).all()
 
 
 def smoothed_field(name: str, passes: int) -> PotentialField:
@@ -98,8 +82,8 @@ def smoothed_field(name: str, passes: int) -> PotentialField:
 
 
 @pytest.mark.parametrize("name", TEXTURES)
-def test_smoothed_fields_keep_their_bounds_and_stay_inside_their_grid(name: str) -> None:
-    """Each pass spreads the potential one level upwards; above them the force is zero."""
+def test_smoothed_fields_keep_their_bounds(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bake, "_STALLED", np.inf)
     texture, rng = TEXTURES[name], np.random.default_rng(4)
     exact = Surface(texture, "H", K, max_depth=DEPTH)
     gains, differences = [], []
@@ -114,14 +98,10 @@ def test_smoothed_fields_keep_their_bounds_and_stay_inside_their_grid(name: str)
         error = np.linalg.norm(surface.force(points) - exact.force(points), axis=1) / K
         assert error.max() <= field.accuracy.bound
         states = [split_state(each, points).potential / K for each in (surface, exact)]
-        difference = np.abs(states[0] - states[1]).max()
-        assert difference <= field.accuracy.potential_bound
-        assert difference > 0.7 * field.accuracy.potential_bound
-        # Of the two levels above the surface, each pass fills one of the margin.
-        columns = field.arguments.columns
-        assert columns[..., 2].max() <= field.grid.levels - 2
-        points[:, 2] = top * (1.0 + 1e-9)
-        assert not surface.force(points).any()
+        assert np.abs(states[0] - states[1]).max() <= field.accuracy.potential_bound
+        # Below the surface a field of a former kind was wrong by a tenth of its spacing already.
+        onset = np.abs(np.sqrt(2.0 * states[0]) - np.sqrt(2.0 * states[1]))
+        assert onset[states[1] > 0.0].max() < (0.5 + passes) * field.grid.level_spacing
         points[:, 2] = top - rng.uniform(0.0, 2.0, len(points)) * field.grid.level_spacing
         step = 1e-9
         numeric = np.stack(

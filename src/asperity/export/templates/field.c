@@ -6,10 +6,11 @@ typedef struct {
     uint64_t file_bytes;
     uint32_t rows, width;
     uint64_t columns_offset, count, values_offset, heights_offset, json_offset;
-    double x0, y0, z0, m00, m01, m10, m11, iz;
+    double x0, y0, z0, m00, m01, m10, m11, iz, margin, lift;
     int32_t levels, border;
     double q, floor;
-    unsigned char reserved[88];
+    int32_t below;
+    unsigned char reserved[68];
     uint32_t checksum, header_checksum;
 } @name@_field_header;
 
@@ -88,7 +89,8 @@ static inline uint32_t @name@_checksum(const unsigned char *bytes, size_t size)
 static inline int @name@_fits(const @name@_field_header *head, size_t size)
 {
     const double numbers[] = {head->m00, head->m01, head->m10, head->m11, head->iz,
-                              head->z0, 1e7 * head->x0, 1e7 * head->y0};
+                              head->z0, 1e7 * head->x0, 1e7 * head->y0, head->margin,
+                              head->lift};
     const uint64_t places = (uint64_t)head->rows * head->width;
     size_t i;
     for (i = 0; i < sizeof numbers / sizeof numbers[0]; i++) {
@@ -98,6 +100,7 @@ static inline int @name@_fits(const @name@_field_header *head, size_t size)
     }
     return (head->rows == 1 || head->rows >= 4) && head->width >= 4 && head->iz > 0
         && places <= 0x7FFFFFFFu && head->levels >= 3 && head->border >= 0 && head->border <= 2
+        && head->below >= 1 && head->below <= head->levels - 2
         && head->columns_offset <= size && head->columns_offset % 4 == 0
         && places <= (size - head->columns_offset) / 16
         && head->values_offset <= size && head->values_offset % 4 == 0
@@ -113,7 +116,7 @@ static inline int @name@_is_consistent(
     for (i = 0; i < places; i++) {
         const int64_t offset = columns[4 * i], first = columns[4 * i + 1];
         const int64_t end = columns[4 * i + 2], reach = columns[4 * i + 3];
-        if (first < 0 || end < first || reach < end || reach > head->levels) {
+        if (first < 0 || end < first || reach < 0 || reach > head->levels) {
             return 0;
         }
         if (first < end && (offset + first < 0 || offset + end > (int64_t)head->count)) {
@@ -134,7 +137,7 @@ static inline int @name@_check_file(const unsigned char *bytes, size_t size, @na
         return @NAME@_NO_FIELD;
     }
     memcpy(head, bytes, sizeof *head);
-    if (memcmp(head->magic, "ASPFIELD", 8) != 0 || head->version != 1
+    if (memcmp(head->magic, "ASPFIELD", 8) != 0 || head->version != 2
         || head->byte_order != 0x01020304u) {
         return @NAME@_NO_FIELD;
     }
@@ -164,7 +167,10 @@ static inline void @name@_use(const @name@_field_header *head, const unsigned ch
     @name@_surface.m10 = (@real@)head->m10;
     @name@_surface.m11 = (@real@)head->m11;
     @name@_surface.iz = (@real@)head->iz;
+    @name@_surface.margin = (@real@)head->margin;
+    @name@_surface.lift = (@real@)head->lift;
     @name@_surface.levels = head->levels;
+    @name@_surface.below = head->below;
     @name@_surface.border = head->border;
     @name@_surface.q = head->q;
 }

@@ -12,8 +12,8 @@ typedef struct {
     const float *c;
     const int32_t *columns;
     int64_t rows, width, count;
-    @real@ x0, y0, z0, m00, m01, m10, m11, iz;
-    int64_t levels, border;
+    @real@ x0, y0, z0, m00, m01, m10, m11, iz, margin, lift;
+    int64_t levels, below, border;
     double q;
     void *file;
     size_t size, used;
@@ -22,6 +22,7 @@ typedef struct {
 static const int32_t @name@_no_columns[16] = {0};
 static const float @name@_no_values[1] = {0};
 #define @NAME@_NOTHING \
-    {@name@_no_values, @name@_no_columns, 1, 4, 1, 0, 0, 0, 0, 0, 0, 0, 1, 3, 2, 0, NULL, 0, 0}
+    {@name@_no_values, @name@_no_columns, 1, 4, 1, 0, 0, 0, 0, 0, 0, 0, 1, \
+     1, 0, 3, 1, 2, 0, NULL, 0, 0}
 static const @name@_field @name@_no_field = @NAME@_NOTHING;
 static @name@_field @name@_surface = @NAME@_NOTHING;

@@ -3,33 +3,52 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from asperity.clamps import NONE
 from asperity.core.checks import FloatArray, check_positive
 from asperity.core.errors import ParameterError
 from asperity.core.units import round_up
 from asperity.laws import LAWS
-from asperity.textures.fields.field_certificate import Progress, curvature_bounds, run_in_threads
-from asperity.textures.fields.field_grid import NEIGHBOUR_WEIGHT, FieldGrid, SingleArray
-from asperity.textures.fields.field_sampler import quadratic_weight_slopes, quadratic_weights
-from asperity.textures.fields.node_potentials import compute_potentials, smooth, split_columns
+from asperity.textures.fields.field_certificate import Progress, cells_above, curvature_bounds
+from asperity.textures.fields.field_grid import FieldGrid, SingleArray
+from asperity.textures.fields.node_potentials import (
+    compute_potentials,
+    smooth,
+    split_columns,
+    spread_marks,
+)
 from asperity.textures.fields.potential_field import FieldAccuracy, PotentialField, certified_number
 from asperity.textures.texture import Texture
 
-_MAX_PASSES = 6
-# Number of probes at which the difference from exact H is measured.
-PROBES = 1024
-_TRIAL_PROBES = 128
-_TRIAL_COARSENING = 2.0
-_TRIAL_MARGIN = 0.95
+_MAX_PASSES = 10
+# Part of the cells above the goal that a pass may leave and still help.
+_STALLED = 0.8
+# Number of depths at which the difference from exact H is measured, and of probes at each of them.
+DEPTHS = 12
+PROBES = 256
+# Mean force over stiffness from which on differences count [m]: 0.1 N on a stiff device.
+LIGHT_TOUCH = 0.1 / 3000.0
+LEAST_DEPTH = 0.03
+# Distance [m] from the surface at which contact may begin, and the part of its heights' range.
+_ONSET = 10e-6, 0.02
+# Depth at which the place of a body's surface is measured, over the greatest.
+SHALLOW = 0.04
+_TRIAL_BYTES = 2**19
+# Steps to finer resolutions, and limits of the power of the resolution with which the difference
+# falls: steps of corners and of smooth surfaces.
+_SECOND_STEP, _LARGEST_STEP = 0.7, 0.2
+_POWERS = 1.3, 1.8
 _MAX_TRIALS = 12
+_FLAT = 1e-9  # of the greatest force: less is rounding
 _BYTES_PER_NODE = 4
-# Depth in which a field fades below its floor, over half the range of the vertical force there.
-_FADE_DEPTH = 2.0
+# Height of the cells in which a field fades below its floor, over the range of the vertical force
+# there.
+_FADE = 1.0
 
 
 @dataclass(frozen=True)
@@ -37,7 +56,8 @@ class BakeGoal:
     """What a field must reach.
 
     Attributes:
-        share: greatest RMS difference from exact H over the RMS of the texture's force.
+        share: greatest RMS difference from exact H over the RMS of the texture's force, at every
+            depth at which the mean force is at least 0.1 N at 3000 N/m.
         max_gain: greatest certified q over max(1, c): smoothing is repeated until it is reached.
         max_bytes: greatest size of the coefficients.
     """
@@ -95,65 +115,75 @@ def scale_progress(progress: Progress | None, start: float, size: float) -> Prog
 class BakePlan:
     """A field to bake: exact force and potential at probes, from which its grid is chosen."""
 
+    lift = 0.0
+
     def __init__(
         self, texture: Texture, max_depth: float, continuity: float, goal: BakeGoal
     ) -> None:
         self.texture, self.max_depth, self.continuity = texture, max_depth, continuity
         self.goal = goal
         self.gain = self.lipschitz = max(1.0, continuity)
-        self._exact_columns = split_columns(texture, continuity)
+        self.columns = split_columns(texture, continuity)
         self._law_arguments = (1.0, 0.0, 1.0, max_depth, 0.0, continuity)
-        self.probes = self._random_probes(PROBES)
-        self.force = self._force(texture, self.probes)
-        level = np.column_stack([self.probes[:, :2], np.full(PROBES, texture.extremes[0])])
-        force = self._force(texture, level)
-        self.texture_rms = float(np.sqrt(np.square(force - force.mean(axis=0)).sum(axis=1).mean()))
-        level[:, 2] = self.floor = texture.extremes[0] - max_depth
-        lifts = self._force(texture, level)[:, 2]
-        self.lift, self.lift_range = 0.5 * (lifts.max() + lifts.min()), 0.5 * np.ptp(lifts)
-        self.fade = max(_FADE_DEPTH * self.lift_range, 1e-9 * max_depth)
+        low, top = texture.extremes
+        self.floor, self.onset_limit = low - max_depth, max(_ONSET[0], _ONSET[1] * (top - low))
+        xy = texture.domain.points(
+            np.random.default_rng(0).uniform(size=(PROBES, len(texture.domain.spans)))
+        )
+        depths = (top - self.floor) * np.geomspace(LEAST_DEPTH, 1.0, DEPTHS)
+        level = np.repeat(top - depths, PROBES)
+        points = np.column_stack([np.tile(xy, (DEPTHS, 1)), level])
+        self.set_probes(points, np.repeat(np.arange(DEPTHS), PROBES), depths)
+        forces = self.force[-PROBES:, 2]
+        self.lift, self.fade = float(forces.min()), _FADE * float(np.ptp(forces))
+        self.set_shallow(np.column_stack([xy, texture.height(xy) - 2.0 * self.onset_limit]))
 
-    def columns(self, xy: FloatArray, z: FloatArray, out: SingleArray) -> None:
-        """Write the potential at columns of nodes; see :data:`ColumnFunction`.
+    def set_probes(self, points: FloatArray, rows: NDArray[np.intp], depths: FloatArray) -> None:
+        """Set the probes at which the difference from exact H is measured.
 
-        Below the floor it is U(floor - ψ) + g: with r = depth/fade below it, ψ' = 1 - r falls to
-        zero, and so does the variation of the force along z; g makes up for its mean, so that the
-        second derivative along z is at most 1 and that of the flat wall in the end.
+        Args:
+            points: [m], (n, 3).
+            rows: index of the depth of each.
+            depths: [m]; those at which hardly any force is felt are omitted, but for the last.
         """
-        depth = np.maximum(self.floor - z, 0.0)
-        r = np.minimum(depth / self.fade, 1.0)
-        beyond = np.maximum(depth - self.fade, 0.0)
-        warped = np.maximum(z, self.floor) - self.fade * (r - 0.5 * r * r)
-        # All levels that are deeper than the fade have the potential of one place.
-        same = max(int(np.count_nonzero(r >= 1.0)) - 1, 0)
-        exact = np.empty((len(xy), len(z) - same), np.float32)
-        self._exact_columns(xy, warped[same:], exact)
-        out[:, same:], out[:, :same] = exact, exact[:, :1]
-        slope = self.lift - self.lift_range
-        gained = self.fade**2 * (0.5 - 0.125 * r) * r**3 + 0.5 * self.fade * slope * r * r
-        out += (gained + (self.fade + slope + 0.5 * beyond) * beyond).astype(np.float32)
+        force = self.exact(points)[0]
+        felt = _mean_of_rows(np.linalg.norm(force, axis=1), rows, len(depths)) >= LIGHT_TOUCH
+        felt[-1] = True
+        self.depths, used = depths[felt], felt[rows]
+        self.probes, self.rows = points[used], (np.cumsum(felt) - 1)[rows[used]]
+        self.force, count = force[used], len(self.depths)
+        mean = np.column_stack([_mean_of_rows(part, self.rows, count) for part in self.force.T])
+        around = np.square(self.force - mean[self.rows]).sum(axis=1)
+        self.row_rms = np.sqrt(_mean_of_rows(around, self.rows, count))
+        self.texture_scale = float(np.abs(self.force).max())
+
+    def set_shallow(self, points: FloatArray) -> None:
+        """Set the points [m], (n, 3), just below the surface at which its place is measured."""
+        self.shallow, self.shallow_depth = points, self.exact(points)[1]
+
+    def exact(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the exact force over the stiffness [m], (n, 3), and depth √(2U) [m], (n,)."""
+        return self._render(self.texture, points)
+
+    def _render(self, texture: Texture, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        from asperity.kernels.fuse import fuse_surface
+
+        loops = fuse_surface(LAWS["H"], texture.sampler, NONE)
+        force, split = np.empty(points.shape), np.empty(points.shape)
+        loops.force_batch(points, force, texture.arguments, self._law_arguments)
+        loops.split_batch(points, split, self.continuity, texture.arguments)
+        return force, np.sqrt(np.maximum(2.0 * split[:, 0], 0.0))
 
     def grid(self, resolution: float) -> FieldGrid:
         """Return the coarsest grid of a resolution [m]."""
         heights, domain = self.texture.extremes, self.texture.domain
-        fitted = FieldGrid.fit(domain, heights, self.max_depth, resolution, self.goal.passes)
-        return fitted.extend_down(math.ceil(self.fade / fitted.level_spacing) + 2)
+        return FieldGrid.fit(domain, heights, self.max_depth, self.fade, resolution)
 
-    def _force(self, texture: Texture, points: FloatArray) -> FloatArray:
-        """Return the force over the stiffness [m], (n, 3)."""
-        from asperity.kernels.fuse import fuse_surface
-
-        loops, out = fuse_surface(LAWS["H"], texture.sampler, NONE), np.empty(points.shape)
-        loops.force_batch(points, out, texture.arguments, self._law_arguments)
-        return out
-
-    def _random_probes(self, count: int) -> FloatArray:
-        """Return points between floor and surface, as many of each depth below the surface."""
-        rng, domain = np.random.default_rng(0), self.texture.domain
-        xy = domain.points(rng.uniform(size=(count, len(domain.spans))))
-        low = self.texture.extremes[0] - self.max_depth
-        top = self.texture.height(xy)
-        return np.column_stack([xy, low + (top - low) * rng.uniform(size=count)])
+    def shares(self, difference: FloatArray, rows: NDArray[np.intp]) -> FloatArray:
+        """Return the RMS of differences over that of the texture's force, at each depth."""
+        square = _mean_of_rows(np.square(difference).sum(axis=1), rows, len(self.depths))
+        ratio: FloatArray = np.sqrt(square) / np.maximum(self.row_rms, 1e-300)
+        return np.where(self.row_rms > _FLAT * self.texture_scale, ratio, 0.0)
 
     def bake(self, resolution: float, progress: Progress | None) -> PotentialField:
         """Return the field of a resolution [m]."""
@@ -169,75 +199,30 @@ class BakePlan:
         The resolution is corrected by the measured difference, first of a field of few nodes.
         """
         finest, coarsest = self.finest_resolution(), max(self.grid(math.inf).spacing)
-        resolution = min(max(_TRIAL_COARSENING * self.choose(), finest), coarsest)
-        part = scale_progress(progress, 0.0, 0.1)
+        resolution, goal = max(self.finest_resolution(_TRIAL_BYTES), finest), self.goal.share
+        tried: list[tuple[float, float]] = []
         for trial in range(_MAX_TRIALS):
-            field = self.bake(resolution, part)
-            share, goal = field.accuracy.share, self.goal.share
+            done = 1.0 - 0.5**trial
+            field = self.bake(resolution, scale_progress(progress, done, 0.5 * (1.0 - done)))
+            share = max(field.accuracy.share, goal * field.accuracy.onset / self.onset_limit)
             if resolution == (coarsest if share <= goal else finest) or 0.5 * goal <= share <= goal:
                 break
-            if field.gain.upper > _TRIAL_MARGIN * self.goal.max_gain * self.gain:
-                # A finer field may need one more smoothing pass: about this power of the variance.
-                share *= ((2.0 + field.passes) / (1.0 + field.passes)) ** 0.65
-            ratio = 0.92 * goal / max(share, 0.01 * goal)
-            power = 0.77 if trial == 0 else 1.0  # near the goal rather too fine than once more
-            resolution = min(max(resolution * ratio**power, finest), coarsest)
-            part = scale_progress(progress, 0.1, 0.9)
+            tried.append((resolution, max(share, 0.01 * goal)))
+            resolution = min(max(_next_resolution(tried, goal), finest), coarsest)
+        if resolution == finest and share > goal:
+            field.accuracy = replace(field.accuracy, is_limited=True)
+        if progress is not None:
+            progress(1.0)
         return field
 
-    def choose(self) -> float:
-        """Return a resolution [m] at which a field that is smoothed once meets the goal.
-
-        It is the coarsest one by an estimate at few probes.
-        """
-        resolution = coarsest = max(self.grid(math.inf).spacing)
-        finest, goal = self.finest_resolution(), self.goal.share * self.texture_rms
-        for _ in range(_MAX_TRIALS):
-            ratio = goal / max(self.estimate(resolution, 1, _TRIAL_PROBES), 1e-6 * goal)
-            changed = min(max(resolution * (0.98 * ratio) ** 0.8, finest), coarsest)
-            if changed == resolution or 1.0 <= ratio <= 1.1:
-                break
-            resolution = changed
-        return resolution
-
-    def estimate(self, resolution: float, passes: int, count: int) -> float:
-        """Return the RMS difference of a field from the exact force at the first probes [m].
-
-        The force is computed from the potentials at the nodes around each probe.
-        """
-        grid, points = self.grid(resolution), self.probes[:count]
-        axes = len(grid.steps) + 1
-        steps = np.vstack([np.pad(grid.steps, [(0, 0), (0, 1)]), [0.0, 0.0, grid.level_spacing]])
-        inverse = np.linalg.pinv(steps)
-        place = (points - [*grid.start, grid.height(0)]) @ inverse
-        place -= np.rint(place)
-        ticks = [np.arange(-1.0 - passes, 2.0 + passes)] * axes
-        plane = np.stack(np.meshgrid(*ticks[1:], indexing="ij"), axis=-1).reshape(-1, axes - 1)
-        xy = points[:, None, :2] + (plane - place[:, None, :-1]) @ steps[:-1, :2]
-        z = points[:, 2:] + (ticks[0] - place[:, -1:]) * steps[-1, 2]
-        values = np.empty((len(points), len(plane), len(ticks[0])), np.float32)
-        run_in_threads(lambda i: self.columns(xy[i], z[i], values[i]), range(len(points)), None)
-        functions: list[Any] = [quadratic_weights, quadratic_weight_slopes]
-        weights = np.stack([np.stack(function(place), axis=-1) for function in functions])
-        for _ in range(passes):
-            wide = np.pad(weights, [(0, 0), (0, 0), (0, 0), (2, 2)])
-            sides = NEIGHBOUR_WEIGHT * (wide[..., :-2] + wide[..., 2:])
-            weights = sides + (1.0 - 2.0 * NEIGHBOUR_WEIGHT) * wide[..., 1:-1]
-        difference = self.force[:count].copy()
-        for axis in range(axes):
-            rest = values.reshape(len(points), *map(len, ticks))
-            for other in range(axes):
-                rest = np.einsum("nk...,nk->n...", rest, weights[int(other == axis)][:, other])
-            difference += rest[:, None] * inverse[:, axis]
-        return float(np.sqrt(np.square(difference).sum(axis=1).mean()))
-
-    def finest_resolution(self) -> float:
+    def finest_resolution(self, max_bytes: float = math.inf) -> float:
         """Return the finest resolution [m] of a field within the size allowed, to three digits."""
+        most = min(max_bytes, self.goal.max_bytes)
         coarse = max(self.grid(math.inf).spacing)
         fine = 1e-5 * coarse
         while coarse > 1.001 * fine:
             middle = math.sqrt(fine * coarse)
-            fits = self._bytes(middle) <= self.goal.max_bytes
+            fits = self._bytes(middle) <= most
             fine, coarse = (fine, middle) if fits else (middle, coarse)
         return coarse
 
@@ -272,25 +257,55 @@ class BakePlan:
             grid: the nodes.
             progress: called with the finished fraction.
         """
-        passes, most = 0, self.goal.passes
+        passes, most, before = 0, self.goal.passes, np.inf
+        cells, limit = np.ones(grid.node_counts, np.uint8), self.goal.max_gain * self.gain
         while True:
-            arguments = grid.arguments(potentials[..., most - passes :])
-            limit = math.inf if passes == most else self.goal.max_gain * self.gain
-            upper, attained = curvature_bounds(grid, arguments, progress, limit)
-            if max(upper) <= limit:
+            below = most - passes
+            arguments = grid.arguments(potentials[..., below:], self.lift)
+            cells = cells_above(arguments, limit, cells)
+            count = np.count_nonzero(cells)
+            # Where smoothing no longer helps, more of it would raise the gain again.
+            if passes == most or count == 0 or count > _STALLED * before:
                 break
-            potentials, passes = smooth(potentials, grid), passes + 1
+            before = count
+            marks = np.pad(cells, [(0, 0)] * (cells.ndim - 1) + [(below, 0)])
+            weights, cells = spread_marks(marks, grid.border)
+            cells = np.ascontiguousarray(cells[..., below:])
+            potentials, passes = smooth(potentials, weights, grid), passes + 1
+        upper, attained = curvature_bounds(grid, arguments, progress)
         one_sided, other = (certified_number(float(upper[i]), attained[i]) for i in range(2))
         larger = max(one_sided, other, key=lambda number: number.lower)
         largest = float(arguments.c.max(initial=0.0))
         force, energy = grid.error_bounds(self.lipschitz, passes, largest)
-        accuracy = FieldAccuracy(math.nan, math.nan, force, energy, self.texture_rms, PROBES)
         field = PotentialField(
             self.texture, grid, arguments, max_depth=self.max_depth, continuity=self.continuity,
             passes=passes, gain=replace(larger, upper=max(one_sided.upper, other.upper)),
-            one_sided=one_sided, accuracy=accuracy,
+            one_sided=one_sided, accuracy=FieldAccuracy(force, energy),
         )  # fmt: skip
-        distance = np.linalg.norm(self._force(field, self.probes) - self.force, axis=1)
-        rms, largest = float(np.sqrt(np.square(distance).mean())), float(distance.max())
-        field.accuracy = replace(field.accuracy, rms=rms, largest=largest)
+        difference = self._render(field, self.probes)[0] - self.force
+        shift = np.abs(self._render(field, self.shallow)[1] - self.shallow_depth)
+        field.accuracy = replace(
+            field.accuracy,
+            rms=float(np.sqrt(np.square(difference).sum(axis=1).mean())),
+            largest=float(np.linalg.norm(difference, axis=1).max()),
+            depths=tuple(self.depths.tolist()),
+            shares=tuple(self.shares(difference, self.rows).tolist()),
+            onset=float(shift.max()),
+        )
         return field
+
+
+def _next_resolution(tried: Sequence[tuple[float, float]], goal: float) -> float:
+    """Return the resolution [m] that should reach the goal, after those tried and their shares."""
+    (resolution, share), power, least = tried[-1], _POWERS[0], _SECOND_STEP
+    if len(tried) > 1:
+        coarser, before = tried[-2]
+        power, least = math.log(share / before) / math.log(resolution / coarser), _LARGEST_STEP
+    ratio = (0.92 * goal / share) ** (1.0 / min(max(power, _POWERS[0]), _POWERS[1]))
+    return float(resolution * max(ratio, least))
+
+
+def _mean_of_rows(values: FloatArray, rows: NDArray[np.intp], count: int) -> FloatArray:
+    """Return the mean of the values of each row, 0 for a row of none."""
+    total = np.bincount(rows, weights=values, minlength=count)
+    return total / np.maximum(np.bincount(rows, minlength=count), 1)

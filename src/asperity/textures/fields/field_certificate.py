@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from asperity.core.checks import FloatArray
 from asperity.core.processes import available_cores
 from asperity.textures.fields import field_curvature, field_sampler
 from asperity.textures.fields.field_grid import FieldGrid
-from asperity.textures.fields.field_sampler import PERIODIC, FieldArguments
+from asperity.textures.fields.field_sampler import PERIODIC, ZERO, FieldArguments
 
 Progress = Callable[[float], None]
 CurvatureBounds = tuple[FloatArray, FloatArray]
@@ -30,10 +30,7 @@ _BERNSTEIN = np.array([
 
 
 def curvature_bounds(
-    grid: FieldGrid,
-    field: FieldArguments,
-    progress: Progress | None = None,
-    limit: float = math.inf,
+    grid: FieldGrid, field: FieldArguments, progress: Progress | None = None
 ) -> CurvatureBounds:
     """Return certified bounds of the eigenvalues of Hess T over the whole field.
 
@@ -41,32 +38,53 @@ def curvature_bounds(
         grid: the nodes.
         field: the coefficients.
         progress: called with the finished fraction.
-        limit: the search ends once an eigenvalue above it is found; then the bounds are those of
-            a part of the field.
 
     Returns:
         Two arrays of shape (2,), for Hess T and for -Hess T: upper bounds of the greatest
         eigenvalue; and (2, 4): the greatest one attained, and where, x, y, z [m].
     """
-    from asperity.kernels.fuse import fuse_module
-
-    loops, weights = fuse_module(field_curvature, field_sampler), hull_weights(field)
-    width = field.columns.shape[1] - 3 + (grid.border != PERIODIC)
-    parts = [(k, min(k + _COLUMNS_PER_PART, width)) for k in range(0, width, _COLUMNS_PER_PART)]
-    found = np.zeros((len(parts), 2, 5))
-
-    def search(part: int) -> None:
-        # Starting from the bounds of the first part, the others evaluate few cells.
-        found[part] = found[0]
-        if found[:, :, 1].max() <= limit:
-            loops.hull_batch(*parts[part], *weights, found[part], field)
-
-    run_in_threads(search, range(len(parts)), progress)
-    rounding = _DIFFERENCE_ROUNDING * float(field.c.max(initial=0.0)) / min(grid.spacing) ** 2
+    bounds = np.zeros((2, 5))
+    if grid.border != ZERO:
+        bounds[0, :2] = 1.0  # of the flat wall far below
+    found = _search(bounds, np.zeros((0, 0, 0), np.uint8), field, progress)
+    largest = float(field.c.max(initial=0.0))
+    rounding = _DIFFERENCE_ROUNDING * (largest / min(grid.spacing)) ** 2
     best = found[np.argmax(found[:, :, 1], axis=0), [0, 1]]
     at = grid.positions(best[:, 2 : 2 + len(grid.cells)])
     attained = np.column_stack([best[:, 1], at, grid.height(best[:, 4])])
     return found[:, :, 0].max(axis=0) + rounding, attained
+
+
+def cells_above(field: FieldArguments, limit: float, cells: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return those of the cells, not 0, in which an eigenvalue may be above the limit.
+
+    A cell is named by the node in its middle; the shape is that of the nodes.
+    """
+    marks = cells.copy()
+    whole = marks if field.columns.shape[0] > 1 else marks[:, None]
+    _search(np.full((2, 5), limit), whole, field, None)
+    return marks
+
+
+def _search(
+    bounds: FloatArray, marks: NDArray[np.uint8], field: FieldArguments, progress: Progress | None
+) -> FloatArray:
+    """Return the bounds found by each part of the search, (n, 2, 5)."""
+    from asperity.kernels.fuse import fuse_module
+
+    loops = fuse_module(field_curvature, field_sampler)
+    weights = *hull_weights(field), *product_weights(field)
+    width = field.columns.shape[1] - 3 + (field.border != PERIODIC)
+    parts = [(k, min(k + _COLUMNS_PER_PART, width)) for k in range(0, width, _COLUMNS_PER_PART)]
+    found = np.repeat(bounds[None], len(parts), axis=0)
+
+    def search(part: int) -> None:
+        # Starting from the bounds of the first part, the others evaluate few cells.
+        found[part] = found[0]
+        loops.hull_batch(*parts[part], *weights, found[part], marks, field)
+
+    run_in_threads(search, range(len(parts)), progress)
+    return found
 
 
 def hull_weights(field: FieldArguments) -> tuple[FloatArray, FloatArray]:
@@ -94,6 +112,22 @@ def hull_weights(field: FieldArguments) -> tuple[FloatArray, FloatArray]:
     plane = np.stack([second[0, 0], second[0, 1], second[1, 1], *first, product(0, 0)], axis=1)
     upward = np.stack([along[0], iz * along[1], iz * iz * along[2]], axis=1)
     return np.ascontiguousarray(plane), upward
+
+
+def product_weights(field: FieldArguments) -> tuple[NDArray[np.int64], FloatArray]:
+    """Return for pairs of Bernstein coefficients of degree 2 that of degree 4, and its weight.
+
+    Of a cell, (27, 27) each, or (9, 9) for a profile: the weight of i and j along an axis is
+    C(2, i) C(2, j)/C(4, i + j).
+    """
+    place = np.add.outer(np.arange(3), np.arange(3))
+    weight = np.outer([1, 2, 1], [1, 2, 1]) / np.array([1, 4, 6, 4, 1])[place]
+    places, weights = place, weight
+    for _ in range(2 if field.columns.shape[0] > 1 else 1):
+        size = 3 * len(places)
+        places = (5 * places[:, None, :, None] + place[:, None]).reshape(size, size)
+        weights = np.kron(weights, weight)
+    return np.ascontiguousarray(places), np.ascontiguousarray(weights)
 
 
 def run_in_threads(

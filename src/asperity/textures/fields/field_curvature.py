@@ -1,28 +1,31 @@
-"""Certified bounds of the second derivatives of a baked potential, by its Bernstein hull.
+"""Certified bounds of the second derivatives of a baked potential, by Bernstein hulls.
 
-On each cell a second derivative of the spline is a polynomial of degree 2, which lies in the hull
-of its Bernstein coefficients, and so does the matrix of them. The greatest eigenvalue is a convex
+Where S > 0 the Hessian of T = S²/2 is ∇S ∇Sᵀ + S Hess S. On each cell S and its derivatives are
+polynomials of degree 2, which lie in the hull of their Bernstein coefficients; those of the
+product, of degree 4, are weighted means of products of theirs. The greatest eigenvalue is a convex
 function, so no matrix of the hull has a greater one than the coefficients have. A coefficient at a
 corner of the cell is the second derivative there, from inside the cell: it is attained.
 
-The matrices of a run of cells of one column are computed together in vector registers. Most have
-eigenvalues below the bounds found before, which the signs of their leading minors show; only of the
-others are the eigenvalues computed.
+Most cells are excluded before the product is formed. With the values S₀, g₀, H₀ of the middle
+coefficient, S H = S₀ H + (S - S₀) H₀ + (S - S₀)(H - H₀), and the last term is bounded by the
+greatest factors of the cell; ∇S ∇Sᵀ is convex, and not less than g₀ ∇Sᵀ + ∇S g₀ᵀ - g₀ g₀ᵀ. What is
+left is linear or convex in the coefficients. The matrices of a run of cells of one column are
+computed together in vector registers, and the signs of their leading minors show that their
+eigenvalues are below the bounds found before.
 
 The weights of coefficients are those of :func:`field_certificate.hull_weights`.
 """
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
 from asperity.core.checks import FloatArray
 from asperity.core.compiled import Kernels, local_array
-from asperity.textures.fields.field_sampler import (
-    REACH,
-    FieldArguments,
-    SixEntries,
-    Vector,
-    field_triple,
-)
+from asperity.textures.fields.field_sampler import PERIODIC, REACH, FieldArguments, field_triple
+
+IntArray = NDArray[np.int64]
 
 KERNELS = Kernels(loops=("hull_batch",), iterates=True)
 
@@ -60,21 +63,6 @@ def least_minor(
     return min(a, middle, c * middle - a * yz * yz - b * xz * xz - 2.0 * xy * xz * yz)
 
 
-def raise_bound(bound: FloatArray, row: int, corner: bool, hessian: SixEntries, at: Vector) -> None:
-    """Raise the bounds of the greatest eigenvalue in a row of ``bound`` by one matrix of a hull.
-
-    It holds the upper bound, the greatest value at a corner of a cell, and that corner.
-    """
-    if least_minor(bound[row, 1] if corner else bound[row, 0], *hessian) > MINOR_ROUNDING:
-        return
-    top = largest_eigenvalue_3x3(*hessian)
-    bound[row, 0] = max(bound[row, 0], top * (1.0 + 2.0 * SLACK))
-    if corner and top > bound[row, 1]:
-        bound[row, 1] = top
-        for d in range(3):
-            bound[row, 2 + d] = at[d]
-
-
 def load_nodes(
     i: int, j: int, m: int, count: int, rows: int, nodes: FloatArray, field: FieldArguments
 ) -> None:
@@ -96,48 +84,197 @@ def mix_nodes(nodes: FloatArray, count: int, n: int, plane: FloatArray, mixed: F
                     mixed[t, k] += w * nodes[q, k]
 
 
-def hull_matrix(mixed: FloatArray, k: int, w: FloatArray, g: int) -> SixEntries:
-    """Return the matrix of coefficient g along z of cell k of a run."""
-    xx = w[g, 0, 0] * mixed[0, k] + w[g, 0, 1] * mixed[0, k + 1] + w[g, 0, 2] * mixed[0, k + 2]
-    xy = w[g, 0, 0] * mixed[1, k] + w[g, 0, 1] * mixed[1, k + 1] + w[g, 0, 2] * mixed[1, k + 2]
-    yy = w[g, 0, 0] * mixed[2, k] + w[g, 0, 1] * mixed[2, k + 1] + w[g, 0, 2] * mixed[2, k + 2]
-    xz = w[g, 1, 0] * mixed[3, k] + w[g, 1, 1] * mixed[3, k + 1] + w[g, 1, 2] * mixed[3, k + 2]
-    yz = w[g, 1, 0] * mixed[4, k] + w[g, 1, 1] * mixed[4, k + 1] + w[g, 1, 2] * mixed[4, k + 2]
-    zz = w[g, 2, 0] * mixed[5, k] + w[g, 2, 1] * mixed[5, k + 1] + w[g, 2, 2] * mixed[5, k + 2]
-    return xx, xy, xz, yy, yz, zz
-
-
-def hull_run(
-    place: tuple[int, int, int], count: int, nodes: FloatArray, plane: FloatArray,
-    upward: FloatArray, mixed: FloatArray, bounds: FloatArray,
+def expand_run(
+    count: int, nodes: FloatArray, plane: FloatArray, upward: FloatArray, mixed: FloatArray,
+    margin: float, hull: FloatArray,
 ) -> None:  # fmt: skip
-    """Raise the bounds of the eigenvalues of Hess T by a run of cells; see ``hull_batch``.
+    """Write the Bernstein coefficients of S, ∇S and Hess S of a run of cells.
 
-    The last row of ``mixed`` is for the least leading minor of each cell.
+    ``hull`` (27, 10, count) holds S, x, y, z, xx, xy, xz, yy, yz, zz.
     """
+    sources = (5, 3, 4, 5, 0, 1, 3, 2, 4, 5)  # mixture of columns, and derivative along z
+    orders = (0, 0, 0, 1, 0, 0, 1, 0, 1, 2)
     for n in range(plane.shape[0]):
-        e = 0.5 * (n // 3) - 0.5 if plane.shape[0] > 3 else 0.0
-        f = 0.5 * (n % 3) - 0.5
         mix_nodes(nodes, count + 2, n, plane, mixed)
         for g in range(3):
-            corner = g != 1 and f != 0.0 and (e != 0.0 or plane.shape[0] == 3)
-            above = bounds[0, 1] * (1.0 + SLACK) if corner else bounds[0, 0] * (1.0 - SLACK)
-            below = bounds[1, 1] * (1.0 + SLACK) if corner else bounds[1, 0] * (1.0 - SLACK)
-            for k in range(count):
-                xx, xy, xz, yy, yz, zz = hull_matrix(mixed, k, upward, g)
-                other = least_minor(below, -xx, -xy, -xz, -yy, -yz, -zz)
-                mixed[6, k] = min(other, least_minor(above, xx, xy, xz, yy, yz, zz))
-            for k in range(count):
-                if not mixed[6, k] > MINOR_ROUNDING:
-                    xx, xy, xz, yy, yz, zz = hull_matrix(mixed, k, upward, g)
-                    at = (place[0] + f, place[1] + e, place[2] + k + 0.5 * g - 0.5)
-                    raise_bound(bounds, 0, corner, (xx, xy, xz, yy, yz, zz), at)
-                    raise_bound(bounds, 1, corner, (-xx, -xy, -xz, -yy, -yz, -zz), at)
+            q = 3 * n + g
+            for t in range(10):
+                source = sources[t]
+                order = orders[t]
+                w0 = upward[g, order, 0]
+                w1 = upward[g, order, 1]
+                w2 = upward[g, order, 2]
+                shift = margin if t == 0 else 0.0
+                for k in range(count):
+                    value = w0 * mixed[source, k] + w1 * mixed[source, k + 1]
+                    hull[q, t, k] = value + w2 * mixed[source, k + 2] - shift
+
+
+def measure_hulls(count: int, hull: FloatArray, work: FloatArray, size: int) -> None:
+    """Write how far the coefficients of each cell are from its middle one, and the greatest S.
+
+    Rows 0, 1, 2 and 4 of ``work`` are those of S, of Hess S, squared, the greatest S, and that of
+    ∂S/∂z; row 3 is made large.
+    """
+    middle = size // 2
+    for k in range(count):
+        work[0, k] = 0.0
+        work[1, k] = 0.0
+        work[2, k] = hull[middle, 0, k]
+        work[3, k] = 1e300
+        work[4, k] = 0.0
+    for q in range(size):
+        for k in range(count):
+            s = hull[q, 0, k]
+            change = 0.0
+            for t in range(4, 10):
+                weight = 1.0 if t in (4, 7, 9) else 2.0
+                change += weight * (hull[q, t, k] - hull[middle, t, k]) ** 2
+            work[0, k] = max(work[0, k], abs(s - hull[middle, 0, k]))
+            work[4, k] = max(work[4, k], abs(hull[q, 3, k] - hull[middle, 3, k]))
+            work[1, k] = max(work[1, k], change)
+            work[2, k] = max(work[2, k], s)
+
+
+def exclude_cells(
+    m: int, count: int, rate: float, hull: FloatArray, bounds: FloatArray, work: FloatArray,
+    size: int, field: FieldArguments,
+) -> None:  # fmt: skip
+    """Write to row 3 of ``work`` what is positive for cells whose bounds are not raised.
+
+    It is the least leading minor, of linearized matrices, or 1 where S is nowhere positive.
+    """
+    middle = size // 2
+    measure_hulls(count, hull, work, size)
+    for q in range(size):
+        for k in range(count):
+            slack = work[0, k] * math.sqrt(work[1, k])
+            above = bounds[0, 0] * (1.0 - SLACK) - slack
+            below = bounds[1, 0] * (1.0 - SLACK) - slack
+            s0 = hull[middle, 0, k]
+            ds = hull[q, 0, k] - s0
+            xx = s0 * hull[q, 4, k] + ds * hull[middle, 4, k]
+            xy = s0 * hull[q, 5, k] + ds * hull[middle, 5, k]
+            xz = s0 * hull[q, 6, k] + ds * hull[middle, 6, k]
+            yy = s0 * hull[q, 7, k] + ds * hull[middle, 7, k]
+            yz = s0 * hull[q, 8, k] + ds * hull[middle, 8, k]
+            zz = s0 * hull[q, 9, k] + ds * hull[middle, 9, k]
+            x = hull[q, 1, k]
+            y = hull[q, 2, k]
+            z = hull[q, 3, k]
+            a = hull[middle, 1, k]
+            b = hull[middle, 2, k]
+            c = hull[middle, 3, k]
+            depth = field.lift + (field.below + 1 - m - k - 0.5 * (q % 3)) / field.iz
+            drop = rate * (s0 * c - s0 * z - hull[q, 0, k] * c - depth)
+            sag = rate * work[0, k] * work[4, k]
+            upper = least_minor(
+                above, xx + x * x, xy + x * y, xz + x * z, yy + y * y, yz + y * z,
+                zz + z * z - drop + sag,
+            )  # fmt: skip
+            lower = least_minor(
+                below, a * (a - 2.0 * x) - xx, a * b - a * y - b * x - xy,
+                a * c - a * z - c * x - xz, b * (b - 2.0 * y) - yy,
+                b * c - b * z - c * y - yz, c * (c - 2.0 * z) - zz + drop + sag,
+            )  # fmt: skip
+            if rate > 0.0:
+                upper = min(upper, above - 1.0 + drop - sag)
+            work[3, k] = min(work[3, k], upper, lower)
+    for k in range(count):
+        if work[2, k] <= 0.0:
+            work[3, k] = 1.0
+
+
+def multiply_hull(
+    k: int, hull: FloatArray, pairs: IntArray, weights: FloatArray, product: FloatArray
+) -> None:
+    """Write the Bernstein coefficients of degree 4 of Hess T and S ∂S/∂z on cell k, (125, 7)."""
+    product[:] = 0.0
+    for i in range(pairs.shape[0]):
+        s = hull[i, 0, k]
+        x = hull[i, 1, k]
+        y = hull[i, 2, k]
+        z = hull[i, 3, k]
+        for j in range(pairs.shape[0]):
+            n = pairs[i, j]
+            w = weights[i, j]
+            product[n, 0] += w * (s * hull[j, 4, k] + x * hull[j, 1, k])
+            product[n, 1] += w * (s * hull[j, 5, k] + x * hull[j, 2, k])
+            product[n, 2] += w * (s * hull[j, 6, k] + x * hull[j, 3, k])
+            product[n, 3] += w * (s * hull[j, 7, k] + y * hull[j, 2, k])
+            product[n, 4] += w * (s * hull[j, 8, k] + y * hull[j, 3, k])
+            product[n, 5] += w * (s * hull[j, 9, k] + z * hull[j, 3, k])
+            product[n, 6] += w * s * hull[j, 3, k]
+
+
+def raise_bound(
+    row: int, place: tuple[int, int, int], k: int, rate: float, hull: FloatArray,
+    product: FloatArray, bounds: FloatArray, field: FieldArguments,
+) -> None:  # fmt: skip
+    """Raise the bounds of Hess T, or of its negative, by cell k of a run from a place on.
+
+    ``bounds[row]`` holds the upper bound, the greatest value attained, and where. Below the floor
+    the rate, 1/F, is not zero. The Hessian there is that of the spline, its second derivative along
+    z lowered by 1/F of what the force less the depth exceeds the lift by, all times ψ' for each z,
+    plus 1 - ψ'² times 1 less the same: no eigenvalue exceeds both bounds, and none is attained.
+    """
+    sign = 1.0 - 2.0 * row
+    rows = min(field.columns.shape[0], 3)
+    for n in range(125 if rows > 1 else 25):
+        e = n // 25
+        f = n // 5 % 5
+        g = n % 5
+        w = place[2] + k + 0.25 * g - 0.5
+        corner = rate == 0.0 and e % 4 + f % 4 + g % 4 == 0
+        corner = corner and hull[9 * (e // 2) + 3 * (f // 2) + g // 2, 0, k] > 0.0
+        drop = -rate * (product[n, 6] + (field.below + 0.5 - w) / field.iz + field.lift)
+        if rate > 0.0 and row == 0:
+            bounds[0, 0] = max(bounds[0, 0], 1.0 - drop)
+        zz = sign * (product[n, 5] - drop)
+        matrix = (
+            sign * product[n, 0], sign * product[n, 1], sign * product[n, 2],
+            sign * product[n, 3], sign * product[n, 4], zz,
+        )  # fmt: skip
+        bound = bounds[row, 0] * (1.0 - SLACK)
+        if corner:
+            bound = min(bound, bounds[row, 1])
+        if least_minor(bound, *matrix) > MINOR_ROUNDING:
+            continue
+        top = largest_eigenvalue_3x3(*matrix)
+        bounds[row, 0] = max(bounds[row, 0], top * (1.0 + 2.0 * SLACK))
+        if corner and top > bounds[row, 1]:
+            bounds[row, 1] = top
+            bounds[row, 2] = place[0] + 0.25 * f - 0.5
+            bounds[row, 3] = place[1] + (0.25 * e - 0.5 if rows > 1 else 0.0)
+            bounds[row, 4] = w
+
+
+def search_run(
+    place: tuple[int, int, int], count: int, rate: float, hull: FloatArray, work: FloatArray,
+    pairs: IntArray, weights: FloatArray, product: FloatArray, bounds: FloatArray,
+    marks: NDArray[np.uint8], field: FieldArguments,
+) -> None:  # fmt: skip
+    """Raise the bounds by the cells of a run that are not excluded, or test these cells."""
+    upper = bounds[0, 0]
+    lower = bounds[1, 0]
+    tests = marks.shape[0] > 0
+    for k in range(count):
+        if tests and marks[place[0], place[1], place[2] + k] == 0:
+            continue
+        if not work[3, k] > MINOR_ROUNDING:
+            multiply_hull(k, hull, pairs, weights, product)
+            for row in range(2):
+                raise_bound(row, place, k, rate, hull, product, bounds, field)
+        if tests:
+            is_above = bounds[0, 0] > upper or bounds[1, 0] > lower
+            marks[place[0], place[1], place[2] + k] = 1 if is_above else 0
+            bounds[0, 0] = upper
+            bounds[1, 0] = lower
 
 
 def hull_batch(
-    first: int, last: int, plane: FloatArray, upward: FloatArray, bounds: FloatArray,
-    field: FieldArguments,
+    first: int, last: int, plane: FloatArray, upward: FloatArray, pairs: IntArray,
+    weights: FloatArray, bounds: FloatArray, marks: NDArray[np.uint8], field: FieldArguments,
 ) -> None:  # fmt: skip
     """Raise bounds of the eigenvalues of Hess T by the cells of nodes first to last along x.
 
@@ -146,17 +283,42 @@ def hull_batch(
         last: node after the last.
         plane: weights of the columns around a cell, (9, 6, 9); (3, 6, 3) for a profile.
         upward: weights along z, (3, 3, 3).
+        pairs: coefficient of the product to which a pair of coefficients adds, (27, 27) or (9, 9).
+        weights: its weight, likewise.
         bounds: (2, 5), for Hess T and for its negative: an upper bound of the greatest eigenvalue,
-            the greatest value at a corner of a cell, and that corner in nodes along x, y, z.
+            the greatest value attained at a corner, and that corner in nodes along the axes.
+        marks: cells to test, not 0: left so if their bounds are above those given, which then do
+            not change; shape of the nodes, those along x first, or empty to search the bounds.
         field: the field.
     """
     rows = min(field.columns.shape[0], 3)
-    nodes = local_array((9, 66))
-    mixed = local_array((7, 66))
-    for i in range(field.columns.shape[0] - rows + 1):
+    size = pairs.shape[0]
+    nodes = local_array((9, 34))
+    mixed = local_array((6, 34))
+    work = local_array((5, 32))
+    hull = local_array((27, 10, 32))
+    product = local_array((125, 7))
+    lines = max(field.columns.shape[0] - 3 + int(field.border != PERIODIC), 1)
+    tests = marks.shape[0] > 0
+    for i in range(lines):
         for j in range(first, last):
             end = min(int(field.columns[i + rows // 2, j + 1, REACH]) + 1, field.levels - 1)
-            for m in range(1, end, 64):
-                count = min(64, end - m)
+            m = 1
+            if tests:
+                marks[j, i, :1] = 0
+                marks[j, i, end:] = 0
+            while m < end:
+                above = m > field.below
+                count = min(32, (end if above else min(end, field.below + 1)) - m)
+                rate = 0.0 if above else 0.5 * field.iz / field.below
+                if tests and not marks[j, i, m : m + count].any():
+                    m += count
+                    continue
                 load_nodes(i, j, m - 1, count + 2, rows, nodes, field)
-                hull_run((j, i, m), count, nodes, plane, upward, mixed, bounds)
+                expand_run(count, nodes, plane, upward, mixed, field.margin, hull)
+                exclude_cells(m, count, rate, hull, bounds, work, size, field)
+                search_run(
+                    (j, i, m), count, rate, hull, work, pairs, weights, product, bounds, marks,
+                    field,
+                )  # fmt: skip
+                m += count

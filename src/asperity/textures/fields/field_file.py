@@ -29,10 +29,11 @@ from asperity.textures.spline.spline_texture import fit_spline
 from asperity.textures.texture import CertifiedNumber, Texture
 
 MAGIC = b"ASPFIELD"
-VERSION = 1
+VERSION = 2
 _BYTE_ORDER = 0x01020304
 _ALIGNMENT = 4096
-_SCALARS = ("x0", "y0", "z0", "m00", "m01", "m10", "m11", "iz")
+_COUNTS = ("levels", "below", "border")
+_SCALARS = ("x0", "y0", "z0", "m00", "m01", "m10", "m11", "iz", "margin", "lift")
 
 HEADER = np.dtype(
     [
@@ -51,8 +52,9 @@ HEADER = np.dtype(
         ("levels", "<i4"),
         ("border", "<i4"),
         ("q", "<f8"),  # certified characteristic number
-        ("floor", "<f8"),  # z down to which it holds [m]
-        ("reserved", "V88"),
+        ("floor", "<f8"),  # z down to which it is that of the spline [m]
+        ("below", "<i4"),
+        ("reserved", "V68"),
         ("checksum", "<u4"),  # CRC-32 of all that follows the header
         ("header_checksum", "<u4"),  # CRC-32 of the header before this entry
     ]
@@ -112,7 +114,7 @@ def _encode(field: PotentialField) -> tuple[NDArray[Any], list[tuple[int, bytes]
     names = ("columns_offset", "values_offset", "heights_offset", "json_offset")
     for name, offset in zip(names, offsets, strict=True):
         header[name] = offset
-    for name in (*_SCALARS, "levels", "border"):
+    for name in (*_SCALARS, *_COUNTS):
         header[name] = getattr(record, name)
     header["q"], header["floor"] = field.gain.upper, field.grid.floor
     sections = list(zip(offsets, parts, strict=True))
@@ -171,10 +173,8 @@ def _decode(data: NDArray[np.uint8], build_texture: BuildTexture) -> PotentialFi
     columns = _section(data, header["columns_offset"], rows * width * 4, "<i4")
     values = _section(data, header["values_offset"], count, "<f4")
     text = bytes(data[int(header["json_offset"]) :])
-    scalars = {name: float(header[name]) for name in _SCALARS}
-    levels, border = int(header["levels"]), int(header["border"])
-    table = columns.reshape(rows, width, 4)
-    record = FieldArguments(values, table, **scalars, levels=levels, border=border)
+    numbers: dict[str, Any] = {name: header[name].item() for name in (*_SCALARS, *_COUNTS)}
+    record = FieldArguments(values, columns.reshape(rows, width, 4), **numbers)
     described = json.loads(text)
     count = math.prod(described["shape"]) if described["shape"] else 0
     heights = _section(data, header["heights_offset"], count, "<f8")
@@ -203,7 +203,8 @@ def assemble_field(
     grid = FieldGrid(
         steps=np.array(numbers["steps"]), cells=tuple(numbers["cells"]),
         start=np.array(numbers["start"]), levels=record.levels,
-        level_spacing=numbers["level_spacing"], floor=numbers["floor"], border=record.border,
+        level_spacing=numbers["level_spacing"], floor=numbers["floor"], below=record.below,
+        border=record.border,
     )  # fmt: skip
     _check_record(record, grid)
     gain, one_sided = (
@@ -254,7 +255,8 @@ def _check_record(record: FieldArguments, grid: FieldGrid) -> None:
     rows = 1 if len(grid.cells) == 1 else grid.cells[1] + 3
     fits = record.columns.shape == (rows, grid.cells[0] + 3, 4) and record.levels >= 3
     fits = fits and record.border in (PERIODIC, MIRRORED, ZERO)
-    ordered = (first >= 0) & (first <= end) & (end <= reach) & (reach <= record.levels)
+    fits = fits and 1 <= record.below <= record.levels - 2
+    ordered = (first >= 0) & (first <= end) & (reach >= 0) & (reach <= record.levels)
     stored = (first == end) | ((offset + first >= 0) & (offset + end <= record.c.size))
     numbers = np.array([getattr(record, name) for name in _SCALARS])
     if not (fits and ordered.all() and stored.all()):

@@ -15,7 +15,14 @@ from asperity.textures.fields.field_sampler import MIRRORED, PERIODIC, ZERO, Fie
 
 # Weight of both neighbours of a node along an axis in a smoothing pass.
 NEIGHBOUR_WEIGHT = 0.125
+# Steps over which the share of a smoothing pass rises from 0 to 1.
+RAMP = 5
 _MIN_STEPS = 4
+_MIN_BELOW = 2
+# Height above the surface at which coefficients end, in nodes: a cell with contact has no node
+# farther outside. The last part of it only adds levels of no effect.
+_MARGIN = 2.75
+_CUT = 0.05
 
 SingleArray = NDArray[np.float32]
 
@@ -28,9 +35,11 @@ class FieldGrid:
         steps: from node to node along each axis of the texture [m], shape (d, 2).
         cells: number of steps along each of them.
         start: the first node [m], shape (2,).
-        levels: number of levels of nodes along z, at least two of them above the highest point.
+        levels: number of levels of nodes along z, up to the margin above the highest point.
         level_spacing: distance of the levels [m].
-        floor: z halfway between the two lowest levels [m], the bottom of the spline's cells.
+        floor: z down to which the field is that of the spline [m].
+        below: number of cells below the floor, at least 1; the lowest ends halfway between the two
+            lowest levels.
         border: what the field is beyond its first and last node.
     """
 
@@ -40,6 +49,7 @@ class FieldGrid:
     levels: int
     level_spacing: float
     floor: float
+    below: int
     border: int
 
     @staticmethod
@@ -47,43 +57,46 @@ class FieldGrid:
         domain: Domain,
         heights: tuple[float, float],
         max_depth: float,
+        fade: float,
         resolution: float,
-        margin: int = 0,
     ) -> FieldGrid:
         """Return the coarsest grid whose nodes are at most the resolution apart.
 
         Args:
             domain: the domain of the texture.
             heights: its least and greatest height [m].
-            max_depth: depth below the least height down to which the field extends [m].
+            max_depth: depth of the floor below the least height [m].
+            fade: least height of the cells below the floor [m].
             resolution: [m].
-            margin: levels above the two that are above the highest point; smoothing needs one a
-                pass.
         """
         lengths = np.hypot(*domain.spans.T)
         cells = [max(math.ceil(length / resolution), _MIN_STEPS) for length in lengths]
         floor = heights[0] - max_depth
         inside = max(math.ceil((heights[1] - floor) / resolution), _MIN_STEPS)
-        return FieldGrid(
+        spacing = (heights[1] - floor) / inside
+        below = max(math.ceil(fade / spacing), _MIN_BELOW)
+        grid = FieldGrid(
             steps=domain.spans / np.array(cells)[:, None],
             cells=tuple(cells),
             start=domain.origin,
-            levels=inside + 3 + margin,
-            level_spacing=(heights[1] - floor) / inside,
+            levels=inside + below + 2,
+            level_spacing=spacing,
             floor=floor,
+            below=below,
             border=PERIODIC if domain.periodic else MIRRORED,
         )
+        return replace(grid, levels=grid.levels + math.ceil(grid.margin / grid.level_spacing))
 
     @staticmethod
     def around(lower: FloatArray, upper: FloatArray, spacing: float) -> FieldGrid:
-        """Return the grid of a closed body: its box and at least two nodes of margin around it.
+        """Return the grid of a closed body: its box and at least three nodes around it.
 
         Args:
             lower: corner of the box of least coordinates [m], shape (3,).
             upper: the opposite corner [m].
             spacing: of the nodes along all axes [m].
         """
-        counts = np.ceil((upper - lower) / spacing).astype(int) + 4
+        counts = np.ceil((upper - lower) / spacing).astype(int) + 6
         origin = 0.5 * (lower + upper - counts * spacing)
         return FieldGrid(
             steps=spacing * np.eye(2),
@@ -91,7 +104,8 @@ class FieldGrid:
             start=origin[:2],
             levels=int(counts[2]) + 1,
             level_spacing=spacing,
-            floor=float(origin[2] + 0.5 * spacing),
+            floor=float(origin[2] + 1.5 * spacing),
+            below=1,
             border=ZERO,
         )
 
@@ -106,9 +120,14 @@ class FieldGrid:
         """Distance of the nodes along each axis [m], z last."""
         return (*(float(length) for length in np.hypot(*self.steps.T)), self.level_spacing)
 
+    @property
+    def margin(self) -> float:
+        """Distance outside of the surface at which coefficients end [m]."""
+        return _MARGIN * max(self.spacing)
+
     def height(self, level: Any) -> Any:
         """Return z of a level [m]."""
-        return self.floor + (level - 0.5) * self.level_spacing
+        return self.floor + (level - self.below - 0.5) * self.level_spacing
 
     def positions(self, index: NDArray[np.intp] | FloatArray) -> FloatArray:
         """Return x and y [m], (n, 2), of nodes of the plane (n, d)."""
@@ -116,8 +135,7 @@ class FieldGrid:
 
     def extend_down(self, count: int) -> FieldGrid:
         """Return the grid with further levels below the lowest."""
-        floor = self.floor - count * self.level_spacing
-        return replace(self, levels=self.levels + count, floor=floor)
+        return replace(self, levels=self.levels + count, below=self.below + count)
 
     def stored_nodes(self, axis: int) -> NDArray[np.intp]:
         """Return the node stored at each place along an axis, beyond the borders too; -1: none."""
@@ -130,10 +148,10 @@ class FieldGrid:
         return np.where((index < 0) | (index > last), -1, index)
 
     def spread(self, passes: int) -> float:
-        """Return the variance [m²] of the points of which T is the mean of U.
+        """Return the greatest variance [m²] of the points of which S is the mean of the depth.
 
         A quadratic B-spline has the variance 1/4 of a squared step along each axis, and a smoothing
-        pass adds 1/4.
+        pass adds at most 1/4.
         """
         return (0.25 + 2.0 * NEIGHBOUR_WEIGHT * passes) * float(np.square(self.spacing).sum())
 
@@ -142,42 +160,56 @@ class FieldGrid:
     ) -> tuple[float, float]:
         """Return proved bounds of |∇T - ∇U| [m] and of |T - U| [m²].
 
-        A derivative of T along a step is the mean of that derivative of U over points around the
-        probe, its potential the mean of U over other points. Both have the probe as their mean;
-        :meth:`spread` is the variance of the latter, and in the former the variance along the step
-        itself is at most 1/12 of its square greater (a linear B-spline, at most 1/4, and the
-        step's own 1/12, for 1/4). Single precision rounds a potential at most twice, and less than
-        5 times in a smoothing pass; a slope takes at most twice that over a step.
+        S is the mean of the exact depth D, which is 1-Lipschitz, over points around the probe p
+        with p as their mean; :meth:`spread` is their variance σ². Its derivative along a step h is
+        the difference of two such means over h, at ±h/2, with mean squares τ² = σ² + h²/4 of the
+        distances from p. For every point x, D(p) (D(x) - D(p)) is ∇U(p) · (x - p) up to
+        (L + 1) |x - p|²/2, so D(p) times the derivative is that of U up to (L + 1) τ²/h; and S
+        differs from D(p) by at most σ. The derivative of S is at most 1, and a smoothing pass may
+        add to it, since its weights differ between nodes. T is at most the mean of U; it is less by
+        at most the variance of S where all points are inside, and by σ times the depth otherwise.
+        Single precision rounds a coefficient at most twice, and less than 5 times in a pass.
 
         Args:
-            gain: Lipschitz constant of ∇U [1].
+            gain: Lipschitz constant L of ∇U [1].
             passes: number of smoothing passes.
-            largest: greatest potential that is stored in single precision [m²].
+            largest: greatest coefficient that is stored in single precision [m].
         """
         rounding = (2.0 + 5.0 * passes) * largest * 0.5 * float(np.finfo(np.float32).eps)
-        square, spread = np.square(self.spacing), self.spread(passes)
-        components = gain * np.sqrt(spread + square / 12.0) + 2.0 * rounding / np.sqrt(square)
+        steps, spread = np.array(self.spacing), self.spread(passes)
+        square = np.square(steps)
+        change = NEIGHBOUR_WEIGHT * (1.0 / RAMP + 3.0 / 255.0)  # of the weight, and its rounding
+        growth = 1.0 + 2.0 * change * steps.max() / steps.min()
+        slope = growth ** (passes * (len(steps) - 1))
+        components = (gain + 1.0) * (spread + 0.25 * square) / steps + slope * math.sqrt(spread)
+        components += rounding * (slope + 2.0 * largest / steps)
         rates = np.linalg.pinv(self.steps).T * np.hypot(*self.steps.T)[:, None]
         # Derivatives along non-orthogonal steps amplify an error of the gradient.
         skew = max(1.0, float(np.linalg.norm(rates, 2)))
-        return skew * float(np.linalg.norm(components)), 0.5 * gain * float(spread) + rounding
+        reach = (1.5 + passes) * math.sqrt(float(square.sum()))
+        potential = max(0.5 * (gain + 1.0) * spread, reach * math.sqrt(spread))
+        return skew * float(np.linalg.norm(components)), potential + largest * rounding
 
-    def arguments(self, potentials: SingleArray) -> FieldArguments:
-        """Return the record of a field from its potentials at the nodes.
+    def arguments(self, depths: SingleArray, lift: float = 0.0) -> FieldArguments:
+        """Return the record of a field from its depths at the nodes.
 
         Args:
-            potentials: [m²], shape ``node_counts``: first axis, second axis, z.
+            depths: [m], shape ``node_counts``: first axis, second axis, z.
+            lift: vertical force over the stiffness below the floor, less the depth there, at least
+                about [m].
         """
-        rows = np.swapaxes(potentials if len(self.cells) == 2 else potentials[:, None], 0, 1)
+        rows = np.swapaxes(depths if len(self.cells) == 2 else depths[:, None], 0, 1)
         # One row after the other, since masks of a large field would take more memory than it does.
-        first, end = np.stack([_column_limits(row) for row in rows], axis=1)
+        least = (_CUT - 1.0) * self.margin
+        first, end = np.stack([_column_limits(row, least) for row in rows], axis=1)
+        reach = np.stack([_column_limits(row, 0.0)[1] for row in rows])
         starts = (np.cumsum(end - first) - (end - first).ravel()).reshape(first.shape)
         values = np.empty(int((end - first).sum()), np.float32)
         level = np.arange(self.levels)
         for row, low, high, start in zip(rows, first, end, starts[:, 0], strict=True):
             part = row[(level >= low[:, None]) & (level < high[:, None])]
-            values[start : start + len(part)] = part
-        table = np.stack([starts - first, first, end, end], axis=-1).astype(np.int32)
+            values[start : start + len(part)] = np.maximum(part + self.margin, 0.0)
+        table = np.stack([starts - first, first, end, reach], axis=-1).astype(np.int32)
         table = self._with_borders(table)
         x0, y0 = (float(value) for value in self.start)
         rates = np.zeros((2, 2))
@@ -185,8 +217,8 @@ class FieldGrid:
         rates[: len(self.cells)] = np.linalg.pinv(self.steps).T
         (m00, m01), (m10, m11) = rates.tolist()
         return FieldArguments(
-            values, table, x0, y0, float(self.height(0)),
-            m00, m01, m10, m11, 1.0 / self.level_spacing, self.levels, self.border,
+            values, table, x0, y0, float(self.height(0)), m00, m01, m10, m11,
+            1.0 / self.level_spacing, self.margin, lift, self.levels, self.below, self.border,
         )  # fmt: skip
 
     def _with_borders(self, table: NDArray[np.int32]) -> NDArray[np.int32]:
@@ -196,7 +228,7 @@ class FieldGrid:
             table = np.take(table, nodes, axis=axis)
             outside = np.expand_dims(nodes < 0, 0 if axis == 1 else 1)
             table[np.broadcast_to(outside, table.shape[:2])] = 0
-        reach = table[..., 2]
+        reach = table[..., 3]
         for axis in range(2):
             width = [(1, 1) if k == axis else (0, 0) for k in range(2)]
             wide = np.pad(reach, width)
@@ -206,8 +238,8 @@ class FieldGrid:
         return np.ascontiguousarray(table)
 
 
-def _column_limits(row: SingleArray) -> NDArray[np.intp]:
-    """Return the first level of each column that is not zero, and the one after the last."""
-    inside = row > 0.0
+def _column_limits(row: SingleArray, least: float) -> NDArray[np.intp]:
+    """Return the first level of each column that exceeds a depth, and the one after the last."""
+    inside = row > least
     end = inside.shape[-1] - inside[:, ::-1].argmax(axis=-1)
     return np.where(inside.any(axis=-1), [inside.argmax(axis=-1), end], 0)

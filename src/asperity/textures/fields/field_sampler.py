@@ -1,13 +1,15 @@
-"""Force of a baked potential field: the gradient of a quadratic B-spline on a grid of nodes.
+"""Force of a baked potential field: half the square of a quadratic B-spline on a grid of nodes.
 
-The potential is T(p) = Σ c_n Π β((p - p_n)_i/h_i), β the quadratic B-spline, and the force -k ∇T,
-evaluated as written: it is conservative and continuous whatever the coefficients are, and takes 27
-of them (docs/theory/split.md). Coefficients are stored by columns of nodes along z, each from its
-first to its last coefficient that is not zero; outside of a column they are zero.
+The depth is S(p) = Σ c_n Π β((p - p_n)_i/h_i) - margin, β the quadratic B-spline, the potential is
+T = S²/2 where S > 0 and 0 elsewhere, and the force -k ∇T = -k S ∇S, evaluated as written: it is
+conservative and continuous whatever the coefficients are, and takes 27 of them. Coefficients are
+stored by columns of nodes along z, each from its first to its last coefficient that is not zero;
+outside of a column they are zero.
 
-Below the bottom, halfway between the two lowest levels, the field of a surface continues with its
-value and slope there and the curvature of the flat wall. The field of a closed body ends inside its
-grid.
+Below the floor the field of a surface is evaluated at floor - ψ of the depth d below it, plus a
+function g(d): with r = d/F, where F/2 is the height of the cells below the floor, ψ' = 1 - r falls
+to zero, and with it the variation of the force along z, while g'' makes up for it, so that the
+field ends in the curvature of the flat wall. The field of a closed body ends inside its grid.
 """
 
 from typing import NamedTuple
@@ -27,7 +29,7 @@ MIRRORED = 1
 ZERO = 2
 
 # Entries of a column: where its node at level 0 would be stored, its first level, the level after
-# its last, and the greatest of these among the column and its eight neighbours.
+# its last, and the level after the last of positive depth of it and its eight neighbours.
 OFFSET = 0
 FIRST = 1
 END = 2
@@ -42,7 +44,7 @@ class FieldArguments(NamedTuple):
     """Record of a baked field.
 
     Attributes:
-        c: coefficients [m²], column after column.
+        c: coefficients [m], column after column.
         columns: OFFSET, FIRST, END and REACH, shape (rows, columns, 4), with one node before the
             first and two after the last along both axes; one row for a profile.
         x0: the first node [m].
@@ -53,7 +55,10 @@ class FieldArguments(NamedTuple):
         m10: along the second: x.
         m11: y.
         iz: nodes per metre along z.
+        margin: height above the surface at which coefficients are zero [m].
+        lift: vertical force over the stiffness below the floor, less the depth, at least about [m].
         levels: number of levels.
+        below: number of cells below the floor, at least 1.
         border: PERIODIC, MIRRORED or ZERO.
     """
 
@@ -67,7 +72,10 @@ class FieldArguments(NamedTuple):
     m10: float
     m11: float
     iz: float
+    margin: float
+    lift: float
     levels: int
+    below: int
     border: int
 
 
@@ -110,16 +118,24 @@ def field_row_weights(rows: int, v: float) -> tuple[int, ThreeWeights, ThreeWeig
     return i, quadratic_weights(v - i), quadratic_weight_slopes(v - i)
 
 
-def field_z_weights(w: float) -> tuple[int, float, ThreeWeights, ThreeWeights]:
-    """Return node, negative height above the floor or 0, weights and slopes along z.
+def field_level(w: float, field: FieldArguments) -> tuple[float, float]:
+    """Return where the spline is evaluated along z, in nodes, and the depth below the floor."""
+    floor = field.below + 0.5
+    if w >= floor:
+        return w, 0.0
+    r = (floor - w) / (2.0 * field.below)
+    s = min(r, 1.0)
+    return floor - field.below * s * (2.0 - s), r
 
-    Below the floor the weights are linear.
-    """
-    if w >= 0.5:
-        m = int(w + 0.5)
-        return m, 0.0, quadratic_weights(w - m), quadratic_weight_slopes(w - m)
-    t = w - 0.5
-    return 1, t, (0.5 - t, 0.5 + t, 0.0), (-1.0, 1.0, 0.0)
+
+def field_descent(r: float, field: FieldArguments) -> Vector:
+    """Return ψ', g' [m] and g [m²] at a depth of r F below the floor."""
+    s = min(r, 1.0)
+    size = 2.0 * field.below / field.iz
+    beyond = size * (r - s)
+    slope = s * (field.lift + size * s * (1.5 - 0.5 * s))
+    value = size * s * s * (0.5 * field.lift + size * s * (0.5 - 0.125 * s))
+    return 1.0 - s, slope + beyond, value + beyond * (slope + 0.5 * beyond)
 
 
 def field_triple(i: int, j: int, m: int, field: FieldArguments) -> Vector:
@@ -147,7 +163,11 @@ def field_gradient(x: float, y: float, z: float, field: FieldArguments) -> Vecto
         return 0.0, 0.0, 0.0
     u0 = quadratic_weights(u - j)
     u1 = quadratic_weight_slopes(u - j)
-    m, below, w0, w1 = field_z_weights(w)
+    w, below = field_level(w, field)
+    m = int(w + 0.5)
+    w0 = quadratic_weights(w - m)
+    w1 = quadratic_weight_slopes(w - m)
+    depth = -field.margin
     gu = gv = gw = 0.0
     for a in range(rows):
         value = along = upward = 0.0
@@ -157,18 +177,19 @@ def field_gradient(x: float, y: float, z: float, field: FieldArguments) -> Vecto
             value += u0[b] * s
             along += u1[b] * s
             upward += u0[b] * (w1[0] * c0 + w1[1] * c1 + w1[2] * c2)
+        depth += v0[a] * value
         gu += v0[a] * along
         gv += v1[a] * value
         gw += v0[a] * upward
-    gu *= u_sign
-    gv *= v_sign
-    if field.border == ZERO:
-        below = 0.0
-    return (
-        field.m00 * gu + field.m10 * gv,
-        field.m01 * gu + field.m11 * gv,
-        field.iz * gw + below / field.iz,
-    )
+    if depth <= 0.0:
+        return 0.0, 0.0, 0.0
+    gu *= depth * u_sign
+    gv *= depth * v_sign
+    gz = depth * field.iz * gw
+    if below > 0.0:
+        rate, slope, _value = field_descent(below, field)
+        gz = rate * gz - slope
+    return field.m00 * gu + field.m10 * gv, field.m01 * gu + field.m11 * gv, gz
 
 
 def field_hessian(
@@ -192,29 +213,35 @@ def field_hessian(
 
 def field_node_expansion(
     u: float, v: float, w: float, field: FieldArguments
-) -> tuple[float, float, float, float, float, float, float]:
-    """Return T and its second derivatives in nodes: value, uu, uv, uw, vv, vw, ww."""
+) -> tuple[float, Vector, SixEntries]:
+    """Return S, its first derivatives and its second ones uu, uv, uw, vv, vw, ww in nodes."""
     rows = min(field.columns.shape[0], 3)
     j = int(u + 0.5)
     u0 = quadratic_weights(u - j)
     u1 = quadratic_weight_slopes(u - j)
     i, v0, v1 = field_row_weights(field.columns.shape[0], v)
-    m, below, w0, w1 = field_z_weights(w)
+    m = int(w + 0.5)
+    w0 = quadratic_weights(w - m)
+    w1 = quadratic_weight_slopes(w - m)
     second = (1.0, -2.0, 1.0)
-    value = uu = uv = uw = vv = vw = ww = 0.0
+    value = -field.margin
+    du = dv = dw = uu = uv = uw = vv = vw = ww = 0.0
     for a in range(rows):
         for b in range(3):
             c0, c1, c2 = field_triple(i + a, j + b, m, field)
             s0 = w0[0] * c0 + w0[1] * c1 + w0[2] * c2
             s1 = w1[0] * c0 + w1[1] * c1 + w1[2] * c2
             value += v0[a] * u0[b] * s0
+            du += v0[a] * u1[b] * s0
+            dv += v1[a] * u0[b] * s0
+            dw += v0[a] * u0[b] * s1
             uu += v0[a] * second[b] * s0
             uv += v1[a] * u1[b] * s0
             uw += v0[a] * u1[b] * s1
             vv += second[a] * u0[b] * s0
             vw += v1[a] * u0[b] * s1
             ww += v0[a] * u0[b] * (c0 - 2.0 * c1 + c2)
-    return value, uu, uv, uw, vv if rows > 1 else 0.0, vw, ww if below == 0.0 else 0.0
+    return value, (du, dv, dw), (uu, uv, uw, vv if rows > 1 else 0.0, vw, ww)
 
 
 def field_expansion(
@@ -225,21 +252,27 @@ def field_expansion(
     u, u_sign, v, v_sign = field_coordinates(x, y, field)
     if w >= field.levels - 1.5 or u_sign * v_sign == 0.0:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    value, uu, uv, uw, vv, vw, ww = field_node_expansion(u, v, w, field)
-    uv *= u_sign * v_sign
-    uw *= u_sign
-    vw *= v_sign
-    drop = 0.0 if field.border == ZERO else min(w - 0.5, 0.0) / field.iz
-    xx, xy, xz, yy, yz, zz = field_hessian(uu, uv, uw, vv, vw, ww, field)
-    zz += 1.0 if drop < 0.0 else 0.0
-    return value + 0.5 * drop * drop, xx, xy, xz, yy, yz, zz
+    w, below = field_level(w, field)
+    s, (du, dv, dw), (uu, uv, uw, vv, vw, ww) = field_node_expansion(u, v, w, field)
+    if s <= 0.0:
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    xx, xy, xz, yy, yz, zz = field_hessian(
+        du * du + s * uu, (du * dv + s * uv) * u_sign * v_sign, (du * dw + s * uw) * u_sign,
+        dv * dv + s * vv, (dv * dw + s * vw) * v_sign, dw * dw + s * ww, field,
+    )  # fmt: skip
+    rate, _slope, added = field_descent(below, field)
+    curvature = 1.0 - rate * rate
+    if 0.0 < below < 1.0:
+        size = 2.0 * field.below / field.iz
+        curvature = 1.5 * curvature + (field.lift + s * dw * field.iz) / size
+    return 0.5 * s * s + added, xx, xy, rate * xz, yy, rate * yz, rate * rate * zz + curvature
 
 
 # --- the functions of a texture and of the split contact ------------------------------------------
 
 
 def sample_height(x: float, y: float, field: FieldArguments) -> float:
-    """Return z [m] above which the force is zero, at most 2 nodes above the surface."""
+    """Return z [m] above which the force is zero, about 2 nodes above the surface."""
     u, _u_sign, v, _v_sign = field_coordinates(x, y, field)
     i = min(field.columns.shape[0] // 2, 1) + int(v + 0.5)
     return float(field.z0 + (field.columns[i, int(u + 0.5) + 1, REACH] + 0.5) / field.iz)

@@ -1,40 +1,45 @@
-"""The exact potential of law H at the nodes of a field, and its smoothing."""
+"""The exact depth of law H at the nodes of a field, and its smoothing."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from asperity.clamps import NONE
 from asperity.core.checks import FloatArray
 from asperity.laws import LAWS
 from asperity.textures.fields import node_loop
 from asperity.textures.fields.field_certificate import Progress, run_in_threads
-from asperity.textures.fields.field_grid import NEIGHBOUR_WEIGHT, FieldGrid, SingleArray
-from asperity.textures.fields.field_sampler import PERIODIC, ZERO
+from asperity.textures.fields.field_grid import NEIGHBOUR_WEIGHT, RAMP, FieldGrid, SingleArray
+from asperity.textures.fields.field_sampler import MIRRORED, PERIODIC, ZERO
 from asperity.textures.texture import Texture
 
 _NODES_PER_BLOCK = 10_000
+_MODES: Any = {PERIODIC: "wrap", MIRRORED: "mirror", ZERO: "nearest"}
 
-# Writes U [m²] in single precision, (n, levels), at columns of nodes at x, y (n, 2) and rising z
-# (levels,) [m]; called by several threads at once.
-ColumnFunction = Callable[[FloatArray, FloatArray, SingleArray], None]
+# Writes the depth [m] in single precision, (n, levels), at columns of nodes at x, y (n, 2) and
+# rising z (levels,) [m]: sqrt(2U) inside, the negative distance of the surface outside, at least
+# -margin, the third argument; called by several threads at once.
+ColumnFunction = Callable[[FloatArray, FloatArray, float, SingleArray], None]
 
 
 def split_columns(texture: Texture, continuity: float) -> ColumnFunction:
-    """Return the function of the exact potential of law H of a texture, over its stiffness."""
+    """Return the function of the exact depth of law H of a texture."""
     from asperity.kernels.fuse import fuse_on_texture
 
     loops = fuse_on_texture(LAWS["H"], texture.sampler, NONE, (node_loop,))
-    return lambda xy, z, out: loops.column_batch(xy, z, out, continuity, texture.arguments)
+    arguments = texture.arguments
+    return lambda xy, z, margin, out: loops.column_batch(xy, z, out, continuity, margin, arguments)
 
 
 def compute_potentials(
     columns: ColumnFunction, grid: FieldGrid, progress: Progress | None = None
 ) -> SingleArray:
-    """Return U [m²] at the nodes, shape ``grid.node_counts``, in single precision."""
+    """Return the depth [m] at the nodes, shape ``grid.node_counts``, in single precision."""
     *plane, levels = grid.node_counts
     result = np.empty((math.prod(plane), levels), np.float32)
     at_once = max(_NODES_PER_BLOCK // levels, 1)
@@ -43,36 +48,45 @@ def compute_potentials(
     def fill(first: int) -> None:
         part = np.arange(first, min(first + at_once, len(result)))
         xy = grid.positions(np.stack(np.unravel_index(part, plane), axis=-1))
-        columns(xy, z, result[first : first + at_once])
+        columns(xy, z, grid.margin, result[first : first + at_once])
 
     run_in_threads(fill, range(0, len(result), at_once), progress)
     return result.reshape(grid.node_counts)
 
 
-def smooth(potentials: SingleArray, grid: FieldGrid) -> SingleArray:
-    """Return means of potentials with weights 1/8, 3/4, 1/8 along each axis.
+def smooth(depths: SingleArray, weights: NDArray[np.uint8], grid: FieldGrid) -> SingleArray:
+    """Return means of depths with weights w/8, 1 - w/4, w/8 along each axis.
 
-    A mean of exact potentials over shifted copies keeps the bounds -c <= Hess U <= 1 (MATH
-    section 10). The lowest level is lost, since it has no neighbour.
+    They lower the gain where second derivatives jump. The lowest level is lost, since it has no
+    neighbour; above the highest the depth is that of the highest.
 
     Args:
-        potentials: [m²], shape ``grid.node_counts``; changed in place.
+        depths: [m], shape ``grid.node_counts``; changed in place, plane by plane.
+        weights: 255 w at the nodes.
         grid: the nodes.
     """
-    for axis in range(potentials.ndim - 1):
-        _smooth_axis(np.moveaxis(potentials, axis, 0), grid.border)
-    for rows in potentials.reshape(-1, *potentials.shape[-2:]):
-        _smooth_axis(np.moveaxis(rows, -1, 0), ZERO)
-    return potentials[..., 1:]
+    from scipy import ndimage
+
+    for axis in range(depths.ndim):
+        other = (axis + 1) % depths.ndim
+        mode = _MODES[grid.border if axis < depths.ndim - 1 else ZERO]
+        planes = np.moveaxis(depths, other, 0), np.moveaxis(weights, other, 0)
+        for plane, shares in zip(*planes, strict=True):
+            change = ndimage.correlate1d(plane, [1.0, -2.0, 1.0], axis - (axis > other), mode=mode)
+            np.add(plane, np.float32(NEIGHBOUR_WEIGHT / 255.0) * shares * change, out=plane)
+    return depths[..., 1:]
 
 
-def _smooth_axis(rows: SingleArray, border: int) -> None:
-    """Smooth along the first axis, in place; borders repeat, are mirrored, or zero."""
-    nothing = np.zeros_like(rows[0])
-    before = {PERIODIC: rows[-1], ZERO: nothing}.get(border, rows[1]).copy()
-    after = {PERIODIC: rows[0], ZERO: nothing}.get(border, rows[-2]).copy()
-    for k in range(len(rows)):
-        here = rows[k].copy()
-        beyond = rows[k + 1] if k + 1 < len(rows) else after
-        rows[k] = (1.0 - 2.0 * NEIGHBOUR_WEIGHT) * here + NEIGHBOUR_WEIGHT * (before + beyond)
-        before = here
+def spread_marks(marks: NDArray[np.uint8], border: int) -> tuple[Any, Any]:
+    """Return weights, 255 at marked nodes and falling slowly to 0, and the cells they change."""
+    from scipy import ndimage
+
+    weights: Any = 255 * (marks > 0).astype(np.uint8)
+    largest, mean = ndimage.maximum_filter1d, ndimage.uniform_filter1d
+    steps = [(largest, RAMP), (mean, RAMP), (largest, 3)]
+    for function, size in steps:
+        before = weights
+        for axis in range(marks.ndim):
+            mode = _MODES[border if axis < marks.ndim - 1 else ZERO]
+            weights = function(weights, size, axis=axis, mode=mode)
+    return before, weights

@@ -15,6 +15,7 @@ from asperity.core.checks import FloatArray
 from asperity.core.digests import content_digest
 from asperity.core.errors import ParameterError
 from asperity.core.files import to_plain_data
+from asperity.measured.lengths import format_length
 from asperity.textures.fields.field_grid import FieldGrid
 from asperity.textures.fields.field_sampler import FieldArguments
 from asperity.textures.texture import CertifiedNumber, Texture
@@ -25,25 +26,36 @@ class FieldAccuracy:
     """Difference of a baked field from exact law H, forces over the stiffness.
 
     Attributes:
-        rms: RMS difference of the forces [m], measured at random probes.
-        largest: the greatest one measured [m].
         bound: the greatest one possible [m], proved for all z above the floor.
         potential_bound: greatest difference of the potentials [m²], proved there.
-        texture_rms: RMS of the texture's force [m]: the exact force about its mean at one height.
-        probes: number of probes measured.
+        rms: RMS difference of the forces [m], measured at random probes of the depths.
+        largest: the greatest one measured [m].
+        depths: depths below the highest point of which the probes are [m]; of a body, below its
+            surface. At the least of them the mean force is about 0.1 N at 3000 N/m.
+        shares: RMS difference over the RMS of the texture's force at each of them: the exact force
+            about its mean there.
+        onset: greatest distance [m] from the surface at which contact was found to begin.
+        is_limited: whether the goal was missed, because no finer field has the size allowed.
     """
 
-    rms: float
-    largest: float
     bound: float
     potential_bound: float
-    texture_rms: float
-    probes: int
+    rms: float = 0.0
+    largest: float = 0.0
+    depths: tuple[float, ...] = ()
+    shares: tuple[float, ...] = ()
+    onset: float = 0.0
+    is_limited: bool = False
 
     @property
     def share(self) -> float:
-        """RMS difference over the RMS of the texture's force."""
-        return self.rms / self.texture_rms if self.texture_rms > 0.0 else 0.0
+        """RMS difference over the RMS of the texture's force, at the depth where it is worst."""
+        return max(self.shares, default=0.0)
+
+    @property
+    def worst_depth(self) -> float:
+        """Depth [m] of that share."""
+        return max(zip(self.shares, self.depths, strict=True), default=(0.0, 0.0))[1]
 
 
 @dataclass(frozen=True)
@@ -70,14 +82,16 @@ def _of_source(name: str) -> property:
 class PotentialField(Texture):
     """A potential field baked from law H of a texture, which is rendered without a search.
 
-    T(p) = Σ c_n Π β((p - p_n)_i/h_i), β the quadratic B-spline, c_n the exact potential U of law H
-    at nodes p_n, or its mean over neighbouring nodes; the force is -k ∇T. So the force that is
-    rendered is conservative and continuous, and its gain is certified from the coefficients. There
-    is no force farther outside of the body than 2 nodes and one for each smoothing pass.
+    T = S²/2 where S(p) = Σ c_n Π β((p - p_n)_i/h_i) is positive, β the quadratic B-spline, c_n
+    the exact depth at nodes p_n, or where smoothed its mean over neighbouring nodes: √(2U) of the
+    potential U of law H inside and the negative distance of the surface outside. The force is
+    -k ∇T. So the force that is rendered is conservative and continuous, and its gain is certified
+    from the coefficients. Where the surface is smooth, S is, too, and contact begins at the
+    surface.
 
     Below the floor, the least height minus ``max_depth``, the variation of the force with depth
-    fades within a few nodes, which the certified gain covers. Farther below, the field continues
-    with the curvature of the flat wall; its gain changes by rounding only.
+    fades, and farther below the field continues with the curvature of the flat wall; the certified
+    gain covers both.
 
     Heights, slopes and the domain are those of the texture that was baked.
 
@@ -86,7 +100,7 @@ class PotentialField(Texture):
         grid: the nodes.
         max_depth: depth below the least height down to which the numbers hold [m].
         continuity: c of law H.
-        passes: number of smoothing passes with weights 1/8, 3/4, 1/8 along each axis.
+        passes: number of smoothing passes, each around the cells whose gain is above the goal.
         gain: certified sup ‖Hess T‖, the characteristic number q.
         one_sided: certified sup λ_max(Hess T), the one-sided number q⁺.
         accuracy: difference from exact law H.
@@ -126,12 +140,16 @@ class PotentialField(Texture):
     @property
     def preparation(self) -> tuple[str, ...]:  # type: ignore[override]  # computed here
         """See :class:`Texture`; the last step is the baking."""
-        smoothed = {0: "not smoothed", 1: "smoothed once"}
-        how = smoothed.get(self.passes, f"smoothed {self.passes} times")
-        nodes, spacing = self.arguments.c.size, max(self.grid.spacing)
+        smoothed = {0: "not smoothed", 1: "smoothed locally once"}
+        how = smoothed.get(self.passes, f"smoothed locally {self.passes} times")
+        nodes, spacing, accuracy = self.arguments.c.size, max(self.grid.spacing), self.accuracy
+        depth, onset = format_length(accuracy.worst_depth), format_length(accuracy.onset)
+        missed = ": more than asked for, the memory allows no finer field"
         text = (
             f"Law H baked as a potential field: {nodes} nodes, {1e6 * spacing:.3g} µm apart, {how};"
-            f" q at most {self.gain.upper:.4g}, {100 * self.accuracy.share:.2g} % RMS from exact H"
+            f" q at most {self.gain.upper:.4g}; force at most {100 * accuracy.share:.2g} % RMS from"
+            f" exact H where pressed with 0.1 N or more (at {depth}){missed * accuracy.is_limited};"
+            f" contact begins at most {onset} from the surface"
         )
         return (*self.source.preparation, text)
 

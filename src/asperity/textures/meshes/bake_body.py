@@ -9,7 +9,15 @@ from asperity.contacts.split import optimality, solver
 from asperity.core.checks import FloatArray, check_positive
 from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.measured.lengths import format_length, format_lengths
-from asperity.textures.fields.bake import PROBES, BakeGoal, BakePlan, scale_progress
+from asperity.textures.fields.bake import (
+    DEPTHS,
+    LEAST_DEPTH,
+    PROBES,
+    SHALLOW,
+    BakeGoal,
+    BakePlan,
+    scale_progress,
+)
 from asperity.textures.fields.field_certificate import Progress
 from asperity.textures.fields.field_grid import FieldGrid, SingleArray
 from asperity.textures.fields.node_potentials import compute_potentials
@@ -25,7 +33,6 @@ DEFAULT_DEPTH = 1e-3
 DEFAULT_GOAL = BakeGoal()
 _MOST_CROSSINGS = 4096
 _LEAST_CELLS = 4
-_MAX_BAKES = 3
 _DIGITS = 12  # of places and thickness of thin parts [m]
 # Duality gap in squared spacings: it adds less than 4 times as much to the gain.
 _GAP = 1e-4
@@ -68,19 +75,9 @@ def bake_body(
         depth = min(depth, deepest)
     plan = _BodyPlan(body, depth, continuity, goal)
     plan.deepest = deepest
-    if resolution is not None:
-        return plan.bake(check_positive("resolution", resolution, "m"), progress)
-    chosen, finest = plan.choose(), plan.finest_resolution()
-    part = scale_progress(progress, 0.0, 0.5)
-    for _ in range(_MAX_BAKES):
-        field = plan.bake(chosen, part)
-        share = field.accuracy.share
-        if share <= goal.share or chosen <= finest:
-            break
-        # It is smoothed more often than the estimate assumes.
-        chosen = max(chosen * max(0.9 * goal.share / share, 0.5), finest)
-        part = scale_progress(progress, 0.5, 0.5)
-    return field
+    if resolution is None:
+        return plan.bake_coarsest(progress)
+    return plan.bake(check_positive("resolution", resolution, "m"), progress)
 
 
 class _BodyLoops:
@@ -100,14 +97,13 @@ class _BodyLoops:
         self._loops.point_batch(points, self.law, out, crossings, self.body.tree)
         return out
 
-    def columns(self, xy: FloatArray, z: FloatArray, out: SingleArray) -> FloatArray:
-        """Write the potentials of columns of nodes; return the summary of each, (n, 7)."""
-        out[:] = 0.0
+    def columns(self, xy: FloatArray, z: FloatArray, margin: float, out: SingleArray) -> FloatArray:
+        """Write the depths of columns of nodes; return the summary of each, (n, 7)."""
         summary = np.zeros((len(xy), 7))
         crossings = np.empty((_MOST_CROSSINGS, 2))
         self._loops.column_batch(
-            np.ascontiguousarray(xy), np.ascontiguousarray(z), self.law, self._tolerance, out,
-            summary, crossings, self.body.tree,
+            np.ascontiguousarray(xy), np.ascontiguousarray(z), self.law, self._tolerance, margin,
+            out, summary, crossings, self.body.tree,
         )  # fmt: skip
         return summary
 
@@ -118,21 +114,19 @@ class _BodyLoops:
         points = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1).reshape(-1, 3)
         return float(self.evaluate(points)[:, 4].max())
 
-    def surface_probes(self, count: int) -> FloatArray:
-        """Return random points at most the law's depth inside, (n, 3) [m]."""
+    def surface_probes(self, depths: FloatArray) -> FloatArray:
+        """Return random points of the surface, moved inward by depths [m], (n, 3) [m]."""
         # The areas of all triangles of a large mesh would take much memory.
         rng, step = np.random.default_rng(0), 1 + len(self.body.triangles) // 2**16
         corners = self.body.triangles[::step]
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         areas = np.linalg.norm(normals, axis=1)
-        chosen = np.searchsorted(np.cumsum(areas), rng.uniform(0.0, areas.sum(), 4 * count))
+        chosen = np.searchsorted(np.cumsum(areas), rng.uniform(0.0, areas.sum(), len(depths)))
         chosen = np.minimum(chosen, len(areas) - 1)
         weights = rng.dirichlet(np.ones(3), len(chosen))
         inward = -normals[chosen] / np.maximum(areas[chosen], 1e-300)[:, None]
         points = np.einsum("nk,nkd->nd", weights, corners[chosen])
-        points += inward * rng.uniform(0.0, self.law.max_depth, (len(chosen), 1))
-        depth = self.evaluate(points)[:, 4]
-        return np.asarray(points[(depth > 0.0) & (depth <= self.law.max_depth)][:count])
+        return np.asarray(points + inward * depths[:, None])
 
     def prepare(self, grid: FieldGrid, tolerance: float) -> None:
         """Set the grid, and check that no column of nodes finds the mesh overlapping itself."""
@@ -141,17 +135,19 @@ class _BodyLoops:
         index = np.stack(np.unravel_index(np.arange(width * depth), (width, depth)), axis=-1)
         self._xy = grid.positions(index)
         empty = np.zeros((len(self._xy), 0), np.float32)
-        self._summary = self.columns(self._xy, np.empty(0), empty)
+        self._summary = self.columns(self._xy, np.empty(0), grid.margin, empty)
         least, greatest = self._summary[:, 4], self._summary[:, 5]
         wrong = (least < 0.0) | (greatest > 1.0)
         places = np.column_stack([self._xy, self._summary[:, 6]])[wrong]
         if fault := make_fault(INTERSECTING, places):
             raise SurfaceFileError(f"{self.body.name} has no defined inside: {fault[0]}")
 
-    def record_columns(self, xy: FloatArray, z: FloatArray, out: SingleArray) -> None:
-        """Write the potentials of columns of the grid, and keep their summaries."""
+    def record_columns(
+        self, xy: FloatArray, z: FloatArray, margin: float, out: SingleArray
+    ) -> None:
+        """Write the depths of columns of the grid, and keep their summaries."""
         rows = self._rows(xy)
-        self._summary[rows] = self.columns(xy, z, out)
+        self._summary[rows] = self.columns(xy, z, margin, out)
 
     def _rows(self, xy: FloatArray) -> NDArray[np.intp]:
         steps = np.rint((xy - self.grid.start) / self.grid.spacing[0]).astype(np.intp)
@@ -215,41 +211,45 @@ class _BodyPlan(BakePlan):
         self.loops = _BodyLoops(body, BodyLaw(continuity, max_depth, 0.0))
         thinnest = float(np.ptp(np.array(body.box), axis=0).min())
         self.coarsest = min(thinnest / _LEAST_CELLS, body.coarsest)
-        self.probes = self.loops.surface_probes(PROBES)
-        if len(self.probes) == 0:
+        self.onset_limit = np.inf  # it would ask of edges what few bodies need
+        depths = max_depth * np.geomspace(LEAST_DEPTH, 1.0, DEPTHS)
+        rows = np.repeat(np.arange(DEPTHS), PROBES)
+        points = self.loops.surface_probes(depths[rows])
+        inside = self.exact(points)[1] > 0.0
+        if not inside.any():
             raise ParameterError("max_depth", "finds no point inside the body", max_depth)
-        self.force = np.ascontiguousarray(self.loops.evaluate(self.probes)[:, 1:4])
-        self.texture_rms = float(np.sqrt(np.square(self.force).sum(axis=1).mean()))
+        self.set_probes(points[inside], rows[inside], depths)
+        points = self.loops.surface_probes(np.full(PROBES, SHALLOW * max_depth))
+        self.set_shallow(points[self.exact(points)[1] > 0.0])
 
-    def columns(self, xy: FloatArray, z: FloatArray, out: SingleArray) -> None:
-        """Write the potentials of columns of nodes; see :data:`ColumnFunction`."""
-        if hasattr(self.loops, "grid"):
-            self.loops.record_columns(xy, z, out)
-        else:
-            self.loops.columns(xy, z, out)
+    def exact(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """See :class:`BakePlan`."""
+        found = self.loops.evaluate(points)
+        return np.ascontiguousarray(found[:, 1:4]), np.sqrt(np.maximum(2.0 * found[:, 0], 0.0))
 
     def bake(self, resolution: float, progress: Progress | None) -> PotentialField:
-        """Return the field of a resolution [m], with the thin parts of the body."""
-        grid, body, depth = self.checked_grid(resolution), self.loops.body, self.max_depth
-        self.loops.prepare(grid.extend_down(self.goal.passes), _GAP * resolution**2)
-        first_part = scale_progress(progress, 0.05, 0.85)
-        potentials = compute_potentials(self.columns, self.loops.grid, first_part)
-        thin_map = self.loops.thin_map(depth)
-        thin = self.loops.thin_regions(thin_map)
-        self.texture, found = self.loops.upper_envelope(body, thin)
-        if depth > (deepest := max(self.deepest, found)):
+        """See :class:`BakePlan`."""
+        grid, loops = self.checked_grid(resolution), self.loops
+        loops.prepare(grid.extend_down(self.goal.passes), _GAP * resolution**2)
+        part = scale_progress(progress, 0.05, 0.85)
+        depths = compute_potentials(loops.record_columns, loops.grid, part)
+        thin_map = loops.thin_map(self.max_depth)
+        thin = loops.thin_regions(thin_map)
+        self.texture, deepest = loops.upper_envelope(loops.body, thin)
+        if self.max_depth > (deepest := max(self.deepest, deepest)):
             reason = f"must be at most {format_length(deepest)}, the greatest depth of the body"
-            raise ParameterError("max_depth", reason, depth)
-        field = self.certify(potentials, grid, scale_progress(progress, 0.9, 0.1))
+            raise ParameterError("max_depth", reason, self.max_depth)
+        field = self.certify(depths, grid, scale_progress(progress, 0.9, 0.1))
         field.thin_regions, field.thin_map = thin, thin_map if thin else None
         return field
 
     def grid(self, resolution: float) -> FieldGrid:
-        """Return the grid around the body, with a margin for smoothing."""
-        lower, upper = self.loops.body.box
-        spacing = min(resolution, self.coarsest)
-        margin = self.goal.passes * spacing
-        return FieldGrid.around(lower - margin, upper + margin, spacing)
+        """Return the grid around the body.
+
+        Smoothed depths are means over points around a place, of a standard deviation of at most 1.7
+        spacings after ten passes: half a spacing outside of the box they are still negative.
+        """
+        return FieldGrid.around(*self.loops.body.box, min(resolution, self.coarsest))
 
     def checked_grid(self, resolution: float) -> FieldGrid:
         """Return the grid of a resolution that suits the body and the size allowed."""

@@ -1,4 +1,4 @@
-"""Exact potential of law H inside a closed mesh.
+"""Exact potential and depth of law H of a closed mesh.
 
 Fully-corrective Frank-Wolfe, as in :mod:`asperity.contacts.split.solver`, with the closest points
 of a mesh. For c >= 1 every y that is queried is at most as far from the probe as its closest point
@@ -172,17 +172,19 @@ def note_thin_spans(
 
 
 def column_batch(
-    columns: FloatArray, z: FloatArray, law: BodyLaw, tolerance: float,
+    columns: FloatArray, z: FloatArray, law: BodyLaw, tolerance: float, margin: float,
     out: NDArray[np.float32], summary: FloatArray, crossings: FloatArray, tree: TriangleTree,
 ) -> None:  # fmt: skip
-    """Write the potentials of columns of nodes.
+    """Write the depths of columns of nodes.
 
     Args:
         columns: x and y [m], shape (n, 2).
         z: of the levels [m].
         law: the law.
         tolerance: distance of crossings that count as one [m].
-        out: result [m²], shape (n, levels), zero where outside.
+        margin: [m].
+        out: result [m], shape (n, levels): √(2U), and outside the negative distance of the body, at
+            least -margin.
         summary: result, shape (n, 7): the greatest z of the body, the greatest distance, the least
             half thickness between opposite walls and z there [m], the least and the greatest
             winding number, and z of a winding number other than 0 and 1.
@@ -206,9 +208,14 @@ def column_batch(
         for m in range(out.shape[1]):
             p[2] = z[m]
             if winding_above(p[2], total, crossings) <= 0:
+                square, _x, _y, _z, found = tree_closest(
+                    p[0], p[1], p[2], margin * margin, near, tree
+                )
+                out[i, m] = -math.sqrt(square) if found >= 0 else -margin
                 continue
             energy, count, near, distance = split_in_mesh(p, near, law, y, atoms, offset, tree)
-            out[i, m], _slope = limited_potential(energy, law.max_depth)
+            energy, _slope = limited_potential(energy, law.max_depth)
+            out[i, m] = math.sqrt(max(2.0 * energy, 0.0))
             summary[i, DEEPEST] = max(summary[i, DEEPEST], distance)
             if count > 1:
                 note_thin_part(atoms, count, y, i, summary)
