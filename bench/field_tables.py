@@ -6,8 +6,8 @@
   spacings, smoothed to several gains.
 - ``python -m bench.field_tables goals [SURFACE ...]`` bakes with the default goals and prints what
   is reached, and what it costs: the time of a tick along strokes of 0.1 m/s at 4 kHz, and the
-  processor time of baking. A surface may be a file, magnified: ``land.x3p*20``. ``ball`` is a closed
-  mesh of 81 920 triangles, 20 mm wide, with bumps of 0.2 mm.
+  processor time of baking. A surface may be a file, magnified: ``land.x3p*20``. ``ball`` is a
+  closed mesh of 81 920 triangles, 20 mm wide, with bumps of 0.2 mm.
 """
 
 from __future__ import annotations

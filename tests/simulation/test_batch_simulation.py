@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.simulation.onset import limit_cycle_definition as definition
+from tests.simulation.limit_cycles import limit_cycle_definition as definition
 
 from asperity.core.errors import ParameterError
 from asperity.simulation import (

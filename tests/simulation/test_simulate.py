@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.helpers.allocations import traced_peak
-from tests.simulation.onset.limit_cycle_definition import is_cycling, velocity_spread
+from tests.simulation.limit_cycles.limit_cycle_definition import is_cycling, velocity_spread
 
 from asperity.core.errors import ParameterError
 from asperity.simulation import (

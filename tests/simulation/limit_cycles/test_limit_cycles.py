@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from tests.simulation.onset.limit_cycle_definition import (
+from tests.simulation.limit_cycles.limit_cycle_definition import (
     ShiftedMotion,
     ends_in_cycle,
     velocity_spread,

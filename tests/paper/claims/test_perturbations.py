@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from tests.paper.perturbations import (
+from tests.paper.claims.perturbations import (
     PERTURBATIONS,
     SCALED_FORCES,
     SCALED_JACOBIANS,
@@ -11,8 +11,8 @@ from tests.paper.perturbations import (
     Replacement,
     replace_name,
 )
-from tests.paper.test_claims import CORRECTED, FAILS, HOLDS
-from tests.paper.test_experiments import EXPECTED
+from tests.paper.claims.test_claims import CORRECTED, FAILS, HOLDS
+from tests.paper.experiments.test_experiments import EXPECTED
 
 from asperity.paper import CLAIMS, Claim, get_claim
 from asperity.paper.claim_registry import register

@@ -9,7 +9,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.simulation.onset.limit_cycle_definition import is_cycling, is_settling, velocity_spread
+from tests.simulation.limit_cycles.limit_cycle_definition import (
+    is_cycling,
+    is_settling,
+    velocity_spread,
+)
 
 from asperity.core.errors import ParameterError
 from asperity.simulation import (

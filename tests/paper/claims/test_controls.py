@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.paper.perturbations import replace_name
+from tests.paper.claims.perturbations import replace_name
 
 import asperity.reference
 from asperity.analysis.energy.loop_integral import loop_work
