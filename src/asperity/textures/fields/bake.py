@@ -263,7 +263,7 @@ class BakePlan:
             below = most - passes
             arguments = grid.arguments(potentials[..., below:], self.lift)
             cells = cells_above(arguments, limit, cells)
-            count = np.count_nonzero(cells)
+            count = int(np.count_nonzero(cells))
             # Where smoothing no longer helps, more of it would raise the gain again.
             if passes == most or count == 0 or count > _STALLED * before:
                 break
