@@ -106,7 +106,9 @@ def triangle_work(
     return work.reshape(-1, 3), scale
 
 
-def may_leave_twice(force: Force, loops: FloatArray, field: FieldArguments) -> NDArray[np.bool_]:
+def may_leave_twice(
+    force: Force, loops: FloatArray, field: FieldArguments, stiffness: float = K
+) -> NDArray[np.bool_]:
     """Return which triangles (n, 3, 3) may leave the surface twice between two knots.
 
     Their work is not summed exactly. Others are at least a tenth of a spacing deep at closely
@@ -114,7 +116,7 @@ def may_leave_twice(force: Force, loops: FloatArray, field: FieldArguments) -> N
     """
     share = np.arange(SAMPLES)[:, None] / SAMPLES
     points = loops[:, :, None] + share * (np.roll(loops, -1, axis=1) - loops)[:, :, None]
-    size = np.linalg.norm(force(points.reshape(-1, 3)), axis=1).reshape(len(loops), -1) / K
+    size = np.linalg.norm(force(points.reshape(-1, 3)), axis=1).reshape(len(loops), -1) / stiffness
     return np.asarray(((size > 0.0) & (size < 0.1 / field.iz)).any(axis=1))
 
 

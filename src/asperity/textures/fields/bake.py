@@ -15,7 +15,7 @@ from asperity.core.errors import ParameterError
 from asperity.core.units import round_up
 from asperity.laws import LAWS
 from asperity.textures.fields.field_certificate import Progress, cells_above, curvature_bounds
-from asperity.textures.fields.field_grid import FieldGrid, SingleArray
+from asperity.textures.fields.field_grid import RAMP, FieldGrid, SingleArray
 from asperity.textures.fields.node_potentials import (
     compute_potentials,
     smooth,
@@ -257,19 +257,19 @@ class BakePlan:
             grid: the nodes.
             progress: called with the finished fraction.
         """
-        passes, most, before = 0, self.goal.passes, np.inf
+        passes, most, before, ramp = 0, self.goal.passes, np.inf, RAMP
         cells, limit = np.ones(grid.node_counts, np.uint8), self.goal.max_gain * self.gain
         while True:
             below = most - passes
             arguments = grid.arguments(potentials[..., below:], self.lift)
             cells = cells_above(arguments, limit, cells)
             count = int(np.count_nonzero(cells))
-            # Where smoothing no longer helps, more of it would raise the gain again.
-            if passes == most or count == 0 or count > _STALLED * before:
+            if passes == most or count == 0:
                 break
-            before = count
+            # What is left is due to the borders of smoothed parts: they are widened.
+            ramp, before = 2 * ramp + 1 if count > _STALLED * before else ramp, count
             marks = np.pad(cells, [(0, 0)] * (cells.ndim - 1) + [(below, 0)])
-            weights, cells = spread_marks(marks, grid.border)
+            weights, cells = spread_marks(marks, grid.border, ramp)
             cells = np.ascontiguousarray(cells[..., below:])
             potentials, passes = smooth(potentials, weights, grid), passes + 1
         upper, attained = curvature_bounds(grid, arguments, progress)

@@ -77,13 +77,13 @@ def smooth(depths: SingleArray, weights: NDArray[np.uint8], grid: FieldGrid) -> 
     return depths[..., 1:]
 
 
-def spread_marks(marks: NDArray[np.uint8], border: int) -> tuple[Any, Any]:
+def spread_marks(marks: NDArray[np.uint8], border: int, ramp: int = RAMP) -> tuple[Any, Any]:
     """Return weights, 255 at marked nodes and falling slowly to 0, and the cells they change."""
     from scipy import ndimage
 
     weights: Any = 255 * (marks > 0).astype(np.uint8)
     largest, mean = ndimage.maximum_filter1d, ndimage.uniform_filter1d
-    steps = [(largest, RAMP), (mean, RAMP), (largest, 3)]
+    steps = [(largest, ramp), (mean, ramp), (largest, 3)]
     for function, size in steps:
         before = weights
         for axis in range(marks.ndim):
