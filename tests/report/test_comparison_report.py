@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+import numpy as np
 import pytest
 from tests.report.pages import Reader, check_alone, check_alts, terminal
 
@@ -12,6 +13,7 @@ from asperity.devices import parse_device
 from asperity.report import comparison_table, html_text
 from asperity.report.comparison_columns import describe_texture
 from asperity.report.comparison_report import comparison_page
+from asperity.report.pictures.plotting import plot
 from asperity.report.sentences.number_text import limit_text
 from asperity.textures.catalogue import CATALOGUE
 
@@ -45,7 +47,11 @@ def test_narrow_table_has_fewer_columns_and_rounded_numbers(result: asp.Comparis
     counts = [len(comparison_table(result, width).columns) for width in (30, 40, 60, 80, 120)]
     assert counts == [3, 4, 6, 7, 8]
     stiffnesses = [str(cell) for cell in comparison_table(result, 40).columns[1].cells]
-    assert stiffnesses[:2] == ["5000 N/m", limit_text(result.row("A").recommended_stiffness)]
+    best = result.recommended_row
+    assert best is not None
+    assert best.law.letter not in "WA"
+    starts = [limit_text(row.recommended_stiffness) for row in (best, result.row("A"))]
+    assert stiffnesses[:3] == [starts[0], "5000 N/m", starts[1]]
 
 
 def test_recommendation_answers_the_questions_of_a_new_user(result: asp.Comparison) -> None:
@@ -73,15 +79,50 @@ def test_recommendation_answers_the_questions_of_a_new_user(result: asp.Comparis
 
 def test_sampled_numbers_are_marked_with_a_tilde() -> None:
     comparison = asp.compare(asp.Sinusoid(amplitude=0.1e-3, period=2e-3), laws="ACF")
-    leaks = [str(cell) for cell in comparison_table(comparison, 120).columns[5].cells]
-    assert leaks[0][0].isdigit()  # A's leak is certified
-    assert leaks[1] == "0"  # C's is zero by theorem
-    assert leaks[2].startswith("~")  # F's is the worst of the sampled loops
+    columns = [[str(cell) for cell in one.cells] for one in comparison_table(comparison).columns]
+    leaks = dict(zip(columns[0], columns[5], strict=True))
+    assert leaks["A"][0].isdigit()  # certified
+    assert leaks["C"] == "0"  # zero by theorem
+    assert leaks["F"].startswith("~")  # the worst of the sampled loops
 
 
-def test_page_has_a_row_per_law_with_the_letter_alone(page: str) -> None:
-    rows = re.findall(r'<tr[^>]*><td class="l">([^<]*)</td>', page)
-    assert rows[:4] == ["W", "A", "C", "D"]
+def test_page_has_a_row_per_law_the_recommended_one_first(
+    result: asp.Comparison, page: str
+) -> None:
+    rows = re.findall(r'<tr( class="best")?[^>]*><td class="l">([^<]*)</td>', page)
+    best = result.recommended_row
+    assert best is not None
+    others = [letter for letter in "WACD" if letter != best.law.letter]
+    assert rows[:4] == [(' class="best"', best.law.letter), *[("", letter) for letter in others]]
+
+
+def test_page_lists_only_what_goes_wrong(result: asp.Comparison, page: str) -> None:
+    """A law that is quiet, felt and continuous is not in that table."""
+    section = page.split("What will go wrong</h2>")[1].split("</section>", maxsplit=1)[0]
+    listed = re.findall(r'data-law="(\w)"', section)
+    assert set(listed) == {row.law.letter for row in result.rows if row.artefacts}
+    assert "feels alive" in section
+    quiet = asp.compare(asp.Sinusoid(0.1e-3, 5e-3), device="omega.3", laws="C").rows[0]
+    assert quiet.artefacts == []
+    assert quiet.verdict.startswith("plausible up to")
+
+
+@pytest.mark.parametrize(("stiffness", "name"), [(None, "force / k"), (500.0, "force")])
+def test_forces_of_different_stiffnesses_are_divided_by_it(
+    stiffness: float | None, name: str
+) -> None:
+    """So that a law that starts at a fraction of another's stiffness is seen, too."""
+    comparison = asp.compare(TEXTURE, device="omega.3", stiffness=stiffness, laws="WAG")
+    starts = [row.surface.stiffness for row in comparison.rows]
+    assert (max(starts) > 10 * min(starts)) == (stiffness is None)
+    axes = plot(comparison, "force").axes
+    assert [one.get_ylabel().split(" [")[0] for one in axes[:1]] == [name]
+    peaks = [max(np.abs(line.get_ydata()).max() for line in one.lines) for one in axes[:3]]
+    assert min(peaks) > 0.2 * max(peaks)
+    scales = {one.get_ylim() for one in axes[:3]}
+    assert len(scales) == 1
+    curl = plot(comparison, "field").axes[-1]
+    assert curl.get_xlabel().startswith("curl / k [1]" if stiffness is None else "curl [N/m]")
 
 
 def test_page_is_self_contained(page: str) -> None:

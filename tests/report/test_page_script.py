@@ -71,7 +71,7 @@ def test_content_security_policy_allows_only_the_own_script(page: str, tmp_path:
     assert dom.count('class="tools"') == 7
     assert dom.count('type="checkbox"') == 3
     assert "<title>taken" not in dom
-    assert "<title>Haptic texture on" in dom
+    assert "<title>Sinusoid on the " in dom
 
 
 POINTER = """
@@ -97,7 +97,7 @@ def test_pointer_shows_values_of_the_nearest_points(page: str, tmp_path: Path) -
         name, value = line.replace("−", "-").split(": ")
         assert name == series["name"]
         assert float(value.split()[0]) == pytest.approx(series["y"][100], rel=1e-3)
-        assert value.split()[1] in ("N", "mN")
+        assert value.split()[1] in ("mm", "µm")
     assert marks == 2
     assert hidden is True
 
@@ -135,6 +135,30 @@ def test_ctrl_wheel_zooms_and_plain_wheel_scrolls(page: str, tmp_path: Path) -> 
     assert less[2] == pytest.approx(1.5 * zoomed[2])
     assert more[2] == pytest.approx(zoomed[2])
     assert is_default is True  # the full view leaves arrow keys to the page
+
+
+SORTING = """
+const table = document.querySelector("table:has(tr[data-law])");
+const laws = () => [...table.tBodies[0].rows].map((row) => row.dataset.law).join("");
+const press = (column) => {
+  const heading = table.querySelectorAll("th")[column];
+  heading.querySelector("button").click();
+  return [laws(), heading.getAttribute("aria-sort")];
+};
+const values = ["0", "~37 µJ", "1.5 mN", "400 N/m", "−2 mm", "∞", "none", "3 m"].map(cellValue);
+return [laws(), press(2), press(2), press(0), values];
+"""
+
+
+@needs_browser
+def test_headings_sort_the_laws(page: str, tmp_path: Path) -> None:
+    """Numbers by value whatever their unit, first the greatest; words by their letters."""
+    first, down, up, letters, values = evaluate_script(page, tmp_path / "page.html", SORTING)
+    assert sorted(first) == ["A", "C", "W"]
+    assert down == ["WCA", "descending"]
+    assert up == ["ACW", "ascending"]
+    assert letters == ["ACW", "ascending"]
+    assert values == [0, 37e-6, 1.5e-3, 400, -2e-3, None, None, 3]
 
 
 LAWS = """
@@ -176,7 +200,7 @@ def test_hidden_laws_are_left_out_of_saved_files(page: str, tmp_path: Path) -> N
     assert max(digits) <= 8  # no rounding noise
     assert "A, groove" in result["again"]
     fields = [*csv.reader(io.StringIO(result["csv"][4]))]
-    assert fields[0][2].endswith("curl [N/m]")
+    assert fields[0][2].endswith("curl / k [1]")
     assert all(np.isfinite([float(cell) for cell in fields[1][:3]]))
     for text in result["svg"]:
         root = ET.fromstring(text)

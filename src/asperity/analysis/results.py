@@ -125,19 +125,28 @@ class LawRow:
         """Whether contact is lost on a part of the scan."""
         return self.contact_lost > 0.0 and self.law.contact.begins_on_texture
 
-    @cached_property
+    @property
     def verdict(self) -> str:
-        """Artefacts to expect from the law, in one line."""
-        k, parts = stiffness_limit_text(self.surface.stiffness), []
+        """Limit of a law that is quiet, and the artefacts to expect, in one line."""
+        quiet = self.conservative and not self._instability
+        return "; ".join([*([_passivity_text(self)] if quiet else ()), *self.artefacts])
+
+    @property
+    def _instability(self) -> str:
+        """How the law may be unstable at its stiffness; empty if nothing is known of it."""
+        k = stiffness_limit_text(self.surface.stiffness)
         stability = stability_limit_text(self.stability_limit, self.passivity.loop)
         if self.passivity.verdict == "not passive" and self.conservative:
-            parts.append(f"not passive at {k}; {stability}")
-        elif not self.recommended_stiffness:
-            parts.append(stability)
-        elif self.may_buzz:
-            parts.append(f"may buzz at {k}" + (f"; {stability}" if self.conservative else ""))
-        elif self.conservative:
-            parts.append(_passivity_text(self, k, stability))
+            return f"not passive at {k}; {stability}"
+        if not self.recommended_stiffness:
+            return stability
+        limit = f"; {stability}" if self.conservative else ""
+        return f"may buzz at {k}{limit}" if self.may_buzz else ""
+
+    @cached_property
+    def artefacts(self) -> list[str]:
+        """Artefacts to expect from the law, each in a few words."""
+        parts = [self._instability] if self._instability else []
         if not self.conservative:
             gain = f"feels alive: gains up to {leak_energy_text(self.leak)}"
             parts.append(f"{gain}; {delivery_text(self.passivity.loop)}")
@@ -152,7 +161,7 @@ class LawRow:
             parts.append(f"search truncated in {part:.2g} % of samples")
         if self.loses_contact:
             parts.append(f"no contact on {100.0 * self.contact_lost:.0f} % of the scan")
-        return "; ".join(parts)
+        return parts
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""
@@ -173,9 +182,11 @@ class LawRow:
         }
 
 
-def _passivity_text(row: LawRow, stiffness: str, stability: str) -> str:
-    """Return the passivity of a conservative law at a stiffness."""
-    passivity = row.passivity
+def _passivity_text(row: LawRow) -> str:
+    """Return the passivity of a conservative law at its stiffness."""
+    passivity, stiffness = row.passivity, stiffness_limit_text(row.surface.stiffness)
     if passivity.verdict == "bounded" and passivity.buzz is not None:
         return f"passive at {stiffness} but for steps: {buzz_text(passivity.buzz)}"
-    return stability if passivity.verdict == "plausible" else f"{passivity.verdict} at {stiffness}"
+    if passivity.verdict == "plausible":
+        return stability_limit_text(row.stability_limit, passivity.loop)
+    return f"{passivity.verdict} at {stiffness}"

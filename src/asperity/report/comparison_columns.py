@@ -111,6 +111,16 @@ def _value_text(name: str, value: Any, argument: Argument | None) -> str:
     return format_quantity(value, "m") if is_length else f"{value}"
 
 
+def texture_name(description: dict[str, Any]) -> str:
+    """Return the kind of a texture, or of the one that was baked, for a title.
+
+    Example:
+        >>> texture_name({"kind": "field", "source": {"kind": "cloth"}})
+        'Cloth'
+    """
+    return number_text.readable_name(description.get("source", description)["kind"]).capitalize()
+
+
 # --- tables ---------------------------------------------------------------------------------------
 
 
@@ -213,11 +223,11 @@ def single_line(heading: str) -> str:
 
 
 def law_rows(comparison: Comparison, cells: Callable[[LawRow], Sequence[str | Cell]]) -> list[Row]:
-    """Return a row per law, the recommended one marked."""
+    """Return a row per law, the recommended one first and marked."""
     best = comparison.recommended_row
     return [
         Row(cells(row), "best" if row is best else "", law=row.law.letter)
-        for row in comparison.rows
+        for row in sorted(comparison.rows, key=lambda row: row is not best)
     ]
 
 
@@ -241,7 +251,7 @@ def laws_table(comparison: Comparison, columns: Sequence[LawColumn]) -> Table:
     return Table([_heading(one, comparison) for one in columns], rows, numeric, layout)
 
 
-def verdicts_table(comparison: Comparison, max_console: int | None = None) -> Table:
+def verdicts_table(comparison: Comparison, max_console: int | None) -> Table:
     """Return letter and verdict of each law, for consoles up to a width [characters]."""
     rows = law_rows(comparison, lambda row: [Cell(row.law.letter, "l"), row.verdict])
     return Table((), rows, layout=TableLayout(wrap=(1,), max_console=max_console))
@@ -292,8 +302,10 @@ def law_sections(comparison: Comparison) -> list[Section]:
     summary = _single_line_table(comparison, SUMMARY_COLUMNS)
     full = _single_line_table(comparison, FULL_COLUMNS)
     notes = table_notes("sampled") if has_sampled(comparison) else []
+    wrong = law_rows(comparison, lambda row: [Cell(row.law.letter, "l"), "; ".join(row.artefacts)])
+    artefacts = Table((), [row for row in wrong if row.cells[1]])
     return [
         Section("The laws compared", [summary]),
-        Section("What will go wrong", [verdicts_table(comparison)]),
+        Section("What will go wrong", [artefacts]),
         Section("Every number", [full], notes=notes),
     ]

@@ -17,6 +17,7 @@ from asperity.report.comparison_columns import (
     law_sections,
     recommended_stiffness_text,
     terminal_sections,
+    texture_name,
 )
 from asperity.report.device_report import datum_text, device_numbers_table
 from asperity.report.measured_report import measured_sections, thin_sections
@@ -41,7 +42,7 @@ def comparison_page(comparison: Comparison, full: bool = False) -> Page:
         full: whether a terminal shows every number instead of the summary.
     """
     return Page(
-        title=f"Haptic texture on {comparison.device.name}",
+        title=f"{texture_name(comparison.texture.describe())} on the {comparison.device.name}",
         answer=comparison.recommendation,
         facts=_facts(comparison),
         sections=[
@@ -161,7 +162,7 @@ def comparisons_page(comparisons: DeviceComparisons) -> Page:
     ]
     assumed = [one for one in page.assumption_sections(common) if Media.TERMINAL in one.media]
     return Page(
-        title="Haptic texture on several devices",
+        title=f"{texture_name(texture.describe())} on several devices",
         answer=comparisons.recommendation,
         facts=[
             ("Surface", describe_texture(texture.describe())),

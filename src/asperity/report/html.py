@@ -19,16 +19,7 @@ from asperity.core.cache import get_or_compute
 from asperity.core.digests import content_digest
 from asperity.core.processes import precompute
 from asperity.core.version import __version__
-from asperity.report.page import (
-    Cards,
-    Media,
-    Page,
-    Paragraph,
-    Picture,
-    Section,
-    Table,
-    default_style,
-)
+from asperity.report import page as pages
 
 if TYPE_CHECKING:
     import jinja2
@@ -63,19 +54,19 @@ class RenderedPicture:
     panel_json: str
 
 
-def render_picture(picture: Picture) -> RenderedPicture:
+def render_picture(picture: pages.Picture) -> RenderedPicture:
     """Return a picture as SVG with its numbers, drawn with Matplotlib's defaults."""
     from asperity.report.pictures.panel_data import extract_panels, panels_to_json, ranges_text
     from asperity.report.pictures.style import svg_text
 
-    with default_style():
+    with pages.default_style():
         figure = picture.draw()
         svg = svg_text(figure, picture.dpi)  # drawing the figure places its panels
         panels = extract_panels(figure)
     return RenderedPicture(svg, picture.describe() + ranges_text(panels), panels_to_json(panels))
 
 
-def _render_pictures(sections: Sequence[Section]) -> dict[int, RenderedPicture]:
+def _render_pictures(sections: Sequence[pages.Section]) -> dict[int, RenderedPicture]:
     """Return the rendered pictures of sections by ``id`` of the picture.
 
     Those with a digest are shared out among helper processes, and cached.
@@ -91,20 +82,20 @@ def _render_pictures(sections: Sequence[Section]) -> dict[int, RenderedPicture]:
     return rendered
 
 
-def _result_or_render(result: RenderedPicture | None, picture: Picture) -> RenderedPicture:
+def _result_or_render(result: RenderedPicture | None, picture: pages.Picture) -> RenderedPicture:
     return render_picture(picture) if result is None else result
 
 
-def _pictures_in(sections: Sequence[Section]) -> Iterator[Picture]:
+def _pictures_in(sections: Sequence[pages.Section]) -> Iterator[pages.Picture]:
     for section in sections:
         for block in section.blocks:
-            if isinstance(block, Picture):
+            if isinstance(block, pages.Picture):
                 yield block
-            elif isinstance(block, Cards):
+            elif isinstance(block, pages.Cards):
                 yield from _pictures_in(block.sections)
 
 
-def render_page(page: Page, origin: Origin | None = None) -> str:
+def render_page(page: pages.Page, origin: Origin | None = None) -> str:
     """Return a page as HTML that loads nothing, for light and dark screens and print.
 
     Args:
@@ -114,7 +105,7 @@ def render_page(page: Page, origin: Origin | None = None) -> str:
     # Insignificant white space only makes pages larger.
     style = re.sub(r"\s*([{};])\s*", r"\1", _read_template("style.css"))
     script = _read_template("page.js")
-    sections = [one for one in page.sections if Media.HTML in one.media]
+    sections = [one for one in page.sections if pages.Media.HTML in one.media]
     pictures = _render_pictures(sections)
     template = template_environment().get_template("page.html.j2")
     return template.render(
@@ -130,30 +121,30 @@ def render_page(page: Page, origin: Origin | None = None) -> str:
     )
 
 
-def render_notebook(page: Page) -> str:
+def render_notebook(page: pages.Page) -> str:
     """Return answer, paragraphs, tables and first figure for a notebook, as HTML."""
     blocks = [
         block
         for section in page.sections
-        if Media.NOTEBOOK in section.media
+        if pages.Media.NOTEBOOK in section.media
         for block in section.blocks
     ]
-    picture = next((block for block in blocks if isinstance(block, Picture)), None)
+    picture = next((block for block in blocks if isinstance(block, pages.Picture)), None)
     template = template_environment().get_template("notebook.html.j2")
     return template.render(
         page=page,
-        paragraphs=[block.text for block in blocks if isinstance(block, Paragraph)],
-        tables=[block for block in blocks if isinstance(block, Table)],
+        paragraphs=[block.text for block in blocks if isinstance(block, pages.Paragraph)],
+        tables=[block for block in blocks if isinstance(block, pages.Table)],
         picture=picture,
         png="" if picture is None else _encode_png(picture),
     )
 
 
-def _encode_png(picture: Picture) -> str:
+def _encode_png(picture: pages.Picture) -> str:
     """Return a picture as PNG in base64: a white card, whatever the colours of the notebook."""
     from asperity.report.pictures.style import to_png
 
-    with default_style():
+    with pages.default_style():
         return base64.b64encode(to_png(picture.draw())).decode("ascii")
 
 

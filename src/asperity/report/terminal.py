@@ -9,17 +9,7 @@ from rich.console import Console, RenderableType
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from asperity.report.page import (
-    Block,
-    BulletList,
-    Cell,
-    DefinitionList,
-    Media,
-    Page,
-    Paragraph,
-    Section,
-    Table,
-)
+from asperity.report import page as pages
 
 _KIND_STYLES = {"l": "bold", "good": "green", "part": "yellow", "no": "red", "open": "dim"}
 _MAX_NAME_WIDTH = 26  # of a list of pairs [characters]
@@ -29,27 +19,28 @@ class _CodeText(Text):
     """A line of code or a path, which a console does not wrap."""
 
 
-def print_page(page: Page, console: Console) -> None:
+def print_page(page: pages.Page, console: Console) -> None:
     """Print the answer of a page and its sections for a terminal."""
     for part in page_renderables(page, console.width):
         console.print(part, soft_wrap=isinstance(part, _CodeText))
 
 
-def page_renderables(page: Page, width: int) -> Iterator[RenderableType]:
+def page_renderables(page: pages.Page, width: int) -> Iterator[RenderableType]:
     """Yield the answer of a page and its sections, for a console of a width [characters]."""
     if page.answer:
         yield Text(page.answer, "bold")
     is_first = not page.answer
     for section in page.sections:
-        parts = list(_section_parts(section, width)) if Media.TERMINAL in section.media else []
+        is_shown = pages.Media.TERMINAL in section.media
+        parts = list(_section_parts(section, width)) if is_shown else []
         if parts and not is_first:
             yield Text()
         is_first = is_first and not parts
         yield from parts
 
 
-def _section_parts(section: Section, width: int) -> Iterator[RenderableType]:
-    if Media.HEADING in section.media:
+def _section_parts(section: pages.Section, width: int) -> Iterator[RenderableType]:
+    if pages.Media.HEADING in section.media:
         yield Text(section.title, "bold")
     for block in section.blocks:
         yield from _block_parts(block, width)
@@ -57,9 +48,9 @@ def _section_parts(section: Section, width: int) -> Iterator[RenderableType]:
         yield Text(note, "dim")
 
 
-def _block_parts(block: Block, width: int) -> Iterator[RenderableType]:
+def _block_parts(block: pages.Block, width: int) -> Iterator[RenderableType]:
     """Yield a block; pictures and cards have no equivalent in a terminal."""
-    if isinstance(block, Table):
+    if isinstance(block, pages.Table):
         if block.layout.max_console is None or width <= block.layout.max_console:
             yield rich_table(block, width)
             hidden = _hidden_columns(block, width)
@@ -69,25 +60,25 @@ def _block_parts(block: Block, width: int) -> Iterator[RenderableType]:
                 yield rich_pairs(shown, "dim")
             if block.layout.dropped_note and _dropped_columns(block, width):
                 yield Text(block.layout.dropped_note, "dim")
-    elif isinstance(block, BulletList):
+    elif isinstance(block, pages.BulletList):
         yield rich_pairs(("-", sentence) for sentence in block.sentences)
-    elif isinstance(block, DefinitionList):
+    elif isinstance(block, pages.DefinitionList):
         yield rich_pairs(block.pairs, "dim")
-    elif isinstance(block, Paragraph):
+    elif isinstance(block, pages.Paragraph):
         if block.kind in ("code", "mono"):
             yield from (_CodeText(line, overflow="fold") for line in block.text.split("\n"))
         else:
             yield Text(block.text, "dim" if block.kind == "note" else "", overflow="fold")
 
 
-def _hidden_columns(table: Table, width: int) -> set[int]:
+def _hidden_columns(table: pages.Table, width: int) -> set[int]:
     """Return the columns of a table that a console of a width [characters] does not show."""
     layout = table.layout
     narrow = {i for i, least in layout.min_console.items() if width < least}
     return {*layout.omit, *narrow, *_dropped_columns(table, width)}
 
 
-def _dropped_columns(table: Table, width: int) -> set[int]:
+def _dropped_columns(table: pages.Table, width: int) -> set[int]:
     """Return the columns of the drop order to leave out, so that the others fit uncut."""
     order, gap = table.layout.drop_order, table.layout.gap + 1
     if not order:
@@ -108,7 +99,7 @@ def _dropped_columns(table: Table, width: int) -> set[int]:
     return dropped
 
 
-def rich_table(table: Table, width: int) -> RichTable:
+def rich_table(table: pages.Table, width: int) -> RichTable:
     """Return a table for a console of a width [characters], without tooltips and details."""
     layout, headings = table.layout, table.headings or [""] * len(table.rows[0].cells)
     columns = sorted(set(range(len(headings))) - _hidden_columns(table, width))
@@ -135,7 +126,7 @@ def rich_table(table: Table, width: int) -> RichTable:
     return result
 
 
-def _cell_text(cell: str | Cell) -> Text:
+def _cell_text(cell: str | pages.Cell) -> Text:
     if isinstance(cell, str):
         return Text(cell)
     text = Text(cell.text, _KIND_STYLES.get(cell.kind, ""))

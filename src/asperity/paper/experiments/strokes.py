@@ -10,17 +10,7 @@ import numpy as np
 
 from asperity.core.checks import FloatArray
 from asperity.core.files import Serializable
-from asperity.paper.experiments.experiment_setups import (
-    ALL_LAWS,
-    ENTRIES,
-    GUESSED_BUMP,
-    GUESSED_HANDS,
-    HANDS,
-    SPEEDS,
-    TRACE_STRIDE,
-    bump_setup,
-    stroke_setup,
-)
+from asperity.paper.experiments import experiment_setups as setups
 from asperity.scene.sweeps import map_threads
 from asperity.simulation import Strokes
 from asperity.simulation.scan import Stroke, scan_strokes
@@ -79,7 +69,7 @@ class BumpExperiment(Serializable):
     """
 
     bumps: tuple[BumpRun, ...]
-    guessed: tuple[str, ...] = GUESSED_BUMP
+    guessed: tuple[str, ...] = setups.GUESSED_BUMP
 
     def runs_of(self, law: str) -> tuple[BumpRun, ...]:
         """Return the runs of a law for all entries."""
@@ -89,12 +79,12 @@ class BumpExperiment(Serializable):
 @lru_cache(maxsize=16)
 def simulate_bump(law: str, entry: str) -> BumpRun:
     """Simulate a hand that moves over the bump and back."""
-    run = bump_setup(law, entry).simulate()
+    run = setups.bump_setup(law, entry).simulate()
     contact = np.any(run.applied != 0.0, axis=1)
     summed = run.energies["supplied"].sum(axis=1)
     window = min(_WINDOW, len(summed) - 1)
     x, _y, z = run.ledger.supplied
-    traced = slice(None, None, TRACE_STRIDE)
+    traced = slice(None, None, setups.TRACE_STRIDE)
     return BumpRun(
         law=law,
         entry=entry,
@@ -113,7 +103,7 @@ def simulate_bump(law: str, entry: str) -> BumpRun:
 
 def bump_experiment(laws: str = BUMP_LAWS) -> BumpExperiment:
     """Simulate section V.C for both entries."""
-    jobs = [(law, entry) for entry in ENTRIES for law in laws]
+    jobs = [(law, entry) for entry in setups.ENTRIES for law in laws]
     return BumpExperiment(map_threads(simulate_bump, jobs))
 
 
@@ -168,7 +158,7 @@ class ScanningExperiment(Serializable):
 
     strokes: tuple[HandStroke, ...]
     traces: tuple[EnergyTrace, ...]
-    guessed: tuple[str, ...] = GUESSED_HANDS
+    guessed: tuple[str, ...] = setups.GUESSED_HANDS
 
     def strokes_of(self, law: str) -> tuple[Stroke, ...]:
         """Return the strokes of a law for all hands and speeds."""
@@ -177,7 +167,7 @@ class ScanningExperiment(Serializable):
 
 @lru_cache(maxsize=128)
 def _simulate_stroke(law: str, hand: str, speed: float) -> HandStroke:
-    setup = stroke_setup(law, hand, speed)
+    setup = setups.stroke_setup(law, hand, speed)
     assert isinstance(setup.motion, Strokes)
     depth = -setup.motion.start[2]
     loop = setup.surface, setup.plant, setup.hand, setup.servo, setup.motion
@@ -188,16 +178,16 @@ def _simulate_stroke(law: str, hand: str, speed: float) -> HandStroke:
 @lru_cache(maxsize=16)
 def energy_trace(law: str) -> EnergyTrace:
     """Return the energies of the first stroke, of about a second, as in figure 6."""
-    setup = stroke_setup(law)
+    setup = setups.stroke_setup(law)
     assert isinstance(setup.motion, Strokes)
     run = setup.simulate()
-    traced = slice(0, round(setup.motion.period / run.period), TRACE_STRIDE)
+    traced = slice(0, round(setup.motion.period / run.period), setups.TRACE_STRIDE)
     exact, paper = (run.energies[name][traced][:, [0, 2]] for name in ("supplied", "same_sample"))
     return EnergyTrace(law, run.time[traced], exact, paper)
 
 
-def scanning_experiment(laws: str = ALL_LAWS) -> ScanningExperiment:
+def scanning_experiment(laws: str = setups.ALL_LAWS) -> ScanningExperiment:
     """Simulate section V.B for every hand and speed."""
-    jobs = [(law, hand, speed) for law in laws for hand in HANDS for speed in SPEEDS]
+    jobs = [(law, hand, speed) for law in laws for hand in setups.HANDS for speed in setups.SPEEDS]
     traces = map_threads(energy_trace, [(law,) for law in FIGURE_6_LAWS if law in laws])
     return ScanningExperiment(map_threads(_simulate_stroke, jobs), traces)

@@ -123,6 +123,7 @@ def draw_fields(
     """
     window = window or field_window(surfaces)
     segment, bottom, top = window.segment, window.bottom, window.top
+    surfaces, over, per = _to_one_stiffness(surfaces)
     curls = [curl_field(surface, segment, bottom) for surface in surfaces]
     arrows = [arrow_field(surface, segment, bottom, top) for surface in surfaces]
     curl_limit, force_per_inch = _choose_scales(surfaces, curls, arrows)
@@ -137,10 +138,23 @@ def draw_fields(
         style.title_law(axes, surface.law, remarks[index] if index < len(remarks) else "")
         window.limit_axes(axes)
         axes.set_aspect("equal" if is_true_to_scale else "auto")
-    label = "curl [N/m]: white is conservative"
+    label = f"curl{over} [{'1' if over else 'N/m'}]: white is conservative"
     bar = style.add_colorbar(figure, mesh, panels, label, **style.WIDE_COLORBAR)
-    _draw_force_key(bar, quiver, style.nice_length(0.35 * force_per_inch))
+    key = style.nice_length(0.35 * force_per_inch)
+    unit = per(key)
+    _draw_force_key(bar, quiver, key, f"{'k · ' if over else ''}{key * unit.scale:g} {unit.name}")
     return panels
+
+
+def _to_one_stiffness(surfaces: Sequence[Surface]) -> tuple[list[Surface], str, Any]:
+    """Return surfaces of one stiffness, words for their force, and the choice of its unit.
+
+    Where the stiffness differs between laws, forces are over it: those of weak laws would be
+    invisible beside those of stiff ones.
+    """
+    if len({surface.stiffness for surface in surfaces}) == 1:
+        return list(surfaces), "", style.force_unit
+    return [surface.to_stiffness(1.0) for surface in surfaces], " / k", style.length_unit
 
 
 def _choose_scales(
@@ -187,10 +201,8 @@ def _draw_outline(axes: Axes, surface: Surface, window: Window) -> None:
     axes.axhline(scan_height(surface) * high.scale, color=green, lw=1.0, ls="--")
 
 
-def _draw_force_key(bar: Any, quiver: Any, force: float) -> None:
+def _draw_force_key(bar: Any, quiver: Any, force: float, text: str) -> None:
     """Draw an arrow of a force [N] in the axes of a colour bar, which no law hides."""
-    unit = style.force_unit(force)
-    text = f"{force * unit.scale:g} {unit.name}"
     options: dict[str, Any] = {"color": style.INK, "labelcolor": style.INK, "labelpos": "W"}
     font = {"size": style.TICK}
     bar.ax.quiverkey(quiver, 0.92, 1.04, force, text, fontproperties=font, **options)
@@ -217,12 +229,12 @@ def force_size(count: int) -> tuple[float, float]:
 def draw_forces(figure: Figure | SubFigure, surfaces: Sequence[Surface]) -> None:
     """Draw tangential and normal force along the scan for every law, on shared axes."""
     segment = force_segment(surfaces[0].texture)
+    surfaces, over, choose_unit = _to_one_stiffness(surfaces)
     forces = [scan_forces(surface, segment) for surface in surfaces]
-    equal_stiffness = len({surface.stiffness for surface in surfaces}) == 1
-    limits = _shared_limits(forces, equal_stiffness)
-    unit = style.force_unit(max(map(abs, limits)))
+    limits = _shared_limits(forces)
+    unit = choose_unit(max(map(abs, limits)))
     wide = style.length_unit(segment.length)
-    x, y = f"along the scan line [{wide.name}]", f"force [{unit.name}]"
+    x, y = f"along the scan line [{wide.name}]", f"force{over} [{unit.name}]"
     panels = style.axes_grid(figure, len(surfaces), _FORCE_COLUMNS, x=x, y=y)
     for axes, surface, force in zip(panels, surfaces, forces, strict=True):
         _draw_force_panel(axes, surface, force, (wide, unit))
@@ -232,15 +244,12 @@ def draw_forces(figure: Figure | SubFigure, surfaces: Sequence[Surface]) -> None
     _draw_force_legend(figure, panels[0])
 
 
-def _shared_limits(forces: Sequence[PlaneForces], equal_stiffness: bool) -> tuple[float, float]:
-    """Return the limits of the shared axis [N], which clip a law that exceeds the others by far.
-
-    Only laws at equal stiffness are clipped.
-    """
+def _shared_limits(forces: Sequence[PlaneForces]) -> tuple[float, float]:
+    """Return the limits of the shared axis [N], which clip a law that exceeds the others by far."""
     lows = [min(float(f.tangential.min()), float(f.normal.min()), 0.0) for f in forces]
     highs = [max(float(f.tangential.max()), float(f.normal.max()), 0.0) for f in forces]
     spans = sorted(max(high, -low) for low, high in zip(lows, highs, strict=True))
-    usual = spans[(len(spans) - 1) // 2 if equal_stiffness else -1]
+    usual = spans[(len(spans) - 1) // 2]
     limit = _MAX_FORCE_RATIO * usual if usual > 0.0 else (spans[-1] or 1.0)
     low, high = max(min(lows), -limit), min(max(highs), limit)
     margin = 0.08 * ((high - low) or 1.0)

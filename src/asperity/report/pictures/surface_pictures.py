@@ -61,7 +61,15 @@ _SECTION_POINTS = 1600
 
 def surface_size(texture: Texture) -> tuple[float, float]:
     """Return width and height of the figure [inch]."""
-    return (10.0, 2.6) if texture.is_profile else (10.0, 5.4)
+    if texture.is_profile:
+        return 10.0, 2.6
+    return (10.0, 5.4) if _is_wide(texture) else (10.0, 3.9)
+
+
+def _is_wide(texture: Texture) -> bool:
+    """Return whether the map of a texture is so wide that its section belongs below it."""
+    width, depth = map_grid(texture, _MAP_POINTS).size
+    return bool(width > 1.7 * depth)
 
 
 def draw_surface(figure: Figure | SubFigure, texture: Texture) -> None:
@@ -71,10 +79,13 @@ def draw_surface(figure: Figure | SubFigure, texture: Texture) -> None:
         segment = choose_segment(texture, 4.0 * length, 24.0 * length)
         draw_section(figure.subplots(), texture, segment)
         return
-    upper, lower = figure.subplots(2, 1, height_ratios=[3.0, 1.0])
-    _draw_map(figure, upper, texture)
+    stacked = {"nrows": 2, "height_ratios": [3.0, 1.0]}
+    beside = {"ncols": 2, "width_ratios": [1.0, 1.15]}
+    layout: dict[str, Any] = stacked if _is_wide(texture) else beside
+    first, second = figure.subplots(**layout)
+    _draw_map(figure, first, texture)
     line = texture.scan_line()
-    draw_section(lower, texture, ScanSegment(line, 0.0, line.length))
+    draw_section(second, texture, ScanSegment(line, 0.0, line.length))
 
 
 def draw_section(axes: Axes, texture: Texture, segment: ScanSegment) -> None:
@@ -131,7 +142,6 @@ def _draw_map(figure: Figure | SubFigure, axes: Axes, texture: Texture) -> None:
     # Covered by the relief: the data of the colour bar and of the numbers of the page.
     known = axes.imshow(heights * high.scale, colours, norm, origin="lower", extent=frame)
     axes.imshow(shaded, origin="lower", extent=frame, interpolation="bilinear")
-    axes.set_anchor("W")
     style.style_axes(axes)
     style.label_axes(axes, f"x [{wide.name}]", f"y [{wide.name}]")
     _draw_scan_line(axes, texture, wide)

@@ -1,6 +1,6 @@
 "use strict";
 // Interactive tools of a report page: values at the pointer, zoom, export of a figure as SVG and of
-// its data as CSV, and hiding of laws. Without this script the page is complete but static.
+// its data as CSV, sorting and hiding of laws. Without this script the page is complete but static.
 
 const hiddenLaws = new Set();
 
@@ -304,6 +304,46 @@ function addLawFilter() {
   document.querySelector("section").before(filter);
 }
 
+// --- sorting -------------------------------------------------------------------------------------
+
+const PREFIXES = { p: 1e-12, n: 1e-9, "µ": 1e-6, m: 1e-3, k: 1e3 };
+
+/** Return the number that a cell begins with, in the unit without its prefix; NaN without one. */
+function cellValue(text) {
+  if (text.trim() === "∞") return Infinity;
+  const match = /^\s*~?\s*([-−]?\d[\d.]*(?:e[-−]?\d+)?)\s*(?:([pnµmk])(?=[NJmsgWH]))?/.exec(text);
+  return match ? Number(match[1].replaceAll("−", "-")) * (PREFIXES[match[2]] ?? 1) : NaN;
+}
+
+/** Sort the rows of a table by a column: numbers by value and before words, words by their letters. */
+function sortRows(table, column, isDescending) {
+  const rows = [...table.tBodies[0].rows].map((row) => {
+    const text = row.cells[column].textContent;
+    return { row, text, value: cellValue(text) };
+  });
+  const sign = isDescending ? -1 : 1;
+  rows.sort((a, b) => {
+    if (isNaN(a.value) !== isNaN(b.value)) return isNaN(a.value) - isNaN(b.value);
+    return sign * (isNaN(a.value) ? a.text.localeCompare(b.text) : a.value - b.value || 0);
+  });
+  table.tBodies[0].append(...rows.map(({ row }) => row));
+}
+
+/** Make the headings of a table of laws buttons that sort it, first the greatest numbers. */
+function addSorting(table) {
+  const headings = [...table.querySelectorAll("th")];
+  headings.forEach((heading, column) => {
+    const button = createButton(heading.textContent, `Sort by ${heading.textContent}`, () => {
+      const descends = heading.getAttribute("aria-sort") !== "descending" && heading.classList.contains("n");
+      const isDescending = descends || heading.getAttribute("aria-sort") === "ascending";
+      headings.forEach((other) => other.removeAttribute("aria-sort"));
+      heading.setAttribute("aria-sort", isDescending ? "descending" : "ascending");
+      sortRows(table, column, isDescending);
+    });
+    heading.replaceChildren(button);
+  });
+}
+
 // --- page ----------------------------------------------------------------------------------------
 
 /** Add zoom, values at the pointer and export to a figure. */
@@ -326,4 +366,5 @@ function addTools(figure) {
 }
 
 document.querySelectorAll("figure").forEach(addTools);
+document.querySelectorAll("table:has(tr[data-law])").forEach(addSorting);
 addLawFilter();
