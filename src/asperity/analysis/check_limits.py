@@ -15,23 +15,11 @@ from asperity.analysis.bounds.bound import NORM, ONE_SIDED, Bound
 from asperity.analysis.compare import DEFAULT_DEVICE, recommended_law
 from asperity.analysis.energy.merit import merit
 from asperity.analysis.gain.characteristic import cached_number
+from asperity.analysis.limits import limit_rules
 from asperity.analysis.limits.limit_result import Limits, RenderedWave, limits_assumptions
-from asperity.analysis.limits.limit_rules import (
-    DEFAULT_SAMPLES,
-    DEFAULT_SPEED,
-    LIMIT_RULES,
-    Decision,
-    LimitCase,
-    evaluate_limit,
-)
 from asperity.analysis.limits.perceptibility import Perceptibility, assess_perceptibility
 from asperity.analysis.limits.spectrum import MIN_SHARE, Spectrum, compute_spectrum, wave_forces
-from asperity.analysis.passivity.verdict import (
-    StabilityLimit,
-    StiffnessRecommendation,
-    at_recommended_stiffness,
-    recommend_stiffness,
-)
+from asperity.analysis.passivity import verdict
 from asperity.core.arguments import DEFAULT_STIFFNESS, FIELD
 from asperity.core.checks import FloatArray, check_positive, check_real
 from asperity.core.errors import ParameterError
@@ -96,7 +84,7 @@ def limits(
         (('force_resolution',), (0.0, 0.4))
     """
     device, texture = load_device(device), as_texture(texture)
-    v = DEFAULT_SPEED if speed is None else check_positive("speed", speed, "m/s")
+    v = limit_rules.DEFAULT_SPEED if speed is None else check_positive("speed", speed, "m/s")
     settings: dict[str, Any] = {
         "speed": v,
         "time_samples": _check_sample_count("time_samples", time_samples, 2.0),
@@ -111,9 +99,9 @@ def limits(
     surface = Surface(texture, law, k, max_depth, **surface_arguments)
     surface = rendered_surface(surface, rendering)
     q, one_sided = cached_number(surface, NORM), cached_number(surface, ONE_SIDED)
-    recommended = recommend_stiffness(surface, device, q, one_sided)
+    recommended = verdict.recommend_stiffness(surface, device, q, one_sided)
     if stiffness is None:
-        surface = at_recommended_stiffness(surface, device, recommended)
+        surface = verdict.at_recommended_stiffness(surface, device, recommended)
     scan, hand = merit(surface), load_grip(grip)
     perceptibility = assess_perceptibility(
         surface,
@@ -136,7 +124,7 @@ def limits(
 def _evaluate_limits(
     surface: Surface,
     device: Device,
-    recommended: StiffnessRecommendation,
+    recommended: verdict.StiffnessRecommendation,
     gain: Bound,
     gain_symbol: str,
     perceptibility: Perceptibility,
@@ -150,7 +138,7 @@ def _evaluate_limits(
     data = {field: datum.value for field, datum in device.data.items()}
     if recommended.wall_stiffness is not None:
         data["max_stiffness"] = recommended.wall_stiffness
-    case = LimitCase(
+    case = limit_rules.LimitCase(
         device=data,
         wavelengths=spectrum.wavelengths[is_significant],
         forces=forces[is_significant],
@@ -160,8 +148,10 @@ def _evaluate_limits(
         **settings,
     )
     decisions = [
-        evaluate_limit(rule, case, f"{gain_symbol} k ≤ K₀" if rule.number == 5 else None)
-        for rule in LIMIT_RULES
+        limit_rules.evaluate_limit(
+            rule, case, f"{gain_symbol} k ≤ K₀" if rule.number == 5 else None
+        )
+        for rule in limit_rules.LIMIT_RULES
     ]
     six = tuple(decision.limit for decision in decisions)
     top = min((limit.speeds[1] for limit in six if limit.speeds is not None), default=math.inf)
@@ -185,14 +175,14 @@ def _evaluate_limits(
 
 def _check_sample_count(name: str, value: float | None, least: float) -> float:
     """Return the number of samples needed, checked; fewer than two cannot represent a wave."""
-    number = DEFAULT_SAMPLES if value is None else check_real(name, value)
+    number = limit_rules.DEFAULT_SAMPLES if value is None else check_real(name, value)
     if number < least:
         raise ParameterError(name, f"must be at least {least:g}", value)
     return number
 
 
 def _limiting_number(
-    q: Bound, one_sided: Bound, stability_limit: StabilityLimit
+    q: Bound, one_sided: Bound, stability_limit: verdict.StabilityLimit
 ) -> tuple[Bound, str]:
     """Return the number that limits the stiffness on this device, and its symbol.
 
@@ -223,8 +213,8 @@ def _significant_waves(spectrum: Spectrum, forces: FloatArray) -> NDArray[np.boo
 def _rendered_waves(
     spectrum: Spectrum,
     is_significant: NDArray[np.bool_],
-    case: LimitCase,
-    decisions: Sequence[Decision],
+    case: limit_rules.LimitCase,
+    decisions: Sequence[limit_rules.Decision],
 ) -> tuple[RenderedWave, ...]:
     """Return the significant waves, each with its limits."""
     on_waves = [one for one in decisions if one.limit.holds is not None and one.limit.number != 5]

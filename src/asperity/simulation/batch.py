@@ -19,6 +19,7 @@ from asperity.core.checks import FloatArray, check_array
 from asperity.core.errors import ParameterError
 from asperity.kernels import tick
 from asperity.kernels.fuse import fuse_on_texture
+from asperity.simulation import simulate
 from asperity.simulation.hands import Hand
 from asperity.simulation.kernels import batch_loop, simulated_device
 from asperity.simulation.kernels.body_interface import LANES, SAMPLES, STOP
@@ -26,14 +27,6 @@ from asperity.simulation.kernels.energy_ledger import FRICTION, LEDGER_SIZE, LOS
 from asperity.simulation.motions import Motion
 from asperity.simulation.plants import Plant, sampled_plant
 from asperity.simulation.servo import Servo
-from asperity.simulation.simulate import (
-    CHUNK_SAMPLES,
-    STOP_REASONS,
-    anchor_points,
-    check_delay,
-    check_parts,
-    initial_motion,
-)
 from asperity.simulation.trace import StopReason
 from asperity.surface import Surface
 
@@ -91,7 +84,7 @@ class Trajectory:
         max_evaluations: float, stop_rule: StopRule,
     ) -> None:  # fmt: skip
         self.initial_state, self.offset, self.stiffness = state, offset, float(stiffness)
-        self.delay, self._stop_rule = check_delay(delay), stop_rule
+        self.delay, self._stop_rule = simulate.check_delay(delay), stop_rule
         self.max_evaluations = max_evaluations
         self.verdict: bool | None = None
         self.next_evaluation = next(stop_rule)
@@ -129,7 +122,7 @@ class Trajectory:
 
     def evaluate_stop_rule(self) -> None:
         """Evaluate the stop rule when its next evaluation is due."""
-        stop = STOP_REASONS[self.progress[STOP]]
+        stop = simulate.STOP_REASONS[self.progress[STOP]]
         if not stop and self.samples < self.next_evaluation:
             return
         supplied = self.ledger[SUPPLIED] + self.ledger[SUPPLIED + 1] + self.ledger[SUPPLIED + 2]
@@ -170,7 +163,7 @@ class BatchSimulation:
         self, surface: Surface, plant: Plant, hand: Hand, servo: Servo, motion: Motion,
         start: ArrayLike | None = None, velocity: ArrayLike | None = None,
     ) -> None:  # fmt: skip
-        check_parts(surface, plant, hand, servo, motion)
+        simulate.check_parts(surface, plant, hand, servo, motion)
         self._surface, self._plant, self._servo, self._motion = surface, plant, servo, motion
         origin = motion.at(np.zeros(1))[0]
         self._origin = origin if start is None else check_array("start", start, (3,), "m")
@@ -200,7 +193,7 @@ class BatchSimulation:
         Raises:
             ParameterError: for a start outside the workspace.
         """
-        position, velocity = initial_motion(
+        position, velocity = simulate.initial_motion(
             self._plant, self._hand, self._servo, self._motion, self._origin + offset,
             self._velocity,
         )  # fmt: skip
@@ -216,7 +209,9 @@ class BatchSimulation:
         """
         if len(trajectories) > LANES:
             raise ParameterError("starts", f"must be at most {LANES}", len(trajectories))
-        span = min(CHUNK_SAMPLES, *(run.next_evaluation - run.samples for run in trajectories))
+        span = min(
+            simulate.CHUNK_SAMPLES, *(run.next_evaluation - run.samples for run in trajectories)
+        )
         anchor = self._anchor_up_to(span + max(run.samples for run in trajectories))
         queues = np.zeros((len(trajectories), 1 + max(run.delay for run in trajectories), 3))
         for queue, run in zip(queues, trajectories, strict=True):
@@ -243,7 +238,9 @@ class BatchSimulation:
         if last >= len(self._anchor):
             self._anchor = np.concatenate([self._anchor[:count], np.empty((2 * last, 3))])
         if last >= count:
-            points = anchor_points(self._motion, self._servo.period, self._plant, count, last)
+            points = simulate.anchor_points(
+                self._motion, self._servo.period, self._plant, count, last
+            )
             self._anchor[count : last + 1] = points
             self._anchor_count = last + 1
         return self._anchor

@@ -9,14 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from asperity.analysis.bounds.branch_and_bound import DIFFERENCE_AMPLIFICATION, ROUNDING_ERROR
-from asperity.analysis.energy.curl_columns import (
-    column_polygon,
-    curl_integral_bounds,
-    curl_region_loop,
-    plane_curl,
-    positive_interval,
-    sample_curl_integrals,
-)
+from asperity.analysis.energy import curl_columns
 from asperity.analysis.energy.loop_integral import initial_panels, integrate, loop_work
 from asperity.analysis.energy.scan_lines import parallel_scan_lines, scan_height, scan_line_along
 from asperity.analysis.gain.characteristic import cached_result, is_shipped_law
@@ -166,12 +159,12 @@ def _find_worst_loop(surface: Surface, line: ScanLine) -> Leak:
 
 def _column_leak(surface: Surface, lines: list[ScanLine]) -> Leak:
     """Return the loop around the curl of one sign, certified in the plane of the worst line."""
-    sides = [sample_curl_integrals(surface, line) for line in lines]
+    sides = [curl_columns.sample_curl_integrals(surface, line) for line in lines]
     worst = int(np.argmax([max(side) for side in sides]))
     line = lines[worst]
     sign = 1.0 if sides[worst][0] >= sides[worst][1] else -1.0
-    vertices, energy = orient_loop(surface, curl_region_loop(surface, line, sign))
-    bounds = curl_integral_bounds(surface, line)
+    vertices, energy = orient_loop(surface, curl_columns.curl_region_loop(surface, line, sign))
+    bounds = curl_columns.curl_integral_bounds(surface, line)
     upper = math.inf if bounds is None else max(high for _low, high in bounds)
     if energy > upper:
         _check_against_bound(surface, line, vertices, energy)
@@ -195,7 +188,7 @@ def _check_against_bound(
     """
     gap = float(np.hypot(*np.diff(vertices[:, :2], axis=0).T).max())
     sag = surface.texture.bounds[1] * gap * gap / 8.0
-    bounds = curl_integral_bounds(surface, line, sag) if math.isfinite(sag) else None
+    bounds = curl_columns.curl_integral_bounds(surface, line, sag) if math.isfinite(sag) else None
     if bounds is None:
         return
     proved = max(high for _low, high in bounds)
@@ -254,14 +247,14 @@ def _nearest_outlines(
     # At the surface the curl is evaluated just below it.
     inside = np.maximum(parts, 0.5 / levels)
     points = np.concatenate([np.column_stack([xy, tops - part * reach]) for part in inside])
-    curls = plane_curl(surface.jacobian(points), line).reshape(levels + 1, -1)
+    curls = curl_columns.plane_curl(surface.jacobian(points), line).reshape(levels + 1, -1)
     area = reach * line.length / (columns * levels)
     for sign in (1.0, -1.0):
-        top, bottom = positive_interval(parts.tolist(), sign * curls)
+        top, bottom = curl_columns.positive_interval(parts.tolist(), sign * curls)
         chosen = (parts[:, None] >= top) & (parts[:, None] <= bottom) & (sign * curls > 0.0)
         estimate = float((np.where(chosen, np.abs(curls), 0.0) * area).sum())
         low, high = tops - bottom * reach, tops - top * reach
-        yield estimate, column_polygon(xy, high, low, periodic=line.periodic), line
+        yield estimate, curl_columns.column_polygon(xy, high, low, periodic=line.periodic), line
 
 
 def _region_depth(surface: Surface, xy: FloatArray, heights: FloatArray) -> FloatArray:

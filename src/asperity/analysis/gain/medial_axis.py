@@ -16,14 +16,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from asperity.analysis.bounds.bound import (
-    NORM,
-    Bound,
-    Method,
-    bound_from_theorem,
-    checked_upper_bound,
-    witness_in_contact,
-)
+from asperity.analysis.bounds import bound
 from asperity.analysis.bounds.branch_and_bound import (
     DEFAULT_WORK_LIMIT,
     Problem,
@@ -161,7 +154,7 @@ _ONSET_NOTE = "the depth reaches the medial axis, where the force jumps; its ons
 _UNDECIDED_NOTE = "crest curvature: undecided whether the depth reaches the medial axis"
 
 
-def crest_number(surface: Surface, options: SearchOptions) -> Bound:
+def crest_number(surface: Surface, options: SearchOptions) -> bound.Bound:
     """Return q_D: 1, y/(1 - y) with y = depth times crest curvature, or infinity from y = 1 on.
 
     ‖J‖/k at depth δ below a surface point of crest curvature κ is max(1, δκ/(1 - δκ)), and every
@@ -172,16 +165,16 @@ def crest_number(surface: Surface, options: SearchOptions) -> Bound:
         return _crest_number_of_wave(surface, texture.single_wave)
     if depth * texture.bounds[1] <= 0.5:
         note = "depth times the bound of the second derivatives is at most 1/2"
-        return bound_from_theorem(
-            surface, NORM, 1.0, "theorem", note, highest_point(texture), [depth]
+        return bound.bound_from_theorem(
+            surface, bound.NORM, 1.0, "theorem", note, highest_point(texture), [depth]
         )
     crest = options.crest(surface)
     if crest is None:
         note, xy = "the surface has no crest", highest_point(texture)
-        return bound_from_theorem(surface, NORM, 1.0, "certified", note, xy, [0.0])
+        return bound.bound_from_theorem(surface, bound.NORM, 1.0, "certified", note, xy, [0.0])
     if depth >= crest.radius:
-        method: Method = "certified" if crest.min_radius > 0.0 else "sampled"
-        return Bound(math.inf, math.inf, method, crest.centre, _ONSET_NOTE)
+        method: bound.Method = "certified" if crest.min_radius > 0.0 else "sampled"
+        return bound.Bound(math.inf, math.inf, method, crest.centre, _ONSET_NOTE)
     xy, least = np.array(crest.point[:2]), crest.min_radius
     cells = texture.cells(options.extent, options.margin(surface))
     if cells is not None:
@@ -191,23 +184,23 @@ def crest_number(surface: Surface, options: SearchOptions) -> Bound:
             xy = cells.to_plane(found.at[None])[0]
     else:
         least = max(least, 1.0 / texture.bounds[1])
-    witness = witness_in_contact(surface, NORM, xy, depth)
+    witness = bound.witness_in_contact(surface, bound.NORM, xy, depth)
     # The effect of rounding grows towards the medial axis.
     upper = _norm_from_curvature(_curvature_times_depth(least, depth)) * (1.0 + _RELATIVE_ROUNDING)
-    top = checked_upper_bound(surface, NORM, upper, witness)
+    top = bound.checked_upper_bound(surface, bound.NORM, upper, witness)
     if math.isinf(upper):
-        return Bound(witness.value, top, "sampled", witness.at, _UNDECIDED_NOTE)
-    return Bound(witness.value, top, "certified", witness.at, "crest curvature")
+        return bound.Bound(witness.value, top, "sampled", witness.at, _UNDECIDED_NOTE)
+    return bound.Bound(witness.value, top, "certified", witness.at, "crest curvature")
 
 
-def _crest_number_of_wave(surface: Surface, wave: SingleWave) -> Bound:
+def _crest_number_of_wave(surface: Surface, wave: SingleWave) -> bound.Bound:
     value, note = closed_forms.q_d(wave, surface.max_depth), "formula on a sinusoid"
     if math.isinf(value):
         crest = sharpest_crest(surface.texture)
         assert crest is not None
-        return Bound(math.inf, math.inf, "closed form", crest.centre, _ONSET_NOTE)
+        return bound.Bound(math.inf, math.inf, "closed form", crest.centre, _ONSET_NOTE)
     xy, depths = point_at_phase(wave, 0.5 * math.pi), [surface.max_depth]
-    return bound_from_theorem(surface, NORM, value, "closed form", note, xy, depths)
+    return bound.bound_from_theorem(surface, bound.NORM, value, "closed form", note, xy, depths)
 
 
 def gain_above_crest(surface: Surface, height: float) -> float:
@@ -224,7 +217,7 @@ def gain_above_crest(surface: Surface, height: float) -> float:
     return _norm_from_curvature(above / reach)
 
 
-def split_number(surface: Surface, options: SearchOptions) -> Bound:
+def split_number(surface: Surface, options: SearchOptions) -> bound.Bound:
     """Return q_H: max(1, c) by theorem, less only where no depth suffices for a split.
 
     Down to the fraction c/(1 + c) of the crest's radius H is law D, whose number grows to c there.
@@ -233,8 +226,8 @@ def split_number(surface: Surface, options: SearchOptions) -> Bound:
     reason = "-c <= Hess U <= 1 for any surface: q = max(1, c)"
     crest = options.crest(surface) if c > 1.0 else None
     if crest is None:
-        return bound_from_theorem(
-            surface, NORM, 1.0, "theorem", reason, highest_point(surface.texture), [0.0]
+        return bound.bound_from_theorem(
+            surface, bound.NORM, 1.0, "theorem", reason, highest_point(surface.texture), [0.0]
         )
     share = c / (1.0 + c) * crest.radius
     xy = np.array(crest.point[:2])
@@ -244,7 +237,7 @@ def split_number(surface: Surface, options: SearchOptions) -> Bound:
     upper = min(c, alone * (1.0 + _RELATIVE_ROUNDING) if alone > 1.0 else 1.0)
     if upper < c:
         reason = "law D's number: the depth is too small for the god-object to split"
-    return bound_from_theorem(surface, NORM, upper, "theorem", reason, xy, depths)
+    return bound.bound_from_theorem(surface, bound.NORM, upper, "theorem", reason, xy, depths)
 
 
 def _curvature_times_depth(radius: float, depth: float) -> float:

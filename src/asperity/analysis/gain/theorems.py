@@ -15,19 +15,7 @@ from asperity.analysis.bounds.bound import CURL, NORM, ONE_SIDED, Bound, Jacobia
 from asperity.analysis.bounds.branch_and_bound import Problem
 from asperity.analysis.bounds.surface_problems import NormalChangeProblem, SlopeProblem
 from asperity.analysis.gain import closed_forms as forms
-from asperity.analysis.gain.friction_problem import (
-    EntryMeasure,
-    FrictionProblem,
-    largest_singular_value,
-    largest_symmetric_eigenvalue,
-    norm_bound_f,
-)
-from asperity.analysis.gain.medial_axis import (
-    SearchOptions,
-    crest_number,
-    gain_above_crest,
-    split_number,
-)
+from asperity.analysis.gain import friction_problem, medial_axis
 from asperity.clamps import BACKED, LATERAL, WHOLE, Clamp
 from asperity.core.errors import ParameterError
 from asperity.enclosures.cells import Cells
@@ -99,9 +87,9 @@ class Theorem:
 
     constants: Mapping[JacobianMeasure, Constant] = field(default_factory=dict)
     closed_forms: Mapping[JacobianMeasure, ClosedForm] = field(default_factory=dict)
-    special_proofs: Mapping[JacobianMeasure, Callable[[Surface, SearchOptions], Bound]] = field(
-        default_factory=dict
-    )
+    special_proofs: Mapping[
+        JacobianMeasure, Callable[[Surface, medial_axis.SearchOptions], Bound]
+    ] = field(default_factory=dict)
     reductions: Mapping[JacobianMeasure, Reduction] = field(default_factory=dict)
     norm_bound: Callable[[Surface], float] | None = None
     gain_above_height: Callable[[Surface, float], float] | None = None
@@ -142,8 +130,10 @@ def _norm_bound_from(bound: Callable[[float, float], float]) -> Callable[[Surfac
 _ALL_CLAMPS = (WHOLE, LATERAL, BACKED)
 
 
-def _friction_reduction(entries: EntryMeasure) -> Reduction:
-    return Reduction(lambda surface, cells: FrictionProblem(surface, cells, entries))
+def _friction_reduction(entries: friction_problem.EntryMeasure) -> Reduction:
+    return Reduction(
+        lambda surface, cells: friction_problem.FrictionProblem(surface, cells, entries)
+    )
 
 
 THEOREMS: dict[Law, Theorem] = {
@@ -184,8 +174,8 @@ THEOREMS: dict[Law, Theorem] = {
     ),
     LAWS["D"]: Theorem(
         constants={ONE_SIDED: Constant(1.0, _SQUARED_DISTANCE_REASON)},
-        special_proofs={NORM: crest_number},
-        gain_above_height=gain_above_crest,
+        special_proofs={NORM: medial_axis.crest_number},
+        gain_above_height=medial_axis.gain_above_crest,
         is_infimum=True,
         detects_medial_axis=True,
     ),
@@ -202,10 +192,10 @@ THEOREMS: dict[Law, Theorem] = {
     ),
     LAWS["F"]: Theorem(
         reductions={
-            NORM: _friction_reduction(largest_singular_value),
-            ONE_SIDED: _friction_reduction(largest_symmetric_eigenvalue),
+            NORM: _friction_reduction(friction_problem.largest_singular_value),
+            ONE_SIDED: _friction_reduction(friction_problem.largest_symmetric_eigenvalue),
         },
-        norm_bound=norm_bound_f,
+        norm_bound=friction_problem.norm_bound_f,
         not_raised_by_clamp=dict.fromkeys(_ALL_CLAMPS, (NORM, ONE_SIDED)),
     ),
     LAWS["G"]: Theorem(
@@ -221,7 +211,7 @@ THEOREMS: dict[Law, Theorem] = {
     ),
     LAWS["H"]: Theorem(
         constants={ONE_SIDED: Constant(1.0, _SPLIT_REASON)},
-        special_proofs={NORM: split_number},
+        special_proofs={NORM: medial_axis.split_number},
         gain_above_height=lambda surface, _height: max(1.0, surface.parameter("continuity")),
         is_infimum=True,
         # With c <= 1 both are 1 by theorem; with more, q is c only where the god-object splits.
@@ -233,8 +223,10 @@ THEOREMS: dict[Law, Theorem] = {
 _NO_THEOREM = Theorem()
 
 
-def _baked_number(measure: JacobianMeasure) -> Callable[[Surface, SearchOptions], Bound]:
-    def number(surface: Surface, _options: SearchOptions) -> Bound:
+def _baked_number(
+    measure: JacobianMeasure,
+) -> Callable[[Surface, medial_axis.SearchOptions], Bound]:
+    def number(surface: Surface, _options: medial_axis.SearchOptions) -> Bound:
         found = surface.texture.baked_numbers[measure.name]
         note = "hull of the second differences of the field; attained on one side of a knot"
         return Bound(found.lower, found.upper, "certified", found.at, note)

@@ -13,26 +13,7 @@ from pathlib import Path
 from typing import Literal
 
 from asperity.analysis.bounds.bound import Bound
-from asperity.analysis.passivity.criteria import (
-    DELAY,
-    LEAK,
-    ONE_SIDED,
-    QUANTIZATION,
-    VIRTUAL,
-    WALL,
-    WALL_TEST,
-    BuzzBound,
-    Criterion,
-    buzz_limited_stiffness,
-    evaluate_criteria,
-)
-from asperity.analysis.passivity.device_loop import (
-    HALF,
-    DeviceLoop,
-    Number,
-    is_contradictory,
-    make_device_loop,
-)
+from asperity.analysis.passivity import criteria, device_loop
 from asperity.core.arguments import DEFAULT_STIFFNESS
 from asperity.core.files import Serializable
 from asperity.core.units import round_down
@@ -98,7 +79,9 @@ class StabilityLimit(Serializable):
 
 
 def decide_verdict(
-    loop: DeviceLoop, by_name: Mapping[str, Criterion], buzz: BuzzBound | None
+    loop: device_loop.DeviceLoop,
+    by_name: Mapping[str, criteria.Criterion],
+    buzz: criteria.BuzzBound | None,
 ) -> tuple[Verdict, str, Ground]:
     """Return the verdict, the name of the deciding criterion, and the ground.
 
@@ -106,47 +89,55 @@ def decide_verdict(
     """
     main = _main_rule(loop)
     if not loop.conservative:
-        unknown = by_name[LEAK].holds is None
-        return "undecided" if unknown else "not passive", LEAK, Ground.CRITERION
-    if is_contradictory(loop):
+        unknown = by_name[criteria.LEAK].holds is None
+        return "undecided" if unknown else "not passive", criteria.LEAK, Ground.CRITERION
+    if device_loop.is_contradictory(loop):
         return "undecided", main, Ground.CONTRADICTION
     if loop.delay is not None and by_name[main].holds:
         return _assess_quantization(by_name, main, buzz)
     ground = _find_unstable_motion(loop)
     if ground is not None:
-        return "not passive", WALL_TEST if ground is Ground.WALL_CYCLED else main, ground
+        return "not passive", criteria.WALL_TEST if ground is Ground.WALL_CYCLED else main, ground
     return _assess_wall_test(loop, by_name, main)
 
 
 def _assess_quantization(
-    by_name: Mapping[str, Criterion], main: str, buzz: BuzzBound | None
+    by_name: Mapping[str, criteria.Criterion], main: str, buzz: criteria.BuzzBound | None
 ) -> tuple[Verdict, str, Ground]:
     """Return the verdict on a loop that is passive but for quantisation."""
-    steps = by_name[QUANTIZATION]
+    steps = by_name[criteria.QUANTIZATION]
     if steps.holds:
         return "passive", main, Ground.PROVED
     if buzz is not None and not steps.missing:
-        return "bounded", QUANTIZATION, Ground.BOUNDED
-    return "undecided", QUANTIZATION, Ground.UNBOUNDED
+        return "bounded", criteria.QUANTIZATION, Ground.BOUNDED
+    return "undecided", criteria.QUANTIZATION, Ground.UNBOUNDED
 
 
-def stability_limit(loop: DeviceLoop, by_name: Mapping[str, Criterion]) -> StabilityLimit:
+def stability_limit(
+    loop: device_loop.DeviceLoop, by_name: Mapping[str, criteria.Criterion]
+) -> StabilityLimit:
     """Return the stability limit of the stiffness, and its basis.
 
     Comparison, analysis and the six limits of the device share this limit.
     """
-    main, steps = by_name[_main_rule(loop)], by_name[QUANTIZATION]
+    main, steps = by_name[_main_rule(loop)], by_name[criteria.QUANTIZATION]
     if not loop.conservative:
-        return _limit_from_criterion("wall gain", by_name[WALL])
-    plausible = _limit_from_criterion("plausible", by_name[WALL_TEST], loop.longest_delay)
-    if loop.obstacle is not None or loop.delay is None or is_contradictory(loop):
+        return _limit_from_criterion("wall gain", by_name[criteria.WALL])
+    plausible = _limit_from_criterion("plausible", by_name[criteria.WALL_TEST], loop.longest_delay)
+    if loop.obstacle is not None or loop.delay is None or device_loop.is_contradictory(loop):
         return plausible
     proved = _proved_limit(main, steps)
     silent = proved.stiffness or 0.0
-    if main.limit and not steps.missing and (calm := buzz_limited_stiffness(loop)) is not None:
+    if (
+        main.limit
+        and not steps.missing
+        and (calm := criteria.buzz_limited_stiffness(loop)) is not None
+    ):
         bounded = min(calm, main.limit)
         if bounded > silent:
-            return StabilityLimit(bounded, "bounded", QUANTIZATION, proved_stiffness=silent)
+            return StabilityLimit(
+                bounded, "bounded", criteria.QUANTIZATION, proved_stiffness=silent
+            )
     if (plausible.stiffness or 0.0) > (proved.stiffness or 0.0):
         return replace(plausible, proved_stiffness=proved.proved_stiffness)
     if proved.stiffness is None:
@@ -154,7 +145,7 @@ def stability_limit(loop: DeviceLoop, by_name: Mapping[str, Criterion]) -> Stabi
     return proved
 
 
-def _proved_limit(main: Criterion, steps: Criterion) -> StabilityLimit:
+def _proved_limit(main: criteria.Criterion, steps: criteria.Criterion) -> StabilityLimit:
     """Return the stiffness up to which the rule and the quantisation criterion are proved."""
     if main.limit is None or steps.limit is None:
         sampled = _limit_from_criterion("proved", main)
@@ -167,7 +158,7 @@ def _proved_limit(main: Criterion, steps: Criterion) -> StabilityLimit:
 
 
 def _limit_from_criterion(
-    basis: Basis, criterion: Criterion, delay: Number | None = None
+    basis: Basis, criterion: criteria.Criterion, delay: device_loop.Number | None = None
 ) -> StabilityLimit:
     sampled = criterion.limit is None and criterion.upper_limit is not None
     stiffness = criterion.upper_limit if sampled else criterion.limit
@@ -177,14 +168,14 @@ def _limit_from_criterion(
     return StabilityLimit(stiffness, basis, criterion.name, pair, sampled)
 
 
-def _main_rule(loop: DeviceLoop) -> str:
+def _main_rule(loop: device_loop.DeviceLoop) -> str:
     """Return the name of the criterion for the known data of the device."""
     if loop.virtual_damping is not None:
-        return VIRTUAL
-    return ONE_SIDED if loop.delay == 0 else DELAY
+        return criteria.VIRTUAL
+    return criteria.ONE_SIDED if loop.delay == 0 else criteria.DELAY
 
 
-def _find_unstable_motion(loop: DeviceLoop) -> Ground | None:
+def _find_unstable_motion(loop: device_loop.DeviceLoop) -> Ground | None:
     """Return why a small motion at a witness point gains energy without limit, if one does.
 
     A straight oscillation along the witness direction, p + u ε cos(θ i), where -uᵀJu = K, gains
@@ -206,7 +197,7 @@ def _find_unstable_motion(loop: DeviceLoop) -> Ground | None:
         return None
     gains = [stiff / 2 + loop.virtual_damping_gain]
     if loop.delay is not None:
-        gains.append(stiff * (loop.delay + HALF) - loop.virtual_damping_gain)
+        gains.append(stiff * (loop.delay + device_loop.HALF) - loop.virtual_damping_gain)
     if loop.delay and loop.q.lower > loop.one_sided.upper:
         slack = loop.weighted_gain(Fraction(0), Fraction(1), "lower") * loop.stiffness
         gains.append(slack / 2 - loop.virtual_damping_gain)
@@ -214,17 +205,17 @@ def _find_unstable_motion(loop: DeviceLoop) -> Ground | None:
 
 
 def _assess_wall_test(
-    loop: DeviceLoop, by_name: Mapping[str, Criterion], main: str
+    loop: device_loop.DeviceLoop, by_name: Mapping[str, criteria.Criterion], main: str
 ) -> tuple[Verdict, str, Ground]:
     """Return the verdict of the wall test, or the criterion that would decide."""
-    if by_name[WALL_TEST].holds:
-        return "plausible", WALL_TEST, Ground.WALL_HELD
+    if by_name[criteria.WALL_TEST].holds:
+        return "plausible", criteria.WALL_TEST, Ground.WALL_HELD
     if loop.obstacle is not None:
         return "undecided", main, Ground.CRITERION
-    if loop.damping_gain is None and by_name[WALL_TEST].limit is not None:
-        return "undecided", WALL_TEST, Ground.DEVICE_UNKNOWN
+    if loop.damping_gain is None and by_name[criteria.WALL_TEST].limit is not None:
+        return "undecided", criteria.WALL_TEST, Ground.DEVICE_UNKNOWN
     if loop.delay is None and not by_name[main].missing:
-        main = DELAY
+        main = criteria.DELAY
     return "undecided", main, Ground.CRITERION
 
 
@@ -323,8 +314,8 @@ def recommend_stiffness(
         q: its characteristic number.
         one_sided: its one-sided number.
     """
-    loop = make_device_loop(surface, device, q, one_sided, None)
-    limit = stability_limit(loop, evaluate_criteria(loop))
+    loop = device_loop.make_device_loop(surface, device, q, one_sided, None)
+    limit = stability_limit(loop, criteria.evaluate_criteria(loop))
     margin = safety_margin(surface, device, limit)
     known = limit.stiffness or 0.0
     start = round_down(margin.factor * known) if math.isfinite(known) else 0.0

@@ -20,18 +20,7 @@ from asperity.analysis.compare import Comparison
 from asperity.analysis.energy.scan_lines import scan_height
 from asperity.analysis.results import LawRow
 from asperity.core.units import format_quantity
-from asperity.report.pictures import style
-from asperity.report.pictures.scan_plane import (
-    CurlField,
-    PlaneForces,
-    ScanSegment,
-    arrow_field,
-    choose_segment,
-    curl_field,
-    feature_length,
-    field_range,
-    scan_forces,
-)
+from asperity.report.pictures import scan_plane, style
 from asperity.report.sentences.number_text import bound_text, number_text, strength_has_unit
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
@@ -54,7 +43,7 @@ class Window:
         top: [m].
     """
 
-    segment: ScanSegment
+    segment: scan_plane.ScanSegment
     bottom: float
     top: float
 
@@ -75,13 +64,13 @@ class Window:
         axes.set(xlim=(0.0, self.segment.length * wide.scale), ylim=(self.bottom * high.scale, top))
 
 
-def field_segment(surfaces: Sequence[Surface]) -> ScanSegment:
+def field_segment(surfaces: Sequence[Surface]) -> scan_plane.ScanSegment:
     """Return the part of the scan line shown in figures of the field."""
     texture = surfaces[0].texture
     depth = max(surface.max_depth for surface in surfaces)
-    length = feature_length(texture)
+    length = scan_plane.feature_length(texture)
     wanted = 1.3 * (texture.peak_to_valley + depth)
-    return choose_segment(texture, min(max(wanted, length), 3.0 * length), 3.0 * length)
+    return scan_plane.choose_segment(texture, min(max(wanted, length), 3.0 * length), 3.0 * length)
 
 
 def field_size(surfaces: Sequence[Surface]) -> tuple[float, float]:
@@ -100,7 +89,7 @@ def _column_count(count: int) -> int:
 def field_window(surfaces: Sequence[Surface]) -> Window:
     """Return the part of the plane along the scan line shown in figures of the field."""
     segment = field_segment(surfaces)
-    return Window(segment, *field_range(surfaces, segment))
+    return Window(segment, *scan_plane.field_range(surfaces, segment))
 
 
 def draw_fields(
@@ -124,8 +113,8 @@ def draw_fields(
     window = window or field_window(surfaces)
     segment, bottom, top = window.segment, window.bottom, window.top
     surfaces, over, per = _to_one_stiffness(surfaces)
-    curls = [curl_field(surface, segment, bottom) for surface in surfaces]
-    arrows = [arrow_field(surface, segment, bottom, top) for surface in surfaces]
+    curls = [scan_plane.curl_field(surface, segment, bottom) for surface in surfaces]
+    arrows = [scan_plane.arrow_field(surface, segment, bottom, top) for surface in surfaces]
     curl_limit, force_per_inch = _choose_scales(surfaces, curls, arrows)
     (wide, high), columns = window.units, _column_count(len(surfaces))
     x, y = f"along the scan line [{wide.name}]", f"z [{high.name}]"
@@ -158,7 +147,9 @@ def _to_one_stiffness(surfaces: Sequence[Surface]) -> tuple[list[Surface], str, 
 
 
 def _choose_scales(
-    surfaces: Sequence[Surface], curls: Sequence[CurlField], arrows: Sequence[PlaneForces]
+    surfaces: Sequence[Surface],
+    curls: Sequence[scan_plane.CurlField],
+    arrows: Sequence[scan_plane.PlaneForces],
 ) -> tuple[float, float]:
     """Return the greatest curl of the colours [N/m] and the force of an inch of arrow [N]."""
     strong = [np.abs(c.curl).ravel() for c in curls if np.abs(c.curl).max() > 1e-9 * c.max_norm]
@@ -169,7 +160,7 @@ def _choose_scales(
     return rounded, usual / 0.32
 
 
-def _draw_curl(axes: Axes, field: CurlField, window: Window, limit: float) -> Any:
+def _draw_curl(axes: Axes, field: scan_plane.CurlField, window: Window, limit: float) -> Any:
     axes.set_facecolor(style.FREE_SPACE)
     wide, high = window.units
     places = (field.along * wide.scale, field.z * high.scale)
@@ -177,7 +168,9 @@ def _draw_curl(axes: Axes, field: CurlField, window: Window, limit: float) -> An
     return axes.pcolormesh(*places, field.curl, shading="flat", rasterized=True, **colours)
 
 
-def _draw_arrows(axes: Axes, field: PlaneForces, window: Window, force_per_inch: float) -> Any:
+def _draw_arrows(
+    axes: Axes, field: scan_plane.PlaneForces, window: Window, force_per_inch: float
+) -> Any:
     wide, high = window.units
     places = (field.along * wide.scale, field.z * high.scale)
     options = _ARROWS | {"scale": force_per_inch, "color": style.unthemed_colour(style.INK)}
@@ -215,10 +208,10 @@ _FORCE_COLUMNS = 2
 _MAX_FORCE_RATIO = 3.0
 
 
-def force_segment(texture: Texture) -> ScanSegment:
+def force_segment(texture: Texture) -> scan_plane.ScanSegment:
     """Return the part of the scan line shown in figures of forces."""
-    length = feature_length(texture)
-    return choose_segment(texture, 2.0 * length, 12.0 * length)
+    length = scan_plane.feature_length(texture)
+    return scan_plane.choose_segment(texture, 2.0 * length, 12.0 * length)
 
 
 def force_size(count: int) -> tuple[float, float]:
@@ -230,7 +223,7 @@ def draw_forces(figure: Figure | SubFigure, surfaces: Sequence[Surface]) -> None
     """Draw tangential and normal force along the scan for every law, on shared axes."""
     segment = force_segment(surfaces[0].texture)
     surfaces, over, choose_unit = _to_one_stiffness(surfaces)
-    forces = [scan_forces(surface, segment) for surface in surfaces]
+    forces = [scan_plane.scan_forces(surface, segment) for surface in surfaces]
     limits = _shared_limits(forces)
     unit = choose_unit(max(map(abs, limits)))
     wide = style.length_unit(segment.length)
@@ -244,7 +237,7 @@ def draw_forces(figure: Figure | SubFigure, surfaces: Sequence[Surface]) -> None
     _draw_force_legend(figure, panels[0])
 
 
-def _shared_limits(forces: Sequence[PlaneForces]) -> tuple[float, float]:
+def _shared_limits(forces: Sequence[scan_plane.PlaneForces]) -> tuple[float, float]:
     """Return the limits of the shared axis [N], which clip a law that exceeds the others by far."""
     lows = [min(float(f.tangential.min()), float(f.normal.min()), 0.0) for f in forces]
     highs = [max(float(f.tangential.max()), float(f.normal.max()), 0.0) for f in forces]
@@ -257,7 +250,10 @@ def _shared_limits(forces: Sequence[PlaneForces]) -> tuple[float, float]:
 
 
 def _draw_force_panel(
-    axes: Axes, surface: Surface, force: PlaneForces, units: tuple[style.AxisUnit, style.AxisUnit]
+    axes: Axes,
+    surface: Surface,
+    force: scan_plane.PlaneForces,
+    units: tuple[style.AxisUnit, style.AxisUnit],
 ) -> None:
     wide, unit = units
     x = force.along * wide.scale
@@ -270,7 +266,7 @@ def _draw_force_panel(
 
 
 def _annotate_clipping(
-    axes: Axes, force: PlaneForces, limits: tuple[float, float], unit: style.AxisUnit
+    axes: Axes, force: scan_plane.PlaneForces, limits: tuple[float, float], unit: style.AxisUnit
 ) -> None:
     """Add the extremes of a curve that leaves the panel."""
     both = np.concatenate([force.tangential, force.normal])
@@ -305,7 +301,8 @@ def gain_figure(comparison: Comparison) -> Figure:
     surfaces = [row.surface for row in comparison.rows]
     window = field_window(surfaces)
     fields = [
-        curl_field(surface, window.segment, window.bottom, *_GAIN_CELLS) for surface in surfaces
+        scan_plane.curl_field(surface, window.segment, window.bottom, *_GAIN_CELLS)
+        for surface in surfaces
     ]
     values = np.concatenate([field.gain.ravel() for field in fields])
     highest = max(float(np.quantile(values[np.isfinite(values)], 0.995)), 2.0)
@@ -333,7 +330,7 @@ def _draw_witness(axes: Axes, row: LawRow, window: Window) -> None:
         axes.plot(x, y, "x", color=style.unthemed_colour(style.BLUE), ms=7, mew=2, zorder=5)
 
 
-def draw_gain_field(axes: Axes, field: CurlField, scale: LogNorm, window: Window) -> Any:
+def draw_gain_field(axes: Axes, field: scan_plane.CurlField, scale: LogNorm, window: Window) -> Any:
     """Draw ‖J‖/k of the cells of a vertical plane; return the mesh for a colour bar."""
     axes.set_facecolor(style.FREE_SPACE)
     wide, high = window.units

@@ -24,12 +24,7 @@ from asperity.laws.w_smooth_wall import LAW as SMOOTH_WALL
 from asperity.simulation.batch import BatchSimulation, Trajectory
 from asperity.simulation.hands import Hand
 from asperity.simulation.kernels.body_interface import LANES
-from asperity.simulation.limit_cycles.onset_search import (
-    OnsetSearch,
-    bracket_onset,
-    limit_cycle_rule,
-    run_searches,
-)
+from asperity.simulation.limit_cycles import onset_search
 from asperity.simulation.motions import Motion
 from asperity.simulation.plants import Plant
 from asperity.simulation.servo import Servo
@@ -96,7 +91,7 @@ def run_starts(
     """Return the trajectories for each shift of the start [m], (n, 3), with their verdicts."""
     samples = _samples_for(duration, servo)
     runs = [
-        batch.new_trajectory(stiffness, servo.delay, shift, limit_cycle_rule(samples))
+        batch.new_trajectory(stiffness, servo.delay, shift, onset_search.limit_cycle_rule(samples))
         for shift in offsets
     ]
     while active := [run for run in runs if run.verdict is None][:LANES]:
@@ -215,16 +210,16 @@ def find_onsets(
         batch = BatchSimulation(surface, plant, hand, servo, motion, origin, velocity)
         offsets = start_offsets(surface, int(starts))
 
-        def search(number: int) -> OnsetSearch:
+        def search(number: int) -> onset_search.OnsetSearch:
             def trajectory(stiffness: float, start: int) -> Trajectory:
-                rule = limit_cycle_rule(samples, limit)
+                rule = onset_search.limit_cycle_rule(samples, limit)
                 return batch.new_trajectory(stiffness, delays[number], offsets[start], rule)
 
-            bracketing = bracket_onset(lowest, highest, width, nears[number])
-            return OnsetSearch(trajectory, len(offsets), bracketing, progress)
+            bracketing = onset_search.bracket_onset(lowest, highest, width, nears[number])
+            return onset_search.OnsetSearch(trajectory, len(offsets), bracketing, progress)
 
         searches = {number: search(number) for number in numbers}
-        for number in run_searches(batch, searches):
+        for number in onset_search.run_searches(batch, searches):
             yield number, Onset(
                 surface.law.letter, delays[number], starts=len(offsets),
                 is_smooth_wall=surface.law is SMOOTH_WALL, **searches[number].result()._asdict(),

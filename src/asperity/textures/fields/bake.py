@@ -14,14 +14,9 @@ from asperity.core.checks import FloatArray, check_positive
 from asperity.core.errors import ParameterError
 from asperity.core.units import round_up
 from asperity.laws import LAWS
+from asperity.textures.fields import node_potentials
 from asperity.textures.fields.field_certificate import Progress, cells_above, curvature_bounds
 from asperity.textures.fields.field_grid import RAMP, FieldGrid, SingleArray
-from asperity.textures.fields.node_potentials import (
-    compute_potentials,
-    smooth,
-    split_columns,
-    spread_marks,
-)
 from asperity.textures.fields.potential_field import FieldAccuracy, PotentialField, certified_number
 from asperity.textures.texture import Texture
 
@@ -123,7 +118,7 @@ class BakePlan:
         self.texture, self.max_depth, self.continuity = texture, max_depth, continuity
         self.goal = goal
         self.gain = self.lipschitz = max(1.0, continuity)
-        self.columns = split_columns(texture, continuity)
+        self.columns = node_potentials.split_columns(texture, continuity)
         self._law_arguments = (1.0, 0.0, 1.0, max_depth, 0.0, continuity)
         low, top = texture.extremes
         self.floor, self.onset_limit = low - max_depth, max(_ONSET[0], _ONSET[1] * (top - low))
@@ -190,7 +185,7 @@ class BakePlan:
         grid = self.grid(resolution)
         self.check_size(grid)
         deep, first_part = grid.extend_down(self.goal.passes), scale_progress(progress, 0.0, 0.9)
-        potentials = compute_potentials(self.columns, deep, first_part)
+        potentials = node_potentials.compute_potentials(self.columns, deep, first_part)
         return self.certify(potentials, grid, scale_progress(progress, 0.9, 0.1))
 
     def bake_coarsest(self, progress: Progress | None) -> PotentialField:
@@ -269,9 +264,9 @@ class BakePlan:
             # What is left is due to the borders of smoothed parts: they are widened.
             ramp, before = 2 * ramp + 1 if count > _STALLED * before else ramp, count
             marks = np.pad(cells, [(0, 0)] * (cells.ndim - 1) + [(below, 0)])
-            weights, cells = spread_marks(marks, grid.border, ramp)
+            weights, cells = node_potentials.spread_marks(marks, grid.border, ramp)
             cells = np.ascontiguousarray(cells[..., below:])
-            potentials, passes = smooth(potentials, weights, grid), passes + 1
+            potentials, passes = node_potentials.smooth(potentials, weights, grid), passes + 1
         upper, attained = curvature_bounds(grid, arguments, progress)
         one_sided, other = (certified_number(float(upper[i]), attained[i]) for i in range(2))
         larger = max(one_sided, other, key=lambda number: number.lower)

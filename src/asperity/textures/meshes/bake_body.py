@@ -9,15 +9,7 @@ from asperity.contacts.split import optimality, solver
 from asperity.core.checks import FloatArray, check_positive
 from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.measured.lengths import format_length, format_lengths
-from asperity.textures.fields.bake import (
-    DEPTHS,
-    LEAST_DEPTH,
-    PROBES,
-    SHALLOW,
-    BakeGoal,
-    BakePlan,
-    scale_progress,
-)
+from asperity.textures.fields import bake
 from asperity.textures.fields.field_certificate import Progress
 from asperity.textures.fields.field_grid import FieldGrid, SingleArray
 from asperity.textures.fields.node_potentials import compute_potentials
@@ -30,7 +22,7 @@ from asperity.textures.spline.spline_texture import HeightMap
 
 # Greatest default of the depth to which the field of a body is exact [m].
 DEFAULT_DEPTH = 1e-3
-DEFAULT_GOAL = BakeGoal()
+DEFAULT_GOAL = bake.BakeGoal()
 _MOST_CROSSINGS = 4096
 _LEAST_CELLS = 4
 _DIGITS = 12  # of places and thickness of thin parts [m]
@@ -44,7 +36,7 @@ def bake_body(
     continuity: float = 1.0,
     *,
     resolution: float | None = None,
-    goal: BakeGoal = DEFAULT_GOAL,
+    goal: bake.BakeGoal = DEFAULT_GOAL,
     progress: Progress | None = None,
 ) -> PotentialField:
     """Return law H of a closed body as a baked potential field.
@@ -199,12 +191,14 @@ class _BodyLoops:
         return tuple(sorted(found, key=lambda region: region.half_thickness))
 
 
-class _BodyPlan(BakePlan):
+class _BodyPlan(bake.BakePlan):
     """A field of a body to bake; ``deepest`` is a depth [m] that it is known to have."""
 
     deepest = 0.0
 
-    def __init__(self, body: MeshBody, max_depth: float, continuity: float, goal: BakeGoal) -> None:
+    def __init__(
+        self, body: MeshBody, max_depth: float, continuity: float, goal: bake.BakeGoal
+    ) -> None:
         self.max_depth, self.continuity, self.goal = max_depth, continuity, goal
         self.gain, self.lipschitz = continuity, continuity + 1.0
         self._law_arguments = (1.0, 0.0, 1.0, max_depth, 0.0, continuity)
@@ -212,14 +206,14 @@ class _BodyPlan(BakePlan):
         thinnest = float(np.ptp(np.array(body.box), axis=0).min())
         self.coarsest = min(thinnest / _LEAST_CELLS, body.coarsest)
         self.onset_limit = np.inf  # it would ask of edges what few bodies need
-        depths = max_depth * np.geomspace(LEAST_DEPTH, 1.0, DEPTHS)
-        rows = np.repeat(np.arange(DEPTHS), PROBES)
+        depths = max_depth * np.geomspace(bake.LEAST_DEPTH, 1.0, bake.DEPTHS)
+        rows = np.repeat(np.arange(bake.DEPTHS), bake.PROBES)
         points = self.loops.surface_probes(depths[rows])
         inside = self.exact(points)[1] > 0.0
         if not inside.any():
             raise ParameterError("max_depth", "finds no point inside the body", max_depth)
         self.set_probes(points[inside], rows[inside], depths)
-        points = self.loops.surface_probes(np.full(PROBES, SHALLOW * max_depth))
+        points = self.loops.surface_probes(np.full(bake.PROBES, bake.SHALLOW * max_depth))
         self.set_shallow(points[self.exact(points)[1] > 0.0])
 
     def exact(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -231,7 +225,7 @@ class _BodyPlan(BakePlan):
         """See :class:`BakePlan`."""
         grid, loops = self.checked_grid(resolution), self.loops
         loops.prepare(grid.extend_down(self.goal.passes), _GAP * resolution**2)
-        part = scale_progress(progress, 0.05, 0.85)
+        part = bake.scale_progress(progress, 0.05, 0.85)
         depths = compute_potentials(loops.record_columns, loops.grid, part)
         thin_map = loops.thin_map(self.max_depth)
         thin = loops.thin_regions(thin_map)
@@ -239,7 +233,7 @@ class _BodyPlan(BakePlan):
         if self.max_depth > (deepest := max(self.deepest, deepest)):
             reason = f"must be at most {format_length(deepest)}, the greatest depth of the body"
             raise ParameterError("max_depth", reason, self.max_depth)
-        field = self.certify(depths, grid, scale_progress(progress, 0.9, 0.1))
+        field = self.certify(depths, grid, bake.scale_progress(progress, 0.9, 0.1))
         field.thin_regions, field.thin_map = thin, thin_map if thin else None
         return field
 
