@@ -5,16 +5,20 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import shlex
 import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
+import click
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from tests.report.pages import check_alone, check_alts
 
-from asperity.cli.main import COMMANDS
+from asperity.cli.main import COMMANDS, cli
 
 Call = Callable[..., tuple[int, str, str]]
 
@@ -338,3 +342,44 @@ def test_comparing_shipped_laws_does_not_import_sympy() -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, check=False, env=os.environ
     )
     assert process.returncode == 0, process.stderr
+
+
+def _next_commands(out: str) -> list[list[str]]:
+    lines = out.split("\nNext:\n")[1].splitlines()
+    return [shlex.split(line)[1:] for line in lines]
+
+
+def test_next_commands_run_the_recommended_law(call: Call, tmp_path: Path) -> None:
+    """With the options of the file, device, plugin and law that it takes, ready to paste."""
+    path = tmp_path / "two words.npy"
+    np.save(path, 2e-4 * np.sin(np.linspace(0.0, 12.0 * np.pi, 400)))
+    options = ["--pitch", "20um", "--periodic", "--set", "apparent_mass=60g"]
+    options += ["--set", "modulation_depth=0.5"]
+    code, out, err = call("compare", str(path), "--laws", "WFC", "--device", "touch", *options)
+    assert (code, err) == (0, "")
+    commands = _next_commands(out)
+    assert [one[0] for one in commands] == ["lab", "run", "export"]
+    for name, source, *rest in commands:
+        assert source == str(path)
+        assert "modulation_depth=0.5" not in rest  # of law F, C was recommended
+        assert rest[:4] == ["--law", "C", "--device", "touch"]
+        for words in (["--pitch", "20um"], ["--set", "apparent_mass=60g"], ["--periodic"]):
+            assert " ".join(words) in " ".join(rest)
+        command = cli.get_command(click.Context(cli), name)
+        assert command is not None
+        command.make_context(name, [source, *rest])
+    _name, *arguments = commands[2]
+    target = tmp_path / "texture.h"
+    assert call("export", *arguments[:-1], str(target))[0] == 0
+    assert target.exists()
+
+
+def test_compare_without_arguments_asks_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    code = CliRunner().invoke(cli, ["compare"]).exit_code
+    assert code == 2
+    terminal = SimpleNamespace(stdin=SimpleNamespace(isatty=lambda: True))
+    monkeypatch.setattr("asperity.cli.analysis_commands.sys", terminal)
+    done = CliRunner().invoke(cli, ["compare"], input="knurl\ntouch\n0.2mm\n")
+    assert "Surface" in done.output
+    assert "on the 3D Systems Touch" in " ".join(done.output.split())
+    assert "--max-depth 0.2mm" in done.output

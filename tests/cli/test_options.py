@@ -9,16 +9,17 @@ import subprocess
 import sys
 from pathlib import Path
 
+import click
 import pytest
 from click.testing import CliRunner
 
 import asperity as asp
-from asperity.analysis.check_limits import DEFAULT_SAMPLES, DEFAULT_SPEED
+from asperity.analysis.limits.limit_rules import DEFAULT_SAMPLES, DEFAULT_SPEED
 from asperity.cli import analysis_commands as analyze
 from asperity.cli import analysis_commands as compare
 from asperity.cli import analysis_commands as limits
 from asperity.cli import simulation_commands as onset
-from asperity.cli.main import COMMANDS, cli
+from asperity.cli.main import COMMANDS, GROUPS, cli
 from asperity.cli.options import LAW_OPTIONS, SPEED, option_help
 from asperity.cli.output import progress_bar, step_bar
 from asperity.core.arguments import MAX_DEPTH, Argument
@@ -31,7 +32,7 @@ READ_A_SURFACE = ["analyze", "compare", "limits", "onset", "scan", "simulate"]
 
 @pytest.mark.parametrize("command", READ_A_SURFACE)
 def test_every_declared_argument_is_an_option_with_its_help(command: str) -> None:
-    result = CliRunner().invoke(cli, [command, "--help"], env={"COLUMNS": "100"})
+    result = CliRunner().invoke(cli, [command, "--help-surface"], env={"COLUMNS": "100"})
     assert result.exit_code == 0
     text = " ".join(result.output.split())
     depths = [compare._MAX_DEPTHS] if command == "compare" else [MAX_DEPTH]  # several there
@@ -85,16 +86,48 @@ def test_help_of_all_commands_in_one_process_imports_no_heavy_package() -> None:
     assert process.returncode == 0, process.stderr
 
 
-def test_help_lists_every_command_with_its_summary() -> None:
+def test_help_lists_every_command_with_its_summary_by_group() -> None:
     text = CliRunner().invoke(cli, ["--help"], env={"COLUMNS": "100"}).output
-    for name, (_module, summary) in COMMANDS.items():
+    for name, (_module, summary, _example) in COMMANDS.items():
         assert f"  {name} " in text
         assert summary in text
+    titles = [line[:-1] for line in text.splitlines() if line and not line.startswith(" ")]
+    assert [one for one in titles if one in GROUPS] == list(GROUPS)
+    assert text.index("Answer:") < text.index("  compare ") < text.index("Surface:")
     for command in ("compare", "recording"):
         short = CliRunner().invoke(cli, [command, "-h"])
         assert (short.exit_code, short.output.split()[2]) == (0, command)
     wrong = CliRunner().invoke(cli, ["campare"])
     assert (wrong.exit_code, "No such command 'campare'" in wrong.output) == (2, True)
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_help_has_headings_an_example_and_every_option(name: str) -> None:
+    """Options of a measured file are shown by ``--help-surface`` alone."""
+    command = cli.get_command(click.Context(cli), name)
+    assert command is not None
+    if isinstance(command, click.Group):
+        return
+    short = CliRunner().invoke(cli, [name, "--help"], env={"COLUMNS": "100"}).output
+    full, takes_files = short, any(one.name == "unit" for one in command.params)
+    if takes_files:
+        full = CliRunner().invoke(cli, [name, "--help-surface"], env={"COLUMNS": "100"}).output
+        assert "--tip-radius" not in short
+        assert "Measured surface:\n" in full
+    for option in command.params:
+        if isinstance(option, click.Option) and not option.hidden:
+            assert f"{max(option.opts, key=len)}" in full
+    if {"json_path", "output"} & {str(one.name) for one in command.params}:
+        assert "\nOutput:\n" in short
+    example = short.split("Example:\n")[1].split()
+    assert example[:2] == ["asperity", name]
+    _, rest, _ = command.make_parser(click.Context(command)).parse_args(example[2:])
+    assert len(rest) <= len([one for one in command.params if isinstance(one, click.Argument)]) + 1
+
+
+def test_metavar_of_an_option_with_choices_names_them() -> None:
+    text = CliRunner().invoke(cli, ["compare", "--help"]).output
+    assert "--rendering field|search" in text
 
 
 class _Terminal(io.StringIO):

@@ -181,3 +181,24 @@ def test_user_defined_section_is_on_the_page(call: Call, source: str, tmp_path: 
     add_section(MeasurementSummary, build_section)
     call("show", source, *PLAIN, "--html", str(tmp_path / "page.html"))
     assert "of map.npy" in (tmp_path / "page.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("command", [["show"], ["prepare", "-o", "surface.npz"]])
+def test_surface_of_the_catalogue_is_refused_where_a_file_is_expected(
+    call: Call, command: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, out, err = call(command[0], "cloth", *command[1:])
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert "must be a measured file" in err
+    assert "asperity surfaces cloth" in err
+
+
+def test_folder_hides_no_surface_of_the_catalogue(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "knurl").mkdir()
+    code, out, _err = call("limits", "knurl", "--law", "W", "--json", "-")
+    assert code == 0
+    assert '"knurl"' in out

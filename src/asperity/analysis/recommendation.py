@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from asperity.analysis import surface_sentences
 from asperity.analysis.limits.limit_rules import DEFAULT_SPEED
 from asperity.analysis.limits.perceptibility import Perceptibility
 from asperity.analysis.limits.perceptibility_sentences import (
@@ -29,11 +30,6 @@ from asperity.analysis.passivity.assess_passivity import (
 from asperity.analysis.passivity.criteria import buzz_goal, damping_assumption
 from asperity.analysis.passivity.verdict import Margin, load_margins
 from asperity.analysis.results import LawRow
-from asperity.analysis.surface_sentences import (
-    SCOPE_SENTENCE,
-    default_depth_text,
-    law_parameter_sentences,
-)
 from asperity.core.units import format_quantity, round_down, round_up
 from asperity.devices import Device
 from asperity.perception.grip import Grip
@@ -392,7 +388,7 @@ def comparison_assumptions(
         "The leak is the work of the field on one slow traversal of its worst loop, without "
         "delay, quantisation and friction of the device"
     )
-    return (*sentences, SCOPE_SENTENCE)
+    return (*sentences, surface_sentences.SCOPE_SENTENCE)
 
 
 def _margin_assumptions(rows: Sequence[LawRow]) -> list[str]:
@@ -430,9 +426,9 @@ def _default_sentences(rows: Sequence[LawRow], defaults: Mapping[str, bool]) -> 
     if defaults["speed"]:
         sentences.append(f"Default scanning speed {speed_text(DEFAULT_SPEED)}")
     if defaults["max_depth"]:
-        sentences.append(default_depth_text(rows[0].surface))
+        sentences.append(surface_sentences.default_depth_text(rows[0].surface))
     return sentences + [
         f"{parameter} for law {row.law.letter}"
         for row in rows
-        for parameter in law_parameter_sentences(row.surface)
+        for parameter in surface_sentences.law_parameter_sentences(row.surface)
     ]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import shlex
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -10,13 +12,15 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from asperity.cli import options
+from asperity.cli.main import HeadedCommand, declare_command, repeat_options
 from asperity.cli.options import GRIP, REQUESTED_STIFFNESS, SPEED
 from asperity.cli.output import Outputs, output_options, step_bar
 from asperity.core.arguments import MAX_DEPTH, Argument
 from asperity.core.errors import ParameterError
-from asperity.laws import REGISTERED_LAWS
+from asperity.laws import REGISTERED_LAWS, registered_arguments
 
 if TYPE_CHECKING:
+    from asperity.analysis.compare import Comparison
     from asperity.analysis.device_comparisons import DeviceComparisons
     from asperity.devices import Device
     from asperity.laws import Law
@@ -36,7 +40,7 @@ def _validated_parser(argument: Argument) -> Callable[[str], Any]:
     return parse
 
 
-@click.command("analyze")
+@declare_command("analyze")
 @options.surface_options("Law, by letter or name.  [default: the scene's, or the recommended law]")
 @options.argument_options(_BOUND_SEARCH, _validated_parser)
 @output_options()
@@ -76,7 +80,20 @@ _STIFFNESS = replace(
 _MAX_DEPTHS = replace(MAX_DEPTH, form="items", example="0.1mm; 0.5mm")
 
 
-@click.command("compare")
+class _AskingCommand(HeadedCommand):
+    """Command that asks for its arguments on a terminal, if there are none."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Parse the arguments, or the answers."""
+        if not args and sys.stdin.isatty():
+            surface = click.prompt("Surface: a kind, a name such as cloth, or a file")
+            device = click.prompt("Device of the catalogue, or a TOML file", "omega.3")
+            depth = click.prompt("Greatest depth, such as 0.5mm, or Enter", "", show_default=False)
+            args = [surface, "--device", device, *(["--max-depth", depth] if depth else [])]
+        return super().parse_args(ctx, args)
+
+
+@click.command("compare", cls=_AskingCommand)
 @click.argument("surface")
 @options.device_option(
     "Devices of the catalogue, or TOML files, 'touch,mine.toml'.  [default: omega.3]",
@@ -125,10 +142,28 @@ def compare_command(
             **options.provided_values(values, [SPEED, GRIP]),
             **arguments,
         )
-    _write_comparisons(result, outputs, full)
+    _write_comparisons(result, outputs, full, surface)
 
 
-def _write_comparisons(result: DeviceComparisons, outputs: Outputs, full: bool) -> None:
+def _next_commands(surface: str, result: Comparison) -> str:
+    """Return the commands to type next, for the recommended law; empty without one."""
+    from asperity.report.sentences import number_text
+
+    row = result.recommended_row
+    if row is None:
+        return ""
+    k = f"{number_text.limit_text(row.surface.stiffness)}".replace(" ", "")
+    unused = set(registered_arguments()) - set(row.law.arguments)
+    typed = repeat_options({"plugin", "settings", "max_depth", *row.law.arguments}, unused)
+    words = [surface, "--law", row.law.letter, "--device", result.device.id, "--stiffness", k]
+    rest = shlex.join([*words, *typed])
+    commands = (f"lab {rest}", f"run {rest}", f"export {rest} -o texture.h")
+    return "\n".join(["", "Next:", *(f"  asperity {command}" for command in commands)])
+
+
+def _write_comparisons(
+    result: DeviceComparisons, outputs: Outputs, full: bool, surface: str
+) -> None:
     """Write a single comparison, or the table of several.
 
     Raises:
@@ -138,7 +173,9 @@ def _write_comparisons(result: DeviceComparisons, outputs: Outputs, full: bool) 
 
     if len(result.comparisons) == 1 and not result.missing_data:
         one = result.comparisons[0]
-        outputs.write(one, report.comparison_page(one, full))
+        outputs.write(
+            one, report.comparison_page(one, full), extra_line=_next_commands(surface, one)
+        )
         return
     if result.comparisons or len(result.missing_data) > 1:
         outputs.write(result, report.comparisons_page(result))
@@ -150,7 +187,7 @@ def _write_comparisons(result: DeviceComparisons, outputs: Outputs, full: bool) 
 _SAMPLING = options.command_arguments("limits")
 
 
-@click.command("limits")
+@declare_command("limits")
 @options.surface_options("Law, by letter or name.  [default: the recommended law]")
 @options.argument_options((SPEED, GRIP, *_SAMPLING))
 @output_options()

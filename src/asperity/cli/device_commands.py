@@ -13,6 +13,7 @@ import click
 
 from asperity.cli import options
 from asperity.cli.loop_setup import SIMULATED
+from asperity.cli.main import declare_command
 from asperity.cli.output import Outputs, check_outputs, output_options, progress_bar, write_output
 from asperity.cli.servo_commands import stop_on_signals, suspend_if_requested
 from asperity.core.errors import ParameterError, print_message
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from asperity.simulation.servo import Servo
 
 
-@click.command("devices")
+@declare_command("devices")
 @click.argument("names", nargs=-1, metavar="[ID|FILE]...")
 @click.option(
     "--template",
@@ -59,7 +60,7 @@ _DEFAULT_RATE = 1000.0  # [Hz] for a device without an update rate
 _CALIBRATE = options.command_arguments("calibrate")
 
 
-@click.command("calibrate")
+@declare_command("calibrate")
 @options.device_option("The device with its known values: ID of the catalogue, or a TOML file.")
 @click.option(
     "--driver", metavar="NAME", default=SIMULATED,

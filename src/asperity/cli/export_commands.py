@@ -11,6 +11,7 @@ import click
 
 from asperity.clamps import BACKED
 from asperity.cli import options
+from asperity.cli.main import declare_command
 from asperity.cli.output import check_output, progress_bar, step_bar
 from asperity.core.arguments import STIFFNESS
 from asperity.core.errors import ParameterError, escape_unprintable
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 _LANG, *_REQUEST_ARGUMENTS, _CLAMP = options.command_arguments("export")
 
 
-@click.command("export")
+@declare_command("export")
 @click.option("-o", "--output", metavar="PATH", required=True, help="File to write ('texture.h').")
 @click.option(
     "--exact",
@@ -107,7 +108,7 @@ def export_command(
 _GRID_ARGUMENTS = options.command_arguments("maps")
 
 
-@click.command("maps")
+@declare_command("maps")
 @click.argument("surface")
 @click.option(
     "-o",

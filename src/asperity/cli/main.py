@@ -1,10 +1,12 @@
-"""The command ``asperity``: its list of commands and the report of errors."""
+"""The command ``asperity``: its commands, their help, and the report of errors."""
 
 from __future__ import annotations
 
 import importlib
 import sys
 import warnings
+from collections.abc import Collection, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -15,6 +17,91 @@ from asperity.cli.plugins import plugin_error_text
 from asperity.core.cache import CacheWarning, size_limit
 from asperity.core.errors import AsperityError, ParameterError, print_message
 from asperity.core.files import read_toml
+from asperity.laws import SHIPPED_LAW_ARGUMENTS
+from asperity.measured.file_arguments import FILE_ARGUMENTS
+
+GROUPS = read_toml("commands", Path(__file__).with_name("commands.toml"))
+"""Module, summary and example of each command, by group and name."""
+COMMANDS = {name: entry for group in GROUPS.values() for name, entry in group.items()}
+
+_FILE_OPTIONS = {argument.name for argument in FILE_ARGUMENTS}
+_LAW = {"law", "laws", "clamp", "stiffness", "max_depth", "rendering"}
+_HEADINGS = {
+    "Law": _LAW | set(SHIPPED_LAW_ARGUMENTS),
+    "Device and hand": {"device", "driver", "speed", "grip", "settings"},
+    "Measured surface": _FILE_OPTIONS,
+    "Output": {"output", "json_path", "html_path", "trace_path", "record", "force", "no_cache"},
+}
+_HEADING_OF = {name: title for title, names in _HEADINGS.items() for name in names}
+_ARGUMENTS, _SHOWS_FILES = "asperity.arguments", "asperity.shows_files"
+
+
+class HeadedCommand(click.Command):
+    """Command whose help has options under headings, and an example."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Parse the arguments, and keep them for :func:`repeat_options`."""
+        ctx.meta[_ARGUMENTS] = list(args)
+        return super().parse_args(ctx, args)
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the options; those of a measured file only for ``--help-surface``."""
+        rows: dict[str, list[tuple[str, str]]] = {"Options": [], **{one: [] for one in _HEADINGS}}
+        for option in self.get_params(ctx):
+            record = option.get_help_record(ctx) if isinstance(option, click.Option) else None
+            if record is not None:
+                rows[_HEADING_OF.get(str(option.name), "Options")].append(record)
+        if not ctx.meta.get(_SHOWS_FILES):
+            del rows["Measured surface"]
+        for title, records in rows.items():
+            if records:
+                with formatter.section(title):
+                    formatter.write_dl(records)
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002 - click's signature
+        """Write the example."""
+        name = str(self.name)
+        if name in COMMANDS:
+            with formatter.section("Example"):
+                formatter.write_text(f"asperity {name} {COMMANDS[name][2]}")
+
+
+declare_command = partial(click.command, cls=HeadedCommand)
+"""Decorator of a command by its name."""
+
+
+def _show_file_options(ctx: click.Context, _option: click.Parameter, requested: bool) -> None:
+    if requested:
+        ctx.meta[_SHOWS_FILES] = True
+        click.echo(ctx.get_help())
+        ctx.exit()
+
+
+help_surface_option = click.option(
+    "--help-surface", is_flag=True, is_eager=True, expose_value=False, callback=_show_file_options,
+    help="Show the options of a measured surface, too: unit, filters, magnification ...",
+)  # fmt: skip
+"""Adds ``--help-surface``."""
+
+
+def repeat_options(names: Collection[str], unused: Collection[str]) -> list[str]:
+    """Return the options of the running command with these names, and of its file, as typed.
+
+    Args:
+        names: of the options.
+        unused: names of values of ``--set`` to leave out.
+    """
+    ctx = click.get_current_context()
+    typed: Sequence[str] = ctx.meta[_ARGUMENTS]
+    values, _rest, _order = ctx.command.make_parser(ctx).parse_args(list(typed))
+    parts = []
+    for option in ctx.command.params:
+        if option.name in values and option.name in {*names, *_FILE_OPTIONS}:
+            value = values[option.name]
+            for text in value if isinstance(value, list) else [value]:
+                if str(text).partition("=")[0].strip().replace("-", "_") not in unused:
+                    parts += [max(option.opts, key=len), *([text] if isinstance(text, str) else ())]
+    return parts
 
 
 def check_not_repeated(
@@ -56,9 +143,6 @@ class StrictGroup(click.Group):
 
 BAD_INPUT = AsperityError.exit_code
 
-COMMANDS = read_toml("commands", Path(__file__).with_name("commands.toml"))
-"""Each command's module ``cli/MODULE_commands.py`` and summary; it is ``NAME_command`` there."""
-
 
 class LazyCommands(StrictGroup):
     """Group that imports a command when it is called, so that the program starts fast."""
@@ -76,9 +160,10 @@ class LazyCommands(StrictGroup):
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002 - as above
-        """Write the list of commands."""
-        with formatter.section("Commands"):
-            formatter.write_dl([(name, summary) for name, (_, summary) in COMMANDS.items()])
+        """Write the commands by group."""
+        for title, group in GROUPS.items():
+            with formatter.section(title):
+                formatter.write_dl([(f"{name:<9}", entry[1]) for name, entry in group.items()])
 
 
 @click.group(

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from asperity.cli.main import help_surface_option
 from asperity.cli.plugins import load_plugins
 from asperity.core.arguments import MAX_DEPTH, RENDERING, STIFFNESS, Argument, read_arguments
 from asperity.core.errors import ParameterError, suggest_names
@@ -158,11 +159,11 @@ def argument_options(
                 continue
             parse = argument.parse if make_parser is None else make_parser(argument)
             is_list = make_parser is list_parser or argument.form == "items"
-            metavar = "LIST" if is_list else "N" if argument.form == "integer" else "TEXT"
+            metavar = "|".join(argument.choices) or ("N" if argument.form == "integer" else "TEXT")
             command = click.option(
                 flag,
                 argument.name,
-                metavar=metavar,
+                metavar="LIST" if is_list else metavar,
                 callback=parser_callback(parse),
                 help=words,
                 hidden=argument in hidden,
@@ -318,7 +319,7 @@ jobs_option = click.option(
 
 def file_options(command: Command) -> Command:
     """Add the options of a measured file and ``--memory``."""
-    return argument_options(FILE_ARGUMENTS)(_memory_option(command))
+    return help_surface_option(argument_options(FILE_ARGUMENTS)(_memory_option(command)))
 
 
 def file_values(values: Mapping[str, Any]) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from asperity.cli import options
+from asperity.cli.main import declare_command
 from asperity.cli.output import Outputs, check_outputs, output_options, progress_bar, step_bar
 from asperity.core.errors import ParameterError, escape_unprintable
 
@@ -23,7 +24,7 @@ _CLAIMS_FRACTION = 0.35
 (_FORMAT,) = options.command_arguments("reproduce")
 
 
-@click.command("reproduce")
+@declare_command("reproduce")
 @click.option(
     "--claim",
     "names",

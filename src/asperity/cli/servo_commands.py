@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from asperity.cli import loop_setup, options
+from asperity.cli.main import declare_command
 from asperity.cli.options import file_values, surface_values
 from asperity.cli.output import Outputs, check_outputs, output_options, progress_bar
 from asperity.cli.plugins import load_plugin_files, plugin_contents, plugin_files
@@ -45,7 +46,7 @@ POLL_INTERVAL = 0.05
 _RUN_ARGUMENTS = options.command_arguments("run")
 
 
-@click.command("run")
+@declare_command("run")
 @loop_setup.loop_options(
     loop_setup.stiffness_option("the scene's; without a scene, the recommended stiffness")
 )
@@ -230,7 +231,7 @@ def show_live_state() -> Iterator[Any]:
 _LAB_ARGUMENTS = options.command_arguments("lab")
 
 
-@click.command("lab")
+@declare_command("lab")
 @click.argument("surface", required=False)
 @options.law_option(
     "Initial law.  [default: the scene's, else C; with --driver the recommended law]"

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from asperity.cli import output
+from asperity.cli.main import declare_command
 from asperity.cli.options import jobs_option
 from asperity.core import cache
 from asperity.core.errors import AsperityError, ParameterError, escape_unprintable
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from asperity.textures import Texture
 
 
-@click.command("init")
+@declare_command("init")
 @click.argument("scene")
 @click.option("--force", is_flag=True, help="Replace an existing file.")
 def init_command(scene: str, *, force: bool) -> None:
@@ -43,7 +44,7 @@ _NAMESPACE_LABELS = {
 }
 
 
-@click.command("cache")
+@declare_command("cache")
 @click.option("--clear", is_flag=True, help="Delete all entries.")
 @output.output_options(html=False, uses_cache=False)
 def cache_command(outputs: output.Outputs, *, clear: bool) -> None:
@@ -80,7 +81,7 @@ def _format_megabytes(sizes: Iterable[int]) -> str:
     return f"{sum(sizes) / 1e6:.1f} MB"
 
 
-@click.command("warm")
+@declare_command("warm")
 @jobs_option
 def warm_command() -> None:
     """Compile the shipped laws for every texture kind and store the code in the cache.

@@ -12,6 +12,7 @@ import click
 
 from asperity.cli import options
 from asperity.cli.loop_setup import load_setup, loop_options, select_laws, stiffness_option
+from asperity.cli.main import declare_command
 from asperity.cli.output import Outputs, output_options, progress_bar
 from asperity.core.errors import ParameterError
 
@@ -24,7 +25,7 @@ _STIFFNESS = stiffness_option("the scene's, else 1000 N/m")
 _SIMULATE_ARGUMENTS = options.command_arguments("simulate")
 
 
-@click.command("simulate")
+@declare_command("simulate")
 @loop_options(_STIFFNESS)
 @options.argument_options(_SIMULATE_ARGUMENTS)
 @click.option(
@@ -88,7 +89,7 @@ _laws_option = options.laws_option("Laws to simulate.  [default: all]")
 _report_options = output_options()
 
 
-@click.command("onset")
+@declare_command("onset")
 @loop_options(None, several_laws=True)
 @_laws_option
 @options.argument_options([_DELAYS], options.list_parser)
@@ -126,7 +127,7 @@ def onset_command(
 *_SCAN_LISTS, _STROKES = options.command_arguments("scan")
 
 
-@click.command("scan")
+@declare_command("scan")
 @loop_options(_STIFFNESS, several_laws=True)
 @_laws_option
 @options.argument_options(_SCAN_LISTS, options.list_parser)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -9,23 +10,17 @@ from typing import Any
 
 import click
 
-from asperity.cli.options import (
-    argument_options,
-    command_arguments,
-    file_options,
-    file_values,
-    plugin_option,
-    provided_values,
-)
+from asperity.cli import options
+from asperity.cli.main import declare_command
 from asperity.cli.output import Outputs, check_outputs, output_options, progress_bar
 from asperity.core.arguments import MAX_DEPTH
 from asperity.core.errors import ParameterError
 from asperity.laws import SHIPPED_LAW_ARGUMENTS
 
 
-@click.command("surfaces")
+@declare_command("surfaces")
 @click.argument("names", nargs=-1, metavar="[NAME]...")
-@plugin_option
+@options.plugin_option
 @output_options()
 def surfaces_command(names: tuple[str, ...], outputs: Outputs) -> None:
     """List texture kinds and named surfaces with their arguments, units, defaults and sizes.
@@ -62,13 +57,24 @@ def preparation_progress() -> Iterator[Callable[[str], None]]:
         yield lambda stage: update(stages.index(stage) / len(stages), _STAGE_LABELS[stage])
 
 
-@click.command("prepare")
-@click.argument("file")
+def _check_file(_ctx: click.Context, _argument: click.Parameter, name: str) -> str:
+    """Refuse a surface of the catalogue where a file is expected."""
+    from asperity.textures.catalogue import CATALOGUE
+
+    kind = name.partition(":")[0].lower()
+    if kind in CATALOGUE and not os.path.isfile(name):
+        words = "must be a measured file; this is a surface of the catalogue: asperity surfaces"
+        raise ParameterError("file", f"{words} {kind}", name)
+    return name
+
+
+@declare_command("prepare")
+@click.argument("file", callback=_check_file)
 @click.option(
     "-o", "--output", metavar="PATH", required=True, help="The file to write, surface.npz."
 )
-@plugin_option
-@file_options
+@options.plugin_option
+@options.file_options
 @output_options(html=False)
 def prepare_command(file: str, output: str, outputs: Outputs, **values: Any) -> None:
     """Prepare the measured surface FILE and write it with the history of its preparation.
@@ -84,7 +90,7 @@ def prepare_command(file: str, output: str, outputs: Outputs, **values: Any) -> 
     check_output_path(Path(output), Path(file))
     check_outputs(force=outputs.force, output=output, json=outputs.json)
     with preparation_progress() as start_stage:
-        prepared = prepare_file(file, progress=start_stage, **file_values(values))
+        prepared = prepare_file(file, progress=start_stage, **options.file_values(values))
         start_stage("write")
         save_prepared(output, prepared, file)
     from asperity.report.measured_report import preparation_page
@@ -92,19 +98,19 @@ def prepare_command(file: str, output: str, outputs: Outputs, **values: Any) -> 
     outputs.write(prepared, preparation_page(prepared, output))
 
 
-_BAKE = command_arguments("bake")
+_BAKE = options.command_arguments("bake")
 
 
-@click.command("bake")
+@declare_command("bake")
 @click.argument("surface")
 @click.option("-o", "--output", metavar="PATH", required=True, help="File to write.")
 @click.option("--body", is_flag=True, help="SURFACE is the mesh of a closed body; needs --unit.")
 @click.option(
     "--repair", is_flag=True, help="With --body, fill open edges and turn triangles of the mesh."
 )
-@argument_options((*_BAKE, MAX_DEPTH, SHIPPED_LAW_ARGUMENTS["continuity"]))
-@plugin_option
-@file_options
+@options.argument_options((*_BAKE, MAX_DEPTH, SHIPPED_LAW_ARGUMENTS["continuity"]))
+@options.plugin_option
+@options.file_options
 @output_options()
 def bake_command(surface: str, output: str, *, body: bool, outputs: Outputs, **values: Any) -> None:
     """Bake law H of SURFACE as a potential field, and write it to a file.
@@ -123,24 +129,24 @@ def bake_command(surface: str, output: str, *, body: bool, outputs: Outputs, **v
         raise ParameterError("texture", "requires --body: it is laid on a mesh")
     check_outputs(force=outputs.force, output=output, json=outputs.json)
     with progress_bar("baking the field") as update:
-        given = provided_values(values, (MAX_DEPTH, SHIPPED_LAW_ARGUMENTS["continuity"]))
-        options = provided_values(values, _BAKE)
+        given = options.provided_values(values, (MAX_DEPTH, SHIPPED_LAW_ARGUMENTS["continuity"]))
+        chosen = options.provided_values(values, _BAKE)
         if body:
-            options |= {"repair": repair, **file_values(values)}
-            baked = bake_mesh(surface, progress=update, **given, **options)
+            chosen |= {"repair": repair, **options.file_values(values)}
+            baked = bake_mesh(surface, progress=update, **given, **chosen)
         else:
-            texture = load_scene(surface, file_values(values)).texture
-            baked = bake(Surface(texture, "H", **given), progress=update, **options)
+            texture = load_scene(surface, options.file_values(values)).texture
+            baked = bake(Surface(texture, "H", **given), progress=update, **chosen)
         field = save_field(output, baked.texture)
     from asperity.report.measured_report import field_page
 
     outputs.write(field.describe(), field_page(field, output))
 
 
-@click.command("show")
-@click.argument("file")
-@plugin_option
-@file_options
+@declare_command("show")
+@click.argument("file", callback=_check_file)
+@options.plugin_option
+@options.file_options
 @output_options()
 def show_command(file: str, outputs: Outputs, **values: Any) -> None:
     """Report the roughness parameters of the measured surface FILE after each preparation step.
@@ -152,7 +158,7 @@ def show_command(file: str, outputs: Outputs, **values: Any) -> None:
     from asperity.textures.texture_loading import summarize_file
 
     with preparation_progress() as start_stage:
-        summary = summarize_file(file, progress=start_stage, **file_values(values))
+        summary = summarize_file(file, progress=start_stage, **options.file_values(values))
 
     from asperity.report.measured_report import surface_summary_page
 

@@ -8,32 +8,13 @@ from typing import Any
 
 import sympy as sp
 
-from asperity.contacts.symbols import (
-    ARGUMENT_ORDER,
-    DEPTH,
-    DX,
-    DY,
-    H_HALF,
-    H_MID,
-    HX,
-    HXX,
-    HXY,
-    HY,
-    HYY,
-    POSITION,
-    SXX,
-    SXY,
-    SYY,
-    ContactSymbols,
-    H,
-    K,
-)
+from asperity.contacts import symbols as sym
 from asperity.core.errors import LawError
 from asperity.laws.law import Law
 
 # s = |w| = √(1 + h_x² + h_y²), as a separate symbol so that formulas become rational.
 ROOT = sp.Symbol("s", positive=True)
-ROOT_SQUARED = 1 + HX**2 + HY**2
+ROOT_SQUARED = 1 + sym.HX**2 + sym.HY**2
 
 
 @dataclass(frozen=True)
@@ -76,15 +57,16 @@ def derive(law: Law) -> Derivation:
     """
     force = symbolic_force(law)
     contact = law.contact.derivatives()
-    by_height = force.jacobian([H, HX, HY])
-    height_by_point = sp.Matrix([[HX, HY], [HXX, HXY], [HXY, HYY]])
+    by_height = force.jacobian([sym.H, sym.HX, sym.HY])
+    height_by_point = sp.Matrix([[sym.HX, sym.HY], [sym.HXX, sym.HXY], [sym.HXY, sym.HYY]])
     saturated = by_height * height_by_point * contact.point_derivative
-    saturated += force.jacobian(list(POSITION))
+    saturated += force.jacobian(list(sym.POSITION))
     if law.stateful:
         # ∂d/∂p is an argument: the identity while sticking, I - u uᵀ while sliding.
-        saturated += force.jacobian([DX, DY]) * sp.Matrix([[SXX, SXY, 0], [SXY, SYY, 0]])
+        motion = sp.Matrix([[sym.SXX, sym.SXY, 0], [sym.SXY, sym.SYY, 0]])
+        saturated += force.jacobian([sym.DX, sym.DY]) * motion
     saturated += law.contact.jacobian_contribution(force)
-    full = saturated + force.diff(DEPTH) * contact.depth_gradient
+    full = saturated + force.diff(sym.DEPTH) * contact.depth_gradient
     return Derivation(
         law, force, _factor_entries(full), _factor_entries(saturated), contact.definitions
     )
@@ -110,7 +92,7 @@ def symbolic_force(law: Law) -> Any:
     Raises:
         LawError: see :func:`derive`.
     """
-    symbols = ContactSymbols(tuple(law.parameters), law.contact.contact_vector())
+    symbols = sym.ContactSymbols(tuple(law.parameters), law.contact.contact_vector())
     _check_parameter_names(law)
     if law.stateful and "max_deflection" not in law.parameters:
         raise LawError(f"law {law.letter}: a law with state needs the parameter max_deflection")
@@ -134,7 +116,7 @@ def symbolic_force(law: Law) -> Any:
 
 def _check_parameter_names(law: Law) -> None:
     definitions = [name for name, _ in law.contact.derivatives().definitions]
-    symbols = {str(symbol) for symbol in (*ARGUMENT_ORDER, *definitions)}
+    symbols = {str(symbol) for symbol in (*sym.ARGUMENT_ORDER, *definitions)}
     for name in law.parameters:
         if not name.isidentifier():
             raise LawError(
@@ -147,8 +129,9 @@ def _check_parameter_names(law: Law) -> None:
 
 def _check_symbols(law: Law, force: Any) -> None:
     own = [sp.Symbol(name, real=True) for name in law.parameters]
-    state = (DX, DY) if law.stateful else ()
-    allowed = {*POSITION, *law.contact.formula_symbols(), *own, K, H_MID, H_HALF, *state}
+    state = (sym.DX, sym.DY) if law.stateful else ()
+    allowed = {*sym.POSITION, sym.K, sym.H_MID, sym.H_HALF, *own, *state}
+    allowed |= {*law.contact.formula_symbols()}
     unknown = sorted(str(symbol) for symbol in force.free_symbols - allowed)
     if unknown:
         raise LawError(

@@ -72,12 +72,10 @@ def row_limit_text(row: LawRow) -> str:
 
 def has_sampled(comparison: Comparison) -> bool:
     """Return whether any number of the table is marked with ~."""
-    return any(
-        number_text.is_sampled(row.q)
-        or number_text.is_sampled(row.one_sided)
-        or row.leak.method == "sampled"
-        for row in comparison.rows
-    )
+    rows = comparison.rows
+    numbers = [number for row in rows for number in (row.q, row.one_sided)]
+    leaks = [row.leak.method == "sampled" for row in rows]
+    return any(map(number_text.is_sampled, numbers)) or any(leaks)
 
 
 def describe_texture(description: dict[str, Any]) -> str:
@@ -126,9 +124,8 @@ def texture_name(description: dict[str, Any]) -> str:
 
 def recommended_stiffness_text(row: LawRow) -> str:
     """Return the recommended stiffness: "3050 N/m", or "none"."""
-    return (
-        number_text.limit_text(row.recommended_stiffness) if row.recommended_stiffness else "none"
-    )
+    stiffness = row.recommended_stiffness
+    return number_text.limit_text(stiffness) if stiffness else "none"
 
 
 def _recommendation_cell(row: LawRow, _comparison: Comparison) -> Cell:
@@ -169,10 +166,9 @@ def _basis_cell(row: LawRow, _comparison: Comparison) -> Cell:
 
 
 def _oscillation_cell(row: LawRow, _comparison: Comparison) -> Cell:
-    has_force = row.perceptibility is not None or row.is_textureless
-    return Cell(
-        number_text.force_text(row.texture_force) if has_force else number_text.NOT_AVAILABLE
-    )
+    if row.perceptibility is None and not row.is_textureless:
+        return Cell(number_text.NOT_AVAILABLE)
+    return Cell(number_text.force_text(row.texture_force))
 
 
 def _bound_cell(bound: Bound) -> Cell:

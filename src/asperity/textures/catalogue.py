@@ -178,9 +178,10 @@ def parse_specification(source: str) -> tuple[str, dict[str, str]] | None:
         ParameterError: for a name that is neither a kind nor a file.
     """
     kind, colon, arguments = source.partition(":")
-    if not re.fullmatch(r"[A-Za-z][\w-]+", kind) or os.path.exists(source):
-        return None
     named = kind.lower()
+    is_path = os.path.exists(source) and not (named in KINDS and os.path.isdir(source))
+    if is_path or not re.fullmatch(r"[A-Za-z][\w-]+", kind):
+        return None
     if not colon and (named == _FILE.name or named not in KINDS):
         hint = suggest_names(kind, KINDS)
         words = f"is neither a file nor a named surface: {source!r}; {hint}"
@@ -243,7 +244,8 @@ def _require_all(kind: TextureKind, arguments: dict[str, Any]) -> dict[str, Any]
     required = [argument.name for argument in kind.required_arguments]
     for name in required:
         if name not in arguments:
-            raise ParameterError(name, f"is missing: a {kind.name} needs {', '.join(required)}")
+            needs = f"is missing: a {kind.name} needs {', '.join(required)}"
+            raise ParameterError(name, f"{needs}; asperity surfaces {kind.name} shows an example")
     return arguments
 
 

@@ -120,14 +120,14 @@ def test_loop_energy_above_its_proved_bound_is_detected(
     surface = Surface(*case)
     correct = worst_loop(surface)
     assert 0.9 * correct.upper_per_period < correct.energy <= correct.upper_per_period
-    intact, share = leaks.curl_integral_bounds, [0.8]
+    intact, share = leaks.curl_columns.curl_integral_bounds, [0.8]
 
     def scaled_down(*arguments: Any) -> Any:
         result = intact(*arguments)
         assert result is not None
         return [(share[0] * low, share[0] * high) for low, high in result]
 
-    monkeypatch.setattr(leaks, "curl_integral_bounds", scaled_down)
+    monkeypatch.setattr(leaks.curl_columns, "curl_integral_bounds", scaled_down)
     with pytest.raises(InternalError, match="gains"):
         worst_loop(surface)
     share[0] = correct.energy / correct.upper_per_period * (1.0 - 1e-12)  # that much is rounding

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+from asperity.analysis import surface_sentences
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.limits.limit_rules import Limit
 from asperity.analysis.limits.perceptibility import Perceptibility
@@ -21,11 +22,6 @@ from asperity.analysis.limits.perceptibility_sentences import (
 from asperity.analysis.limits.spectrum import Spectrum
 from asperity.analysis.passivity.assess_passivity import stability_limit_text
 from asperity.analysis.passivity.verdict import Margin, StabilityLimit
-from asperity.analysis.surface_sentences import (
-    default_depth_text,
-    law_parameter_sentences,
-    unverified_sentences,
-)
 from asperity.core.display import Plottable, Reportable
 from asperity.core.files import Serializable, attributes_to_dict
 from asperity.core.units import format_quantity, round_down
@@ -280,7 +276,7 @@ def limits_assumptions(
         sentences.append(f"{result.gain_symbol} = {result.gain.value:.4g} is sampled, not proved")
     used = [*dict.fromkeys(limit.device_field for limit in result.limits), "friction"]
     sentences += perceptibility_assumptions(result.perceptibility, result.device, result.grip)
-    sentences += unverified_sentences(result.device, used)
+    sentences += surface_sentences.unverified_sentences(result.device, used)
     sentences.append("The limits are necessary, not sufficient; they were not tested with people")
     return tuple(sentences)
 
@@ -301,5 +297,5 @@ def _default_sentences(result: Limits, defaults: Mapping[str, bool]) -> list[str
             f"Stiffness {stiffness_text(result)}{default}: {part}{stability_limit_text(limit)}"
         )
     if defaults["max_depth"]:
-        sentences.append(default_depth_text(result.surface))
-    return sentences + law_parameter_sentences(result.surface)
+        sentences.append(surface_sentences.default_depth_text(result.surface))
+    return sentences + surface_sentences.law_parameter_sentences(result.surface)

@@ -79,10 +79,10 @@ def draw_surface(figure: Figure | SubFigure, texture: Texture) -> None:
         segment = choose_segment(texture, 4.0 * length, 24.0 * length)
         draw_section(figure.subplots(), texture, segment)
         return
-    stacked = {"nrows": 2, "height_ratios": [3.0, 1.0]}
-    beside = {"ncols": 2, "width_ratios": [1.0, 1.15]}
-    layout: dict[str, Any] = stacked if _is_wide(texture) else beside
-    first, second = figure.subplots(**layout)
+    if _is_wide(texture):
+        first, second = figure.subplots(2, 1, height_ratios=[3.0, 1.0])
+    else:
+        first, second = figure.subplots(1, 2, width_ratios=[1.0, 1.15])
     _draw_map(figure, first, texture)
     line = texture.scan_line()
     draw_section(second, texture, ScanSegment(line, 0.0, line.length))

@@ -10,11 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from asperity.analysis.gain.characteristic import (
-    characteristic_number,
-    one_sided_number,
-    surface_content,
-)
+from asperity.analysis.gain import characteristic
 from asperity.core.cache import get_or_compute_each
 from asperity.core.checks import FloatArray, check_array, check_positive
 from asperity.core.digests import is_shipped
@@ -240,7 +236,7 @@ def _cache_key(surface: Surface, parts: Sequence[Any], numbers: Sequence[Any]) -
     if not all(is_shipped(type(part)) for part in parts):
         return None
     values = [None if number is None else np.asarray(number).tolist() for number in numbers]
-    return surface_content(surface, json_text([*parts, values]))
+    return characteristic.surface_content(surface, json_text([*parts, values]))
 
 
 def _check_arguments(
@@ -333,8 +329,8 @@ def expected_onset(
     """
     top = surface.law.contact.extremes(surface.texture)[1]
     damping = plant.min_damping(start, start, hand, top)
-    plus = one_sided_number(surface, TOLERANCE).value
-    q = characteristic_number(surface, TOLERANCE).value
+    plus = characteristic.one_sided_number(surface, TOLERANCE).value
+    q = characteristic.characteristic_number(surface, TOLERANCE).value
     # Below a medial axis q is unbounded; most trajectories never reach it.
     weight = 0.5 * plus + servo.delay * (q if math.isfinite(q) else plus)
     onset = damping / servo.period / weight if weight > 0.0 else math.inf
@@ -368,8 +364,8 @@ def predict(
         # Below the depth of a clamp the numbers are those of the clamped force.
         clamped = surface.effective_clamp.changes_force and depth > surface.max_depth
         pressed = surface if clamped else surface.to_depth(min(depth, limit))
-        q = characteristic_number(pressed, TOLERANCE).value
-        plus = one_sided_number(pressed, TOLERANCE).value
+        q = characteristic.characteristic_number(pressed, TOLERANCE).value
+        plus = characteristic.one_sided_number(pressed, TOLERANCE).value
     budget = damping / servo.period
     weight = 0.5 * plus + (servo.delay * q if servo.delay else 0.0)
     return Prediction(
