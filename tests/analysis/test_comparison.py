@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -315,3 +316,21 @@ def test_answer_says_how_much_calibrating_gains() -> None:
     assert ratio == pytest.approx(2.0, rel=1e-2)
     assert "calibrated" not in after.recommendation
     assert "calibrated" not in asp.compare(texture, parse_device(rig, "mine"), "G").recommendation
+
+
+def test_quantities_may_be_texts_and_rows_are_found_by_letter() -> None:
+    wave = {"amplitude": "0.2mm", "period": "2 mm"}
+    texture = asp.Sinusoid(**wave)  # type: ignore[arg-type]  # texts are accepted, not declared
+    assert texture.describe() == asp.Sinusoid(0.2e-3, 2e-3).describe()
+    texts: dict[str, Any] = {"stiffness": "0.5N/mm", "max_depth": "0.3mm", "speed": "5cm/s"}
+    result = asp.compare(texture, "touch", "CH", **texts)
+    numbers = asp.compare(texture, "touch", "CH", stiffness=500.0, max_depth=3e-4, speed=0.05)
+    assert result.to_dict() == numbers.to_dict()
+    assert result["C"] is result.rows[0]
+    assert float(result["C"].q) == result["C"].q.upper > 1.0
+    with pytest.raises(KeyError):
+        result["A"]
+    with pytest.raises(asp.ParameterError, match="stiffness needs a unit: write 500N/m"):
+        asp.Surface(texture, "C", "500")  # type: ignore[arg-type]  # as above
+    with pytest.raises(asp.ParameterError, match="unit is of another dimension"):
+        asp.Surface(texture, "C", "5mm")  # type: ignore[arg-type]  # as above

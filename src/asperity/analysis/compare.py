@@ -94,6 +94,8 @@ class Comparison(Plottable, Reportable):
         """
         return {row.law.letter: row for row in self.rows}[letter]
 
+    __getitem__ = row
+
     def __repr__(self) -> str:
         row = self.recommended_row
         outcome = "none recommended" if row is None else f"{row!r} recommended"

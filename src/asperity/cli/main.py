@@ -51,19 +51,16 @@ class HeadedCommand(click.Command):
             record = option.get_help_record(ctx) if isinstance(option, click.Option) else None
             if record is not None:
                 rows[_HEADING_OF.get(str(option.name), "Options")].append(record)
-        if not ctx.meta.get(_SHOWS_FILES):
-            del rows["Measured surface"]
         for title, records in rows.items():
-            if records:
+            if records and (title != "Measured surface" or ctx.meta.get(_SHOWS_FILES)):
                 with formatter.section(title):
                     formatter.write_dl(records)
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002 - click's signature
         """Write the example."""
         name = str(self.name)
-        if name in COMMANDS:
-            with formatter.section("Example"):
-                formatter.write_text(f"asperity {name} {COMMANDS[name][2]}")
+        with formatter.section("Example"):
+            formatter.write_text(f"asperity {name} {COMMANDS[name][2]}")
 
 
 declare_command = partial(click.command, cls=HeadedCommand)

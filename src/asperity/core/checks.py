@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from asperity.core import compiled
 from asperity.core.errors import ParameterError
+from asperity.core.units import parse_quantity
 
 FloatArray = compiled.FloatArray
 IntArray = compiled.IntArray
@@ -24,9 +25,17 @@ _FLOAT = np.dtype(np.float64)
 def check_real(name: str, value: object, unit: str = "") -> float:
     """Return a finite number of magnitude at most 1e30.
 
+    A quantity with a unit may be a text, as on the command line.
+
     Raises:
         ParameterError: for any other value.
+
+    Example:
+        >>> check_real("max_depth", "0.5mm", "m"), check_real("max_depth", 5e-4, "m")
+        (0.0005, 0.0005)
     """
+    if isinstance(value, str) and unit:
+        value = parse_quantity(name, value, unit)
     unit = f" [{unit}]" if unit else ""
     if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
         raise ParameterError(name, f"must be a number{unit}", value)

@@ -55,6 +55,10 @@ class Bound(Serializable, Displayable):
         """``upper`` where one is proved, else ``lower``."""
         return self.upper if math.isfinite(self.upper) else self.lower
 
+    def __float__(self) -> float:
+        """Return :attr:`value`."""
+        return self.value
+
     @property
     def gap(self) -> float:
         """Relative gap (upper - lower)/lower; zero where both are infinite."""
