@@ -219,7 +219,7 @@ def test_expected_onset_is_the_limit_of_the_delay_rule(
     monkeypatch.setattr(Cartesian, "min_damping", min_damping)
     for name, value in (("characteristic_number", q), ("one_sided_number", plus)):
         bound = Bound(value, value, "theorem")
-        monkeypatch.setattr(onset_module, name, lambda *_given, bound=bound: bound)
+        monkeypatch.setattr(onset_module.characteristic, name, lambda *_given, bound=bound: bound)
     servo, start, surface = Servo(PERIOD, delay=delay), (1.0, 2.0, 3.0), Surface(SHARP, "C")
     expected = onset_module.expected_onset(surface, PLANT, HAND, servo, start)
     assert expected == (rule if rule is None else pytest.approx(rule, rel=1e-12))
