@@ -33,6 +33,10 @@ def test_simulated_device_is_measured_and_written(call: Call, tmp_path: Path) ->
     measured = json.loads(json_path.read_text())
     assert len(measured["measured"]["axes"]) == 3
     assert measured["device"]["data"]["max_stiffness"]["value"] == device.max_stiffness
+    simulated = {name for name, datum in device.data.items() if datum.pedigree == "simulated"}
+    assert {"max_stiffness", "position_resolution", "delay_samples"} <= simulated
+    assert 'verified = "simulated"' in device_path.read_text()
+    assert "measured" not in {datum.pedigree for datum in device.data.values()}
     # The printed change is the one that a comparison finds, here for law H, which has q = 1.
     before, after = measured["unit_starts"]["H"]
     assert f"H {before:>15g} N/m {after:>7.3g} N/m {after / before:.2g} times".split() in [

@@ -22,7 +22,7 @@ FULL = {
 def test_all_fields_of_a_wall_test_are_parsed() -> None:
     test = parse_device({"max_stiffness": FULL}, "mine").wall_test
     assert test == WallTest(
-        1800.0, "N/m", "tried", True, (), True, ("x", "z"), 2000.0, 1000.0, "stepped", 0.7
+        1800.0, "N/m", "tried", True, (), "measured", ("x", "z"), 2000.0, 1000.0, "stepped", 0.7
     )
     assert test.to_dict() == {
         "value": 1800.0,
@@ -73,8 +73,8 @@ def test_only_the_papers_wall_was_measured() -> None:
         ({"directions": "z"}, "list of 'x', 'y' and 'z'"),
         ({"directions": ["up"]}, "list of 'x', 'y' and 'z'"),
         ({"directions": [["x"]]}, "list of 'x', 'y' and 'z'"),
-        ({"verified": "seen"}, "'read' or 'measured'"),
-        ({"verified": ["read"]}, "'read' or 'measured'"),
+        ({"verified": "seen"}, "'measured' or 'simulated'"),
+        ({"verified": ["read"]}, "'measured' or 'simulated'"),
         ({"heard": 3}, "unknown key 'heard'"),
         ({"also": [{"value": 3, "cycled": 4}]}, "unknown key 'cycled'"),
     ],

@@ -157,8 +157,8 @@ def _next_commands(surface: str, result: Comparison) -> str:
     typed = repeat_options({"plugin", "settings", "max_depth", *row.law.arguments}, unused)
     words = [surface, "--law", row.law.letter, "--device", result.device.id, "--stiffness", k]
     rest = shlex.join([*words, *typed])
-    commands = (f"lab {rest}", f"run {rest}", f"export {rest} -o texture.h")
-    return "\n".join(["", "Next:", *(f"  asperity {command}" for command in commands)])
+    lab, run, export = (f"  asperity {name} {rest}" for name in ("lab", "run", "export"))
+    return f"\nNext:\n{lab}\n{run}\n{export} -o texture.h"
 
 
 def _write_comparisons(

@@ -33,7 +33,6 @@ _HEADINGS = {
     "Output": {"output", "json_path", "html_path", "trace_path", "record", "force", "no_cache"},
 }
 _HEADING_OF = {name: title for title, names in _HEADINGS.items() for name in names}
-_ARGUMENTS, _SHOWS_FILES = "asperity.arguments", "asperity.shows_files"
 
 
 class HeadedCommand(click.Command):
@@ -41,7 +40,7 @@ class HeadedCommand(click.Command):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Parse the arguments, and keep them for :func:`repeat_options`."""
-        ctx.meta[_ARGUMENTS] = list(args)
+        ctx.meta["arguments"] = list(args)
         return super().parse_args(ctx, args)
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -52,7 +51,7 @@ class HeadedCommand(click.Command):
             if record is not None:
                 rows[_HEADING_OF.get(str(option.name), "Options")].append(record)
         for title, records in rows.items():
-            if records and (title != "Measured surface" or ctx.meta.get(_SHOWS_FILES)):
+            if records and (title != "Measured surface" or ctx.meta.get("shows_files")):
                 with formatter.section(title):
                     formatter.write_dl(records)
 
@@ -69,7 +68,7 @@ declare_command = partial(click.command, cls=HeadedCommand)
 
 def _show_file_options(ctx: click.Context, _option: click.Parameter, requested: bool) -> None:
     if requested:
-        ctx.meta[_SHOWS_FILES] = True
+        ctx.meta["shows_files"] = True
         click.echo(ctx.get_help())
         ctx.exit()
 
@@ -89,7 +88,7 @@ def repeat_options(names: Collection[str], unused: Collection[str]) -> list[str]
         unused: names of values of ``--set`` to leave out.
     """
     ctx = click.get_current_context()
-    typed: Sequence[str] = ctx.meta[_ARGUMENTS]
+    typed: Sequence[str] = ctx.meta["arguments"]
     values, _rest, _order = ctx.command.make_parser(ctx).parse_args(list(typed))
     parts = []
     for option in ctx.command.params:

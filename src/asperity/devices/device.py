@@ -27,6 +27,9 @@ TEXT_FIELDS = ("id", "name", "axes", "driver", "notes")
 """Fields of a device file that are text."""
 
 
+Origin = Literal["measured", "simulated", "read"]
+
+
 @dataclass(frozen=True)
 class Datum(Serializable):
     """One number of a device.
@@ -37,8 +40,8 @@ class Datum(Serializable):
         source: source of the number.
         verified: whether the source is accessible, or the number follows from accessible ones.
         also: values of the same number in other sources or for other conditions.
-        is_measured: whether the number was measured on such a device, according to the source; a
-            constant in a driver or a line of a data sheet is read, not measured.
+        origin: ``"measured"`` on such a device, according to the source; ``"simulated"``, found
+            on a simulated one; ``"read"``, a constant in a driver or a line of a data sheet.
     """
 
     value: float
@@ -46,12 +49,13 @@ class Datum(Serializable):
     source: str
     verified: bool
     also: tuple[Datum, ...] = ()
-    is_measured: bool = False
+    origin: Origin = "read"
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain data, SI units; ``verified`` is "measured" for a measured number."""
+        """Return plain data, SI units; ``verified`` is the origin of a number that is not read."""
         data = attributes_to_dict(self, "value", "unit", "source", "verified", "also")
-        return data | ({"verified": "measured"} if self.pedigree == "measured" else {})
+        is_special = self.verified and self.origin != "read"
+        return data | ({"verified": self.origin} if is_special else {})
 
     @property
     def text(self) -> str:
@@ -68,14 +72,11 @@ class Datum(Serializable):
         return format_quantity(self.value, self.unit).replace("*", "·")
 
     @property
-    def pedigree(self) -> Pedigree:
-        """Origin of the number: ``"measured"``, ``"read"`` or ``"not verified"``."""
-        if not self.verified:
-            return "not verified"
-        return "measured" if self.is_measured else "read"
+    def pedigree(self) -> str:
+        """Origin of the number, or ``"not verified"``."""
+        return self.origin if self.verified else "not verified"
 
 
-Pedigree = Literal["measured", "read", "not verified"]
 Axis = Literal["x", "y", "z"]
 Positions = Literal["exact", "stepped"]
 

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from asperity.core.arguments import Argument
 from asperity.core.errors import ParameterError, suggest_names
@@ -24,6 +24,7 @@ from asperity.devices.device import (
     WALL_KEYS,
     Datum,
     Device,
+    Origin,
     WallTest,
 )
 
@@ -53,9 +54,9 @@ def load_device(device: str | os.PathLike[str] | Device) -> Device:
 
     A file has ``id``, ``name`` and any of the fields of the catalogue, each with its unit
     ("12 N"), or as a table with ``value``, ``unit``, ``source``, ``verified`` (``true``,
-    ``"read"``, ``"measured"`` or ``false``) and ``also``. ``max_stiffness`` is a wall test, which
-    may have ``directions``, ``cycled``, ``update_rate``, ``positions`` and ``lightest``; see
-    :class:`~asperity.devices.device.WallTest`.
+    ``"read"``, ``"measured"``, ``"simulated"`` or ``false``) and ``also``. ``max_stiffness`` is a
+    wall test, which may have ``directions``, ``cycled``, ``update_rate``, ``positions`` and
+    ``lightest``; see :class:`~asperity.devices.device.WallTest`.
 
     Raises:
         ParameterError: the id is unknown, or the file has unknown or wrong fields.
@@ -167,26 +168,26 @@ def _parse_datum(field: str, value: Any, from_file: bool, is_nested: bool = Fals
     if "unit" in table:
         quantity = _append_unit(name, quantity, table["unit"], argument.unit)
     value = argument.validate(_parse_quantity(name, quantity, argument.unit, from_file))
-    verified, measured = _parse_verified(name, table.get("verified", False))
+    verified, origin = _parse_verified(name, table.get("verified", False))
     source = _check_text(f"{name}.source", table.get("source", USER_SOURCE))
     others = table.get("also", [])
     if not isinstance(others, list) or not all(isinstance(other, dict) for other in others):
         raise ParameterError(f"{name}.also", "must be a list of tables with value and unit", others)
     also = tuple(_parse_datum(field, other, from_file, is_nested=True) for other in others)
-    datum = (float(value), argument.unit or "1", source, verified, also, measured)
+    datum = (float(value), argument.unit or "1", source, verified, also, origin)
     if is_wall:
         return WallTest(*datum, **_parse_wall_test(name, value, table, from_file))
     return Datum(*datum)
 
 
-def _parse_verified(name: str, value: Any) -> tuple[bool, bool]:
-    """Return whether a number was verified, and whether it was measured."""
-    if value in ("read", "measured"):
-        return True, value == "measured"
+def _parse_verified(name: str, value: Any) -> tuple[bool, Origin]:
+    """Return whether a number was verified, and its origin."""
+    if value in get_args(Origin):
+        return True, value
     if not isinstance(value, bool):
-        words = "verified must be true or false, 'read' or 'measured'"
+        words = "verified must be true or false, 'read', 'measured' or 'simulated'"
         raise ParameterError(name, words, value)
-    return value, False
+    return value, "read"
 
 
 def _parse_wall_test(name: str, stiffness: float, table: Table, from_file: bool) -> dict[str, Any]:

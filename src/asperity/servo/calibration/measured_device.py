@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 
 from asperity.core.units import format_quantity
-from asperity.devices.device import FIELD_UNITS, Datum, Device, WallTest
+from asperity.devices.device import FIELD_UNITS, Datum, Device, Origin, WallTest
 from asperity.servo.calibration.calibrator import AxisCalibration, Calibration
 from asperity.servo.calibration.identification import Estimate
 
@@ -38,12 +38,13 @@ def measured_device(
     """
     source = f"measured by asperity calibrate, {date}"
     source += f", on a simulated {base.id}" if simulated else ""
+    origin: Origin = "simulated" if simulated else "measured"
     data = {field: datum for field, datum in base.data.items() if field not in _MEASURED_FIELDS}
 
     def add(field: str, value: float, words: str) -> None:
-        data[field] = _datum(value, FIELD_UNITS[field], f"{source}: {words}")
+        data[field] = _datum(value, FIELD_UNITS[field], f"{source}: {words}", origin)
 
-    wall = _wall_test(calibration, source)
+    wall = _wall_test(calibration, source, origin)
     if wall is not None:
         data["max_stiffness"] = wall
     resolution, rate = effective_resolution(calibration), calibration.update_rate
@@ -75,7 +76,7 @@ _MEASURED_FIELDS = (
 )  # fmt: skip
 
 
-def _wall_test(calibration: Calibration, source: str) -> WallTest | None:
+def _wall_test(calibration: Calibration, source: str, origin: Origin) -> WallTest | None:
     """Return the test of the smooth wall on the weakest axis, with the others beside it."""
     if any(not axis.wall.stable_stiffness for axis in calibration.axes):
         return None
@@ -83,23 +84,23 @@ def _wall_test(calibration: Calibration, source: str) -> WallTest | None:
              for axis in calibration.axes}  # fmt: skip
     weakest = calibration.weakest_axis
     others = tuple(
-        _datum(axis.wall.stable_stiffness, "N/m", words[axis.name])
+        _datum(axis.wall.stable_stiffness, "N/m", words[axis.name], origin)
         for axis in calibration.axes
         if axis is not weakest
     )
     cycled = weakest.wall.cycling_stiffness
     return WallTest(
         _round_to_four_digits(weakest.wall.stable_stiffness), "N/m", words[weakest.name], True,
-        others, True, directions=tuple(axis.name for axis in calibration.axes), lightest=1.0,
+        others, origin, directions=tuple(axis.name for axis in calibration.axes), lightest=1.0,
         cycled=None if cycled is None else _round_to_four_digits(cycled),
         update_rate=_round_to_four_digits(calibration.update_rate.value),
         positions="stepped" if calibration.position_step else "exact",
     )  # fmt: skip
 
 
-def _datum(value: float, unit: str, source: str) -> Datum:
-    """Return a measured number."""
-    return Datum(_round_to_four_digits(value), unit, source, True, is_measured=True)
+def _datum(value: float, unit: str, source: str, origin: Origin) -> Datum:
+    """Return a number with four digits."""
+    return Datum(_round_to_four_digits(value), unit, source, True, origin=origin)
 
 
 def _round_to_four_digits(value: float) -> float:
