@@ -190,8 +190,8 @@ def test_flat_texture_does_not_modulate_the_friction(plain: Check):
 INVALID_ARGUMENTS: list[tuple[str, Any]] = [
     *[("texture", value) for value in (None, 3.0, np.zeros((4, 4)))],
     *[("law", value) for value in ("X", "", None, 1)],
-    *[("stiffness", value) for value in (0.0, -1.0, math.nan, math.inf, "500 N/m", None, True)],
-    *[("max_depth", value) for value in (0.0, -1e-3, math.nan, "1 mm")],
+    *[("stiffness", value) for value in (0.0, -1.0, math.nan, math.inf, "500 N", None, True)],
+    *[("max_depth", value) for value in (0.0, -1e-3, math.nan, "1 kg")],
     *[("friction", value) for value in (-0.1, math.nan, math.inf, "high")],
     *[("max_deflection", value) for value in (0.0, -1e-3, math.nan)],
     *[("modulation_depth", value) for value in (-0.01, 1.01, math.nan, "0.5")],

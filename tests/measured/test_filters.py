@@ -118,7 +118,7 @@ def test_steps_state_both_filters() -> None:
         (-1e-5, "must be positive"),
         (np.nan, "must be finite"),
         (np.inf, "must be finite"),
-        ("1e-4", "must be a number"),
+        ("1e-4", "needs a unit: write 1e-4mm"),
     ],
 )
 def test_invalid_l_cutoffs_are_refused(l_cutoff: Any, match: str) -> None:

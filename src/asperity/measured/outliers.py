@@ -51,7 +51,7 @@ def remove_outliers(heights: FloatArray, threshold: float) -> str:
         >>> remove_outliers(wave, 6.0)[:47], np.flatnonzero(np.isnan(wave))
         ('outliers: 1 point beyond 6 robust standard devi', array([17]))
     """
-    threshold = check_positive("outliers", threshold, "robust standard deviations")
+    threshold = check_positive("outliers", threshold)
     padded = _pad_by_reflection(heights, _half_window(heights.shape))
     residual = _local_median(padded, heights.shape)
     np.subtract(heights, residual, out=residual)

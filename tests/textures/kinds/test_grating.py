@@ -163,7 +163,7 @@ def test_grating_is_a_periodic_profile_with_a_description():
     [
         ("height", {"height": 0.0}),
         ("height", {"height": -1e-4}),
-        ("height", {"height": "1 mm"}),
+        ("height", {"height": "1 kg"}),
         ("period", {"period": 0.0}),
         ("period", {"period": math.inf}),
         ("duty", {"duty": 0.0}),

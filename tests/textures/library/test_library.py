@@ -347,7 +347,7 @@ def test_unknown_parameter_suggests_the_nearest():
         ("sandpaper", "seed", 0.5),
         ("cloth", "spacing", 0.0),
         ("cloth", "spacing", math.nan),
-        ("cloth", "spacing", "1 mm"),
+        ("cloth", "spacing", "1 kg"),
         ("cloth", "cover", 1.2),
         ("cloth", "irregularity", 0.5),
         ("knurl", "groove_angle", 1.5),

@@ -225,7 +225,7 @@ def test_flat_map_has_constant_height():
         ("pitch", np.zeros((4, 4)), {"pitch": math.nan}),
         ("pitch", np.zeros((4, 4)), {"pitch": (1e-3, 0.0)}),
         ("pitch", np.zeros((4, 4)), {"pitch": (1e-3, 1e-3, 1e-3)}),
-        ("pitch", np.zeros((4, 4)), {"pitch": "1 mm"}),
+        ("pitch", np.zeros((4, 4)), {"pitch": "1 kg"}),
         ("origin", np.zeros((4, 4)), {"origin": (0.0, 0.0, 0.0)}),
         ("origin", np.zeros((4, 4)), {"origin": (0.0, math.inf)}),
     ],

@@ -91,8 +91,8 @@ def test_invalid_points_and_pitches_are_refused(tmp_path: Path) -> None:
     for pitch in (1e-12, 1e-29):
         with pytest.raises(ParameterError, match=too_fine):
             read_text(SurfaceFile.open(path), ReadingOptions(resample=pitch))
-    for wrong in (0.0, -1e-5, np.nan, "5um"):
-        with pytest.raises(ParameterError, match=r"resample must be (positive|finite|a number)"):
+    for wrong in (0.0, -1e-5, np.nan, "5 kg"):
+        with pytest.raises(ParameterError, match=r"resample must be (positive|finite|a quantity)"):
             read_surface(path, resample=wrong)  # wrong type on purpose
     other = tmp_path / "a.txt"
     other.write_text("1 2 3 4\n5 6 7 8\n")
