@@ -379,7 +379,9 @@ def test_compare_without_arguments_asks_on_a_terminal(monkeypatch: pytest.Monkey
     assert code == 2
     terminal = SimpleNamespace(stdin=SimpleNamespace(isatty=lambda: True))
     monkeypatch.setattr("asperity.cli.analysis_commands.sys", terminal)
-    done = CliRunner().invoke(cli, ["compare"], input="sinusoid:amplitude=0.1mm,period=2mm\ntouch\n0.2mm\n")
+    done = CliRunner().invoke(
+        cli, ["compare"], input="sinusoid:amplitude=0.1mm,period=2mm\ntouch\n0.2mm\n"
+    )
     assert "Surface" in done.output
     assert "on the 3D Systems Touch" in " ".join(done.output.split())
     assert "--max-depth 0.2mm" in done.output
