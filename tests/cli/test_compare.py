@@ -353,17 +353,20 @@ def test_next_commands_run_the_recommended_law(call: Call, tmp_path: Path) -> No
     """With the options of the file, device, plugin and law that it takes, ready to paste."""
     path = tmp_path / "two words.npy"
     np.save(path, 2e-4 * np.sin(np.linspace(0.0, 12.0 * np.pi, 400)))
+    device = tmp_path / "mine.toml"
+    device.write_text('id = "other"\nname = "Mine"\nmax_stiffness = "900N/m"\n')
     options = ["--pitch", "20um", "--periodic", "--set", "apparent_mass=60g"]
     options += ["--set", "modulation_depth=0.5"]
-    code, out, err = call("compare", str(path), "--laws", "WFC", "--device", "touch", *options)
+    code, out, err = call("compare", str(path), "--laws", "WFC", "--device", str(device), *options)
     assert (code, err) == (0, "")
     commands = _next_commands(out)
     assert [one[0] for one in commands] == ["lab", "run", "export"]
     for name, source, *rest in commands:
         assert source == str(path)
         assert "modulation_depth=0.5" not in rest  # of law F, C was recommended
-        assert rest[:4] == ["--law", "C", "--device", "touch"]
-        for words in (["--pitch", "20um"], ["--set", "apparent_mass=60g"], ["--periodic"]):
+        assert rest[:3] == ["--law", "C", "--stiffness"]
+        kept = (["--pitch", "20um"], ["--set", "apparent_mass=60g"], ["--periodic"])
+        for words in (*kept, ["--device", str(device)]):
             assert " ".join(words) in " ".join(rest)
         command = cli.get_command(click.Context(cli), name)
         assert command is not None

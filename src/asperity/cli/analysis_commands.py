@@ -152,11 +152,13 @@ def _next_commands(surface: str, result: Comparison) -> str:
     row = result.recommended_row
     if row is None:
         return ""
-    k = f"{number_text.limit_text(row.surface.stiffness)}".replace(" ", "")
+    k = number_text.limit_text(row.surface.stiffness).replace(" ", "")
     unused = set(registered_arguments()) - set(row.law.arguments)
-    typed = repeat_options({"plugin", "settings", "max_depth", *row.law.arguments}, unused)
-    words = [surface, "--law", row.law.letter, "--device", result.device.id, "--stiffness", k]
-    rest = shlex.join([*words, *typed])
+    names = {"device", "plugin", "settings", "max_depth", *row.law.arguments}
+    typed = repeat_options(names, unused)
+    has_device = "--device" in typed or surface.endswith(".toml")
+    device = [] if has_device else ["--device", result.device.id]
+    rest = shlex.join([surface, "--law", row.law.letter, "--stiffness", k, *device, *typed])
     lab, run, export = (f"  asperity {name} {rest}" for name in ("lab", "run", "export"))
     return f"\nNext:\n{lab}\n{run}\n{export} -o texture.h"
 

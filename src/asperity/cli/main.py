@@ -25,9 +25,8 @@ GROUPS = read_toml("commands", Path(__file__).with_name("commands.toml"))
 COMMANDS = {name: entry for group in GROUPS.values() for name, entry in group.items()}
 
 _FILE_OPTIONS = {argument.name for argument in FILE_ARGUMENTS}
-_LAW = {"law", "laws", "clamp", "stiffness", "max_depth", "rendering"}
 _HEADINGS = {
-    "Law": _LAW | set(SHIPPED_LAW_ARGUMENTS),
+    "Law": {"law", "laws", "clamp", "stiffness", "max_depth", "rendering", *SHIPPED_LAW_ARGUMENTS},
     "Device and hand": {"device", "driver", "speed", "grip", "settings"},
     "Measured surface": _FILE_OPTIONS,
     "Output": {"output", "json_path", "html_path", "trace_path", "record", "force", "no_cache"},
@@ -57,9 +56,8 @@ class HeadedCommand(click.Command):
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002 - click's signature
         """Write the example."""
-        name = str(self.name)
         with formatter.section("Example"):
-            formatter.write_text(f"asperity {name} {COMMANDS[name][2]}")
+            formatter.write_text(f"asperity {self.name} {COMMANDS[str(self.name)][2]}")
 
 
 declare_command = partial(click.command, cls=HeadedCommand)
