@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 import pytest
 
@@ -43,7 +44,7 @@ EXPECTED: dict[str, dict[str, list[tuple[float, bool]]]] = {
     },
     "touch": {
         "max_force": [(3.3, True)],
-        "max_stiffness": [(400, True)],
+        "max_stiffness": [(400, True), (700, True)],
         "position_resolution": [(55e-6, False)],
         "friction": [(0.26, False)],
         "apparent_mass": [(0.045, False)],
@@ -51,9 +52,12 @@ EXPECTED: dict[str, dict[str, list[tuple[float, bool]]]] = {
     },
     "omni": {
         "max_force": [(3.3, True)],
-        "max_stiffness": [(700, True)],
+        "max_stiffness": [(400, True), (700, True)],
         "position_resolution": [(55e-6, False)],
         "update_rate": [(1000, False)],
+        "friction": [(0.26, False)],
+        "apparent_mass": [(0.045, False)],
+        "continuous_force": [(0.88, False)],
     },
     "touch-x": {
         "max_force": [(7.9, True)],
@@ -153,6 +157,25 @@ def test_verified_number_precedes_remembered_ones() -> None:
         if not datum.verified:
             continue
         assert device.data[field].verified, f"{device.id}.{field}"
+
+
+def test_entries_of_one_device_under_two_names_agree() -> None:
+    touch, omni = load_device("touch").data, load_device("omni").data
+    # The rate is a property of the connection, which differs: FireWire, later Ethernet and USB.
+    assert set(touch) == set(omni) - {"update_rate"}
+    for field, datum in touch.items():
+        values = [(entry.value, entry.verified) for entry in (datum, *datum.also)]
+        other = omni[field]
+        assert [(entry.value, entry.verified) for entry in (other, *other.also)] == values, field
+
+
+def test_every_stiffest_wall_states_what_it_is_and_of_which_year() -> None:
+    walls = [datum for _device, field, datum in entries() if field == "max_stiffness"]
+    assert len(walls) == 16
+    for datum in walls:
+        kinds = ("a constant of the library", "data sheet", "product page", "a test: ")
+        assert any(kind in datum.source for kind in kinds), datum.source
+        assert re.search(r"\((19|20)\d\d\)|of an unknown year", datum.source), datum.source
 
 
 def test_derived_resolutions_follow_from_their_sources() -> None:
