@@ -6,6 +6,7 @@ import ctypes
 import re
 import shutil
 import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,11 @@ from asperity.devices import load_device
 
 PAGE = Path(__file__).parents[2] / "docs" / "howto" / "own-loop.md"
 _RUN = re.compile(r"^```\{run\}\n(.*?)^```$", re.M | re.S)
+_C = re.compile(r"^```c\n(.*?)^```$", re.M | re.S)
+_CPP = re.compile(r"^```cpp\n(.*?)^```$", re.M | re.S)
+_EXPORT = re.compile(r"^\$ asperity (export sinusoid.*)$", re.M)
+EFFECT = PAGE.parents[2] / "examples" / "export" / "chai3d_effect.hpp"
+STAND_IN = PAGE.parents[2] / "tests" / "export" / "cpp" / "chai3d.h"
 # Where the outward normal of a wall points, in the words of each frame's source.
 NORMALS = {
     ("CHAI3D, libdhd", "lying"): (0, 0, 1),
@@ -141,7 +147,7 @@ def law_c(tmp_path_factory: pytest.TempPathFactory) -> Any:
     if compiler is None:
         pytest.skip("not run: no C compiler here")
     folder = tmp_path_factory.mktemp("c")
-    (source,) = re.findall(r"^```c\n(.*?)^```$", PAGE.read_text("utf-8"), re.M | re.S)
+    _tick, source = _C.findall(PAGE.read_text("utf-8"))
     (folder / "law_c.c").write_text(source, encoding="utf-8")
     command = [compiler, "-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-O2", "-shared"]
     subprocess.run([*command, "-fPIC", "-o", "law_c.so", "law_c.c", "-lm"], cwd=folder, check=True)
@@ -170,3 +176,55 @@ def test_c_function_gives_the_force_of_law_c(law_c: Any) -> None:
     perturbed = _forces(law_c, points, stiffness, 1.0001 * amplitude, period)
     assert np.abs(perturbed - expected).max() > 100 * atol
     assert not _forces(law_c, np.full((1, 3), np.nan), stiffness, amplitude, period).any()
+
+
+@pytest.fixture(scope="module")
+def header(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder with the header that the first command of the page writes."""
+    folder = tmp_path_factory.mktemp("header")
+    (command,) = _EXPORT.findall(PAGE.read_text("utf-8"))
+    program = [sys.executable, "-m", "asperity", *command.split()]
+    subprocess.run(program, cwd=folder, check=True, capture_output=True)
+    return folder
+
+
+def test_first_block_renders_the_exported_force(header: Path) -> None:
+    compiler = shutil.which("cc")
+    if compiler is None:
+        pytest.skip("not run: no C compiler here")
+    assert PAGE.read_text("utf-8").index('#include "texture.h"') < 700  # the page begins with it
+    (header / "tick.c").write_text(_C.findall(PAGE.read_text("utf-8"))[0], encoding="utf-8")
+    command = [compiler, "-std=c99", "-Wall", "-Wextra", "-Werror", "-O2", "-shared", "-fPIC"]
+    subprocess.run([*command, "-o", "tick.so", "tick.c", "-lm"], cwd=header, check=True)
+    tick = ctypes.CDLL(str(header / "tick.so")).haptic_tick
+    surface = asp.Surface(asp.Sinusoid(0.2e-3, 1e-3), "C", 800.0, clamp="backed")
+    points = np.random.default_rng(4).uniform(-0.4e-3, 0.4e-3, (200, 3))
+    expected = surface.force(points)
+    assert 50 < np.count_nonzero(expected[:, 2]) < 150
+    atol = 1e-9 * 800.0 * 1e-3
+    np.testing.assert_allclose(_forces(tick, points), expected, rtol=0, atol=atol)
+
+
+def test_chai3d_object_lies_before_the_user(page: dict[str, Any]) -> None:
+    """The quarter turn of the page makes the object's axes those of the lying wall."""
+    (block,) = _CPP.findall(PAGE.read_text("utf-8"))
+    numbers = re.search(r"rotateAboutGlobalAxisDeg\(([^)]*)\)", block)
+    assert numbers is not None
+    *axis, angle = map(float, numbers[1].split(","))
+    assert axis == [0.0, 0.0, 1.0]
+    cos, sin = np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))
+    turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    expected = page["rotation"]("CHAI3D, libdhd", "lying, like a table")
+    np.testing.assert_allclose(turn, expected, atol=1e-15)
+
+
+def test_chai3d_block_compiles(header: Path) -> None:
+    compiler = shutil.which("c++")
+    if compiler is None:
+        pytest.skip("not run: no C++ compiler here")
+    for file in (EFFECT, STAND_IN):
+        shutil.copy(file, header)
+    (block,) = _CPP.findall(PAGE.read_text("utf-8"))
+    (header / "page.cpp").write_text(block, encoding="utf-8")
+    command = [compiler, "-std=c++11", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", "page.cpp"]
+    subprocess.run(command, cwd=header, check=True)

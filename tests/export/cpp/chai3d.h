@@ -23,7 +23,24 @@ private:
     double m_x, m_y, m_z;
 };
 
-class cGenericObject {};
+class cGenericEffect;
+
+class cGenericObject
+{
+public:
+    void addChild(cGenericObject*) {}
+    void addEffect(cGenericEffect*) {}
+    void setLocalPos(const double, const double, const double = 0.0) {}
+    void rotateAboutGlobalAxisDeg(const double, const double, const double, const double) {}
+};
+
+class cWorld : public cGenericObject {};
+
+class cGenericTool : public cGenericObject
+{
+public:
+    double getWorkspaceScaleFactor() { return 1.0; }
+};
 
 class cGenericEffect
 {
