@@ -57,6 +57,26 @@ def test_every_public_name_is_documented() -> None:
     assert documented - set(asperity.__all__) == set()
 
 
+def test_no_reference_page_documents_more_than_a_few_names() -> None:
+    counts = {
+        page.stem: len(re.findall(r"^\.\. auto\w+::", page.read_text("utf-8"), re.M))
+        for page in PAGES
+        if page.parent.name == "api" and page.stem in {"surfaces", "analysis", "recordings"}
+    }
+    assert len(counts) == 3
+    assert max(counts.values()) <= 14
+    assert "public" not in {page.stem for page in PAGES}
+
+
+def test_glossary_is_sorted_and_defines_terms_of_the_tables() -> None:
+    text = (DOCS / "glossary.md").read_text("utf-8")
+    terms = re.findall(r"^(\S.*)\n  \S", text, re.M)
+    assert len(terms) > 35
+    assert terms == sorted(terms, key=str.casefold)
+    columns = ("leak", "click", "felt, borderline, not felt", "recommended stiffness", "v\\*")
+    assert set(columns) <= set(terms)
+
+
 def test_every_device_has_a_page() -> None:
     text = "\n".join(path.read_text("utf-8") for path in (DOCS / "devices").glob("*.md"))
     assert sorted(re.findall(r"^```{device} (\S+)$", text, re.M)) == device_names()

@@ -95,6 +95,11 @@ def test_python_examples_of_readme_run() -> None:
         exec(block, {})
 
 
+def test_plugin_that_readme_names_is_in_the_repository() -> None:
+    (file, law) = re.findall(r"--plugin (\S+) --laws C(\w)`", README)[0]
+    assert f'letter="{law}"' in (ROOT / file).read_text("utf-8")
+
+
 def _parse(command: str) -> None:
     """Parse a command as click does, without its values: files that a page names may not exist."""
     words = shlex.split(command.partition(" > ")[0], comments=True)
