@@ -12,6 +12,8 @@ from asperity.analysis import worst_loop as worst_loop
 from asperity.analysis.analyze import Analysis as Analysis
 from asperity.analysis.analyze import analyze as analyze
 from asperity.analysis.check_limits import limits as limits
+from asperity.analysis.device_comparisons import DeviceComparisons as DeviceComparisons
+from asperity.analysis.device_comparisons import compare_devices as compare_devices
 from asperity.analysis.limits.limit_result import Limits as Limits
 from asperity.analysis.passivity.assess_passivity import passivity as passivity
 from asperity.analysis.split.split_state import SplitState as SplitState
@@ -31,6 +33,10 @@ from asperity.recording.replay import replay as replay
 from asperity.recording.writer import RecordingWriter as RecordingWriter
 from asperity.rendering import bake as bake
 from asperity.rendering import bake_mesh as bake_mesh
+from asperity.scene import load_scene as load_scene
+from asperity.scene.loops import onset as onset
+from asperity.scene.loops import scan as scan
+from asperity.scene.loops import simulate as simulate
 from asperity.surface import Surface as Surface
 from asperity.textures import Fourier as Fourier
 from asperity.textures import Grating as Grating

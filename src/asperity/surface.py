@@ -45,6 +45,13 @@ def _law_parameter(name: str, text: str) -> property:
     return property(value, doc=text)
 
 
+SURFACE_KEYWORDS = frozenset({
+    "law", "stiffness", "max_depth", "friction", "max_deflection", "modulation_depth", "clamp",
+    "continuity", "law_parameters",
+})  # fmt: skip
+"""Keywords of :class:`Surface` that an analysis passes on."""
+
+
 class Surface(Plottable):
     """A textured surface as a force field: the body is z < h(x, y), z points out of it.
 

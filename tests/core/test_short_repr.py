@@ -42,6 +42,7 @@ EXAMPLES: dict[str, Callable[[], Any]] = {
     "Bound": lambda: asp.characteristic_number(surface("F")),
     "Comparison": lambda: asp.compare(MANY, "touch", "WC", max_depth=1e-5),
     "Device": lambda: asp.load_device("touch"),
+    "DeviceComparisons": lambda: compare_devices(MANY, ["touch"], laws="WC", max_depths=[1e-5]),
     "Fourier": lambda: MANY,
     "Grating": lambda: asp.Grating(1e-4, 1e-3),
     "HeightMap": lambda: asp.HeightMap(HEIGHTS, 5e-5),

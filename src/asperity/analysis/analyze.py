@@ -35,13 +35,14 @@ from asperity.analysis.surface_sentences import (
     unverified_sentences,
 )
 from asperity.core.arguments import DEFAULT_STIFFNESS, FIELD
+from asperity.core.checks import check_keywords
 from asperity.core.display import Plottable, Reportable
 from asperity.core.errors import ParameterError
 from asperity.core.files import attributes_to_dict, to_plain_data
 from asperity.core.units import format_quantity
 from asperity.devices import Device, load_device
 from asperity.rendering import Rendering, assess_rendering, rendered_surface
-from asperity.surface import Surface, default_max_depth
+from asperity.surface import SURFACE_KEYWORDS, Surface, default_max_depth
 from asperity.textures.catalogue import TextureLike, as_texture
 from asperity.textures.texture import Texture
 
@@ -289,6 +290,7 @@ def _resolve_surface(
             words = "belongs to the surface: give a texture, or change it by to_law, to_stiffness"
             raise ParameterError(name, words)
         return surface
+    check_keywords(given, SURFACE_KEYWORDS, analyze)
     texture = as_texture(surface, name="surface")
     if "law" not in given:
         given["law"] = recommended_law(texture, device, rendering=rendering, **given)

@@ -21,13 +21,13 @@ from asperity.analysis.limits.perceptibility import Perceptibility, assess_perce
 from asperity.analysis.limits.spectrum import MIN_SHARE, Spectrum, compute_spectrum, wave_forces
 from asperity.analysis.passivity import verdict
 from asperity.core.arguments import DEFAULT_STIFFNESS, FIELD
-from asperity.core.checks import FloatArray, check_positive, check_real
+from asperity.core.checks import FloatArray, check_keywords, check_positive, check_real
 from asperity.core.errors import ParameterError
 from asperity.devices import Device, load_device
 from asperity.laws import Law
 from asperity.perception.grip import DEFAULT_GRIP, Grip, load_grip
 from asperity.rendering import rendered_surface
-from asperity.surface import Surface
+from asperity.surface import SURFACE_KEYWORDS, Surface
 from asperity.textures.catalogue import TextureLike, as_texture
 
 
@@ -83,6 +83,7 @@ def limits(
         >>> result.limit(4).missing_data, result.speeds
         (('force_resolution',), (0.0, 0.4))
     """
+    check_keywords(surface_arguments, SURFACE_KEYWORDS, limits)
     device, texture = load_device(device), as_texture(texture)
     v = limit_rules.DEFAULT_SPEED if speed is None else check_positive("speed", speed, "m/s")
     settings: dict[str, Any] = {

@@ -20,9 +20,9 @@ from asperity.analysis.passivity.verdict import at_recommended_stiffness, recomm
 from asperity.analysis.recommendation import comparison_assumptions, recommend, recommendation_text
 from asperity.analysis.results import LawRow
 from asperity.core.arguments import DEFAULT_STIFFNESS, FIELD
-from asperity.core.checks import check_positive
+from asperity.core.checks import check_keywords, check_positive
 from asperity.core.digests import content_digest
-from asperity.core.display import Plottable, Reportable
+from asperity.core.display import Plottable, Reportable, Tabular
 from asperity.core.errors import ParameterError
 from asperity.core.files import attributes_to_dict, json_text, to_plain_data
 from asperity.core.processes import precompute
@@ -30,7 +30,7 @@ from asperity.devices import Device, load_device
 from asperity.laws import LAWS, Law, distribute_parameters, find_laws
 from asperity.perception.grip import DEFAULT_GRIP, Grip, load_grip
 from asperity.rendering import assess_rendering, rendered_surface
-from asperity.surface import Surface
+from asperity.surface import SURFACE_KEYWORDS, Surface
 from asperity.textures.catalogue import TextureLike, as_texture
 from asperity.textures.texture import Texture, TexturePart
 
@@ -42,7 +42,7 @@ Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True)
-class Comparison(Plottable, Reportable):
+class Comparison(Plottable, Reportable, Tabular):
     """The laws compared on one surface and one device.
 
     Attributes:
@@ -100,6 +100,11 @@ class Comparison(Plottable, Reportable):
         row = self.recommended_row
         outcome = "none recommended" if row is None else f"{row!r} recommended"
         return f"<Comparison of {len(self.rows)} laws on {self.device.id}: {outcome}>"
+
+    def table_rows(self) -> list[dict[str, Any]]:
+        """Return device, depth, speed and the main numbers of each law; SI units."""
+        case = {"device": self.device.id, "depth [m]": self.max_depth, "speed [m/s]": self.speed}
+        return [case | row.table_row() for row in self.rows]
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units, with a schema number."""
@@ -162,6 +167,7 @@ def compare(
         >>> [f"{row.law.letter} {row.stability_limit.stiffness:.0f} N/m" for row in result.rows]
         ['W 5000 N/m', 'A 976 N/m']
     """
+    check_keywords(surface_arguments, SURFACE_KEYWORDS - {"law"}, compare)
     texture = as_texture(texture)
     laws = _renderable_laws(find_laws(list(laws) if not isinstance(laws, str) else laws), texture)
     device = load_device(device)

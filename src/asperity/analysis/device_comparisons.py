@@ -10,7 +10,7 @@ from typing import Any
 
 from asperity.analysis.compare import SCHEMA, Comparison, compare, missing_data_hint
 from asperity.analysis.limits.perceptibility_sentences import texture_amount_text
-from asperity.core.display import Reportable
+from asperity.core.display import Reportable, Tabular
 from asperity.core.errors import ParameterError
 from asperity.core.files import Serializable, to_plain_data
 from asperity.core.units import format_quantity
@@ -72,7 +72,7 @@ class MissingData(Serializable):
 
 
 @dataclass(frozen=True)
-class DeviceComparisons(Reportable):
+class DeviceComparisons(Reportable, Tabular):
     """A surface on several devices, pressed to several depths.
 
     Attributes:
@@ -104,6 +104,10 @@ class DeviceComparisons(Reportable):
     def __repr__(self) -> str:
         counts = f"{len(self.comparisons)} compared, {len(self.missing_data)} without data"
         return f"<DeviceComparisons: {counts}>"
+
+    def table_rows(self) -> list[dict[str, Any]]:
+        """Return the main numbers of each device, depth and law; SI units."""
+        return [row for one in self.comparisons for row in one.table_rows()]
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units, with a schema number."""

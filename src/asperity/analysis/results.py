@@ -163,6 +163,28 @@ class LawRow:
             parts.append(f"no contact on {100.0 * self.contact_lost:.0f} % of the scan")
         return parts
 
+    def table_row(self) -> dict[str, Any]:
+        """Return the main numbers by name and unit; ``None`` where one is unknown."""
+        return {
+            "law": self.law.letter,
+            "recommended stiffness [N/m]": self.recommended_stiffness,
+            "stiffness [N/m]": self.surface.stiffness,
+            "stability limit [N/m]": self.stability_limit.stiffness,
+            "passivity": self.passivity.verdict,
+            "q": self.q.value,
+            "q method": self.q.method,
+            "one-sided q": self.one_sided.value,
+            "tier": self.tier,
+            "texture force RMS [N]": self.texture_force,
+            "resolved force RMS [N]": self.resolved_force,
+            "conservative": self.conservative,
+            "loop gain [J]": self.leak.energy,
+            "continuous": self.continuous,
+            "strength": self.strength,
+            "support": self.support,
+            "verdict": self.verdict,
+        }
+
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""
         before = "q one_sided stability_limit margin recommended_stiffness"

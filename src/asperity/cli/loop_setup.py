@@ -79,7 +79,6 @@ def load_setup(
     Raises:
         ParameterError: for a missing, unknown or invalid value.
     """
-    from asperity.rendering import assess_rendering, rendered_surface, rendering_sentences
     from asperity.scene import load_scene
     from asperity.scene.setup import make_setup
 
@@ -114,12 +113,7 @@ def load_setup(
         use_defaults=driver is not None,
     )
     with progress_bar("baking the field") as update:
-        rendered = rendered_surface(setup.surface, setup.rendering, progress=update)
-    searched = assess_rendering(rendered, update_rate=1.0 / setup.servo.period)
-    notes = filter(None, (note, *rendering_sentences(rendered), searched.sentence(rendered.law)))
-    setup = replace(setup, assumptions=(*notes, *setup.assumptions))
-    vars(setup)["rendered"] = rendered  # also where nothing is kept in the cache
-    return setup
+        return setup.with_rendering([note], update)
 
 
 def _check_driver(name: str, device: Device) -> None:

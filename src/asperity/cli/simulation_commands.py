@@ -108,9 +108,10 @@ def onset_command(
         raise ParameterError("stiffness", "is the result of onset: leave it out")
     chosen = select_laws(laws, values["law"])
     setup = load_setup(scene, values, values["duration"], chosen, include_delay=False)
+    from asperity.scene.loops import DEFAULT_DELAYS, OnsetSweep
     from asperity.scene.sweeps import sweep_onsets
 
-    delays, letters = values["delays"] or list(range(6)), [law.letter for law in chosen]
+    delays, letters = values["delays"] or DEFAULT_DELAYS, [law.letter for law in chosen]
     done, total = count(1), len(letters) * len(delays)
     search = options.provided_values(values, _ONSET_SEARCH)
     with progress_bar("simulating onsets") as update:
@@ -120,8 +121,8 @@ def onset_command(
 
     from asperity.report.loop.sweep_report import onset_page
 
-    data = {"schema": 2, "scene": setup, "onsets": onsets}
-    outputs.write(data, onset_page(setup, onsets))
+    result = OnsetSweep(setup, onsets)
+    outputs.write(result, onset_page(result))
 
 
 *_SCAN_LISTS, _STROKES = options.command_arguments("scan")
@@ -138,6 +139,7 @@ def scan_command(scene: str, outputs: Outputs, laws: tuple[Law, ...] | None, **v
 
     The motion of the scene must consist of strokes; their speed and depth are replaced.
     """
+    from asperity.scene.loops import StrokeSweep
     from asperity.scene.sweeps import sweep_strokes
 
     chosen = select_laws(laws, values["law"])
@@ -149,5 +151,5 @@ def scan_command(scene: str, outputs: Outputs, laws: tuple[Law, ...] | None, **v
 
     from asperity.report.loop.sweep_report import strokes_page
 
-    data = {"schema": 2, "scene": setup, "strokes": strokes}
-    outputs.write(data, strokes_page(setup, strokes))
+    result = StrokeSweep(setup, strokes)
+    outputs.write(result, strokes_page(result))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
 import math
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 from typing import Any, TypeVar, cast
 
@@ -10,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from asperity.core import compiled
-from asperity.core.errors import ParameterError
+from asperity.core.errors import ParameterError, suggest_names
 from asperity.core.units import parse_quantity
 
 FloatArray = compiled.FloatArray
@@ -20,6 +22,21 @@ Values = TypeVar("Values", bound=NDArray[Any])
 # Beyond these limits products of a few values leave the range of double precision.
 _SMALLEST, _LARGEST = 1e-30, 1e30
 _FLOAT = np.dtype(np.float64)
+
+
+def check_keywords(
+    keywords: Iterable[str], accepted: Collection[str], function: Callable[..., Any]
+) -> None:
+    """Check keywords that a function passes on.
+
+    Raises:
+        ParameterError: for an unknown one, with the nearest of these and of the function's own.
+    """
+    for name in keywords:
+        if name not in accepted:
+            own = inspect.signature(function).parameters.values()
+            names = {one.name for one in own if one.kind is not one.VAR_KEYWORD}
+            raise ParameterError(name, f"is unknown; {suggest_names(name, names.union(accepted))}")
 
 
 def check_real(name: str, value: object, unit: str = "") -> float:

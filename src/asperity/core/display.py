@@ -7,9 +7,11 @@ with :func:`set_renderer`, and it is loaded at the first use.
 from __future__ import annotations
 
 import os
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any, overload
 
+from asperity.core.errors import ParameterError
 from asperity.core.files import write_bytes
 
 if TYPE_CHECKING:
@@ -95,3 +97,32 @@ class Reportable(Displayable):
         """Yield the output of the command line, for a console of this width."""
         del console  # the options contain its width
         yield from _load_renderer().rich_renderables(self, options.max_width)
+
+
+class Tabular(ABC):
+    """A result with rows of plain values."""
+
+    @abstractmethod
+    def table_rows(self) -> list[dict[str, Any]]:
+        """Return the rows: SI units, which are named in the columns, "stiffness [N/m]"."""
+
+    def to_dataframe(self) -> Any:
+        """Return the rows as a pandas ``DataFrame``; pandas must be installed.
+
+        Columns have SI units, which their names contain; an unknown number is ``None``.
+
+        Raises:
+            ParameterError: if pandas is not installed.
+
+        Example:
+            >>> import asperity as asp
+            >>> frame = asp.compare("sinusoid:amplitude=0.8mm,period=1mm", laws="WA").to_dataframe()
+            >>> [f"{one:.0f}" for one in frame["stability limit [N/m]"]]
+            ['5000', '976']
+        """
+        try:
+            import pandas
+        except ImportError:
+            words = "needs pandas: pip install pandas; or use table_rows()"
+            raise ParameterError("to_dataframe", words) from None
+        return pandas.DataFrame(self.table_rows())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -32,7 +33,7 @@ from asperity.recording.recorded_field import (
     read_field,
     surface_field,
 )
-from asperity.recording.recording import Recording
+from asperity.recording.recording import Recording, open_recording
 from asperity.recording.replay_trace import ReplayTrace
 from asperity.surface import Surface
 from asperity.textures.catalogue import rebuild_texture
@@ -93,19 +94,21 @@ class Replay(Serializable, Displayable):
         return self.differing_rows == 0
 
 
-def replay(recording: Recording, surface: Surface | None = None) -> Replay:
+def replay(recording: Recording | str | os.PathLike[str], surface: Surface | None = None) -> Replay:
     """Replay a recording, and compare the forces of the law bit for bit.
 
     The servo's tick is computed for each position: steps of the encoder, law, virtual damping,
     limit and steps of the force, with the law's and the servo's state carried from the first row.
 
     Args:
-        recording: a recording with every sample of a loop.
+        recording: a recording with every sample of a loop, or its path.
         surface: surface to evaluate in place of the recorded one.
 
     Raises:
         ParameterError: for a recording without rows, a column, a sample or the surface.
     """
+    if not isinstance(recording, Recording):
+        recording = open_recording(recording)
     surface_data = _surface_metadata(recording)
     if not recording.rows:
         raise ParameterError("recording", "has no rows to replay")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -19,7 +19,7 @@ from asperity.devices import Device, load_device
 from asperity.devices.device_file import to_device_toml
 from asperity.laws import Law, distribute_parameters, find_law
 from asperity.recording.replay import file_digest
-from asperity.rendering import rendered_surface
+from asperity.rendering import assess_rendering, rendered_surface, rendering_sentences
 from asperity.scene import scene_defaults, sections
 from asperity.scene.scene_file import Scene
 from asperity.servo import safety
@@ -109,6 +109,17 @@ class Setup:
         """Return the current hash of each readable file."""
         contents = {str(path): file_digest(path) for path in self.files}
         return {name: content for name, content in contents.items() if content is not None}
+
+    def with_rendering(
+        self, notes: Iterable[str] = (), progress: Callable[[float], None] | None = None
+    ) -> Setup:
+        """Return the same loop with its field baked, and notes about it among its assumptions."""
+        rendered = rendered_surface(self.surface, self.rendering, progress=progress)
+        searched = assess_rendering(rendered, update_rate=1.0 / self.servo.period)
+        notes = (*notes, *rendering_sentences(rendered), searched.sentence(rendered.law))
+        result = replace(self, assumptions=(*filter(None, notes), *self.assumptions))
+        vars(result)["rendered"] = rendered  # also where nothing is kept in the cache
+        return result
 
     def with_law(self, law: str | Law) -> Setup:
         """Return the same loop with another law."""

@@ -8,8 +8,9 @@ from typing import Any
 from asperity.paper.table_two import TableTwo
 from asperity.recording.recording import Recording
 from asperity.recording.replay import Replay
-from asperity.report.loop import run_report
+from asperity.report.loop import run_report, sweep_report
 from asperity.report.page import Page, Row, Table, notebook_page
+from asperity.scene.loops import OnsetSweep, StrokeSweep
 from asperity.simulation import Run
 
 
@@ -21,6 +22,8 @@ def find_loop_page(_result: Any) -> Page | None:
 
 find_loop_page.register(Recording, run_report.recording_page)
 find_loop_page.register(Replay, run_report.replay_page)
+find_loop_page.register(OnsetSweep, sweep_report.onset_page)
+find_loop_page.register(StrokeSweep, sweep_report.strokes_page)
 
 
 @find_loop_page.register

@@ -14,6 +14,7 @@ from asperity.report.loop.run_report import LOOP_FOOTER, loop_facts
 from asperity.report.page import Cell, Cells, Media, Page, Row, Section, Table, TableLayout
 from asperity.report.sentences.number_text import INFINITY_SIGN, NOT_AVAILABLE
 from asperity.report.sentences.texts import table_notes
+from asperity.scene.loops import OnsetSweep, StrokeSweep
 from asperity.scene.setup import Setup
 from asperity.simulation.limit_cycles.onset import Prediction
 from asperity.simulation.scan import Stroke
@@ -103,8 +104,9 @@ def _case_name(prediction: Prediction) -> str:
     return f"{prediction.onset.law} at d = {prediction.onset.delay}"
 
 
-def onset_page(setup: Setup, predictions: Sequence[Prediction]) -> Page:
+def onset_page(result: OnsetSweep) -> Page:
     """Return the report of the onsets."""
+    setup, predictions = result.setup, result.onsets
     cycle = "A limit cycle: motion that lasts without steps of position and force and is felt."
     in_numbers = onset_section("In numbers, N/m", predictions, cycle)
     return Page(
@@ -189,8 +191,9 @@ def _group_laws(strokes: Sequence[Stroke], gains_energy: Callable[[Stroke], bool
     return ", ".join(f"{', '.join(laws)} {when}" for when, laws in groups.items() if laws)
 
 
-def strokes_page(setup: Setup, strokes: Sequence[Stroke]) -> Page:
+def strokes_page(result: StrokeSweep) -> Page:
     """Return the report of the strokes."""
+    setup, strokes = result.setup, result.strokes
     laws = ", ".join(dict.fromkeys(stroke.law for stroke in strokes))
     stops = sorted({stroke.stop_message for stroke in strokes if stroke.stop_message})
     (note,) = table_notes("strokes")
