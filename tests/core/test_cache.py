@@ -385,3 +385,24 @@ def test_nothing_is_locked_without_a_usable_cache(
     start = time.monotonic()
     assert not cache.wait_and_lock(NAMESPACE, KEY)
     assert time.monotonic() - start < 10.0
+
+
+def test_entries_are_listed_while_folders_appear_and_vanish(folder: Path) -> None:
+    """As when another process clears the cache: about a third of the lists meet such a folder."""
+    cache.put_entry(NAMESPACE, KEY, CONTENT)
+    over = threading.Event()
+
+    def change_folders() -> None:
+        while not over.is_set():
+            for number in range(20):
+                (folder / f"vanishing{number}").mkdir()
+                (folder / f"vanishing{number}").rmdir()
+
+    thread = threading.Thread(target=change_folders)
+    thread.start()
+    try:
+        for _ in range(300):
+            assert [entry.namespace for entry in cache.list_entries()] == [NAMESPACE]
+    finally:
+        over.set()
+        thread.join()

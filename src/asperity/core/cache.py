@@ -118,8 +118,11 @@ class CacheEntry:
 
 def list_entries() -> list[CacheEntry]:
     """Return the entries of the cache that can be read."""
-    entries = []
-    for path in cache_folder().glob("*/*"):
+    entries, paths = [], list[Path]()
+    for folder in cache_folder().glob("*"):
+        with suppress(OSError):  # no folder, or another process has deleted it
+            paths += folder.iterdir()
+    for path in paths:
         if _ENTRY_NAME.fullmatch(path.name):
             with suppress(OSError):  # another process may have deleted it
                 status = path.stat()
