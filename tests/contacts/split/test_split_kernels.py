@@ -251,7 +251,7 @@ def test_weights_are_optimal(count: int) -> None:
         if expected[-1] < 1e-3:
             continue
         case_count += 1
-        remaining = solver.split_solve_weights(atoms, count, p, MU, a)
+        remaining = conditions.split_solve_weights(atoms, count, p, MU, a)
         rows = np.flatnonzero(expected > 1e-9)
         np.testing.assert_array_equal(atoms[:remaining, :3], w[rows])
         np.testing.assert_allclose(atoms[:remaining, 3], expected[rows], rtol=1e-6)
@@ -264,19 +264,19 @@ def test_subset_mask_selects_atoms() -> None:
     atoms[:3, :3] = [[1.0, 0.0, 0.0], [-0.5, 0.8, 0.0], [-0.5, -0.8, 0.0]]
     p, trial, y = np.array([0.0, 0.0, -1.0]), np.zeros((4, 4)), np.zeros(3)
     for mask, rows in ((0b11, [0, 1, 2]), (0b01, [0, 2]), (0b10, [1, 2]), (0b00, [2])):
-        assert solver.split_solve_subset(atoms, 3, mask, p, MU, a, trial, y) == len(rows)
+        assert conditions.split_solve_subset(atoms, 3, mask, p, MU, a, trial, y) == len(rows)
         np.testing.assert_array_equal(trial[: len(rows), :3], atoms[rows, :3])
         weights = trial[: len(rows), 3]
         assert np.abs(residual(y, weights, atoms[rows, :3], p)).max() < 1e-12
     outside = np.array([9.0, 0.0, -1.0])
-    assert solver.split_solve_subset(atoms, 3, 0b11, outside, MU, a, trial, y) == 0
+    assert conditions.split_solve_subset(atoms, 3, 0b11, outside, MU, a, trial, y) == 0
 
 
 def test_subset_with_a_singular_system_has_no_weights(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(solver, "split_solve_linear", lambda *_arguments: False)
+    monkeypatch.setattr(conditions, "split_solve_linear", lambda *_arguments: False)
     atoms, trial, y = random_atoms(3), np.zeros((4, 4)), np.zeros(3)
     p, a = RNG.normal(size=3), np.zeros((7, 10))
-    assert solver.split_solve_subset(atoms, 3, 0b11, p, MU, a, trial, y) == 0
+    assert conditions.split_solve_subset(atoms, 3, 0b11, p, MU, a, trial, y) == 0
 
 
 def test_step_drops_atoms_without_weight() -> None:
@@ -284,7 +284,7 @@ def test_step_drops_atoms_without_weight() -> None:
     atoms[:3, 3] = 0.2, 0.3, 0.5
     before = atoms.copy()
     a[:6, 6] = 0.1, -0.2, 0.3, 0.05, -0.3, 0.1
-    remaining, size = solver.split_apply_step(atoms, 3, y, a)
+    remaining, size = conditions.split_apply_step(atoms, 3, y, a)
     assert (remaining, size) == (2, pytest.approx(0.14, rel=1e-12))
     np.testing.assert_allclose(y, [1.1, 1.8, 3.3], rtol=1e-12)
     np.testing.assert_array_equal(atoms[:2, :3], before[[0, 2], :3])
@@ -297,12 +297,12 @@ def test_duality_gap_and_query_error() -> None:
     for scale in (1.0, -1.0):
         atoms[3, :3] = y + scale * np.array([0.01, 0.02, -0.02])
         squares = ((atoms[:4, :3] - y) ** 2).sum(axis=1)
-        gap, rounding = solver.split_duality_gap(atoms, 3, y, MU, 7.0)
+        gap, rounding = conditions.split_duality_gap(atoms, 3, y, MU, 7.0)
         expected = 0.5 * (1.0 - MU) * float(atoms[:3, 3] @ (squares[:3] - squares[3]))
         assert gap == pytest.approx(expected, rel=1e-12)
         assert rounding == pytest.approx(4e-16 * (1.0 - MU) * 0.05 * 7.05, rel=1e-12)
     atoms[3, :3] = y + 100.0
-    assert solver.split_duality_gap(atoms, 3, y, MU, 0.0)[0] == 0.0
+    assert conditions.split_duality_gap(atoms, 3, y, MU, 0.0)[0] == 0.0
     distance = 100.0 * math.sqrt(3.0)
     error = solver.split_query_error(atoms, 3, y, MU, 5.0)
     assert error == pytest.approx(0.5 * (1.0 - MU) * (distance**2 - (distance - 5.0) ** 2))

@@ -36,20 +36,21 @@ from asperity.contacts.sampler_interface import (
 )
 from asperity.contacts.split.optimality import (
     split_add_atom_motion,
+    split_apply_step,
     split_assemble_system,
     split_closest_derivative,
     split_copy_atoms,
-    split_distance_difference,
+    split_duality_gap,
     split_evaluate_energy,
     split_solve_linear,
+    split_solve_subset,
+    split_solve_weights,
     split_track_point,
 )
 from asperity.core.compiled import EPS, FloatArray, Kernels, local_array
 
 KERNELS = Kernels(
-    provides=("split_compute_atoms", "split_solve_weights", "split_duality_gap"),
-    merged=("split_newton", "split_try_newton"),
-    iterates=True,
+    provides=("split_compute_atoms",), merged=("split_newton", "split_try_newton"), iterates=True
 )
 
 # Newton steps of each atom before the joint solution; more do not pay.
@@ -87,93 +88,6 @@ def split_query(
     atoms[row, 2] = fz
     atoms[row, 3] = 0.0
     return gap, evaluations
-
-
-def split_solve_subset(
-    atoms: FloatArray, count: int, mask: int, p: FloatArray, mu: float, a: FloatArray,
-    trial: FloatArray, y: FloatArray,
-) -> int:  # fmt: skip
-    """Write the best weights on the last atom and a subset of the others, and y.
-
-    Returns:
-        The number of atoms; 0 if a weight is not positive.
-    """
-    # Not a literal: Numba compiles a function again for each literal argument.
-    n: Any = np.int64(0)
-    for i in range(count):
-        if i == count - 1 or mask >> i & 1:
-            for d in range(3):
-                trial[n, d] = atoms[i, d]
-            trial[n, 3] = 0.0
-            n += 1
-    for d in range(3):
-        y[d] = p[d]
-    split_assemble_system(trial, n, p, y, mu, a)
-    if not split_solve_linear(a, 3 + n, 4 + n):
-        return 0
-    for i in range(n):
-        trial[i, 3] = a[3 + i, 3 + n]
-        if not trial[i, 3] > 0.0:
-            return 0
-    for d in range(3):
-        y[d] += a[d, 3 + n]
-    return int(n)
-
-
-def split_solve_weights(
-    atoms: FloatArray, count: int, p: FloatArray, mu: float, a: FloatArray
-) -> int:
-    """Write the optimal weights, drop atoms without weight, and return the number of atoms.
-
-    The last atom is new and closer to y than the others, so it has weight; every subset of the
-    others is tried, the largest first, until one satisfies all optimality conditions. If none does
-    because of rounding, the one with the least violation is taken; 0 if there is none.
-    """
-    trial = local_array((4, 4))
-    best = local_array((4, 4))
-    y = local_array((3,))
-    left: Any = np.int64(0)
-    least = np.inf
-    for mask in range((1 << (count - 1)) - 1, -1, -1):
-        # In space at most four atoms are needed (Carathéodory).
-        n = split_solve_subset(atoms, count, mask, p, mu, a, trial, y) if mask != 15 else 0
-        if n == 0:
-            continue
-        violation = 0.0
-        for i in range(count):
-            violation = max(violation, split_distance_difference(atoms, count - 1, i, y))
-        if violation < least:
-            least = violation
-            left = n
-            split_copy_atoms(trial, best, n)
-        if violation == 0.0:
-            break
-    split_copy_atoms(best, atoms, left)
-    return int(left)
-
-
-def split_apply_step(
-    atoms: FloatArray, count: int, y: FloatArray, a: FloatArray
-) -> tuple[int, float]:
-    """Apply the step of the solved system, and drop atoms without weight.
-
-    Returns:
-        The number of atoms left, and the squared step of y [m²].
-    """
-    n = 3 + count
-    size = 0.0
-    for d in range(3):
-        y[d] += a[d, n]
-        size += a[d, n] * a[d, n]
-    left = 0
-    for i in range(count):
-        weight = atoms[i, 3] + a[3 + i, n]
-        if weight > 0.0:
-            for d in range(3):
-                atoms[left, d] = atoms[i, d]
-            atoms[left, 3] = weight
-            left += 1
-    return left, size
 
 
 def split_newton(
@@ -250,23 +164,6 @@ def split_is_local_minimum(atoms: FloatArray, y: FloatArray, texture: object) ->
     projection = local_array((3, 3))
     first: Any = np.int64(0)
     return split_closest_derivative(y, atoms, first, projection, texture)
-
-
-def split_duality_gap(
-    atoms: FloatArray, count: int, y: FloatArray, mu: float, scale: float
-) -> tuple[float, float]:
-    """Return the duality gap [m²] and its possible rounding error.
-
-    The atom in row ``count`` is the closest to y.
-    """
-    gap = 0.0
-    distance = 0.0
-    for i in range(count):
-        gap += atoms[i, 3] * split_distance_difference(atoms, i, count, y)
-    for d in range(3):
-        distance += abs(atoms[count, d] - y[d])
-    rounding = 2.0 * EPS * (1.0 - mu) * distance * (distance + scale)
-    return max((1.0 - mu) * gap, 0.0), rounding
 
 
 def split_update_dual(

@@ -11,8 +11,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.contacts.split.optimality import split_evaluate_energy
-from asperity.contacts.split.solver import split_duality_gap, split_solve_weights
+from asperity.contacts.split.optimality import (
+    split_duality_gap,
+    split_evaluate_energy,
+    split_solve_weights,
+)
 from asperity.core.checks import FloatArray
 from asperity.core.compiled import Kernels, local_array
 from asperity.textures.meshes.triangle_tree import (
