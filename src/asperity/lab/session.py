@@ -293,7 +293,7 @@ class Session:
             loop.memory.request_stop()
         try:
             loop.start()
-        except BaseException:
+        except BaseException:  # also for an interrupt
             self._active_shared = None
             raise
         self._loop, self.shared, self.scene_state = loop, loop.memory, scene_state

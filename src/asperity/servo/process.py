@@ -147,7 +147,7 @@ class ServoProcess:
         try:
             self._connection.send(_pickle(self._job))
             self.notes = self._wait_for("ready", START_TIMEOUT)
-        except BaseException:
+        except BaseException:  # also for an interrupt
             self._terminate()
             raise
         self._last_progress = time.monotonic()

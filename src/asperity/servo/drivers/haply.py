@@ -214,7 +214,7 @@ class HaplyDriver(threaded.ThreadedDriver):
         try:
             chosen = _choose_device(_list_devices(connection), self.device)
             exchange = HaplyThread(connection, chosen, self.force_timeout)
-        except BaseException:
+        except BaseException:  # also for an interrupt
             connection.close()
             raise
         self._exchange, self._previous_switch_interval = exchange, sys.getswitchinterval()

@@ -44,7 +44,7 @@ class WebSocketClient:
             self._flush()
             while self._protocol.state.name == "CONNECTING":
                 self._read()
-        except BaseException:
+        except BaseException:  # also for an interrupt
             self._socket.close()
             raise
 
