@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Mapping
 from functools import cached_property
 from types import MappingProxyType, ModuleType
@@ -43,13 +44,6 @@ def _law_parameter(name: str, text: str) -> property:
         return float({name: default, **self._explicit_parameters, **self.law_parameters}[name])
 
     return property(value, doc=text)
-
-
-SURFACE_KEYWORDS = frozenset({
-    "law", "stiffness", "max_depth", "friction", "max_deflection", "modulation_depth", "clamp",
-    "continuity", "law_parameters",
-})  # fmt: skip
-"""Keywords of :class:`Surface` that an analysis passes on."""
 
 
 class Surface(Plottable):
@@ -434,3 +428,7 @@ class Surface(Plottable):
             limit = f"must not be longer than max_deflection = {self.max_deflection} m"
             raise ParameterError("deflection", limit, longest)
         return (given,)
+
+
+SURFACE_KEYWORDS = frozenset(inspect.signature(Surface).parameters) - {"texture"}
+"""Keywords of :class:`Surface` that an analysis passes on."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -40,7 +39,7 @@ from asperity.core.display import Plottable, Reportable
 from asperity.core.errors import ParameterError
 from asperity.core.files import attributes_to_dict, to_plain_data
 from asperity.core.units import format_quantity
-from asperity.devices import Device, load_device
+from asperity.devices import Device, DeviceLike, load_device
 from asperity.rendering import Rendering, assess_rendering, rendered_surface
 from asperity.surface import SURFACE_KEYWORDS, Surface, default_max_depth
 from asperity.textures.catalogue import TextureLike, as_texture
@@ -188,7 +187,7 @@ class Analysis(Plottable, Reportable):
 
 def analyze(
     surface: Surface | TextureLike,
-    device: str | os.PathLike[str] | Device = DEFAULT_DEVICE,
+    device: DeviceLike = DEFAULT_DEVICE,
     *,
     direction: tuple[float, float] | None = None,
     tolerance: float | None = None,

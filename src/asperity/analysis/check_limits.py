@@ -23,7 +23,7 @@ from asperity.analysis.passivity import verdict
 from asperity.core.arguments import DEFAULT_STIFFNESS, FIELD
 from asperity.core.checks import FloatArray, check_keywords, check_positive, check_real
 from asperity.core.errors import ParameterError
-from asperity.devices import Device, load_device
+from asperity.devices import Device, DeviceLike, load_device
 from asperity.laws import Law
 from asperity.perception.grip import DEFAULT_GRIP, Grip, load_grip
 from asperity.rendering import rendered_surface
@@ -33,7 +33,7 @@ from asperity.textures.catalogue import TextureLike, as_texture
 
 def limits(
     texture: TextureLike,
-    device: str | os.PathLike[str] | Device = DEFAULT_DEVICE,
+    device: DeviceLike = DEFAULT_DEVICE,
     speed: float | None = None,
     law: str | Law | None = None,
     stiffness: float | None = None,

@@ -26,7 +26,7 @@ from asperity.core.display import Plottable, Reportable, Tabular
 from asperity.core.errors import ParameterError
 from asperity.core.files import attributes_to_dict, json_text, to_plain_data
 from asperity.core.processes import precompute
-from asperity.devices import Device, load_device
+from asperity.devices import Device, DeviceLike, load_device
 from asperity.laws import LAWS, Law, distribute_parameters, find_laws
 from asperity.perception.grip import DEFAULT_GRIP, Grip, load_grip
 from asperity.rendering import assess_rendering, rendered_surface
@@ -119,7 +119,7 @@ class Comparison(Plottable, Reportable, Tabular):
 
 def compare(
     texture: TextureLike,
-    device: str | os.PathLike[str] | Device = DEFAULT_DEVICE,
+    device: DeviceLike = DEFAULT_DEVICE,
     laws: str | Sequence[str | Law] = ALL_LAWS,
     stiffness: float | None = None,
     max_depth: float | None = None,
@@ -232,7 +232,7 @@ def missing_data_hint(device: Device) -> str:
 
 def recommended_law(
     texture: TextureLike,
-    device: str | os.PathLike[str] | Device = DEFAULT_DEVICE,
+    device: DeviceLike = DEFAULT_DEVICE,
     max_depth: float | None = None,
     **arguments: Any,
 ) -> Law:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -10,11 +9,12 @@ from typing import Any
 
 from asperity.analysis.compare import SCHEMA, Comparison, compare, missing_data_hint
 from asperity.analysis.limits.perceptibility_sentences import texture_amount_text
+from asperity.core.checks import check_items
 from asperity.core.display import Reportable, Tabular
 from asperity.core.errors import ParameterError
 from asperity.core.files import Serializable, to_plain_data
 from asperity.core.units import format_quantity
-from asperity.devices import Device, load_device
+from asperity.devices import Device, DeviceLike, load_device
 from asperity.laws import REGISTERED_LAWS, Law
 from asperity.textures.catalogue import TextureLike, as_texture
 from asperity.textures.texture import Texture
@@ -122,8 +122,8 @@ class DeviceComparisons(Reportable, Tabular):
 
 def compare_devices(
     texture: TextureLike,
-    devices: Sequence[str | os.PathLike[str] | Device],
-    max_depths: Sequence[float] | None = None,
+    devices: DeviceLike | Sequence[DeviceLike],
+    max_depths: float | Sequence[float] | None = None,
     laws: str | Sequence[str | Law] | None = None,
     *,
     progress: DeviceProgress | None = None,
@@ -152,13 +152,9 @@ def compare_devices(
         >>> [data.device for data in result.missing_data]
         ['2diy']
     """
-    loaded = [load_device(device) for device in devices]
-    if not loaded:
-        raise ParameterError("device", "must be one or several")
+    loaded = [load_device(device) for device in check_items("device", devices)]
     laws = tuple(REGISTERED_LAWS.values()) if laws is None else laws
-    depths: Sequence[float | None] = [None] if max_depths is None else max_depths
-    if not depths:
-        raise ParameterError("max_depth", "must be one or several depths")
+    depths = [None] if max_depths is None else check_items("max_depth", max_depths)
     if len(set(depths)) < len(depths):
         raise ParameterError("max_depth", "contains a depth twice", list(depths))
     texture, comparisons, missing_data = as_texture(texture), [], []

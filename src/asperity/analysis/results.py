@@ -165,9 +165,10 @@ class LawRow:
 
     def table_row(self) -> dict[str, Any]:
         """Return the main numbers by name and unit; ``None`` where one is unknown."""
+        felt = self.perceptibility
         return {
             "law": self.law.letter,
-            "recommended stiffness [N/m]": self.recommended_stiffness,
+            "recommended stiffness [N/m]": self.recommended_stiffness or None,
             "stiffness [N/m]": self.surface.stiffness,
             "stability limit [N/m]": self.stability_limit.stiffness,
             "passivity": self.passivity.verdict,
@@ -175,12 +176,12 @@ class LawRow:
             "q method": self.q.method,
             "one-sided q": self.one_sided.value,
             "tier": self.tier,
-            "texture force RMS [N]": self.texture_force,
-            "resolved force RMS [N]": self.resolved_force,
+            "texture force RMS [N]": None if felt is None else self.texture_force,
+            "resolved force RMS [N]": None if felt is None else self.resolved_force,
             "conservative": self.conservative,
-            "loop gain [J]": self.leak.energy,
+            "leak [J]": self.leak.energy,
             "continuous": self.continuous,
-            "strength": self.strength,
+            "ripple [m]": self.ripple,
             "support": self.support,
             "verdict": self.verdict,
         }

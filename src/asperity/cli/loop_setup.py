@@ -15,7 +15,7 @@ from asperity.cli.output import progress_bar, step_bar
 from asperity.core.arguments import STIFFNESS, Argument
 from asperity.core.errors import ParameterError, print_message
 from asperity.core.units import format_quantity
-from asperity.laws import REGISTERED_LAWS, Law, find_law
+from asperity.laws import REGISTERED_LAWS, Law, check_parameters_apply, find_law
 
 if TYPE_CHECKING:
     from asperity.devices import Device
@@ -102,7 +102,7 @@ def load_setup(
         servo = {name: section for name, section in scene.loop.items() if name == "servo"}
         scene = replace(scene, loop={**_NO_HAND, **servo})
     if laws or "law" in surface:
-        options.check_parameters_apply(requested, laws or (find_law(surface["law"]),))
+        check_parameters_apply(requested, laws or (find_law(surface["law"]),))
     setup = make_setup(
         scene,
         surface=surface,

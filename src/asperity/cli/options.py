@@ -21,6 +21,7 @@ from asperity.laws import (
     REGISTERED_LAWS,
     SHIPPED_LAW_ARGUMENTS,
     Law,
+    check_parameters_apply,
     find_law,
     find_laws,
     registered_arguments,
@@ -351,21 +352,6 @@ def select_device(device: Device | None, scene: Scene, values: Mapping[str, Any]
     chosen = device or scene.device or load_device(DEFAULT_DEVICE)
     settings: Overrides = values["settings"]
     return settings.apply_to(chosen)
-
-
-def check_parameters_apply(requested: Iterable[str], laws: Sequence[Law]) -> None:
-    """Check that each requested parameter is one of some of the laws.
-
-    Raises:
-        ParameterError: otherwise; the message names the laws that take the parameter.
-    """
-    taken = registered_arguments(laws)
-    for name in requested:
-        takers = [law.letter for law in REGISTERED_LAWS.values() if name in law.arguments]
-        if takers and name not in taken:
-            letters, others = (", ".join(part) for part in ((law.letter for law in laws), takers))
-            words = f"has no effect: law {letters} does not take it; law {others} does"
-            raise ParameterError(name, words)
 
 
 def load_surface(

@@ -39,6 +39,18 @@ def check_keywords(
             raise ParameterError(name, f"is unknown; {suggest_names(name, names.union(accepted))}")
 
 
+def check_items(name: str, values: Any) -> list[Any]:
+    """Return one or several values as a list; a text is one value.
+
+    Raises:
+        ParameterError: for none.
+    """
+    items = [values] if isinstance(values, str) or not isinstance(values, Iterable) else [*values]
+    if not items:
+        raise ParameterError(name, "must be one or several")
+    return items
+
+
 def check_real(name: str, value: object, unit: str = "") -> float:
     """Return a finite number of magnitude at most 1e30.
 

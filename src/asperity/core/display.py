@@ -116,8 +116,8 @@ class Tabular(ABC):
 
         Example:
             >>> import asperity as asp
-            >>> frame = asp.compare("sinusoid:amplitude=0.8mm,period=1mm", laws="WA").to_dataframe()
-            >>> [f"{one:.0f}" for one in frame["stability limit [N/m]"]]
+            >>> result = asp.compare("sinusoid:amplitude=0.8mm,period=1mm", laws="WA")
+            >>> [f"{row['stability limit [N/m]']:.0f}" for row in result.table_rows()]
             ['5000', '976']
         """
         try:

@@ -49,7 +49,11 @@ def _catalogue() -> dict[str, dict[str, Any]]:
     return {str(content["id"]): content for content in contents}
 
 
-def load_device(device: str | os.PathLike[str] | Device) -> Device:
+DeviceLike = Device | str | os.PathLike[str]
+"""A device, its id in the catalogue, or its TOML file."""
+
+
+def load_device(device: DeviceLike) -> Device:
     """Return a device of the catalogue by its id, or one from a TOML file.
 
     A file has ``id``, ``name`` and any of the fields of the catalogue, each with its unit

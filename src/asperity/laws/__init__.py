@@ -64,6 +64,21 @@ def registered_arguments(laws: Iterable[Law] | None = None) -> dict[str, Argumen
     return {name: argument for law in chosen for name, argument in law.arguments.items()}
 
 
+def check_parameters_apply(requested: Iterable[str], laws: Sequence[Law]) -> None:
+    """Check that each requested parameter is one of some of the laws.
+
+    Raises:
+        ParameterError: otherwise; the message names the laws that take the parameter.
+    """
+    taken = registered_arguments(laws)
+    for name in requested:
+        takers = [law.letter for law in REGISTERED_LAWS.values() if name in law.arguments]
+        if takers and name not in taken:
+            letters, others = (", ".join(part) for part in ((law.letter for law in laws), takers))
+            words = f"has no effect: law {letters} does not take it; law {others} does"
+            raise ParameterError(name, words)
+
+
 def distribute_parameters(
     values: Mapping[str, float], laws: Sequence[Law]
 ) -> list[dict[str, float]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -37,7 +36,7 @@ from asperity.core.display import Displayable
 from asperity.core.errors import ParameterError
 from asperity.core.files import Serializable
 from asperity.core.units import format_quantity, round_down
-from asperity.devices import Device, load_device
+from asperity.devices import DeviceLike, load_device
 from asperity.surface import Surface
 
 
@@ -307,11 +306,7 @@ class Passivity(Serializable, Displayable):
 
 
 def passivity(
-    surface: Surface,
-    device: str | os.PathLike[str] | Device,
-    q: Bound,
-    one_sided: Bound,
-    leak: Leak,
+    surface: Surface, device: DeviceLike, q: Bound, one_sided: Bound, leak: Leak
 ) -> Passivity:
     """Return whether the loop of hand, device and texture is passive, with every criterion.
 
