@@ -62,7 +62,7 @@ def _setups(name: str) -> tuple[Setup, Setup]:
 
 
 def _onsets(setup: Setup) -> list[float]:
-    found = sweep_onsets(setup, "H", DELAYS, n_phases=STARTS, tolerance=TOLERANCE)
+    found = sweep_onsets(setup, "H", DELAYS, n_phases=STARTS, tolerance=TOLERANCE).onsets
     return [prediction.onset.cycling for prediction in found]
 
 

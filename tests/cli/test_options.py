@@ -25,7 +25,6 @@ from asperity.cli.output import progress_bar, step_bar
 from asperity.core.arguments import MAX_DEPTH, Argument
 from asperity.laws import LAWS
 from asperity.measured.file_arguments import FILE_ARGUMENTS
-from asperity.scene.sweeps import sweep_onsets
 
 READ_A_SURFACE = ["analyze", "compare", "limits", "onset", "scan", "simulate"]
 
@@ -56,13 +55,14 @@ def test_every_parameter_of_a_shipped_law_is_an_option() -> None:
 
 
 def test_default_values_in_help_equal_those_of_the_functions() -> None:
-    for command, function in ((limits, asp.limits), (onset, sweep_onsets), (analyze, asp.analyze)):
+    for command, function in ((limits, asp.limits), (onset, asp.onset), (analyze, asp.analyze)):
         parameters = inspect.signature(function).parameters
         options = [item for item in vars(command).values() if isinstance(item, tuple) and item]
         arguments = [item for group in options for item in group if isinstance(item, Argument)]
         assert arguments
         for argument in arguments:
-            default = parameters[argument.name].default if argument.name in parameters else None
+            name = argument.keyword or argument.name
+            default = parameters[name].default if name in parameters else None
             if argument.default is not None and default is not None:
                 assert argument.default == default, argument.name
     assert {item.default for item in limits._SAMPLING} == {DEFAULT_SAMPLES}

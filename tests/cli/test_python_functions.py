@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,6 +14,8 @@ from tests.cli.conftest import Call
 
 import asperity as asp
 from asperity.core.errors import ParameterError
+from asperity.devices import override_device
+from asperity.laws import Law
 
 ROOT = Path(__file__).parents[2]
 STROKE, PRESS = (str(ROOT / "examples" / name) for name in ("stroke.toml", "press.toml"))
@@ -37,24 +41,76 @@ def test_simulate_is_the_command(call: Call, tmp_path: Path) -> None:
 
 def test_onset_is_the_command(call: Call, tmp_path: Path) -> None:
     output = tmp_path / "onset.json"
-    options = ("--laws", "WC", "--delays", "1", "--starts", "2", "--json", str(output))
-    assert call("onset", PRESS, *options)[0] == 0
-    result = asp.onset(PRESS, "WC", [1], n_phases=2)
+    options = ("--laws", "WC", "--delays", "1", "--starts", "2", "--lowest", "7N/m")
+    device = ("--device", "pantograph", "--set", "update_rate=5kHz", "--json", str(output))
+    assert call("onset", PRESS, *options, *device)[0] == 0
+    pantograph = override_device(asp.load_device("pantograph"), {"update_rate": "5 kHz"})
+    result = asp.onset(PRESS, "WC", 1, device=pantograph, n_phases=2, min_stiffness=7.0)
     assert read_json(output) == as_json(result)
+    assert result.setup.servo.period == pytest.approx(2e-4)
     rows = result.table_rows()
     assert [row["law"] for row in rows] == ["W", "C"]
     assert rows[1]["cycling [N/m]"] == result.onsets[1].onset.cycling
     assert result.to_html().startswith("<!DOCTYPE html>")
+    other = asp.onset(PRESS, "C", 1, device=pantograph, n_phases=2, min_stiffness=9.0)
+    assert other.onsets[0].onset.quiet != result.onsets[1].onset.quiet
 
 
 def test_scan_is_the_command(call: Call, tmp_path: Path) -> None:
     output = tmp_path / "scan.json"
     options = ("--speeds", "0.1m/s", "--strokes", "3", "--json", str(output))
-    assert call("scan", STROKE, "--laws", "A", *options)[0] == 0
-    result = asp.scan(STROKE, "A", speeds=[0.1], strokes=3)
+    assert call("scan", STROKE, "--laws", "AF", "--friction", "0.3", *options)[0] == 0
+    result = asp.scan(STROKE, "AF", speeds="0.1 m/s", strokes=3, friction=0.3)
     assert read_json(output) == as_json(result)
     assert result.table_rows()[0]["gains energy"]
     assert "Energy per stroke" in result.to_html()
+    assert as_json(asp.scan(STROKE, "AF", speeds=0.1, strokes=3)) != as_json(result)
+
+
+WAVES = """[texture]
+kind = "fourier"
+amplitudes = ["50 um", "30 um"]
+wavevectors = [["6000 1/m", "0 1/m"], ["0 1/m", "6000 1/m"]]
+"""
+
+
+def write_waves(folder: Path, source: str) -> Path:
+    """Write a scene with two waves, on which law H is baked and law D searches."""
+    text, scene = Path(source).read_text("utf-8"), folder / "waves.toml"
+    before, after = text.split("[texture]")[0], text[text.index("[surface]") :]
+    scene.write_text(f"{before}{WAVES}\n{after}", encoding="utf-8")
+    return scene
+
+
+def test_strokes_state_how_each_law_is_rendered(tmp_path: Path) -> None:
+    scene = write_waves(tmp_path, STROKE)
+    notes = asp.scan(scene, "WHD", speeds=0.1, strokes=3, device="touch").setup.assumptions
+    baked, searched = notes[:2]
+    assert baked.startswith("Law H baked as a potential field: ")
+    assert searched.startswith("Law D finds its contact by a search")
+    assert len(set(notes)) == len(notes)
+    plain = asp.scan(scene, "WC", speeds=0.1, strokes=3, device="touch").setup.assumptions
+    assert not any("baked" in note or "search" in note for note in plain)
+
+
+def test_onsets_state_how_each_law_is_rendered(tmp_path: Path) -> None:
+    """And nothing about the delay of the device, which the delays of the sweep replace."""
+    scene = write_waves(tmp_path, PRESS)
+    text = scene.read_text("utf-8")
+    scene.write_text(re.sub("^centre = .*", "", text, flags=re.MULTILINE), encoding="utf-8")
+    result = asp.onset(
+        scene, "H", 1, device="touch", n_phases=1, duration=0.1, min_stiffness=1000.0
+    )
+    baked, *others = result.setup.assumptions
+    assert baked.startswith("Law H baked as a potential field: ")
+    assert any(note.startswith("The update rate") for note in others)
+    assert not any("delay" in note for note in others)
+
+
+def test_sweeps_take_laws_of_the_user() -> None:
+    law = Law("Y", "doubled-height", "vertical", lambda c: 2 * c.k * c.depth * c.w)
+    result = asp.scan(STROKE, [law, "C"], speeds=0.1, strokes=3)
+    assert [stroke.law for stroke in result.strokes] == ["Y", "C"]
 
 
 def test_tables_name_units() -> None:
@@ -65,8 +121,31 @@ def test_tables_name_units() -> None:
     assert list(frame["law"]) == ["W", "A"]
     limit = result["A"].stability_limit.stiffness
     assert frame["stability limit [N/m]"][1] == limit
+    row = result.table_rows()[1]
+    assert row["ripple [m]"] * row["stiffness [N/m]"] == pytest.approx(row["texture force RMS [N]"])
     several = asp.compare_devices("sinusoid:amplitude=0.1mm,period=1mm", ["touch", "omega.3"])
     assert list(several.to_dataframe()["device"].unique()) == ["touch", "omega.3"]
+
+
+def test_unknown_numbers_are_none() -> None:
+    """On this device nothing is known to be stable for D below crests: no stiffness, no force."""
+    result = asp.compare("sinusoid:amplitude=0.8mm,period=1mm", "omega.3", "D", max_depth=1e-3)
+    (row,) = result.table_rows()
+    assert result["D"].recommended_stiffness == 0.0
+    names = ("recommended stiffness [N/m]", "texture force RMS [N]", "resolved force RMS [N]")
+    assert [row[name] for name in names] == [None, None, None]
+
+
+def test_table_without_pandas(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pandas", None)  # as if it were not installed
+    result = asp.compare("sinusoid:amplitude=0.8mm,period=1mm", laws="W")
+    with pytest.raises(ParameterError, match="needs pandas: pip install pandas"):
+        result.to_dataframe()
+
+
+def test_compare_devices_takes_one_device_and_depth() -> None:
+    result = asp.compare_devices("sinusoid:amplitude=0.1mm,period=1mm", "touch", 1e-4, "W")
+    assert [(one.device.id, one.max_depth) for one in result.comparisons] == [("touch", 1e-4)]
 
 
 @pytest.mark.parametrize(
@@ -77,8 +156,17 @@ def test_tables_name_units() -> None:
         (lambda: asp.limits("cloth", stifness=3.0), "stifness is unknown; did you mean"),
         (lambda: asp.analyze("cloth", depth=1e-4), "depth is unknown; did you mean 'max_depth'"),
         (lambda: asp.onset(PRESS, starts=3), "starts is unknown"),
+        (lambda: asp.onset(PRESS, "W", []), "delays must be one or several"),
+        (lambda: asp.onset(PRESS, "W", 1, stiffness=5.0), "stiffness is the result of onset"),
+        (lambda: asp.onset(PRESS, "W", 1, law="C"), "law is unknown; did you mean 'laws'"),
+        (lambda: asp.onset(PRESS, []), "laws must name at least one law"),
         (lambda: asp.scan(STROKE, speed=[0.1]), "speed is unknown; did you mean 'speeds'"),
-        (lambda: asp.simulate(STROKE, lw="C"), "lw"),
+        (lambda: asp.scan(STROKE, "A", speeds=[]), "speeds must be one or several"),
+        (lambda: asp.scan(STROKE, "A", speeds=-0.1), "speeds must be positive"),
+        (lambda: asp.simulate(STROKE, lw="C"), "lw is unknown; did you mean 'law'"),
+        (lambda: asp.simulate(STROKE, law="C", friction=0.3), "friction has no effect: law C"),
+        (lambda: asp.simulate(None), "scene must be the path of a scene file"),  # type: ignore[arg-type]  # wrong on purpose
+        (lambda: asp.compare_devices("cloth", []), "device must be one or several"),
         (lambda: asp.simulate("cloth", law="C"), r"needs a section \[hand\]"),
         (lambda: asp.replay("missing.mcap"), "missing.mcap"),
     ],

@@ -196,7 +196,7 @@ def test_onsets_do_not_depend_on_the_threads(monkeypatch: pytest.MonkeyPatch, wo
         n_phases=2,
         min_stiffness=5.0,
         progress=lambda: steps.append(1),
-    )
+    ).onsets
     by_law = [f"{cell.onset.law}{cell.onset.delay}" for cell in cells]
     assert by_law == ["W0", "W3", "A0", "A3", "C0", "C3"]
     assert len(steps) == 6
@@ -205,7 +205,7 @@ def test_onsets_do_not_depend_on_the_threads(monkeypatch: pytest.MonkeyPatch, wo
         single = sweeps.sweep_onsets(
             setup, cell.onset.law, (cell.onset.delay,), n_phases=2, min_stiffness=5.0
         )
-        assert single[0].onset == cell.onset
+        assert single.onsets[0].onset == cell.onset
 
 
 def test_threads_are_notified_of_an_interrupt(monkeypatch: pytest.MonkeyPatch) -> None:

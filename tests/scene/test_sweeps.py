@@ -52,7 +52,7 @@ def test_strokes_are_listed_by_law_then_speed_then_depth(tmp_path: Path) -> None
         depths=[0.2e-3, 0.3e-3],
         strokes=2,
         progress=fractions.append,
-    )
+    ).strokes
     order = [(stroke.law, stroke.speed, stroke.depth) for stroke in strokes]
     assert order == [
         (law, speed, depth) for law in "AC" for speed in (0.2, 0.4) for depth in (0.2e-3, 0.3e-3)
@@ -61,7 +61,7 @@ def test_strokes_are_listed_by_law_then_speed_then_depth(tmp_path: Path) -> None
 
 
 def test_default_depth_is_that_of_the_motion(tmp_path: Path) -> None:
-    (stroke,) = sweep_strokes(load_setup(tmp_path), ["C"], speeds=[0.4], strokes=2)
+    (stroke,) = sweep_strokes(load_setup(tmp_path), ["C"], speeds=[0.4], strokes=2).strokes
     assert stroke.depth == pytest.approx(0.3e-3)
 
 

@@ -108,20 +108,18 @@ def onset_command(
         raise ParameterError("stiffness", "is the result of onset: leave it out")
     chosen = select_laws(laws, values["law"])
     setup = load_setup(scene, values, values["duration"], chosen, include_delay=False)
-    from asperity.scene.loops import DEFAULT_DELAYS, OnsetSweep
-    from asperity.scene.sweeps import sweep_onsets
+    from asperity.scene.sweeps import DEFAULT_DELAYS, sweep_onsets
 
-    delays, letters = values["delays"] or DEFAULT_DELAYS, [law.letter for law in chosen]
-    done, total = count(1), len(letters) * len(delays)
+    delays = values["delays"] or DEFAULT_DELAYS
+    done, total = count(1), len(chosen) * len(delays)
     search = options.provided_values(values, _ONSET_SEARCH)
     with progress_bar("simulating onsets") as update:
-        onsets = sweep_onsets(
-            setup, letters, delays, progress=lambda: update(next(done) / total), **search
+        result = sweep_onsets(
+            setup, chosen, delays, progress=lambda: update(next(done) / total), **search
         )
 
     from asperity.report.loop.sweep_report import onset_page
 
-    result = OnsetSweep(setup, onsets)
     outputs.write(result, onset_page(result))
 
 
@@ -139,17 +137,14 @@ def scan_command(scene: str, outputs: Outputs, laws: tuple[Law, ...] | None, **v
 
     The motion of the scene must consist of strokes; their speed and depth are replaced.
     """
-    from asperity.scene.loops import StrokeSweep
     from asperity.scene.sweeps import sweep_strokes
 
     chosen = select_laws(laws, values["law"])
     setup = load_setup(scene, values, laws=chosen)
-    letters = [law.letter for law in chosen]
     arguments = options.provided_values(values, (*_SCAN_LISTS, _STROKES))
     with progress_bar("simulating strokes") as update:
-        strokes = sweep_strokes(setup, letters, progress=update, **arguments)
+        result = sweep_strokes(setup, chosen, progress=update, **arguments)
 
     from asperity.report.loop.sweep_report import strokes_page
 
-    result = StrokeSweep(setup, strokes)
     outputs.write(result, strokes_page(result))

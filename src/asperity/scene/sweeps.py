@@ -10,13 +10,15 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from asperity.core.checks import check_items, check_positive, check_real
 from asperity.core.errors import ParameterError
 from asperity.core.processes import available_cores
+from asperity.laws import Law
 from asperity.scene.setup import Setup
+from asperity.scene.sweep_results import OnsetSweep, StrokeSweep
 from asperity.simulation.limit_cycles.onset import (
     MIN_STIFFNESS,
     Onset,
-    Prediction,
     expected_onset,
     find_onsets,
     predict,
@@ -25,8 +27,10 @@ from asperity.simulation.limit_cycles.onset import (
 from asperity.simulation.motions import Strokes
 from asperity.simulation.scan import Stroke, scan_strokes
 
+DEFAULT_DELAYS = tuple(range(6))  # [samples]
 DEFAULT_SPEEDS = (0.02, 0.05, 0.1, 0.2)  # m/s
 DEFAULT_STROKES = 5
+DEFAULT_STARTS, DEFAULT_TOLERANCE = 12, 0.05
 
 
 ResultT = TypeVar("ResultT")
@@ -55,19 +59,19 @@ def map_threads(
 
 def sweep_onsets(
     setup: Setup,
-    laws: Sequence[str],
-    delays: Sequence[int],
+    laws: Sequence[str | Law],
+    delays: int | Sequence[int],
     *,
-    n_phases: int = 12,
-    tolerance: float = 0.05,
+    n_phases: int = DEFAULT_STARTS,
+    tolerance: float = DEFAULT_TOLERANCE,
     min_stiffness: float = MIN_STIFFNESS,
     progress: Callable[[], None] | None = None,
-) -> tuple[Prediction, ...]:
-    """Return the onset of limit cycles for every law and delay, laws first.
+) -> OnsetSweep:
+    """Find the onset of limit cycles for every law and delay, laws first.
 
     Args:
         setup: the closed loop; its law, stiffness and delay are replaced.
-        laws: letters.
+        laws: letters, or laws.
         delays: delays [samples].
         n_phases: phases of the texture at which the handle starts.
         tolerance: relative width of the bracket.
@@ -78,21 +82,21 @@ def sweep_onsets(
         ParameterError: the hand does not come to rest, see
             :func:`~asperity.simulation.find_onset`.
     """
-    cancelled = Event()
+    cancelled, delays = Event(), check_items("delays", delays)
 
     def check_cancelled() -> None:
         if cancelled.is_set():
             raise CancelledError
 
-    def find(law: str) -> list[Onset]:
-        loop = setup.with_law(law)
+    def find(law: str | Law) -> tuple[Setup, list[Onset]]:
+        loop = setup.with_law(law).with_rendering()
         start = loop.motion.at(np.zeros(1))[0] if loop.start is None else loop.start
         rendered = loop.rendered
         nears = [
             expected_onset(rendered, loop.plant, loop.hand, loop.with_delay(delay).servo, start)
             for delay in delays
         ]
-        return find_onsets(
+        return loop, find_onsets(
             rendered, loop.plant, loop.hand, loop.servo, loop.motion, delays, nears,
             start=loop.start, velocity=loop.velocity, duration=loop.duration, starts=n_phases,
             tolerance=tolerance, lowest=min_stiffness, progress=check_cancelled,
@@ -100,31 +104,39 @@ def sweep_onsets(
         )  # fmt: skip
 
     by_law = map_threads(find, [(law,) for law in laws], cancelled)
-    found = [onset for onsets in by_law for onset in onsets]
-    jobs = [(law, delay) for law in laws for delay in delays]
-    return tuple(
+    found = [onset for _, onsets in by_law for onset in onsets]
+    predictions = tuple(
         predict(
-            setup.with_law(law).rendered, setup.plant, setup.hand, setup.with_delay(delay).servo,
-            onset, smooth_wall_onset(found, delay),
+            loop.rendered, loop.plant, loop.hand, loop.with_delay(onset.delay).servo, onset,
+            smooth_wall_onset(found, onset.delay),
         )
-        for (law, delay), onset in zip(jobs, found, strict=True)
+        for loop, onsets in by_law
+        for onset in onsets
     )  # fmt: skip
+    return OnsetSweep(_with_notes(setup, [loop for loop, _ in by_law]), predictions)
+
+
+def _with_notes(setup: Setup, loops: Sequence[Setup]) -> Setup:
+    """Return the loop with what its copies of each law assume about their rendering."""
+    known = setup.assumptions
+    notes = [note for loop in loops for note in loop.assumptions if note not in known]
+    return replace(setup, assumptions=(*dict.fromkeys(notes), *known))
 
 
 def sweep_strokes(
     setup: Setup,
-    laws: Sequence[str],
+    laws: Sequence[str | Law],
     *,
-    speeds: Sequence[float] = DEFAULT_SPEEDS,
-    depths: Sequence[float] | None = None,
+    speeds: float | Sequence[float] = DEFAULT_SPEEDS,
+    depths: float | Sequence[float] | None = None,
     strokes: int | None = None,
     progress: Callable[[float], None] | None = None,
-) -> tuple[Stroke, ...]:
-    """Return the energy per stroke for every law, speed and depth, laws first.
+) -> StrokeSweep:
+    """Simulate the energy per stroke for every law, speed and depth, laws first.
 
     Args:
         setup: the closed loop; its law is replaced.
-        laws: letters.
+        laws: letters, or laws.
         speeds: speeds of the hand [m/s].
         depths: depths of the hand below z = 0 [m]; default: the motion's.
         strokes: number of strokes per run; default: the motion's, at least 5.
@@ -141,17 +153,20 @@ def sweep_strokes(
     if depths is None:
         if deepest <= 0.0:
             raise ParameterError("depths", "are needed: the motion of the scene is not below z = 0")
-        depths = (deepest,)
+        depths = deepest
     elif not setup.hand.holds_height:
         raise ParameterError("depths", "mean nothing: the hand has no stiffness along z")
     count = max(motion.count, DEFAULT_STROKES) if strokes is None else strokes
     path = replace(motion, count=count)
-    jobs = [(law, speed, depth) for law in laws for speed in speeds for depth in depths]
+    speeds = [check_positive("speeds", one, "m/s") for one in check_items("speeds", speeds)]
+    depths = [check_real("depths", one, "m") for one in check_items("depths", depths)]
+    loops = map_threads(lambda law: setup.with_law(law).with_rendering(), [(law,) for law in laws])
+    jobs = [(loop, speed, depth) for loop in loops for speed in speeds for depth in depths]
     done = [0]
 
-    def one(law: str, speed: float, depth: float) -> Stroke:
+    def one(loop: Setup, speed: float, depth: float) -> Stroke:
         (found,) = scan_strokes(
-            setup.with_law(law).rendered, setup.plant, setup.hand, setup.servo, path,
+            loop.rendered, setup.plant, setup.hand, setup.servo, path,
             speeds=[speed], depths=[depth], start=setup.start, velocity=setup.velocity,
         )  # fmt: skip
         done[0] += 1
@@ -159,4 +174,4 @@ def sweep_strokes(
             progress(done[0] / len(jobs))
         return found
 
-    return map_threads(one, jobs)
+    return StrokeSweep(_with_notes(setup, loops), map_threads(one, jobs))

@@ -115,7 +115,7 @@ def passivity_onsets(laws: str, delays: tuple[int, ...], starts: int) -> tuple[P
     """Return the onsets of laws at delays, including W, and the limits by the criteria."""
     return sweep_onsets(
         band_setup("W"), laws, delays, n_phases=starts, tolerance=0.05, min_stiffness=50.0
-    )
+    ).onsets
 
 
 def passivity_experiment(

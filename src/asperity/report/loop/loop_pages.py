@@ -10,7 +10,7 @@ from asperity.recording.recording import Recording
 from asperity.recording.replay import Replay
 from asperity.report.loop import run_report, sweep_report
 from asperity.report.page import Page, Row, Table, notebook_page
-from asperity.scene.loops import OnsetSweep, StrokeSweep
+from asperity.scene.sweep_results import OnsetSweep, StrokeSweep
 from asperity.simulation import Run
 
 

@@ -14,8 +14,8 @@ from asperity.report.loop.run_report import LOOP_FOOTER, loop_facts
 from asperity.report.page import Cell, Cells, Media, Page, Row, Section, Table, TableLayout
 from asperity.report.sentences.number_text import INFINITY_SIGN, NOT_AVAILABLE
 from asperity.report.sentences.texts import table_notes
-from asperity.scene.loops import OnsetSweep, StrokeSweep
 from asperity.scene.setup import Setup
+from asperity.scene.sweep_results import OnsetSweep, StrokeSweep
 from asperity.simulation.limit_cycles.onset import Prediction
 from asperity.simulation.scan import Stroke
 
