@@ -10,15 +10,15 @@ const STILL_DISTANCE = 1e-6; // m per frame, below which the anchor of the hand 
 const WINDOW = 0.6; // s over which an oscillation is observed
 const MAX_BOUNCE = 0.1; // s: a probe that leaves the surface for less is still pressed
 
-/** Energy supplied to the hand since the probe was last free, and how much of it sampling and quantisation explain. */
+/** Energy supplied to the hand since the reset or, unless it was fed before, since the probe was first free, and how much of it sampling and quantisation explain. */
 export class EnergyMeter {
   constructor() { this.reset(); this.awaitsFreeProbe = false; }
 
-  /** Reset the energy at the next frame, and again at the next frame with a free probe. */
+  /** Reset the energy at the next frame, and again at the next frame with a free probe unless it was fed by then. */
   reset() {
     this.awaitsFreeProbe = true;
     this.offset = null; // of the supplied energy
-    this.energy = this.samplingBound = 0;
+    this.energy = this.samplingBound = this.storedEnergy = 0;
   }
 
   /**
@@ -39,12 +39,17 @@ export class EnergyMeter {
       const bound = k * (0.5 * (limit.one_sided ?? 1) + delayTerm) * squaredSteps + (quantisation + halfDiagonal * forceResolution) * pathLength;
       this.samplingBound += bound * rowCount / Math.max(rowCount - 1, 1); // includes the step from the previous frame
     }
+    // A wall that was pressed at the reset may give back what it stored, f²/(2k) at most.
+    const force = Math.hypot(...["applied x", "applied y", "applied z"].map(name => newest[columns[name]]));
+    if (this.awaitsFreeProbe) this.storedEnergy = Math.max(this.storedEnergy, 0.5 * force ** 2 / settings.stiffness);
     if (this.awaitsFreeProbe && !newest[columns.inside]) {
       this.awaitsFreeProbe = false;
-      this.offset = supplied;
-      this.samplingBound = 0;
+      if (!this.suppliesEnergy) {
+        this.offset = supplied;
+        this.samplingBound = this.storedEnergy = 0;
+      }
     }
-    this.energy = supplied - this.offset;
+    this.energy = supplied - this.offset - this.storedEnergy;
   }
 
   get suppliesEnergy() { return this.energy > Math.max(MIN_ENERGY, this.samplingBound); }
