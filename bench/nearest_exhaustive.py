@@ -69,7 +69,7 @@ def _fourier(waves: Any, amplitudes: Any, step: float, depth: float) -> Case:
 
 def _bullet_case() -> Case:
     """Return a third of a measured surface, 300 x 256 points, magnified 20 times."""
-    whole = load_texture(REAL, magnify=20.0, cutoff=20e-6)
+    whole = load_texture(REAL, magnify=20.0, s_cutoff=20e-6)
     assert isinstance(whole, HeightMap)
     return Case(HeightMap(whole.heights[:, 300:600], whole.pitch), 1e-5, 0.6e-3)
 

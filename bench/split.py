@@ -72,7 +72,7 @@ def _exact_cases() -> list[tuple[str, str, Surface, FloatArray]]:
     rough = HeightMap(cases._rough((1024, 1024), rng), pitch=50e-6)
     named: dict[str, HeightMap] = {"band-limited noise": rough}
     if DATA.exists():
-        measured = load_texture(DATA, magnify=20, cutoff=10e-6)
+        measured = load_texture(DATA, magnify=20, s_cutoff=10e-6)
         assert isinstance(measured, HeightMap)
         named["measured land"] = measured
     for name, surface_map in named.items():
@@ -149,7 +149,7 @@ def search_textures() -> dict[str, Texture]:
     rng = np.random.default_rng(cases.SEED)
     result["noise"] = Profile(1e-4 * rng.normal(size=256), 1e-4, periodic=True)
     if DATA.exists():
-        result["measured land"] = load_texture(DATA, magnify=20, cutoff=10e-6)
+        result["measured land"] = load_texture(DATA, magnify=20, s_cutoff=10e-6)
     return result
 
 

@@ -29,7 +29,7 @@ raw[(x - 5.5e-4) ** 2 + (y - 2.5e-4) ** 2 < (4e-5) ** 2] = np.nan  # a spot with
 with tempfile.TemporaryDirectory() as folder:
     path = Path(folder) / "sample.npy"
     np.save(path, raw)
-    texture = asp.load_texture(path, pitch=pitch, cutoff=30e-6, magnify=10)
+    texture = asp.load_texture(path, pitch=pitch, s_cutoff=30e-6, magnify=10)
 for sentence in texture.preparation:
     print("-", sentence)
 

@@ -64,7 +64,7 @@ def test_every_option_reaches_the_preparation(call: Call, source: str, tmp_path:
         "--height-range": "8um",
         "--outliers": "6",
         "--form": "3",
-        "--cutoff": "9um",
+        "--s-cutoff": "9um",
         "--l-cutoff": "60um",
         "--tip-radius": "4um",
         "--blend": "10um",
@@ -92,7 +92,7 @@ def test_every_option_reaches_the_preparation(call: Call, source: str, tmp_path:
         height_range=8e-6,
         outliers=6,
         form=3,
-        cutoff=9e-6,
+        s_cutoff=9e-6,
         l_cutoff=6e-5,
         tip_radius=4e-6,
         periodic=True,
@@ -114,10 +114,10 @@ def test_prepared_file_is_used_by_compare_and_scenes(
     code, out, err = call("compare", str(target), "--laws", "W", "--magnify-height", "2")
     assert (code, err) == (0, "")
     assert "outliers: 1 point beyond 6 robust" in flat(out)
-    code, _out, err = call("compare", str(target), "--laws", "W", "--cutoff", "90um")
+    code, _out, err = call("compare", str(target), "--laws", "W", "--s-cutoff", "90um")
     assert code == 2
     assert err.count("\n") == 1
-    assert "cutoff cannot be applied" in err
+    assert "s_cutoff cannot be applied" in err
     assert "was prepared already" in err
     (tmp_path / "scene.toml").write_text('[texture]\nkind = "file"\npath = "surface.npz"\n')
     texture = load_scene(str(tmp_path / "scene.toml")).texture
@@ -155,7 +155,7 @@ def test_scene_options_prepare_the_surface(source: str, tmp_path: Path) -> None:
         (["--pitch", "2um", "--form", "2.5"], "form must be a whole number"),
         (["--pitch", "2um", "--form", "nan"], "form must be finite"),
         (["--pitch", "2um", "--form", "30"], "form must be a whole number from 0 to 10"),
-        (["--pitch", "2um", "--cutoff", "9um", "--l-cutoff", "9um"], "l_cutoff must be longer"),
+        (["--pitch", "2um", "--s-cutoff", "9um", "--l-cutoff", "9um"], "l_cutoff must be longer"),
         (["--pitch", "2um", "--l-cutoff", "1kg"], "l_cutoff must be a quantity"),
         (["--pitch", "2um", "--tip-radius", "1 m"], "tip_radius must be at most"),
         (["--pitch", "2um", "--tip-radius", "-1um"], "tip_radius must be positive"),

@@ -61,7 +61,10 @@ def test_surface_parameters_are_listed_after_each_step(call: Call, source: str) 
     assert all(len(row) == 12 for row in rows)
     assert re.search(r"^Sdr\s+developed interfacial area ratio", out, re.MULTILINE)
     assert re.search(r"Sal \d.* µm \(autocorrelation length\)", out)
-    assert out.startswith("Texture of ")
+    assert out.startswith(
+        f"Roughness Sq of {float(rows[-1][1]):g} µm RMS: the waves shorter than 80 µm"
+    )
+    assert "Form, waviness" not in out
     assert "pitch 2 µm as given" in out
     heights = np.load(source)
     sq = float(rows[0][1])
@@ -112,7 +115,7 @@ def test_html_page_shows_each_step_and_what_it_removed(
         "Levelled",
         "S-filter 8 µm",
         "L-filter 80 µm",
-        "Form, waviness and texture",
+        "autocorrelation length",
         "ISO 25178-2:2021, 4.4.3",
         "what the step removed",
     ):
@@ -202,3 +205,17 @@ def test_folder_hides_no_surface_of_the_catalogue(
     code, out, _err = call("limits", "knurl", "--law", "W", "--json", "-")
     assert code == 0
     assert '"knurl"' in out
+
+
+def test_headline_follows_the_requested_filter(call: Call, source: str) -> None:
+    assert call("show", source, *PLAIN)[1].startswith("Texture of ")
+    long = call("show", source, *PLAIN, "--l-cutoff", "0.16mm")[1]
+    assert "ISO 25178-3 takes at least 160 µm" in " ".join(long.split("\n\n")[0].split())
+    out = call("show", source, *PLAIN, "--l-cutoff", "80um", "--json", "-")[1]
+    assert json.loads(out)["parts"] is None
+
+
+def test_cutoff_alone_asks_which(call: Call, source: str) -> None:
+    code, out, err = call("show", source, "--cutoff", "0.8mm")
+    assert (code, out) == (2, "")
+    assert "'--l-cutoff', '--s-cutoff'" in err

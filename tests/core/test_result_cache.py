@@ -327,7 +327,8 @@ def test_file_is_prepared_again_only_after_a_change(
     assert len(stored) == 1
     assert np.array_equal(first.heights, second.heights)
     assert (first.steps, first.history, first.pitch) == (second.steps, second.history, second.pitch)
-    for count, changed in enumerate([{"magnify": 2.0}, {"cutoff": 9e-4}, {"pitch": [1e-4, 2e-4]}]):
+    changes = [{"magnify": 2.0}, {"s_cutoff": 9e-4}, {"pitch": [1e-4, 2e-4]}]
+    for count, changed in enumerate(changes):
         prepare_file(file, **{"pitch": 1e-4} | changed)
         assert len(stored) == 2 + count
     np.save(file, 2e-5 * HEIGHTS.repeat(4, 0).repeat(4, 1))

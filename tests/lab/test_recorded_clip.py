@@ -310,7 +310,7 @@ def test_the_command_refuses_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "empty.mcap").write_bytes(b"")
     for arguments, words in (
         (["empty.mcap"], "cannot be read: it is empty"),
-        (["run.mcap", "--cutoff", "1mm"], "cutoff has no effect on a recording"),
+        (["run.mcap", "--s-cutoff", "1mm"], "s_cutoff has no effect on a recording"),
     ):
         command = [sys.executable, "-m", "asperity", "lab", "--no-browser", *arguments]
         done = subprocess.run(

@@ -64,7 +64,7 @@ def made(name: str, folder: Path) -> SceneState:
     text = KINDS[name]
     if name == "measured":
         Image.effect_noise((40, 30), 20.0).save(folder / text)
-        told = {"pitch": 2e-4, "height_range": 2e-4, "cutoff": 8e-4}
+        told = {"pitch": 2e-4, "height_range": 2e-4, "s_cutoff": 8e-4}
         return make_scene_state(
             load_scene(str(folder / text), told), str(folder / text), preparation=told
         )

@@ -44,7 +44,7 @@ def test_alpha_is_the_constant_of_the_standard() -> None:
 def test_s_filter_of_a_profile(waves: int, cutoff: float) -> None:
     before = wave(waves)
     length = 2 * (N - 1) * P / waves
-    filtered = filter_only(before, cutoff=cutoff).heights
+    filtered = filter_only(before, s_cutoff=cutoff).heights
     mean = before.mean()  # form 0 subtracts it, and the filter keeps a constant
     expected = transmission(length, cutoff) * before - mean
     assert np.max(np.abs(filtered - expected)) < 1e-12 * 1e-6
@@ -55,7 +55,7 @@ def test_s_and_l_filter_of_a_profile(waves: int) -> None:
     short, long = 4e-6, 5e-5
     before = wave(waves)
     length = 2 * (N - 1) * P / waves
-    filtered = filter_only(before, cutoff=short, l_cutoff=long).heights
+    filtered = filter_only(before, s_cutoff=short, l_cutoff=long).heights
     expected = transmission(length, short) * (1 - transmission(length, long)) * before
     assert np.max(np.abs(filtered - expected)) < 1e-12 * 1e-6
     wrong = transmission(length, short) * (1 - transmission(length, 1.001 * long)) * before
@@ -69,7 +69,7 @@ def test_l_filter_of_a_map_with_unequal_pitch() -> None:
     kx, ky = 7 / (2 * (nx - 1) * px), 9 / (2 * (ny - 1) * py)  # waves per metre
     before = 1e-6 * np.cos(2 * np.pi * kx * px * x) * np.cos(2 * np.pi * ky * py * y)
     raw = RawSurface(before, (px, py), "test", ())
-    filtered = prepare(raw, form=0, cutoff=short, l_cutoff=long).heights
+    filtered = prepare(raw, form=0, s_cutoff=short, l_cutoff=long).heights
     square = kx**2 + ky**2
     expected = 2.0 ** -(short**2 * square) * (1 - 2.0 ** -(long**2 * square)) * before
     assert np.max(np.abs(filtered - expected)) < 1e-12 * 1e-6
@@ -103,16 +103,35 @@ def test_input_is_not_changed() -> None:
 
 
 def test_steps_state_both_filters() -> None:
-    steps = filter_only(wave(5), cutoff=4e-6, l_cutoff=8e-5).steps
+    steps = filter_only(wave(5), s_cutoff=4e-6, l_cutoff=8e-5).steps
     assert steps[2] == "filtered: Gaussian ISO 16610-21, cut-off 4 µm"
     assert steps[3] == "waviness removed: Gaussian L-filter ISO 16610-21, cut-off 80 µm"
 
 
 @pytest.mark.parametrize(
+    ("shape", "l_cutoff", "words"),
+    [
+        ((401,), 80e-6, None),  # 400 µm: five section lengths, exactly
+        ((401,), 81e-6, "400 µm are 4.94 section lengths of 81 µm, ISO 21920-3 takes 5"),
+        ((101, 401), 100e-6, None),  # the shorter side is 100 µm
+        ((401, 101), 101e-6, "100 µm wide, ISO 25178-3 takes at least 101 µm"),
+    ],
+)
+def test_a_trace_too_short_for_the_l_filter_is_reported(
+    shape: tuple[int, ...], l_cutoff: float, words: str | None
+) -> None:
+    heights = 1e-6 * np.random.default_rng(1).standard_normal(shape)
+    raw = RawSurface(heights, (1e-6,) * len(shape), "rough", ())
+    warnings = [step for step in prepare(raw, l_cutoff=l_cutoff).steps if "for this L" in step]
+    assert len(warnings) == (words is not None)
+    assert all(warning.endswith(words or "") for warning in warnings)
+
+
+@pytest.mark.parametrize(
     ("l_cutoff", "match"),
     [
-        (4e-6, "must be longer than cutoff, 4 µm"),
-        (1e-6, "must be longer than cutoff"),
+        (4e-6, "must be longer than s_cutoff, 4 µm"),
+        (1e-6, "must be longer than s_cutoff"),
         (1e-3, "must be at most the surface's length, 400 µm"),
         (0.0, "must be positive"),
         (-1e-5, "must be positive"),
@@ -123,10 +142,10 @@ def test_steps_state_both_filters() -> None:
 )
 def test_invalid_l_cutoffs_are_refused(l_cutoff: Any, match: str) -> None:
     with pytest.raises(ParameterError, match=match) as caught:
-        filter_only(wave(5), cutoff=4e-6, l_cutoff=l_cutoff)
+        filter_only(wave(5), s_cutoff=4e-6, l_cutoff=l_cutoff)
     assert caught.value.argument == "l_cutoff"
 
 
 def test_l_cutoff_must_exceed_the_default_cutoff() -> None:
-    with pytest.raises(ParameterError, match="l_cutoff must be longer than cutoff, 4 µm"):
+    with pytest.raises(ParameterError, match="l_cutoff must be longer than s_cutoff, 4 µm"):
         filter_only(wave(5), l_cutoff=3e-6)

@@ -100,7 +100,7 @@ def test_step_states_size_and_slopes_of_the_form() -> None:
 
 def test_degree_zero_keeps_the_tilt() -> None:
     ramp = np.linspace(0.0, 1e-4, 50)
-    prepared = prepare(RawSurface(ramp, (1e-5,), "ramp", ()), form=0, cutoff=2e-5)
+    prepared = prepare(RawSurface(ramp, (1e-5,), "ramp", ()), form=0, s_cutoff=2e-5)
     assert np.ptp(prepared.heights) > 0.9e-4
     assert abs(prepared.heights.mean()) < 1e-18
     assert prepared.steps[1] == "mean height 50 µm subtracted; not levelled"

@@ -36,7 +36,7 @@ def stage_names(stages: tuple[PreparationStage, ...]) -> list[str]:
 
 
 def test_every_step_is_recorded() -> None:
-    arguments: dict[str, Any] = {"cutoff": 2e-5, "l_cutoff": 1e-4, "tip_radius": 1e-5}
+    arguments: dict[str, Any] = {"s_cutoff": 2e-5, "l_cutoff": 1e-4, "tip_radius": 1e-5}
     ready = prepare(surface(), outliers=9.0, periodic=True, blend=5e-5, magnify=3.0, **arguments)
     assert stage_names(ready.history) == [
         "as read",
@@ -61,7 +61,7 @@ def test_every_step_is_recorded() -> None:
 
 def test_stages_state_the_removed_heights_of_each_filter() -> None:
     """Cosines are smooth at the mirrored border, so the filters remove known shares."""
-    ready = prepare(surface(hole=False), form=0, cutoff=2e-5, l_cutoff=1e-4)
+    ready = prepare(surface(hole=False), form=0, s_cutoff=2e-5, l_cutoff=1e-4)
     by_name = {stage.name: stage for stage in ready.history}
     tilt = 0.01 * np.arange(401) * 5e-6
     assert by_name["mean removed"].removed is not None

@@ -83,7 +83,7 @@ def test_levelling_fits_the_valid_points_only() -> None:
     fill_in_place(flat, (P, 2 * P))
     flat -= fit[0] + fit[1] * columns + fit[2] * rows
     expected = gaussian_filter(flat, (P, 2 * P), 8 * P)
-    filtered = prepare(surface(heights), cutoff=8 * P).heights
+    filtered = prepare(surface(heights), s_cutoff=8 * P).heights
     np.testing.assert_allclose(filtered, expected, atol=1e-17)
 
 
@@ -95,7 +95,7 @@ def test_hole_at_the_border_continues_the_form(form: int) -> None:
     wave = 1e-3 * P * np.cos(np.pi * x / 5)
     heights = shape + wave
     heights[:, 50:] = np.nan
-    prepared = prepare(surface(heights), form=form, cutoff=4 * P)
+    prepared = prepare(surface(heights), form=form, s_cutoff=4 * P)
     assert np.max(np.abs(prepared.heights)) < 3e-3 * P
     assert np.ptp(shape) > 1.0 * P
     assert prepared.filled_mask is not None
@@ -157,7 +157,7 @@ def test_default_cutoff_is_stated() -> None:
     assert prepared.steps[2] == (
         "filtered: Gaussian ISO 16610-61, cut-off 8 µm (chosen from the sampling: 4 samples)"
     )
-    same = prepare(surface(bumpy()), cutoff=8e-6)
+    same = prepare(surface(bumpy()), s_cutoff=8e-6)
     np.testing.assert_array_equal(prepared.heights, same.heights)
     assert same.steps[2] == "filtered: Gaussian ISO 16610-61, cut-off 8 µm"
     smallest = prepare(surface(bumpy(4, 4), pitch=(P, P)))
@@ -229,10 +229,10 @@ def test_input_is_not_changed() -> None:
         ({"magnify": -2.0}, "magnify must be positive"),
         ({"magnify": np.nan}, "magnify must be finite"),
         ({"magnify_height": np.inf}, "magnify_height must be finite"),
-        ({"cutoff": 0.0}, "cutoff must be positive"),
-        ({"cutoff": np.nan}, "cutoff must be finite"),
-        ({"cutoff": 3.9e-6}, "cutoff must be at least two samples, 4 µm"),
-        ({"cutoff": 1e-4}, "cutoff must be at most the surface's length, 78 µm"),
+        ({"s_cutoff": 0.0}, "s_cutoff must be positive"),
+        ({"s_cutoff": np.nan}, "s_cutoff must be finite"),
+        ({"s_cutoff": 3.9e-6}, "s_cutoff must be at least two samples, 4 µm"),
+        ({"s_cutoff": 1e-4}, "s_cutoff must be at most the surface's length, 78 µm"),
         ({"pitch": 0.0}, "pitch must be positive"),
         ({"pitch": (1e-6, np.nan)}, "pitch must be finite"),
         ({"pitch": (1e-6, 1e-6, 1e-6)}, "pitch must be one number or"),
@@ -251,8 +251,8 @@ def test_magnification_that_overflows_is_refused() -> None:
 
 
 def test_limits_of_the_cutoff_are_accepted() -> None:
-    prepare(surface(bumpy()), cutoff=4e-6)
-    prepare(surface(bumpy()), cutoff=78e-6)
+    prepare(surface(bumpy()), s_cutoff=4e-6)
+    prepare(surface(bumpy()), s_cutoff=78e-6)
 
 
 @pytest.mark.parametrize(

@@ -110,7 +110,7 @@ def test_prepared_surface_can_be_magnified(saved: Path) -> None:
         {"outliers": 6.0},
         {"form": 1},
         {"form": 0},
-        {"cutoff": 1e-5},
+        {"s_cutoff": 1e-5},
         {"l_cutoff": 1e-4},
         {"tip_radius": 1e-6},
         {"periodic": True},

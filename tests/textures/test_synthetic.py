@@ -54,7 +54,7 @@ def test_amplitudes_are_multiplied_by_the_filter_transfer() -> None:
     texture = Fourier(
         [3e-4, -2e-4], 2 * np.pi / 1e-3 * np.array([[0.6, 0.8], [0.0, 3.0]]), [0.3, 1]
     )
-    filtered = prepare_texture(texture, cutoff=0.5e-3, l_cutoff=2e-3, magnify=2.0)
+    filtered = prepare_texture(texture, s_cutoff=0.5e-3, l_cutoff=2e-3, magnify=2.0)
     assert isinstance(filtered, Fourier)
     lengths = np.array([1e-3, 1e-3 / 3.0])
     expected = [transfer(0.5e-3, length) * (1 - transfer(2e-3, length)) for length in lengths]
@@ -65,7 +65,7 @@ def test_amplitudes_are_multiplied_by_the_filter_transfer() -> None:
 
 def test_filtered_sinusoid_is_a_sinusoid() -> None:
     texture = Sinusoid(1e-3, 2e-3, 0.7, (3.0, 4.0))
-    filtered = prepare_texture(texture, cutoff=2e-3, magnify=1.5)
+    filtered = prepare_texture(texture, s_cutoff=2e-3, magnify=1.5)
     assert isinstance(filtered, Sinusoid)
     assert filtered.amplitude == pytest.approx(0.75e-3, rel=1e-12)
     assert (filtered.period, filtered.phase, filtered.direction) == (3e-3, 0.7, (0.6, 0.8))
@@ -76,11 +76,11 @@ def test_filtered_sinusoid_is_a_sinusoid() -> None:
 def test_periodic_map_is_filtered_across_its_border() -> None:
     wave = 1e-4 * np.cos(2 * np.pi * (np.arange(64) + 3) / 64)
     texture = HeightMap(np.tile(wave, (8, 1)), 1e-5, periodic=True)
-    filtered = prepare_texture(texture, cutoff=0.64e-3 * 0.9)
+    filtered = prepare_texture(texture, s_cutoff=0.64e-3 * 0.9)
     assert isinstance(filtered, HeightMap)
     np.testing.assert_allclose(filtered.heights, transfer(0.9, 1.0) * texture.heights, atol=1e-16)
     finite = HeightMap(texture.heights, 1e-5)
-    mirrored = prepare_texture(finite, cutoff=0.64e-3 * 0.9)
+    mirrored = prepare_texture(finite, s_cutoff=0.64e-3 * 0.9)
     assert isinstance(mirrored, HeightMap)
     assert not np.allclose(mirrored.heights, filtered.heights, atol=1e-6)
 
@@ -128,7 +128,7 @@ class Hill(Texture):
 
 
 def test_texture_without_optional_members_is_sampled() -> None:
-    prepared = prepare_texture(Hill(), magnify=2.0, cutoff=2e-3)
+    prepared = prepare_texture(Hill(), magnify=2.0, s_cutoff=2e-3)
     np.testing.assert_allclose(
         prepared.height(2.0 * POINTS), Hill.wave.height(POINTS), atol=1e-9, rtol=1e-6
     )
@@ -136,12 +136,12 @@ def test_texture_without_optional_members_is_sampled() -> None:
 
 BAD = [
     ("sinusoid:amplitude=1mm,period=1mm", {"form": 2}, "form applies to measured surfaces only"),
-    ("knurl", {"outliers": 6.0}, "others take height_range, cutoff, l_cutoff, tip_radius, magn"),
+    ("knurl", {"outliers": 6.0}, "others take height_range, s_cutoff, l_cutoff, tip_radius, magn"),
     ("knurl", {"magnify": 0.0}, "magnify must be positive"),
-    ("knurl", {"cutoff": 1.0}, "cutoff must be at most"),
-    ("sinusoid:amplitude=1mm,period=1mm", {"cutoff": -1.0}, "cutoff must be positive"),
+    ("knurl", {"s_cutoff": 1.0}, "s_cutoff must be at most"),
+    ("sinusoid:amplitude=1mm,period=1mm", {"s_cutoff": -1.0}, "s_cutoff must be positive"),
     ("sinusoid:amplitude=1mm,period=1mm,magnify=2mm", {}, "magnify must be a number"),
-    ("sinusoid:amplitude=1mm,period=1mm,cutoff=2", {}, "cutoff needs a unit"),
+    ("sinusoid:amplitude=1mm,period=1mm,s_cutoff=2", {}, "s_cutoff needs a unit"),
     ("sinusoid:amplitude=1mm,period=1mm,outliers=2", {}, "sinusoid.outliers is unknown"),
 ]
 
@@ -171,10 +171,10 @@ def test_specifications_scenes_and_options_agree(tmp_path: Path) -> None:
 
 
 def test_texture_argument_precedes_a_preparation_of_the_same_name() -> None:
-    """``cutoff`` in a noise specification is its shortest wave; as an option it is a filter."""
+    """``cutoff`` of noise is its shortest wave; ``s_cutoff`` is a filter."""
     unfiltered = load_scene("noise:rms=20um,size=5mm,cutoff=0.5mm").texture
     assert not any("filtered" in step for step in unfiltered.preparation)
-    filtered = load_scene("noise:rms=20um,size=5mm", {"cutoff": 0.5e-3}).texture
+    filtered = load_scene("noise:rms=20um,size=5mm", {"s_cutoff": 0.5e-3}).texture
     assert any("filtered" in step for step in filtered.preparation)
 
 

@@ -25,9 +25,10 @@ PREPARATION_ARGUMENTS = (*read_arguments(_TABLES, "preparation").values(), *MAGN
 FILE_ARGUMENTS = (*READING_ARGUMENTS, *PREPARATION_ARGUMENTS)
 """All arguments of a measured file."""
 
-_SYNTHETIC_NAMES = ("height_range", "cutoff", "l_cutoff", "tip_radius", "magnify", "magnify_height")
+_MAGNIFICATION_NAMES = {argument.name for argument in MAGNIFICATION_ARGUMENTS}
+_SYNTHETIC_NAMES = {"height_range", "s_cutoff", "l_cutoff", "tip_radius", *_MAGNIFICATION_NAMES}
 SYNTHETIC_ARGUMENTS = tuple(
-    replace(argument, default_description="none") if argument.name == "cutoff" else argument
+    replace(argument, default_description="none") if argument.name == "s_cutoff" else argument
     for argument in PREPARATION_ARGUMENTS
     if argument.name in _SYNTHETIC_NAMES
 )

@@ -16,6 +16,9 @@ from asperity.measured.lengths import Pitch, Shape, format_length
 ALPHA = math.sqrt(math.log(2.0) / math.pi)
 """Constant of ISO 16610-21 and -61 for a transmission of 50 % at the cut-off."""
 
+SECTION_COUNT = 5
+"""Section lengths, each as long as the cut-off of the L-filter, of a profile (ISO 21920-3)."""
+
 DEFAULT_SAMPLES = 4
 """Default cut-off wavelength in samples."""
 
@@ -100,26 +103,26 @@ class Cutoffs:
 
 
 def find_cutoffs(
-    shape: Shape, pitch: Pitch, cutoff: float | None, l_cutoff: float | None
+    shape: Shape, pitch: Pitch, s_cutoff: float | None, l_cutoff: float | None
 ) -> Cutoffs:
     """Return the cut-offs for a surface.
 
     Args:
         shape: (ny, nx) or (n,).
         pitch: (px, py) or (px,) [m].
-        cutoff: cut-off of the S-filter [m]; None for four times the larger pitch.
+        s_cutoff: cut-off of the S-filter [m]; None for four times the larger pitch.
         l_cutoff: cut-off of the L-filter [m]; None for no L-filter.
 
     Raises:
         ParameterError: a cut-off conflicts with the sampling, the extent or the other cut-off.
     """
     longest = max((n - 1) * p for n, p in zip(shape[::-1], pitch, strict=True))
-    short, note = _s_cutoff(max(pitch), longest, cutoff)
+    short, note = _s_cutoff(max(pitch), longest, s_cutoff)
     if l_cutoff is None:
         return Cutoffs(short, None, note)
     long = check_positive("l_cutoff", l_cutoff, "m")
     if long <= short:
-        limit = f"must be longer than cutoff, {format_length(short)} [m]"
+        limit = f"must be longer than s_cutoff, {format_length(short)} [m]"
         raise ParameterError("l_cutoff", limit, l_cutoff)
     _check_at_most("l_cutoff", long, longest)
     return Cutoffs(short, long, note)
@@ -149,7 +152,36 @@ def apply_filters(
         long = format_length(cutoffs.long)
         record(f"L-filter {long}", heights, pitch, removes=True, nesting=cutoffs.long)
         steps.append(f"waviness removed: Gaussian L-filter ISO 16610-{part}, cut-off {long}")
+        steps.extend(filter(None, [short_trace_text(heights.shape, pitch, cutoffs.long)]))
     return steps
+
+
+def short_trace_text(shape: Shape, pitch: Pitch, l_cutoff: float) -> str:
+    """Return how a surface is too short for the cut-off of its L-filter; empty if it is not.
+
+    A profile is evaluated over five section lengths, each as long as the cut-off (ISO 21920-3). The
+    evaluation area of a map is at least as wide as the nesting index (ISO 25178-3).
+
+    Args:
+        shape: (ny, nx) or (n,).
+        pitch: (px, py) or (px,) [m].
+        l_cutoff: cut-off of the L-filter [m].
+
+    Example:
+        >>> short_trace_text((3001,), (1e-6,), 0.8e-3)
+        'too short for this L-filter: 3 mm are 3.75 section lengths of 800 µm, ISO 21920-3 takes 5'
+        >>> short_trace_text((5001,), (1e-6,), 0.8e-3)
+        ''
+    """
+    shortest = min((n - 1) * p for n, p in zip(shape[::-1], pitch, strict=True))
+    count = SECTION_COUNT if len(shape) == 1 else 1
+    if shortest * (1 + 1e-9) >= count * l_cutoff:
+        return ""
+    side, length = format_length(shortest), format_length(l_cutoff)
+    if len(shape) > 1:
+        return f"too small for this L-filter: {side} wide, ISO 25178-3 takes at least {length}"
+    sections = f"{shortest / l_cutoff:.3g} section lengths of {length}"
+    return f"too short for this L-filter: {side} are {sections}, ISO 21920-3 takes {SECTION_COUNT}"
 
 
 def _blocks(heights: FloatArray, axis: int) -> Iterator[FloatArray]:
@@ -164,16 +196,16 @@ def _blocks(heights: FloatArray, axis: int) -> Iterator[FloatArray]:
         yield heights[part] if across == 0 else heights[:, part]
 
 
-def _s_cutoff(max_pitch: float, max_length: float, cutoff: float | None) -> tuple[float, str]:
-    if cutoff is None:
+def _s_cutoff(max_pitch: float, max_length: float, s_cutoff: float | None) -> tuple[float, str]:
+    if s_cutoff is None:
         length = min(DEFAULT_SAMPLES * max_pitch, max_length)
         return length, f" (chosen from the sampling: {length / max_pitch:g} samples)"
-    length = check_positive("cutoff", cutoff, "m")
+    length = check_positive("s_cutoff", s_cutoff, "m")
     # The tolerance admits a limit that the user computed in rounded decimals.
     if length < 2.0 * max_pitch * (1 - 5e-7):
         limit = f"must be at least two samples, {format_length(2 * max_pitch)} [m]"
-        raise ParameterError("cutoff", limit, length)
-    _check_at_most("cutoff", length, max_length)
+        raise ParameterError("s_cutoff", limit, length)
+    _check_at_most("s_cutoff", length, max_length)
     return length, ""
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from asperity.core.checks import FloatArray, check_positive
 from asperity.core.errors import ParameterError
 from asperity.measured.filling import fill_in_place
-from asperity.measured.filters import gaussian_filter
+from asperity.measured.filters import SECTION_COUNT, gaussian_filter
 from asperity.measured.lengths import Pitch, Shape, format_length
 
 MAX_DEGREE = 10
@@ -278,7 +278,7 @@ def default_nesting_index(shape: Shape, pitch: Pitch, periodic: bool) -> float:
     if periodic:
         return MAX_TEXTURE_WAVELENGTH
     shortest = min((n - 1) * p for n, p in zip(shape[::-1], pitch, strict=True))
-    limit = shortest / (5 if len(shape) == 1 else 1)
+    limit = shortest / (SECTION_COUNT if len(shape) == 1 else 1)
     limit *= 1 + 1e-9  # rounding must not exclude a map as long as a nesting index
     exponent = math.floor(math.log10(limit))
     fitting = (float(f"{digits}e{exponent}") for digits in (8, 2.5, 0.8))

@@ -133,7 +133,7 @@ def prepare(  # noqa: D417 - the others are described by their declarations
     outliers: float | None = None,
     max_missing: float = MAX_MISSING,
     form: int = 1,
-    cutoff: float | None = None,
+    s_cutoff: float | None = None,
     l_cutoff: float | None = None,
     tip_radius: float | None = None,
     periodic: bool = False,
@@ -183,7 +183,7 @@ def prepare(  # noqa: D417 - the others are described by their declarations
     lateral = _resolve_pitch(raw, pitch, steps)
     check_degree(form)
     magnification_factors(magnify, magnify_height)
-    cutoffs = find_cutoffs(raw.heights.shape, lateral, cutoff, l_cutoff)
+    cutoffs = find_cutoffs(raw.heights.shape, lateral, s_cutoff, l_cutoff)
     _check_arguments(raw.heights.shape, lateral, tip_radius, periodic, blend)
     require_memory(*raw.heights.shape[::-1])
     start("outliers")

@@ -14,6 +14,7 @@ from asperity.core.cache import get_or_compute
 from asperity.core.checks import FloatArray
 from asperity.core.errors import escape_unprintable
 from asperity.core.units import format_quantity
+from asperity.measured.filters import short_trace_text
 from asperity.measured.form import SurfaceDecomposition, decompose_surface
 from asperity.measured.lengths import format_counts, format_lengths
 from asperity.measured.parameters import MAX_CORRELATION_POINTS, SurfaceParameter, find_parameter
@@ -134,9 +135,11 @@ def measured_sections(texture: Texture) -> list[Section]:
     """Return the section of the parameters of a measured surface; none for other textures."""
     if not texture.history:
         return []
+    table, more = stages_table(texture.history), "More: asperity show."
+    if text := roughness_text(texture.history):
+        return [Section("Surface parameters", [table], text, [more])]
     parts = get_or_compute("parts", texture.digest, lambda: _compute_parts(texture))
-    blocks = [stages_table(texture.history), parts_table(parts)]
-    notes = [parts_text(parts), "More: asperity show."]
+    blocks, notes = [table, parts_table(parts)], [parts_text(parts), more]
     return [Section("Surface parameters", blocks, texture_text(parts), notes)]
 
 
@@ -161,6 +164,17 @@ def texture_text(parts: SurfaceDecomposition) -> str:
         f"Texture of {rms} RMS in waves shorter than {format_quantity(parts.nesting, 'm')}, on a "
         f"form of {format_quantity(parts.form.rms, 'm')} and a waviness of "
         f"{format_quantity(parts.waviness.rms, 'm')} RMS."
+    )
+
+
+def roughness_text(history: Sequence[PreparationStage]) -> str:
+    """Return the RMS of what the requested L-filter left, in one sentence; empty for none."""
+    if not history or (nesting := history[-1].nesting) is None:
+        return ""
+    symbol, rms = next(iter(history[-1].values.items()))
+    return (
+        f"Roughness {symbol} of {format_quantity(rms or 0.0, 'm')} RMS: the waves shorter than "
+        f"{format_quantity(nesting, 'm')}, the cut-off of the L-filter that was asked for."
     )
 
 
@@ -212,7 +226,7 @@ def surface_summary_page(summary: MeasurementSummary) -> page.Page:
     sections = [
         page.terminal_section(page.Paragraph(surface_summary_text(prepared))),
         *_stage_sections(prepared, title),
-        _parts_section(summary),
+        *_parts_sections(summary),
         *_figure_sections(summary),
         *_step_sections(prepared),
         *page.user_sections(MeasurementSummary, summary),
@@ -220,10 +234,19 @@ def surface_summary_page(summary: MeasurementSummary) -> page.Page:
     ]
     return page.Page(
         title=f"Parameters of the surface {summary.source}",
-        answer=texture_text(summary.parts),
+        answer=_answer(summary),
         facts=[("Surface", surface_summary_text(prepared))],
         sections=sections,
     )
+
+
+def _answer(summary: MeasurementSummary) -> str:
+    if summary.parts is not None:
+        return texture_text(summary.parts)
+    prepared, nesting = summary.prepared, summary.prepared.history[-1].nesting
+    warning = short_trace_text(prepared.heights.shape, prepared.pitch, nesting or 0.0)
+    roughness = roughness_text(prepared.history)
+    return f"{roughness} {warning[:1].upper()}{warning[1:]}." if warning else roughness
 
 
 def preparation_page(prepared: PreparedSurface, path: str) -> page.Page:
@@ -251,12 +274,12 @@ def _step_sections(prepared: PreparedSurface) -> list[Section]:
     ]
 
 
-def _parts_section(summary: MeasurementSummary) -> Section:
-    notes = [text for text in (parts_text(summary.parts), lay_text(summary)) if text]
-    table = parts_table(summary.parts)
-    return Section(
-        "Form, waviness and texture", [table], notes=notes, media=SCREEN | Media.NOTEBOOK
-    )
+def _parts_sections(summary: MeasurementSummary) -> list[Section]:
+    lay, media = [text for text in [lay_text(summary)] if text], SCREEN | Media.NOTEBOOK
+    if summary.parts is None:
+        return [Section("Lay", [], notes=lay, media=media)] if lay else []
+    notes, table = [parts_text(summary.parts), *lay], parts_table(summary.parts)
+    return [Section("Form, waviness and texture", [table], notes=notes, media=media)]
 
 
 def _figure_sections(summary: MeasurementSummary) -> list[Section]:

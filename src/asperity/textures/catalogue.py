@@ -87,13 +87,14 @@ def load_texture(  # noqa: D417 - the others are described where they are declar
     outliers: float | None = None,
     max_missing: float | None = None,
     form: int | None = None,
-    cutoff: float | None = None,
+    s_cutoff: float | None = None,
     l_cutoff: float | None = None,
     tip_radius: float | None = None,
     periodic: bool = False,
     blend: float | None = None,
     magnify: float = 1.0,
     magnify_height: float | None = None,
+    cutoff: float | None = None,
 ) -> Texture:
     """Load a measured surface as a texture.
 
@@ -104,6 +105,7 @@ def load_texture(  # noqa: D417 - the others are described where they are declar
     Args:
         path: the file; its format is recognised by its content.
         {arguments}
+        cutoff: another name of ``s_cutoff``; the former name.
 
     Raises:
         SurfaceFileError: for a file that cannot be read, with the reason.
@@ -112,6 +114,10 @@ def load_texture(  # noqa: D417 - the others are described where they are declar
     values = dict(locals())  # every argument under its own name
     defaults = load_texture.__kwdefaults__ or {}
     given = {name: x for name, x in values.items() if x is not defaults.get(name, ...)}
+    if cutoff is not None:
+        if s_cutoff is not None:
+            raise ParameterError("cutoff", "is the former name of s_cutoff: give one of them")
+        given["s_cutoff"] = given.pop("cutoff")
     return _load_file(**given)
 
 

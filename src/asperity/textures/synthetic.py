@@ -31,7 +31,7 @@ def prepare_texture(  # noqa: D417 - the others are described where they are dec
     texture: Texture,
     *,
     height_range: float | None = None,
-    cutoff: float | None = None,
+    s_cutoff: float | None = None,
     l_cutoff: float | None = None,
     tip_radius: float | None = None,
     magnify: float = 1.0,
@@ -50,7 +50,7 @@ def prepare_texture(  # noqa: D417 - the others are described where they are dec
         ParameterError: for an argument that cannot be used.
 
     Example:
-        >>> half = prepare_texture(Sinusoid(1e-3, 2e-3), cutoff=2e-3, magnify=3)
+        >>> half = prepare_texture(Sinusoid(1e-3, 2e-3), s_cutoff=2e-3, magnify=3)
         >>> round(half.amplitude, 9), half.period, half.preparation[-1]
         (0.0015, 0.006, 'magnified 3 times laterally and in height')
     """
@@ -62,15 +62,15 @@ def prepare_texture(  # noqa: D417 - the others are described where they are dec
         scale = _height_scale(texture, height_range)
     prepared: Texture
     if texture.waves is not None and tip_radius is None:
-        amplitudes = _filter_amplitudes(texture.waves, scale * vertical, cutoff, l_cutoff)
+        amplitudes = _filter_amplitudes(texture.waves, scale * vertical, s_cutoff, l_cutoff)
         prepared = _scaled_waves(texture, texture.waves, amplitudes, lateral)
-        steps += _filter_steps(cutoff, l_cutoff)
+        steps += _filter_steps(s_cutoff, l_cutoff)
     else:
         if not texture.preparation:
             steps.insert(0, f"made from {texture!r}")
         heights, pitch, periodic = _sample(texture)
-        heights = _filter_heights(scale * heights, pitch, periodic, cutoff, l_cutoff)
-        steps += _filter_steps(cutoff, l_cutoff)
+        heights = _filter_heights(scale * heights, pitch, periodic, s_cutoff, l_cutoff)
+        steps += _filter_steps(s_cutoff, l_cutoff)
         if tip_radius is not None:
             heights, sentence = _apply_periodic_tip(heights, pitch, tip_radius, periodic=periodic)
             steps.append(sentence)
@@ -91,16 +91,16 @@ def _height_scale(texture: Texture, height_range: float) -> float:
 
 
 def _filter_amplitudes(
-    waves: PlaneWaves, factor: float, cutoff: float | None, l_cutoff: float | None
+    waves: PlaneWaves, factor: float, s_cutoff: float | None, l_cutoff: float | None
 ) -> FloatArray:
     """Return the amplitudes times a factor and the transfer of the filters."""
     numbers = np.hypot(*waves.wavevectors.T)
     amplitudes = waves.amplitudes * factor
-    for name, length in (("cutoff", cutoff), ("l_cutoff", l_cutoff)):
+    for name, length in (("s_cutoff", s_cutoff), ("l_cutoff", l_cutoff)):
         if length is not None:
             short = filters.ALPHA * check_positive(name, length, "m") * numbers / (2.0 * math.pi)
             transfer = np.exp(-math.pi * short**2)
-            amplitudes = amplitudes * (transfer if name == "cutoff" else 1.0 - transfer)
+            amplitudes = amplitudes * (transfer if name == "s_cutoff" else 1.0 - transfer)
     return amplitudes
 
 
@@ -126,23 +126,23 @@ def _filter_heights(
     heights: FloatArray,
     pitch: tuple[float, ...],
     periodic: bool,
-    cutoff: float | None,
+    s_cutoff: float | None,
     l_cutoff: float | None,
 ) -> FloatArray:
-    if cutoff is not None or l_cutoff is not None:
+    if s_cutoff is not None or l_cutoff is not None:
         # Checks the cut-offs; the first node of the next period is one pitch from the last one.
         shape = tuple(count + periodic for count in heights.shape)
-        filters.find_cutoffs(shape, pitch, cutoff, l_cutoff)
-    if cutoff is not None:
-        heights = filters.gaussian_filter(heights, pitch, cutoff, periodic=periodic)
+        filters.find_cutoffs(shape, pitch, s_cutoff, l_cutoff)
+    if s_cutoff is not None:
+        heights = filters.gaussian_filter(heights, pitch, s_cutoff, periodic=periodic)
     if l_cutoff is not None:
         heights = heights - filters.gaussian_filter(heights, pitch, l_cutoff, periodic=periodic)
     return heights
 
 
-def _filter_steps(cutoff: float | None, l_cutoff: float | None) -> Iterator[str]:
-    if cutoff is not None:
-        yield f"filtered: Gaussian S-filter, cut-off {format_length(cutoff)}"
+def _filter_steps(s_cutoff: float | None, l_cutoff: float | None) -> Iterator[str]:
+    if s_cutoff is not None:
+        yield f"filtered: Gaussian S-filter, cut-off {format_length(s_cutoff)}"
     if l_cutoff is not None:
         yield f"waviness removed: Gaussian L-filter, cut-off {format_length(l_cutoff)}"
 

@@ -138,7 +138,7 @@ class MeasurementSummary(Reportable):
     Attributes:
         source: name of the file.
         prepared: the prepared surface with its preparation steps.
-        parts: its form, waviness and texture.
+        parts: its form, waviness and texture; None after an L-filter, which has separated them.
         correlation: autocorrelation length Sal [m] and texture aspect ratio Str of it; None for
             those that are not defined, as for a profile.
         changes: the steps that removed something; none for a prepared file.
@@ -146,7 +146,7 @@ class MeasurementSummary(Reportable):
 
     source: str
     prepared: PreparedSurface
-    parts: SurfaceDecomposition
+    parts: SurfaceDecomposition | None
     correlation: tuple[float | None, float | None] = (None, None)
     changes: tuple[StepChange, ...] = ()
 
@@ -160,11 +160,11 @@ class MeasurementSummary(Reportable):
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""
-        parts = ("form", "waviness", "texture", "nesting")
+        names, parts = ("form", "waviness", "texture", "nesting"), self.parts
         return {
             **self.prepared.to_dict(),
             "source": self.source,
-            "parts": {name: to_plain_data(getattr(self.parts, name)) for name in parts},
+            "parts": parts and {name: to_plain_data(getattr(parts, name)) for name in names},
             "Sal": self.correlation[0],
             "Str": self.correlation[1],
         }
@@ -197,7 +197,9 @@ def summarize_file(
     if progress is not None:
         progress("measure")
     heights, pitch = prepared.heights, prepared.pitch
-    parts = decompose_surface(heights, pitch, periodic=prepared.periodic)
+    parts = None
+    if not prepared.history or prepared.history[-1].nesting is None:
+        parts = decompose_surface(heights, pitch, periodic=prepared.periodic)
     found: tuple[float | None, float | None] = (None, None)
     if len(pitch) == 2:
         found = correlation_parameters(heights, (pitch[0], pitch[1]))

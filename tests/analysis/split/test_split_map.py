@@ -30,7 +30,7 @@ def _texture(name: str) -> Texture:
     if name == "egg crate":  # four crests around a trough: up to four atoms at once
         return HeightMap(2e-4 * np.outer(np.cos(_NODES), np.cos(_NODES)), 8e-5, periodic=True)
     if name == "measured":
-        texture = asp.load_texture(DATA / "sample-land.x3p", magnify=20, cutoff=10e-6)
+        texture = asp.load_texture(DATA / "sample-land.x3p", magnify=20, s_cutoff=10e-6)
         assert isinstance(texture, HeightMap)
         return texture
     rough = 6e-5 * np.random.default_rng(3).normal(size=(9, 11))
