@@ -25,6 +25,7 @@ from asperity.core.errors import SurfaceFileError as SurfaceFileError
 from asperity.core.version import __version__ as __version__
 from asperity.devices import Device as Device
 from asperity.devices import load_device as load_device
+from asperity.export.export_surface import export_code as export_code
 from asperity.laws import Law as Law
 from asperity.recording.recording import Recording as Recording
 from asperity.recording.recording import open_recording as open_recording
@@ -34,6 +35,7 @@ from asperity.recording.writer import RecordingWriter as RecordingWriter
 from asperity.rendering import bake as bake
 from asperity.rendering import bake_mesh as bake_mesh
 from asperity.scene import load_scene as load_scene
+from asperity.scene.device_run import run as run
 from asperity.scene.loops import onset as onset
 from asperity.scene.loops import scan as scan
 from asperity.scene.loops import simulate as simulate
@@ -50,3 +52,4 @@ from asperity.textures import named_surface as named_surface
 from asperity.textures import surface_names as surface_names
 from asperity.textures.fields.field_file import save_field as save_field
 from asperity.textures.fields.potential_field import PotentialField as PotentialField
+from asperity.textures.texture_loading import show as show

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from tests.cli.conftest import Call
 
@@ -174,3 +175,91 @@ def test_compare_devices_takes_one_device_and_depth() -> None:
 def test_mistakes_are_named(mistake: Callable[[], Any], words: str) -> None:
     with pytest.raises(ParameterError, match=words):
         mistake()
+
+
+def test_export_is_the_command(call: Call, tmp_path: Path) -> None:
+    options = ("--device", "touch", "--law", "C", "--stiffness", "300N/m", "--name", "felt")
+    assert call("export", "cloth", "-o", str(tmp_path / "a.h"), *options)[0] == 0
+    law = {"law": "C", "stiffness": 300, "name": "felt"}
+    files = asp.export_code("cloth", tmp_path / "b.h", "touch", **law)
+    assert files == (tmp_path / "b.h", tmp_path / "b_data.c")
+    texts = [(tmp_path / name).read_text("utf-8") for name in ("a.h", "b.h")]
+    assert texts[0].replace("a.h", "b.h").replace("a_data", "b_data") == texts[1]
+    assert "felt_force" in texts[1]
+    surface = asp.Surface(asp.named_surface("cloth"), "C", stiffness=300, clamp="backed")
+    asp.export_code(surface, tmp_path / "c.h", "touch", name="felt")
+    text = (tmp_path / "c.h").read_text("utf-8")
+    assert text.replace("c.h", "b.h").replace("c_data", "b_data") == texts[1]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"lang": "c98"}, "lang is unknown: .c98."),
+        ({"name": "2"}, "name must be a C identifier"),
+        ({"stifness": 3}, "stifness"),
+        ({"path": "texture.c"}, "must be a file that ends in .h"),
+        ({"path": "here.h"}, "path exists"),
+        ({"load": True}, "load needs a baked field"),
+    ],
+)
+def test_export_refuses_what_the_command_refuses(
+    arguments: dict[str, Any], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("here.h").touch()
+    given = {"path": "there.h", "law": "C", "stiffness": 300} | arguments
+    with pytest.raises(ParameterError, match=words):
+        asp.export_code("cloth", **given)
+    assert [file.name for file in tmp_path.iterdir()] == ["here.h"]
+
+
+def test_export_writes_the_field_beside_the_program(tmp_path: Path) -> None:
+    law = {"law": "H", "stiffness": 300, "load": True}
+    files = asp.export_code("cloth", tmp_path / "soft.h", "touch", **law)
+    assert [file.name for file in files] == ["soft.h", "soft.field"]
+    with pytest.raises(ParameterError, match="path exists"):
+        asp.export_code("cloth", tmp_path / "soft.h", "touch", **law)
+    (tmp_path / "soft.h").unlink()
+    with pytest.raises(ParameterError, match="path exists"):
+        asp.export_code("cloth", tmp_path / "soft.h", "touch", **law)
+
+
+def test_run_is_the_command(call: Call, tmp_path: Path) -> None:
+    done: list[float] = []
+    law = {"law": "C", "stiffness": 5, "duration": 0.2}
+    recordings = [str(tmp_path / name) for name in ("a.mcap", "b.mcap")]
+    result = asp.run("cloth", device="touch", record=recordings[0], progress=done.append, **law)
+    assert result.ended.name == "FINISHED"
+    assert done == sorted(done)
+    options = ("--law", "C", "--stiffness", "5N/m", "--duration", "0.2s", "--device", "touch")
+    output = tmp_path / "run.json"
+    options += ("--record", recordings[1], "--json", str(output))
+    assert call("run", "cloth", *options)[0] == 0
+    assert read_json(output)["statistics"]["samples"] == result.statistics.samples
+    own, other = (asp.open_recording(path).metadata for path in recordings)
+    for key in ("surface", "servo", "driver"):
+        assert own[key] == other[key], key
+    with pytest.raises(ParameterError, match="record exists"):
+        asp.run("cloth", record=recordings[0], **law)
+    with pytest.raises(ParameterError, match="stiffness is refused"):
+        asp.run("cloth", device="touch", law="C", stiffness=300)
+    with pytest.raises(ParameterError, match="stifness"):
+        asp.run("cloth", stifness=3)
+
+
+def test_run_takes_the_recommended_law() -> None:
+    result = asp.run("cloth", device="touch", duration=0.05)
+    row = asp.compare("cloth", "touch").recommended_row
+    assert row is not None
+    assert result.scene.surface.law == row.law
+    assert result.scene.surface.stiffness == row.recommended_stiffness
+    assert any("as asperity compare recommends" in text for text in result.scene.assumptions)
+
+
+def test_show_is_the_command(call: Call, tmp_path: Path) -> None:
+    file, output = tmp_path / "rough.npy", tmp_path / "show.json"
+    np.save(file, 1e-6 * np.random.default_rng(1).standard_normal((40, 50)))
+    options = ("--pitch", "2um", "--unit", "m", "--form", "2", "--json", str(output))
+    assert call("show", str(file), *options)[0] == 0
+    assert read_json(output) == as_json(asp.show(file, pitch=2e-6, unit="m", form=2))

@@ -27,6 +27,7 @@ from asperity.core.units import format_quantity
 from asperity.recording.recording import open_recording
 from asperity.recording.replay import replay
 from asperity.report.pictures.loop_pictures import recording_figure
+from asperity.scene import device_run
 from asperity.scene.scene_file import load_scene
 from asperity.scene.setup import make_setup
 from asperity.servo.drivers import force_dimension, open_haptics
@@ -240,7 +241,7 @@ def test_unusable_driver_is_refused_before_the_laws_are_compared(
     call: Call, monkeypatch: pytest.MonkeyPatch, name: str, message: str, tmp_path: Path
 ) -> None:
     """A comparison takes a minute; an existing recording is left as it is."""
-    monkeypatch.setattr(loop_setup, "_recommend_law_and_stiffness", lambda *_args: 1 / 0)
+    monkeypatch.setattr(device_run, "recommend_law_and_stiffness", lambda *_args: 1 / 0)
     monkeypatch.setenv(force_dimension.LIBRARY, "/missing/libdhd.so")
     monkeypatch.setenv(open_haptics.LIBRARY, "/missing/libHD.so")
     recording = tmp_path / "run.mcap"

@@ -30,7 +30,7 @@ from asperity.paper.table_two import TableTwo
 from asperity.report.terminal import print_page
 from asperity.report.views import find_page
 from asperity.simulation import Cartesian, Run, Servo, SpringHand, Stationary, simulate
-from asperity.textures.texture_loading import MeasurementSummary, summarize_file
+from asperity.textures.texture_loading import MeasurementSummary, show
 
 WAVE = asp.Sinusoid(2e-4, 2e-3)
 HOSTILE = "<script>alert(1)</script>"
@@ -48,7 +48,7 @@ def make_file_summary() -> MeasurementSummary:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "ridge.txt")
         np.savetxt(path, np.column_stack([x, 1e-6 * np.sin(9e3 * x)]), header="x [m] z [m]")
-        return summarize_file(path)
+        return show(path)
 
 
 def make_recording() -> Path:

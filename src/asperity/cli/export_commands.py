@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -20,7 +20,6 @@ from asperity.core.files import write_bytes
 if TYPE_CHECKING:
     from asperity.devices import Device
     from asperity.export.surface_maps import SampledMap
-    from asperity.textures.fields.potential_field import PotentialField
     from asperity.textures.texture import Texture
 
 
@@ -60,7 +59,7 @@ def export_command(
     """
     from asperity.export import targets
     from asperity.export.export_request import ExportRequest
-    from asperity.textures.fields.field_file import is_field, save_field
+    from asperity.textures.fields.field_file import is_field
 
     request = options.provided_values(values, _REQUEST_ARGUMENTS)
     if exact:
@@ -79,7 +78,7 @@ def export_command(
     )
 
     from asperity.analysis.analyze import STEPS, analyze
-    from asperity.export.header_comment import header_comment_text
+    from asperity.export.export_surface import export_analysis
 
     clamp = {"clamp": values["clamp"]} if values["clamp"] is not None else {}
     with step_bar("reading the surface", len(STEPS)) as step:
@@ -87,22 +86,14 @@ def export_command(
             surface, device, values, clamp=BACKED.name
         )
         analysis = analyze(texture, device, progress=step, **{**arguments, **clamp})
-    order = ExportRequest(
-        analysis.surface,
-        comment=header_comment_text(analysis, path.name),
-        q_upper=analysis.q.upper,
-        as_library=shared,
-        loads_field=load,
-        **request,
-    )
-    files = targets.write_files(path, target, order, force=force)
-    if field is not None:
-        save_field(field, cast("PotentialField", analysis.surface.texture))
-        files.append(field)
+    request |= {"as_library": shared, "loads_field": load}
+    files = export_analysis(analysis, path, target, field, request, force=force)
     click.echo(f"Written: {', '.join(escape_unprintable(file) for file in files)}")
     for source in [file.name for file in files if file.name.endswith("_data.c")]:
         click.echo(f"To be compiled with the program: {escape_unprintable(source)}")
-    click.echo(f"{order.name}_force() is law {analysis.surface.law}. {analysis.answer}")
+    click.echo(
+        f"{request.get('name', 'texture')}_force() is law {analysis.surface.law}. {analysis.answer}"
+    )
 
 
 _GRID_ARGUMENTS = options.command_arguments("maps")

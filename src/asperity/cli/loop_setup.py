@@ -14,7 +14,6 @@ from asperity.cli.options import Command, file_values
 from asperity.cli.output import progress_bar, step_bar
 from asperity.core.arguments import STIFFNESS, Argument
 from asperity.core.errors import ParameterError, print_message
-from asperity.core.units import format_quantity
 from asperity.laws import REGISTERED_LAWS, Law, check_parameters_apply, find_law
 
 if TYPE_CHECKING:
@@ -23,7 +22,6 @@ if TYPE_CHECKING:
     from asperity.servo.drivers.driver import Driver
     from asperity.servo.process import PrestartedProcess
     from asperity.simulation.servo import Servo
-    from asperity.textures import Texture
 
 
 def stiffness_option(default: str) -> Argument:
@@ -80,6 +78,7 @@ def load_setup(
         ParameterError: for a missing, unknown or invalid value.
     """
     from asperity.scene import load_scene
+    from asperity.scene.device_run import recommend_law_and_stiffness
     from asperity.scene.setup import make_setup
 
     if driver is None and not source.lower().endswith(".toml"):
@@ -97,7 +96,10 @@ def load_setup(
         # A clamp bounds the force, and the analysis then holds at every depth.
         surface = {"clamp": BACKED.name, **surface}
         if not {"law", "stiffness"} <= surface.keys() and "hand" not in scene.loop:
-            surface, note = _recommend_law_and_stiffness(scene.texture, device, surface)
+            with step_bar(
+                "comparing the laws", 1 if "law" in surface else len(REGISTERED_LAWS)
+            ) as step:
+                surface, note = recommend_law_and_stiffness(scene.texture, device, surface, step)
     if driver not in (None, SIMULATED):
         servo = {name: section for name, section in scene.loop.items() if name == "servo"}
         scene = replace(scene, loop={**_NO_HAND, **servo})
@@ -127,39 +129,6 @@ def _check_driver(name: str, device: Device) -> None:
     elif name != SIMULATED:
         kind, argument = find_driver(name, device)
         kind.create(argument, IDENTITY_FRAME).check_library()
-
-
-def _recommend_law_and_stiffness(
-    texture: Texture, device: Device, surface: dict[str, Any]
-) -> tuple[dict[str, Any], str]:
-    """Return surface arguments with the recommended law and stiffness, and a note about them.
-
-    A law or a stiffness among the arguments is not replaced.
-
-    Raises:
-        ParameterError: if nothing can be recommended.
-    """
-    from asperity.analysis.compare import compare
-    from asperity.scene.sections import surface_keywords
-
-    laws = [find_law(surface["law"])] if "law" in surface else list(REGISTERED_LAWS.values())
-    keywords = surface_keywords(surface, *laws)
-    keywords.pop("law", None)
-    with step_bar("comparing the laws", len(laws)) as step:
-        result = compare(texture, device, laws, progress=step, **keywords)
-    row = result.rows[0] if "law" in surface else result.recommended_row or result.nearest_row
-    if row is None:
-        reason = f"is missing, and none can be recommended: {result.recommendation}"
-        raise ParameterError("law", reason)
-    chosen = {**surface, "law": row.law}
-    if "stiffness" in surface:
-        return chosen, f"Law {row.law.letter}, as asperity compare recommends"
-    if not row.recommended_stiffness:
-        reason = f"is missing, and none is known to be stable for law {row.law.letter}"
-        raise ParameterError("stiffness", f"{reason} on {device.id}: try --stiffness 100N/m")
-    chosen["stiffness"] = row.recommended_stiffness
-    stiffness = format_quantity(row.recommended_stiffness, "N/m")
-    return chosen, f"Law {row.law.letter} at {stiffness}, as asperity compare recommends"
 
 
 # A real hand on a real device is not simulated.
@@ -227,20 +196,6 @@ def make_driver(name: str, setup: Setup) -> Driver:
         f" {driver.loss_notice}"
     )
     return driver
-
-
-def check_stiffness_limit(setup: Setup) -> None:
-    """Check that the stiffness is within the analyzed limit.
-
-    Raises:
-        ParameterError: otherwise, with the reason.
-    """
-    from asperity.servo.safety import excess_stiffness_reason
-
-    with progress_bar("analyzing the surface"):
-        reason = excess_stiffness_reason(setup.rendered, setup.device)
-    if reason:
-        raise ParameterError("stiffness", f"is refused: {reason}; --accept-risk accepts it")
 
 
 def prestart_process() -> PrestartedProcess:

@@ -34,14 +34,10 @@ if TYPE_CHECKING:
     from asperity.lab.scene_state import SceneState
     from asperity.lab.session import Handle
     from asperity.scene.setup import Setup
-    from asperity.servo.drivers.driver import Driver
     from asperity.servo.fault import EndReason
     from asperity.servo.loop_memory import LoopMemory
     from asperity.servo.process import PrestartedProcess, ServoProcess
 
-
-POLL_INTERVAL = 0.05
-"""Interval at which the loop is polled [s]."""
 
 _RUN_ARGUMENTS = options.command_arguments("run")
 
@@ -75,11 +71,13 @@ def run_command(
     before using a real device.
     """
     check_outputs(force=outputs.force, json=outputs.json, record=record)
+    from asperity.scene.device_run import check_stiffness_limit
+
     process = loop_setup.prestart_process()
     setup, _servo = loop_setup.driver_setup(scene, values, driver, duration)
     hashes = setup.file_hashes()
-    if not accept_risk:
-        loop_setup.check_stiffness_limit(setup)
+    with progress_bar("analyzing the surface"):
+        check_stiffness_limit(setup, accept_risk=accept_risk)
     from asperity.report.loop.servo_report import device_run_page
 
     loop = make_loop(setup, driver, duration, process)
@@ -111,19 +109,14 @@ def make_loop(
     Raises:
         ParameterError: for an unknown driver, or a device without a maximum force.
     """
-    from asperity.servo.drivers.simulated import simulated_driver
+    from asperity.scene.device_run import simulated_process
     from asperity.servo.process import ServoProcess
 
     if driver_name == loop_setup.SIMULATED:
-        duration = setup.duration
-        driver: Driver = simulated_driver(
-            setup.plant, setup.hand, setup.servo, setup.motion, duration, setup.start,
-            setup.velocity,
-        )  # fmt: skip
-    else:
-        driver = loop_setup.make_driver(driver_name, setup)
-        if duration is None and driver.max_readings is not None:
-            duration = setup.servo.period * driver.max_readings
+        return simulated_process(setup, process)
+    driver = loop_setup.make_driver(driver_name, setup)
+    if duration is None and driver.max_readings is not None:
+        duration = setup.servo.period * driver.max_readings
     reach = setup.safety.reach_limit(setup.device)
     return ServoProcess(
         setup.rendered, driver, setup.servo, setup.safety, reach, duration, prestarted=process
@@ -198,6 +191,7 @@ def watch_loop(loop: ServoProcess, signals: list[int], write_rows: Callable[[], 
     Raises:
         DeviceFault: for a fault.
     """
+    from asperity.scene.device_run import POLL_INTERVAL
     from asperity.servo.fault import EndReason
 
     for note in loop.notes:
@@ -331,6 +325,7 @@ def _device_scene(
     from asperity.lab.clips import find_recording
     from asperity.lab.scene_state import make_device_scene_state
     from asperity.lab.session import make_handle
+    from asperity.scene.device_run import check_stiffness_limit
     from asperity.servo.process import require_max_force
 
     if find_recording(source, _temporary_folder()) is not None:
@@ -339,7 +334,7 @@ def _device_scene(
     setup, servo = loop_setup.driver_setup(source, values, name)
     driver = loop_setup.make_driver(name, setup)
     require_max_force(driver, setup.servo)
-    if not accept_risk:
-        loop_setup.check_stiffness_limit(setup)
+    with progress_bar("analyzing the surface"):
+        check_stiffness_limit(setup, accept_risk=accept_risk)
     scene = make_device_scene_state(setup, servo, source, file_values(values))
     return scene, make_handle(driver, setup)

@@ -155,10 +155,10 @@ def show_command(file: str, outputs: Outputs, **values: Any) -> None:
     ISO 21920-2 (Rq, Ra, Rz ...). The report also shows what each step removed and separates form,
     waviness and texture. FILE may also be an output of asperity prepare.
     """
-    from asperity.textures.texture_loading import summarize_file
+    from asperity.textures.texture_loading import show
 
     with preparation_progress() as start_stage:
-        summary = summarize_file(file, progress=start_stage, **options.file_values(values))
+        summary = show(file, progress=start_stage, **options.file_values(values))
 
     from asperity.report.measured_report import surface_summary_page
 

@@ -37,7 +37,14 @@ SceneLike = Scene | str | os.PathLike[str]
 Laws = str | Sequence[str | Law]
 
 
-def _make_loop(
+def as_scene(scene: SceneLike) -> Scene:
+    """Return the scene of a path, or the scene itself."""
+    if not isinstance(scene, (Scene, str, os.PathLike)):
+        raise ParameterError("scene", "must be the path of a scene file, or a Scene", scene)
+    return scene if isinstance(scene, Scene) else load_scene(os.fspath(scene))
+
+
+def make_loop(
     function: Callable[..., Any],
     scene: SceneLike,
     device: DeviceLike | None,
@@ -55,9 +62,7 @@ def _make_loop(
         laws: laws of a sweep, which replace the scene's.
         options: further arguments of :func:`~asperity.scene.setup.make_setup`.
     """
-    if not isinstance(scene, (Scene, str, os.PathLike)):
-        raise ParameterError("scene", "must be the path of a scene file, or a Scene", scene)
-    loaded = scene if isinstance(scene, Scene) else load_scene(os.fspath(scene))
+    loaded = as_scene(scene)
     # The law of the surface is replaced by each of a sweep.
     surface = {**loaded.surface, **({"law": "W"} if laws else {}), **arguments}
     used = laws or ([find_law(surface["law"])] if "law" in surface else [])
@@ -107,7 +112,7 @@ def simulate(
         >>> run.samples, run.is_energy_balanced
         (500, True)
     """
-    setup = _make_loop(simulate, scene, device, surface_arguments, duration=duration)
+    setup = make_loop(simulate, scene, device, surface_arguments, duration=duration)
     return setup.with_rendering().simulate(trace=trace, progress=progress)
 
 
@@ -149,7 +154,7 @@ def onset(
     if "stiffness" in surface_arguments:
         raise ParameterError("stiffness", "is the result of onset: leave it out")
     chosen = _find_laws(laws)
-    setup = _make_loop(
+    setup = make_loop(
         onset, scene, device, surface_arguments, chosen, duration=duration, uses_delay=False
     )
     return sweep_onsets(
@@ -190,7 +195,7 @@ def scan(
         [('A', True), ('C', False)]
     """
     chosen = _find_laws(laws)
-    setup = _make_loop(scan, scene, device, surface_arguments, chosen)
+    setup = make_loop(scan, scene, device, surface_arguments, chosen)
     return sweep_strokes(
         setup, chosen, speeds=speeds, depths=depths, strokes=strokes, progress=progress
     )

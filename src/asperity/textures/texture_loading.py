@@ -170,10 +170,10 @@ class MeasurementSummary(Reportable):
         }
 
 
-def summarize_file(
+def show(
     path: str | os.PathLike[str], *, progress: Callable[[str], None] | None = None, **arguments: Any
 ) -> MeasurementSummary:
-    """Summarize a measured surface after each preparation step.
+    """Report the roughness parameters of a measured surface, as ``asperity show`` does.
 
     Args:
         path: the file, also a prepared one.

@@ -1,0 +1,237 @@
+"""Export a surface and its law as the source of a program: ``export_code``."""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+import textwrap
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from asperity.analysis.analyze import Analysis, Progress, analyze
+from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.compare import DEFAULT_DEVICE
+from asperity.analysis.surface_sentences import depth_range_text, leak_energy_text
+from asperity.clamps import BACKED
+from asperity.core.files import check_not_existing
+from asperity.core.units import format_quantity
+from asperity.core.version import __version__
+from asperity.devices import DeviceLike
+from asperity.export import targets
+from asperity.export.export_request import ExportRequest, is_searching
+from asperity.laws import Law
+from asperity.surface import Surface
+from asperity.textures.catalogue import TextureLike
+from asperity.textures.fields.field_file import is_field, save_field
+from asperity.textures.texture import Texture
+
+if TYPE_CHECKING:
+    from asperity.export.targets import ExportTarget
+    from asperity.textures.fields.potential_field import PotentialField
+
+
+_WIDTH = 92
+
+
+def export_code(
+    surface: Surface | TextureLike,
+    path: str | os.PathLike[str],
+    device: DeviceLike = DEFAULT_DEVICE,
+    *,
+    lang: str = "c99",
+    load: bool = False,
+    shared: bool = False,
+    force: bool = False,
+    progress: Progress | None = None,
+    **arguments: Any,
+) -> tuple[Path, ...]:
+    """Export a surface and its law as C code with one function, ``texture_force()``.
+
+    The numbers at the top of the file are those of :func:`~asperity.analysis.analyze.analyze`.
+
+    Args:
+        surface: the surface; or a texture, or what names one, which gets the law and the stiffness
+            that are recommended on the device.
+        path: the main file ("texture.h"); further files are written beside it.
+        device: device whose limits stand in the file.
+        lang: export target, "c99" or one of a plugin.
+        load: whether the program loads the field of law H from a file, which is written as well.
+        shared: whether to write a library: header, source and CMakeLists.txt.
+        force: whether to replace existing files.
+        progress: called with the name of each step of the analysis.
+        **arguments: ``name``, ``precision``, ``max_data_size``, ``max_evaluations`` of
+            :class:`~asperity.export.export_request.ExportRequest`; those of
+            :func:`~asperity.analysis.analyze.analyze` otherwise.
+
+    Returns:
+        The files that were written.
+
+    Raises:
+        ParameterError: for an invalid value, a file that exists, or one that cannot be written.
+
+    Example:
+        >>> from tempfile import TemporaryDirectory
+        >>> with TemporaryDirectory() as folder:
+        ...     files = export_code("cloth", f"{folder}/texture.h", law="C", stiffness=300)
+        >>> [file.name for file in files]
+        ['texture.h', 'texture_data.c']
+    """
+    target, place = targets.find_target(lang), Path(path)
+    targets.check_name(place, target)
+    names = ("name", "precision", "max_data_size", "max_evaluations")
+    request = {name: arguments.pop(name) for name in names if name in arguments}
+    ExportRequest.validate(
+        request.get("name", "texture"),
+        request.get("precision", "double"),
+        request.get("max_evaluations"),
+    )
+    is_file = isinstance(surface, (str, os.PathLike)) and is_field(surface)
+    field = place.with_suffix(".field") if load and not is_file else None
+    for file in filter(None, [place, field]):
+        check_not_existing("path", file, force=force)
+    if not isinstance(surface, Surface):
+        arguments = {"clamp": BACKED.name, **arguments}
+    analysis = analyze(surface, device, progress=progress, **arguments)
+    request |= {"as_library": shared, "loads_field": load}
+    return tuple(export_analysis(analysis, place, target, field, request, force=force))
+
+
+def export_analysis(
+    analysis: Analysis,
+    path: Path,
+    target: ExportTarget,
+    field: Path | None,
+    request: Mapping[str, Any],
+    *,
+    force: bool,
+) -> list[Path]:
+    """Export an analyzed surface; return the files that were written.
+
+    Args:
+        analysis: the analysis, whose numbers stand at the top of the file.
+        path: the main file.
+        target: the export target.
+        field: where to save the field of law H; ``None`` to save none.
+        request: options of :class:`~asperity.export.export_request.ExportRequest`.
+        force: whether to replace existing files.
+    """
+    comment = header_comment_text(analysis, path.name)
+    order = ExportRequest(analysis.surface, comment=comment, q_upper=analysis.q.upper, **request)
+    files = targets.write_files(path, target, order, force=force)
+    if field is not None:
+        save_field(field, cast("PotentialField", analysis.surface.texture))
+        files.append(field)
+    return files
+
+
+# --- comment at the top of the file --------------------------------------------------------------
+
+
+def header_comment_text(analysis: Analysis, file_name: str) -> str:
+    """Return the comment of an exported program.
+
+    Args:
+        analysis: analysis of the surface.
+        file_name: name of the file.
+    """
+    surface, law = analysis.surface, analysis.surface.law
+    doc = (sys.modules[law.force.__module__].__doc__ or "").strip()
+    description = doc if doc.startswith(law.letter) else law.summary
+    return "\n".join(
+        [
+            f"{file_name}: law {law}, by asperity {__version__}. Generated, do not edit.",
+            "",
+            *_usage(surface.law),
+            "",
+            description,
+            "",
+            *_facts(analysis),
+            "",
+            *_wrap([analysis.answer, *analysis.assumptions]),
+        ]
+    )
+
+
+def _usage(law: Law) -> list[str]:
+    """Return the lines on the use of the program."""
+    state = "This law stores nothing in it"
+    if is_searching(law.contact):
+        state = "It stores the closest point for a warm start"
+    if law.stateful:
+        state = "It stores the anchor of friction"
+    return _wrap(
+        [
+            "Positions [m] in the frame of the surface: z points out of the body, which is "
+            "z < h(x, y). The force [N] is the one on the probe.",
+            f"Call reset once for each state, then force in each tick. {state}.",
+        ]
+    )
+
+
+def _facts(analysis: Analysis) -> list[str]:
+    surface = analysis.surface
+    parameters = "".join(f", {name} = {value:g}" for name, value in surface.law_parameters.items())
+    rows = {
+        "surface": ", ".join(
+            f"{k} = {_format_value(v)}" for k, v in surface.texture.describe().items()
+        ),
+        "place": _format_extent(surface.texture),
+        "device": analysis.device.name,
+        "stiffness": f"k = {format_quantity(surface.stiffness, 'N/m')}{parameters}",
+        "region": f"{surface.texture.domain.description}, {depth_range_text(surface)}",
+        "clamp": _format_clamp(analysis),
+        "q": _format_bound(analysis.q),
+        "q+": _format_bound(analysis.one_sided),
+        "leak": f"{leak_energy_text(analysis.leak)} ({analysis.leak.method})",
+    }
+    lines = []
+    for name, value in rows.items():
+        lines += textwrap.wrap(f"{name:<10}{value}", _WIDTH, subsequent_indent=" " * 10)
+    return lines
+
+
+def _format_extent(texture: Texture) -> str:
+    """Return the extent of the surface: its heights, and one period in the plane."""
+    low, high = (format_quantity(height, "m") for height in texture.extremes)
+    parts = [f"heights {low} to {high}"]
+    if len(texture.domain.spans) > 1:
+        corners = texture.domain.points(np.array([[0.0, 0.0], [0.0, 1.0], [1.0, 0.0], [1.0, 1.0]]))
+        for axis, values in zip("xy", corners.T, strict=True):
+            ends = (format_quantity(float(end), "m") for end in (values.min(), values.max()))
+            parts.append(f"{axis} {' to '.join(ends)}")
+    return ", ".join(parts)
+
+
+def _format_value(value: object) -> str:
+    """Return a value of a description as text, truncated if it is long."""
+    if isinstance(value, list):
+        return _truncate(f"[{', '.join(map(_format_value, value))}]")
+    return _truncate(f"{value:g}" if isinstance(value, float) else str(value))
+
+
+def _truncate(text: str) -> str:
+    return text if len(text) <= _WIDTH else f"{text[:40]} ..."
+
+
+def _format_clamp(analysis: Analysis) -> str:
+    surface = analysis.surface
+    depth = format_quantity(surface.max_depth, "m")
+    if not surface.effective_clamp.changes_force:
+        return f"none; meant to be pressed to {depth}"
+    return f"{surface.effective_clamp}, the depth is held at {depth}"
+
+
+def _format_bound(bound: Bound) -> str:
+    if math.isfinite(bound.upper):
+        return f"between {bound.lower:.6g} and {bound.upper:.6g} ({bound.method})"
+    if math.isinf(bound.lower):
+        return f"unbounded ({bound.method})"
+    return f"at least {bound.lower:.6g}, no upper bound ({bound.method})"
+
+
+def _wrap(sentences: list[str]) -> list[str]:
+    return [line for one in sentences for line in textwrap.wrap(one, _WIDTH)]
