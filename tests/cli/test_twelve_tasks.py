@@ -66,7 +66,10 @@ EXPECTED: dict[int, tuple[str, dict[str, str]]] = {
     7: (r"^1\.\d+ \d{4,}$", {}),
     8: (RECOMMENDATION, {"phone.html": "width=device-width"}),
     9: (r"law C", {"print.html": "@media print"}),
-    10: (r"http://(127\.0\.0\.1|localhost):\d+", {"claim.html": "eq-5"}),
+    10: (
+        r"http://(127\.0\.0\.1|localhost):\d+",
+        {"claim.html": "eq-5", "lecture/slides.html": "<h1>Around a closed path"},
+    ),
     11: (r"Did you mean one of: '--device'[\s\S]*^law start at texture", {}),
     12: (r"The recording was not closed", {"run.csv": "x [m]"}),
 }

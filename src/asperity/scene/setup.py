@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from asperity.analysis.compare import DEFAULT_DEVICE
 from asperity.analysis.surface_sentences import law_parameter_sentences
 from asperity.core.arguments import FIELD, parse_arguments
 from asperity.core.errors import ParameterError
@@ -28,7 +29,6 @@ from asperity.simulation import Hand, Motion, Plant, Run, Servo, simulate
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
 
-DEFAULT_DEVICE = "omega.3"
 DEFAULT_DURATION = 1.0
 SIMULATED_DRIVER = "simulated"
 """Name of the driver that simulates plant and hand."""

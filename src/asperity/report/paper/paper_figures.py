@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import io
 import os
 from collections.abc import Callable, Iterable, Sequence
@@ -14,16 +15,19 @@ from matplotlib.figure import Figure
 
 from asperity.core.errors import ParameterError
 from asperity.core.files import write_bytes
+from asperity.core.version import __version__
 from asperity.paper.claim_registry import find_claims
 from asperity.paper.experiments import Experiments
 from asperity.paper.experiments.cycle_counts import passivity_experiment
 from asperity.paper.experiments.strokes import bump_experiment, scanning_experiment
+from asperity.report.html import template_environment
 from asperity.report.page import default_style
 from asperity.report.pictures import paper_pictures as pictures
 from asperity.report.pictures.loop_pictures import onset_figure
 from asperity.report.pictures.paper_pictures import figure_three, figure_two
+from asperity.report.sentences.texts import slide_text
 
-FileFormat = Literal["svg", "png"]
+FileFormat = Literal["svg", "png", "slides"]
 _DPI = 192  # of a PNG: about 1920 pixels for the 10 inches that all figures are wide
 _MARGIN = 0.15  # around the figure [inch]
 _HASH_SALT = "asperity"  # of the identifiers in an SVG, which are random without one
@@ -35,6 +39,7 @@ class PaperFigure:
 
     Attributes:
         name: of the file, without its suffix.
+        texts: name of its texts.
         claim_names: claims that it shows, as names for
             :func:`~asperity.paper.claim_registry.find_claims`.
         draw: returns the figure, from all experiments or from the one that it needs.
@@ -42,6 +47,7 @@ class PaperFigure:
     """
 
     name: str
+    texts: str
     claim_names: tuple[str, ...]
     draw: Callable[[Experiments | None], Figure]
     needs_simulation: bool = True
@@ -65,25 +71,32 @@ def _cycles_figure(experiments: Experiments | None) -> Figure:
 
 
 PAPER_FIGURES = (
-    PaperFigure("fig-2", ("fig-2",), lambda _found: figure_two(), needs_simulation=False),
-    PaperFigure("fig-3", ("fig-3",), lambda _found: figure_three(), needs_simulation=False),
-    PaperFigure("fig-5", ("fig-5",), _cycles_figure),
+    PaperFigure(
+        "fig-2", "paper.forces", ("fig-2",), lambda _found: figure_two(), needs_simulation=False
+    ),
+    PaperFigure(
+        "fig-3", "paper.loops", ("fig-3",), lambda _found: figure_three(), needs_simulation=False
+    ),
+    PaperFigure("fig-5", "paper.cycles", ("fig-5",), _cycles_figure),
     PaperFigure(
         "onsets",
+        "paper.onsets",
         ("sentence-III.B-reduced",),
         lambda found: onset_figure((found.passivity if found else passivity_experiment()).onsets),
     ),
     PaperFigure(
         "fig-6",
+        "paper.energies",
         ("fig-6",),
         lambda found: pictures.energies_figure(found.scanning if found else scanning_experiment()),
     ),
     PaperFigure(
         "fig-7",
+        "paper.bumps",
         ("fig-7",),
         lambda found: pictures.bumps_figure(found.bump if found else bump_experiment()),
     ),
-    PaperFigure("devices", (), _devices_figure),
+    PaperFigure("devices", "paper.devices", (), _devices_figure),
 )
 """In the order of the paper; additional figures follow those that they belong to."""
 
@@ -140,7 +153,7 @@ def write_figures(
     experiments: Experiments | None = None,
     progress: Callable[[str], None] = lambda _name: None,
 ) -> tuple[Path, ...]:
-    """Draw figures and write each to a file, the same bytes for the same numbers.
+    """Draw figures and write each to a file, or all on slides; the same bytes for the same numbers.
 
     Args:
         figures: the figures.
@@ -152,19 +165,35 @@ def write_figures(
     Raises:
         ParameterError: if a file cannot be written.
     """
-    paths = []
+    ending = "svg" if file_format == "slides" else file_format
+    files: dict[Path, bytes] = {}
     with default_style():
         matplotlib.rcParams["svg.hashsalt"] = _HASH_SALT
         for figure in figures:
             progress(figure.name)
-            paths.append(folder / f"{figure.name}.{file_format}")
-            _write_figure(figure.draw(experiments), paths[-1], file_format)
-    return tuple(paths)
+            image = _draw_image(figure.draw(experiments), ending)
+            files[folder / f"{figure.name}.{ending}"] = image
+    if file_format == "slides":
+        files = {folder / "slides.html": _slides(figures, files.values()).encode()}
+    for path, content in files.items():
+        write_bytes("figures", path, content)
+    return tuple(files)
 
 
-def _write_figure(figure: Figure, path: Path, file_format: FileFormat) -> None:
+def _slides(figures: Sequence[PaperFigure], images: Iterable[bytes]) -> str:
+    """Return a page with a slide for each figure: one sentence and the picture."""
+    slides = []
+    for figure, image in zip(figures, images, strict=True):
+        title, sentence = slide_text(figure.texts)
+        picture = base64.b64encode(image).decode("ascii")
+        slides.append({"title": title, "sentence": sentence, "image": picture})
+    template = template_environment().get_template("slides.html.j2")
+    return template.render(slides=slides, version=__version__)
+
+
+def _draw_image(figure: Figure, file_format: str) -> bytes:
     metadata: dict[str, Any] = {"svg": {"Date": None, "Creator": None}, "png": {"Software": None}}
     options: dict[str, Any] = {"dpi": _DPI, "bbox_inches": "tight", "pad_inches": _MARGIN}
     image = io.BytesIO()
     figure.savefig(image, format=file_format, metadata=metadata[file_format], **options)
-    write_bytes("figures", path, image.getvalue())
+    return image.getvalue()

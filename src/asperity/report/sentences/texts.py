@@ -30,6 +30,13 @@ def table_notes(table: str) -> list[str]:
     return list(_load_texts()["notes"][table])
 
 
+def slide_text(name: str) -> tuple[str, str]:
+    """Return title and sentence of the slide of a figure, by the name of its texts."""
+    report, figure = name.split(".")
+    text = _load_texts()["figures"][report][figure]
+    return text["title"], text["slide"]
+
+
 def figure_text(name: str, **values: object) -> tuple[str, str, str]:
     """Return title, caption and description of a figure.
 
