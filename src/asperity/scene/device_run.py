@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from asperity.analysis.compare import compare
+from asperity.analysis.compare import DEFAULT_DEVICE, compare
 from asperity.clamps import BACKED
 from asperity.core.errors import ParameterError
 from asperity.core.files import Serializable, check_not_existing
@@ -18,7 +18,7 @@ from asperity.devices import Device, DeviceLike, load_device
 from asperity.laws import REGISTERED_LAWS, find_law
 from asperity.scene.loops import SceneLike, as_scene, make_loop
 from asperity.scene.sections import surface_keywords
-from asperity.scene.setup import DEFAULT_DEVICE, SIMULATED_DRIVER, Setup
+from asperity.scene.setup import SIMULATED_DRIVER, Setup
 from asperity.servo.drivers.simulated import simulated_driver
 from asperity.servo.fault import EndReason
 from asperity.servo.loop_memory import LoopStatistics
