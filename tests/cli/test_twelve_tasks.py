@@ -70,7 +70,7 @@ EXPECTED: dict[int, tuple[str, dict[str, str]]] = {
         r"http://(127\.0\.0\.1|localhost):\d+",
         {"claim.html": "eq-5", "lecture/slides.html": "<h1>Around a closed path"},
     ),
-    11: (r"Did you mean one of: '--device'[\s\S]*^law start at texture", {}),
+    11: (r"did you mean '--device'[\s\S]*^law start at texture", {}),
     12: (r"The recording was not closed", {"run.csv": "x [m]"}),
 }
 """A pattern of stderr and stdout, and words of the files that each task writes."""

@@ -14,6 +14,7 @@ import click
 
 import asperity
 from asperity.cli.plugins import plugin_error_text
+from asperity.cli.usage_errors import unknown_command_error, usage_error_text
 from asperity.core.cache import CacheWarning, size_limit
 from asperity.core.errors import AsperityError, ParameterError, print_message
 from asperity.core.files import read_toml
@@ -53,6 +54,12 @@ class HeadedCommand(click.Command):
             if records and (title != "Measured surface" or ctx.meta.get("shows_files")):
                 with formatter.section(title):
                     formatter.write_dl(records)
+
+    def get_usage(self, ctx: click.Context) -> str:
+        """Return the usage with an example, for messages."""
+        return (
+            f"{super().get_usage(ctx)}, such as asperity {self.name} {COMMANDS[str(self.name)][2]}"
+        )
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002 - click's signature
         """Write the example."""
@@ -129,6 +136,8 @@ class StrictGroup(click.Group):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Return the command after a check for repeated options."""
+        if args[0][:1] != "-" and self.get_command(ctx, args[0]) is None:
+            raise unknown_command_error(args[0], ctx)
         name, command, rest = super().resolve_command(ctx, args)
         if command is not None:
             check_not_repeated(command, rest, ctx)
@@ -187,8 +196,10 @@ def main() -> None:
     except click.Abort:
         raise KeyboardInterrupt from None  # reported by asperity.__main__
     except click.ClickException as error:
-        error.show()
-        sys.exit(BAD_INPUT)
+        if isinstance(error, getattr(click.exceptions, "NoArgsIsHelpError", ())):
+            error.show()  # the help of a group
+            sys.exit(BAD_INPUT)
+        _exit_with_message(usage_error_text(error), BAD_INPUT)
     except AsperityError as error:
         _exit_with_message(error, error.exit_code)
     except MemoryError:

@@ -78,7 +78,8 @@ def parse_settings(
         name = name.removeprefix(_DEVICE_PREFIX)
         if name not in (FIELD_UNITS if of_device else parameters):
             words = f"names {name!r}, which is a parameter of no law and no field of a device"
-            hint = suggest_names(name, [*parameters, *FIELD_UNITS])
+            shared = {f"{_DEVICE_PREFIX}{one}" for one in FIELD_UNITS.keys() & parameters.keys()}
+            hint = suggest_names(name, {*parameters, *FIELD_UNITS, *shared})
             raise ParameterError("set", f"{words}; {hint}")
         first = earlier.setdefault((of_device, name), text)
         if first is not text:
@@ -86,7 +87,12 @@ def parse_settings(
         if of_device:
             device[name] = value.strip()
         else:
-            law[name] = parameters[name].parse(value)
+            try:
+                law[name] = parameters[name].parse(value)
+            except ParameterError as error:
+                field = f"; that of the device is --set {_DEVICE_PREFIX}{name}={value.strip()}"
+                words = f"{error.requirement}{field if name in FIELD_UNITS else ''}"
+                raise ParameterError(name, words, error.value) from None
     return Overrides(law, device)
 
 

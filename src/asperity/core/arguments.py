@@ -7,6 +7,7 @@ are derived from a declaration.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +19,7 @@ from asperity.core.units import format_quantity, parse_quantity, parse_size
 
 Form = Literal[
     "quantity",  # "1.5 mm"; a bare number only where there is no unit
-    "pair",  # "5um", or "5um; 8um" for x and y
+    "pair",  # "5um", or "5um; 8um" for x and y; like all lists also with a comma
     "vector",  # "1 0.4", or a list of numbers
     "items",  # "1mm; 2mm"
     "vectors",  # "3 1 rad/mm; 4 0 rad/mm"; single ones lie along x
@@ -246,10 +247,10 @@ FIELD, SEARCH = RENDERING.choices
 # --- parsers of the forms: name of the argument, value, unit --------------------------------------
 
 
-def _split(value: Any, separator: str | None = ";") -> list[Any]:
+def _split(value: Any, separators: str = "[;,]") -> list[Any]:
     if isinstance(value, list):
         return value
-    return [part for part in str(value).split(separator) if part.strip()]
+    return [part for part in re.split(separators, str(value)) if part.strip()]
 
 
 def _parse_quantities(name: str, value: Any, unit: str) -> list[float]:
@@ -257,7 +258,7 @@ def _parse_quantities(name: str, value: Any, unit: str) -> list[float]:
 
 
 def _parse_vector(name: str, value: Any, unit: str) -> list[float]:
-    parts = _split(value, None)
+    parts = _split(value, r"[;,\s]")
     last = parts[-1] if len(parts) > 1 else ""
     if unit and isinstance(last, str) and last[:1].isalpha():  # "3 1 rad/mm"
         parts = [f"{part}{last}" for part in parts[:-1]]

@@ -103,10 +103,19 @@ def suggest_names(name: str, choices: Iterable[str]) -> str:
         >>> suggest_names("omega3", ["omega.3", "touch"])
         "did you mean 'omega.3'? known: omega.3, touch"
     """
+    choice = sorted(choices)
+    return f"{nearest_names(name, choice)}known: {', '.join(choice)}"
+
+
+def nearest_names(name: str, choices: Iterable[str]) -> str:
+    """Return a question with the one or two nearest names; empty if none is near.
+
+    Example:
+        >>> nearest_names("--stifness", ["--speed", "--stiffness"])
+        "did you mean '--stiffness'? "
+    """
     import difflib  # imported for an error only
 
-    choice = sorted(choices)
-    lowered = {c.lower(): c for c in choice}
-    hits = [lowered[c] for c in difflib.get_close_matches(name.lower(), lowered, n=2, cutoff=0.65)]
-    hint = f"did you mean {' or '.join(repr(h) for h in hits)}? " if hits else ""
-    return f"{hint}known: {', '.join(choice)}"
+    lowered = {choice.lower().lstrip("-"): choice for choice in choices}
+    near = difflib.get_close_matches(name.lower().lstrip("-"), lowered, n=2, cutoff=0.65)
+    return f"did you mean {' or '.join(repr(lowered[one]) for one in near)}? " if near else ""

@@ -132,12 +132,24 @@ def _parse_number(text: str | float) -> float | None:
 def _parse_with_unit(name: str, text: str, unit: str) -> float:
     match = _NUMBER.match(text.strip())
     if match is None or not unit:
-        raise ParameterError(name, _requirement(unit), text)
+        raise ParameterError(name, f"{_requirement(unit)}{_correction(text, unit)}", text)
     words = text.strip()[match.end() :].strip()
     try:
         return _scale(match.group(), _find_unit_factor(words, unit))
     except ValueError as error:
-        raise ParameterError(name, f"{_requirement(unit)}; the unit {error}", text) from None
+        reason = f"the unit {error}{_correction(text, unit)}"
+        raise ParameterError(name, f"{_requirement(unit)}; {reason}", text) from None
+
+
+def _correction(text: str, unit: str) -> str:
+    """Return how to write a list, a decimal comma or the case of a unit; empty for no hint."""
+    if re.search(r"\d\S*\s+\d", text):
+        return "; several values are separated by commas or semicolons"
+    if re.fullmatch(r"\s*\d+,\d+[^\d,]*", text):
+        return f"; with a decimal point {text.replace(',', '.')}"
+    written = _NUMBER.sub("", text.strip(), count=1).strip()
+    known = {one.lower(): one for one in _SI_FACTORS.get(unit, ())}.get(written.lower())
+    return f"; write {text.replace(written, known)}" if known else ""
 
 
 @lru_cache(maxsize=1024)

@@ -133,8 +133,8 @@ def find_law(law: str | Law) -> Law:
 def find_laws(laws: str | list[str | Law] | tuple[str | Law, ...]) -> tuple[Law, ...]:
     """Return several laws from letters ("WABC"), a name, or a sequence of both.
 
-    A string with commas is split there; otherwise each of its letters is a law, unless the whole
-    string is the name of one.
+    A string with commas or semicolons is split there; otherwise each of its letters is a law,
+    unless the whole string is the name of one.
 
     Raises:
         ParameterError: for an unknown law, a law named twice, or none at all.
@@ -144,9 +144,10 @@ def find_laws(laws: str | list[str | Law] | tuple[str | Law, ...]) -> tuple[Law,
         ['W', 'B', 'D']
     """
     if isinstance(laws, str):
-        parts: list[str | Law] = [part.strip() for part in laws.split(",") if part.strip()]
+        names = laws.replace(";", ",").split(",")
+        parts: list[str | Law] = [part.strip() for part in names if part.strip()]
         if len(parts) == 1 and "-" not in laws and _find_registered(laws) is None:
-            parts = list(laws.strip())
+            parts = list("".join(laws.split()).strip(",;"))
     else:
         parts = list(laws)
     found = tuple(find_law(part) for part in parts)

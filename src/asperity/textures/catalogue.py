@@ -186,6 +186,10 @@ def parse_specification(source: str) -> tuple[str, dict[str, str]] | None:
     kind, colon, arguments = source.partition(":")
     named = kind.lower()
     is_path = os.path.exists(source) and not (named in KINDS and os.path.isdir(source))
+    match = re.match(r"([A-Za-z][\w-]+)[,; ]+(?=[\w-]+ *=)", source)
+    if match and match[1].lower() in KINDS and not is_path:
+        hint = f"did you mean {source.replace(match[0], f'{match[1]}:')!r}?"
+        raise ParameterError("surface", f"must be kind:argument=value,...: {hint}")
     if is_path or not re.fullmatch(r"[A-Za-z][\w-]+", kind):
         return None
     if not colon and (named == _FILE.name or named not in KINDS):

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from asperity.core.checks import check_positive
-from asperity.core.errors import AsperityError, ParameterError, SurfaceFileError
+from asperity.core.errors import AsperityError, ParameterError, SurfaceFileError, nearest_names
 from asperity.measured.reading import unsupported
 from asperity.measured.reading.grids import NPY_MAGIC, is_esri, read_esri, read_npy
 from asperity.measured.reading.images.image_files import PNG_MAGIC, TIFF_MAGIC, read_png, read_tiff
@@ -286,7 +286,8 @@ def _check_file(path: Path, name: str) -> None:
     try:
         is_folder, size = path.is_dir(), path.stat().st_size
     except FileNotFoundError as error:
-        raise SurfaceFileError(f"{path}: no such file") from error
+        near = nearest_names(path.name, [one.name for one in path.parent.glob("*")])
+        raise SurfaceFileError(f"{path}: no such file{near and f'; {near.strip()}'}") from error
     except ValueError as error:  # a NUL in the name
         raise SurfaceFileError(f"{str(path)!r} is not a file name") from error
     if is_folder:
