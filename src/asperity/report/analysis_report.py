@@ -14,6 +14,7 @@ from asperity.clamps import NONE
 from asperity.core.units import format_quantity
 from asperity.laws import LAWS, SHIPPED_LAW_ARGUMENTS
 from asperity.report import page
+from asperity.report.comparison_columns import texture_name
 from asperity.report.device_report import device_numbers_table
 from asperity.report.page import HEADED, Cell, Media, Row, Section, Table, TableLayout
 from asperity.report.sentences import number_text
@@ -110,7 +111,7 @@ def merit_facts(analysis: Analysis) -> list[tuple[str, str]]:
     facts = [
         ("strength T", f"{number_text.merit_text(scan.strength)}{unit}"),
         ("support S", number_text.merit_text(scan.support)),
-        ("texture force", f"{format_quantity(scan.ripple * surface.stiffness, 'N')} RMS at this k"),
+        ("RMS force", f"{format_quantity(scan.ripple * surface.stiffness, 'N')} RMS at this k"),
         ("height", f"z = {format_quantity(scan.height, 'm')}"),
     ]
     if scan.contact_lost > 0.0:
@@ -177,9 +178,10 @@ def analysis_page(analysis: Analysis, texture_code: str = "") -> page.Page:
         texture_code: a Python expression of the texture; see
             :func:`reproduction_lines`.
     """
-    law, code = analysis.surface.law, "\n".join(reproduction_lines(analysis, texture_code))
+    code = "\n".join(reproduction_lines(analysis, texture_code))
+    surface, name = analysis.surface, analysis.device.name
     return page.Page(
-        title=f"Law {law.letter} on the {analysis.device.name}",
+        title=f"{texture_name(surface.texture)}, law {surface.law.letter}, on the {name}",
         answer=analysis.answer,
         facts=_facts(analysis),
         sections=[

@@ -10,7 +10,7 @@ from rich.table import Table as RichTable
 
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.compare import Comparison
-from asperity.analysis.limits.perceptibility_sentences import tier_text
+from asperity.analysis.limits.perceptibility_sentences import texture_amount_text, tier_text
 from asperity.analysis.passivity.assess_passivity import stability_limit_text
 from asperity.analysis.passivity.verdict import Basis
 from asperity.analysis.results import LawRow
@@ -21,6 +21,7 @@ from asperity.report.sentences import number_text
 from asperity.report.sentences.texts import column_meanings, table_notes
 from asperity.report.terminal import rich_table
 from asperity.textures.catalogue import CATALOGUE
+from asperity.textures.texture import Texture
 
 VERDICT_MIN_CONSOLE = 72
 """Console width [characters] from which the verdicts are in the table, not below it."""
@@ -109,14 +110,17 @@ def _value_text(name: str, value: Any, argument: Argument | None) -> str:
     return format_quantity(value, "m") if is_length else f"{value}"
 
 
-def texture_name(description: dict[str, Any]) -> str:
-    """Return the kind of a texture, or of the one that was baked, for a title.
+def texture_name(texture: Texture) -> str:
+    """Return the file of a texture, its kind, or that of the one that was baked, for a title.
 
     Example:
-        >>> texture_name({"kind": "field", "source": {"kind": "cloth"}})
-        'Cloth'
+        >>> from asperity.textures import Sinusoid
+        >>> texture_name(Sinusoid(1e-4, 1e-3))
+        'Sinusoid'
     """
-    return number_text.readable_name(description.get("source", description)["kind"]).capitalize()
+    description = texture.describe()
+    kind = number_text.readable_name(description.get("source", description)["kind"]).capitalize()
+    return texture.file_name or kind
 
 
 # --- tables ---------------------------------------------------------------------------------------
@@ -145,7 +149,8 @@ def _texture_force_cell(row: LawRow, comparison: Comparison) -> Cell:
     if row.perceptibility is None:
         return Cell(number_text.NOT_AVAILABLE)
     forces = [row.resolved_force, *(other.resolved_force for other in comparison.rows)]
-    return Cell(number_text.format_in_one_unit(forces, "N", digits=2)[0])
+    text = number_text.format_in_one_unit(forces, "N", digits=2)[0]
+    return Cell(text, note=texture_amount_text(row.perceptibility))
 
 
 def _leak_cell(row: LawRow, comparison: Comparison) -> Cell:
@@ -204,7 +209,7 @@ FULL_COLUMNS = (
     LawColumn("contin-\nuous", lambda row, _: _continuity_cell(row, row.continuous), False, 80),
     LawColumn("T", lambda row, _: Cell(number_text.merit_text(row.strength)), True, 80),
     LawColumn("S", lambda row, _: Cell(number_text.merit_text(row.support)), True, 80),
-    LawColumn("texture\nforce", _oscillation_cell, True, 80),
+    LawColumn("RMS\nforce", _oscillation_cell, True, 80),
 )
 
 

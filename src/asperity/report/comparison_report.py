@@ -42,7 +42,7 @@ def comparison_page(comparison: Comparison, full: bool = False) -> Page:
         full: whether a terminal shows every number instead of the summary.
     """
     return Page(
-        title=f"{texture_name(comparison.texture.describe())} on the {comparison.device.name}",
+        title=f"{texture_name(comparison.texture)} on the {comparison.device.name}",
         answer=comparison.recommendation,
         facts=_facts(comparison),
         sections=[
@@ -162,7 +162,7 @@ def comparisons_page(comparisons: DeviceComparisons) -> Page:
     ]
     assumed = [one for one in page.assumption_sections(common) if Media.TERMINAL in one.media]
     return Page(
-        title=f"{texture_name(texture.describe())} on several devices",
+        title=f"{texture_name(texture)} on several devices",
         answer=comparisons.recommendation,
         facts=[
             ("Surface", describe_texture(texture.describe())),

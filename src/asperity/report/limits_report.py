@@ -7,6 +7,7 @@ from asperity.analysis.limits.limit_rules import LIMIT_RULES
 from asperity.analysis.limits.perceptibility_sentences import speed_text, texture_amount_text
 from asperity.core.units import format_quantity
 from asperity.report import page
+from asperity.report.comparison_columns import texture_name
 from asperity.report.device_report import device_numbers_table
 from asperity.report.page import SCREEN, Cell, Media, Row, Section, Table, TableLayout
 from asperity.report.sentences.number_text import (
@@ -126,9 +127,9 @@ def limits_page(result: limit_result.Limits) -> page.Page:
     """Return the report: answer, limits, figure, waves and assumptions."""
     fields = [*dict.fromkeys(limit.device_field for limit in result.limits), "friction"]
     notes = [*symbol_lines(result), *table_notes("limits")]
-    limits = [six_limits_table(result)]
+    limits, surface, name = [six_limits_table(result)], result.surface, result.device.name
     return page.Page(
-        title=f"Rendering limits of law {result.surface.law.letter} on {result.device.name}",
+        title=f"Limits of {texture_name(surface.texture)}, law {surface.law.letter}, on the {name}",
         answer=result.answer,
         facts=_facts(result),
         sections=[

@@ -68,10 +68,14 @@ TextureLike = Texture | str | os.PathLike[str]
 def _load_file(path: str | os.PathLike[str], **values: Any) -> Texture:
     """Return the texture of a measured file, or a baked field; see :func:`load_texture`."""
     if not is_field(path):
-        return texture_from_prepared(prepare_file(path, **values))
-    for name in values:
-        raise ParameterError(name, f"cannot be applied: {os.fspath(path)} was baked already")
-    return load_field(path, _build_described)
+        texture: Texture = texture_from_prepared(prepare_file(path, **values))
+    elif values:
+        words = f"cannot be applied: {os.fspath(path)} was baked already"
+        raise ParameterError(next(iter(values)), words)
+    else:
+        texture = load_field(path, _build_described)
+    texture.file_name = os.path.basename(os.fspath(path))
+    return texture
 
 
 @document_arguments(FILE_ARGUMENTS)

@@ -87,6 +87,7 @@ class Texture(Plottable, ABC):
             search.
         sample_offset: position of a sample in its cell: 0 at the nodes of a spline, where second
             derivatives are extreme.
+        file_name: name of the file that the texture was loaded from; empty for none.
         preparation: steps of the preparation of measured heights, as sentences for reports.
         filled_mask: where missing heights have been interpolated; ``None`` for nowhere.
         history: surface parameters as read and after each step of the preparation.
@@ -98,6 +99,7 @@ class Texture(Plottable, ABC):
     constructor_arguments: ClassVar[tuple[Argument, ...]] = ()
     finds_contacts: ClassVar[bool] = False
     sample_offset: ClassVar[float] = 0.5
+    file_name: str = ""
     preparation: tuple[str, ...] = ()
     filled_mask: NDArray[np.bool_] | None = None
     history: tuple[PreparationStage, ...] = ()

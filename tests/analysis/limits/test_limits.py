@@ -305,7 +305,8 @@ def test_perceptibility_of_a_sum_of_two_waves() -> None:
     assert perceptibility.resolved == pytest.approx(LONG, rel=1e-6)
     assert perceptibility.resolved_rms == pytest.approx(500.0 * 5e-5 / math.sqrt(2), rel=1e-3)
     assert perceptibility.missing_data == ("apparent_mass", "damping")
-    assert default_limits(TWO).answer.endswith("20 mN RMS of texture: felt.")
+    words = "20 mN RMS of texture, of which the device resolves 18 mN at 0.12 m/s: felt."
+    assert default_limits(TWO).answer.endswith(words)
 
 
 def test_force_below_a_step_is_not_felt() -> None:

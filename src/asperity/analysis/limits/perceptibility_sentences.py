@@ -31,14 +31,14 @@ def force_magnitude_text(force: float) -> str:
 
 
 def texture_amount_text(texture: Perceptibility) -> str:
-    """Return the RMS of the oscillating force, and the part of it that is texture."""
+    """Return the RMS of the oscillating force, the part that is texture, and what is resolved."""
     texture_force = force_magnitude_text(texture.texture_rms)
     text = f"{texture_force} RMS of texture"
     if texture.is_mostly_form:
         text = f"{force_magnitude_text(texture.rms)} RMS, of which {texture_force} is texture"
-    if texture.resolved < 0.5:
-        resolved, speed = force_magnitude_text(texture.resolved_rms), speed_text(texture.speed)
-        text += f", of which the device resolves {resolved} at {speed}"
+    resolved = force_magnitude_text(texture.resolved_rms)
+    if resolved != texture_force:
+        text += f", of which the device resolves {resolved} at {speed_text(texture.speed)}"
     return text
 
 

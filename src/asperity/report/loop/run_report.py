@@ -16,7 +16,7 @@ from asperity.core.units import format_quantity
 from asperity.recording.recording import Recording
 from asperity.recording.replay import Replay
 from asperity.report import page
-from asperity.report.comparison_columns import describe_texture
+from asperity.report.comparison_columns import describe_texture, texture_name
 from asperity.report.html import Origin, render_page
 from asperity.report.page import SCREEN, Media, Page, Row, Section, Table, TableLayout
 from asperity.report.sentences.number_text import readable_name
@@ -178,8 +178,9 @@ def ledger_table(run: Run) -> Table:
 def run_page(setup: Setup, run: Run) -> Page:
     """Return the report of a run."""
     caption, ledger = closure_text(run), ledger_table(run)
+    surface, name = setup.surface, setup.device.name
     return Page(
-        title=f"Law {setup.surface.law.letter} in the loop, {setup.device.name}",
+        title=f"{texture_name(surface.texture)}, law {surface.law.letter}, in the loop, {name}",
         answer=run_answer(setup, run),
         facts=run_facts(setup, run),
         sections=[
