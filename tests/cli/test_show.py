@@ -218,4 +218,4 @@ def test_headline_follows_the_requested_filter(call: Call, source: str) -> None:
 def test_cutoff_alone_asks_which(call: Call, source: str) -> None:
     code, out, err = call("show", source, "--cutoff", "0.8mm")
     assert (code, out) == (2, "")
-    assert "'--l-cutoff', '--s-cutoff'" in err
+    assert "did you mean '--s-cutoff' or '--l-cutoff'?" in err
