@@ -7,6 +7,7 @@ import os
 import signal
 from collections.abc import Callable
 from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
 from functools import partial
 from typing import Any
 
@@ -21,7 +22,9 @@ from asperity.devices import load_device
 from asperity.lab.background import (
     MAX_CRASHES,
     BackgroundRenderer,
+    BackgroundResult,
     BackgroundWorker,
+    compute_recommendation,
     render_view,
     set_surface,
 )
@@ -143,3 +146,67 @@ def test_another_device_has_another_limit_of_the_same_pictures(setup: Setup) -> 
 
     with BackgroundWorker() as pictures, BackgroundWorker() as limits:
         asyncio.run(asyncio.wait_for(scenario(pictures, limits), 240.0))
+
+
+def test_the_recommendation_is_that_of_compare(setup: Setup) -> None:
+    surface, device = setup.surface, load_device("omega.3")
+    result = asp.compare(surface.texture, device, clamp=surface.clamp)
+    row = result.recommended_row
+    assert row is not None
+    found = compute_recommendation(surface.texture, device, surface.max_depth, surface.clamp)
+    assert found["reason"] == result.recommendation
+    assert found["changes"]["law"] == result.recommended
+    assert found["changes"]["stiffness"] == row.recommended_stiffness
+    assert found["limit"]["stiffness"] == row.stability_limit.stiffness
+    assert found["tier"] == row.tier
+    # What cannot be compared is said, in the words of compare.
+    with pytest.raises(asp.ParameterError) as refused:
+        asp.compare(surface.texture, "2diy")
+    found = compute_recommendation(surface.texture, load_device("2diy"), 1e-4, "none")
+    assert found == {"reason": str(refused.value)}
+
+
+class Counted(BackgroundWorker):
+    """One that does its work at once, and crashes as often as is said."""
+
+    crashes = 0
+
+    def __init__(self) -> None:
+        self.seen: list[int] = []
+
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        self.seen.append(arguments[0])
+        result: Future[Any] = Future()
+        if len(self.seen) <= self.crashes:
+            result.set_exception(BrokenProcessPool())
+        else:
+            asyncio.get_running_loop().call_later(
+                0.05, lambda: result.set_result(function(*arguments))
+            )
+        return result
+
+
+def test_of_many_requests_only_the_newest_counts() -> None:
+    async def scenario(crashes: int) -> tuple[list[int], dict[str, Any], int]:
+        updates: list[int] = []
+
+        async def note() -> None:
+            updates.append(1)
+
+        worker = Counted()
+        worker.crashes = crashes
+        result = BackgroundResult(worker, lambda number: {"square": number**2}, note)
+        tasks = []
+        for number in (1, 2, 3):
+            assert result.request(number)
+            assert not result.request(number)
+            tasks.append(asyncio.create_task(result.compute()))
+            await asyncio.sleep(0.0)
+        await asyncio.gather(*tasks)
+        return worker.seen, result.value, len(updates)
+
+    # The first had begun, the second never does.
+    assert asyncio.run(scenario(0)) == ([1, 3], {"square": 9}, 1)
+    seen, value, updates = asyncio.run(scenario(10))
+    assert (seen, updates) == ([1, 3, 3], 1)
+    assert "crashed twice" in value["reason"]

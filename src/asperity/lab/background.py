@@ -8,6 +8,7 @@ from collections.abc import Callable, Coroutine
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, Self
 
@@ -20,7 +21,9 @@ from asperity.core.errors import AsperityError
 from asperity.core.processes import make_pool
 from asperity.devices import Device
 from asperity.lab.messages import ViewRequest, encode_relief, encode_section
-from asperity.surface import Surface
+from asperity.laws import REGISTERED_LAWS
+from asperity.surface import Surface, default_max_depth
+from asperity.textures.texture import Texture
 
 _STATE: dict[str, Surface] = {}
 _NICENESS = 10  # lower priority than the loop and the page
@@ -107,11 +110,90 @@ def compute_limit(surface: Surface, device: Device) -> dict[str, Any]:
     }
 
 
+def compute_recommendation(
+    texture: Texture, device: Device, max_depth: float, clamp: str
+) -> dict[str, Any]:
+    """Return what :func:`~asperity.analysis.compare.compare` recommends among all registered laws.
+
+    ``reason`` is the recommendation in words. If there is a law to show, ``changes`` are those of
+    the scene that apply it, ``is_recommended`` is false for the law that comes nearest where no
+    texture is felt, ``limit`` is its stability limit, ``tier`` its perceptibility, ``amount`` the
+    amount of texture, and ``grip`` the assumed hand.
+    """
+    # Imported by the worker process alone: the server starts sooner.
+    from asperity.analysis.compare import compare
+    from asperity.analysis.limits.perceptibility_sentences import texture_amount_text
+    from asperity.perception.grip import grip_text
+
+    laws, is_default = tuple(REGISTERED_LAWS.values()), max_depth == default_max_depth(texture)
+    depth = None if is_default else max_depth
+    try:
+        result = compare(texture, device, laws, max_depth=depth, clamp=clamp)
+    except AsperityError as error:
+        return {"reason": str(error)}
+    row, words = result.recommended_row or result.nearest_row, {"reason": result.recommendation}
+    if row is None or row.perceptibility is None:
+        return words
+    settings = {"law": row.law.letter, "stiffness": row.recommended_stiffness}
+    return words | {
+        "changes": {**settings, **row.surface.law_parameters},
+        "is_recommended": result.recommended_row is not None,
+        "limit": row.stability_limit.to_dict(),
+        "tier": row.tier,
+        "amount": texture_amount_text(row.perceptibility),
+        "grip": grip_text(result.grip),
+    }
+
+
+_CRASH_TEXT = "the process that computes it has crashed twice"
+_CRASH_RESULT = {"stiffness": None, "basis": _CRASH_TEXT, "reason": _CRASH_TEXT}
+
+
+@dataclass
+class BackgroundResult:
+    """Result of a function for the newest arguments, computed in a worker process.
+
+    Attributes:
+        worker: the process; if it crashes twice, ``basis`` and ``reason`` of the result say so.
+        function: computes the result from the arguments.
+        on_update: called when the result is new.
+        value: the result; empty until computed.
+    """
+
+    worker: BackgroundWorker
+    function: Callable[..., dict[str, Any]]
+    on_update: Callable[[], Coroutine[Any, Any, None]]
+    value: dict[str, Any] = field(default_factory=dict)
+    _arguments: tuple[Any, ...] = ()
+    _lock: asyncio.Lock = field(default_factory=asyncio.Lock)
+
+    def request(self, subject: object, *conditions: Any) -> bool:
+        """Set the arguments; false if these are the current subject and equal conditions."""
+        old = self._arguments
+        if old and old[0] is subject and old[1:] == conditions:
+            return False
+        self._arguments, self.value = (subject, *conditions), {}
+        return True
+
+    async def compute(self) -> None:
+        """Compute the result, after one that is being computed; only the newest one counts."""
+        arguments, value = self._arguments, _CRASH_RESULT
+        async with self._lock:
+            for _attempt in range(2):  # the crash may have had another cause
+                if arguments is not self._arguments or self.value:
+                    return
+                with suppress(BrokenProcessPool):
+                    value = await _run_in_worker(self.worker, self.function, *arguments)
+                    break
+        if arguments is self._arguments:
+            self.value = value
+            await self.on_update()
+
+
 MAX_CRASHES, CRASH_WINDOW = 3, 600.0
 """Crashes of the picture process, within so many seconds, after which it is not restarted."""
 _RESTART_TEXT = "the picture process has crashed and is restarted"
 _NO_PICTURES_TEXT = "no pictures of this surface: the picture process crashed each time"
-_NO_LIMIT_TEXT = "the process that computes the limit has crashed twice"
 
 
 class BackgroundRenderer:
@@ -126,7 +208,6 @@ class BackgroundRenderer:
         on_update: called when a result or a message is new.
 
     Attributes:
-        limit: of :func:`asperity.lab.background.compute_limit`; empty until computed.
         version: incremented with each surface whose pictures are available.
         message: state of the pictures, for the user.
     """
@@ -137,28 +218,29 @@ class BackgroundRenderer:
         limit_worker: BackgroundWorker,
         on_update: Callable[[], Coroutine[Any, Any, None]],
     ) -> None:
-        self._picture_worker, self._limit_worker = picture_worker, limit_worker
-        self._on_update = on_update
+        self._picture_worker, self._on_update = picture_worker, on_update
+        self._limit = BackgroundResult(limit_worker, compute_limit, on_update)
         self._requested_surface: Surface | None = None
-        self._requested_device: Device | None = None
         self._ready_surface: Surface | None = None
         self._crash_times: list[float] = []
         self._tasks: set[asyncio.Task[None]] = set()
-        self.limit: dict[str, Any] = {}
         self.version = 0
         self.message = ""
 
+    @property
+    def limit(self) -> dict[str, Any]:
+        """The limit, see :func:`asperity.lab.background.compute_limit`; empty until computed."""
+        return self._limit.value
+
     def show(self, surface: Surface, device: Device) -> None:
         """Start the computations for a surface on a device, unless it is the current one."""
-        if surface is self._requested_surface and device == self._requested_device:
+        if not self._limit.request(surface, device):
             return
-        previous, self.limit = self._requested_surface, {}
-        self._requested_surface, self._requested_device = surface, device
-        if surface is previous:
-            self._start_task(self._compute_limit(surface, device))
+        if surface is self._requested_surface:
+            self._start_task(self._limit.compute())
             return
-        self._crash_times, self.message = [], ""
-        self._start_task(self._compute(surface, device))
+        self._requested_surface, self._crash_times, self.message = surface, [], ""
+        self._start_task(self._compute(surface))
 
     def _start_task(self, work: Coroutine[Any, Any, None]) -> None:
         task = asyncio.create_task(work)
@@ -170,10 +252,10 @@ class BackgroundRenderer:
         for task in self._tasks:
             task.cancel()
 
-    async def _compute(self, surface: Surface, device: Device) -> None:
+    async def _compute(self, surface: Surface) -> None:
         """Prepare the pictures first: the page waits for them, and the limit takes longer."""
         await self._prepare_pictures(surface)
-        await self._compute_limit(surface, device)
+        await self._limit.compute()
 
     async def _prepare_pictures(self, surface: Surface) -> None:
         while surface is self._requested_surface and len(self._crash_times) < MAX_CRASHES:
@@ -197,16 +279,6 @@ class BackgroundRenderer:
             self._crash_times = [*recent, now]
             restarts = len(self._crash_times) < MAX_CRASHES
             self.message = _RESTART_TEXT if restarts else _NO_PICTURES_TEXT
-            await self._on_update()
-
-    async def _compute_limit(self, surface: Surface, device: Device) -> None:
-        limit = {"stiffness": None, "basis": _NO_LIMIT_TEXT, "q": None, "one_sided": None}
-        for _attempt in range(2):  # the crash may have had another cause
-            with suppress(BrokenProcessPool):
-                limit = await _run_in_worker(self._limit_worker, compute_limit, surface, device)
-                break
-        if surface is self._requested_surface and device == self._requested_device:
-            self.limit = limit
             await self._on_update()
 
     async def render(self, request: ViewRequest) -> bytes:

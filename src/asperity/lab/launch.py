@@ -7,7 +7,7 @@ import os
 import signal
 import socket
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from functools import partial
 from multiprocessing import active_children
 
@@ -71,8 +71,9 @@ async def serve_lab(
     token = AccessToken(listener.getsockname()[1])
     stopped = asyncio.Event()
     plugins = options.load_plugins
-    with BackgroundWorker(plugins) as pictures, BackgroundWorker(plugins) as limits:
-        lab = LabServer(scene_state, pictures, limits, options)
+    with ExitStack() as stack:
+        workers = [stack.enter_context(BackgroundWorker(plugins)) for _ in range(3)]
+        lab = LabServer(scene_state, workers, options)
         tasks = [asyncio.create_task(work()) for work in (lab.watch_session, lab.watch_steering)]
         fetch = lab.clip_store.fetch
         _handle_signals(lab.session, stopped)
@@ -88,7 +89,7 @@ async def serve_lab(
                     on_ready(token.url)
                     await stopped.wait()
         finally:
-            for task in tasks:
+            for task in (*tasks, *lab.pending_tasks):
                 task.cancel()
             lab.background.close()
             # The loop has ended; remaining processes compute pictures and limits, maybe for long.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import time
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
@@ -21,7 +21,12 @@ from asperity.core.files import to_plain_data
 from asperity.devices import device_names
 from asperity.lab import messages
 from asperity.lab.access import MalformedMessageError, RateLimit
-from asperity.lab.background import BackgroundRenderer, BackgroundWorker
+from asperity.lab.background import (
+    BackgroundRenderer,
+    BackgroundResult,
+    BackgroundWorker,
+    compute_recommendation,
+)
 from asperity.lab.clips import ClipStore
 from asperity.lab.playback import Playback
 from asperity.lab.scene_state import RANGES, SceneState
@@ -119,17 +124,12 @@ class LabServer:
 
     Args:
         scene_state: the initial scene.
-        picture_worker: process for pictures, see ``background_worker``.
-        limit_worker: process for limits.
+        workers: processes for pictures, limits and comparisons, see ``background``.
         options: see :class:`LabOptions`.
     """
 
     def __init__(
-        self,
-        scene_state: SceneState,
-        picture_worker: BackgroundWorker,
-        limit_worker: BackgroundWorker,
-        options: LabOptions,
+        self, scene_state: SceneState, workers: Sequence[BackgroundWorker], options: LabOptions
     ) -> None:
         self._loop = asyncio.get_running_loop()
         self._clients: list[Client] = []
@@ -137,15 +137,19 @@ class LabServer:
         self._state_changed = asyncio.Event()
         self._last_contact = 0.0  # time of the last message of the controlling page [s]
         handle, assess_risk = options.handle, None
+        pictures, limits, comparisons = workers
         if handle is not None and not options.accept_risk:
-            assess_risk = partial(limit_worker.submit, excess_stiffness_reason)
+            assess_risk = partial(limits.submit, excess_stiffness_reason)
         self.session = Session(scene_state, self._notify, options.prestarted, handle, assess_risk)
-        self.background = BackgroundRenderer(picture_worker, limit_worker, self._broadcast_state)
+        self.background = BackgroundRenderer(pictures, limits, self._broadcast_state)
+        self.recommendation = BackgroundResult(
+            comparisons, compute_recommendation, self._broadcast_state
+        )
         self.clip_store = ClipStore(self.session)
         if options.playback is not None:
             title = Path(scene_state.source).name
             self.clip_store.add_recording("recording", options.playback, scene_state, title)
-        self._save_tasks: set[asyncio.Task[None]] = set()
+        self.pending_tasks: set[asyncio.Task[None]] = set()
 
     def _notify(self) -> None:
         """Signal a change, from the thread of the session."""
@@ -153,8 +157,11 @@ class LabServer:
             self._loop.call_soon_threadsafe(self._state_changed.set)
 
     def _update_background(self) -> None:
-        scene = self.session.scene_state
+        scene, surface = self.session.scene_state, self.session.scene_state.setup.surface
         self.background.show(scene.setup.rendered, scene.rated_device)
+        conditions = scene.rated_device, surface.max_depth, surface.clamp
+        if self.recommendation.request(surface.texture, *conditions):
+            self._start_task(self.recommendation.compute())
 
     async def watch_session(self) -> None:
         """Send changes of the session to the pages, until cancelled."""
@@ -245,9 +252,12 @@ class LabServer:
         elif kind == "stop":
             self.session.release_force("the force was released")
         elif kind == "save_clip":
-            saving = asyncio.create_task(self._save_clip(client))
-            self._save_tasks.add(saving)
-            saving.add_done_callback(self._save_tasks.discard)
+            self._start_task(self._save_clip(client))
+
+    def _start_task(self, work: Coroutine[Any, Any, None]) -> None:
+        task = asyncio.create_task(work)
+        self.pending_tasks.add(task)
+        task.add_done_callback(self.pending_tasks.discard)
 
     async def _save_clip(self, client: Client) -> None:
         """Save the newest seconds as a clip."""
@@ -273,6 +283,7 @@ class LabServer:
             "lowest": lowest, "highest": highest, "centre": session.scene_state.centre,
             "limit": self.background.limit, "surface_version": self.background.version,
             "picture_message": self.background.message,
+            "recommendation": self.recommendation.value,
         }  # fmt: skip
         for page in tuple(self._clients):
             await page.send("status", has_control=page is self._controller, **status)

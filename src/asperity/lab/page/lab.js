@@ -11,6 +11,7 @@ import { readTheme } from "./canvas.js";
 import { ForceSound } from "./sound.js";
 import { Player } from "./player.js";
 import { ClipsPanel } from "./clips_panel.js";
+import { RecommendationPanel } from "./recommendation_panel.js";
 import { Tour } from "./tour.js";
 import { TourPanel } from "./tour_panel.js";
 import { SpectrumPlot, TracePlot } from "./traces.js";
@@ -100,7 +101,7 @@ const tour = new Tour({
   changeScene, hand, energyMeter, get status() { return status; },
   get viewWidth() { return viewWidth; }, set viewWidth(width) { viewWidth = width; },
 });
-const tourPanel = new TourPanel(tour);
+const tourPanel = new TourPanel(tour), recommendationPanel = new RecommendationPanel(changeScene);
 
 const player = new Player({
   showFrame(playbackFrame) { showFrame({ ...playbackFrame, number: paintedFrame }); },
@@ -171,6 +172,7 @@ function showStatus() {
   $("assumptions").replaceChildren(...status.assumptions.map(text =>
     Object.assign(document.createElement("li"), { textContent: text })));
   showLimit(settings, status.limit);
+  recommendationPanel.update(status);
   if (hasControl && state === "running" && !status.handle) storeUrlSettings(settings);
 }
 
