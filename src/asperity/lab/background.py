@@ -209,6 +209,7 @@ class BackgroundRenderer:
 
     Attributes:
         version: incremented with each surface whose pictures are available.
+        is_current: whether these are pictures of the requested surface.
         message: state of the pictures, for the user.
     """
 
@@ -224,7 +225,7 @@ class BackgroundRenderer:
         self._ready_surface: Surface | None = None
         self._crash_times: list[float] = []
         self._tasks: set[asyncio.Task[None]] = set()
-        self.version = 0
+        self.version, self.is_current = 0, False
         self.message = ""
 
     @property
@@ -239,7 +240,8 @@ class BackgroundRenderer:
         if surface is self._requested_surface:
             self._start_task(self._limit.compute())
             return
-        self._requested_surface, self._crash_times, self.message = surface, [], ""
+        self._requested_surface, self.is_current = surface, False
+        self._crash_times, self.message = [], ""
         self._start_task(self._compute(surface))
 
     def _start_task(self, work: Coroutine[Any, Any, None]) -> None:
@@ -266,7 +268,7 @@ class BackgroundRenderer:
                 continue
             if surface is self._requested_surface:
                 self._ready_surface, self.message = surface, ""
-                self.version += 1
+                self.version, self.is_current = self.version + 1, True
                 await self._on_update()
             return
 

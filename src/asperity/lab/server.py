@@ -283,6 +283,7 @@ class LabServer:
             "lowest": lowest, "highest": highest, "centre": session.scene_state.centre,
             "limit": self.background.limit, "surface_version": self.background.version,
             "picture_message": self.background.message,
+            "pictures_current": self.background.is_current,
             "recommendation": self.recommendation.value,
         }  # fmt: skip
         for page in tuple(self._clients):

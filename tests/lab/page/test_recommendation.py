@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+
 from tests.lab.browser import Browser, needs_browser
 
 import asperity as asp

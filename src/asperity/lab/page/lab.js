@@ -1,6 +1,8 @@
 // The page of the lab: shows the frames and the status sent by the server, and sends the requests of the user.
 
 import { EnergyMeter } from "./tactile_metrics.js";
+import { followPointer, obeyKeys } from "./input.js";
+import { Pictures } from "./pictures.js";
 import { PointerHand } from "./pointer_hand.js";
 import { DeviceHandle } from "./device_handle.js";
 import { LatencyMonitor } from "./latency.js";
@@ -23,8 +25,6 @@ const $ = id => document.getElementById(id);
 const NUMBER_FIELDS = ["delay", "hand_stiffness", "hand_damping", "magnify", "magnify_height"];
 const LOCAL_CONTROLS = ["sound", "volume", "save-png", "save-svg", "reset-energy"]; // need no control of the loop
 const MIN_VIEW_WIDTH = 5e-4, MAX_VIEW_WIDTH = 0.06; // m
-const ZOOM_FACTOR = 1.15;
-const RETRY_DELAY = 500; // ms, after a picture was not available
 const relief = new ReliefView($("relief")), section = new SectionView($("section"));
 const traces = new TracePlot($("traces")), spectrum = new SpectrumPlot($("spectrum")), sound = new ForceSound();
 const energyMeter = new EnergyMeter(), latencyMonitor = new LatencyMonitor();
@@ -32,7 +32,6 @@ const energyMeter = new EnergyMeter(), latencyMonitor = new LatencyMonitor();
 let status = null, frame = null, viewWidth = 8e-3, viewCentre = [0, 0], isFirstStatus = true;
 let laws = []; // of the server, with their parameters
 let errorCount = 0, paintedFrame = -1;
-let viewRequests = {}; // last request of a picture by kind: key, surface version, time sent and earliest next request [ms]
 
 const connection = new Connection({
   hello(message) {
@@ -52,6 +51,7 @@ const connection = new Connection({
   status(message) {
     const previous = status;
     status = message;
+    pictures.setStatus(status);
     const hasRestarted = previous?.start_count !== status.start_count;
     if (status.has_control && !previous?.has_control) hand.requestCount = status.request_count;
     if (hasRestarted) traces.clear();
@@ -71,26 +71,20 @@ const connection = new Connection({
     showFrame(newFrame);
     if (document.hidden) acknowledge(newFrame); // nothing is painted
   },
-  picture(numbers) {
-    const view = isRelief(numbers) ? relief : section, now = performance.now();
-    const request = viewRequests[view.kind];
-    if (request) request.nextTime = now + REST_FACTOR * (now - request.sentTime);
-    view.setPicture(numbers);
-  },
-  picture_unavailable({ kind }) {
-    if (viewRequests[kind]) Object.assign(viewRequests[kind], { key: "", version: -1, nextTime: performance.now() + RETRY_DELAY });
-  },
+  picture(numbers) { pictures.receive(isRelief(numbers) ? relief : section, numbers); },
+  picture_unavailable({ kind }) { pictures.noteUnavailable(kind); },
   disconnected(reason) {
     const notice = status?.handle ? " The force is released when no page with control is connected." : "";
     isFirstStatus = false;
     status = null;
-    viewRequests = {};
+    pictures.setStatus(null);
     $("state").className = "stopped";
     $("state").textContent = "connection lost";
     showAlarm(`${reason ? `The server closed the connection: ${reason}.` : "Connection lost. Is asperity lab still running?"}${notice} Reconnecting …`);
   },
 });
 
+const pictures = new Pictures((kind, content) => connection.send(kind, content), { relief, section });
 const hand = new PointerHand((type, payload) => {
   const isSent = Boolean(status?.has_control && !status.handle) && connection.send(type, payload);
   if (isSent) latencyMonitor.addRequest(hand.requestCount + 1, hand.inputTime);
@@ -108,7 +102,7 @@ const player = new Player({
   clear() {
     traces.clear(); energyMeter.reset();
     // The probe may be elsewhere: pictures are requested again at once.
-    for (const request of Object.values(viewRequests)) if (request.nextTime < Infinity) request.nextTime = 0;
+    pictures.endPauses();
   },
 });
 const clipsPanel = new ClipsPanel({
@@ -253,19 +247,8 @@ function requestPictures(state) {
     const [x, y] = state.probe;
     if (Math.abs(x - viewCentre[0]) > 0.45 * viewWidth || Math.abs(y - viewCentre[1]) > 0.45 * viewWidth) viewCentre = [x, y];
   }
-  requestPicture("relief", { x: viewCentre[0], y: viewCentre[1], size: viewWidth });
-  requestPicture("section", { box: sectionBox(), y: state ? Math.round(state.probe[1] / 5e-5) * 5e-5 : 0 });
-}
-
-// Requests pause for a multiple of the time that a picture took, so that pictures use a tenth of a core.
-const REST_FACTOR = 8;
-
-/** Request a picture unless it is the last one requested, that one is pending, or the pause has not passed. */
-function requestPicture(kind, view) {
-  const { surface_version: version, start_count: startCount } = status, now = performance.now();
-  const key = `${version} ${startCount} ${JSON.stringify(view)}`;
-  if (!version || viewRequests[kind]?.key === key || now < (viewRequests[kind]?.nextTime ?? 0)) return;
-  if (connection.send(kind, view)) viewRequests[kind] = { key, version, sentTime: now, nextTime: Infinity };
+  pictures.request("relief", { x: viewCentre[0], y: viewCentre[1], size: viewWidth });
+  pictures.request("section", { box: sectionBox(), y: state ? Math.round(state.probe[1] / 5e-5) * 5e-5 : 0 });
 }
 
 const lastRun = { texts: 0, traces: 0, requestPictures: 0 }; // time of the last run of each periodic task [ms]
@@ -310,12 +293,13 @@ function updateTexts({ probe, force, energy, isInside }) {
   $("trace-note").textContent = `${frame.late} late samples, ${frame.skipped} skipped`;
   const forceText = `force ${formatQuantity(Math.hypot(...force), "N")}`, position = probe.map(formatMillimetres).join(", ");
   $("readout").textContent = `probe ${position} mm · ${forceText} · time ${frame.newest[0].toFixed(1)} s`;
-  $("relief-note").textContent = `heights × ${(relief.exaggeration ?? 1).toPrecision(2)} · ${handle.isPresent ? "move the handle of the device" : "hold down to press"}`;
+  const stale = pictures.staleText(section);
+  $("relief-note").textContent = pictures.staleText(relief) || `heights × ${(relief.exaggeration ?? 1).toPrecision(2)} · ${handle.isPresent ? "move the handle of the device" : "hold down to press"}`;
   const curl = section.hasCurl ? `curl up to ${formatQuantity(section.maxCurl, "N/m")}` : "no curl: no energy gain";
-  $("section-note").textContent = section.box ? `${curl} · wheel: zoom` : "computing …";
+  $("section-note").textContent = stale || `${curl} · wheel: zoom`;
   const description = `Probe at ${position} millimetres, ${forceText}${isInside ? ", in contact" : ""}`;
   $("relief").setAttribute("aria-label", `The surface in relief. ${description}`);
-  $("section").setAttribute("aria-label", `Section through the surface along x. ${description}. ${curl}`);
+  $("section").setAttribute("aria-label", `Section through the surface along x. ${description}. ${stale || curl}`);
   $("traces").setAttribute("aria-label", `Traces of five seconds. Energy given to the hand ${formatQuantity(energy, "J")}`);
   $("spectrum").setAttribute("aria-label", `Spectrum of the normal force: ${$("peak").textContent}`);
 }
@@ -324,29 +308,14 @@ function updateTexts({ probe, force, energy, isInside }) {
 
 function zoom(factor) { viewWidth = Math.max(MIN_VIEW_WIDTH, Math.min(MAX_VIEW_WIDTH, viewWidth * factor)); }
 
-for (const [canvas, moveHand] of [
-  [$("relief"), event => { [hand.x, hand.y] = relief.pointAt(event.offsetX, event.offsetY); hand.z = null; }],
-  [$("section"), event => { [hand.x, hand.z] = section.pointAt(event.offsetX, event.offsetY, sectionBox()); }],
-]) {
-  let lastInput = "";
-  const followPointer = event => {
-    // A browser also sends pointermove after a change of the layout, which must not override the keys.
-    const input = [event.offsetX, event.offsetY, event.buttons, event.pressure].join();
-    if (input === lastInput) return;
-    lastInput = input;
-    if (hand.motion !== "pointer" || !relief.heights || handle.isPresent) return;
-    hand.isPressed = event.buttons > 0;
-    hand.pressure = event.pointerType === "pen" ? 2 * event.pressure : 1;
-    moveHand(event);
-    hand.requestMotion(event.timeStamp);
-  };
-  canvas.onpointerdown = event => { canvas.setPointerCapture(event.pointerId); followPointer(event); };
-  canvas.onpointermove = canvas.onpointerup = followPointer;
-  // Where supported, raw updates are sent at once; pointermove waits for the next animation frame.
-  canvas.addEventListener("pointerrawupdate", followPointer);
-  canvas.onpointercancel = () => { hand.isPressed = false; hand.requestMotion(); };
-  canvas.addEventListener("wheel", event => { event.preventDefault(); zoom(ZOOM_FACTOR ** Math.sign(event.deltaY)); }, { passive: false });
-}
+const inputHost = {
+  hand, handle, player, tour, tourPanel, energyMeter, zoom,
+  get viewWidth() { return viewWidth; }, get hasControl() { return Boolean(status?.has_control); },
+  get canFollowPointer() { return Boolean(relief.heights) && !handle.isPresent; },
+};
+followPointer($("relief"), inputHost, event => { [hand.x, hand.y] = relief.pointAt(event.offsetX, event.offsetY); hand.z = null; });
+followPointer($("section"), inputHost, event => { [hand.x, hand.z] = section.pointAt(event.offsetX, event.offsetY, sectionBox()); });
+obeyKeys(inputHost);
 
 $("stiffness").oninput = event => { $("stiffness-value").textContent = formatQuantity(fromSliderValue(event.target.value), "N/m"); };
 $("stiffness").onchange = event => changeScene({ stiffness: fromSliderValue(event.target.value) });
@@ -379,50 +348,18 @@ const views = [
 $("save-png").onclick = async () => download(await toPng(views), "asperity-lab.png");
 $("save-svg").onclick = () => download(new Blob([toSvg(views)], { type: "image/svg+xml" }), "asperity-lab.svg");
 
-const ARROW_DIRECTIONS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
-const MAX_KEY_HEIGHT = 0.01; // m
-const KEY_ACTIONS = {
-  " ": () => { hand.z = null; hand.pressure = 1; hand.isLatched = !hand.isLatched; hand.requestMotion(); },
-  PageUp: () => { hand.z = Math.min(hand.height + viewWidth / 80, MAX_KEY_HEIGHT); hand.requestMotion(); },
-  PageDown: () => { hand.z = Math.max(hand.height - viewWidth / 80, -MAX_KEY_HEIGHT); hand.requestMotion(); },
-  m: () => hand.nextMotion(),
-  x: () => $("swap-laws").click(), r: () => energyMeter.reset(), s: () => $("sound").click(),
-  k: () => handle.isPresent || $("save-clip").click(),
-  j: () => player.isOpen && $("play").click(), l: () => player.isOpen && $("return-to-live").click(),
-  t: () => handle.isPresent || tourPanel.toggle(), v: () => tour.isActive && $("tour-demo").click(),
-  n: () => tour.isActive && $("tour-next").click(), p: () => tour.isActive && $("tour-back").click(),
-  "+": () => zoom(1 / ZOOM_FACTOR), "-": () => zoom(ZOOM_FACTOR),
-};
-
-addEventListener("keydown", event => {
-  const isTyping = event.target.closest("input:not([type=range]), select, textarea");
-  if (isTyping || event.ctrlKey || event.altKey || event.metaKey) return;
-  const { key } = event, direction = ARROW_DIRECTIONS[key], isSlider = event.target.matches("input[type=range]");
-  const lawButton = [...$("law-buttons").children].find(button => button.textContent === key.toUpperCase());
-  const activatesButton = event.target.closest("button, summary") && key === " ";
-  if (direction && !isSlider) {
-    hand.x += direction[0] * viewWidth / 60;
-    hand.y += direction[1] * viewWidth / 60;
-    hand.requestMotion();
-  } else if (KEY_ACTIONS[key] && !activatesButton && !(isSlider && key.startsWith("Page"))) KEY_ACTIONS[key]();
-  else if (lawButton) { if (status?.has_control) lawButton.click(); } else return;
-  event.preventDefault();
-});
-
 for (const type of ["error", "unhandledrejection"]) addEventListener(type, () => errorCount++);
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", readTheme);
 readTheme();
 requestAnimationFrame(paint);
 // For the tests and for the console of the browser.
 globalThis.lab = {
-  connection, hand, tour, energyMeter, player, relief, section, probeState, sectionBox,
+  connection, hand, pictures, tour, energyMeter, player, relief, section, probeState, sectionBox,
   latencies: latencyMonitor.latencies, toSvg: () => toSvg(views), toPng: () => toPng(views),
   get viewWidth() { return viewWidth; }, get frame() { return frame; }, get status() { return status; },
   get errorCount() { return errorCount; },
   /** Whether both views have a picture. */
   get hasPictures() { return Boolean(relief.heights && section.box); },
   /** Whether both pictures are of the current surface. */
-  get hasCurrentPictures() {
-    return ["relief", "section"].every(kind => viewRequests[kind]?.nextTime < Infinity && viewRequests[kind].version === status?.surface_version);
-  },
+  get hasCurrentPictures() { return pictures.areCurrent; },
 };

@@ -1,0 +1,79 @@
+"""A picture that is not yet of the law shown is grey, and says of which law it is."""
+
+from __future__ import annotations
+
+import pytest
+from tests.lab.browser import Browser, needs_browser
+from tests.lab.page.test_look import change, shown
+
+SETTLED = "lab.status.state === 'running' && lab.status.pictures_current"
+
+
+def choose(page: Browser, law: str) -> None:
+    page.press(law.lower())
+    page.until(f"lab.status.settings.law === '{law}' && {SETTLED}")
+
+
+def text(page: Browser, name: str) -> str:
+    return str(page.ask(f"document.getElementById('{name}').textContent"))
+
+
+def colourfulness(page: Browser, name: str) -> float:
+    """Return the greatest difference of the channels of a pixel, in the upper half of a view."""
+    page.ask("new Promise(done => setTimeout(done, 300))")
+    pixels = shown(page, name)
+    return float((pixels.max(axis=-1) - pixels.min(axis=-1)).max())
+
+
+@needs_browser
+def test_a_picture_of_another_law_is_grey_and_says_so(page: Browser) -> None:
+    choose(page, "A")
+    page.until("lab.hasCurrentPictures")
+    page.until("document.getElementById('section-note').textContent.startsWith('curl up to')")
+    assert colourfulness(page, "section") > 60.0
+    stiffness = page.ask("lab.status.settings.stiffness")
+    # No new picture comes.
+    page.ask("globalThis.sendPicture = lab.pictures.send; lab.pictures.send = () => false; 1")
+    choose(page, "C")
+    page.until("document.getElementById('section-note').textContent.includes('computing')")
+    assert text(page, "section-note") == f"of law A at {stiffness:.0f} N/m: computing …"
+    label = page.ask("document.getElementById('section').getAttribute('aria-label')")
+    assert "curl" not in label
+    assert "of law A" in label
+    assert colourfulness(page, "section") < 20.0
+    # The relief is that of the surface, whatever the law.
+    assert "heights" in text(page, "relief-note")
+    assert not page.ask("document.getElementById('relief').classList.contains('stale')")
+    assert not page.ask("lab.hasCurrentPictures")
+    # Of the law that is rendered again, but requested before: not shown as current.
+    choose(page, "A")
+    page.ask("new Promise(done => setTimeout(done, 300))")
+    assert "of law A" in text(page, "section-note")
+    choose(page, "C")
+    page.ask("lab.pictures.send = globalThis.sendPicture; 1")
+    page.until("lab.hasCurrentPictures")
+    page.until("document.getElementById('section-note').textContent.startsWith('no curl')")
+    assert not page.ask("document.getElementById('section').classList.contains('stale')")
+    assert page.said == []
+
+
+@needs_browser
+def test_a_picture_of_another_surface_is_grey(page: Browser) -> None:
+    former = page.ask("lab.status.settings.texture")
+    page.ask("globalThis.sendPicture = lab.pictures.send; lab.pictures.send = () => false; 1")
+    with pytest.raises(AssertionError, match="in vain"):
+        page.until("document.getElementById('relief').classList.contains('stale')", 1.0)
+    page.ask(
+        "{ const field = document.getElementById('texture');"
+        "field.value = 'sinusoid:amplitude=0.1mm,period=3mm';"
+        "field.dispatchEvent(new Event('change')); }"
+    )
+    page.until("lab.status.settings.texture.includes('3mm') && lab.status.pictures_current")
+    page.until("document.getElementById('relief').classList.contains('stale')")
+    page.until(
+        "document.getElementById('relief-note').textContent"
+        " === 'of the previous surface: computing …'"
+    )
+    page.ask("lab.pictures.send = globalThis.sendPicture; 1")
+    page.until("lab.hasCurrentPictures && !document.querySelector('.stale')")
+    change(page, "texture", former)
