@@ -35,7 +35,7 @@ function keyActions(host) {
     " ": () => { hand.z = null; hand.pressure = 1; hand.isLatched = !hand.isLatched; hand.requestMotion(); },
     PageUp: () => { hand.z = Math.min(hand.height + host.viewWidth / 80, MAX_KEY_HEIGHT); hand.requestMotion(); },
     PageDown: () => { hand.z = Math.max(hand.height - host.viewWidth / 80, -MAX_KEY_HEIGHT); hand.requestMotion(); },
-    m: () => hand.nextMotion(),
+    m: () => handle.isPresent || host.motionPanel.choose(hand.nextMotion),
     x: () => $("swap-laws").click(), r: () => host.energyMeter.reset(), s: () => $("sound").click(),
     k: () => handle.isPresent || $("save-clip").click(),
     j: () => player.isOpen && $("play").click(), l: () => player.isOpen && $("return-to-live").click(),
@@ -47,7 +47,7 @@ function keyActions(host) {
 
 /**
  * Obey the keys.
- * @param host object with hand, handle, player, tour, tourPanel, energyMeter, viewWidth [m], hasControl and zoom(factor)
+ * @param host object with hand, handle, player, tour, tourPanel, motionPanel, energyMeter, viewWidth [m], hasControl and zoom(factor)
  */
 export function obeyKeys(host) {
   const { hand } = host, actions = keyActions(host);

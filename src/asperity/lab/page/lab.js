@@ -13,6 +13,8 @@ import { readTheme } from "./canvas.js";
 import { ForceSound } from "./sound.js";
 import { Player } from "./player.js";
 import { ClipsPanel } from "./clips_panel.js";
+import { MotionPanel } from "./motion_panel.js";
+import { QuietContact } from "./quiet_contact.js";
 import { RecommendationPanel } from "./recommendation_panel.js";
 import { Tour } from "./tour.js";
 import { TourPanel } from "./tour_panel.js";
@@ -27,7 +29,7 @@ const LOCAL_CONTROLS = ["sound", "volume", "save-png", "save-svg", "reset-energy
 const MIN_VIEW_WIDTH = 5e-4, MAX_VIEW_WIDTH = 0.06; // m
 const relief = new ReliefView($("relief")), section = new SectionView($("section"));
 const traces = new TracePlot($("traces")), spectrum = new SpectrumPlot($("spectrum")), sound = new ForceSound();
-const energyMeter = new EnergyMeter(), latencyMonitor = new LatencyMonitor();
+const energyMeter = new EnergyMeter(), quietContact = new QuietContact(), latencyMonitor = new LatencyMonitor();
 
 let status = null, frame = null, viewWidth = 8e-3, viewCentre = [0, 0], isFirstStatus = true;
 let laws = []; // of the server, with their parameters
@@ -96,6 +98,7 @@ const tour = new Tour({
   get viewWidth() { return viewWidth; }, set viewWidth(width) { viewWidth = width; },
 });
 const tourPanel = new TourPanel(tour), recommendationPanel = new RecommendationPanel(changeScene);
+const motionPanel = new MotionPanel({ hand, section, get isSectionCurrent() { return pictures.isCurrent(section); } });
 
 const player = new Player({
   showFrame(playbackFrame) { showFrame({ ...playbackFrame, number: paintedFrame }); },
@@ -118,7 +121,7 @@ function acknowledge({ number }) { connection.send("acknowledge", { frame: numbe
 /** Show a frame of the live loop or of a clip. */
 function showFrame(newFrame) {
   frame = newFrame;
-  if (status) energyMeter.addFrame(frame, connection.layout.columns, status);
+  if (status) for (const metrics of [energyMeter, quietContact]) metrics.addFrame(frame, connection.layout.columns, status);
   traces.addFrame(frame, connection.layout.columns);
   spectrum.addForces(frame.forces);
   sound.addForces(frame.forces, updateRate());
@@ -165,10 +168,12 @@ function showStatus() {
   $("stiffness-value").textContent = formatQuantity(settings.stiffness, "N/m");
   $("assumptions").replaceChildren(...status.assumptions.map(text =>
     Object.assign(document.createElement("li"), { textContent: text })));
-  showLimit(settings, status.limit);
+  showCurrentLimit();
   recommendationPanel.update(status);
   if (hasControl && state === "running" && !status.handle) storeUrlSettings(settings);
 }
+
+function showCurrentLimit() { showLimit(status.settings, status.limit, player.isOpen ? "" : quietContact.text); }
 
 function magnificationText(settings) {
   const [size, height] = [settings.magnify, settings.magnify_height].map(factor => Number(factor.toPrecision(3)));
@@ -282,7 +287,8 @@ function paint(time) {
 function updateTexts({ probe, force, energy, isInside }) {
   tourPanel.update();
   clipsPanel.update();
-  setField("motion", hand.motion);
+  motionPanel.update();
+  if (status) showCurrentLimit();
   setField("press-depth", 1e3 * hand.pressDepth);
   $("press-depth-value").textContent = formatQuantity(hand.pressDepth, "m");
   $("energy").textContent = formatQuantity(energy, "J");
@@ -309,7 +315,7 @@ function updateTexts({ probe, force, energy, isInside }) {
 function zoom(factor) { viewWidth = Math.max(MIN_VIEW_WIDTH, Math.min(MAX_VIEW_WIDTH, viewWidth * factor)); }
 
 const inputHost = {
-  hand, handle, player, tour, tourPanel, energyMeter, zoom,
+  hand, handle, player, tour, tourPanel, motionPanel, energyMeter, zoom,
   get viewWidth() { return viewWidth; }, get hasControl() { return Boolean(status?.has_control); },
   get canFollowPointer() { return Boolean(relief.heights) && !handle.isPresent; },
 };
@@ -320,7 +326,6 @@ obeyKeys(inputHost);
 $("stiffness").oninput = event => { $("stiffness-value").textContent = formatQuantity(fromSliderValue(event.target.value), "N/m"); };
 $("stiffness").onchange = event => changeScene({ stiffness: fromSliderValue(event.target.value) });
 $("press-depth").oninput = event => { hand.pressDepth = 1e-3 * event.target.value; hand.requestMotion(); };
-$("motion").onchange = event => { hand.motion = event.target.value; hand.requestMotion(); };
 $("texture").onchange = event => changeScene({ texture: event.target.value });
 $("device").onchange = event => changeScene({ device: event.target.value });
 $("max_depth").onchange = event => changeScene({ max_depth: 1e-3 * event.target.value });
@@ -354,7 +359,7 @@ readTheme();
 requestAnimationFrame(paint);
 // For the tests and for the console of the browser.
 globalThis.lab = {
-  connection, hand, pictures, tour, energyMeter, player, relief, section, probeState, sectionBox,
+  connection, hand, pictures, quietContact, tour, energyMeter, player, relief, section, probeState, sectionBox,
   latencies: latencyMonitor.latencies, toSvg: () => toSvg(views), toPng: () => toPng(views),
   get viewWidth() { return viewWidth; }, get frame() { return frame; }, get status() { return status; },
   get errorCount() { return errorCount; },

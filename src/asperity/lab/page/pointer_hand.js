@@ -23,7 +23,7 @@ export class PointerHand {
     this.surfaceHeight = 0; // highest point of the surface [m]
     this.strokeAmplitude = 4e-3;
     this.loopRadius = 5e-4; // m along x
-    this.loopSpeed = 20; // rad/s
+    this.loopSpeed = 20; // rad/s, counterclockwise
     this.requestCount = 0;
     this.lastRequestTime = 0;
     this.isRequestPending = false;
@@ -46,9 +46,12 @@ export class PointerHand {
     this.requestMotion();
   }
 
-  nextMotion() {
-    this.motion = MOTIONS[(MOTIONS.indexOf(this.motion) + 1) % MOTIONS.length];
-    this.requestMotion();
+  get nextMotion() { return MOTIONS[(MOTIONS.indexOf(this.motion) + 1) % MOTIONS.length]; }
+
+  /** Centre and radii of the loops in the x-z plane [m]. */
+  get loop() {
+    const radiusZ = 0.6 * this.pressDepth;
+    return { x: clamp(this.x, MAX_REACH), z: -radiusZ, radiusX: this.loopRadius, radiusZ };
   }
 
   /** Return the requested trajectory, target + cosine cos(speed t) + sine sin(speed t): a point or an ellipse. */
@@ -60,8 +63,8 @@ export class PointerHand {
       return { ...point, target: [x, y, -this.pressDepth], sine: [this.strokeAmplitude, 0, 0], speed };
     }
     if (this.motion === "loop") {
-      const depth = 0.6 * this.pressDepth;
-      return { target: [x, y, -depth], cosine: [this.loopRadius, 0, 0], sine: [0, 0, depth], speed: this.loopSpeed };
+      const { z, radiusX, radiusZ } = this.loop;
+      return { target: [x, y, z], cosine: [radiusX, 0, 0], sine: [0, 0, radiusZ], speed: this.loopSpeed };
     }
     return point;
   }

@@ -8,12 +8,13 @@ const $ = id => document.getElementById(id);
 export const toSliderFraction = stiffness => Math.max(0, Math.min(1, Math.log10(stiffness / 10) / 3));
 export const fromSliderValue = value => Number((10 * 10 ** (3 * value / 1000)).toPrecision(3));
 
-/** Show the stability limit as a mark on the slider and as text. */
-export function showLimit({ stiffness, law }, limit) {
-  const isKnown = Number.isFinite(limit.stiffness);
+/** Show the stability limit as a mark on the slider and as text, with what the contact shows of one that is exceeded. */
+export function showLimit({ stiffness, law }, limit, quietText) {
+  const isKnown = Number.isFinite(limit.stiffness), isExceeded = isKnown && limit.basis !== "wall gain" && stiffness > limit.stiffness;
+  const text = `${limitText(stiffness, law, limit, isKnown)}${isExceeded ? quietText : ""}`;
   $("limit-mark").hidden = !isKnown;
   $("limit-text").classList.toggle("above-limit", isKnown && stiffness > limit.stiffness);
-  $("limit-text").textContent = limitText(stiffness, law, limit, isKnown);
+  if ($("limit-text").textContent !== text) $("limit-text").textContent = text;
   if (isKnown) $("limit-mark").style.left = `calc(0.5rem + ${toSliderFraction(limit.stiffness)} * (100% - 1rem))`;
 }
 

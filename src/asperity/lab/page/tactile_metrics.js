@@ -1,6 +1,6 @@
 // Metrics of the frames: energy supplied to the hand, buzz, clicks and stiffness, each with its threshold.
 
-const PERCEPTION_THRESHOLD = 0.01; // N of an oscillating force, assumed
+export const PERCEPTION_THRESHOLD = 0.01; // N of an oscillating force, assumed
 export const BUZZ_AMPLITUDE = 15 * PERCEPTION_THRESHOLD; // N: clearly felt, and above the effect of encoder steps at a wall
 export const CLICK_FORCE = 20 * PERCEPTION_THRESHOLD; // N in one sample
 const CLICK_STEEPNESS = 4; // times the stiffness of the law: a smaller change in one sample may be a steep slope

@@ -87,7 +87,8 @@ export const STEPS = [
     title: "A feels alive", watch: "The energy given to the hand: it grows with every loop, and turns red.",
     explanation: "Law A pushes straight up by the depth below the groove, without pushing sideways. Such a field has curl: a probe that moves down on one flank and up on the other gains energy.",
     result: "The field has fed the hand, by more than sampling and quantisation explain. A surface that supplies energy feels alive.",
-    tasks: [{ law: "A", stiffness: 1500, instruction: "Move in small loops on a slope: in the section, move the pointer right, down, left and up again.", demo: LOOP, evaluate: checkEnergySupplied }],
+    showsItself: true, // the pointer is moved straight, which shows nothing
+    tasks: [{ law: "A", stiffness: 1500, instruction: "Watch the hand move in small loops on a slope; then “Try it”: in the section, move the pointer right, down, left and up again.", demo: LOOP, evaluate: checkEnergySupplied }],
   }, {
     title: "B buzzes above its limit", watch: "The mark at the stiffness, and the band of the force: it oscillates while the hand is still.",
     explanation: ({ B, W }) => `Law B rotates the force to the surface normal. On a curved surface its lateral stiffness exceeds the nominal one: its limit is ${!B ? "below the wall's" : `${formatQuantity(B, "N/m")}${W ? `, ${formatPercent(B, W)} of the wall's` : ""}`}, and here it is set to ${formatQuantity(BUZZING_STIFFNESS, "N/m")}${B ? `, ${formatRatio(BUZZING_STIFFNESS, B)} times that` : ""}.`,
@@ -128,6 +129,7 @@ export class Tour {
     this.metrics = new ContactMetrics();
     this.stepIndex = -1; // not active
     this.isDemo = false; // whether the hand moves by itself
+    this.wasDemoRequested = false; // by the user, for this step and those after it
     this.completedSteps = STEPS.map(() => false);
     this.previous = null; // view and motion before the tour
     this.limits = {}; // stability limits of the laws on this surface, as received [N/m]
@@ -171,6 +173,7 @@ export class Tour {
     this.stepIndex = stepIndex;
     this.completedSteps[stepIndex] = false;
     this.reference = 0;
+    this.isDemo = this.wasDemoRequested || Boolean(this.step.showsItself);
     this.startTask(0);
   }
 
@@ -198,7 +201,7 @@ export class Tour {
 
   /** Let the hand move by itself, or no longer. */
   setDemo(isOn = !this.isDemo) {
-    this.isDemo = isOn && this.isActive;
+    this.isDemo = this.wasDemoRequested = isOn && this.isActive;
     if (this.isActive && !isOn) this.stopHand();
     this.hasDemoStarted = false;
   }

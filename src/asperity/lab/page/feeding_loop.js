@@ -1,0 +1,42 @@
+// The loop of the hand that gains most energy from the curl of the field in a section.
+
+const RADII = [1, 0.5, 0.25]; // relative to the greatest radius along x
+const EQUAL_SHARE = 0.9; // of the greatest gain: loops that gain more than this are equally good
+
+/** Return the integral of the curl over an ellipse of the x-z plane [N]. */
+function integrateCurl({ box: [left, right, bottom, top], columns, rows, curl }, x, z, radiusX, radiusZ) {
+  const dx = (right - left) / (columns - 1), dz = (top - bottom) / (rows - 1);
+  let sum = 0;
+  for (let j = 0; j < rows; j++) {
+    const v = (bottom + j * dz - z) / radiusZ;
+    for (let i = 0; i < columns; i++) {
+      const u = (left + i * dx - x) / radiusX;
+      if (u * u + v * v <= 1) sum += curl[j * columns + i];
+    }
+  }
+  return sum * dx * dz;
+}
+
+/**
+ * Return the loop near x that gains most energy, or null where no loop gains any.
+ *
+ * Counterclockwise in the x-z plane (x right, z up), ∮ f·dp = -∬ (∂f_x/∂z - ∂f_z/∂x) dA: the sense is that in
+ * which the field supplies energy.
+ * @param section view with a current picture
+ * @param loop x, centre z, radius along x and radius along z [m]
+ * @returns x, radius along x [m], and sense: 1 counterclockwise, -1 clockwise
+ */
+export function findFeedingLoop(section, { x, z, radiusX, radiusZ }) {
+  if (!section.box || !section.hasCurl) return null;
+  const [left, right] = section.box, step = (right - left) / (section.columns - 1), loops = [];
+  for (const radius of RADII.map(factor => factor * radiusX).filter(value => value > 1.5 * step || value === radiusX)) {
+    for (let centre = left + radius; centre <= right - radius; centre += step) {
+      const gain = -integrateCurl(section, centre, z, radius, radiusZ);
+      loops.push({ x: centre, radiusX: radius, gain: Math.abs(gain), sense: Math.sign(gain) });
+    }
+  }
+  const most = Math.max(0, ...loops.map(({ gain }) => gain));
+  if (!(most > 0)) return null;
+  const [nearest] = loops.filter(({ gain }) => gain >= EQUAL_SHARE * most).sort((a, b) => Math.abs(a.x - x) - Math.abs(b.x - x));
+  return nearest;
+}

@@ -1,0 +1,118 @@
+"""Motions of the hand: loops show curl, and a quiet contact shows that a limit is conservative."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from tests.lab.browser import Browser, needs_browser
+
+FED = "document.getElementById('energy-card').classList.contains('supplies-energy')"
+QUIET = "The limit is conservative for this hand: in "
+
+
+def text(page: Browser, name: str) -> str:
+    return str(page.ask(f"document.getElementById('{name}').textContent"))
+
+
+def choose(page: Browser, motion: str) -> None:
+    page.ask(f"document.querySelector('#motion [value={motion}]').click()")
+    assert page.ask("lab.hand.motion") == motion
+
+
+def render(page: Browser, law: str, stiffness: float) -> None:
+    """Render another law as a user does, by key and slider, and wait for its pictures."""
+    page.press(law.lower())
+    page.until(f"lab.status.settings.law === '{law}' && lab.status.state === 'running'")
+    value = f"1000 * Math.log10({stiffness} / 10) / 3"
+    page.ask(
+        "{ const slider = document.getElementById('stiffness'); slider.step = 'any';"
+        f"slider.value = {value}; slider.dispatchEvent(new Event('change')); }}"
+    )
+    page.until(
+        f"lab.status.settings.stiffness === {stiffness} && lab.status.state === 'running'"
+        "&& lab.hasCurrentPictures"
+    )
+
+
+@pytest.fixture(autouse=True)
+def still_hand(page: Browser) -> Iterator[None]:
+    """The hand follows the pointer before and after, not pressed."""
+    page.ask("document.activeElement.blur()")
+    yield
+    choose(page, "pointer")
+    page.ask("lab.hand.isLatched = false; lab.hand.loopSpeed = 20; lab.hand.requestMotion(); 1")
+
+
+@needs_browser
+@pytest.mark.parametrize("x", [0.1e-3, 0.9e-3])
+def test_loops_are_offered_where_the_field_has_curl_and_feed_the_hand(
+    page: Browser, x: float
+) -> None:
+    render(page, "A", 250.0)
+    page.until("document.getElementById('motion-note').textContent.startsWith('This field has')")
+    page.ask(f"Object.assign(lab.hand, {{ x: {x}, y: 0, pressDepth: 2e-4 }}); 1")
+    choose(page, "loop")
+    # On the nearest flank, in the sense that gains energy there: sin rises at 0, and falls at 1 mm.
+    place, speed = page.ask("[lab.hand.x, lab.hand.loopSpeed]")
+    assert place == pytest.approx(1e-3 * round(1e3 * x), abs=0.3e-3)
+    assert speed == (20.0 if x < 0.5e-3 else -20.0)
+    assert text(page, "motion-note") == ""
+    page.press("r")
+    page.until(FED)
+    # In the other sense the hand does work on the field.
+    page.ask("lab.hand.loopSpeed *= -1; lab.hand.requestMotion(); 1")
+    page.ask("new Promise(done => setTimeout(done, 1000))")
+    page.press("r")
+    page.until("!lab.energyMeter.awaitsFreeProbe")
+    page.ask("new Promise(done => setTimeout(done, 1500))")
+    assert not page.ask(FED)
+
+
+@needs_browser
+def test_without_curl_there_is_no_hint_and_loops_stay_in_place(page: Browser) -> None:
+    render(page, "C", 250.0)
+    page.ask("lab.hand.x = 0.4e-3; 1")
+    page.until("document.getElementById('section-note').textContent.startsWith('no curl')")
+    assert text(page, "motion-note") == ""
+    choose(page, "loop")
+    assert page.ask("[lab.hand.x, lab.hand.loopSpeed]") == [0.4e-3, 20.0]
+
+
+@needs_browser
+def test_the_tour_shows_law_a_alive_without_being_asked(page: Browser) -> None:
+    starts = page.ask("lab.status.start_count")
+    page.press("t")
+    page.until(f"lab.status.start_count > {starts}")
+    page.press("n")
+    assert text(page, "tour-title") == "A feels alive"
+    page.until("lab.tour.isStepCompleted && lab.hand.motion === 'loop'")
+    assert text(page, "tour-demo") == "Try it"
+    # The next step waits for the user, as before.
+    page.press("n")
+    assert not page.ask("lab.tour.isDemo")
+    page.press("t")
+    page.until(f"lab.status.start_count === {starts} + 2 && lab.status.state === 'running'")
+
+
+@needs_browser
+def test_a_quiet_contact_above_the_limit_says_that_it_is_conservative(page: Browser) -> None:
+    render(page, "C", 800.0)
+    page.until("lab.status.limit.stiffness > 0")
+    assert page.ask("lab.status.limit.stiffness") < 800.0
+    assert QUIET not in text(page, "limit-text")  # nothing is touched
+    page.ask("Object.assign(lab.hand, { x: 0.5e-3, y: 0, z: null, pressDepth: 1e-3 }); 1")
+    page.press(" ")
+    page.until(f"document.getElementById('limit-text').textContent.includes('{QUIET}')", 30.0)
+    assert text(page, "limit-text").startswith("▲ above the limit of 699 N/m for law C")
+    # The same contact below the limit exceeds none.
+    render(page, "C", 600.0)
+    page.ask("new Promise(done => setTimeout(done, 5000))")
+    assert text(page, "limit-text").startswith("below the limit")
+    assert QUIET not in text(page, "limit-text")
+    # Far above it the force oscillates, by one step of the encoder.
+    render(page, "C", 9000.0)
+    page.ask("new Promise(done => setTimeout(done, 5000))")
+    assert page.ask("lab.quietContact.metrics.forceAmplitude") > 0.05
+    assert text(page, "limit-text").startswith("▲ above the limit")
+    assert QUIET not in text(page, "limit-text")
