@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.servo.python_device import SURFACE, PythonClock, PythonDevice, program_for
 
+from asperity.contacts.warm_start import TRUNCATED_TICKS
 from asperity.servo.driver_loop import DriverLoop, build_program, no_clock
 from asperity.servo.drivers.simulated import simulated_driver
 from asperity.servo.fault import EndReason
@@ -31,6 +32,7 @@ from asperity.simulation import (
     simulate,
 )
 from asperity.surface import Surface
+from asperity.textures import Fourier
 
 RunLoop = Callable[..., SimpleNamespace]
 PRESSED = SpringHand(stiffness=300.0, damping=3.0, mass=0.05, force=(0.0, 0.0, -0.6))
@@ -340,3 +342,20 @@ def test_random_faults_end_with_zero_force(run_loop: RunLoop) -> None:
         assert result.shared.row_count == sample + 1
         assert (result.forces[-1] == 0.0).all()
         assert np.array_equal(result.rows[-1, 7:10], result.forces[sample]) or kind == 3
+
+
+def test_truncated_searches_are_counted_in_the_shared_memory() -> None:
+    texture = Fourier([2e-5, 1e-5], [[3e3, 1e3], [-1e3, 4e3]])
+    surface = Surface(texture, "D", stiffness=500.0, max_depth=1e-3)
+    driver = simulated_driver(Cartesian(0.05), PRESSED, Servo(1e-3), STROKES, 0.3)
+    counts = []
+    for budget in (2.0, surface.law.contact.max_evaluations):
+        shared = LoopMemory()
+        loop = DriverLoop(driver, Servo(1e-3), OPEN, math.inf, shared.block(), no_clock())
+        loop.search_state = shared.search_state
+        program = replace(build_program(surface, driver), max_evaluations=budget)
+        assert loop.run(program, driver.open(), 300)[0] is EndReason.FINISHED
+        counts.append(shared.search_state[TRUNCATED_TICKS])
+    # Two evaluations end no search in contact; those of the contact end all.
+    assert counts[0] > 50
+    assert counts[1] == 0

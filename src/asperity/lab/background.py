@@ -190,6 +190,13 @@ class BackgroundResult:
             await self.on_update()
 
 
+def start_task(pending: set[asyncio.Task[None]], work: Coroutine[Any, Any, None]) -> None:
+    """Start a task, and store it until it is done."""
+    task = asyncio.create_task(work)
+    pending.add(task)
+    task.add_done_callback(pending.discard)
+
+
 MAX_CRASHES, CRASH_WINDOW = 3, 600.0
 """Crashes of the picture process, within so many seconds, after which it is not restarted."""
 _RESTART_TEXT = "the picture process has crashed and is restarted"
@@ -238,16 +245,11 @@ class BackgroundRenderer:
         if not self._limit.request(surface, device):
             return
         if surface is self._requested_surface:
-            self._start_task(self._limit.compute())
+            start_task(self._tasks, self._limit.compute())
             return
         self._requested_surface, self.is_current = surface, False
         self._crash_times, self.message = [], ""
-        self._start_task(self._compute(surface))
-
-    def _start_task(self, work: Coroutine[Any, Any, None]) -> None:
-        task = asyncio.create_task(work)
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
+        start_task(self._tasks, self._compute(surface))
 
     def close(self) -> None:
         """Cancel all tasks."""
@@ -294,7 +296,7 @@ class BackgroundRenderer:
             view = await _run_in_worker(self._picture_worker, render_view, *arguments)
         if not view and surface is self._ready_surface:  # the crash was not yet recorded
             await self._record_crash(surface)
-            self._start_task(self._prepare_pictures(surface))
+            start_task(self._tasks, self._prepare_pictures(surface))
         return view
 
     def nearest(self, point: FloatArray) -> FloatArray:

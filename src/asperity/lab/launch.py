@@ -91,7 +91,7 @@ async def serve_lab(
         finally:
             for task in (*tasks, *lab.pending_tasks):
                 task.cancel()
-            lab.background.close()
+            lab.pictures.close()
             # The loop has ended; remaining processes compute pictures and limits, maybe for long.
             for child in active_children():
                 child.terminate()

@@ -152,7 +152,8 @@ POSITION = slice(COLUMN_NAMES.index("x"), COLUMN_NAMES.index("z") + 1)
 _LAW_FORCE = slice(COLUMN_NAMES.index("commanded x"), COLUMN_NAMES.index("commanded z") + 1)
 _STEP_STATISTICS = ("path_length", "squared_steps", "max_force_step", "position_step")
 HEADER = (
-    *("kind", "frame", "rows", "first", "acknowledged", "late", "skipped", "forces"),
+    *("kind", "frame", "rows", "first", "acknowledged", "forces"),
+    *("late", "skipped", "lateness", "truncated"),
     *_STEP_STATISTICS,
 )
 _POSITION_NAMES = ("closest x", "closest y", "closest z", "hand x", "hand y", "hand z")
@@ -182,7 +183,8 @@ def encode_frame(
     Args:
         rows: at least one, with the columns ``loop.shared_layout.COLUMNS``.
         first: number of the first row.
-        counts: ``frame`` (its number), ``acknowledged``, ``late`` and ``skipped``.
+        counts: ``frame`` (its number), ``acknowledged``, ``late`` and ``skipped`` ticks,
+            ``lateness`` (greatest delay of a start [s]) and ``truncated`` (ticks whose search was).
         positions: of closest point and hand (6,) [m].
     """
     forces = rows[-MAX_FORCE_ROWS:, FORCE_COLUMNS]

@@ -16,17 +16,13 @@ import numpy as np
 from websockets.asyncio.server import ServerConnection
 from websockets.exceptions import ConnectionClosed
 
+from asperity.contacts.warm_start import TRUNCATED_TICKS
 from asperity.core.errors import ParameterError
 from asperity.core.files import to_plain_data
 from asperity.devices import device_names
-from asperity.lab import messages
+from asperity.lab import background, messages
 from asperity.lab.access import MalformedMessageError, RateLimit
-from asperity.lab.background import (
-    BackgroundRenderer,
-    BackgroundResult,
-    BackgroundWorker,
-    compute_recommendation,
-)
+from asperity.lab.background import BackgroundRenderer, BackgroundResult, BackgroundWorker
 from asperity.lab.clips import ClipStore
 from asperity.lab.playback import Playback
 from asperity.lab.scene_state import RANGES, SceneState
@@ -141,9 +137,9 @@ class LabServer:
         if handle is not None and not options.accept_risk:
             assess_risk = partial(limits.submit, excess_stiffness_reason)
         self.session = Session(scene_state, self._notify, options.prestarted, handle, assess_risk)
-        self.background = BackgroundRenderer(pictures, limits, self._broadcast_state)
+        self.pictures = BackgroundRenderer(pictures, limits, self._broadcast_state)
         self.recommendation = BackgroundResult(
-            comparisons, compute_recommendation, self._broadcast_state
+            comparisons, background.compute_recommendation, self._broadcast_state
         )
         self.clip_store = ClipStore(self.session)
         if options.playback is not None:
@@ -158,10 +154,10 @@ class LabServer:
 
     def _update_background(self) -> None:
         scene, surface = self.session.scene_state, self.session.scene_state.setup.surface
-        self.background.show(scene.setup.rendered, scene.rated_device)
+        self.pictures.show(scene.setup.rendered, scene.rated_device)
         conditions = scene.rated_device, surface.max_depth, surface.clamp
         if self.recommendation.request(surface.texture, *conditions):
-            self._start_task(self.recommendation.compute())
+            background.start_task(self.pending_tasks, self.recommendation.compute())
 
     async def watch_session(self) -> None:
         """Send changes of the session to the pages, until cancelled."""
@@ -252,12 +248,7 @@ class LabServer:
         elif kind == "stop":
             self.session.release_force("the force was released")
         elif kind == "save_clip":
-            self._start_task(self._save_clip(client))
-
-    def _start_task(self, work: Coroutine[Any, Any, None]) -> None:
-        task = asyncio.create_task(work)
-        self.pending_tasks.add(task)
-        task.add_done_callback(self.pending_tasks.discard)
+            background.start_task(self.pending_tasks, self._save_clip(client))
 
     async def _save_clip(self, client: Client) -> None:
         """Save the newest seconds as a clip."""
@@ -281,9 +272,9 @@ class LabServer:
             "position_resolution": electronics.position_resolution,
             "force_resolution": electronics.force_resolution,
             "lowest": lowest, "highest": highest, "centre": session.scene_state.centre,
-            "limit": self.background.limit, "surface_version": self.background.version,
-            "picture_message": self.background.message,
-            "pictures_current": self.background.is_current,
+            "limit": self.pictures.limit, "surface_version": self.pictures.version,
+            "picture_message": self.pictures.message,
+            "pictures_current": self.pictures.is_current,
             "recommendation": self.recommendation.value,
         }  # fmt: skip
         for page in tuple(self._clients):
@@ -323,9 +314,10 @@ class LabServer:
             client.last_sent += 1
             counts = {
                 "frame": client.last_sent, "acknowledged": progress["acknowledged"],
-                "late": counted.late, "skipped": counted.skipped,
+                "late": counted.late, "skipped": counted.skipped, "lateness": counted.max_lateness,
+                "truncated": shared.search_state[TRUNCATED_TICKS],
             }  # fmt: skip
-            places = [self.background.nearest(rows[-1, 1:4]), session.anchor]
+            places = [self.pictures.nearest(rows[-1, 1:4]), session.anchor]
             async with asyncio.timeout(_SEND_TIMEOUT):
                 await client.connection.send(
                     messages.encode_frame(rows, first, counts, np.concatenate(places))
@@ -337,7 +329,7 @@ class LabServer:
             await client.view_requested.wait()
             client.view_requested.clear()
             for kind in tuple(client.view_requests):
-                content = await self.background.render(client.view_requests.pop(kind))
+                content = await self.pictures.render(client.view_requests.pop(kind))
                 if content:
                     await client.connection.send(content)
                 else:

@@ -139,6 +139,9 @@ class DriverLoop:
         reach: reach of the handle from the origin of the device [m].
         block: memory of rows and counts.
         clock: the clock.
+
+    Attributes:
+        search_state: of the contact's search; see :mod:`asperity.contacts.warm_start`.
     """
 
     def __init__(
@@ -149,7 +152,7 @@ class DriverLoop:
         self._frame: FloatArray = driver.frame.matrix
         self._block, self._clock, self._placeholder = block, clock, driver.placeholder_record()
         self.state = LoopState()
-        self._memory = new_warm_start(UNLIMITED)
+        self.search_state = new_warm_start(UNLIMITED)
 
     def compile(self, program: LoopProgram) -> None:
         """Compile the loop for a surface, or load it; the device is left alone."""
@@ -174,7 +177,7 @@ class DriverLoop:
     def reset_contact(self) -> None:
         """Reset the state of the law; position and velocity are kept for the next surface."""
         servo = self.state.servo
-        self._memory[POINT_COUNT] = 0.0
+        self.search_state[POINT_COUNT] = 0.0
         fresh = ServoState(servo.x, servo.y, servo.z, servo.vx, servo.vy, servo.vz)
         self.state = self.state._replace(servo=fresh)
 
@@ -182,11 +185,11 @@ class DriverLoop:
         self, program: LoopProgram, device: tuple[Any, ...], state: LoopState, end_sample: int
     ) -> tuple[int, int, LoopState]:
         limits = loop_limits(self._servo, self._safety, self._reach, self._frame[:3, 3], program)
-        self._memory[BUDGET] = program.max_evaluations
+        self.search_state[BUDGET] = program.max_evaluations
         answer: tuple[int, int, LoopState] = load_fused(program.source).servo_loop(
             state, end_sample, self._servo.settings, self._clock,
-            Guards(limits, self._frame, self._block), device, self._block, self._memory,
-            program.texture, program.law,
+            Guards(limits, self._frame, self._block), device, self._block,
+            self.search_state, program.texture, program.law,
         )  # fmt: skip
         return answer
 
@@ -268,6 +271,7 @@ class _LoopServer:
         self._loop = DriverLoop(
             job.driver, job.servo, job.safety, job.reach, self._block, system_clock()
         )
+        self._loop.search_state = memory.search_state
         self._program = self._next_program = job.program
 
     def serve(self) -> None:

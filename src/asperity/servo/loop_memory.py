@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from asperity.contacts.warm_start import WARM_START_SIZE
 from asperity.core.checks import FloatArray
 from asperity.core.files import Serializable
 from asperity.loop import shared_trace as words
@@ -32,6 +33,7 @@ class LoopMemory:
         self._control: Any = context.RawArray(ctypes.c_int64, words.CONTROL_SIZE)
         self._status: Any = context.RawArray(ctypes.c_int64, words.STATUS_SIZE)
         self._table: Any = context.RawArray(ctypes.c_double, BUFFER_ROWS * len(COLUMNS))
+        self._search: Any = context.RawArray(ctypes.c_double, WARM_START_SIZE)
 
     def block(self) -> SharedBlock:
         """Return the memory as the compiled loop takes it."""
@@ -39,6 +41,11 @@ class LoopMemory:
             np.frombuffer(self._control, np.int64), np.frombuffer(self._status, np.int64),
             np.frombuffer(self._table, np.float64).reshape(-1, len(COLUMNS)), np.zeros(1, np.int64),
         )  # fmt: skip
+
+    @property
+    def search_state(self) -> FloatArray:
+        """State of the loop's search, with its truncated ticks since the start."""
+        return np.frombuffer(self._search, np.float64)
 
     @property
     def row_count(self) -> int:

@@ -14,6 +14,7 @@ function decodeFrame(numbers, layout) {
   return {
     number: value("frame"), rowCount: value("rows"), firstRow: value("first"),
     acknowledged: value("acknowledged"), late: value("late"), skipped: value("skipped"),
+    lateness: value("lateness"), truncated: value("truncated"),
     pathLength: value("path_length"), squaredSteps: value("squared_steps"),
     maxForceStep: value("max_force_step"), positionStep: value("position_step"),
     closest: point("closest"), hand: point("hand"), newest: numbers.subarray(newest, newest + width),

@@ -283,6 +283,12 @@ function paint(time) {
   if (state && isDue("texts", time, 150)) updateTexts(state);
 }
 
+/** Return the counts of ticks since the start of the loop; a recording has none. */
+function tickText({ late, skipped, lateness, truncated }) {
+  if (late === undefined) return "";
+  return `${late} late ticks, ${skipped} skipped, ${truncated} truncated; latest start ${formatQuantity(lateness, "s")}`;
+}
+
 /** Update the panels, the numbers, and the descriptions of the views for screen readers. */
 function updateTexts({ probe, force, energy, isInside }) {
   tourPanel.update();
@@ -296,7 +302,7 @@ function updateTexts({ probe, force, energy, isInside }) {
   $("verdict").textContent = energyMeter.verdict;
   const [frequency, amplitude] = spectrum.draw(updateRate());
   $("peak").textContent = amplitude > 1e-3 ? `strongest ${formatQuantity(frequency, "Hz")}, ${formatQuantity(amplitude, "N")}` : "quiet";
-  $("trace-note").textContent = `${frame.late} late samples, ${frame.skipped} skipped`;
+  $("trace-note").textContent = tickText(frame);
   const forceText = `force ${formatQuantity(Math.hypot(...force), "N")}`, position = probe.map(formatMillimetres).join(", ");
   $("readout").textContent = `probe ${position} mm · ${forceText} · time ${frame.newest[0].toFixed(1)} s`;
   const stale = pictures.staleText(section);

@@ -69,7 +69,7 @@ export class Playback {
       forces.set(row.subarray(columns["applied x"], columns["applied x"] + 3), 3 * (index - first));
       if (index > first) this.addStep(statistics, this.row(index - 1), row);
     }
-    return { rowCount: end - first, firstRow: first, acknowledged: 0, late: 0, skipped: 0, ...statistics, newest, minima, maxima, forces,
+    return { rowCount: end - first, firstRow: first, acknowledged: 0, ...statistics, newest, minima, maxima, forces,
       closest: [...newest.subarray(count, count + 3)], hand: [...newest.subarray(count + 3, count + 6)] };
   }
 

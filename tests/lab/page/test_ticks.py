@@ -1,0 +1,45 @@
+"""The page counts the ticks that were late, left out or truncated."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import time
+from pathlib import Path
+
+from tests.lab.browser import Browser, needs_browser
+from tests.lab.started import Started
+
+
+def children(lab: Started) -> list[int]:
+    """Return the processes that the lab has started, among them that of the loop."""
+    tasks = Path(f"/proc/{lab.process.pid}/task").iterdir()
+    return [int(one) for task in tasks for one in (task / "children").read_text().split()]
+
+
+@needs_browser
+def test_a_suspended_loop_is_counted_as_late_ticks(page: Browser, lab: Started) -> None:
+    page.until("lab.status.state === 'running'")
+    before = page.ask("[lab.frame.late, lab.frame.skipped]")
+    for _ in range(5):  # the lab resumes a suspended loop within some ten milliseconds
+        for one in children(lab):
+            os.kill(one, signal.SIGSTOP)
+        time.sleep(0.1)
+        for one in children(lab):
+            os.kill(one, signal.SIGCONT)
+    page.until(f"lab.frame.late > {before[0]} && lab.frame.skipped > {before[1]} + 5")
+    assert page.ask("lab.frame.lateness") > 3e-3
+    assert page.ask("lab.frame.truncated") == 0.0
+    # What the frame has is what the page shows.
+    page.until(
+        "document.getElementById('trace-note').textContent.startsWith(`${lab.frame.late} late`)"
+    )
+    note = page.ask("document.getElementById('trace-note').textContent")
+    shown = re.fullmatch(
+        r"(\d+) late ticks, (\d+) skipped, 0 truncated; latest start ([\d.]+) (m?)s", note
+    )
+    assert shown is not None, note
+    assert int(shown[1]) > before[0]
+    assert float(shown[3]) * (1e-3 if shown[4] else 1.0) > 3e-3
+    assert page.said == []
