@@ -286,7 +286,7 @@ function paint(time) {
 /** Return the counts of ticks since the start of the loop; a recording has none. */
 function tickText({ late, skipped, lateness, truncated }) {
   if (late === undefined) return "";
-  return `${late} late ticks, ${skipped} skipped, ${truncated} truncated; latest start ${formatQuantity(lateness, "s")}`;
+  return `${late} late (${formatQuantity(lateness, "s")}), ${skipped} skipped, ${truncated} truncated ticks`;
 }
 
 /** Update the panels, the numbers, and the descriptions of the views for screen readers. */
@@ -308,7 +308,7 @@ function updateTexts({ probe, force, energy, isInside }) {
   const stale = pictures.staleText(section);
   $("relief-note").textContent = pictures.staleText(relief) || `heights × ${(relief.exaggeration ?? 1).toPrecision(2)} · ${handle.isPresent ? "move the handle of the device" : "hold down to press"}`;
   const curl = section.hasCurl ? `curl up to ${formatQuantity(section.maxCurl, "N/m")}` : "no curl: no energy gain";
-  $("section-note").textContent = stale || `${curl} · wheel: zoom`;
+  $("section-note").textContent = stale || curl;
   const description = `Probe at ${position} millimetres, ${forceText}${isInside ? ", in contact" : ""}`;
   $("relief").setAttribute("aria-label", `The surface in relief. ${description}`);
   $("section").setAttribute("aria-label", `Section through the surface along x. ${description}. ${stale || curl}`);

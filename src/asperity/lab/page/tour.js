@@ -34,10 +34,11 @@ const handText = metrics => `the hand ${metrics.stillTime ? "holds still" : "mov
 
 // Each check returns the progress of a task as text, as a fraction, and whether the effect has occurred.
 const checkQuiet = ({ metrics, energyMeter, status }) => ({
-  text: `stroked ${formatOf(metrics.pathLength, STROKE_PATH, "m")}; the force varies by ${formatQuantity(metrics.forceAmplitude, "N")}`,
+  text: `stroked ${formatOf(metrics.pathLength, STROKE_PATH, "m")}; the force varies by ${formatQuantity(metrics.forceAmplitude, "N")} (a buzz: more than ${formatQuantity(BUZZ_AMPLITUDE, "N")})`,
   fraction: metrics.pathLength / STROKE_PATH,
   isDone: metrics.pathLength >= STROKE_PATH && metrics.forceAmplitude < BUZZ_AMPLITUDE && !metrics.clickCount
     && !energyMeter.suppliesEnergy && isBelowLimit(status),
+  outcome: formatQuantity(metrics.forceAmplitude, "N"),
 });
 const checkNoEnergySupplied = ({ metrics, energyMeter, isSettled }) => ({
   text: `given ${formatQuantity(energyMeter.energy, "J")}; at most ${formatQuantity(energyMeter.samplingBound, "J")} by sampling; path ${formatOf(metrics.pathLength, LOOP_PATH, "m")}`,
@@ -74,14 +75,14 @@ const checkSoft = ({ metrics, status, reference }) => ({
   text: `felt: ${formatQuantity(metrics.feltStiffness, "N/m")}; the wall: ${formatQuantity(reference, "N/m")}`,
   fraction: metrics.stillTime,
   isDone: metrics.feltStiffness > 0 && metrics.feltStiffness < SOFT_FRACTION * reference && isBelowLimit(status),
-  ratio: formatRatio(reference, metrics.feltStiffness),
+  outcome: formatRatio(reference, metrics.feltStiffness),
 });
 
 export const STEPS = [
   {
     title: "W is quiet", watch: "The traces: a flat force. The energy: the hand is not fed.",
     explanation: "The smooth wall is the reference. It pushes straight up, in proportion to the depth of the probe: no texture, and no buzz.",
-    result: "The wall was stroked, and the force did not oscillate.",
+    result: variation => `The wall was stroked, and the force varied by ${variation}: less than a buzz.`,
     tasks: [{ law: "W", stiffness: 1500, instruction: "Stroke the wall: hold the pointer down on the surface and move it back and forth.", demo: STROKE, evaluate: checkQuiet }],
   }, {
     title: "A feels alive", watch: "The energy given to the hand: it grows with every loop, and turns red.",
@@ -144,7 +145,7 @@ export class Tour {
   }
 
   get explanation() { return resolveText(this.step.explanation, this.limits); }
-  get resultText() { return resolveText(this.step.result, this.ratio); }
+  get resultText() { return resolveText(this.step.result, this.outcome); }
 
   get isStepCompleted() { return this.isActive && this.completedSteps[this.stepIndex]; }
 
@@ -179,6 +180,7 @@ export class Tour {
 
   startTask(taskIndex) {
     this.taskIndex = taskIndex;
+    this.progress = null;
     const { law, stiffness, ...others } = this.requiredSettings, { settings, start_count: startCount } = this.host.status;
     // Settings of the tour may restart the loop: they are repeated only if they differ once the loop of
     // the tour runs. Parameters of the task are always set.
@@ -215,7 +217,8 @@ export class Tour {
   /** Evaluate the task with a frame of the loop. */
   addFrame(frame, columns) {
     if (!this.isActive) return;
-    this.progress = null;
+    // The progress of a completed step stays that at its completion, as its result does.
+    if (!this.isStepCompleted) this.progress = null;
     if (!this.isReady) { this.metrics.reset(); this.hasDemoStarted = false; return; }
     const { hand, energyMeter, status } = this.host;
     if (status.limit.stiffness) this.limits[status.settings.law] = status.limit.stiffness;
@@ -226,13 +229,14 @@ export class Tour {
     this.metrics.addFrame(frame, columns, status, this.task.usesPlane);
     if (!this.hasLanded && this.metrics.pathLength > LANDING_PATH) { this.hasLanded = true; energyMeter.reset(); }
     const isSettled = this.hasLanded && !energyMeter.awaitsFreeProbe;
+    if (this.isStepCompleted) return;
     this.progress = this.task.evaluate({ metrics: this.metrics, energyMeter, status, isSettled, reference: this.reference });
-    if (this.progress.isDone && !this.isStepCompleted) this.completeTask();
+    if (this.progress.isDone) this.completeTask();
   }
 
   completeTask() {
     this.reference = this.progress.reference ?? this.reference;
-    this.ratio = this.progress.ratio;
+    this.outcome = this.progress.outcome;
     this.hasDemoStarted = false;
     if (this.taskIndex + 1 < this.step.tasks.length) this.startTask(this.taskIndex + 1);
     else this.completedSteps[this.stepIndex] = true;
