@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import io
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -14,6 +15,7 @@ import pytest
 from click.testing import CliRunner
 
 import asperity as asp
+from asperity.analysis.compare import DEFAULT_DEVICE
 from asperity.analysis.limits.limit_rules import DEFAULT_SAMPLES, DEFAULT_SPEED
 from asperity.cli import analysis_commands as analyze
 from asperity.cli import analysis_commands as compare
@@ -23,6 +25,8 @@ from asperity.cli.main import COMMANDS, GROUPS, cli
 from asperity.cli.options import LAW_OPTIONS, SPEED, option_help
 from asperity.cli.output import progress_bar, step_bar
 from asperity.core.arguments import MAX_DEPTH, Argument
+from asperity.core.units import format_quantity
+from asperity.lab.scene_state import START_LAW, START_STIFFNESS
 from asperity.laws import LAWS
 from asperity.measured.file_arguments import FILE_ARGUMENTS
 
@@ -173,3 +177,19 @@ def test_progress_reports_compilation_only_when_code_is_not_cached(
         report(0.5)
     assert ("comparing: compiling loop 2, cached" in output) != is_cached
     assert COMPILE_CALLBACKS == []
+
+
+@pytest.mark.parametrize("command", [*READ_A_SURFACE, "run", "lab", "export"])
+def test_default_device_is_the_same_everywhere(command: str) -> None:
+    result = CliRunner().invoke(cli, [command, "--help"], env={"COLUMNS": "200"})
+    (words,) = re.findall(
+        r"--device ID\|FILE(.*?default:[^\]]*)\]", " ".join(result.output.split())
+    )
+    assert words.endswith(DEFAULT_DEVICE)
+
+
+def test_help_of_the_lab_states_its_initial_law_and_stiffness() -> None:
+    result = CliRunner().invoke(cli, ["lab", "--help"], env={"COLUMNS": "200"})
+    text = " ".join(result.output.split())
+    assert f"else {START_LAW}; with --driver" in text
+    assert f"else {format_quantity(START_STIFFNESS, 'N/m')}; with --driver" in text

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from asperity.analysis.compare import DEFAULT_DEVICE
 from asperity.core.arguments import STIFFNESS
 from asperity.core.checks import check_real
 from asperity.core.errors import ParameterError
@@ -23,9 +24,9 @@ from asperity.textures.texture import Texture
 
 DEFAULT_SURFACE = "sinusoid:amplitude=0.2mm,period=2mm"
 """The default surface."""
-DEFAULT_DEVICE = "touch-x"
-DEFAULT_LAW = "C"
-_DEFAULT_STIFFNESS = 250.0  # [N/m]
+START_LAW = "C"
+START_STIFFNESS = 250.0
+"""Initial stiffness without a scene [N/m]."""
 # Follows a pointer; the hand of a scene file takes precedence.
 _DEFAULT_HAND = {"kind": "spring", "stiffness": "800 N/m", "damping": "5 N*s/m", "mass": "50 g"}
 _STILL_MOTION = {"kind": "still", "point": [0, 0, 0]}
@@ -258,7 +259,7 @@ def make_device_scene_state(
 def _build_scene_state(
     scene: Scene, device: Device, source: str, surface: Mapping[str, Any] | None = None
 ) -> SceneState:
-    defaults = {"law": find_law(DEFAULT_LAW), STIFFNESS.name: _DEFAULT_STIFFNESS, "clamp": "backed"}
+    defaults = {"law": find_law(START_LAW), STIFFNESS.name: START_STIFFNESS, "clamp": "backed"}
     hand = scene.loop.get("hand", _DEFAULT_HAND)
     if hand.get("kind") == "moved":
         hand = _DEFAULT_HAND
