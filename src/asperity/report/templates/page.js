@@ -299,7 +299,7 @@ function addLawFilter() {
   const filter = createElement("fieldset", { className: "laws" }, legend, ...labels);
   filter.append(
     createButton("All", "Show all laws", setAll(true)),
-    createButton("None", "Hide all laws", setAll(false)),
+    createButton("None", "Show none of the laws", setAll(false)),
   );
   document.querySelector("section").before(filter);
 }
@@ -331,8 +331,9 @@ function sortRows(table, column, isDescending) {
 
 /** Make the headings of a table of laws buttons that sort it, first the greatest numbers. */
 function addSorting(table) {
-  const headings = [...table.querySelectorAll("th")];
+  const headings = [...table.tHead.rows[0].cells];
   headings.forEach((heading, column) => {
+    if (!heading.textContent) return;
     const button = createButton(heading.textContent, `Sort by ${heading.textContent}`, () => {
       const descends = heading.getAttribute("aria-sort") !== "descending" && heading.classList.contains("n");
       const isDescending = descends || heading.getAttribute("aria-sort") === "ascending";
@@ -356,15 +357,26 @@ function addTools(figure) {
   const tools = createElement("div", { className: "tools" });
   addZoom(svg, tools);
   const saveSvg = () => downloadText(`${name}.svg`, "image/svg+xml", svgFile(svg, viewBox));
-  tools.append(createButton("SVG", "Save the figure (SVG)", saveSvg));
+  tools.append(createButton("SVG", "Save the figure as SVG", saveSvg));
   if (panels.length) {
     addReading(figure, svg, panels);
     const saveCsv = () => downloadText(`${name}.csv`, "text/csv", csvFile(panels));
-    tools.append(createButton("CSV", "Save the data (CSV)", saveCsv));
+    tools.append(createButton("CSV", "Save the data as CSV", saveCsv));
   }
   figure.append(tools);
 }
 
+/** Let the keyboard reach what is wider than the window, and only that. */
+function addScrolling(regions) {
+  const update = (region) => {
+    if (region.scrollWidth > region.clientWidth + 1) region.tabIndex = 0;
+    else region.removeAttribute("tabindex");
+  };
+  const observer = new ResizeObserver((entries) => entries.forEach(({ target }) => update(target)));
+  for (const region of regions) observer.observe(region);
+}
+
 document.querySelectorAll("figure").forEach(addTools);
+addScrolling(document.querySelectorAll(".view, .scroll"));
 document.querySelectorAll("table:has(tr[data-law])").forEach(addSorting);
 addLawFilter();

@@ -1,0 +1,321 @@
+"""Pictures and tables of report pages in a browser, at 400 and 1280 pixels, dark and on paper.
+
+Checks compare shares and places of pixels, not pixels: fonts differ between machines. Each check
+has a control: a page that is broken on purpose, in which it finds the fault.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.lab.browser import Browser, needs_browser
+from tests.report.browsed import (
+    Image,
+    Shot,
+    content,
+    edges,
+    grow,
+    lonely_headings,
+    open_page,
+    pictures,
+    printed_places,
+)
+
+import asperity as asp
+from asperity.report import html_text
+
+pytestmark = needs_browser
+DATA = Path(__file__).parents[3] / "shared" / "data"
+WIDTHS = (1280, 400)
+
+
+@pytest.fixture(scope="module")
+def land_page(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the page of a cut-out of a measured surface."""
+    if not DATA.is_dir():
+        pytest.skip("not run: the real surfaces of ../shared/data are not there")
+    folder = tmp_path_factory.mktemp("land")
+    whole = asp.load_texture(DATA / "sample-land.x3p", pitch=60e-6)
+    np.save(folder / "sample-land.npy", whole.heights[80:176, 300:480])
+    cut = asp.load_texture(folder / "sample-land.npy", pitch=60e-6, unit="m")
+    path = folder / "land.html"
+    path.write_text(html_text(asp.compare(cut, device="touch", laws="WAC")), "utf-8")
+    return path
+
+
+@pytest.fixture
+def cloth_page(report_pages: dict[str, Path]) -> Path:
+    return report_pages["comparison"]
+
+
+@pytest.fixture(params=["cloth_page", "land_page"])
+def page(request: pytest.FixtureRequest) -> Path:
+    path: Path = request.getfixturevalue(request.param)
+    return path
+
+
+# --- content of pictures --------------------------------------------------------------------------
+
+
+def blank_pictures(shots: list[Shot]) -> list[str]:
+    """Return the pictures that are blank, or of which a half is."""
+    blank = []
+    for shot in shots:
+        ink = content(shot.image, shot.ground)
+        rows, columns = (size // 2 for size in ink.shape)
+        halves = [ink[:rows], ink[rows:], ink[:, :columns], ink[:, columns:]]
+        if ink.mean() < 0.01 or min(half.mean() for half in halves) < 0.004:
+            blank.append(shot.title)
+    return blank
+
+
+def empty_panels(shots: list[Shot]) -> list[str]:
+    """Return the panels without visible data in the middle of their frame."""
+    empty = []
+    for shot in shots:
+        height, width = shot.image.shape[:2]
+        for (left, top, right, bottom), panel in shot.panels:
+            if left < 0 or top < 0 or right > width or bottom > height:
+                continue  # scrolled away
+            inner = shot.image[top + 3 : bottom - 3, left + 3 : right - 3]
+            ink = content(inner, shot.ground)
+            if ink.mean() < 0.002 or np.ptp(np.flatnonzero(ink.any(axis=0))) < 0.3 * (right - left):
+                empty.append(f"{shot.title}: {panel['name']}")
+    return empty
+
+
+def outside_frame(shots: list[Shot]) -> list[str]:
+    """Return the panels of which less than 9 in 10 finite points lie within the axes."""
+    outside = []
+    for shot in shots:
+        for _box, panel in shot.panels:
+            for series in panel["series"]:
+                y = np.array([value for value in series["y"] if value is not None])
+                inside = (y >= panel["y"]["low"]) & (y <= panel["y"]["high"])
+                if y.size and inside.mean() < 0.9:
+                    outside.append(f"{shot.title}: {panel['name']} {series['name']}")
+    return outside
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("dark", [False, True])
+def test_every_picture_shows_its_content(
+    browser: Browser, page: Path, width: int, dark: bool
+) -> None:
+    open_page(browser, page, width, dark=dark)
+    for end in (False, True):
+        shots = pictures(browser, end=end)
+        assert len(shots) == 7
+        assert empty_panels(shots) == []
+        assert outside_frame(shots) == []
+        if not end:
+            assert blank_pictures(shots) == []
+
+
+def test_surface_has_no_blank_half(browser: Browser, page: Path) -> None:
+    """Map and section together fill nine tenths of the frame's width and height."""
+    open_page(browser, page, 1280)
+    shot = next(one for one in pictures(browser) if one.title == "The surface")
+    assert filled_sides(shot) > (0.9, 0.85)
+    browser.ask("document.querySelector('figure svg').style.clipPath = 'inset(0 50% 0 0)'")
+    shot = next(one for one in pictures(browser) if one.title == "The surface")
+    assert filled_sides(shot)[0] < 0.55
+
+
+def filled_sides(shot: Shot) -> tuple[float, float]:
+    """Return the shares of columns and rows, in tenths of the picture, that show anything."""
+    ink = content(shot.image, shot.ground)
+    parts = [np.array_split(ink, 20, axis=axis) for axis in (1, 0)]
+    across, down = (np.mean([part.mean() > 0.002 for part in each]) for each in parts)
+    return float(across), float(down)
+
+
+@pytest.mark.parametrize(
+    ("fault", "check"),
+    [
+        ("svg > g { visibility: hidden }", blank_pictures),
+        ("svg { clip-path: inset(0 50% 0 0) }", blank_pictures),
+        ("svg { clip-path: inset(50% 0 0 0) }", blank_pictures),
+        ("svg path[clip-path], svg g[clip-path], svg image { visibility: hidden }", empty_panels),
+    ],
+)
+def test_blank_picture_is_detected(
+    browser: Browser, cloth_page: Path, fault: str, check: Callable[[list[Shot]], list[str]]
+) -> None:
+    open_page(browser, cloth_page, 1280)
+    add_style(browser, fault)
+    assert len(check(pictures(browser))) >= 4
+
+
+def test_data_outside_the_frame_are_detected(browser: Browser, cloth_page: Path) -> None:
+    open_page(browser, cloth_page, 1280)
+    shots = pictures(browser)
+    for shot in shots:
+        for _box, panel in shot.panels:
+            panel["y"]["high"] = panel["y"]["low"]
+    assert len(outside_frame(shots)) >= 4
+
+
+def add_style(browser: Browser, text: str) -> None:
+    """Add a style to the open page."""
+    browser.ask(
+        "document.head.append(Object.assign(document.createElement('style'),"
+        f"{{ textContent: {text!r} }})) || document.body.offsetHeight"
+    )
+
+
+# --- light and dark -------------------------------------------------------------------------------
+
+
+def structure_differences(light: list[Shot], dark: list[Shot]) -> list[str]:
+    """Return the pictures whose edges are not at the same places in light and in dark."""
+    different = []
+    for one, other in zip(light, dark, strict=True):
+        first, second = edges(one.image), edges(other.image)
+        shared = [(a & grow(b, 2)).sum() / a.sum() for a, b in ((first, second), (second, first))]
+        if one.image.shape != other.image.shape or min(shared) < 0.85:
+            different.append(f"{one.title}: {min(shared):.2f}")
+    return different
+
+
+def shoot_both(browser: Browser, path: Path, fault: str = "") -> tuple[list[Shot], list[Shot]]:
+    """Return the pictures in light and in dark, there with a further style."""
+    open_page(browser, path, 1280)
+    light = pictures(browser)
+    open_page(browser, path, 1280, dark=True)
+    add_style(browser, fault)
+    return light, pictures(browser)
+
+
+def test_light_and_dark_differ_in_colour_alone(browser: Browser, page: Path) -> None:
+    light, dark = shoot_both(browser, page)
+    assert structure_differences(light, dark) == []
+    for one, other in zip(light, dark, strict=True):
+        assert brightness(one.image) > brightness(other.image) + 0.1
+        assert one.ground.mean() > 0.9
+        assert other.ground.mean() < 0.2
+
+
+def brightness(image: Image) -> float:
+    return float(image.mean())
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [
+        "svg path[clip-path] { visibility: hidden }",
+        "svg { transform: translateX(12px) }",
+        "svg text, svg use { visibility: hidden }",
+    ],
+)
+def test_other_structure_in_dark_is_detected(
+    browser: Browser, cloth_page: Path, fault: str
+) -> None:
+    assert structure_differences(*shoot_both(browser, cloth_page, fault))
+
+
+# --- width ----------------------------------------------------------------------------------------
+
+_OVERFLOW = """(() => {
+  const limit = document.documentElement.clientWidth;
+  const wide = [...document.querySelectorAll("main *")].filter((one) =>
+    one.getBoundingClientRect().right > limit + 1 && !one.closest(".scroll, .view"));
+  const excess = document.documentElement.scrollWidth - limit;
+  return [excess, wide.map((one) => one.outerHTML.slice(0, 80))];
+})()"""
+_COLUMNS = """[...document.querySelectorAll("table")].map((table) => {
+  const scroll = table.closest(".scroll"), row = table.rows[0];
+  const rights = () => [...row.cells].map((cell) => [cell.textContent.trim(), cell.offsetWidth
+    ? cell.getBoundingClientRect().right - scroll.getBoundingClientRect().right : null]);
+  const first = rights();
+  scroll.scrollLeft = scroll.scrollWidth;
+  return [first, rights(), scroll.scrollWidth <= scroll.clientWidth + 1 || scroll.tabIndex === 0];
+})"""
+
+
+def overflowing(browser: Browser) -> list[str]:
+    """Return what is wider than the window outside of tables and pictures, which scroll."""
+    excess, elements = browser.ask(_OVERFLOW)
+    return [*elements, *(["the page"] if excess > 0 else [])]
+
+
+def unreachable_columns(browser: Browser) -> list[str]:
+    """Return the columns that are not seen at the end of scrolling, or at once in the summary."""
+    browser.until("document.querySelectorAll('.scroll').length > 0")
+    unreachable = []
+    for first, last, by_keyboard in browser.ask(_COLUMNS):
+        names = [name for name, right in last if right is not None and right > 1]
+        if any(name == "felt?" for name, _right in first):
+            names += [name for name, right in first if right is not None and right > 1]
+            shown = {name for name, right in first if right is not None}
+            names += sorted({"felt?", "leak", "clicks?", "start at"} - shown)
+        unreachable += names if by_keyboard else [*names, "not by the keyboard"]
+    return unreachable
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_nothing_is_wider_than_the_window(
+    browser: Browser, report_pages: dict[str, Path], land_page: Path, width: int
+) -> None:
+    for path in (*report_pages.values(), land_page):
+        open_page(browser, path, width)
+        assert (path.name, overflowing(browser)) == (path.name, [])
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_every_column_can_be_read(browser: Browser, page: Path, width: int) -> None:
+    open_page(browser, page, width)
+    assert unreachable_columns(browser) == []
+
+
+@pytest.mark.parametrize(
+    ("fault", "check"),
+    [
+        ("h2 { width: 900px }", overflowing),
+        (".answer { white-space: nowrap }", overflowing),
+        (
+            ".scroll { overflow: hidden } table { position: relative; left: 200px }",
+            unreachable_columns,
+        ),
+        ("th, td { min-width: 90px }", unreachable_columns),
+        ("th:nth-child(5), td:nth-child(5) { display: none }", unreachable_columns),
+    ],
+)
+def test_too_wide_page_is_detected(
+    browser: Browser, cloth_page: Path, fault: str, check: Callable[[Browser], list[str]]
+) -> None:
+    open_page(browser, cloth_page, 400)
+    add_style(browser, fault)
+    assert check(browser)
+
+
+# --- paper ----------------------------------------------------------------------------------------
+
+OFFSETS = (0, 130, 260, 390, 520)
+"""Heights of a block before the page [px], so that headings come to lie at other places."""
+_BREAKS = "* { break-before: auto !important; break-after: auto !important }"
+
+
+def print_shifted(browser: Browser, path: Path, offset: int, fault: str = "") -> Any:
+    """Return the places of headings on paper, below a block of a height [px]."""
+    open_page(browser, path, 1280)
+    add_style(browser, f"main {{ padding-top: {offset}px !important }} {fault}")
+    return printed_places(browser)
+
+
+def test_no_heading_is_alone_at_the_foot_of_a_page(browser: Browser, page: Path) -> None:
+    for offset in OFFSETS:
+        places = print_shifted(browser, page, offset)
+        assert (offset, lonely_headings(places)) == (offset, [])
+        split = [name for name, parts in places.items() if len({one[0] for one in parts}) > 1]
+        assert split == []
+
+
+def test_lonely_heading_is_detected(browser: Browser, cloth_page: Path) -> None:
+    """Without the rules of the style, some offset leaves a heading alone."""
+    found = [lonely_headings(print_shifted(browser, cloth_page, one, _BREAKS)) for one in OFFSETS]
+    assert any(found)
