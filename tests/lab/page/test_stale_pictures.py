@@ -45,6 +45,7 @@ def test_a_picture_of_another_law_is_grey_and_says_so(page: Browser) -> None:
     assert "heights" in text(page, "relief-note")
     assert not page.ask("document.getElementById('relief').classList.contains('stale')")
     assert not page.ask("lab.hasCurrentPictures")
+    assert page.ask("document.getElementById('save-png').disabled")
     # Of the law that is rendered again, but requested before: not shown as current.
     choose(page, "A")
     page.ask("new Promise(done => setTimeout(done, 300))")
@@ -54,6 +55,7 @@ def test_a_picture_of_another_law_is_grey_and_says_so(page: Browser) -> None:
     page.until("lab.hasCurrentPictures")
     page.until("document.getElementById('section-note').textContent.startsWith('no curl')")
     assert not page.ask("document.getElementById('section').classList.contains('stale')")
+    assert not page.ask("document.getElementById('save-png').disabled")
     assert page.said == []
 
 

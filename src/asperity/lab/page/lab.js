@@ -309,6 +309,7 @@ function updateTexts({ probe, force, energy, isInside }) {
   $("relief-note").textContent = pictures.staleText(relief) || `heights × ${(relief.exaggeration ?? 1).toPrecision(2)} · ${handle.isPresent ? "move the handle of the device" : "hold down to press"}`;
   const curl = section.hasCurl ? `curl up to ${formatQuantity(section.maxCurl, "N/m")}` : "no curl: no energy gain";
   $("section-note").textContent = stale || curl;
+  for (const id of ["save-png", "save-svg"]) $(id).disabled = Boolean(stale || pictures.staleText(relief)); // a file would not say so
   const description = `Probe at ${position} millimetres, ${forceText}${isInside ? ", in contact" : ""}`;
   $("relief").setAttribute("aria-label", `The surface in relief. ${description}`);
   $("section").setAttribute("aria-label", `Section through the surface along x. ${description}. ${stale || curl}`);

@@ -1,0 +1,111 @@
+"""axe-core finds nothing wrong with the page; not run where there is no axe.min.js."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from importlib.metadata import PackageNotFoundError, distribution
+from pathlib import Path
+
+import pytest
+from tests.lab.browser import Browser, needs_browser
+
+
+def find_axe() -> Path | None:
+    """Return axe.min.js of the environment variable AXE, or of an installed Python package."""
+    if named := os.environ.get("AXE"):
+        return Path(named)
+    for package in ("axe-playwright-python", "axe-core-python", "axe-selenium-python"):
+        try:
+            files = distribution(package).files or []
+        except PackageNotFoundError:
+            continue
+        for file in files:
+            if file.name == "axe.min.js":
+                return Path(str(file.locate()))
+    return None
+
+
+AXE = find_axe()
+needs_axe = pytest.mark.skipif(
+    AXE is None, reason="not run: no axe.min.js (AXE=its path, or axe-playwright-python)"
+)
+_RUN = (
+    "axe.run(document, {resultTypes: ['violations']}).then(({violations, passes}) => ["
+    "passes.length, violations.map(({id, nodes}) =>"
+    " `${id}: ${nodes.map(({html, failureSummary}) => html + failureSummary).join('; ')}`)])"
+)
+
+
+def violations(page: Browser) -> list[str]:
+    """Return what axe-core finds wrong, after a check that it has found anything at all."""
+    assert AXE is not None
+    page.ask("new Promise(done => setTimeout(done, 300))")
+    page.ask(f"{AXE.read_text(encoding='utf-8')}; 1")
+    passes, found = page.ask(_RUN)
+    assert passes > 20
+    return list(found)
+
+
+@pytest.fixture
+def everything_open(page: Browser) -> Iterator[None]:
+    """All parts that can be folded are open."""
+    page.until("lab.status.recommendation.reason && lab.hasCurrentPictures")
+    page.ask("for (const part of document.querySelectorAll('details')) part.open = true; 1")
+    yield
+    page.ask("for (const part of document.querySelectorAll('details')) part.open = false; 1")
+    page.resize(1280, 900)
+
+
+@needs_browser
+@needs_axe
+@pytest.mark.usefixtures("everything_open")
+@pytest.mark.parametrize("dark", [False, True])
+@pytest.mark.parametrize("width", [1280, 400])
+def test_axe_finds_nothing(page: Browser, dark: bool, width: int) -> None:
+    page.resize(width, 800, dark=dark)
+    assert violations(page) == []
+    # A field that feeds the hand, above its limit, with a hint; then the loops.
+    page.press("a")
+    page.until("lab.status.settings.law === 'A' && lab.hasCurrentPictures")
+    page.ask(
+        "{ const slider = document.getElementById('stiffness');"
+        "slider.value = 660; slider.dispatchEvent(new Event('change')); }"
+    )
+    page.until("document.getElementById('motion-note').textContent")
+    page.until("document.querySelector('.above-limit') !== null")
+    assert violations(page) == []
+    page.ask("document.querySelector('#motion [value=loop]').click()")
+    page.until("lab.energyMeter.suppliesEnergy")
+    assert violations(page) == []
+    # A clip, and its recording.
+    page.press("k")
+    page.until("document.querySelector('#clips button') !== null")
+    page.ask("document.querySelector('#clips button').click()")
+    page.until("lab.player.isOpen && !document.getElementById('playback').hidden")
+    assert violations(page) == []
+    page.press("l")
+    page.ask("document.querySelector('#motion [value=pointer]').click()")
+    # The tour, before and after its first step.
+    page.press("t")
+    page.until("lab.tour.isActive && lab.status.state === 'running'")
+    assert violations(page) == []
+    page.press("v")
+    page.until("document.querySelector('#tour.completed') !== null")
+    assert violations(page) == []
+    page.press("t")
+    page.until("lab.status.state === 'running' && !lab.tour.isActive")
+
+
+@needs_browser
+@needs_axe
+@pytest.mark.usefixtures("everything_open")
+def test_axe_finds_what_is_wrong(page: Browser) -> None:
+    page.ask("document.getElementById('texture').insertAdjacentHTML('afterend', '<input>'); 1")
+    (found,) = violations(page)
+    assert found.startswith("label: ")
+    page.ask("document.querySelector('#texture + input').remove(); 1")
+    page.ask("document.getElementById('surface').style.color = '#c0c0c0'; 1")
+    (found,) = violations(page)
+    assert found.startswith("color-contrast: ")
+    page.ask("document.getElementById('surface').style.color = ''; 1")
