@@ -201,18 +201,16 @@ def test_a_frame_keeps_the_extremes_between_two_pictures() -> None:
     rows = np.zeros((50, len(COLUMN_NAMES)))
     place = COLUMN_NAMES.index("applied z")
     rows[:, place] = 0.3 * np.sin(2.0 * np.pi * 800.0 * time + 0.1)
-    numbers = np.frombuffer(
-        encode_frame(
-            rows, 7, {"frame": 5, "acknowledged": 3, "late": 1, "skipped": 2}, np.arange(6.0)
-        )
-    )
+    counts = {"frame": 5, "acknowledged": 3, "late": 1, "skipped": 2, "lateness": 0.5}
+    counts["truncated"] = 4
+    numbers = np.frombuffer(encode_frame(rows, 7, counts, np.arange(6.0)))
     named = frame_layout()
     # The newest row alone would show nothing of it.
     assert abs(numbers[named["newest"] + place]) < 0.2
     assert numbers[named["minima"] + place] == rows[:, place].min() < -0.29
     assert numbers[named["maxima"] + place] == rows[:, place].max() > 0.29
     head = [numbers[named["header"][name]] for name in HEADER]
-    assert head == [1.0, 5.0, 50.0, 7.0, 3.0, 1.0, 2.0, 50.0, 0.0, 0.0, 0.0, 0.0]
+    assert head == [1.0, 5.0, 50.0, 7.0, 3.0, 50.0, 1.0, 2.0, 0.5, 4.0, 0.0, 0.0, 0.0, 0.0]
     forces = numbers[named["forces"] :].reshape(-1, 3)
     assert (forces == rows[:, FORCE_COLUMNS]).all()
 
@@ -221,7 +219,7 @@ def test_a_page_that_was_slow_gets_the_newest_forces_and_all_extremes() -> None:
     rows = np.zeros((MAX_FORCE_ROWS + 10, len(COLUMN_NAMES)))
     rows[0, COLUMN_NAMES.index("x")] = -5.0
     rows[:, FORCE_COLUMNS.start] = np.arange(len(rows))
-    counts = {"frame": 1, "acknowledged": 0, "late": 0, "skipped": 0}
+    counts = {"frame": 1, "acknowledged": 0, "late": 0, "skipped": 0, "lateness": 0, "truncated": 0}
     numbers = np.frombuffer(encode_frame(rows, 0, counts, np.zeros(6)))
     assert numbers[frame_layout()["minima"] + COLUMN_NAMES.index("x")] == -5.0
     assert numbers[frame_layout()["forces"] :: 3].tolist() == list(range(10, len(rows)))

@@ -239,7 +239,7 @@ _LAB_ARGUMENTS = options.command_arguments("lab")
     )
 )
 @options.file_options
-@options.device_option("Device.  [default: the scene's, else omega.3]")
+@options.device_option("Device.  [default: the scene's, else touch-x; with --driver omega.3]")
 @loop_setup.driver_options
 @options.argument_options(_LAB_ARGUMENTS)
 @click.option("--no-browser", is_flag=True, help="Print the address without opening a browser.")
@@ -281,9 +281,8 @@ def lab_command(
 
 def _simulated_scene(source: str, values: dict[str, Any]) -> tuple[SceneState, Playback | None]:
     """Return the initial scene on the simulated device, and the playback of a recording."""
-    from asperity.analysis.compare import DEFAULT_DEVICE
     from asperity.lab.clips import find_recording, load_recorded_clip
-    from asperity.lab.scene_state import make_scene_state
+    from asperity.lab.scene_state import DEFAULT_DEVICE, make_scene_state
     from asperity.scene import load_scene
 
     own, file_options, settings = surface_values(values), file_values(values), values["settings"]
