@@ -78,7 +78,7 @@ MISTAKES: list[tuple[str, tuple[str, ...]]] = [
     ("compare sinusoid:amplitude=1mm,periode=1mm", ("periode", "did you mean 'period'?")),
     ("compare sinusoid:amplitude=1mm,period=1N", ("period", "'1N'", "another dimension")),
     ("compare sinusoid:1mm,1mm", ("kind:argument=value", "'1mm'")),
-    ("compare sinusoid,amplitude=1mm,period=1mm", ("did you mean 'sinusoid:amplitude=1mm,",)),
+    ("compare sinusoid,amplitude=1mm,period=1mm", ("sinusoid,amplitude=1mm", "no such file")),
     ("surfaces clotth", ("'clotth'", "did you mean 'cloth'?")),
     # Files and folders.
     ("compare ghost.x3p", ("ghost.x3p: no such file",)),

@@ -25,7 +25,8 @@ from asperity.textures import load_texture
 VALID = [
     ("quantity", "1.5 mm", 1.5e-3),
     ("quantity", "2m", 2.0),
-    ("pair", "5 µm; 8 µm", [5e-6, 8e-6]),
+    ("pair", "5 µm; 8 µm", (5e-6, 8e-6)),
+    ("pair", "5 µm, 8 µm", (5e-6, 8e-6)),
     ("pair", "5 µm", 5e-6),
     ("vector", "1m 0.4m", [1.0, 0.4]),
     ("vector", "1 400 mm", [1e-3, 0.4]),
@@ -72,7 +73,7 @@ INVALID = [
     ("items", [1, 2], "write 1mm"),
     ("space", "0; 0; 3", "write 3mm"),
     ("axes", 3, "write 3mm"),
-    ("pair", "1;2;3", "one quantity, or two"),
+    ("pair", "1;2;3", "1 or 2 quantities"),
     ("space", "1;2", "3 quantities"),
     ("plane", "1;2;3", "2 quantities"),
     ("axes", "1;2", "3 quantities"),

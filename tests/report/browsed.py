@@ -110,7 +110,8 @@ _MARK = """(() => {
     element.append(link);
   };
   for (const heading of document.querySelectorAll("h2, h3")) {
-    const first = [...document.querySelectorAll(blocks)].find((one) => one.textContent.trim()
+    const first = [...document.querySelectorAll(blocks)].find((one) =>
+      (one.matches(".view") || one.textContent.trim())
       && heading.compareDocumentPosition(one) & Node.DOCUMENT_POSITION_FOLLOWING);
     if (!first || first.querySelector("a")) continue;
     mark(first, "content" + count);

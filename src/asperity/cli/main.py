@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 import importlib
+import re
 import sys
 import warnings
 from collections.abc import Collection, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NoReturn, cast
 
 import click
 
 import asperity
 from asperity.cli.plugins import plugin_error_text
-from asperity.cli.usage_errors import unknown_command_error, usage_error_text
 from asperity.core.cache import CacheWarning, size_limit
-from asperity.core.errors import AsperityError, ParameterError, print_message
+from asperity.core.errors import (
+    AsperityError,
+    ParameterError,
+    nearest_names,
+    print_message,
+    suggest_names,
+)
 from asperity.core.files import read_toml
 from asperity.laws import SHIPPED_LAW_ARGUMENTS
 from asperity.measured.file_arguments import FILE_ARGUMENTS
@@ -129,6 +135,43 @@ def check_not_repeated(
             raise ParameterError(flag.lstrip("-"), f"is given twice: give {flag} once{several}")
 
 
+_SYNONYMS = Path(__file__).with_name("synonyms.toml")
+
+
+def unknown_command_error(name: str, group: click.Group, ctx: click.Context) -> ParameterError:
+    """Return the error for a name that is no command of a group."""
+    usual = read_toml("synonyms", _SYNONYMS).get(str(group.name), {}).get(name.lower())
+    hint = f"did you mean {usual!r}?" if usual else suggest_names(name, group.list_commands(ctx))
+    return ParameterError("command", f"is unknown: {name!r}; {hint}")
+
+
+def usage_error_text(error: click.ClickException) -> str:
+    """Return what is wrong with a command line, and the likely correction, as one line."""
+    ctx: click.Context | None = getattr(error, "ctx", None)
+    if ctx is not None and isinstance(error, click.NoSuchOption):
+        return _unknown_option_text(error.option_name, ctx)
+    usage = f"; {ctx.get_usage().replace('Usage', 'usage')}" if ctx is not None else ""
+    return f"{error.format_message().rstrip('.')}{usage}"
+
+
+def _unknown_option_text(option: str, ctx: click.Context) -> str:
+    """Return the message for an unknown option; it names the commands that have it."""
+    pattern = re.compile(rf"-[a-z]*{re.escape(option[1:])}.*")  # -device is parsed as -d
+    name = next(filter(pattern.fullmatch, sys.argv), option) if len(option) == 2 else option
+    options, group = _options_of(ctx.command), cast("click.Group", ctx.find_root().command)
+    usual = read_toml("synonyms", _SYNONYMS)["options"].get(name.lower())
+    near = f"did you mean {usual!r}? " if usual in options else nearest_names(name, options)
+    known = {one: group.get_command(ctx, one) for one in group.list_commands(ctx)}
+    having = ", ".join(one for one in known if name in _options_of(known[one]))
+    taken, path = f"option of {having}; " if having else "", ctx.command_path
+    return f"{path.split()[-1]} has no option {name}; {near}{taken}see {path} --help"
+
+
+def _options_of(command: click.Command | None) -> list[str]:
+    parameters = command.params if command else []
+    return [flag for one in parameters for flag in one.opts if flag.startswith("--")]
+
+
 class StrictGroup(click.Group):
     """Group of commands that refuses repeated options."""
 
@@ -137,7 +180,7 @@ class StrictGroup(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Return the command after a check for repeated options."""
         if args[0][:1] != "-" and self.get_command(ctx, args[0]) is None:
-            raise unknown_command_error(args[0], ctx)
+            raise unknown_command_error(args[0], self, ctx)
         name, command, rest = super().resolve_command(ctx, args)
         if command is not None:
             check_not_repeated(command, rest, ctx)

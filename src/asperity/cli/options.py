@@ -90,9 +90,8 @@ def parse_settings(
             try:
                 law[name] = parameters[name].parse(value)
             except ParameterError as error:
-                field = f"; that of the device is --set {_DEVICE_PREFIX}{name}={value.strip()}"
-                words = f"{error.requirement}{field if name in FIELD_UNITS else ''}"
-                raise ParameterError(name, words, error.value) from None
+                field = f"; the device's is {_DEVICE_PREFIX}{text}" if name in FIELD_UNITS else ""
+                raise ParameterError(name, f"{error.requirement}{field}", error.value) from None
     return Overrides(law, device)
 
 

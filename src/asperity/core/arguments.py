@@ -81,7 +81,7 @@ class Argument:
 
         Example:
             >>> Argument("pitch", "of the points", "m", form="pair").parse("5 µm; 8 µm")
-            [5e-06, 8e-06]
+            (5e-06, 8e-06)
         """
         return _PARSERS[self.form](self.name, value, self.unit)
 
@@ -270,13 +270,6 @@ def _parse_vectors(name: str, value: Any, unit: str) -> list[Any]:
     return [row[0] for row in rows] if all(len(row) == 1 for row in rows) else rows
 
 
-def _parse_pair(name: str, value: Any, unit: str) -> float | list[float]:
-    if len(_split(value)) not in {1, 2}:
-        raise ParameterError(name, "must be one quantity, or two for x and y: 'a; b'", value)
-    values = _parse_quantities(name, value, unit)
-    return values[0] if len(values) == 1 else values
-
-
 def _parse_fixed(name: str, value: Any, unit: str, *counts: int) -> tuple[float, ...]:
     if len(_split(value)) not in counts:
         numbers = " or ".join(map(str, counts))
@@ -284,8 +277,8 @@ def _parse_fixed(name: str, value: Any, unit: str, *counts: int) -> tuple[float,
     return tuple(_parse_quantities(name, value, unit))
 
 
-def _parse_axes(name: str, value: Any, unit: str) -> float | tuple[float, ...]:
-    values = _parse_fixed(name, value, unit, 1, 3)
+def _parse_axes(name: str, value: Any, unit: str, count: int = 3) -> float | tuple[float, ...]:
+    values = _parse_fixed(name, value, unit, 1, count)
     return values[0] if len(values) == 1 else values
 
 
@@ -294,7 +287,7 @@ def _parse_direction(name: str, value: Any, _unit: str) -> tuple[float, ...]:
     word = str(value).strip().lower()
     if word in axes:
         return axes[word]
-    parts = value if isinstance(value, list) else str(value).replace(",", " ").split()
+    parts = _split(value, r"[;,\s]")
     if len(parts) != 2:
         raise ParameterError(name, "must be x, y, or two numbers '1,0.5'", value)
     vector = tuple(parse_quantity(name, part, "") for part in parts)
@@ -333,7 +326,7 @@ def _parse_text(name: str, value: Any, _unit: str) -> str:
 
 _PARSERS: dict[Form, Callable[[str, Any, str], Any]] = {
     "quantity": parse_quantity,
-    "pair": _parse_pair,
+    "pair": lambda name, value, unit: _parse_axes(name, value, unit, 2),
     "vector": _parse_vector,
     "items": _parse_quantities,
     "vectors": _parse_vectors,

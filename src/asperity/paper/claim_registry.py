@@ -6,11 +6,10 @@ import math
 import re
 from collections.abc import Callable, Iterable
 from contextlib import nullcontext
-from difflib import get_close_matches
 from importlib import import_module
 from pkgutil import iter_modules
 
-from asperity.core.errors import ParameterError
+from asperity.core.errors import ParameterError, nearest_names
 from asperity.core.processes import limit_processes, precompute
 from asperity.paper import claims
 from asperity.paper.claim import DECLARED_CLAIMS, Claim, Result
@@ -55,14 +54,11 @@ def get_claim(claim_id: str) -> Claim:
         ('(12)',)
     """
     if not isinstance(claim_id, str) or claim_id not in CLAIMS:
-        close = get_close_matches(str(claim_id).lower(), [known.lower() for known in CLAIMS], n=3)
-        close.append(f"eq-{str(claim_id).strip('() ')}")
-        near = [known for known in CLAIMS if known.lower() in close]
-        hint = f"did you mean {' or '.join(map(repr, near))}? " if near else ""
+        equation = f"eq-{str(claim_id).strip('() ')}"
+        hint = nearest_names(equation if equation in CLAIMS else str(claim_id), CLAIMS)
         listing = "run without it to list them; fig-3 selects the claims of a figure"
-        raise ParameterError(
-            "claim", f"is unknown: {claim_id!r}; {hint}there are {len(CLAIMS)} claims: {listing}"
-        )
+        words = f"is unknown: {claim_id!r}; {hint}there are {len(CLAIMS)} claims: {listing}"
+        raise ParameterError("claim", words)
     return CLAIMS[claim_id]
 
 

@@ -118,9 +118,8 @@ def texture_name(texture: Texture) -> str:
         >>> texture_name(Sinusoid(1e-4, 1e-3))
         'Sinusoid'
     """
-    description = texture.describe()
-    kind = number_text.readable_name(description.get("source", description)["kind"]).capitalize()
-    return texture.file_name or kind
+    description = texture.describe().get("source", texture.describe())
+    return texture.file_name or number_text.readable_name(description["kind"]).capitalize()
 
 
 # --- tables ---------------------------------------------------------------------------------------
@@ -213,11 +212,6 @@ FULL_COLUMNS = (
 )
 
 
-def _heading(column: LawColumn, comparison: Comparison) -> str:
-    unit = " [m]" if column.heading == "T" and number_text.strength_has_unit(comparison) else ""
-    return f"{column.heading}{unit}"
-
-
 def single_line(heading: str) -> str:
     """Return a heading in one line."""
     return heading.replace("-\n", "").replace("\n", " ")
@@ -249,7 +243,9 @@ def laws_table(comparison: Comparison, columns: Sequence[LawColumn]) -> Table:
         tight_below=_WIDE_GAP_CONSOLE,
     )
     numeric = [i for i, one in enumerate(columns) if one.is_numeric]
-    return Table([_heading(one, comparison) for one in columns], rows, numeric, layout)
+    units = {"T": " [m]"} if number_text.strength_has_unit(comparison) else {}
+    headings = [f"{one.heading}{units.get(one.heading, '')}" for one in columns]
+    return Table(headings, rows, numeric, layout)
 
 
 def verdicts_table(comparison: Comparison, max_console: int | None) -> Table:

@@ -189,7 +189,7 @@ def to_scene_values(values: Mapping[str, Any], arguments: Iterable[Argument]) ->
 
 
 def _to_scene_value(value: Any, unit: str) -> Any:
-    if isinstance(value, list):
+    if isinstance(value, (list, tuple)):
         return [_to_scene_value(part, unit) for part in value]
     if isinstance(value, (bool, str)):
         return value

@@ -67,12 +67,12 @@ TextureLike = Texture | str | os.PathLike[str]
 
 def _load_file(path: str | os.PathLike[str], **values: Any) -> Texture:
     """Return the texture of a measured file, or a baked field; see :func:`load_texture`."""
+    texture: Texture
     if not is_field(path):
-        texture: Texture = texture_from_prepared(prepare_file(path, **values))
-    elif values:
-        words = f"cannot be applied: {os.fspath(path)} was baked already"
-        raise ParameterError(next(iter(values)), words)
+        texture = texture_from_prepared(prepare_file(path, **values))
     else:
+        for name in values:
+            raise ParameterError(name, f"cannot be applied: {os.fspath(path)} was baked already")
         texture = load_field(path, _build_described)
     texture.file_name = os.path.basename(os.fspath(path))
     return texture
@@ -190,10 +190,6 @@ def parse_specification(source: str) -> tuple[str, dict[str, str]] | None:
     kind, colon, arguments = source.partition(":")
     named = kind.lower()
     is_path = os.path.exists(source) and not (named in KINDS and os.path.isdir(source))
-    match = re.match(r"([A-Za-z][\w-]+)[,; ]+(?=[\w-]+ *=)", source)
-    if match and match[1].lower() in KINDS and not is_path:
-        hint = f"did you mean {source.replace(match[0], f'{match[1]}:')!r}?"
-        raise ParameterError("surface", f"must be kind:argument=value,...: {hint}")
     if is_path or not re.fullmatch(r"[A-Za-z][\w-]+", kind):
         return None
     if not colon and (named == _FILE.name or named not in KINDS):
