@@ -265,8 +265,10 @@ def test_nothing_is_wider_than_the_window(
     browser: Browser, report_pages: dict[str, Path], land_page: Path, width: int
 ) -> None:
     for path in (*report_pages.values(), land_page):
+        browser.said.clear()
         open_page(browser, path, width)
         assert (path.name, overflowing(browser)) == (path.name, [])
+        assert (path.name, browser.said) == (path.name, [])  # no script stopped
 
 
 @pytest.mark.parametrize("width", WIDTHS)

@@ -331,7 +331,7 @@ function sortRows(table, column, isDescending) {
 
 /** Make the headings of a table of laws buttons that sort it, first the greatest numbers. */
 function addSorting(table) {
-  const headings = [...table.tHead.rows[0].cells];
+  const headings = [...(table.tHead?.rows[0].cells ?? [])];
   headings.forEach((heading, column) => {
     if (!heading.textContent) return;
     const button = createButton(heading.textContent, `Sort by ${heading.textContent}`, () => {
