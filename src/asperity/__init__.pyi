@@ -40,6 +40,8 @@ from asperity.scene.loops import onset as onset
 from asperity.scene.loops import scan as scan
 from asperity.scene.loops import simulate as simulate
 from asperity.surface import Surface as Surface
+from asperity.sweeps.run_sweep import sweep as sweep
+from asperity.sweeps.sweep_result import SweepResult as SweepResult
 from asperity.textures import Fourier as Fourier
 from asperity.textures import Grating as Grating
 from asperity.textures import HeightMap as HeightMap

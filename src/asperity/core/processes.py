@@ -81,6 +81,20 @@ def _start_worker(prepare: Callable[[], None] | None, niceness: int) -> None:
         prepare()
 
 
+def end_pool(pool: ProcessPoolExecutor, others: set[BaseProcess]) -> None:
+    """End the processes of a pool without waiting for their tasks.
+
+    Args:
+        pool: the pool.
+        others: child processes that were there before it, and stay.
+    """
+    from multiprocessing import active_children
+
+    for child in set(active_children()) - others:
+        child.kill()
+    pool.shutdown(cancel_futures=True)
+
+
 def end_with_parent(release: Callable[[], None] = lambda: None) -> None:
     """Let this process end when the one that started it has ended, however that was.
 
@@ -202,9 +216,5 @@ class _TaskQueue:
         if self.started.acquire(blocking=False):
             return  # nothing was started, and nothing will be
         self.timer.join()
-        from multiprocessing import active_children
-
-        for child in set(active_children()) - self.other_children:
-            child.kill()
         if self.pool is not None:
-            self.pool.shutdown(cancel_futures=True)
+            end_pool(self.pool, self.other_children)

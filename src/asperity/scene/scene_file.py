@@ -29,7 +29,7 @@ _SUMMARY = "the surface of a recording"
 RECORDING_KIND = TextureKind("recording", _SUMMARY, _load_recorded_texture, (_PATH,))
 TEXTURE_KINDS = ChainMap({"recording": RECORDING_KIND}, *catalogue.KINDS.maps)
 """Texture kinds of the section [texture]."""
-_DEVICE_ID = Argument("device.id", "device of the catalogue", form="text")
+DEVICE_ID = Argument("device.id", "device of the catalogue", form="text")
 LOOP_SECTIONS = ("hand", "motion", "run", "servo")
 SECTIONS = ("texture", "surface", "device", *LOOP_SECTIONS)
 
@@ -76,11 +76,36 @@ def load_scene(source: str, file_arguments: Mapping[str, Any] | None = None) -> 
     """
     extra = dict(file_arguments or {})
     if catalogue.is_scene(source) and catalogue.parse_specification(source) is None:
-        return _load_scene_file(Path(source), extra)
+        path = Path(source)
+        return build_scene(_read_sections(path), path.parent, path, extra)
     return Scene(catalogue.as_texture(source, extra))
 
 
-def _load_scene_file(path: Path, extra: Mapping[str, Any]) -> Scene:
+def read_scene(source: str) -> tuple[dict[str, dict[str, Any]], Path]:
+    """Return the sections of a scene without building it, and the folder of its relative paths.
+
+    Args:
+        source: as for :func:`load_scene`; a specification or a measured surface becomes a section
+            [texture].
+
+    Raises:
+        ParameterError: a scene file cannot be read, or contains something else than sections.
+
+    Example:
+        >>> read_scene("sinusoid:period=1mm")[0]
+        {'texture': {'kind': 'sinusoid', 'period': '1mm'}}
+    """
+    specification = catalogue.parse_specification(source)
+    if specification is not None:
+        kind, arguments = specification
+        return {"texture": {"kind": kind, **arguments}}, Path()
+    path = Path(source)
+    if catalogue.is_scene(source):
+        return _read_sections(path), path.parent
+    return {"texture": {"kind": "file", "path": path.name}}, path.parent
+
+
+def _read_sections(path: Path) -> dict[str, dict[str, Any]]:
     content = read_toml("scene", path)
     _reject_code(content)
     for name in content:
@@ -90,17 +115,37 @@ def _load_scene_file(path: Path, extra: Mapping[str, Any]) -> Scene:
     for name, section in content.items():
         if not isinstance(section, dict):
             raise ParameterError("scene", f"{path.name}: [{name}] must be a section", section)
-    texture = dict(content.get("texture", {}))
+    return content
+
+
+def build_scene(
+    sections: Mapping[str, Mapping[str, Any]],
+    folder: Path,
+    path: Path = Path("the scene"),
+    extra: Mapping[str, Any] | None = None,
+) -> Scene:
+    """Return the scene of sections as they stand in a scene file.
+
+    Args:
+        sections: entries by the name of their section.
+        folder: folder to which paths in the sections are relative.
+        path: the scene file.
+        extra: see ``file_arguments`` of :func:`load_scene`.
+
+    Raises:
+        ParameterError: as for :func:`load_scene`.
+    """
+    texture = dict(sections.get("texture", {}))
     kind = texture.pop("kind", None)
     if not isinstance(kind, str):
         known = " | ".join(f'"{name}"' for name in TEXTURE_KINDS)
         raise ParameterError("scene", f"{path.name} needs [texture] with kind = {known}", kind)
-    surface = parse_arguments("surface", content.get("surface", {}), surface_arguments())
-    device = _scene_device(content["device"]) if "device" in content else None
-    loop = {name: content[name] for name in LOOP_SECTIONS if name in content}
-    built = catalogue.build_texture(kind, texture, path.parent, extra, TEXTURE_KINDS)
-    files = [path.parent / texture["path"]] if "path" in texture else []
-    return Scene(built, surface, device, loop, path.parent, (path, *files))
+    surface = parse_arguments("surface", sections.get("surface", {}), surface_arguments())
+    device = _scene_device(sections["device"]) if "device" in sections else None
+    loop = {name: sections[name] for name in LOOP_SECTIONS if name in sections}
+    built = catalogue.build_texture(kind, texture, folder, extra, TEXTURE_KINDS)
+    files = [folder / texture["path"]] if "path" in texture else []
+    return Scene(built, surface, device, loop, folder, (path, *files))
 
 
 def _reject_code(content: Mapping[str, Any]) -> None:
@@ -117,4 +162,4 @@ def _scene_device(section: Mapping[str, Any]) -> Device:
     fields = {name: value for name, value in section.items() if name != "id"}
     if "id" not in section:
         return parse_device(fields, "the scene's device", from_file=True)
-    return override_device(load_device(_DEVICE_ID.parse(section["id"])), fields)
+    return override_device(load_device(DEVICE_ID.parse(section["id"])), fields)

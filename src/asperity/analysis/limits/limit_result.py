@@ -22,7 +22,7 @@ from asperity.analysis.limits.perceptibility_sentences import (
 from asperity.analysis.limits.spectrum import Spectrum
 from asperity.analysis.passivity.assess_passivity import stability_limit_text
 from asperity.analysis.passivity.verdict import Margin, StabilityLimit
-from asperity.core.display import Plottable, Reportable
+from asperity.core.display import Plottable, Reportable, Tabular
 from asperity.core.files import Serializable, attributes_to_dict
 from asperity.core.units import format_quantity, round_down
 from asperity.devices import Device
@@ -58,7 +58,7 @@ class RenderedWave(Serializable):
 
 
 @dataclass(frozen=True)
-class Limits(Plottable, Reportable):
+class Limits(Plottable, Reportable, Tabular):
     """The six limits for one surface on one device at one scanning speed.
 
     Attributes:
@@ -150,6 +150,30 @@ class Limits(Plottable, Reportable):
         law, count = self.surface.law.letter, sum(bool(limit.holds) for limit in self.limits)
         outcome = f"{count} of 6 hold, {self.perceptibility.tier}"
         return f"<Limits of law {law} on {self.device.id} at {self.speed:g} m/s: {outcome}>"
+
+    def table_rows(self) -> list[dict[str, Any]]:
+        """Return one row: law, stiffness, whether each limit holds, what is felt; SI units."""
+        surface, felt = self.surface, self.perceptibility
+        return [
+            {
+                "device": self.device.id,
+                "law": surface.law.letter,
+                "stiffness [N/m]": surface.stiffness,
+                "depth [m]": surface.max_depth,
+                "speed [m/s]": self.speed,
+                "stability limit [N/m]": self.stability_limit.stiffness,
+                "gain": self.gain.value,
+                "gain method": self.gain.method,
+                **{f"limit {limit.number} holds": limit.holds for limit in self.limits},
+                "top speed [m/s]": self.speeds[1],
+                "resolved share": self.resolved_share,
+                "tier": felt.tier,
+                "texture force RMS [N]": felt.rms,
+                "resolved force RMS [N]": felt.resolved_rms,
+                "hand motion [m]": felt.hand_motion,
+                "level": felt.level,
+            }
+        ]
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units, with a schema number."""

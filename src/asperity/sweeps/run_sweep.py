@@ -1,0 +1,125 @@
+"""Sweep a scene: compute all cases of a plan that are not in its results folder."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import time
+import weakref
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from asperity.core.arguments import check_integer
+from asperity.core.errors import ParameterError
+from asperity.core.processes import available_cores
+from asperity.sweeps.compute_cases import Case, Outcome, check_first_case, compute_cases
+from asperity.sweeps.engine import run_cases
+from asperity.sweeps.places import Place, cores_place, serial_place
+from asperity.sweeps.result_store import ResultStore
+from asperity.sweeps.sweep_plan import SweepPlan, make_plan
+from asperity.sweeps.sweep_result import SweepResult
+
+Progress = Callable[[float], object]
+
+
+def sweep(
+    scene: str | os.PathLike[str],
+    vary: Mapping[str, str],
+    run: str = "compare",
+    *,
+    laws: str | Sequence[str] | None = None,
+    design: str = "",
+    folder: str | os.PathLike[str] | None = None,
+    processes: int | None = None,
+    progress: Progress | None = None,
+    **options: Any,
+) -> SweepResult:
+    """Compute a scene for many values of its keys.
+
+    Every case is computed from its own text alone, which also seeds random numbers: its rows do not
+    depend on the order of the cases or on where they are computed.
+
+    Args:
+        scene: path of a scene file, or a surface as for :func:`asperity.compare`.
+        vary: values by key, as on the command line: ``{"texture.period": "0.5mm:4mm:40log",
+            "device": "touch,omega.3"}``. The last key changes fastest.
+        run: ``"compare"``, ``"limits"``, ``"onset"`` or ``"scan"``.
+        laws: letters or names, for runs with several laws; all by default.
+        design: ``"sobol:64"`` for that many points of a Sobol sequence over the ranges, which are
+            then ``"0.5mm:4mm"`` or ``"0.5mm:4mm:log"``; by default all combinations.
+        folder: results folder. The same call goes on where an earlier one was stopped. Default: a
+            temporary one, which lives as long as the result.
+        processes: number of worker processes; 1 for none; default: one per core. A script that
+            starts some needs the usual ``if __name__ == "__main__":``.
+        progress: called with the completed fraction of the cases that were left.
+        **options: further arguments of :func:`asperity.compare`, :func:`asperity.limits`,
+            :func:`asperity.onset` or :func:`asperity.scan`.
+
+    Raises:
+        ParameterError: for an unknown key or a value that cannot be used, a folder of another
+            sweep, or if every case fails.
+
+    Example:
+        >>> result = sweep("sinusoid:amplitude=0.1mm", {"texture.period": "1mm:2mm:2"}, "compare",
+        ...                laws="WA", processes=1)
+        >>> [(row["texture.period [m]"], row["law"]) for row in result.table_rows()]
+        [(0.001, 'W'), (0.001, 'A'), (0.002, 'W'), (0.002, 'A')]
+    """  # fmt: skip
+    count = available_cores() if processes is None else check_integer("processes", processes, 1)
+    place = serial_place() if count == 1 else cores_place(count)
+    plan = make_plan(os.fspath(scene), vary, run, design=design, laws=laws, options=options)
+    return run_plan(plan, place, None if folder is None else Path(folder), progress)
+
+
+def run_plan(
+    plan: SweepPlan, place: Place, folder: Path | None = None, progress: Progress | None = None
+) -> SweepResult:
+    """Compute the cases of a plan that are not in a folder; see :func:`sweep`."""
+    check_first_case(plan.template, [(i, plan.values(i)) for i in {0, len(plan) - 1}])
+    store = open_store(plan, folder)
+    left = len(plan) - store.n_done
+    total, report = max(left, 1), progress or (lambda _fraction: None)
+
+    def record(outcomes: Iterable[Outcome]) -> None:
+        store.record(outcomes)
+        report(1.0 - (len(plan) - store.n_done) / total)
+
+    try:
+        if left:
+            run_cases(place, plan.template, missing_cases(plan, store), record)
+    finally:
+        store.release()
+    result = SweepResult(plan, store, folder)
+    if len(result.errors) == len(plan):
+        first = result.errors[0]
+        raise ParameterError("sweep", f"failed in each of {len(plan)} cases, the first: {first}")
+    return result
+
+
+def open_store(plan: SweepPlan, folder: Path | None) -> ResultStore:
+    """Return the results folder of a plan; a temporary one lives as long as the store."""
+    if folder is not None:
+        return ResultStore(folder, plan.describe(), len(plan))
+    temporary = tempfile.TemporaryDirectory(prefix="asperity-sweep-", ignore_cleanup_errors=True)
+    store = ResultStore(Path(temporary.name), plan.describe(), len(plan))
+    weakref.finalize(store, temporary.cleanup)
+    return store
+
+
+def missing_cases(plan: SweepPlan, store: ResultStore) -> Iterator[Case]:
+    """Yield the cases that are not recorded."""
+    return ((i, plan.values(i)) for i in range(len(plan)) if i not in store)
+
+
+def estimate_time(plan: SweepPlan, store: ResultStore) -> float:
+    """Return the estimated time [s] of the cases that are left, in one process.
+
+    Two cases are computed: the first compiles what all need.
+    """
+    cases = list(islice(missing_cases(plan, store), 2))
+    compute_cases(plan.template, cases[:1])
+    start = time.perf_counter()
+    compute_cases(plan.template, cases[-1:])
+    return (time.perf_counter() - start) * (len(plan) - store.n_done)
