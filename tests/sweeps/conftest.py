@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from asperity.sweeps.run_kinds import RUN_KINDS
+from asperity.sweeps.case_runs import RUN_KINDS
 from asperity.sweeps.sweep_plan import SweepPlan, make_plan
 
 COUNTING = Path(__file__).with_name("counting_run.py")

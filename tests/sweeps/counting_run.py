@@ -18,7 +18,7 @@ import numpy as np
 
 from asperity.core.display import Tabular
 from asperity.core.errors import ParameterError
-from asperity.sweeps.run_kinds import RUN_KINDS, RunKind
+from asperity.sweeps.case_runs import RUN_KINDS, RunKind
 
 
 class CountedResult(Tabular):

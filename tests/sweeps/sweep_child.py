@@ -6,7 +6,7 @@ import sys
 from functools import partial
 from pathlib import Path
 
-from asperity.sweeps.places import cores_place, serial_place
+from asperity.sweeps.engine import local_place
 from asperity.sweeps.run_sweep import run_plan
 from asperity.sweeps.sweep_plan import make_plan
 
@@ -18,5 +18,5 @@ if __name__ == "__main__":
     prepare = pickle.dumps(partial(runpy.run_path, COUNTING))
     vary = {"texture.period": values}
     plan = make_plan("sinusoid:amplitude=0.1mm", vary, "counting", prepare=prepare)
-    place = serial_place() if processes == "1" else cores_place(int(processes))
+    place = local_place(int(processes))
     run_plan(plan, place, Path(folder)).to_csv(Path(folder) / "table.csv")

@@ -37,7 +37,7 @@ def export_recording(
     if suffix not in TABLE_WRITERS:
         raise ParameterError("output", f"must end in {', '.join(TABLE_WRITERS)}", str(path))
     if suffix == ".parquet":
-        _import_pyarrow()  # an error before anything is written
+        import_pyarrow()  # an error before anything is written
     try:
         with open_atomic(path) as stream:
             TABLE_WRITERS[suffix](recording, stream, progress or (lambda _part: None))
@@ -72,7 +72,7 @@ def _write_mat(recording: Recording, stream: IO[bytes], progress: Progress) -> N
 
 
 def _write_parquet(recording: Recording, stream: IO[bytes], progress: Progress) -> None:
-    arrow: Any = _import_pyarrow()
+    arrow: Any = import_pyarrow()
     from pyarrow import parquet
 
     fields = [
@@ -89,7 +89,12 @@ def _write_parquet(recording: Recording, stream: IO[bytes], progress: Progress) 
             progress(done / recording.rows)
 
 
-def _import_pyarrow() -> Any:
+def import_pyarrow() -> Any:
+    """Return pyarrow.
+
+    Raises:
+        ParameterError: if it is not installed.
+    """
     try:
         import pyarrow
     except ImportError:

@@ -1,7 +1,7 @@
 """Sweeps: many cases of one scene, in this process, on all cores or on a cluster."""
 
-from asperity.sweeps.run_kinds import RUN_KINDS, RunKind
+from asperity.sweeps.case_runs import RunKind, register_run
 from asperity.sweeps.run_sweep import sweep
 from asperity.sweeps.sweep_result import SweepResult
 
-__all__ = ["RUN_KINDS", "RunKind", "SweepResult", "sweep"]
+__all__ = ["RunKind", "SweepResult", "register_run", "sweep"]

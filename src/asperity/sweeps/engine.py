@@ -1,44 +1,81 @@
-"""The engine of a sweep: submit tasks to an executor, and record what comes back."""
+"""The engine of a sweep: submit cases to an executor, and record what comes back."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Executor, Future
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import BrokenExecutor, Executor, Future
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
 from itertools import islice
 from queue import SimpleQueue
 from typing import Any
 
-from asperity.sweeps.compute_cases import Case, Outcome, compute_cases
-from asperity.sweeps.places import Place
-from asperity.sweeps.sweep_plan import CaseTemplate
+from asperity.core.errors import ParameterError
+from asperity.core.processes import end_pool, make_pool
+from asperity.sweeps.case_runs import Case, CaseTemplate, Outcome, compute_cases
 
-Record = Callable[[Iterable[Outcome]], None]
+Record = Callable[[Sequence[Outcome]], None]
+TASKS_PER_WORKER = 4
+"""Tasks that are submitted at a time, so that no worker waits for the next."""
 MAX_CASES_PER_TASK = 4096
 LOST = "its worker process ended: killed, crashed or out of memory"
-_SMOOTHING = 0.2
 
 
-class _Batches:
-    """The cases that are left, in batches that take about the same time."""
+@dataclass(frozen=True)
+class Place:
+    """Where cases are computed.
 
-    def __init__(self, cases: Iterator[Case], task_time: float) -> None:
-        self._cases, self._task_time = cases, task_time
-        self._mean: float | None = None  # time of a case [s]
+    Attributes:
+        open: returns a context of the executor that computes them.
+        n_tasks: returns the number of tasks to be submitted at a time.
+        task_time: time that a task is to take at least [s], so that its own cost does not count;
+            0 for one case per task.
+        lost: error of a task whose worker process ended.
+    """
 
-    def take(self) -> list[Case]:
-        """Return the next cases; none at the end."""
-        size = 1.0
-        if self._mean is not None and self._task_time:
-            size = self._task_time / max(self._mean, 1e-9)
-        return list(islice(self._cases, max(1, min(MAX_CASES_PER_TASK, round(size)))))
-
-    def learn(self, seconds: float, count: int) -> None:
-        """Take the time of a batch into account."""
-        mean = seconds / count
-        self._mean = mean if self._mean is None else self._mean + _SMOOTHING * (mean - self._mean)
+    open: Callable[[], AbstractContextManager[Executor]]
+    n_tasks: Callable[[], int] = lambda: 1
+    task_time: float = 0.0
+    lost: type[Exception] = BrokenExecutor
 
 
-def run_cases(place: Place, template: CaseTemplate, cases: Iterable[Case], record: Record) -> None:
+class SerialExecutor(Executor):
+    """Executor that computes a task in this process, when it is submitted."""
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Return the future of a task that is done."""
+        future: Future[Any] = Future()
+        future.set_result(fn(*args, **kwargs))
+        return future
+
+
+def local_place(processes: int) -> Place:
+    """Return worker processes on this machine; for one process, this one."""
+    if processes == 1:
+        return Place(SerialExecutor)
+    return Place(lambda: _open_pool(processes), lambda: TASKS_PER_WORKER * processes)
+
+
+@contextmanager
+def _open_pool(processes: int) -> Iterator[Executor]:
+    """Open a pool of processes, which end at once if the block ends with an error."""
+    from multiprocessing import active_children
+
+    others, pool = set(active_children()), make_pool(processes)
+    try:
+        try:
+            pool.submit(int).result()
+        except BrokenExecutor:
+            words = "end when they start: a script needs  if __name__ == '__main__':  around sweep"
+            raise ParameterError("processes", words) from None
+        yield pool
+        pool.shutdown()
+    except BaseException:  # also for an interrupt
+        end_pool(pool, others)
+        raise
+
+
+def run_cases(place: Place, template: CaseTemplate, cases: Iterator[Case], record: Record) -> None:
     """Compute cases and record each when it is done, in any order.
 
     A case whose worker process ends is computed once more alone; if that process ends too, its
@@ -50,59 +87,46 @@ def run_cases(place: Place, template: CaseTemplate, cases: Iterable[Case], recor
         cases: number and values of each.
         record: called in this thread with outcomes.
     """
-    batches = _Batches(iter(cases), place.task_time)
-    while lost := _run_until_lost(place, template, batches, record):
-        alone = _Batches(iter(lost), 0.0)
-        while culprits := _run_until_lost(place, template, alone, record, limit=1):
-            record(Outcome(index, error=LOST) for index, _ in culprits)
+    while lost := _run_until_lost(place, template, cases, record, place.n_tasks):
+        alone = iter(lost)
+        while culprits := _run_until_lost(place, template, alone, record, lambda: 1):
+            record([Outcome(index, error=LOST) for index, _ in culprits])
 
 
 def _run_until_lost(
-    place: Place, template: CaseTemplate, batches: _Batches, record: Record, limit: int = 0
-) -> list[Case]:
-    """Compute batches until a worker process ends; return the cases that are lost."""
+    place: Place, template: CaseTemplate, cases: Iterator[Case], record: Record,
+    n_tasks: Callable[[], int],
+) -> list[Case]:  # fmt: skip
+    """Compute cases until a worker process ends; return the cases that are lost."""
     lost: list[Case] = []
     tasks: dict[Future[Any], list[Case]] = {}
-    done: SimpleQueue[Future[Any]] = SimpleQueue()
+    done, size = SimpleQueue[Future[Any]](), 1
     with place.open() as executor:
         while True:
-            while not lost and len(tasks) < (limit or place.count_tasks()):
-                if not (batch := batches.take()):
-                    break
+            while not lost and len(tasks) < n_tasks() and (batch := list(islice(cases, size))):
                 future = _submit(executor, place, template, batch)
-                if future is None:
-                    lost += batch
-                    break
                 tasks[future] = batch
                 future.add_done_callback(done.put)
             if not tasks:
                 return lost
             future = done.get()
-            lost += _collect(future, tasks.pop(future), place, batches, record)
+            batch = tasks.pop(future)
+            try:
+                seconds, outcomes = future.result()
+            except place.lost:
+                lost += batch
+                continue
+            record(outcomes)
+            ideal = place.task_time * len(batch) / max(seconds, 1e-9)
+            size = max(1, min(MAX_CASES_PER_TASK, round(ideal)))
 
 
 def _submit(
     executor: Executor, place: Place, template: CaseTemplate, batch: list[Case]
-) -> Future[Any] | None:
-    """Return the future of a task; ``None`` if the executor has lost a worker."""
+) -> Future[Any]:
     try:
         return executor.submit(compute_cases, template, batch)
-    except Exception as error:
-        if not place.is_lost(error):
-            raise
-        return None
-
-
-def _collect(
-    future: Future[Any], batch: list[Case], place: Place, batches: _Batches, record: Record
-) -> list[Case]:
-    """Record the outcomes of a task; return its cases if its worker ended."""
-    try:
-        seconds, outcomes = future.result()
-    except Exception as error:
-        if not place.is_lost(error):
-            raise
-        return batch
-    batches.learn(seconds, len(batch))
-    record(outcomes)
-    return []
+    except place.lost as error:
+        future: Future[Any] = Future()
+        future.set_exception(error)
+        return future

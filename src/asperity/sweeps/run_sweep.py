@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import os
 import tempfile
-import time
 import weakref
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from itertools import islice
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from asperity.core.arguments import check_integer
 from asperity.core.errors import ParameterError
 from asperity.core.processes import available_cores
-from asperity.sweeps.compute_cases import Case, Outcome, check_first_case, compute_cases
-from asperity.sweeps.engine import run_cases
-from asperity.sweeps.places import Place, cores_place, serial_place
+from asperity.sweeps.case_runs import Case, Outcome, compute_cases
+from asperity.sweeps.engine import Place, local_place, run_cases
 from asperity.sweeps.result_store import ResultStore
 from asperity.sweeps.sweep_plan import SweepPlan, make_plan
 from asperity.sweeps.sweep_result import SweepResult
@@ -66,42 +63,43 @@ def sweep(
         ...                laws="WA", processes=1)
         >>> [(row["texture.period [m]"], row["law"]) for row in result.table_rows()]
         [(0.001, 'W'), (0.001, 'A'), (0.002, 'W'), (0.002, 'A')]
-    """  # fmt: skip
+    """
     count = available_cores() if processes is None else check_integer("processes", processes, 1)
-    place = serial_place() if count == 1 else cores_place(count)
     plan = make_plan(os.fspath(scene), vary, run, design=design, laws=laws, options=options)
-    return run_plan(plan, place, None if folder is None else Path(folder), progress)
+    return run_plan(plan, local_place(count), folder, progress)
 
 
 def run_plan(
-    plan: SweepPlan, place: Place, folder: Path | None = None, progress: Progress | None = None
+    plan: SweepPlan,
+    place: Place,
+    folder: str | os.PathLike[str] | None = None,
+    progress: Progress | None = None,
 ) -> SweepResult:
     """Compute the cases of a plan that are not in a folder; see :func:`sweep`."""
-    check_first_case(plan.template, [(i, plan.values(i)) for i in {0, len(plan) - 1}])
     store = open_store(plan, folder)
     left = len(plan) - store.n_done
-    total, report = max(left, 1), progress or (lambda _fraction: None)
 
-    def record(outcomes: Iterable[Outcome]) -> None:
+    def record(outcomes: Sequence[Outcome]) -> None:
         store.record(outcomes)
-        report(1.0 - (len(plan) - store.n_done) / total)
+        if progress is not None:
+            progress(1.0 - (len(plan) - store.n_done) / left)
 
     try:
         if left:
             run_cases(place, plan.template, missing_cases(plan, store), record)
     finally:
         store.release()
-    result = SweepResult(plan, store, folder)
+    result = SweepResult(plan, store)
     if len(result.errors) == len(plan):
         first = result.errors[0]
         raise ParameterError("sweep", f"failed in each of {len(plan)} cases, the first: {first}")
     return result
 
 
-def open_store(plan: SweepPlan, folder: Path | None) -> ResultStore:
+def open_store(plan: SweepPlan, folder: str | os.PathLike[str] | None) -> ResultStore:
     """Return the results folder of a plan; a temporary one lives as long as the store."""
     if folder is not None:
-        return ResultStore(folder, plan.describe(), len(plan))
+        return ResultStore(Path(folder), plan.describe(), len(plan))
     temporary = tempfile.TemporaryDirectory(prefix="asperity-sweep-", ignore_cleanup_errors=True)
     store = ResultStore(Path(temporary.name), plan.describe(), len(plan))
     weakref.finalize(store, temporary.cleanup)
@@ -113,13 +111,10 @@ def missing_cases(plan: SweepPlan, store: ResultStore) -> Iterator[Case]:
     return ((i, plan.values(i)) for i in range(len(plan)) if i not in store)
 
 
-def estimate_time(plan: SweepPlan, store: ResultStore) -> float:
-    """Return the estimated time [s] of the cases that are left, in one process.
+def estimate_case_time(plan: SweepPlan) -> float:
+    """Return the time of a case [s]: of the last one, after the first has compiled what they need.
 
-    Two cases are computed: the first compiles what all need.
+    Neither is recorded.
     """
-    cases = list(islice(missing_cases(plan, store), 2))
-    compute_cases(plan.template, cases[:1])
-    start = time.perf_counter()
-    compute_cases(plan.template, cases[-1:])
-    return (time.perf_counter() - start) * (len(plan) - store.n_done)
+    compute_cases(plan.template, [(0, plan.values(0))])
+    return compute_cases(plan.template, [(len(plan) - 1, plan.values(len(plan) - 1))])[0]

@@ -4,24 +4,25 @@ from __future__ import annotations
 
 import csv
 import io
+import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import islice
-from pathlib import Path
 from typing import IO, Any
 
 from asperity.core.display import Reportable, Tabular
 from asperity.core.errors import ParameterError
 from asperity.core.files import json_text, open_atomic, to_plain_data
+from asperity.recording.table_export import import_pyarrow
+from asperity.sweeps.case_runs import RunKind, find_run
 from asperity.sweeps.result_store import ResultStore
-from asperity.sweeps.run_kinds import RunKind, find_run
 from asperity.sweeps.sweep_plan import SweepPlan
 
 SCHEMA = 1
 CASE, ERROR = "case", "error"
-_BLOCK = 4096
+_BLOCK = 4096  # rows of Parquet that are in memory at a time
 _UNIT = re.compile(r".* \[(.+)\]")
 
 
@@ -34,12 +35,10 @@ class SweepResult(Reportable, Tabular):
     Attributes:
         plan: the cases.
         store: their outcomes.
-        folder: results folder, as given; ``None`` for a temporary one.
     """
 
     plan: SweepPlan
     store: ResultStore = field(repr=False)
-    folder: Path | None = None
 
     @property
     def run(self) -> RunKind:
@@ -65,26 +64,26 @@ class SweepResult(Reportable, Tabular):
         return {name: _common_type(found) for name, found in types.items()}
 
     def iterate_rows(self) -> Iterator[dict[str, Any]]:
-        """Yield the rows in the order of the cases, as in :meth:`table_rows`."""
+        """Yield the rows of :meth:`table_rows`, without the columns that a row lacks."""
         for one in self.store.outcomes():
             case = {CASE: one.index, **self.plan.numbers(one.index)}
-            for row in one.rows or ({},):
-                yield {**case, **row, **({ERROR: one.error} if one.error else {})}
+            for row in one.rows or ({ERROR: one.error},):
+                yield {**case, **row}
 
     def table_rows(self) -> list[dict[str, Any]]:
-        """Return the rows: number and values of the case, its results or its error; SI units.
+        """Return the rows in the order of the cases; SI units.
 
-        All rows have all columns; an unknown value is ``None``.
+        A row has the number and the values of its case, and results or an error; an unknown value
+        is ``None``.
         """
-        columns = self.columns
-        return [{name: row.get(name) for name in columns} for row in self.iterate_rows()]
+        return [{name: row.get(name) for name in self.columns} for row in self.iterate_rows()]
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units, with a schema number."""
         rows = to_plain_data(self.table_rows())
         return {"schema": SCHEMA, "sweep": self.plan.describe(), "rows": rows}
 
-    def to_csv(self, path: str | Path) -> None:
+    def to_csv(self, path: str | os.PathLike[str]) -> None:
         """Write the table as CSV, whose first line names the columns with their units.
 
         Raises:
@@ -92,7 +91,7 @@ class SweepResult(Reportable, Tabular):
         """
         _write_file(path, self._write_csv)
 
-    def to_parquet(self, path: str | Path) -> None:
+    def to_parquet(self, path: str | os.PathLike[str]) -> None:
         """Write the table as Parquet, whose fields have the metadata ``unit``.
 
         Raises:
@@ -111,28 +110,26 @@ class SweepResult(Reportable, Tabular):
         Raises:
             ParameterError: if xarray or pandas is not installed.
         """
-        frame = self.to_dataframe()
+        frame, plan = self.to_dataframe(), self.plan
+        keys = [CASE] if plan.design else [plan.column(key) for key in plan.arguments]
+        index = [name for name in self.run.index if name in frame]
+        found = frame[frame[ERROR].isna()].drop(columns=[ERROR])
         try:
-            import xarray  # noqa: F401 - pandas needs it
+            dataset = found.set_index(keys + index).to_xarray()
         except ImportError:
             words = "needs xarray: pip install xarray; or use table_rows()"
             raise ParameterError("to_xarray", words) from None
-        keys = [one.column for one in self.plan.variations]
-        index = [one for one in self.run.index if one in frame and one not in keys]
-        dimensions = [*([CASE] if self.plan.design else keys), *index]
-        found = frame[frame[ERROR].isna()].drop(columns=[ERROR])
-        dataset = found.set_index(dimensions).to_xarray()
         for name in dataset.variables:
-            dataset[name].attrs.update({"units": unit} if (unit := _unit(str(name))) else {})
+            if match := _UNIT.fullmatch(str(name)):
+                dataset[name].attrs["units"] = match[1]
         return dataset
 
     def _write_csv(self, stream: IO[bytes]) -> None:
-        columns = self.columns
         text = io.TextIOWrapper(stream, "utf-8", newline="", write_through=True)
         writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(columns)
+        writer.writerow(self.columns)
         for row in self.iterate_rows():
-            writer.writerow([_csv_value(row.get(name)) for name in columns])
+            writer.writerow([_csv_value(row.get(name)) for name in self.columns])
         text.detach()
 
     def _write_parquet(self, stream: IO[bytes]) -> None:
@@ -140,26 +137,28 @@ class SweepResult(Reportable, Tabular):
         from pyarrow import parquet
 
         types = {bool: arrow.bool_(), int: arrow.int64(), float: arrow.float64()}
-        fields = [
-            arrow.field(name, types.get(kind, arrow.string()), metadata=_unit_metadata(name))
-            for name, kind in self.columns.items()
-        ]
+        fields = []
+        for name, kind in self.columns.items():
+            match = _UNIT.fullmatch(name)
+            unit = {"unit": match[1]} if match else None
+            fields.append(arrow.field(name, types.get(kind, arrow.string()), metadata=unit))
         metadata = {"asperity": json_text(self.plan.describe())}
         schema, rows = arrow.schema(fields, metadata=metadata), self.iterate_rows()
         with parquet.ParquetWriter(stream, schema) as writer:
             while block := list(islice(rows, _BLOCK)):
                 columns = [
-                    arrow.array([_convert(row.get(name), kind) for row in block], field.type)
-                    for (name, kind), field in zip(self.columns.items(), fields, strict=True)
+                    [_convert(row.get(name), kind) for row in block]
+                    for name, kind in self.columns.items()
                 ]
-                writer.write_table(arrow.Table.from_arrays(columns, schema=schema))
+                arrays = [arrow.array(*one) for one in zip(columns, schema.types, strict=True)]
+                writer.write_table(arrow.Table.from_arrays(arrays, schema=schema))
 
 
 def _common_type(types: set[type]) -> type:
     """Return the type of a column from those of its values."""
-    if types <= {int, float}:
-        return int if types == {int} else float
-    return types.pop() if len(types) == 1 else str
+    if types == {int, float}:
+        return float
+    return next(iter(types)) if len(types) == 1 else str
 
 
 def _convert(value: Any, kind: type) -> Any:
@@ -167,38 +166,14 @@ def _convert(value: Any, kind: type) -> Any:
 
 
 def _csv_value(value: Any) -> Any:
-    """Return a value of CSV: as in JSON, but text without quotes, and nothing for ``None``."""
+    """Return a value of CSV: true and false as in JSON."""
     return str(value).lower() if isinstance(value, bool) else value
 
 
-def _unit(column: str) -> str:
-    match = _UNIT.fullmatch(column)
-    return match[1] if match else ""
-
-
-def _unit_metadata(column: str) -> Mapping[str, str] | None:
-    unit = _unit(column)
-    return {"unit": unit} if unit else None
-
-
-def _write_file(path: str | Path, write: Any) -> None:
+def _write_file(path: str | os.PathLike[str], write: Callable[[IO[bytes]], None]) -> None:
     try:
         with open_atomic(path) as stream:
             write(stream)
     except OSError as error:
         words = f"cannot be written: {error.strerror}"
-        raise ParameterError("output", words, str(path)) from None
-
-
-def import_pyarrow() -> Any:
-    """Return pyarrow.
-
-    Raises:
-        ParameterError: if it is not installed.
-    """
-    try:
-        import pyarrow
-    except ImportError:
-        words = "needs pyarrow for Parquet: pip install 'asperity[parquet]'"
-        raise ParameterError("output", words) from None
-    return pyarrow
+        raise ParameterError("output", words, os.fspath(path)) from None

@@ -1,0 +1,215 @@
+"""What a sweep computes for a case: a comparison, limits, onsets or strokes, in any process."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import pickle
+import random
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from asperity.analysis.check_limits import limits
+from asperity.analysis.compare import DEFAULT_DEVICE, compare
+from asperity.core.checks import check_keywords
+from asperity.core.digests import content_digest, package_digest
+from asperity.core.display import Tabular
+from asperity.core.errors import AsperityError, ParameterError, suggest_names
+from asperity.core.files import to_plain_data
+from asperity.laws import REGISTERED_LAWS, find_laws
+from asperity.scene.loops import onset, scan
+from asperity.scene.scene_file import Scene, build_scene
+from asperity.scene.sections import surface_keywords
+
+LAW_KEY = "surface.law"
+Case = tuple[int, Mapping[str, Any]]
+"""Number of a case, and the values of its keys as written in a scene."""
+Laws = tuple[str, ...] | None
+_SCENE_ARGUMENTS = {"scene", "texture", "device", "laws", "law", "progress", "law_parameters"}
+
+
+@dataclass(frozen=True)
+class RunKind:
+    """A computation on a scene.
+
+    Attributes:
+        name: as on the command line.
+        function: public function whose keywords are the options of the run.
+        compute: returns its result from a scene, the laws and the options.
+        index: columns that distinguish the rows of one case.
+        shown: columns of numbers that a report draws.
+        takes_laws: whether it computes several laws.
+    """
+
+    name: str
+    function: Callable[..., Any]
+    compute: Callable[[Scene, Laws, Mapping[str, Any]], Tabular]
+    index: tuple[str, ...] = ()
+    shown: tuple[str, ...] = ()
+    takes_laws: bool = True
+
+    def check_options(self, options: Mapping[str, Any], laws: Laws) -> None:
+        """Check the options and the laws of a sweep.
+
+        Raises:
+            ParameterError: for an unknown option, with the nearest, or laws that do not apply.
+        """
+        names = inspect.signature(self.function).parameters.keys()
+        check_keywords(options, names - _SCENE_ARGUMENTS, lambda: None)
+        if laws is not None and not self.takes_laws:
+            words = f"do not apply to {self.name}, which takes one: --vary {LAW_KEY}=A,B"
+            raise ParameterError("laws", words)
+
+
+def _compare(scene: Scene, laws: Laws, options: Mapping[str, Any]) -> Tabular:
+    found = tuple(REGISTERED_LAWS.values()) if laws is None else find_laws(laws)
+    arguments = {**surface_keywords(scene.surface, *found), **options}
+    arguments.pop("law", None)
+    return compare(scene.texture, scene.device or DEFAULT_DEVICE, found, **arguments)
+
+
+def _limits(scene: Scene, _laws: Laws, options: Mapping[str, Any]) -> Tabular:
+    laws = find_laws([scene.surface["law"]]) if "law" in scene.surface else ()
+    arguments = surface_keywords(scene.surface, *(laws or REGISTERED_LAWS.values()))
+    return limits(scene.texture, scene.device or DEFAULT_DEVICE, **{**arguments, **options})
+
+
+_FORCE, _STIFFNESS = "resolved force RMS [N]", "recommended stiffness [N/m]"
+RUN_KINDS = {
+    kind.name: kind
+    for kind in (
+        RunKind("compare", compare, _compare, ("law",), (_STIFFNESS, _FORCE)),
+        RunKind("limits", limits, _limits, (), ("top speed [m/s]", _FORCE), takes_laws=False),
+        RunKind("onset", onset, lambda scene, laws, options: onset(scene, laws, **options),
+                ("law", "delay [samples]"), ("cycling [N/m]",)),
+        RunKind("scan", scan, lambda scene, laws, options: scan(scene, laws, **options),
+                ("law", "speed [m/s]", "depth [m]"), ("energy of the field [J]",)),
+    )
+}  # fmt: skip
+"""Runs by name; a plugin may define one."""
+
+
+def register_run(kind: RunKind) -> None:
+    """Register a user-defined run by its name."""
+    RUN_KINDS[kind.name] = kind
+
+
+def find_run(name: str) -> RunKind:
+    """Return the run of a name.
+
+    Raises:
+        ParameterError: for an unknown one, with the nearest.
+    """
+    if name not in RUN_KINDS:
+        raise ParameterError("run", f"is unknown: {name!r}; {suggest_names(name, RUN_KINDS)}")
+    return RUN_KINDS[name]
+
+
+@dataclass(frozen=True)
+class CaseTemplate:
+    """What all cases of a sweep share; it is sent to the workers.
+
+    Attributes:
+        sections: sections of the scene.
+        folder: folder of the paths in the scene.
+        run: name of the run.
+        laws: letters of the laws; ``None`` for all.
+        options: arguments of the run by name.
+        package: digest of the package that a worker must have.
+        prepare: pickled function that each worker process calls first, such as one that loads
+            plugins; empty for none.
+    """
+
+    sections: Mapping[str, Mapping[str, Any]]
+    folder: Path
+    run: str
+    laws: Laws
+    options: Mapping[str, Any]
+    package: str
+    prepare: bytes = b""
+
+    def case_sections(self, values: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+        """Return the sections of a case, whose values replace those of the scene."""
+        sections = {name: dict(section) for name, section in self.sections.items()}
+        for key, value in values.items():
+            section, _, name = key.partition(".")
+            sections.setdefault(section, {})[name] = value
+        return sections
+
+    def case_text(self, values: Mapping[str, Any]) -> str:
+        """Return the text of a case: its scene and what is computed, the same for the same case."""
+        content = {"run": self.run, "laws": self.laws, "options": self.options}
+        content["scene"] = self.case_sections(values)
+        return json.dumps(content, sort_keys=True, ensure_ascii=False, default=str)
+
+    def case_seed(self, values: Mapping[str, Any]) -> int:
+        """Return the seed of a case, which depends on its text alone."""
+        return int(content_digest(self.case_text(values))[:16], 16)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a case came to.
+
+    Attributes:
+        index: number of the case.
+        rows: rows of its table, plain values.
+        error: why it failed, in one line; empty if it did not.
+    """
+
+    index: int
+    rows: Sequence[Mapping[str, Any]] = ()
+    error: str = ""
+
+
+_ONE_CASE = threading.Lock()  # random numbers of libraries belong to the process
+
+
+def compute_cases(template: CaseTemplate, cases: Sequence[Case]) -> tuple[float, list[Outcome]]:
+    """Return the time that cases took [s], and what they came to.
+
+    Args:
+        template: what the cases share.
+        cases: number and values of each.
+
+    Raises:
+        ParameterError: if this process has another version of the package.
+    """
+    start = time.perf_counter()
+    if template.package != package_digest():
+        words = "has a worker with another version of asperity, Python, NumPy, SciPy or Numba"
+        raise ParameterError("scheduler", words)
+    _prepare(template.prepare)
+    with _ONE_CASE:
+        outcomes = [_compute_case(template, *case) for case in cases]
+    return time.perf_counter() - start, outcomes
+
+
+@lru_cache(maxsize=1)
+def _prepare(function: bytes) -> None:
+    """Call a pickled function, once in this process."""
+    if function:
+        pickle.loads(function)()
+
+
+def _compute_case(template: CaseTemplate, index: int, values: Mapping[str, Any]) -> Outcome:
+    seed = template.case_seed(values)
+    random.seed(seed)
+    np.random.seed(seed % 2**32)  # noqa: NPY002 - the generator of code that has none of its own
+    run, laws = find_run(template.run), template.laws
+    if LAW_KEY in values and run.takes_laws:
+        laws = (values[LAW_KEY],)
+    try:
+        scene = build_scene(template.case_sections(values), template.folder)
+        result = run.compute(scene, laws, template.options)
+        return Outcome(index, to_plain_data(result.table_rows()))
+    except Exception as error:  # one case must not end the others
+        kind = "" if isinstance(error, AsperityError) else f"{type(error).__name__}: "
+        return Outcome(index, error=" ".join(f"{kind}{error}".split()))
