@@ -74,6 +74,7 @@ def plugin_registries() -> tuple[PluginRegistry, ...]:
     from asperity.report import page
     from asperity.servo.drivers import driver_registry
     from asperity.servo.drivers.driver import DriverKind
+    from asperity.sweeps import case_runs
     from asperity.textures import catalogue
     from asperity.textures.texture import TextureKind
 
@@ -84,6 +85,7 @@ def plugin_registries() -> tuple[PluginRegistry, ...]:
         PluginRegistry(claim_registry.CLAIMS, Claim, claim_registry.register),
         PluginRegistry(driver_registry.DRIVER_KINDS, DriverKind, driver_registry.register_driver),
         PluginRegistry(targets.TARGETS, targets.ExportTarget, targets.register),
+        PluginRegistry(case_runs.RUN_KINDS, case_runs.RunKind, case_runs.register_run),
         PluginRegistry(CRITERIA),
         PluginRegistry(THEOREMS),
         PluginRegistry(page._USER_SECTIONS),

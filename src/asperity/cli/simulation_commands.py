@@ -1,11 +1,15 @@
-"""The commands ``simulate``, ``onset`` and ``scan``."""
+"""The commands ``simulate``, ``onset``, ``scan`` and ``sweep``."""
 
 from __future__ import annotations
 
+import importlib.util
+import pickle
 import sys
 from dataclasses import replace
 from datetime import timedelta
+from functools import partial
 from itertools import count
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -14,11 +18,15 @@ from asperity.cli import options
 from asperity.cli.loop_setup import load_setup, loop_options, select_laws, stiffness_option
 from asperity.cli.main import declare_command
 from asperity.cli.output import Outputs, output_options, progress_bar
+from asperity.cli.plugins import load_plugin_files, plugin_files
 from asperity.core.errors import ParameterError
+from asperity.core.processes import available_cores
 
 if TYPE_CHECKING:
     from asperity.laws import Law
     from asperity.scene.setup import Setup
+    from asperity.sweeps.sweep_plan import SweepPlan
+    from asperity.sweeps.sweep_result import SweepResult
 
 
 _STIFFNESS = stiffness_option("the scene's, else 1000 N/m")
@@ -148,3 +156,108 @@ def scan_command(scene: str, outputs: Outputs, laws: tuple[Law, ...] | None, **v
     from asperity.report.loop.sweep_report import strokes_page
 
     outputs.write(result, strokes_page(result))
+
+
+_RUN, _DESIGN, _SCHEDULER = options.command_arguments("sweep")
+_SINGLE = (*_ONSET_SEARCH, _STROKES)
+_MAX_UNASKED_CASES = 10_000
+"""Number of cases above which a sweep is asked for."""
+
+
+@declare_command("sweep")
+@click.argument("scene")
+@click.option(
+    "--vary",
+    metavar="KEY=VALUES",
+    multiple=True,
+    help="Vary a key of the scene: KEY=START:STOP:COUNT, KEY=START:STOP:COUNTlog or KEY=a,b,c;"
+    " may be repeated, for all combinations.",
+)
+@options.argument_options([_RUN, _DESIGN, _SCHEDULER, options.JOBS])
+@_laws_option
+@options.argument_options([options.SPEED, options.GRIP, _DURATION])
+@options.argument_options([_DELAYS, *_SCAN_LISTS], options.list_parser)
+@options.argument_options(_SINGLE, options.single_value_parser)
+@click.option(
+    "-o",
+    "--output",
+    metavar="FOLDER",
+    help="Results folder, in which the same command goes on where it was stopped.",
+)
+@click.option("--yes", is_flag=True, help=f"Compute more than {_MAX_UNASKED_CASES} cases.")
+@options.plugin_option
+@_report_options
+def sweep_command(
+    scene: str, vary: tuple[str, ...], laws: tuple[Law, ...] | None, outputs: Outputs, *,
+    output: str | None, yes: bool, **values: Any,
+) -> None:  # fmt: skip
+    """Compute SCENE for many values of its keys, on all cores or on a cluster.
+
+    SCENE is a scene file (TOML), a texture with its arguments or a measured file. With --output,
+    the same command goes on where it was stopped.
+    """
+    from asperity.sweeps.engine import local_place
+    from asperity.sweeps.run_sweep import run_plan
+    from asperity.sweeps.sweep_plan import make_plan
+
+    processes = available_cores() if values["jobs"] is None else values["jobs"]
+    options.JOBS.validate(processes)
+    plan = make_plan(
+        scene, _parse_vary(vary), values["run"] or str(_RUN.default),
+        design=values["design"] or "", laws=[law.letter for law in laws] if laws else None,
+        options=options.provided_values(
+            values, [options.SPEED, options.GRIP, _DURATION, _DELAYS, *_SCAN_LISTS, *_SINGLE]
+        ),
+        prepare=_prepare_worker() if processes > 1 or values["scheduler"] else b"",
+    )  # fmt: skip
+    if not yes and len(plan) > _MAX_UNASKED_CASES:
+        _confirm_many_cases(plan, processes)
+    with progress_bar(f"computing {len(plan)} cases") as update:
+        result = run_plan(plan, local_place(processes), output, update)
+
+    from asperity.report.cases_report import sweep_page
+
+    extra = "" if output is None else _write_tables(result, Path(output))
+    outputs.write(result, sweep_page(result), extra_line=extra)
+
+
+def _parse_vary(texts: tuple[str, ...]) -> dict[str, str]:
+    """Return the values of ``--vary`` by key."""
+    vary: dict[str, str] = {}
+    for text in texts:
+        key, equals, values = text.partition("=")
+        if not equals or key.strip() in vary:
+            words = "names a key twice" if equals else "must be KEY=VALUES"
+            raise ParameterError("vary", words, text)
+        vary[key.strip()] = values
+    return vary
+
+
+def _prepare_worker() -> bytes:
+    """Return the pickled function that loads the plugins; empty without any."""
+    files = tuple(str(Path(file).resolve()) for file in plugin_files())
+    return pickle.dumps(partial(load_plugin_files, files)) if files else b""
+
+
+def _confirm_many_cases(plan: SweepPlan, processes: int) -> None:
+    """Ask the user to confirm a large sweep.
+
+    Raises:
+        ParameterError: without a confirmation.
+    """
+    from asperity.sweeps.run_sweep import estimate_case_time
+
+    seconds = estimate_case_time(plan) * len(plan)
+    time = timedelta(seconds=round(seconds / processes))
+    words = f"{len(plan)} cases, which take about {time} on {processes} cores"
+    if not (sys.stdin.isatty() and click.confirm(f"{words}. Compute?", err=True)):
+        raise ParameterError("vary", f"makes {words}; --yes computes them")
+
+
+def _write_tables(result: SweepResult, folder: Path) -> str:
+    """Write the table as CSV, and as Parquet where pyarrow is installed; return where."""
+    result.to_csv(folder / "table.csv")
+    if importlib.util.find_spec("pyarrow") is None:
+        return f"Table: {folder / 'table.csv'} (Parquet: pip install 'asperity[parquet]')"
+    result.to_parquet(folder / "table.parquet")
+    return f"Table: {folder / 'table.csv'}, {folder / 'table.parquet'}"

@@ -78,7 +78,7 @@ class SweepPlan:
         return {
             "schema": SCHEMA,
             "asperity": __version__,
-            "package": template.package,
+            "version_digest": template.package,
             **json.loads(template.case_text({})),
             "vary": dict(self.vary),
             "design": self.design,

@@ -23,7 +23,8 @@ from asperity.sweeps.sweep_plan import SweepPlan
 SCHEMA = 1
 CASE, ERROR = "case", "error"
 _BLOCK = 4096  # rows of Parquet that are in memory at a time
-_UNIT = re.compile(r".* \[(.+)\]")
+UNIT = re.compile(r"(.*) \[(.+)\]")
+"""Name and unit of a column."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,8 +121,8 @@ class SweepResult(Reportable, Tabular):
             words = "needs xarray: pip install xarray; or use table_rows()"
             raise ParameterError("to_xarray", words) from None
         for name in dataset.variables:
-            if match := _UNIT.fullmatch(str(name)):
-                dataset[name].attrs["units"] = match[1]
+            if match := UNIT.fullmatch(str(name)):
+                dataset[name].attrs["units"] = match[2]
         return dataset
 
     def _write_csv(self, stream: IO[bytes]) -> None:
@@ -139,8 +140,8 @@ class SweepResult(Reportable, Tabular):
         types = {bool: arrow.bool_(), int: arrow.int64(), float: arrow.float64()}
         fields = []
         for name, kind in self.columns.items():
-            match = _UNIT.fullmatch(name)
-            unit = {"unit": match[1]} if match else None
+            match = UNIT.fullmatch(name)
+            unit = {"unit": match[2]} if match else None
             fields.append(arrow.field(name, types.get(kind, arrow.string()), metadata=unit))
         metadata = {"asperity": json_text(self.plan.describe())}
         schema, rows = arrow.schema(fields, metadata=metadata), self.iterate_rows()

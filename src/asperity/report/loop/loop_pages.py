@@ -8,10 +8,12 @@ from typing import Any
 from asperity.paper.table_two import TableTwo
 from asperity.recording.recording import Recording
 from asperity.recording.replay import Replay
+from asperity.report.cases_report import sweep_page
 from asperity.report.loop import run_report, sweep_report
 from asperity.report.page import Page, Row, Table, notebook_page
 from asperity.scene.sweep_results import OnsetSweep, StrokeSweep
 from asperity.simulation import Run
+from asperity.sweeps.sweep_result import SweepResult
 
 
 @singledispatch
@@ -24,6 +26,7 @@ find_loop_page.register(Recording, run_report.recording_page)
 find_loop_page.register(Replay, run_report.replay_page)
 find_loop_page.register(OnsetSweep, sweep_report.onset_page)
 find_loop_page.register(StrokeSweep, sweep_report.strokes_page)
+find_loop_page.register(SweepResult, sweep_page)
 
 
 @find_loop_page.register
