@@ -132,7 +132,7 @@ def test_many_cases_need_yes(call: Call, tmp_path: Path, monkeypatch: pytest.Mon
     options = ("--laws", "W", "--jobs", "1", "-o", str(tmp_path / "run"))
     code, out, err = call(SURFACE, *VARY, *options)
     assert (code, out) == (2, "")
-    words = "vary makes 6 cases, which take about 1:00:00 on 1 cores; --yes computes them"
+    words = "vary makes 6 cases, which take about 1:00:00 on 1 processes here; --yes computes them"
     assert words in err
     assert not (tmp_path / "run").exists()
     assert call(SURFACE, *VARY, *options, "--yes")[0] == 0

@@ -24,14 +24,14 @@ from asperity.sweeps.case_runs import RUN_KINDS, RunKind
 class CountedResult(Tabular):
     """One row: the period, its square, and random numbers of the process."""
 
-    def __init__(self, period: float) -> None:
-        self.period = period
+    def __init__(self, period: float, seed: int) -> None:
+        self.period, self.seed = period, seed
 
     def table_rows(self):
         return [
             {
                 "square [m^2]": self.period**2,
-                "random": random.random(),
+                "random": random.Random(self.seed).random(),
                 "numpy": float(np.random.random()),  # noqa: NPY002 - its seeding is tested
                 "reach [m]": float("inf"),
                 "unknown": None,
@@ -40,7 +40,7 @@ class CountedResult(Tabular):
         ]
 
 
-def count(scene: Any, _laws: object, options: Mapping[str, Any]) -> CountedResult:
+def count(scene: Any, _laws: object, options: Mapping[str, Any], seed: int) -> CountedResult:
     period = scene.texture.period
     time.sleep(float(os.environ.get("SWEEP_PAUSE", "0")))
     if period == options.get("failing"):
@@ -50,7 +50,7 @@ def count(scene: Any, _laws: object, options: Mapping[str, Any]) -> CountedResul
     if log := os.environ.get("SWEEP_LOG"):
         with Path(log).open("a") as stream:
             stream.write(f"{period!r}\n")
-    return CountedResult(period)
+    return CountedResult(period, seed)
 
 
 def options(failing: float | None = None, crashing: float | None = None) -> None: ...

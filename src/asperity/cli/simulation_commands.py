@@ -196,6 +196,7 @@ def sweep_command(
     SCENE is a scene file (TOML), a texture with its arguments or a measured file. With --output,
     the same command goes on where it was stopped.
     """
+    from asperity.sweeps.cluster import cluster_place
     from asperity.sweeps.engine import local_place
     from asperity.sweeps.run_sweep import run_plan
     from asperity.sweeps.sweep_plan import make_plan
@@ -210,10 +211,12 @@ def sweep_command(
         ),
         prepare=_prepare_worker() if processes > 1 or values["scheduler"] else b"",
     )  # fmt: skip
+    scheduler = values["scheduler"]
+    place = local_place(processes) if scheduler is None else cluster_place(scheduler)
     if not yes and len(plan) > _MAX_UNASKED_CASES:
         _confirm_many_cases(plan, processes)
     with progress_bar(f"computing {len(plan)} cases") as update:
-        result = run_plan(plan, local_place(processes), output, update)
+        result = run_plan(plan, place, output, update)
 
     from asperity.report.cases_report import sweep_page
 
@@ -249,7 +252,7 @@ def _confirm_many_cases(plan: SweepPlan, processes: int) -> None:
 
     seconds = estimate_case_time(plan) * len(plan)
     time = timedelta(seconds=round(seconds / processes))
-    words = f"{len(plan)} cases, which take about {time} on {processes} cores"
+    words = f"{len(plan)} cases, which take about {time} on {processes} processes here"
     if not (sys.stdin.isatty() and click.confirm(f"{words}. Compute?", err=True)):
         raise ParameterError("vary", f"makes {words}; --yes computes them")
 

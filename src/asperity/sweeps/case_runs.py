@@ -42,7 +42,7 @@ class RunKind:
     Attributes:
         name: as on the command line.
         function: public function whose keywords are the options of the run.
-        compute: returns its result from a scene, the laws and the options.
+        compute: returns its result from a scene, the laws, the options and the seed of the case.
         index: columns that distinguish the rows of one case.
         shown: columns of numbers that a report draws.
         takes_laws: whether it computes several laws.
@@ -50,7 +50,7 @@ class RunKind:
 
     name: str
     function: Callable[..., Any]
-    compute: Callable[[Scene, Laws, Mapping[str, Any]], Tabular]
+    compute: Callable[[Scene, Laws, Mapping[str, Any], int], Tabular]
     index: tuple[str, ...] = ()
     shown: tuple[str, ...] = ()
     takes_laws: bool = True
@@ -68,14 +68,14 @@ class RunKind:
             raise ParameterError("laws", words)
 
 
-def _compare(scene: Scene, laws: Laws, options: Mapping[str, Any]) -> Tabular:
+def _compare(scene: Scene, laws: Laws, options: Mapping[str, Any], _seed: int) -> Tabular:
     found = tuple(REGISTERED_LAWS.values()) if laws is None else find_laws(laws)
     arguments = {**surface_keywords(scene.surface, *found), **options}
     arguments.pop("law", None)
     return compare(scene.texture, scene.device or DEFAULT_DEVICE, found, **arguments)
 
 
-def _limits(scene: Scene, _laws: Laws, options: Mapping[str, Any]) -> Tabular:
+def _limits(scene: Scene, _laws: Laws, options: Mapping[str, Any], _seed: int) -> Tabular:
     laws = find_laws([scene.surface["law"]]) if "law" in scene.surface else ()
     arguments = surface_keywords(scene.surface, *(laws or REGISTERED_LAWS.values()))
     return limits(scene.texture, scene.device or DEFAULT_DEVICE, **{**arguments, **options})
@@ -87,9 +87,9 @@ RUN_KINDS = {
     for kind in (
         RunKind("compare", compare, _compare, ("law",), (_STIFFNESS, _FORCE)),
         RunKind("limits", limits, _limits, (), ("top speed [m/s]", _FORCE), takes_laws=False),
-        RunKind("onset", onset, lambda scene, laws, options: onset(scene, laws, **options),
+        RunKind("onset", onset, lambda scene, laws, options, _: onset(scene, laws, **options),
                 ("law", "delay [samples]"), ("cycling [N/m]",)),
-        RunKind("scan", scan, lambda scene, laws, options: scan(scene, laws, **options),
+        RunKind("scan", scan, lambda scene, laws, options, _: scan(scene, laws, **options),
                 ("law", "speed [m/s]", "depth [m]"), ("energy of the field [J]",)),
     )
 }  # fmt: skip
@@ -200,6 +200,7 @@ def _prepare(function: bytes) -> None:
 
 
 def _compute_case(template: CaseTemplate, index: int, values: Mapping[str, Any]) -> Outcome:
+    # The generators of the process are a convenience: threads of Dask draw from random, too.
     seed = template.case_seed(values)
     random.seed(seed)
     np.random.seed(seed % 2**32)  # noqa: NPY002 - the generator of code that has none of its own
@@ -208,7 +209,7 @@ def _compute_case(template: CaseTemplate, index: int, values: Mapping[str, Any])
         laws = (values[LAW_KEY],)
     try:
         scene = build_scene(template.case_sections(values), template.folder)
-        result = run.compute(scene, laws, template.options)
+        result = run.compute(scene, laws, template.options, seed)
         return Outcome(index, to_plain_data(result.table_rows()))
     except Exception as error:  # one case must not end the others
         kind = "" if isinstance(error, AsperityError) else f"{type(error).__name__}: "

@@ -13,6 +13,7 @@ from asperity.core.arguments import check_integer
 from asperity.core.errors import ParameterError
 from asperity.core.processes import available_cores
 from asperity.sweeps.case_runs import Case, Outcome, compute_cases
+from asperity.sweeps.cluster import cluster_place
 from asperity.sweeps.engine import Place, local_place, run_cases
 from asperity.sweeps.result_store import ResultStore
 from asperity.sweeps.sweep_plan import SweepPlan, make_plan
@@ -30,6 +31,7 @@ def sweep(
     design: str = "",
     folder: str | os.PathLike[str] | None = None,
     processes: int | None = None,
+    scheduler: str | None = None,
     progress: Progress | None = None,
     **options: Any,
 ) -> SweepResult:
@@ -50,6 +52,8 @@ def sweep(
             temporary one, which lives as long as the result.
         processes: number of worker processes; 1 for none; default: one per core. A script that
             starts some needs the usual ``if __name__ == "__main__":``.
+        scheduler: address of a scheduler of Dask, whose workers compute instead; see
+            :func:`~asperity.sweeps.cluster.cluster_place`.
         progress: called with the completed fraction of the cases that were left.
         **options: further arguments of :func:`asperity.compare`, :func:`asperity.limits`,
             :func:`asperity.onset` or :func:`asperity.scan`.
@@ -66,7 +70,8 @@ def sweep(
     """
     count = available_cores() if processes is None else check_integer("processes", processes, 1)
     plan = make_plan(os.fspath(scene), vary, run, design=design, laws=laws, options=options)
-    return run_plan(plan, local_place(count), folder, progress)
+    place = local_place(count) if scheduler is None else cluster_place(scheduler)
+    return run_plan(plan, place, folder, progress)
 
 
 def run_plan(
