@@ -103,7 +103,7 @@ def test_tasks_contain_as_many_cases_as_fit_their_time(counting_plan: MakePlan) 
     plan, sizes = counting_plan("texture.period=1mm:2mm:500"), list[int]()
     cases = [(i, plan.values(i)) for i in range(len(plan))]
     found: list[Any] = []
-    place = Place(lambda: _Delayed(sizes, 2e-3), lambda: 3, task_time=0.1)
+    place = Place(lambda: _Delayed(sizes, 2e-3), lambda: 3, lambda: 0.1)
     run_cases(place, plan.template, iter(cases), found.extend)
     assert sizes[:3] == [1, 1, 1]
     assert set(sizes[3:-1]) == {50}

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import logging
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, Executor, Future
 from contextlib import contextmanager
+from functools import lru_cache
 from typing import Any
 
 from asperity.core.errors import ParameterError
 from asperity.sweeps.engine import TASKS_PER_WORKER, Place
 
-TASK_TIME = 0.5
-"""Time that a task is to take at least [s]: a hundred times what the scheduler needs for it."""
+TASK_TIME, TASK_TIME_PER_WORKER = 0.5, 2e-3
+"""Time that a task is to take at least [s]: all workers together then finish at most 500 tasks in a
+second, half of what the scheduler manages (0.2 to 1 ms for each)."""
 _CONNECT_TIME = 10.0
 _MAX_TASKS = 10_000
 
@@ -42,11 +45,19 @@ def cluster_place(address: str) -> Place:
             clients[:] = [client]
             yield _ClientExecutor(client)
 
-    def count_tasks() -> int:
-        workers = len(clients[0].scheduler_info(n_workers=-1)["workers"])
-        return min(_MAX_TASKS, TASKS_PER_WORKER * max(workers, 1))
+    @lru_cache(maxsize=1)
+    def count_workers(_second: int) -> int:
+        return len(clients[0].scheduler_info(n_workers=-1)["workers"])
 
-    return Place(connect, count_tasks, TASK_TIME, KilledWorker)
+    def workers() -> int:
+        return max(1, count_workers(int(time.monotonic())))  # asked for once a second
+
+    return Place(
+        connect,
+        lambda: min(_MAX_TASKS, TASKS_PER_WORKER * workers()),
+        lambda: max(TASK_TIME, TASK_TIME_PER_WORKER * workers()),
+        KilledWorker,
+    )
 
 
 class _ClientExecutor(Executor):

@@ -28,14 +28,14 @@ class Place:
     Attributes:
         open: returns a context of the executor that computes them.
         n_tasks: returns the number of tasks to be submitted at a time.
-        task_time: time that a task is to take at least [s], so that its own cost does not count;
-            0 for one case per task.
+        task_time: returns the time that a task is to take at least [s], so that its own cost does
+            not count; 0 for one case per task.
         lost: error of a task whose worker process ended.
     """
 
     open: Callable[[], AbstractContextManager[Executor]]
     n_tasks: Callable[[], int] = lambda: 1
-    task_time: float = 0.0
+    task_time: Callable[[], float] = lambda: 0.0
     lost: type[Exception] = BrokenExecutor
 
 
@@ -117,7 +117,7 @@ def _run_until_lost(
                 lost += batch
                 continue
             record(outcomes)
-            ideal = place.task_time * len(batch) / max(seconds, 1e-9)
+            ideal = place.task_time() * len(batch) / max(seconds, 1e-9)
             size = max(1, min(MAX_CASES_PER_TASK, round(ideal)))
 
 
