@@ -17,6 +17,7 @@ from asperity.sweeps.result_store import CASES_FILE
 
 COMMAND = "sweep"
 ROOT = Path(__file__).parents[2]
+DATA = ROOT.parent / "shared" / "data"
 COUNTING = str(ROOT / "tests" / "sweeps" / "counting_run.py")
 PRESS, STROKE = (str(ROOT / "examples" / name) for name in ("press.toml", "stroke.toml"))
 SURFACE = "sinusoid:amplitude=0.1mm"
@@ -168,3 +169,22 @@ def test_result_as_xarray() -> None:
     place = {"texture.period [m]": row["texture.period [m]"], "device.id": "touch", "law": "A"}
     assert (row["law"], row["device.id"]) == ("A", "touch")
     assert float(data["q"].sel(place)) == row["q"]
+
+
+def test_a_measured_surface_and_a_change_of_its_file(call: Call, tmp_path: Path) -> None:
+    land = DATA / "sample-land.x3p"
+    if not land.exists():
+        pytest.skip(f"not run: no {land.name} here")
+    shutil.copy(land, tmp_path / land.name)
+    scene, folder = tmp_path / "scene.toml", tmp_path / "run"
+    scene.write_text(f'[texture]\nkind = "file"\npath = "{land.name}"\n[surface]\nlaw = "A"\n')
+    options = ("--run", "limits", "--jobs", "1", "-o", str(folder))
+    vary = ("--vary", "texture.magnify=1,20")
+    assert call(str(scene), *vary, *options)[0] == 0
+    rows = read_csv(folder / "table.csv")
+    direct = asp.limits(asp.load_texture(land, magnify=20), law="A").table_rows()[0]
+    assert float(rows[1]["resolved force RMS [N]"]) == direct["resolved force RMS [N]"]
+    assert rows[0]["resolved force RMS [N]"] != rows[1]["resolved force RMS [N]"]
+    (tmp_path / land.name).write_bytes(land.read_bytes() + b"\0")
+    code, _, err = call(str(scene), *vary, *options)
+    assert (code, "holds another sweep (other files)" in err) == (2, True)
