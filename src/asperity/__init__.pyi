@@ -25,6 +25,8 @@ from asperity.core.errors import SurfaceFileError as SurfaceFileError
 from asperity.core.version import __version__ as __version__
 from asperity.devices import Device as Device
 from asperity.devices import load_device as load_device
+from asperity.envelopes.envelope import Envelope as Envelope
+from asperity.envelopes.envelope import envelope as envelope
 from asperity.export.export_surface import export_code as export_code
 from asperity.laws import Law as Law
 from asperity.recording.recording import Recording as Recording

@@ -21,8 +21,7 @@ from asperity.analysis.limits.perceptibility import Perceptibility, assess_perce
 from asperity.analysis.limits.spectrum import MIN_SHARE, Spectrum, compute_spectrum, wave_forces
 from asperity.analysis.passivity import verdict
 from asperity.core.arguments import DEFAULT_STIFFNESS, FIELD
-from asperity.core.checks import FloatArray, check_keywords, check_positive, check_real
-from asperity.core.errors import ParameterError
+from asperity.core.checks import FloatArray, check_keywords, check_positive
 from asperity.devices import Device, DeviceLike, load_device
 from asperity.laws import Law
 from asperity.perception.grip import DEFAULT_GRIP, Grip, load_grip
@@ -86,11 +85,10 @@ def limits(
     check_keywords(surface_arguments, SURFACE_KEYWORDS, limits)
     device, texture = load_device(device), as_texture(texture)
     v = limit_rules.DEFAULT_SPEED if speed is None else check_positive("speed", speed, "m/s")
-    settings: dict[str, Any] = {
-        "speed": v,
-        "time_samples": _check_sample_count("time_samples", time_samples, 2.0),
-        "position_samples": _check_sample_count("position_samples", position_samples, 2.0),
-        "force_steps": _check_sample_count("force_steps", force_steps, 1.0),
+    samples = time_samples, position_samples, force_steps
+    settings: dict[str, Any] = {"speed": v} | {
+        name: limit_rules.check_sample_count(name, value)
+        for name, value in zip(limit_rules.LEAST_SAMPLES, samples, strict=True)
     }
     if law is None:
         law = recommended_law(
@@ -172,14 +170,6 @@ def _evaluate_limits(
         assumptions=(),
         **settings,
     )
-
-
-def _check_sample_count(name: str, value: float | None, least: float) -> float:
-    """Return the number of samples needed, checked; fewer than two cannot represent a wave."""
-    number = limit_rules.DEFAULT_SAMPLES if value is None else check_real(name, value)
-    if number < least:
-        raise ParameterError(name, f"must be at least {least:g}", value)
-    return number
 
 
 def _limiting_number(

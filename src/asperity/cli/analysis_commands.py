@@ -1,4 +1,4 @@
-"""The commands ``analyze``, ``compare`` and ``limits``."""
+"""The commands ``analyze``, ``compare``, ``limits``, ``envelope`` and ``design``."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ import click
 from asperity.cli import options
 from asperity.cli.main import HeadedCommand, declare_command, repeat_options
 from asperity.cli.options import GRIP, REQUESTED_STIFFNESS, SPEED
-from asperity.cli.output import Outputs, output_options, step_bar
+from asperity.cli.output import Outputs, check_outputs, output_options, step_bar
 from asperity.core.arguments import MAX_DEPTH, Argument
 from asperity.core.errors import ParameterError
-from asperity.laws import REGISTERED_LAWS, registered_arguments
+from asperity.laws import REGISTERED_LAWS, SHIPPED_LAW_ARGUMENTS, registered_arguments
 
 if TYPE_CHECKING:
     from asperity.analysis.compare import Comparison
@@ -211,3 +211,72 @@ def limits_command(surface: str, device: Device | None, outputs: Outputs, **valu
     from asperity.report.limits_report import limits_page
 
     outputs.write(result, limits_page(result))
+
+
+_CONDITIONS = (SPEED, *options.command_arguments("envelope"), MAX_DEPTH, GRIP, *_SAMPLING)
+_LAW_PARAMETERS = tuple(SHIPPED_LAW_ARGUMENTS.values())
+
+
+@declare_command("envelope")
+@options.device_option(
+    "Devices of the catalogue, or TOML files, 'touch,mine.toml'.  [default: omega.3]",
+    options.parse_devices,
+)
+@options.laws_option("Laws, 'HC' or names with commas.  [default: all with a texture]")
+@click.option(
+    "--surface",
+    metavar="SURFACE",
+    multiple=True,
+    help="Surface whose greatest waves are located on the diagram, such as 'land.x3p'; may be"
+    " repeated.",
+)
+@options.argument_options(_CONDITIONS)
+@options.law_options(_LAW_PARAMETERS)
+@click.option(
+    "-o",
+    "--output",
+    metavar="PATH",
+    multiple=True,
+    help="Write the borders (.csv) or the diagram (.svg, .pdf, .png); may be repeated.",
+)
+@options.jobs_option
+@output_options()
+def envelope_command(
+    device: tuple[Device, ...] | None,
+    laws: tuple[Law, ...] | None,
+    surface: tuple[str, ...],
+    output: tuple[str, ...],
+    outputs: Outputs,
+    **values: Any,
+) -> None:
+    """Compute which sinusoids devices render, by law: wavelengths and amplitudes.
+
+    A texture is rendered if the recommended stiffness of the law is at least --min-stiffness and
+    the texture is felt at that stiffness on a scan, as in asperity compare.
+    """
+    from asperity.envelopes.envelope import envelope, textured_laws
+    from asperity.report.envelope_report import check_suffix, envelope_page, write_envelope
+
+    for path in output:
+        check_suffix(path)
+    check_outputs(force=outputs.force, **{f"output {i}": path for i, path in enumerate(output, 1)})
+    devices = [
+        values["settings"].apply_to(one) for one in device or options.parse_devices("omega.3")
+    ]
+    chosen = laws or textured_laws()
+    with step_bar("reading the surfaces", len(devices) * len(chosen)) as step:
+        result = envelope(
+            devices,
+            chosen,
+            surface=surface or None,
+            law_parameters=_law_parameters(values),
+            progress=step,
+            **options.provided_values(values, _CONDITIONS),
+        )
+    for path in output:
+        write_envelope(result, path)
+    outputs.write(result, envelope_page(result))
+
+
+def _law_parameters(values: dict[str, Any]) -> dict[str, Any]:
+    return options.provided_values(values, _LAW_PARAMETERS) | dict(values["settings"].law)

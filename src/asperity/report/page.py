@@ -6,6 +6,7 @@ or as the output of a notebook cell.
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
@@ -351,6 +352,20 @@ def default_style() -> Iterator[None]:
     with matplotlib.rc_context():
         matplotlib.rcdefaults()
         yield
+
+
+FIGURE_SUFFIXES = (".svg", ".png", ".pdf")
+"""Suffixes of the files to which figures are written."""
+
+
+def figure_bytes(result: Any, suffix: str) -> bytes:
+    """Return the main figure of a result as the content of a file with one of these suffixes."""
+    image = io.BytesIO()
+    # Without a date, the same result gives the same file.
+    metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(suffix)
+    with default_style():
+        _plot(result, None).savefig(image, format=suffix[1:], metadata=metadata)
+    return image.getvalue()
 
 
 # --- user-defined sections ------------------------------------------------------------------------

@@ -16,10 +16,12 @@ from asperity.analysis.passivity.assess_passivity import Passivity
 from asperity.core.files import json_text, text_digest
 from asperity.core.units import format_quantity
 from asperity.devices import Device
+from asperity.envelopes.envelope import Envelope
 from asperity.report.analysis_report import analysis_page, criteria_table
 from asperity.report.comparison_columns import describe_texture
 from asperity.report.comparison_report import comparison_page, comparisons_page
 from asperity.report.device_report import device_page
+from asperity.report.envelope_report import envelope_page
 from asperity.report.html import Origin, render_notebook, render_page
 from asperity.report.limits_report import limits_page
 from asperity.report.measured_report import surface_summary_page
@@ -43,6 +45,7 @@ find_page.register(Analysis, analysis_page)
 find_page.register(Comparison, comparison_page)
 find_page.register(Device, device_page)
 find_page.register(DeviceComparisons, comparisons_page)
+find_page.register(Envelope, envelope_page)
 find_page.register(Limits, limits_page)
 find_page.register(MeasurementSummary, surface_summary_page)
 

@@ -12,7 +12,12 @@ import pytest
 from asperity.analysis import check_limits
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.limits import perceptibility, spectrum
-from asperity.analysis.limits.limit_rules import LIMIT_RULES, LimitCase, evaluate_limit
+from asperity.analysis.limits.limit_rules import (
+    LIMIT_RULES,
+    LimitCase,
+    check_sample_count,
+    evaluate_limit,
+)
 from asperity.analysis.limits.perceptibility import (
     MaskingSource,
     Perceptibility,
@@ -110,10 +115,10 @@ def test_gain_limit_tolerates_rounding_and_needs_no_waves() -> None:
 
 
 def test_sample_count_accepts_its_minimum() -> None:
-    assert check_limits._check_sample_count("time_samples", 2.0, 2.0) == 2.0
-    assert check_limits._check_sample_count("time_samples", None, 2.0) == 5.0
+    assert check_sample_count("time_samples", 2.0) == 2.0
+    assert check_sample_count("time_samples", None) == 5.0
     with pytest.raises(ParameterError, match="at least 2"):
-        check_limits._check_sample_count("time_samples", math.nextafter(2.0, 0.0), 2.0)
+        check_sample_count("time_samples", math.nextafter(2.0, 0.0))
 
 
 @pytest.mark.parametrize(

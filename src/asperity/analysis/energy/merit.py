@@ -56,10 +56,7 @@ def _compute_merit(surface: Surface) -> Merit:
     line = surface.texture.scan_line()
     height = scan_height(surface)
     forces, slopes, lost = _scan_forces_and_slopes(surface, line, height)
-    variance = float(np.mean(np.var(forces, axis=1).sum(axis=1)))
-    size = float(np.mean(np.square(forces).sum(axis=2)))
-    # The variance of a constant force is rounding.
-    ripple = math.sqrt(variance) if variance > 1e-24 * size else 0.0
+    ripple = _rms_of_oscillation(forces)
     gain = _gain_above_height(surface, height)
     unit = line.length if line.periodic else 1.0
     if math.isinf(gain) or gain == 0.0:  # a constant force has neither
@@ -69,13 +66,32 @@ def _compute_merit(surface: Surface) -> Merit:
     return Merit(strength, support, ripple, gain, height, lost)
 
 
+def scan_ripple(surface: Surface, points: int | None = None) -> float:
+    """Return the ripple of :func:`merit` [m] alone, without the gain and without the cache.
+
+    Args:
+        surface: the surface.
+        points: of each scan line; by default those of ``merit``.
+    """
+    line, height = surface.texture.scan_line(), scan_height(surface)
+    return _rms_of_oscillation(_scan_forces_and_slopes(surface, line, height, points)[0])
+
+
+def _rms_of_oscillation(forces: FloatArray) -> float:
+    """Return the RMS of forces (lines, points, 3) about the mean of each line."""
+    variance = float(np.mean(np.var(forces, axis=1).sum(axis=1)))
+    size = float(np.mean(np.square(forces).sum(axis=2)))
+    # The variance of a constant force is rounding.
+    return math.sqrt(variance) if variance > 1e-24 * size else 0.0
+
+
 def _scan_forces_and_slopes(
-    surface: Surface, line: ScanLine, height: float
+    surface: Surface, line: ScanLine, height: float, points: int | None = None
 ) -> tuple[FloatArray, FloatArray, float]:
     """Return f/k and -J_zz/k on the scan, and the fraction without contact."""
     costly = surface.law.contact.requires_search
     count = _NEAREST_SCAN_POINTS[surface.texture.is_profile] if costly else _SCAN_POINTS_PER_LINE
-    xy = parallel_line_points(surface.texture, line, count)
+    xy = parallel_line_points(surface.texture, line, points or count)
     shape = xy.shape[:2]
     flat = np.column_stack([xy.reshape(-1, 2), np.full(math.prod(shape), height)])
     if surface.law.stateful:

@@ -19,11 +19,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.core.checks import FloatArray
+from asperity.core.checks import FloatArray, check_real
+from asperity.core.errors import ParameterError
 from asperity.core.files import Serializable
+from asperity.devices import Device
 
 DEFAULT_SPEED = 0.1  # [m/s], a fast stroke
 DEFAULT_SAMPLES = 5.0  # "typically 5 to 10"
+LEAST_SAMPLES = {"time_samples": 2.0, "position_samples": 2.0, "force_steps": 1.0}
+"""Least α, β and γ."""
 
 
 @dataclass(frozen=True)
@@ -182,3 +186,38 @@ def evaluate_limit(rule: LimitRule, case: LimitCase, inequality: str | None = No
         speeds=(0.0, float(top.min())),
     )
     return Decision(limit, holds, top)
+
+
+def shortest_wavelengths(
+    device: Device, speed: float, time_samples: float, position_samples: float
+) -> list[tuple[float, int, str]]:
+    """Return the wavelengths [m] below which a limit fails at a speed, with number and name.
+
+    Limits 1, 2, 3 and 6 of the paper's section II.B, α v T < l, β δ < l, α δ < l and v/l < F₀; 3
+    only where it differs from 2.
+    """
+    rate, step = device.value("update_rate"), device.value("position_resolution")
+    bandwidth = device.value("bandwidth")
+    found = []
+    if rate is not None:
+        found.append((time_samples * speed / rate, 1, f"{time_samples:g} updates"))
+    if step is not None:
+        found.append((position_samples * step, 2, f"{position_samples:g} position steps"))
+        if time_samples != position_samples:
+            found.append((time_samples * step, 3, f"{time_samples:g} position steps"))
+    if bandwidth is not None:
+        found.append((speed / bandwidth, 6, "bandwidth"))
+    return sorted(found)
+
+
+def check_sample_count(name: str, value: float | None) -> float:
+    """Return the number of samples needed, checked; fewer than two cannot represent a wave.
+
+    Raises:
+        ParameterError: for less than the least number.
+    """
+    number = DEFAULT_SAMPLES if value is None else check_real(name, value)
+    least = LEAST_SAMPLES[name]
+    if number < least:
+        raise ParameterError(name, f"must be at least {least:g}", value)
+    return number

@@ -234,13 +234,50 @@ def assess_perceptibility(
         ['magnify 2.5', 'speed 0.029', 'apparent_mass 0.017']
     """
     hand = load_grip() if grip is None else grip
+    waves, doubtful, texture_rms = scan_waves(
+        surface, device, part, hand, rms=rms, explicit_depth=explicit_depth, points=None, **scan
+    )
+    result = classify_perceptibility(waves, doubtful, rms, texture_rms, part.nesting)
+    if not find_remedies or result.tier == "felt" or texture_rms == 0.0:
+        return result
+    options = {"explicit_depth": explicit_depth, "grip": grip, **scan}
+    is_felt = partial(_is_felt_magnified, surface, device, options)
+    return replace(result, remedies=tuple(_find_remedies(waves, is_felt)))
+
+
+def scan_waves(
+    surface: Surface,
+    device: Device,
+    part: TexturePart,
+    grip: Grip,
+    *,
+    rms: float,
+    explicit_depth: bool,
+    points: int | None = None,
+    **scan: float,
+) -> tuple[WaveScan, dict[str, float], float]:
+    """Return the waves of a surface on a scan with the trusted numbers of a device.
+
+    Args:
+        surface: texture, law and stiffness.
+        device: see :func:`assess_perceptibility`.
+        part: see :func:`assess_perceptibility`.
+        grip: the hand.
+        rms: RMS of the oscillating force of the surface [N].
+        explicit_depth: see :func:`assess_perceptibility`.
+        points: see :func:`~asperity.analysis.limits.spectrum.wave_force_components`.
+        **scan: see :func:`assess_perceptibility`.
+
+    Returns:
+        The waves; the numbers of the device that are not trusted; RMS of the force of the texture.
+    """
     texture_rms, scanned = rms, surface
     if part.nesting is not None:
         depth = surface.max_depth if explicit_depth else default_max_depth(part.texture)
         scanned = surface.to_texture(part.texture, depth)
         texture_rms = merit(scanned).ripple * surface.stiffness
     spectrum = compute_spectrum(part.texture)
-    components = wave_force_components(scanned, spectrum)
+    components = wave_force_components(scanned, spectrum, points)
     forces = np.hypot(*components.T)
     # The waves share the RMS of the scan; their sum differs by what is not periodic in the scan.
     total = math.sqrt(float(forces @ forces))
@@ -252,13 +289,8 @@ def assess_perceptibility(
         if (datum := device.data.get(name)) and not datum.verified and datum.source != USER_SOURCE
     }
     case = LimitCase(data, spectrum.wavelengths, scale * forces, spectrum.shares, **scan)
-    waves = WaveScan(case, scale * components, hand, surface.stiffness, device.workspace_size)
-    result = classify_perceptibility(waves, doubtful, rms, texture_rms, part.nesting)
-    if not find_remedies or result.tier == "felt" or texture_rms == 0.0:
-        return result
-    options = {"explicit_depth": explicit_depth, "grip": grip, **scan}
-    is_felt = partial(_is_felt_magnified, surface, device, options)
-    return replace(result, remedies=tuple(_find_remedies(waves, is_felt)))
+    waves = WaveScan(case, scale * components, grip, surface.stiffness, device.workspace_size)
+    return waves, doubtful, texture_rms
 
 
 def _is_felt_magnified(
@@ -363,16 +395,32 @@ def respond(waves: WaveScan) -> HandSpectrum:
         for one in (case, coarse)
     )
     step = case.device.get("force_resolution", 0.0)
-    amplitude, sampled_amplitude = (
-        float(np.linalg.norm(case.forces[which])) for which in (resolved, sampled)
-    )
+    sampled_amplitude = float(np.linalg.norm(case.forces[sampled]))
     tier: Tier = "not felt"
     if np.linalg.norm((motions / unnoticed)[sampled]) >= 1.0 and sampled_amplitude >= step:
         tier = "borderline"
-    is_strong = amplitude >= case.force_steps * step
-    if np.linalg.norm((motions / felt)[resolved]) >= 1.0 and is_strong:
-        tier = "felt"
-    return HandSpectrum(tier, frequencies, motions, unnoticed, felt, resolved, mass)
+    response = HandSpectrum(tier, frequencies, motions, unnoticed, felt, resolved, mass)
+    return replace(response, tier="felt") if felt_ratio(waves, response) >= 1.0 else response
+
+
+def felt_ratio(waves: WaveScan, response: HandSpectrum) -> float:
+    """Return by which factor a texture exceeds what it needs to be felt; it is felt from 1 on.
+
+    The lesser of the ratio of motion and felt amplitude, root of the sum of squares, and of that
+    of the amplitude of the force and γ force steps, over the waves that the device resolves.
+    """
+    case, resolved = waves.case, response.is_resolved
+    level = float(np.linalg.norm((response.motions / response.felt)[resolved]))
+    return min(level, force_step_ratio(case, resolved))
+
+
+def force_step_ratio(case: LimitCase, resolved: NDArray[np.bool_]) -> float:
+    """Return the amplitude of the force of resolved waves over γ force steps of the device.
+
+    Infinite where the device has no steps that are known.
+    """
+    needed = case.force_steps * case.device.get("force_resolution", 0.0)
+    return float(np.linalg.norm(case.forces[resolved])) / needed if needed else math.inf
 
 
 def _find_remedies(waves: WaveScan, is_felt_magnified: Callable[[float], bool]) -> list[Remedy]:

@@ -274,7 +274,9 @@ def wave_forces(surface: Surface, spectrum: Spectrum) -> FloatArray:
     return np.asarray(np.hypot(*wave_force_components(surface, spectrum).T))
 
 
-def wave_force_components(surface: Surface, spectrum: Spectrum) -> FloatArray:
+def wave_force_components(
+    surface: Surface, spectrum: Spectrum, points: int | None = None
+) -> FloatArray:
     """Return the force amplitude of every wave of a texture, along the wall and along its normal.
 
     The probe moves at constant height, as deep as
@@ -289,6 +291,8 @@ def wave_force_components(surface: Surface, spectrum: Spectrum) -> FloatArray:
     """
     if not spectrum.waves:
         return np.zeros((0, 2))
+    if points is not None and spectrum.exact:
+        return _fit_waves(surface, spectrum, points)
     compute = _fit_waves if spectrum.exact else _band_force_amplitudes
     key = repr((spectrum.exact, spectrum.waves))
     forces = cached_result("wave forces", surface, lambda unit: compute(unit, spectrum), key)
@@ -306,9 +310,10 @@ def scan_forces(surface: Surface, xy: FloatArray) -> FloatArray:
     )
 
 
-def _fit_waves(surface: Surface, spectrum: Spectrum) -> FloatArray:
+def _fit_waves(surface: Surface, spectrum: Spectrum, points: int | None = None) -> FloatArray:
     """Return the amplitudes of the least-squares fit of waves to the force."""
-    xy = _fit_points(surface.texture, spectrum, _FIT_POINTS[surface.law.contact.requires_search])
+    count = points or _FIT_POINTS[surface.law.contact.requires_search]
+    xy = _fit_points(surface.texture, spectrum, count)
     vectors = np.array([wave.vector for wave in spectrum.waves])
     angles = xy @ vectors.T + np.array([wave.phase for wave in spectrum.waves])
     columns = np.hstack([np.ones((len(xy), 1)), np.sin(angles), np.cos(angles)])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import math
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -221,8 +220,6 @@ def _motion_section(
 
 # --- recordings -----------------------------------------------------------------------------------
 
-_FIGURE_SUFFIXES = (".svg", ".png", ".pdf")
-
 
 def recording_answer(recording: Recording) -> str:
     """Return size, surface and completeness of a recording in one or two sentences."""
@@ -347,14 +344,13 @@ def write_recording_report(recording: Recording, path: str) -> None:
             be written.
     """
     suffix = Path(path).suffix.lower()
-    if suffix not in (".html", *_FIGURE_SUFFIXES):
-        raise ParameterError("output", f"must end in .html, {', '.join(_FIGURE_SUFFIXES)}", path)
+    if suffix not in (".html", *page.FIGURE_SUFFIXES):
+        raise ParameterError(
+            "output", f"must end in .html, {', '.join(page.FIGURE_SUFFIXES)}", path
+        )
     if suffix == ".html":
         origin = Origin(content=text_digest(json_text(recording)))
         content = render_page(recording_page(recording), origin).encode()
     else:
-        image = io.BytesIO()
-        with page.default_style():
-            recording.plot().savefig(image, format=suffix[1:])
-        content = image.getvalue()
+        content = page.figure_bytes(recording, suffix)
     write_bytes("output", path, content)

@@ -12,9 +12,11 @@ from asperity.analysis.analyze import Analysis
 from asperity.analysis.compare import Comparison
 from asperity.analysis.limits.limit_result import Limits
 from asperity.core.errors import ParameterError
+from asperity.envelopes.envelope import Envelope
 from asperity.recording.recording import Recording
 from asperity.report.pictures import law_pictures, style
 from asperity.report.pictures.analysis_pictures import available_pictures
+from asperity.report.pictures.envelope_pictures import envelope_figure
 from asperity.report.pictures.loop_pictures import recording_figure, run_figure
 from asperity.report.pictures.spectrum_pictures import hand_figure, limits_figure, spectrum_figure
 from asperity.report.pictures.surface_pictures import draw_surface, surface_size
@@ -33,7 +35,8 @@ def plot(result: Any, picture: str | None = None) -> Figure:
             the fields of all laws), a :class:`~asperity.surface.Surface` (forces and field of its
             law), a texture (the surface), an :class:`~asperity.analysis.analyze.Analysis`
             (the field with the worst loop, the loop gain, the singular values), the
-            :class:`~asperity.analysis.limits.limit_result.Limits` (waves and their forces), a
+            :class:`~asperity.analysis.limits.limit_result.Limits` (waves and their forces), an
+            :class:`~asperity.Envelope` (the sinusoids that devices render), a
             :class:`~asperity.simulation.Run` or a :class:`~asperity.Recording` (motion, force,
             energy, phase).
         picture: name of one figure of the report: of a comparison "surface", "spectrum", "hand",
@@ -90,6 +93,12 @@ def _plot_analysis(result: Analysis, picture: str | None = None) -> Figure:
 def _plot_limits(result: Limits, picture: str | None = None) -> Figure:
     _check_picture_name(picture)
     return limits_figure(result)
+
+
+@plot.register
+def _plot_envelope(result: Envelope, picture: str | None = None) -> Figure:
+    _check_picture_name(picture)
+    return envelope_figure(result)
 
 
 @plot.register

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from asperity.analysis.compare import Comparison
 from asperity.analysis.energy.scan_lines import parallel_line_points
 from asperity.analysis.limits.limit_result import Limits, stiffness_text
+from asperity.analysis.limits.limit_rules import shortest_wavelengths
 from asperity.analysis.limits.perceptibility import HandSpectrum
 from asperity.analysis.limits.perceptibility_sentences import speed_text
 from asperity.core.checks import FloatArray
@@ -42,28 +43,6 @@ def line_spectrum(texture: Texture) -> tuple[FloatArray, FloatArray]:
     amplitude = np.sqrt(np.mean(spectrum**2, axis=0))[1:]
     wavelength = line.length / np.arange(1, len(amplitude) + 1)
     return wavelength, amplitude
-
-
-def shortest_wavelengths(
-    device: Device, speed: float, time_samples: float, position_samples: float
-) -> list[tuple[float, int, str]]:
-    """Return the wavelengths [m] below which a limit fails at a speed, with number and name.
-
-    Limits 1, 2, 3 and 6 of the paper's section II.B, α v T < l, β δ < l, α δ < l and v/l < F₀; 3
-    only where it differs from 2.
-    """
-    rate, step = device.value("update_rate"), device.value("position_resolution")
-    bandwidth = device.value("bandwidth")
-    found = []
-    if rate is not None:
-        found.append((time_samples * speed / rate, 1, f"{time_samples:g} updates"))
-    if step is not None:
-        found.append((position_samples * step, 2, f"{position_samples:g} position steps"))
-        if time_samples != position_samples:
-            found.append((time_samples * step, 3, f"{time_samples:g} position steps"))
-    if bandwidth is not None:
-        found.append((speed / bandwidth, 6, "bandwidth"))
-    return sorted(found)
 
 
 def device_wavelength_limits(device: Device) -> list[tuple[float, str]]:

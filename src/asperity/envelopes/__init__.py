@@ -1,0 +1,1 @@
+"""Which textures a device renders, and the texture that meets a target."""

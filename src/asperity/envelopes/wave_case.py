@@ -1,0 +1,202 @@
+"""One sinusoid with a law on a device: is its wall firm enough, and is its texture felt?
+
+The numbers are those of a comparison at the recommended stiffness; only the points of the scan are
+fewer, since a single wave needs no more.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from asperity.analysis.bounds.bound import NORM, ONE_SIDED, Bound
+from asperity.analysis.energy.merit import scan_ripple
+from asperity.analysis.gain.characteristic import cached_number
+from asperity.analysis.limits import perceptibility
+from asperity.analysis.limits.limit_rules import (
+    DEFAULT_SAMPLES,
+    DEFAULT_SPEED,
+    LEAST_SAMPLES,
+    check_sample_count,
+)
+from asperity.analysis.passivity.verdict import StiffnessRecommendation, recommend_stiffness
+from asperity.core.checks import check_keywords, check_positive
+from asperity.core.files import Serializable
+from asperity.devices import Device
+from asperity.laws import Law, find_law
+from asperity.perception.grip import DEFAULT_GRIP, Grip, load_grip
+from asperity.rendering import rendered_surface
+from asperity.surface import Surface
+from asperity.textures import Sinusoid
+from asperity.textures.texture import Texture
+
+DEFAULT_MIN_STIFFNESS = 100.0
+"""Least stiffness of a wall [N/m]: a press of 1 N sinks in by at most 10 mm."""
+
+_SCAN_POINTS = 256
+"""Points of a period of one wave: forces that bend differ by 1e-4 from those of 16384 points."""
+
+
+@dataclass(frozen=True)
+class RenderConditions(Serializable):
+    """What rendering a texture means.
+
+    A device renders a texture with a law if the recommended stiffness is at least ``min_stiffness``
+    and the texture is felt at that stiffness on a scan.
+
+    Attributes:
+        speed: of the scan [m/s].
+        min_stiffness: least stiffness of the wall [N/m].
+        grip: the hand.
+        max_depth: depth to which the texture is pressed [m]; ``None`` for its peak-to-valley
+            height, at most 1 mm.
+        time_samples: α, updates that a wave needs.
+        position_samples: β, position steps that a wave needs.
+        force_steps: γ, force steps that an amplitude needs.
+    """
+
+    speed: float = DEFAULT_SPEED
+    min_stiffness: float = DEFAULT_MIN_STIFFNESS
+    grip: Grip = field(default_factory=load_grip)
+    max_depth: float | None = None
+    time_samples: float = DEFAULT_SAMPLES
+    position_samples: float = DEFAULT_SAMPLES
+    force_steps: float = DEFAULT_SAMPLES
+
+    @property
+    def scan(self) -> dict[str, float]:
+        """Speed and samples, as the limits take them."""
+        return {name: getattr(self, name) for name in ("speed", *LEAST_SAMPLES)}
+
+
+_UNITS = {"speed": "m/s", "min_stiffness": "N/m", "max_depth": "m"}
+
+
+def make_conditions(function: Callable[..., Any], **keywords: Any) -> RenderConditions:
+    """Return conditions from keywords of a function; ``None`` is the default.
+
+    Raises:
+        ParameterError: for an unknown keyword or a value that cannot be used.
+    """
+    check_keywords(keywords, {*_UNITS, *LEAST_SAMPLES, "grip"}, function)
+    values = {name: value for name, value in keywords.items() if value is not None}
+    for name in _UNITS.keys() & values.keys():
+        values[name] = check_positive(name, values[name], _UNITS[name])
+    for name in LEAST_SAMPLES.keys() & values.keys():
+        values[name] = check_sample_count(name, values[name])
+    return RenderConditions(**values | {"grip": load_grip(values.get("grip", DEFAULT_GRIP))})
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A surface on a device at the recommended stiffness.
+
+    Attributes:
+        surface: the surface as it is rendered; at the recommended stiffness if there is one.
+        recommended: the recommended stiffness, 0 for none, with its limit and safety margin.
+        q: characteristic number.
+        waves: waves of the texture on a scan; ``None`` without a recommended stiffness.
+        min_stiffness: least stiffness of the wall [N/m].
+    """
+
+    surface: Surface
+    recommended: StiffnessRecommendation
+    q: Bound
+    waves: perceptibility.WaveScan | None
+    min_stiffness: float
+
+    @property
+    def firm(self) -> float:
+        """Limit of the stiffness times safety margin, before rounding, over the least one."""
+        limit = self.recommended.stability_limit.stiffness or 0.0
+        return self.recommended.margin.factor * limit / self.min_stiffness
+
+    @property
+    def wall(self) -> float:
+        """K₀ over q times the least stiffness: limit 5 of the paper holds from 1 on."""
+        wall = self.recommended.wall_stiffness or math.inf
+        return wall / (self.q.value * self.min_stiffness)
+
+    def felt(self) -> float:
+        """Return the ratio of :func:`~asperity.analysis.limits.perceptibility.felt_ratio`."""
+        if self.waves is None:
+            return 0.0
+        return perceptibility.felt_ratio(self.waves, perceptibility.respond(self.waves))
+
+    @property
+    def force_steps(self) -> float:
+        """Amplitude of the force over γ force steps; infinite where the steps are unknown."""
+        if self.waves is None:
+            return 0.0
+        resolved = perceptibility.respond(self.waves).is_resolved
+        return perceptibility.force_step_ratio(self.waves.case, resolved)
+
+    @property
+    def is_rendered(self) -> bool:
+        """Whether the device renders the texture."""
+        return min(self.firm, self.felt()) >= 1.0
+
+
+@dataclass(frozen=True)
+class WaveCase:
+    """A law on a device, for any texture.
+
+    Attributes:
+        law: letter, or a user-defined law.
+        law_parameters: its parameters.
+        device: the device.
+        conditions: what rendering means.
+    """
+
+    law: str | Law
+    law_parameters: Mapping[str, float]
+    device: Device
+    conditions: RenderConditions
+
+    @property
+    def letter(self) -> str:
+        """Letter of the law."""
+        return find_law(self.law).letter
+
+    def surface(self, texture: Texture) -> Surface:
+        """Return a texture with this law, as a loop renders it."""
+        depth, parameters = self.conditions.max_depth, self.law_parameters
+        return rendered_surface(
+            Surface(texture, self.law, max_depth=depth, law_parameters=parameters)
+        )
+
+    def recommend(self, texture: Texture) -> Trial:
+        """Return a texture at its recommended stiffness, without its waves."""
+        surface = self.surface(texture)
+        q = cached_number(surface, NORM)
+        # A law with curl is limited by the wall's gain K₀/q alone, whatever q⁺ is.
+        is_conservative = surface.facts.conservative
+        one_sided = cached_number(surface, ONE_SIDED) if is_conservative else q
+        recommended = recommend_stiffness(surface, self.device, q, one_sided)
+        if recommended.stiffness:
+            surface = surface.to_stiffness(recommended.stiffness)
+        return Trial(surface, recommended, q, None, self.conditions.min_stiffness)
+
+    def trial(self, texture: Texture) -> Trial:
+        """Return a texture at its recommended stiffness, with its waves."""
+        trial, conditions = self.recommend(texture), self.conditions
+        if not trial.recommended.stiffness:
+            return trial
+        surface, points = trial.surface, _SCAN_POINTS if texture.single_wave else None
+        waves, _doubtful, _rms = perceptibility.scan_waves(
+            surface,
+            self.device,
+            texture.texture_part(),
+            conditions.grip,
+            rms=scan_ripple(surface, points) * surface.stiffness,
+            explicit_depth=conditions.max_depth is not None,
+            points=points,
+            **conditions.scan,
+        )
+        return replace(trial, waves=waves)
+
+    def try_wave(self, wavelength: float, amplitude: float) -> Trial:
+        """Return the trial of a sinusoid [m]."""
+        return self.trial(Sinusoid(amplitude, wavelength))

@@ -1,0 +1,61 @@
+"""Output, files and errors of ``asperity envelope``."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+from tests.cli.conftest import Call
+
+import asperity as asp
+
+ENVELOPE = ("envelope", "--device", "touch,pantograph", "--laws", "CH")
+
+
+def test_envelope_writes_what_python_returns(call: Call, tmp_path: Path) -> None:
+    names = ("borders.csv", "picture.svg", "picture.pdf", "report.html", "data.json")
+    paths = [str(tmp_path / name) for name in names]
+    files = ("-o", paths[0], "-o", paths[1], "-o", paths[2], "--html", paths[3], "--json", paths[4])
+    code, out, err = call(*ENVELOPE, "--speed", "0.2m/s", "--jobs", "1", *files, width=80)
+    assert (code, err) == (0, "")
+    assert "3D Systems Touch renders most with law H" in out
+    assert max(map(len, out.splitlines())) <= 80 + len(str(tmp_path))
+    assert "…" not in out
+    result = asp.envelope(["touch", "pantograph"], "CH", speed=0.2)
+    with open(paths[0], encoding="utf-8", newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [row["law"] for row in rows] == [row["law"] for row in result.table_rows()]
+    for row, expected in zip(rows, result.table_rows(), strict=True):
+        value = expected["rendered from amplitude [m]"]
+        assert row["rendered from amplitude [m]"] == ("" if value is None else repr(value))
+    assert json.loads(Path(paths[4]).read_text("utf-8")) == json.loads(json.dumps(result.to_dict()))
+    assert Path(paths[1]).read_text("utf-8").startswith("<?xml")
+    assert Path(paths[2]).read_bytes().startswith(b"%PDF")
+    assert "Which sinusoids are rendered" in Path(paths[3]).read_text("utf-8")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("envelope", "--device", "nope"), "device is unknown"),
+        (("envelope", "-o", "borders.txt"), "output must end in .csv"),
+        (("envelope", "-o", "a.csv", "-o", "a.csv"), "cannot both"),
+        (("envelope", "--min-stiffness", "0N/m"), "min_stiffness must be positive"),
+        (("envelope", "--laws", "C", "--friction", "0.5"), "friction"),
+        (("envelope", "--surface", "nix.x3p"), "nix.x3p"),
+    ],
+)
+def test_bad_input_is_one_line(
+    call: Call,
+    arguments: tuple[str, ...],
+    words: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, out, err = call(*arguments)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert words in err
+    assert list(tmp_path.iterdir()) == []
