@@ -134,28 +134,8 @@ class Claim:
         return Result(*about, check.verdict, check, self.flips_under)
 
 
-DECLARED_CLAIMS: list[Claim] = []
-"""The claims of the paper, in the order of declaration."""
-
 CATALOGUE = tomllib.loads(Path(__file__).with_name("claims.toml").read_text(encoding="utf-8"))
-"""Place, correction and falsifying change of each claim that a function computes, by id."""
-
-
-def declare_claim(claim_id: str) -> Callable[[Computation], Computation]:
-    """Declare that the decorated function judges a claim of the paper.
-
-    The first line of its docstring is the statement; the rest is in ``claims.toml``.
-    """
-
-    def declare(compute: Computation) -> Computation:
-        statement = (compute.__doc__ or "").partition("\n")[0]
-        row = CATALOGUE[claim_id]
-        place = tuple(row.get("equations", ())), row["section"]
-        texts = (row.get(name, "") for name in ("flips_under", "correction", "fitted"))
-        DECLARED_CLAIMS.append(Claim(claim_id, *place, statement, compute, *texts))
-        return compute
-
-    return declare
+"""Function, place, correction and falsifying change of each claim that a function computes."""
 
 
 def check_values(

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import nullcontext
 from importlib import import_module
-from pkgutil import iter_modules
+from typing import Any
 
 from asperity.core.errors import ParameterError, nearest_names
 from asperity.core.processes import limit_processes, precompute
 from asperity.paper import claims
-from asperity.paper.claim import DECLARED_CLAIMS, Claim, Result
+from asperity.paper.claim import CATALOGUE, Claim, Result
+from asperity.paper.claims.formula_claims import FORMULA_CLAIMS
+from asperity.paper.claims.tables_and_remarks import TABLE_TWO_CLAIMS
 
 Progress = Callable[[Result, int, int], None]
 """Called after each claim with its result, the number of finished claims and their total."""
@@ -25,9 +27,21 @@ def _paper_order(claim: Claim) -> tuple[bool, str, float]:
     return claim.section.startswith("App."), claim.section, position
 
 
-for _module in iter_modules(claims.__path__):  # each declares its claims
-    import_module(f"{claims.__name__}.{_module.name}")
-CLAIMS: dict[str, Claim] = {one.id: one for one in sorted(DECLARED_CLAIMS, key=_paper_order)}
+def _catalogued_claim(claim_id: str, row: Mapping[str, Any]) -> Claim:
+    """Return a claim of ``claims.toml``; the first line of a docstring is the statement."""
+    module, function = row["function"].split(".")
+    compute = getattr(import_module(f"{claims.__name__}.{module}"), function)
+    statement = (compute.__doc__ or "").partition("\n")[0]
+    place = tuple(row.get("equations", ())), row["section"]
+    texts = (row.get(name, "") for name in ("flips_under", "correction", "fitted"))
+    return Claim(claim_id, *place, statement, compute, *texts)
+
+
+_CATALOGUED_CLAIMS = [_catalogued_claim(claim_id, row) for claim_id, row in CATALOGUE.items()]
+CLAIMS: dict[str, Claim] = {
+    one.id: one
+    for one in sorted([*FORMULA_CLAIMS, *_CATALOGUED_CLAIMS, *TABLE_TWO_CLAIMS], key=_paper_order)
+}
 _PAPER_CLAIM_IDS = frozenset(CLAIMS)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from asperity.core.checks import FloatArray
 from asperity.paper.cases import random_settings
-from asperity.paper.claim import Check, check_statement, combine_checks, declare_claim
+from asperity.paper.claim import Check, check_statement, combine_checks
 from asperity.paper.formula_checks import check_difference_quotients
 from asperity.surface import Surface
 from asperity.textures.kinds.sinusoid import Sinusoid
@@ -156,7 +156,6 @@ def _check_sample_count(
     )
 
 
-@declare_claim("limit-1")
 def limit_1() -> Check:
     """Scanning velocity: α v T/l < 1.
 
@@ -166,7 +165,6 @@ def limit_1() -> Check:
     return combine_checks(reconstruction, _check_dimensions(1))
 
 
-@declare_claim("limit-2")
 def limit_2() -> Check:
     """Low speed reconstruction: β δ/l < 1.
 
@@ -176,7 +174,6 @@ def limit_2() -> Check:
     return combine_checks(reconstruction, _check_dimensions(2))
 
 
-@declare_claim("limit-3")
 def limit_3() -> Check:
     """High speed reconstruction: α δ/l < 1, one more limit.
 
@@ -202,7 +199,6 @@ def limit_3() -> Check:
     return combine_checks(samples, difference)
 
 
-@declare_claim("limit-4")
 def limit_4() -> Check:
     """Force reconstruction: γ b/l < A.
 
@@ -213,7 +209,6 @@ def limit_4() -> Check:
     return combine_checks(count, _check_dimensions(4))
 
 
-@declare_claim("limit-5")
 def limit_5() -> Check:
     """Gain: 2πA/l < A₀.
 
@@ -227,7 +222,6 @@ def limit_5() -> Check:
     return combine_checks(_check_dimensions(5), quotients)
 
 
-@declare_claim("limit-6")
 def limit_6() -> Check:
     """Structure of the device: v/l < F₀.
 

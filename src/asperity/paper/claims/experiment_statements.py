@@ -24,7 +24,6 @@ _SPEED = 0.2  # [m/s], greatest
 # --- V --------------------------------------------------------------------------------------------
 
 
-@claim.declare_claim("sentence-V-samples")
 def samples_per_period() -> claim.Check:
     """With 1 mm, the highest period, there are 50 samples and more, and at most 200 Hz.
 
@@ -51,7 +50,6 @@ def samples_per_period() -> claim.Check:
     )
 
 
-@claim.declare_claim("eq-30")
 def force_w() -> claim.Check:
     """Force of the smooth wall W."""
     surface, rng = cases.PASSIVITY.surface("W"), np.random.default_rng(1)
@@ -66,7 +64,6 @@ def force_w() -> claim.Check:
     )
 
 
-@claim.declare_claim("sentence-V.A-qF")
 def number_f() -> claim.Check:
     """q_F = 8.3 for the stated parameters."""
     own, true = PAPER_CASE.sticking_norm(), PAPER_CASE.max_norm_ratio()
@@ -83,7 +80,6 @@ def number_f() -> claim.Check:
     )
 
 
-@claim.declare_claim("sentence-V.A-qA")
 def number_a() -> claim.Check:
     """q_A = 5.1 for the stated parameters."""
     q = cases.PASSIVITY.q("A")
@@ -101,7 +97,6 @@ def _handle_damping(x: float) -> float:
     return float(np.linalg.svd(matrix, compute_uv=False)[-1])
 
 
-@claim.declare_claim("sentence-V.A-rule")
 def stability_rule() -> claim.Check:
     """At 2000 N/m W is within (1), A and F are not, and are when divided by their numbers."""
     q_a, q_f = cases.PASSIVITY.q("A"), PAPER_CASE.sticking_norm()
@@ -121,7 +116,6 @@ def stability_rule() -> claim.Check:
     )
 
 
-@claim.declare_claim("sentence-V.A-ensured")
 def division_ensures_passivity() -> claim.Check:
     """Dividing by the characteristic number ensures passivity for A and F.
 
@@ -153,7 +147,6 @@ def held_force_work(path: FloatArray, force: FloatArray) -> float:
     )
 
 
-@claim.declare_claim("sentence-V.B-sum")
 def energy_sums() -> claim.Check:
     """Force times displacement of the same sample, summed, is the energy supplied.
 
@@ -175,7 +168,6 @@ def energy_sums() -> claim.Check:
     )
 
 
-@claim.declare_claim("sentence-V.B-margin")
 def passivity_margins() -> claim.Check:
     """The margin of passivity is larger than in section V.A."""
     numbers = {law: [case.q(law) for case in (cases.PASSIVITY, cases.SCANNING)] for law in "WABCEG"}
@@ -190,7 +182,6 @@ def passivity_margins() -> claim.Check:
     )
 
 
-@claim.declare_claim("sentence-V.B-lateral")
 def no_lateral_energy() -> claim.Check:
     """A exchanges no energy along the surface."""
     surface, rng = cases.SCANNING.surface("A"), np.random.default_rng(5)
@@ -204,7 +195,6 @@ def no_lateral_energy() -> claim.Check:
     )
 
 
-@claim.declare_claim("sentence-V.C-alive")
 def nonconservative_feels_alive() -> claim.Check:
     """Fields that are not conservative feel alive.
 
@@ -232,7 +222,6 @@ def growth_exponents(case: Case, compute: Callable[..., float], *arguments: Any)
     return [math.log(ratio) / math.log(1.01) for ratio in ratios]
 
 
-@claim.declare_claim("sentence-V.C-scaling")
 def scaling_with_texture() -> claim.Check:
     """q_A is proportional to A/l, the energy gained on a horizontal path to A²."""
     q_by_a, q_by_l = growth_exponents(cases.BUMP, cases.ExperimentCase.q, "A")
@@ -259,7 +248,6 @@ def scaling_with_texture() -> claim.Check:
     )
 
 
-@claim.declare_claim("sentence-V.C-perpendicular")
 def passive_along_normal() -> claim.Check:
     """A is passive to a probe that moves at right angles to the surface.
 
@@ -288,7 +276,6 @@ def passive_along_normal() -> claim.Check:
 # --- VI -------------------------------------------------------------------------------------------
 
 
-@claim.declare_claim("sentence-VI-increase")
 def stiffness_is_raised() -> claim.Check:
     """Texturing generally raises the effective stiffness."""
     settings = [*cases.SETTINGS.values(), *cases.random_settings(5)]
@@ -303,7 +290,6 @@ def stiffness_is_raised() -> claim.Check:
     )
 
 
-@claim.declare_claim("sentence-VI-proportional")
 def number_is_proportional() -> claim.Check:
     """The characteristic number is most frequently proportional to A/l."""
     base = cases.ExperimentCase(1000.0, 1e-3, 0.8e-3)
@@ -323,7 +309,6 @@ def number_is_proportional() -> claim.Check:
     )
 
 
-@claim.declare_claim("sentence-VI-always")
 def always_passive() -> claim.Check:
     """Passivity can always be had by less gain, faster sampling or more damping, for any law.
 
@@ -352,7 +337,6 @@ def always_passive() -> claim.Check:
     )
 
 
-@claim.declare_claim("sentence-VI-D")
 def conclusion_d() -> claim.Check:
     """D is conservative and leaves the effective stiffness as it is, but jumps."""
     surface = cases.SCANNING.surface("D")
@@ -370,7 +354,6 @@ def conclusion_d() -> claim.Check:
     )
 
 
-@claim.declare_claim("sentence-VI-F")
 def conclusion_f() -> claim.Check:
     """F has no advantage in effective stiffness, but dissipates (its feel is left out).
 

@@ -14,7 +14,7 @@ import numpy as np
 from asperity.analysis.energy.loop_integral import loop_work
 from asperity.core.checks import FloatArray
 from asperity.paper.cases import SCANNING, random_settings
-from asperity.paper.claim import DECLARED_CLAIMS, Check, Claim, check_values, combine_checks
+from asperity.paper.claim import Check, Claim, check_values, combine_checks
 from asperity.paper.formula_checks import (
     check_continuity,
     check_curl,
@@ -129,4 +129,4 @@ def _closest_point_values() -> list[list[float]]:
 
 
 _TABLE = Path(__file__).with_name("formulas.toml").read_text(encoding="utf-8")
-DECLARED_CLAIMS += [FormulaRow(**row).to_claim() for row in tomllib.loads(_TABLE)["claim"]]
+FORMULA_CLAIMS = [FormulaRow(**row).to_claim() for row in tomllib.loads(_TABLE)["claim"]]

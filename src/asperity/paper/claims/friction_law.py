@@ -28,7 +28,6 @@ _TWO_PI = 2.0 * math.pi
 # --- field and Jacobian ---------------------------------------------------------------------------
 
 
-@claim.declare_claim("eq-22")
 def field_f() -> claim.Check:
     """Force of F: the wall, and friction that h modulates.
 
@@ -38,7 +37,6 @@ def field_f() -> claim.Check:
     return claim.combine_checks(force, _check_sliding_work())
 
 
-@claim.declare_claim("table-1-F")
 def table_one_f() -> claim.Check:
     """Force of F (Fig. 2): [-κ(x) d, -κ₀ d].
 
@@ -86,7 +84,6 @@ def _check_sliding_work() -> claim.Check:
     )
 
 
-@claim.declare_claim("eq-23")
 def jacobian_f() -> claim.Check:
     """Jacobian of F.
 
@@ -132,7 +129,6 @@ def _printed_jacobian(
     return [[-first, -r.friction * (1.0 - h) * d / r.deflection], [0.0, -1.0]]
 
 
-@claim.declare_claim("eq-24")
 def stick_slip_phases() -> claim.Check:
     """d follows the probe while d < d_max and does not change while d = d_max.
 
@@ -162,7 +158,6 @@ def stick_slip_phases() -> claim.Check:
     )
 
 
-@claim.declare_claim("eq-25")
 def sliding_entries_bound() -> claim.Check:
     """Greatest entries of F's Jacobian while sliding."""
     cases = [PAPER_CASE, *random_friction_cases()]
@@ -177,7 +172,6 @@ def sliding_entries_bound() -> claim.Check:
     )
 
 
-@claim.declare_claim("eq-26")
 def sticking_entries_bound() -> claim.Check:
     """Greatest entries of F's Jacobian while sticking."""
     cases = [PAPER_CASE, *random_friction_cases()]
@@ -208,13 +202,11 @@ def _corrected_sticking_entries(r: FrictionCase) -> tuple[float, float]:
 # --- energy ---------------------------------------------------------------------------------------
 
 
-@claim.declare_claim("sentence-IV.F-deflections")
 def deflection_range() -> claim.Check:
     """Realistic d_max go from 1e-2 m (tissue) to 1e-6 m (metal)."""
     return claim.check_observation("a statement on real materials: nothing here can be computed")
 
 
-@claim.declare_claim("eq-27")
 def energy_f() -> claim.Check:
     """Energy of F without texture around its path of Fig. 3.
 
@@ -244,7 +236,6 @@ def energy_f() -> claim.Check:
     )
 
 
-@claim.declare_claim("sentence-IV.F-stick")
 def sticking_generates_energy() -> claim.Check:
     """F generates energy while sticking only, which is at most 2 d_max wide."""
     case = SCANNING
@@ -276,7 +267,6 @@ def _anchor_deflection(x: FloatArray, max_deflection: float) -> FloatArray:
     return d
 
 
-@claim.declare_claim("sentence-IV.F-compliant")
 def compliant_materials() -> claim.Check:
     """The energy that is not conserved is proportional to d_max, as with d_max = 1 cm."""
     energies = []
@@ -325,7 +315,6 @@ def expand_bound(r: FrictionCase, *, as_printed: bool) -> float:
     return math.sqrt(2.0) / (2.0 * d) * math.sqrt(max(whole, 0.0))
 
 
-@claim.declare_claim("eq-31")
 def friction_number_bound() -> claim.Check:
     """An upper bound on q_F, and its expression written out."""
     cases = [PAPER_CASE, *random_friction_cases(6)]

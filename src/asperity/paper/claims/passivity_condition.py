@@ -18,7 +18,7 @@ from asperity.paper.cases import (
     path_points,
     random_settings,
 )
-from asperity.paper.claim import Check, check_statement, check_values, combine_checks, declare_claim
+from asperity.paper.claim import Check, check_statement, check_values, combine_checks
 from asperity.paper.formula_checks import check_difference_quotients, find_max_norm, format_by_name
 from asperity.paper.probes import generic_probes
 from asperity.surface import Surface
@@ -110,7 +110,6 @@ def _delayed_wall_gain(delay: int = 2) -> float:
     return energy_gained(wall, path, 2.0 * wall.stiffness, delay)
 
 
-@declare_claim("eq-1")
 def corollary() -> Check:
     """‖J‖ <= σ₀(B)/(2T) everywhere is sufficient for passivity (Corollary 1)."""
     net, damping, _path, _surface = _slow_loop_gain("A")
@@ -128,7 +127,6 @@ def corollary() -> Check:
     )
 
 
-@declare_claim("eq-2")
 def increment_condition() -> Check:
     """The force changing by at most σ₀/(2T) per length at every step is sufficient.
 
@@ -149,7 +147,6 @@ def increment_condition() -> Check:
     )
 
 
-@declare_claim("eq-3")
 def product_bound() -> Check:
     """To first order the force changes by J Δ, and ‖J Δ‖ <= ‖J‖₂ |Δ|.
 
@@ -179,7 +176,6 @@ def product_bound() -> Check:
     )
 
 
-@declare_claim("eq-4")
 def step_bound() -> Check:
     """With (1), the force changes by at most σ₀/(2T) |Δ|.
 
@@ -196,7 +192,6 @@ def step_bound() -> Check:
 # --- the characteristic number --------------------------------------------------------------------
 
 
-@declare_claim("eq-5")
 def number_is_intrinsic() -> Check:
     """q = σ_n(J)/κ₀ belongs to the algorithm, whatever κ₀ is.
 
@@ -225,7 +220,6 @@ def _norm_at_witness(surface: Surface) -> float:
     return float(np.linalg.norm(surface.jacobian(point, *state)[0], 2))
 
 
-@declare_claim("sentence-III.B-doubling")
 def doubling_halves_stiffness() -> Check:
     """Doubling the spatial frequency requires half the stiffness."""
     ratios: dict[str, list[float]] = {}
@@ -248,7 +242,6 @@ def doubling_halves_stiffness() -> Check:
     )
 
 
-@declare_claim("sentence-III.B-compare")
 def number_does_not_rank() -> Check:
     """q does not rank algorithms: its order depends on the parameters."""  # noqa: D403 - a symbol
     orders = set()
@@ -266,7 +259,6 @@ def number_does_not_rank() -> Check:
 # --- conservativity -------------------------------------------------------------------------------
 
 
-@declare_claim("sentence-III.C-curl")
 def zero_curl_is_conservative() -> Check:
     """A field with zero curl is conservative.
 
@@ -292,7 +284,6 @@ def zero_curl_is_conservative() -> Check:
     )
 
 
-@declare_claim("sentence-III.C-case-1")
 def condition_violated() -> Check:
     """Where (1) does not hold unwanted energy may be injected."""
     surface = SCANNING.surface("C")
@@ -308,7 +299,6 @@ def condition_violated() -> Check:
     )
 
 
-@declare_claim("sentence-III.C-case-2")
 def condition_with_generative_law() -> Check:
     """Where (1) holds and the law is generative, some motions may still gain."""
     nets = {law: _slow_loop_gain(law)[0] for law in "ABE"}
@@ -320,7 +310,6 @@ def condition_with_generative_law() -> Check:
     )
 
 
-@declare_claim("sentence-III.C-case-3")
 def condition_with_conservative_law() -> Check:
     """Where (1) holds and the field is conservative, every motion loses.
 
@@ -341,7 +330,6 @@ def condition_with_conservative_law() -> Check:
     )
 
 
-@declare_claim("sentence-abstract-texture")
 def smooth_then_textured() -> Check:
     """A smooth surface that is rendered passively may lose this once textured."""
     wall, textured = SCANNING.surface("W"), SCANNING.surface("C")

@@ -11,7 +11,7 @@ from asperity.analysis.energy.loop_integral import loop_work
 from asperity.analysis.gain.closed_forms import q_b, q_c, q_g
 from asperity.laws import Law, find_law
 from asperity.paper.cases import PASSIVITY, SCANNING, SETTINGS, ExperimentCase, random_settings
-from asperity.paper.claim import Check, check_statement, check_values, combine_checks, declare_claim
+from asperity.paper.claim import Check, check_statement, check_values, combine_checks
 from asperity.paper.claims.formula_claims import FormulaRow
 from asperity.paper.formula_checks import check_curl, find_max_norm, max_loop_share, segment_work
 from asperity.paper.probes import generic_probes
@@ -19,7 +19,6 @@ from asperity.paper.probes import generic_probes
 # --- A --------------------------------------------------------------------------------------------
 
 
-@declare_claim("eq-9")
 def number_a() -> Check:
     """The increase of stiffness by A is √(1 + h'²).
 
@@ -44,7 +43,6 @@ def number_a() -> Check:
     return combine_checks(local, ratio)
 
 
-@declare_claim("eq-10")
 def sinusoid_a() -> Check:
     """On a sinusoid the greatest norm is κ₀ √(1 + (2πA/l)²), at x = 0 mod π/l.
 
@@ -79,7 +77,6 @@ def _least_norm_share(
     return least
 
 
-@declare_claim("sentence-IV.A-proportional")
 def proportional_a() -> Check:
     """2πA/l is large, so A's number is nearly proportional to A and 1/l.
 
@@ -95,7 +92,6 @@ def proportional_a() -> Check:
     )
 
 
-@declare_claim("sentence-IV.A-energy")
 def energy_a() -> Check:
     """A is not conservative; around a path of Fig. 3 it generates κ₀A²/2."""
     return FormulaRow(loop_energy={"A": "k*A**2/2"}, conservative={"A": False}).check()
@@ -107,7 +103,6 @@ def energy_a() -> Check:
 _CLOSED_FORMS = {"B": q_b, "C": q_c, "G": q_g}
 
 
-@declare_claim("sentence-IV-closed-form")
 def closed_forms() -> Check:
     """The numbers of B, C and G have no closed form, not even on a sinusoid: a search gives them.
 
@@ -135,7 +130,6 @@ def closed_forms() -> Check:
 # --- C --------------------------------------------------------------------------------------------
 
 
-@declare_claim("sentence-IV.C-normal")
 def direction_c() -> Check:
     """The force field of C does not follow the normal of the texture.
 
@@ -157,7 +151,6 @@ def direction_c() -> Check:
     )
 
 
-@declare_claim("sentence-IV.C-curvature")
 def curvature_c() -> Check:
     """C's stiffness grows with curvature, very large in sharp asperities and crevices.
 
@@ -177,7 +170,6 @@ def curvature_c() -> Check:
     )
 
 
-@declare_claim("sentence-IV.C-conservative")
 def conservative_c() -> Check:
     """C is conservative.
 
@@ -190,7 +182,6 @@ def conservative_c() -> Check:
     return combine_checks(check_curl("C", is_conservative=True), loops)
 
 
-@declare_claim("remark-5")
 def remark_5() -> Check:
     """The factor √(1 + h'²) is what keeps B from being conservative."""
     import sympy as sp
@@ -215,7 +206,6 @@ def remark_5() -> Check:
 # --- G --------------------------------------------------------------------------------------------
 
 
-@declare_claim("eq-29")
 def energy_g() -> Check:
     """Around its path of Fig. 3 G gains energy on one leg."""
     errors, gains = [], []
@@ -239,3 +229,8 @@ def energy_g() -> Check:
         ),
         check_curl("G", is_conservative=False),
     )
+
+
+def conclusion_c() -> Check:
+    """C gives continuous and conservative fields."""
+    return FormulaRow(continuous={"C": True}, conservative={"C": True}).check()
