@@ -231,16 +231,8 @@ def document_arguments(arguments: Iterable[Argument]) -> Callable[[Function], Fu
     return describe
 
 
-DEFAULT_STIFFNESS = 1000.0
-STIFFNESS = Argument(
-    "stiffness",
-    "stiffness of the surface",
-    "N/m",
-    DEFAULT_STIFFNESS,
-    must_be_positive=True,
-    example="500N/m",
-)
-SEED, MAX_DEPTH, RENDERING = read_arguments(Path(__file__).with_suffix(".toml")).values()
+STIFFNESS, SEED, MAX_DEPTH, RENDERING = read_arguments(Path(__file__).with_suffix(".toml")).values()
+DEFAULT_STIFFNESS: Any = STIFFNESS.default
 FIELD, SEARCH = RENDERING.choices
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -14,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from asperity.core.checks import FloatArray
 from asperity.core.errors import AsperityError
-from asperity.core.files import Serializable, to_plain_data
+from asperity.core.files import Serializable, read_toml, to_plain_data
 
 Verdict = Literal["holds", "holds with correction", "does not hold", "undecided"]
 VERDICTS: tuple[Verdict, ...] = ("holds", "holds with correction", "does not hold", "undecided")
@@ -134,7 +133,7 @@ class Claim:
         return Result(*about, check.verdict, check, self.flips_under)
 
 
-CATALOGUE = tomllib.loads(Path(__file__).with_name("claims.toml").read_text(encoding="utf-8"))
+CATALOGUE = read_toml("claims", Path(__file__).with_name("claims.toml"))
 """Function, place, correction and falsifying change of each claim that a function computes."""
 
 

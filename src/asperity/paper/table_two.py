@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,13 +11,11 @@ from asperity.analysis.energy.continuity import continuity
 from asperity.analysis.energy.loop_integral import loop_work
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
 from asperity.core.display import Displayable
-from asperity.core.files import Serializable
+from asperity.core.files import Serializable, read_toml
 from asperity.paper.cases import PAPER_CASE, PAPER_LAWS, PASSIVITY, SCANNING, TURNING_DEPTH
 
 _ENERGY_TOLERANCE = 1e-9  # relative to k A²
-TABLE_TWO: dict[str, dict[str, str]] = tomllib.loads(
-    Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
-)
+TABLE_TWO: dict[str, dict[str, str]] = read_toml("table", Path(__file__).with_suffix(".toml"))
 """Rows of ``table_two.toml`` by law, where the entries are explained."""
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 import importlib
 import io
 import sys
-import tomllib
 import zipfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -22,7 +21,7 @@ from asperity.clamps import Clamp, find_clamp
 from asperity.core.checks import FloatArray
 from asperity.core.digests import content_digest
 from asperity.core.errors import ParameterError
-from asperity.core.files import text_digest, to_plain_data
+from asperity.core.files import read_toml, text_digest, to_plain_data
 from asperity.kernels.fuse import kernel_source
 from asperity.laws import Law, find_law
 from asperity.surface import Surface
@@ -33,9 +32,7 @@ TEXTURE_FILE = "texture.npz"
 MAX_BYTES = 2**26
 _PACKAGE_PREFIX = "asperity."
 # Modules of samplers in recordings of earlier versions, and their modules now.
-MOVED_MODULES: dict[str, str] = tomllib.loads(
-    Path(__file__).with_name("moved_modules.toml").read_text("utf-8")
-)
+MOVED_MODULES = read_toml("modules", Path(__file__).with_name("moved_modules.toml"))
 _DAMAGE_ERRORS = (ValueError, KeyError, EOFError, OSError, TypeError, zipfile.BadZipFile)
 
 

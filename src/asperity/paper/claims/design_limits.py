@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from pathlib import Path
 
 import numpy as np
 
 from asperity.core.checks import FloatArray
+from asperity.core.files import read_toml
 from asperity.paper.cases import random_settings
 from asperity.paper.claim import Check, check_statement, combine_checks
 from asperity.paper.formula_checks import check_difference_quotients
@@ -15,22 +17,7 @@ from asperity.surface import Surface
 from asperity.textures.kinds.sinusoid import Sinusoid
 
 # Exponents of metre, second and newton.
-_DIMENSIONS: dict[str, tuple[int, int, int]] = {
-    "v": (1, -1, 0),
-    "T": (0, 1, 0),
-    "l": (1, 0, 0),
-    "delta": (1, 0, 0),
-    "b": (0, 0, 1),
-    "force": (0, 0, 1),
-    "A": (1, 0, 0),
-    "stiffest": (-1, 0, 1),
-    "k": (-1, 0, 1),
-    "resonance": (0, -1, 0),
-    "alpha": (0, 0, 0),
-    "beta": (0, 0, 0),
-    "gamma": (0, 0, 0),
-    "q": (0, 0, 0),
-}
+_DIMENSIONS = read_toml("dimensions", Path(__file__).with_name("dimensions.toml"))
 Quantities = Mapping[str, float]
 Inequality = Callable[[Quantities], tuple[float, float]]
 _CASES = 400

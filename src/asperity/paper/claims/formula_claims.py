@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -13,6 +12,7 @@ import numpy as np
 
 from asperity.analysis.energy.loop_integral import loop_work
 from asperity.core.checks import FloatArray
+from asperity.core.files import read_toml
 from asperity.paper.cases import SCANNING, random_settings
 from asperity.paper.claim import Check, Claim, check_values, combine_checks
 from asperity.paper.formula_checks import (
@@ -128,5 +128,5 @@ def _closest_point_values() -> list[list[float]]:
     ]
 
 
-_TABLE = Path(__file__).with_name("formulas.toml").read_text(encoding="utf-8")
-FORMULA_CLAIMS = [FormulaRow(**row).to_claim() for row in tomllib.loads(_TABLE)["claim"]]
+_TABLE = read_toml("formulas", Path(__file__).with_name("formulas.toml"))
+FORMULA_CLAIMS = [FormulaRow(**row).to_claim() for row in _TABLE["claim"]]

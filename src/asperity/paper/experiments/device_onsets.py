@@ -9,7 +9,7 @@ from typing import Any
 from asperity.core.errors import ParameterError
 from asperity.core.files import Serializable, to_plain_data
 from asperity.devices import device_names, load_device
-from asperity.paper.experiments.experiment_setups import device_setup
+from asperity.paper.experiments.experiment_setups import GUESSED_DEVICES, device_setup
 from asperity.scene.setup import Setup
 from asperity.scene.sweeps import map_threads
 from asperity.simulation import SpringHand, find_onset
@@ -24,11 +24,6 @@ STARTS = 4
 LOWEST_STIFFNESS = 400.0  # N/m: balances the hand's 1 N at 2.5 mm
 TOLERANCE = 0.1
 PRESSING_HAND = SpringHand((300.0, 300.0, 0.0), 3.0, 0.0, (0.0, 0.0, -1.0))
-GUESSED_HAND = (
-    "The hand: 300 N/m sideways, 3 N·s/m, pressing with 1 N. Most of these devices have no other "
-    "damping: none of their physical damping is published",
-    "Where the update rate is not known, 1 kHz; where the delay is not known, none",
-)
 
 
 @dataclass(frozen=True)
@@ -83,7 +78,7 @@ class DeviceExperiment(Serializable):
 
     onsets: tuple[DeviceOnset, ...]
     skipped: tuple[str, ...]
-    guessed: tuple[str, ...] = GUESSED_HAND
+    guessed: tuple[str, ...] = GUESSED_DEVICES
 
     @property
     def wall_ratios(self) -> tuple[float, ...]:

@@ -6,6 +6,9 @@ parameters are from other sources, fitted or guessed, and are listed in every re
 
 from __future__ import annotations
 
+from pathlib import Path
+
+from asperity.core.files import read_toml
 from asperity.devices import load_device
 from asperity.paper.cases import BUMP, PASSIVITY, SAMPLING_PERIOD, SCANNING
 from asperity.scene.scene_defaults import make_plant
@@ -19,26 +22,9 @@ ALL_LAWS = "WABCDEFGH"
 FITTED_DELAY = 6  # samples, fitted: of 0 and 4 to 7 the one at which W settles while A and F cycle
 TRACE_STRIDE = 10  # samples
 
-FITTED_ASSUMPTIONS = (
-    "Link masses (about 20 g at the handle): guessed, the paper gives none",
-    "Link lengths 63, 75, 25 mm: the published device, not read in a source",
-    "Working point (37.5, 100) mm from the right motor: fitted; only there x and z couple",
-    "Loop lag of 6 samples: fitted; the paper states none",
-    "Elastic band 200 N/m, 3 N and 80 mm long at the surface, 0.02 N·s/m: guessed",
-    "Release from rest 4 mm above the surface, at 24 phases of the texture: guessed",
-)
-"""Parameters that section V.A requires and does not state."""
-
-GUESSED_HANDS = (
-    "The hand of section V.B, 300 N/m and 3 N·s/m, 50 g, pressing with 1 N: guessed",
-    "Two more hands, softer and stiffer, and three speeds, to show their influence",
-)
-"""Parameters that section V.B requires and does not state."""
-
-GUESSED_BUMP = (
-    "Hands, entry height and speeds of section V.C: guessed; the paper's subject moved freely",
-)
-"""Parameters that section V.C requires and does not state."""
+_ASSUMPTIONS = read_toml("assumptions", Path(__file__).with_name("assumptions.toml"))
+FITTED_ASSUMPTIONS, GUESSED_HANDS, GUESSED_BUMP, GUESSED_DEVICES = map(tuple, _ASSUMPTIONS.values())
+"""What sections V.A, V.B, V.C and further devices require and the paper does not state."""
 
 
 def band_setup(
