@@ -5,12 +5,11 @@ bodies advance. Each run equals its run alone, bit for bit. No trace is written:
 enough to detect a limit cycle.
 """
 
-from asperity.core.compiled import FloatArray, IntArray, Kernels, local_array
+from asperity.core.compiled import FloatArray, IntArray, Kernels
 from asperity.kernels.law_interface import probe_in_contact
 from asperity.kernels.tick import ServoSettings, ServoState, servo_tick, state_before_tick
 from asperity.simulation.kernels.body_interface import (
     DIVERGED,
-    LANES,
     RUNNING,
     SAMPLES,
     STOP,
@@ -80,7 +79,6 @@ def simulate_lanes(
         progress: stop reason, samples and delay of each run (n, 3); changed. Runs that have stopped
             are skipped.
     """
-    inputs = local_array((LANES, 10))
     rate = 1.0 / settings.period
     for _sample in range(samples):
         active = False
@@ -104,18 +102,21 @@ def simulate_lanes(
             queues[run, head, 1] = servo.fy
             queues[run, head, 2] = servo.fz
             head = head + 1 if head + 1 < size else 0
-            for i in range(3):
-                here = anchor[now, i] + offset[run, i]
-                inputs[run, i] = queues[run, head, i]
-                inputs[run, 3 + i] = here
-                inputs[run, 6 + i] = (anchor[now + 1, i] + offset[run, i] - here) * rate
-            inputs[run, 9] = 1.0 if probe_in_contact(servo.x, servo.y, servo.z, texture) else 0.0
+            ax = anchor[now, 0] + offset[run, 0]
+            ay = anchor[now, 1] + offset[run, 1]
+            az = anchor[now, 2] + offset[run, 2]
+            inputs = SampleInput(
+                queues[run, head, 0], queues[run, head, 1], queues[run, head, 2], ax, ay, az,
+                (anchor[now + 1, 0] + offset[run, 0] - ax) * rate,
+                (anchor[now + 1, 1] + offset[run, 1] - ay) * rate,
+                (anchor[now + 1, 2] + offset[run, 2] - az) * rate,
+                probe_in_contact(servo.x, servo.y, servo.z, texture),
+            )  # fmt: skip
             update_lane_statistics(statistics, run, x, ledger)
+            progress[run, STOP] = advance_body(x[run], ledger[run], inputs, plant)
+            finish_lane_sample(x, progress, run)
         if not active:
             break
-        advance_lanes(x, ledger, inputs, progress, plant)
-        for run in range(x.shape[0]):
-            finish_lane_sample(x, progress, run)
 
 
 def update_lane_statistics(
@@ -156,30 +157,3 @@ def finish_lane_sample(x: FloatArray, progress: IntArray, lane: int) -> None:
         size += abs(x[lane, i])
     if not size < 1e6:
         progress[lane, STOP] = DIVERGED
-
-
-def lane_input(inputs: FloatArray, lane: int) -> SampleInput:
-    """Return the row of a run as a record."""
-    return SampleInput(
-        inputs[lane, 0], inputs[lane, 1], inputs[lane, 2],
-        inputs[lane, 3], inputs[lane, 4], inputs[lane, 5],
-        inputs[lane, 6], inputs[lane, 7], inputs[lane, 8],
-        inputs[lane, 9] > 0.0,
-    )  # fmt: skip
-
-
-def advance_lanes(
-    x: FloatArray, ledger: FloatArray, inputs: FloatArray, progress: IntArray, plant: object
-) -> None:
-    """Move the bodies of at most ``LANES`` runs over one sample, as ``advance_body`` moves each.
-
-    Args:
-        x: states, a row for each run; changed.
-        ledger: sums of each run; changed.
-        inputs: the fields of ``SampleInput`` of each run, ``in_contact`` as 1 or 0.
-        progress: stop reason of each run; changed. Runs that have stopped are skipped.
-        plant: record of the body.
-    """
-    for run in range(x.shape[0]):
-        if progress[run, STOP] == RUNNING:
-            progress[run, STOP] = advance_body(x[run], ledger[run], lane_input(inputs, run), plant)
