@@ -88,26 +88,17 @@ def reproduce_command(
 
     written = ""
     if folder is not None:
-        written = _write_figures(figures, Path(folder), values["format"], experiments)
+        from asperity.report.paper.paper_figures import write_figures
+
+        file_format: FileFormat = values["format"] or "svg"
+        with step_bar("drawing the figures", len(figures)) as step:
+            paths = write_figures(figures, Path(folder), file_format, experiments, step)
+        names_text = ", ".join(path.name for path in paths)
+        written = f"Figures in {escape_unprintable(folder)}: {names_text}"
 
     page = evidence_page(results) if names else claims_page(results, experiments)
     data = {"schema": 1, "claims": results, "experiments": experiments}
     outputs.write(data, page, extra_line=written)
-
-
-def _write_figures(
-    figures: Sequence[PaperFigure],
-    folder: Path,
-    file_format: FileFormat | None,
-    experiments: Experiments | None,
-) -> str:
-    """Write figures to a folder and return a message."""
-    from asperity.report.paper.paper_figures import write_figures
-
-    with step_bar("drawing the figures", len(figures)) as step:
-        paths = write_figures(figures, folder, file_format or "svg", experiments, step)
-    names = ", ".join(path.name for path in paths)
-    return f"Figures in {escape_unprintable(str(folder))}: {names}"
 
 
 def _load_measured_texture(surface: str | None, values: dict[str, Any]) -> Texture | None:

@@ -15,6 +15,7 @@ from asperity.cli.main import declare_command
 from asperity.cli.output import Outputs, check_outputs, output_options, progress_bar
 from asperity.core.arguments import MAX_DEPTH
 from asperity.core.errors import ParameterError
+from asperity.core.files import read_toml
 from asperity.laws import SHIPPED_LAW_ARGUMENTS
 
 
@@ -35,18 +36,7 @@ def surfaces_command(names: tuple[str, ...], outputs: Outputs) -> None:
     outputs.write({"schema": 2, "surfaces": surfaces}, page, "Figures")
 
 
-_STAGE_LABELS = {
-    "read": "reading the surface",
-    "outliers": "removing outliers",
-    "form": "removing the form",
-    "fill": "filling missing points",
-    "filter": "filtering",
-    "tip": "simulating the tip",
-    "repeat": "blending the borders",
-    "magnify": "magnifying",
-    "measure": "computing parameters",
-    "write": "writing",
-}
+_STAGE_LABELS = read_toml("stages", Path(__file__).with_name("preparation_stages.toml"))
 
 
 @contextmanager

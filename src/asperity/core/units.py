@@ -132,7 +132,8 @@ def _correction(text: str, unit: str) -> str:
 @lru_cache(maxsize=1024)
 def _find_unit_factor(unit_text: str, unit: str) -> float:
     """Return the SI value of a unit; for an invalid one the message of the error is the reason."""
-    if (known := _SI_FACTORS.get(unit, {}).get(unit_text)) is not None:
+    known: float | None = _SI_FACTORS.get(unit, {}).get(unit_text)
+    if known is not None:
         return known
     if len(unit_text) > _MAX_UNIT_LENGTH or _UNIT_PATTERN.fullmatch(unit_text) is None:
         raise ValueError("is not understood")

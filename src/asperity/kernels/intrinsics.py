@@ -26,7 +26,8 @@ _intrinsic: Any = intrinsic
 
 
 def _call_address(_typing: Any, address: Any, *arguments: Any) -> Any:
-    given = arguments[0] if len(arguments) == 1 and _is_tuple(arguments[0]) else arguments
+    is_tuple = len(arguments) == 1 and isinstance(arguments[0], types.BaseTuple)
+    given = arguments[0] if is_tuple else arguments
     kinds = [_c_type(kind) for kind in given]
     if not isinstance(address, types.Integer) or None in kinds:
         return None
@@ -52,10 +53,6 @@ def _c_argument(context: Any, builder: Any, numba_type: Any, value: Any) -> Any:
     if isinstance(numba_type, (types.Integer, types.Boolean)):
         return context.cast(builder, value, numba_type, types.int64)
     return value
-
-
-def _is_tuple(numba_type: Any) -> bool:
-    return isinstance(numba_type, types.BaseTuple)
 
 
 def _c_type(numba_type: Any) -> Any:
@@ -135,8 +132,7 @@ def load_unchecked(_typing: Any, array: Any, index: Any) -> Any:
     """Return an element of an array by its position in memory, without a bounds check."""
 
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        data = context.make_array(signature.args[0])(context, builder, values[0]).data
-        return builder.load(builder.gep(data, [values[1]]))
+        return builder.load(_element_address(context, builder, signature, values))
 
     return types.float64(array, index), generate
 
