@@ -322,17 +322,13 @@ def _ball_offsets(
 def _dilate_tiles(heights: FloatArray, offsets: Offsets, drops: FloatArray) -> FloatArray:
     """Dilate tile by tile, which fit into the cache, up to the reach that each tile needs."""
     result, shape = np.array(heights), heights.shape
-    reach = tuple(int(r) for r in np.abs(offsets).max(axis=0))
+    reach = np.abs(offsets).max(axis=0)
+    mirrored = np.pad(heights, [(r, r) for r in reach], mode="reflect")
     starts = np.indices([math.ceil(n / _TILE) for n in shape]).reshape(len(shape), -1).T * _TILE
     for start in starts:
-        stop = np.minimum(start + _TILE, shape)
-        rows = [
-            _mirrored_indices(a - r, b + r, n)
-            for a, b, r, n in zip(start, stop, reach, shape, strict=True)
-        ]
-        around = heights[np.ix_(*rows)]
-        tile = result[tuple(slice(a, b) for a, b in zip(start, stop, strict=True))]
-        _dilate_tile(around, tile, offsets + np.array(reach), drops)
+        part = tuple(slice(a, a + _TILE) for a in start)
+        around = tuple(slice(a, a + _TILE + 2 * r) for a, r in zip(start, reach, strict=True))
+        _dilate_tile(mirrored[around], result[part], offsets + reach, drops)
     return result
 
 
@@ -347,10 +343,3 @@ def _dilate_tile(
         window = tuple(slice(c, c + n) for c, n in zip(corner, tile.shape, strict=True))
         np.subtract(neighbourhood[window], drop, out=work)
         np.maximum(tile, work, out=tile)
-
-
-def _mirrored_indices(first: int, stop: int, count: int) -> Offsets:
-    """Return the indices from first to stop of a line mirrored at its ends."""
-    period = 2 * (count - 1)
-    index = np.arange(first, stop) % period
-    return np.minimum(index, period - index)

@@ -19,10 +19,11 @@ from asperity.core.errors import ParameterError, suggest_names
 from asperity.measured.file_arguments import FILE_ARGUMENTS, SYNTHETIC_ARGUMENTS
 from asperity.textures.fields.field_file import assemble_field, is_field, load_field
 from asperity.textures.fields.field_sampler import FieldArguments
-from asperity.textures.kinds.fourier import FOURIER
-from asperity.textures.kinds.grating import GRATING
-from asperity.textures.kinds.noise import NOISE, NOISE_PROFILE
-from asperity.textures.kinds.sinusoid import SINUSOID
+from asperity.textures.kinds.fourier import Fourier
+from asperity.textures.kinds.grating import Grating
+from asperity.textures.kinds.kind_tables import KIND_EXAMPLES
+from asperity.textures.kinds.noise import Noise, NoiseProfile
+from asperity.textures.kinds.sinusoid import Sinusoid
 from asperity.textures.library.surface_library import LIBRARY
 from asperity.textures.spline.heightmap_sampler import HeightMapArguments
 from asperity.textures.spline.profile_sampler import ProfileArguments
@@ -31,8 +32,10 @@ from asperity.textures.synthetic import prepare_texture
 from asperity.textures.texture import Texture, TextureKind
 from asperity.textures.texture_loading import prepare_file, texture_from_prepared
 
-_KINDS = SINUSOID, FOURIER, GRATING, NOISE, NOISE_PROFILE
-CATALOGUE: dict[str, TextureKind] = {kind.name: kind for kind in _KINDS} | LIBRARY
+_KINDS = (Sinusoid, Fourier, Grating, Noise, NoiseProfile)
+CATALOGUE: dict[str, TextureKind] = {
+    kind.kind: TextureKind.of_class(kind, **KIND_EXAMPLES[kind.kind]) for kind in _KINDS
+} | LIBRARY
 """All texture kinds and named surfaces by name, and those added by :func:`register`."""
 
 # Names that the command line and scenes use for something else.

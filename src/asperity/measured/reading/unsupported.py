@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import tomllib
 import zipfile
 import zlib
 from pathlib import Path
@@ -56,20 +57,8 @@ def classify_archive(path: Path) -> str:
 SUPPORTED_FORMATS = "X3P, SDF, NPY, text matrix, two-column profile, PNG, TIFF, STL, OBJ"
 _EXTRA_HINT = "the files of most instruments need the extra: pip install 'asperity[formats]'"
 
-_PICTURE_HINT = "save the heights as a grey PNG or TIFF, 16 bit if possible"
 # Signatures of formats that are mistaken for surfaces, so that the message can name them.
-_SIGNATURES: tuple[tuple[bytes, str, str], ...] = (
-    (b"\xff\xd8\xff", "JPEG image", _PICTURE_HINT),
-    (b"GIF8", "GIF image", _PICTURE_HINT),
-    (b"BM", "BMP image", _PICTURE_HINT),
-    (b"%PDF", "PDF document", ""),
-    (b"\x1f\x8b", "gzip archive", "unpack it first"),
-    (b"BZh", "bzip2 archive", "unpack it first"),
-    (b"7z\xbc\xaf", "7-Zip archive", "unpack it first"),
-    (b"Rar!", "RAR archive", "unpack it first"),
-    (b"<?xml", "XML document", ""),
-    (b"{\\rtf", "RTF document", ""),
-)
+_SIGNATURES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))["signatures"]
 
 
 def reject_unsupported(file: SurfaceFile, _options: ReadingOptions) -> None:
@@ -83,7 +72,8 @@ def reject_unsupported(file: SurfaceFile, _options: ReadingOptions) -> None:
             f"{file.name} is an NPZ archive that asperity did not prepare;"
             " save one array of heights as NPY"
         )
-    for magic, kind, advice in _SIGNATURES:
+    for signature, kind, advice in _SIGNATURES:
+        magic = signature.encode("latin-1")
         # Text may start with the same two letters ("BMS profile ..."): require a binary byte too.
         is_binary = len(magic) > 2 or b"\x00" in file.head[:64] or magic[0] < 32
         if file.head.startswith(magic) and is_binary:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import tomllib
 import zlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -35,30 +36,7 @@ _ALIGNMENT = 4096
 _COUNTS = ("levels", "below", "border")
 _SCALARS = ("x0", "y0", "z0", "m00", "m01", "m10", "m11", "iz", "margin", "lift")
 
-HEADER = np.dtype(
-    [
-        ("magic", "S8"),
-        ("version", "<u4"),
-        ("byte_order", "<u4"),  # 0x01020304
-        ("file_bytes", "<u8"),
-        ("rows", "<u4"),
-        ("columns", "<u4"),
-        ("columns_offset", "<u8"),  # int32 (rows, columns, 4)
-        ("count", "<u8"),
-        ("values_offset", "<u8"),  # float32 (count,)
-        ("heights_offset", "<u8"),  # float64, to the description
-        ("json_offset", "<u8"),  # UTF-8, to the end of the file
-        *((name, "<f8") for name in _SCALARS),
-        ("levels", "<i4"),
-        ("border", "<i4"),
-        ("q", "<f8"),  # certified characteristic number
-        ("floor", "<f8"),  # z down to which it is that of the spline [m]
-        ("below", "<i4"),
-        ("reserved", "V68"),
-        ("checksum", "<u4"),  # CRC-32 of all that follows the header
-        ("header_checksum", "<u4"),  # CRC-32 of the header before this entry
-    ]
-)
+HEADER = np.dtype([*tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8")).items()])
 
 # Builds the texture of a description; see :meth:`Texture.describe`.
 BuildTexture = Callable[[Mapping[str, Any]], Texture]

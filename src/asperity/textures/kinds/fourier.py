@@ -16,8 +16,9 @@ from asperity.core.checks import FloatArray, check_array
 from asperity.core.errors import ParameterError
 from asperity.textures.domain import Domain, ScanLine
 from asperity.textures.kinds.fourier_sampler import FourierArguments
+from asperity.textures.kinds.kind_tables import kind_arguments
 from asperity.textures.plane_waves import PlaneWaves, check_curvature
-from asperity.textures.texture import ExactHeight, Texture, TextureKind
+from asperity.textures.texture import ExactHeight, Texture
 
 # Side of the domain of an aperiodic sum, in longest wavelengths.
 _APERIODIC_EXTENT_WAVES = 16
@@ -46,11 +47,7 @@ class Fourier(Texture):
     """
 
     kind: ClassVar[str] = "fourier"
-    constructor_arguments: ClassVar[tuple[Argument, ...]] = (
-        Argument("amplitudes", "of the waves", "m", form="items", required=True),
-        Argument("wavevectors", "of the waves", "rad/m", form="vectors", required=True),
-        Argument("phases", "of the waves", "rad", default_description="0", form="items"),
-    )
+    constructor_arguments: ClassVar[tuple[Argument, ...]] = kind_arguments("fourier")
 
     def __init__(
         self, amplitudes: ArrayLike, wavevectors: ArrayLike, phases: ArrayLike | None = None
@@ -224,9 +221,3 @@ class Fourier(Texture):
             half *= 0.5
             if len(centres) > _CELL_LIMIT:
                 return outer  # an upper bound: too many cells are equally high
-
-
-_VECTORS = [[3000.0, 0.0], [0.0, 6000.0]]
-FOURIER = TextureKind.of_class(
-    Fourier, "sum of plane waves", amplitudes=[2e-4, 1e-4], wavevectors=_VECTORS
-)

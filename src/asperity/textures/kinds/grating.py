@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from asperity.core.arguments import Argument
 from asperity.core.checks import FloatArray, check_positive, check_real
 from asperity.core.errors import ParameterError
+from asperity.textures.kinds.kind_tables import kind_arguments
 from asperity.textures.spline.spline_texture import Profile
-from asperity.textures.texture import TextureKind
 
 # The spline then follows the closed form to 2e-5 of the height (tested).
 _NODES_PER_EDGE = 40
@@ -48,12 +48,7 @@ class Grating(Profile):
     """
 
     kind: ClassVar[str] = "grating"
-    constructor_arguments: ClassVar[tuple[Argument, ...]] = (
-        Argument("height", "from groove to top", "m", required=True),
-        Argument("period", "from ridge to ridge", "m", required=True),
-        Argument("duty", "share of the ridge", default=0.5, maximum=1.0),
-        Argument("edge", "width of an edge", "m", default_description="ridge or groove/4"),
-    )
+    constructor_arguments: ClassVar[tuple[Argument, ...]] = kind_arguments("grating")
 
     def __init__(
         self, height: float, period: float, duty: float = 0.5, edge: float | None = None
@@ -94,7 +89,3 @@ class Grating(Profile):
     def constructor_values(self) -> dict[str, Any]:
         """See :class:`Texture`; the attribute ``height`` is a method."""
         return super().constructor_values() | {"height": self.ridge_height}
-
-
-_SUMMARY = "straight ridges with rounded edges, along y"
-GRATING = TextureKind.of_class(Grating, _SUMMARY, height=0.2e-3, period=2e-3)

@@ -8,10 +8,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from asperity.core.arguments import SEED, Argument, check_integer
+from asperity.core.arguments import Argument, check_integer
 from asperity.core.checks import FloatArray, check_fraction, check_positive
 from asperity.core.errors import ParameterError
 from asperity.core.memory import require_memory
+from asperity.textures.kinds.kind_tables import kind_arguments
 from asperity.textures.spline.spline_texture import MIN_NODES, HeightMap, Profile, Spline
 from asperity.textures.synthetic import (
     MIN_NODES_PER_WAVE,
@@ -20,7 +21,6 @@ from asperity.textures.synthetic import (
     random_profile,
     scale_to_rms,
 )
-from asperity.textures.texture import TextureKind
 
 DEFAULT_HURST = 0.8
 # Defaults: 32 shortest waves per side, sampled finely enough that the spline is their sum.
@@ -30,18 +30,6 @@ _NODES_PER_WAVE = 8.0
 _MAX_NODES = 2**24
 # Phases are generated for a square of waves, even for a narrow map: seconds for this many.
 _MAX_WAVES = 4096
-
-
-def _noise_arguments(size: Argument) -> tuple[Argument, ...]:
-    return (
-        Argument("rms", "root mean square height", "m", required=True),
-        size,
-        Argument("pitch", "maximum spacing of the nodes", "m", default_description="cutoff/8"),
-        Argument("hurst", "Hurst exponent", default=DEFAULT_HURST, maximum=1.0),
-        Argument("rolloff", "flat spectrum beyond it", "m", default_description="size/4"),
-        Argument("cutoff", "shortest wavelength", "m", default_description="size/32"),
-        SEED,
-    )
 
 
 class _SelfAffine(Spline):
@@ -145,9 +133,7 @@ class Noise(_SelfAffine, HeightMap):
     """
 
     kind: ClassVar[str] = "noise"
-    constructor_arguments: ClassVar[tuple[Argument, ...]] = _noise_arguments(
-        Argument("size", "period along x and y", "m", form="pair", required=True)
-    )
+    constructor_arguments: ClassVar[tuple[Argument, ...]] = kind_arguments("noise")
 
     def _check_size(self, size: Any) -> tuple[float, float]:
         pair = (size, size) if np.ndim(size) == 0 else tuple(size)
@@ -187,19 +173,10 @@ class NoiseProfile(_SelfAffine, Profile):
     """
 
     kind: ClassVar[str] = "noise-profile"
-    constructor_arguments: ClassVar[tuple[Argument, ...]] = _noise_arguments(
-        Argument("size", "period", "m", required=True)
-    )
+    constructor_arguments: ClassVar[tuple[Argument, ...]] = kind_arguments("noise", "noise-profile")
 
     def _check_size(self, size: Any) -> float:
         return check_positive("size", size, "m")
 
     def _random_field(self, counts: tuple[int, ...], spectrum: SelfAffineSpectrum) -> FloatArray:
         return random_profile(counts[0], self.size, spectrum, self.seed)
-
-
-_SUMMARY = "rough surface: self-affine, isotropic, band-limited"
-NOISE = TextureKind.of_class(Noise, _SUMMARY, rms=20e-6, size=10e-3)
-NOISE_PROFILE = TextureKind.of_class(
-    NoiseProfile, "rough profile: the same along x only", rms=20e-6, size=10e-3
-)

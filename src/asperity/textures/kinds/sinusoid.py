@@ -14,9 +14,10 @@ from asperity.core.arguments import Argument
 from asperity.core.checks import check_array, check_positive, check_real
 from asperity.core.errors import ParameterError
 from asperity.textures.domain import Domain, ScanLine
+from asperity.textures.kinds.kind_tables import kind_arguments
 from asperity.textures.kinds.sinusoid_sampler import SinusoidArguments
 from asperity.textures.plane_waves import PlaneWaves, SingleWave, check_curvature
-from asperity.textures.texture import ExactHeight, Texture, TextureKind
+from asperity.textures.texture import ExactHeight, Texture
 
 
 class Sinusoid(Texture):
@@ -43,12 +44,7 @@ class Sinusoid(Texture):
 
     kind: ClassVar[str] = "sinusoid"
     finds_contacts: ClassVar[bool] = True
-    constructor_arguments: ClassVar[tuple[Argument, ...]] = (
-        Argument("amplitude", "half of the peak-to-valley height", "m", required=True),
-        Argument("period", "wavelength", "m", required=True),
-        Argument("phase", "at the origin", "rad", 0.0, minimum=-math.inf),
-        Argument("direction", "across the waves", default_description="1 0", form="vector"),
-    )
+    constructor_arguments: ClassVar[tuple[Argument, ...]] = kind_arguments("sinusoid")
 
     def __init__(
         self,
@@ -126,7 +122,3 @@ class Sinusoid(Texture):
     def scan_line(self) -> ScanLine:
         """One period along the direction, through the origin."""
         return ScanLine(np.zeros(2), np.array(self.direction), self.period, periodic=True)
-
-
-_SUMMARY = "one sinusoid, the classic of haptic texture"
-SINUSOID = TextureKind.of_class(Sinusoid, _SUMMARY, amplitude=0.4e-3, period=1.5e-3)
