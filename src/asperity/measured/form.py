@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.polynomial.legendre import legder, legval, legvander
-from numpy.typing import NDArray
 
 from asperity.core.checks import FloatArray, check_positive
 from asperity.core.errors import ParameterError
@@ -91,19 +90,21 @@ def fit_form(heights: FloatArray, degree: int = 1) -> FormPolynomial:
         >>> bool(np.allclose(fit_form(parabola, 2).evaluate_rows(slice(None)), parabola))
         True
     """
-    degree = check_degree(degree)
-    _check_support(heights, degree)
-    terms = _term_indices(heights.ndim, degree)
+    degree, most = check_degree(degree), max_degree(heights)
+    if degree > most:
+        points = f"{_count_valid_coordinates(heights)} points along the shorter side"
+        raise ParameterError("form", f"must be at most {most} for {points}", degree)
+    orders = np.indices((degree + 1,) * heights.ndim).sum(axis=0)
+    terms = np.flatnonzero(orders <= degree)
     gram, right = _normal_equations(heights, degree, None)
     normal = gram[np.ix_(terms, terms)]
     if np.linalg.cond(normal) > _MAX_CONDITION:
         raise ParameterError("form", f"of degree {degree} is not determined by the valid points")
     coefficients = np.zeros(right.size)
     form = FormPolynomial(degree, coefficients.reshape(right.shape), heights.shape)
-    for iteration in range(2):
-        if iteration:
-            _, right = _normal_equations(heights, degree, form)
-        coefficients[terms] += np.linalg.solve(normal, right.ravel()[terms])
+    coefficients[terms] = np.linalg.solve(normal, right.ravel()[terms])
+    _, right = _normal_equations(heights, degree, form)
+    coefficients[terms] += np.linalg.solve(normal, right.ravel()[terms])
     return form
 
 
@@ -149,13 +150,6 @@ def _legendre_bases(shape: Shape, degree: int) -> list[FloatArray]:
     return [np.asarray(legvander(np.linspace(-1.0, 1.0, n), degree)) for n in shape]
 
 
-def _term_indices(n_axes: int, degree: int) -> NDArray[np.intp]:
-    """Return the indices of the terms up to the total degree among all products."""
-    order = np.arange(degree + 1)
-    total = order if n_axes == 1 else order[:, None] + order[None, :]
-    return np.flatnonzero(total <= degree)
-
-
 def _row_blocks(shape: Shape) -> list[slice]:
     count = _BLOCK if len(shape) == 1 else max(1, _BLOCK // shape[1])
     return [slice(first, first + count) for first in range(0, shape[0], count)]
@@ -193,13 +187,6 @@ def _count_valid_coordinates(heights: FloatArray) -> int:
     return min(int(valid.any(axis=axis).sum()) for axis in range(heights.ndim))
 
 
-def _check_support(heights: FloatArray, degree: int) -> None:
-    most = max_degree(heights)
-    if degree > most:
-        points = f"{_count_valid_coordinates(heights)} points along the shorter side"
-        raise ParameterError("form", f"must be at most {most} for {points}", degree)
-
-
 def _central_slopes(form: FormPolynomial, pitch: Pitch) -> list[float]:
     """Return the slopes along x and y in the middle of the surface."""
     shape, c = form.shape, form.coefficients
@@ -233,6 +220,11 @@ class HeightStatistics:
 
     rms: float
     range: float
+
+    @classmethod
+    def of(cls, heights: FloatArray) -> HeightStatistics:
+        """Return the statistics of heights [m] without missing points."""
+        return cls(float(np.std(heights)), float(np.ptp(heights)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -336,9 +328,5 @@ def decompose_surface(
     waviness = gaussian_filter(rest, pitch, nesting, periodic=periodic)
     rest -= waviness
     rest[missing] = np.nan
-    bow, wave, texture = (_height_statistics(part[~missing]) for part in (form, waviness, rest))
+    bow, wave, texture = (HeightStatistics.of(part[~missing]) for part in (form, waviness, rest))
     return SurfaceDecomposition(bow, wave, texture, nesting, rest.reshape(whole))
-
-
-def _height_statistics(heights: FloatArray) -> HeightStatistics:
-    return HeightStatistics(float(np.std(heights)), float(np.ptp(heights)))

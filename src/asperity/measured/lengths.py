@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 import re
+import tomllib
 import warnings
 from collections.abc import Sequence
-from typing import NoReturn
+from pathlib import Path
 
 import numpy as np
 
@@ -48,18 +49,10 @@ def format_counts(values: Sequence[int]) -> str:
     return " x ".join(str(value) for value in values)
 
 
-_UNIT_NAMES = {
-    1.0: "m meter metre",
-    1e-2: "cm",
-    1e-3: "mm millimeter millimetre",
-    1e-6: "um µm μm micron micrometer micrometre",  # with U+00B5 and with U+03BC
-    1e-9: "nm nanometer nanometre",
-    1e-10: "angstrom ångström å",
-    1e-12: "pm",
-}
-METRES_PER_UNIT = {name: metres for metres, names in _UNIT_NAMES.items() for name in names.split()}
+_UNITS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
+METRES_PER_UNIT: dict[str, float] = _UNITS["lower_case"]
 """Lengths of the units [m] by name in lower case."""
-_EXPLICIT_UNITS = {"Å": 1e-10, "in": 0.0254, "inch": 0.0254, "km": 1e3, "dm": 0.1}
+_EXPLICIT_UNITS: dict[str, float] = _UNITS["as_written"]
 _MULTIPLE = re.compile(r"((?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\D+)")
 
 
@@ -124,12 +117,7 @@ def parse_heights(text: str) -> FloatArray:
         try:
             return np.fromstring(text, dtype=np.float64, sep=" ")
         except (DeprecationWarning, ValueError):
-            _reject_height(text)
-
-
-def _reject_height(text: str) -> NoReturn:
-    """Raise the error for the first height that is no number."""
-    for index, match in enumerate(re.finditer(r"\S+", text), 1):
-        if match.group().lower() not in ("nan", "-nan"):
-            parse_number(match.group(), f"height {index}")
-    raise SurfaceFileError("the heights are not numbers")
+            for index, match in enumerate(re.finditer(r"\S+", text), 1):
+                if match.group().lower() not in ("nan", "-nan"):
+                    parse_number(match.group(), f"height {index}")
+            raise SurfaceFileError("the heights are not numbers") from None

@@ -132,7 +132,7 @@ def _removed_statistics(before: FloatArray, after: FloatArray) -> HeightStatisti
     """Return RMS about the mean and range of the difference; None if all its points are missing."""
     difference = before - after
     known = difference[~np.isnan(difference)]
-    return HeightStatistics(float(known.std()), float(np.ptp(known))) if known.size else None
+    return HeightStatistics.of(known) if known.size else None
 
 
 FilePath = str | os.PathLike[str]

@@ -24,7 +24,7 @@ from asperity.textures.kinds.grating import Grating
 from asperity.textures.kinds.kind_tables import KIND_EXAMPLES
 from asperity.textures.kinds.noise import Noise, NoiseProfile
 from asperity.textures.kinds.sinusoid import Sinusoid
-from asperity.textures.library.surface_library import LIBRARY
+from asperity.textures.library import LIBRARY
 from asperity.textures.spline.heightmap_sampler import HeightMapArguments
 from asperity.textures.spline.profile_sampler import ProfileArguments
 from asperity.textures.spline.spline_texture import fit_spline
@@ -310,19 +310,13 @@ def _rebuild_spline(record: ProfileArguments | HeightMapArguments) -> Texture:
     pitch: tuple[float, ...] = (1.0 / record.ix,)
     if isinstance(record, HeightMapArguments):
         pitch, origin = (*pitch, 1.0 / record.iy), (record.x0, record.y0)
-    for _axis in pitch:
-        heights = _node_heights(heights, record.periodic).T
+    for _axis in pitch:  # the heights at the nodes along an axis are (c₋ + 4 c + c₊)/6
+        last = len(heights) - (2 if record.periodic else 1)
+        heights = (heights[: last - 1] + 4.0 * heights[1:last] + heights[2 : last + 1]).T / 6.0
     texture = fit_spline(heights, pitch, periodic=record.periodic, origin=origin)
     digest = content_digest("rebuilt", type(record).__name__, *record)
     vars(texture).update(coefficients=record.c, digest=digest)
     return texture
-
-
-def _node_heights(c: FloatArray, periodic: bool) -> FloatArray:
-    """Return the heights at the nodes along the first axis, (c₋ + 4 c + c₊)/6."""
-    count = len(c) - (3 if periodic else 2)
-    heights: FloatArray = (c[:count] + 4.0 * c[1 : count + 1] + c[2 : count + 2]) / 6.0
-    return heights
 
 
 def _rebuild_from_description(description: Mapping[str, Any]) -> Texture | None:

@@ -17,7 +17,8 @@ from asperity.measured.reading.isolation import reject_on_error
 from asperity.measured.reading.mesh_grid import rasterise
 from asperity.measured.reading.reader import RawSurface, ReadingOptions, SurfaceFile
 
-_STL_HEADER, _STL_RECORD = 84, 50
+_STL_HEADER = 84
+_STL_RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
 _STL_TEXT = re.compile(rb"\s*solid\b[^\n]*\n\s*(facet\s+normal\b|endsolid\b)", re.IGNORECASE)
 _OBJ_LINE = re.compile(rb"(#|v |vn |vt |vp |f |o |g |s |l |mtllib |usemtl |o$|g$)")
 _OBJ_VERTEX = re.compile(rb"^v[ \t]+[-+.0-9]", re.MULTILINE)
@@ -30,10 +31,10 @@ _CLOSED_BODY_FRACTION = 0.25  # share of overhanging area that suggests a closed
 
 def is_binary_stl(file: SurfaceFile) -> bool:
     """Whether the number of triangles in the header of a file matches its size."""
-    if len(file.head) < _STL_HEADER + _STL_RECORD:
+    if len(file.head) < _STL_HEADER + _STL_RECORD.itemsize:
         return False
     (count,) = struct.unpack_from("<I", file.head, 80)
-    return bool(file.path.stat().st_size == _STL_HEADER + _STL_RECORD * count)
+    return bool(file.path.stat().st_size == _STL_HEADER + _STL_RECORD.itemsize * count)
 
 
 def is_text_stl(file: SurfaceFile) -> bool:
@@ -69,19 +70,15 @@ def read_mesh(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
             f"is required: {file.name} is an {mesh_format} file, which has no unit; say what its"
             " coordinates are in, such as 'mm'",
         )
-    content = file.content
-    corners = _parse_binary_stl(content) if is_binary else _parse_text_mesh(content, mesh_format)
+    if is_binary:
+        corners = np.frombuffer(file.content, _STL_RECORD, offset=_STL_HEADER)["corners"]
+    else:
+        corners = _parse_text_mesh(file.content, mesh_format)
     with np.errstate(invalid="ignore"):  # refused below
         corners = corners.astype(np.float64)
     if not np.isfinite(corners).all():
         raise SurfaceFileError("has corners that are not finite numbers")
     return _to_surface(corners * unit, file.name)
-
-
-def _parse_binary_stl(content: bytes) -> NDArray[Any]:
-    """Return the corners of the triangles, shape (n, 3, 3); the normals in the file are ignored."""
-    record = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
-    return np.frombuffer(content, record, offset=_STL_HEADER)["corners"]
 
 
 def _parse_text_mesh(content: bytes, mesh_format: str) -> FloatArray:
@@ -228,14 +225,9 @@ def _min_rectangle_angle(points: FloatArray) -> float:
     edges = np.roll(hull, -1, axis=0) - hull
     angles = np.arctan2(edges[:, 1], edges[:, 0])
     angles = (angles + math.pi / 4) % (math.pi / 2) - math.pi / 4
-    best, least = 0.0, _rectangle_area(hull, 0.0) * (1 - _MIN_AREA_SAVING)
-    for angle in angles:
-        area = _rectangle_area(hull, float(angle))
-        if area < least:
-            best, least = float(angle), area
-    return best
-
-
-def _rectangle_area(hull: FloatArray, angle: float) -> float:
-    c, s = math.cos(angle), math.sin(angle)
-    return float(np.ptp(c * hull[:, 0] + s * hull[:, 1]) * np.ptp(c * hull[:, 1] - s * hull[:, 0]))
+    areas = [
+        np.ptp(c * hull[:, 0] + s * hull[:, 1]) * np.ptp(c * hull[:, 1] - s * hull[:, 0])
+        for c, s in zip(np.cos([0.0, *angles]), np.sin([0.0, *angles]), strict=True)
+    ]
+    best = int(np.argmin(areas[1:]))
+    return float(angles[best]) if areas[best + 1] < areas[0] * (1 - _MIN_AREA_SAVING) else 0.0

@@ -15,16 +15,9 @@ from asperity.measured.reading.reader import ReadingOptions, SurfaceFile
 
 ZIP_MAGIC = (b"PK\x03\x04", b"PK\x05\x06")  # the second is that of an empty archive
 _MAX_UNPACKED_BYTES = 2 * 10**9
-ARCHIVE_ERRORS = (
-    zipfile.BadZipFile,
-    zlib.error,
-    struct.error,
-    EOFError,
-    KeyError,
-    NotImplementedError,  # a compression that zipfile does not support
-    RuntimeError,  # an encrypted member
-    ValueError,
-)
+# RuntimeError: an encrypted member, or a compression that zipfile does not support.
+_DAMAGED = (zipfile.BadZipFile, zlib.error, struct.error, EOFError, KeyError, ValueError)
+ARCHIVE_ERRORS = (*_DAMAGED, RuntimeError)
 """Errors that zipfile raises for a damaged archive."""
 
 

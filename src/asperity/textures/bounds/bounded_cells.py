@@ -115,10 +115,8 @@ class BoundedCells(Cells):
         order, b = sum(DERIVATIVE_ORDERS[name]), self._bounds
         value = np.ascontiguousarray(values[:, DERIVATIVE_NAMES.index(name)])
         linear = np.zeros((len(steps), len(value)))
-        by_taylor, by_slope = (
-            0.5 * b.third_derivative_bound * reach * reach,
-            b.hessian_bound * reach,
-        )
+        by_taylor = 0.5 * b.third_derivative_bound * reach * reach
+        by_slope = b.hessian_bound * reach
         second = 0.5 * b.hessian_bound * reach * reach
         error = (second, min(by_taylor, by_slope), b.third_derivative_bound * reach)[order]
         if order == 0 or (order == 1 and by_taylor < by_slope):

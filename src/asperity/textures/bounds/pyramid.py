@@ -77,10 +77,8 @@ def _plane_bounds(c: FloatArray, pitch: tuple[float, float], spread: float) -> l
     """Return the five bounds of every two by two cells, the lower one negated."""
     xx, yy, xy = np.diff(c, 2, axis=1), np.diff(c, 2, axis=0), np.diff(np.diff(c, axis=0), axis=1)
     aspect = pitch[0] / pitch[1]
-    fxx, fyy = (
-        _upper_bounds(np.abs, xx, (3, 1), 2),
-        aspect**2 * _upper_bounds(np.abs, yy, (1, 3), 2),
-    )
+    fxx = _upper_bounds(np.abs, xx, (3, 1), 2)
+    fyy = aspect**2 * _upper_bounds(np.abs, yy, (1, 3), 2)
     fxy = aspect * _upper_bounds(np.abs, xy, (2, 2), 2)
     second = np.minimum(np.maximum(fxx, fyy) + fxy, np.sqrt(fxx**2 + 2.0 * fxy**2 + fyy**2))
     # ‖D³h‖ is at most the root of the sum of the squares of all eight derivatives.
@@ -89,13 +87,9 @@ def _plane_bounds(c: FloatArray, pitch: tuple[float, float], spread: float) -> l
     third += 3.0 * (aspect**2 * _upper_bounds(np.abs, np.diff(yy, axis=1), (1, 2), 2)) ** 2
     third += (aspect**3 * _upper_bounds(np.abs, np.diff(yy, axis=0), (0, 3), 2)) ** 2
     # Gershgorin's discs of -Hess h.
-    crest = (
-        np.maximum(
-            _upper_bounds(np.negative, xx, (3, 1), 2),
-            aspect**2 * _upper_bounds(np.negative, yy, (1, 3), 2),
-        )
-        + fxy
-    )
+    crest_x = _upper_bounds(np.negative, xx, (3, 1), 2)
+    crest_y = aspect**2 * _upper_bounds(np.negative, yy, (1, 3), 2)
+    crest = np.maximum(crest_x, crest_y) + fxy
     low, high = _height_bounds(c, (3, 3), 2, spread)
     derivatives = second, np.sqrt(third), np.minimum(crest, second)
     return [low, high, *(bound / pitch[0] for bound in derivatives)]
@@ -165,14 +159,13 @@ def _bernstein_along_axis(c: Float32Array, degree: int) -> list[tuple[Float32Arr
 
 def _max_over_boxes(function: np.ufunc, parts: list[BernsteinPart], step: int) -> FloatArray:
     """Return the maximum of a function over each box and over all parts."""
-    result: Float32Array | None = None
+    greatest = []
     for values, widths in parts:
         boxes = function(values)
         for axis, width in enumerate(widths):
             boxes = _window_max(boxes, axis, width, step)
-        result = boxes if result is None else np.maximum(result, boxes, out=result)
-    assert result is not None
-    return result.astype(np.float64)
+        greatest.append(boxes)
+    return np.maximum.reduce(greatest).astype(np.float64)
 
 
 def _window_max(values: Float32Array, axis: int, width: int, step: int) -> Float32Array:
@@ -200,16 +193,10 @@ def _build_levels(finest: Float32Array) -> Pyramid:
         for axis in range(len(shape)):
             odd = [(0, 0)] * level.ndim
             odd[axis] = (0, level.shape[axis] % 2)
-            level = _pairwise_max(np.pad(level, odd, mode="edge"), axis)
+            level = _window_max(np.pad(level, odd, mode="edge"), axis, 2, 2)
         shape = level.shape[:-1]
         starts.append((starts[-1][0] + len(parts[-1]), *shape))
         parts.append(level.reshape(-1, BOUNDS_PER_BOX))
     boxes = np.concatenate(parts)
     boxes[:, 0] *= -1.0
     return np.ascontiguousarray(boxes), np.array(starts, dtype=np.int64)
-
-
-def _pairwise_max(level: Float32Array, axis: int) -> Float32Array:
-    """Return the maximum of every two neighbours along an axis."""
-    values = np.moveaxis(level, axis, 0)
-    return np.ascontiguousarray(np.moveaxis(np.maximum(values[::2], values[1::2]), 0, axis))

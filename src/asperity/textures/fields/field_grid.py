@@ -223,18 +223,14 @@ class FieldGrid:
 
     def _with_borders(self, table: NDArray[np.int32]) -> NDArray[np.int32]:
         """Return the columns (rows, columns, 4) with those beyond the borders, and their reach."""
+        from scipy.ndimage import maximum_filter
+
         axes = [self.stored_nodes(axis) for axis in range(len(self.cells))]
         for axis, nodes in zip((1, 0), axes, strict=False):
             table = np.take(table, nodes, axis=axis)
             outside = np.expand_dims(nodes < 0, 0 if axis == 1 else 1)
             table[np.broadcast_to(outside, table.shape[:2])] = 0
-        reach = table[..., 3]
-        for axis in range(2):
-            width = [(1, 1) if k == axis else (0, 0) for k in range(2)]
-            wide = np.pad(reach, width)
-            parts = [np.take(wide, np.arange(k, k + reach.shape[axis]), axis) for k in range(3)]
-            reach = np.maximum.reduce(parts)
-        table[..., 3] = reach
+        table[..., 3] = maximum_filter(table[..., 3], 3, mode="constant")
         return np.ascontiguousarray(table)
 
 

@@ -27,7 +27,7 @@ class SinusoidArguments(NamedTuple):
     """Record of a sinusoid passed to the functions below.
 
     Attributes:
-        amplitude: A [m].
+        amplitude: A [m], positive.
         kx: wave vector [rad/m].
         ky: likewise.
         phase: [rad].
@@ -74,16 +74,12 @@ def closest_point(x: float, y: float, z: float, texture: SinusoidArguments) -> C
     changes sign exactly once: it is convex from u to the inflection π/2 with F(u) <= 0, and
     increasing from there on while the surface is above the probe.
     """
-    amplitude = abs(texture.amplitude)
-    if amplitude == 0.0:
-        return x, y, 0.0, 0.0, 0.0
+    amplitude = texture.amplitude
     kx = texture.kx
     ky = texture.ky
     k2 = kx * kx + ky * ky
     angle = kx * x + ky * y + texture.phase
-    depth = texture.amplitude * math.sin(angle) - z
-    if texture.amplitude < 0.0:
-        angle += math.pi
+    depth = amplitude * math.sin(angle) - z
     over = 1.0
     if depth < 0.0:
         angle += math.pi
@@ -164,7 +160,7 @@ def flank_root(
 def split_phase(x: float, y: float, texture: SinusoidArguments) -> float:
     """Return the phase from the nearest crest, in [-π, π]."""
     angle = texture.kx * x + texture.ky * y + texture.phase
-    turns = angle / (2.0 * math.pi) - (0.25 if texture.amplitude >= 0.0 else 0.75)
+    turns = angle / (2.0 * math.pi) - 0.25
     return 2.0 * math.pi * (turns - math.floor(turns + 0.5))
 
 
@@ -187,7 +183,7 @@ def split_contact(
     x: float, y: float, z: float, continuity: float, texture: SinusoidArguments
 ) -> tuple[float, float, float]:
     """Return z̄ - p, from the probe to the mean of the split god-object [m]."""
-    amplitude = abs(texture.amplitude)
+    amplitude = texture.amplitude
     k2 = texture.kx * texture.kx + texture.ky * texture.ky
     u = split_phase(x, y, texture)
     split, psi, c, _s = split_closest_point(abs(u), z, continuity, amplitude, k2 * amplitude)
@@ -207,7 +203,7 @@ def split_derivative(
     x: float, y: float, z: float, continuity: float, texture: SinusoidArguments
 ) -> tuple[float, float, float, float, float, float, float, float, float]:
     """Return z̄ - p [m] and its derivative by p as m_xx, m_xy, m_xz, m_yy, m_yz, m_zz."""
-    amplitude = abs(texture.amplitude)
+    amplitude = texture.amplitude
     k2 = texture.kx * texture.kx + texture.ky * texture.ky
     wave = math.sqrt(k2)
     u = split_phase(x, y, texture)
@@ -244,7 +240,7 @@ def split_energy(
 
     The lower bound uses the globally closest point of y from the sampler's own search.
     """
-    amplitude = abs(texture.amplitude)
+    amplitude = texture.amplitude
     k2 = texture.kx * texture.kx + texture.ky * texture.ky
     share = continuity / (1.0 + continuity)
     u = split_phase(x, y, texture)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import tomllib
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,14 +77,8 @@ def _add_scratch(
 # --- sandpaper: angular grains of a standard grade, glued to paper --------------------------------
 
 _PAPER_NODES = 448
-GRAIN_SIZES = {
-    "P60": 269e-6,
-    "P80": 201e-6,
-    "P120": 125e-6,
-    "P180": 82e-6,
-    "P240": 58.5e-6,
-    "P400": 35.0e-6,
-}
+_SURFACES = Path(__file__).with_name("surfaces.toml").read_text("utf-8")
+GRAIN_SIZES: dict[str, float] = tomllib.loads(_SURFACES)["sandpaper"]["grain_sizes"]
 """Mean grain size [m] by grade: FEPA 43-1, ISO 6344."""
 _NODES_PER_GRAIN = 16.0
 _FACETS = 7

@@ -81,19 +81,15 @@ class Spline(Texture):
 
     def _compute_bounds(self) -> tuple[float, float]:
         c, pitches = self.coefficients, self._pitches
-
-        def greatest(values: FloatArray) -> float:
-            return max(float(values.max()), -float(values.min()))
-
         axes = range(c.ndim)[::-1]  # x first, as the pitches
-        slopes = [greatest(np.diff(c, axis=i)) / p for i, p in zip(axes, pitches, strict=True)]
+        slopes = [np.abs(np.diff(c, axis=i)).max() / p for i, p in zip(axes, pitches, strict=True)]
         second = max(
-            greatest(np.diff(c, 2, axis=i)) / p**2 for i, p in zip(axes, pitches, strict=True)
+            np.abs(np.diff(c, 2, axis=i)).max() / p**2 for i, p in zip(axes, pitches, strict=True)
         )
         if c.ndim == 2:
-            second += greatest(np.diff(np.diff(c, axis=0), axis=1)) / math.prod(pitches)
+            second += np.abs(np.diff(np.diff(c, axis=0), axis=1)).max() / math.prod(pitches)
         inflate = 1.0 + 1e-12  # the rounding of the differences
-        return inflate * float(np.hypot.reduce(slopes)), inflate * second
+        return inflate * float(np.hypot.reduce(slopes)), inflate * float(second)
 
     @cached_property
     def extremes(self) -> tuple[float, float]:

@@ -11,6 +11,8 @@ from __future__ import annotations
 import math
 import re
 import struct
+import tomllib
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -30,16 +32,7 @@ _HEADER_2 = struct.Struct("<8s10s12s12sIIddddBBB")
 _OLYMPUS_PADDING = 8  # bytes that Olympus adds to the header of bISO-1.0 files (sdfile.c)
 
 # By type code: NumPy type of a height, and the value of a missing point.
-_DATA_TYPES = {
-    0: ("u1", math.nan),
-    1: ("<u2", 2.0**16 - 1),
-    2: ("<u4", 2.0**32 - 1),
-    3: ("<f4", float(np.finfo(np.float32).min)),
-    4: ("i1", -(2.0**7)),
-    5: ("<i2", -(2.0**15)),
-    6: ("<i4", -(2.0**31)),
-    7: ("<f8", float(np.finfo(np.float64).min)),
-}
+_DATA_TYPES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))["data_types"]
 
 
 class _Header(NamedTuple):
@@ -98,7 +91,7 @@ def _check_header(header: _Header) -> _Header:
     if points < 1 or profiles < 1:
         raise SurfaceFileError(f"NumPoints is {points}, NumProfiles {profiles}: both must be > 0")
     reader.check_point_count(points, profiles)
-    if header.data_type not in _DATA_TYPES:
+    if not 0 <= header.data_type < len(_DATA_TYPES):
         raise SurfaceFileError(f"DataType is {header.data_type}; 0 to 7 are defined")
     for key, value in (("Compression", header.compression), ("CheckType", header.check_type)):
         if value != 0:

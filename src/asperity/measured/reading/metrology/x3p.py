@@ -265,20 +265,19 @@ def _parse_axis(root: ET.Element, name: str, notes: list[str]) -> CoordinateAxis
 
 
 def _parse_shape(root: ET.Element, is_profile: bool) -> tuple[int, int]:
-    nx, ny, nz = (_parse_size(root, f"Size{letter}") for letter in "XYZ")
+    sizes = []
+    for name in ("SizeX", "SizeY", "SizeZ"):
+        text = _required_text(root, f"Record3/MatrixDimension/{name}")
+        if not re.fullmatch(r"[0-9]{1,12}", text) or int(text) < 1:
+            raise SurfaceFileError(f"{name} is {text[:40]!r}; a positive integer is expected")
+        sizes.append(int(text))
+    nx, ny, nz = sizes
     if nz != 1:
         raise SurfaceFileError(f"SizeZ is {nz}: a file of several layers is no single surface")
     if is_profile and ny != 1:
         raise SurfaceFileError(f"a profile (PRF) has SizeY 1, got {ny}")
     reader.check_point_count(nx, ny)
     return ny, nx
-
-
-def _parse_size(root: ET.Element, name: str) -> int:
-    text = _required_text(root, f"Record3/MatrixDimension/{name}")
-    if not re.fullmatch(r"[0-9]{1,12}", text) or int(text) < 1:
-        raise SurfaceFileError(f"{name} is {text[:40]!r}; a positive integer is expected")
-    return int(text)
 
 
 # --- the points ---------------------------------------------------------------------------------
