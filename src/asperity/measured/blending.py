@@ -48,11 +48,8 @@ def to_blend_samples(shape: Shape, pitch: Pitch, width: float | None) -> tuple[i
     if width is None:
         samples = [max(_MIN_SAMPLES, round(DEFAULT_FRACTION * n)) for n in counts]
         if any(2 * w > n for w, n in zip(samples, counts, strict=True)):
-            raise ParameterError(
-                "periodic",
-                f"needs at least {2 * _MIN_SAMPLES} points along each side to blend",
-                counts,
-            )
+            least = f"needs at least {2 * _MIN_SAMPLES} points along each side to blend"
+            raise ParameterError("periodic", least, counts)
         return tuple(samples)
     check_positive("blend", width, "m")
     if width < (_MIN_SAMPLES - 0.5) * max(pitch):

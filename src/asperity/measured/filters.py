@@ -273,11 +273,8 @@ def check_tip_radius(shape: Shape, pitch: Pitch, radius: float) -> None:
     check_positive("tip_radius", radius, "m")
     extent = min((n - 1) * p for n, p in zip(shape[::-1], pitch, strict=True))
     if radius > extent * (1 + 5e-7):
-        raise ParameterError(
-            "tip_radius",
-            f"must be at most the surface's shorter side, {format_length(extent)} [m]",
-            radius,
-        )
+        limit = f"must be at most the surface's shorter side, {format_length(extent)} [m]"
+        raise ParameterError("tip_radius", limit, radius)
 
 
 def apply_tip(heights: FloatArray, pitch: Pitch, radius: float) -> tuple[FloatArray, str]:

@@ -289,9 +289,9 @@ def _check_shape(heights: FloatArray, max_missing: float) -> None:
     if heights.ndim == 1 and shape[0] < _MIN_POINTS:
         raise ParameterError("surface", f"must have at least {_MIN_POINTS} points", shape[0])
     if heights.ndim == 2 and min(shape) < _MIN_POINTS:
+        given = f"got {format_counts(shape)} points"
         raise ParameterError(
-            "surface",
-            f"is too small: the smallest accepted map is 4 x 4, got {format_counts(shape)} points",
+            "surface", f"is too small: the smallest accepted map is 4 x 4, {given}"
         )
     if heights.ndim not in (1, 2):
         raise ParameterError("surface", "must be a profile (n,) or a map (ny, nx)", shape)

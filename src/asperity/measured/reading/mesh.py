@@ -99,10 +99,8 @@ def _parse_text_mesh(content: bytes, mesh_format: str) -> FloatArray:
     else:
         expected = content.lower().count(b"facet normal")
     if len(triangles) != expected:  # trimesh ignores faces that it cannot parse
-        raise SurfaceFileError(
-            f"damaged or truncated {mesh_format} mesh"
-            f" ({len(triangles)} of {expected} triangles are sound)"
-        )
+        found = f"{len(triangles)} of {expected} triangles are sound"
+        raise SurfaceFileError(f"damaged or truncated {mesh_format} mesh ({found})")
     return triangles
 
 

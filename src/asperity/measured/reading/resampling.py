@@ -105,10 +105,8 @@ def resampling_hint(pitch: float) -> str:
     """
     pitch = float(f"{pitch:.2g}")
     option = format_quantity(pitch, "m", digits=2).replace(" ", "").replace("µ", "u")
-    return (
-        "points on no grid are interpolated to a pitch that you give, such as"
-        f" resample={pitch:g} (--resample {option})"
-    )
+    example = f"resample={pitch:g} (--resample {option})"
+    return f"points on no grid are interpolated to a pitch that you give, such as {example}"
 
 
 def suggest_pitch(positions: FloatArray) -> float | None:
@@ -237,11 +235,8 @@ def _describe_holdout_error(positions: FloatArray, heights: FloatArray) -> str:
     missed = missed[~np.isnan(missed)]
     if not len(missed):
         return "too few points to know its error"
-    rms = _rms(missed)
-    return (
-        f"{len(missed)} points that were left out are missed by {format_length(rms)} rms,"
-        f" {format_length(float(missed.max()))} at most"
-    )
+    rms, most = format_length(_rms(missed)), format_length(float(missed.max()))
+    return f"{len(missed)} points that were left out are missed by {rms} rms, {most} at most"
 
 
 def _rms(values: FloatArray) -> float:

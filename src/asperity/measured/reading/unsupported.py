@@ -40,10 +40,8 @@ def classify_archive(path: Path) -> str:
         return "X3P"  # its reader checks the size of each member against main.xml
     size = sum(member.file_size for member in members)
     if size > _MAX_UNPACKED_BYTES:
-        raise SurfaceFileError(
-            f"{path.name} unpacks to {size / 1e9:.1f} GB;"
-            f" at most {_MAX_UNPACKED_BYTES / 1e9:.0f} GB are read"
-        )
+        limit = f"at most {_MAX_UNPACKED_BYTES / 1e9:.0f} GB are read"
+        raise SurfaceFileError(f"{path.name} unpacks to {size / 1e9:.1f} GB; {limit}")
     return "NPZ" if any(name.endswith(".npy") for name in names) else "other"
 
 

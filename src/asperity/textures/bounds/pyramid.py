@@ -165,7 +165,7 @@ def _max_over_boxes(function: np.ufunc, parts: list[BernsteinPart], step: int) -
         for axis, width in enumerate(widths):
             boxes = _window_max(boxes, axis, width, step)
         greatest.append(boxes)
-    return np.maximum.reduce(greatest).astype(np.float64)
+    return np.asarray(np.max(greatest, axis=0), dtype=np.float64)
 
 
 def _window_max(values: Float32Array, axis: int, width: int, step: int) -> Float32Array:

@@ -123,9 +123,8 @@ class SplineCells(cells.Cells):
         """See :class:`Cells`; at nodes, where second derivatives of a spline are extreme."""
         if self.dimensions == 1:
             count = min(count, 4 * int(self._counts[0]))
-        return np.asarray(
-            np.round(cells.low_discrepancy_points(count, self.dimensions) * self._counts)
-        )
+        fractions = cells.low_discrepancy_points(count, self.dimensions)
+        return np.asarray(np.round(fractions * self._counts))
 
     def enclosures(
         self, centres: FloatArray, half: FloatArray, names: Sequence[str]

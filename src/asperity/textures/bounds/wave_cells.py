@@ -21,10 +21,9 @@ _SINES_PER_CHUNK = 2_000_000
 _MAX_CELLS = {4: 1_000_000}
 # Initial samples per wave of a profile.
 _SAMPLES_PER_WAVE = 64
-_ODD = [
-    i for i, name in enumerate(cells.DERIVATIVE_NAMES) if sum(cells.DERIVATIVE_ORDERS[name]) == 1
-]
-_EVEN = [i for i in range(len(cells.DERIVATIVE_NAMES)) if i not in _ODD]
+_ORDERS = [sum(cells.DERIVATIVE_ORDERS[name]) for name in cells.DERIVATIVE_NAMES]
+_ODD = [i for i, order in enumerate(_ORDERS) if order == 1]
+_EVEN = [i for i, order in enumerate(_ORDERS) if order != 1]
 
 
 class WaveCells(cells.Cells):

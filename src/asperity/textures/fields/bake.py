@@ -122,9 +122,8 @@ class BakePlan:
         self._law_arguments = (1.0, 0.0, 1.0, max_depth, 0.0, continuity)
         low, top = texture.extremes
         self.floor, self.onset_limit = low - max_depth, max(_ONSET[0], _ONSET[1] * (top - low))
-        xy = texture.domain.points(
-            np.random.default_rng(0).uniform(size=(PROBES, len(texture.domain.spans)))
-        )
+        size = (PROBES, len(texture.domain.spans))
+        xy = texture.domain.points(np.random.default_rng(0).uniform(size=size))
         depths = (top - self.floor) * np.geomspace(LEAST_DEPTH, 1.0, DEPTHS)
         level = np.repeat(top - depths, PROBES)
         points = np.column_stack([np.tile(xy, (DEPTHS, 1)), level])
@@ -236,10 +235,8 @@ class BakePlan:
             fits = f"even the coarsest one takes {least} byte"
             if least <= limit:  # rounded up, so that the resolution in the message fits
                 fits = f"{round_up(self.finest_resolution()):.3g} m fits"
-            words = (
-                f"would need a field of {nodes} nodes, {size / 1e6:,.1f} MB, more than max_bytes"
-            )
-            words += f" = {limit / 1e6:,.1f} MB; {fits}"
+            words = f"would need a field of {nodes} nodes, {size / 1e6:,.1f} MB, more than"
+            words += f" max_bytes = {limit / 1e6:,.1f} MB; {fits}"
             raise ParameterError("resolution", words, max(grid.spacing))
 
     def certify(

@@ -184,9 +184,8 @@ class Fourier(Texture):
         return ScanLine(origin, vector / length, length, periodic=True)
 
     def _period_along_x(self, periods: FloatArray) -> FloatArray:
-        multiples = np.array(
-            [[m, n] for m in range(-8, 9) for n in range(-8, 9) if (m, n) != (0, 0)]
-        )
+        multiples = np.mgrid[-8:9, -8:9].reshape(2, -1).T
+        multiples = multiples[multiples.any(axis=1)]
         vectors = multiples @ periods
         lengths = np.hypot(*vectors.T)
         along_x = (np.abs(vectors[:, 1]) < 1e-9 * lengths) & (vectors[:, 0] > 0.0)

@@ -60,22 +60,15 @@ def read_instrument(file: SurfaceFile, options: ReadingOptions) -> RawSurface | 
             with contextlib.closing(reader), _reject_damaged(reader):
                 channel = _select_channel(reader, file.name, options.channel)
                 if channel is not None:
-                    _reject_wrong_format(reader)
+                    if fault := _WRONG_FORMATS.get(reader.format()):
+                        what = f"a {reader.name()} file, which {LIBRARY} may misread"
+                        raise SurfaceFileError(f"{what}: {fault}; export it as X3P or SDF")
                     return _to_surface(reader, channel, file, options)
                 names = [f"{c.name!r} ({c.data_kind.value})" for c in reader.channels]
                 channels = channels or ", ".join(names) or "none"
     if channels:
         raise SurfaceFileError(f"no height channel; the file has: {channels}")
     return None
-
-
-def _reject_wrong_format(reader: Any) -> None:
-    """Refuse a format whose lengths the library gets wrong."""
-    fault = _WRONG_FORMATS.get(reader.format())
-    if fault is not None:
-        raise SurfaceFileError(
-            f"a {reader.name()} file, which {LIBRARY} may misread: {fault}; export it as X3P or SDF"
-        )
 
 
 def _reject_damaged(reader: Any) -> contextlib.AbstractContextManager[None]:

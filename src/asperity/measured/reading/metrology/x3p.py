@@ -84,10 +84,8 @@ class _Archive:
             raise SurfaceFileError(f"{name} has {info.file_size} bytes; at most {limit} are read")
         if expected and info.file_size != expected:
             fault = "is truncated" if info.file_size < expected else "is too long"
-            raise SurfaceFileError(
-                f"{name} {fault}: {info.file_size} bytes,"
-                f" the matrix dimension and data types require {expected}"
-            )
+            needed = f"the matrix dimension and data types require {expected}"
+            raise SurfaceFileError(f"{name} {fault}: {info.file_size} bytes, {needed}")
         if info.compress_size > self.size:  # zipfile would allocate this size
             raise SurfaceFileError(f"{name} is truncated")
         content = self.zip_file.read(info)
@@ -383,8 +381,6 @@ def _find_step(
     result = measure_spacing(low, resolution)
     deviation = max(result.deviation, float(np.max(high - low)))
     if not result.is_uniform or np.max(high - low) > 1e-3 * result.step:
-        raise SurfaceFileError(
-            f"{axis.name} is absolute and its positions are no uniform grid"
-            f" (deviation up to {deviation:.3g} m)"
-        )
+        fault = f"its positions are no uniform grid (deviation up to {deviation:.3g} m)"
+        raise SurfaceFileError(f"{axis.name} is absolute and {fault}")
     return result.step

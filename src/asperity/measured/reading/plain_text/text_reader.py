@@ -90,10 +90,8 @@ def _is_monotonic(table: TextTable) -> bool:
         return True
     if len(wrong) > len(steps) // 10 and not np.isnan(positions).any():
         return False
-    raise SurfaceFileError(
-        f"line {table.line_numbers[int(wrong[0]) + 1]}: the positions in the first of two columns"
-        " must increase throughout"
-    )
+    fault = "the positions in the first of two columns must increase throughout"
+    raise SurfaceFileError(f"line {table.line_numbers[int(wrong[0]) + 1]}: {fault}")
 
 
 def _find_units(
@@ -260,8 +258,6 @@ def _grid_step(axis: str, positions: FloatArray, resolution: FloatArray) -> floa
         return 0.0
     result = resampling.measure_spacing(positions, float(resolution.max()))
     if not result.is_uniform:
-        raise _NoGridError(
-            f"the {axis} positions are not uniform: one is {result.deviation:.3g} from a grid of"
-            f" {result.step:.3g}"
-        )
+        fault = f"one is {result.deviation:.3g} from a grid of {result.step:.3g}"
+        raise _NoGridError(f"the {axis} positions are not uniform: {fault}")
     return result.step
