@@ -369,9 +369,7 @@ def _fill_missing(
         return filled
     share = 100.0 * missing / heights.size
     base = (" about the mean", " on the fitted tilt")[form] if form < 2 else " on the fitted form"
-    steps.append(
-        f"filled {missing} of {heights.size} missing points ({share:.2g} %)"
-        f" by harmonic interpolation{base}"
-    )
+    count = f"{missing} of {heights.size} missing points ({share:.2g} %)"
+    steps.append(f"filled {count} by harmonic interpolation{base}")
     fill_in_place(heights, pitch)
     return filled

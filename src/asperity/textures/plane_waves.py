@@ -212,6 +212,5 @@ def check_curvature(name: str, curvature: float, wavelength_name: str) -> None:
     """
     if curvature and not _MIN_CURVATURE <= curvature <= _MAX_CURVATURE:
         limits = f"must be {_MIN_CURVATURE:g}/m to {_MAX_CURVATURE:g}/m"
-        raise ParameterError(
-            name, f"and {wavelength_name} make a curvature of {curvature:.3g}/m, which {limits}"
-        )
+        fault = f"and {wavelength_name} make a curvature of {curvature:.3g}/m, which {limits}"
+        raise ParameterError(name, fault)

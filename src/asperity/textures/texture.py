@@ -143,9 +143,8 @@ class Texture(Plottable, ABC):
 
     def constructor_values(self) -> dict[str, Any]:
         """Return the arguments of the constructor by name, SI units."""
-        return {
-            argument.name: getattr(self, argument.name) for argument in self.constructor_arguments
-        }
+        names = [argument.name for argument in self.constructor_arguments]
+        return {name: getattr(self, name) for name in names}
 
     def __repr__(self) -> str:
         values = ", ".join(f"{name}={value!r}" for name, value in self.constructor_values().items())
@@ -254,9 +253,8 @@ class Texture(Plottable, ABC):
         return bounded_cells.equal_segments(self._bounded_cells(region), line, min_count, 1.0)
 
     def _bounded_cells(self, region: Domain) -> bounded_cells.BoundedCells:
-        bounds = bounded_cells.DerivativeBounds(
-            *self.extremes, *self.bounds, self.third_derivative_bound
-        )
+        numbers = (*self.extremes, *self.bounds, self.third_derivative_bound)
+        bounds = bounded_cells.DerivativeBounds(*numbers)
         return bounded_cells.BoundedCells(region, self.derivatives, bounds)
 
     def sample_counts(self) -> list[int]:

@@ -62,9 +62,8 @@ def _check_array(array: np.ndarray[Any, np.dtype[Any]]) -> None:
     if array.dtype.kind not in "iuf":
         raise SurfaceFileError(f"array of type {array.dtype}; integers or floats are expected")
     if array.ndim not in (1, 2) or min(array.shape) < 1:
-        raise SurfaceFileError(
-            f"array of shape {array.shape}; (ny, nx) for a map or (n,) for a profile is expected"
-        )
+        wanted = "(ny, nx) for a map or (n,) for a profile is expected"
+        raise SurfaceFileError(f"array of shape {array.shape}; {wanted}")
     reader.check_point_count(*array.shape[::-1])
 
 
@@ -100,9 +99,8 @@ def read_esri(file: reader.SurfaceFile, options: reader.ReadingOptions) -> reade
     body = text[start:] if "." in text[start:] else text[start:].replace(",", ".")
     stored = parse_heights(body)
     if len(stored) != rows * columns:
-        raise SurfaceFileError(
-            f"the header says {rows} rows of {columns} heights, there are {len(stored)} numbers"
-        )
+        stated = f"the header says {rows} rows of {columns} heights"
+        raise SurfaceFileError(f"{stated}, there are {len(stored)} numbers")
     code = header.get("nodata_value", _DEFAULT_NODATA)
     heights, notes = reader.mask_missing(stored.reshape(rows, columns), code)
     unit, assumed = options.resolve_unit(file.name)

@@ -148,10 +148,8 @@ def _check_overhangs(areas: FloatArray, overhanging: NDArray[np.bool_]) -> None:
         if area > _CLOSED_BODY_FRACTION * total
         else "a height field has one height at each point: cut them off"
     )
-    raise SurfaceFileError(
-        f"{int(overhanging.sum())} triangles overhang, {1e6 * area:.4g} mm² or"
-        f" {area / total:.2%} of the surface; {advice}"
-    )
+    part = f"{1e6 * area:.4g} mm² or {area / total:.2%} of the surface"
+    raise SurfaceFileError(f"{int(overhanging.sum())} triangles overhang, {part}; {advice}")
 
 
 _MIN_AREA_SAVING = 0.02  # least relative saving of area for which the axes are turned
@@ -187,10 +185,8 @@ def fit_plane(
     normal = np.linalg.eigh(moment)[1][:, 0]
     facing = 0.5 * cross.sum(axis=0) @ normal
     if abs(facing) < 1e-6 * total:
-        raise SurfaceFileError(
-            f"its triangles ({1e6 * total:.4g} mm²) face in all directions, as those of a closed"
-            " body; cut off the textured side"
-        )
+        fault = "face in all directions, as those of a closed body; cut off the textured side"
+        raise SurfaceFileError(f"its triangles ({1e6 * total:.4g} mm²) {fault}")
     normal = normal * math.copysign(1.0, facing)
     axes = _plane_axes(normal)
     angle = _min_rectangle_angle(moved.reshape(-1, 3) @ axes[:2].T)

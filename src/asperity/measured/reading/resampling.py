@@ -163,9 +163,8 @@ def resample_points(points: FloatArray, pitch: float) -> tuple[FloatArray, str]:
     local = (points[:, :2] - low) / pitch
     columns, rows = (int(n) for n in np.minimum(local.max(axis=0) + 1e-9, 2.0**40) + 1)
     if rows * columns > min(MAX_POINTS, _MAX_GRID_RATIO * len(points)):
-        raise ParameterError(
-            "resample", f"is too fine for {len(points)} points: {columns} x {rows} of a grid", pitch
-        )
+        fault = f"is too fine for {len(points)} points: {columns} x {rows} of a grid"
+        raise ParameterError("resample", fault, pitch)
     y, x = np.mgrid[:rows, :columns].astype(np.float64)
     heights = _interpolate_linear(local, points[:, 2], (x, y))
     sentence = (

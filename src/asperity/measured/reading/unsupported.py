@@ -59,10 +59,8 @@ def reject_unsupported(file: SurfaceFile, _options: ReadingOptions) -> None:
         SurfaceFileError: the file has such a format.
     """
     if file.head.startswith(ZIP_MAGIC) and classify_archive(file.path) == "NPZ":
-        raise SurfaceFileError(
-            f"{file.name} is an NPZ archive that asperity did not prepare;"
-            " save one array of heights as NPY"
-        )
+        fault = "an NPZ archive that asperity did not prepare; save one array of heights as NPY"
+        raise SurfaceFileError(f"{file.name} is {fault}")
     for signature, kind, advice in _SIGNATURES:
         magic = signature.encode("latin-1")
         # Text may start with the same two letters ("BMS profile ..."): require a binary byte too.
@@ -84,10 +82,8 @@ def unrecognised_error(file: SurfaceFile) -> SurfaceFileError:
 
 def _unsupported_error(file: SurfaceFile, kind: str, advice: str) -> SurfaceFileError:
     tail = f"; {advice}" if advice else ""
-    return SurfaceFileError(
-        f"{file.name} looks like {kind}: not a surface format that asperity reads:"
-        f" {SUPPORTED_FORMATS}{tail}"
-    )
+    fault = f"not a surface format that asperity reads: {SUPPORTED_FORMATS}{tail}"
+    return SurfaceFileError(f"{file.name} looks like {kind}: {fault}")
 
 
 def too_large_error(name: str, size: int, limit: int, what: str = "") -> SurfaceFileError:

@@ -43,9 +43,8 @@ def line_pyramid(c: FloatArray, pitch: float) -> Pyramid:
     third = _upper_bounds(np.abs, np.diff(c, 3), (0,), 1)
     crest = _upper_bounds(np.negative, np.diff(c, 2), (1,), 1)
     low, high = _height_bounds(c - middle, (3,), 1, spread)
-    return _build_levels(
-        _round_outward(middle, [low, high, second / pitch, third / pitch, crest / pitch])
-    )
+    bounds = [low, high, second / pitch, third / pitch, crest / pitch]
+    return _build_levels(_round_outward(middle, bounds))
 
 
 def plane_pyramid(c: FloatArray, pitch: tuple[float, float]) -> Pyramid:

@@ -146,16 +146,13 @@ def _check_count(path: Path, suffix: str) -> None:
     count = size // _LEAST_BYTES[suffix]
     stated = _stated_count(head, suffix)
     if stated is not None:
-        held = (size - _STL_HEADER) // 50
         if suffix == "stl" and size != _STL_HEADER + 50 * stated:
-            raise SurfaceFileError(
-                f"{path.name} is damaged: it states {stated:,} triangles and holds {held:,}"
-            )
+            found = f"it states {stated:,} triangles and holds {(size - _STL_HEADER) // 50:,}"
+            raise SurfaceFileError(f"{path.name} is damaged: {found}")
         count = stated
     if count > MAX_TRIANGLES:
-        raise SurfaceFileError(
-            f"{path.name} may hold {count:,} triangles, more than {MAX_TRIANGLES:,}"
-        )
+        excess = f"{count:,} triangles, more than {MAX_TRIANGLES:,}"
+        raise SurfaceFileError(f"{path.name} may hold {excess}")
 
 
 def _stated_count(head: bytes, suffix: str) -> int | None:

@@ -60,11 +60,8 @@ def find_faults(vertices: FloatArray, faces: NDArray[np.int32]) -> list[MeshFaul
     keys, start, counts, sums = _edges(faces, len(vertices))
     if len(keys) == 0:
         return faults
-    kinds = (
-        (OPEN, counts == 1),
-        (ORIENTATION, (counts > 1) & (sums != 0)),
-        (NON_MANIFOLD, counts > 2),
-    )
+    turned = (counts > 1) & (sums != 0)
+    kinds = ((OPEN, counts == 1), (ORIENTATION, turned), (NON_MANIFOLD, counts > 2))
     for kind, where in kinds:
         first, second = np.divmod(keys[start[where]], len(vertices))
         faults += make_fault(kind, 0.5 * (vertices[first] + vertices[second]))

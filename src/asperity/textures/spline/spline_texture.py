@@ -83,9 +83,8 @@ class Spline(Texture):
         c, pitches = self.coefficients, self._pitches
         axes = range(c.ndim)[::-1]  # x first, as the pitches
         slopes = [np.abs(np.diff(c, axis=i)).max() / p for i, p in zip(axes, pitches, strict=True)]
-        second = max(
-            np.abs(np.diff(c, 2, axis=i)).max() / p**2 for i, p in zip(axes, pitches, strict=True)
-        )
+        turns = [np.abs(np.diff(c, 2, axis=i)).max() for i in axes]
+        second = max(turn / p**2 for turn, p in zip(turns, pitches, strict=True))
         if c.ndim == 2:
             second += np.abs(np.diff(np.diff(c, axis=0), axis=1)).max() / math.prod(pitches)
         inflate = 1.0 + 1e-12  # the rounding of the differences
@@ -114,9 +113,8 @@ class Spline(Texture):
 
     def texture_part(self) -> TexturePart:
         """See :class:`Texture` and :func:`~asperity.measured.form.decompose_surface`."""
-        heights, nesting, form, waviness = get_or_compute(
-            "texture part", self.digest, self._separate_texture
-        )
+        found = get_or_compute("texture part", self.digest, self._separate_texture)
+        heights, nesting, form, waviness = found
         return TexturePart(self.with_heights(heights), nesting, form, waviness)
 
     def _separate_texture(self) -> tuple[FloatArray, float, float, float]:

@@ -218,9 +218,8 @@ def _check_page(page: Any, size: int) -> None:
     bytes_needed = page.imagelength * page.imagewidth * channels * page.dtype.itemsize
     packed = min(sum(int(n) for n in page.databytecounts), size)
     if bytes_needed > packed * (1 if int(page.compression) == 1 else _MAX_TIFF_RATIO):
-        raise SurfaceFileError(
-            f"truncated: {packed} bytes cannot hold {page.imagewidth} x {page.imagelength} pixels"
-        )
+        pixel_count = f"{page.imagewidth} x {page.imagelength} pixels"
+        raise SurfaceFileError(f"truncated: {packed} bytes cannot hold {pixel_count}")
 
 
 def _orientation(page: Any) -> int:

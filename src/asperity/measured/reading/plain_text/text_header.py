@@ -103,10 +103,8 @@ def parse_unit(name: str, *, is_bracketed: bool) -> float | None:
 
 
 def _unknown_unit_error(name: str) -> SurfaceFileError:
-    return SurfaceFileError(
-        f"the header names the unit {shorten(name, 60)!r};"
-        " m, mm, µm (um, micron), nm or [A] (angstrom) is expected"
-    )
+    wanted = "m, mm, µm (um, micron), nm or [A] (angstrom) is expected"
+    return SurfaceFileError(f"the header names the unit {shorten(name, 60)!r}; {wanted}")
 
 
 @dataclass(frozen=True)
