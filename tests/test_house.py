@@ -218,7 +218,7 @@ def test_other_comparisons_are_ignored(text: str) -> None:
 
 # --- size, annotations, documentation ------------------------------------------------------------
 
-MAX_LINES = 44_042  # 2042 of the 1800 for sweeps, envelopes and design
+MAX_LINES = 43_939  # 1939 of the 1800 for sweeps, envelopes and design
 """Lines of code without docstrings, comments, blank lines and generated files."""
 
 

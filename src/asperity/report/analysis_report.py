@@ -19,7 +19,7 @@ from asperity.report.device_report import device_numbers_table
 from asperity.report.page import HEADED, Cell, Media, Row, Section, Table, TableLayout
 from asperity.report.sentences import number_text
 from asperity.report.sentences.alt_text import analysis_figure_names
-from asperity.report.sentences.texts import glossary
+from asperity.report.sentences.texts import glossary, sentence
 from asperity.surface import Surface
 
 _BOUND_HEADINGS = ("number", "lower", "upper", "method", "attained at")
@@ -238,12 +238,8 @@ def _criteria_sections(analysis: Analysis) -> list[Section]:
     short = Table(("", *table.headings), marked, (4, 5), layout)
     limit = stability_limit_text(passivity.stability_limit, passivity.loop)
     stiffness = f"Stiffness: {limit}"
-    caption = (
-        f"Verdict: {passivity.verdict}. It rests on: {passivity.decided_by}. {stiffness}. T is the "
-        "update period, σ₀ the least damping of the device, b_v virtual damping, d the delay in "
-        "whole samples, K₀ the stiffest smooth wall that held on the device, |δ| and |b| steps of "
-        "position and force, f_c a lower bound of the dry friction."
-    )
+    verdict = f"{passivity.verdict}. It rests on: {passivity.decided_by}"
+    caption = sentence("criteria", verdict=verdict, stiffness=stiffness)
     undecided = page.DefinitionList(undecided_criteria(analysis))
     blocks: list[page.Block] = [short, undecided, page.Paragraph(stiffness)]
     return [

@@ -12,7 +12,6 @@ from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.compare import Comparison
 from asperity.analysis.limits.perceptibility_sentences import texture_amount_text, tier_text
 from asperity.analysis.passivity.assess_passivity import stability_limit_text
-from asperity.analysis.passivity.verdict import Basis
 from asperity.analysis.results import LawRow
 from asperity.core.arguments import Argument
 from asperity.core.units import format_quantity, round_down
@@ -46,13 +45,7 @@ class LawColumn:
     min_console: int = 0
 
 
-_BASIS_TEXT: dict[Basis, str] = {
-    "proved": "proved",
-    "plausible": "plausible",
-    "bounded": "bounded",
-    "wall gain": "no limit",
-    "none": "–",
-}
+_BASIS_TEXT = {"wall gain": "no limit", "none": "–"}
 # Lengths of maps and profiles, which are not arguments of a kind.
 _LENGTH_NAMES = {"pitch", "cutoff"}
 _OMITTED_NAMES = {"kind", "preparation", "phase", "direction", "phases", "wavevectors"}
@@ -166,7 +159,10 @@ def _conservation_cell(row: LawRow, _comparison: Comparison) -> Cell:
 
 def _basis_cell(row: LawRow, _comparison: Comparison) -> Cell:
     limit = row.stability_limit
-    return Cell(_BASIS_TEXT[limit.basis], note=stability_limit_text(limit, row.passivity.loop))
+    return Cell(
+        _BASIS_TEXT.get(limit.basis, limit.basis),
+        note=stability_limit_text(limit, row.passivity.loop),
+    )
 
 
 def _oscillation_cell(row: LawRow, _comparison: Comparison) -> Cell:

@@ -9,34 +9,11 @@ from asperity.devices import FIELD_TABLE, FIELD_UNITS, Datum, Device, WallTest
 from asperity.report import page
 from asperity.report.page import HEADED, Cell, Media, Page, Row, Section, Table, TableLayout
 from asperity.report.sentences.number_text import NOT_AVAILABLE, readable_name
+from asperity.report.sentences.texts import table_data, table_notes
 
 UNVERIFIED_MARK = "?"
-UNVERIFIED_NOTE = (
-    f"{UNVERIFIED_MARK} not verified: from memory, or derived from unverified data; "
-    "no public source was read."
-)
-_MORE_NOTE = "Sources and other values: asperity devices NAME"
 _NAME_MIN_CONSOLE = 96
 """Console width [characters] from which the full name has a column."""
-
-_USED_FIELDS = (
-    "max_stiffness",
-    "position_resolution",
-    "force_resolution",
-    "update_rate",
-    "bandwidth",
-    "damping",
-    "friction",
-)
-# The data that distinguish devices; all data are listed for one device.
-_DEVICE_COLUMNS = {
-    "max\nforce": "max_force",
-    "stiffest\nwall": "max_stiffness",
-    "position\nstep": "position_resolution",
-    "force\nstep": "force_resolution",
-    "update\nrate": "update_rate",
-    "damping\nσ₀(B)": "damping",
-}
 
 
 def datum_text(datum: Datum | None) -> str:
@@ -78,18 +55,18 @@ def devices_page(devices: Sequence[Device], *, detailed: bool = False) -> Page:
     if detailed:
         return Page("", "", (), [part for device in devices for part in _device_sections(device)])
     has_unverified = any(not datum.verified for device in devices for datum in device.data.values())
-    notes = [UNVERIFIED_NOTE] if has_unverified else []
-    last = page.terminal_section(notes=[*notes, _MORE_NOTE])
+    unverified, more = table_notes("devices")
+    last = page.terminal_section(notes=[unverified, more] if has_unverified else [more])
     return Page("", "", (), [page.terminal_section(_devices_table(devices)), last])
 
 
 def _devices_table(devices: Sequence[Device]) -> Table:
     """Return one row per device, the first column its id alone."""
-    rows = []
+    rows, columns = [], table_data("devices")
     for device in devices:
-        texts = [datum_text(device.data.get(field)) for field in _DEVICE_COLUMNS.values()]
+        texts = [datum_text(device.data.get(field)) for field in columns.values()]
         rows.append(Row([Cell(device.id, "l"), device.name, *texts]))
-    headings = ("id", "device", *_DEVICE_COLUMNS)
+    headings = ("id", "device", *columns)
     layout = TableLayout(wrap=(1,), min_console={1: _NAME_MIN_CONSOLE})
     return Table(headings, rows, range(2, len(headings)), layout)
 
@@ -144,7 +121,7 @@ def missing_fields(device: Device) -> list[str]:
     """
     return [
         f"{field} [{FIELD_UNITS[field]}]: {FIELD_TABLE[field].description}"
-        for field in _USED_FIELDS
+        for field in table_data("used_fields")
         if field not in device.data
     ]
 

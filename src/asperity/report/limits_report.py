@@ -16,7 +16,7 @@ from asperity.report.sentences.number_text import (
     readable_name,
     yes_no_text,
 )
-from asperity.report.sentences.texts import glossary, table_notes
+from asperity.report.sentences.texts import glossary, table_data, table_notes
 
 _LIMIT_HEADINGS = ("", "limit", "condition", "left", "right", "holds", "for", "at speeds")
 _NAME_COLUMN, _SHARE_COLUMN, _SPEEDS_COLUMN = 1, 6, 7
@@ -32,13 +32,6 @@ _WAVE_HEADINGS = ("wavelength", "amplitude", "share", "frequency", "force")
 MAX_WAVES = 16
 """Number of waves listed: those with the greatest share of the height variance."""
 WAVE_LIMITS = tuple(rule.number for rule in LIMIT_RULES if rule.number != 5)
-_SYMBOL_FIELDS = {
-    "T": "update_rate",
-    "δ": "position_resolution",
-    "b": "force_resolution",
-    "K₀": "max_stiffness",
-    "F₀": "bandwidth",
-}
 
 
 def side_text(side: float | None, unit: str) -> str:
@@ -108,7 +101,7 @@ def symbol_lines(result: limit_result.Limits) -> list[str]:
     """Return the symbols of the limits with their values."""
     device, surface = result.device, result.surface
     values = []
-    for symbol, field in _SYMBOL_FIELDS.items():
+    for symbol, field in table_data("symbols").items():
         if field in device.data:
             datum = device.data[field]
             text = f"1/({datum.text})" if field == "update_rate" else datum.text

@@ -22,6 +22,7 @@ from asperity.measured.prepared import PreparationStage, PreparedSurface
 from asperity.report import page
 from asperity.report.page import HEADED, SCREEN, Cell, Media, Row, Section, Table, TableLayout
 from asperity.report.sentences.number_text import NOT_AVAILABLE
+from asperity.report.sentences.texts import sentence, table_data
 from asperity.textures.fields.potential_field import PotentialField
 from asperity.textures.texture import Texture
 from asperity.textures.texture_loading import MeasurementSummary, decimate
@@ -31,14 +32,6 @@ if TYPE_CHECKING:
 
 _RMS = find_parameter("Sq")
 _REMOVED = ("removed, RMS", "removed, range")
-# Columns of maps and profiles by importance, for narrow consoles.
-_COLUMN_PRIORITY = (
-    *["Sq", "q", "Sz", "z"],
-    _REMOVED[0],
-    *["Sa", "a", "Sdq", "Sm", "dq", "Sdr", "Ssk", "sk", "Sku", "ku"],
-    _REMOVED[1],
-    *["t", "Sp", "p", "Sv", "v"],
-)
 _LENGTH_UNITS = (("m", 1.0), ("mm", 1e-3), ("µm", 1e-6), ("nm", 1e-9))
 _Column = tuple[str, list[Cell]]  # heading and cells
 _REMOVED_MEANING = ("removed", "deviation that the step removed: RMS about the mean, and range")
@@ -59,8 +52,9 @@ def stages_table(stages: Sequence[PreparationStage]) -> Table:
     for name, values in zip(_REMOVED, zip(*removed, strict=True), strict=True):
         columns.append(_number_column(name, _RMS, values))
     keys += _REMOVED
+    priority = table_data("parameters")
     layout = TableLayout(
-        drop_order=sorted(range(1, len(keys)), key=lambda i: _COLUMN_PRIORITY.index(keys[i])),
+        drop_order=sorted(range(1, len(keys)), key=lambda i: priority.index(keys[i])),
         legend={**legend, len(keys): _REMOVED_MEANING},
         dropped_note="More in a wider terminal, and with --json.",
     )
@@ -151,20 +145,14 @@ def _compute_parts(texture: Texture) -> SurfaceDecomposition:
 
 def parts_text(parts: SurfaceDecomposition) -> str:
     """Return how form, waviness and texture are separated, in one sentence."""
-    return (
-        "Form: the least-squares polynomial of second degree. Waviness: longer than about "
-        f"{format_quantity(parts.nesting, 'm')} (Gaussian L-filter, ISO 16610). Texture: the rest."
-    )
+    return sentence("parts", nesting=format_quantity(parts.nesting, "m"))
 
 
 def texture_text(parts: SurfaceDecomposition) -> str:
     """Return the RMS of texture, form and waviness, in one sentence."""
-    rms = format_quantity(parts.texture.rms, "m")
-    return (
-        f"Texture of {rms} RMS in waves shorter than {format_quantity(parts.nesting, 'm')}, on a "
-        f"form of {format_quantity(parts.form.rms, 'm')} and a waviness of "
-        f"{format_quantity(parts.waviness.rms, 'm')} RMS."
-    )
+    lengths = (parts.texture.rms, parts.nesting, parts.form.rms, parts.waviness.rms)
+    texture, nesting, form, waviness = (format_quantity(length, "m") for length in lengths)
+    return sentence("texture", texture=texture, nesting=nesting, form=form, waviness=waviness)
 
 
 def roughness_text(history: Sequence[PreparationStage]) -> str:
@@ -172,10 +160,8 @@ def roughness_text(history: Sequence[PreparationStage]) -> str:
     if not history or (nesting := history[-1].nesting) is None:
         return ""
     symbol, rms = next(iter(history[-1].values.items()))
-    return (
-        f"Roughness {symbol} of {format_quantity(rms or 0.0, 'm')} RMS: the waves shorter than "
-        f"{format_quantity(nesting, 'm')}, the cut-off of the L-filter that was asked for."
-    )
+    rms_text, nesting_text = format_quantity(rms or 0.0, "m"), format_quantity(nesting, "m")
+    return sentence("roughness", symbol=symbol, rms=rms_text, nesting=nesting_text)
 
 
 def surface_summary_text(prepared: PreparedSurface) -> str:

@@ -19,6 +19,7 @@ from asperity.report.comparison_columns import describe_texture, texture_name
 from asperity.report.html import Origin, render_page
 from asperity.report.page import SCREEN, Media, Page, Row, Section, Table, TableLayout
 from asperity.report.sentences.number_text import readable_name
+from asperity.report.sentences.texts import sentence
 from asperity.scene.setup import Setup
 from asperity.simulation import Run
 from asperity.simulation.limit_cycles.onset import is_at_rest
@@ -73,10 +74,7 @@ def run_answer(setup: Setup, run: Run) -> str:
 
 def search_error_text(run: Run) -> str:
     """Return the error bound of the forces where searches were truncated."""
-    share = (
-        f"In {run.truncated_ticks} of {run.samples} samples the search for the nearest point was "
-        "truncated"
-    )
+    share = sentence("truncated", count=run.truncated_ticks, samples=run.samples)
     if run.surface.law.contact.bounds_force_error:
         error = format_quantity(run.surface.stiffness * run.search_error, "N", digits=2)
         return f"{share}: the error of the force was at most {error}"
@@ -99,10 +97,7 @@ def rest_text(setup: Setup, run: Run) -> str:
         verdict = "keeps moving: a limit cycle"
         verdict += ", or the chatter of steps" if has_steps else ""
     limit, spread = (format_quantity(one, "m/s", digits=3) for one in (felt, speed))
-    return (
-        f"The handle {verdict} (velocity varies by {spread} in the last quarter; a hand feels "
-        f"{limit} at that frequency)"
-    )
+    return sentence("rest", verdict=verdict, spread=spread, limit=limit)
 
 
 def loop_facts(setup: Setup) -> list[tuple[str, str]]:
@@ -159,12 +154,8 @@ def closure_text(run: Run) -> str:
     share = abs(ledger.closure) / ledger.exchanged if ledger.exchanged > 0.0 else 0.0
     if not math.isfinite(share):
         return "The run diverged: its energies are not finite."
-    return (
-        "Positive: the hand gains energy. Exact: the held force on the true motion. The paper's "
-        "sum: the command and the measured step of one sample. By sampling: the energy that "
-        f"holding the force adds, ½ Σ (f_k - f_k+1)·(p_k+1 - p_k). Residual: {share:.1g} of the "
-        f"{format_quantity(ledger.exchanged, 'J', digits=3)} exchanged."
-    )
+    exchanged = format_quantity(ledger.exchanged, "J", digits=3)
+    return sentence("ledger", share=f"{share:.1g}", exchanged=exchanged)
 
 
 def ledger_table(run: Run) -> Table:

@@ -13,7 +13,7 @@ from asperity.report import page
 from asperity.report.loop.run_report import LOOP_FOOTER, loop_facts
 from asperity.report.page import Cell, Cells, Media, Page, Row, Section, Table, TableLayout
 from asperity.report.sentences.number_text import INFINITY_SIGN, NOT_AVAILABLE
-from asperity.report.sentences.texts import table_notes
+from asperity.report.sentences.texts import table_data, table_notes
 from asperity.scene.setup import Setup
 from asperity.scene.sweep_results import OnsetSweep, StrokeSweep
 from asperity.simulation.limit_cycles.onset import Prediction
@@ -21,19 +21,6 @@ from asperity.simulation.scan import Stroke
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-ONSET_HEADINGS = (
-    "law",
-    "d",
-    "quiet to",
-    "cycles",
-    "starts",
-    "depth",
-    "q",
-    "paper (1)",
-    "delay rule",
-    "K₀/q",
-)
 
 
 def onset_cells(prediction: Prediction) -> list[Cell]:
@@ -58,11 +45,6 @@ def onset_cells(prediction: Prediction) -> list[Cell]:
         Cell(proved, "no" if prediction.violates_delay_rule else ""),
         Cell(wall_text, "no" if prediction.violates_wall_rule else ""),
     ]
-
-
-def _onset_table(predictions: Sequence[Prediction]) -> Table:
-    rows = [Row(onset_cells(one), law=one.onset.law) for one in predictions]
-    return _sweep_table(ONSET_HEADINGS, rows)
 
 
 def _sweep_table(headings: Sequence[str], rows: Sequence[Row], omit: Sequence[int] = ()) -> Table:
@@ -138,7 +120,9 @@ def _draw_onsets(predictions: Sequence[Prediction]) -> Figure:
 
 def onset_section(title: str, predictions: Sequence[Prediction], caption: str = "") -> Section:
     """Return onsets and limits in numbers."""
-    return Section(title, [_onset_table(predictions)], caption, table_notes("onsets"))
+    rows = [Row(onset_cells(one), law=one.onset.law) for one in predictions]
+    table = _sweep_table(table_data("onsets"), rows)
+    return Section(title, [table], caption, table_notes("onsets"))
 
 
 STROKE_HEADINGS = ("law", "speed", "depth", "x", "y", "z", "sum", "field", "±", "paper's", "lost")
@@ -170,11 +154,6 @@ def stroke_cells(stroke: Stroke) -> Cells:
     ]
 
 
-def _stroke_table(strokes: Sequence[Stroke]) -> Table:
-    rows = [Row(stroke_cells(one), law=one.law) for one in strokes]
-    return _sweep_table(STROKE_HEADINGS, rows, omit=(STROKE_HEADINGS.index("y"),))
-
-
 def stroke_answer(strokes: Sequence[Stroke]) -> str:
     """Return which laws deliver energy, and which do so by their field, in two sentences."""
     by_all = _group_laws(strokes, lambda stroke: stroke.total > stroke.spread + stroke.error)
@@ -198,7 +177,8 @@ def strokes_page(result: StrokeSweep) -> Page:
     stops = sorted({stroke.stop_message for stroke in strokes if stroke.stop_message})
     (note,) = table_notes("strokes")
     notes = [f"{note} The y axis: --html, --json.", *(f"Stopped: it {one}" for one in stops)]
-    table = _stroke_table(strokes)
+    rows = [Row(stroke_cells(one), law=one.law) for one in strokes]
+    table = _sweep_table(STROKE_HEADINGS, rows, omit=(STROKE_HEADINGS.index("y"),))
     return Page(
         title=f"Energy per stroke, {setup.device.name}",
         answer=stroke_answer(strokes),

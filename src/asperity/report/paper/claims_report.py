@@ -8,7 +8,7 @@ from functools import partial
 from itertools import groupby
 from typing import Any
 
-from asperity.paper import VERDICTS, Result, Verdict
+from asperity.paper import VERDICTS, Result
 from asperity.paper.claim import Number
 from asperity.paper.experiments import Experiments
 from asperity.paper.experiments.cycle_counts import CycleCount, PassivityExperiment
@@ -21,32 +21,16 @@ from asperity.report.loop.run_report import energy_text
 from asperity.report.page import HEADED, Cell, Cells, Media, Page, Row, Section, Table, TableLayout
 from asperity.report.pictures import paper_pictures
 from asperity.report.pictures.paper_pictures import loop_energy_text
-from asperity.report.sentences.texts import table_notes
+from asperity.report.sentences.texts import sentence, table_data, table_notes
 
-_VERDICT_KINDS: dict[Verdict, str] = {
-    "holds": "good",
-    "holds with correction": "part",
-    "does not hold": "no",
-    "undecided": "open",
-}
-_VERDICT_FACTS = (
-    ("As printed", "holds"),
-    ("With a small correction", "holds with correction"),
-    ("Contradicted by the numbers", "does not hold"),
-    ("Needs perception, or unstated values", "undecided"),
-)
 _MORE_NOTE = "The evidence of one claim: asperity reproduce --claim ID"
-_FOOTER = (
-    "on Campion and Hayward, “On the Synthesis of Haptic Textures”. Every verdict follows from "
-    "numbers computed for this page."
-)
 
 
 def verdict_counts_text(results: Sequence[Result]) -> str:
     """Return the number of claims by verdict: "Of 60 claims 55 hold, ..."."""
     counts = {verdict: sum(r.verdict == verdict for r in results) for verdict in VERDICTS}
-    words = ("hold", "hold with a correction", "do not hold", "are undecided")
-    parts = [f"{count} {word}" for count, word in zip(counts.values(), words, strict=True)]
+    verdicts = table_data("verdicts")
+    parts = [f"{count} {verdicts[verdict]['plural']}" for verdict, count in counts.items()]
     return f"Of {len(results)} claims {', '.join(parts)}."
 
 
@@ -70,7 +54,12 @@ def claims_page(results: Sequence[Result], experiments: Experiments | None) -> P
     sections += page.user_sections(Result, results, experiments)
     sections += [one for one in page.assumption_sections(guesses) if Media.HTML in one.media]
     title = "“On the Synthesis of Haptic Textures”, claim by claim"
-    return Page(title, verdict_counts_text(results), _VERDICT_FACTS, sections, _FOOTER)
+    facts = [(one["fact"], verdict) for verdict, one in table_data("verdicts").items()]
+    return Page(title, verdict_counts_text(results), facts, sections, sentence("claims"))
+
+
+def _verdict_cell(result: Result) -> Cell:
+    return Cell(result.verdict, table_data("verdicts")[result.verdict]["kind"])
 
 
 def _terminal_sections(results: Sequence[Result], experiments: Experiments | None) -> list[Section]:
@@ -83,8 +72,7 @@ def _terminal_sections(results: Sequence[Result], experiments: Experiments | Non
             statement = f"{numbers}: {result.statement}" if numbers else result.statement
             if result.evidence.fitted:
                 statement += f" ({result.evidence.fitted})"
-            verdict = Cell(result.verdict, _VERDICT_KINDS[result.verdict])
-            rows.append(Row([result.id, verdict, statement]))
+            rows.append(Row([result.id, _verdict_cell(result), statement]))
     layout = TableLayout(wrap=(2,), gap=2, has_rule=False)
     table = Table(("claim", "verdict", "states"), rows, layout=layout)
     lines = experiments.summary_lines if experiments is not None else ()
@@ -105,11 +93,10 @@ def evidence_page(results: Sequence[Result]) -> Page:
 
 def _evidence_section(result: Result) -> Section:
     places = ", ".join((*result.equations, f"section {result.section}"))
-    verdict = Row([Cell(result.verdict, _VERDICT_KINDS[result.verdict])])
     details = _evidence_details(result)[1:]
     blocks: list[page.Block] = [
         page.Paragraph(result.statement),
-        Table((), [verdict]),
+        Table((), [Row([_verdict_cell(result)])]),
         page.Paragraph(result.evidence.summary),
         *[page.Paragraph(f"{name[0].upper()}{name[1:]}: {text}") for name, text in details],
     ]
@@ -150,7 +137,7 @@ def _claim_row(result: Result) -> Row:
         Cell(result.id, "l"),
         ", ".join(result.equations),
         Cell(result.statement, subtext=evidence.fitted, details=details),
-        Cell(result.verdict, _VERDICT_KINDS[result.verdict]),
+        _verdict_cell(result),
     ]
     return Row(cells, id=result.id)
 

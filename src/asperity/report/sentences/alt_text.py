@@ -11,6 +11,7 @@ from asperity.analysis.analyze import Analysis
 from asperity.analysis.compare import Comparison
 from asperity.core.units import format_quantity
 from asperity.report.sentences.number_text import bound_text
+from asperity.report.sentences.texts import sentence
 from asperity.textures.texture import Texture
 
 
@@ -27,10 +28,7 @@ def surface_alt_text(texture: Texture) -> str:
     sides = " by ".join(
         format_quantity(float((span @ span) ** 0.5), "m") for span in texture.domain.spans
     )
-    return (
-        f"A map of {sides} from above, {height} from peak to valley, and a section along the "
-        "scan line."
-    )
+    return sentence("map", sides=sides, height=height)
 
 
 def spectrum_alt_text(comparison: Comparison) -> str:
@@ -54,12 +52,7 @@ def hand_alt_text(comparison: Comparison) -> str:
     row = comparison.recommended_row or comparison.nearest_row
     if row is None or row.perceptibility is None:
         return "Thresholds of the hand; no law has a known stiffness."
-    found = row.perceptibility
-    return (
-        f"Motion of the held tool under law {row.law.letter} against frequency, with what nobody "
-        f"notices and what is felt: {found.tier}, {found.level:.2g} times what is felt, most of "
-        f"it at {found.frequency:.3g} Hz."
-    )
+    return sentence("hand", law=row.law.letter, found=row.perceptibility)
 
 
 def force_alt_text(comparison: Comparison) -> str:
@@ -67,9 +60,7 @@ def force_alt_text(comparison: Comparison) -> str:
     from asperity.report.pictures.law_pictures import force_segment
 
     length = format_quantity(force_segment(comparison.texture).length, "m", digits=3)
-    return (
-        f"Force along {length} of the scan line, a panel for each of {_law_count_text(comparison)}."
-    )
+    return sentence("force", length=length, laws=_law_count_text(comparison))
 
 
 def field_alt_text(comparison: Comparison) -> str:
@@ -84,11 +75,7 @@ def gain_alt_text(comparison: Comparison) -> str:
     """Return the laws with the greatest and the least loop gain."""
     rows = sorted(comparison.rows, key=lambda row: row.q.value)
     least, most = (f"{row.law.letter} ({bound_text(row.q)})" for row in (rows[0], rows[-1]))
-    return (
-        "Loop gain in the vertical plane of the scan, a panel for each of "
-        f"{_law_count_text(comparison)}. The supremum q is least for {least} and greatest for "
-        f"{most}."
-    )
+    return sentence("gain", laws=_law_count_text(comparison), least=least, most=most)
 
 
 def merit_alt_text(comparison: Comparison) -> str:

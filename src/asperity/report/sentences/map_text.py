@@ -8,6 +8,7 @@ from asperity.analysis import characteristic_number, worst_loop
 from asperity.core.units import format_quantity
 from asperity.export.surface_maps import SampledMap, height_resolution, normal_error
 from asperity.report.loop.run_report import energy_text
+from asperity.report.sentences.texts import sentence
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
 
@@ -19,10 +20,7 @@ def describe_map(sampled_map: SampledMap) -> str:
     wide, high = (format_quantity(side, "m") for side in sampled_map.size)
     tiled = "it can be tiled" if sampled_map.is_periodic else "it cannot be tiled"
     words = f"{sampled_map.description[:1].upper()}{sampled_map.description[1:]}"
-    return (
-        f"{words}: {wide} x {high} as a picture, x to the right, y down; {tiled}. On a mesh v"
-        " is y / height where it goes down (glTF), 1 - y / height where it goes up (CHAI3D)."
-    )
+    return sentence("sampled_map", words=words, size=f"{wide} x {high}", tiled=tiled)
 
 
 def describe_heights(sampled_map: SampledMap, suffix: str) -> str:
@@ -37,10 +35,8 @@ def describe_heights(sampled_map: SampledMap, suffix: str) -> str:
 def describe_normals(sampled_map: SampledMap, convention: str) -> str:
     """Return the errors of normals in 8 bits, and of forces computed from them."""
     angle = normal_error(sampled_map, convention)
-    return (
-        f"8 bits turn a normal by up to {math.degrees(angle):.2g}°: the error of a force along it "
-        f"is up to {100.0 * 2.0 * math.sin(0.5 * angle):.2g} % of the force."
-    )
+    error = 100.0 * 2.0 * math.sin(0.5 * angle)
+    return sentence("normals", angle=f"{math.degrees(angle):.2g}°", error=f"{error:.2g} %")
 
 
 def describe_shading(texture: Texture, stiffness: float | None) -> str:
@@ -56,7 +52,4 @@ def describe_shading(texture: Texture, stiffness: float | None) -> str:
     has_gain = leak.energy > 0.0
     energy = f"a loop gains {energy_text(leak.energy)}" if has_gain else "no loop gains energy"
     at, depth = format_quantity(surface.stiffness, "N/m"), format_quantity(surface.max_depth, "m")
-    return (
-        f"A force along these normals is law {_SHADING_LAW}. At {at}, pressed to {depth}, {energy},"
-        f" and its stiffness is up to {q.value:.3g} times that of the wall (q, {q.method})."
-    )
+    return sentence("shading", law=_SHADING_LAW, at=at, depth=depth, energy=energy, q=q)

@@ -1,4 +1,4 @@
-"""Texts of the pages that contain no results, read from ``texts.toml``."""
+"""Texts of the pages, read from ``texts.toml``; results are filled in."""
 
 from __future__ import annotations
 
@@ -13,6 +13,17 @@ def _load_texts() -> dict[str, Any]:
     return tomllib.loads(
         resources.files("asperity.report").joinpath("texts.toml").read_text("utf-8")
     )
+
+
+def sentence(name: str, **values: object) -> str:
+    """Return a sentence by its name in ``texts.toml``, with values for the names in braces."""
+    text: str = _load_texts()["sentences"][name]
+    return text.format(**values)
+
+
+def table_data(name: str) -> Any:
+    """Return headings, fields or kinds of rows of a table, by its name in ``texts.toml``."""
+    return _load_texts()["tables"][name]
 
 
 def glossary(result: str) -> list[tuple[str, str]]:
