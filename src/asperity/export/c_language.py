@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import ast
 import math
+import tomllib
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -164,14 +165,14 @@ def c_scalar_type(value_type: ValueType, real: str) -> str:
     return known.get(value_type, real)
 
 
-REAL_FUNCTIONS = {"arccos": "acos", "arcsin": "asin", "arctan": "atan", "arctan2": "atan2"} | {
-    name: name
-    for line in (
-        "acos acosh asin asinh atan atan2 atanh cbrt copysign cos cosh exp exp2 expm1 fabs hypot",
-        "log log10 log1p log2 pow sin sinh sqrt tan tanh",
-    )
-    for name in line.split()
-}
+def words(group: str) -> list[str]:
+    """Return the words of a group of the file ``c_words.toml``."""
+    text: str = tomllib.loads(load_template("c_words.toml"))[group]
+    return text.split()
+
+
+REAL_FUNCTIONS = {name: name for name in words("functions")}
+REAL_FUNCTIONS |= {f"arc{name}": f"a{name}" for name in ("cos", "sin", "tan", "tan2")}
 """C functions of the functions of ``math`` and ``numpy`` from real numbers to a real number."""
 
 REAL_CONSTANTS = {name: float(getattr(math, name)) for name in ("e", "inf", "nan", "pi", "tau")}

@@ -320,10 +320,8 @@ class ExpressionTypes(ast.NodeVisitor):
         raise self.not_exportable("makes a work array without a constant shape", node)
 
 
-_CONVERSIONS = {"bool": c.BOOL, "pow": c.FLOAT, "float": c.FLOAT, "float64": c.FLOAT} | {
-    "int": c.INT,
-    "int64": c.INT,
-}
+_CONVERSIONS = {"bool": c.BOOL} | dict.fromkeys(("pow", "float", "float64"), c.FLOAT)
+_CONVERSIONS |= dict.fromkeys(("int", "int64"), c.INT)
 
 
 def called_name(node: ast.Call) -> str:

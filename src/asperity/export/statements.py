@@ -12,20 +12,7 @@ from asperity.export.expression_types import ProgramContext, called_name
 from asperity.export.expressions import BINARY_OPERATORS, ExpressionPrinter
 from asperity.export.type_inference import FunctionTypes
 
-RESERVED_WORDS = frozenset(
-    word
-    for line in (
-        "auto break case char const continue default do double else enum extern float for goto if",
-        "inline int long register restrict return short signed sizeof static struct switch typedef",
-        "union unsigned void volatile while and and_eq asm bitand bitor bool catch class compl",
-        "const_cast constexpr delete dynamic_cast explicit export false friend mutable namespace",
-        "new noexcept not not_eq nullptr operator or or_eq private protected public",
-        "reinterpret_cast static_assert static_cast template this throw true try typeid typename",
-        "using virtual wchar_t xor xor_eq far near small huge interface pascal linux unix I IN OUT",
-        "min max",
-    )
-    for word in line.split()
-)
+RESERVED_WORDS = frozenset(c.words("reserved"))
 """Keywords of C and C++, and names that system headers define as macros."""
 
 

@@ -9,7 +9,6 @@ import hashlib
 import io
 import struct
 import zipfile
-import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -297,18 +296,15 @@ def _encode_png(
     text.add_text("Description", words.encode("latin-1", "replace").decode("latin-1"))
     stream = io.BytesIO()
     Image.fromarray(pixels).save(stream, "png", pnginfo=text)
-    size = "\0".join(repr(step) for step in surface_map.spacing)
-    chunks = _png_chunk(b"sCAL", b"\x01" + size.encode()) + (kind and _png_chunk(kind, data))
+    size, chunks = "\0".join(repr(step) for step in surface_map.spacing), io.BytesIO()
+    PngImagePlugin.putchunk(chunks, b"sCAL", b"\x01" + size.encode())
+    if kind:
+        PngImagePlugin.putchunk(chunks, kind, data)
     png = stream.getvalue()
-    return png[:_PNG_HEADER_SIZE] + chunks + png[_PNG_HEADER_SIZE:]
+    return png[:_PNG_HEADER_SIZE] + chunks.getvalue() + png[_PNG_HEADER_SIZE:]
 
 
 _PNG_HEADER_SIZE = 8 + 25  # signature and chunk IHDR
-
-
-def _png_chunk(kind: bytes, data: bytes) -> bytes:
-    checksum = zlib.crc32(data, zlib.crc32(kind))
-    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", checksum)
 
 
 def _x3p_main_xml(surface_map: SampledMap, digest: str) -> bytes:
