@@ -218,7 +218,7 @@ def test_other_comparisons_are_ignored(text: str) -> None:
 
 # --- size, annotations, documentation ------------------------------------------------------------
 
-MAX_LINES = 43_939  # 1939 of the 1800 for sweeps, envelopes and design
+MAX_LINES = 43_841
 """Lines of code without docstrings, comments, blank lines and generated files."""
 
 

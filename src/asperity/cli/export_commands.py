@@ -71,11 +71,7 @@ def export_command(
     check_output("output", output, force=force)
     field = path.with_suffix(".field") if load and not is_field(surface) else None
     check_output("output", str(field) if field else None, force=force)
-    ExportRequest.validate(
-        request.get("name", "texture"),
-        request.get("precision", "double"),
-        request.get("max_evaluations"),
-    )
+    ExportRequest.validate(**request)
 
     from asperity.analysis.analyze import STEPS, analyze
     from asperity.export.export_surface import export_analysis

@@ -57,7 +57,7 @@ class ExportRequest:
     max_evaluations: float | None = None
 
     def __post_init__(self) -> None:
-        self.validate(self.name, self.precision, self.max_evaluations)
+        self.validate(**vars(self))
         if is_searched(self.surface):
             words = "must be baked to export law H: asperity bake, with --extent without a period"
             raise ParameterError("surface", words)
@@ -65,8 +65,13 @@ class ExportRequest:
             raise ParameterError("load", "needs a baked field: law H without a closed form")
 
     @staticmethod
-    def validate(name: str, precision: str, max_evaluations: float | None) -> None:
-        """Check the options without a surface.
+    def validate(
+        name: str = "texture",
+        precision: str = "double",
+        max_evaluations: float | None = None,
+        **_others: object,
+    ) -> None:
+        """Check the options without a surface; others are ignored.
 
         Raises:
             ParameterError: see the class.

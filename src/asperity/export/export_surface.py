@@ -84,11 +84,7 @@ def export_code(
     targets.check_name(place, target)
     names = ("name", "precision", "max_data_size", "max_evaluations")
     request = {name: arguments.pop(name) for name in names if name in arguments}
-    ExportRequest.validate(
-        request.get("name", "texture"),
-        request.get("precision", "double"),
-        request.get("max_evaluations"),
-    )
+    ExportRequest.validate(**request)
     is_file = isinstance(surface, (str, os.PathLike)) and is_field(surface)
     field = place.with_suffix(".field") if load and not is_file else None
     for file in filter(None, [place, field]):

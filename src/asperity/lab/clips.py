@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import io
-import shutil
 import zipfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -139,10 +138,8 @@ def _find_segment(rows: FloatArray, delay: int) -> tuple[int, int]:
     end = int(whole.nonzero()[0][-1]) + 1 if whole.any() else 0
     ramped = np.flatnonzero(~whole[:end])
     changed = int(ramped[-1]) + 1 if len(ramped) else 0
-    busy = (rows[:, _FORCES] != 0.0).any(axis=1)
-    busy |= (rows[:, COLUMN_NAMES.index("inside")] != 0.0) | (
-        rows[:, COLUMN_NAMES.index("law held")] != 0.0
-    )
+    states = [COLUMN_NAMES.index(name) for name in ("inside", "law held")]
+    busy = (rows[:, _FORCES] != 0.0).any(axis=1) | (rows[:, states] != 0.0).any(axis=1)
     # Commands of the last samples are still delayed.
     waits = np.convolve(busy, np.ones(delay + 2))[: len(rows)] > 0.5
     free = np.flatnonzero(~waits[changed:end])
@@ -186,15 +183,10 @@ class ClipStore:
         self.announcements: list[dict[str, Any]] = []
         self._saved_count, self._is_saving = 0, False
 
-    def add_recording(
-        self, name: str, playback: Playback, scene_state: SceneState, title: str
-    ) -> None:
-        """Add a recording, which is never discarded and is opened at once."""
-        self._add(name, playback, scene_state, title=title, opens_at_start=True)
-
-    def _add(
+    def add(
         self, name: str, playback: Playback, scene_state: SceneState, **words: Any
     ) -> dict[str, Any]:
+        """Add a clip, or a recording, which is never discarded; return its description."""
         self._playbacks[name] = playback
         self._session.saved_scenes.clip_scenes[name] = scene_state
         clip = {"name": name, "law": scene_state.setup.surface.law.letter, "archive": None, **words}
@@ -230,9 +222,8 @@ class ClipStore:
         self._archives[name] = archive
         if len(self._archives) > MAX_CLIPS:
             self._discard(next(iter(self._archives)))
-        title = str(self._saved_count)
-        files = {"title": title, "archive": f"{name}.zip"}
-        return self._add(name, clip.playback(), clip.scene_state, **files)
+        files = {"title": str(self._saved_count), "archive": f"{name}.zip"}
+        return self.add(name, clip.playback(), clip.scene_state, **files)
 
     def _discard(self, name: str) -> None:
         for clips in (self._archives, self._playbacks, self._session.saved_scenes.clip_scenes):
@@ -274,11 +265,7 @@ def find_recording(source: str, folder: Path) -> Path | None:
                 raise ParameterError(
                     "recording", f"{source} contains a recording larger than 1 GiB"
                 )
-            with (
-                archive.open(RECORDING_FILE) as packed,
-                (folder / RECORDING_FILE).open("wb") as file,
-            ):
-                shutil.copyfileobj(packed, file)
+            archive.extract(RECORDING_FILE, folder)
     except (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError) as error:
         if not zipfile.is_zipfile(source):
             return None

@@ -28,7 +28,7 @@ _PORT_ATTEMPTS = 50  # consecutive ports that are tried
 
 
 def bind_socket(port: int | None) -> socket.socket:
-    """Return a socket that is bound to the loopback interface.
+    """Return a socket that listens on the loopback interface.
 
     Args:
         port: the port, 0 for any; ``None`` for the first free one from ``DEFAULT_PORT``.
@@ -40,12 +40,9 @@ def bind_socket(port: int | None) -> socket.socket:
     if not 0 <= wanted < PORT_COUNT:
         raise ParameterError("port", f"must be 0 (any free port) to {PORT_COUNT - 1}", wanted)
     for number in range(wanted, min(wanted + _PORT_ATTEMPTS, PORT_COUNT)):
-        bound = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         try:
-            bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            bound.bind((LOOPBACK_ADDRESS, number))
+            bound = socket.create_server((LOOPBACK_ADDRESS, number))
         except OSError:
-            bound.close()
             continue
         if port is not None and number != wanted:
             bound.close()

@@ -93,19 +93,14 @@ def _parse_number(name: str, value: object, minimum: float, maximum: float) -> f
     return float(value)
 
 
-def _parse_numbers(
-    name: str, value: object, count: int, minimum: float, maximum: float
-) -> tuple[float, ...]:
+def _parse_numbers(name: str, value: object, count: int, limit: float) -> tuple[float, ...]:
     if not isinstance(value, list) or len(value) != count:
         raise MalformedMessageError(f"{name} must be {count} numbers")
-    return tuple(_parse_number(name, part, minimum, maximum) for part in value)
+    return tuple(_parse_number(name, part, -limit, limit) for part in value)
 
 
 def _parse_steer(speed: object, **points: object) -> SteerRequest:
-    vectors = {
-        name: _parse_numbers(name, value, 3, -MAX_REACH, MAX_REACH)
-        for name, value in points.items()
-    }
+    vectors = {name: _parse_numbers(name, value, 3, MAX_REACH) for name, value in points.items()}
     angular = _parse_number("speed", speed, -MAX_ANGULAR_SPEED, MAX_ANGULAR_SPEED)
     return SteerRequest(**vectors, speed=angular)
 
@@ -126,7 +121,7 @@ def _parse_relief(x: object, y: object, size: object) -> ViewRequest:
 
 
 def _parse_section(box: object, y: object) -> ViewRequest:
-    sides = left, right, bottom, top = _parse_numbers("box", box, 4, -1.0, 1.0)
+    sides = left, right, bottom, top = _parse_numbers("box", box, 4, 1.0)
     if not all(MIN_VIEW_SIZE <= side <= MAX_VIEW_SIZE for side in (right - left, top - bottom)):
         limits = f"must have sides of {MIN_VIEW_SIZE:g} to {MAX_VIEW_SIZE:g} m"
         raise ParameterError("box", limits, box)
@@ -163,15 +158,11 @@ MAX_FORCE_ROWS = 2048
 
 def frame_layout() -> dict[str, Any]:
     """Return the index of each number of a frame, for the page."""
-    columns = len(COLUMN_NAMES)
-    after = len(HEADER) + len(_POSITION_NAMES)
+    parts, after = ("newest", "minima", "maxima", "forces"), len(HEADER) + len(_POSITION_NAMES)
     return {
         "header": {name: place for place, name in enumerate((*HEADER, *_POSITION_NAMES))},
         "columns": {name: place for place, name in enumerate(COLUMN_NAMES)},
-        "newest": after,
-        "minima": after + columns,
-        "maxima": after + 2 * columns,
-        "forces": after + 3 * columns,
+        **{part: after + number * len(COLUMN_NAMES) for number, part in enumerate(parts)},
     }
 
 
@@ -263,13 +254,7 @@ def encode_section(
         np.linspace(left, right, SECTION_COLUMNS), np.linspace(bottom, top, SECTION_ROWS)
     )
     points = np.column_stack([xs.ravel(), np.full(xs.size, y), zs.ravel()])
-    force, jacobian = evaluate_field(surface, points)
+    force, jacobian = map(np.nan_to_num, surface.force_and_jacobian(points))
     curl = jacobian[:, 0, 2] - jacobian[:, 2, 0]
     head = [SECTION, PROFILE_POINTS, SECTION_COLUMNS, SECTION_ROWS, y, left, right, bottom, top]
     return np.concatenate([head, heights, force[:, 0], force[:, 2], curl]).tobytes()
-
-
-def evaluate_field(surface: Surface, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return forces (n, 3) [N] and Jacobians (n, 3, 3) [N/m], NaN replaced by zero."""
-    force, jacobian = surface.force_and_jacobian(points)
-    return np.nan_to_num(force), np.nan_to_num(jacobian)

@@ -140,9 +140,8 @@ class _ColumnLayout:
         for name in (*_POSITION_COLUMNS, *_FORCE_COLUMNS):
             if name not in self._names:
                 raise ParameterError("recording", f"has no column {name!r}: it cannot be shown")
-        self._energy_columns = ["supplied"]
-        if "supplied" not in self._names:
-            self._energy_columns = [f"supplied {axis}" for axis in "xyz"]
+        parts = tuple(f"supplied {axis}" for axis in "xyz")
+        self._energy_columns = ("supplied",) if "supplied" in self._names else parts
         if not {*self._energy_columns} <= {*self._names}:
             missing = "has no column of the energy supplied to the hand ('supplied')"
             raise ParameterError("recording", f"{missing}: it cannot be shown")
@@ -156,13 +155,14 @@ class _ColumnLayout:
         positions = np.ascontiguousarray(rows[:, self.indices(_POSITION_COLUMNS)])
         computed = {
             "share": np.ones(len(rows)),
-            "supplied": rows[:, self.indices(tuple(self._energy_columns))].sum(axis=1),
+            "supplied": rows[:, self.indices(self._energy_columns)].sum(axis=1),
             **{f"anchor {axis}": np.full(len(rows), np.nan) for axis in "xyz"},
+            **{
+                f"commanded {axis}": rows[:, self._names.index(f"applied {axis}")] for axis in "xyz"
+            },
         }
         if "inside" not in self._names:
             computed["inside"] = self._detect_contact(positions).astype(float)
-        for axis in "xyz":
-            computed[f"commanded {axis}"] = rows[:, self._names.index(f"applied {axis}")]
         zeros = np.zeros(len(rows))
         columns = computed | {name: rows[:, k] for k, name in enumerate(self._names)}
         names = (name for name, _unit in (*COLUMNS, *ANCHOR_COLUMNS))

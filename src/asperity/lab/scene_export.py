@@ -53,14 +53,10 @@ def format_scene(
         | run_section(setup.plant.to_dict(), setup.servo),
     }
     parts = [f"[{name}]\n{_format_values(values)}" for name, values in sections.items()]
-    device = _format_device(scene_state.rated_device)
-    return "\n".join([_format_header(scene_state), *parts, device])
-
-
-def _format_header(scene_state: SceneState) -> str:
-    """Return the command that runs the scene, with the plugins, which a scene cannot name."""
+    # The command names the plugins, which a scene cannot name.
     named = "".join(f" --plugin {name}" for name in scene_state.plugin_files)
-    return f"# In this folder: asperity simulate scene.toml{named}\n"
+    header = f"# In this folder: asperity simulate scene.toml{named}\n"
+    return "\n".join([header, *parts, _format_device(scene_state.rated_device)])
 
 
 def texture_section(scene_state: SceneState, recording_file: str) -> dict[str, Any]:

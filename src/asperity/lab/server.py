@@ -143,8 +143,8 @@ class LabServer:
         )
         self.clip_store = ClipStore(self.session)
         if options.playback is not None:
-            title = Path(scene_state.source).name
-            self.clip_store.add_recording("recording", options.playback, scene_state, title)
+            words = {"title": Path(scene_state.source).name, "opens_at_start": True}
+            self.clip_store.add("recording", options.playback, scene_state, **words)
         self.pending_tasks: set[asyncio.Task[None]] = set()
 
     def _notify(self) -> None:
@@ -349,13 +349,9 @@ async def _run_while_connected(
 
 
 def _greeting() -> dict[str, Any]:
+    names = ("letter", "name", "summary")
     laws = [
-        {
-            "letter": law.letter,
-            "name": law.name,
-            "summary": law.summary,
-            "parameters": [argument.to_dict() for argument in law.arguments.values()],
-        }
+        {name: getattr(law, name) for name in names} | {"parameters": [*law.arguments.values()]}
         for law in REGISTERED_LAWS.values()
     ]
     kinds = [name for name, kind in KINDS.items() if not kind.required_arguments]

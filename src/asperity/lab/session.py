@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from queue import Empty, Queue
 from typing import Any, Literal
 
@@ -183,8 +183,8 @@ class Session:
     def steering_progress(self) -> dict[str, int]:
         """Numbers of the newest request for the hand, and of the newest acknowledged one."""
         hand = self.pointer_hand
-        counts = (hand.request_count, hand.acknowledged_count) if hand else (0, 0)
-        return dict(zip(("requested", "acknowledged"), counts, strict=True))
+        requested, acknowledged = (hand.request_count, hand.acknowledged_count) if hand else (0, 0)
+        return {"requested": requested, "acknowledged": acknowledged}
 
     @property
     def anchor(self) -> FloatArray:
@@ -199,8 +199,7 @@ class Session:
         """
         if self.pointer_hand is None:
             raise ParameterError("steering", "is done by the user of the handle")
-        motion = request.target, request.cosine, request.sine, request.speed
-        self.pointer_hand.request_motion(*motion)
+        self.pointer_hand.request_motion(*astuple(request))
 
     def change(self, changes: Mapping[str, Any]) -> None:
         """Request a change of the scene, which starts a stopped loop on the simulated device."""

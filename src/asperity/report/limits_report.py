@@ -16,7 +16,7 @@ from asperity.report.sentences.number_text import (
     readable_name,
     yes_no_text,
 )
-from asperity.report.sentences.texts import glossary, table_data, table_notes
+from asperity.report.sentences.texts import glossary, sentence, table_data, table_notes
 
 _LIMIT_HEADINGS = ("", "limit", "condition", "left", "right", "holds", "for", "at speeds")
 _NAME_COLUMN, _SHARE_COLUMN, _SPEEDS_COLUMN = 1, 6, 7
@@ -107,12 +107,11 @@ def symbol_lines(result: limit_result.Limits) -> list[str]:
             text = f"1/({datum.text})" if field == "update_rate" else datum.text
             values.append(f"{symbol} = {text}{'' if datum.verified else ' (not verified)'}")
     q = INFINITY_SIGN if result.gain.value == float("inf") else f"{result.gain.value:.4g}"
+    numbers = ", ".join(values) or "no data"
+    speed, stiffness = speed_text(result.speed), limit_result.stiffness_text(result)
     return [
-        f"v = {speed_text(result.speed)}, α = {result.time_samples:g}, "
-        f"β = {result.position_samples:g}, γ = {result.force_steps:g}; {device.name}: "
-        f"{', '.join(values) or 'no data'}",
-        f"Law {surface.law.letter} at k = {limit_result.stiffness_text(result)}: "
-        f"{result.gain_symbol} = {q} ({result.gain.method})",
+        sentence("symbols", speed=speed, limits=result, device=device.name, numbers=numbers),
+        sentence("gain_symbol", law=surface.law.letter, stiffness=stiffness, limits=result, q=q),
     ]
 
 

@@ -117,12 +117,15 @@ def arguments_text(kind: TextureKind) -> str:
     """
     parts = []
     for argument in kind.arguments:
-        unit = f" [{argument.unit}]" if argument.unit else ""
         # Without spaces, so that no line breaks inside a quantity.
         default = argument.default_text.replace(" ", "") if argument.default is not None else ""
         value = f"={default or argument.default_description}"
-        parts.append(argument.name + (unit if argument.required else value))
+        parts.append(_unit_name(argument) if argument.required else f"{argument.name}{value}")
     return ", ".join(parts)
+
+
+def _unit_name(argument: Argument) -> str:
+    return f"{argument.name} [{argument.unit}]" if argument.unit else argument.name
 
 
 def _argument_text(argument: Argument) -> str:
@@ -188,11 +191,10 @@ def _draw_card(texture: Texture) -> Figure:
 
 def _card(entry: SurfaceEntry) -> Section:
     kind = entry.kind
-    rows = []
-    for argument in kind.arguments:
-        unit = f" [{argument.unit}]" if argument.unit else ""
-        name = Cell(f"{argument.name}{unit}", "mono")
-        rows.append(Row([name, argument.default_text, _argument_text(argument)]))
+    rows = [
+        Row([Cell(_unit_name(one), "mono"), one.default_text, _argument_text(one)])
+        for one in kind.arguments
+    ]
     blocks: list[page.Block] = [
         page.Picture(partial(_draw_card, entry.texture), f"{kind.name}: {kind.summary}.", dpi=110),
         page.Paragraph(f"{entry.size_text}, {entry.height_text} from peak to valley", "note"),

@@ -49,10 +49,8 @@ def work_text(surface: Surface, run: Run) -> str:
     total = run.ledger.total
     energy = format_quantity(abs(total), "J", digits=3)
     work = f"delivers {energy} to the hand" if total > 0.0 else f"takes {energy} from the hand"
-    if not total:
-        work = "does no work"
-    if not math.isfinite(total):
-        work = "delivers an energy that is not finite"
+    if not (total and math.isfinite(total)):
+        work = "delivers an energy that is not finite" if total else "does no work"
     stiffness = format_quantity(surface.stiffness, "N/m")
     duration = format_quantity(run.duration, "s")
     return f"Law {surface.law.letter} at {stiffness} {work} in {duration}"

@@ -117,10 +117,8 @@ def timing_lines(statistics: LoopStatistics) -> list[str]:
     """
 
     def quantiles(quantile: Callable[[float], float]) -> str:
-        spans = [format_quantity(quantile(share), "s") for share in _QUANTILES]
-        median, *tails = zip(_QUANTILES, spans, strict=True)
-        rest = [f"{100.0 * share:g} % {span}" for share, span in tails]
-        return ", ".join([f"{100.0 * median[0]:g} % within {median[1]}", *rest])
+        spans = [f"{100.0 * q:g} % {format_quantity(quantile(q), 's')}" for q in _QUANTILES]
+        return ", ".join(spans).replace("% ", "% within ", 1)
 
     worst = format_quantity(statistics.max_lateness, "s")
     return [

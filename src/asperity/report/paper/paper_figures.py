@@ -25,7 +25,7 @@ from asperity.report.page import default_style
 from asperity.report.pictures import paper_pictures as pictures
 from asperity.report.pictures.loop_pictures import onset_figure
 from asperity.report.pictures.paper_pictures import figure_three, figure_two
-from asperity.report.sentences.texts import slide_text
+from asperity.report.sentences.texts import slide_text, table_data
 
 FileFormat = Literal["svg", "png", "slides"]
 _DPI = 192  # of a PNG: about 1920 pixels for the 10 inches that all figures are wide
@@ -48,7 +48,7 @@ class PaperFigure:
 
     name: str
     texts: str
-    claim_names: tuple[str, ...]
+    claim_names: Sequence[str]
     draw: Callable[[Experiments | None], Figure]
     needs_simulation: bool = True
 
@@ -70,33 +70,22 @@ def _cycles_figure(experiments: Experiments | None) -> Figure:
     )
 
 
-PAPER_FIGURES = (
-    PaperFigure(
-        "fig-2", "paper.forces", ("fig-2",), lambda _found: figure_two(), needs_simulation=False
+_DRAWINGS: dict[str, Callable[[Experiments | None], Figure]] = {
+    "fig-2": lambda _found: figure_two(),
+    "fig-3": lambda _found: figure_three(),
+    "fig-5": _cycles_figure,
+    "onsets": lambda found: onset_figure(
+        (found.passivity if found else passivity_experiment()).onsets
     ),
-    PaperFigure(
-        "fig-3", "paper.loops", ("fig-3",), lambda _found: figure_three(), needs_simulation=False
+    "fig-6": lambda found: pictures.energies_figure(
+        found.scanning if found else scanning_experiment()
     ),
-    PaperFigure("fig-5", "paper.cycles", ("fig-5",), _cycles_figure),
-    PaperFigure(
-        "onsets",
-        "paper.onsets",
-        ("sentence-III.B-reduced",),
-        lambda found: onset_figure((found.passivity if found else passivity_experiment()).onsets),
-    ),
-    PaperFigure(
-        "fig-6",
-        "paper.energies",
-        ("fig-6",),
-        lambda found: pictures.energies_figure(found.scanning if found else scanning_experiment()),
-    ),
-    PaperFigure(
-        "fig-7",
-        "paper.bumps",
-        ("fig-7",),
-        lambda found: pictures.bumps_figure(found.bump if found else bump_experiment()),
-    ),
-    PaperFigure("devices", "paper.devices", (), _devices_figure),
+    "fig-7": lambda found: pictures.bumps_figure(found.bump if found else bump_experiment()),
+    "devices": _devices_figure,
+}
+PAPER_FIGURES = tuple(
+    PaperFigure(name, draw=_DRAWINGS[name], **values)
+    for name, values in table_data("paper_figures").items()
 )
 """In the order of the paper; additional figures follow those that they belong to."""
 

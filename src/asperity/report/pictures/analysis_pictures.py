@@ -94,8 +94,7 @@ def draw_field(figure: FigureArea, analysis: Analysis) -> None:
     if len(leak.vertices):
         offset = leak.vertices[:, :2] - window.segment.xy(np.zeros(1))[0]
         along = offset @ window.segment.line.direction
-        wide, high = window.units
-        _draw_loop(axes, along * wide.scale, leak.vertices[:, 2] * high.scale)
+        _draw_loop(axes, *window.scale(along, leak.vertices[:, 2]))
 
 
 def _scale_axes(axes: Axes, window: law_pictures.Window) -> None:
@@ -131,8 +130,7 @@ def _fade_beyond_depth(
     beyond = depth - analysis.surface.max_depth
     if beyond.max() <= 0.0:
         return
-    wide, high = window.units
-    places = (field.along * wide.scale, field.z * high.scale)
+    places = window.scale(field.along, field.z)
     fade: dict[str, Any] = {"colors": [style.FREE_SPACE], "alpha": 0.8, "zorder": 4.5}
     axes.contourf(*places, beyond, [0.0, math.inf], **fade)
     border: dict[str, Any] = {"colors": [style.unthemed_colour(style.MUTED)], "linewidths": 0.9}
@@ -162,19 +160,15 @@ def _gain_scale(analysis: Analysis, values: FloatArray) -> LogNorm:
 def draw_gain(figure: FigureArea, analysis: Analysis) -> None:
     """Draw ‖J‖/k in the vertical plane through the witness of q, and the witness."""
     window, surface = analysis_windows.gain_window(analysis), analysis.surface
-    wide, high = window.units
     field = curl_field(surface, window.segment, window.bottom, *_GRID_CELLS)
     scale = _gain_scale(analysis, field.gain)
     axes = style.single_axes(figure)
     mesh = law_pictures.draw_gain_field(axes, field, scale, window)
     _fade_beyond_depth(axes, analysis, window, field)
-    at = (
-        analysis_windows.project_on_window(window, analysis_windows.witness_point(analysis))
-        if analysis.q.at is not None
-        else None
-    )
-    if at is not None:
-        _draw_cross(axes, at[0] * wide.scale, at[1] * high.scale)
+    if analysis.q.at is not None:
+        at = analysis_windows.project_on_window(window, np.array(analysis.q.at))
+        if at is not None:
+            _draw_cross(axes, *window.scale(*at))
     _scale_axes(axes, window)
     style.title_law(axes, surface.law, _gain_remark(analysis))
     law_pictures.add_gain_colorbar(figure, mesh, axes, "‖J‖ / k [1]")

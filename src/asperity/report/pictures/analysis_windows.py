@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,7 +15,6 @@ from asperity.report.pictures.law_pictures import Window
 from asperity.report.pictures.scan_plane import ScanSegment, choose_segment, feature_length
 from asperity.report.pictures.surface_pictures import MapGrid, map_grid
 from asperity.surface import Surface
-from asperity.textures.texture import ScanLine
 
 # A picture shows the whole loop or the whole line if that is no longer than so many features.
 _MAX_FEATURES = 4.0
@@ -85,12 +84,8 @@ def gain_window(analysis: Analysis) -> Window:
     texture = surface.texture
     at = witness_point(analysis)
     across = np.array([-line.direction[1], line.direction[0]])
-    shifted = ScanLine(
-        line.start + float((at[:2] - line.start) @ across) * across,
-        line.direction,
-        line.length,
-        line.periodic,
-    )
+    offset = float((at[:2] - line.start) @ across)
+    shifted = replace(line, start=line.start + offset * across)
     place = float((at[:2] - shifted.start) @ line.direction)
     length = _feature_size(surface)
     own = choose_segment(texture, length, _MAX_FEATURES * length)

@@ -57,11 +57,15 @@ class Window:
         """Width over height."""
         return self.segment.length / (self.top - self.bottom)
 
+    def scale(self, along: Any, z: Any) -> tuple[Any, Any]:
+        """Return distances along its segment and heights [m] in its units."""
+        wide, high = self.units
+        return along * wide.scale, z * high.scale
+
     def limit_axes(self, axes: Axes) -> None:
         """Limit axes, which are in its units, to the window."""
-        wide, high = self.units
-        top = self.top * high.scale
-        axes.set(xlim=(0.0, self.segment.length * wide.scale), ylim=(self.bottom * high.scale, top))
+        right, top = self.scale(self.segment.length, self.top)
+        axes.set(xlim=(0.0, right), ylim=(self.scale(0.0, self.bottom)[1], top))
 
 
 def field_segment(surfaces: Sequence[Surface]) -> scan_plane.ScanSegment:
@@ -162,8 +166,7 @@ def _choose_scales(
 
 def _draw_curl(axes: Axes, field: scan_plane.CurlField, window: Window, limit: float) -> Any:
     axes.set_facecolor(style.FREE_SPACE)
-    wide, high = window.units
-    places = (field.along * wide.scale, field.z * high.scale)
+    places = window.scale(field.along, field.z)
     colours: dict[str, Any] = {"cmap": style.CURL, "vmin": -limit, "vmax": limit, "zorder": 1}
     return axes.pcolormesh(*places, field.curl, shading="flat", rasterized=True, **colours)
 
@@ -171,27 +174,23 @@ def _draw_curl(axes: Axes, field: scan_plane.CurlField, window: Window, limit: f
 def _draw_arrows(
     axes: Axes, field: scan_plane.PlaneForces, window: Window, force_per_inch: float
 ) -> Any:
-    wide, high = window.units
-    places = (field.along * wide.scale, field.z * high.scale)
+    places = window.scale(field.along, field.z)
     options = _ARROWS | {"scale": force_per_inch, "color": style.unthemed_colour(style.INK)}
     return axes.quiver(*places, field.tangential, field.normal, zorder=4, **options)
 
 
 def _draw_outline(axes: Axes, surface: Surface, window: Window) -> None:
     """Draw the textured body, the contact surface if it is another, and the scan."""
-    wide, high = window.units
     along = window.segment.distances(600)
-    x = along * wide.scale
-    xy = window.segment.xy(along)
-    heights = surface.texture.height(xy) * high.scale
-    contact = surface.law.contact
+    xy, contact = window.segment.xy(along), surface.law.contact
+    x, heights = window.scale(along, surface.texture.height(xy))
     on_texture = contact.begins_on_texture
     ink, green = style.unthemed_colour(style.INK), style.unthemed_colour(style.GREEN)
     axes.plot(x, heights, color=ink, linewidth=1.3, linestyle="-" if on_texture else ":")
     if not on_texture:
-        tops = contact.contact_height(surface.texture, xy) * high.scale
-        axes.plot(x, tops, color=ink, linewidth=1.3)
-    axes.axhline(scan_height(surface) * high.scale, color=green, lw=1.0, ls="--")
+        tops = contact.contact_height(surface.texture, xy)
+        axes.plot(*window.scale(along, tops), color=ink, linewidth=1.3)
+    axes.axhline(window.scale(0.0, scan_height(surface))[1], color=green, lw=1.0, ls="--")
 
 
 def _draw_force_key(bar: Any, quiver: Any, force: float, text: str) -> None:
@@ -314,7 +313,7 @@ def gain_figure(comparison: Comparison) -> Figure:
         mesh = draw_gain_field(axes, field, scale, window)
         style.title_law(axes, row.law, f"q = {bound_text(row.q)}")
         _draw_witness(axes, row, window)
-        axes.set_ylim(window.bottom * high.scale, window.top * high.scale)
+        axes.set_ylim(window.scale(0.0, np.array([window.bottom, window.top]))[1])
     add_gain_colorbar(figure, mesh, panels, "‖J‖ / k: loop gain over that of the smooth wall [1]")
     return figure
 
@@ -323,18 +322,17 @@ def _draw_witness(axes: Axes, row: LawRow, window: Window) -> None:
     """Draw a cross at the witness of q, if it is in the part of the plane that is shown."""
     if row.q.at is None:
         return
-    segment, (wide, high) = window.segment, window.units
+    segment = window.segment
     along, aside = segment.project(np.array(row.q.at[:2]))
     if 0.0 <= along <= segment.length and aside < 0.01 * segment.length:
-        x, y = along * wide.scale, row.q.at[2] * high.scale
+        x, y = window.scale(along, row.q.at[2])
         axes.plot(x, y, "x", color=style.unthemed_colour(style.BLUE), ms=7, mew=2, zorder=5)
 
 
 def draw_gain_field(axes: Axes, field: scan_plane.CurlField, scale: LogNorm, window: Window) -> Any:
     """Draw ‖J‖/k of the cells of a vertical plane; return the mesh for a colour bar."""
     axes.set_facecolor(style.FREE_SPACE)
-    wide, high = window.units
-    x, z = field.along * wide.scale, field.z * high.scale
+    x, z = window.scale(field.along, field.z)
     gain = np.maximum(field.gain, scale.vmin or 0.0)
     return axes.pcolormesh(x, z, gain, norm=scale, cmap="magma_r", shading="flat", rasterized=True)
 

@@ -19,6 +19,7 @@ from asperity.paper.experiments.strokes import BumpExperiment, ScanningExperimen
 from asperity.paper.figures import ForceField, LoopEnergy, force_fields, loop_energies
 from asperity.report.pictures import style
 from asperity.report.sentences.number_text import readable_name
+from asperity.report.sentences.texts import table_notes
 from asperity.simulation.limit_cycles.onset import Prediction
 
 _COLUMNS = 4
@@ -111,15 +112,9 @@ def _draw_key(free_axes: Sequence[Axes]) -> None:
     options: dict[str, Any] = {**place, "fontsize": style.LABEL, "color": style.MUTED}
     arrow = style.INCH_ARROWS | _HANDLE_ARROW | place
     free_axes[0].quiver([0.02], [0.78], [_KEY_FORCE], [0.0], **arrow)
-    words = (
-        f"{_KEY_FORCE:g} N at a handle",
-        "brown: where the force acts",
-        "grey: its direction, and its",
-        "size within one panel",
-        "F: while it slides to +x",
-    )
-    free_axes[0].text(0.4, 0.78, words[0], va="center", **options)
-    for number, line in enumerate(words[1:]):
+    handle = f"{_KEY_FORCE:g} N at a handle"
+    free_axes[0].text(0.4, 0.78, handle, va="center", **options)
+    for number, line in enumerate(table_notes("figure_two")):
         free_axes[0].text(0.02, 0.58 - 0.12 * number, line, va="center", **options)
 
 

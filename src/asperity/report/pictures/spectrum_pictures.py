@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,7 +15,6 @@ from asperity.analysis.compare import Comparison
 from asperity.analysis.energy.scan_lines import parallel_line_points
 from asperity.analysis.limits.limit_result import Limits, stiffness_text
 from asperity.analysis.limits.limit_rules import shortest_wavelengths
-from asperity.analysis.limits.perceptibility import HandSpectrum
 from asperity.analysis.limits.perceptibility_sentences import speed_text
 from asperity.core.checks import FloatArray
 from asperity.core.units import format_quantity
@@ -98,7 +98,9 @@ def hand_figure(comparison: Comparison) -> Figure:
     axes.plot(span, felt, color=style.GREEN, lw=1.2, ls="--", label="felt above")
     axes.plot(span, unnoticed, color=style.GREEN, lw=1.2, ls=":", label="nobody notices below")
     title = f"law {row.law.letter}, {found.tier}"
-    _draw_hand_waves(axes, waves, motions > 1e-3 * unnoticed.min(), title)
+    drawn = motions > 1e-3 * unnoticed.min()
+    parts = {title: drawn & waves.is_resolved, "beyond the device": drawn & ~waves.is_resolved}
+    _draw_marks(axes, frequencies, motions, parts)
     axes.set(xscale="log", yscale="log", xlim=(span[0], span[-1]))
     plain = FuncFormatter(lambda value, _place: f"{value:g}")
     for axis in (axes.xaxis, axes.yaxis):
@@ -111,18 +113,14 @@ def hand_figure(comparison: Comparison) -> Figure:
     return figure
 
 
-def _draw_hand_waves(
-    axes: Axes, waves: HandSpectrum, is_drawn: NDArray[np.bool_], title: str
+def _draw_marks(
+    axes: Axes, x: FloatArray, y: FloatArray, parts: Mapping[str, NDArray[np.bool_]]
 ) -> None:
-    """Draw the waves, those beyond the device hollow."""
-    x, y, resolved = waves.frequencies, waves.motions * _MICRO, waves.is_resolved
-    for which, face, name in (
-        (resolved & is_drawn, style.BLUE, title),
-        (~resolved & is_drawn, style.BACKGROUND, "beyond the device"),
-    ):
-        if which.any():
-            (line,) = axes.plot(x[which], y[which], "o", ms=5.0, label=name, zorder=4.0)
-            line.set(markerfacecolor=face, markeredgecolor=style.BLUE)
+    """Draw waves in two parts by name, those of the second hollow."""
+    for (name, part), face in zip(parts.items(), (style.BLUE, style.BACKGROUND), strict=True):
+        if part.any():
+            marks: dict[str, Any] = {"ms": 5.0, "mfc": face, "mec": style.BLUE, "zorder": 4.0}
+            axes.plot(x[part], y[part], "o", label=name, **marks)
 
 
 def _draw_wavelength_limit(
@@ -192,12 +190,8 @@ def _draw_waves(
     else:
         axes.plot(lengths[shown] * _MILLI, values[shown], color=style.BLUE, lw=0.9)
     filled = np.array(meets_limits)
-    for which, face, name in (
-        (shown & filled, style.BLUE, "meets every limit"),
-        (shown & ~filled, style.BACKGROUND, "breaks a limit"),
-    ):
-        x = lengths[which] * _MILLI
-        axes.plot(x, values[which], "o", ms=5.0, mfc=face, mec=style.BLUE, zorder=4.0, label=name)
+    parts = {"meets every limit": shown & filled, "breaks a limit": shown & ~filled}
+    _draw_marks(axes, lengths * _MILLI, values, parts)
     axes.set_ylim(floor, top * 4.0)
 
 
