@@ -121,7 +121,9 @@ def _keywords(function: Any, *excluded: str) -> dict[str, inspect.Parameter]:
 def test_signatures_match_the_declared_arguments() -> None:
     """The keywords of Python functions have the declared names, order and defaults."""
     names = [argument.name for argument in FILE_ARGUMENTS]
-    assert list(_keywords(load_texture, "path")) == names
+    assert (
+        list(_keywords(load_texture, "path", "cutoff")) == names
+    )  # cutoff: former name of s_cutoff
     prepare_keywords = _keywords(prepare, "raw", "progress", "on_stage")
     assert list(prepare_keywords) == [argument.name for argument in PREPARATION_ARGUMENTS]
     for argument in PREPARATION_ARGUMENTS:

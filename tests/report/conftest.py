@@ -24,7 +24,7 @@ from asperity.scene import load_scene
 from asperity.scene.setup import make_setup
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
-from asperity.textures.texture_loading import summarize_file
+from asperity.textures.texture_loading import show
 
 PRESS = Path(__file__).parents[2] / "examples" / "press.toml"
 
@@ -56,7 +56,7 @@ def report_pages(
         "comparison": html_text(asp.compare("cloth", device="touch", laws="WAC")),
         "analysis": html_text(asp.analyze(sinusoid, device="touch", law="A")),
         "limits": html_text(asp.limits(sinusoid, device="touch", law="A")),
-        "measured": html_text(summarize_file(folder / "rough.npy", **options)),
+        "measured": html_text(show(folder / "rough.npy", **options)),
         "run": render_page(run_page(setup, setup.simulate())),
         "experiments": render_page(Page("Experiments", "", [], experiment_sections(experiments))),
         "surfaces": render_page(surfaces_page(find_surfaces(("cloth", "sinusoid")), detailed=True)),

@@ -23,6 +23,7 @@ from asperity.core.version import __version__
 from asperity.devices import DeviceLike
 from asperity.export import targets
 from asperity.export.export_request import ExportRequest, is_searching
+from asperity.export.template_files import fill_template, load_template
 from asperity.laws import Law
 from asperity.surface import Surface
 from asperity.textures.catalogue import TextureLike
@@ -134,22 +135,17 @@ def header_comment_text(analysis: Analysis, file_name: str) -> str:
         analysis: analysis of the surface.
         file_name: name of the file.
     """
-    surface, law = analysis.surface, analysis.surface.law
+    law = analysis.surface.law
     doc = (sys.modules[law.force.__module__].__doc__ or "").strip()
     description = doc if doc.startswith(law.letter) else law.summary
-    return "\n".join(
-        [
-            f"{file_name}: law {law}, by asperity {__version__}. Generated, do not edit.",
-            "",
-            *_usage(surface.law),
-            "",
-            description,
-            "",
-            *_facts(analysis),
-            "",
-            *_wrap([analysis.answer, *analysis.assumptions]),
-        ]
-    )
+    paragraphs = [
+        [f"{file_name}: law {law}, by asperity {__version__}. Generated, do not edit."],
+        _usage(law),
+        [description],
+        _facts(analysis),
+        _wrap([analysis.answer, *analysis.assumptions]),
+    ]
+    return "\n\n".join(map("\n".join, paragraphs))
 
 
 def _usage(law: Law) -> list[str]:
@@ -159,13 +155,7 @@ def _usage(law: Law) -> list[str]:
         state = "It stores the closest point for a warm start"
     if law.stateful:
         state = "It stores the anchor of friction"
-    return _wrap(
-        [
-            "Positions [m] in the frame of the surface: z points out of the body, which is "
-            "z < h(x, y). The force [N] is the one on the probe.",
-            f"Call reset once for each state, then force in each tick. {state}.",
-        ]
-    )
+    return _wrap(fill_template(load_template("usage.txt"), {"state": state}).splitlines())
 
 
 def _facts(analysis: Analysis) -> list[str]:

@@ -200,9 +200,8 @@ class ExpressionTypes(ast.NodeVisitor):
         left, right = self.infer_scalar(node.left), self.infer_scalar(node.right)
         both = max(left, right)
         if left == right == c.SINGLE:
-            raise self.not_exportable(
-                "computes with two numbers of single precision: use float()", node
-            )
+            words = "computes with two numbers of single precision: use float()"
+            raise self.not_exportable(words, node)
         if isinstance(node.op, ast.Div):
             return c.FLOAT
         if isinstance(node.op, ast.Pow):

@@ -300,15 +300,9 @@ class ExpressionPrinter(ast.NodeVisitor):
 _BUILTINS: dict[str, Callable[[ExpressionPrinter, ast.Call], CExpression]] = {
     "abs": ExpressionPrinter._absolute,
     "bool": ExpressionPrinter._to_boolean,
-    "ceil": ExpressionPrinter._to_integer,
-    "float": ExpressionPrinter._to_real,
-    "float64": ExpressionPrinter._to_real,
-    "floor": ExpressionPrinter._to_integer,
-    "int": ExpressionPrinter._to_integer,
-    "int64": ExpressionPrinter._to_integer,
-    "max": ExpressionPrinter._minimum_or_maximum,
-    "min": ExpressionPrinter._minimum_or_maximum,
-    "round": ExpressionPrinter._to_integer,
+    **dict.fromkeys(("float", "float64"), ExpressionPrinter._to_real),
+    **dict.fromkeys(("max", "min"), ExpressionPrinter._minimum_or_maximum),
+    **dict.fromkeys(("ceil", "floor", "int", "int64", "round"), ExpressionPrinter._to_integer),
 }
 
 

@@ -262,9 +262,8 @@ def find_recording(source: str, folder: Path) -> Path | None:
             if RECORDING_FILE not in archive.namelist():
                 return None  # some measured surfaces are archives too
             if archive.getinfo(RECORDING_FILE).file_size > _MAX_RECORDING_BYTES:
-                raise ParameterError(
-                    "recording", f"{source} contains a recording larger than 1 GiB"
-                )
+                reason = f"{source} contains a recording larger than 1 GiB"
+                raise ParameterError("recording", reason)
             archive.extract(RECORDING_FILE, folder)
     except (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError) as error:
         if not zipfile.is_zipfile(source):

@@ -67,9 +67,8 @@ async def serve_lab(
     """
     token = AccessToken(listener.getsockname()[1])
     stopped = asyncio.Event()
-    plugins = options.load_plugins
     with ExitStack() as stack:
-        workers = [stack.enter_context(BackgroundWorker(plugins)) for _ in range(3)]
+        workers = [stack.enter_context(BackgroundWorker(options.load_plugins)) for _ in range(3)]
         lab = LabServer(scene_state, workers, options)
         tasks = [asyncio.create_task(work()) for work in (lab.watch_session, lab.watch_steering)]
         fetch = lab.clip_store.fetch

@@ -162,14 +162,10 @@ class _ColumnLayout:
             },
         }
         if "inside" not in self._names:
-            computed["inside"] = self._detect_contact(positions).astype(float)
+            texture, contact = self._surface.texture, self._surface.law.contact
+            tops = contact.contact_height(texture, positions[:, :2])
+            computed["inside"] = (positions[:, 2] < tops).astype(float)
         zeros = np.zeros(len(rows))
         columns = computed | {name: rows[:, k] for k, name in enumerate(self._names)}
         names = (name for name, _unit in (*COLUMNS, *ANCHOR_COLUMNS))
         return np.column_stack([columns.get(name, zeros) for name in names])
-
-    def _detect_contact(self, positions: FloatArray) -> Any:
-        """Return whether probes are in contact (n,)."""
-        if not self._surface.law.contact.begins_on_texture:
-            return positions[:, 2] < 0.0
-        return positions[:, 2] < self._surface.texture.height(positions[:, :2])

@@ -25,8 +25,8 @@ PREPARATION_ARGUMENTS = (*read_arguments(_TABLES, "preparation").values(), *MAGN
 FILE_ARGUMENTS = (*READING_ARGUMENTS, *PREPARATION_ARGUMENTS)
 """All arguments of a measured file."""
 
-_MAGNIFICATION_NAMES = {argument.name for argument in MAGNIFICATION_ARGUMENTS}
-_SYNTHETIC_NAMES = {"height_range", "s_cutoff", "l_cutoff", "tip_radius", *_MAGNIFICATION_NAMES}
+_SYNTHETIC_NAMES = {"height_range", "s_cutoff", "l_cutoff", "tip_radius"}
+_SYNTHETIC_NAMES |= {argument.name for argument in MAGNIFICATION_ARGUMENTS}
 SYNTHETIC_ARGUMENTS = tuple(
     replace(argument, default_description="none") if argument.name == "s_cutoff" else argument
     for argument in PREPARATION_ARGUMENTS

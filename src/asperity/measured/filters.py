@@ -152,8 +152,8 @@ def apply_filters(
         long = format_length(cutoffs.long)
         record(f"L-filter {long}", heights, pitch, removes=True, nesting=cutoffs.long)
         steps.append(f"waviness removed: Gaussian L-filter ISO 16610-{part}, cut-off {long}")
-        steps.extend(filter(None, [short_trace_text(heights.shape, pitch, cutoffs.long)]))
-    return steps
+        steps.append(short_trace_text(heights.shape, pitch, cutoffs.long))
+    return [step for step in steps if step]
 
 
 def short_trace_text(shape: Shape, pitch: Pitch, l_cutoff: float) -> str:

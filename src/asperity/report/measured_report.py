@@ -231,8 +231,8 @@ def _answer(summary: MeasurementSummary) -> str:
         return texture_text(summary.parts)
     prepared, nesting = summary.prepared, summary.prepared.history[-1].nesting
     warning = short_trace_text(prepared.heights.shape, prepared.pitch, nesting or 0.0)
-    roughness = roughness_text(prepared.history)
-    return f"{roughness} {warning[:1].upper()}{warning[1:]}." if warning else roughness
+    warning = f" {warning[:1].upper()}{warning[1:]}." if warning else ""
+    return f"{roughness_text(prepared.history)}{warning}"
 
 
 def preparation_page(prepared: PreparedSurface, path: str) -> page.Page:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from itertools import accumulate
 
 from rich import box
 from rich.console import Console, RenderableType
@@ -90,13 +91,8 @@ def _dropped_columns(table: pages.Table, width: int) -> set[int]:
         for column in zip(*texts, strict=True)
     ]
     room = width + gap - sum(widths) + sum(widths[i] for i in order)
-    dropped = set(order)
-    for column in order:
-        room -= widths[column]
-        if room < 0:
-            break
-        dropped.discard(column)
-    return dropped
+    fitting = sum(total <= room for total in accumulate(widths[i] for i in order))
+    return set(order[fitting:])
 
 
 def rich_table(table: pages.Table, width: int) -> RichTable:

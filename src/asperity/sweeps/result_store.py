@@ -131,9 +131,8 @@ def _check_plan(folder: Path, plan: Mapping[str, Any]) -> None:
     path, text = folder / PLAN_FILE, json_text(plan)
     if not path.exists():
         if any(one.name != _LOCK_FILE for one in folder.iterdir()):
-            raise ParameterError(
-                "output", "is neither empty nor the folder of a sweep", str(folder)
-            )
+            words = "is neither empty nor the folder of a sweep"
+            raise ParameterError("output", words, str(folder))
         write_bytes("output", path, text.encode())
         return
     with open_input(path) as stream:

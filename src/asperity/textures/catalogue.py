@@ -121,10 +121,9 @@ def load_texture(  # noqa: D417 - the others are described where they are declar
     values = dict(locals())  # every argument under its own name
     defaults = load_texture.__kwdefaults__ or {}
     given = {name: x for name, x in values.items() if x is not defaults.get(name, ...)}
-    if cutoff is not None:
-        if s_cutoff is not None:
-            raise ParameterError("cutoff", "is the former name of s_cutoff: give one of them")
-        given["s_cutoff"] = given.pop("cutoff")
+    if {"cutoff", "s_cutoff"} <= given.keys():
+        raise ParameterError("cutoff", "is the former name of s_cutoff: give one of them")
+    given = {"s_cutoff" if name == "cutoff" else name: x for name, x in given.items()}
     return _load_file(**given)
 
 

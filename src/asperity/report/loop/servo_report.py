@@ -11,6 +11,7 @@ from asperity.devices import Device
 from asperity.report.loop.run_report import energy_text
 from asperity.report.page import Page, Paragraph, Row, Table, terminal_page
 from asperity.report.sentences.number_text import readable_name
+from asperity.report.sentences.texts import table_data
 from asperity.scene.setup import Setup
 from asperity.servo.calibration.calibrator import AxisCalibration, Calibration
 from asperity.servo.calibration.measured_device import effective_resolution, format_uncertainty
@@ -135,11 +136,7 @@ def device_run_page(setup: Setup, loop: ServoProcess, cause: EndReason, path: st
     surface, period = setup.surface, setup.servo.period
     driver = "" if loop.driver.has_moving_handle else f", {loop.driver.name}"
     span = format_quantity(period * statistics.samples, "s", digits=3)
-    limited = (
-        (statistics.force_limited, "Force limit active in {} samples: not the force of the law"),
-        (statistics.slew_limited, "Slew limit active in {} samples: not the force of the law"),
-        (statistics.too_deep, "{} samples below max_depth, outside the analysed region"),
-    )
+    limited = [(getattr(statistics, name), text) for name, text in table_data("limited").items()]
     lines = [
         f"Law {surface.law.letter}, {readable_name(surface.law.name)}, at "
         f"{format_quantity(surface.stiffness, 'N/m')} on {setup.device.name}{driver}: "

@@ -25,7 +25,7 @@ from asperity.report.page import default_style
 from asperity.report.pictures import paper_pictures as pictures
 from asperity.report.pictures.loop_pictures import onset_figure
 from asperity.report.pictures.paper_pictures import figure_three, figure_two
-from asperity.report.sentences.texts import slide_text, table_data
+from asperity.report.sentences.texts import slide_texts, table_data
 
 FileFormat = Literal["svg", "png", "slides"]
 _DPI = 192  # of a PNG: about 1920 pixels for the 10 inches that all figures are wide
@@ -171,13 +171,10 @@ def write_figures(
 
 def _slides(figures: Sequence[PaperFigure], images: Iterable[bytes]) -> str:
     """Return a page with a slide for each figure: one sentence and the picture."""
-    slides = []
-    for figure, image in zip(figures, images, strict=True):
-        title, sentence = slide_text(figure.texts)
-        picture = base64.b64encode(image).decode("ascii")
-        slides.append({"title": title, "sentence": sentence, "image": picture})
+    pictures = [base64.b64encode(image).decode("ascii") for image in images]
+    slides = [slide_texts(figure.texts) for figure in figures]
     template = template_environment().get_template("slides.html.j2")
-    return template.render(slides=slides, version=__version__)
+    return template.render(slides=[*zip(slides, pictures, strict=True)], version=__version__)
 
 
 def _draw_image(figure: Figure, file_format: str) -> bytes:

@@ -176,10 +176,8 @@ def _witness_state(surface: Surface, bound: Bound, count: int) -> dict[str, Floa
 def top_view(analysis: Analysis) -> tuple[MapGrid, FloatArray]:
     """Return a grid, of a map, and the greatest ‖J‖/k at five depths below each of its points."""
     surface = analysis.surface
-    affordable = math.isqrt(
-        int(_TOP_BUDGET / (len(TOP_VIEW_DEPTHS) * surface.law.contact.relative_cost))
-    )
-    grid = map_grid(surface.texture, min(_TOP_CELLS, affordable))
+    cost = len(TOP_VIEW_DEPTHS) * surface.law.contact.relative_cost
+    grid = map_grid(surface.texture, min(_TOP_CELLS, math.isqrt(int(_TOP_BUDGET / cost))))
     tops = surface.law.contact.contact_height(surface.texture, grid.xy)
     best = np.zeros(len(grid.xy))
     for part in TOP_VIEW_DEPTHS:

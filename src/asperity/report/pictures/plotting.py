@@ -121,16 +121,14 @@ def _texture_drawing(texture: Texture) -> style.SizedDrawing:
 
 def _forces_drawing(surfaces: Sequence[Surface]) -> style.SizedDrawing:
     """Return the forces along the scan, one panel per law, on shared axes."""
-    return law_pictures.force_size(len(surfaces)), partial(
-        law_pictures.draw_forces, surfaces=surfaces
-    )
+    draw = partial(law_pictures.draw_forces, surfaces=surfaces)
+    return law_pictures.force_size(len(surfaces)), draw
 
 
 def _fields_drawing(surfaces: Sequence[Surface], remarks: Sequence[str] = ()) -> style.SizedDrawing:
     """Return the force fields over their curl, one panel per law, on shared scales."""
-    return law_pictures.field_size(surfaces), partial(
-        law_pictures.draw_fields, surfaces=surfaces, remarks=remarks
-    )
+    draw = partial(law_pictures.draw_fields, surfaces=surfaces, remarks=remarks)
+    return law_pictures.field_size(surfaces), draw
 
 
 def _conservation_remarks(comparison: Comparison) -> list[str]:

@@ -84,10 +84,8 @@ def choose_segment(texture: Texture, target_length: float, max_length: float) ->
     """
     line = texture.scan_line()
     if line.length <= max_length * (1.0 + 1e-9):
-        periods = (
-            max(1, round(min(target_length, max_length) / line.length)) if line.periodic else 1
-        )
-        return ScanSegment(line, 0.0, periods * line.length)
+        fitting = round(min(target_length, max_length) / line.length)
+        return ScanSegment(line, 0.0, (max(1, fitting) if line.periodic else 1) * line.length)
     length = min(max(target_length, 0.0) or max_length, max_length)
     highest = int(np.argmax(texture.height(line.points(_SURVEY_POINTS))))
     centre = (highest + 0.5) * line.length / _SURVEY_POINTS

@@ -293,7 +293,8 @@ def svg_text(figure: Figure, dpi: int = 160) -> str:
     # The page sets the size; namespaces are needed in a separate file only.
     root = re.sub(r' (?:width|height|version|xmlns[:\w]*)="[^"]*"', "", text[: text.index(">")])
     text = root.replace("<svg", f'<svg style="{whole}"') + text[text.index(">") :]
-    return _renumber_ids(_apply_theme(_shorten_paths(text)))
+    text = re.sub(r'style="[^"]*"', lambda found: _theme_style(found[0]), _shorten_paths(text))
+    return _renumber_ids(text)
 
 
 def _shorten_paths(text: str) -> str:
@@ -301,12 +302,9 @@ def _shorten_paths(text: str) -> str:
     return re.sub(r' d="[^"]*"', lambda found: re.sub(r"(\.\d{3})\d+", r"\1", found[0]), text)
 
 
-def _apply_theme(text: str) -> str:
-    """Return the text with CSS variables for the colours of the palette in styles."""
-    return re.sub(r'style="[^"]*"', lambda found: _theme_style(found[0]), text)
-
-
 def _theme_style(styles: str) -> str:
+    """Return styles with CSS variables for the colours of the palette."""
+
     def variable(found: re.Match[str]) -> str:
         what, colour = found.groups()
         name = THEME_VARIABLES.get(colour)

@@ -41,11 +41,10 @@ def table_notes(table: str) -> list[str]:
     return list(_load_texts()["notes"][table])
 
 
-def slide_text(name: str) -> tuple[str, str]:
-    """Return title and sentence of the slide of a figure, by the name of its texts."""
+def slide_texts(name: str) -> dict[str, str]:
+    """Return the texts of a figure, with "title" and "slide", by their name."""
     report, figure = name.split(".")
-    text = _load_texts()["figures"][report][figure]
-    return text["title"], text["slide"]
+    return dict(_load_texts()["figures"][report][figure])
 
 
 def figure_text(name: str, **values: object) -> tuple[str, str, str]:
