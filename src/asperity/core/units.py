@@ -109,12 +109,12 @@ def _parse_number(text: str | float) -> float | None:
 def _parse_with_unit(name: str, text: str, unit: str) -> float:
     match = _NUMBER.match(text.strip())
     if match is None or not unit:
-        raise ParameterError(name, f"{_requirement(unit)}{_correction(text, unit)}", text)
+        raise ParameterError(name, f"{_requirement(unit)}{_correction(text[:80], unit)}", text)
     words = text.strip()[match.end() :].strip()
     try:
         return _scale(match.group(), _find_unit_factor(words, unit))
     except ValueError as error:
-        reason = f"the unit {error}{_correction(text, unit)}"
+        reason = f"the unit {error}{_correction(text[:80], unit)}"
         raise ParameterError(name, f"{_requirement(unit)}; {reason}", text) from None
 
 
