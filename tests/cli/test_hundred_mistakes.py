@@ -27,6 +27,9 @@ MISTAKES: list[tuple[str, tuple[str, ...]]] = [
     ("recording inf run.mcap", ("'inf'", "did you mean 'info'?", "known: export, info, plot")),
     ("cloth --device touch", ("'cloth'", "known: analyze, bake", "compare")),
     ("--vresion", ("--vresion", "did you mean '--version'?")),
+    ("envelop --device touch", ("'envelop'", "did you mean 'envelope'?")),
+    ("envelope --device tuoch", ("device is unknown: 'tuoch'", "did you mean 'touch'")),
+    ("sweep cloth --vary texture.magnifi=1,2", ("texture.magnifi", "texture.magnify")),
     # Options misspelt.
     ("compare cloth --devise touch", ("--devise", "did you mean '--device'?")),
     ("compare cloth -device touch", ("no option -device", "did you mean '--device'?")),
@@ -43,13 +46,16 @@ MISTAKES: list[tuple[str, tuple[str, ...]]] = [
     ("cache --clean", ("--clean", "did you mean '--clear'?")),
     # Options of other commands.
     ("compare cloth --law H", ("compare has no option --law", "'--laws'", "analyze, limits")),
-    ("analyze cloth --laws WA", ("analyze has no option --laws", "'--law'", "compare, onset")),
+    (
+        "analyze cloth --laws WA",
+        ("analyze has no option --laws", "'--law'", "compare, sweep, envelope, onset"),
+    ),
     (
         "compare cloth --output r.html",
-        ("--output", "did you mean '--html'?", "option of prepare, bake"),
+        ("--output", "did you mean '--html'?", "option of sweep, prepare, bake"),
     ),
     ("compare cloth --driver simulated", ("--driver", "option of calibrate, lab, run")),
-    ("compare cloth --duration 2s", ("--duration", "option of simulate, onset, run")),
+    ("compare cloth --duration 2s", ("--duration", "option of sweep, simulate, onset, run")),
     ("analyze cloth --law H --clamp whole", ("--clamp", "option of export;")),
     ("export cloth --html e.html -o t.h", ("--html", "compare, analyze, limits")),
     ("run cloth --html r.html", ("run has no option --html", "see asperity run --help")),
