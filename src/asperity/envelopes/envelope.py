@@ -224,7 +224,7 @@ def envelope(
         >>> result = envelope("touch", "C", wavelengths=[1e-3, 2e-3])
         >>> [f"{one.felt_from * 1e6:.1f} to {one.felt_up_to * 1e6:.0f} µm"
         ...  for one in result["touch"]["C"].borders]
-        ['14.4 to 198 µm', '19.1 to 396 µm']
+        ['20.5 to 201 µm', '18.7 to 403 µm']
     """
     cases = make_cases(device, laws, law_parameters, envelope, conditions)
     devices, checked = list(dict.fromkeys(case.device.id for case in cases)), cases[0].conditions
