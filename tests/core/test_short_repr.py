@@ -43,6 +43,7 @@ EXAMPLES: dict[str, Callable[[], Any]] = {
     "Comparison": lambda: asp.compare(MANY, "touch", "WC", max_depth=1e-5),
     "Device": lambda: asp.load_device("touch"),
     "DeviceComparisons": lambda: compare_devices(MANY, ["touch"], laws="WC", max_depths=[1e-5]),
+    "Envelope": lambda: asp.envelope("touch", "C", wavelengths=[1e-3, 2e-3]),
     "Fourier": lambda: MANY,
     "Grating": lambda: asp.Grating(1e-4, 1e-3),
     "HeightMap": lambda: asp.HeightMap(HEIGHTS, 5e-5),
@@ -59,6 +60,7 @@ EXAMPLES: dict[str, Callable[[], Any]] = {
     "Replay": lambda: asp.replay(asp.open_recording(record_run())),
     "Sinusoid": lambda: asp.Sinusoid(2e-4, 2e-3),
     "SplitState": lambda: asp.split_state(surface("H"), np.zeros((200, 3))),
+    "SweepResult": lambda: asp.sweep("cloth", {"texture.magnify": "1,2"}, "limits", processes=1),
     "Surface": lambda: asp.Surface(MANY, "F", max_depth=1e-5),
 }
 
