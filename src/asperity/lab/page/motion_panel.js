@@ -17,6 +17,7 @@ export class MotionPanel {
   choose(motion) {
     const { hand, section, isSectionCurrent } = this.host;
     const loop = motion === "loop" && isSectionCurrent ? findFeedingLoop(section, hand.loop) : null;
+    this.awaitsPicture = motion === "loop" && !isSectionCurrent;
     if (loop) Object.assign(hand, { x: loop.x, loopRadius: loop.radiusX, loopSpeed: loop.sense * Math.abs(hand.loopSpeed) });
     hand.motion = motion;
     hand.requestMotion();
@@ -25,6 +26,7 @@ export class MotionPanel {
 
   update() {
     const { hand, section, isSectionCurrent } = this.host;
+    if (this.awaitsPicture && isSectionCurrent) this.choose(hand.motion); // the loop is placed once its field is known
     for (const button of this.buttons) button.setAttribute("aria-checked", button.value === hand.motion);
     const hint = isSectionCurrent && section.hasCurl && hand.motion !== "loop" ? HINT : "";
     if ($("motion-note").textContent !== hint) $("motion-note").textContent = hint;
