@@ -115,6 +115,10 @@ def page(held: Started, device: Device) -> Iterator[Any]:
         yield line
 
 
+def knows_nearest(message: Any) -> bool:
+    return frames(message) and bool(np.isfinite(head(message, "closest z")))
+
+
 def begin(page: Any, device: Device) -> dict[str, Any]:
     """Start the loop, and press."""
     say(page, "start")
@@ -137,8 +141,10 @@ def test_nothing_moves_before_somebody_starts_it(page: Any, held: Started, devic
         starts = begin(page, device)["start_count"]
         say(watcher, "stop")
         assert "steering" in heard(watcher, refused)["message"]
-        # The nearest point is known once another process has compiled it.
-        frame = heard(watcher, lambda m: frames(m) and np.isfinite(head(m, "closest z")))
+        # The nearest point is known once another process has compiled it. Who steers must be
+        # heard from meanwhile, or the loop ends.
+        heard(page, knows_nearest)
+        frame = heard(watcher, knows_nearest)
         assert starts == first["start_count"] + 1
     assert device.pushes
     # The frames are those of the real loop; nobody knows where the hand is pulled to.
