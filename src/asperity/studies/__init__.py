@@ -1,0 +1,1 @@
+"""Perception studies: methods, sessions with participants, and their statistics."""

@@ -1,0 +1,1 @@
+"""Statistics of studies: psychometric functions, Bradley–Terry scores, intervals, scores."""

@@ -1,0 +1,91 @@
+"""Scores: what a study estimates, for each participant and pooled."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.core.compiled import FloatArray
+from asperity.studies.statistics.intervals import mean_interval
+
+RESAMPLES = 2000
+"""Number of samples of a bootstrap, unless stated otherwise."""
+
+
+@dataclass(frozen=True)
+class Score:
+    """Estimates for each participant (row) and each condition or pair of conditions (column).
+
+    Attributes:
+        quantity: what is estimated.
+        participants: codes of the participants.
+        estimates: values, and lower and upper ends of the 95 % intervals of each participant, shape
+            (3, participants, columns); those of a logarithmic quantity are natural logarithms.
+        counts: numbers of answers.
+        is_logarithmic: whether the values are logarithms.
+        interval: how the intervals of each participant were found.
+        pooled: values whose means are the pooled estimates, where they are not ``values``.
+        chance: value without an effect, where a column by itself may show one.
+    """
+
+    quantity: str
+    participants: tuple[str, ...]
+    estimates: FloatArray
+    counts: NDArray[np.int_]
+    is_logarithmic: bool = False
+    interval: str = ""
+    pooled: FloatArray | None = None
+    chance: float | None = None
+
+    def pool(self, resamples: int, seed: int) -> list[tuple[float, float, float]]:
+        """Return the mean over the participants of each column, with its interval."""
+        return [_pool(column, resamples, seed) for column in self._units.T]
+
+    def differences(self, resamples: int, seed: int) -> list[tuple[float, float, float]]:
+        """Return by how much each column but the first differs from the first.
+
+        The differences are within participants. A column with a chance value is compared with it.
+        """
+        units = self._units
+        if self.chance is not None:
+            return [_pool(column - self.chance, resamples, seed) for column in units.T]
+        return [_pool(column - units[:, 0], resamples, seed) for column in units.T[1:]]
+
+    @property
+    def values(self) -> FloatArray:
+        """The estimates without their intervals."""
+        result: FloatArray = self.estimates[0]
+        return result
+
+    @property
+    def _units(self) -> FloatArray:
+        return self.values if self.pooled is None else self.pooled
+
+    def to_scale(self, value: float) -> float:
+        """Return a value on the scale of the quantity."""
+        if not self.is_logarithmic:
+            return value
+        return math.exp(value) if value < 700.0 else math.inf
+
+
+def _pool(values: FloatArray, resamples: int, seed: int) -> tuple[float, float, float]:
+    return mean_interval(values[np.isfinite(values)], resamples, seed)
+
+
+def repeated_score(
+    cells: list[list[list[float]]], resamples: int, seed: int
+) -> tuple[FloatArray, NDArray[np.int_]]:
+    """Return means with intervals, shape (3, participants, columns), and counts of repeated values.
+
+    Args:
+        cells: values of each participant and column.
+        resamples: number of bootstrap samples.
+        seed: of the samples.
+    """
+    shape = len(cells), len(cells[0]) if cells else 0
+    found = [[mean_interval(np.array(one), resamples, seed) for one in row] for row in cells]
+    counts = np.array([[len(one) for one in row] for row in cells], int).reshape(shape)
+    return np.moveaxis(np.array(found, float).reshape(*shape, 3), 2, 0), counts
