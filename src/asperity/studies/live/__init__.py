@@ -1,0 +1,1 @@
+"""A session of a study: stimuli, loop, screens, and the page."""

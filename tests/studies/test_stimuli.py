@@ -1,0 +1,92 @@
+"""Stimuli: each is within its limit before it is felt, over the whole range of the level."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from tests.studies.study_texts import COMPARISON, FACTORS, ONSET, SCENE, make_study
+
+import asperity as asp
+from asperity.core.errors import ParameterError
+from asperity.studies.live.player import LoopPlayer
+from asperity.studies.live.stimuli import Stimuli, excess_reason
+
+
+def test_stimuli_within_their_limits_are_accepted(tmp_path: Path) -> None:
+    stimuli = Stimuli(make_study(tmp_path))
+    assert stimuli.check_all() == {"surface.stiffness": 61.5}
+    surface = stimuli.setup({"surface.stiffness": 97.5}).rendered
+    assert (surface.stiffness, surface.law.letter) == (97.5, "C")
+    assert excess_reason(stimuli.rest(stimuli.setup({})), stimuli.device) == ""
+
+
+def test_levels_that_differ_in_the_fifth_digit_are_different_stimuli(tmp_path: Path) -> None:
+    stimuli = Stimuli(make_study(tmp_path))
+    for stiffness in (61.50001, 61.50002):
+        setup = stimuli.setup({"surface.stiffness": stiffness})
+        assert setup.surface.stiffness == stiffness
+
+
+def test_a_stimulus_above_its_limit_is_named_with_the_limit(tmp_path: Path) -> None:
+    stimuli = Stimuli(make_study(tmp_path, COMPARISON.replace("97.5 N/m", "900 N/m")))
+    message = (
+        r"surface\.stiffness = 900 N/m is refused: 900 N/m is above the .* for law C"
+    )
+    with pytest.raises(ParameterError, match=message):
+        stimuli.check_all()
+    with pytest.raises(ParameterError, match="is refused"):
+        stimuli.setup({"surface.stiffness": 900.0})
+
+
+def test_a_law_is_refused_where_another_is_accepted(tmp_path: Path) -> None:
+    text = COMPARISON.replace(FACTORS, '\n[vary]\n"surface.law" = ["C", "A"]\n')
+    with pytest.raises(ParameterError, match=r"surface\.law = A is refused"):
+        Stimuli(make_study(tmp_path, text)).check_all()
+
+
+def test_the_limit_is_what_compare_recommends(tmp_path: Path) -> None:
+    study = make_study(tmp_path)
+    device = Stimuli(study).device
+    surface = Stimuli(study).setup({}).surface
+    for row in asp.compare(surface.texture, device, "CDA", stiffness=100.0).rows:
+        recommended = row.recommended_stiffness
+        same = surface.to_law(row.law).to_stiffness(recommended)
+        assert excess_reason(same, device) == ""
+        assert "that asperity compare recommends" in excess_reason(
+            same.to_stiffness(1.001 * recommended), device
+        )
+
+
+def test_the_worst_level_of_a_range_decides(tmp_path: Path) -> None:
+    amplitude = ONSET.replace('level = "surface.stiffness"', 'level = "texture.amplitude"')
+    amplitude = amplitude.replace('"texture.amplitude" = ["61.5 um", "83.5 um", "97.5 um"]', "")
+    narrow = amplitude.replace('["20 N/m", "80 N/m"]', '["1 um", "50 um"]')
+    Stimuli(make_study(tmp_path, narrow)).check_all()
+    wide = narrow.replace("50 um", "900 um")
+    stimuli = Stimuli(make_study(tmp_path, wide))
+    stimuli.setup({"texture.amplitude": 1e-6})
+    with pytest.raises(ParameterError, match=r"texture\.amplitude = .* is refused"):
+        stimuli.check_all()
+
+
+def test_what_cannot_be_built_is_named(tmp_path: Path) -> None:
+    text = COMPARISON.replace('law = "C"\n', "")
+    with pytest.raises(
+        ParameterError, match=r"stiffness = 61.5 N/m cannot be rendered: law is miss"
+    ):
+        Stimuli(make_study(tmp_path, text)).check_all()
+    hand = COMPARISON + '[hand]\nkind = "moved"\n'
+    stimuli = Stimuli(make_study(tmp_path, hand))
+    with pytest.raises(ParameterError, match="hand must be a spring or a band"):
+        LoopPlayer(stimuli, stimuli.check_all(), None).start()
+    assert SCENE in COMPARISON
+
+
+def test_a_real_device_has_its_own_delay_and_resolution(tmp_path: Path) -> None:
+    study = make_study(tmp_path)
+    setup = Stimuli(study, is_real=True).setup({})
+    servo = setup.servo
+    assert (servo.delay, servo.position_resolution, servo.force_resolution) == (0, 0.0, 0.0)
+    assert setup.safety.lateness is None
+    assert Stimuli(study).setup({}).safety.lateness == 60.0
