@@ -151,7 +151,7 @@ class LoopPlayer:
         self._marks[1] = 0.0
         self._change(surface)
         self._record()
-        self._marks[1] = interval
+        self._marks[1], self._first_row = interval, self._next_row
 
     def _change(self, surface: Surface) -> None:
         loop = self._running
@@ -165,7 +165,6 @@ class LoopPlayer:
             self._record()
             rows, start = self._running.rows(self._running.memory.row_count - 1)
             if len(rows) and start - first > ramp and rows[-1, _SHARE] >= _FULL_SHARE:
-                self._first_row = start
                 return
             time.sleep(min(POLL_INTERVAL, self._setup.safety.ramp))
 
