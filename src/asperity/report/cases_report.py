@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 from asperity.core.units import format_quantity
 from asperity.report import page
 from asperity.report.page import Cell, Media, Page, Row, Section, Table, TableLayout
-from asperity.sweeps.sweep_result import CASE, UNIT, SweepResult
+from asperity.sweeps.sweep_result import CASE, SweepResult
+from asperity.sweeps.table_files import UNIT
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

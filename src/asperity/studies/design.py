@@ -123,6 +123,7 @@ class MethodKind:
             :class:`~asperity.studies.statistics.scores.Score`.
         consistency: share of repeated questions that a participant answers alike; ``None`` where
             the method has no such share.
+        has_function: whether the answers are those of a psychometric function of a level.
     """
 
     name: str
@@ -132,6 +133,7 @@ class MethodKind:
     label: Callable[[StudyDesign], Sequence[dict[str, Any]]]
     score: Callable[[StudyDesign, Mapping[str, Sequence[Answered]], int], Score]
     consistency: Callable[[Sequence[Answered]], float | None] = lambda _answers: None
+    has_function: bool = False
 
     def complete(self, design: StudyDesign) -> StudyDesign:
         """Return the design with the defaults of the options that it does not state.

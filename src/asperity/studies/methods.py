@@ -34,9 +34,11 @@ _DISCRIMINATION = {
 
 _KINDS = (
     MethodKind("detection", "level from which one interval is told from others",
-               tuple(_DETECTION.values()), ThresholdRun, label_conditions, score_thresholds),
+               tuple(_DETECTION.values()), ThresholdRun, label_conditions, score_thresholds,
+               has_function=True),
     MethodKind("discrimination", "difference from which one interval is told from others",
-               tuple(_DISCRIMINATION.values()), ThresholdRun, label_conditions, score_thresholds),
+               tuple(_DISCRIMINATION.values()), ThresholdRun, label_conditions, score_thresholds,
+               has_function=True),
     MethodKind("comparison", "which of two feels more so; Bradley–Terry scores",
                tuple(read_arguments(_FILE, "comparison").values()),
                run_comparison, label_conditions, score_comparison, pair_consistency),

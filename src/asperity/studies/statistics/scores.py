@@ -28,7 +28,7 @@ class Score:
         is_logarithmic: whether the values are logarithms.
         interval: how the intervals of each participant were found.
         pooled: values whose means are the pooled estimates, where they are not ``values``.
-        chance: value without an effect, where a column by itself may show one.
+        chance: of a share, its value without an effect.
     """
 
     quantity: str
@@ -42,7 +42,10 @@ class Score:
 
     def pool(self, resamples: int, seed: int) -> list[tuple[float, float, float]]:
         """Return the mean over the participants of each column, with its interval."""
-        return [_pool(column, resamples, seed) for column in self._units.T]
+        found = [_pool(column, resamples, seed) for column in self._units.T]
+        if self.chance is None:
+            return found
+        return [(mean, max(low, 0.0), min(high, 1.0)) for mean, low, high in found]  # shares
 
     def differences(self, resamples: int, seed: int) -> list[tuple[float, float, float]]:
         """Return by how much each column but the first differs from the first.

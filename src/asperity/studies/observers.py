@@ -1,0 +1,203 @@
+"""Simulated participants, who answer by how strongly they feel each stimulus."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asperity.core.errors import ParameterError, suggest_names
+from asperity.studies.design import Answered, Presentation, StudyDesign, Values
+from asperity.studies.methods import METHODS
+
+if TYPE_CHECKING:
+    from asperity.devices import Device
+    from asperity.surface import Surface
+
+Strength = Callable[[Values], float]
+"""How strong a stimulus is at the hand; what a typical observer just feels is 1."""
+_NONE = 1e-9
+_SPREAD_OF_RATINGS, _SPREAD_OF_ONSETS = 0.2, 0.1  # of logarithms
+_POINTS = 33  # of the search for an onset
+
+
+@dataclass(frozen=True)
+class Observer:
+    """A simulated participant: a psychometric function of the strength at the hand.
+
+    Attributes:
+        threshold: difference of strengths that is known half of the time; infinite for an observer
+            who guesses.
+        slope: s of the psychometric function of the logarithm of the strength.
+        lapse: share of lapses.
+    """
+
+    threshold: float = 1.0
+    slope: float = 4.0
+    lapse: float = 0.02
+
+    def draw(self, rng: np.random.Generator, spread: float) -> Observer:
+        """Return another observer, whose logarithm of the threshold deviates by a spread."""
+        return replace(self, threshold=self.threshold * math.exp(spread * rng.standard_normal()))
+
+    def answer(
+        self, presentation: Presentation, strength: Strength, rng: np.random.Generator
+    ) -> str:
+        """Return the answer to a presentation.
+
+        Args:
+            presentation: what is presented.
+            strength: of a stimulus.
+            rng: random numbers.
+        """
+        if presentation.adjusts:
+            return self._adjust(presentation, presentation.adjusts, strength, rng)
+        felt = [max(strength(one), _NONE) for one in presentation.intervals]
+        if presentation.correct:
+            return self._find(presentation, max(felt) - min(felt), rng)
+        if len(felt) == 1:
+            return self._rate(presentation, math.log(felt[0]), rng)
+        is_first = rng.random() < self._logistic(math.log(felt[0] / felt[1]))
+        return presentation.answers[0 if is_first else 1]
+
+    def _logistic(self, x: float) -> float:
+        return 0.5 + 0.5 * math.tanh(0.5 * self.slope * x)
+
+    def _find(self, presentation: Presentation, difference: float, rng: np.random.Generator) -> str:
+        """Return the right answer with the chance of the psychometric function."""
+        wrong = [one for one in presentation.answers if one != presentation.correct]
+        guess = 1.0 / len(presentation.answers)
+        known = 0.0
+        if difference > _NONE and math.isfinite(self.threshold):
+            known = self._logistic(math.log(difference / self.threshold))
+        is_right = rng.random() < guess + (1.0 - guess - self.lapse) * known
+        other = wrong[rng.integers(len(wrong))]
+        return str(presentation.correct) if is_right else other
+
+    def _rate(self, presentation: Presentation, felt: float, rng: np.random.Generator) -> str:
+        noisy = felt + _SPREAD_OF_RATINGS * rng.standard_normal()
+        if not presentation.answers:
+            low, high = presentation.range or (_NONE, 1.0 / _NONE)
+            return repr(min(max(10.0 * math.exp(noisy), low), high))
+        count = len(presentation.answers)
+        return presentation.answers[min(int(count / (1.0 + math.exp(-noisy))), count - 1)]
+
+    def _adjust(
+        self, presentation: Presentation, key: str, strength: Strength, rng: np.random.Generator
+    ) -> str:
+        """Return the value from which on the stimulus is felt, or about so."""
+        low, high = presentation.range or (_NONE, 1.0)
+        values = np.geomspace(low, high, _POINTS)
+        felt = [max(strength({**presentation.intervals[0], key: x}), _NONE) for x in values]
+        threshold = math.log(min(self.threshold, 1.0 / _NONE))
+        found = float(np.interp(threshold, np.log(felt), np.log(values)))
+        noisy = math.exp(found + _SPREAD_OF_ONSETS * rng.standard_normal())
+        return repr(float(min(max(noisy, low), high)))
+
+
+OBSERVERS = {
+    "typical": Observer(),
+    "keen": Observer(threshold=0.5),
+    "dull": Observer(threshold=2.0),
+    "guessing": Observer(threshold=math.inf, slope=0.0),
+}
+"""Simulated observers by name; ``guessing`` answers by chance, as a negative control."""
+
+
+def find_observer(name: str) -> Observer:
+    """Return the observer of a name.
+
+    Raises:
+        ParameterError: for an unknown one, with the nearest.
+    """
+    if name not in OBSERVERS:
+        raise ParameterError("observer", f"is unknown: {name!r}; {suggest_names(name, OBSERVERS)}")
+    return OBSERVERS[name]
+
+
+def surface_strength(surface: Surface, device: Device) -> float:
+    """Return how strong the texture of a surface is at the hand that scans it.
+
+    It is the root of the sum of squares, over the waves of the force, of the motion of the hand
+    over the motion that is felt; see :mod:`asperity.analysis.limits.perceptibility`.
+
+    Args:
+        surface: texture, law and stiffness.
+        device: the device.
+    """
+    from asperity.analysis.energy.merit import merit
+    from asperity.analysis.limits.perceptibility import assess_perceptibility
+
+    rms = merit(surface).ripple * surface.stiffness
+    part = surface.texture.texture_part()
+    assessed = assess_perceptibility(surface, device, part, rms=rms, find_remedies=False)
+    return assessed.level
+
+
+@dataclass(frozen=True)
+class HandStrength:
+    """The strength of the stimuli of a study, computed once for each condition and some levels.
+
+    Between these levels it is interpolated, logarithm by logarithm.
+
+    Attributes:
+        design: the study.
+        make: makes the surface and the device of a stimulus.
+    """
+
+    design: StudyDesign
+    make: Callable[[Values], tuple[Surface, Device]]
+
+    @cached_property
+    def _tables(self) -> dict[str, tuple[list[float], list[float]]]:
+        return {}
+
+    def __call__(self, values: Values) -> float:
+        """Return the strength of a stimulus."""
+        key = self.design.options.get("level", "")
+        rest = {name: value for name, value in values.items() if name != key}
+        table = self._tables.get(repr(rest))
+        if table is None:
+            table = self._tables[repr(rest)] = self._compute(rest, key)
+        return float(np.exp(np.interp(math.log(values.get(key, 1.0)), *table)))
+
+    def _compute(self, rest: Values, key: str) -> tuple[list[float], list[float]]:
+        options, levels = self.design.options, [1.0]
+        if key:
+            low = min(options["range"][0], options.get("reference", math.inf))
+            levels = list(np.geomspace(low, options["range"][1], 9))
+        stimuli = [{**rest, key: float(level)} if key else rest for level in levels]
+        found = [max(surface_strength(*self.make(one)), _NONE) for one in stimuli]
+        return [math.log(one) for one in levels], [math.log(one) for one in found]
+
+
+def simulate_run(
+    design: StudyDesign, number: int, observer: Observer, strength: Strength, seed: int
+) -> list[Answered]:
+    """Return the answers of a simulated participant; the same seed gives the same ones.
+
+    Args:
+        design: the study.
+        number: of the participant, from 0.
+        observer: the participant.
+        strength: of a stimulus.
+        seed: of the method and of the answers.
+    """
+    method = METHODS[design.kind].make(design, number, seed)
+    rng, answered = np.random.default_rng([seed, number, 1]), []
+    while (presentation := method.next()) is not None:
+        answer = observer.answer(presentation, strength, rng)
+        answered.append(Answered(presentation, answer))
+        method.answer(answer)
+    return answered
+
+
+def draw_observers(
+    observer: Observer, count: int, spread: float, rng: np.random.Generator
+) -> Sequence[Observer]:
+    """Return participants whose thresholds are scattered."""
+    return [observer.draw(rng, spread) for _ in range(count)]
