@@ -73,7 +73,7 @@ class _Player:
         path.write_text(f"{dict(metadata)}")
         self._line.send(("asked", trial))
 
-    def render(self, values: Mapping[str, Any] | None, _interval: int) -> None:
+    def render(self, values: Mapping[str, Any] | None, _interval: int, _wait: Any) -> None:
         """Tell the stiffness, after the check."""
         if values is not None:
             surface = self._stimuli.setup(values).rendered

@@ -65,7 +65,9 @@ class FakePlayer:
         self.calls.append(("begin", trial))
         self.metadata, self.path = dict(metadata), path
 
-    def render(self, values: Mapping[str, Any] | None, interval: int) -> None:
+    def render(
+        self, values: Mapping[str, Any] | None, interval: int, _wait: Callable[[], object]
+    ) -> None:
         self.calls.append(("render", values and dict(values), interval))
 
     def elapsed(self) -> float:

@@ -30,9 +30,7 @@ def test_levels_that_differ_in_the_fifth_digit_are_different_stimuli(tmp_path: P
 
 def test_a_stimulus_above_its_limit_is_named_with_the_limit(tmp_path: Path) -> None:
     stimuli = Stimuli(make_study(tmp_path, COMPARISON.replace("97.5 N/m", "900 N/m")))
-    message = (
-        r"surface\.stiffness = 900 N/m is refused: 900 N/m is above the .* for law C"
-    )
+    message = r"surface\.stiffness = 900 N/m is refused: 900 N/m is above the .* for law C"
     with pytest.raises(ParameterError, match=message):
         stimuli.check_all()
     with pytest.raises(ParameterError, match="is refused"):

@@ -43,6 +43,12 @@ def start(folder: Path, *options: str) -> Started:
     return Started(*arguments, command=RUN)
 
 
+def finish(session: Started) -> int:
+    """Wait for the end of a session; return its exit code."""
+    session.process.communicate(timeout=60)
+    return int(session.process.returncode)
+
+
 @needs_browser
 def test_a_study_is_done_by_keyboard_alone(browser: Browser, tmp_path: Path) -> None:
     session = start(tmp_path)
@@ -63,7 +69,7 @@ def test_a_study_is_done_by_keyboard_alone(browser: Browser, tmp_path: Path) -> 
                 await_title(browser, QUESTION)
             browser.press("2" if trial else "1")
         await_title(browser, "The end")
-        assert session.process.wait(timeout=60) == 0
+        assert finish(session) == 0
     finally:
         session.close()
     assert [one.answer for one in read_trials(tmp_path / "data")] == ["1", "2", "2"]
@@ -104,7 +110,7 @@ def test_escape_stops_and_a_closed_page_pauses(browser: Browser, tmp_path: Path)
         browser.call("Page.navigate", url=again.address)
         await_title(browser, "Welcome")
         browser.press("Escape")
-        assert again.process.wait(timeout=60) == 0
+        assert finish(again) == 0
     finally:
         again.close()
 
@@ -133,7 +139,7 @@ def test_buttons_and_the_noise_start_by_a_key(browser: Browser, tmp_path: Path) 
         browser.ask("document.querySelector('[data-key=\"2\"]').click()")
         await_title(browser, "First")
         browser.press("Escape")
-        assert session.process.wait(timeout=60) == 0
+        assert finish(session) == 0
     finally:
         session.close()
     assert [one.answer for one in read_trials(tmp_path / "data")] == ["2"]
@@ -153,7 +159,7 @@ def test_axe_finds_nothing(browser: Browser, tmp_path: Path, dark: bool) -> None
         await_title(browser, QUESTION)
         assert violations(browser) == []
         browser.press("Escape")
-        assert session.process.wait(timeout=60) == 0
+        assert finish(session) == 0
     finally:
         session.close()
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import csv
 import json
 from pathlib import Path
-from random import Random
 
+import numpy as np
 import pytest
 from tests.studies.study_texts import COMPARISON, make_study
 
@@ -29,8 +29,8 @@ from asperity.studies.study_store import (
 )
 
 
-def choose(presentation: Presentation, generator: Random) -> str:
-    return generator.choice(presentation.answers)
+def choose(presentation: Presentation, rng: np.random.Generator) -> str:
+    return str(rng.choice(presentation.answers))
 
 
 @pytest.fixture

@@ -84,12 +84,19 @@ def run_command(
         _run_on_device(study, path, participant, resume=resume, **values)
         return
     from asperity.studies.live.session import simulate_session
-    from asperity.studies.observers import find_observer
+    from asperity.studies.live.stimuli import Stimuli
+    from asperity.studies.methods import METHODS
+    from asperity.studies.observers import HandStrength, find_observer
 
-    observer = find_observer(values["simulate"], study.design)
+    observer, stimuli = find_observer(values["simulate"]), Stimuli(study)
+    stimuli.check_all()
+    design = METHODS[study.design.kind].complete(study.design)
+    strength = HandStrength(design, lambda one: (stimuli.setup(one).surface, stimuli.device))
     write_study(path, study)
     with Participant(path, study, participant, resume=resume) as person:
-        count = simulate_session(person, observer, study.design.seed)
+        count = simulate_session(
+            person, lambda shown, rng: observer.answer(shown, strength, rng), design.seed
+        )
     _report_end(path, participant, count, is_stopped=False)
 
 
@@ -152,6 +159,45 @@ def _open_screen(
         if not no_browser and not webbrowser.open(page.url):
             print_message("no browser was found: open the address in a browser of this machine")
         yield page
+
+
+@study_command.command("report", short_help="Write scores, tables and a page; unblinds.")
+@click.argument("folder")
+@output.output_options(uses_cache=False)
+def report_command(folder: str, outputs: output.Outputs) -> None:
+    """Write scores with intervals, pictures and tables into FOLDER, with the key of the codes.
+
+    It unblinds the study: write it when all participants are done.
+    """
+    from asperity.studies.result_page import study_page
+    from asperity.studies.study_functions import study_report, write_report
+
+    with output.progress_bar("analyzing the answers"):
+        result = study_report(folder)
+        names = ", ".join(write_report(folder, result))
+    written = f"Written in {escape_unprintable(folder)}: {names}"
+    outputs.write(result, study_page(result), extra_line=written)
+
+
+@study_command.command("plan", short_help="Compute the power of a study by simulation.")
+@click.argument("file")
+@click.option(
+    "--effect", type=float, required=True,
+    help="By which factor the first condition is stronger at the hand than the others.",
+)  # fmt: skip
+@click.option("--participants", type=int, help="Number.  [default: that of the study]")
+@click.option("--simulations", type=int, default=200, help="Simulated studies.  [default: 200]")
+@click.option(
+    "--observer", default="typical",
+    help="typical, keen, dull or guessing.  [default: typical]",
+)  # fmt: skip
+def plan_command(file: str, effect: float, **options: Any) -> None:
+    """Compute how often the study FILE would find an effect, with simulated participants."""
+    from asperity.studies.study_functions import plan_study
+
+    with output.progress_bar("simulating studies"):
+        found = plan_study(file, effect, **options)
+    click.echo(found.text)
 
 
 @study_command.command("remove", short_help="Delete all data of a participant.")

@@ -32,7 +32,12 @@ from asperity.studies.methods import METHODS, Method, Presentation
 from asperity.studies.study_file import Study, build_study
 
 STUDY_FILE, ANSWERS_FILE, KEY_FILE = "study.json", "answers.jsonl", "key.csv"
-DERIVED_FILES = (KEY_FILE, "table.csv", "table.parquet", "report.html", "report.json")
+TABLE_FILES = ("trials", "table")
+DERIVED_FILES = (
+    KEY_FILE,
+    "report.html",
+    *(f"{name}.{kind}" for name in TABLE_FILES for kind in ("csv", "parquet")),
+)
 """Files that a report writes; they hold data of all participants."""
 _NUMBER_FILE, _LOCK_FILE = "participant.json", ".lock"
 SCHEMA = 1

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol, Self
 
@@ -35,6 +36,10 @@ _START_HEIGHT = 2e-3  # of the simulated hand above the highest point [m]
 _FULL_SHARE = 1.0 - 1e-9
 
 
+Wait = Callable[[], object]
+"""Waits for a short time."""
+
+
 class Player(Protocol):
     """Renders stimuli."""
 
@@ -47,7 +52,7 @@ class Player(Protocol):
     def begin_trial(self, path: Path, trial: int, metadata: Mapping[str, Any]) -> None:
         """Begin the recording of a trial."""
 
-    def render(self, values: Mapping[str, Any] | None, interval: int) -> None:
+    def render(self, values: Mapping[str, Any] | None, interval: int, wait: Wait) -> None:
         """Render a stimulus, or the smooth wall for ``None``; return when its force is complete."""
 
     def elapsed(self) -> float:
@@ -98,7 +103,7 @@ class LoopPlayer:
             self._hand.request_motion(
                 stroke.centre, stroke.half, angular_velocity=stroke.angular_velocity
             )
-        self._wait_for_force(0)
+        self._wait_for_force(0, partial(time.sleep, POLL_INTERVAL))
 
     def _simulated_driver(self) -> Driver:
         setup = self._setup
@@ -139,8 +144,13 @@ class LoopPlayer:
         self._next_row = self._running.memory.row_count
         self._marks = np.array([trial, 0.0, math.nan, math.nan])
 
-    def render(self, values: Mapping[str, Any] | None, interval: int) -> None:
+    def render(self, values: Mapping[str, Any] | None, interval: int, wait: Wait) -> None:
         """Render a stimulus, or the smooth wall for ``None``; return when its force is complete.
+
+        Args:
+            values: of the stimulus.
+            interval: its number.
+            wait: called again and again during the ramps; whatever it raises ends the waiting.
 
         Raises:
             ParameterError: for a stimulus above its limit, which is not rendered.
@@ -149,16 +159,16 @@ class LoopPlayer:
         surface = self._wall if values is None else self._stimuli.setup(values).rendered
         self._record()
         self._marks[1] = 0.0
-        self._change(surface)
+        self._change(surface, wait)
         self._record()
         self._marks[1], self._first_row = interval, self._next_row
 
-    def _change(self, surface: Surface) -> None:
+    def _change(self, surface: Surface, wait: Wait) -> None:
         loop = self._running
         loop.change_surface(surface, accept_risk=True)  # its limit was checked
-        self._wait_for_force(loop.memory.row_count)
+        self._wait_for_force(loop.memory.row_count, wait)
 
-    def _wait_for_force(self, first: int) -> None:
+    def _wait_for_force(self, first: int, wait: Wait) -> None:
         """Wait until the force has fallen, where it does, and risen to all of the law's."""
         ramp = math.ceil(2.0 * self._setup.safety.ramp / self._setup.servo.period)
         while True:
@@ -166,7 +176,7 @@ class LoopPlayer:
             rows, start = self._running.rows(self._running.memory.row_count - 1)
             if len(rows) and start - first > ramp and rows[-1, _SHARE] >= _FULL_SHARE:
                 return
-            time.sleep(min(POLL_INTERVAL, self._setup.safety.ramp))
+            wait()
 
     def _record(self) -> None:
         """Write the new rows, and check that the loop runs.

@@ -17,7 +17,7 @@ from websockets.asyncio.server import ServerConnection, serve
 from websockets.exceptions import ConnectionClosed
 
 from asperity.lab.access import MAX_MESSAGE_BYTES, AccessToken, RateLimit, respond
-from asperity.studies.live.screens import PAUSE, View
+from asperity.studies.live.screens import PAUSE, STOP, View
 
 PAGE_FILE = "study.html"
 """Name of the page, below the access token."""
@@ -76,10 +76,11 @@ class PageScreen:
         self._thread.join()
 
     def show(self, view: View) -> None:
-        """Show a view in place of the one before; keys pressed before do not count."""
+        """Show a view in place of the one before; earlier keys do not count, but pause and stop."""
         self._view = view
-        while not self._keys.empty():
-            self._keys.get()
+        earlier = [self._keys.get_nowait() for _ in range(self._keys.qsize())]
+        for key in {PAUSE, STOP}.intersection(earlier):
+            self._keys.put(key)
         asyncio.run_coroutine_threadsafe(self._broadcast(), self._events).result()
 
     def read_key(self, timeout: float) -> str | None:

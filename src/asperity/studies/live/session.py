@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Collection
-from random import Random
 from typing import Any
 
-from asperity.core.errors import ParameterError
+import numpy as np
+
 from asperity.scene.device_run import POLL_INTERVAL
 from asperity.studies.live.player import Player
 from asperity.studies.live.screens import BACK, DOWN, GO_ON, PAUSE, STOP, UP, Screen, View
@@ -18,6 +18,8 @@ from asperity.studies.study_store import Participant, current_time
 
 ADJUSTMENT_STEPS = 40
 """Number of steps from the least to the greatest value of an adjustment."""
+SIMULATED_RESPONSE_TIME = 1.0
+"""Response time of simulated observers [s]."""
 _NUMERAL = "0123456789.-"
 _MAX_DIGITS = 12
 _ALWAYS = ((PAUSE, "pause"), (STOP, "stop"))
@@ -92,20 +94,24 @@ class Session:
         else:
             for number, values in enumerate(presentation.intervals, start=1):
                 self._present_interval(number, len(presentation.intervals), values)
-            self._player.render(None, 0)
+            self._player.render(None, 0, self._watch)
             answer, seconds = self._ask(presentation)
         self._player.end_trial(float(answer), seconds)
         participant.record(answer, seconds, started)
 
     def _present_interval(self, number: int, total: int, values: Any) -> None:
-        self._player.render(values, number)
+        self._player.render(values, number, self._watch)
         title = (
             "Feel this one" if total == 1 else ("First", "Second", "Third", "Fourth")[number - 1]
         )
         self._screen.show(View(title, "Move the handle over the surface.", _ALWAYS))
-        self._read_key(())
+        self._watch()
         while self._player.elapsed() < self._study.settings["interval"]:
-            self._read_key(())
+            self._watch()
+
+    def _watch(self) -> None:
+        """Wait for a short time for a pause or the stop."""
+        self._read_key(())
 
     def _read_key(self, keys: Collection[str]) -> str | None:
         """Return a pressed key that is one of some; ``None`` if there is none yet."""
@@ -152,7 +158,7 @@ class Session:
         at = min(range(len(levels)), key=lambda i: abs(levels[i] - values[key]))
         keys = ((UP, "more"), (DOWN, "less"), (GO_ON, "done"), *_ALWAYS)
         while True:
-            self._player.render({**values, key: levels[at]}, 1)
+            self._player.render({**values, key: levels[at]}, 1, self._watch)
             self._screen.show(View(presentation.question, "", keys))
             while (pressed := self._read_key((UP, DOWN, GO_ON))) is None:
                 pass
@@ -195,24 +201,18 @@ def adjustment_levels(low: float, high: float) -> list[float]:
 
 
 def simulate_session(
-    participant: Participant, observer: Callable[[Presentation, Random], str], seed: int
+    participant: Participant, answer: Callable[[Presentation, np.random.Generator], str], seed: int
 ) -> int:
     """Record the answers of a simulated observer, without a loop; return their number.
 
     Args:
         participant: whose answers are recorded.
-        observer: returns the answer to a presentation.
+        answer: returns the answer to a presentation.
         seed: of the observer; a session that goes on gives the answers of one that was not stopped.
-
-    Raises:
-        ParameterError: for an answer that the trial does not allow.
     """
     count = 0
     while (presentation := participant.method.next()) is not None:
-        generator = Random(f"{seed} {participant.number} {participant.trial}")
-        answer = observer(presentation, generator)
-        if presentation.answers and answer not in presentation.answers:
-            raise ParameterError("simulate", f"gave {answer!r}, not one of {presentation.answers}")
-        participant.record(answer, 0.0, current_time())
+        rng = np.random.default_rng([seed, participant.number, participant.trial])
+        participant.record(answer(presentation, rng), SIMULATED_RESPONSE_TIME, current_time())
         count += 1
     return count
