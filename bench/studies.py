@@ -1,6 +1,6 @@
 """Do the intervals of studies hold the truth, and how many trials does the adaptive method need?
 
-``python -m bench.studies [COUNT]`` simulates that many studies (1000) with each method, by observers
+``python -m bench.studies [COUNT]`` simulates that many studies (1000) of each method by observers
 whose thresholds and scores are known, and prints the share of 95 % intervals that hold them, apart
 for a participant and for the pooled value of twelve. A control whose intervals are half as wide
 shows what the shares would be if the intervals were too narrow. Then it prints how many trials the
@@ -28,6 +28,7 @@ COUNT, PARTICIPANTS, RESAMPLES, SPREAD = 1000, 12, 400, 0.3
 LAWS = {"surface.law": ("A", "C", "D", "H")}
 SCORES = np.array([0.0, 0.2, 0.4, 0.7])
 KEY, LEVELS = "texture.amplitude", {"level": "texture.amplitude", "range": [1e-6, 1e-4]}
+UNFELT = {**LEVELS, "reference": 1e-12}
 Interval = tuple[float, float, float, float]
 """Truth, estimate and ends."""
 
@@ -47,10 +48,9 @@ def threshold_study(seed: int, **options: object) -> Iterator[Interval]:
     rng = np.random.default_rng([seed, 9])
     observer = Observer(float(np.exp(rng.normal(0.0, 0.5))), float(np.exp(rng.normal(1.4, 0.3))))
     kind = METHODS["detection"]
-    design = StudyDesign("detection", {}, {**LEVELS, **options}, seed=seed)
+    design = StudyDesign("detection", {}, {**UNFELT, **options}, seed=seed)
     design = kind.complete(design)
-    # The strength of the reference, the lowest level, is a tenth of the threshold.
-    answered = simulate_run(design, 0, observer, lambda v: level_strength(v), seed)
+    answered = simulate_run(design, 0, observer, level_strength, seed)
     low, high = (
         float(x) for x in kind.score(design, {"P": answered}, RESAMPLES).estimates[1:, 0, 0]
     )
@@ -135,11 +135,11 @@ def trials_needed(count: int, most: int = 100) -> tuple[float, float]:
         demonstration = Library.Simulate()[0]
         goal = _deviation(demonstration.pf)
         track, rng = BayesianTrack(-5.0, 5.0, 0.5, 0.02), np.random.default_rng(seed)
-        for trial in range(1, most + 1):
+        trial = 0
+        while trial < most and _deviation(track.procedure.pf) > goal:
+            trial += 1
             chance = 0.5 + 0.49 / (1.0 + math.exp(-4.0 * (track.level() - truth)))
             track.record(bool(rng.random() < chance))
-            if _deviation(track.procedure.pf) <= goal:
-                break
         needed.append(trial)
         reached.append(goal)
     return float(np.median(needed)), float(np.median(reached))
@@ -164,9 +164,8 @@ def replays(kind_name: str, **options: object) -> bool:
 
 
 def run(console: Console, count: int = COUNT) -> None:
-    table = Table(
-        "method", "in 95 % intervals", "halved", "intervals", "s", title=f"{count} studies"
-    )
+    headings = ("method", "in 95 % intervals", "halved", "intervals", "s")
+    table = Table(*headings, title=f"{count} studies")
     for name, study in STUDIES.items():
         start = time.perf_counter()
         held, halved, total = coverage(study, count)
