@@ -153,13 +153,16 @@ def _deviation(function: object) -> float:
     return float(np.sqrt(share @ np.square(values - share @ values)))
 
 
+def _any_strength(values: Values) -> float:
+    return level_strength(values) if KEY in values else score_strength(values)
+
+
 def replays(kind_name: str, **options: object) -> bool:
     """Return whether a study with the same seed is the same, and with another one is not."""
     design = StudyDesign(kind_name, LAWS, options, seed=3)
     first, same, other = (
-        repr(simulate_run(design, 2, Observer(), lambda v: 1.0 if KEY not in v else level_strength(v),
-                          seed)) for seed in (5, 5, 6)
-    )  # fmt: skip
+        repr(simulate_run(design, 2, Observer(), _any_strength, seed)) for seed in (5, 5, 6)
+    )
     return first == same and first != other
 
 
