@@ -34,6 +34,7 @@ def study_page(result: StudyResult) -> Page:
             ("Participants", f"{used} of {len(score.participants)} used"),
             ("Trials", str(len(result.trials))),
             ("Seed", str(result.design.seed)),
+            ("Units", "SI; lengths in m, stiffness in N/m"),
         ],
         sections=[
             page.terminal_section(table),

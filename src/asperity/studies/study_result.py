@@ -14,7 +14,6 @@ from asperity.core.errors import ParameterError
 from asperity.core.files import to_plain_data
 from asperity.studies.design import Answered, Presentation, StudyDesign
 from asperity.studies.methods import EXCLUSIONS, METHODS
-from asperity.studies.statistics.intervals import LEAST_RESAMPLED
 from asperity.studies.statistics.scores import RESAMPLES, Score
 from asperity.sweeps.table_files import TableFiles
 
@@ -184,9 +183,7 @@ class StudyResult(Reportable, TableFiles):
                 count = int(score.counts[row, column])
                 yield {**head, **numbers, "answers": count, "interval": score.interval,
                        "excluded": self.excluded.get(name, "")}  # fmt: skip
-        method = f"studentised bootstrap over participants, {self.resamples} samples"
-        if len(self.included) < LEAST_RESAMPLED:
-            method = "Student's t over participants"
+        method = self.included_score.pooled_interval(self.resamples)
         compared = labels if score.chance is not None else labels[1:]
         word = "ratio to the first" if score.is_logarithmic else "difference from the first"
         word = word if score.chance is None else "difference from chance"

@@ -85,6 +85,9 @@ def score_comparison(
     return Score(
         "Bradley–Terry score", tuple(answered), estimates, counts,
         interval="Fisher information", pooled=pooled,
+        # The values are skewed where hardly any choice goes the other way; samples without it would
+        # make the interval of the bootstrap much too wide.
+        is_resampled=False,
     )  # fmt: skip
 
 

@@ -69,13 +69,12 @@ class LogLevels:
         return thresholds, *pairs
 
 
-def log_prior(slopes: FloatArray) -> FloatArray:
+def log_prior(slopes: FloatArray | float) -> FloatArray:
     """Return the logarithm of the weak prior of the slope.
 
     ln(s/4) is normal with deviation 1; without it, few trials may fit a slope without bounds.
     """
-    result: FloatArray = -0.5 * np.square(np.log(slopes / USUAL_SLOPE))
-    return result
+    return np.asarray(-0.5 * np.square(np.log(slopes / USUAL_SLOPE)))
 
 
 @dataclass(frozen=True)
@@ -125,16 +124,22 @@ def fit_psychometric(levels: LogLevels, counts: Counts) -> tuple[float, float]:
     likelihood = _log_likelihoods(levels, counts)(counts.right[None])[0]
     best = int(np.argmax(likelihood))
 
-    def loss(point: FloatArray) -> float:
-        slope = np.exp(point[1])
-        chance = np.clip(levels.probability(counts.x, point[0], slope), _LEAST, 1.0 - _LEAST)
+    def loss(point: FloatArray) -> tuple[float, FloatArray]:
+        offset, slope = counts.x - point[0], float(np.exp(point[1]))
+        chance = np.clip(levels.probability(offset, 0.0, slope), _LEAST, 1.0 - _LEAST)
         wrong = counts.total - counts.right
         sum_ = counts.right @ np.log(chance) + wrong @ np.log1p(-chance)
-        return -float(sum_ + log_prior(slope))
+        # Derivatives of the sum by the exponent s (x − α), then by α and ln s.
+        range_ = 1.0 - levels.guess - levels.lapse
+        known = (chance - levels.guess) / range_
+        terms = (counts.right / chance - wrong / (1.0 - chance)) * range_ * known * (1.0 - known)
+        prior, prior_slope = log_prior(slope), -math.log(slope / USUAL_SLOPE)
+        by = np.array([-slope * terms.sum(), slope * (terms @ offset) + prior_slope])
+        return -float(sum_ + prior), -by
 
     start = np.array([all_thresholds[best], math.log(all_slopes[best])])
     bounds = [(thresholds[0], thresholds[-1]), (math.log(_SLOPES[0]), math.log(_SLOPES[-1]))]
-    found = minimize(loss, start, bounds=bounds)
+    found = minimize(loss, start, jac=True, bounds=bounds)
     return float(found.x[0]), float(math.exp(found.x[1]))
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.core.compiled import FloatArray
-from asperity.studies.statistics.intervals import mean_interval
+from asperity.studies.statistics.intervals import LEAST_RESAMPLED, mean_interval
 
 RESAMPLES = 2000
 """Number of samples of a bootstrap, unless stated otherwise."""
@@ -29,6 +29,7 @@ class Score:
         interval: how the intervals of each participant were found.
         pooled: values whose means are the pooled estimates, where they are not ``values``.
         chance: of a share, its value without an effect.
+        is_resampled: whether pooled intervals are those of the bootstrap rather than Student's t.
     """
 
     quantity: str
@@ -39,10 +40,11 @@ class Score:
     interval: str = ""
     pooled: FloatArray | None = None
     chance: float | None = None
+    is_resampled: bool = True
 
     def pool(self, resamples: int, seed: int) -> list[tuple[float, float, float]]:
         """Return the mean over the participants of each column, with its interval."""
-        found = [_pool(column, resamples, seed) for column in self._units.T]
+        found = [self._pool(column, resamples, seed) for column in self._units.T]
         if self.chance is None:
             return found
         return [(mean, max(low, 0.0), min(high, 1.0)) for mean, low, high in found]  # shares
@@ -54,8 +56,8 @@ class Score:
         """
         units = self._units
         if self.chance is not None:
-            return [_pool(column - self.chance, resamples, seed) for column in units.T]
-        return [_pool(column - units[:, 0], resamples, seed) for column in units.T[1:]]
+            return [self._pool(column - self.chance, resamples, seed) for column in units.T]
+        return [self._pool(column - units[:, 0], resamples, seed) for column in units.T[1:]]
 
     @property
     def values(self) -> FloatArray:
@@ -67,15 +69,21 @@ class Score:
     def _units(self) -> FloatArray:
         return self.values if self.pooled is None else self.pooled
 
+    def _pool(self, values: FloatArray, resamples: int, seed: int) -> tuple[float, float, float]:
+        known = values[np.isfinite(values)]
+        return mean_interval(known, resamples if self.is_resampled else 0, seed)
+
+    def pooled_interval(self, resamples: int) -> str:
+        """Return how the pooled intervals are found."""
+        if not self.is_resampled or not resamples or len(self._units) < LEAST_RESAMPLED:
+            return "Student's t over participants"
+        return f"studentised bootstrap over participants, {resamples} samples"
+
     def to_scale(self, value: float) -> float:
         """Return a value on the scale of the quantity."""
         if not self.is_logarithmic:
             return value
         return math.exp(value) if value < 700.0 else math.inf
-
-
-def _pool(values: FloatArray, resamples: int, seed: int) -> tuple[float, float, float]:
-    return mean_interval(values[np.isfinite(values)], resamples, seed)
 
 
 def repeated_score(

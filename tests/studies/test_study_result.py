@@ -1,0 +1,192 @@
+"""Results of studies: effects that are there, exclusions, tables, reports, plans and observers."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from tests.studies.study_cases import AMPLITUDE, Record, design_of, records
+
+from asperity.core.errors import ParameterError
+from asperity.devices import load_device
+from asperity.studies.methods import METHODS
+from asperity.studies.observers import OBSERVERS, HandStrength, find_observer, surface_strength
+from asperity.studies.plan import plan
+from asperity.studies.study_result import analyse
+from asperity.surface import Surface
+from asperity.textures import Sinusoid
+
+EFFECTS = {"comparison": 4.0 * math.log(2.0), "rating": math.log(2.0), "onset": math.log(0.5)}
+
+
+@pytest.mark.parametrize("kind", EFFECTS)
+def test_effects_come_out(kind: str) -> None:
+    result = analyse(design_of(kind), records(design_of(kind), 12), 400)
+    for estimate, low, high in result.differences:
+        assert low < -EFFECTS[kind] < high
+        assert high < 0.0 or low > 0.0
+        assert estimate == pytest.approx(-EFFECTS[kind], rel=0.5)
+
+
+def test_matches_of_what_is_equal_are_at_chance() -> None:
+    result = analyse(design_of("axb", repeats=8), records(design_of("axb", repeats=8), 12), 400)
+    law = [label["surface.law"] for label in result.labels]
+    assert law == ["A / C", "A / D", "A / H", "C / D", "C / H", "D / H"]
+    for (share, low, high), pair in zip(result.pooled, law, strict=True):
+        assert 0.0 <= low <= share <= high <= 1.0
+        assert low > 0.5 if pair.startswith("A") else 0.38 < share < 0.62
+
+
+def test_likert_scales_keep_the_order() -> None:
+    design = design_of("rating", scale="likert")
+    pooled = [one[0] for one in analyse(design, records(design, 6), 400).pooled]
+    assert pooled[0] > max(pooled[1:])
+    assert 1.0 <= min(pooled) <= max(pooled) <= 7.0
+
+
+def test_magnitudes_do_not_depend_on_the_numbers_that_a_participant_likes() -> None:
+    design, trials = design_of("rating"), records(design_of("rating"), 4)
+    scaled = [
+        replace(one, answer=repr(7.0 * float(one.answer))) if one.participant == "P00" else one
+        for one in trials
+    ]
+    first, second = analyse(design, trials, 0), analyse(design, scaled, 0)
+    assert [one[1:] for one in second.differences] == [
+        pytest.approx(one[1:], abs=1e-9) for one in first.differences
+    ]
+    spread = second.score.values.std(axis=0)
+    assert spread == pytest.approx(first.score.values.std(axis=0), abs=1e-9)
+
+
+def test_participants_and_trials_are_excluded_by_the_rules() -> None:
+    rules = {"shortest_response": 0.3, "least_correct": 0.6, "largest_omission": 0.3}
+    design = design_of("axb", repeats=8, exclusion=rules)
+    trials = records(design, 4, threshold=0.1)
+
+    def change(one: Record) -> Record:
+        is_hasty = one.trial == 3 or (one.participant == "P01" and one.trial % 2)
+        answer = "1" if one.participant == "P02" else one.answer
+        return replace(one, answer=answer, response_time=0.1 if is_hasty else 1.0)
+
+    changed = [change(one) for one in trials]
+    result = analyse(design, changed, 200)
+    assert result.excluded.keys() == {"P01", "P02"}
+    assert "left out" in result.excluded["P01"]
+    assert "answers right" in result.excluded["P02"]
+    assert result.omitted["P00"] == 1
+    assert result.included_score.participants == ("P00", "P03")
+    assert [row["used"] for row in result.trial_table.table_rows()][:5] == [True] * 3 + [
+        False,
+        True,
+    ]
+    assert analyse(design_of("axb", repeats=8), changed, 200).excluded == {}
+
+
+def test_inconsistent_participants_are_excluded() -> None:
+    design = design_of("comparison", repeats=4, exclusion={"least_consistency": 0.6})
+    steady = records(design, 1, slope=40.0)
+    opposite = [
+        replace(one, participant="P9", answer="1") for one in steady
+    ]  # always the first: of a pair that changes places, each as often
+    result = analyse(design, [*steady, *opposite], 0)
+    assert result.excluded.keys() == {"P9"}
+    assert result.consistency["P9"] == pytest.approx(1.0 / 3.0)
+
+
+@pytest.mark.parametrize("kind", METHODS)
+def test_reports_and_tables(kind: str, tmp_path: Path) -> None:
+    options = {"trials": 8} if kind in {"detection", "discrimination"} else {}
+    design = design_of(kind, **options)
+    result = analyse(design, records(design, 3), 50)
+    html = result.to_html()
+    assert "rougher?" in html
+    assert html.count("<svg") >= 1 + METHODS[kind].has_function
+    assert json.loads(json.dumps(result.to_dict()))["schema"] == 1
+    result.to_csv(tmp_path / "scores.csv")
+    result.trial_table.to_csv(tmp_path / "trials.csv")
+    with (tmp_path / "trials.csv").open(encoding="utf-8", newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert len(rows) == len(result.trials)
+    assert {"participant", "answer", "surface.law", "response time [s]", "used"} <= rows[0].keys()
+    with (tmp_path / "scores.csv").open(encoding="utf-8", newline="") as stream:
+        scores = list(csv.DictReader(stream))
+    labels = len(result.labels)
+    compared = labels if kind == "axb" else labels - 1
+    assert len(scores) == 3 * labels + labels + compared
+
+
+def test_tables_as_parquet(tmp_path: Path) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
+    result = analyse(design_of("rating"), records(design_of("rating"), 3), 0)
+    result.trial_table.to_parquet(tmp_path / "trials.parquet")
+    table = parquet.read_table(tmp_path / "trials.parquet")
+    assert table.num_rows == len(result.trials)
+    assert table.schema.field("response time [s]").metadata == {b"unit": b"s"}
+
+
+def test_a_study_without_trials_is_refused() -> None:
+    with pytest.raises(ParameterError, match="no trials"):
+        analyse(design_of("rating"), [])
+
+
+def test_plans_find_effects_and_nothing_else() -> None:
+    design = design_of("comparison", repeats=2)
+    strong = plan(design, 2.0, 10, simulations=30)
+    none = plan(design, 1.0, 10, simulations=40)
+    few = plan(design, 1.3, 4, simulations=30)
+    more = plan(design, 1.3, 16, simulations=30)
+    assert strong.found >= 27
+    assert none.found <= 7  # of 40: 5 % are expected, more than 7 come once in 700 times
+    assert few.found < more.found
+    assert strong == plan(design, 2.0, 10, simulations=30)
+    assert "10 participants of 12 trials" in strong.text
+
+
+def test_observers_who_guess_show_no_effect() -> None:
+    found = plan(design_of("axb"), 3.0, 10, simulations=40, observer="guessing")
+    assert found.found <= 7
+    assert plan(design_of("axb"), 3.0, 10, simulations=10).found >= 8
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"effect": 0.0}, "effect"),
+        ({"effect": 2.0, "participants": 2}, "at least 3"),
+        ({"effect": 2.0, "observer": "tipical"}, "typical"),
+    ],
+)
+def test_plans_that_cannot_be_made_are_refused(options: dict, words: str) -> None:
+    with pytest.raises(ParameterError, match=words):
+        plan(design_of("rating"), **{"simulations": 1, **options})
+
+
+def make_stimulus(values: dict) -> tuple[Surface, object]:
+    wave = Sinusoid(amplitude=values[AMPLITUDE], period=1e-3)
+    return Surface(wave, values["surface.law"], stiffness=500.0), load_device("touch")
+
+
+def test_strength_grows_with_the_force_at_the_hand() -> None:
+    weak, strong = (
+        surface_strength(*make_stimulus({AMPLITUDE: x, "surface.law": "A"})) for x in (2e-6, 1e-5)
+    )
+    assert 0.0 < weak < 1.0
+    assert strong == pytest.approx(5.0 * weak, rel=0.2)
+
+
+def test_strengths_between_levels_are_interpolated() -> None:
+    design = design_of("detection", reference=1e-6)
+    strength = HandStrength(design, make_stimulus)
+    values = {AMPLITUDE: 7e-6, "surface.law": "C"}
+    assert strength(values) == pytest.approx(surface_strength(*make_stimulus(values)), rel=0.02)
+    assert strength({**values, AMPLITUDE: 1e-6}) < strength(values)
+
+
+def test_observers_have_names() -> None:
+    assert find_observer("typical") is OBSERVERS["typical"]
+    with pytest.raises(ParameterError, match="typical"):
+        find_observer("tipycal")
