@@ -44,8 +44,9 @@ def init_command(kind: str, file: str, *, force: bool) -> None:
     if Path(file).suffix.lower() != ".toml":
         raise ParameterError("file", "must be a file that ends in .toml", file)
     output.check_output("file", file, force=force)
-    output.write_output("file", file, (_TEMPLATES / f"{kind}.toml").read_text("utf-8"))
     name = escape_unprintable(file)
+    text = (_TEMPLATES / f"{kind}.toml").read_text("utf-8").replace("{name}", name)
+    output.write_output("file", file, text)
     click.echo(f"Written: {name}; now: asperity study run {name} --participant P01")
 
 
