@@ -103,6 +103,8 @@ def test_escape_stops_and_a_closed_page_pauses(browser: Browser, tmp_path: Path)
         output, _ = session.process.communicate(timeout=60)
         assert "P01: 1 answers in" in output
         assert "stopped; --resume goes on" in output
+        await_title(browser, "Stopped")
+        assert browser.ask("document.getElementById('keys').hidden")
     finally:
         session.close()
     again = start(tmp_path, "--resume")

@@ -44,6 +44,13 @@ function show(message) {
 
 socket.addEventListener("message", ({ data }) => show(data));
 socket.addEventListener("close", () => {
+  part("keys").hidden = true;
+  part("typed").hidden = true;
+  if (!view || view.progress < 1) {
+    part("title").textContent = "Stopped";
+    part("text").textContent = "The force is released.";
+    part("text").hidden = false;
+  }
   part("state").textContent = "The session has ended, or the connection is lost. Ask the experimenter.";
 });
 
