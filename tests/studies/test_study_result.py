@@ -13,6 +13,7 @@ from tests.studies.study_cases import AMPLITUDE, Record, design_of, records
 
 from asperity.core.errors import ParameterError
 from asperity.devices import load_device
+from asperity.studies import result_page  # noqa: F401
 from asperity.studies.methods import METHODS
 from asperity.studies.observers import OBSERVERS, HandStrength, find_observer, surface_strength
 from asperity.studies.plan import plan

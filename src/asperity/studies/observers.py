@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -194,10 +194,3 @@ def simulate_run(
         answered.append(Answered(presentation, answer))
         method.answer(answer)
     return answered
-
-
-def draw_observers(
-    observer: Observer, count: int, spread: float, rng: np.random.Generator
-) -> Sequence[Observer]:
-    """Return participants whose thresholds are scattered."""
-    return [observer.draw(rng, spread) for _ in range(count)]

@@ -15,7 +15,7 @@ from asperity.core.errors import ParameterError
 from asperity.core.files import Serializable
 from asperity.studies.design import StudyDesign, Values
 from asperity.studies.methods import METHODS
-from asperity.studies.observers import Strength, draw_observers, find_observer, simulate_run
+from asperity.studies.observers import Strength, find_observer, simulate_run
 from asperity.studies.statistics.intervals import share_interval
 
 SPREAD = 0.3
@@ -114,9 +114,11 @@ def plan(
     found, widths, trials = 0, [], 0
     for number in range(simulations):
         rng = np.random.default_rng([seed, number])
-        people = enumerate(draw_observers(base, count, spread, rng))
         own = int(rng.integers(2**31))
-        answered = {str(i): simulate_run(design, i, one, strength, own) for i, one in people}
+        answered = {
+            str(i): simulate_run(design, i, base.draw(rng, spread), strength, own)
+            for i in range(count)
+        }
         low, high = kind.score(design, answered, 0).differences(_RESAMPLES, own)[0][1:]
         found += not low <= 0.0 <= high
         widths.append((high - low) / 2.0)

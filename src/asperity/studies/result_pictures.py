@@ -32,9 +32,9 @@ def scores_figure(result: StudyResult) -> Figure:
     figure = style.new_figure(7.0, 1.2 + 0.45 * len(labels))
     axes = style.single_axes(figure)
     score, places = result.score, np.arange(len(labels))
-    kept = [i for i, name in enumerate(score.participants) if name not in result.excluded]
-    values = _scaled(result, score.values[kept])
-    for row, offset in zip(values, np.linspace(-0.3, -0.1, len(kept)), strict=True):
+    used = [i for i, name in enumerate(score.participants) if name not in result.excluded]
+    values = _scaled(result, score.values[used])
+    for row, offset in zip(values, np.linspace(-0.3, -0.1, len(used)), strict=True):
         axes.plot(row, places + offset, "o", color=_FAINT, markersize=3)
     pooled = _scaled(result, np.array(result.pooled))
     for place, (value, low, high) in zip(places, pooled, strict=True):
@@ -110,10 +110,12 @@ def _group(counts: Counts) -> Counts:
     """Return the answers in groups of near levels with about as many answers each."""
     share = np.cumsum(counts.total) - counts.total / 2.0
     group = np.minimum((share / counts.total.sum() * _MAX_BINS).astype(int), _MAX_BINS - 1)
-    kept = np.unique(group)
-    total = np.array([counts.total[group == one].sum() for one in kept])
-    right = np.array([counts.right[group == one].sum() for one in kept])
-    x = np.array([np.average(counts.x[group == i], weights=counts.total[group == i]) for i in kept])
+    groups = np.unique(group)
+    total = np.array([counts.total[group == one].sum() for one in groups])
+    right = np.array([counts.right[group == one].sum() for one in groups])
+    x = np.array(
+        [np.average(counts.x[group == i], weights=counts.total[group == i]) for i in groups]
+    )
     return Counts(x, right, total)
 
 

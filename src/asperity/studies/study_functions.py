@@ -6,6 +6,7 @@ import importlib.util
 from pathlib import Path
 from typing import Any
 
+from asperity.studies import result_page  # noqa: F401  # registers the report of results
 from asperity.studies.plan import StudyPlan, plan
 from asperity.studies.study_file import load_study
 from asperity.studies.study_result import StudyResult, analyse

@@ -5,53 +5,24 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from asperity.core.display import Reportable
 from asperity.core.errors import ParameterError
 from asperity.core.files import to_plain_data
-from asperity.studies.design import Answered, Presentation, StudyDesign
+from asperity.studies.design import Answered, StudyDesign
 from asperity.studies.methods import EXCLUSIONS, METHODS
 from asperity.studies.statistics.scores import RESAMPLES, Score
 from asperity.sweeps.table_files import TableFiles
 
+if TYPE_CHECKING:
+    from asperity.studies.study_store import TrialRecord
+
 SCHEMA = 1
 POOLED = "pooled"
 _END = ("estimate", "lower", "upper")
-
-
-class Trial(Protocol):
-    """A trial as it was recorded."""
-
-    @property
-    def participant(self) -> str:
-        """Code of the participant."""
-
-    @property
-    def run(self) -> int:
-        """Number of the run."""
-
-    @property
-    def trial(self) -> int:
-        """Number of the trial in its run."""
-
-    @property
-    def presentation(self) -> Presentation:
-        """What was presented."""
-
-    @property
-    def answer(self) -> str:
-        """The answer."""
-
-    @property
-    def response_time(self) -> float:
-        """Time from the end of the presentation to the answer [s]."""
-
-    @property
-    def started(self) -> str:
-        """When the trial began, as ISO time."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +36,7 @@ class TrialTable(TableFiles):
     """
 
     design: StudyDesign
-    trials: Sequence[Trial]
+    trials: Sequence[TrialRecord]
     excluded: Mapping[str, str]
 
     @property
@@ -116,7 +87,7 @@ class StudyResult(Reportable, TableFiles):
     """
 
     design: StudyDesign
-    trials: Sequence[Trial]
+    trials: Sequence[TrialRecord]
     score: Score
     excluded: Mapping[str, str]
     omitted: Mapping[str, int]
@@ -147,8 +118,8 @@ class StudyResult(Reportable, TableFiles):
     @cached_property
     def included_score(self) -> Score:
         """The estimates of the participants who are not excluded."""
-        kept = {one: answers for one, answers in self.answered.items() if one not in self.excluded}
-        return METHODS[self.design.kind].score(self.design, kept, 0)
+        used = {one: answers for one, answers in self.answered.items() if one not in self.excluded}
+        return METHODS[self.design.kind].score(self.design, used, 0)
 
     @cached_property
     def answered(self) -> dict[str, list[Answered]]:
@@ -227,14 +198,14 @@ def exclusion_rules(design: StudyDesign) -> dict[str, float]:
     return {name: float(value) for name, value in given.items() if value is not None}
 
 
-def is_used(design: StudyDesign, trial: Trial) -> bool:
+def is_used(design: StudyDesign, trial: TrialRecord) -> bool:
     """Return whether a trial was answered neither too fast nor too slowly."""
     rules = exclusion_rules(design)
     longest = rules.get("longest_response", float("inf"))
     return rules["shortest_response"] <= trial.response_time <= longest
 
 
-def group_answers(design: StudyDesign, trials: Sequence[Trial]) -> dict[str, list[Answered]]:
+def group_answers(design: StudyDesign, trials: Sequence[TrialRecord]) -> dict[str, list[Answered]]:
     """Return the used answers of each participant, in the order of the first trials."""
     found: dict[str, list[Answered]] = {one.participant: [] for one in trials}
     for one in trials:
@@ -244,7 +215,7 @@ def group_answers(design: StudyDesign, trials: Sequence[Trial]) -> dict[str, lis
 
 
 def analyse(
-    design: StudyDesign, trials: Sequence[Trial], resamples: int = RESAMPLES
+    design: StudyDesign, trials: Sequence[TrialRecord], resamples: int = RESAMPLES
 ) -> StudyResult:
     """Return what the trials of a study say.
 
@@ -256,8 +227,6 @@ def analyse(
     Raises:
         ParameterError: without trials.
     """
-    from asperity.studies import result_page  # noqa: F401  # registers the report of results
-
     if not trials:
         raise ParameterError("study", "has no trials yet")
     kind = METHODS[design.kind]
@@ -284,9 +253,9 @@ def _exclude(
     total = len(answered) + omitted
     if omitted > rules["largest_omission"] * total:
         return f"{omitted} of {total} trials left out"
-    asked = [one.is_correct for one in answered if one.presentation.correct]
-    if asked and sum(asked) < rules["least_correct"] * len(asked):
-        return f"{sum(asked)} of {len(asked)} answers right"
+    right = [one.is_correct for one in answered if one.presentation.correct]
+    if right and sum(right) < rules["least_correct"] * len(right):
+        return f"{sum(right)} of {len(right)} answers right"
     if consistency is not None and consistency < rules["least_consistency"]:
         return f"{consistency:.0%} of repeated questions answered alike"
     return ""
