@@ -16,7 +16,7 @@ from tests.studies.study_texts import COMPARISON
 
 from asperity.lab.access import page_files
 from asperity.recording.recording import open_recording
-from asperity.studies.live.server import study_files
+from asperity.studies.live.page_screen import study_files
 from asperity.studies.study_store import ANSWERS_FILE, read_trials
 
 RUN = (sys.executable, "-m", "asperity", "study", "run", "--no-browser")

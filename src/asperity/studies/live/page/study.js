@@ -38,7 +38,7 @@ function show(message) {
   part("keys").hidden = !view.keys.length;
   part("state").textContent = view.noise
     ? "Noise masks the sound of the device; it begins with your first key."
-    : "Keys: a foot switch may send them, too.";
+    : "Keys: a pedal may send them, too.";
   globalThis.study = { view, noise };
 }
 
