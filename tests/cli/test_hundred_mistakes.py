@@ -29,6 +29,7 @@ MISTAKES: list[tuple[str, tuple[str, ...]]] = [
     ("--vresion", ("--vresion", "did you mean '--version'?")),
     ("envelop --device touch", ("'envelop'", "did you mean 'envelope'?")),
     ("envelope --device tuoch", ("device is unknown: 'tuoch'", "did you mean 'touch'")),
+    ("study report nowhere", ("folder", "asperity study run makes one")),
     ("sweep cloth --vary texture.magnifi=1,2", ("texture.magnifi", "texture.magnify")),
     # Options misspelt.
     ("compare cloth --devise touch", ("--devise", "did you mean '--device'?")),
