@@ -10,7 +10,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from asperity.core.checks import FloatArray
 from asperity.report.pictures import style
 from asperity.studies.design import Answered
 from asperity.studies.kinds.thresholds import log_levels, presented_level
@@ -33,10 +32,10 @@ def scores_figure(result: StudyResult) -> Figure:
     axes = style.single_axes(figure)
     score, places = result.score, np.arange(len(labels))
     used = [i for i, name in enumerate(score.participants) if name not in result.excluded]
-    values = _scaled(result, score.values[used])
+    values = score.to_scale(score.values[used])
     for row, offset in zip(values, np.linspace(-0.3, -0.1, len(used)), strict=True):
         axes.plot(row, places + offset, "o", color=_FAINT, markersize=3)
-    pooled = _scaled(result, np.array(result.pooled))
+    pooled = score.to_scale(np.array(result.pooled))
     for place, (value, low, high) in zip(places, pooled, strict=True):
         ends = [end for end in (low, high) if np.isfinite(end) and end > -math.inf]
         axes.plot(value, place, "s", color=_STRONG)
@@ -50,10 +49,6 @@ def scores_figure(result: StudyResult) -> Figure:
     axes.invert_yaxis()
     style.label_axes(axes, score.quantity, "")
     return figure
-
-
-def _scaled(result: StudyResult, values: FloatArray) -> FloatArray:
-    return np.asarray(np.vectorize(result.score.to_scale, otypes=[float])(values))
 
 
 def _text(value: object) -> str:
