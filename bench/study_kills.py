@@ -24,8 +24,8 @@ from typing import Any
 
 from asperity.core.errors import ParameterError
 from asperity.studies.live.screens import GO_ON, View
-from asperity.studies.live.session import Session
 from asperity.studies.live.stimuli import Stimuli
+from asperity.studies.live.trial_session import StudySession
 from asperity.studies.study_file import Study, load_study
 from asperity.studies.study_store import (
     ANSWERS_FILE,
@@ -36,7 +36,7 @@ from asperity.studies.study_store import (
 )
 
 COUNT = 500
-LONGEST = 0.06  # [s] until a kill
+LONGEST = 0.2  # [s] until a kill
 STIFFNESSES = (50.123, 75.123, 100.123)
 STUDY = f"""
 [study]
@@ -121,7 +121,7 @@ def _run(folder: Path, study: Study, stimuli: Stimuli, code: str, line: Connecti
         is_known = code in list_participants(folder)
         with _ToldParticipant(folder, study, code, resume=is_known) as person:
             person.line = line
-            Session(study, person, _Player(stimuli, line), _Screen()).run()
+            StudySession(study, person, _Player(stimuli, line), _Screen()).run()
     except ParameterError as error:
         if "has answered all" not in str(error):
             raise

@@ -17,7 +17,7 @@ from tests.studies.study_texts import (
 )
 
 from asperity.studies.live.screens import DOWN, GO_ON, PAUSE, STOP, UP, View
-from asperity.studies.live.session import Session, SessionStopped, adjustment_levels
+from asperity.studies.live.trial_session import SessionStopped, StudySession, adjustment_levels
 from asperity.studies.study_store import Participant, TrialRecord, read_trials, write_study
 
 
@@ -28,7 +28,7 @@ def run(
     write_study(folder / "data", study)
     player, screen = FakePlayer(), ScriptedScreen(press)
     with Participant(folder / "data", study, "P01", resume=resume) as person:
-        Session(study, person, player, screen).run()
+        StudySession(study, person, player, screen).run()
     return player, screen, read_trials(folder / "data")
 
 

@@ -16,7 +16,7 @@ from tests.studies.study_texts import COMPARISON
 
 from asperity.lab.access import page_files
 from asperity.recording.recording import open_recording
-from asperity.studies.live.server import study_files
+from asperity.studies.live.page_screen import study_files
 from asperity.studies.study_store import ANSWERS_FILE, read_trials
 
 RUN = (sys.executable, "-m", "asperity", "study", "run", "--no-browser")
@@ -103,6 +103,8 @@ def test_escape_stops_and_a_closed_page_pauses(browser: Browser, tmp_path: Path)
         output, _ = session.process.communicate(timeout=60)
         assert "P01: 1 answers in" in output
         assert "stopped; --resume goes on" in output
+        await_title(browser, "Stopped")
+        assert browser.ask("document.getElementById('keys').hidden")
     finally:
         session.close()
     again = start(tmp_path, "--resume")

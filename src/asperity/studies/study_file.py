@@ -131,10 +131,10 @@ def _parse_section(
 
 
 def _find_argument(
-    key: str, known: Mapping[str, Argument], taken: Mapping[str, Argument]
+    key: str, declared: Mapping[str, Argument], taken: Mapping[str, Argument]
 ) -> Argument:
     """Return the argument of a varied key, which can change while the loop runs."""
-    argument = find_scene_argument(key, known)
+    argument = find_scene_argument(key, declared)
     if argument.name in taken:
         raise ParameterError("vary", f"names a key twice: {argument.name}")
     if not argument.name.startswith(_CHANGEABLE):
@@ -157,14 +157,14 @@ def _parse_factor(argument: Argument, values: Any) -> tuple[Any, ...]:
 def _parse_method(
     kind: str,
     entries: Mapping[str, Any],
-    known: Mapping[str, Argument],
+    keys: Mapping[str, Argument],
     arguments: dict[str, Argument],
 ) -> dict[str, Any]:
     """Return the options of a method; the level that it varies is added to the arguments."""
     declared: Sequence[Argument] = METHODS[kind].arguments
     unit = ""
     if isinstance(key := entries.get("level"), str):
-        level = _find_argument(key, known, arguments)
+        level = _find_argument(key, keys, arguments)
         entries, arguments[level.name] = {**entries, "level": level.name}, level
         unit = level.unit
     scaled = [replace(one, unit=unit) if one.unit == LEVEL_UNIT else one for one in declared]

@@ -1,4 +1,4 @@
-"""What a participant sees and presses: in the terminal, or in a page (:mod:`.server`)."""
+"""What a participant sees and presses: in the terminal, or in a page (:mod:`.page_screen`)."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class View:
 
 
 class Screen(Protocol):
-    """A screen with a keyboard; a foot switch is a keyboard with one key."""
+    """A screen with a keyboard; a pedal is a keyboard with one key."""
 
     def show(self, view: View) -> None:
         """Show a view in place of the one before."""

@@ -56,7 +56,7 @@ def excess_reason(surface: Surface, device: Device) -> str:
 
 
 @dataclass(frozen=True)
-class Stroke:
+class StrokeMotion:
     """Motion of a simulated hand to and fro: the points centre + half cos(angle).
 
     Attributes:
@@ -183,7 +183,7 @@ class Stimuli:
             raise ParameterError("vary", f"the smooth wall between stimuli is refused: {reason}")
         return wall
 
-    def stroke(self, setup: Setup) -> Stroke:
+    def stroke(self, setup: Setup) -> StrokeMotion:
         """Return the motion of a simulated hand on a stimulus."""
         sections, _ = default_hand_sections(setup.surface, setup.device, 1.0)
         motion = sections["motion"]
@@ -194,4 +194,4 @@ class Stimuli:
         half = 0.5 * (end - start)
         speed = float(str(motion["speed"]).split()[0])
         rate = speed / max(float(np.hypot(*half[:2])), 1e-6)
-        return Stroke(tuple(0.5 * (start + end)), tuple(half), rate)
+        return StrokeMotion(tuple(0.5 * (start + end)), tuple(half), rate)

@@ -38,12 +38,19 @@ function show(message) {
   part("keys").hidden = !view.keys.length;
   part("state").textContent = view.noise
     ? "Noise masks the sound of the device; it begins with your first key."
-    : "Keys: a foot switch may send them, too.";
+    : "Keys: a pedal may send them, too.";
   globalThis.study = { view, noise };
 }
 
 socket.addEventListener("message", ({ data }) => show(data));
 socket.addEventListener("close", () => {
+  part("keys").hidden = true;
+  part("typed").hidden = true;
+  if (!view || view.progress < 1) {
+    part("title").textContent = "Stopped";
+    part("text").textContent = "The force is released.";
+    part("text").hidden = false;
+  }
   part("state").textContent = "The session has ended, or the connection is lost. Ask the experimenter.";
 });
 

@@ -34,7 +34,7 @@ class _Paused(Exception):  # noqa: N818 - it is no error
     """The participant pauses: the trial is presented again."""
 
 
-class Session:
+class StudySession:
     """A session of a participant on a device.
 
     Args:

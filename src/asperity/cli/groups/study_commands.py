@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from asperity.studies.live.screens import Screen
     from asperity.studies.study_file import Study
 
-_TEMPLATES = Path(__file__).parents[1] / "studies" / "templates"
+_TEMPLATES = Path(__file__).parents[2] / "studies" / "templates"
 
 
 @click.group("study", cls=StrictGroup)
@@ -44,8 +44,9 @@ def init_command(kind: str, file: str, *, force: bool) -> None:
     if Path(file).suffix.lower() != ".toml":
         raise ParameterError("file", "must be a file that ends in .toml", file)
     output.check_output("file", file, force=force)
-    output.write_output("file", file, (_TEMPLATES / f"{kind}.toml").read_text("utf-8"))
     name = escape_unprintable(file)
+    text = (_TEMPLATES / f"{kind}.toml").read_text("utf-8").replace("{name}", name)
+    output.write_output("file", file, text)
     click.echo(f"Written: {name}; now: asperity study run {name} --participant P01")
 
 
@@ -83,8 +84,8 @@ def run_command(
     if values["simulate"] is None:
         _run_on_device(study, path, participant, resume=resume, **values)
         return
-    from asperity.studies.live.session import simulate_session
     from asperity.studies.live.stimuli import Stimuli
+    from asperity.studies.live.trial_session import simulate_session
     from asperity.studies.methods import METHODS
     from asperity.studies.observers import HandStrength, find_observer
 
@@ -95,7 +96,7 @@ def run_command(
     write_study(path, study)
     with Participant(path, study, participant, resume=resume) as person:
         count = simulate_session(
-            person, lambda shown, rng: observer.answer(shown, strength, rng), design.seed
+            person, lambda trial, rng: observer.answer(trial, strength, rng), design.seed
         )
     _report_end(path, participant, count, is_stopped=False)
 
@@ -103,7 +104,7 @@ def run_command(
 def _run_on_device(
     study: Study, path: Path, code: str, *, resume: bool, driver: str, **values: Any
 ) -> None:
-    from asperity.studies.live.session import Session, SessionStopped
+    from asperity.studies.live.trial_session import SessionStopped, StudySession
     from asperity.studies.study_store import Participant, write_study
 
     player = _make_player(study, driver)
@@ -112,7 +113,7 @@ def _run_on_device(
         before = person.trial
         with _open_screen(study, **values) as screen:
             try:
-                Session(study, person, player, screen).run()
+                StudySession(study, person, player, screen).run()
                 is_stopped = False
             except SessionStopped:
                 is_stopped = True
@@ -151,7 +152,7 @@ def _open_screen(
             yield screen
         return
     from asperity.lab.launch import bind_socket
-    from asperity.studies.live.server import PageScreen
+    from asperity.studies.live.page_screen import PageScreen
 
     noise = study.settings["masking_noise"]
     with PageScreen(bind_socket(port), masking_noise=noise) as page:
