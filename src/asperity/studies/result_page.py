@@ -80,7 +80,7 @@ def _text(value: Any) -> str:
 
 
 def _number(value: float | None) -> str:
-    return NOT_AVAILABLE if value is None else f"{value:.4g}"
+    return NOT_AVAILABLE if value is None else f"{round(value, 12):.4g}"
 
 
 def _interval_text(row: Mapping[str, Any]) -> str:

@@ -17,6 +17,7 @@ from asperity.studies.statistics.scores import Score
 
 ANSWERS = ("1", "2")
 _NORMAL = 1.96  # quantile of the normal distribution
+_INTERVAL = "Fisher information; half a choice added either way where scores had no bounds"
 
 
 def list_pairs(design: StudyDesign) -> list[tuple[int, int]]:
@@ -73,7 +74,7 @@ def score_comparison(
     estimates = np.array([values, values - _NORMAL * errors, values + _NORMAL * errors])
     return Score(
         "Bradley–Terry score", tuple(answered), estimates, counts,
-        interval="Fisher information", pooled=pooled,
+        interval=_INTERVAL, pooled=pooled,
         # The values are skewed where hardly any choice goes the other way; samples without it would
         # make the interval of the bootstrap much too wide.
         is_resampled=False,
