@@ -191,3 +191,13 @@ def test_observers_have_names() -> None:
     assert find_observer("typical") is OBSERVERS["typical"]
     with pytest.raises(ParameterError, match="typical"):
         find_observer("tipycal")
+
+
+@pytest.mark.parametrize("kind", METHODS)
+def test_studies_whose_participants_are_all_excluded(kind: str) -> None:
+    rules = {"shortest_response": 9.0}
+    options = {"trials": 5} if METHODS[kind].has_function else {}
+    design = design_of(kind, exclusion=rules, **options)
+    result = analyse(design, records(design, 3), 50)
+    assert len(result.excluded) == 3
+    assert "no participant is used" in result.to_html()

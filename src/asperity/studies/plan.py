@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -137,10 +136,7 @@ def _planned_strength(design: StudyDesign, effect: float) -> Strength:
 
     def strength(values: Values) -> float:
         level = float(values[key]) / middle if key else 1.0
-        return level * (effect if _agrees(values, first) else 1.0)
+        is_first = all(values[name] == value for name, value in first.items())
+        return level * (effect if is_first else 1.0)
 
     return strength
-
-
-def _agrees(values: Values, condition: Mapping[str, Any]) -> bool:
-    return all(values[name] == value for name, value in condition.items())

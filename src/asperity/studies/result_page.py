@@ -25,7 +25,7 @@ def study_page(result: StudyResult) -> Page:
     """Return the report of a study."""
     score, used = result.score, len(result.included)
     pooled = _rows_of(result, POOLED)
-    table = _score_table(result, pooled)
+    table, notes = _score_table(result, pooled), [str(row["interval"]) for row in pooled[:1]]
     return Page(
         title=f"Study: {result.design.question or result.design.kind}",
         answer=_answer(result),
@@ -39,7 +39,7 @@ def study_page(result: StudyResult) -> Page:
         sections=[
             page.terminal_section(table),
             _figure(result, "scores", f"{score.quantity} by participant and pooled"),
-            Section("Pooled over participants", [table], notes=[str(pooled[0]["interval"])]),
+            Section("Pooled over participants", [table], notes=notes),
             *_function_sections(result),
             Section("Participants", [_participant_table(result)], notes=[score.interval]),
             Section("Exclusion", [page.pairs_table(_rules(result)), *_excluded(result)],
@@ -80,7 +80,7 @@ def _text(value: Any) -> str:
 
 
 def _number(value: float | None) -> str:
-    return NOT_AVAILABLE if value is None else f"{value:.4g}"
+    return NOT_AVAILABLE if value is None else f"{round(value, 12):.4g}"
 
 
 def _interval_text(row: Mapping[str, Any]) -> str:
@@ -125,7 +125,7 @@ def _excluded(result: StudyResult) -> list[page.Paragraph]:
 
 
 def _function_sections(result: StudyResult) -> list[Section]:
-    if not METHODS[result.design.kind].has_function:
+    if not METHODS[result.design.kind].has_function or not result.included:
         return []
     text = "share of right answers over the level, with the fitted psychometric functions"
     return [_figure(result, "functions", text)]

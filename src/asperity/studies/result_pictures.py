@@ -10,19 +10,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from asperity.core.checks import FloatArray
 from asperity.report.pictures import style
 from asperity.studies.design import Answered
 from asperity.studies.kinds.thresholds import log_levels, presented_level
-from asperity.studies.statistics.psychometric import (
-    Counts,
-    LogLevels,
-    count_answers,
-    fit_psychometric,
-)
+from asperity.studies.statistics.psychometric import LogLevels, count_answers, fit_psychometric
 from asperity.studies.study_result import StudyResult
 
-_MAX_BINS = 8
+_MAX_GROUPS = 8
 _FAINT, _STRONG = "0.6", "C0"
 
 
@@ -33,10 +27,10 @@ def scores_figure(result: StudyResult) -> Figure:
     axes = style.single_axes(figure)
     score, places = result.score, np.arange(len(labels))
     used = [i for i, name in enumerate(score.participants) if name not in result.excluded]
-    values = _scaled(result, score.values[used])
+    values = score.to_scale(score.values[used])
     for row, offset in zip(values, np.linspace(-0.3, -0.1, len(used)), strict=True):
         axes.plot(row, places + offset, "o", color=_FAINT, markersize=3)
-    pooled = _scaled(result, np.array(result.pooled))
+    pooled = score.to_scale(np.array(result.pooled))
     for place, (value, low, high) in zip(places, pooled, strict=True):
         ends = [end for end in (low, high) if np.isfinite(end) and end > -math.inf]
         axes.plot(value, place, "s", color=_STRONG)
@@ -52,10 +46,6 @@ def scores_figure(result: StudyResult) -> Figure:
     return figure
 
 
-def _scaled(result: StudyResult, values: FloatArray) -> FloatArray:
-    return np.asarray(np.vectorize(result.score.to_scale, otypes=[float])(values))
-
-
 def _text(value: object) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
@@ -63,7 +53,7 @@ def _text(value: object) -> str:
 def functions_figure(result: StudyResult) -> Figure:
     """Return the shares of right answers of all used participants, and the function fitted to them.
 
-    Levels are grouped; a mark grows with its answers.
+    Levels are grouped, with as many answers in each.
     """
     design, labels = result.design, result.labels
     levels = log_levels(design)
@@ -101,22 +91,9 @@ def _draw_function(
     axes.plot(
         np.exp(x), levels.probability(x, *fit_psychometric(levels, counts)), colour, label=label
     )
-    grouped = _group(counts)
-    sizes = 60.0 * np.sqrt(grouped.total / grouped.total.max())
-    axes.scatter(np.exp(grouped.x), grouped.right / grouped.total, sizes, colour, alpha=0.6)
-
-
-def _group(counts: Counts) -> Counts:
-    """Return the answers in groups of near levels with about as many answers each."""
-    share = np.cumsum(counts.total) - counts.total / 2.0
-    group = np.minimum((share / counts.total.sum() * _MAX_BINS).astype(int), _MAX_BINS - 1)
-    groups = np.unique(group)
-    total = np.array([counts.total[group == one].sum() for one in groups])
-    right = np.array([counts.right[group == one].sum() for one in groups])
-    x = np.array(
-        [np.average(counts.x[group == i], weights=counts.total[group == i]) for i in groups]
-    )
-    return Counts(x, right, total)
+    groups = np.array_split(np.argsort(values), min(_MAX_GROUPS, len(values)))
+    middles = [np.exp(np.log(values[group] - levels.base).mean()) for group in groups]
+    axes.plot(middles, [right[group].mean() for group in groups], "o", color=colour, alpha=0.6)
 
 
 FIGURES: dict[str, Callable[[StudyResult], Figure]] = {

@@ -53,23 +53,16 @@ class TrialTable(TableFiles):
         labels = kind.label(self.design)
         for one in self.trials:
             shown = one.presentation
-            intervals = {
-                f"interval {i + 1} {key}": value
-                for i, values in enumerate(shown.intervals)
-                for key, value in values.items()
-            }
+            parts = enumerate(shown.intervals, 1)
+            intervals = {f"interval {i} {key}": x for i, part in parts for key, x in part.items()}
+            is_right = one.answer == shown.correct if shown.correct else None
+            used = is_used(self.design, one) and one.participant not in self.excluded
             yield {
-                "participant": one.participant,
-                "run": one.run,
-                "trial": one.trial,
-                **(labels[shown.condition] if shown.condition < len(labels) else {}),
-                **intervals,
-                "answer": one.answer,
-                "correct": one.answer == shown.correct if shown.correct else None,
-                "response time [s]": float(one.response_time),
-                "started": one.started,
-                "used": is_used(self.design, one) and one.participant not in self.excluded,
-            }
+                "participant": one.participant, "run": one.run, "trial": one.trial,
+                **(labels[shown.condition] if shown.condition < len(labels) else {}), **intervals,
+                "answer": one.answer, "correct": is_right,
+                "response time [s]": float(one.response_time), "started": one.started, "used": used,
+            }  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,9 +89,7 @@ class StudyResult(Reportable, TableFiles):
 
     def __repr__(self) -> str:
         count = len(self.score.participants)
-        return (
-            f"<StudyResult of {self.design.kind}: {count} participants, {len(self.trials)} trials>"
-        )
+        return f"<StudyResult of {self.design.kind}, {count} participants>"
 
     @property
     def labels(self) -> Sequence[dict[str, Any]]:
@@ -168,9 +159,9 @@ class StudyResult(Reportable, TableFiles):
 
     def _numbers(self, values: Sequence[float]) -> dict[str, float | None]:
         """Return estimate and ends; what is unknown is ``None``."""
-        scaled = [self.score.to_scale(float(one)) for one in values]
+        scaled = self.score.to_scale(np.array(values)).tolist()
         return {
-            name: float(one) if np.isfinite(one) and np.isfinite(raw) else None
+            name: one if np.isfinite(one) and np.isfinite(raw) else None
             for name, one, raw in zip(_END, scaled, values, strict=True)
         }
 

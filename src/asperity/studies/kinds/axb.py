@@ -12,7 +12,7 @@ from asperity.studies.kinds.comparison import list_pairs
 from asperity.studies.kinds.latin_square import balanced_order
 from asperity.studies.kinds.trial_list import TrialList
 from asperity.studies.statistics.intervals import share_interval
-from asperity.studies.statistics.scores import Score
+from asperity.studies.statistics.scores import Score, collect_values, count_values
 
 ANSWERS = ("1", "3")
 
@@ -48,15 +48,12 @@ def score_axb(
     design: StudyDesign, answered: Mapping[str, Sequence[Answered]], _resamples: int
 ) -> Score:
     """Return the shares of right matches of each pair of conditions."""
-    columns = range(len(list_pairs(design)))
-    cells = [
-        [[one.is_correct for one in trials if one.presentation.condition == i] for i in columns]
-        for trials in answered.values()
-    ]
-    found = [[share_interval(sum(cell), len(cell)) for cell in row] for row in cells]
-    estimates = np.array(found, float).reshape(len(cells), len(columns), 3)
-    counts = np.array([[len(cell) for cell in row] for row in cells], int)
+    columns = len(list_pairs(design))
+    cells = collect_values(answered, columns, lambda one: one.is_correct)
+    found = [[share_interval(int(sum(cell)), len(cell)) for cell in row] for row in cells]
+    estimates = np.array(found, float).reshape(len(cells), columns, 3)
+    estimates = np.moveaxis(estimates, 2, 0)
     return Score(
-        "share of right matches", tuple(answered), np.moveaxis(estimates, 2, 0), counts,
+        "share of right matches", tuple(answered), estimates, count_values(cells, columns),
         interval="Wilson score", chance=0.5,
     )  # fmt: skip

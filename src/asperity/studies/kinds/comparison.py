@@ -12,16 +12,12 @@ from asperity.core.compiled import FloatArray
 from asperity.studies.design import Answered, Presentation, StudyDesign
 from asperity.studies.kinds.latin_square import balanced_order
 from asperity.studies.kinds.trial_list import TrialList, check_conditions
-from asperity.studies.statistics.bradley_terry import (
-    complete_wins,
-    covariance,
-    fit_scores,
-    pseudo_values,
-)
+from asperity.studies.statistics import bradley_terry
 from asperity.studies.statistics.scores import Score
 
 ANSWERS = ("1", "2")
 _NORMAL = 1.96  # quantile of the normal distribution
+_INTERVAL = "Fisher information; half a choice added either way where scores had no bounds"
 
 
 def list_pairs(design: StudyDesign) -> list[tuple[int, int]]:
@@ -52,18 +48,12 @@ def run_comparison(design: StudyDesign, participant: int, rng: np.random.Generat
 
 def count_choices(design: StudyDesign, answered: Sequence[Answered]) -> FloatArray:
     """Return how often each condition (row) was chosen over each other (column)."""
-    conditions, pairs = design.conditions, list_pairs(design)
+    conditions = design.conditions
     wins = np.zeros((len(conditions), len(conditions)))
     for one in answered:
-        chosen = chosen_of_pair(one, conditions)
-        pair = pairs[one.presentation.condition]
-        wins[chosen, pair[0] if chosen == pair[1] else pair[1]] += 1.0
+        first, second = (conditions.index(dict(values)) for values in one.presentation.intervals)
+        wins[(first, second) if one.answer == ANSWERS[0] else (second, first)] += 1.0
     return wins
-
-
-def chosen_of_pair(one: Answered, conditions: Sequence[dict[str, object]]) -> int:
-    """Return the number of the condition that was chosen."""
-    return conditions.index(dict(one.presentation.intervals[int(one.answer) - 1]))
 
 
 def score_comparison(
@@ -77,14 +67,14 @@ def score_comparison(
     shape = len(answered), len(design.conditions)
     each = np.array([count_choices(design, one) for one in answered.values()])
     each = each.reshape(shape[0], shape[1], shape[1])
-    values = np.array([fit_scores(wins) for wins in each]).reshape(shape)
+    values = np.array([bradley_terry.fit_scores(wins) for wins in each]).reshape(shape)
     errors = np.array([_errors(*one) for one in zip(each, values, strict=True)]).reshape(shape)
     counts = (each + each.swapaxes(1, 2)).sum(axis=2).astype(int)
-    pooled = pseudo_values(each)[1] if len(each) else values
+    pooled = bradley_terry.pseudo_values(each)[1] if len(each) else values
     estimates = np.array([values, values - _NORMAL * errors, values + _NORMAL * errors])
     return Score(
         "Bradley–Terry score", tuple(answered), estimates, counts,
-        interval="Fisher information", pooled=pooled,
+        interval=_INTERVAL, pooled=pooled,
         # The values are skewed where hardly any choice goes the other way; samples without it would
         # make the interval of the bootstrap much too wide.
         is_resampled=False,
@@ -92,8 +82,8 @@ def score_comparison(
 
 
 def _errors(wins: FloatArray, scores: FloatArray) -> FloatArray:
-    result: FloatArray = np.sqrt(np.diag(covariance(complete_wins(wins), scores)))
-    return result
+    spread = bradley_terry.covariance(bradley_terry.complete_wins(wins), scores)
+    return np.asarray(np.sqrt(np.diag(spread)))
 
 
 def pair_consistency(answered: Sequence[Answered]) -> float | None:

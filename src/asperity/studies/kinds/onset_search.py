@@ -52,9 +52,9 @@ def score_onset(
     design: StudyDesign, answered: Mapping[str, Sequence[Answered]], resamples: int
 ) -> Score:
     """Return the geometric means over ascending and descending series, each with equal weight."""
-    columns = range(len(design.conditions))
-    cells = [[_pair_series(design, trials, i) for i in columns] for trials in answered.values()]
-    estimates, counts = repeated_score(cells, resamples, design.seed)
+    count = len(design.conditions)
+    cells = [[_pair_series(design, one, i) for i in range(count)] for one in answered.values()]
+    estimates, counts = repeated_score(cells, count, resamples, design.seed)
     return Score(
         f"onset of {design.options['level']}", tuple(answered), estimates, counts,
         is_logarithmic=True, interval="Student's t over pairs of series",

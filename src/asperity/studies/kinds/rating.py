@@ -12,7 +12,7 @@ from asperity.core.compiled import FloatArray
 from asperity.studies.design import Answered, Presentation, StudyDesign
 from asperity.studies.kinds.latin_square import balanced_order
 from asperity.studies.kinds.trial_list import TrialList, check_conditions
-from asperity.studies.statistics.scores import Score, repeated_score
+from asperity.studies.statistics.scores import Score, collect_values, repeated_score
 
 _SMALLEST, _LARGEST = 1e-6, 1e6
 
@@ -62,19 +62,9 @@ def score_rating(
     References:
         S. S. Stevens: Psychophysics (1975), on magnitude estimation and modulus equalisation.
     """
-    scale, columns = SCALES[design.options["scale"]], range(len(design.conditions))
-    cells = [
-        [
-            [
-                scale.transform(float(one.answer))
-                for one in trials
-                if one.presentation.condition == i
-            ]
-            for i in columns
-        ]
-        for trials in answered.values()
-    ]
-    estimates, counts = repeated_score(cells, resamples, design.seed)
+    scale, count = SCALES[design.options["scale"]], len(design.conditions)
+    cells = collect_values(answered, count, lambda one: scale.transform(float(one.answer)))
+    estimates, counts = repeated_score(cells, count, resamples, design.seed)
     if scale.is_logarithmic:
         estimates = estimates + _equalising_shifts(estimates[0])[:, None]
     return Score(
@@ -83,13 +73,8 @@ def score_rating(
     )  # fmt: skip
 
 
-def _ratings(scale: Scale, trials: Sequence[Answered], condition: int) -> list[float]:
-    found = [one for one in trials if one.presentation.condition == condition]
-    return [scale.transform(float(one.answer)) for one in found]
-
-
 def _equalising_shifts(values: FloatArray) -> FloatArray:
     """Return what gives all participants the same mean."""
-    means = np.nanmean(values, axis=1) if values.size else np.zeros(len(values))
-    result: FloatArray = np.nanmean(means) - means if len(means) else means
-    return result
+    known = np.isfinite(values)
+    means = np.where(known, values, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
+    return np.asarray(means.mean() - means) if len(means) else means

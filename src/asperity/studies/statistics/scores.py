@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from asperity.core.compiled import FloatArray
+from asperity.studies.design import Answered
 from asperity.studies.statistics.intervals import LEAST_RESAMPLED, mean_interval
 
 RESAMPLES = 2000
@@ -79,24 +80,42 @@ class Score:
             return "Student's t over participants"
         return f"studentised bootstrap over participants, {resamples} samples"
 
-    def to_scale(self, value: float) -> float:
-        """Return a value on the scale of the quantity."""
-        if not self.is_logarithmic:
-            return value
-        return math.exp(value) if value < 700.0 else math.inf
+    def to_scale(self, values: FloatArray) -> FloatArray:
+        """Return values on the scale of the quantity."""
+        with np.errstate(over="ignore"):
+            return np.asarray(np.exp(values) if self.is_logarithmic else values)
+
+
+Cells = list[list[list[float]]]
+"""Values of each participant and column."""
+
+
+def collect_values(
+    answered: Mapping[str, Sequence[Answered]], columns: int, value: Callable[[Answered], float]
+) -> Cells:
+    """Return a value of each answer, by participant and condition."""
+    return [
+        [[value(one) for one in found if one.presentation.condition == i] for i in range(columns)]
+        for found in answered.values()
+    ]
+
+
+def count_values(cells: Cells, columns: int) -> NDArray[np.int_]:
+    """Return the numbers of values, shape (participants, columns)."""
+    return np.array([[len(one) for one in row] for row in cells], int).reshape(-1, columns)
 
 
 def repeated_score(
-    cells: list[list[list[float]]], resamples: int, seed: int
+    cells: Cells, columns: int, resamples: int, seed: int
 ) -> tuple[FloatArray, NDArray[np.int_]]:
     """Return means with intervals, shape (3, participants, columns), and counts of repeated values.
 
     Args:
         cells: values of each participant and column.
+        columns: number of columns.
         resamples: number of bootstrap samples.
         seed: of the samples.
     """
-    shape = len(cells), len(cells[0]) if cells else 0
     found = [[mean_interval(np.array(one), resamples, seed) for one in row] for row in cells]
-    counts = np.array([[len(one) for one in row] for row in cells], int).reshape(shape)
-    return np.moveaxis(np.array(found, float).reshape(*shape, 3), 2, 0), counts
+    estimates = np.array(found, float).reshape(-1, columns, 3)
+    return np.moveaxis(estimates, 2, 0), count_values(cells, columns)
