@@ -18,7 +18,9 @@ def test_stimuli_within_their_limits_are_accepted(tmp_path: Path) -> None:
     assert stimuli.check_all() == {"surface.stiffness": 61.5}
     surface = stimuli.setup({"surface.stiffness": 97.5}).rendered
     assert (surface.stiffness, surface.law.letter) == (97.5, "C")
-    assert excess_reason(stimuli.rest(stimuli.setup({})), stimuli.device) == ""
+    wall = stimuli.rest(stimuli.setup({}))
+    assert excess_reason(wall, stimuli.device) == ""
+    assert wall.max_depth >= 0.1  # no press on the wall between stimuli is a fault
 
 
 def test_levels_that_differ_in_the_fifth_digit_are_different_stimuli(tmp_path: Path) -> None:

@@ -34,6 +34,7 @@ _LEVEL_OPTIONS = ("range", "reference", "standard", "start")
 _NO_MOTION = {"kind": "still", "point": [0, 0, 0]}
 _HAND = {"kind": "spring", "stiffness": "500 N/m", "damping": "5 N*s/m", "mass": "50 g"}
 _REST_LAW = "W"  # the smooth wall
+_REST_DEPTH = 0.1  # [m]: its gain is the same at every depth, so that no press is too deep
 # A simulated device is harmless: late samples do not end its loop.
 _RELAXED = {"lateness": 60.0, "silence": 10.0}
 
@@ -178,7 +179,7 @@ class Stimuli:
         Raises:
             ParameterError: if it is above its limit.
         """
-        wall = setup.surface.to_law(_REST_LAW)
+        wall = setup.surface.to_law(_REST_LAW).to_depth(_REST_DEPTH)
         if reason := excess_reason(wall, self.device):
             raise ParameterError("vary", f"the smooth wall between stimuli is refused: {reason}")
         return wall
