@@ -54,6 +54,53 @@ def compute_potentials(
     return result.reshape(grid.node_counts)
 
 
+def interpolate_depths(
+    columns: ColumnFunction, grid: FieldGrid, points: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return depth [m], (n,), and its gradient (n, 3) at points above the floor (n, 3) [m].
+
+    They are those of the spline of a field that is not smoothed, of which only the nodes around the
+    points are computed.
+    """
+    rates = np.linalg.pinv(grid.steps)
+    level = (points[:, 2:] - grid.height(0)) / grid.level_spacing
+    index = np.column_stack([(points[:, :2] - grid.start) @ rates, level])
+    nearest = np.rint(index)
+    plane = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * len(grid.cells), indexing="ij"), axis=-1)
+    around = nearest[:, None, :-1] + plane.reshape(-1, len(grid.cells))
+    nodes = np.empty((len(points), around.shape[1], 3), np.float32)
+
+    def fill(level: float) -> None:
+        rows = np.flatnonzero(nearest[:, -1] == level)
+        xy = grid.positions(around[rows].reshape(-1, len(grid.cells)))
+        values = np.empty((len(xy), 3), np.float32)
+        columns(xy, grid.height(level + np.array([-1.0, 0.0, 1.0])), grid.margin, values)
+        nodes[rows] = values.reshape(len(rows), -1, 3)
+
+    run_in_threads(fill, np.unique(nearest[:, -1]).tolist(), None)
+    part = index - nearest
+    weights = np.stack([0.5 * (0.5 - part) ** 2, 0.75 - part**2, 0.5 * (0.5 + part) ** 2], axis=-1)
+    rises = np.stack([part - 0.5, -2.0 * part, part + 0.5], axis=-1)
+    values = np.maximum(nodes.astype(float) + grid.margin, 0.0)
+    values = values.reshape(len(points), *[3] * part.shape[1])
+    depth = _weighted_sum(values, weights) - grid.margin
+    slopes = []
+    for axis in range(part.shape[1]):
+        mixed = weights.copy()
+        mixed[:, axis] = rises[:, axis]
+        slopes.append(_weighted_sum(values, mixed))
+    slope = np.stack(slopes, axis=-1)
+    gradient = np.column_stack([slope[:, :-1] @ rates.T, slope[:, -1] / grid.level_spacing])
+    return np.maximum(depth, 0.0), gradient
+
+
+def _weighted_sum(values: FloatArray, weights: FloatArray) -> FloatArray:
+    """Return the sum of values (n, 3, ..., 3) with products of weights (n, axes, 3)."""
+    for axis in reversed(range(weights.shape[1])):
+        values = np.einsum("n...i,ni->n...", values, weights[:, axis])
+    return values
+
+
 def smooth(depths: SingleArray, weights: NDArray[np.uint8], grid: FieldGrid) -> SingleArray:
     """Return means of depths with weights w/8, 1 - w/4, w/8 along each axis.
 
