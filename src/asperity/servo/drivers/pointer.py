@@ -15,8 +15,9 @@ from numpy.typing import ArrayLike
 
 from asperity.core.checks import FloatArray, check_array, check_real
 from asperity.core.errors import ParameterError
+from asperity.servo.driver_loop import no_clock, system_clock
 from asperity.servo.drivers.simulated import SimulatedDriver, simulated_driver
-from asperity.servo.kernels import pointer_anchor
+from asperity.servo.kernels import following_anchor, pointer_anchor
 from asperity.simulation.hands import Hand
 from asperity.simulation.kernels.simulated_device import SimulatedDevice
 from asperity.simulation.motions import Stationary
@@ -103,6 +104,13 @@ class PointerHand:
         return int(self.table[pointer_anchor.STATE_ROW, pointer_anchor.REQUEST_NUMBER])
 
     @property
+    def follower_lag(self) -> tuple[int, int]:
+        """Samples by which a following loop is behind, and samples that it has left out."""
+        count = self.table[pointer_anchor.STATE_ROW, pointer_anchor.SAMPLE_COUNT]
+        sample, left_out, _ = self.table[pointer_anchor.FOLLOWER_ROW]
+        return max(int(count - sample), 0), int(left_out)
+
+    @property
     def anchor(self) -> FloatArray:
         """Position of the anchor (3,) [m]."""
         return np.array(self.table[pointer_anchor.ANCHOR])
@@ -162,16 +170,48 @@ class PointerDriver(SimulatedDriver):
         Raises:
             ParameterError: if the pointer was closed.
         """
+        device = self._open_on_table()
+        device.anchor[pointer_anchor.STATE_ROW] = 0.0
+        return device
+
+    def _open_on_table(self) -> SimulatedDevice:
         try:
             table = open_pointer_table(self.pointer_file)
         except FileNotFoundError:
             raise ParameterError("pointer", "is closed: nothing moves the hand") from None
-        table[pointer_anchor.STATE_ROW] = 0.0
-        device = super().open()
-        return SimulatedDevice(*device)._replace(anchor=table)
+        return SimulatedDevice(*super().open())._replace(anchor=table)
 
 
-def pointer_driver(plant: Plant, hand: Hand, servo: Servo, pointer: PointerHand) -> PointerDriver:
+@dataclass(frozen=True, eq=False)
+class FollowingDriver(PointerDriver):
+    """A simulated device whose hand repeats the motion of another loop's, sample by sample."""
+
+    has_own_clock: ClassVar[bool] = False
+
+    def kernel_modules(self) -> tuple[ModuleType, ...]:
+        """Return the modules of a simulated device, with the following anchor first."""
+        return following_anchor, *SimulatedDriver.kernel_modules(self)
+
+    def placeholder_record(self) -> tuple[Any, ...]:
+        """Return the device with a clock, which does not run."""
+        return self.device._replace(clock=no_clock())
+
+    def open(self) -> tuple[Any, ...]:
+        """Return the device, held by the hand, from the newest sample of the other loop on.
+
+        Raises:
+            ParameterError: if the pointer was closed.
+        """
+        device = self._open_on_table()
+        table, state = device.anchor, pointer_anchor.STATE_ROW
+        device.counters[2] = max(int(table[state, pointer_anchor.SAMPLE_COUNT]) - 1, 0)
+        table[pointer_anchor.FOLLOWER_ROW] = device.counters[2], 0.0, 0.0
+        return device._replace(clock=system_clock())
+
+
+def pointer_driver(
+    plant: Plant, hand: Hand, servo: Servo, pointer: PointerHand, *, follows: bool = False
+) -> PointerDriver:
     """Return a simulated device whose hand follows a pointer.
 
     Args:
@@ -179,6 +219,7 @@ def pointer_driver(plant: Plant, hand: Hand, servo: Servo, pointer: PointerHand)
         hand: the hand that holds it, without a prescribed motion.
         servo: period and delay.
         pointer: moves the hand's anchor, from the initial position of the handle.
+        follows: whether another loop reads the pointer, and this one repeats its motion.
 
     Raises:
         ParameterError: for a plant that cannot be simulated with this hand; for a prescribed hand.
@@ -188,4 +229,5 @@ def pointer_driver(plant: Plant, hand: Hand, servo: Servo, pointer: PointerHand)
     start = Stationary(tuple(pointer.anchor))
     driver = simulated_driver(plant, hand, servo, start, servo.period)
     device = driver.device._replace(anchor=np.zeros((_ROW_COUNT, 3)))
-    return PointerDriver(driver.body_modules, device, pointer.name)
+    kind = FollowingDriver if follows else PointerDriver
+    return kind(driver.body_modules, device, pointer.name)

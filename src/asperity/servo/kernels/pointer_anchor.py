@@ -11,15 +11,16 @@ from asperity.simulation.kernels.simulated_device import SimulatedDevice
 
 KERNELS = Kernels(provides=("anchor_segment",))
 
-# Rows of the memory: the pointer writes the first four, the loop the others. The request is the
-# point TARGET + COSINE cos(angle) + SINE sin(angle) [m].
-TARGET, COSINE, SINE, REQUEST_ROW, ANCHOR, VELOCITY, STATE_ROW = range(7)
-HEADER_ROWS = 7
+# Rows of the memory: the pointer writes the first four, the loop the next three, a following loop
+# the last. The request is the point TARGET + COSINE cos(angle) + SINE sin(angle) [m].
+TARGET, COSINE, SINE, REQUEST_ROW, ANCHOR, VELOCITY, STATE_ROW, FOLLOWER_ROW = range(8)
+HEADER_ROWS = 8
 # Then follow anchor [m], velocity [m/s] and position [m] of each of the newest samples.
 HISTORY_SAMPLES, ROWS_PER_SAMPLE = 40_000, 3
-# REQUEST_ROW: angular velocity [rad/s] and number of the newest request; STATE_ROW: angle [rad]
-# and number of the newest acknowledged request.
-ANGLE, REQUEST_NUMBER = 0, 1
+# REQUEST_ROW: angular velocity [rad/s] and number of the newest request; STATE_ROW: angle [rad],
+# number of the newest acknowledged request, and samples whose rows are complete; FOLLOWER_ROW: see
+# ``following_anchor``.
+ANGLE, REQUEST_NUMBER, SAMPLE_COUNT = 0, 1, 2
 
 TRACKING_BANDWIDTH = 250.0
 """Bandwidth of the anchor [rad/s]; it lags by 2/ω, 8 ms."""
@@ -33,6 +34,7 @@ def anchor_segment(device: SimulatedDevice) -> tuple[float, float, float, float,
     v' = ω² (target - a) - 2 ω v, with |v| limited to ``MAX_SPEED``.
     """
     at = device.anchor
+    at[STATE_ROW, SAMPLE_COUNT] = device.counters[1]  # written between two calls of the loop
     step = 1.0 / device.update_rate
     number = at[REQUEST_ROW, REQUEST_NUMBER]
     angle = (at[STATE_ROW, ANGLE] + at[REQUEST_ROW, ANGLE] * step) % (2.0 * math.pi)
