@@ -22,7 +22,7 @@ from asperity.lab import background, messages
 from asperity.lab.access import MalformedMessageError, RateLimit
 from asperity.lab.background import BackgroundRenderer, BackgroundResult, BackgroundWorker
 from asperity.lab.clips import ClipStore
-from asperity.lab.lanes import FrameReader, SecondLane
+from asperity.lab.lanes import FrameReader, Lane, SecondLane
 from asperity.lab.messages import BESIDE
 from asperity.lab.playback import Playback
 from asperity.lab.scene_state import RANGES, SceneState
@@ -140,9 +140,9 @@ class LabServer:
         self.recommendation = BackgroundResult(
             comparisons, background.compute_recommendation, self._broadcast_state
         )
-        self.second_lane = SecondLane(
-            self.session, self._notify, (pictures, limits), self._broadcast_state
-        )
+        self.lane = Lane(self.session, self.pictures)
+        beside = BackgroundRenderer(pictures, limits, self._broadcast_state, BESIDE)
+        self.second_lane = SecondLane(self.session, self._notify, beside)
         self.clip_store = ClipStore(self.session)
         if options.playback is not None:
             words = {"title": Path(scene_state.source).name, "opens_at_start": True}
@@ -271,19 +271,15 @@ class LabServer:
         lowest, highest = map(float, setup.surface.texture.extremes)
         electronics = session.scene_state.electronics
         status = {
-            "state": session.state, "message": session.message,
-            "start_count": session.start_count,
+            **self.lane.status, BESIDE: self.second_lane.status,
             "settings": session.scene_state.settings | {BESIDE: self.second_lane.law},
-            BESIDE: self.second_lane.status, "assumptions": setup.assumptions,
+            "assumptions": setup.assumptions,
             "control_available": self._controller is None,
             "request_count": session.steering_progress["requested"], "handle": session.handle,
             "update_rate": 1.0 / setup.servo.period, "max_force": setup.servo.max_force,
             "position_resolution": electronics.position_resolution,
             "force_resolution": electronics.force_resolution,
             "lowest": lowest, "highest": highest, "centre": session.scene_state.centre,
-            "limit": self.pictures.limit, "surface_version": self.pictures.version,
-            "picture_message": self.pictures.message,
-            "pictures_current": self.pictures.is_current,
             "recommendation": self.recommendation.value,
         }  # fmt: skip
         for page in tuple(self._clients):
@@ -300,8 +296,7 @@ class LabServer:
 
     async def _send_frames(self, client: Client) -> None:
         """Send the rows since the last frame, at once after a motion."""
-        first = FrameReader(self.session, self.pictures)
-        second = FrameReader(self.second_lane.session, self.second_lane.pictures, self.session)
+        first, second = map(FrameReader, (self.lane, self.second_lane))
         while True:
             await asyncio.sleep(MIN_FRAME_INTERVAL)
             with suppress(TimeoutError):
@@ -311,15 +306,15 @@ class LabServer:
                 client.hand_moved.clear()
                 await self._wait_for_response()
             await client.wait_until_ready()
-            content = first.read(client.last_sent + 1)
-            if content is None:
+            contents = [first.read(client.last_sent + 1)]
+            if not contents[0]:
                 continue
             client.last_sent += 1
-            beside = second.read(client.last_sent) if self.second_lane.law else None
+            if self.second_lane.law:
+                contents.append(second.read(client.last_sent))
             async with asyncio.timeout(_SEND_TIMEOUT):
-                await client.connection.send(content)
-                if beside is not None:
-                    await client.connection.send(beside)
+                for content in filter(None, contents):
+                    await client.connection.send(content)
 
     async def _send_pictures(self, client: Client) -> None:
         """Send the requested pictures."""

@@ -88,16 +88,6 @@ def recovery_advice(fault: DeviceFault | None) -> str:
     return f". {advice}. Start, with the handle in the air, ramps the force up again"
 
 
-def _make_pointer_hand(
-    scene_state: SceneState, handle: Handle | None, leader: Session | None
-) -> PointerHand | None:
-    """Return the hand of a session: a new one, that of the leader, or none beside a handle."""
-    if handle is not None or leader is not None:
-        return None if leader is None else leader.pointer_hand
-    highest = float(scene_state.setup.surface.texture.extremes[1])
-    return PointerHand((*scene_state.centre, highest + START_HEIGHT))
-
-
 POLL_INTERVAL = 0.05
 """Interval at which the loop is polled [s]."""
 START_HEIGHT = 1e-3
@@ -116,15 +106,7 @@ class _StopRequest(str):
     """Request to stop, with the reason."""
 
 
-@dataclass(frozen=True)
-class _FollowRequest:
-    """Request to render a scene beside the leading loop, after so many starts of that loop."""
-
-    scene_state: SceneState
-    start_count: int
-
-
-_Request = Mapping[str, Any] | _StartRequest | _StopRequest | _FollowRequest
+_Request = Mapping[str, Any] | _StartRequest | _StopRequest
 
 
 class Session:
@@ -141,7 +123,8 @@ class Session:
         prestarted: the process of the first loop.
         handle: of a real device; ``None`` for the simulated device.
         assess_risk: of surfaces on a real device; ``None`` if risks are accepted.
-        leader: session whose hand this one's repeats, sample by sample; see :meth:`follow`.
+        leader: session whose hand moves this one's, sample by sample; the first change starts the
+            loop.
 
     Attributes:
         scene_state: the current scene.
@@ -163,12 +146,15 @@ class Session:
     ) -> None:
         self.scene_state, self._on_change, self._prestarted = scene_state, on_change, prestarted
         self.saved_scenes = SavedScenes()
-        self.handle, self._assess_risk = handle, assess_risk
-        self._leader, self._leader_start = leader, 0
-        self.pointer_hand = _make_pointer_hand(scene_state, handle, leader)
+        self.handle, self._assess_risk, self.leader = handle, assess_risk, leader
+        highest = float(scene_state.setup.surface.texture.extremes[1])
+        is_steered = handle is None and leader is None
+        self.pointer_hand: PointerHand | None = leader.pointer_hand if leader else None
+        if is_steered:
+            self.pointer_hand = PointerHand((*scene_state.centre, highest + START_HEIGHT))
         self.shared: LoopMemory | None = None
         self.start_count = 0
-        self.state: LoopState = "stopped" if handle or leader else "starting"
+        self.state: LoopState = "starting" if is_steered else "stopped"
         self.message = handle.start_prompt if handle else ""
         self._loop: ServoProcess | None = None
         self._active_shared: LoopMemory | None = None
@@ -184,7 +170,7 @@ class Session:
         self._is_closing = True
         self.release_force("")
         self._thread.join()
-        if self.pointer_hand is not None and self._leader is None:
+        if self.pointer_hand is not None and self.leader is None:
             self.pointer_hand.close()
 
     @property
@@ -227,11 +213,6 @@ class Session:
         """Request the start of a stopped loop."""
         self._requests.put(_StartRequest(self._stop_count))
 
-    def follow(self, scene_state: SceneState) -> None:
-        """Request to render a scene with the hand of the leading session, whose loop runs."""
-        assert self._leader is not None  # else the hand is this session's own
-        self._requests.put(_FollowRequest(scene_state, self._leader.start_count))
-
     def release_force(self, reason: str, *, now: bool = False) -> None:
         """Stop the loop at once, whatever the thread is doing: by a ramp, or with no force now."""
         self._stop_count += 1  # makes earlier start requests stale
@@ -246,7 +227,7 @@ class Session:
 
     def _run(self) -> None:
         try:
-            if self.handle is None and self._leader is None:
+            if self.state == "starting":
                 self._run_guarded(self._start, self.scene_state)
             while not self._is_closing:
                 for request in self._next_requests():
@@ -294,11 +275,6 @@ class Session:
         elif isinstance(request, _StartRequest):
             if self._loop is None and request == self._stop_count:
                 self._start(self.scene_state)
-        elif isinstance(request, _FollowRequest):
-            if request.start_count != self._leader_start:
-                self._stop()  # the samples of the leading loop count from zero again
-            self._leader_start = request.start_count
-            self._apply_scene(request.scene_state)
         else:
             self._apply_changes(request)
 
@@ -331,8 +307,10 @@ class Session:
         if self.handle is not None:
             return self.handle.driver
         assert self.pointer_hand is not None  # as there is no handle
-        parts, follows = (setup.plant, setup.hand, setup.servo), self._leader is not None
-        return pointer_driver(*parts, self.pointer_hand, follows=follows)
+        follows = self.leader is not None
+        return pointer_driver(
+            setup.plant, setup.hand, setup.servo, self.pointer_hand, follows=follows
+        )
 
     def _run_duration(self, setup: Setup) -> float | None:
         """Return the time after which the loop ends by itself [s]."""
@@ -342,9 +320,7 @@ class Session:
     def _apply_changes(self, changes: Mapping[str, Any]) -> None:
         if self.handle is not None and SCENE_KEY in changes:
             raise ParameterError(SCENE_KEY, "needs the simulated device")
-        self._apply_scene(self.saved_scenes.apply_changes(self.scene_state, changes))
-
-    def _apply_scene(self, scene: SceneState) -> None:
+        scene = self.saved_scenes.apply_changes(self.scene_state, changes)
         if scene is self.scene_state and self._loop is not None:
             self._set_state("running")
             return

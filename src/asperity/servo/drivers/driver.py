@@ -87,8 +87,6 @@ class Driver(ABC):
     Attributes:
         name: name on the command line.
         has_moving_handle: whether a real handle moves.
-        has_own_clock: whether the loop waits for each sample by the system's clock; otherwise the
-            device waits.
         can_reopen: whether opening the device moves nothing and closing it leaves no force, so that
             both release a force that a dead process has left.
         loss_notice: what the device does if the process of the loop dies, in a sentence.
@@ -96,7 +94,6 @@ class Driver(ABC):
 
     name: ClassVar[str]
     has_moving_handle: ClassVar[bool] = True
-    has_own_clock: ClassVar[bool] = True
     can_reopen: ClassVar[bool] = False
     loss_notice: ClassVar[str]
 

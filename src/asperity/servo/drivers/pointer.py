@@ -17,7 +17,7 @@ from asperity.core.checks import FloatArray, check_array, check_real
 from asperity.core.errors import ParameterError
 from asperity.servo.driver_loop import no_clock, system_clock
 from asperity.servo.drivers.simulated import SimulatedDriver, simulated_driver
-from asperity.servo.kernels import following_anchor, pointer_anchor
+from asperity.servo.kernels import pointer_anchor
 from asperity.simulation.hands import Hand
 from asperity.simulation.kernels.simulated_device import SimulatedDevice
 from asperity.simulation.motions import Stationary
@@ -106,8 +106,8 @@ class PointerHand:
     @property
     def follower_lag(self) -> tuple[int, int]:
         """Samples by which a following loop is behind, and samples that it has left out."""
-        count = self.table[pointer_anchor.STATE_ROW, pointer_anchor.SAMPLE_COUNT]
         sample, left_out, _ = self.table[pointer_anchor.FOLLOWER_ROW]
+        count = self.table[pointer_anchor.STATE_ROW, pointer_anchor.SAMPLE_COUNT]
         return max(int(count - sample), 0), int(left_out)
 
     @property
@@ -155,10 +155,12 @@ class PointerDriver(SimulatedDriver):
 
     Attributes:
         pointer_file: name of the file of its memory.
+        follows: whether another loop moves the anchor, and this one repeats its motion.
     """
 
     name: ClassVar[str] = "simulated"
     pointer_file: str = ""
+    follows: bool = False
 
     def kernel_modules(self) -> tuple[ModuleType, ...]:
         """Return the modules of a simulated device, with the anchor of the pointer first."""
@@ -170,43 +172,19 @@ class PointerDriver(SimulatedDriver):
         Raises:
             ParameterError: if the pointer was closed.
         """
-        device = self._open_on_table()
-        device.anchor[pointer_anchor.STATE_ROW] = 0.0
-        return device
-
-    def _open_on_table(self) -> SimulatedDevice:
         try:
             table = open_pointer_table(self.pointer_file)
         except FileNotFoundError:
             raise ParameterError("pointer", "is closed: nothing moves the hand") from None
-        return SimulatedDevice(*super().open())._replace(anchor=table)
-
-
-@dataclass(frozen=True, eq=False)
-class FollowingDriver(PointerDriver):
-    """A simulated device whose hand repeats the motion of another loop's, sample by sample."""
-
-    has_own_clock: ClassVar[bool] = False
-
-    def kernel_modules(self) -> tuple[ModuleType, ...]:
-        """Return the modules of a simulated device, with the following anchor first."""
-        return following_anchor, *SimulatedDriver.kernel_modules(self)
-
-    def placeholder_record(self) -> tuple[Any, ...]:
-        """Return the device with a clock, which does not run."""
-        return self.device._replace(clock=no_clock())
-
-    def open(self) -> tuple[Any, ...]:
-        """Return the device, held by the hand, from the newest sample of the other loop on.
-
-        Raises:
-            ParameterError: if the pointer was closed.
-        """
-        device = self._open_on_table()
-        table, state = device.anchor, pointer_anchor.STATE_ROW
-        device.counters[2] = max(int(table[state, pointer_anchor.SAMPLE_COUNT]) - 1, 0)
+        device = SimulatedDevice(*super().open())._replace(anchor=table)
+        if not self.follows:
+            table[pointer_anchor.STATE_ROW] = 0.0
+            return device
+        count = int(table[pointer_anchor.STATE_ROW, pointer_anchor.SAMPLE_COUNT])
+        device.counters[2] = max(count - 1, 0)
         table[pointer_anchor.FOLLOWER_ROW] = device.counters[2], 0.0, 0.0
-        return device._replace(clock=system_clock())
+        waiting = system_clock()._replace(timespec=np.array([0, pointer_anchor.POLL_TIME]))
+        return device._replace(clock=waiting)
 
 
 def pointer_driver(
@@ -228,6 +206,5 @@ def pointer_driver(
         raise ParameterError("hand", "must be a spring or a band: the pointer moves its anchor")
     start = Stationary(tuple(pointer.anchor))
     driver = simulated_driver(plant, hand, servo, start, servo.period)
-    device = driver.device._replace(anchor=np.zeros((_ROW_COUNT, 3)))
-    kind = FollowingDriver if follows else PointerDriver
-    return kind(driver.body_modules, device, pointer.name)
+    device = driver.device._replace(anchor=np.zeros((_ROW_COUNT, 3)), clock=no_clock())
+    return PointerDriver(driver.body_modules, device, pointer.name, follows)
