@@ -94,11 +94,13 @@ function drawLabels(context, width, y, title, traces) {
   context.font = "11px system-ui, sans-serif";
   context.fillStyle = colours().soft;
   context.fillText(title, 4, y);
+  const titleEnd = 8 + context.measureText(title).width;
   let x = width - 4;
   for (const [name, colour] of [...traces].reverse()) {
     context.fillStyle = colours()[colour];
     const label = name.replace("applied ", "f").replace("supplied", "given to the hand");
     x -= context.measureText(label).width;
+    if (x < titleEnd) break; // a narrow plot
     context.fillText(label, x, y);
     x -= 10;
   }
