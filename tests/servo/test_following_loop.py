@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -42,7 +43,7 @@ def pointer() -> Iterator[PointerHand]:
 
 
 def driver(pointer: PointerHand, *, follows: bool = False) -> PointerDriver:
-    return pointer_driver(Cartesian(0.05, 0.5), HAND, SERVO, pointer, follows=follows)
+    return replace(pointer_driver(Cartesian(0.05, 0.5), HAND, SERVO, pointer), follows=follows)
 
 
 def run(surface: Surface, device: PointerDriver, opened: tuple[object, ...]) -> FloatArray:

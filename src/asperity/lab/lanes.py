@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -49,17 +48,14 @@ class SecondLane(Lane):
 
     Args:
         leader: session of the first lane.
-        on_change: called after a change of the state, in the thread of the session.
         pictures: of the surface.
 
     Attributes:
         law: letter of the law; empty for none.
     """
 
-    def __init__(
-        self, leader: Session, on_change: Callable[[], None], pictures: BackgroundRenderer
-    ) -> None:
-        super().__init__(Session(leader.scene_state, on_change, leader=leader), pictures)
+    def __init__(self, leader: Session, pictures: BackgroundRenderer) -> None:
+        super().__init__(Session(leader.scene_state, leader.on_change, leader=leader), pictures)
         # Scene and start of the first loop, and law, that were requested last.
         self._leader, self.law, self._followed = leader, "", (0, 0, "")
 
@@ -70,8 +66,7 @@ class SecondLane(Lane):
             ParameterError: for an unknown law, or a real device.
         """
         if self._leader.handle is not None:
-            words = "needs the simulated device: a hand cannot feel two laws on one handle"
-            raise ParameterError(BESIDE, words)
+            raise ParameterError(BESIDE, "needs the simulated device: one handle has one law")
         self.law, self._followed = find_law(letter).letter if letter else "", (0, 0, "")
         if not letter:
             self.session.release_force("", now=True)

@@ -142,7 +142,7 @@ class LabServer:
         )
         self.lane = Lane(self.session, self.pictures)
         beside = BackgroundRenderer(pictures, limits, self._broadcast_state, BESIDE)
-        self.second_lane = SecondLane(self.session, self._notify, beside)
+        self.second_lane = SecondLane(self.session, beside)
         self.clip_store = ClipStore(self.session)
         if options.playback is not None:
             words = {"title": Path(scene_state.source).name, "opens_at_start": True}
@@ -248,9 +248,7 @@ class LabServer:
             changes = dict(content)
             if BESIDE in changes:
                 self.second_lane.choose(str(changes.pop(BESIDE)))
-                self._state_changed.set()
-            if changes or not content:
-                self.session.change(changes)
+            self.session.change(changes)
         elif kind == "start":
             self.session.start()
         elif kind == "stop":

@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, replace
 from queue import Empty, Queue
 from typing import Any, Literal
 
@@ -127,6 +127,7 @@ class Session:
             loop.
 
     Attributes:
+        on_change: as given.
         scene_state: the current scene.
         saved_scenes: other scenes by name.
         shared: rows of the loop; replaced at each start.
@@ -144,7 +145,7 @@ class Session:
         assess_risk: RiskAssessor | None = None,
         leader: Session | None = None,
     ) -> None:
-        self.scene_state, self._on_change, self._prestarted = scene_state, on_change, prestarted
+        self.scene_state, self.on_change, self._prestarted = scene_state, on_change, prestarted
         self.saved_scenes = SavedScenes()
         self.handle, self._assess_risk, self.leader = handle, assess_risk, leader
         highest = float(scene_state.setup.surface.texture.extremes[1])
@@ -223,7 +224,7 @@ class Session:
 
     def _set_state(self, state: LoopState, message: str = "") -> None:
         self.state, self.message = state, message
-        self._on_change()
+        self.on_change()
 
     def _run(self) -> None:
         try:
@@ -307,10 +308,8 @@ class Session:
         if self.handle is not None:
             return self.handle.driver
         assert self.pointer_hand is not None  # as there is no handle
-        follows = self.leader is not None
-        return pointer_driver(
-            setup.plant, setup.hand, setup.servo, self.pointer_hand, follows=follows
-        )
+        driver = pointer_driver(setup.plant, setup.hand, setup.servo, self.pointer_hand)
+        return replace(driver, follows=self.leader is not None)
 
     def _run_duration(self, setup: Setup) -> float | None:
         """Return the time after which the loop ends by itself [s]."""

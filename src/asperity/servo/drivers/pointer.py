@@ -180,16 +180,14 @@ class PointerDriver(SimulatedDriver):
         if not self.follows:
             table[pointer_anchor.STATE_ROW] = 0.0
             return device
-        count = int(table[pointer_anchor.STATE_ROW, pointer_anchor.SAMPLE_COUNT])
-        device.counters[2] = max(count - 1, 0)
+        count = table[pointer_anchor.STATE_ROW, pointer_anchor.SAMPLE_COUNT]
+        device.counters[2] = max(count - 1.0, 0.0)
         table[pointer_anchor.FOLLOWER_ROW] = device.counters[2], 0.0, 0.0
-        waiting = system_clock()._replace(timespec=np.array([0, pointer_anchor.POLL_TIME]))
-        return device._replace(clock=waiting)
+        wait = np.array([0, pointer_anchor.POLL_TIME])
+        return device._replace(clock=system_clock()._replace(timespec=wait))
 
 
-def pointer_driver(
-    plant: Plant, hand: Hand, servo: Servo, pointer: PointerHand, *, follows: bool = False
-) -> PointerDriver:
+def pointer_driver(plant: Plant, hand: Hand, servo: Servo, pointer: PointerHand) -> PointerDriver:
     """Return a simulated device whose hand follows a pointer.
 
     Args:
@@ -197,7 +195,6 @@ def pointer_driver(
         hand: the hand that holds it, without a prescribed motion.
         servo: period and delay.
         pointer: moves the hand's anchor, from the initial position of the handle.
-        follows: whether another loop reads the pointer, and this one repeats its motion.
 
     Raises:
         ParameterError: for a plant that cannot be simulated with this hand; for a prescribed hand.
@@ -207,4 +204,4 @@ def pointer_driver(
     start = Stationary(tuple(pointer.anchor))
     driver = simulated_driver(plant, hand, servo, start, servo.period)
     device = driver.device._replace(anchor=np.zeros((_ROW_COUNT, 3)), clock=no_clock())
-    return PointerDriver(driver.body_modules, device, pointer.name, follows)
+    return PointerDriver(driver.body_modules, device, pointer.name)
