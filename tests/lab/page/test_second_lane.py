@@ -105,9 +105,9 @@ def test_clips_and_tour_show_one_law(page: Browser) -> None:
     page.until("!lab.probeState().isInside")
     page.ask("new Promise(done => setTimeout(done, 800))")
     page.ask("document.getElementById('save-clip').click()")
-    saved = "document.querySelector('#clips button')"
+    saved = "Boolean(document.querySelector('#clips button'))"
     page.until(f"{saved} || !document.getElementById('alarm').hidden")
-    assert page.ask(f"Boolean({saved})"), text(page, "alarm")
+    assert page.ask(saved), text(page, "alarm")
     page.ask("document.querySelector('#clips button').click()")
     page.until(
         "lab.player.isOpen && !lab.secondLane.isShown && document.getElementById('beside').disabled"
