@@ -9,7 +9,6 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from datetime import timedelta
 from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -41,23 +40,16 @@ def progress_bar(description: str) -> Iterator[Callable[..., None]]:
         return
     from rich import progress
     from rich.console import Console
-    from rich.text import Text
 
     from asperity.core.compiled import COMPILE_CALLBACKS
-
-    class TimeLeftColumn(progress.ProgressColumn):
-        """The time left; unlike Rich's column, from the first step on."""
-
-        def render(self, task: progress.Task) -> Text:
-            """Return the text of the column."""
-            return Text(f"left: {format_time_left(task.elapsed or 0.0, task.completed)}")
 
     columns = (
         progress.TextColumn("{task.description:<24}"),
         progress.BarColumn(),
         progress.TaskProgressColumn(),
         progress.TimeElapsedColumn(),
-        TimeLeftColumn(),
+        progress.TextColumn("left:"),
+        progress.TimeRemainingColumn(),
     )
     with progress.Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task, loops = bar.add_task(description, total=1.0), count(1)
@@ -76,22 +68,6 @@ def progress_bar(description: str) -> Iterator[Callable[..., None]]:
             yield update
         finally:
             COMPILE_CALLBACKS.remove(report_compilation)
-
-
-def format_time_left(elapsed: float, fraction: float) -> str:
-    """Return the estimated time left as text.
-
-    Args:
-        elapsed: elapsed time [s].
-        fraction: completed fraction in [0, 1].
-
-    Example:
-        >>> format_time_left(30.0, 0.25), format_time_left(30.0, 0.0)
-        ('0:01:30', '-:--:--')
-    """
-    if fraction <= 0.0:
-        return "-:--:--"
-    return str(timedelta(seconds=round(elapsed * (1.0 - fraction) / fraction)))
 
 
 @contextmanager
