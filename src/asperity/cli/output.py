@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import count
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -18,6 +17,7 @@ import click
 from asperity.core import files
 from asperity.core.cache import bypass
 from asperity.core.errors import ParameterError, escape_unprintable
+from asperity.core.files import STANDARD_OUTPUT, check_output
 
 if TYPE_CHECKING:
     from asperity.report.page import Page
@@ -76,9 +76,6 @@ def step_bar(description: str, steps: int) -> Iterator[Callable[[str], None]]:
     with progress_bar(description) as update:
         done = count()
         yield lambda name: update(next(done) / steps, name)
-
-
-STANDARD_OUTPUT = "-"
 
 
 @dataclass(frozen=True)
@@ -203,40 +200,6 @@ def check_outputs(*, force: bool, **paths: str | None) -> None:
             raise ParameterError(taken[target], f"and {name} cannot both {place}")
         taken[target] = name
         check_output(name, path, force=force)
-
-
-def check_output(name: str, path: str | None, *, force: bool) -> None:
-    """Check before a computation that a path can be written.
-
-    Raises:
-        ParameterError: if the file exists and ``force`` is false, the folder does not exist or is
-            not writable, or the path is too long, a folder, a link to itself, or a device or a pipe
-            that is not writable.
-    """
-    if path is None or path == STANDARD_OUTPUT:
-        return
-    try:
-        os.lstat(path)
-    except (FileNotFoundError, NotADirectoryError):
-        pass
-    except (OSError, ValueError) as error:  # the name is too long
-        reason = getattr(error, "strerror", None) or str(error)
-        raise ParameterError(name, f"cannot be written: {reason}", path) from None
-    if Path(path).is_dir():
-        raise ParameterError(name, "must be a file, not a folder", path)
-    if files.is_special_file(path):
-        if not os.access(path, os.W_OK):
-            raise ParameterError(name, "must be a file that can be written", path)
-        return
-    target = Path(os.path.realpath(path))
-    if target.is_symlink():
-        raise ParameterError(name, "must be a file, not a link to itself", path)
-    folder = target.parent
-    if not folder.is_dir():
-        raise ParameterError(name, f"must lie in a folder that exists, {folder} does not")
-    if not os.access(folder, os.W_OK):
-        raise ParameterError(name, f"must lie in a folder that can be written, not {folder}")
-    files.check_not_existing(name, path, force=force)
 
 
 def write_output(name: str, path: str, text: str) -> None:

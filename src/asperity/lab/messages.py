@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -124,31 +125,26 @@ def _parse_relief(x: object, y: object, size: object) -> ViewRequest:
     return ViewRequest("relief", (*middle, side))
 
 
-def _parse_section(box: object, y: object) -> ViewRequest:
+def _parse_section(kind: str, *code: float, box: object, y: object) -> ViewRequest:
     sides = left, right, bottom, top = _parse_numbers("box", box, 4, 1.0)
     if not all(MIN_VIEW_SIZE <= side <= MAX_VIEW_SIZE for side in (right - left, top - bottom)):
         limits = f"must have sides of {MIN_VIEW_SIZE:g} to {MAX_VIEW_SIZE:g} m"
         raise ParameterError("box", limits, box)
-    return ViewRequest("section", (*sides, _parse_number("y", y, -1.0, 1.0)))
+    return ViewRequest(kind, (*sides, _parse_number("y", y, -1.0, 1.0), *code))
 
 
-def _beside(section: ViewRequest) -> ViewRequest:
-    return ViewRequest(BESIDE, (*section.numbers, BESIDE_SECTION))
-
+STATE, RELIEF, SECTION, BESIDE_SECTION = 1.0, 2.0, 3.0, 4.0
+"""First number of a message: its kind."""
 
 _PARSERS: dict[str, tuple[tuple[str, ...], Callable[..., Any]]] = {
     "steer": (("target", "cosine", "sine", "speed"), _parse_steer),
     "change": (("changes",), _parse_change),
     "relief": (("x", "y", "size"), _parse_relief),
-    "section": (("box", "y"), _parse_section),
-    BESIDE: (("box", "y"), lambda **sides: _beside(_parse_section(**sides))),
+    "section": (("box", "y"), partial(_parse_section, "section")),
+    BESIDE: (("box", "y"), partial(_parse_section, BESIDE, BESIDE_SECTION)),
     "acknowledge": (("frame",), lambda frame: _parse_number("frame", frame, 0.0, math.inf)),
     **{kind: ((), lambda: None) for kind in ("take_control", "start", "stop", "save_clip")},
 }
-
-
-STATE, RELIEF, SECTION, BESIDE_SECTION = 1.0, 2.0, 3.0, 4.0
-"""First number of a message: its kind."""
 
 COLUMN_NAMES = [name for name, _unit in COLUMNS]
 FORCE_COLUMNS = slice(COLUMN_NAMES.index("applied x"), COLUMN_NAMES.index("applied z") + 1)

@@ -186,11 +186,8 @@ class Ledger:
     @classmethod
     def from_sums(cls, sums: FloatArray, stored_before: float, stored_after: float) -> Ledger:
         """Return the ledger of the sums of a run; see ``kernels/energy_ledger.py``."""
-        x, y, z, px, py, pz, lost, hand, friction, sampling, exchanged = map(float, sums)
-        work, same = (x, y, z), (px, py, pz)
-        return cls(
-            work, same, lost, hand, friction, sampling, exchanged, stored_before, stored_after
-        )
+        x, y, z, px, py, pz, *others = map(float, sums)
+        return cls((x, y, z), (px, py, pz), *(*others, stored_before, stored_after))
 
     @property
     def total(self) -> float:

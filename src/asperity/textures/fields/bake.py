@@ -34,7 +34,7 @@ _ONSET = 10e-6, 0.02
 SHALLOW = 0.04
 _TRIAL_BYTES = 2**19
 # Share of the goal that is aimed at, and relative error of the resolution predicted for it.
-_AIM, _PREDICTION_STEP = 0.94, 0.02
+_AIM, _PREDICTION_STEP = 0.96, 0.02
 _MAX_TRIALS = 12
 _FLAT = 1e-9  # of the greatest force: less is rounding
 _BYTES_PER_NODE = 4
@@ -196,7 +196,7 @@ class BakePlan:
         for trial in range(_MAX_TRIALS):
             done = 1.0 - 0.5**trial
             field = self.bake(resolution, scale_progress(progress, done, 0.5 * (1.0 - done)))
-            share = self.worst_share(field.accuracy.share, field.accuracy.onset)
+            share = max(field.accuracy.share, goal * field.accuracy.onset / self.onset_limit)
             if resolution == (coarsest if share <= goal else finest) or 0.5 * goal <= share <= goal:
                 break
             tried.add(resolution)
@@ -227,20 +227,12 @@ class BakePlan:
     def predict_share(self, resolution: float) -> float:
         """Return the share of a field that is not smoothed, from the nodes around the probes."""
         grid = self.grid(resolution)
-        columns = self.node_columns(grid)
-        depth, gradient = node_potentials.interpolate_depths(columns, grid, self.probes)
-        difference = -depth[:, None] * gradient - self.force
-        onset = node_potentials.interpolate_depths(columns, grid, self.shallow)[0]
-        shift = float(np.abs(onset - self.shallow_depth).max(initial=0.0))
-        return self.worst_share(float(self.shares(difference, self.rows).max()), shift)
+        force = node_potentials.interpolate_force(self.node_columns(grid), grid, self.probes)
+        return float(self.shares(force - self.force, self.rows).max())
 
     def node_columns(self, _grid: FieldGrid) -> node_potentials.ColumnFunction:
         """Return the function of the exact depth at columns of nodes of a grid."""
         return self.columns
-
-    def worst_share(self, share: float, onset: float) -> float:
-        """Return the larger of a share and that of an onset [m] which is as far from its limit."""
-        return max(share, self.goal.share * onset / self.onset_limit)
 
     def finest_resolution(self, max_bytes: float = math.inf) -> float:
         """Return the finest resolution [m] of a field within the size allowed, to three digits."""

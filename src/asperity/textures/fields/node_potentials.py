@@ -24,7 +24,7 @@ _MODES: Any = {PERIODIC: "wrap", MIRRORED: "mirror", ZERO: "nearest"}
 # Writes the depth [m] in single precision, (n, levels), at columns of nodes at x, y (n, 2) and
 # rising z (levels,) [m]: sqrt(2U) inside, the negative distance of the surface outside, at least
 # -margin, the third argument; called by several threads at once.
-ColumnFunction = Callable[[FloatArray, FloatArray, float, SingleArray], None]
+ColumnFunction = Callable[[FloatArray, FloatArray, float, SingleArray], object]
 
 
 def split_columns(texture: Texture, continuity: float) -> ColumnFunction:
@@ -54,12 +54,10 @@ def compute_potentials(
     return result.reshape(grid.node_counts)
 
 
-def interpolate_depths(
-    columns: ColumnFunction, grid: FieldGrid, points: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return depth [m], (n,), and its gradient (n, 3) at points above the floor (n, 3) [m].
+def interpolate_force(columns: ColumnFunction, grid: FieldGrid, points: FloatArray) -> FloatArray:
+    """Return the force over the stiffness [m], (n, 3), at points above the floor (n, 3) [m].
 
-    They are those of the spline of a field that is not smoothed, of which only the nodes around the
+    It is that of the spline of a field that is not smoothed, of which only the nodes around the
     points are computed.
     """
     rates = np.linalg.pinv(grid.steps)
@@ -67,31 +65,26 @@ def interpolate_depths(
     index = np.column_stack([(points[:, :2] - grid.start) @ rates, level])
     nearest = np.rint(index)
     plane = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * len(grid.cells), indexing="ij"), axis=-1)
-    around = nearest[:, None, :-1] + plane.reshape(-1, len(grid.cells))
-    nodes = np.empty((len(points), around.shape[1], 3), np.float32)
+    plane = plane.reshape(-1, len(grid.cells))
+    nodes = np.empty((len(points), len(plane), 3), np.float32)
 
-    def fill(level: float) -> None:
-        rows = np.flatnonzero(nearest[:, -1] == level)
-        xy = grid.positions(around[rows].reshape(-1, len(grid.cells)))
-        values = np.empty((len(xy), 3), np.float32)
-        columns(xy, grid.height(level + np.array([-1.0, 0.0, 1.0])), grid.margin, values)
-        nodes[rows] = values.reshape(len(rows), -1, 3)
+    def fill(row: int) -> None:
+        xy = grid.positions(nearest[row, :-1] + plane)
+        z = grid.height(nearest[row, -1] + np.array([-1.0, 0.0, 1.0]))
+        columns(xy, z, grid.margin, nodes[row])
 
-    run_in_threads(fill, np.unique(nearest[:, -1]).tolist(), None)
+    run_in_threads(fill, range(len(points)), None)
     part = index - nearest
     weights = np.stack([0.5 * (0.5 - part) ** 2, 0.75 - part**2, 0.5 * (0.5 + part) ** 2], axis=-1)
     rises = np.stack([part - 0.5, -2.0 * part, part + 0.5], axis=-1)
     values = np.maximum(nodes.astype(float) + grid.margin, 0.0)
     values = values.reshape(len(points), *[3] * part.shape[1])
     depth = _weighted_sum(values, weights) - grid.margin
-    slopes = []
-    for axis in range(part.shape[1]):
-        mixed = weights.copy()
-        mixed[:, axis] = rises[:, axis]
-        slopes.append(_weighted_sum(values, mixed))
+    chosen = np.eye(part.shape[1], dtype=bool)[:, :, None]
+    slopes = [_weighted_sum(values, np.where(axis, rises, weights)) for axis in chosen]
     slope = np.stack(slopes, axis=-1)
     gradient = np.column_stack([slope[:, :-1] @ rates.T, slope[:, -1] / grid.level_spacing])
-    return np.maximum(depth, 0.0), gradient
+    return np.asarray(-np.maximum(depth, 0.0)[:, None] * gradient)
 
 
 def _weighted_sum(values: FloatArray, weights: FloatArray) -> FloatArray:

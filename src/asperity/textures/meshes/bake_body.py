@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, cast
-
 import numpy as np
-from numpy.typing import NDArray
 
 from asperity.contacts.split import optimality, solver
 from asperity.core.checks import FloatArray, check_positive
@@ -145,12 +142,9 @@ class _BodyLoops:
         self, xy: FloatArray, z: FloatArray, margin: float, out: SingleArray
     ) -> None:
         """Write the depths of columns of the grid, and keep their summaries."""
-        rows = self._rows(xy)
-        self._summary[rows] = self.columns(xy, z, margin, out)
-
-    def _rows(self, xy: FloatArray) -> NDArray[np.intp]:
         steps = np.rint((xy - self.grid.start) / self.grid.spacing[0]).astype(np.intp)
-        return np.asarray(steps[:, 0] * self.grid.node_counts[1] + steps[:, 1])
+        rows = steps[:, 0] * self.grid.node_counts[1] + steps[:, 1]
+        self._summary[rows] = self.columns(xy, z, margin, out)
 
     def upper_envelope(
         self, body: MeshBody, thin: tuple[ThinRegion, ...]
@@ -247,8 +241,7 @@ class _BodyPlan(bake.BakePlan):
     def node_columns(self, grid: FieldGrid) -> ColumnFunction:
         """See :class:`BakePlan`."""
         self.loops.set_tolerance(grid)
-        columns: ColumnFunction = cast(Any, self.loops.columns)  # its summaries are not used
-        return columns
+        return self.loops.columns
 
     def grid(self, resolution: float) -> FieldGrid:
         """Return the grid around the body.
