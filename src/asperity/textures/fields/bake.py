@@ -34,7 +34,7 @@ _ONSET = 10e-6, 0.02
 SHALLOW = 0.04
 _TRIAL_BYTES = 2**19
 # Share of the goal that is aimed at, and relative error of the resolution predicted for it.
-_AIM, _PREDICTION_STEP = 0.96, 0.02
+_AIM, _PREDICTION_STEP = 0.94, 0.02
 _MAX_TRIALS = 12
 _FLAT = 1e-9  # of the greatest force: less is rounding
 _BYTES_PER_NODE = 4
@@ -202,7 +202,7 @@ class BakePlan:
             tried.add(resolution)
             lower, upper = (lower, resolution) if share > goal else (resolution, upper)
             ratio = max(share, 0.01 * goal) / max(self.predict_share(resolution), 0.01 * goal)
-            resolution = self.predict_resolution(lower, upper, _AIM * goal / ratio)
+            resolution = self.predict_resolution(lower, upper, _AIM ** (trial + 1) * goal / ratio)
             if resolution in tried:
                 resolution = math.sqrt(lower * upper)
         if resolution == finest and share > goal:
