@@ -114,7 +114,10 @@ def test_smoothing_is_widened_where_it_no_longer_lowers_the_gain(
 
 
 @pytest.mark.parametrize("texture", [WAVE, asp.named_surface("knurl")])
-def test_predicted_share_is_that_of_a_field_that_is_not_smoothed(texture: Texture) -> None:
+def test_predicted_share_is_that_of_a_field_that_is_not_smoothed(
+    texture: Texture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(bake, "_PREDICTION_PART", 1)
     plan = BakePlan(texture, 3e-4, 1.0, BakeGoal(max_gain=math.inf))
     resolution = 5e-2 * float(np.hypot(*texture.domain.spans.T).min())
     share = plan.bake(resolution, None).accuracy.share
