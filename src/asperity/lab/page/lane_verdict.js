@@ -31,7 +31,7 @@ export class LaneVerdict {
     const buzz = hasBuzzed ? `buzzes ±${formatQuantity(metrics.forceAmplitude, "N")}` : "no buzz";
     return [
       energyMeter.suppliesEnergy ? [`alive: gave ${energy}`, true] : [`not alive${energyMeter.energy > 2e-6 ? ` (${energy} by sampling)` : ""}`, false],
-      [metrics.stillTime > 0.6 || hasBuzzed ? buzz : "buzz: seen at rest", hasBuzzed],
+      [metrics.stillTime > 0.6 || hasBuzzed ? buzz : "buzz: not judged in motion", hasBuzzed],
       [metrics.clickCount ? `${metrics.clickCount} clicks` : "no clicks", metrics.clickCount > 0],
     ];
   }
