@@ -170,7 +170,7 @@ def compare(
     """
     check_keywords(surface_arguments, SURFACE_KEYWORDS - {"law"}, compare)
     texture = as_texture(texture)
-    laws = _renderable_laws(find_laws(list(laws) if not isinstance(laws, str) else laws), texture)
+    laws = _renderable_laws(find_laws(laws), texture)
     device = load_device(device)
     if stiffness is not None:
         stiffness = check_positive("stiffness", stiffness, "N/m")

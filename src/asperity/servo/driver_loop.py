@@ -269,7 +269,7 @@ class _LoopServer:
         self._connection, self._job, self._memory = connection, job, memory
         self._block = memory.block()
         # A device that follows another loop waits for each of its samples.
-        clock = no_clock() if getattr(job.driver, "follows", False) else system_clock()
+        clock = no_clock() if job.driver.follows else system_clock()
         self._loop = DriverLoop(job.driver, job.servo, job.safety, job.reach, self._block, clock)
         self._loop.search_state = memory.search_state
         self._program = self._next_program = job.program

@@ -77,5 +77,5 @@ def test_a_picture_of_another_surface_is_grey(page: Browser) -> None:
         " === 'of the previous surface: computing …'"
     )
     page.ask("lab.pictures.send = globalThis.sendPicture; 1")
-    page.until("lab.hasCurrentPictures && !document.querySelector('.stale:not(#beside-section)')")
+    page.until("lab.hasCurrentPictures && !document.querySelector('.stale')")
     change(page, "texture", former)

@@ -51,6 +51,7 @@ export class SecondLane {
     // What concerns the loop and its pictures is of this lane; the rest is common to both.
     this.status = law ? { ...status, ...status.beside } : null;
     this.pictures.setStatus(this.status);
+    if (!law) $("beside-section").classList.remove("stale"); // it is hidden
     if (law) this.lastLaw = law;
     if (status && document.activeElement !== $("beside")) $("beside").value = law;
     const key = this.status && [status.start_count, status.settings.law, this.status.start_count, this.status.settings.law].join();
