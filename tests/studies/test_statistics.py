@@ -8,15 +8,10 @@ import numpy as np
 import pytest
 from tests.studies.study_cases import answers, design_of
 
-from asperity.studies.kinds.staircase import Staircase
+from asperity.studies.kinds.tracks import Staircase
 from asperity.studies.statistics.bradley_terry import covariance, fit_scores, pseudo_values
-from asperity.studies.statistics.intervals import mean_interval, share_interval
-from asperity.studies.statistics.psychometric import (
-    LogLevels,
-    count_answers,
-    fit_psychometric,
-    fit_thresholds,
-)
+from asperity.studies.statistics.intervals import mean_interval
+from asperity.studies.statistics.psychometric import LogLevels
 
 # American League 1987: games won (rows) against each other team (columns), in the order
 # Milwaukee, Detroit, Toronto, New York, Boston, Cleveland, Baltimore; A. Agresti, Categorical Data
@@ -32,7 +27,7 @@ LEVELS = LogLevels(1e-6, 1e-4, 1e-12, 0.0, guess=0.5, lapse=0.02)
 
 
 def test_scores_are_those_published_for_baseball() -> None:
-    scores = fit_scores(BASEBALL)
+    scores, _ = fit_scores(BASEBALL)
     assert scores - scores[-1] == pytest.approx(ABILITIES, abs=5e-5)
     spread = covariance(BASEBALL, scores)
     boston = math.sqrt(spread[4, 4] + spread[6, 6] - 2.0 * spread[4, 6])
@@ -41,15 +36,16 @@ def test_scores_are_those_published_for_baseball() -> None:
 
 def test_scores_follow_a_permutation_and_see_a_swapped_game() -> None:
     order = np.array([3, 1, 0, 2, 6, 5, 4])
-    permuted = fit_scores(BASEBALL[np.ix_(order, order)])
-    assert permuted == pytest.approx(fit_scores(BASEBALL)[order], abs=1e-6)
+    permuted = fit_scores(BASEBALL[np.ix_(order, order)])[0]
+    scores = fit_scores(BASEBALL)[0]
+    assert permuted == pytest.approx(scores[order], abs=1e-6)
     swapped = BASEBALL.copy()
     swapped[0, 1], swapped[1, 0] = 6, 7
-    assert abs(fit_scores(swapped) - fit_scores(BASEBALL)).max() > 0.01
+    assert abs(fit_scores(swapped)[0] - scores).max() > 0.01
 
 
 def test_scores_without_a_maximum_stay_finite() -> None:
-    scores = fit_scores(np.array([[0.0, 5.0, 5.0], [0.0, 0.0, 5.0], [0.0, 0.0, 0.0]]))
+    scores, _ = fit_scores(np.array([[0.0, 5.0, 5.0], [0.0, 0.0, 5.0], [0.0, 0.0, 0.0]]))
     assert scores[0] > scores[1] > scores[2]
     assert np.all(np.isfinite(scores))
 
@@ -57,7 +53,7 @@ def test_scores_without_a_maximum_stay_finite() -> None:
 def test_pseudo_values_have_the_mean_of_the_scores_and_the_spread_of_participants() -> None:
     each = np.random.default_rng(1).multinomial(1, BASEBALL.ravel() / BASEBALL.sum(), size=4000)
     each = each.reshape(-1, 7, 7).astype(float)
-    scores, values = pseudo_values(each)
+    scores, values = fit_scores(each.sum(axis=0))[0], pseudo_values(each)
     assert values.mean(axis=0) == pytest.approx(scores, abs=1e-9)
     errors = values.std(axis=0, ddof=1) / math.sqrt(len(values))
     expected = np.sqrt(np.diag(covariance(each.sum(axis=0), scores)))
@@ -66,7 +62,7 @@ def test_pseudo_values_have_the_mean_of_the_scores_and_the_spread_of_participant
 
 def test_a_staircase_settles_at_its_target() -> None:
     rng = np.random.default_rng(2)
-    track = Staircase(math.log(1e-4), *LEVELS.ends, step=0.1, target=0.75, guess=0.5)
+    track = Staircase(LEVELS, step=0.1, target=0.75)
     right = []
     for _ in range(6000):
         chance = LEVELS.probability(np.array(track.level()), math.log(1e-5), 4.0)
@@ -80,16 +76,16 @@ def known_thresholds(count: int, width: float = 1.0) -> int:
     held = 0
     for seed in range(count):
         rng = np.random.default_rng([seed, 1])
-        x = np.log(np.clip(1e-5 * np.exp(rng.normal(0.3, 0.7, 50)), 1e-6, 1e-4)).round(1)
+        x = np.log(np.clip(1e-5 * np.exp(rng.normal(0.3, 0.7, 50)), 1e-6, 1e-4))
         right = rng.random(50) < LEVELS.probability(x, math.log(1e-5), 4.0)
-        middle, low, high = fit_thresholds(LEVELS, np.exp(x), right, 200, seed)
+        middle, low, high = LEVELS.estimate_threshold(x, right)
         ends = middle + width * (low - middle), middle + width * (high - middle)
         held += ends[0] <= math.log(1e-5) <= ends[1]
     return held
 
 
 def test_intervals_of_thresholds_hold_them_and_narrower_ones_do_not() -> None:
-    count = 120
+    count = 400
     assert held_at_least(known_thresholds(count), count)
     assert not held_at_least(known_thresholds(count, width=0.5), count)
 
@@ -101,30 +97,41 @@ def held_at_least(held: int, count: int) -> bool:
     return bool(binom.cdf(held, count, 0.95) > 1e-3)
 
 
-def test_fits_are_where_the_likelihood_is_greatest() -> None:
+def test_the_posterior_is_prior_times_likelihood() -> None:
     rng = np.random.default_rng(4)
-    x = rng.uniform(*LEVELS.ends, 400)
-    right = rng.random(400) < LEVELS.probability(x, -11.0, 5.0)
-    counts = count_answers(x, right)
-    best = fit_psychometric(LEVELS, counts)
+    x = rng.uniform(*LEVELS.ends, 30)
+    right = rng.random(30) < LEVELS.probability(x, -11.0, 5.0)
+    thresholds, slopes, share = LEVELS.posterior(x, right)
+    assert share.sum() == pytest.approx(1.0, abs=1e-12)
 
-    def likelihood(threshold: float, slope: float) -> float:
-        chance = LEVELS.probability(counts.x, threshold, slope)
-        sum_ = counts.right @ np.log(chance) + (counts.total - counts.right) @ np.log1p(-chance)
-        return float(sum_) - 0.5 * math.log(slope / 4.0) ** 2
+    def logarithm(threshold: float, slope: float) -> float:
+        total = -0.5 * (math.log(slope / 4.0) / 0.5) ** 2
+        for one, is_right in zip(x, right, strict=True):
+            chance = 0.5 + 0.48 / (1.0 + math.exp(-slope * (one - threshold)))
+            total += math.log(chance if is_right else 1.0 - chance)
+        return total
 
-    for step in ((0.01, 1.0), (-0.01, 1.0), (0.0, 1.02), (0.0, 0.98)):
-        assert likelihood(*best) > likelihood(best[0] + step[0], best[1] * step[1])
+    first, second = (120, 10), (135, 14)
+    expected = logarithm(thresholds[first[0]], slopes[first[1]]) - logarithm(
+        thresholds[second[0]], slopes[second[1]]
+    )
+    assert math.log(share[first] / share[second]) == pytest.approx(expected, abs=1e-9)
 
 
 def test_answers_that_say_nothing_give_unbounded_intervals() -> None:
     right = np.arange(40) % 2 == 0  # as of a guess
-    values = np.geomspace(1e-6, 1e-4, 40)
-    low, high = fit_thresholds(LEVELS, values, right, 200, 0)[1:]
-    assert high == math.inf
-    low, high = fit_thresholds(LEVELS, values, right | True, 200, 0)[1:]
+    x = np.linspace(*LEVELS.ends, 40)
+    assert LEVELS.estimate_threshold(x, right)[2] == math.inf
+    _, low, high = LEVELS.estimate_threshold(x, np.ones(40, bool))
     assert low == -math.inf
     assert high < math.log(1e-4)
+
+
+def test_a_wrong_answer_is_possible_without_lapses() -> None:
+    levels = LogLevels(1e-6, 1e-4, 1e-12, 0.0, guess=0.5, lapse=0.0)
+    x = np.linspace(*levels.ends, 20)
+    estimates = levels.estimate_threshold(x, x < x[-1])
+    assert math.isfinite(estimates[0])
 
 
 @pytest.mark.parametrize("count", [5, 12])
@@ -145,17 +152,16 @@ def test_intervals_of_few_or_equal_values_are_unbounded() -> None:
     assert mean_interval(np.array([1.0, 2.0]), 100, 0) == (1.5, -math.inf, math.inf)
     assert mean_interval(np.full(12, 3.0), 100, 0) == (3.0, -math.inf, math.inf)
     assert math.isnan(mean_interval(np.array([]), 100, 0)[0])
-    assert math.isnan(share_interval(0, 0)[0])
 
 
 def test_thresholds_of_laws_come_out() -> None:
     from asperity.studies.methods import METHODS
 
     design = design_of("detection", trials=400)
-    score = METHODS["detection"].score(design, {"P": answers(design)}, 0)
+    score = METHODS["detection"].score(design, {"P": answers(design)})
     assert np.exp(score.values[0]) == pytest.approx([5e-6, 1e-5, 1e-5, 1e-5], rel=0.2)
     design = design_of("discrimination", trials=400)
-    score = METHODS["discrimination"].score(design, {"P": answers(design)}, 0)
+    score = METHODS["discrimination"].score(design, {"P": answers(design)})
     assert np.exp(score.values[0]) == pytest.approx([5e-6, 1e-5, 1e-5, 1e-5], rel=0.2)
 
 
@@ -164,6 +170,6 @@ def test_bayesian_thresholds_come_out() -> None:
     from asperity.studies.methods import METHODS
 
     design = design_of("detection", procedure="bayesian", trials=60)
-    score = METHODS["detection"].score(design, {"P": answers(design)}, 0)
+    score = METHODS["detection"].score(design, {"P": answers(design)})
     assert np.exp(score.values[0]) == pytest.approx([5e-6, 1e-5, 1e-5, 1e-5], rel=0.5)
     assert score.values[0, 0] < score.values[0, 1:].min()

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Protocol
+import math
+from collections.abc import Callable, Generator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from asperity.core.arguments import Argument
+from asperity.core.errors import ParameterError, suggest_names
 
 if TYPE_CHECKING:
     from asperity.studies.statistics.scores import Score
@@ -68,15 +70,47 @@ class StudyDesign:
         names, values = self.factors.keys(), self.factors.values()
         return tuple(dict(zip(names, one, strict=True)) for one in itertools.product(*values))
 
+    def check_conditions(self, minimum: int) -> int:
+        """Return the number of conditions.
 
-class Method(Protocol):
-    """One run of a method by one participant; the same seed and answers give the same run."""
+        Raises:
+            ParameterError: if it is below a minimum.
+        """
+        if (count := len(self.conditions)) < minimum:
+            words = f"must give at least {minimum} conditions for the method {self.kind}"
+            raise ParameterError("vary", words, count)
+        return count
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """Ends of the range of the level [SI].
+
+        Raises:
+            ParameterError: unless they are two ascending values.
+        """
+        values = self.options["range"]
+        if len(values) != 2 or not values[0] < values[1]:
+            raise ParameterError("method.range", "must be two ascending values", list(values))
+        return float(values[0]), float(values[1])
+
+
+Steps = Generator[Presentation, str, None]
+"""A method as a generator: it yields what to present, and receives the answer."""
+
+
+class Method:
+    """One run of a method by one participant; the same seed and answers give the same run.
+
+    Args:
+        steps: yields presentations, and receives their answers.
+    """
+
+    def __init__(self, steps: Steps) -> None:
+        self._steps, self._now = steps, next(steps, None)
 
     def next(self) -> Presentation | None:
-        """Return what to present now; ``None`` when the run is over.
-
-        It is the same until :meth:`answer` is called.
-        """
+        """Return what to present now, the same until it is answered; ``None`` at the end."""
+        return self._now
 
     def answer(self, answer: str) -> None:
         """Record the answer to what is presented now.
@@ -87,6 +121,28 @@ class Method(Protocol):
         Raises:
             ParameterError: for an answer that is not allowed, or after the end.
         """
+        _check_answer(self._now, answer)
+        try:
+            self._now = self._steps.send(answer)
+        except StopIteration:
+            self._now = None
+
+
+def _check_answer(presentation: Presentation | None, answer: str) -> None:
+    if presentation is None:
+        raise ParameterError("answer", "comes after the end of the run", answer)
+    if presentation.answers:
+        if answer not in presentation.answers:
+            hint = suggest_names(answer, presentation.answers)
+            raise ParameterError("answer", f"is unknown: {answer!r}; {hint}")
+        return
+    low, high = presentation.range or (-math.inf, math.inf)
+    try:
+        is_within = low <= float(answer) <= high and math.isfinite(float(answer))
+    except ValueError:
+        is_within = False
+    if not is_within:
+        raise ParameterError("answer", f"must be a number from {low:.6g} to {high:.6g}", answer)
 
 
 @dataclass(frozen=True)
@@ -107,6 +163,10 @@ class Answered:
         return self.answer == self.presentation.correct
 
 
+Answers = Mapping[str, Sequence[Answered]]
+"""Answers of each participant."""
+
+
 @dataclass(frozen=True)
 class MethodKind:
     """A kind of method.
@@ -115,12 +175,11 @@ class MethodKind:
         name: name in study files.
         description: a short description.
         arguments: options; a unit "level" stands for that of the level.
-        run: makes a run from a design with all options, the number of the participant and random
+        run: the method, from a design with all options, the number of the participant and random
             numbers.
-        label: names of what is estimated, such as conditions or their pairs.
-        score: estimates from the answers of each participant and the number of bootstrap samples
-            (without any there are no intervals); see
+        score: estimates from the answers; see
             :class:`~asperity.studies.statistics.scores.Score`.
+        label: names of what is estimated: conditions, unless their pairs are.
         consistency: share of repeated questions that a participant answers alike; ``None`` where
             the method has no such share.
         has_function: whether the answers are those of a psychometric function of a level.
@@ -129,28 +188,16 @@ class MethodKind:
     name: str
     description: str
     arguments: tuple[Argument, ...]
-    run: Callable[[StudyDesign, int, np.random.Generator], Method]
-    label: Callable[[StudyDesign], Sequence[dict[str, Any]]]
-    score: Callable[[StudyDesign, Mapping[str, Sequence[Answered]], int], Score]
+    run: Callable[[StudyDesign, int, np.random.Generator], Steps]
+    score: Callable[[StudyDesign, Answers], Score]
+    label: Callable[[StudyDesign], Sequence[dict[str, Any]]] = lambda design: design.conditions
     consistency: Callable[[Sequence[Answered]], float | None] = lambda _answers: None
     has_function: bool = False
 
     def complete(self, design: StudyDesign) -> StudyDesign:
-        """Return the design with the defaults of the options that it does not state.
-
-        Raises:
-            ParameterError: for a required option that is missing.
-        """
-        from dataclasses import replace
-
-        from asperity.core.errors import ParameterError
-
+        """Return the design with the defaults of the options that it does not state."""
         given = {one.name: one.default for one in self.arguments if one.default is not None}
-        options = {**given, **design.options}
-        for one in self.arguments:
-            if one.required and one.name not in options:
-                raise ParameterError(f"method.{one.name}", f"is missing: {one.description}")
-        return replace(design, options=options)
+        return replace(design, options={**given, **design.options})
 
     def make(self, design: StudyDesign, participant_number: int, seed: int) -> Method:
         """Return a run of the method.
@@ -164,4 +211,4 @@ class MethodKind:
             ParameterError: for options or factors that the method cannot use.
         """
         rng = np.random.default_rng([seed, participant_number])
-        return self.run(self.complete(design), participant_number, rng)
+        return Method(self.run(self.complete(design), participant_number, rng))

@@ -5,25 +5,21 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from asperity.core.arguments import read_arguments
-from asperity.studies.design import Answered, Method, MethodKind, Presentation, StudyDesign
+from asperity.core.arguments import Argument, read_arguments
+from asperity.studies.design import MethodKind
 from asperity.studies.kinds.axb import label_pairs, run_axb, score_axb
 from asperity.studies.kinds.comparison import pair_consistency, run_comparison, score_comparison
-from asperity.studies.kinds.onset_search import run_onset, score_onset
+from asperity.studies.kinds.onset import run_onset, score_onset
 from asperity.studies.kinds.rating import run_rating, score_rating
-from asperity.studies.kinds.thresholds import ThresholdRun, label_conditions, score_thresholds
-
-__all__ = [
-    "EXCLUSIONS",
-    "METHODS",
-    "Answered",
-    "Method",
-    "MethodKind",
-    "Presentation",
-    "StudyDesign",
-]
+from asperity.studies.kinds.thresholds import run_thresholds, score_thresholds
 
 _FILE = Path(__file__).with_suffix(".toml")
+
+
+def _options(name: str) -> tuple[Argument, ...]:
+    return tuple(read_arguments(_FILE, name).values())
+
+
 _DETECTION = read_arguments(_FILE, "detection")
 _DISCRIMINATION = {
     **_DETECTION,
@@ -34,24 +30,21 @@ _DISCRIMINATION = {
 
 _KINDS = (
     MethodKind("detection", "level from which one interval is told from others",
-               tuple(_DETECTION.values()), ThresholdRun, label_conditions, score_thresholds,
-               has_function=True),
+               tuple(_DETECTION.values()), run_thresholds, score_thresholds, has_function=True),
     MethodKind("discrimination", "difference from which one interval is told from others",
-               tuple(_DISCRIMINATION.values()), ThresholdRun, label_conditions, score_thresholds,
+               tuple(_DISCRIMINATION.values()), run_thresholds, score_thresholds,
                has_function=True),
     MethodKind("comparison", "which of two feels more so; Bradley–Terry scores",
-               tuple(read_arguments(_FILE, "comparison").values()),
-               run_comparison, label_conditions, score_comparison, pair_consistency),
+               _options("comparison"), run_comparison, score_comparison,
+               consistency=pair_consistency),
     MethodKind("rating", "magnitude estimation or a Likert scale",
-               tuple(read_arguments(_FILE, "rating").values()),
-               run_rating, label_conditions, score_rating),
+               _options("rating"), run_rating, score_rating),
     MethodKind("axb", "which of two the one between them equals",
-               tuple(read_arguments(_FILE, "axb").values()), run_axb, label_pairs, score_axb),
+               _options("axb"), run_axb, score_axb, label_pairs),
     MethodKind("onset", "a value is raised until it begins, and lowered until it ends",
-               tuple(read_arguments(_FILE, "onset").values()),
-               run_onset, label_conditions, score_onset),
+               _options("onset"), run_onset, score_onset),
 )  # fmt: skip
 METHODS: dict[str, MethodKind] = {one.name: one for one in _KINDS}
 """The kinds of methods by name."""
-EXCLUSIONS = tuple(read_arguments(_FILE, "exclusion").values())
+EXCLUSIONS = _options("exclusion")
 """Rules by which trials and participants are excluded; they are stated before the study."""

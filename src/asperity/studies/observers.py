@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.special import expit
 
+from asperity.core.compiled import FloatArray
 from asperity.core.errors import ParameterError, suggest_names
 from asperity.studies.design import Answered, Presentation, StudyDesign, Values
 from asperity.studies.methods import METHODS
@@ -23,6 +24,7 @@ Strength = Callable[[Values], float]
 _NONE = 1e-9
 _SPREAD_OF_RATINGS, _SPREAD_OF_ONSETS = 0.2, 0.1  # of logarithms
 _POINTS = 33  # of the search for an onset
+_LEVELS = 9  # at which strengths are computed
 
 
 @dataclass(frozen=True)
@@ -30,19 +32,14 @@ class Observer:
     """A simulated participant: a psychometric function of the strength at the hand.
 
     Attributes:
-        threshold: difference of strengths that is known half of the time; infinite for an observer
-            who guesses.
+        threshold: difference of strengths that is known half of the time.
         slope: s of the psychometric function of the logarithm of the strength.
-        lapse: share of lapses.
+        lapse: share of the questions with a right answer that are answered by a guess.
     """
 
     threshold: float = 1.0
     slope: float = 4.0
-    lapse: float = 0.02
-
-    def draw(self, rng: np.random.Generator, spread: float) -> Observer:
-        """Return another observer, whose logarithm of the threshold deviates by a spread."""
-        return replace(self, threshold=self.threshold * math.exp(spread * rng.standard_normal()))
+    lapse: float = 0.04
 
     def answer(
         self, presentation: Presentation, strength: Strength, rng: np.random.Generator
@@ -61,22 +58,19 @@ class Observer:
             return self._find(presentation, max(felt) - min(felt), rng)
         if len(felt) == 1:
             return self._rate(presentation, math.log(felt[0]), rng)
-        is_first = rng.random() < self._logistic(math.log(felt[0] / felt[1]))
-        return presentation.answers[0 if is_first else 1]
+        is_second = rng.random() >= self._logistic(math.log(felt[0] / felt[1]))
+        return presentation.answers[is_second]
 
     def _logistic(self, x: float) -> float:
-        return 0.5 + 0.5 * math.tanh(0.5 * self.slope * x)
+        return float(expit(self.slope * x))
 
     def _find(self, presentation: Presentation, difference: float, rng: np.random.Generator) -> str:
         """Return the right answer with the chance of the psychometric function."""
         wrong = [one for one in presentation.answers if one != presentation.correct]
         guess = 1.0 / len(presentation.answers)
-        known = 0.0
-        if difference > _NONE and math.isfinite(self.threshold):
-            known = self._logistic(math.log(difference / self.threshold))
-        is_right = rng.random() < guess + (1.0 - guess - self.lapse) * known
-        other = wrong[rng.integers(len(wrong))]
-        return str(presentation.correct) if is_right else other
+        known = self._logistic(math.log(max(difference, _NONE) / self.threshold))
+        is_right = rng.random() < guess + (1.0 - guess) * (1.0 - self.lapse) * known
+        return str(presentation.correct) if is_right else wrong[rng.integers(len(wrong))]
 
     def _rate(self, presentation: Presentation, felt: float, rng: np.random.Generator) -> str:
         noisy = felt + _SPREAD_OF_RATINGS * rng.standard_normal()
@@ -84,7 +78,7 @@ class Observer:
             low, high = presentation.range or (_NONE, 1.0 / _NONE)
             return repr(min(max(10.0 * math.exp(noisy), low), high))
         count = len(presentation.answers)
-        return presentation.answers[min(int(count / (1.0 + math.exp(-noisy))), count - 1)]
+        return presentation.answers[min(int(count * expit(noisy)), count - 1)]
 
     def _adjust(
         self, presentation: Presentation, key: str, strength: Strength, rng: np.random.Generator
@@ -93,18 +87,12 @@ class Observer:
         low, high = presentation.range or (_NONE, 1.0)
         values = np.geomspace(low, high, _POINTS)
         felt = [max(strength({**presentation.intervals[0], key: x}), _NONE) for x in values]
-        threshold = math.log(min(self.threshold, 1.0 / _NONE))
-        found = float(np.interp(threshold, np.log(felt), np.log(values)))
+        found = float(np.interp(math.log(self.threshold), np.log(felt), np.log(values)))
         noisy = math.exp(found + _SPREAD_OF_ONSETS * rng.standard_normal())
         return repr(float(min(max(noisy, low), high)))
 
 
-OBSERVERS = {
-    "typical": Observer(),
-    "keen": Observer(threshold=0.5),
-    "dull": Observer(threshold=2.0),
-    "guessing": Observer(threshold=math.inf, slope=0.0),
-}
+OBSERVERS = {"typical": Observer(), "guessing": Observer(slope=0.0, lapse=1.0)}
 """Simulated observers by name; ``guessing`` answers by chance, as a negative control."""
 
 
@@ -145,34 +133,28 @@ class HandStrength:
     Between these levels it is interpolated, logarithm by logarithm.
 
     Attributes:
-        design: the study.
+        design: the study with all options.
         make: makes the surface and the device of a stimulus.
     """
 
     design: StudyDesign
     make: Callable[[Values], tuple[Surface, Device]]
-
-    @cached_property
-    def _tables(self) -> dict[str, tuple[list[float], list[float]]]:
-        return {}
+    _tables: dict[str, FloatArray] = field(default_factory=dict)
 
     def __call__(self, values: Values) -> float:
         """Return the strength of a stimulus."""
-        key = self.design.options.get("level", "")
+        options, key = self.design.options, self.design.options.get("level", "")
         rest = {name: value for name, value in values.items() if name != key}
-        table = self._tables.get(repr(rest))
-        if table is None:
-            table = self._tables[repr(rest)] = self._compute(rest, key)
-        return float(np.exp(np.interp(math.log(values.get(key, 1.0)), *table)))
-
-    def _compute(self, rest: Values, key: str) -> tuple[list[float], list[float]]:
-        options, levels = self.design.options, [1.0]
+        levels = np.ones(1)
         if key:
             low = min(options["range"][0], options.get("reference", math.inf))
-            levels = list(np.geomspace(low, options["range"][1], 9))
-        stimuli = [{**rest, key: float(level)} if key else rest for level in levels]
-        found = [max(surface_strength(*self.make(one)), _NONE) for one in stimuli]
-        return [math.log(one) for one in levels], [math.log(one) for one in found]
+            levels = np.geomspace(low, options["range"][1], _LEVELS)
+        if (name := repr(rest)) not in self._tables:
+            stimuli = [{**rest, key: float(level)} if key else rest for level in levels]
+            found = [max(surface_strength(*self.make(one)), _NONE) for one in stimuli]
+            self._tables[name] = np.log(found)
+        at = math.log(values.get(key, 1.0))
+        return math.exp(float(np.interp(at, np.log(levels), self._tables[name])))
 
 
 def simulate_run(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -16,34 +16,39 @@ from asperity.studies.study_result import POOLED, StudyResult, exclusion_rules
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_NUMBERS = (1, 2, 3)
-_INTERVALS = "Bars are 95 % intervals; an end that the data do not bound is left out."
+_BARS = "Bars are 95 % intervals; an end that the data do not bound is left out."
+_FUNCTIONS = "Share of right answers over the level, with the fitted psychometric functions"
+_RULES = "The rules stand in the study file, and were stated before the study."
 
 
 @find_loop_page.register
 def study_page(result: StudyResult) -> Page:
     """Return the report of a study."""
-    score, used = result.score, len(result.included)
-    pooled = _rows_of(result, POOLED)
-    table, notes = _score_table(result, pooled), [str(row["interval"]) for row in pooled[:1]]
+    score, design = result.score, result.design
+    kind, table = METHODS[design.kind], _score_table(result)
+    scores = f"{score.quantity} by participant and pooled"
+    functions = [_figure(result, "Psychometric functions", _FUNCTIONS)]
+    pooled = Section("Pooled", [table], notes=[result.included_score.pooled_interval])
+    rules = [(name.replace("_", " "), f"{x:g}") for name, x in exclusion_rules(design).items()]
+    excluded = [page.Paragraph(f"{name}: {why}.") for name, why in result.excluded.items()]
+    nobody = page.Paragraph("Nobody is excluded.")
     return Page(
-        title=f"Study: {result.design.question or result.design.kind}",
+        title=f"Study: {design.question or design.kind}",
         answer=_answer(result),
         facts=[
-            ("Method", f"{result.design.kind}: {METHODS[result.design.kind].description}"),
-            ("Participants", f"{used} of {len(score.participants)} used"),
+            ("Method", f"{design.kind}: {kind.description}"),
+            ("Participants", f"{len(result.included)} of {len(result.answered)} used"),
             ("Trials", str(len(result.trials))),
-            ("Seed", str(result.design.seed)),
+            ("Seed", str(design.seed)),
             ("Units", "SI; lengths in m, stiffness in N/m"),
         ],
         sections=[
             page.terminal_section(table),
-            _figure(result, "scores", f"{score.quantity} by participant and pooled"),
-            Section("Pooled over participants", [table], notes=notes),
-            *_function_sections(result),
+            _figure(result, "Scores", scores, f"{scores}. {_BARS}"),
+            pooled,
+            *(functions if kind.has_function and result.included else ()),
             Section("Participants", [_participant_table(result)], notes=[score.interval]),
-            Section("Exclusion", [page.pairs_table(_rules(result)), *_excluded(result)],
-                    "The rules stand in the study file, and were stated before the study."),
+            Section("Exclusion", [page.pairs_table(rules), *(excluded or [nobody])], _RULES),
             *page.user_sections(StudyResult, result),
         ],
     )  # fmt: skip
@@ -54,29 +59,24 @@ def _rows_of(result: StudyResult, participant: str) -> list[dict[str, Any]]:
 
 
 def _answer(result: StudyResult) -> str:
-    """Return which condition has the greatest pooled score, and how many differ from the first."""
-    rows = _rows_of(result, POOLED)
-    scores = [row for row in rows if row["quantity"] == result.score.quantity]
-    known = [row for row in scores if row["estimate"] is not None]
+    """Return which condition has the greatest pooled score."""
+    known = [
+        row for row in _rows_of(result, POOLED)
+        if row["quantity"] == result.score.quantity and row["estimate"] is not None
+    ]  # fmt: skip
     if not known:
         return f"{result.score.quantity}: no participant is used."
     best = max(known, key=lambda row: row["estimate"])
-    parts = [f"{result.score.quantity}: {_interval_text(best)}"]
-    label = label_text(result, best)
-    if len(scores) > 1:
-        parts.append(f"for {label}, the greatest of {len(scores)}")
-    elif label:
-        parts.append(f"for {label}")
-    return f"{' '.join(parts)}; {len(result.included)} participants."
+    which = f", the greatest of {len(known)}" if len(known) > 1 else ""
+    label = f" for {text}{which}" if (text := label_text(result, best)) else ""
+    people = f"{len(result.included)} participants"
+    return f"{result.score.quantity}: {_interval_text(best)}{label}; {people}."
 
 
 def label_text(result: StudyResult, row: Mapping[str, Any]) -> str:
     """Return the condition of a row."""
-    return ", ".join(_text(row[key]) for key in result.design.factors if key in row)
-
-
-def _text(value: Any) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    values = [row[key] for key in result.design.factors]
+    return ", ".join(f"{x:.4g}" if isinstance(x, float) else str(x) for x in values)
 
 
 def _number(value: float | None) -> str:
@@ -88,58 +88,37 @@ def _interval_text(row: Mapping[str, Any]) -> str:
     return f"{_number(row['estimate'])} ({low} to {high})"
 
 
-def _score_table(result: StudyResult, rows: Sequence[Mapping[str, Any]]) -> Table:
+def _score_table(result: StudyResult) -> Table:
     cells = [
         Row([Cell(label_text(result, row) or "all", "l"),
              *(_number(row[name]) for name in ("estimate", "lower", "upper")), row["quantity"]])
-        for row in rows
+        for row in _rows_of(result, POOLED)
     ]  # fmt: skip
     headings = (", ".join(result.design.factors) or "condition", "estimate", "from", "to", "of")
-    return Table(headings, cells, _NUMBERS, TableLayout(wrap=(0, 4), gap=2))
+    return Table(headings, cells, (1, 2, 3), TableLayout(wrap=(0, 4), gap=2))
 
 
 def _participant_table(result: StudyResult) -> Table:
     rows = []
-    for name in result.score.participants:
-        share = result.consistency[name]
-        text = NOT_AVAILABLE if share is None else f"{share:.0%}"
-        found = " · ".join(
+    for name, share in result.consistency.items():
+        found = [
             f"{label_text(result, row)} {_interval_text(row)}".strip()
             for row in _rows_of(result, name)
-        )
-        reason = result.excluded.get(name, "")
-        rows.append(Row([Cell(name, "l"), found, text, str(result.omitted[name]), reason]))
+        ]
+        text = NOT_AVAILABLE if share is None else f"{share:.0%}"
+        omitted, reason = str(result.omitted[name]), result.excluded.get(name, "")
+        rows.append(Row([Cell(name, "l"), " · ".join(found), text, omitted, reason]))
     headings = ("participant", result.score.quantity, "consistency", "left out", "excluded")
     return Table(headings, rows, (2, 3), TableLayout(wrap=(1, 4)))
 
 
-def _rules(result: StudyResult) -> list[tuple[str, str]]:
-    rules = exclusion_rules(result.design)
-    return [(name.replace("_", " "), f"{value:g}") for name, value in rules.items()]
+def _figure(result: StudyResult, title: str, text: str, caption: str = "") -> Section:
+    media, draw = Media.HTML | Media.NOTEBOOK, partial(_draw, result, title)
+    return page.picture_section(title, draw, text, caption or f"{text}.", media=media)
 
 
-def _excluded(result: StudyResult) -> list[page.Paragraph]:
-    if not result.excluded:
-        return [page.Paragraph("Nobody is excluded.")]
-    return [page.Paragraph(f"{name}: {reason}.") for name, reason in result.excluded.items()]
-
-
-def _function_sections(result: StudyResult) -> list[Section]:
-    if not METHODS[result.design.kind].has_function or not result.included:
-        return []
-    text = "share of right answers over the level, with the fitted psychometric functions"
-    return [_figure(result, "functions", text)]
-
-
-def _figure(result: StudyResult, name: str, text: str) -> Section:
-    title = {"scores": "Scores", "functions": "Psychometric functions"}[name]
-    caption = f"{text[0].upper()}{text[1:]}. {_INTERVALS if name == 'scores' else ''}".strip()
-    media = Media.HTML | Media.NOTEBOOK
-    draw = partial(_draw, result, name)
-    return page.picture_section(title, draw, text, caption, media=media)
-
-
-def _draw(result: StudyResult, name: str) -> Figure:
+def _draw(result: StudyResult, title: str) -> Figure:
     from asperity.studies import result_pictures
 
-    return result_pictures.FIGURES[name](result)
+    draw: Callable[[StudyResult], Figure] = result_pictures.FIGURES[title]
+    return draw(result)

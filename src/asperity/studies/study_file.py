@@ -12,7 +12,8 @@ from asperity.core.errors import ParameterError, suggest_names
 from asperity.core.files import read_toml
 from asperity.scene.scene_file import SECTIONS, read_scene
 from asperity.scene.scene_keys import find_scene_argument, scene_arguments
-from asperity.studies.methods import EXCLUSIONS, METHODS, StudyDesign
+from asperity.studies.design import StudyDesign
+from asperity.studies.methods import EXCLUSIONS, METHODS
 
 STUDY_ARGUMENTS = read_arguments(Path(__file__).with_suffix(".toml"))
 """Arguments of the section [study]."""

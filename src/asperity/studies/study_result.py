@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,10 +12,11 @@ import numpy as np
 
 from asperity.core.display import Reportable
 from asperity.core.errors import ParameterError
-from asperity.core.files import to_plain_data
+from asperity.core.files import attributes_to_dict, to_plain_data
 from asperity.studies.design import Answered, StudyDesign
 from asperity.studies.methods import EXCLUSIONS, METHODS
-from asperity.studies.statistics.scores import RESAMPLES, Score
+from asperity.studies.statistics.intervals import Interval
+from asperity.studies.statistics.scores import Score
 from asperity.sweeps.table_files import TableFiles
 
 if TYPE_CHECKING:
@@ -23,6 +25,7 @@ if TYPE_CHECKING:
 SCHEMA = 1
 POOLED = "pooled"
 _END = ("estimate", "lower", "upper")
+_DESIGN = ("kind", "factors", "options", "question", "seed")
 
 
 @dataclass(frozen=True)
@@ -42,26 +45,27 @@ class TrialTable(TableFiles):
     @property
     def metadata(self) -> dict[str, Any]:
         """The design."""
-        return describe_design(self.design)
+        return attributes_to_dict(self.design, *_DESIGN)
 
     def iterate_rows(self) -> Iterator[dict[str, Any]]:
         """Yield a row for each trial; ``used`` tells whether the statistics use it.
 
-        The columns of the factors hold what differs, such as the pair of laws ``A / C``.
+        The columns of the factors hold what was presented, such as the pair of laws ``A / C``.
         """
-        kind = METHODS[self.design.kind]
-        labels = kind.label(self.design)
         for one in self.trials:
             shown = one.presentation
             parts = enumerate(shown.intervals, 1)
             intervals = {f"interval {i} {key}": x for i, part in parts for key, x in part.items()}
-            is_right = one.answer == shown.correct if shown.correct else None
-            used = is_used(self.design, one) and one.participant not in self.excluded
+            values = {
+                key: " / ".join(dict.fromkeys(str(part[key]) for part in shown.intervals))
+                for key in self.design.factors
+            }
             yield {
                 "participant": one.participant, "run": one.run, "trial": one.trial,
-                **(labels[shown.condition] if shown.condition < len(labels) else {}), **intervals,
-                "answer": one.answer, "correct": is_right,
-                "response time [s]": float(one.response_time), "started": one.started, "used": used,
+                **values, **intervals, "answer": one.answer,
+                "correct": one.answer == shown.correct if shown.correct else None,
+                "response time [s]": float(one.response_time), "started": one.started,
+                "used": is_used(self.design, one) and one.participant not in self.excluded,
             }  # fmt: skip
 
 
@@ -72,24 +76,21 @@ class StudyResult(Reportable, TableFiles):
     Attributes:
         design: the study with all options.
         trials: the trials with their answers.
-        score: estimates of all participants, also of those who are excluded.
-        excluded: why participants were excluded, by the rules of the design.
+        answered: the answers of each participant that the statistics use.
         omitted: number of trials of each participant that were left out.
         consistency: share of repeated questions that each participant answered alike.
-        resamples: number of bootstrap samples.
+        excluded: why participants were excluded, by the rules of the design.
     """
 
     design: StudyDesign
     trials: Sequence[TrialRecord]
-    score: Score
-    excluded: Mapping[str, str]
+    answered: Mapping[str, Sequence[Answered]]
     omitted: Mapping[str, int]
     consistency: Mapping[str, float | None]
-    resamples: int
+    excluded: Mapping[str, str]
 
     def __repr__(self) -> str:
-        count = len(self.score.participants)
-        return f"<StudyResult of {self.design.kind}, {count} participants>"
+        return f"<StudyResult of {self.design.kind}, {len(self.answered)} participants>"
 
     @property
     def labels(self) -> Sequence[dict[str, Any]]:
@@ -97,40 +98,39 @@ class StudyResult(Reportable, TableFiles):
         return METHODS[self.design.kind].label(self.design)
 
     @property
+    def metadata(self) -> dict[str, Any]:
+        """The design."""
+        return self.trial_table.metadata
+
+    @property
     def trial_table(self) -> TrialTable:
         """The trials, one in a row."""
         return TrialTable(self.design, self.trials, self.excluded)
 
     @property
-    def included(self) -> tuple[str, ...]:
-        """Participants who are not excluded."""
-        return tuple(one for one in self.score.participants if one not in self.excluded)
+    def included(self) -> dict[str, Sequence[Answered]]:
+        """The answers of participants who are not excluded."""
+        return {name: one for name, one in self.answered.items() if name not in self.excluded}
+
+    @cached_property
+    def score(self) -> Score:
+        """The estimates of all participants, also of those who are excluded."""
+        return METHODS[self.design.kind].score(self.design, self.answered)
 
     @cached_property
     def included_score(self) -> Score:
         """The estimates of the participants who are not excluded."""
-        used = {one: answers for one, answers in self.answered.items() if one not in self.excluded}
-        return METHODS[self.design.kind].score(self.design, used, 0)
+        return METHODS[self.design.kind].score(self.design, self.included)
 
     @cached_property
-    def answered(self) -> dict[str, list[Answered]]:
-        """The answers of each participant that the statistics use."""
-        return group_answers(self.design, self.trials)
-
-    @cached_property
-    def pooled(self) -> list[tuple[float, float, float]]:
+    def pooled(self) -> list[Interval]:
         """Mean over the participants and its interval, for each label."""
-        return self.included_score.pool(self.resamples, self.design.seed)
+        return self.included_score.pool(self.design.seed)
 
     @cached_property
-    def differences(self) -> list[tuple[float, float, float]]:
+    def differences(self) -> list[Interval]:
         """Differences of each label from the first (or from chance), with intervals."""
-        return self.included_score.differences(self.resamples, self.design.seed)
-
-    @property
-    def metadata(self) -> dict[str, Any]:
-        """The design."""
-        return describe_design(self.design)
+        return self.included_score.differences(self.design.seed)
 
     def iterate_rows(self) -> Iterator[dict[str, Any]]:
         """Yield a row for each participant and label, then the pooled ones, then differences.
@@ -140,80 +140,50 @@ class StudyResult(Reportable, TableFiles):
         score, labels = self.score, self.labels
         for row, name in enumerate(score.participants):
             for column, label in enumerate(labels):
-                head = {"participant": name, **label, "quantity": score.quantity}
                 numbers = self._numbers(score.estimates[:, row, column].tolist())
-                count = int(score.counts[row, column])
-                yield {**head, **numbers, "answers": count, "interval": score.interval,
+                yield {"participant": name, **label, "quantity": score.quantity, **numbers,
+                       "answers": int(score.counts[row, column]), "interval": score.interval,
                        "excluded": self.excluded.get(name, "")}  # fmt: skip
-        method = self.included_score.pooled_interval(self.resamples)
-        compared = labels if score.chance is not None else labels[1:]
         word = "ratio to the first" if score.is_logarithmic else "difference from the first"
-        word = word if score.chance is None else "difference from chance"
-        for title, values, found in (
-            (score.quantity, self.pooled, labels),
-            (f"{score.quantity}, {word}", self.differences, compared),
-        ):
-            for value, label in zip(values, found, strict=False):
-                yield {"participant": POOLED, **label, "quantity": title,
-                       **self._numbers(value), "interval": method}  # fmt: skip
+        compared = f"{score.quantity}, {word}", self.differences, labels[1:]
+        if score.chance is not None:
+            compared = f"{score.quantity}, difference from chance", self.differences, labels
+        for title, values, found in ((score.quantity, self.pooled, labels), compared):
+            for value, label in zip(values, found, strict=True):
+                yield {"participant": POOLED, **label, "quantity": title, **self._numbers(value),
+                       "interval": self.included_score.pooled_interval}  # fmt: skip
 
     def _numbers(self, values: Sequence[float]) -> dict[str, float | None]:
         """Return estimate and ends; what is unknown is ``None``."""
         scaled = self.score.to_scale(np.array(values)).tolist()
-        return {
-            name: one if np.isfinite(one) and np.isfinite(raw) else None
-            for name, one, raw in zip(_END, scaled, values, strict=True)
-        }
+        pairs = zip(_END, scaled, values, strict=True)
+        return {name: one if math.isfinite(raw) else None for name, one, raw in pairs}
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data with a schema number."""
+        people = attributes_to_dict(self, "excluded", "omitted", "consistency")
         rows = to_plain_data(self.table_rows())
-        people = {"excluded": dict(self.excluded), "omitted": dict(self.omitted)}
-        return {
-            "schema": SCHEMA, "study": self.metadata, "rows": rows, **people,
-            "consistency": dict(self.consistency),
-        }  # fmt: skip
-
-
-def describe_design(design: StudyDesign) -> dict[str, Any]:
-    """Return a design as plain data."""
-    content = {"kind": design.kind, "factors": design.factors, "options": design.options}
-    plain = to_plain_data({**content, "question": design.question, "seed": design.seed})
-    return dict(plain)
+        return {"schema": SCHEMA, "study": self.metadata, "rows": rows, **people}
 
 
 def exclusion_rules(design: StudyDesign) -> dict[str, float]:
-    """Return the rules of a design, with their defaults."""
-    rules = {one.name: one.default for one in EXCLUSIONS}
-    given = {**rules, **design.options.get("exclusion", {})}
-    return {name: float(value) for name, value in given.items() if value is not None}
+    """Return the rules of a design, with their defaults; a rule without a limit is infinite."""
+    rules = {one.name: math.inf if one.default is None else one.default for one in EXCLUSIONS}
+    return {**rules, **design.options.get("exclusion", {})}
 
 
 def is_used(design: StudyDesign, trial: TrialRecord) -> bool:
     """Return whether a trial was answered neither too fast nor too slowly."""
     rules = exclusion_rules(design)
-    longest = rules.get("longest_response", float("inf"))
-    return rules["shortest_response"] <= trial.response_time <= longest
+    return rules["shortest_response"] <= trial.response_time <= rules["longest_response"]
 
 
-def group_answers(design: StudyDesign, trials: Sequence[TrialRecord]) -> dict[str, list[Answered]]:
-    """Return the used answers of each participant, in the order of the first trials."""
-    found: dict[str, list[Answered]] = {one.participant: [] for one in trials}
-    for one in trials:
-        if is_used(design, one):
-            found[one.participant].append(Answered(one.presentation, one.answer))
-    return found
-
-
-def analyse(
-    design: StudyDesign, trials: Sequence[TrialRecord], resamples: int = RESAMPLES
-) -> StudyResult:
+def analyse(design: StudyDesign, trials: Sequence[TrialRecord]) -> StudyResult:
     """Return what the trials of a study say.
 
     Args:
         design: the study.
         trials: all trials of all participants.
-        resamples: number of bootstrap samples.
 
     Raises:
         ParameterError: without trials.
@@ -222,31 +192,32 @@ def analyse(
         raise ParameterError("study", "has no trials yet")
     kind = METHODS[design.kind]
     design = kind.complete(design)
-    answered = group_answers(design, trials)
-    omitted = {one.participant: 0 for one in trials}
+    answered: dict[str, list[Answered]] = {one.participant: [] for one in trials}
+    omitted = dict.fromkeys(answered, 0)
     for one in trials:
-        omitted[one.participant] += not is_used(design, one)
+        if is_used(design, one):
+            answered[one.participant].append(Answered(one.presentation, one.answer))
+        else:
+            omitted[one.participant] += 1
     consistency = {name: kind.consistency(found) for name, found in answered.items()}
-    excluded = {
-        name: reason
+    reasons = {
+        name: _exclude(exclusion_rules(design), found, omitted[name], consistency[name])
         for name, found in answered.items()
-        if (reason := _exclude(design, found, omitted[name], consistency[name]))
     }
-    score = kind.score(design, answered, resamples)
-    return StudyResult(design, trials, score, excluded, omitted, consistency, resamples)
+    excluded = {name: reason for name, reason in reasons.items() if reason}
+    return StudyResult(design, trials, answered, omitted, consistency, excluded)
 
 
 def _exclude(
-    design: StudyDesign, answered: Sequence[Answered], omitted: int, consistency: float | None
+    rules: Mapping[str, float], answered: Sequence[Answered], omitted: int, share: float | None
 ) -> str:
     """Return why a participant is excluded; empty if not."""
-    rules = exclusion_rules(design)
     total = len(answered) + omitted
     if omitted > rules["largest_omission"] * total:
         return f"{omitted} of {total} trials left out"
     right = [one.is_correct for one in answered if one.presentation.correct]
-    if right and sum(right) < rules["least_correct"] * len(right):
+    if sum(right) < rules["least_correct"] * len(right):
         return f"{sum(right)} of {len(right)} answers right"
-    if consistency is not None and consistency < rules["least_consistency"]:
-        return f"{consistency:.0%} of repeated questions answered alike"
+    if share is not None and share < rules["least_consistency"]:
+        return f"{share:.0%} of repeated questions answered alike"
     return ""

@@ -28,7 +28,8 @@ from asperity.core.errors import ParameterError, escape_unprintable
 from asperity.core.files import json_text, open_input, to_plain_data, write_bytes
 from asperity.core.version import __version__
 from asperity.recording.replay import file_digest
-from asperity.studies.methods import METHODS, Method, Presentation
+from asperity.studies.design import Method, Presentation
+from asperity.studies.methods import METHODS
 from asperity.studies.study_file import Study, build_study
 
 STUDY_FILE, ANSWERS_FILE, KEY_FILE = "study.json", "answers.jsonl", "key.csv"

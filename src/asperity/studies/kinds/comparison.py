@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from asperity.core.compiled import FloatArray
-from asperity.studies.design import Answered, Presentation, StudyDesign
-from asperity.studies.kinds.latin_square import balanced_order
-from asperity.studies.kinds.trial_list import TrialList, check_conditions
+from asperity.studies.design import Answered, Answers, Presentation, Steps, StudyDesign
+from asperity.studies.kinds.orders import list_pairs, repeated_order
 from asperity.studies.statistics import bradley_terry
 from asperity.studies.statistics.scores import Score
 
@@ -20,30 +19,13 @@ _NORMAL = 1.96  # quantile of the normal distribution
 _INTERVAL = "Fisher information; half a choice added either way where scores had no bounds"
 
 
-def list_pairs(design: StudyDesign) -> list[tuple[int, int]]:
-    """Return all pairs of conditions.
-
-    Raises:
-        ParameterError: for fewer than two conditions.
-    """
-    check_conditions(design, 2)
-    return list(itertools.combinations(range(len(design.conditions)), 2))
-
-
-def run_comparison(design: StudyDesign, participant: int, rng: np.random.Generator) -> TrialList:
-    """Return a run: every pair as often as stated, first in either place by turns.
-
-    Each repeat has all pairs, in the next row of a balanced square.
-    """
+def run_comparison(design: StudyDesign, participant: int, rng: np.random.Generator) -> Steps:
+    """Yield every pair as often as stated, first in either place by turns."""
     pairs, repeats = list_pairs(design), int(design.options["repeats"])
     first = rng.integers(2, size=len(pairs))
-    trials = []
-    for repeat in range(repeats):
-        for index in balanced_order(len(pairs), participant * repeats + repeat):
-            pair = pairs[index][:: -1 if (first[index] + repeat) % 2 else 1]
-            intervals = tuple(design.conditions[one] for one in pair)
-            trials.append(Presentation(intervals, ANSWERS, design.question, condition=index))
-    return TrialList(trials)
+    for repeat, index in repeated_order(len(pairs), repeats, participant):
+        pair = pairs[index][:: -1 if (first[index] + repeat) % 2 else 1]
+        yield Presentation(pair, ANSWERS, design.question, condition=index)
 
 
 def count_choices(design: StudyDesign, answered: Sequence[Answered]) -> FloatArray:
@@ -56,34 +38,23 @@ def count_choices(design: StudyDesign, answered: Sequence[Answered]) -> FloatArr
     return wins
 
 
-def score_comparison(
-    design: StudyDesign, answered: Mapping[str, Sequence[Answered]], _resamples: int
-) -> Score:
+def score_comparison(design: StudyDesign, answered: Answers) -> Score:
     """Return the Bradley–Terry scores of the conditions.
 
     Those of a participant have half a choice either way added to each pair if the participant is
     too consistent for finite scores; their intervals are those of Fisher's information.
     """
-    shape = len(answered), len(design.conditions)
+    count = len(design.conditions)
     each = np.array([count_choices(design, one) for one in answered.values()])
-    each = each.reshape(shape[0], shape[1], shape[1])
-    values = np.array([bradley_terry.fit_scores(wins) for wins in each]).reshape(shape)
-    errors = np.array([_errors(*one) for one in zip(each, values, strict=True)]).reshape(shape)
-    counts = (each + each.swapaxes(1, 2)).sum(axis=2).astype(int)
-    pooled = bradley_terry.pseudo_values(each)[1] if len(each) else values
+    each = each.reshape(-1, count, count)
+    fitted = [bradley_terry.fit_scores(wins) for wins in each]
+    values, errors = np.array(fitted).reshape(-1, 2, count).swapaxes(0, 1)
     estimates = np.array([values, values - _NORMAL * errors, values + _NORMAL * errors])
+    counts = (each + each.swapaxes(1, 2)).sum(axis=2).astype(int)
+    pooled = bradley_terry.pseudo_values(each) if len(each) else values
     return Score(
-        "Bradley–Terry score", tuple(answered), estimates, counts,
-        interval=_INTERVAL, pooled=pooled,
-        # The values are skewed where hardly any choice goes the other way; samples without it would
-        # make the interval of the bootstrap much too wide.
-        is_resampled=False,
-    )  # fmt: skip
-
-
-def _errors(wins: FloatArray, scores: FloatArray) -> FloatArray:
-    spread = bradley_terry.covariance(bradley_terry.complete_wins(wins), scores)
-    return np.asarray(np.sqrt(np.diag(spread)))
+        "Bradley–Terry score", tuple(answered), estimates, counts, interval=_INTERVAL, pooled=pooled
+    )
 
 
 def pair_consistency(answered: Sequence[Answered]) -> float | None:

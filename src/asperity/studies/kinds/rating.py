@@ -3,78 +3,62 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from asperity.core.compiled import FloatArray
-from asperity.studies.design import Answered, Presentation, StudyDesign
-from asperity.studies.kinds.latin_square import balanced_order
-from asperity.studies.kinds.trial_list import TrialList, check_conditions
-from asperity.studies.statistics.scores import Score, collect_values, repeated_score
+from asperity.studies.design import Answers, Presentation, Steps, StudyDesign
+from asperity.studies.kinds.orders import repeated_order
+from asperity.studies.statistics.intervals import mean_interval
+from asperity.studies.statistics.scores import Score, score_cells
 
-_SMALLEST, _LARGEST = 1e-6, 1e6
-
-
-@dataclass(frozen=True)
-class Scale:
-    """A scale of ratings.
-
-    Attributes:
-        quantity: what it measures.
-        transform: from the answer to the value of which means are taken.
-        is_logarithmic: whether the values are logarithms, which are taken from the mean of the
-            participant, and have the mean of all added (modulus equalisation).
-    """
-
-    quantity: str
-    transform: Callable[[float], float]
-    is_logarithmic: bool
+_LIMITS = (1e-6, 1e6)
+_INTERVAL = "Student's t over repeats"
+LIKERT, MAGNITUDE = "likert", "magnitude"
 
 
-SCALES = {
-    "magnitude": Scale("magnitude", math.log, is_logarithmic=True),
-    "likert": Scale("rating", float, is_logarithmic=False),
-}
-"""Scales by name."""
+def run_rating(design: StudyDesign, participant: int, _rng: np.random.Generator) -> Steps:
+    """Yield each condition in each repeat, in the next row of a balanced square."""
+    points = range(int(design.options["points"]))
+    is_likert = design.options["scale"] == LIKERT
+    answers = tuple(str(one + 1) for one in points) if is_likert else ()
+    limits = None if is_likert else _LIMITS
+    count = len(design.conditions)
+    for _, one in repeated_order(count, int(design.options["repeats"]), participant):
+        shown = (design.conditions[one],)
+        yield Presentation(shown, answers, design.question, limits, condition=one)
 
 
-def run_rating(design: StudyDesign, participant: int, _rng: np.random.Generator) -> TrialList:
-    """Return a run: each repeat has all conditions, in the next row of a balanced square."""
-    check_conditions(design, 1)
-    repeats, count = int(design.options["repeats"]), len(design.conditions)
-    likert = tuple(str(one + 1) for one in range(int(design.options["points"])))
-    answers = {"magnitude": (), "likert": likert}[design.options["scale"]]
-    limits = None if answers else (_SMALLEST, _LARGEST)
-    return TrialList([
-        Presentation((design.conditions[one],), answers, design.question, limits, condition=one)
-        for repeat in range(repeats)
-        for one in balanced_order(count, participant * repeats + repeat)
-    ])  # fmt: skip
+def score_rating(design: StudyDesign, answered: Answers) -> Score:
+    """Return the mean ratings of the scale."""
+    score = {MAGNITUDE: _score_magnitudes, LIKERT: _score_likert}[design.options["scale"]]
+    return score(design, answered)
 
 
-def score_rating(
-    design: StudyDesign, answered: Mapping[str, Sequence[Answered]], resamples: int
-) -> Score:
-    """Return the mean ratings: geometric means of magnitudes, arithmetic ones of Likert scales.
+def _score_magnitudes(design: StudyDesign, answered: Answers) -> Score:
+    """Return geometric means, shifted so that all participants have the same (equalised modulus).
 
     References:
-        S. S. Stevens: Psychophysics (1975), on magnitude estimation and modulus equalisation.
+        S. S. Stevens: Psychophysics (1975).
     """
-    scale, count = SCALES[design.options["scale"]], len(design.conditions)
-    cells = collect_values(answered, count, lambda one: scale.transform(float(one.answer)))
-    estimates, counts = repeated_score(cells, count, resamples, design.seed)
-    if scale.is_logarithmic:
-        estimates = estimates + _equalising_shifts(estimates[0])[:, None]
-    return Score(
-        scale.quantity, tuple(answered), estimates, counts,
-        is_logarithmic=scale.is_logarithmic, interval="Student's t over repeats",
+    score = _mean_score("magnitude", design, answered, math.log)
+    known = np.isfinite(score.values)
+    means = np.where(known, score.values, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
+    shifts: FloatArray = means.mean() - means if len(means) else means
+    return replace(score, estimates=score.estimates + shifts[:, None], is_logarithmic=True)
+
+
+def _score_likert(design: StudyDesign, answered: Answers) -> Score:
+    return _mean_score("rating", design, answered, float)
+
+
+def _mean_score(
+    quantity: str, design: StudyDesign, answered: Answers, transform: Callable[[float], float]
+) -> Score:
+    cells = score_cells(
+        answered, len(design.conditions),
+        lambda found: mean_interval(np.array([transform(float(one.answer)) for one in found])),
     )  # fmt: skip
-
-
-def _equalising_shifts(values: FloatArray) -> FloatArray:
-    """Return what gives all participants the same mean."""
-    known = np.isfinite(values)
-    means = np.where(known, values, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
-    return np.asarray(means.mean() - means) if len(means) else means
+    return Score(quantity, *cells, interval=_INTERVAL)

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from asperity.core.compiled import FloatArray
 from asperity.core.errors import ParameterError
-from asperity.studies.design import Answered, Presentation, StudyDesign
-from asperity.studies.kinds.bayes import BayesianTrack
-from asperity.studies.kinds.latin_square import balanced_order
-from asperity.studies.kinds.staircase import Staircase, Track
-from asperity.studies.kinds.trial_list import check_answer, parse_range
-from asperity.studies.statistics.psychometric import LogLevels, fit_thresholds
-from asperity.studies.statistics.scores import Score
+from asperity.studies.design import Answered, Answers, Presentation, Steps, StudyDesign
+from asperity.studies.kinds.orders import balanced_order
+from asperity.studies.kinds.tracks import TRACKS
+from asperity.studies.statistics.psychometric import LogLevels
+from asperity.studies.statistics.scores import Score, score_cells
 
 _MAX_INTERVALS = 3
 _BASES = {"level": 0.0, "difference": 1.0}  # share of the reference
@@ -29,8 +28,7 @@ def log_levels(design: StudyDesign) -> LogLevels:
     Raises:
         ParameterError: for a range or a reference that cannot be used.
     """
-    options = design.options
-    low, high = parse_range(options["range"])
+    options, (low, high) = design.options, design.range
     reference = float(options.get("reference", low))
     base = _BASES[options["scale"]] * reference
     if base >= low:
@@ -42,112 +40,43 @@ def log_levels(design: StudyDesign) -> LogLevels:
     return LogLevels(low, high, reference, base, 1.0 / count, float(options["lapse"]))
 
 
-def _staircase(design: StudyDesign, levels: LogLevels) -> Track:
-    low, high = levels.ends
-    step, target = math.log(design.options["step"]), float(design.options["target"])
-    return Staircase(high, low, high, step, target, levels.guess)
+def run_thresholds(design: StudyDesign, participant: int, rng: np.random.Generator) -> Steps:
+    """Yield the trials of one condition after another, in the order of a balanced square."""
+    levels, options = log_levels(design), design.options
+    key, count = str(options["level"]), int(options["intervals"])
+    answers = tuple(str(one + 1) for one in range(count))
+    for condition in balanced_order(len(design.conditions), participant):
+        values = design.conditions[condition]
+        track = TRACKS[options["procedure"]](levels, options)
+        for place in rng.integers(count, size=int(options["trials"])):
+            intervals: list[dict[str, Any]] = [{**values, key: levels.reference}] * count
+            intervals[place] = {**values, key: levels.value(track.level())}
+            right = answers[place]
+            answer = yield Presentation(
+                tuple(intervals), answers, design.question, correct=right, condition=condition
+            )
+            track.record(answer == right)
 
 
-def _bayesian(_design: StudyDesign, levels: LogLevels) -> Track:
-    return BayesianTrack(*levels.ends, levels.guess, levels.lapse)
+def level_answers(
+    design: StudyDesign, trials: Sequence[Answered]
+) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Return the level x of the interval that differs, and whether it was found, for each trial."""
+    key = design.options["level"]
+    shown = [one.presentation for one in trials]
+    values = [float(one.intervals[int(one.correct or 1) - 1][key]) for one in shown]
+    x = np.log(np.array(values) - log_levels(design).base)
+    return x, np.array([one.is_correct for one in trials], bool)
 
 
-PROCEDURES: dict[str, Callable[[StudyDesign, LogLevels], Track]] = {
-    "weighted-up-down": _staircase,
-    "bayesian": _bayesian,
-}
-"""Procedures that choose the levels, by name."""
-
-
-class ThresholdRun:
-    """A run that has the conditions one after another, in the order of a balanced square.
-
-    Args:
-        design: the study with all options.
-        participant: number of the participant.
-        rng: random numbers, for the interval that differs.
-    """
-
-    def __init__(self, design: StudyDesign, participant: int, rng: np.random.Generator) -> None:
-        self._design, self._levels = design, log_levels(design)
-        conditions, trials = design.conditions, int(design.options["trials"])
-        order = balanced_order(len(conditions), participant)
-        places = rng.integers(int(design.options["intervals"]), size=(len(order), trials))
-        self._trials = [
-            (one, int(place)) for one, row in zip(order, places, strict=True) for place in row
-        ]
-        self._trials_each, self._done = trials, 0
-        self._start()
-
-    def _start(self) -> None:
-        """Begin a condition if it is time, and prepare what to present."""
-        if self._done == len(self._trials):
-            self._now: Presentation | None = None
-            return
-        if self._done % self._trials_each == 0:
-            self._track = PROCEDURES[self._design.options["procedure"]](self._design, self._levels)
-        condition, place = self._trials[self._done]
-        self._now = self._present(condition, place)
-
-    def _present(self, condition: int, place: int) -> Presentation:
-        key, count = self._design.options["level"], int(self._design.options["intervals"])
-        values = self._design.conditions[condition]
-        usual = {**values, key: self._levels.reference}
-        intervals = [usual] * count
-        intervals[place] = {**values, key: self._levels.value(self._track.level())}
-        answers = tuple(str(one + 1) for one in range(count))
-        return Presentation(
-            tuple(intervals), answers, self._design.question,
-            correct=answers[place], condition=condition,
-        )  # fmt: skip
-
-    def next(self) -> Presentation | None:
-        """Return what to present now; ``None`` at the end."""
-        return self._now
-
-    def answer(self, answer: str) -> None:
-        """Record an answer."""
-        check_answer(self._now, answer)
-        self._track.record(self._now is not None and answer == self._now.correct)
-        self._done += 1
-        self._start()
-
-
-def presented_level(design: StudyDesign, presentation: Presentation) -> float:
-    """Return the level of the interval that differs [SI]."""
-    interval = presentation.intervals[int(presentation.correct or 1) - 1]
-    return float(interval[design.options["level"]])
-
-
-def label_conditions(design: StudyDesign) -> Sequence[dict[str, Any]]:
-    """Return the conditions, which are what is estimated."""
-    return design.conditions
-
-
-def score_thresholds(
-    design: StudyDesign, answered: Mapping[str, Sequence[Answered]], resamples: int
-) -> Score:
-    """Return the thresholds of each participant in each condition, as logarithms of levels.
-
-    A psychometric function is fitted for each by maximum likelihood; the interval is that of the
-    parametric bootstrap.
-    """
-    levels, count = log_levels(design), len(design.conditions)
-    estimates = np.full((3, len(answered), count), np.nan)
-    counts = np.zeros((len(answered), count), int)
-    for row, trials in enumerate(answered.values()):
-        for column in range(count):
-            found = [one for one in trials if one.presentation.condition == column]
-            counts[row, column] = len(found)
-            if found:
-                x = [presented_level(design, one.presentation) for one in found]
-                right = np.array([one.is_correct for one in found])
-                seed = design.seed
-                estimates[:, row, column] = fit_thresholds(
-                    levels, np.array(x), right, resamples, seed
-                )
-    unit = str(design.options["level"])
+def score_thresholds(design: StudyDesign, answered: Answers) -> Score:
+    """Return the thresholds of each participant in each condition, as logarithms of levels."""
+    levels = log_levels(design)
+    cells = score_cells(
+        answered, len(design.conditions),
+        lambda found: levels.estimate_threshold(*level_answers(design, found)),
+    )  # fmt: skip
     return Score(
-        f"threshold of {unit}", tuple(answered), estimates, counts, is_logarithmic=True,
-        interval="parametric bootstrap of the psychometric function",
+        f"threshold of {design.options['level']}", *cells, is_logarithmic=True,
+        interval="posterior of the psychometric function",
     )  # fmt: skip

@@ -6,17 +6,19 @@ The chance that i is chosen over j is 1/(1 + exp(θⱼ − θᵢ)); the scores �
 from __future__ import annotations
 
 import numpy as np
+from scipy.special import expit
 
 from asperity.core.compiled import FloatArray
 
 _HALF_WIN = 0.5
 
 
-def fit_scores(wins: FloatArray) -> FloatArray:
-    """Return the scores θ of greatest likelihood, which sum to zero.
+def fit_scores(wins: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the scores θ of greatest likelihood, which sum to zero, and their standard errors.
 
     Where some conditions are never chosen over the others, no finite scores have the greatest
-    likelihood; then half a choice either way is added to each pair.
+    likelihood; then half a choice either way is added to each pair. The errors are those of
+    Fisher's information.
 
     Args:
         wins: how often each condition (row) was chosen over each other (column), shape (n, n).
@@ -27,7 +29,7 @@ def fit_scores(wins: FloatArray) -> FloatArray:
         Mathematical Monthly 64 (1957) 28–33.
 
     Example:
-        >>> scores = fit_scores(np.array([[0.0, 30.0], [10.0, 0.0]]))
+        >>> scores, errors = fit_scores(np.array([[0.0, 30.0], [10.0, 0.0]]))
         >>> f"{scores[0] - scores[1]:.4f}"  # ln 3
         '1.0986'
     """
@@ -36,13 +38,12 @@ def fit_scores(wins: FloatArray) -> FloatArray:
     wins = complete_wins(wins)
 
     def loss(scores: FloatArray) -> tuple[float, FloatArray]:
-        differences = scores[:, None] - scores
-        value = float((wins * np.logaddexp(0.0, -differences)).sum())
+        value = float((wins * np.logaddexp(0.0, scores - scores[:, None])).sum())
         return value + 0.5 * float(scores.sum()) ** 2, scores.sum() - gradient(wins, scores)
 
     found = minimize(loss, np.zeros(len(wins)), jac=True, options={"gtol": 1e-9})
-    result: FloatArray = found.x - found.x.mean()
-    return result
+    scores: FloatArray = found.x - found.x.mean()
+    return scores, np.sqrt(np.diag(covariance(wins, scores)))
 
 
 def complete_wins(wins: FloatArray) -> FloatArray:
@@ -50,28 +51,26 @@ def complete_wins(wins: FloatArray) -> FloatArray:
     from scipy.sparse.csgraph import connected_components
 
     _parts, labels = connected_components(wins > 0.0, connection="strong")
-    if not labels.any():
-        return wins
-    return wins + _HALF_WIN * (1.0 - np.eye(len(wins)))
+    return wins + _HALF_WIN * (1.0 - np.eye(len(wins))) if labels.any() else wins
 
 
 def gradient(wins: FloatArray, scores: FloatArray) -> FloatArray:
     """Return the derivative of the logarithm of the likelihood by each score."""
-    losing = wins / (1.0 + np.exp(scores[:, None] - scores))
+    losing = wins * expit(scores - scores[:, None])
     result: FloatArray = losing.sum(axis=1) - losing.sum(axis=0)
     return result
 
 
 def covariance(wins: FloatArray, scores: FloatArray) -> FloatArray:
     """Return the covariance of the scores of greatest likelihood, from Fisher's information."""
-    chance = 1.0 / (1.0 + np.exp(scores - scores[:, None]))
+    chance = expit(scores[:, None] - scores)
     weights = (wins + wins.T) * chance * (1.0 - chance)
     information = np.diag(weights.sum(axis=1)) - weights
     return np.asarray(np.linalg.pinv(information), float)
 
 
-def pseudo_values(each: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the pooled scores, and a value for each participant whose mean they are.
+def pseudo_values(each: FloatArray) -> FloatArray:
+    """Return a value of each score for each participant, whose means are the pooled scores.
 
     A participant's values are θ + N C gᵢ, with the derivative gᵢ of the logarithm of the likelihood
     of the participant's answers at the pooled scores θ of N participants, and their covariance C:
@@ -81,7 +80,6 @@ def pseudo_values(each: FloatArray) -> tuple[FloatArray, FloatArray]:
         each: choices of each participant, shape (participants, n, n).
     """
     wins = complete_wins(each.sum(axis=0))
-    scores = fit_scores(wins)
-    inverse = covariance(wins, scores)
-    steps = np.array([gradient(one, scores) for one in each]) @ inverse
-    return scores, scores + len(each) * (steps - steps.mean(axis=0))
+    scores, _ = fit_scores(wins)
+    steps = np.array([gradient(one, scores) for one in each]) @ covariance(wins, scores)
+    return np.asarray(scores + len(each) * (steps - steps.mean(axis=0)))

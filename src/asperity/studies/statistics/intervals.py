@@ -1,4 +1,4 @@
-"""Intervals of means, of shares, and of differences."""
+"""Intervals of means and of shares."""
 
 from __future__ import annotations
 
@@ -8,11 +8,13 @@ import numpy as np
 
 from asperity.core.compiled import FloatArray
 
+Interval = tuple[float, float, float]
+"""An estimate, and the ends of its 95 % interval; an unbounded end is infinite."""
 LEAST_RESAMPLED = 8
 """Least number of values that are resampled; the interval of fewer is that of Student's t."""
 
 
-def mean_interval(values: FloatArray, resamples: int, seed: int) -> tuple[float, float, float]:
+def mean_interval(values: FloatArray, resamples: int = 0, seed: int = 0) -> Interval:
     """Return the mean of independent values, and its 95 % interval.
 
     The studentised bootstrap: the interval of the mean m with standard error e is
@@ -31,7 +33,7 @@ def mean_interval(values: FloatArray, resamples: int, seed: int) -> tuple[float,
         B. Efron, R. J. Tibshirani: An Introduction to the Bootstrap (1993), section 12.5.
 
     Example:
-        >>> low, high = mean_interval(np.array([1.0, 2.0, 3.0, 4.0]), 0, 0)[1:]
+        >>> low, high = mean_interval(np.array([1.0, 2.0, 3.0, 4.0]))[1:]
         >>> f"{low:.3f} {high:.3f}"
         '0.446 4.554'
     """
@@ -60,7 +62,7 @@ def _quantiles(values: FloatArray, mean: float, resamples: int, seed: int) -> tu
     return float(low), float(high)
 
 
-def share_interval(right: int, total: int) -> tuple[float, float, float]:
+def share_interval(right: int, total: int) -> Interval:
     """Return a share and its 95 % interval by Wilson's score.
 
     Example:
@@ -69,7 +71,5 @@ def share_interval(right: int, total: int) -> tuple[float, float, float]:
     """
     from scipy.stats import binomtest
 
-    if not total:
-        return math.nan, -math.inf, math.inf
     interval = binomtest(right, total).proportion_ci(method="wilson")
     return right / total, float(interval.low), float(interval.high)

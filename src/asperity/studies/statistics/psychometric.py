@@ -1,4 +1,4 @@
-"""Psychometric functions: maximum likelihood, and thresholds with intervals of the bootstrap.
+"""Psychometric functions, and thresholds with intervals of the posterior.
 
 P(x) = γ + (1 − γ − λ)/(1 + exp(−s (x − α))) is the share of right answers at the level x, the
 natural logarithm of an increment. The threshold α is where the chance of knowing the answer is a
@@ -9,18 +9,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import expit
 
 from asperity.core.compiled import FloatArray
+from asperity.studies.statistics.intervals import Interval
 
-USUAL_SLOPE = 4.0
-_SLOPES = np.geomspace(0.5, 40.0, 15)
-_THRESHOLDS = 121
-_CHI_SQUARED = 3.841  # of one degree of freedom at 95 %
-_LEAST = 1e-12
+USUAL_SLOPE, SLOPE_SPREAD = 4.0, 0.5
+"""Prior of the slope: median, and deviation of the logarithm."""
+_SLOPES = np.geomspace(0.8, 20.0, 25)
+_THRESHOLDS = 241
+_QUANTILES = (0.5, 0.025, 0.975)
 
 
 @dataclass(frozen=True)
@@ -56,183 +57,53 @@ class LogLevels:
         self, x: FloatArray, threshold: FloatArray | float, slope: FloatArray | float
     ) -> FloatArray:
         """Return P(x)."""
-        known: FloatArray = 0.5 + 0.5 * np.tanh(0.5 * slope * (x - threshold))
+        known: FloatArray = expit(slope * (x - threshold))
         return self.guess + (1.0 - self.guess - self.lapse) * known
 
-    @cached_property
-    def grid(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Thresholds α, and all pairs (α, s); half the range beyond each end."""
+    def posterior(
+        self, x: FloatArray, right: NDArray[np.bool_]
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return thresholds α, slopes s, and the probability of each pair after the answers.
+
+        Before them, α is as likely anywhere from half the range below its low end to half the range
+        above its high end, and ln(s/4) is normal with deviation 0.5.
+
+        Args:
+            x: level of each trial.
+            right: whether it was answered right.
+
+        Returns:
+            The probabilities have the shape (thresholds, slopes), and sum to one.
+        """
         low, high = self.ends
         margin = (high - low) / 2.0
         thresholds = np.linspace(low - margin, high + margin, _THRESHOLDS)
-        pairs = np.repeat(thresholds, len(_SLOPES)), np.tile(_SLOPES, len(thresholds))
-        return thresholds, *pairs
+        chance = self.probability(x[:, None, None], thresholds[:, None], _SLOPES)
+        with np.errstate(divide="ignore"):  # without lapses a wrong answer may be impossible
+            logarithm = np.log(np.where(right[:, None, None], chance, 1.0 - chance)).sum(axis=0)
+        logarithm -= 0.5 * np.square(np.log(_SLOPES / USUAL_SLOPE) / SLOPE_SPREAD)
+        share = np.exp(logarithm - logarithm.max())
+        return thresholds, _SLOPES, share / share.sum()
 
+    def estimate_threshold(self, x: FloatArray, right: NDArray[np.bool_]) -> Interval:
+        """Return the median of the posterior of α, and its central 95 % interval.
 
-def log_prior(slopes: FloatArray | float) -> FloatArray:
-    """Return the logarithm of the weak prior of the slope.
+        An end that lies outside the levels is infinite: the answers do not bound it.
 
-    ln(s/4) is normal with deviation 1; without it, few trials may fit a slope without bounds.
-    """
-    return np.asarray(-0.5 * np.square(np.log(slopes / USUAL_SLOPE)))
+        References:
+            H. H. Schütt et al.: Painfree and accurate Bayesian estimation of psychometric functions
+            for (potentially) overdispersed data. Vision Research 122 (2016) 105–123.
 
-
-@dataclass(frozen=True)
-class Counts:
-    """Answers by level.
-
-    Attributes:
-        x: the levels.
-        right: numbers of right answers.
-        total: numbers of answers.
-    """
-
-    x: FloatArray
-    right: FloatArray
-    total: FloatArray
-
-
-def count_answers(x: FloatArray, right: NDArray[np.bool_]) -> Counts:
-    """Return the answers to trials by level.
-
-    Args:
-        x: level of each trial.
-        right: whether it was answered right.
-    """
-    levels, index = np.unique(x, return_inverse=True)
-    return Counts(levels, np.bincount(index, right).astype(float), np.bincount(index).astype(float))
-
-
-def fit_psychometric(levels: LogLevels, counts: Counts) -> tuple[float, float]:
-    """Return α and s of greatest likelihood, times the weak prior of the slope.
-
-    Args:
-        levels: range, guesses and lapses.
-        counts: answers by level.
-
-    Example:
-        >>> levels = LogLevels(1.0, 100.0, 1.0, 0.0, guess=0.5, lapse=0.0)
-        >>> x = np.log([5.0, 10.0, 20.0])
-        >>> share = levels.probability(x, float(np.log(10.0)), 4.0)
-        >>> alpha, s = fit_psychometric(levels, Counts(x, 1e6 * share, np.full(3, 1e6)))
-        >>> f"{np.exp(alpha):.3f} {s:.3f}"
-        '10.000 4.000'
-    """
-    from scipy.optimize import minimize
-
-    thresholds, all_thresholds, all_slopes = levels.grid
-    likelihood = _log_likelihoods(levels, counts)(counts.right[None])[0]
-    best = int(np.argmax(likelihood))
-
-    def loss(point: FloatArray) -> tuple[float, FloatArray]:
-        offset, slope = counts.x - point[0], float(np.exp(point[1]))
-        chance = np.clip(levels.probability(offset, 0.0, slope), _LEAST, 1.0 - _LEAST)
-        wrong = counts.total - counts.right
-        sum_ = counts.right @ np.log(chance) + wrong @ np.log1p(-chance)
-        # Derivatives of the sum by the exponent s (x − α), then by α and ln s.
-        range_ = 1.0 - levels.guess - levels.lapse
-        known = (chance - levels.guess) / range_
-        terms = (counts.right / chance - wrong / (1.0 - chance)) * range_ * known * (1.0 - known)
-        prior, prior_slope = log_prior(slope), -math.log(slope / USUAL_SLOPE)
-        by = np.array([-slope * terms.sum(), slope * (terms @ offset) + prior_slope])
-        return -float(sum_ + prior), -by
-
-    start = np.array([all_thresholds[best], math.log(all_slopes[best])])
-    bounds = [(thresholds[0], thresholds[-1]), (math.log(_SLOPES[0]), math.log(_SLOPES[-1]))]
-    found = minimize(loss, start, jac=True, bounds=bounds)
-    return float(found.x[0]), float(math.exp(found.x[1]))
-
-
-def _log_likelihoods(levels: LogLevels, counts: Counts) -> _Likelihood:
-    _, thresholds, slopes = levels.grid
-    chance = levels.probability(counts.x[:, None], thresholds, slopes)
-    chance = np.clip(chance, _LEAST, 1.0 - _LEAST)
-    return _Likelihood(counts.total, np.log(chance), np.log1p(-chance), log_prior(slopes))
-
-
-@dataclass(frozen=True)
-class _Likelihood:
-    """Logarithm of the likelihood of every pair of the grid."""
-
-    total: FloatArray
-    log_right: FloatArray
-    log_wrong: FloatArray
-    prior: FloatArray
-
-    def __call__(self, right: FloatArray) -> FloatArray:
-        """Return it for each row of numbers of right answers."""
-        result: FloatArray = right @ self.log_right + (self.total - right) @ self.log_wrong
-        return result + self.prior
-
-    def profile(self, right: FloatArray) -> FloatArray:
-        """Return its maximum over the slopes for each threshold."""
-        shape = len(right), _THRESHOLDS, len(_SLOPES)
-        result: FloatArray = self(right).reshape(shape).max(axis=2)
-        return result
-
-
-def threshold_interval(
-    levels: LogLevels, counts: Counts, fit: tuple[float, float], resamples: int, seed: int
-) -> tuple[float, float]:
-    """Return the 95 % interval of a threshold.
-
-    It holds each α whose likelihood ratio, −2 ln(L(α)/L(best)) with the best slope for each α, is
-    at most the 95 % quantile of what that of the fitted threshold is in answers drawn from the
-    fitted function at the same levels (parametric bootstrap), and not less than that of χ². Ends
-    that the grid does not hold are infinite.
-
-    Args:
-        levels: range, guesses and lapses.
-        counts: answers by level.
-        fit: α and s.
-        resamples: number of bootstrap samples.
-        seed: of the samples.
-
-    References:
-        F. A. Wichmann, N. J. Hill: The psychometric function II. Bootstrap-based confidence
-        intervals and sampling. Perception & Psychophysics 63 (2001) 1314–1329.
-    """
-    likelihood, thresholds = _log_likelihoods(levels, counts), levels.grid[0]
-    rng = np.random.default_rng(seed)
-    chance = levels.probability(counts.x, *fit)
-    drawn = rng.binomial(counts.total.astype(int), chance, size=(resamples, len(chance)))
-    profiles = likelihood.profile(drawn.astype(float))
-    place = np.interp(fit[0], thresholds, np.arange(_THRESHOLDS))
-    before = min(int(place), _THRESHOLDS - 2)
-    share = place - before
-    at_fit = (1.0 - share) * profiles[:, before] + share * profiles[:, before + 1]
-    ratios = 2.0 * (profiles.max(axis=1) - at_fit)
-    limit = max(float(np.quantile(ratios, 0.95)), _CHI_SQUARED)
-    profile = likelihood.profile(counts.right[None])[0]
-    return _where_above(thresholds, 2.0 * (profile - profile.max()) + limit)
-
-
-def _where_above(x: FloatArray, height: FloatArray) -> tuple[float, float]:
-    """Return the outermost zeros of a curve that is above zero between them."""
-    inside = np.flatnonzero(height >= 0.0)
-    first, last = int(inside[0]), int(inside[-1])
-    low, high = -math.inf, math.inf
-    if first > 0:
-        low = float(np.interp(0.0, height[first - 1 : first + 1], x[first - 1 : first + 1]))
-    if last < len(x) - 1:
-        high = float(np.interp(0.0, height[[last + 1, last]], x[[last + 1, last]]))
-    return low, high
-
-
-def fit_thresholds(
-    levels: LogLevels, values: FloatArray, right: NDArray[np.bool_], resamples: int, seed: int
-) -> tuple[float, float, float]:
-    """Return a threshold α with the ends of its interval.
-
-    Args:
-        levels: range, guesses and lapses.
-        values: presented levels [SI].
-        right: whether each was answered right.
-        resamples: number of bootstrap samples; without any the ends are infinite.
-        seed: of the samples.
-    """
-    counts = count_answers(np.log(values - levels.base), right)
-    fit = fit_psychometric(levels, counts)
-    if not resamples:
-        return fit[0], -math.inf, math.inf
-    return (fit[0], *threshold_interval(levels, counts, fit, resamples, seed))
+        Example:
+            >>> levels = LogLevels(1.0, 100.0, 1.0, 0.0, guess=0.5, lapse=0.0)
+            >>> x = np.log(np.repeat([5.0, 10.0, 20.0], 400))
+            >>> right = np.arange(1200) % 400 < 400 * levels.probability(x, np.log(10.0), 4.0)
+            >>> f"{np.exp(levels.estimate_threshold(x, right)[0]):.1f}"
+            '10.0'
+        """
+        thresholds, _, pairs = self.posterior(x, right)
+        share = pairs.sum(axis=1)
+        below = np.cumsum(share) - 0.5 * share
+        middle, low, high = (float(one) for one in np.interp(_QUANTILES, below, thresholds))
+        least, greatest = self.ends
+        return middle, low if low > least else -math.inf, high if high < greatest else math.inf

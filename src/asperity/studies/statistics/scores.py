@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from asperity.core.compiled import FloatArray
-from asperity.studies.design import Answered
-from asperity.studies.statistics.intervals import LEAST_RESAMPLED, mean_interval
+from asperity.studies.design import Answered, Answers
+from asperity.studies.statistics.intervals import LEAST_RESAMPLED, Interval, mean_interval
 
 RESAMPLES = 2000
 """Number of samples of a bootstrap, unless stated otherwise."""
@@ -28,9 +29,9 @@ class Score:
         counts: numbers of answers.
         is_logarithmic: whether the values are logarithms.
         interval: how the intervals of each participant were found.
-        pooled: values whose means are the pooled estimates, where they are not ``values``.
+        pooled: values whose means are the pooled estimates, where they are not ``values``; they may
+            be too skewed to be resampled, as where hardly any choice goes the other way.
         chance: of a share, its value without an effect.
-        is_resampled: whether pooled intervals are those of the bootstrap rather than Student's t.
     """
 
     quantity: str
@@ -41,24 +42,23 @@ class Score:
     interval: str = ""
     pooled: FloatArray | None = None
     chance: float | None = None
-    is_resampled: bool = True
 
-    def pool(self, resamples: int, seed: int) -> list[tuple[float, float, float]]:
+    def pool(self, seed: int, resamples: int = RESAMPLES) -> list[Interval]:
         """Return the mean over the participants of each column, with its interval."""
-        found = [self._pool(column, resamples, seed) for column in self._units.T]
+        found = [self._pool(column, seed, resamples) for column in self._units.T]
         if self.chance is None:
             return found
         return [(mean, max(low, 0.0), min(high, 1.0)) for mean, low, high in found]  # shares
 
-    def differences(self, resamples: int, seed: int) -> list[tuple[float, float, float]]:
+    def differences(self, seed: int, resamples: int = RESAMPLES) -> list[Interval]:
         """Return by how much each column but the first differs from the first.
 
         The differences are within participants. A column with a chance value is compared with it.
         """
         units = self._units
         if self.chance is not None:
-            return [self._pool(column - self.chance, resamples, seed) for column in units.T]
-        return [self._pool(column - units[:, 0], resamples, seed) for column in units.T[1:]]
+            return [self._pool(column - self.chance, seed, resamples) for column in units.T]
+        return [self._pool(column - units[:, 0], seed, resamples) for column in units.T[1:]]
 
     @property
     def values(self) -> FloatArray:
@@ -70,15 +70,16 @@ class Score:
     def _units(self) -> FloatArray:
         return self.values if self.pooled is None else self.pooled
 
-    def _pool(self, values: FloatArray, resamples: int, seed: int) -> tuple[float, float, float]:
+    def _pool(self, values: FloatArray, seed: int, resamples: int) -> Interval:
         known = values[np.isfinite(values)]
-        return mean_interval(known, resamples if self.is_resampled else 0, seed)
+        return mean_interval(known, resamples if self.pooled is None else 0, seed)
 
-    def pooled_interval(self, resamples: int) -> str:
-        """Return how the pooled intervals are found."""
-        if not self.is_resampled or not resamples or len(self._units) < LEAST_RESAMPLED:
+    @property
+    def pooled_interval(self) -> str:
+        """How the pooled intervals are found."""
+        if self.pooled is not None or len(self.participants) < LEAST_RESAMPLED:
             return "Student's t over participants"
-        return f"studentised bootstrap over participants, {resamples} samples"
+        return f"studentised bootstrap over participants, {RESAMPLES} samples"
 
     def to_scale(self, values: FloatArray) -> FloatArray:
         """Return values on the scale of the quantity."""
@@ -86,36 +87,25 @@ class Score:
             return np.asarray(np.exp(values) if self.is_logarithmic else values)
 
 
-Cells = list[list[list[float]]]
-"""Values of each participant and column."""
+Cells = tuple[tuple[str, ...], FloatArray, NDArray[np.int_]]
+"""Participants, their estimates, and numbers of answers, see :class:`Score`."""
+_NOTHING = (math.nan, -math.inf, math.inf)
 
 
-def collect_values(
-    answered: Mapping[str, Sequence[Answered]], columns: int, value: Callable[[Answered], float]
+def score_cells(
+    answered: Answers, columns: int, estimate: Callable[[Sequence[Answered]], Interval]
 ) -> Cells:
-    """Return a value of each answer, by participant and condition."""
-    return [
-        [[value(one) for one in found if one.presentation.condition == i] for i in range(columns)]
-        for found in answered.values()
-    ]
-
-
-def count_values(cells: Cells, columns: int) -> NDArray[np.int_]:
-    """Return the numbers of values, shape (participants, columns)."""
-    return np.array([[len(one) for one in row] for row in cells], int).reshape(-1, columns)
-
-
-def repeated_score(
-    cells: Cells, columns: int, resamples: int, seed: int
-) -> tuple[FloatArray, NDArray[np.int_]]:
-    """Return means with intervals, shape (3, participants, columns), and counts of repeated values.
+    """Return an estimate from the answers of each participant to each condition.
 
     Args:
-        cells: values of each participant and column.
-        columns: number of columns.
-        resamples: number of bootstrap samples.
-        seed: of the samples.
+        answered: the answers.
+        columns: number of conditions, or of their pairs.
+        estimate: from one answer or more.
     """
-    found = [[mean_interval(np.array(one), resamples, seed) for one in row] for row in cells]
-    estimates = np.array(found, float).reshape(-1, columns, 3)
-    return np.moveaxis(estimates, 2, 0), count_values(cells, columns)
+    cells = [
+        [[one for one in found if one.presentation.condition == i] for i in range(columns)]
+        for found in answered.values()
+    ]
+    estimates = [[estimate(one) if one else _NOTHING for one in row] for row in cells]
+    counts = np.array([[len(one) for one in row] for row in cells], int).reshape(-1, columns)
+    return tuple(answered), np.array(estimates).reshape(-1, columns, 3).transpose(2, 0, 1), counts

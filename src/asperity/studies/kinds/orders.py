@@ -1,6 +1,11 @@
-"""Balanced Latin squares: orders in which each condition follows each other one equally often."""
+"""Balanced orders of conditions, and the pairs of conditions."""
 
 from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+
+from asperity.studies.design import StudyDesign
 
 
 def balanced_order(count: int, participant: int) -> list[int]:
@@ -27,3 +32,20 @@ def balanced_order(count: int, participant: int) -> list[int]:
     order = [(one + participant) % count for one in first]
     is_reversed = count % 2 == 1 and participant // count % 2 == 1
     return order[::-1] if is_reversed else order
+
+
+def repeated_order(count: int, repeats: int, participant: int) -> Iterator[tuple[int, int]]:
+    """Yield repeat and condition: each repeat has all, in the next row of the balanced square."""
+    for repeat in range(repeats):
+        for one in balanced_order(count, participant * repeats + repeat):
+            yield repeat, one
+
+
+def list_pairs(design: StudyDesign) -> list[tuple[dict[str, object], dict[str, object]]]:
+    """Return all pairs of conditions.
+
+    Raises:
+        ParameterError: for fewer than two conditions.
+    """
+    design.check_conditions(2)
+    return list(itertools.combinations(design.conditions, 2))

@@ -1,0 +1,122 @@
+"""Procedures that choose the levels of a threshold: the staircase and the Bayesian method."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol
+
+import numpy as np
+
+from asperity.core.errors import ParameterError
+from asperity.studies.statistics.psychometric import LogLevels
+
+_FASTER = (4.0, 2.0, 2.0)  # multiples of the step before each of the first reversals
+_THRESHOLDS, _CANDIDATES = 101, 51
+_SLOPES = (-2.0, 3.0, 15)  # logarithm of the slope at the threshold: ends, number
+
+
+class Track(Protocol):
+    """A procedure that chooses levels x, the natural logarithm of an increment."""
+
+    def level(self) -> float:
+        """Return the level to present now."""
+
+    def record(self, correct: bool) -> None:
+        """Record whether the answer was right."""
+
+
+class Staircase:
+    """The weighted up-down staircase, which settles where a share p of the answers is right.
+
+    A right answer lowers the level by a step s, a wrong one raises it by s p/(1 − p); where a
+    share p is right, the level stays. Before the first reversals the steps are greater.
+
+    Args:
+        levels: the range, whose greatest level is the first, and the share of right guesses.
+        step: s, in the unit of the levels.
+        target: p; it must be above the share of right guesses.
+
+    Raises:
+        ParameterError: for a target that a guess reaches.
+
+    References:
+        C. Kaernbach: Simple adaptive testing with the weighted up-down method. Perception &
+        Psychophysics 49 (1991) 227–229, https://doi.org/10.3758/BF03214307.
+
+    Example:
+        >>> track = Staircase(LogLevels(1.0, 10.0, 1.0, 0.0, 0.5, 0.0), step=0.1, target=0.75)
+        >>> track.record(True)
+        >>> f"{track.level():.3f}"  # ln 10 − 0.4
+        '1.903'
+    """
+
+    def __init__(self, levels: LogLevels, step: float, target: float) -> None:
+        if target <= levels.guess:
+            words = f"must be above {levels.guess:.3g}, the share of right answers of a guess"
+            raise ParameterError("method.target", words, target)
+        self._low, self._high = levels.ends
+        self._level, self._down, self._up = self._high, step, step * target / (1.0 - target)
+        self._reversals, self._last = 0, True
+
+    def level(self) -> float:
+        """Return the level to present now."""
+        return self._level
+
+    def record(self, correct: bool) -> None:
+        """Move the level."""
+        self._reversals += correct != self._last
+        self._last = correct
+        factor = _FASTER[self._reversals] if self._reversals < len(_FASTER) else 1.0
+        moved = self._level + factor * (-self._down if correct else self._up)
+        self._level = min(max(moved, self._low), self._high)
+
+
+class BayesianTrack:
+    """Levels after which the threshold is expected to be known best: the psi-marginal method.
+
+    It is that of the library SweetSpot. The prior of the threshold is normal, centred in the range
+    and half as wide; the slope is marginalised.
+
+    Args:
+        levels: the range, and the shares of guesses and lapses.
+
+    Raises:
+        ParameterError: if SweetSpot is not installed.
+
+    References:
+        N. Prins: The psi-marginal adaptive method. Journal of Vision 13 (2013) 7:3,
+        https://doi.org/10.1167/13.7.3.
+    """
+
+    def __init__(self, levels: LogLevels) -> None:
+        try:
+            import SweetSpot as Library
+        except ImportError:
+            words = "bayesian needs the library SweetSpot: pip install 'asperity[studies]'"
+            raise ParameterError("method.procedure", words) from None
+        low, high = levels.ends
+        function = Library.PsychometricFunction(gamma=levels.guess, lambda_=levels.lapse)
+        function.Grid(alpha=(low, high, _THRESHOLDS), beta=_SLOPES)
+        function.SetPrior(alpha=((low + high) / 2.0, (high - low) / 2.0), beta=(0.0, 1.0))
+        candidates = np.linspace(low, high, _CANDIDATES)
+        self.procedure = Library.PsiMarginal(
+            pf=function, xCandidates=candidates, maxIterations=None, parameterOfInterest="alpha"
+        )
+
+    def level(self) -> float:
+        """Return the level to present now."""
+        return float(self.procedure.PendingValue())
+
+    def record(self, correct: bool) -> None:
+        """Update the posterior."""
+        self.procedure.Observe(int(correct))
+
+
+TRACKS: dict[str, Callable[[LogLevels, Mapping[str, Any]], Track]] = {
+    "weighted-up-down": lambda levels, options: Staircase(
+        levels, math.log(options["step"]), float(options["target"])
+    ),
+    "bayesian": lambda levels, _options: BayesianTrack(levels),
+}
+"""Procedures by name, from the levels and the options of the method."""
