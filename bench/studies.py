@@ -20,9 +20,10 @@ from rich.console import Console
 from rich.table import Table
 
 from asperity.studies.design import StudyDesign, Values
-from asperity.studies.kinds.bayes import BayesianTrack
+from asperity.studies.kinds.tracks import BayesianTrack
 from asperity.studies.methods import METHODS
 from asperity.studies.observers import Observer, simulate_run
+from asperity.studies.statistics.psychometric import LogLevels
 
 COUNT, PARTICIPANTS, RESAMPLES, SPREAD = 1000, 12, 400, 0.3
 LAWS = {"surface.law": ("A", "C", "D", "H")}
@@ -46,15 +47,12 @@ def score_strength(values: Values) -> float:
 def threshold_study(seed: int, **options: object) -> Iterator[Interval]:
     """Yield the threshold of one participant, whose slope is random."""
     rng = np.random.default_rng([seed, 9])
-    observer = Observer(float(np.exp(rng.normal(0.0, 0.5))), float(np.exp(rng.normal(1.4, 0.3))))
+    observer = Observer(float(np.exp(rng.normal(0.0, 0.5))), float(np.exp(rng.normal(1.4, 0.4))))
     kind = METHODS["detection"]
     design = StudyDesign("detection", {}, {**UNFELT, **options}, seed=seed)
     design = kind.complete(design)
     answered = simulate_run(design, 0, observer, level_strength, seed)
-    low, high = (
-        float(x) for x in kind.score(design, {"P": answered}, RESAMPLES).estimates[1:, 0, 0]
-    )
-    estimate = float(kind.score(design, {"P": answered}, 0).values[0, 0])
+    estimate, low, high = (float(x) for x in kind.score(design, {"P": answered}).estimates[:, 0, 0])
     yield math.log(1e-5 * observer.threshold), estimate, low, high
 
 
@@ -65,12 +63,11 @@ def pooled_study(kind_name: str, seed: int, **options: object) -> Iterator[Inter
     design = kind.complete(StudyDesign(kind_name, factors, options, seed=seed))
     answered = {}
     for number in range(PARTICIPANTS):
-        observer = Observer(slope=2.0).draw(rng, SPREAD)
+        observer = Observer(float(np.exp(SPREAD * rng.standard_normal())), slope=2.0)
         strength = level_strength if "level" in options else score_strength
         answered[str(number)] = simulate_run(design, number, observer, strength, seed)
-    score = kind.score(design, answered, 0)
-    found = TRUTHS[kind_name](score.differences(RESAMPLES, seed), score.pool(RESAMPLES, seed))
-    yield from found
+    score = kind.score(design, answered)
+    yield from TRUTHS[kind_name](score.differences(seed, RESAMPLES), score.pool(seed, RESAMPLES))
 
 
 def _comparison(differences: list[tuple[float, float, float]], _pooled: object) -> list[Interval]:
@@ -134,7 +131,8 @@ def trials_needed(count: int, most: int = 100) -> tuple[float, float]:
         np.random.seed(seed)  # noqa: NPY002  # the library draws from the global generator
         demonstration = Library.Simulate()[0]
         goal = _deviation(demonstration.pf)
-        track, rng = BayesianTrack(-5.0, 5.0, 0.5, 0.02), np.random.default_rng(seed)
+        levels = LogLevels(math.exp(-5.0), math.exp(5.0), 1e-9, 0.0, guess=0.5, lapse=0.02)
+        track, rng = BayesianTrack(levels), np.random.default_rng(seed)
         trial = 0
         while trial < most and _deviation(track.procedure.pf) > goal:
             trial += 1

@@ -7,8 +7,7 @@ from pathlib import Path
 
 from asperity.core.arguments import Argument, read_arguments
 from asperity.studies.design import MethodKind
-from asperity.studies.kinds.axb import label_pairs, run_axb, score_axb
-from asperity.studies.kinds.comparison import pair_consistency, run_comparison, score_comparison
+from asperity.studies.kinds import pairs
 from asperity.studies.kinds.onset import run_onset, score_onset
 from asperity.studies.kinds.rating import run_rating, score_rating
 from asperity.studies.kinds.thresholds import run_thresholds, score_thresholds
@@ -35,12 +34,12 @@ _KINDS = (
                tuple(_DISCRIMINATION.values()), run_thresholds, score_thresholds,
                has_function=True),
     MethodKind("comparison", "which of two feels more so; Bradley–Terry scores",
-               _options("comparison"), run_comparison, score_comparison,
-               consistency=pair_consistency),
+               _options("comparison"), pairs.run_comparison, pairs.score_comparison,
+               consistency=pairs.pair_consistency),
     MethodKind("rating", "magnitude estimation or a Likert scale",
                _options("rating"), run_rating, score_rating),
     MethodKind("axb", "which of two the one between them equals",
-               _options("axb"), run_axb, score_axb, label_pairs),
+               _options("axb"), pairs.run_axb, pairs.score_axb, pairs.label_pairs),
     MethodKind("onset", "a value is raised until it begins, and lowered until it ends",
                _options("onset"), run_onset, score_onset),
 )  # fmt: skip

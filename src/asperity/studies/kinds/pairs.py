@@ -1,10 +1,10 @@
-"""Pairwise comparison: which of two feels more so."""
+"""Pairs of conditions: which of two feels more so, and which of two does a third equal (AXB)."""
 
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -12,9 +12,9 @@ from asperity.core.compiled import FloatArray
 from asperity.studies.design import Answered, Answers, Presentation, Steps, StudyDesign
 from asperity.studies.kinds.orders import list_pairs, repeated_order
 from asperity.studies.statistics import bradley_terry
-from asperity.studies.statistics.scores import Score
+from asperity.studies.statistics.intervals import share_interval
+from asperity.studies.statistics.scores import Score, score_cells
 
-ANSWERS = ("1", "2")
 _NORMAL = 1.96  # quantile of the normal distribution
 _INTERVAL = "Fisher information; half a choice added either way where scores had no bounds"
 
@@ -25,7 +25,7 @@ def run_comparison(design: StudyDesign, participant: int, rng: np.random.Generat
     first = rng.integers(2, size=len(pairs))
     for repeat, index in repeated_order(len(pairs), repeats, participant):
         pair = pairs[index][:: -1 if (first[index] + repeat) % 2 else 1]
-        yield Presentation(pair, ANSWERS, design.question, condition=index)
+        yield Presentation(pair, ("1", "2"), design.question, condition=index)
 
 
 def count_choices(design: StudyDesign, answered: Sequence[Answered]) -> FloatArray:
@@ -34,7 +34,7 @@ def count_choices(design: StudyDesign, answered: Sequence[Answered]) -> FloatArr
     wins = np.zeros((len(conditions), len(conditions)))
     for one in answered:
         first, second = (conditions.index(dict(values)) for values in one.presentation.intervals)
-        wins[(first, second) if one.answer == ANSWERS[0] else (second, first)] += 1.0
+        wins[(first, second) if one.answer == "1" else (second, first)] += 1.0
     return wins
 
 
@@ -64,4 +64,31 @@ def pair_consistency(answered: Sequence[Answered]) -> float | None:
         shown = one.presentation.intervals[int(one.answer) - 1]
         chosen.setdefault(one.presentation.condition, []).append(str(sorted(shown.items())))
     alike = [a == b for found in chosen.values() for a, b in itertools.combinations(found, 2)]
-    return math.fsum(alike) / len(alike) if alike else None
+    return sum(alike) / len(alike) if alike else None
+
+
+def run_axb(design: StudyDesign, participant: int, rng: np.random.Generator) -> Steps:
+    """Yield A, X and B, where X equals A or B, as often either way as the repeats allow."""
+    pairs, repeats = list_pairs(design), int(design.options["repeats"])
+    kinds = [rng.permutation(np.arange(repeats) % 4) for _ in pairs]
+    for repeat, index in repeated_order(len(pairs), repeats, participant):
+        is_last, is_swapped = divmod(int(kinds[index][repeat]), 2)
+        first, last = pairs[index][:: -1 if is_swapped else 1]
+        shown = (first, last if is_last else first, last)
+        right = "3" if is_last else "1"
+        yield Presentation(shown, ("1", "3"), design.question, correct=right, condition=index)
+
+
+def label_pairs(design: StudyDesign) -> Sequence[dict[str, Any]]:
+    """Return the pairs of conditions, which are what is estimated."""
+    pairs = list_pairs(design)
+    return [{key: f"{first[key]} / {last[key]}" for key in first} for first, last in pairs]
+
+
+def score_axb(design: StudyDesign, answered: Answers) -> Score:
+    """Return the shares of right matches of each pair of conditions."""
+    cells = score_cells(
+        answered, len(list_pairs(design)),
+        lambda found: share_interval(sum(one.is_correct for one in found), len(found)),
+    )  # fmt: skip
+    return Score("share of right matches", *cells, interval="Wilson score", chance=0.5)
