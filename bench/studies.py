@@ -23,7 +23,7 @@ from asperity.studies.design import StudyDesign, Values
 from asperity.studies.kinds.tracks import BayesianTrack
 from asperity.studies.methods import METHODS
 from asperity.studies.observers import Observer, simulate_run
-from asperity.studies.statistics.psychometric import LogLevels
+from asperity.studies.statistics.psychometric import SLOPE_SPREAD, USUAL_SLOPE, LogLevels
 
 COUNT, PARTICIPANTS, RESAMPLES, SPREAD = 1000, 12, 400, 0.3
 LAWS = {"surface.law": ("A", "C", "D", "H")}
@@ -45,9 +45,10 @@ def score_strength(values: Values) -> float:
 
 
 def threshold_study(seed: int, **options: object) -> Iterator[Interval]:
-    """Yield the threshold of one participant, whose slope is random."""
+    """Yield the threshold of one participant, whose slope is drawn from its prior."""
     rng = np.random.default_rng([seed, 9])
-    observer = Observer(float(np.exp(rng.normal(0.0, 0.5))), float(np.exp(rng.normal(1.4, 0.4))))
+    threshold, slope = np.exp(rng.normal((0.0, math.log(USUAL_SLOPE)), (0.5, SLOPE_SPREAD)))
+    observer = Observer(float(threshold), float(slope))
     kind = METHODS["detection"]
     design = StudyDesign("detection", {}, {**UNFELT, **options}, seed=seed)
     design = kind.complete(design)

@@ -105,7 +105,7 @@ def test_the_posterior_is_prior_times_likelihood() -> None:
     assert share.sum() == pytest.approx(1.0, abs=1e-12)
 
     def logarithm(threshold: float, slope: float) -> float:
-        total = -0.5 * (math.log(slope / 4.0) / 0.5) ** 2
+        total = -0.5 * (math.log(slope / 4.0) / 0.7) ** 2
         for one, is_right in zip(x, right, strict=True):
             chance = 0.5 + 0.48 / (1.0 + math.exp(-slope * (one - threshold)))
             total += math.log(chance if is_right else 1.0 - chance)

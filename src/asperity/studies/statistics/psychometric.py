@@ -17,9 +17,9 @@ from scipy.special import expit
 from asperity.core.compiled import FloatArray
 from asperity.studies.statistics.intervals import Interval
 
-USUAL_SLOPE, SLOPE_SPREAD = 4.0, 0.5
+USUAL_SLOPE, SLOPE_SPREAD = 4.0, 0.7
 """Prior of the slope: median, and deviation of the logarithm."""
-_SLOPES = np.geomspace(0.8, 20.0, 25)
+_SLOPES = np.geomspace(0.5, 32.0, 25)
 _THRESHOLDS = 241
 _QUANTILES = (0.5, 0.025, 0.975)
 
@@ -66,7 +66,7 @@ class LogLevels:
         """Return thresholds α, slopes s, and the probability of each pair after the answers.
 
         Before them, α is as likely anywhere from half the range below its low end to half the range
-        above its high end, and ln(s/4) is normal with deviation 0.5.
+        above its high end, and ln(s/4) is normal with deviation 0.7.
 
         Args:
             x: level of each trial.
