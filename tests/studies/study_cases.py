@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any
 
-from asperity.studies.design import Answered, Presentation, StudyDesign, Values
+from asperity.studies.design import StudyDesign, TrialRecord, Values
 from asperity.studies.methods import METHODS
 from asperity.studies.observers import Observer, simulate_run
 
@@ -22,19 +22,6 @@ OPTIONS: dict[str, dict[str, Any]] = {
 }
 
 
-@dataclass(frozen=True)
-class Record:
-    """A trial as a session records it."""
-
-    participant: str
-    run: int
-    trial: int
-    presentation: Presentation
-    answer: str
-    response_time: float = 1.0
-    started: str = "2025-01-01T00:00:00"
-
-
 def design_of(kind: str, seed: int = 1, **options: Any) -> StudyDesign:
     """Return a study of four laws with all options."""
     design = StudyDesign(kind, LAWS, {**OPTIONS[kind], **options}, "rougher?", seed, 4)
@@ -49,15 +36,15 @@ def strength(values: Values) -> float:
 
 def answers(
     design: StudyDesign, number: int = 0, seed: int = 5, **observer: float
-) -> list[Answered]:
+) -> list[TrialRecord]:
     """Return the answers of a simulated participant."""
     return simulate_run(design, number, Observer(**observer), strength, seed)
 
 
-def records(design: StudyDesign, count: int, **observer: float) -> list[Record]:
+def records(design: StudyDesign, count: int, **observer: float) -> list[TrialRecord]:
     """Return the trials of simulated participants."""
     return [
-        Record(f"P{number:02}", 1, i, one.presentation, one.answer)
+        replace(one, participant=f"P{number:02}", response_time=1.0)
         for number in range(count)
-        for i, one in enumerate(answers(design, number, **observer))
+        for one in answers(design, number, **observer)
     ]

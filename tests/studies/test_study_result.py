@@ -9,11 +9,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from tests.studies.study_cases import AMPLITUDE, Record, design_of, records
+from tests.studies.study_cases import AMPLITUDE, design_of, records
 
 from asperity.core.errors import ParameterError
 from asperity.devices import load_device
 from asperity.studies import result_page  # noqa: F401
+from asperity.studies.design import TrialRecord
 from asperity.studies.methods import METHODS
 from asperity.studies.observers import OBSERVERS, HandStrength, find_observer, surface_strength
 from asperity.studies.plan import plan
@@ -69,8 +70,8 @@ def test_participants_and_trials_are_excluded_by_the_rules() -> None:
     design = design_of("axb", repeats=8, exclusion=rules)
     trials = records(design, 4, threshold=0.1)
 
-    def change(one: Record) -> Record:
-        is_hasty = one.trial == 3 or (one.participant == "P01" and one.trial % 2)
+    def change(one: TrialRecord) -> TrialRecord:
+        is_hasty = one.trial == 4 or (one.participant == "P01" and one.trial % 2)
         answer = "1" if one.participant == "P02" else one.answer
         return replace(one, answer=answer, response_time=0.1 if is_hasty else 1.0)
 

@@ -11,8 +11,8 @@ import pytest
 from tests.studies.study_texts import COMPARISON, make_study
 
 from asperity.core.errors import ParameterError
+from asperity.studies.design import Presentation
 from asperity.studies.live.trial_session import simulate_session
-from asperity.studies.methods import Presentation
 from asperity.studies.study_file import Study
 from asperity.studies.study_store import (
     ANSWERS_FILE,

@@ -146,16 +146,26 @@ def _check_answer(presentation: Presentation | None, answer: str) -> None:
 
 
 @dataclass(frozen=True)
-class Answered:
-    """A presentation with its answer, for the statistics.
+class TrialRecord:
+    """An answered trial.
 
     Attributes:
         presentation: what was presented.
-        answer: the answer.
+        answer: as given.
+        participant: code of the participant.
+        run: number of the sitting, from 1.
+        trial: number of the trial, from 1.
+        response_time: from the question to the answer [s].
+        started: start of the trial, ISO 8601.
     """
 
     presentation: Presentation
     answer: str
+    participant: str = ""
+    run: int = 1
+    trial: int = 1
+    response_time: float = 0.0
+    started: str = ""
 
     @property
     def is_correct(self) -> bool:
@@ -163,8 +173,8 @@ class Answered:
         return self.answer == self.presentation.correct
 
 
-Answers = Mapping[str, Sequence[Answered]]
-"""Answers of each participant."""
+Answers = Mapping[str, Sequence[TrialRecord]]
+"""Answered trials of each participant."""
 
 
 @dataclass(frozen=True)
@@ -191,7 +201,7 @@ class MethodKind:
     run: Callable[[StudyDesign, int, np.random.Generator], Steps]
     score: Callable[[StudyDesign, Answers], Score]
     label: Callable[[StudyDesign], Sequence[dict[str, Any]]] = lambda design: design.conditions
-    consistency: Callable[[Sequence[Answered]], float | None] = lambda _answers: None
+    consistency: Callable[[Sequence[TrialRecord]], float | None] = lambda _answers: None
     has_function: bool = False
 
     def complete(self, design: StudyDesign) -> StudyDesign:

@@ -12,7 +12,7 @@ from scipy.special import expit
 
 from asperity.core.compiled import FloatArray
 from asperity.core.errors import ParameterError, suggest_names
-from asperity.studies.design import Answered, Presentation, StudyDesign, Values
+from asperity.studies.design import Presentation, StudyDesign, TrialRecord, Values
 from asperity.studies.methods import METHODS
 
 if TYPE_CHECKING:
@@ -159,8 +159,8 @@ class HandStrength:
 
 def simulate_run(
     design: StudyDesign, number: int, observer: Observer, strength: Strength, seed: int
-) -> list[Answered]:
-    """Return the answers of a simulated participant; the same seed gives the same ones.
+) -> list[TrialRecord]:
+    """Return the trials of a simulated participant; the same seed gives the same ones.
 
     Args:
         design: the study.
@@ -170,9 +170,10 @@ def simulate_run(
         seed: of the method and of the answers.
     """
     method = METHODS[design.kind].make(design, number, seed)
-    rng, answered = np.random.default_rng([seed, number, 1]), []
+    rng = np.random.default_rng([seed, number, 1])
+    answered: list[TrialRecord] = []
     while (presentation := method.next()) is not None:
         answer = observer.answer(presentation, strength, rng)
-        answered.append(Answered(presentation, answer))
+        answered.append(TrialRecord(presentation, answer, str(number), 1, len(answered) + 1))
         method.answer(answer)
     return answered

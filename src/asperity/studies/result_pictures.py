@@ -11,7 +11,7 @@ from matplotlib.ticker import MaxNLocator
 
 from asperity.core.compiled import FloatArray
 from asperity.report.pictures import style
-from asperity.studies.design import Answered
+from asperity.studies.design import TrialRecord
 from asperity.studies.kinds.thresholds import level_answers, log_levels
 from asperity.studies.result_page import label_text
 from asperity.studies.study_result import StudyResult
@@ -68,7 +68,7 @@ def functions_figure(result: StudyResult) -> Figure:
 
 
 def _draw_function(
-    axes: Axes, result: StudyResult, found: Sequence[Answered], colour: str, label: str
+    axes: Axes, result: StudyResult, found: Sequence[TrialRecord], colour: str, label: str
 ) -> None:
     """Draw the function of the posterior's mean, and the shares of groups of levels."""
     levels = log_levels(result.design)

@@ -6,21 +6,18 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from asperity.core.display import Reportable
 from asperity.core.errors import ParameterError
 from asperity.core.files import attributes_to_dict, to_plain_data
-from asperity.studies.design import Answered, StudyDesign
+from asperity.studies.design import StudyDesign, TrialRecord
 from asperity.studies.methods import EXCLUSIONS, METHODS
 from asperity.studies.statistics.intervals import Interval
 from asperity.studies.statistics.scores import Score
 from asperity.sweeps.table_files import TableFiles
-
-if TYPE_CHECKING:
-    from asperity.studies.study_store import TrialRecord
 
 SCHEMA = 1
 POOLED = "pooled"
@@ -84,7 +81,7 @@ class StudyResult(Reportable, TableFiles):
 
     design: StudyDesign
     trials: Sequence[TrialRecord]
-    answered: Mapping[str, Sequence[Answered]]
+    answered: Mapping[str, Sequence[TrialRecord]]
     omitted: Mapping[str, int]
     consistency: Mapping[str, float | None]
     excluded: Mapping[str, str]
@@ -108,7 +105,7 @@ class StudyResult(Reportable, TableFiles):
         return TrialTable(self.design, self.trials, self.excluded)
 
     @property
-    def included(self) -> dict[str, Sequence[Answered]]:
+    def included(self) -> dict[str, Sequence[TrialRecord]]:
         """The answers of participants who are not excluded."""
         return {name: one for name, one in self.answered.items() if name not in self.excluded}
 
@@ -192,11 +189,11 @@ def analyse(design: StudyDesign, trials: Sequence[TrialRecord]) -> StudyResult:
         raise ParameterError("study", "has no trials yet")
     kind = METHODS[design.kind]
     design = kind.complete(design)
-    answered: dict[str, list[Answered]] = {one.participant: [] for one in trials}
+    answered: dict[str, list[TrialRecord]] = {one.participant: [] for one in trials}
     omitted = dict.fromkeys(answered, 0)
     for one in trials:
         if is_used(design, one):
-            answered[one.participant].append(Answered(one.presentation, one.answer))
+            answered[one.participant].append(one)
         else:
             omitted[one.participant] += 1
     consistency = {name: kind.consistency(found) for name, found in answered.items()}
@@ -209,7 +206,7 @@ def analyse(design: StudyDesign, trials: Sequence[TrialRecord]) -> StudyResult:
 
 
 def _exclude(
-    rules: Mapping[str, float], answered: Sequence[Answered], omitted: int, share: float | None
+    rules: Mapping[str, float], answered: Sequence[TrialRecord], omitted: int, share: float | None
 ) -> str:
     """Return why a participant is excluded; empty if not."""
     total = len(answered) + omitted

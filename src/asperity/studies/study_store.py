@@ -17,7 +17,6 @@ import re
 import shutil
 from base64 import b32encode
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Self
@@ -28,7 +27,7 @@ from asperity.core.errors import ParameterError, escape_unprintable
 from asperity.core.files import json_text, open_input, to_plain_data, write_bytes
 from asperity.core.version import __version__
 from asperity.recording.replay import file_digest
-from asperity.studies.design import Method, Presentation
+from asperity.studies.design import Method, Presentation, TrialRecord
 from asperity.studies.methods import METHODS
 from asperity.studies.study_file import Study, build_study
 
@@ -44,29 +43,6 @@ _NUMBER_FILE, _LOCK_FILE = "participant.json", ".lock"
 SCHEMA = 1
 _CODE = re.compile(r"(?=.*\d)[A-Za-z0-9][A-Za-z0-9_-]{0,15}")
 _CODE_LENGTH = 6  # of a stimulus
-
-
-@dataclass(frozen=True)
-class TrialRecord:
-    """An answered trial.
-
-    Attributes:
-        participant: code of the participant.
-        run: number of the sitting, from 1.
-        trial: number of the trial, from 1.
-        presentation: what was presented.
-        answer: as given.
-        response_time: from the question to the answer [s].
-        started: start of the trial, ISO 8601.
-    """
-
-    participant: str
-    run: int
-    trial: int
-    presentation: Presentation
-    answer: str
-    response_time: float
-    started: str
 
 
 def check_participant(code: str) -> str:
@@ -215,8 +191,8 @@ def replay_answers(
             words = f"trial {count} of {participant} was not made by this study and version"
             raise ParameterError("folder", words)
         method.answer(line["answer"])
-        own = (line[name] for name in ("answer", "response_time", "started"))
-        records.append(TrialRecord(participant, line["run"], count, shown, *own))
+        own = (line[name] for name in ("response_time", "started"))
+        records.append(TrialRecord(shown, line["answer"], participant, line["run"], count, *own))
     return method, records
 
 

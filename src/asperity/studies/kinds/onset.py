@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from asperity.studies.design import Answered, Answers, Presentation, Steps, StudyDesign
+from asperity.studies.design import Answers, Presentation, Steps, StudyDesign, TrialRecord
 from asperity.studies.kinds.orders import repeated_order
 from asperity.studies.statistics.intervals import Interval, mean_interval
 from asperity.studies.statistics.scores import Score, score_cells
@@ -40,7 +40,7 @@ def score_onset(design: StudyDesign, answered: Answers) -> Score:
     """
     key, middle = str(design.options["level"]), math.sqrt(math.prod(design.range))
 
-    def estimate(trials: Sequence[Answered]) -> Interval:
+    def estimate(trials: Sequence[TrialRecord]) -> Interval:
         found: tuple[list[float], list[float]] = ([], [])
         for one in trials:
             is_descending = one.presentation.intervals[0][key] > middle

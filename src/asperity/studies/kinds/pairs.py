@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from asperity.core.compiled import FloatArray
-from asperity.studies.design import Answered, Answers, Presentation, Steps, StudyDesign
+from asperity.studies.design import Answers, Presentation, Steps, StudyDesign, TrialRecord
 from asperity.studies.kinds.orders import list_pairs, repeated_order
 from asperity.studies.statistics import bradley_terry
 from asperity.studies.statistics.intervals import share_interval
@@ -28,7 +28,7 @@ def run_comparison(design: StudyDesign, participant: int, rng: np.random.Generat
         yield Presentation(pair, ("1", "2"), design.question, condition=index)
 
 
-def count_choices(design: StudyDesign, answered: Sequence[Answered]) -> FloatArray:
+def count_choices(design: StudyDesign, answered: Sequence[TrialRecord]) -> FloatArray:
     """Return how often each condition (row) was chosen over each other (column)."""
     conditions = design.conditions
     wins = np.zeros((len(conditions), len(conditions)))
@@ -57,7 +57,7 @@ def score_comparison(design: StudyDesign, answered: Answers) -> Score:
     )
 
 
-def pair_consistency(answered: Sequence[Answered]) -> float | None:
+def pair_consistency(answered: Sequence[TrialRecord]) -> float | None:
     """Return the share of repeated pairs that were answered alike; ``None`` without repeats."""
     chosen: dict[int, list[str]] = {}
     for one in answered:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from asperity.core.compiled import FloatArray
 from asperity.core.errors import ParameterError
-from asperity.studies.design import Answered, Answers, Presentation, Steps, StudyDesign
+from asperity.studies.design import Answers, Presentation, Steps, StudyDesign, TrialRecord
 from asperity.studies.kinds.orders import balanced_order
 from asperity.studies.kinds.tracks import TRACKS
 from asperity.studies.statistics.psychometric import LogLevels
@@ -59,7 +59,7 @@ def run_thresholds(design: StudyDesign, participant: int, rng: np.random.Generat
 
 
 def level_answers(
-    design: StudyDesign, trials: Sequence[Answered]
+    design: StudyDesign, trials: Sequence[TrialRecord]
 ) -> tuple[FloatArray, NDArray[np.bool_]]:
     """Return the level x of the interval that differs, and whether it was found, for each trial."""
     key = design.options["level"]

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from asperity.scene.device_run import POLL_INTERVAL
+from asperity.studies.design import Presentation
 from asperity.studies.live.player import Player
 from asperity.studies.live.screens import BACK, DOWN, GO_ON, PAUSE, STOP, UP, Screen, View
-from asperity.studies.design import Presentation
 from asperity.studies.study_file import Study
 from asperity.studies.study_store import Participant, current_time
 

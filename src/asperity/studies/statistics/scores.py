@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.core.compiled import FloatArray
-from asperity.studies.design import Answered, Answers
+from asperity.studies.design import Answers, TrialRecord
 from asperity.studies.statistics.intervals import LEAST_RESAMPLED, Interval, mean_interval
 
 RESAMPLES = 2000
@@ -93,7 +93,7 @@ _NOTHING = (math.nan, -math.inf, math.inf)
 
 
 def score_cells(
-    answered: Answers, columns: int, estimate: Callable[[Sequence[Answered]], Interval]
+    answered: Answers, columns: int, estimate: Callable[[Sequence[TrialRecord]], Interval]
 ) -> Cells:
     """Return an estimate from the answers of each participant to each condition.
 
