@@ -46,7 +46,8 @@ def folder(tmp_path: Path, study: Study) -> Path:
 
 def finish(folder: Path, study: Study, code: str) -> int:
     with Participant(folder, study, code) as person:
-        return simulate_session(person, choose, study.design.seed)
+        simulate_session(person, choose, study.design.seed)
+        return person.trial - 1
 
 
 def test_trials_are_read_with_what_was_presented(folder: Path, study: Study) -> None:
@@ -145,7 +146,8 @@ def test_participants_exist_once_and_sit_once(folder: Path, study: Study) -> Non
     with pytest.raises(ParameterError, match="P02 is unknown; known: P01"):
         Participant(folder, study, "P02", resume=True)
     with Participant(folder, study, "P01", resume=True) as person:
-        count = simulate_session(person, choose, 1)
+        simulate_session(person, choose, 1)
+        count = person.trial - 1
     with pytest.raises(ParameterError, match=f"P01 has answered all {count} trials"):
         Participant(folder, study, "P01", resume=True)
 

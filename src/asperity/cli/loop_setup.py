@@ -78,7 +78,7 @@ def load_setup(
         ParameterError: for a missing, unknown or invalid value.
     """
     from asperity.scene import load_scene
-    from asperity.scene.device_run import recommend_law_and_stiffness
+    from asperity.scene.device_run import recommend_law_and_stiffness, without_hand
     from asperity.scene.setup import make_setup
 
     if driver is None and not source.lower().endswith(".toml"):
@@ -101,8 +101,7 @@ def load_setup(
             ) as step:
                 surface, note = recommend_law_and_stiffness(scene.texture, device, surface, step)
     if driver not in (None, SIMULATED):
-        servo = {name: section for name, section in scene.loop.items() if name == "servo"}
-        scene = replace(scene, loop={**_NO_HAND, **servo})
+        scene = without_hand(scene)
     if laws or "law" in surface:
         check_parameters_apply(requested, laws or (find_law(surface["law"]),))
     setup = make_setup(
@@ -129,13 +128,6 @@ def _check_driver(name: str, device: Device) -> None:
     elif name != SIMULATED:
         kind, argument = find_driver(name, device)
         kind.create(argument, IDENTITY_FRAME).check_library()
-
-
-# A real hand on a real device is not simulated.
-_NO_HAND: dict[str, Any] = {
-    "hand": {"kind": "moved"},
-    "motion": {"kind": "still", "point": [0, 0, 0]},
-}
 
 
 def select_laws(laws: tuple[Law, ...] | None, law: Law | None) -> tuple[Law, ...]:
@@ -174,8 +166,7 @@ def driver_setup(
     setup = load_setup(source, values, duration, driver=name)
     if name == SIMULATED or name.startswith(REPLAY_PREFIX):
         return setup, setup.servo
-    servo = replace(setup.servo, delay=0, position_resolution=0.0, force_resolution=0.0)
-    return replace(setup, servo=servo), setup.servo
+    return setup.on_real_device(), setup.servo
 
 
 def make_driver(name: str, setup: Setup) -> Driver:

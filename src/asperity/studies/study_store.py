@@ -18,7 +18,6 @@ import shutil
 from base64 import b32encode
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Self
 
@@ -336,11 +335,6 @@ class Participant:
     def __exit__(self, *_: object) -> None:
         self._stream.close()
         self._lock.release()
-
-
-def current_time() -> str:
-    """Return the time in UTC, ISO 8601."""
-    return datetime.now(UTC).isoformat(timespec="milliseconds")
 
 
 def write_key(folder: str | Path) -> Path:

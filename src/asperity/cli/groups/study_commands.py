@@ -92,12 +92,16 @@ def run_command(
     observer, stimuli = find_observer(values["simulate"]), Stimuli(study)
     stimuli.check_all()
     design = METHODS[study.design.kind].complete(study.design)
-    strength = HandStrength(design, lambda one: (stimuli.setup(one).surface, stimuli.device))
+    strength = HandStrength(
+        design, lambda one: (stimuli.setup(one).surface, stimuli.setup(one).device)
+    )
     write_study(path, study)
     with Participant(path, study, participant, resume=resume) as person:
-        count = simulate_session(
+        before = person.trial
+        simulate_session(
             person, lambda trial, rng: observer.answer(trial, strength, rng), design.seed
         )
+        count = person.trial - before
     _report_end(path, participant, count, is_stopped=False)
 
 
@@ -136,7 +140,7 @@ def _make_player(study: Study, driver: str) -> LoopPlayer:
     stimuli = Stimuli(study, is_real=is_real)
     with output.progress_bar("analyzing the stimuli") as update:
         first = stimuli.check_all(update)
-    real = loop_setup.make_driver(driver, stimuli.setup(first)) if is_real else None
+    real = loop_setup.make_driver(driver, first) if is_real else None
     return LoopPlayer(stimuli, first, real)
 
 

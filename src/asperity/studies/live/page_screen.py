@@ -4,46 +4,26 @@ from __future__ import annotations
 
 import asyncio
 import json
-import queue
 import socket
 import threading
 from contextlib import suppress
 from dataclasses import asdict
-from functools import cache
-from importlib.resources import files
+from queue import Empty, Queue
 from typing import Self
 
-from websockets.asyncio.server import ServerConnection, serve
 from websockets.exceptions import ConnectionClosed
+from websockets.sync.server import ServerConnection, serve
 
-from asperity.lab.access import MAX_MESSAGE_BYTES, AccessToken, RateLimit, respond
+from asperity.lab.access import MAX_MESSAGE_BYTES, AccessToken, respond
 from asperity.studies.live.screens import PAUSE, STOP, View
 
-PAGE_FILE = "study.html"
-"""Name of the page, below the access token."""
+PACKAGE = "asperity.studies.live"
+"""Package of the page."""
 _PING = 2.0  # a page that does not answer for this time is gone [s]
-_MAX_KEY = 16  # characters of a key's name
-_CONTENT_TYPES = {"html": "text/html", "js": "text/javascript", "css": "text/css"}
-
-
-@cache
-def study_files() -> dict[str, tuple[str, bytes]]:
-    """Return type and content of each file of the page, by name."""
-    entries = files("asperity.studies.live").joinpath("page").iterdir()
-    kinds = {entry: _CONTENT_TYPES.get(entry.name.rpartition(".")[2]) for entry in entries}
-    return {
-        entry.name: (f"{kind}; charset=utf-8", entry.read_bytes())
-        for entry, kind in kinds.items()
-        if kind is not None
-    }
-
-
-async def _fetch(name: str) -> tuple[str, bytes] | None:
-    return study_files().get(name)
 
 
 class PageScreen:
-    """A screen in a page, served by a thread of its own; use it in a ``with``.
+    """A screen in a page, served by threads; use it in a ``with``.
 
     If the last page is closed or does not answer, the session pauses.
 
@@ -56,24 +36,26 @@ class PageScreen:
     """
 
     def __init__(self, listener: socket.socket, *, masking_noise: bool = False) -> None:
-        self._listener, self._masking_noise = listener, masking_noise
-        self._token = AccessToken(listener.getsockname()[1])
-        self.url = f"{self._token.url}{PAGE_FILE}"
-        self._keys: queue.Queue[str] = queue.Queue()
-        self._pages: set[ServerConnection] = set()
+        token = AccessToken(listener.getsockname()[1])
+        self.url, self._masking_noise, self._lock = token.url, masking_noise, threading.Lock()
+        self._keys, self._pages = Queue[str](), set[ServerConnection]()
         self._view = View("One moment", "The study is being prepared.")
-        self._events = asyncio.new_event_loop()
-        self._stopped, self._is_served = asyncio.Event(), threading.Event()
-        self._thread = threading.Thread(target=self._run, name="study page", daemon=True)
+        self._server = serve(
+            self._serve_page, sock=listener, max_size=MAX_MESSAGE_BYTES, compression=None,
+            ping_interval=_PING, ping_timeout=_PING,
+            process_request=lambda _page, request: asyncio.run(
+                respond(token, request, package=PACKAGE)
+            ),
+        )  # fmt: skip
 
     def __enter__(self) -> Self:
-        self._thread.start()
-        self._is_served.wait()
+        threading.Thread(target=self._server.serve_forever, name="study page", daemon=True).start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._events.call_soon_threadsafe(self._stopped.set)
-        self._thread.join()
+        for page in tuple(self._pages):
+            page.close()
+        self._server.shutdown()
 
     def show(self, view: View) -> None:
         """Show a view in place of the one before; earlier keys do not count, but pause and stop."""
@@ -81,49 +63,27 @@ class PageScreen:
         earlier = [self._keys.get_nowait() for _ in range(self._keys.qsize())]
         for key in {PAUSE, STOP}.intersection(earlier):
             self._keys.put(key)
-        asyncio.run_coroutine_threadsafe(self._broadcast(), self._events).result()
+        for page in tuple(self._pages):
+            self._send_view(page)
 
     def read_key(self, timeout: float) -> str | None:
         """Return the next pressed key; ``None`` if there is none in a time [s]."""
-        try:
+        with suppress(Empty):
             return self._keys.get(timeout=timeout)
-        except queue.Empty:
-            return None
+        return None
 
-    def _run(self) -> None:
-        with suppress(RuntimeError):
-            self._events.run_until_complete(self._serve())
-        self._events.close()
-
-    async def _serve(self) -> None:
-        async with serve(
-            self._serve_page, sock=self._listener, max_size=MAX_MESSAGE_BYTES, compression=None,
-            ping_interval=_PING, ping_timeout=_PING,
-            process_request=lambda _line, request: respond(self._token, request, _fetch),
-        ):  # fmt: skip
-            self._is_served.set()
-            await self._stopped.wait()
-
-    async def _serve_page(self, connection: ServerConnection) -> None:
+    def _serve_page(self, page: ServerConnection) -> None:
         """Serve a page until it disconnects."""
-        rate = RateLimit()
-        self._pages.add(connection)
-        try:
-            await connection.send(self._message())
-            async for content in connection:
-                rate.consume()
-                self._keys.put(str(content)[:_MAX_KEY])
-        except ConnectionClosed:
-            pass
-        finally:
-            self._pages.discard(connection)
-            if not self._pages:
-                self._keys.put(PAUSE)
+        self._pages.add(page)
+        self._send_view(page)
+        with suppress(ConnectionClosed):
+            for key in page:
+                self._keys.put(str(key))
+        self._pages.discard(page)
+        if not self._pages:
+            self._keys.put(PAUSE)
 
-    def _message(self) -> str:
-        return json.dumps({**asdict(self._view), "noise": self._masking_noise})
-
-    async def _broadcast(self) -> None:
-        for page in tuple(self._pages):
-            with suppress(ConnectionClosed):
-                await page.send(self._message())
+    def _send_view(self, page: ServerConnection) -> None:
+        # The lock makes the newest view the last one that a page receives.
+        with self._lock, suppress(ConnectionClosed):
+            page.send(json.dumps({**asdict(self._view), "noise": self._masking_noise}))

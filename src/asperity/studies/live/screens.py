@@ -32,15 +32,15 @@ class View:
         title: a line in large letters.
         text: further lines.
         keys: keys that have an effect, with what they do.
-        progress: share of the session that is done, or negative if it is not known.
         typed: digits of an answer.
+        is_last: whether the session ends with it.
     """
 
     title: str
     text: str = ""
     keys: tuple[tuple[str, str], ...] = ()
-    progress: float = -1.0
     typed: str = ""
+    is_last: bool = False
 
 
 class Screen(Protocol):
@@ -58,11 +58,9 @@ class Terminal:
 
     def show(self, view: View) -> None:
         """Print a view."""
-        lines = ["", view.title.upper(), *textwrap.wrap(view.text, _WIDTH)]
-        lines += [f"  [{key}] {label}" for key, label in view.keys]
-        if view.typed:
-            lines.append(f"  {view.typed}")
-        click.echo("\n".join(lines), err=True)
+        keys = (f"  [{key}] {label}" for key, label in view.keys)
+        lines = ("", view.title.upper(), *textwrap.wrap(view.text, _WIDTH), *keys, view.typed)
+        click.echo("\n".join(lines).rstrip(), err=True)
 
     def read_key(self, timeout: float) -> str | None:
         """Return the next pressed key.
@@ -75,22 +73,23 @@ class Terminal:
         pressed = os.read(sys.stdin.fileno(), 1)
         if not pressed:
             raise ParameterError("terminal", "is closed: --resume goes on where it stopped")
-        while pressed.startswith(b"\x1b") and select.select([sys.stdin], [], [], 0.02)[0]:
-            pressed += os.read(sys.stdin.fileno(), 1)
-            if pressed in _SEQUENCES and len(pressed) > 1:
-                break
+        if pressed == b"\x1b" and select.select([sys.stdin], [], [], 0.02)[0]:
+            pressed += os.read(sys.stdin.fileno(), 2)  # the rest of an arrow key
         return _SEQUENCES.get(pressed, pressed.decode("ascii", "replace").lower())
 
 
 @contextmanager
 def open_terminal() -> Iterator[Terminal]:
-    """Yield the terminal, whose keys arrive at once; standard input may also be a pipe."""
-    if not sys.stdin.isatty():
-        yield Terminal()
-        return
+    """Yield the terminal, whose keys arrive at once.
+
+    Raises:
+        ParameterError: without a terminal.
+    """
     import termios
     import tty
 
+    if not sys.stdin.isatty():
+        raise ParameterError("terminal", "is needed: run the command in one")
     before = termios.tcgetattr(sys.stdin)
     tty.setcbreak(sys.stdin)
     try:
