@@ -23,9 +23,8 @@ from pathlib import Path
 from typing import Any
 
 from asperity.core.errors import ParameterError
-from asperity.studies.live.player import LoopPlayer
+from asperity.studies.live.player import LoopPlayer, Stimuli
 from asperity.studies.live.screens import GO_ON, View
-from asperity.studies.live.stimuli import Stimuli
 from asperity.studies.live.trial_session import StudySession
 from asperity.studies.study_file import Study, load_study
 from asperity.studies.study_store import (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +12,7 @@ from tests.studies.study_texts import COMPARISON, make_study
 
 from asperity.core.errors import ParameterError
 from asperity.recording.recording import Recording, open_recording
-from asperity.studies.live.player import LoopPlayer
-from asperity.studies.live.stimuli import Stimuli
+from asperity.studies.live.player import LoopPlayer, Stimuli
 
 STIFFNESSES = (61.5, 97.5)
 
@@ -31,7 +31,9 @@ def trial(tmp_path_factory: pytest.TempPathFactory) -> Recording:
     folder = tmp_path_factory.mktemp("player")
     stimuli = Stimuli(make_study(folder))
     path = folder / "trial.mcap"
-    with LoopPlayer(stimuli, stimuli.check_all()) as player:
+    player = LoopPlayer(stimuli, stimuli.check_all())
+    with ExitStack() as stack:
+        stack.callback(player.stop)
         player.start()
         player.begin_trial(path, 7, {"codes": ["ABCDEF", "GHIJKL"]})
         for number, stiffness in enumerate(STIFFNESSES, start=1):
@@ -87,7 +89,9 @@ def test_a_recording_reveals_no_stimulus(trial: Recording) -> None:
 
 def test_a_stimulus_above_its_limit_is_not_rendered(tmp_path: Path) -> None:
     stimuli = Stimuli(make_study(tmp_path, COMPARISON))
-    with LoopPlayer(stimuli, stimuli.check_all()) as player:
+    player = LoopPlayer(stimuli, stimuli.check_all())
+    with ExitStack() as stack:
+        stack.callback(player.stop)
         player.start()
         with pytest.raises(ParameterError, match="is refused"):
             player.render({"surface.stiffness": 900.0}, 1)

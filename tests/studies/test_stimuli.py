@@ -10,7 +10,7 @@ from tests.studies.study_texts import COMPARISON, FACTORS, ONSET, SCENE, make_st
 import asperity as asp
 from asperity.core.errors import ParameterError
 from asperity.servo.safety import excess_stiffness_reason
-from asperity.studies.live.stimuli import Stimuli, smooth_wall
+from asperity.studies.live.player import Stimuli, smooth_wall
 
 
 def test_stimuli_within_their_limits_are_accepted(tmp_path: Path) -> None:

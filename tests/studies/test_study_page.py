@@ -16,7 +16,7 @@ from tests.studies.study_texts import COMPARISON
 
 from asperity.lab.access import page_files
 from asperity.recording.recording import open_recording
-from asperity.studies.live.page_screen import PACKAGE
+from asperity.studies.live.screens import PAGE_PACKAGE
 from asperity.studies.study_store import ANSWERS_FILE, read_trials
 
 RUN = (sys.executable, "-m", "asperity", "study", "run", "--no-browser")
@@ -174,7 +174,7 @@ def relative_luminance(colour: str) -> float:
 
 
 def test_contrast_is_that_of_wcag_aa() -> None:
-    text = page_files(PACKAGE)["study.css"][1].decode()
+    text = page_files(PAGE_PACKAGE)["study.css"][1].decode()
     themes = re.findall(r":root \{([^}]*)\}", text)
     assert len(themes) == 2
     for theme in themes:
@@ -187,4 +187,4 @@ def test_contrast_is_that_of_wcag_aa() -> None:
 
 def test_the_page_is_served_alone() -> None:
     scripts = {"study.css", "study.js", "masking_noise.js"}
-    assert page_files(PACKAGE).keys() == {"", "index.html", *scripts}
+    assert page_files(PAGE_PACKAGE).keys() == {"", "index.html", *scripts}

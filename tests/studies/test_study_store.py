@@ -121,7 +121,7 @@ def test_codes_of_participants_differ(folder: Path, study: Study) -> None:
 
 def test_another_study_or_folder_is_refused(tmp_path: Path, folder: Path) -> None:
     other = make_study(tmp_path, COMPARISON.replace("rougher", "softer"))
-    with pytest.raises(ParameterError, match=r"holds another study or version \(other \[study\]\)"):
+    with pytest.raises(ParameterError, match=r"holds another study \(other \[study\]\)"):
         write_study(folder, other)
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "thesis.txt").write_text("mine")
@@ -137,7 +137,7 @@ def test_another_study_or_folder_is_refused(tmp_path: Path, folder: Path) -> Non
 
 def test_participants_exist_once_and_sit_once(folder: Path, study: Study) -> None:
     with Participant(folder, study, "P01"):
-        with pytest.raises(ParameterError, match="P01 is in another session now"):
+        with pytest.raises(ParameterError, match="P01 is in a session now"):
             Participant(folder, study, "P01", resume=True)
         with pytest.raises(ParameterError, match="P01 exists already: --resume goes on"):
             Participant(folder, study, "P01")

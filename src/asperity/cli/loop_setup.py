@@ -139,18 +139,20 @@ SIMULATED = "simulated"
 REPLAY_PREFIX = "replay:"
 
 
+driver_option = click.option(
+    "--driver",
+    metavar="NAME",
+    default=SIMULATED,
+    help="'simulated', 'real' (the driver named in the device entry), haply, forcedimension,"
+    " openhaptics, ./device.so, or replay:run.mcap.  [default: simulated]",
+)
+"""Adds ``--driver``."""
+
+
 def driver_options(command: Command) -> Command:
     """Add ``--driver`` and ``--accept-risk``."""
-    command = click.option(
-        "--accept-risk", is_flag=True, help="Allow a stiffness above the stability limit."
-    )(command)
-    return click.option(
-        "--driver",
-        metavar="NAME",
-        default=SIMULATED,
-        help="'simulated', 'real' (the driver named in the device entry), haply, forcedimension,"
-        " openhaptics, ./device.so, or replay:run.mcap.  [default: simulated]",
-    )(command)
+    words = "Allow a stiffness above the stability limit."
+    return driver_option(click.option("--accept-risk", is_flag=True, help=words)(command))
 
 
 def driver_setup(

@@ -70,13 +70,14 @@ def find_scene_argument(key: str, arguments: Mapping[str, Argument]) -> Argument
 
 
 def find_varied_arguments(
-    sections: Mapping[str, Mapping[str, Any]], vary: Mapping[str, Iterable[str]]
+    sections: Mapping[str, Mapping[str, Any]], vary: Mapping[str, Iterable[str]], *others: str
 ) -> dict[str, Argument]:
     """Return the arguments of varied keys, by the keys as they are given.
 
     Args:
         sections: the scene.
         vary: values by key; those of "texture.kind" decide which arguments exist.
+        others: further keys.
 
     Raises:
         ParameterError: for an unknown key, with the nearest ones, or one that is named twice.
@@ -84,7 +85,7 @@ def find_varied_arguments(
     kinds = {key.removesuffix(".kind"): values for key, values in vary.items()}
     known = scene_arguments(sections, kinds)
     found: dict[str, Argument] = {}
-    for key in vary:
+    for key in (*vary, *others):
         argument = find_scene_argument(key, known)
         if argument in found.values():
             raise ParameterError("vary", f"names a key twice: {argument.name}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import time
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
@@ -20,9 +21,8 @@ from asperity.studies.study_store import Participant
 
 ADJUSTMENT_STEPS = 40
 """Number of steps, of equal ratios, from the least to the greatest value of an adjustment."""
-SIMULATED_RESPONSE_TIME = 1.0
-"""Response time of simulated observers [s]."""
-_NUMERAL = "0123456789.-"
+_SIMULATED_RESPONSE_TIME = 1.0  # [s]
+_NUMERAL, _NUMBER = "0123456789.-", re.compile(r"-?(\d+\.?\d*|\.\d+)")
 _ALWAYS = ((PAUSE, "pause"), (STOP, "stop"))
 _TITLES = ("First", "Second", "Third")
 
@@ -58,18 +58,23 @@ class StudySession:
             SessionStopped: if the participant stops.
             DeviceFault: for a fault; the trial under way is presented again by a later session.
         """
-        settings, count = self._settings, 0
-        self._rest("Welcome", settings["instructions"])
+        try:
+            self._rest("Welcome", self._settings["instructions"])
+            self._present_trials(self._settings["break_every"])
+        finally:
+            self._player.stop()
+        self._screen.show(View("The end", self._settings["thanks"], is_last=True))
+
+    def _present_trials(self, break_every: int) -> None:
+        count = 0
         while (presentation := self._participant.method.next()) is not None:
-            if count and settings["break_every"] and count % settings["break_every"] == 0:
+            if count and break_every and count % break_every == 0:
                 self._rest("A break", "Rest your hand as long as you like.")
             try:
                 self._present_trial(presentation)
                 count += 1
             except _Paused:
                 self._rest("Pause", "The trial is presented again when you go on.")
-        self._player.stop()
-        self._screen.show(View("The end", settings["thanks"], is_last=True))
 
     def _rest(self, title: str, text: str) -> None:
         """Show a text without force until the participant goes on; then start the loop."""
@@ -148,7 +153,7 @@ class StudySession:
             key = self._press(view, _NUMERAL)
             if key != GO_ON:
                 note, typed = "", typed[:-1] if key == BACK else typed + key
-            elif low <= to_number(typed) <= high:
+            elif _NUMBER.fullmatch(typed) and low <= float(typed) <= high:
                 return typed
             else:
                 note = "This is not such a number. "
@@ -156,7 +161,7 @@ class StudySession:
     def _adjust(self, presentation: Presentation, key: str) -> str:
         """Return the value of a key that the participant chooses."""
         values, limits = presentation.intervals[0], presentation.range or (1.0, 1.0)
-        levels = adjustment_levels(*limits)
+        levels = np.geomspace(*limits, ADJUSTMENT_STEPS + 1).tolist()
         at = min(range(len(levels)), key=lambda i: abs(levels[i] - values[key]))
         view = View(presentation.question, keys=((UP, "more"), (DOWN, "less"), (GO_ON, "done")))
         while True:
@@ -165,31 +170,6 @@ class StudySession:
             if pressed == GO_ON:
                 return repr(levels[at])
             at = min(max(at + (1 if pressed == UP else -1), 0), len(levels) - 1)
-
-
-def to_number(text: str) -> float:
-    """Return a typed number; NaN for another text.
-
-    Example:
-        >>> to_number("1.5"), to_number("1.-5")
-        (1.5, nan)
-    """
-    try:
-        return float(text)
-    except ValueError:
-        return math.nan
-
-
-def adjustment_levels(low: float, high: float) -> list[float]:
-    """Return the values that an adjustment can reach, by equal ratios.
-
-    Example:
-        >>> levels = adjustment_levels(100.0, 400.0)
-        >>> levels[0], round(levels[20]), levels[-1]
-        (100.0, 200, 400.0)
-    """
-    levels: list[float] = np.geomspace(low, high, ADJUSTMENT_STEPS + 1).tolist()
-    return levels
 
 
 def current_time() -> str:
@@ -209,4 +189,4 @@ def simulate_session(
     """
     while (presentation := participant.method.next()) is not None:
         rng = np.random.default_rng([seed, participant.number, participant.trial])
-        participant.record(answer(presentation, rng), SIMULATED_RESPONSE_TIME, current_time())
+        participant.record(answer(presentation, rng), _SIMULATED_RESPONSE_TIME, current_time())
