@@ -24,7 +24,7 @@ from typing import Any
 
 from asperity.core.errors import ParameterError
 from asperity.studies.live.player import LoopPlayer, Stimuli
-from asperity.studies.live.screens import GO_ON, View
+from asperity.studies.live.screens import GO_ON, Terminal, View
 from asperity.studies.live.trial_session import StudySession
 from asperity.studies.study_file import Study, load_study
 from asperity.studies.study_store import (
@@ -87,7 +87,7 @@ class _Player(LoopPlayer):
         """End nothing."""
 
 
-class _Screen:
+class _Screen(Terminal):
     """A participant who answers at once."""
 
     def __init__(self) -> None:

@@ -11,8 +11,10 @@ import pytest
 from tests.studies.study_texts import COMPARISON, make_study
 
 from asperity.core.errors import ParameterError
+from asperity.studies.live.player import Stimuli
 from asperity.studies.live.trial_session import simulate_session
 from asperity.studies.methods import Presentation
+from asperity.studies.observers import Observer, Strength
 from asperity.studies.study_file import Study
 from asperity.studies.study_store import (
     ANSWERS_FILE,
@@ -29,8 +31,17 @@ from asperity.studies.study_store import (
 )
 
 
-def choose(presentation: Presentation, rng: np.random.Generator) -> str:
-    return str(rng.choice(presentation.answers))
+class Chooser(Observer):
+    """An observer who answers at random without feeling anything."""
+
+    def answer(
+        self, presentation: Presentation, _strength: Strength, rng: np.random.Generator
+    ) -> str:
+        return str(rng.choice(presentation.answers))
+
+
+def answer_all(study: Study, person: Participant) -> None:
+    simulate_session(study, person, Stimuli(study), Chooser())
 
 
 @pytest.fixture
@@ -46,7 +57,7 @@ def folder(tmp_path: Path, study: Study) -> Path:
 
 def finish(folder: Path, study: Study, code: str) -> int:
     with Participant(folder, study, code) as person:
-        simulate_session(person, choose, study.design.seed)
+        answer_all(study, person)
         return person.trial - 1
 
 
@@ -69,7 +80,7 @@ def test_a_torn_line_is_dropped_and_its_trial_is_asked_again(folder: Path, study
     before = read_trials(folder)
     with Participant(folder, study, "P01", resume=True) as person:
         assert (person.trial, person.run) == (len(before) + 1, 2)
-        simulate_session(person, choose, study.design.seed)
+        answer_all(study, person)
     again, first = path.read_bytes().splitlines(), whole.splitlines()
     assert again[:-1] == first[:-1]
     # A session that goes on gives what one gives that was not stopped.
@@ -146,7 +157,7 @@ def test_participants_exist_once_and_sit_once(folder: Path, study: Study) -> Non
     with pytest.raises(ParameterError, match="P02 is unknown; known: P01"):
         Participant(folder, study, "P02", resume=True)
     with Participant(folder, study, "P01", resume=True) as person:
-        simulate_session(person, choose, 1)
+        answer_all(study, person)
         count = person.trial - 1
     with pytest.raises(ParameterError, match=f"P01 has answered all {count} trials"):
         Participant(folder, study, "P01", resume=True)

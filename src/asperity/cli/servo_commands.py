@@ -222,10 +222,6 @@ def show_live_state() -> Iterator[Any]:
         yield lambda loop: live.update(status_line(loop))
 
 
-no_browser_option = click.option(
-    "--no-browser", is_flag=True, help="Print the address without opening a browser."
-)
-"""Adds ``--no-browser``."""
 _LAB_ARGUMENTS = options.command_arguments("lab")
 
 
@@ -246,7 +242,6 @@ _LAB_ARGUMENTS = options.command_arguments("lab")
 @options.device_option("Device.  [default: the scene's, else touch-x; with --driver omega.3]")
 @loop_setup.driver_options
 @options.argument_options(_LAB_ARGUMENTS)
-@no_browser_option
 def lab_command(
     surface: str | None, port: int | None, driver: str, *, accept_risk: bool, no_browser: bool,
     **values: Any,

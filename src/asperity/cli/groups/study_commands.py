@@ -4,22 +4,17 @@ from __future__ import annotations
 
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from asperity.cli import loop_setup, options, output
 from asperity.cli.main import StrictGroup
-from asperity.cli.servo_commands import announce_page, no_browser_option
+from asperity.cli.servo_commands import announce_page
 from asperity.core.errors import ParameterError, escape_unprintable
 
-if TYPE_CHECKING:
-    from asperity.studies.live.player import LoopPlayer, Stimuli
-    from asperity.studies.study_file import Study
-    from asperity.studies.study_store import Participant
-
 _TEMPLATES = Path(__file__).parents[2] / "studies" / "templates"
-_PLAN = options.command_arguments("study_plan")
+_RUN, _PLAN = options.command_arguments("study_run"), options.command_arguments("study_plan")
 
 
 @click.group("study", cls=StrictGroup)
@@ -48,16 +43,13 @@ def init_command(kind: str, file: str, *, force: bool) -> None:
 @study_command.command("run", short_help="Run a session of a participant.")
 @click.argument("file")
 @click.option("--participant", metavar="CODE", required=True, help="Code, such as P01; no name.")
-@click.option("--resume", is_flag=True, help="Go on where a session of the participant stopped.")
 @click.option("-o", "--output", "folder", metavar="FOLDER", help="Folder.  [default: that of FILE]")
+@options.argument_options(_RUN)
 @loop_setup.driver_option
-@click.option("--terminal", is_flag=True, help="Ask in this terminal, without a page.")
-@click.option("--simulate", metavar="OBSERVER", help="Simulated observer in place of a person.")
-@no_browser_option
 @options.plugin_option
 def run_command(
-    file: str, participant: str, folder: str | None, driver: str, simulate: str | None, *,
-    resume: bool, **screen: bool,
+    file: str, participant: str, folder: str | None, driver: str, simulate: str | None,
+    **flags: bool | None,
 ) -> None:  # fmt: skip
     """Run a session of a participant, as the study FILE describes.
 
@@ -65,8 +57,10 @@ def run_command(
     stability limit. Each answer is on the disk before the next trial. The folder of all
     participants is named as the file, without .toml.
     """
+    from asperity.lab.launch import bind_socket
     from asperity.studies.live.player import LoopPlayer, Stimuli
-    from asperity.studies.live.trial_session import SessionStopped
+    from asperity.studies.live.screens import PageScreen, Terminal
+    from asperity.studies.live.trial_session import SessionStopped, StudySession, simulate_session
     from asperity.studies.observers import find_observer
     from asperity.studies.study_file import load_study
     from asperity.studies.study_store import Participant, check_participant, write_study
@@ -75,51 +69,26 @@ def run_command(
     if driver.startswith(loop_setup.REPLAY_PREFIX):
         raise ParameterError("driver", "must be a device that a participant holds", driver)
     study, path = load_study(file), Path(folder or Path(file).stem)
-    observer, is_real = simulate and find_observer(simulate), driver != loop_setup.SIMULATED
+    observer, is_real = find_observer(simulate or "typical"), driver != loop_setup.SIMULATED
     stimuli = Stimuli(study, is_real=is_real)
     with output.progress_bar("analyzing the stimuli") as update:
         first = stimuli.check_all(update)
-    device = loop_setup.make_driver(driver, first) if is_real else None
-    player = None if observer else LoopPlayer(stimuli, first, device)
+    player = LoopPlayer(stimuli, first, loop_setup.make_driver(driver, first) if is_real else None)
     write_study(path, study)
-    with Participant(path, study, participant, resume=resume) as person:
+    with Participant(path, study, participant, resume=bool(flags["resume"])) as person:
         before = person.trial
-        with suppress(SessionStopped):
-            if player:
-                _run_session(study, person, player, **screen)
-            else:
-                _simulate(study, person, stimuli, observer)
+        if simulate:
+            simulate_session(study, person, stimuli, observer)
+        else:
+            noise = study.settings["masking_noise"]
+            page = None if flags["terminal"] else PageScreen(bind_socket(None), masking_noise=noise)
+            if page is not None:
+                announce_page("study", page.url, no_browser=bool(flags["no_browser"]))
+            with page or Terminal() as screen, suppress(SessionStopped):
+                StudySession(study, person, player, screen).run()
     words = "done" if person.method.next() is None else "stopped; --resume goes on"
     count, name = person.trial - before, escape_unprintable(path)
     click.echo(f"{participant}: {count} answers in {name}; {words}")
-
-
-def _simulate(study: Study, person: Participant, stimuli: Stimuli, observer: Any) -> None:
-    from asperity.studies.live.trial_session import simulate_session
-    from asperity.studies.methods import METHODS
-    from asperity.studies.observers import HandStrength
-
-    design = METHODS[study.design.kind].complete(study.design)
-    setup = stimuli.setup
-    strength = HandStrength(design, lambda one: (setup(one).surface, setup(one).device))
-    simulate_session(person, lambda trial, rng: observer.answer(trial, strength, rng), design.seed)
-
-
-def _run_session(
-    study: Study, person: Participant, player: LoopPlayer, *, terminal: bool, no_browser: bool
-) -> None:
-    from asperity.lab.launch import bind_socket
-    from asperity.studies.live.screens import PageScreen, open_terminal
-    from asperity.studies.live.trial_session import StudySession
-
-    if terminal:
-        with open_terminal() as screen:
-            StudySession(study, person, player, screen).run()
-        return
-    noise = study.settings["masking_noise"]
-    with PageScreen(bind_socket(None), masking_noise=noise) as page:
-        announce_page("study", page.url, no_browser=no_browser)
-        StudySession(study, person, player, page).run()
 
 
 @study_command.command("report", short_help="Write scores, tables and a page; unblinds.")

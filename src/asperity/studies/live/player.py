@@ -32,8 +32,7 @@ from asperity.servo.safety import excess_stiffness_reason
 from asperity.studies.study_file import Study
 from asperity.surface import Surface
 
-LEVEL_COUNT = 9
-"""Number of levels in the range of a level that are analysed before the first trial."""
+_LEVEL_COUNT = 9  # levels in the range of a level that are analysed before the first trial
 _REST_LAW = "W"  # the smooth wall
 _REST_DEPTH = 0.1  # [m]: its gain is the same at every depth, so that no press is too deep
 _STROKE_DURATION = 600.0  # [s], after which a simulated hand rests
@@ -42,7 +41,6 @@ _RELAXED = {"lateness": "60 s", "silence": "10 s", "beyond_depth": "warn"}
 # The interval is 0 while no stimulus is rendered; answer and response time are NaN until the end.
 _MARKS = (("trial", "1"), ("interval", "1"), ("answer", "1"), ("response time", "s"))
 _SHARE = [name for name, _ in COLUMNS].index("share")
-_FULL_SHARE = 1.0 - 1e-9
 
 
 class Stimuli:
@@ -74,7 +72,7 @@ class Stimuli:
         if key := design.options.get("level"):
             low, high = design.options["range"]
             named = {low, high, design.options.get("reference", low)}
-            inner = np.geomspace(min(named), max(named), LEVEL_COUNT).tolist()
+            inner = np.geomspace(min(named), max(named), _LEVEL_COUNT).tolist()
             levels = [{key: one} for one in sorted({*inner, *named})]
         stimuli = [{**condition, **one} for condition in design.conditions for one in levels]
         for count, values in enumerate(stimuli, start=1):
@@ -97,11 +95,10 @@ class Stimuli:
             stimulus = ", ".join(texts) or "the stimulus"
             try:
                 setup = self._make_setup(values)
-                reason = _excess_reason(setup.rendered, setup)
+                rendered = setup.rendered
             except AsperityError as error:
                 raise ParameterError("vary", f"{stimulus} cannot be rendered: {error}") from None
-            if reason:
-                raise ParameterError("vary", f"{stimulus} is refused: {reason}")
+            _check_limit(stimulus, rendered, setup)
             self._checked[key] = setup
         return self._checked[key]
 
@@ -126,13 +123,13 @@ def smooth_wall(setup: Setup) -> Surface:
         ParameterError: if it is above its limit.
     """
     wall = setup.surface.to_law(_REST_LAW).to_depth(_REST_DEPTH)
-    if reason := _excess_reason(wall, setup):
-        raise ParameterError("vary", f"the smooth wall between stimuli is refused: {reason}")
+    _check_limit("the smooth wall between stimuli", wall, setup)
     return wall
 
 
-def _excess_reason(surface: Surface, setup: Setup) -> str:
-    return excess_stiffness_reason(surface, setup.device, keeps_margin=True)
+def _check_limit(stimulus: str, surface: Surface, setup: Setup) -> None:
+    if reason := excess_stiffness_reason(surface, setup.device, keeps_margin=True):
+        raise ParameterError("vary", f"{stimulus} is refused: {reason}")
 
 
 class LoopPlayer:
@@ -145,14 +142,14 @@ class LoopPlayer:
     """
 
     _loop: ServoProcess
-    _writer: RecordingWriter | None
+    _writer: RecordingWriter
 
     def __init__(self, stimuli: Stimuli, first: Setup, driver: Driver | None = None) -> None:
         self._stimuli, self._setup, self._wall = stimuli, first, smooth_wall(first)
         self._driver = driver or simulated_driver(
             first.plant, first.hand, first.servo, first.motion, first.duration
         )
-        self._open, self._writer = ExitStack(), None
+        self._running, self._recording = ExitStack(), ExitStack()
         self._marks, self._interval, self._next_row = np.full(4, math.nan), 0, 0
         self._ramp_end = self._full_row = 0.0  # numbers of rows; infinite during a ramp
 
@@ -166,19 +163,19 @@ class LoopPlayer:
         servo, safety = self._setup.servo, self._setup.safety
         reach = safety.reach_limit(self._setup.device)
         loop = ServoProcess(self._wall, self._driver, servo, safety, reach)
-        self._loop, self._next_row = self._open.enter_context(loop), 0
+        self._loop, self._next_row = self._running.enter_context(loop), 0
 
     def stop(self) -> None:
         """Release the force by a ramp, and end the loop; an open recording ends there."""
-        self._open.close()
-        if self._writer is not None:
-            self._writer.close()
+        self._running.close()
+        self._recording.close()
 
     def begin_trial(self, path: Path, trial: int, metadata: Mapping[str, Any]) -> None:
         """Begin the recording of a trial; it names no stimulus but by codes."""
         servo = {"period": self._setup.servo.period}
         about = {"made_by": "study", "device": self._setup.device.id, "servo": servo, **metadata}
-        self._writer = RecordingWriter(path, (*COLUMNS, *_MARKS), about, argument="output")
+        writer = RecordingWriter(path, (*COLUMNS, *_MARKS), about, argument="output")
+        self._writer = self._recording.enter_context(writer)
         self._marks[:] = trial, 0.0, math.nan, math.nan
 
     def render(self, values: Mapping[str, Any] | None, interval: int) -> None:
@@ -210,14 +207,11 @@ class LoopPlayer:
         """
         rows, first = self._loop.rows(self._next_row)
         self._next_row = first + len(rows)
-        if self._writer is not None and len(rows):
-            marks = np.broadcast_to(self._marks, (len(rows), len(self._marks)))
-            self._writer.append(np.hstack([rows, marks]))
+        self._writer.append(np.hstack([rows, np.tile(self._marks, (len(rows), 1))]))
         if self._loop.poll() is not EndReason.RUNNING:
             raise ParameterError("driver", "has ended: --resume goes on where it stopped")
-        is_full = len(rows) > 0 and rows[-1, _SHARE] >= _FULL_SHARE
-        if self._full_row == math.inf and is_full and self._next_row > self._ramp_end:
-            self._full_row, self._marks[1] = self._next_row, self._interval
+        if len(rows) and self._next_row > self._ramp_end and rows[-1, _SHARE] > 1.0 - 1e-9:
+            self._full_row, self._marks[1] = min(self._full_row, self._next_row), self._interval
         return max(0.0, (self._next_row - self._full_row) * self._setup.servo.period)
 
     def end_trial(self, answer: float, response_time: float) -> None:
@@ -227,6 +221,4 @@ class LoopPlayer:
         while self._next_row == first:
             time.sleep(self._setup.servo.period)
             self.elapsed()
-        if self._writer is not None:
-            self._writer.close()
-            self._writer = None
+        self._recording.close()

@@ -10,11 +10,11 @@ import socket
 import sys
 import textwrap
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import asdict, dataclass
+from functools import partial
 from queue import Empty, Queue
-from typing import Protocol, Self
+from typing import Self
 
 import click
 from websockets.exceptions import ConnectionClosed
@@ -26,7 +26,6 @@ from asperity.lab.access import MAX_MESSAGE_BYTES, AccessToken, respond
 GO_ON, PAUSE, STOP, BACK, UP, DOWN = "Enter", "p", "Escape", "Backspace", "ArrowUp", "ArrowDown"
 """Names of keys, as browsers call them."""
 PAGE_PACKAGE = "asperity.studies.live"
-"""Package of the page."""
 _PING = 2.0  # a page that does not answer for this time is gone [s]
 _WIDTH = 60
 _SEQUENCES = {
@@ -54,18 +53,26 @@ class View:
     is_last: bool = False
 
 
-class Screen(Protocol):
-    """A screen with a keyboard; a pedal is a keyboard with one key."""
-
-    def show(self, view: View) -> None:
-        """Show a view in place of the one before."""
-
-    def read_key(self, timeout: float) -> str | None:
-        """Return the next pressed key; ``None`` if there is none in a time [s]."""
-
-
 class Terminal:
-    """The terminal of the command; see :func:`open_terminal`."""
+    """The terminal of the command, whose keys arrive at once; use it in a ``with``.
+
+    Raises:
+        ParameterError: without a terminal.
+    """
+
+    def __enter__(self) -> Self:
+        import termios
+        import tty
+
+        if not sys.stdin.isatty():
+            raise ParameterError("terminal", "is needed: run the command in one")
+        before = termios.tcgetattr(sys.stdin)
+        self._restore = partial(termios.tcsetattr, sys.stdin, termios.TCSADRAIN, before)
+        tty.setcbreak(sys.stdin)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._restore()
 
     def show(self, view: View) -> None:
         """Print a view."""
@@ -87,26 +94,6 @@ class Terminal:
         if pressed == b"\x1b" and select.select([sys.stdin], [], [], 0.02)[0]:
             pressed += os.read(sys.stdin.fileno(), 2)  # the rest of an arrow key
         return _SEQUENCES.get(pressed, pressed.decode("ascii", "replace").lower())
-
-
-@contextmanager
-def open_terminal() -> Iterator[Terminal]:
-    """Yield the terminal, whose keys arrive at once.
-
-    Raises:
-        ParameterError: without a terminal.
-    """
-    import termios
-    import tty
-
-    if not sys.stdin.isatty():
-        raise ParameterError("terminal", "is needed: run the command in one")
-    before = termios.tcgetattr(sys.stdin)
-    tty.setcbreak(sys.stdin)
-    try:
-        yield Terminal()
-    finally:
-        termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
 
 
 class PageScreen:
@@ -145,11 +132,8 @@ class PageScreen:
         self._server.shutdown()
 
     def show(self, view: View) -> None:
-        """Show a view in place of the one before; earlier keys do not count, but pause and stop."""
+        """Show a view in place of the one before."""
         self._view = view
-        earlier = [self._keys.get_nowait() for _ in range(self._keys.qsize())]
-        for key in {PAUSE, STOP}.intersection(earlier):
-            self._keys.put(key)
         for page in tuple(self._pages):
             self._send_view(page)
 
@@ -174,3 +158,6 @@ class PageScreen:
         # The lock makes the newest view the last one that a page receives.
         with self._lock, suppress(ConnectionClosed):
             page.send(json.dumps({**asdict(self._view), "noise": self._masking_noise}))
+
+
+Screen = Terminal | PageScreen  # with a keyboard; a pedal is a keyboard with one key

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import time
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any
@@ -13,14 +13,14 @@ from typing import Any
 import numpy as np
 
 from asperity.scene.device_run import POLL_INTERVAL
-from asperity.studies.live.player import LoopPlayer
+from asperity.studies.live.player import LoopPlayer, Stimuli
 from asperity.studies.live.screens import BACK, DOWN, GO_ON, PAUSE, STOP, UP, Screen, View
-from asperity.studies.methods import Presentation
+from asperity.studies.methods import METHODS, Presentation
+from asperity.studies.observers import HandStrength, Observer
 from asperity.studies.study_file import Study
 from asperity.studies.study_store import Participant
 
-ADJUSTMENT_STEPS = 40
-"""Number of steps, of equal ratios, from the least to the greatest value of an adjustment."""
+ADJUSTMENT_STEPS = 40  # of equal ratios, from the least to the greatest value
 _SIMULATED_RESPONSE_TIME = 1.0  # [s]
 _NUMERAL, _NUMBER = "0123456789.-", re.compile(r"-?(\d+\.?\d*|\.\d+)")
 _ALWAYS = ((PAUSE, "pause"), (STOP, "stop"))
@@ -87,7 +87,7 @@ class StudySession:
         self._player.start()
 
     def _present_trial(self, presentation: Presentation) -> None:
-        participant, started = self._participant, current_time()
+        participant, started = self._participant, _current_time()
         codes = participant.codes(presentation)
         path = participant.path / f"trial-{participant.trial:04d}-{'-'.join(codes)}.mcap"
         about = {"participant": participant.code, "codes": codes, "started": started}
@@ -119,10 +119,8 @@ class StudySession:
     def _watch(self) -> str | None:
         """Wait for a short time for a key, which is returned, a pause or the stop."""
         key = self._screen.read_key(POLL_INTERVAL)
-        if key == STOP:
-            raise SessionStopped
-        if key == PAUSE:
-            raise _Paused
+        if key in {STOP, PAUSE}:
+            raise SessionStopped if key == STOP else _Paused
         self._player.elapsed()
         return key
 
@@ -172,21 +170,26 @@ class StudySession:
             at = min(max(at + (1 if pressed == UP else -1), 0), len(levels) - 1)
 
 
-def current_time() -> str:
-    """Return the time in UTC, ISO 8601."""
+def _current_time() -> str:
     return datetime.now(UTC).isoformat(timespec="milliseconds")
 
 
 def simulate_session(
-    participant: Participant, answer: Callable[[Presentation, np.random.Generator], str], seed: int
+    study: Study, participant: Participant, stimuli: Stimuli, observer: Observer
 ) -> None:
     """Record the answers of a simulated observer, without a loop.
 
+    A session that goes on gives the answers of one that was not stopped.
+
     Args:
+        study: the study.
         participant: whose answers are recorded.
-        answer: returns the answer to a presentation.
-        seed: of the observer; a session that goes on gives the answers of one that was not stopped.
+        stimuli: of the study, which are checked.
+        observer: the observer.
     """
+    design, setup = METHODS[study.design.kind].complete(study.design), stimuli.setup
+    strength = HandStrength(design, lambda one: (setup(one).surface, setup(one).device))
     while (presentation := participant.method.next()) is not None:
-        rng = np.random.default_rng([seed, participant.number, participant.trial])
-        participant.record(answer(presentation, rng), _SIMULATED_RESPONSE_TIME, current_time())
+        rng = np.random.default_rng([design.seed, participant.number, participant.trial])
+        answer = observer.answer(presentation, strength, rng)
+        participant.record(answer, _SIMULATED_RESPONSE_TIME, _current_time())
