@@ -23,8 +23,8 @@ from pathlib import Path
 from typing import Any
 
 from asperity.core.errors import ParameterError
-from asperity.studies.live.screens import GO_ON, View
-from asperity.studies.live.stimuli import Stimuli
+from asperity.studies.live.player import LoopPlayer, Stimuli
+from asperity.studies.live.screens import GO_ON, Terminal, View
 from asperity.studies.live.trial_session import StudySession
 from asperity.studies.study_file import Study, load_study
 from asperity.studies.study_store import (
@@ -56,7 +56,7 @@ id = "touch"
 _SECRETS = (b"surface", b"stiffness", b"law", *(str(one).encode() for one in STIFFNESSES))
 
 
-class _Player:
+class _Player(LoopPlayer):
     """A player that tells what it renders; a stimulus above its limit is refused as in a loop."""
 
     def __init__(self, stimuli: Stimuli, line: Connection) -> None:
@@ -73,7 +73,7 @@ class _Player:
         path.write_text(f"{dict(metadata)}")
         self._line.send(("asked", trial))
 
-    def render(self, values: Mapping[str, Any] | None, _interval: int, _wait: Any) -> None:
+    def render(self, values: Mapping[str, Any] | None, _interval: int) -> None:
         """Tell the stiffness, after the check."""
         if values is not None:
             surface = self._stimuli.setup(values).rendered
@@ -87,7 +87,7 @@ class _Player:
         """End nothing."""
 
 
-class _Screen:
+class _Screen(Terminal):
     """A participant who answers at once."""
 
     def __init__(self) -> None:

@@ -17,7 +17,7 @@ from tests.cli.conftest import Call
 from tests.studies.study_texts import COMPARISON
 
 import asperity as asp
-from asperity.studies.live.stimuli import Stimuli
+from asperity.studies.live.player import Stimuli
 from asperity.studies.methods import METHODS
 from asperity.studies.study_file import load_study
 from asperity.studies.study_store import ANSWERS_FILE, DERIVED_FILES, read_trials
@@ -120,7 +120,7 @@ def test_a_participant_and_a_study_exist_once(call: Call, file: str) -> None:
     assert (code, "P01 has answered all 3 trials" in err) == (2, True)
     Path("study.toml").write_text(COMPARISON.replace("rougher", "softer"))
     code, _, err = call("run", file, "--participant", "P02", *SIMULATED)
-    assert (code, "output holds another study or version (other [study])" in err) == (2, True)
+    assert (code, "output holds another study (other [study])" in err) == (2, True)
 
 
 def test_a_seeded_study_replays_bit_for_bit(call: Call, file: str) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from asperity.studies.live.player import LoopPlayer
 from asperity.studies.live.screens import GO_ON, View
 from asperity.studies.study_file import Study, load_study
 
@@ -49,7 +50,7 @@ def make_study(folder: Path, text: str = COMPARISON) -> Study:
     return load_study(path)
 
 
-class FakePlayer:
+class FakePlayer(LoopPlayer):
     """A player without a loop, which notes what is rendered."""
 
     def __init__(self) -> None:
@@ -65,9 +66,7 @@ class FakePlayer:
         self.calls.append(("begin", trial))
         self.metadata, self.path = dict(metadata), path
 
-    def render(
-        self, values: Mapping[str, Any] | None, interval: int, _wait: Callable[[], object]
-    ) -> None:
+    def render(self, values: Mapping[str, Any] | None, interval: int) -> None:
         self.calls.append(("render", values and dict(values), interval))
 
     def elapsed(self) -> float:

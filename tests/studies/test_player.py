@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
@@ -11,14 +12,17 @@ from tests.studies.study_texts import COMPARISON, make_study
 
 from asperity.core.errors import ParameterError
 from asperity.recording.recording import Recording, open_recording
-from asperity.studies.live.player import LoopPlayer
-from asperity.studies.live.stimuli import Stimuli
+from asperity.studies.live.player import LoopPlayer, Stimuli
 
 STIFFNESSES = (61.5, 97.5)
 
 
-def wait() -> None:
-    time.sleep(0.02)
+def render(player: LoopPlayer, stiffness: float | None, interval: int, seconds: float) -> None:
+    """Render a stimulus, or the wall, with all of its force for a time."""
+    player.render(stiffness and {"surface.stiffness": stiffness}, interval)
+    end = time.monotonic() + 60.0
+    while player.elapsed() < seconds:
+        assert time.monotonic() < end
 
 
 @pytest.fixture(scope="module")
@@ -27,14 +31,14 @@ def trial(tmp_path_factory: pytest.TempPathFactory) -> Recording:
     folder = tmp_path_factory.mktemp("player")
     stimuli = Stimuli(make_study(folder))
     path = folder / "trial.mcap"
-    with LoopPlayer(stimuli, stimuli.check_all(), None) as player:
+    player = LoopPlayer(stimuli, stimuli.check_all())
+    with ExitStack() as stack:
+        stack.callback(player.stop)
         player.start()
         player.begin_trial(path, 7, {"codes": ["ABCDEF", "GHIJKL"]})
         for number, stiffness in enumerate(STIFFNESSES, start=1):
-            player.render({"surface.stiffness": stiffness}, number, wait)
-            while player.elapsed() < 0.2:
-                pass
-        player.render(None, 0, wait)
+            render(player, stiffness, number, 0.2)
+        render(player, None, 0, 0.01)
         player.end_trial(2.0, 0.5)
     return open_recording(path)
 
@@ -60,15 +64,14 @@ def test_surfaces_change_by_ramps(trial: Recording) -> None:
 
 
 def test_the_force_is_that_of_the_stimulus(trial: Recording) -> None:
-    """Law C pushes up by the stiffness times the depth, here known to the steps of the encoder."""
-    depth = 0.1e-3 * np.sin(2.0 * np.pi * trial["x"] / 2e-3) - trial["z"]
-    rendered = []
-    for number in (1, 2):
-        rows = (trial["interval"] == number) & (depth > 20e-6)
-        assert np.count_nonzero(rows) > 20
-        rendered.append(trial["commanded z"][rows].sum() / depth[rows].sum())
-    assert rendered == pytest.approx(STIFFNESSES, rel=0.2)
-    assert rendered[1] / rendered[0] > 1.3
+    """Law C pushes up by the stiffness times the depth, at the position that the encoder reads."""
+    step = 55e-6
+    x, z = (step * np.round(trial[name] / step) for name in "xz")
+    depth = np.maximum(0.1e-3 * np.sin(2.0 * np.pi * x / 2e-3) - z, 0.0)
+    for number, stiffness in enumerate(STIFFNESSES, start=1):
+        rows = trial["interval"] == number
+        assert np.count_nonzero(depth[rows] > 20e-6) > 20
+        np.testing.assert_allclose(trial["commanded z"][rows], stiffness * depth[rows], atol=1e-9)
 
 
 def test_the_answer_is_the_last_event(trial: Recording) -> None:
@@ -86,12 +89,16 @@ def test_a_recording_reveals_no_stimulus(trial: Recording) -> None:
 
 def test_a_stimulus_above_its_limit_is_not_rendered(tmp_path: Path) -> None:
     stimuli = Stimuli(make_study(tmp_path, COMPARISON))
-    with LoopPlayer(stimuli, stimuli.check_all(), None) as player:
+    player = LoopPlayer(stimuli, stimuli.check_all())
+    with ExitStack() as stack:
+        stack.callback(player.stop)
         player.start()
+        player.begin_trial(tmp_path / "trial.mcap", 1, {})
         with pytest.raises(ParameterError, match="is refused"):
-            player.render({"surface.stiffness": 900.0}, 1, wait)
+            player.render({"surface.stiffness": 900.0}, 1)
         before = player.elapsed()
         while player.elapsed() < before + 0.05:  # the wall goes on
             pass
-    with pytest.raises(ParameterError, match="loop is stopped"):
-        player.elapsed()
+    recorded = open_recording(tmp_path / "trial.mcap")
+    assert recorded.is_complete
+    assert set(recorded["interval"]) == {0.0}

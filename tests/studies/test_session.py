@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 from tests.studies.study_texts import (
     COMPARISON,
@@ -17,7 +18,7 @@ from tests.studies.study_texts import (
 )
 
 from asperity.studies.live.screens import DOWN, GO_ON, PAUSE, STOP, UP, View
-from asperity.studies.live.trial_session import SessionStopped, StudySession, adjustment_levels
+from asperity.studies.live.trial_session import ADJUSTMENT_STEPS, SessionStopped, StudySession
 from asperity.studies.study_store import Participant, TrialRecord, read_trials, write_study
 
 
@@ -129,7 +130,7 @@ def test_an_adjustment_stays_within_its_range(tmp_path: Path) -> None:
     assert min(levels) >= 20.0
     assert max(levels) == 80.0
     start = trials[0].presentation.intervals[0]["surface.stiffness"]
-    steps = adjustment_levels(20.0, 80.0)
+    steps = np.geomspace(20.0, 80.0, ADJUSTMENT_STEPS + 1).tolist()
     at = min(range(len(steps)), key=lambda i: abs(steps[i] - start))
     wanted = at
     for key in (1, 1, -1):

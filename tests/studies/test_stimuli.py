@@ -9,17 +9,18 @@ from tests.studies.study_texts import COMPARISON, FACTORS, ONSET, SCENE, make_st
 
 import asperity as asp
 from asperity.core.errors import ParameterError
-from asperity.studies.live.player import LoopPlayer
-from asperity.studies.live.stimuli import Stimuli, excess_reason
+from asperity.servo.safety import excess_stiffness_reason
+from asperity.studies.live.player import Stimuli, smooth_wall
 
 
 def test_stimuli_within_their_limits_are_accepted(tmp_path: Path) -> None:
     stimuli = Stimuli(make_study(tmp_path))
-    assert stimuli.check_all() == {"surface.stiffness": 61.5}
+    assert stimuli.check_all().surface.stiffness == 61.5
     surface = stimuli.setup({"surface.stiffness": 97.5}).rendered
     assert (surface.stiffness, surface.law.letter) == (97.5, "C")
-    wall = stimuli.rest(stimuli.setup({}))
-    assert excess_reason(wall, stimuli.device) == ""
+    setup = stimuli.setup({})
+    wall = smooth_wall(setup)
+    assert excess_stiffness_reason(wall, setup.device, keeps_margin=True) == ""
     assert wall.max_depth >= 0.1  # no press on the wall between stimuli is a fault
 
 
@@ -32,7 +33,7 @@ def test_levels_that_differ_in_the_fifth_digit_are_different_stimuli(tmp_path: P
 
 def test_a_stimulus_above_its_limit_is_named_with_the_limit(tmp_path: Path) -> None:
     stimuli = Stimuli(make_study(tmp_path, COMPARISON.replace("97.5 N/m", "900 N/m")))
-    message = r"surface\.stiffness = 900 N/m is refused: 900 N/m is above the .* for law C"
+    message = r"surface\.stiffness = 900 N/m is refused: .* above the recommended .* for law C"
     with pytest.raises(ParameterError, match=message):
         stimuli.check_all()
     with pytest.raises(ParameterError, match="is refused"):
@@ -46,16 +47,15 @@ def test_a_law_is_refused_where_another_is_accepted(tmp_path: Path) -> None:
 
 
 def test_the_limit_is_what_compare_recommends(tmp_path: Path) -> None:
-    study = make_study(tmp_path)
-    device = Stimuli(study).device
-    surface = Stimuli(study).setup({}).surface
+    setup = Stimuli(make_study(tmp_path)).setup({})
+    device, surface = setup.device, setup.surface
     for row in asp.compare(surface.texture, device, "CDA", stiffness=100.0).rows:
         recommended = row.recommended_stiffness
         same = surface.to_law(row.law).to_stiffness(recommended)
-        assert excess_reason(same, device) == ""
-        assert "that asperity compare recommends" in excess_reason(
-            same.to_stiffness(1.001 * recommended), device
-        )
+        assert excess_stiffness_reason(same, device, keeps_margin=True) == ""
+        above = same.to_stiffness(1.001 * recommended)
+        words = f"is above the recommended limit of {recommended:.3g} N/m for law"
+        assert words in excess_stiffness_reason(above, device, keeps_margin=True)
 
 
 def test_the_worst_level_of_a_range_decides(tmp_path: Path) -> None:
@@ -77,9 +77,8 @@ def test_what_cannot_be_built_is_named(tmp_path: Path) -> None:
     ):
         Stimuli(make_study(tmp_path, text)).check_all()
     hand = COMPARISON + '[hand]\nkind = "moved"\n'
-    stimuli = Stimuli(make_study(tmp_path, hand))
-    with pytest.raises(ParameterError, match="hand must be a spring or a band"):
-        LoopPlayer(stimuli, stimuli.check_all(), None).start()
+    with pytest.raises(ParameterError, match=r"cannot be rendered: scene needs a section \[motion"):
+        Stimuli(make_study(tmp_path, hand)).check_all()
     assert SCENE in COMPARISON
 
 

@@ -42,7 +42,7 @@ def test_a_scene_beside_the_study_becomes_part_of_it(tmp_path: Path) -> None:
         ("[vary]", "[varies]", r"study.toml has an unknown section \[varies\]; .*vary"),
         ("question", "qestion", "study.qestion is unknown; .*question"),
         ('question = "Which one is rougher?"', "", "study.question is missing"),
-        ('"comparison"', '"comparisons"', "study.kind is unknown: 'comparisons'; .*comparison"),
+        ('"comparison"', '"comparisons"', "kind is unknown: 'comparisons'; .*comparison"),
         ("surface.stiffness", "surface.stifness", "no key of the scene: surface.stifness"),
         ("surface.stiffness", "device.update_rate", "device.update_rate cannot change while"),
         ('"61.5 N/m", ', '"83.5 N/m", ', "surface.stiffness names a value twice"),

@@ -16,7 +16,7 @@ from tests.studies.study_texts import COMPARISON
 
 from asperity.lab.access import page_files
 from asperity.recording.recording import open_recording
-from asperity.studies.live.page_screen import study_files
+from asperity.studies.live.screens import PAGE_PACKAGE
 from asperity.studies.study_store import ANSWERS_FILE, read_trials
 
 RUN = (sys.executable, "-m", "asperity", "study", "run", "--no-browser")
@@ -174,7 +174,7 @@ def relative_luminance(colour: str) -> float:
 
 
 def test_contrast_is_that_of_wcag_aa() -> None:
-    text = study_files()["study.css"][1].decode()
+    text = page_files(PAGE_PACKAGE)["study.css"][1].decode()
     themes = re.findall(r":root \{([^}]*)\}", text)
     assert len(themes) == 2
     for theme in themes:
@@ -185,6 +185,6 @@ def test_contrast_is_that_of_wcag_aa() -> None:
             assert (pair[1] + 0.05) / (pair[0] + 0.05) >= least, name
 
 
-def test_files_of_the_page_do_not_hide_those_of_the_lab() -> None:
-    assert study_files().keys() == {"study.html", "study.css", "study.js", "masking_noise.js"}
-    assert not study_files().keys() & page_files().keys()
+def test_the_page_is_served_alone() -> None:
+    scripts = {"study.css", "study.js", "masking_noise.js"}
+    assert page_files(PAGE_PACKAGE).keys() == {"", "index.html", *scripts}

@@ -12,7 +12,9 @@ from tests.studies.study_texts import COMPARISON, make_study
 
 from asperity.core.errors import ParameterError
 from asperity.studies.design import Presentation
+from asperity.studies.live.player import Stimuli
 from asperity.studies.live.trial_session import simulate_session
+from asperity.studies.observers import Observer, Strength
 from asperity.studies.study_file import Study
 from asperity.studies.study_store import (
     ANSWERS_FILE,
@@ -29,8 +31,17 @@ from asperity.studies.study_store import (
 )
 
 
-def choose(presentation: Presentation, rng: np.random.Generator) -> str:
-    return str(rng.choice(presentation.answers))
+class Chooser(Observer):
+    """An observer who answers at random without feeling anything."""
+
+    def answer(
+        self, presentation: Presentation, _strength: Strength, rng: np.random.Generator
+    ) -> str:
+        return str(rng.choice(presentation.answers))
+
+
+def answer_all(study: Study, person: Participant) -> None:
+    simulate_session(study, person, Stimuli(study), Chooser())
 
 
 @pytest.fixture
@@ -46,7 +57,8 @@ def folder(tmp_path: Path, study: Study) -> Path:
 
 def finish(folder: Path, study: Study, code: str) -> int:
     with Participant(folder, study, code) as person:
-        return simulate_session(person, choose, study.design.seed)
+        answer_all(study, person)
+        return person.trial - 1
 
 
 def test_trials_are_read_with_what_was_presented(folder: Path, study: Study) -> None:
@@ -68,7 +80,7 @@ def test_a_torn_line_is_dropped_and_its_trial_is_asked_again(folder: Path, study
     before = read_trials(folder)
     with Participant(folder, study, "P01", resume=True) as person:
         assert (person.trial, person.run) == (len(before) + 1, 2)
-        simulate_session(person, choose, study.design.seed)
+        answer_all(study, person)
     again, first = path.read_bytes().splitlines(), whole.splitlines()
     assert again[:-1] == first[:-1]
     # A session that goes on gives what one gives that was not stopped.
@@ -120,7 +132,7 @@ def test_codes_of_participants_differ(folder: Path, study: Study) -> None:
 
 def test_another_study_or_folder_is_refused(tmp_path: Path, folder: Path) -> None:
     other = make_study(tmp_path, COMPARISON.replace("rougher", "softer"))
-    with pytest.raises(ParameterError, match=r"holds another study or version \(other \[study\]\)"):
+    with pytest.raises(ParameterError, match=r"holds another study \(other \[study\]\)"):
         write_study(folder, other)
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "thesis.txt").write_text("mine")
@@ -136,7 +148,7 @@ def test_another_study_or_folder_is_refused(tmp_path: Path, folder: Path) -> Non
 
 def test_participants_exist_once_and_sit_once(folder: Path, study: Study) -> None:
     with Participant(folder, study, "P01"):
-        with pytest.raises(ParameterError, match="P01 is in another session now"):
+        with pytest.raises(ParameterError, match="P01 is in a session now"):
             Participant(folder, study, "P01", resume=True)
         with pytest.raises(ParameterError, match="P01 exists already: --resume goes on"):
             Participant(folder, study, "P01")
@@ -145,7 +157,8 @@ def test_participants_exist_once_and_sit_once(folder: Path, study: Study) -> Non
     with pytest.raises(ParameterError, match="P02 is unknown; known: P01"):
         Participant(folder, study, "P02", resume=True)
     with Participant(folder, study, "P01", resume=True) as person:
-        count = simulate_session(person, choose, 1)
+        answer_all(study, person)
+        count = person.trial - 1
     with pytest.raises(ParameterError, match=f"P01 has answered all {count} trials"):
         Participant(folder, study, "P01", resume=True)
 

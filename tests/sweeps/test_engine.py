@@ -143,7 +143,7 @@ def test_a_damaged_line_in_the_middle_is_computed_again(
 def test_folders_that_cannot_be_used(counting_plan: MakePlan, tmp_path: Path) -> None:
     plan, folder = counting_plan(RANGE), tmp_path / "run"
     store = open_store(plan, folder)
-    with pytest.raises(ParameterError, match="output is in use by another sweep"):
+    with pytest.raises(ParameterError, match="output is in use by another process"):
         open_store(plan, folder)
     store.release()
     with pytest.raises(ParameterError, match=r"holds another sweep \(other vary, cases\)"):

@@ -78,7 +78,7 @@ def load_setup(
         ParameterError: for a missing, unknown or invalid value.
     """
     from asperity.scene import load_scene
-    from asperity.scene.device_run import recommend_law_and_stiffness
+    from asperity.scene.device_run import recommend_law_and_stiffness, without_hand
     from asperity.scene.setup import make_setup
 
     if driver is None and not source.lower().endswith(".toml"):
@@ -101,8 +101,7 @@ def load_setup(
             ) as step:
                 surface, note = recommend_law_and_stiffness(scene.texture, device, surface, step)
     if driver not in (None, SIMULATED):
-        servo = {name: section for name, section in scene.loop.items() if name == "servo"}
-        scene = replace(scene, loop={**_NO_HAND, **servo})
+        scene = without_hand(scene)
     if laws or "law" in surface:
         check_parameters_apply(requested, laws or (find_law(surface["law"]),))
     setup = make_setup(
@@ -131,13 +130,6 @@ def _check_driver(name: str, device: Device) -> None:
         kind.create(argument, IDENTITY_FRAME).check_library()
 
 
-# A real hand on a real device is not simulated.
-_NO_HAND: dict[str, Any] = {
-    "hand": {"kind": "moved"},
-    "motion": {"kind": "still", "point": [0, 0, 0]},
-}
-
-
 def select_laws(laws: tuple[Law, ...] | None, law: Law | None) -> tuple[Law, ...]:
     """Return the laws of ``--laws``, else the one of ``--law``, else all."""
     return laws or (() if law is None else (law,)) or tuple(REGISTERED_LAWS.values())
@@ -147,18 +139,20 @@ SIMULATED = "simulated"
 REPLAY_PREFIX = "replay:"
 
 
+driver_option = click.option(
+    "--driver",
+    metavar="NAME",
+    default=SIMULATED,
+    help="'simulated', 'real' (the driver named in the device entry), haply, forcedimension,"
+    " openhaptics, ./device.so, or replay:run.mcap.  [default: simulated]",
+)
+"""Adds ``--driver``."""
+
+
 def driver_options(command: Command) -> Command:
     """Add ``--driver`` and ``--accept-risk``."""
-    command = click.option(
-        "--accept-risk", is_flag=True, help="Allow a stiffness above the stability limit."
-    )(command)
-    return click.option(
-        "--driver",
-        metavar="NAME",
-        default=SIMULATED,
-        help="'simulated', 'real' (the driver named in the device entry), haply, forcedimension,"
-        " openhaptics, ./device.so, or replay:run.mcap.  [default: simulated]",
-    )(command)
+    words = "Allow a stiffness above the stability limit."
+    return driver_option(click.option("--accept-risk", is_flag=True, help=words)(command))
 
 
 def driver_setup(
@@ -174,8 +168,7 @@ def driver_setup(
     setup = load_setup(source, values, duration, driver=name)
     if name == SIMULATED or name.startswith(REPLAY_PREFIX):
         return setup, setup.servo
-    servo = replace(setup.servo, delay=0, position_resolution=0.0, force_resolution=0.0)
-    return replace(setup, servo=servo), setup.servo
+    return setup.on_real_device(), setup.servo
 
 
 def make_driver(name: str, setup: Setup) -> Driver:

@@ -204,6 +204,27 @@ def check_outputs(*, force: bool, **paths: str | None) -> None:
         check_output(name, path, force=force)
 
 
+def write_template(name: str, path: str, text: str, command: str, *, force: bool) -> None:
+    """Write a TOML file with all settings, and print what to do with it.
+
+    Args:
+        name: name of the argument, for messages.
+        path: of the file.
+        text: its content.
+        command: the command to run next, with ``{}`` for the file.
+        force: whether an existing file is replaced.
+
+    Raises:
+        ParameterError: for a path that is no TOML file, or see :func:`check_output`.
+    """
+    if not path.lower().endswith(".toml"):
+        raise ParameterError(name, "must be a file that ends in .toml", path)
+    check_output(name, path, force=force)
+    write_output(name, path, text)
+    file = escape_unprintable(path)
+    click.echo(f"Written: {file}; now: {command.format(file)}")
+
+
 def write_output(name: str, path: str, text: str) -> None:
     """Write a text to standard output or to a file."""
     if path == STANDARD_OUTPUT:

@@ -242,7 +242,6 @@ _LAB_ARGUMENTS = options.command_arguments("lab")
 @options.device_option("Device.  [default: the scene's, else touch-x; with --driver omega.3]")
 @loop_setup.driver_options
 @options.argument_options(_LAB_ARGUMENTS)
-@click.option("--no-browser", is_flag=True, help="Print the address without opening a browser.")
 def lab_command(
     surface: str | None, port: int | None, driver: str, *, accept_risk: bool, no_browser: bool,
     **values: Any,
@@ -269,11 +268,7 @@ def lab_command(
     else:
         scene, handle = _device_scene(source, values, driver, accept_risk=accept_risk)
 
-    def open_page(address: str) -> None:
-        print_message(f"the lab is at {address}")
-        if not no_browser and not webbrowser.open(_write_redirect(address, _temporary_folder())):
-            print_message("no browser was found: open the address in a browser of this machine")
-
+    open_page = partial(announce_page, "lab", no_browser=no_browser)
     load = partial(load_plugin_files, plugin_files())
     options = LabOptions(load, process, playback, handle, accept_risk)
     asyncio.run(serve_lab(scene, bind_socket(port), open_page, options))
@@ -295,6 +290,13 @@ def _simulated_scene(source: str, values: dict[str, Any]) -> tuple[SceneState, P
         scene = load_scene(source, file_options)
         device = values["device"] or scene.device or load_device(DEFAULT_DEVICE)
         return make_scene_state(scene, source, own, settings.apply_to(device), file_options), None
+
+
+def announce_page(name: str, address: str, *, no_browser: bool) -> None:
+    """Print the address of a page, and open it in a browser."""
+    print_message(f"the {name} is at {address}")
+    if not no_browser and not webbrowser.open(_write_redirect(address, _temporary_folder())):
+        print_message("no browser was found: open the address in a browser of this machine")
 
 
 def _write_redirect(address: str, folder: Path) -> str:

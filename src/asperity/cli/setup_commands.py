@@ -12,8 +12,7 @@ from asperity.cli import output
 from asperity.cli.main import declare_command
 from asperity.cli.options import jobs_option
 from asperity.core import cache
-from asperity.core.errors import AsperityError, ParameterError, escape_unprintable
-from asperity.core.files import check_output
+from asperity.core.errors import AsperityError, escape_unprintable
 
 if TYPE_CHECKING:
     from asperity.laws import Law
@@ -30,13 +29,8 @@ def init_command(scene: str, *, force: bool) -> None:
     """
     from asperity.scene.scene_template import scene_template
 
-    path = Path(scene)
-    if path.suffix.lower() != ".toml":
-        raise ParameterError("scene", "must be a file that ends in .toml", scene)
-    check_output("scene", scene, force=force)
-    output.write_output("scene", scene, scene_template(path.name))
-    name = escape_unprintable(scene)
-    click.echo(f"Written: {name}; now: asperity simulate {name}")
+    text = scene_template(Path(scene).name)
+    output.write_template("scene", scene, text, "asperity simulate {}", force=force)
 
 
 _NAMESPACE_LABELS = {

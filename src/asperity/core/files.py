@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from enum import Enum
-from io import BufferedReader
+from io import BufferedReader, FileIO
 from pathlib import Path
 from typing import IO, Any, ClassVar, overload
 
@@ -165,6 +165,30 @@ def write_bytes(name: str, path: str | os.PathLike[str], content: bytes) -> None
     except OSError as error:
         requirement = f"cannot be written: {error.strerror}"
         raise ParameterError(name, requirement, os.fspath(path)) from None
+
+
+def append_bytes(name: str, stream: FileIO, content: bytes, *, durable: bool = False) -> None:
+    """Append a content to an unbuffered file, all of it or nothing.
+
+    Args:
+        name: name of the argument, for the error message.
+        stream: the file, opened in the mode "ab".
+        content: the content.
+        durable: wait until it is on the disk, so that it survives a loss of power.
+
+    Raises:
+        ParameterError: if it cannot be written; what was in the file before stays.
+    """
+    end, left = os.fstat(stream.fileno()).st_size, memoryview(content)
+    try:
+        while left:  # the disk may have room for a part
+            left = left[stream.write(left) :]
+        if durable:
+            os.fsync(stream.fileno())
+    except OSError as error:
+        stream.truncate(end)
+        words = f"cannot be written: {error.strerror}; what was recorded stays"
+        raise ParameterError(name, words, str(stream.name)) from None
 
 
 def json_text(value: Any) -> str:

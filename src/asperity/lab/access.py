@@ -103,10 +103,10 @@ _CONTENT_TYPES = {"html": "text/html", "js": "text/javascript", "css": "text/css
 
 
 @cache
-def page_files() -> dict[str, tuple[str, bytes]]:
-    """Return type and content of each file of the page, by name; "" is the page itself."""
+def page_files(package: str = "asperity.lab") -> dict[str, tuple[str, bytes]]:
+    """Return type and content of each file of a package's page, by name; "" is the page itself."""
     found = {}
-    for entry in files("asperity.lab").joinpath("page").iterdir():
+    for entry in files(package).joinpath("page").iterdir():
         kind = _CONTENT_TYPES.get(entry.name.rpartition(".")[2])
         if kind is not None:
             found[entry.name] = f"{kind}; charset=utf-8", entry.read_bytes()
@@ -114,7 +114,10 @@ def page_files() -> dict[str, tuple[str, bytes]]:
 
 
 async def respond(
-    access_token: AccessToken, request: Request, fetch_file: FetchFile
+    access_token: AccessToken,
+    request: Request,
+    fetch_file: FetchFile | None = None,
+    package: str = "asperity.lab",
 ) -> Response | None:
     """Return the response to a request; ``None`` to accept a live connection.
 
@@ -122,6 +125,7 @@ async def respond(
         access_token: authorizes the request.
         request: the request.
         fetch_file: returns type and content of a file that is not of the page, by name.
+        package: of the page.
     """
     name = access_token.authorize(request.path, request.headers.get_all("Host"))
     if name is None:
@@ -130,7 +134,9 @@ async def respond(
         if access_token.is_same_origin(request.headers.get_all("Origin")):
             return None
         return _text_response(HTTPStatus.FORBIDDEN, "The request comes from another page.")
-    found = page_files().get(name) or await fetch_file(name)
+    found = page_files(package).get(name)
+    if found is None and fetch_file is not None:
+        found = await fetch_file(name)
     if found is None:
         return _text_response(HTTPStatus.NOT_FOUND, "No such file.")
     return _response(HTTPStatus.OK, *found)

@@ -17,6 +17,7 @@ from asperity.core.units import format_quantity
 from asperity.devices import Device, DeviceLike, load_device
 from asperity.laws import REGISTERED_LAWS, find_law
 from asperity.scene.loops import SceneLike, as_scene, make_loop
+from asperity.scene.scene_file import Scene
 from asperity.scene.sections import surface_keywords
 from asperity.scene.setup import SIMULATED_DRIVER, Setup
 from asperity.servo.drivers.simulated import simulated_driver
@@ -76,6 +77,18 @@ def recommend_law_and_stiffness(
     chosen["stiffness"] = row.recommended_stiffness
     stiffness = format_quantity(row.recommended_stiffness, "N/m")
     return chosen, f"Law {row.law.letter} at {stiffness}, as asperity compare recommends"
+
+
+_NO_HAND: dict[str, Any] = {
+    "hand": {"kind": "moved"},
+    "motion": {"kind": "still", "point": [0, 0, 0]},
+}
+
+
+def without_hand(scene: Scene) -> Scene:
+    """Return a scene for a real device: its hand is not simulated."""
+    servo = {name: section for name, section in scene.loop.items() if name == "servo"}
+    return replace(scene, loop={**_NO_HAND, **servo})
 
 
 def check_stiffness_limit(setup: Setup, *, accept_risk: bool = False) -> None:

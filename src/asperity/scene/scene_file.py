@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import ChainMap
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -77,7 +77,7 @@ def load_scene(source: str, file_arguments: Mapping[str, Any] | None = None) -> 
     extra = dict(file_arguments or {})
     if catalogue.is_scene(source) and catalogue.parse_specification(source) is None:
         path = Path(source)
-        return build_scene(_read_sections(path), path.parent, path, extra)
+        return build_scene(read_sections(path), path.parent, path, extra)
     return Scene(catalogue.as_texture(source, extra))
 
 
@@ -101,20 +101,33 @@ def read_scene(source: str) -> tuple[dict[str, dict[str, Any]], Path]:
         return {"texture": {"kind": kind, **arguments}}, Path()
     path = Path(source)
     if catalogue.is_scene(source):
-        return _read_sections(path), path.parent
+        return read_sections(path), path.parent
     return {"texture": {"kind": "file", "path": path.name}}, path.parent
 
 
-def _read_sections(path: Path) -> dict[str, dict[str, Any]]:
-    content = read_toml("scene", path)
+def read_sections(
+    path: Path, argument: str = "scene", own: Sequence[str] = ()
+) -> dict[str, dict[str, Any]]:
+    """Return the sections of a scene file, or of a file with further sections.
+
+    Args:
+        path: of the file (TOML).
+        argument: name for messages.
+        own: names of the further sections.
+
+    Raises:
+        ParameterError: if it cannot be read, has an unknown section or something else than
+            sections, or names code.
+    """
+    content, known = read_toml(argument, path), (*own, *SECTIONS)
     _reject_code(content)
     for name in content:
-        if name not in SECTIONS:
-            hint = suggest_names(name, SECTIONS)
-            raise ParameterError("scene", f"{path.name} has an unknown section [{name}]; {hint}")
+        if name not in known:
+            hint = suggest_names(name, known)
+            raise ParameterError(argument, f"{path.name} has an unknown section [{name}]; {hint}")
     for name, section in content.items():
         if not isinstance(section, dict):
-            raise ParameterError("scene", f"{path.name}: [{name}] must be a section", section)
+            raise ParameterError(argument, f"{path.name}: [{name}] must be a section", section)
     return content
 
 

@@ -67,3 +67,43 @@ def find_scene_argument(key: str, arguments: Mapping[str, Argument]) -> Argument
         listed = ", ".join(mine) if mine else f"the keys of a scene, such as {names[:60]} ..."
         raise ParameterError("vary", f"names no key of the scene: {name}; {near}known: {listed}")
     return arguments[name]
+
+
+def find_varied_arguments(
+    sections: Mapping[str, Mapping[str, Any]], vary: Mapping[str, Iterable[str]], *others: str
+) -> dict[str, Argument]:
+    """Return the arguments of varied keys, by the keys as they are given.
+
+    Args:
+        sections: the scene.
+        vary: values by key; those of "texture.kind" decide which arguments exist.
+        others: further keys.
+
+    Raises:
+        ParameterError: for an unknown key, with the nearest ones, or one that is named twice.
+    """
+    kinds = {key.removesuffix(".kind"): values for key, values in vary.items()}
+    known = scene_arguments(sections, kinds)
+    found: dict[str, Argument] = {}
+    for key in (*vary, *others):
+        argument = find_scene_argument(key, known)
+        if argument in found.values():
+            raise ParameterError("vary", f"names a key twice: {argument.name}")
+        found[key] = argument
+    return found
+
+
+def with_values(
+    sections: Mapping[str, Mapping[str, Any]], values: Mapping[str, Any]
+) -> dict[str, dict[str, Any]]:
+    """Return the sections of a scene with other values of some keys.
+
+    Example:
+        >>> with_values({"texture": {"kind": "cloth"}}, {"surface.law": "A"})
+        {'texture': {'kind': 'cloth'}, 'surface': {'law': 'A'}}
+    """
+    changed = {name: dict(section) for name, section in sections.items()}
+    for key, value in values.items():
+        section, _, name = key.partition(".")
+        changed.setdefault(section, {})[name] = value
+    return changed

@@ -129,6 +129,11 @@ class Setup:
         """Return the same loop with another delay [samples]."""
         return replace(self, servo=replace(self.servo, delay=delay))
 
+    def on_real_device(self) -> Setup:
+        """Return the same loop without delay and steps: a real device has its own."""
+        servo = replace(self.servo, delay=0, position_resolution=0.0, force_resolution=0.0)
+        return replace(self, servo=servo)
+
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""
         surface = attributes_to_dict(self.surface, "stiffness", "max_depth")

@@ -128,12 +128,14 @@ DEFAULT_SAFETY = Safety()
 """Limits by default."""
 
 
-def excess_stiffness_reason(surface: Surface, device: Device) -> str:
+def excess_stiffness_reason(surface: Surface, device: Device, *, keeps_margin: bool = False) -> str:
     """Return why a surface at its stiffness may cycle on a device; empty within the limit.
 
     Args:
         surface: the surface, with law and stiffness.
         device: the device.
+        keeps_margin: whether the limit is the recommended stiffness, which is the stability limit
+            with its margin.
 
     Example:
         >>> from asperity.devices import load_device
@@ -143,12 +145,15 @@ def excess_stiffness_reason(surface: Surface, device: Device) -> str:
         '2000 N/m is above the limit of 364 N/m for '
     """
     q = characteristic_number(surface)
-    allowed = recommend_stiffness(surface, device, q, one_sided_number(surface)).stability_limit
+    recommended = recommend_stiffness(surface, device, q, one_sided_number(surface))
+    basis, allowed = recommended.stability_limit.basis, recommended.stability_limit.stiffness
+    allowed = recommended.stiffness if keeps_margin else allowed
     context = f"for law {surface.law.letter} on {device.id}"
-    if not allowed.stiffness:
+    if not allowed:
         return f"no stable stiffness is known {context}: asperity analyze says what is missing"
-    if surface.stiffness <= allowed.stiffness:
+    if surface.stiffness <= allowed:
         return ""
-    limit = format_quantity(allowed.stiffness, "N/m", digits=3)
+    limit = f"limit of {format_quantity(allowed, 'N/m', digits=3)}"
+    limit = f"recommended {limit}" if keeps_margin else limit
     given = format_quantity(surface.stiffness, "N/m")
-    return f"{given} is above the limit of {limit} {context} ({allowed.basis}; q = {q.value:.3g})"
+    return f"{given} is above the {limit} {context} ({basis}; q = {q.value:.3g})"

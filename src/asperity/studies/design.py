@@ -157,6 +157,7 @@ class TrialRecord:
         trial: number of the trial, from 1.
         response_time: from the question to the answer [s].
         started: start of the trial, ISO 8601.
+        codes: of the stimuli, in place of their values.
     """
 
     presentation: Presentation
@@ -166,6 +167,7 @@ class TrialRecord:
     trial: int = 1
     response_time: float = 0.0
     started: str = ""
+    codes: Sequence[str] = ()
 
     @property
     def is_correct(self) -> bool:

@@ -10,7 +10,7 @@ from asperity.studies import result_page  # noqa: F401  # registers the report o
 from asperity.studies.plan import StudyPlan, plan
 from asperity.studies.study_file import load_study
 from asperity.studies.study_result import StudyResult, analyse
-from asperity.studies.study_store import TABLE_FILES, read_study, read_trials, write_key
+from asperity.studies.study_store import find_derived_files, read_study, read_trials, write_key
 
 
 def study_report(folder: str | Path) -> StudyResult:
@@ -51,12 +51,10 @@ def write_report(folder: str | Path, result: StudyResult) -> list[str]:
     Raises:
         ParameterError: for a folder that cannot be written.
     """
-    written = [write_key(folder), Path(folder) / "report.html"]
-    result.to_html(written[-1])
-    for name, table in zip(TABLE_FILES, (result.trial_table, result), strict=True):
-        written.append(Path(folder) / f"{name}.csv")
-        table.to_csv(written[-1])
+    write_key(folder)
+    result.to_html(Path(folder) / "report.html")
+    for name, table in {"trials": result.trial_table, "table": result}.items():
+        table.to_csv(Path(folder) / f"{name}.csv")
         if importlib.util.find_spec("pyarrow") is not None:
-            written.append(Path(folder) / f"{name}.parquet")
-            table.to_parquet(written[-1])
-    return [path.name for path in written]
+            table.to_parquet(Path(folder) / f"{name}.parquet")
+    return find_derived_files(folder)

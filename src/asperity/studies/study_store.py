@@ -3,46 +3,41 @@
 A line is written and synchronized before the next trial. A process that is killed leaves whole
 lines, and at most one torn line at the end, which is removed when the participant goes on. What was
 presented is not recorded: it follows from the design, the number of the participant and the answers
-before, see :class:`~asperity.studies.methods.Method`.
+before, see :class:`~asperity.studies.design.Method`.
 """
 
 from __future__ import annotations
 
 import csv
-import hashlib
 import io
 import json
-import os
 import re
 import shutil
-from base64 import b32encode
-from collections.abc import Mapping, Sequence
-from datetime import UTC, datetime
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, Self
 
 from filelock import FileLock, Timeout
 
-from asperity.core.errors import ParameterError, escape_unprintable
-from asperity.core.files import json_text, open_input, to_plain_data, write_bytes
+from asperity.core.errors import ParameterError
+from asperity.core.files import append_bytes, text_digest, to_plain_data, write_bytes
 from asperity.core.version import __version__
 from asperity.recording.replay import file_digest
 from asperity.studies.design import Method, Presentation, TrialRecord
 from asperity.studies.methods import METHODS
 from asperity.studies.study_file import Study, build_study
+from asperity.sweeps.result_store import check_plan, folder_error
 
 STUDY_FILE, ANSWERS_FILE, KEY_FILE = "study.json", "answers.jsonl", "key.csv"
-TABLE_FILES = ("trials", "table")
 DERIVED_FILES = (
-    KEY_FILE,
-    "report.html",
-    *(f"{name}.{kind}" for name in TABLE_FILES for kind in ("csv", "parquet")),
-)
+    KEY_FILE, "report.html", "trials.csv", "table.csv", "trials.parquet", "table.parquet",
+)  # fmt: skip
 """Files that a report writes; they hold data of all participants."""
-_NUMBER_FILE, _LOCK_FILE = "participant.json", ".lock"
+_NUMBER_FILE, _LOCK_FILE = "number.txt", ".lock"
 SCHEMA = 1
 _CODE = re.compile(r"(?=.*\d)[A-Za-z0-9][A-Za-z0-9_-]{0,15}")
-_CODE_LENGTH = 6  # of a stimulus
+_CODE_LENGTH = 8  # of a stimulus
 
 
 def check_participant(code: str) -> str:
@@ -53,25 +48,15 @@ def check_participant(code: str) -> str:
     """
     if _CODE.fullmatch(code) is None:
         words = "must be a code of letters and digits, such as P01, and no name"
-        raise ParameterError("participant", words, escape_unprintable(code))
+        raise ParameterError("participant", words, code)
     return code
 
 
-def stimulus_code(seed: int, participant: str, values: Mapping[str, Any]) -> str:
-    """Return the code of a stimulus for a participant, which does not reveal its values.
-
-    Example:
-        >>> stimulus_code(1, "P01", {"surface.law": "A"})
-        'BVUDHY'
-    """
-    text = json.dumps([seed, participant, to_plain_data(values)], sort_keys=True)
-    return b32encode(hashlib.sha256(text.encode()).digest()).decode()[:_CODE_LENGTH]
-
-
 def stimulus_codes(study: Study, participant: str, presentation: Presentation) -> list[str]:
-    """Return the codes of the intervals of a trial."""
-    seed = study.design.seed
-    return [stimulus_code(seed, participant, values) for values in presentation.intervals]
+    """Return the codes of the intervals of a trial, which do not reveal their values."""
+    stimuli = ([study.design.seed, participant, one] for one in presentation.intervals)
+    texts = (json.dumps(to_plain_data(one), sort_keys=True) for one in stimuli)
+    return [text_digest(text)[:_CODE_LENGTH] for text in texts]
 
 
 def write_study(folder: Path, study: Study) -> None:
@@ -80,51 +65,16 @@ def write_study(folder: Path, study: Study) -> None:
     Raises:
         ParameterError: for a folder that holds something else, or that cannot be written.
     """
+    path = study.sections.get("texture", {}).get("path")
+    digest = file_digest(study.folder / path) if isinstance(path, str) else None
+    sections = {f"[{name}]": section for name, section in study.content.items()}
+    plan = {"schema": SCHEMA, "asperity": __version__, "file": digest, **sections}
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with FileLock(folder / _LOCK_FILE):
-            _check_or_write(folder, study)
-    except OSError as error:
-        words = f"must be a folder that can be written: {error.strerror}"
-        raise ParameterError("output", words, escape_unprintable(folder)) from None
-
-
-def _check_or_write(folder: Path, study: Study) -> None:
-    path, text = folder / STUDY_FILE, json_text(_describe(study))
-    if not path.exists():
-        if any(one.name != _LOCK_FILE for one in folder.iterdir()):
-            words = "is neither empty nor the folder of a study"
-            raise ParameterError("output", words, escape_unprintable(folder))
-        write_bytes("output", path, text.encode())
-        return
-    recorded, given = _read_json(path), json.loads(text)
-    differing = [name for name, value in given.items() if recorded.get(name) != value]
-    if differing:
-        words = f"holds another study or version (other {', '.join(differing)}): choose another"
-        raise ParameterError("output", words, escape_unprintable(folder))
-
-
-def _describe(study: Study) -> dict[str, Any]:
-    """Return plain data that identifies a study."""
-    path = study.sections.get("texture", {}).get("path")
-    digest = file_digest(study.folder / path) if isinstance(path, str) else None
-    return {
-        "schema": SCHEMA,
-        "asperity": __version__,
-        "file": digest,
-        **{f"[{name}]": section for name, section in study.content.items()},
-    }
-
-
-def _read_json(path: Path) -> dict[str, Any]:
-    try:
-        with open_input(path) as stream:
-            content = json.loads(stream.read())
-    except ValueError:
-        content = None
-    if not isinstance(content, dict):
-        raise ParameterError("folder", f"has a damaged file: {escape_unprintable(path)}")
-    return content
+            check_plan(folder / STUDY_FILE, plan, "study")
+    except (OSError, ValueError) as error:
+        raise folder_error(error, folder) from None
 
 
 def read_study(folder: str | Path) -> Study:
@@ -133,25 +83,31 @@ def read_study(folder: str | Path) -> Study:
     Raises:
         ParameterError: for a folder of something else, or of another version.
     """
-    path = Path(folder) / STUDY_FILE
-    if not path.is_file():
+    try:
+        content = dict(json.loads((Path(folder) / STUDY_FILE).read_bytes()))
+    except (OSError, ValueError):
         words = "is no folder of a study: asperity study run makes one"
-        raise ParameterError("folder", words, escape_unprintable(folder))
-    content = _read_json(path)
+        raise ParameterError("folder", words, str(folder)) from None
     if content.get("schema") != SCHEMA:
         words = f"is of another version: schema {content.get('schema')!r}, not {SCHEMA}"
-        raise ParameterError("folder", words, escape_unprintable(folder))
+        raise ParameterError("folder", words, str(folder))
     sections = {name[1:-1]: part for name, part in content.items() if name.startswith("[")}
     return build_study(sections, Path(folder))
 
 
 def list_participants(folder: str | Path) -> dict[str, int]:
     """Return the numbers of the participants by code, in the order of the numbers."""
-    found = {
-        path.parent.name: int(_read_json(path)["number"])
-        for path in Path(folder).glob(f"*/{_NUMBER_FILE}")
-    }
-    return dict(sorted(found.items(), key=lambda item: item[1]))
+    paths = Path(folder).glob(f"*/{_NUMBER_FILE}")
+    found = sorted((int(path.read_text("utf-8")), path.parent.name) for path in paths)
+    return {code: number for number, code in found}
+
+
+def _find_number(folder: str | Path, code: str) -> int:
+    known = list_participants(folder)
+    if check_participant(code) not in known:
+        words = f"{code} is unknown; known: {', '.join(known) or 'none'}"
+        raise ParameterError("participant", words)
+    return known[code]
 
 
 def read_trials(folder: str | Path) -> list[TrialRecord]:
@@ -163,56 +119,43 @@ def read_trials(folder: str | Path) -> list[TrialRecord]:
     Raises:
         ParameterError: for another folder, a damaged file, or answers of another version.
     """
-    study = read_study(folder)
-    records = []
-    for code, number in list_participants(folder).items():
-        lines, _ = _read_lines(Path(folder) / code / ANSWERS_FILE)
-        records += replay_answers(study, code, number, lines)[1]
-    return records
+    study, known = read_study(folder), list_participants(folder)
+    found = (_replay(Path(folder) / code, study, number)[1] for code, number in known.items())
+    return [record for records in found for record in records]
 
 
-def replay_answers(
-    study: Study, participant: str, number: int, lines: Sequence[Mapping[str, Any]]
-) -> tuple[Method, list[TrialRecord]]:
-    """Return the method after recorded answers, and the trials.
+def _replay(path: Path, study: Study, number: int) -> tuple[Method, list[TrialRecord]]:
+    """Return the method after the recorded answers of a participant, and the trials.
 
     Raises:
-        ParameterError: if the answers do not belong to these stimuli.
+        ParameterError: for a damaged file, or answers that do not belong to these stimuli.
     """
     method = METHODS[study.design.kind].make(study.design, number, study.design.seed)
-    records = []
-    for count, line in enumerate(lines, start=1):
-        shown = method.next()
-        if (
-            shown is None
-            or line["trial"] != count
-            or stimulus_codes(study, participant, shown) != line["codes"]
-        ):
-            words = f"trial {count} of {participant} was not made by this study and version"
+    records: list[TrialRecord] = []
+    lines = (path / ANSWERS_FILE).read_bytes().split(b"\n")
+    for count, line in enumerate(lines[:-1], start=1):  # the last one is empty or torn
+        shown: Any = method.next()
+        try:
+            record = TrialRecord(shown, participant=path.name, **json.loads(line))
+        except (ValueError, TypeError):
+            raise ParameterError("folder", f"has a damaged line {count} in {path}") from None
+        codes = shown and stimulus_codes(study, path.name, shown)
+        if (record.trial, record.codes) != (count, codes):
+            words = f"trial {count} of {path.name} was not made by this study and version"
             raise ParameterError("folder", words)
-        method.answer(line["answer"])
-        own = (line[name] for name in ("response_time", "started"))
-        records.append(TrialRecord(shown, line["answer"], participant, line["run"], count, *own))
+        method.answer(record.answer)
+        records.append(record)
     return method, records
 
 
-_KEYS = {"run", "trial", "codes", "answer", "response_time", "started"}
-
-
-def _read_lines(path: Path) -> tuple[list[dict[str, Any]], int]:
-    """Return the whole lines of a file, and where the last one ends."""
-    content = path.read_bytes() if path.exists() else b""
-    end = content.rfind(b"\n") + 1
-    lines = []
-    for count, line in enumerate(content[:end].splitlines(), start=1):
-        try:
-            data = json.loads(line)
-        except ValueError:
-            data = None
-        if not isinstance(data, dict) or set(data) != _KEYS:
-            raise ParameterError("folder", f"has a damaged line {count} in {path}")
-        lines.append(data)
-    return lines, end
+@contextmanager
+def _lock(path: Path) -> Iterator[None]:
+    """Lock the folder of a participant."""
+    try:
+        with FileLock(path / _LOCK_FILE, timeout=0):
+            yield
+    except Timeout:
+        raise ParameterError("participant", f"{path.name} is in a session now") from None
 
 
 class Participant:
@@ -239,41 +182,27 @@ class Participant:
 
     def __init__(self, folder: Path, study: Study, code: str, *, resume: bool = False) -> None:
         self.path, self.code, self._study = folder / check_participant(code), code, study
-        self._lock = FileLock(self.path / _LOCK_FILE, timeout=0)
-        self.number = self._enter(folder, resume=resume)
-        try:
-            lines, self._end = _read_lines(self.path / ANSWERS_FILE)
-            self.method, _ = replay_answers(study, code, self.number, lines)
-            if lines and self.method.next() is None:
-                raise ParameterError("participant", f"{code} has answered all {len(lines)} trials")
-            self._stream = (self.path / ANSWERS_FILE).open("ab", buffering=0)
-        except BaseException:
-            self._lock.release()
-            raise
-        self._stream.truncate(self._end)
-        self.trial = len(lines) + 1
-        self.run = 1 + max((line["run"] for line in lines), default=0)
-
-    def _enter(self, folder: Path, *, resume: bool) -> int:
-        """Return the number of a new or returning participant, whose folder is locked."""
-        with FileLock(folder / _LOCK_FILE):
-            known = list_participants(folder)
-            if resume != (self.code in known):
-                words = "exists already: --resume goes on where it stopped"
-                if resume:
-                    words = f"is unknown; known: {', '.join(known) or 'none'}"
-                raise ParameterError("participant", f"{self.code} {words}")
+        with FileLock(folder / _LOCK_FILE), ExitStack() as stack:
+            taken = list_participants(folder)
+            if code in taken and not resume:
+                words = f"{code} exists already: --resume goes on where it stopped"
+                raise ParameterError("participant", words)
+            free = min(set(range(len(taken) + 1)) - set(taken.values()))
+            self.number = _find_number(folder, code) if resume else free
             self.path.mkdir(exist_ok=True)
-            try:
-                self._lock.acquire()
-            except Timeout:
-                words = f"{self.code} is in another session now"
-                raise ParameterError("participant", words) from None
-            if not resume:
-                known[self.code] = min(set(range(len(known) + 1)) - set(known.values()))
-                text = json_text({"number": known[self.code]})
-                write_bytes("output", self.path / _NUMBER_FILE, text.encode())
-            return known[self.code]
+            stack.enter_context(_lock(self.path))
+            answers = self.path / ANSWERS_FILE
+            self._stream = stack.enter_context(answers.open("ab", buffering=0))
+            self._stream.truncate(answers.read_bytes().rfind(b"\n") + 1)  # without a torn line
+            write_bytes("output", self.path / _NUMBER_FILE, str(self.number).encode())
+            self.method, records = _replay(self.path, study, self.number)
+            if self.method.next() is None:
+                raise ParameterError(
+                    "participant", f"{code} has answered all {len(records)} trials"
+                )
+            self._release = stack.pop_all().close
+        self.trial = len(records) + 1
+        self.run = 1 + max((record.run for record in records), default=0)
 
     def codes(self, presentation: Presentation) -> list[str]:
         """Return the codes of the intervals of a trial."""
@@ -291,33 +220,15 @@ class Participant:
             "run": self.run, "trial": self.trial, "codes": self.codes(presentation),
             "answer": answer, "response_time": response_time, "started": started,
         }  # fmt: skip
-        self._append(json.dumps(line, allow_nan=False).encode() + b"\n")
+        append_bytes("output", self._stream, json.dumps(line).encode() + b"\n", durable=True)
         self.method.answer(answer)
         self.trial += 1
-
-    def _append(self, data: bytes) -> None:
-        try:
-            written = 0
-            while written < len(data):
-                written += self._stream.write(data[written:])
-            os.fsync(self._stream.fileno())
-        except OSError as error:
-            self._stream.truncate(self._end)
-            words = f"cannot be written: {error.strerror}; --resume goes on from here"
-            raise ParameterError("output", words, escape_unprintable(self.path)) from None
-        self._end += len(data)
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._stream.close()
-        self._lock.release()
-
-
-def current_time() -> str:
-    """Return the time in UTC, ISO 8601."""
-    return datetime.now(UTC).isoformat(timespec="milliseconds")
+        self._release()
 
 
 def write_key(folder: str | Path) -> Path:
@@ -329,20 +240,23 @@ def write_key(folder: str | Path) -> Path:
     Raises:
         ParameterError: as for :func:`read_trials`.
     """
-    study, seed = read_study(folder), read_study(folder).design.seed
     rows = {
-        (record.participant, stimulus_code(seed, record.participant, values)): values
+        (record.participant, code): values
         for record in read_trials(folder)
-        for values in record.presentation.intervals
+        for code, values in zip(record.codes, record.presentation.intervals, strict=True)
     }
-    text = io.StringIO()
+    path, text, names = Path(folder) / KEY_FILE, io.StringIO(), [*read_study(folder).arguments]
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["participant", "code", *study.arguments])
-    for (participant, code), values in sorted(rows.items()):
-        writer.writerow([participant, code, *(values.get(key, "") for key in study.arguments)])
-    path = Path(folder) / KEY_FILE
+    writer.writerow(["participant", "code", *names])
+    for key in sorted(rows):
+        writer.writerow([*key, *(rows[key].get(name) for name in names)])
     write_bytes("folder", path, text.getvalue().encode())
     return path
+
+
+def find_derived_files(folder: str | Path) -> list[str]:
+    """Return the names of the files in the folder of a study that a report has written."""
+    return [name for name in DERIVED_FILES if (Path(folder) / name).exists()]
 
 
 def remove_participant(folder: str | Path, code: str) -> list[str]:
@@ -358,17 +272,10 @@ def remove_participant(folder: str | Path, code: str) -> list[str]:
         ParameterError: for an unknown participant, or one in a session.
     """
     read_study(folder)
-    known = list_participants(folder)
-    if check_participant(code) not in known:
-        words = f"{code} is unknown; known: {', '.join(known) or 'none'}"
-        raise ParameterError("participant", words)
-    path = Path(folder) / code
-    try:
-        with FileLock(path / _LOCK_FILE, timeout=0):
-            derived = [one for one in DERIVED_FILES if (Path(folder) / one).exists()]
-            for name in derived:
-                (Path(folder) / name).unlink()
-            shutil.rmtree(path)
-    except Timeout:
-        raise ParameterError("participant", f"{code} is in a session now") from None
+    _find_number(folder, code)
+    with _lock(Path(folder) / code):
+        derived = find_derived_files(folder)
+        for name in derived:
+            (Path(folder) / name).unlink()
+        shutil.rmtree(Path(folder) / code)
     return [f"{code}/", *derived]

@@ -26,6 +26,7 @@ from asperity.core.files import to_plain_data
 from asperity.laws import REGISTERED_LAWS, find_laws
 from asperity.scene.loops import onset, scan
 from asperity.scene.scene_file import Scene, build_scene
+from asperity.scene.scene_keys import with_values
 from asperity.scene.sections import surface_keywords
 
 LAW_KEY = "surface.law"
@@ -135,18 +136,10 @@ class CaseTemplate:
     package: str
     prepare: bytes = b""
 
-    def case_sections(self, values: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-        """Return the sections of a case, whose values replace those of the scene."""
-        sections = {name: dict(section) for name, section in self.sections.items()}
-        for key, value in values.items():
-            section, _, name = key.partition(".")
-            sections.setdefault(section, {})[name] = value
-        return sections
-
     def case_text(self, values: Mapping[str, Any]) -> str:
         """Return the text of a case: its scene and what is computed, the same for the same case."""
         content = {"run": self.run, "laws": self.laws, "options": self.options}
-        content["scene"] = self.case_sections(values)
+        content["scene"] = with_values(self.sections, values)
         return json.dumps(content, sort_keys=True, ensure_ascii=False, default=str)
 
     def case_seed(self, values: Mapping[str, Any]) -> int:
@@ -208,7 +201,7 @@ def _compute_case(template: CaseTemplate, index: int, values: Mapping[str, Any])
     if LAW_KEY in values and run.takes_laws:
         laws = (values[LAW_KEY],)
     try:
-        scene = build_scene(template.case_sections(values), template.folder)
+        scene = build_scene(with_values(template.sections, values), template.folder)
         result = run.compute(scene, laws, template.options, seed)
         return Outcome(index, to_plain_data(result.table_rows()))
     except Exception as error:  # one case must not end the others

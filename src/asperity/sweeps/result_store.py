@@ -17,7 +17,7 @@ from typing import Any
 from filelock import FileLock, Timeout
 
 from asperity.core.errors import ParameterError, escape_unprintable
-from asperity.core.files import json_text, open_input, write_bytes
+from asperity.core.files import append_bytes, json_text, open_input, write_bytes
 from asperity.core.processes import defer_interrupt
 from asperity.sweeps.case_runs import Outcome
 
@@ -49,7 +49,7 @@ class ResultStore:
         try:
             folder.mkdir(parents=True, exist_ok=True)
             lock.acquire()
-            _check_plan(folder, plan)
+            check_plan(folder / PLAN_FILE, plan, "sweep")
             self._stream = (folder / CASES_FILE).open("ab", buffering=0)
             self._reader = (folder / CASES_FILE).open("rb")
             weakref.finalize(self, self._stream.close)
@@ -57,7 +57,7 @@ class ResultStore:
             self._end = self._find_cases()
         except (OSError, ValueError) as error:
             self.release()
-            raise _folder_error(error, folder) from None
+            raise folder_error(error, folder) from None
         self.n_done = n_cases - self._offsets.count(_MISSING)
 
     def _find_cases(self) -> int:
@@ -82,21 +82,11 @@ class ResultStore:
         """
         lines = [_case_line(one) for one in outcomes]
         with defer_interrupt():
-            self._append(b"".join(lines))
+            append_bytes("output", self._stream, b"".join(lines))
             for one, line in zip(outcomes, lines, strict=True):
                 self._offsets[one.index] = self._end
                 self._end += len(line)
             self.n_done += len(lines)
-
-    def _append(self, data: bytes) -> None:
-        try:
-            written = 0
-            while written < len(data):  # the disk may have room for a part
-                written += self._stream.write(data[written:])
-        except OSError as error:
-            self._stream.truncate(self._end)
-            words = f"cannot be written: {error.strerror}; the same command goes on from here"
-            raise ParameterError("output", words, str(self.path)) from None
 
     def outcomes(self) -> Iterator[Outcome]:
         """Yield the recorded outcomes in the order of their numbers."""
@@ -117,21 +107,32 @@ def _decode(value: Any) -> Any:
     return float(value) if value in ("inf", "-inf") else value
 
 
-def _folder_error(error: Exception, folder: Path) -> ParameterError:
+def folder_error(error: Exception, folder: Path) -> ParameterError:
+    """Return the error for a folder that cannot be used, in one line."""
     if isinstance(error, ParameterError):
         return error
-    words = "is in use by another sweep"
+    words = "is in use by another process"
     if not isinstance(error, Timeout):
         words = f"must be a folder that can be written: {getattr(error, 'strerror', error)}"
     return ParameterError("output", words, escape_unprintable(folder))
 
 
-def _check_plan(folder: Path, plan: Mapping[str, Any]) -> None:
-    """Check that a folder is empty or holds this sweep, and write the plan into an empty one."""
-    path, text = folder / PLAN_FILE, json_text(plan)
+def check_plan(path: Path, plan: Mapping[str, Any], kind: str) -> None:
+    """Check that a folder is empty or holds a plan, and write the plan into an empty one.
+
+    Args:
+        path: of the plan in its folder.
+        plan: plain data.
+        kind: of what is planned, for messages.
+
+    Raises:
+        ParameterError: for a folder that holds something else.
+        OSError: for one that cannot be used, as ``ValueError`` for a damaged plan.
+    """
+    folder, text = path.parent, json_text(plan)
     if not path.exists():
         if any(one.name != _LOCK_FILE for one in folder.iterdir()):
-            words = "is neither empty nor the folder of a sweep"
+            words = f"is neither empty nor the folder of a {kind}"
             raise ParameterError("output", words, str(folder))
         write_bytes("output", path, text.encode())
         return
@@ -139,5 +140,5 @@ def _check_plan(folder: Path, plan: Mapping[str, Any]) -> None:
         recorded, given = json.loads(stream.read()), json.loads(text)
     differing = [name for name, value in given.items() if recorded.get(name) != value]
     if differing:
-        words = f"holds another sweep (other {', '.join(differing)}): choose another folder"
+        words = f"holds another {kind} (other {', '.join(differing)}): choose another folder"
         raise ParameterError("output", words, str(folder))

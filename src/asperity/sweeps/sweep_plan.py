@@ -17,7 +17,7 @@ from asperity.devices import load_device
 from asperity.laws import find_law, find_laws
 from asperity.recording.replay import file_digest
 from asperity.scene.scene_file import DEVICE_ID, read_scene
-from asperity.scene.scene_keys import find_scene_argument, scene_arguments
+from asperity.scene.scene_keys import find_varied_arguments
 from asperity.sweeps import variations
 from asperity.sweeps.case_runs import LAW_KEY, CaseTemplate, find_run
 
@@ -133,17 +133,11 @@ def _parse_axes(
     sections: Mapping[str, Mapping[str, Any]], vary: Mapping[str, str], design: str
 ) -> tuple[dict[str, Argument], list[list[dict[str, Any]]]]:
     """Return the declarations of the varied keys, and the choices that are combined."""
-    kinds = {key.removesuffix(".kind"): text.split(",") for key, text in vary.items()}
-    known = scene_arguments(sections, kinds)
-    arguments: dict[str, Argument] = {}
+    found = find_varied_arguments(sections, {key: text.split(",") for key, text in vary.items()})
     ranges: dict[str, variations.Range] = {}
     axes: list[list[dict[str, Any]]] = []
     for key, text in vary.items():
-        argument = find_scene_argument(key, known)
-        name = argument.name
-        if name in arguments:
-            raise ParameterError("vary", f"names a key twice: {name}")
-        arguments[name] = argument
+        argument, name = found[key], found[key].name
         if design and variations.is_range(argument, text):
             ranges[name], _ = variations.parse_range(argument, text, in_design=True)
             continue
@@ -151,6 +145,7 @@ def _parse_axes(
         for value in values:
             _CHECKS.get(name, str)(value)  # an unknown law or device
         axes.append([{name: _absolute(value)} for value in values])
+    arguments = {argument.name: argument for argument in found.values()}
     return arguments, [variations.design_points(design, ranges), *axes] if design else axes
 
 

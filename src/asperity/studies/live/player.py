@@ -1,89 +1,157 @@
-"""Rendering of stimuli in one loop, which changes by ramps and is recorded trial by trial."""
+"""Stimuli of a study: analysed before they are felt, and rendered in one loop by ramps.
+
+A loop in its own process renders them, and is recorded trial by trial.
+"""
 
 from __future__ import annotations
 
 import math
 import time
 from collections.abc import Callable, Mapping
-from functools import partial
+from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, Protocol, Self
+from typing import Any
 
 import numpy as np
 
-from asperity.core.errors import ParameterError
+from asperity.clamps import BACKED
+from asperity.core.errors import AsperityError, ParameterError
 from asperity.loop.shared_trace import COLUMNS
 from asperity.recording.writer import RecordingWriter
-from asperity.scene.device_run import POLL_INTERVAL
+from asperity.scene.device_run import without_hand
+from asperity.scene.scene_file import build_scene
+from asperity.scene.scene_keys import with_values
+from asperity.scene.sections import to_scene_values
+from asperity.scene.setup import Setup, make_setup
 from asperity.servo.drivers.driver import Driver
-from asperity.servo.drivers.pointer import PointerHand, pointer_driver
+from asperity.servo.drivers.simulated import simulated_driver
 from asperity.servo.fault import EndReason
 from asperity.servo.process import ServoProcess
-from asperity.studies.live.stimuli import Stimuli
+from asperity.servo.safety import excess_stiffness_reason
+from asperity.studies.study_file import Study
 from asperity.surface import Surface
 
-TRIAL_COLUMNS = (
-    *COLUMNS,
-    ("trial", "1"),
-    ("interval", "1"),
-    ("answer", "1"),
-    ("response time", "s"),
-)
-"""Columns of a recorded trial. The interval is 0 while no stimulus is rendered; answer and response
-time are NaN until the answer is given."""
+_LEVEL_COUNT = 9  # levels in the range of a level that are analysed before the first trial
+_REST_LAW = "W"  # the smooth wall
+_REST_DEPTH = 0.1  # [m]: its gain is the same at every depth, so that no press is too deep
+_STROKE_DURATION = 600.0  # [s], after which a simulated hand rests
+# A simulated device is harmless: late samples and deep presses do not end its loop.
+_RELAXED = {"lateness": "60 s", "silence": "10 s", "beyond_depth": "warn"}
+# The interval is 0 while no stimulus is rendered; answer and response time are NaN until the end.
+_MARKS = (("trial", "1"), ("interval", "1"), ("answer", "1"), ("response time", "s"))
 _SHARE = [name for name, _ in COLUMNS].index("share")
-_START_HEIGHT = 2e-3  # of the simulated hand above the highest point [m]
-_FULL_SHARE = 1.0 - 1e-9
 
 
-Wait = Callable[[], object]
-"""Waits for a short time."""
+class Stimuli:
+    """The stimuli of a study on a device.
+
+    The limit of a stimulus is the stiffness that ``asperity compare`` recommends for its law,
+    surface and device: the stability limit with its margin.
+
+    Args:
+        study: the study.
+        is_real: whether a real device renders them, which has its own delay and resolution.
+    """
+
+    def __init__(self, study: Study, *, is_real: bool = False) -> None:
+        self._study, self._is_real = study, is_real
+        self._checked: dict[str, Setup] = {}
+
+    def check_all(self, progress: Callable[[float], None] = lambda _share: None) -> Setup:
+        """Check all stimuli, over the whole range of the level, and return the first one's loop.
+
+        Args:
+            progress: called with the fraction done.
+
+        Raises:
+            ParameterError: for the first stimulus that cannot be rendered or is above its limit.
+        """
+        design = self._study.design
+        levels: list[dict[str, float]] = [{}]
+        if key := design.options.get("level"):
+            low, high = design.options["range"]
+            named = {low, high, design.options.get("reference", low)}
+            inner = np.geomspace(min(named), max(named), _LEVEL_COUNT).tolist()
+            levels = [{key: one} for one in sorted({*inner, *named})]
+        stimuli = [{**condition, **one} for condition in design.conditions for one in levels]
+        for count, values in enumerate(stimuli, start=1):
+            self.setup(values)
+            progress(count / len(stimuli))
+        return self.setup(stimuli[0])
+
+    def setup(self, values: Mapping[str, Any]) -> Setup:
+        """Return the loop of a stimulus that is within its limit.
+
+        Args:
+            values: of the varied keys [SI].
+
+        Raises:
+            ParameterError: if it cannot be rendered, or is above its limit.
+        """
+        key, known = str(sorted(values.items())), self._study.arguments
+        if key not in self._checked:
+            texts = (f"{name} = {known[name].format_value(one)}" for name, one in values.items())
+            stimulus = ", ".join(texts) or "the stimulus"
+            try:
+                setup = self._make_setup(values)
+                rendered = setup.rendered
+            except AsperityError as error:
+                raise ParameterError("vary", f"{stimulus} cannot be rendered: {error}") from None
+            _check_limit(stimulus, rendered, setup)
+            self._checked[key] = setup
+        return self._checked[key]
+
+    def _make_setup(self, values: Mapping[str, Any]) -> Setup:
+        study = self._study
+        texts = to_scene_values(values, study.arguments.values())
+        scene = build_scene(with_values(study.sections, texts), study.folder)
+        if "law" not in scene.surface:
+            raise ParameterError("law", "is missing: in [surface] or in [vary]")
+        scene = replace(scene, surface={"clamp": BACKED.name, **scene.surface})
+        if self._is_real:
+            return make_setup(without_hand(scene)).on_real_device()
+        servo = {"servo": {**_RELAXED, **scene.loop.get("servo", {})}}
+        loop = replace(scene, loop={**scene.loop, **servo})
+        return make_setup(loop, duration=_STROKE_DURATION, use_defaults=True)
 
 
-class Player(Protocol):
-    """Renders stimuli."""
+def smooth_wall(setup: Setup) -> Surface:
+    """Return the smooth wall that is rendered between stimuli, as stiff as one of them.
 
-    def start(self) -> None:
-        """Start the loop with the smooth wall, by a ramp."""
+    Raises:
+        ParameterError: if it is above its limit.
+    """
+    wall = setup.surface.to_law(_REST_LAW).to_depth(_REST_DEPTH)
+    _check_limit("the smooth wall between stimuli", wall, setup)
+    return wall
 
-    def stop(self) -> None:
-        """Release the force by a ramp, and end the loop."""
 
-    def begin_trial(self, path: Path, trial: int, metadata: Mapping[str, Any]) -> None:
-        """Begin the recording of a trial."""
-
-    def render(self, values: Mapping[str, Any] | None, interval: int, wait: Wait) -> None:
-        """Render a stimulus, or the smooth wall for ``None``; return when its force is complete."""
-
-    def elapsed(self) -> float:
-        """Record new rows, and return the time of the current stimulus [s]."""
-
-    def end_trial(self, answer: float, response_time: float) -> None:
-        """Record the answer, and close the recording."""
+def _check_limit(stimulus: str, surface: Surface, setup: Setup) -> None:
+    if reason := excess_stiffness_reason(surface, setup.device, keeps_margin=True):
+        raise ParameterError("vary", f"{stimulus} is refused: {reason}")
 
 
 class LoopPlayer:
-    """A player of a loop in its own process; use it in a ``with``.
+    """Renders stimuli by a loop in its own process, which must be stopped.
 
     Args:
         stimuli: the stimuli, which are checked before they are rendered.
-        first: values of any stimulus; the wall between stimuli is as stiff as it.
+        first: loop of any stimulus; the wall between stimuli is as stiff as it.
         driver: of a real device; ``None`` for a simulated one with a hand that strokes the surface.
     """
 
-    def __init__(self, stimuli: Stimuli, first: Mapping[str, Any], driver: Driver | None) -> None:
-        self._stimuli, self._setup = stimuli, stimuli.setup(first)
-        self._wall, self._driver = stimuli.rest(self._setup), driver
-        self._loop: ServoProcess | None = None
-        self._hand: PointerHand | None = None
-        self._writer: RecordingWriter | None = None
-        self._marks, self._next_row, self._first_row = np.full(4, math.nan), 0, 0
+    _loop: ServoProcess
+    _writer: RecordingWriter
 
-    @property
-    def _running(self) -> ServoProcess:
-        if self._loop is None:
-            raise ParameterError("loop", "is stopped")
-        return self._loop
+    def __init__(self, stimuli: Stimuli, first: Setup, driver: Driver | None = None) -> None:
+        self._stimuli, self._setup, self._wall = stimuli, first, smooth_wall(first)
+        self._driver = driver or simulated_driver(
+            first.plant, first.hand, first.servo, first.motion, first.duration
+        )
+        self._running, self._recording = ExitStack(), ExitStack()
+        self._marks, self._interval, self._next_row = np.full(4, math.nan), 0, 0
+        self._ramp_end = self._full_row = 0.0  # numbers of rows; infinite during a ramp
 
     def start(self) -> None:
         """Start the loop with the smooth wall, by a ramp.
@@ -92,118 +160,65 @@ class LoopPlayer:
             ParameterError: for a device that cannot be opened.
             DeviceFault: for a fault.
         """
-        setup = self._setup
-        reach = setup.safety.reach_limit(setup.device)
-        driver = self._driver or self._simulated_driver()
-        loop = ServoProcess(self._wall, driver, setup.servo, setup.safety, reach)
-        loop.start()
-        self._loop, self._next_row = loop, 0
-        if self._hand is not None:
-            stroke = self._stimuli.stroke(setup)
-            self._hand.request_motion(
-                stroke.centre, stroke.half, angular_velocity=stroke.angular_velocity
-            )
-        self._wait_for_force(0, partial(time.sleep, POLL_INTERVAL))
-
-    def _simulated_driver(self) -> Driver:
-        setup = self._setup
-        stroke = self._stimuli.stroke(setup)
-        highest = float(setup.surface.texture.extremes[1])
-        self._close_hand()
-        self._hand = PointerHand((*stroke.centre[:2], highest + _START_HEIGHT))
-        return pointer_driver(setup.plant, setup.hand, setup.servo, self._hand)
-
-    def _close_hand(self) -> None:
-        hand, self._hand = self._hand, None
-        if hand is not None:
-            hand.close()
+        servo, safety = self._setup.servo, self._setup.safety
+        reach = safety.reach_limit(self._setup.device)
+        loop = ServoProcess(self._wall, self._driver, servo, safety, reach)
+        self._loop, self._next_row = self._running.enter_context(loop), 0
 
     def stop(self) -> None:
         """Release the force by a ramp, and end the loop; an open recording ends there."""
-        loop, self._loop = self._loop, None
-        if loop is not None:
-            loop.stop()
-        writer, self._writer = self._writer, None
-        if writer is not None:
-            writer.close()
-        self._close_hand()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.stop()
+        self._running.close()
+        self._recording.close()
 
     def begin_trial(self, path: Path, trial: int, metadata: Mapping[str, Any]) -> None:
         """Begin the recording of a trial; it names no stimulus but by codes."""
-        if self._writer is not None:
-            self._writer.close()
         servo = {"period": self._setup.servo.period}
         about = {"made_by": "study", "device": self._setup.device.id, "servo": servo, **metadata}
-        self._writer = RecordingWriter(path, TRIAL_COLUMNS, about, argument="output")
-        self._next_row = self._running.memory.row_count
-        self._marks = np.array([trial, 0.0, math.nan, math.nan])
+        writer = RecordingWriter(path, (*COLUMNS, *_MARKS), about, argument="output")
+        self._writer = self._recording.enter_context(writer)
+        self._marks[:] = trial, 0.0, math.nan, math.nan
 
-    def render(self, values: Mapping[str, Any] | None, interval: int, wait: Wait) -> None:
-        """Render a stimulus, or the smooth wall for ``None``; return when its force is complete.
+    def render(self, values: Mapping[str, Any] | None, interval: int) -> None:
+        """Begin to render a stimulus, or the smooth wall for ``None``, by ramps.
 
         Args:
             values: of the stimulus.
             interval: its number.
-            wait: called again and again during the ramps; whatever it raises ends the waiting.
 
         Raises:
             ParameterError: for a stimulus above its limit, which is not rendered.
             DeviceFault: for a fault.
         """
         surface = self._wall if values is None else self._stimuli.setup(values).rendered
-        self._record()
+        self.elapsed()
         self._marks[1] = 0.0
-        self._change(surface, wait)
-        self._record()
-        self._marks[1], self._first_row = interval, self._next_row
+        self._loop.change_surface(surface, accept_risk=True)  # its limit was checked
+        ramps = 2.0 * self._setup.safety.ramp / self._setup.servo.period
+        self._ramp_end, self._full_row = self._loop.memory.row_count + ramps, math.inf
+        self._interval = interval
 
-    def _change(self, surface: Surface, wait: Wait) -> None:
-        loop = self._running
-        loop.change_surface(surface, accept_risk=True)  # its limit was checked
-        self._wait_for_force(loop.memory.row_count, wait)
+    def elapsed(self) -> float:
+        """Record new rows, and return for how long all of the force is rendered [s].
 
-    def _wait_for_force(self, first: int, wait: Wait) -> None:
-        """Wait until the force has fallen, where it does, and risen to all of the law's."""
-        ramp = math.ceil(2.0 * self._setup.safety.ramp / self._setup.servo.period)
-        while True:
-            self._record()
-            rows, start = self._running.rows(self._running.memory.row_count - 1)
-            if len(rows) and start - first > ramp and rows[-1, _SHARE] >= _FULL_SHARE:
-                return
-            wait()
-
-    def _record(self) -> None:
-        """Write the new rows, and check that the loop runs.
+        It is 0 during the ramps: the force falls, and rises to all of the law's.
 
         Raises:
             DeviceFault: for a fault.
         """
-        rows, first = self._running.rows(self._next_row)
+        rows, first = self._loop.rows(self._next_row)
         self._next_row = first + len(rows)
-        if self._writer is not None and len(rows):
-            marks = np.broadcast_to(self._marks, (len(rows), len(self._marks)))
-            self._writer.append(np.hstack([rows, marks]))
-        if self._running.poll() is not EndReason.RUNNING:
+        self._writer.append(np.hstack([rows, np.tile(self._marks, (len(rows), 1))]))
+        if self._loop.poll() is not EndReason.RUNNING:
             raise ParameterError("driver", "has ended: --resume goes on where it stopped")
-
-    def elapsed(self) -> float:
-        """Record new rows, and return the time of the current stimulus in the loop [s]."""
-        self._record()
-        return (self._next_row - self._first_row) * self._setup.servo.period
+        if len(rows) and self._next_row > self._ramp_end and rows[-1, _SHARE] > 1.0 - 1e-9:
+            self._full_row, self._marks[1] = min(self._full_row, self._next_row), self._interval
+        return max(0.0, (self._next_row - self._full_row) * self._setup.servo.period)
 
     def end_trial(self, answer: float, response_time: float) -> None:
         """Record the answer with the newest rows, and close the recording."""
-        first = self._next_row
         self._marks[2:] = answer, response_time
+        first = self._next_row
         while self._next_row == first:
-            self._record()
             time.sleep(self._setup.servo.period)
-        if self._writer is not None:
-            self._writer.close()
-            self._writer = None
+            self.elapsed()
+        self._recording.close()

@@ -1,22 +1,32 @@
-"""What a participant sees and presses: in the terminal, or in a page (:mod:`.page_screen`)."""
+"""What a participant sees and presses: in the terminal, or in a page on this machine alone."""
 
 from __future__ import annotations
 
+import asyncio
+import json
 import os
 import select
+import socket
 import sys
 import textwrap
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import Protocol
+import threading
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from functools import partial
+from queue import Empty, Queue
+from typing import Self
 
 import click
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.server import ServerConnection, serve
 
 from asperity.core.errors import ParameterError
+from asperity.lab.access import MAX_MESSAGE_BYTES, AccessToken, respond
 
 GO_ON, PAUSE, STOP, BACK, UP, DOWN = "Enter", "p", "Escape", "Backspace", "ArrowUp", "ArrowDown"
 """Names of keys, as browsers call them."""
+PAGE_PACKAGE = "asperity.studies.live"
+_PING = 2.0  # a page that does not answer for this time is gone [s]
 _WIDTH = 60
 _SEQUENCES = {
     b"\n": GO_ON, b"\r": GO_ON, b" ": GO_ON, b"\x1b": STOP, b"\x7f": BACK, b"\x08": BACK,
@@ -32,37 +42,43 @@ class View:
         title: a line in large letters.
         text: further lines.
         keys: keys that have an effect, with what they do.
-        progress: share of the session that is done, or negative if it is not known.
         typed: digits of an answer.
+        is_last: whether the session ends with it.
     """
 
     title: str
     text: str = ""
     keys: tuple[tuple[str, str], ...] = ()
-    progress: float = -1.0
     typed: str = ""
-
-
-class Screen(Protocol):
-    """A screen with a keyboard; a pedal is a keyboard with one key."""
-
-    def show(self, view: View) -> None:
-        """Show a view in place of the one before."""
-
-    def read_key(self, timeout: float) -> str | None:
-        """Return the next pressed key; ``None`` if there is none in a time [s]."""
+    is_last: bool = False
 
 
 class Terminal:
-    """The terminal of the command; see :func:`open_terminal`."""
+    """The terminal of the command, whose keys arrive at once; use it in a ``with``.
+
+    Raises:
+        ParameterError: without a terminal.
+    """
+
+    def __enter__(self) -> Self:
+        import termios
+        import tty
+
+        if not sys.stdin.isatty():
+            raise ParameterError("terminal", "is needed: run the command in one")
+        before = termios.tcgetattr(sys.stdin)
+        self._restore = partial(termios.tcsetattr, sys.stdin, termios.TCSADRAIN, before)
+        tty.setcbreak(sys.stdin)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._restore()
 
     def show(self, view: View) -> None:
         """Print a view."""
-        lines = ["", view.title.upper(), *textwrap.wrap(view.text, _WIDTH)]
-        lines += [f"  [{key}] {label}" for key, label in view.keys]
-        if view.typed:
-            lines.append(f"  {view.typed}")
-        click.echo("\n".join(lines), err=True)
+        keys = (f"  [{key}] {label}" for key, label in view.keys)
+        lines = ("", view.title.upper(), *textwrap.wrap(view.text, _WIDTH), *keys, view.typed)
+        click.echo("\n".join(lines).rstrip(), err=True)
 
     def read_key(self, timeout: float) -> str | None:
         """Return the next pressed key.
@@ -75,25 +91,73 @@ class Terminal:
         pressed = os.read(sys.stdin.fileno(), 1)
         if not pressed:
             raise ParameterError("terminal", "is closed: --resume goes on where it stopped")
-        while pressed.startswith(b"\x1b") and select.select([sys.stdin], [], [], 0.02)[0]:
-            pressed += os.read(sys.stdin.fileno(), 1)
-            if pressed in _SEQUENCES and len(pressed) > 1:
-                break
+        if pressed == b"\x1b" and select.select([sys.stdin], [], [], 0.02)[0]:
+            pressed += os.read(sys.stdin.fileno(), 2)  # the rest of an arrow key
         return _SEQUENCES.get(pressed, pressed.decode("ascii", "replace").lower())
 
 
-@contextmanager
-def open_terminal() -> Iterator[Terminal]:
-    """Yield the terminal, whose keys arrive at once; standard input may also be a pipe."""
-    if not sys.stdin.isatty():
-        yield Terminal()
-        return
-    import termios
-    import tty
+class PageScreen:
+    """A screen in a page, served by threads; use it in a ``with``.
 
-    before = termios.tcgetattr(sys.stdin)
-    tty.setcbreak(sys.stdin)
-    try:
-        yield Terminal()
-    finally:
-        termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
+    If the last page is closed or does not answer, the session pauses.
+
+    Args:
+        listener: the bound socket, see :func:`asperity.lab.launch.bind_socket`.
+        masking_noise: whether the page plays noise.
+
+    Attributes:
+        url: address of the page.
+    """
+
+    def __init__(self, listener: socket.socket, *, masking_noise: bool = False) -> None:
+        token = AccessToken(listener.getsockname()[1])
+        self.url, self._masking_noise, self._lock = token.url, masking_noise, threading.Lock()
+        self._keys, self._pages = Queue[str](), set[ServerConnection]()
+        self._view = View("One moment", "The study is being prepared.")
+        self._server = serve(
+            self._serve_page, sock=listener, max_size=MAX_MESSAGE_BYTES, compression=None,
+            ping_interval=_PING, ping_timeout=_PING,
+            process_request=lambda _page, request: asyncio.run(
+                respond(token, request, package=PAGE_PACKAGE)
+            ),
+        )  # fmt: skip
+
+    def __enter__(self) -> Self:
+        threading.Thread(target=self._server.serve_forever, name="study page", daemon=True).start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for page in tuple(self._pages):
+            page.close()
+        self._server.shutdown()
+
+    def show(self, view: View) -> None:
+        """Show a view in place of the one before."""
+        self._view = view
+        for page in tuple(self._pages):
+            self._send_view(page)
+
+    def read_key(self, timeout: float) -> str | None:
+        """Return the next pressed key; ``None`` if there is none in a time [s]."""
+        with suppress(Empty):
+            return self._keys.get(timeout=timeout)
+        return None
+
+    def _serve_page(self, page: ServerConnection) -> None:
+        """Serve a page until it disconnects."""
+        self._pages.add(page)
+        self._send_view(page)
+        with suppress(ConnectionClosed):
+            for key in page:
+                self._keys.put(str(key))
+        self._pages.discard(page)
+        if not self._pages:
+            self._keys.put(PAUSE)
+
+    def _send_view(self, page: ServerConnection) -> None:
+        # The lock makes the newest view the last one that a page receives.
+        with self._lock, suppress(ConnectionClosed):
+            page.send(json.dumps({**asdict(self._view), "noise": self._masking_noise}))
+
+
+Screen = Terminal | PageScreen  # with a keyboard; a pedal is a keyboard with one key

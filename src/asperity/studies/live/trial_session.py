@@ -3,27 +3,29 @@
 from __future__ import annotations
 
 import math
+import re
 import time
-from collections.abc import Callable, Collection
+from collections.abc import Collection, Mapping
+from dataclasses import replace
+from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
 
 from asperity.scene.device_run import POLL_INTERVAL
 from asperity.studies.design import Presentation
-from asperity.studies.live.player import Player
+from asperity.studies.live.player import LoopPlayer, Stimuli
 from asperity.studies.live.screens import BACK, DOWN, GO_ON, PAUSE, STOP, UP, Screen, View
+from asperity.studies.methods import METHODS
+from asperity.studies.observers import HandStrength, Observer
 from asperity.studies.study_file import Study
-from asperity.studies.study_store import Participant, current_time
+from asperity.studies.study_store import Participant
 
-ADJUSTMENT_STEPS = 40
-"""Number of steps from the least to the greatest value of an adjustment."""
-SIMULATED_RESPONSE_TIME = 1.0
-"""Response time of simulated observers [s]."""
-_NUMERAL = "0123456789.-"
-_MAX_DIGITS = 12
+ADJUSTMENT_STEPS = 40  # of equal ratios, from the least to the greatest value
+_SIMULATED_RESPONSE_TIME = 1.0  # [s]
+_NUMERAL, _NUMBER = "0123456789.-", re.compile(r"-?(\d+\.?\d*|\.\d+)")
 _ALWAYS = ((PAUSE, "pause"), (STOP, "stop"))
-_READY = ((GO_ON, "go on (or the space bar)"), *_ALWAYS)
+_TITLES = ("First", "Second", "Third")
 
 
 class SessionStopped(Exception):  # noqa: N818 - it is no error
@@ -45,38 +47,40 @@ class StudySession:
     """
 
     def __init__(
-        self, study: Study, participant: Participant, player: Player, screen: Screen
+        self, study: Study, participant: Participant, player: LoopPlayer, screen: Screen
     ) -> None:
-        self._study, self._participant, self._player, self._screen = (
-            study, participant, player, screen,
-        )  # fmt: skip
+        self._settings, self._participant = study.settings, participant
+        self._player, self._screen = player, screen
 
-    def run(self) -> int:
-        """Present trials until the method ends, and return the number of new answers.
+    def run(self) -> None:
+        """Present trials until the method ends.
 
         Raises:
             SessionStopped: if the participant stops.
             DeviceFault: for a fault; the trial under way is presented again by a later session.
         """
-        settings, count = self._study.settings, 0
-        self._wait_until_ready("Welcome", settings["instructions"])
+        try:
+            self._rest("Welcome", self._settings["instructions"])
+            self._present_trials(self._settings["break_every"])
+        finally:
+            self._player.stop()
+        self._screen.show(View("The end", self._settings["thanks"], is_last=True))
+
+    def _present_trials(self, break_every: int) -> None:
+        count = 0
         while (presentation := self._participant.method.next()) is not None:
-            if count and settings["break_every"] and count % settings["break_every"] == 0:
-                self._wait_until_ready("A break", "Rest your hand as long as you like.")
+            if count and break_every and count % break_every == 0:
+                self._rest("A break", "Rest your hand as long as you like.")
             try:
                 self._present_trial(presentation)
+                count += 1
             except _Paused:
-                self._wait_until_ready("Pause", "The trial is presented again when you go on.")
-                continue
-            count += 1
-        self._player.stop()
-        self._screen.show(View("The end", settings["thanks"], progress=1.0))
-        return count
+                self._rest("Pause", "The trial is presented again when you go on.")
 
-    def _wait_until_ready(self, title: str, text: str) -> None:
+    def _rest(self, title: str, text: str) -> None:
         """Show a text without force until the participant goes on; then start the loop."""
         self._player.stop()
-        self._screen.show(View(title, text, ((GO_ON, _READY[0][1]), _ALWAYS[1])))
+        self._screen.show(View(title, text, ((GO_ON, "go on (or the space bar)"), _ALWAYS[1])))
         while (key := self._screen.read_key(POLL_INTERVAL)) != GO_ON:
             if key == STOP:
                 raise SessionStopped
@@ -84,135 +88,109 @@ class StudySession:
         self._player.start()
 
     def _present_trial(self, presentation: Presentation) -> None:
-        participant, started = self._participant, current_time()
+        participant, started = self._participant, _current_time()
         codes = participant.codes(presentation)
         path = participant.path / f"trial-{participant.trial:04d}-{'-'.join(codes)}.mcap"
         about = {"participant": participant.code, "codes": codes, "started": started}
         self._player.begin_trial(path, participant.trial, about)
-        if presentation.adjusts is not None:
-            answer, seconds = self._adjust(presentation)
-        else:
-            for number, values in enumerate(presentation.intervals, start=1):
-                self._present_interval(number, len(presentation.intervals), values)
-            self._player.render(None, 0, self._watch)
-            answer, seconds = self._ask(presentation)
+        if not presentation.adjusts:
+            self._present_intervals(presentation)
+        begin = time.monotonic()
+        answer = self._ask(presentation)
+        seconds = time.monotonic() - begin
         self._player.end_trial(float(answer), seconds)
         participant.record(answer, seconds, started)
 
-    def _present_interval(self, number: int, total: int, values: Any) -> None:
-        self._player.render(values, number, self._watch)
-        title = (
-            "Feel this one" if total == 1 else ("First", "Second", "Third", "Fourth")[number - 1]
-        )
-        self._screen.show(View(title, "Move the handle over the surface.", _ALWAYS))
-        self._watch()
-        while self._player.elapsed() < self._study.settings["interval"]:
+    def _present_intervals(self, presentation: Presentation) -> None:
+        for number, values in enumerate(presentation.intervals, start=1):
+            title = _TITLES[number - 1] if len(presentation.intervals) > 1 else "Feel this one"
+            self._render(values, number)
+            self._screen.show(View(title, "Move the handle over the surface.", _ALWAYS))
+            self._watch()
+            while self._player.elapsed() < self._settings["interval"]:
+                self._watch()
+        self._render(None, 0)
+
+    def _render(self, values: Mapping[str, Any] | None, interval: int) -> None:
+        """Render a stimulus, and wait for all of its force."""
+        self._player.render(values, interval)
+        while not self._player.elapsed():
             self._watch()
 
-    def _watch(self) -> None:
-        """Wait for a short time for a pause or the stop."""
-        self._read_key(())
-
-    def _read_key(self, keys: Collection[str]) -> str | None:
-        """Return a pressed key that is one of some; ``None`` if there is none yet."""
+    def _watch(self) -> str | None:
+        """Wait for a short time for a key, which is returned, a pause or the stop."""
         key = self._screen.read_key(POLL_INTERVAL)
-        if key == STOP:
-            raise SessionStopped
-        if key == PAUSE:
-            raise _Paused
+        if key in {STOP, PAUSE}:
+            raise SessionStopped if key == STOP else _Paused
         self._player.elapsed()
-        return key if key in keys else None
+        return key
 
-    def _ask(self, presentation: Presentation) -> tuple[str, float]:
-        """Return the answer to the question of a trial, and the response time [s]."""
-        start = time.monotonic()
-        if not presentation.answers:
-            return self._ask_number(presentation), time.monotonic() - start
-        keys = tuple((one, f"answer {one}") for one in presentation.answers)
-        self._screen.show(View(presentation.question, "", (*keys, *_ALWAYS)))
-        while (answer := self._read_key(presentation.answers)) is None:
+    def _press(self, view: View, others: Collection[str] = ()) -> str:
+        """Show a view, and return the key of it, or of others, that is pressed."""
+        self._screen.show(replace(view, keys=(*view.keys, *_ALWAYS)))
+        keys = {*dict(view.keys), *others}
+        while (key := self._watch()) not in keys:
             pass
-        return answer, time.monotonic() - start
+        return str(key)
+
+    def _ask(self, presentation: Presentation) -> str:
+        """Return the answer to the question of a trial: a key, a number, or a value set by keys."""
+        if presentation.adjusts:
+            return self._adjust(presentation, presentation.adjusts)
+        if presentation.answers:
+            keys = tuple((one, f"answer {one}") for one in presentation.answers)
+            return self._press(View(presentation.question, keys=keys))
+        return self._ask_number(presentation)
 
     def _ask_number(self, presentation: Presentation) -> str:
         """Return a number in the range of a presentation, typed and confirmed."""
         low, high = presentation.range or (-math.inf, math.inf)
-        text = (
-            f"Type a number from {low:g} to {high:g}." if math.isfinite(high) else "Type a number."
-        )
-        keys, typed, note = ((GO_ON, "confirm"), (BACK, "delete"), *_ALWAYS), "", ""
+        text, typed, note = f"Type a number from {low:g} to {high:g}.", "", ""
+        keys = ((GO_ON, "confirm"), (BACK, "delete"))
         while True:
-            self._screen.show(View(presentation.question, note + text, keys, typed=typed or "_"))
-            while (key := self._read_key((*_NUMERAL, GO_ON, BACK))) is None:
-                pass
-            if key == GO_ON and is_number(typed) and low <= float(typed) <= high:
+            view = View(presentation.question, note + text, keys, typed=typed or "_")
+            key = self._press(view, _NUMERAL)
+            if key != GO_ON:
+                note, typed = "", typed[:-1] if key == BACK else typed + key
+            elif _NUMBER.fullmatch(typed) and low <= float(typed) <= high:
                 return typed
-            note = "This is not such a number. " if key == GO_ON else ""
-            typed = _edit(typed, key)
+            else:
+                note = "This is not such a number. "
 
-    def _adjust(self, presentation: Presentation) -> tuple[str, float]:
-        """Return the value that the participant chooses, and the time that it took [s]."""
-        start, key = time.monotonic(), str(presentation.adjusts)
-        values = dict(presentation.intervals[0])
-        levels = adjustment_levels(*(presentation.range or (values[key], values[key])))
+    def _adjust(self, presentation: Presentation, key: str) -> str:
+        """Return the value of a key that the participant chooses."""
+        values, limits = presentation.intervals[0], presentation.range or (1.0, 1.0)
+        levels = np.geomspace(*limits, ADJUSTMENT_STEPS + 1).tolist()
         at = min(range(len(levels)), key=lambda i: abs(levels[i] - values[key]))
-        keys = ((UP, "more"), (DOWN, "less"), (GO_ON, "done"), *_ALWAYS)
+        view = View(presentation.question, keys=((UP, "more"), (DOWN, "less"), (GO_ON, "done")))
         while True:
-            self._player.render({**values, key: levels[at]}, 1, self._watch)
-            self._screen.show(View(presentation.question, "", keys))
-            while (pressed := self._read_key((UP, DOWN, GO_ON))) is None:
-                pass
+            self._render({**values, key: levels[at]}, 1)
+            pressed = self._press(view)
             if pressed == GO_ON:
-                return repr(levels[at]), time.monotonic() - start
+                return repr(levels[at])
             at = min(max(at + (1 if pressed == UP else -1), 0), len(levels) - 1)
 
 
-def _edit(typed: str, key: str) -> str:
-    """Return a typed text after a key."""
-    if key == BACK:
-        return typed[:-1]
-    return (typed + key)[:_MAX_DIGITS] if key in _NUMERAL else typed
-
-
-def is_number(text: str) -> bool:
-    """Return whether a typed text is a number.
-
-    Example:
-        >>> is_number("1.5"), is_number("1.-5")
-        (True, False)
-    """
-    try:
-        return math.isfinite(float(text))
-    except ValueError:
-        return False
-
-
-def adjustment_levels(low: float, high: float) -> list[float]:
-    """Return the values that an adjustment can reach: equal ratios, or equal steps from zero.
-
-    Example:
-        >>> levels = adjustment_levels(100.0, 400.0)
-        >>> levels[0], round(levels[20]), levels[-1]
-        (100.0, 200, 400.0)
-    """
-    shares = [step / ADJUSTMENT_STEPS for step in range(ADJUSTMENT_STEPS + 1)]
-    inner = [low * (high / low) ** s if low > 0.0 else low + (high - low) * s for s in shares]
-    return [low, *inner[1:-1], high]
+def _current_time() -> str:
+    return datetime.now(UTC).isoformat(timespec="milliseconds")
 
 
 def simulate_session(
-    participant: Participant, answer: Callable[[Presentation, np.random.Generator], str], seed: int
-) -> int:
-    """Record the answers of a simulated observer, without a loop; return their number.
+    study: Study, participant: Participant, stimuli: Stimuli, observer: Observer
+) -> None:
+    """Record the answers of a simulated observer, without a loop.
+
+    A session that goes on gives the answers of one that was not stopped.
 
     Args:
+        study: the study.
         participant: whose answers are recorded.
-        answer: returns the answer to a presentation.
-        seed: of the observer; a session that goes on gives the answers of one that was not stopped.
+        stimuli: of the study, which are checked.
+        observer: the observer.
     """
-    count = 0
+    design, setup = METHODS[study.design.kind].complete(study.design), stimuli.setup
+    strength = HandStrength(design, lambda one: (setup(one).surface, setup(one).device))
     while (presentation := participant.method.next()) is not None:
-        rng = np.random.default_rng([seed, participant.number, participant.trial])
-        participant.record(answer(presentation, rng), SIMULATED_RESPONSE_TIME, current_time())
-        count += 1
-    return count
+        rng = np.random.default_rng([design.seed, participant.number, participant.trial])
+        answer = observer.answer(presentation, strength, rng)
+        participant.record(answer, _SIMULATED_RESPONSE_TIME, _current_time())

@@ -46,7 +46,7 @@ socket.addEventListener("message", ({ data }) => show(data));
 socket.addEventListener("close", () => {
   part("keys").hidden = true;
   part("typed").hidden = true;
-  if (!view || view.progress < 1) {
+  if (!view?.is_last) {
     part("title").textContent = "Stopped";
     part("text").textContent = "The force is released.";
     part("text").hidden = false;
