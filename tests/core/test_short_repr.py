@@ -60,7 +60,7 @@ EXAMPLES: dict[str, Callable[[], Any]] = {
     "Replay": lambda: asp.replay(asp.open_recording(record_run())),
     "Sinusoid": lambda: asp.Sinusoid(2e-4, 2e-3),
     "SplitState": lambda: asp.split_state(surface("H"), np.zeros((200, 3))),
-    "SweepResult": lambda: asp.sweep("cloth", {"texture.magnify": "1,2"}, "limits", processes=1),
+    "SweepResult": lambda: asp.sweep("knurl", {"surface.law": "A,C"}, "limits", processes=1),
     "Surface": lambda: asp.Surface(MANY, "F", max_depth=1e-5),
 }
 

@@ -2,34 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
-from importlib.metadata import PackageNotFoundError, distribution
-from pathlib import Path
 
 import pytest
+from tests.lab.axe import AXE, needs_axe
 from tests.lab.browser import Browser, needs_browser
 
-
-def find_axe() -> Path | None:
-    """Return axe.min.js of the environment variable AXE, or of an installed Python package."""
-    if named := os.environ.get("AXE"):
-        return Path(named)
-    for package in ("axe-playwright-python", "axe-core-python", "axe-selenium-python"):
-        try:
-            files = distribution(package).files or []
-        except PackageNotFoundError:
-            continue
-        for file in files:
-            if file.name == "axe.min.js":
-                return Path(str(file.locate()))
-    return None
-
-
-AXE = find_axe()
-needs_axe = pytest.mark.skipif(
-    AXE is None, reason="not run: no axe.min.js (AXE=its path, or axe-playwright-python)"
-)
 _RUN = (
     "axe.run(document, {resultTypes: ['violations']}).then(({violations, passes}) => ["
     "passes.length, violations.map(({id, nodes}) =>"
