@@ -17,7 +17,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 from filelock import FileLock, Timeout
 
@@ -111,11 +111,9 @@ def read_study(folder: str | Path) -> Study:
     try:
         content = dict(json.loads((Path(folder) / STUDY_FILE).read_bytes()))
     except (OSError, ValueError):
-        words = "is no folder of a study: asperity study run makes one"
-        raise ParameterError("folder", words, str(folder)) from None
-    if content.get("schema") != SCHEMA:
-        words = f"is of another version: schema {content.get('schema')!r}, not {SCHEMA}"
-        raise ParameterError("folder", words, str(folder))
+        raise ParameterError("folder", "is no folder of a study", str(folder)) from None
+    if (schema := content.get("schema")) != SCHEMA:
+        raise ParameterError("folder", f"is of another version: schema {schema!r}, not {SCHEMA}")
     sections = {name[1:-1]: part for name, part in content.items() if name.startswith("[")}
     return build_study(sections, Path(folder))
 
@@ -127,12 +125,14 @@ def list_participants(folder: str | Path) -> dict[str, int]:
     return {code: number for number, code in found}
 
 
-def _find_number(folder: str | Path, code: str) -> int:
+def _check_known(folder: str | Path, code: str, *, is_new: bool = False) -> dict[str, int]:
+    """Check that a participant exists, or is new; return the numbers of all by code."""
     known = list_participants(folder)
-    if check_participant(code) not in known:
-        words = f"{code} is unknown; known: {', '.join(known) or 'none'}"
-        raise ParameterError("participant", words)
-    return known[code]
+    if (check_participant(code) in known) == is_new:
+        words = f"is unknown; known: {', '.join(known) or 'none'}"
+        words = "exists already: --resume goes on where it stopped" if is_new else words
+        raise ParameterError("participant", f"{code} {words}")
+    return known
 
 
 def read_trials(folder: str | Path) -> list[TrialRecord]:
@@ -183,7 +183,7 @@ def _lock(path: Path) -> Iterator[None]:
         raise ParameterError("participant", f"{path.name} is in a session now") from None
 
 
-class Participant:
+class Participant(ExitStack):
     """A participant whose answers are recorded; use it in a ``with``, which locks its folder.
 
     Args:
@@ -206,26 +206,22 @@ class Participant:
     """
 
     def __init__(self, folder: Path, study: Study, code: str, *, resume: bool = False) -> None:
-        self.path, self.code, self._study = folder / check_participant(code), code, study
-        taken = list_participants(folder)
-        if code in taken and not resume:
-            words = f"{code} exists already: --resume goes on where it stopped"
-            raise ParameterError("participant", words)
-        free = min(set(range(len(taken) + 1)) - set(taken.values()))
-        self.number = _find_number(folder, code) if resume else free
+        super().__init__()
+        known = _check_known(folder, code, is_new=not resume)
+        self.path, self.code, self._study = folder / code, code, study
+        self.number = known.get(code, min(set(range(len(known) + 1)) - set(known.values())))
         self.path.mkdir(exist_ok=True)
+        answers = self.path / ANSWERS_FILE
         with ExitStack() as stack:
             stack.enter_context(_lock(self.path))
-            answers = self.path / ANSWERS_FILE
             self._stream = stack.enter_context(answers.open("ab", buffering=0))
             self._stream.truncate(answers.read_bytes().rfind(b"\n") + 1)  # without a torn line
             write_bytes("output", self.path / _NUMBER_FILE, str(self.number).encode())
             self.method, records = _replay(self.path, study, self.number)
             if self.method.next() is None:
-                raise ParameterError(
-                    "participant", f"{code} has answered all {len(records)} trials"
-                )
-            self._release = stack.pop_all().close
+                words = f"{code} has answered all {len(records)} trials"
+                raise ParameterError("participant", words)
+            self.push(stack.pop_all())
         self.trial = len(records) + 1
         self.run = 1 + max((record.run for record in records), default=0)
 
@@ -249,12 +245,6 @@ class Participant:
         self.method.answer(answer)
         self.trial += 1
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._release()
-
 
 def write_key(folder: str | Path) -> Path:
     """Write which stimulus each code stands for, and return the path: this unblinds the study.
@@ -265,16 +255,16 @@ def write_key(folder: str | Path) -> Path:
     Raises:
         ParameterError: as for :func:`read_trials`.
     """
+    names = [*read_study(folder).arguments]
     rows = {
-        (record.participant, code): values
+        (record.participant, code): [values.get(name) for name in names]
         for record in read_trials(folder)
         for code, values in zip(record.codes, record.presentation.intervals, strict=True)
     }
-    path, text, names = Path(folder) / KEY_FILE, io.StringIO(), [*read_study(folder).arguments]
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["participant", "code", *names])
-    for key in sorted(rows):
-        writer.writerow([*key, *(rows[key].get(name) for name in names)])
+    path, text = Path(folder) / KEY_FILE, io.StringIO()
+    table: list[list[Any]] = [["participant", "code", *names]]
+    table += ([*key, *rows[key]] for key in sorted(rows))
+    csv.writer(text, lineterminator="\n").writerows(table)
     write_bytes("folder", path, text.getvalue().encode())
     return path
 
@@ -297,7 +287,7 @@ def remove_participant(folder: str | Path, code: str) -> list[str]:
         ParameterError: for an unknown participant, or one in a session.
     """
     read_study(folder)
-    _find_number(folder, code)
+    _check_known(folder, code)
     with _lock(Path(folder) / code):
         derived = find_derived_files(folder)
         for name in derived:
