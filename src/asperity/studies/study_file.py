@@ -85,22 +85,22 @@ def build_study(content: Mapping[str, Any], folder: Path) -> Study:
     levels = [str(method["level"])] if "level" in method else []
     texts = {key: [str(value) for value in values] for key, values in vary.items()}
     found, unit = find_varied_arguments(sections, texts, *levels), ""
-    for argument in found.values():
-        if not argument.name.startswith(_CHANGEABLE):
+    arguments = {argument.name: argument for argument in found.values()}
+    for name in arguments:
+        if not name.startswith(_CHANGEABLE):
             words = "cannot change while the participant holds the device: texture.* and surface.*"
-            raise ParameterError("vary", f"{argument.name} {words} can")
+            raise ParameterError("vary", f"{name} {words} can")
     for level in levels:
         method["level"], unit = found[level].name, found[level].unit
-    options = _parse_section(
-        "method", {"method": method}, METHODS[settings["kind"]].arguments, unit
-    )
+    kind = METHODS[settings["kind"]]
+    options = _parse_section("method", {"method": method}, kind.arguments, unit)
     options["exclusion"] = _parse_section("exclusion", content, EXCLUSIONS)
-    factors = {found[key].name: _parse_factor(found[key], values) for key, values in texts.items()}
-    design = StudyDesign(
-        settings["kind"], factors, options, settings["question"], settings["seed"],
-        settings["participants"],
-    )  # fmt: skip
-    arguments = {argument.name: argument for argument in found.values()}
+    factors = {
+        found[key].name: tuple(map(found[key].parse, parse_values(found[key], ", ".join(values))))
+        for key, values in texts.items()
+    }
+    own = {name: settings[name] for name in ("kind", "question", "seed", "participants")}
+    design = StudyDesign(factors=factors, options=options, **own)
     return Study(design, sections, arguments, folder.resolve(), settings, content)
 
 
@@ -117,16 +117,9 @@ def _parse_section(
     """
     declared = [replace(one, unit=unit) if one.unit == _LEVEL_UNIT else one for one in arguments]
     given = parse_arguments(section, content.get(section, {}), declared)
+    values: dict[str, Any] = {}
     for one in declared:
         if one.required and one.name not in given:
             raise ParameterError(f"{section}.{one.name}", f"is missing: {one.description}")
-    values = {
-        one.name: one.validate(given[one.name]) if one.name in given else one.default
-        for one in declared
-    }
+        values[one.name] = one.validate(given[one.name]) if one.name in given else one.default
     return {name: value for name, value in values.items() if value is not None}
-
-
-def _parse_factor(argument: Argument, texts: Iterable[str]) -> tuple[Any, ...]:
-    """Return the values of a factor [SI]."""
-    return tuple(argument.parse(value) for value in parse_values(argument, ", ".join(texts)))

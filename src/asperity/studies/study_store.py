@@ -3,7 +3,7 @@
 A line is written and synchronized before the next trial. A process that is killed leaves whole
 lines, and at most one torn line at the end, which is removed when the participant goes on. What was
 presented is not recorded: it follows from the design, the number of the participant and the answers
-before, see :class:`~asperity.studies.design.Method`.
+before, see :class:`~asperity.studies.methods.Method`.
 """
 
 from __future__ import annotations
@@ -15,8 +15,9 @@ import re
 import shutil
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 from filelock import FileLock, Timeout
 
@@ -24,7 +25,7 @@ from asperity.core.errors import ParameterError
 from asperity.core.files import append_bytes, text_digest, to_plain_data, write_bytes
 from asperity.core.version import __version__
 from asperity.recording.replay import file_digest
-from asperity.studies.design import Method, Presentation, TrialRecord
+from asperity.studies.design import Method, Presentation
 from asperity.studies.methods import METHODS
 from asperity.studies.study_file import Study, build_study
 from asperity.sweeps.result_store import check_plan, folder_error
@@ -38,6 +39,31 @@ _NUMBER_FILE, _LOCK_FILE = "number.txt", ".lock"
 SCHEMA = 1
 _CODE = re.compile(r"(?=.*\d)[A-Za-z0-9][A-Za-z0-9_-]{0,15}")
 _CODE_LENGTH = 8  # of a stimulus
+
+
+@dataclass(frozen=True)
+class TrialRecord:
+    """An answered trial.
+
+    Attributes:
+        participant: code of the participant.
+        presentation: what was presented.
+        run: number of the sitting, from 1.
+        trial: number of the trial, from 1.
+        codes: of the stimuli.
+        answer: as given.
+        response_time: from the question to the answer [s].
+        started: start of the trial, ISO 8601.
+    """
+
+    participant: str
+    presentation: Presentation
+    run: int
+    trial: int
+    codes: list[str]
+    answer: str
+    response_time: float
+    started: str
 
 
 def check_participant(code: str) -> str:
@@ -86,11 +112,9 @@ def read_study(folder: str | Path) -> Study:
     try:
         content = dict(json.loads((Path(folder) / STUDY_FILE).read_bytes()))
     except (OSError, ValueError):
-        words = "is no folder of a study: asperity study run makes one"
-        raise ParameterError("folder", words, str(folder)) from None
-    if content.get("schema") != SCHEMA:
-        words = f"is of another version: schema {content.get('schema')!r}, not {SCHEMA}"
-        raise ParameterError("folder", words, str(folder))
+        raise ParameterError("folder", "is no folder of a study", str(folder)) from None
+    if (schema := content.get("schema")) != SCHEMA:
+        raise ParameterError("folder", f"is of another version: schema {schema!r}, not {SCHEMA}")
     sections = {name[1:-1]: part for name, part in content.items() if name.startswith("[")}
     return build_study(sections, Path(folder))
 
@@ -102,12 +126,14 @@ def list_participants(folder: str | Path) -> dict[str, int]:
     return {code: number for number, code in found}
 
 
-def _find_number(folder: str | Path, code: str) -> int:
+def _check_known(folder: str | Path, code: str, *, is_new: bool = False) -> dict[str, int]:
+    """Check that a participant exists, or is new; return the numbers of all by code."""
     known = list_participants(folder)
-    if check_participant(code) not in known:
-        words = f"{code} is unknown; known: {', '.join(known) or 'none'}"
-        raise ParameterError("participant", words)
-    return known[code]
+    if (check_participant(code) in known) == is_new:
+        words = f"is unknown; known: {', '.join(known) or 'none'}"
+        words = "exists already: --resume goes on where it stopped" if is_new else words
+        raise ParameterError("participant", f"{code} {words}")
+    return known
 
 
 def read_trials(folder: str | Path) -> list[TrialRecord]:
@@ -136,7 +162,7 @@ def _replay(path: Path, study: Study, number: int) -> tuple[Method, list[TrialRe
     for count, line in enumerate(lines[:-1], start=1):  # the last one is empty or torn
         shown: Any = method.next()
         try:
-            record = TrialRecord(shown, participant=path.name, **json.loads(line))
+            record = TrialRecord(path.name, shown, **json.loads(line))
         except (ValueError, TypeError):
             raise ParameterError("folder", f"has a damaged line {count} in {path}") from None
         codes = shown and stimulus_codes(study, path.name, shown)
@@ -158,7 +184,7 @@ def _lock(path: Path) -> Iterator[None]:
         raise ParameterError("participant", f"{path.name} is in a session now") from None
 
 
-class Participant:
+class Participant(ExitStack):
     """A participant whose answers are recorded; use it in a ``with``, which locks its folder.
 
     Args:
@@ -181,26 +207,22 @@ class Participant:
     """
 
     def __init__(self, folder: Path, study: Study, code: str, *, resume: bool = False) -> None:
-        self.path, self.code, self._study = folder / check_participant(code), code, study
-        with FileLock(folder / _LOCK_FILE), ExitStack() as stack:
-            taken = list_participants(folder)
-            if code in taken and not resume:
-                words = f"{code} exists already: --resume goes on where it stopped"
-                raise ParameterError("participant", words)
-            free = min(set(range(len(taken) + 1)) - set(taken.values()))
-            self.number = _find_number(folder, code) if resume else free
-            self.path.mkdir(exist_ok=True)
+        super().__init__()
+        known = _check_known(folder, code, is_new=not resume)
+        self.path, self.code, self._study = folder / code, code, study
+        self.number = known.get(code, min(set(range(len(known) + 1)) - set(known.values())))
+        self.path.mkdir(exist_ok=True)
+        answers = self.path / ANSWERS_FILE
+        with ExitStack() as stack:
             stack.enter_context(_lock(self.path))
-            answers = self.path / ANSWERS_FILE
             self._stream = stack.enter_context(answers.open("ab", buffering=0))
             self._stream.truncate(answers.read_bytes().rfind(b"\n") + 1)  # without a torn line
             write_bytes("output", self.path / _NUMBER_FILE, str(self.number).encode())
             self.method, records = _replay(self.path, study, self.number)
             if self.method.next() is None:
-                raise ParameterError(
-                    "participant", f"{code} has answered all {len(records)} trials"
-                )
-            self._release = stack.pop_all().close
+                words = f"{code} has answered all {len(records)} trials"
+                raise ParameterError("participant", words)
+            self.push(stack.pop_all())
         self.trial = len(records) + 1
         self.run = 1 + max((record.run for record in records), default=0)
 
@@ -224,12 +246,6 @@ class Participant:
         self.method.answer(answer)
         self.trial += 1
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._release()
-
 
 def write_key(folder: str | Path) -> Path:
     """Write which stimulus each code stands for, and return the path: this unblinds the study.
@@ -240,16 +256,16 @@ def write_key(folder: str | Path) -> Path:
     Raises:
         ParameterError: as for :func:`read_trials`.
     """
+    names = [*read_study(folder).arguments]
     rows = {
-        (record.participant, code): values
+        (record.participant, code): [values.get(name) for name in names]
         for record in read_trials(folder)
         for code, values in zip(record.codes, record.presentation.intervals, strict=True)
     }
-    path, text, names = Path(folder) / KEY_FILE, io.StringIO(), [*read_study(folder).arguments]
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["participant", "code", *names])
-    for key in sorted(rows):
-        writer.writerow([*key, *(rows[key].get(name) for name in names)])
+    path, text = Path(folder) / KEY_FILE, io.StringIO()
+    table: list[list[Any]] = [["participant", "code", *names]]
+    table += ([*key, *rows[key]] for key in sorted(rows))
+    csv.writer(text, lineterminator="\n").writerows(table)
     write_bytes("folder", path, text.getvalue().encode())
     return path
 
@@ -272,7 +288,7 @@ def remove_participant(folder: str | Path, code: str) -> list[str]:
         ParameterError: for an unknown participant, or one in a session.
     """
     read_study(folder)
-    _find_number(folder, code)
+    _check_known(folder, code)
     with _lock(Path(folder) / code):
         derived = find_derived_files(folder)
         for name in derived:

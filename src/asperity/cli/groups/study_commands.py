@@ -57,7 +57,6 @@ def run_command(
     stability limit. Each answer is on the disk before the next trial. The folder of all
     participants is named as the file, without .toml.
     """
-    from asperity.lab.launch import bind_socket
     from asperity.studies.live.player import LoopPlayer, Stimuli
     from asperity.studies.live.screens import PageScreen, Terminal
     from asperity.studies.live.trial_session import SessionStopped, StudySession, simulate_session
@@ -81,10 +80,10 @@ def run_command(
             simulate_session(study, person, stimuli, observer)
         else:
             noise = study.settings["masking_noise"]
-            page = None if flags["terminal"] else PageScreen(bind_socket(None), masking_noise=noise)
-            if page is not None:
-                announce_page("study", page.url, no_browser=bool(flags["no_browser"]))
+            page = None if flags["terminal"] else PageScreen(masking_noise=noise)
             with page or Terminal() as screen, suppress(SessionStopped):
+                if page is not None:
+                    announce_page("study", page.url, no_browser=bool(flags["no_browser"]))
                 StudySession(study, person, player, screen).run()
     words = "done" if person.method.next() is None else "stopped; --resume goes on"
     count, name = person.trial - before, escape_unprintable(path)

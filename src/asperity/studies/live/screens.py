@@ -6,13 +6,10 @@ import asyncio
 import json
 import os
 import select
-import socket
 import sys
-import textwrap
 import threading
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import asdict, dataclass
-from functools import partial
 from queue import Empty, Queue
 from typing import Self
 
@@ -22,12 +19,12 @@ from websockets.sync.server import ServerConnection, serve
 
 from asperity.core.errors import ParameterError
 from asperity.lab.access import MAX_MESSAGE_BYTES, AccessToken, respond
+from asperity.lab.launch import bind_socket
 
 GO_ON, PAUSE, STOP, BACK, UP, DOWN = "Enter", "p", "Escape", "Backspace", "ArrowUp", "ArrowDown"
 """Names of keys, as browsers call them."""
 PAGE_PACKAGE = "asperity.studies.live"
 _PING = 2.0  # a page that does not answer for this time is gone [s]
-_WIDTH = 60
 _SEQUENCES = {
     b"\n": GO_ON, b"\r": GO_ON, b" ": GO_ON, b"\x1b": STOP, b"\x7f": BACK, b"\x08": BACK,
     b"\x1b[A": UP, b"\x1b[B": DOWN, b"\x1bOA": UP, b"\x1bOB": DOWN,
@@ -53,31 +50,29 @@ class View:
     is_last: bool = False
 
 
-class Terminal:
+class Terminal(ExitStack):
     """The terminal of the command, whose keys arrive at once; use it in a ``with``.
 
     Raises:
         ParameterError: without a terminal.
     """
 
-    def __enter__(self) -> Self:
+    def __init__(self) -> None:
         import termios
         import tty
 
+        super().__init__()
         if not sys.stdin.isatty():
             raise ParameterError("terminal", "is needed: run the command in one")
         before = termios.tcgetattr(sys.stdin)
-        self._restore = partial(termios.tcsetattr, sys.stdin, termios.TCSADRAIN, before)
+        self.callback(termios.tcsetattr, sys.stdin, termios.TCSADRAIN, before)
         tty.setcbreak(sys.stdin)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._restore()
 
     def show(self, view: View) -> None:
         """Print a view."""
         keys = (f"  [{key}] {label}" for key, label in view.keys)
-        lines = ("", view.title.upper(), *textwrap.wrap(view.text, _WIDTH), *keys, view.typed)
+        text = click.wrap_text(view.text, 60, preserve_paragraphs=True)
+        lines = ("", view.title.upper(), text, *keys, view.typed)
         click.echo("\n".join(lines).rstrip(), err=True)
 
     def read_key(self, timeout: float) -> str | None:
@@ -102,14 +97,14 @@ class PageScreen:
     If the last page is closed or does not answer, the session pauses.
 
     Args:
-        listener: the bound socket, see :func:`asperity.lab.launch.bind_socket`.
         masking_noise: whether the page plays noise.
 
     Attributes:
         url: address of the page.
     """
 
-    def __init__(self, listener: socket.socket, *, masking_noise: bool = False) -> None:
+    def __init__(self, *, masking_noise: bool = False) -> None:
+        listener = bind_socket(None)
         token = AccessToken(listener.getsockname()[1])
         self.url, self._masking_noise, self._lock = token.url, masking_noise, threading.Lock()
         self._keys, self._pages = Queue[str](), set[ServerConnection]()

@@ -17,7 +17,7 @@ from asperity.studies.design import Presentation
 from asperity.studies.live.player import LoopPlayer, Stimuli
 from asperity.studies.live.screens import BACK, DOWN, GO_ON, PAUSE, STOP, UP, Screen, View
 from asperity.studies.methods import METHODS
-from asperity.studies.observers import HandStrength, Observer
+from asperity.studies.observers import HandStrength, Observer, simulate_run
 from asperity.studies.study_file import Study
 from asperity.studies.study_store import Participant
 
@@ -190,7 +190,6 @@ def simulate_session(
     """
     design, setup = METHODS[study.design.kind].complete(study.design), stimuli.setup
     strength = HandStrength(design, lambda one: (setup(one).surface, setup(one).device))
-    while (presentation := participant.method.next()) is not None:
-        rng = np.random.default_rng([design.seed, participant.number, participant.trial])
-        answer = observer.answer(presentation, strength, rng)
-        participant.record(answer, _SIMULATED_RESPONSE_TIME, _current_time())
+    answered = simulate_run(design, participant.number, observer, strength, design.seed)
+    for one in answered[participant.trial - 1 :]:
+        participant.record(one.answer, _SIMULATED_RESPONSE_TIME, _current_time())
