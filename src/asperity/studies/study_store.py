@@ -3,7 +3,7 @@
 A line is written and synchronized before the next trial. A process that is killed leaves whole
 lines, and at most one torn line at the end, which is removed when the participant goes on. What was
 presented is not recorded: it follows from the design, the number of the participant and the answers
-before, see :class:`~asperity.studies.methods.Method`.
+before, see :class:`~asperity.studies.design.Method`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ import re
 import shutil
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +24,7 @@ from asperity.core.errors import ParameterError
 from asperity.core.files import append_bytes, text_digest, to_plain_data, write_bytes
 from asperity.core.version import __version__
 from asperity.recording.replay import file_digest
-from asperity.studies.design import Method, Presentation
+from asperity.studies.design import Method, Presentation, TrialRecord
 from asperity.studies.methods import METHODS
 from asperity.studies.study_file import Study, build_study
 from asperity.sweeps.result_store import check_plan, folder_error
@@ -39,31 +38,6 @@ _NUMBER_FILE, _LOCK_FILE = "number.txt", ".lock"
 SCHEMA = 1
 _CODE = re.compile(r"(?=.*\d)[A-Za-z0-9][A-Za-z0-9_-]{0,15}")
 _CODE_LENGTH = 8  # of a stimulus
-
-
-@dataclass(frozen=True)
-class TrialRecord:
-    """An answered trial.
-
-    Attributes:
-        participant: code of the participant.
-        presentation: what was presented.
-        run: number of the sitting, from 1.
-        trial: number of the trial, from 1.
-        codes: of the stimuli.
-        answer: as given.
-        response_time: from the question to the answer [s].
-        started: start of the trial, ISO 8601.
-    """
-
-    participant: str
-    presentation: Presentation
-    run: int
-    trial: int
-    codes: list[str]
-    answer: str
-    response_time: float
-    started: str
 
 
 def check_participant(code: str) -> str:
@@ -162,7 +136,7 @@ def _replay(path: Path, study: Study, number: int) -> tuple[Method, list[TrialRe
     for count, line in enumerate(lines[:-1], start=1):  # the last one is empty or torn
         shown: Any = method.next()
         try:
-            record = TrialRecord(path.name, shown, **json.loads(line))
+            record = TrialRecord(shown, participant=path.name, **json.loads(line))
         except (ValueError, TypeError):
             raise ParameterError("folder", f"has a damaged line {count} in {path}") from None
         codes = shown and stimulus_codes(study, path.name, shown)
@@ -208,12 +182,12 @@ class Participant(ExitStack):
 
     def __init__(self, folder: Path, study: Study, code: str, *, resume: bool = False) -> None:
         super().__init__()
-        known = _check_known(folder, code, is_new=not resume)
-        self.path, self.code, self._study = folder / code, code, study
-        self.number = known.get(code, min(set(range(len(known) + 1)) - set(known.values())))
-        self.path.mkdir(exist_ok=True)
+        self.path, self.code, self._study = folder / check_participant(code), code, study
         answers = self.path / ANSWERS_FILE
-        with ExitStack() as stack:
+        with FileLock(folder / _LOCK_FILE), ExitStack() as stack:
+            known = _check_known(folder, code, is_new=not resume)
+            self.number = known.get(code, min(set(range(len(known) + 1)) - set(known.values())))
+            self.path.mkdir(exist_ok=True)
             stack.enter_context(_lock(self.path))
             self._stream = stack.enter_context(answers.open("ab", buffering=0))
             self._stream.truncate(answers.read_bytes().rfind(b"\n") + 1)  # without a torn line
