@@ -8,6 +8,7 @@ import pytest
 from tests.studies.study_texts import COMPARISON, FACTORS, ONSET, SCENE, make_study
 
 import asperity as asp
+from asperity.analysis.energy.merit import merit
 from asperity.core.errors import ParameterError
 from asperity.servo.safety import excess_stiffness_reason
 from asperity.studies.live.player import Stimuli, smooth_wall
@@ -89,3 +90,27 @@ def test_a_real_device_has_its_own_delay_and_resolution(tmp_path: Path) -> None:
     assert (servo.delay, servo.position_resolution, servo.force_resolution) == (0, 0.0, 0.0)
     assert setup.safety.lateness is None
     assert Stimuli(study).setup({}).safety.lateness == 60.0
+
+
+def test_the_stiffness_gives_each_stimulus_the_texture_force(tmp_path: Path) -> None:
+    factors = '\n[vary]\n"surface.law" = ["A", "C"]\n"texture.amplitude" = ["20 um", "40 um"]\n'
+    text = COMPARISON.replace(FACTORS, factors)
+    text = text.replace("[study]\n", '[study]\ntexture_force = "0.4 mN"\n')
+    stimuli = Stimuli(make_study(tmp_path, text))
+    stimuli.check_all()
+    found = [
+        stimuli.setup({"surface.law": law, "texture.amplitude": amplitude}).rendered
+        for law in "AC"
+        for amplitude in (20e-6, 40e-6)
+    ]
+    assert [merit(one).ripple * one.stiffness for one in found] == pytest.approx([4e-4] * 4)
+    assert len({one.stiffness for one in found}) == 4
+    strong = text.replace("0.4 mN", "4 N")
+    with pytest.raises(ParameterError, match=r"is refused: .* above the recommended"):
+        Stimuli(make_study(tmp_path, strong)).check_all()
+    smooth = text.replace('["A", "C"]', '["A", "W"]')
+    with pytest.raises(ParameterError, match="needs surfaces with a texture force"):
+        Stimuli(make_study(tmp_path, smooth)).check_all()
+    both = COMPARISON.replace("[study]\n", '[study]\ntexture_force = "0.4 mN"\n')
+    with pytest.raises(ParameterError, match="which is varied, too"):
+        make_study(tmp_path, both)

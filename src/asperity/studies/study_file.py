@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from asperity.core.arguments import Argument, parse_arguments, read_arguments
+from asperity.core.arguments import STIFFNESS, Argument, parse_arguments, read_arguments
 from asperity.core.errors import ParameterError
 from asperity.scene.scene_file import SECTIONS, read_scene, read_sections
 from asperity.scene.scene_keys import find_varied_arguments
@@ -22,6 +22,7 @@ _STUDY_ARGUMENTS = {**_DECLARED, KIND.name: KIND}.values()
 _LEVEL_UNIT = "level"  # of options that are in the unit of the varied level
 _OWN_SECTIONS = ("study", "vary", "method", "exclusion")
 _CHANGEABLE = ("texture.", "surface.")
+_STIFFNESS_KEY = f"surface.{STIFFNESS.name}"
 
 
 @dataclass(frozen=True)
@@ -90,6 +91,8 @@ def build_study(content: Mapping[str, Any], folder: Path) -> Study:
         if not name.startswith(_CHANGEABLE):
             words = "cannot change while the participant holds the device: texture.* and surface.*"
             raise ParameterError("vary", f"{name} {words} can")
+    if _STIFFNESS_KEY in arguments and "texture_force" in settings:
+        raise ParameterError("study.texture_force", f"sets {_STIFFNESS_KEY}, which is varied, too")
     for level in levels:
         method["level"], unit = found[level].name, found[level].unit
     kind = METHODS[settings["kind"]]

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from asperity.analysis.energy.merit import scan_ripple
 from asperity.clamps import BACKED
 from asperity.core.errors import AsperityError, ParameterError
 from asperity.loop.shared_trace import COLUMNS
@@ -103,6 +104,16 @@ class Stimuli:
         return self._checked[key]
 
     def _make_setup(self, values: Mapping[str, Any]) -> Setup:
+        """Return the loop of a stimulus, whose stiffness gives the texture force of the study."""
+        setup, force = self._build_setup(values), self._study.settings.get("texture_force")
+        if force is None:
+            return setup
+        ripple = scan_ripple(setup.rendered)
+        if not ripple:
+            raise ParameterError("study.texture_force", "needs surfaces with a texture force")
+        return replace(setup, surface=setup.surface.to_stiffness(force / ripple))
+
+    def _build_setup(self, values: Mapping[str, Any]) -> Setup:
         study = self._study
         texts = to_scene_values(values, study.arguments.values())
         scene = build_scene(with_values(study.sections, texts), study.folder)
