@@ -37,7 +37,7 @@ from asperity.studies.study_store import (
 
 COUNT = 500
 LONGEST = 0.2  # [s] until a kill
-STIFFNESSES = (50.123, 75.123, 100.123)
+STIFFNESSES = (50.12345, 75.12345, 100.12345)  # more digits than times have
 STUDY = f"""
 [study]
 kind = "comparison"

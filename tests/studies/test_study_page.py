@@ -9,8 +9,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from tests.lab.axe import needs_axe
 from tests.lab.browser import Browser, needs_browser
-from tests.lab.page.test_accessibility import needs_axe, violations
+from tests.lab.page.test_accessibility import violations
 from tests.lab.started import Started
 from tests.studies.study_texts import COMPARISON
 
@@ -104,7 +105,7 @@ def test_escape_stops_and_a_closed_page_pauses(browser: Browser, tmp_path: Path)
         assert "P01: 1 answers in" in output
         assert "stopped; --resume goes on" in output
         await_title(browser, "Stopped")
-        assert browser.ask("document.getElementById('keys').hidden")
+        assert browser.ask("document.getElementById('keys').offsetHeight") == 0
     finally:
         session.close()
     again = start(tmp_path, "--resume")

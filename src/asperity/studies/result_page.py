@@ -44,7 +44,7 @@ def study_page(result: StudyResult) -> Page:
         ],
         sections=[
             page.terminal_section(table),
-            _figure(result, "Scores", scores, f"{scores}. {_BARS}"),
+            _figure(result, "Scores", scores, f"{scores[0].upper()}{scores[1:]}. {_BARS}"),
             pooled,
             *(functions if kind.has_function and result.included else ()),
             Section("Participants", [_participant_table(result)], notes=[score.interval]),
@@ -80,7 +80,7 @@ def label_text(result: StudyResult, row: Mapping[str, Any]) -> str:
 
 
 def _number(value: float | None) -> str:
-    return NOT_AVAILABLE if value is None else f"{round(value, 12):.4g}"
+    return NOT_AVAILABLE if value is None else f"{round(value, 12) + 0.0:.3g}"
 
 
 def _interval_text(row: Mapping[str, Any]) -> str:
