@@ -33,7 +33,6 @@ from asperity.studies.study_file import Study
 from asperity.surface import Surface
 
 _LEVEL_COUNT = 9  # levels in the range of a level that are analysed before the first trial
-_REST_LAW = "W"  # the smooth wall
 _REST_DEPTH = 0.1  # [m]: its gain is the same at every depth, so that no press is too deep
 _STROKE_DURATION = 600.0  # [s], after which a simulated hand rests
 # A simulated device is harmless: late samples and deep presses do not end its loop.
@@ -122,7 +121,7 @@ def smooth_wall(setup: Setup) -> Surface:
     Raises:
         ParameterError: if it is above its limit.
     """
-    wall = setup.surface.to_law(_REST_LAW).to_depth(_REST_DEPTH)
+    wall = setup.surface.to_law("W").to_depth(_REST_DEPTH)
     _check_limit("the smooth wall between stimuli", wall, setup)
     return wall
 

@@ -105,7 +105,6 @@ class StudySession:
             title = _TITLES[number - 1] if len(presentation.intervals) > 1 else "Feel this one"
             self._render(values, number)
             self._screen.show(View(title, "Move the handle over the surface.", _ALWAYS))
-            self._watch()
             while self._player.elapsed() < self._settings["interval"]:
                 self._watch()
         self._render(None, 0)
