@@ -14,10 +14,9 @@ from asperity.scene.scene_keys import find_varied_arguments
 from asperity.studies.methods import EXCLUSIONS, METHODS, StudyDesign
 from asperity.sweeps.variations import parse_values
 
-_DECLARED = read_arguments(Path(__file__).with_suffix(".toml"))
-KIND = replace(_DECLARED["kind"], choices=tuple(METHODS))
-"""Argument of the kind of a study."""
-_STUDY_ARGUMENTS = {**_DECLARED, KIND.name: KIND}.values()
+STUDY_ARGUMENTS = read_arguments(Path(__file__).with_suffix(".toml"))
+"""Arguments of the section [study] by name."""
+STUDY_ARGUMENTS["kind"] = replace(STUDY_ARGUMENTS["kind"], choices=tuple(METHODS))
 _LEVEL_UNIT = "level"  # of options that are in the unit of the varied level
 _OWN_SECTIONS = ("study", "vary", "method", "exclusion")
 _CHANGEABLE = ("texture.", "surface.")
@@ -75,7 +74,7 @@ def build_study(content: Mapping[str, Any], folder: Path) -> Study:
     Raises:
         ParameterError: as for :func:`load_study`.
     """
-    settings = _parse_section("study", content, _STUDY_ARGUMENTS)
+    settings = _parse_section("study", content, STUDY_ARGUMENTS.values())
     sections = {name: content[name] for name in SECTIONS if name in content}
     vary, method = content.get("vary", {}), dict(content.get("method", {}))
     for key, values in vary.items():

@@ -32,9 +32,10 @@ def study_command() -> None:
 @output.force_option
 def init_command(kind: str, file: str, *, force: bool) -> None:
     """Write a study FILE (TOML) of a KIND, which runs as it is; all other settings are comments."""
-    from asperity.studies.study_file import KIND
+    from asperity.studies.study_file import STUDY_ARGUMENTS
 
-    text = (_TEMPLATES / f"{KIND.validate(kind)}.toml").read_text("utf-8")
+    name = STUDY_ARGUMENTS["kind"].validate(kind)
+    text = (_TEMPLATES / f"{name}.toml").read_text("utf-8")
     text = text.replace("{name}", escape_unprintable(file))
     command = "asperity study run {} --participant P01"
     output.write_template("file", file, text, command, force=force)

@@ -105,8 +105,6 @@ class Stimuli:
         study = self._study
         texts = to_scene_values(values, study.arguments.values())
         scene = build_scene(with_values(study.sections, texts), study.folder)
-        if "law" not in scene.surface:
-            raise ParameterError("law", "is missing: in [surface] or in [vary]")
         scene = replace(scene, surface={"clamp": BACKED.name, **scene.surface})
         if self._is_real:
             return make_setup(without_hand(scene)).on_real_device()

@@ -22,12 +22,11 @@ from asperity.lab.access import MAX_MESSAGE_BYTES, AccessToken, respond
 from asperity.lab.launch import bind_socket
 
 GO_ON, PAUSE, STOP, BACK, UP, DOWN = "Enter", "p", "Escape", "Backspace", "ArrowUp", "ArrowDown"
-"""Names of keys, as browsers call them."""
+# These are their names in browsers.
 PAGE_PACKAGE = "asperity.studies.live"
 _PING = 2.0  # a page that does not answer for this time is gone [s]
 _SEQUENCES = {
-    b"\n": GO_ON, b"\r": GO_ON, b" ": GO_ON, b"\x1b": STOP, b"\x7f": BACK, b"\x08": BACK,
-    b"\x1b[A": UP, b"\x1b[B": DOWN, b"\x1bOA": UP, b"\x1bOB": DOWN,
+    b"\n": GO_ON, b" ": GO_ON, b"\x1b": STOP, b"\x7f": BACK, b"\x1b[A": UP, b"\x1b[B": DOWN,
 }  # fmt: skip
 
 

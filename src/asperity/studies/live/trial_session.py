@@ -21,7 +21,6 @@ from asperity.studies.study_file import Study
 from asperity.studies.study_store import Participant
 
 ADJUSTMENT_STEPS = 40  # of equal ratios, from the least to the greatest value
-_SIMULATED_RESPONSE_TIME = 1.0  # [s]
 _NUMERAL, _NUMBER = "0123456789.-", re.compile(r"-?(\d+\.?\d*|\.\d+)")
 _ALWAYS = ((PAUSE, "pause"), (STOP, "stop"))
 _TITLES = ("First", "Second", "Third")
@@ -50,6 +49,7 @@ class StudySession:
     ) -> None:
         self._settings, self._participant = study.settings, participant
         self._player, self._screen = player, screen
+        participant.callback(player.stop)  # whatever ends the session
 
     def run(self) -> None:
         """Present trials until the method ends.
@@ -58,15 +58,8 @@ class StudySession:
             SessionStopped: if the participant stops.
             DeviceFault: for a fault; the trial under way is presented again by a later session.
         """
-        try:
-            self._rest("Welcome", self._settings["instructions"])
-            self._present_trials(self._settings["break_every"])
-        finally:
-            self._player.stop()
-        self._screen.show(View("The end", self._settings["thanks"], is_last=True))
-
-    def _present_trials(self, break_every: int) -> None:
-        count = 0
+        count, break_every = 0, self._settings["break_every"]
+        self._rest("Welcome", self._settings["instructions"])
         while (presentation := self._participant.method.next()) is not None:
             if count and break_every and count % break_every == 0:
                 self._rest("A break", "Rest your hand as long as you like.")
@@ -75,6 +68,8 @@ class StudySession:
                 count += 1
             except _Paused:
                 self._rest("Pause", "The trial is presented again when you go on.")
+        self._player.stop()
+        self._screen.show(View("The end", self._settings["thanks"], is_last=True))
 
     def _rest(self, title: str, text: str) -> None:
         """Show a text without force until the participant goes on; then start the loop."""
@@ -190,4 +185,4 @@ def simulate_session(
     strength = HandStrength(design, lambda one: (setup(one).surface, setup(one).device))
     answered = simulate_run(design, participant.number, observer, strength, design.seed)
     for one in answered[participant.trial - 1 :]:
-        participant.record(one.answer, _SIMULATED_RESPONSE_TIME, _current_time())
+        participant.record(one.answer, 1.0, _current_time())  # after a second
