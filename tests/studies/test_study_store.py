@@ -39,8 +39,8 @@ class Chooser(Observer):
         return str(rng.choice(presentation.answers))
 
 
-def answer_all(study: Study, person: Participant) -> None:
-    simulate_session(study, person, Stimuli(study), Chooser())
+def answer_all(person: Participant) -> None:
+    simulate_session(person, Stimuli(person.study), Chooser())
 
 
 @pytest.fixture
@@ -56,7 +56,7 @@ def folder(tmp_path: Path, study: Study) -> Path:
 
 def finish(folder: Path, study: Study, code: str) -> int:
     with Participant(folder, study, code) as person:
-        answer_all(study, person)
+        answer_all(person)
         return person.trial - 1
 
 
@@ -85,7 +85,7 @@ def test_a_torn_line_is_dropped_and_its_trial_is_asked_again(folder: Path, study
     before = read_trials(folder)
     with Participant(folder, study, "P01", resume=True) as person:
         assert (person.trial, person.run) == (len(before) + 1, 2)
-        answer_all(study, person)
+        answer_all(person)
     again, first = path.read_bytes().splitlines(), whole.splitlines()
     assert again[:-1] == first[:-1]
     # A session that goes on gives what one gives that was not stopped.
@@ -161,7 +161,7 @@ def test_participants_exist_once_and_sit_once(folder: Path, study: Study) -> Non
     with pytest.raises(ParameterError, match="P02 is unknown; known: P01"):
         Participant(folder, study, "P02", resume=True)
     with Participant(folder, study, "P01", resume=True) as person:
-        answer_all(study, person)
+        answer_all(person)
         count = person.trial - 1
     with pytest.raises(ParameterError, match=f"P01 has answered all {count} trials"):
         Participant(folder, study, "P01", resume=True)

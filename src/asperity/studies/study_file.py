@@ -17,9 +17,7 @@ from asperity.sweeps.variations import parse_values
 STUDY_ARGUMENTS = read_arguments(Path(__file__).with_suffix(".toml"))
 """Arguments of the section [study] by name."""
 STUDY_ARGUMENTS["kind"] = replace(STUDY_ARGUMENTS["kind"], choices=tuple(METHODS))
-_LEVEL_UNIT = "level"  # of options that are in the unit of the varied level
 _OWN_SECTIONS = ("study", "vary", "method", "exclusion")
-_CHANGEABLE = ("texture.", "surface.")
 
 
 @dataclass(frozen=True)
@@ -85,7 +83,7 @@ def build_study(content: Mapping[str, Any], folder: Path) -> Study:
     found, unit = find_varied_arguments(sections, texts, *levels), ""
     arguments = {argument.name: argument for argument in found.values()}
     for name in arguments:
-        if not name.startswith(_CHANGEABLE):
+        if not name.startswith(("texture.", "surface.")):
             words = "cannot change while the participant holds the device: texture.* and surface.*"
             raise ParameterError("vary", f"{name} {words} can")
     for level in levels:
@@ -111,9 +109,9 @@ def _parse_section(
         section: its name.
         content: all sections.
         arguments: declarations.
-        unit: of options that are in the unit of the level.
+        unit: of options whose declared unit is "level".
     """
-    declared = [replace(one, unit=unit) if one.unit == _LEVEL_UNIT else one for one in arguments]
+    declared = [replace(one, unit=unit) if one.unit == "level" else one for one in arguments]
     given = parse_arguments(section, content.get(section, {}), declared)
     values: dict[str, Any] = {}
     for one in declared:

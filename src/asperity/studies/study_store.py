@@ -17,13 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from asperity.core.errors import ParameterError
-from asperity.core.files import (
-    append_bytes,
-    json_text,
-    text_digest,
-    to_plain_data,
-    write_bytes,
-)  # fmt: skip
+from asperity.core.files import append_bytes, json_text, text_digest, write_bytes
 from asperity.core.version import __version__
 from asperity.recording.replay import file_digest
 from asperity.studies.methods import METHODS, Method, Presentation
@@ -79,8 +73,8 @@ def check_participant(code: str) -> str:
 
 def stimulus_codes(study: Study, participant: str, presentation: Presentation) -> list[str]:
     """Return the codes of the intervals of a trial, which do not reveal their values."""
-    stimuli = ([study.design.seed, participant, one] for one in presentation.intervals)
-    texts = (json.dumps(to_plain_data(one), sort_keys=True) for one in stimuli)
+    seed = study.design.seed
+    texts = (json_text([seed, participant, values]) for values in presentation.intervals)
     return [text_digest(text)[:8] for text in texts]
 
 
@@ -181,6 +175,7 @@ class Participant(ExitStack):
     Attributes:
         path: folder of the participant.
         code: as given.
+        study: as given.
         number: position in the counterbalanced order, from 0.
         run: number of the sitting.
         method: after the recorded answers.
@@ -194,7 +189,7 @@ class Participant(ExitStack):
     def __init__(self, folder: Path, study: Study, code: str, *, resume: bool = False) -> None:
         super().__init__()
         known = _check_known(folder, code, is_new=not resume)
-        self.path, self.code, self._study = folder / code, code, study
+        self.path, self.code, self.study = folder / code, code, study
         self.number = known.get(code, min(set(range(len(known) + 1)) - set(known.values())))
         answers = self.path / ANSWERS_FILE
         with ExitStack() as stack:
@@ -212,7 +207,7 @@ class Participant(ExitStack):
 
     def codes(self, presentation: Presentation) -> list[str]:
         """Return the codes of the intervals of a trial."""
-        return stimulus_codes(self._study, self.code, presentation)
+        return stimulus_codes(self.study, self.code, presentation)
 
     def record(self, answer: str, response_time: float, started: str) -> None:
         """Record the answer to the current trial, and go on to the next.

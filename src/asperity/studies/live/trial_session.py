@@ -17,7 +17,6 @@ from asperity.studies.live.player import LoopPlayer, Stimuli
 from asperity.studies.live.screens import BACK, DOWN, GO_ON, PAUSE, STOP, UP, Screen, View
 from asperity.studies.methods import METHODS, Presentation
 from asperity.studies.observers import HandStrength, Observer, simulate_run
-from asperity.studies.study_file import Study
 from asperity.studies.study_store import Participant
 
 ADJUSTMENT_STEPS = 40  # of equal ratios, from the least to the greatest value
@@ -38,16 +37,13 @@ class StudySession:
     """A session of a participant on a device.
 
     Args:
-        study: the study.
         participant: whose answers are recorded.
         player: renders the stimuli.
         screen: shows what to do, and reads keys.
     """
 
-    def __init__(
-        self, study: Study, participant: Participant, player: LoopPlayer, screen: Screen
-    ) -> None:
-        self._settings, self._participant = study.settings, participant
+    def __init__(self, participant: Participant, player: LoopPlayer, screen: Screen) -> None:
+        self._settings, self._participant = participant.study.settings, participant
         self._player, self._screen = player, screen
         participant.callback(player.stop)  # whatever ends the session
 
@@ -168,20 +164,18 @@ def _current_time() -> str:
     return datetime.now(UTC).isoformat(timespec="milliseconds")
 
 
-def simulate_session(
-    study: Study, participant: Participant, stimuli: Stimuli, observer: Observer
-) -> None:
+def simulate_session(participant: Participant, stimuli: Stimuli, observer: Observer) -> None:
     """Record the answers of a simulated observer, without a loop.
 
     A session that goes on gives the answers of one that was not stopped.
 
     Args:
-        study: the study.
         participant: whose answers are recorded.
         stimuli: of the study, which are checked.
         observer: the observer.
     """
-    design, setup = METHODS[study.design.kind].complete(study.design), stimuli.setup
+    design, setup = participant.study.design, stimuli.setup
+    design = METHODS[design.kind].complete(design)
     strength = HandStrength(design, lambda one: (setup(one).surface, setup(one).device))
     answered = simulate_run(design, participant.number, observer, strength, design.seed)
     for one in answered[participant.trial - 1 :]:
