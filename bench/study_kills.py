@@ -121,7 +121,7 @@ def _run(folder: Path, study: Study, stimuli: Stimuli, code: str, line: Connecti
         is_known = code in list_participants(folder)
         with _ToldParticipant(folder, study, code, resume=is_known) as person:
             person.line = line
-            StudySession(study, person, _Player(stimuli, line), _Screen()).run()
+            StudySession(person, _Player(stimuli, line), _Screen()).run()
     except ParameterError as error:
         if "has answered all" not in str(error):
             raise

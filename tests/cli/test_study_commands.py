@@ -49,7 +49,7 @@ def test_a_template_of_each_kind_runs_as_it_is(
         assert f"{participant}: " in out
     code, out, err = call("report", "mine")
     assert (code, err) == (0, "")
-    assert "Written in mine: key.csv, report.html, trials.csv" in out
+    assert "Written in mine: key.json, report.html, trials.csv" in out
     question = load_study("mine.toml").design.question
     assert question in Path("mine/report.html").read_text("utf-8")
 

@@ -55,6 +55,7 @@ class FakePlayer(LoopPlayer):
 
     def __init__(self) -> None:
         self.calls: list[Any] = []
+        self._time = 0.0
 
     def start(self) -> None:
         self.calls.append("start")
@@ -68,9 +69,11 @@ class FakePlayer(LoopPlayer):
 
     def render(self, values: Mapping[str, Any] | None, interval: int) -> None:
         self.calls.append(("render", values and dict(values), interval))
+        self._time = 0.0
 
     def elapsed(self) -> float:
-        return 1.0
+        self._time += 0.06  # a part of the interval
+        return self._time
 
     def end_trial(self, answer: float, response_time: float) -> None:
         self.calls.append(("end", answer))

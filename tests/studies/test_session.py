@@ -29,7 +29,7 @@ def run(
     write_study(folder / "data", study)
     player, screen = FakePlayer(), ScriptedScreen(press)
     with Participant(folder / "data", study, "P01", resume=resume) as person:
-        StudySession(study, person, player, screen).run()
+        StudySession(person, player, screen).run()
     return player, screen, read_trials(folder / "data")
 
 

@@ -21,8 +21,8 @@ def test_stimuli_within_their_limits_are_accepted(tmp_path: Path) -> None:
     assert (surface.stiffness, surface.law.letter) == (97.5, "C")
     setup = stimuli.setup({})
     wall = smooth_wall(setup)
-    assert excess_stiffness_reason(wall, setup.device, keeps_margin=True) == ""
-    assert wall.max_depth >= 0.1  # no press on the wall between stimuli is a fault
+    assert excess_stiffness_reason(wall.rendered, setup.device, keeps_margin=True) == ""
+    assert wall.surface.max_depth >= 0.1  # no press on the wall between stimuli is a fault
 
 
 def test_levels_that_differ_in_the_fifth_digit_are_different_stimuli(tmp_path: Path) -> None:

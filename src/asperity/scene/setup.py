@@ -172,13 +172,13 @@ def make_setup(
     """
     merged = {**scene.surface, **(surface or {})}
     run = parse_arguments("run", scene.loop.get("run", {}), sections.RUN_ARGUMENTS)
+    if "law" not in merged:
+        raise ParameterError("law", "is missing: --law B, or a scene whose [surface] names one")
     if use_defaults and not {"hand", "motion"} & scene.loop.keys():
         return _make_default_setup(scene, merged, device, duration or run.get("duration"))
     for name in ("hand", "motion"):
         if name not in scene.loop:
             raise ParameterError("scene", f"needs a section [{name}] with a kind to be simulated")
-    if "law" not in merged:
-        raise ParameterError("law", "is missing: --law B, or a scene whose [surface] names one")
     hand = sections.build_section("hand", scene.loop["hand"], sections.HANDS, scene.folder)
     motion = sections.build_section("motion", scene.loop["motion"], sections.MOTIONS, scene.folder)
     limits = parse_arguments("servo", scene.loop.get("servo", {}), safety.ARGUMENTS)

@@ -15,13 +15,10 @@ from asperity.studies.design import StudyDesign
 from asperity.studies.methods import EXCLUSIONS, METHODS
 from asperity.sweeps.variations import parse_values
 
-_DECLARED = read_arguments(Path(__file__).with_suffix(".toml"))
-KIND = replace(_DECLARED["kind"], choices=tuple(METHODS))
-"""Argument of the kind of a study."""
-_STUDY_ARGUMENTS = {**_DECLARED, KIND.name: KIND}.values()
-_LEVEL_UNIT = "level"  # of options that are in the unit of the varied level
+STUDY_ARGUMENTS = read_arguments(Path(__file__).with_suffix(".toml"))
+"""Arguments of the section [study] by name."""
+STUDY_ARGUMENTS["kind"] = replace(STUDY_ARGUMENTS["kind"], choices=tuple(METHODS))
 _OWN_SECTIONS = ("study", "vary", "method", "exclusion")
-_CHANGEABLE = ("texture.", "surface.")
 _STIFFNESS_KEY = f"surface.{STIFFNESS.name}"
 
 
@@ -77,7 +74,7 @@ def build_study(content: Mapping[str, Any], folder: Path) -> Study:
     Raises:
         ParameterError: as for :func:`load_study`.
     """
-    settings = _parse_section("study", content, _STUDY_ARGUMENTS)
+    settings = _parse_section("study", content, STUDY_ARGUMENTS.values())
     sections = {name: content[name] for name in SECTIONS if name in content}
     vary, method = content.get("vary", {}), dict(content.get("method", {}))
     for key, values in vary.items():
@@ -88,7 +85,7 @@ def build_study(content: Mapping[str, Any], folder: Path) -> Study:
     found, unit = find_varied_arguments(sections, texts, *levels), ""
     arguments = {argument.name: argument for argument in found.values()}
     for name in arguments:
-        if not name.startswith(_CHANGEABLE):
+        if not name.startswith(("texture.", "surface.")):
             words = "cannot change while the participant holds the device: texture.* and surface.*"
             raise ParameterError("vary", f"{name} {words} can")
     if _STIFFNESS_KEY in arguments and "texture_force" in settings:
@@ -116,9 +113,9 @@ def _parse_section(
         section: its name.
         content: all sections.
         arguments: declarations.
-        unit: of options that are in the unit of the level.
+        unit: of options whose declared unit is "level".
     """
-    declared = [replace(one, unit=unit) if one.unit == _LEVEL_UNIT else one for one in arguments]
+    declared = [replace(one, unit=unit) if one.unit == "level" else one for one in arguments]
     given = parse_arguments(section, content.get(section, {}), declared)
     values: dict[str, Any] = {}
     for one in declared:

@@ -8,36 +8,30 @@ before, see :class:`~asperity.studies.design.Method`.
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import re
 import shutil
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from filelock import FileLock, Timeout
-
 from asperity.core.errors import ParameterError
-from asperity.core.files import append_bytes, text_digest, to_plain_data, write_bytes
+from asperity.core.files import append_bytes, json_text, text_digest, write_bytes
 from asperity.core.version import __version__
 from asperity.recording.replay import file_digest
 from asperity.studies.design import Method, Presentation, TrialRecord
 from asperity.studies.methods import METHODS
 from asperity.studies.study_file import Study, build_study
-from asperity.sweeps.result_store import check_plan, folder_error
+from asperity.sweeps.result_store import check_plan, lock_folder
 
-STUDY_FILE, ANSWERS_FILE, KEY_FILE = "study.json", "answers.jsonl", "key.csv"
+STUDY_FILE, ANSWERS_FILE, KEY_FILE = "study.json", "answers.jsonl", "key.json"
 DERIVED_FILES = (
     KEY_FILE, "report.html", "trials.csv", "table.csv", "trials.parquet", "table.parquet",
 )  # fmt: skip
-"""Files that a report writes; they hold data of all participants."""
-_NUMBER_FILE, _LOCK_FILE = "number.txt", ".lock"
+# Files that a report writes; they hold data of all participants.
+_NUMBER_FILE = "number.txt"
 SCHEMA = 1
 _CODE = re.compile(r"(?=.*\d)[A-Za-z0-9][A-Za-z0-9_-]{0,15}")
-_CODE_LENGTH = 8  # of a stimulus
 
 
 def check_participant(code: str) -> str:
@@ -54,9 +48,9 @@ def check_participant(code: str) -> str:
 
 def stimulus_codes(study: Study, participant: str, presentation: Presentation) -> list[str]:
     """Return the codes of the intervals of a trial, which do not reveal their values."""
-    stimuli = ([study.design.seed, participant, one] for one in presentation.intervals)
-    texts = (json.dumps(to_plain_data(one), sort_keys=True) for one in stimuli)
-    return [text_digest(text)[:_CODE_LENGTH] for text in texts]
+    seed = study.design.seed
+    texts = (json_text([seed, participant, values]) for values in presentation.intervals)
+    return [text_digest(text)[:8] for text in texts]
 
 
 def write_study(folder: Path, study: Study) -> None:
@@ -69,12 +63,8 @@ def write_study(folder: Path, study: Study) -> None:
     digest = file_digest(study.folder / path) if isinstance(path, str) else None
     sections = {f"[{name}]": section for name, section in study.content.items()}
     plan = {"schema": SCHEMA, "asperity": __version__, "file": digest, **sections}
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with FileLock(folder / _LOCK_FILE):
-            check_plan(folder / STUDY_FILE, plan, "study")
-    except (OSError, ValueError) as error:
-        raise folder_error(error, folder) from None
+    with lock_folder(folder):
+        check_plan(folder / STUDY_FILE, plan, "study")
 
 
 def read_study(folder: str | Path) -> Study:
@@ -148,16 +138,6 @@ def _replay(path: Path, study: Study, number: int) -> tuple[Method, list[TrialRe
     return method, records
 
 
-@contextmanager
-def _lock(path: Path) -> Iterator[None]:
-    """Lock the folder of a participant."""
-    try:
-        with FileLock(path / _LOCK_FILE, timeout=0):
-            yield
-    except Timeout:
-        raise ParameterError("participant", f"{path.name} is in a session now") from None
-
-
 class Participant(ExitStack):
     """A participant whose answers are recorded; use it in a ``with``, which locks its folder.
 
@@ -170,6 +150,7 @@ class Participant(ExitStack):
     Attributes:
         path: folder of the participant.
         code: as given.
+        study: as given.
         number: position in the counterbalanced order, from 0.
         run: number of the sitting.
         method: after the recorded answers.
@@ -182,13 +163,12 @@ class Participant(ExitStack):
 
     def __init__(self, folder: Path, study: Study, code: str, *, resume: bool = False) -> None:
         super().__init__()
-        self.path, self.code, self._study = folder / check_participant(code), code, study
+        self.path, self.code, self.study = folder / check_participant(code), code, study
         answers = self.path / ANSWERS_FILE
-        with FileLock(folder / _LOCK_FILE), ExitStack() as stack:
+        with lock_folder(folder), ExitStack() as stack:
             known = _check_known(folder, code, is_new=not resume)
             self.number = known.get(code, min(set(range(len(known) + 1)) - set(known.values())))
-            self.path.mkdir(exist_ok=True)
-            stack.enter_context(_lock(self.path))
+            stack.enter_context(lock_folder(self.path))
             self._stream = stack.enter_context(answers.open("ab", buffering=0))
             self._stream.truncate(answers.read_bytes().rfind(b"\n") + 1)  # without a torn line
             write_bytes("output", self.path / _NUMBER_FILE, str(self.number).encode())
@@ -196,13 +176,13 @@ class Participant(ExitStack):
             if self.method.next() is None:
                 words = f"{code} has answered all {len(records)} trials"
                 raise ParameterError("participant", words)
-            self.push(stack.pop_all())
+            self.callback(stack.pop_all().close)
         self.trial = len(records) + 1
         self.run = 1 + max((record.run for record in records), default=0)
 
     def codes(self, presentation: Presentation) -> list[str]:
         """Return the codes of the intervals of a trial."""
-        return stimulus_codes(self._study, self.code, presentation)
+        return stimulus_codes(self.study, self.code, presentation)
 
     def record(self, answer: str, response_time: float, started: str) -> None:
         """Record the answer to the current trial, and go on to the next.
@@ -221,8 +201,8 @@ class Participant(ExitStack):
         self.trial += 1
 
 
-def write_key(folder: str | Path) -> Path:
-    """Write which stimulus each code stands for, and return the path: this unblinds the study.
+def write_key(folder: str | Path) -> None:
+    """Write what each code of each participant stands for (JSON): this unblinds the study.
 
     Args:
         folder: of a study.
@@ -230,18 +210,11 @@ def write_key(folder: str | Path) -> Path:
     Raises:
         ParameterError: as for :func:`read_trials`.
     """
-    names = [*read_study(folder).arguments]
-    rows = {
-        (record.participant, code): [values.get(name) for name in names]
-        for record in read_trials(folder)
-        for code, values in zip(record.codes, record.presentation.intervals, strict=True)
-    }
-    path, text = Path(folder) / KEY_FILE, io.StringIO()
-    table: list[list[Any]] = [["participant", "code", *names]]
-    table += ([*key, *rows[key]] for key in sorted(rows))
-    csv.writer(text, lineterminator="\n").writerows(table)
-    write_bytes("folder", path, text.getvalue().encode())
-    return path
+    key: dict[str, dict[str, Any]] = {}
+    for record in read_trials(folder):
+        stimuli = zip(record.codes, record.presentation.intervals, strict=True)
+        key.setdefault(record.participant, {}).update(stimuli)
+    write_bytes("folder", Path(folder) / KEY_FILE, json_text(key).encode())
 
 
 def find_derived_files(folder: str | Path) -> list[str]:
@@ -263,7 +236,7 @@ def remove_participant(folder: str | Path, code: str) -> list[str]:
     """
     read_study(folder)
     _check_known(folder, code)
-    with _lock(Path(folder) / code):
+    with lock_folder(Path(folder) / code):
         derived = find_derived_files(folder)
         for name in derived:
             (Path(folder) / name).unlink()

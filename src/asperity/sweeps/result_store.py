@@ -11,12 +11,13 @@ import re
 import weakref
 from array import array
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
 from filelock import FileLock, Timeout
 
-from asperity.core.errors import ParameterError, escape_unprintable
+from asperity.core.errors import ParameterError
 from asperity.core.files import append_bytes, json_text, open_input, write_bytes
 from asperity.core.processes import defer_interrupt
 from asperity.sweeps.case_runs import Outcome
@@ -44,20 +45,16 @@ class ResultStore:
 
     def __init__(self, folder: Path, plan: Mapping[str, Any], n_cases: int) -> None:
         self.path, self._offsets = folder, array("q", [_MISSING]) * n_cases
-        lock = FileLock(folder / _LOCK_FILE, timeout=0)
-        self.release = lock.release  # lets other processes write; outcomes can still be read
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            lock.acquire()
+        with ExitStack() as stack:
+            stack.enter_context(lock_folder(folder))
             check_plan(folder / PLAN_FILE, plan, "sweep")
             self._stream = (folder / CASES_FILE).open("ab", buffering=0)
             self._reader = (folder / CASES_FILE).open("rb")
             weakref.finalize(self, self._stream.close)
             weakref.finalize(self, self._reader.close)
             self._end = self._find_cases()
-        except (OSError, ValueError) as error:
-            self.release()
-            raise folder_error(error, folder) from None
+            # Lets other processes write; outcomes can still be read.
+            self.release = stack.pop_all().close
         self.n_done = n_cases - self._offsets.count(_MISSING)
 
     def _find_cases(self) -> int:
@@ -107,14 +104,25 @@ def _decode(value: Any) -> Any:
     return float(value) if value in ("inf", "-inf") else value
 
 
-def folder_error(error: Exception, folder: Path) -> ParameterError:
-    """Return the error for a folder that cannot be used, in one line."""
-    if isinstance(error, ParameterError):
-        return error
-    words = "is in use by another process"
-    if not isinstance(error, Timeout):
+@contextmanager
+def lock_folder(folder: Path) -> Iterator[None]:
+    """Make a folder, and lock it until the block ends.
+
+    Raises:
+        ParameterError: for a folder that another process has locked, and in place of an error of
+            the system or of damaged content in the block.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with FileLock(folder / _LOCK_FILE, timeout=0):
+            yield
+    except Timeout:
+        raise ParameterError("output", "is in use by another process", str(folder)) from None
+    except ParameterError:
+        raise
+    except (OSError, ValueError) as error:
         words = f"must be a folder that can be written: {getattr(error, 'strerror', error)}"
-    return ParameterError("output", words, escape_unprintable(folder))
+        raise ParameterError("output", words, str(folder)) from None
 
 
 def check_plan(path: Path, plan: Mapping[str, Any], kind: str) -> None:
@@ -126,8 +134,7 @@ def check_plan(path: Path, plan: Mapping[str, Any], kind: str) -> None:
         kind: of what is planned, for messages.
 
     Raises:
-        ParameterError: for a folder that holds something else.
-        OSError: for one that cannot be used, as ``ValueError`` for a damaged plan.
+        ParameterError: for a folder that holds something else; others see :func:`lock_folder`.
     """
     folder, text = path.parent, json_text(plan)
     if not path.exists():

@@ -32,9 +32,10 @@ def study_command() -> None:
 @output.force_option
 def init_command(kind: str, file: str, *, force: bool) -> None:
     """Write a study FILE (TOML) of a KIND, which runs as it is; all other settings are comments."""
-    from asperity.studies.study_file import KIND
+    from asperity.studies.study_file import STUDY_ARGUMENTS
 
-    text = (_TEMPLATES / f"{KIND.validate(kind)}.toml").read_text("utf-8")
+    name = STUDY_ARGUMENTS["kind"].validate(kind)
+    text = (_TEMPLATES / f"{name}.toml").read_text("utf-8")
     text = text.replace("{name}", escape_unprintable(file))
     command = "asperity study run {} --participant P01"
     output.write_template("file", file, text, command, force=force)
@@ -47,10 +48,7 @@ def init_command(kind: str, file: str, *, force: bool) -> None:
 @options.argument_options(_RUN)
 @loop_setup.driver_option
 @options.plugin_option
-def run_command(
-    file: str, participant: str, folder: str | None, driver: str, simulate: str | None,
-    **flags: bool | None,
-) -> None:  # fmt: skip
+def run_command(file: str, participant: str, folder: str | None, driver: str, **own: Any) -> None:
     """Run a session of a participant, as the study FILE describes.
 
     Each stimulus is analysed before the first trial, and the study is refused if one is above its
@@ -68,26 +66,26 @@ def run_command(
     if driver.startswith(loop_setup.REPLAY_PREFIX):
         raise ParameterError("driver", "must be a device that a participant holds", driver)
     study, path = load_study(file), Path(folder or Path(file).stem)
-    observer, is_real = find_observer(simulate or "typical"), driver != loop_setup.SIMULATED
+    observer, is_real = find_observer(own["simulate"] or "typical"), driver != loop_setup.SIMULATED
     stimuli = Stimuli(study, is_real=is_real)
     with output.progress_bar("analyzing the stimuli") as update:
         first = stimuli.check_all(update)
     player = LoopPlayer(stimuli, first, loop_setup.make_driver(driver, first) if is_real else None)
     write_study(path, study)
-    with Participant(path, study, participant, resume=bool(flags["resume"])) as person:
+    with Participant(path, study, participant, resume=bool(own["resume"])) as person:
         before = person.trial
-        if simulate:
-            simulate_session(study, person, stimuli, observer)
+        if own["simulate"]:
+            simulate_session(person, stimuli, observer)
         else:
             noise = study.settings["masking_noise"]
-            page = None if flags["terminal"] else PageScreen(masking_noise=noise)
+            page = None if own["terminal"] else PageScreen(masking_noise=noise)
             with page or Terminal() as screen, suppress(SessionStopped):
                 if page is not None:
-                    announce_page("study", page.url, no_browser=bool(flags["no_browser"]))
-                StudySession(study, person, player, screen).run()
+                    announce_page("study", page.url, no_browser=bool(own["no_browser"]))
+                StudySession(person, player, screen).run()
     words = "done" if person.method.next() is None else "stopped; --resume goes on"
-    count, name = person.trial - before, escape_unprintable(path)
-    click.echo(f"{participant}: {count} answers in {name}; {words}")
+    name = escape_unprintable(path)
+    click.echo(f"{participant}: {person.trial - before} answers in {name}; {words}")
 
 
 @study_command.command("report", short_help="Write scores, tables and a page; unblinds.")

@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 from asperity.analysis.energy.merit import scan_ripple
-from asperity.clamps import BACKED
 from asperity.core.errors import AsperityError, ParameterError
 from asperity.loop.shared_trace import COLUMNS
 from asperity.recording.writer import RecordingWriter
@@ -31,12 +30,8 @@ from asperity.servo.fault import EndReason
 from asperity.servo.process import ServoProcess
 from asperity.servo.safety import excess_stiffness_reason
 from asperity.studies.study_file import Study
-from asperity.surface import Surface
 
 _LEVEL_COUNT = 9  # levels in the range of a level that are analysed before the first trial
-_REST_LAW = "W"  # the smooth wall
-_REST_DEPTH = 0.1  # [m]: its gain is the same at every depth, so that no press is too deep
-_STROKE_DURATION = 600.0  # [s], after which a simulated hand rests
 # A simulated device is harmless: late samples and deep presses do not end its loop.
 _RELAXED = {"lateness": "60 s", "silence": "10 s", "beyond_depth": "warn"}
 # The interval is 0 while no stimulus is rendered; answer and response time are NaN until the end.
@@ -96,10 +91,10 @@ class Stimuli:
             stimulus = ", ".join(texts) or "the stimulus"
             try:
                 setup = self._make_setup(values)
-                rendered = setup.rendered
+                assert setup.rendered  # it may have to be baked
             except AsperityError as error:
                 raise ParameterError("vary", f"{stimulus} cannot be rendered: {error}") from None
-            _check_limit(stimulus, rendered, setup)
+            _check_limit(stimulus, setup)
             self._checked[key] = setup
         return self._checked[key]
 
@@ -117,29 +112,29 @@ class Stimuli:
         study = self._study
         texts = to_scene_values(values, study.arguments.values())
         scene = build_scene(with_values(study.sections, texts), study.folder)
-        if "law" not in scene.surface:
-            raise ParameterError("law", "is missing: in [surface] or in [vary]")
-        scene = replace(scene, surface={"clamp": BACKED.name, **scene.surface})
+        scene = replace(scene, surface={"clamp": "backed", **scene.surface})
         if self._is_real:
             return make_setup(without_hand(scene)).on_real_device()
         servo = {"servo": {**_RELAXED, **scene.loop.get("servo", {})}}
         loop = replace(scene, loop={**scene.loop, **servo})
-        return make_setup(loop, duration=_STROKE_DURATION, use_defaults=True)
+        # The simulated hand strokes the surface for ten minutes, and then rests.
+        return make_setup(loop, duration=600.0, use_defaults=True)
 
 
-def smooth_wall(setup: Setup) -> Surface:
-    """Return the smooth wall that is rendered between stimuli, as stiff as one of them.
+def smooth_wall(setup: Setup) -> Setup:
+    """Return the loop of the smooth wall that is rendered between stimuli, as stiff as one of them.
 
     Raises:
         ParameterError: if it is above its limit.
     """
-    wall = setup.surface.to_law(_REST_LAW).to_depth(_REST_DEPTH)
-    _check_limit("the smooth wall between stimuli", wall, setup)
+    # Its gain is the same at every depth: at 0.1 m no press is too deep.
+    wall = replace(setup, surface=setup.surface.to_law("W").to_depth(0.1))
+    _check_limit("the smooth wall between stimuli", wall)
     return wall
 
 
-def _check_limit(stimulus: str, surface: Surface, setup: Setup) -> None:
-    if reason := excess_stiffness_reason(surface, setup.device, keeps_margin=True):
+def _check_limit(stimulus: str, setup: Setup) -> None:
+    if reason := excess_stiffness_reason(setup.rendered, setup.device, keeps_margin=True):
         raise ParameterError("vary", f"{stimulus} is refused: {reason}")
 
 
@@ -173,7 +168,7 @@ class LoopPlayer:
         """
         servo, safety = self._setup.servo, self._setup.safety
         reach = safety.reach_limit(self._setup.device)
-        loop = ServoProcess(self._wall, self._driver, servo, safety, reach)
+        loop = ServoProcess(self._wall.rendered, self._driver, servo, safety, reach)
         self._loop, self._next_row = self._running.enter_context(loop), 0
 
     def stop(self) -> None:
@@ -200,10 +195,10 @@ class LoopPlayer:
             ParameterError: for a stimulus above its limit, which is not rendered.
             DeviceFault: for a fault.
         """
-        surface = self._wall if values is None else self._stimuli.setup(values).rendered
+        setup = self._wall if values is None else self._stimuli.setup(values)
         self.elapsed()
         self._marks[1] = 0.0
-        self._loop.change_surface(surface, accept_risk=True)  # its limit was checked
+        self._loop.change_surface(setup.rendered, accept_risk=True)  # its limit was checked
         ramps = 2.0 * self._setup.safety.ramp / self._setup.servo.period
         self._ramp_end, self._full_row = self._loop.memory.row_count + ramps, math.inf
         self._interval = interval

@@ -21,13 +21,11 @@ from asperity.core.errors import ParameterError
 from asperity.lab.access import MAX_MESSAGE_BYTES, AccessToken, respond
 from asperity.lab.launch import bind_socket
 
+# Keys, as browsers name them.
 GO_ON, PAUSE, STOP, BACK, UP, DOWN = "Enter", "p", "Escape", "Backspace", "ArrowUp", "ArrowDown"
-"""Names of keys, as browsers call them."""
 PAGE_PACKAGE = "asperity.studies.live"
-_PING = 2.0  # a page that does not answer for this time is gone [s]
 _SEQUENCES = {
-    b"\n": GO_ON, b"\r": GO_ON, b" ": GO_ON, b"\x1b": STOP, b"\x7f": BACK, b"\x08": BACK,
-    b"\x1b[A": UP, b"\x1b[B": DOWN, b"\x1bOA": UP, b"\x1bOB": DOWN,
+    b"\n": GO_ON, b" ": GO_ON, b"\x1b": STOP, b"\x7f": BACK, b"\x1b[A": UP, b"\x1b[B": DOWN,
 }  # fmt: skip
 
 
@@ -109,9 +107,10 @@ class PageScreen:
         self.url, self._masking_noise, self._lock = token.url, masking_noise, threading.Lock()
         self._keys, self._pages = Queue[str](), set[ServerConnection]()
         self._view = View("One moment", "The study is being prepared.")
+        # A page that does not answer for two seconds is gone.
         self._server = serve(
             self._serve_page, sock=listener, max_size=MAX_MESSAGE_BYTES, compression=None,
-            ping_interval=_PING, ping_timeout=_PING,
+            ping_interval=2.0, ping_timeout=2.0,
             process_request=lambda _page, request: asyncio.run(
                 respond(token, request, package=PAGE_PACKAGE)
             ),

@@ -18,11 +18,9 @@ from asperity.studies.live.player import LoopPlayer, Stimuli
 from asperity.studies.live.screens import BACK, DOWN, GO_ON, PAUSE, STOP, UP, Screen, View
 from asperity.studies.methods import METHODS
 from asperity.studies.observers import HandStrength, Observer, simulate_run
-from asperity.studies.study_file import Study
 from asperity.studies.study_store import Participant
 
 ADJUSTMENT_STEPS = 40  # of equal ratios, from the least to the greatest value
-_SIMULATED_RESPONSE_TIME = 1.0  # [s]
 _NUMERAL, _NUMBER = "0123456789.-", re.compile(r"-?(\d+\.?\d*|\.\d+)")
 _ALWAYS = ((PAUSE, "pause"), (STOP, "stop"))
 _TITLES = ("First", "Second", "Third")
@@ -40,17 +38,15 @@ class StudySession:
     """A session of a participant on a device.
 
     Args:
-        study: the study.
         participant: whose answers are recorded.
         player: renders the stimuli.
         screen: shows what to do, and reads keys.
     """
 
-    def __init__(
-        self, study: Study, participant: Participant, player: LoopPlayer, screen: Screen
-    ) -> None:
-        self._settings, self._participant = study.settings, participant
+    def __init__(self, participant: Participant, player: LoopPlayer, screen: Screen) -> None:
+        self._settings, self._participant = participant.study.settings, participant
         self._player, self._screen = player, screen
+        participant.callback(player.stop)  # whatever ends the session
 
     def run(self) -> None:
         """Present trials until the method ends.
@@ -59,15 +55,8 @@ class StudySession:
             SessionStopped: if the participant stops.
             DeviceFault: for a fault; the trial under way is presented again by a later session.
         """
-        try:
-            self._rest("Welcome", self._settings["instructions"])
-            self._present_trials(self._settings["break_every"])
-        finally:
-            self._player.stop()
-        self._screen.show(View("The end", self._settings["thanks"], is_last=True))
-
-    def _present_trials(self, break_every: int) -> None:
-        count = 0
+        count, break_every = 0, self._settings["break_every"]
+        self._rest("Welcome", self._settings["instructions"])
         while (presentation := self._participant.method.next()) is not None:
             if count and break_every and count % break_every == 0:
                 self._rest("A break", "Rest your hand as long as you like.")
@@ -76,6 +65,8 @@ class StudySession:
                 count += 1
             except _Paused:
                 self._rest("Pause", "The trial is presented again when you go on.")
+        self._player.stop()
+        self._screen.show(View("The end", self._settings["thanks"], is_last=True))
 
     def _rest(self, title: str, text: str) -> None:
         """Show a text without force until the participant goes on; then start the loop."""
@@ -106,7 +97,6 @@ class StudySession:
             title = _TITLES[number - 1] if len(presentation.intervals) > 1 else "Feel this one"
             self._render(values, number)
             self._screen.show(View(title, "Move the handle over the surface.", _ALWAYS))
-            self._watch()
             while self._player.elapsed() < self._settings["interval"]:
                 self._watch()
         self._render(None, 0)
@@ -175,21 +165,19 @@ def _current_time() -> str:
     return datetime.now(UTC).isoformat(timespec="milliseconds")
 
 
-def simulate_session(
-    study: Study, participant: Participant, stimuli: Stimuli, observer: Observer
-) -> None:
+def simulate_session(participant: Participant, stimuli: Stimuli, observer: Observer) -> None:
     """Record the answers of a simulated observer, without a loop.
 
     A session that goes on gives the answers of one that was not stopped.
 
     Args:
-        study: the study.
         participant: whose answers are recorded.
         stimuli: of the study, which are checked.
         observer: the observer.
     """
-    design, setup = METHODS[study.design.kind].complete(study.design), stimuli.setup
+    design, setup = participant.study.design, stimuli.setup
+    design = METHODS[design.kind].complete(design)
     strength = HandStrength(design, lambda one: (setup(one).surface, setup(one).device))
     answered = simulate_run(design, participant.number, observer, strength, design.seed)
     for one in answered[participant.trial - 1 :]:
-        participant.record(one.answer, _SIMULATED_RESPONSE_TIME, _current_time())
+        participant.record(one.answer, 1.0, _current_time())  # after a second
