@@ -16,7 +16,7 @@ from asperity.devices import load_device
 from asperity.studies import result_page  # noqa: F401
 from asperity.studies.design import TrialRecord
 from asperity.studies.methods import METHODS
-from asperity.studies.observers import OBSERVERS, HandStrength, find_observer, surface_strength
+from asperity.studies.observers import OBSERVERS, find_observer, hand_strength, surface_strength
 from asperity.studies.plan import plan
 from asperity.studies.study_result import analyse
 from asperity.surface import Surface
@@ -185,7 +185,7 @@ def test_strength_grows_with_the_force_at_the_hand() -> None:
 
 def test_strengths_between_levels_are_interpolated() -> None:
     design = design_of("detection", reference=1e-6)
-    strength = HandStrength(design, make_stimulus)
+    strength = hand_strength(design, make_stimulus)
     values = {AMPLITUDE: 7e-6, "surface.law": "C"}
     assert strength(values) == pytest.approx(surface_strength(*make_stimulus(values)), rel=0.02)
     assert strength({**values, AMPLITUDE: 1e-6}) < strength(values)

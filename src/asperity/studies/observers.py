@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -126,35 +126,33 @@ def surface_strength(surface: Surface, device: Device) -> float:
     return assessed.level
 
 
-@dataclass(frozen=True)
-class HandStrength:
-    """The strength of the stimuli of a study, computed once for each condition and some levels.
+def hand_strength(
+    design: StudyDesign, make: Callable[[Values], tuple[Surface, Device]]
+) -> Strength:
+    """Return the strength of the stimuli of a study at the hand.
 
-    Between these levels it is interpolated, logarithm by logarithm.
+    It is computed once for each condition and some levels. Between these it is interpolated,
+    logarithm by logarithm.
 
-    Attributes:
+    Args:
         design: the study with all options.
         make: makes the surface and the device of a stimulus.
     """
+    options, key = design.options, str(design.options.get("level", ""))
+    low = min(options["range"][0], options.get("reference", math.inf)) if key else 1.0
+    levels = np.geomspace(low, options["range"][1], _LEVELS) if key else np.ones(1)
+    tables: dict[str, FloatArray] = {}
 
-    design: StudyDesign
-    make: Callable[[Values], tuple[Surface, Device]]
-    _tables: dict[str, FloatArray] = field(default_factory=dict)
-
-    def __call__(self, values: Values) -> float:
-        """Return the strength of a stimulus."""
-        options, key = self.design.options, self.design.options.get("level", "")
+    def strength(values: Values) -> float:
         rest = {name: value for name, value in values.items() if name != key}
-        levels = np.ones(1)
-        if key:
-            low = min(options["range"][0], options.get("reference", math.inf))
-            levels = np.geomspace(low, options["range"][1], _LEVELS)
-        if (name := repr(rest)) not in self._tables:
+        if (name := repr(rest)) not in tables:
             stimuli = [{**rest, key: float(level)} if key else rest for level in levels]
-            found = [max(surface_strength(*self.make(one)), _NONE) for one in stimuli]
-            self._tables[name] = np.log(found)
+            found = [max(surface_strength(*make(one)), _NONE) for one in stimuli]
+            tables[name] = np.log(found)
         at = math.log(values.get(key, 1.0))
-        return math.exp(float(np.interp(at, np.log(levels), self._tables[name])))
+        return math.exp(float(np.interp(at, np.log(levels), tables[name])))
+
+    return strength
 
 
 def simulate_run(

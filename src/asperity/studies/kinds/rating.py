@@ -16,7 +16,7 @@ from asperity.studies.statistics.scores import Score, score_cells
 
 _LIMITS = (1e-6, 1e6)
 _INTERVAL = "Student's t over repeats"
-LIKERT, MAGNITUDE = "likert", "magnitude"
+LIKERT = "likert"  # scale
 
 
 def run_rating(design: StudyDesign, participant: int, _rng: np.random.Generator) -> Steps:
@@ -32,33 +32,26 @@ def run_rating(design: StudyDesign, participant: int, _rng: np.random.Generator)
 
 
 def score_rating(design: StudyDesign, answered: Answers) -> Score:
-    """Return the mean ratings of the scale."""
-    score = {MAGNITUDE: _score_magnitudes, LIKERT: _score_likert}[design.options["scale"]]
-    return score(design, answered)
+    """Return mean ratings: arithmetic ones of Likert scales, geometric ones of magnitudes.
 
-
-def _score_magnitudes(design: StudyDesign, answered: Answers) -> Score:
-    """Return geometric means, shifted so that all participants have the same (equalised modulus).
+    Magnitudes are shifted so that all participants have the same mean (equalised modulus).
 
     References:
         S. S. Stevens: Psychophysics (1975).
     """
-    score = _mean_score("magnitude", design, answered, math.log)
-    known = np.isfinite(score.values)
-    means = np.where(known, score.values, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
-    shifts: FloatArray = means.mean() - means if len(means) else means
-    return replace(score, estimates=score.estimates + shifts[:, None], is_logarithmic=True)
-
-
-def _score_likert(design: StudyDesign, answered: Answers) -> Score:
-    return _mean_score("rating", design, answered, float)
-
-
-def _mean_score(
-    quantity: str, design: StudyDesign, answered: Answers, transform: Callable[[float], float]
-) -> Score:
+    is_likert = design.options["scale"] == LIKERT
+    transform: Callable[[float], float] = float if is_likert else math.log
     cells = score_cells(
         answered, len(design.conditions),
         lambda found: mean_interval(np.array([transform(float(one.answer)) for one in found])),
     )  # fmt: skip
-    return Score(quantity, *cells, interval=_INTERVAL)
+    score = Score("rating" if is_likert else "magnitude", *cells, interval=_INTERVAL)
+    return score if is_likert else _equalise(score)
+
+
+def _equalise(score: Score) -> Score:
+    """Return logarithms of magnitudes, of which all participants have the same mean."""
+    known = np.isfinite(score.values)
+    means = np.where(known, score.values, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
+    shifts: FloatArray = means.mean() - means if len(means) else means
+    return replace(score, estimates=score.estimates + shifts[:, None], is_logarithmic=True)

@@ -17,7 +17,7 @@ from asperity.studies.design import Presentation
 from asperity.studies.live.player import LoopPlayer, Stimuli
 from asperity.studies.live.screens import BACK, DOWN, GO_ON, PAUSE, STOP, UP, Screen, View
 from asperity.studies.methods import METHODS
-from asperity.studies.observers import HandStrength, Observer, simulate_run
+from asperity.studies.observers import Observer, hand_strength, simulate_run
 from asperity.studies.study_store import Participant
 
 ADJUSTMENT_STEPS = 40  # of equal ratios, from the least to the greatest value
@@ -177,7 +177,7 @@ def simulate_session(participant: Participant, stimuli: Stimuli, observer: Obser
     """
     design, setup = participant.study.design, stimuli.setup
     design = METHODS[design.kind].complete(design)
-    strength = HandStrength(design, lambda one: (setup(one).surface, setup(one).device))
+    strength = hand_strength(design, lambda one: (setup(one).surface, setup(one).device))
     answered = simulate_run(design, participant.number, observer, strength, design.seed)
     for one in answered[participant.trial - 1 :]:
         participant.record(one.answer, 1.0, _current_time())  # after a second
