@@ -76,7 +76,8 @@ def read_study(folder: str | Path) -> Study:
     try:
         content = dict(json.loads((Path(folder) / STUDY_FILE).read_bytes()))
     except (OSError, ValueError):
-        raise ParameterError("folder", "is no folder of a study", str(folder)) from None
+        words = "is no folder of a study: asperity study run makes one"
+        raise ParameterError("folder", words, str(folder)) from None
     if (schema := content.get("schema")) != SCHEMA:
         raise ParameterError("folder", f"is of another version: schema {schema!r}, not {SCHEMA}")
     sections = {name[1:-1]: part for name, part in content.items() if name.startswith("[")}

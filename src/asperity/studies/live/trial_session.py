@@ -16,7 +16,6 @@ from asperity.scene.device_run import POLL_INTERVAL
 from asperity.studies.design import Presentation
 from asperity.studies.live.player import LoopPlayer, Stimuli
 from asperity.studies.live.screens import BACK, DOWN, GO_ON, PAUSE, STOP, UP, Screen, View
-from asperity.studies.methods import METHODS
 from asperity.studies.observers import Observer, hand_strength, simulate_run
 from asperity.studies.study_store import Participant
 
@@ -176,7 +175,6 @@ def simulate_session(participant: Participant, stimuli: Stimuli, observer: Obser
         observer: the observer.
     """
     design, setup = participant.study.design, stimuli.setup
-    design = METHODS[design.kind].complete(design)
     strength = hand_strength(design, lambda one: (setup(one).surface, setup(one).device))
     answered = simulate_run(design, participant.number, observer, strength, design.seed)
     for one in answered[participant.trial - 1 :]:
