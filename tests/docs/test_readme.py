@@ -121,7 +121,8 @@ def test_commands_and_options_that_a_page_names_exist(page: Path) -> None:
     for name in COMMANDS:
         group = cli.get_command(click.Context(cli), name)
         assert group is not None
-        flags |= {flag for option in group.params for flag in option.opts}
+        for command in (group, *getattr(group, "commands", {}).values()):
+            flags |= {flag for option in command.params for flag in option.opts}
     assert set(_FLAG.findall(text)) - flags == set()
 
 
