@@ -164,6 +164,15 @@ def test_a_study_is_done_in_the_terminal(file: str) -> None:
     assert not any(secret in shown for secret in ("stiffness", "61.5", "83.5", "97.5"))
 
 
+def test_without_a_terminal_nobody_is_registered(file: str) -> None:
+    command = [sys.executable, "-m", "asperity", "study", "run", file, "--participant", "P01"]
+    done = subprocess.run(
+        [*command, "--terminal"], stdin=subprocess.DEVNULL, capture_output=True, text=True
+    )
+    assert (done.returncode, "terminal is needed" in done.stderr) == (2, True)
+    assert list_participants("study") == {}
+
+
 @pytest.mark.parametrize("name", ["alive", "click"])
 def test_the_study_of_our_own_is_ready_to_run(call: Call, tmp_path: Path, name: str) -> None:
     path, folder = str(EXAMPLES / f"{name}.toml"), str(tmp_path / name)

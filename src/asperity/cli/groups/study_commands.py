@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import Any
 
@@ -72,16 +72,19 @@ def run_command(file: str, participant: str, folder: str | None, driver: str, **
         first = stimuli.check_all(update)
     player = LoopPlayer(stimuli, first, loop_setup.make_driver(driver, first) if is_real else None)
     write_study(path, study)
-    with Participant(path, study, participant, resume=bool(own["resume"])) as person:
+    opened: Terminal | PageScreen | nullcontext[None] = nullcontext()
+    if not own["simulate"]:
+        noise = study.settings["masking_noise"]
+        opened = Terminal() if own["terminal"] else PageScreen(masking_noise=noise)
+    is_resumed = bool(own["resume"])
+    with opened as screen, Participant(path, study, participant, resume=is_resumed) as person:
         before = person.trial
-        if own["simulate"]:
+        if screen is None:
             simulate_session(person, stimuli, observer)
         else:
-            noise = study.settings["masking_noise"]
-            page = None if own["terminal"] else PageScreen(masking_noise=noise)
-            with page or Terminal() as screen, suppress(SessionStopped):
-                if page is not None:
-                    announce_page("study", page.url, no_browser=bool(own["no_browser"]))
+            if screen.url:
+                announce_page("study", screen.url, no_browser=bool(own["no_browser"]))
+            with suppress(SessionStopped):
                 StudySession(person, player, screen).run()
     words = "done" if person.method.next() is None else "stopped; --resume goes on"
     name = escape_unprintable(path)

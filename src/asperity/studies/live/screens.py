@@ -51,9 +51,14 @@ class View:
 class Terminal(ExitStack):
     """The terminal of the command, whose keys arrive at once; use it in a ``with``.
 
+    Attributes:
+        url: empty, since there is no page.
+
     Raises:
         ParameterError: without a terminal.
     """
+
+    url = ""
 
     def __init__(self) -> None:
         import termios
