@@ -26,7 +26,6 @@ from asperity.cli.options import LAW_OPTIONS, SPEED, option_help
 from asperity.cli.output import progress_bar, step_bar
 from asperity.core.arguments import MAX_DEPTH, Argument
 from asperity.core.units import format_quantity
-from asperity.lab.scene_state import DEFAULT_DEVICE as LAB_DEVICE
 from asperity.lab.scene_state import START_LAW, START_STIFFNESS
 from asperity.laws import LAWS
 from asperity.measured.file_arguments import FILE_ARGUMENTS
@@ -180,7 +179,7 @@ def test_progress_reports_compilation_only_when_code_is_not_cached(
     assert COMPILE_CALLBACKS == []
 
 
-@pytest.mark.parametrize("command", [*READ_A_SURFACE, "run", "export"])
+@pytest.mark.parametrize("command", [*READ_A_SURFACE, "run", "export", "lab"])
 def test_default_device_is_the_same_everywhere(command: str) -> None:
     result = CliRunner().invoke(cli, [command, "--help"], env={"COLUMNS": "200"})
     (words,) = re.findall(
@@ -193,5 +192,4 @@ def test_help_of_the_lab_states_its_initial_scene() -> None:
     result = CliRunner().invoke(cli, ["lab", "--help"], env={"COLUMNS": "200"})
     text = " ".join(result.output.split())
     assert f"else {START_LAW}; with --driver" in text
-    assert f"else {LAB_DEVICE}; with --driver {DEFAULT_DEVICE}" in text
     assert f"else {format_quantity(START_STIFFNESS, 'N/m')}; with --driver" in text

@@ -152,7 +152,10 @@ def test_compare_devices_takes_one_device_and_depth() -> None:
 @pytest.mark.parametrize(
     ("mistake", "words"),
     [
-        (lambda: asp.compare("cloth", devices="touch"), "devices is unknown; did you mean"),
+        (lambda: asp.compare("cloth", devices="touch"), "compare_devices compares several"),
+        (lambda: asp.compare("cloth", ["touch", "omni"]), "compare_devices compares several"),  # type: ignore[arg-type]  # wrong on purpose
+        (lambda: asp.compare("cloth", max_depth=[1e-4]), "max_depth must be a number"),  # type: ignore[arg-type]  # wrong on purpose
+        (lambda: asp.Surface("cloth", "C", stiffness=[9.0]), "stiffness must be a number"),  # type: ignore[arg-type]  # wrong on purpose
         (lambda: asp.compare("cloth", law="C"), "law is unknown; did you mean 'laws'"),
         (lambda: asp.limits("cloth", stifness=3.0), "stifness is unknown; did you mean"),
         (lambda: asp.analyze("cloth", depth=1e-4), "depth is unknown; did you mean 'max_depth'"),

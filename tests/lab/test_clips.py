@@ -33,9 +33,10 @@ LAW = "C"
 SURFACE = "sinusoid:amplitude=0.2mm,period=2mm"
 
 
-def felt(stage: SceneState, samples: int) -> tuple[LoopMemory, PointerHand]:
+def felt(stage: SceneState, duration: float) -> tuple[LoopMemory, PointerHand]:
     """Let a hand go round, up, down into the surface and up, as fast as it can be computed."""
     setup, shared, wheel = stage.setup, LoopMemory(), PointerHand((2e-3, 0.0, 6e-4))
+    samples = round(duration / setup.servo.period)
     driver = pointer_driver(setup.plant, setup.hand, setup.servo, wheel)
     wheel.request_motion((0.0, 0.0, 6e-4), (2e-3, 0.0, 0.0), (0.0, 0.0, 1e-3), 9.0)
     loop = DriverLoop(driver, setup.servo, setup.safety, 1.0, shared.block(), no_clock())
@@ -52,7 +53,7 @@ def stage() -> SceneState:
 
 @pytest.fixture(scope="module")
 def kept(stage: SceneState) -> Clip:
-    shared, wheel = felt(stage, 900)
+    shared, wheel = felt(stage, 0.9)
     with wheel:
         return extract_clip(stage, shared, wheel)
 
@@ -83,7 +84,7 @@ def test_the_scene_goes_the_same_way(kept: Clip, tmp_path: Path) -> None:
 def test_it_begins_where_the_probe_is_free(stage: SceneState, kept: Clip) -> None:
     assert (kept.rows[0, 4:10] == 0.0).all()
     assert kept.rows[0, 0] == 0.0
-    shared, wheel = felt(stage, 150)
+    shared, wheel = felt(stage, 0.15)
     with wheel, pytest.raises(ParameterError, match="must start with a free probe"):
         extract_clip(stage, shared, wheel)
 

@@ -15,6 +15,7 @@ from tests.lab.browser import Browser, needs_browser
 from tests.lab.started import Started
 
 import asperity as asp
+from asperity.analysis.compare import DEFAULT_DEVICE
 from asperity.core.errors import ParameterError
 from asperity.core.files import to_plain_data
 from asperity.lab.clips import RECORDING_FILE, find_recording, load_recorded_clip
@@ -282,10 +283,10 @@ def test_a_device_that_is_not_known_is_replaced_and_said(tmp_path: Path) -> None
         open_recording(rewritten(recording, tmp_path / "other.mcap", about=about))
     )
     assert "names no known device" in stage.setup.assumptions[0]
-    assert stage.setup.device.id == "touch-x"
+    assert stage.setup.device.id == DEFAULT_DEVICE
     assert (
-        load_recorded_clip(recording.path, "", {}, asp.load_device("omega.3"))[0].settings["device"]
-        == "omega.3"
+        load_recorded_clip(recording.path, "", {}, asp.load_device("touch"))[0].settings["device"]
+        == "touch"
     )
 
 

@@ -74,9 +74,10 @@ def made(name: str, folder: Path) -> SceneState:
     return make_scene_state(load_scene(str(folder / "scene.toml")), str(folder / "scene.toml"))
 
 
-def felt(stage: SceneState, samples: int = 900) -> Clip:
+def felt(stage: SceneState, duration: float = 0.9) -> Clip:
     """Let a hand go round, up, down into the surface and up, as fast as it can be computed."""
     setup, shared = stage.setup, LoopMemory()
+    samples = round(duration / setup.servo.period)
     x, y = stage.centre
     low, high = setup.surface.texture.extremes
     place = y if y else 0.0
@@ -142,7 +143,7 @@ def test_a_first_mode_is_in_the_scene(tmp_path: Path) -> None:
         SCENES + 'id = "omega.3"\nbandwidth = "200 Hz"\n' + SPRING + "[run]\nresonance = true\n"
     )
     stage = make_scene_state(load_scene(str(tmp_path / "scene.toml")), str(tmp_path / "scene.toml"))
-    kept = felt(stage, 4000)
+    kept = felt(stage, 4.0)
     setup = again(unpacked(kept, tmp_path / "there"))
     assert to_plain_data(setup.plant) == to_plain_data(stage.setup.plant)
     # How its two masses swing at the beginning is not: that dies out.

@@ -22,6 +22,8 @@ PAPER = {"paperWidth": 8.27, "paperHeight": 11.69}  # A4 [inch]
 def open_page(browser: Browser, path: Path, width: int, *, dark: bool = False) -> None:
     """Open a page in a window of a width [px]."""
     browser.resize(width, 900, dark=dark)
+    # A screenshot beyond the window has none, and would be wider than the page that was measured.
+    browser.call("Emulation.setScrollbarsHidden", hidden=True)
     browser.call("Page.navigate", url=path.as_uri())
     browser.until(f"document.readyState === 'complete' && location.href === {path.as_uri()!r}")
     browser.ask("document.fonts.ready.then(() => true)")

@@ -298,6 +298,99 @@ def test_too_wide_page_is_detected(
     assert check(browser)
 
 
+# --- pictures in a narrow window ------------------------------------------------------------------
+
+_NARROW = """[...document.querySelectorAll("figure")].map((figure) => {
+  const view = figure.querySelector(".view"), svg = view.querySelector("svg");
+  const boxOf = (one) => { const b = one.getBoundingClientRect();
+    return [b.left, b.top, b.right, b.bottom]; };
+  const labelsIn = (one) => [...one.querySelectorAll("g[transform]")].filter((label) =>
+    /scale\\(0\\.\\d+ -0\\.\\d+\\)/.test(label.getAttribute("transform"))
+    && getComputedStyle(label).visibility !== "hidden" && !label.closest("defs")).map(boxOf);
+  return { title: figure.closest("section").querySelector("h2, h3").textContent,
+    scrolls: view.scrollWidth > view.clientWidth + 1, inCard: !!figure.closest(".cards"),
+    text: 8 * svg.getScreenCTM().a, frame: boxOf(svg), labels: labelsIn(svg),
+    axes: [...svg.querySelectorAll(".shared")].map(labelsIn) };
+})"""
+
+
+def unreadable_pictures(browser: Browser) -> list[str]:
+    """Return the pictures that scroll, have text below 8 px, or labels outside or overlapping."""
+    found = []
+    for one in browser.ask(_NARROW):
+        left, top, right, bottom = one["frame"]
+        outside = [
+            label
+            for label in one["labels"]
+            if label[0] < left - 1
+            or label[2] > right + 1
+            or label[1] < top - 1
+            or label[3] > bottom + 1
+        ]
+        overlapping = [
+            (a, b)
+            for labels in one["axes"]
+            for number, a in enumerate(labels)
+            for b in labels[:number]
+            if min(a[2], b[2]) - max(a[0], b[0]) > 0.5 and min(a[3], b[3]) - max(a[1], b[1]) > 2.5
+        ]
+        faults = {
+            "scrolls": one["scrolls"],
+            "small text": one["text"] < 8.0,
+            "no labels": not one["labels"],
+            "labels outside": outside,
+            "labels overlap": overlapping,
+        }
+        found += [f"{one['title']}: {name} {fault}" for name, fault in faults.items() if fault]
+    return found
+
+
+def test_pictures_are_drawn_for_a_narrow_window(
+    browser: Browser, report_pages: dict[str, Path], land_page: Path
+) -> None:
+    for name, path in {**report_pages, "land": land_page}.items():
+        if name == "surfaces":
+            continue  # small pictures in cards, which fit as they are
+        browser.said.clear()
+        open_page(browser, path, 400)
+        assert (name, unreadable_pictures(browser)) == (name, [])
+        assert browser.said == []
+
+
+@pytest.mark.parametrize(
+    ("fault", "name"),
+    [
+        (".view svg { min-width: 44rem !important }", "scrolls"),
+        (".view svg { width: 15rem !important }", "small text"),
+        ("svg .shared { transform: translateX(300px) }", "labels outside"),
+    ],
+)
+def test_unreadable_picture_is_detected(
+    browser: Browser, cloth_page: Path, fault: str, name: str
+) -> None:
+    open_page(browser, cloth_page, 400)
+    add_style(browser, fault)
+    assert any(name in one for one in unreadable_pictures(browser))
+
+
+def test_pictures_follow_the_width_of_the_window(browser: Browser, cloth_page: Path) -> None:
+    """A turned phone gets the wide picture, with tools and without the hidden law, and back."""
+    boxes = (
+        "[...document.querySelectorAll('.view > svg')].map((svg) => svg.getAttribute('viewBox'))"
+    )
+    open_page(browser, cloth_page, 400)
+    narrow = browser.ask(boxes)
+    browser.ask("document.querySelector('.laws [name=A]').click()")
+    browser.resize(1280, 900)
+    browser.until(f"{boxes}.every((box) => box.startsWith('0 0 720 '))")
+    assert browser.ask("document.querySelectorAll('figure > .tools').length") == len(narrow)
+    hidden = "document.querySelector('figure g[data-law=A]').getAttribute('visibility')"
+    assert browser.ask(hidden) == "hidden"
+    browser.resize(400, 900)
+    browser.until(f"{boxes}.join() === {','.join(narrow)!r}")
+    assert browser.said == []
+
+
 # --- paper ----------------------------------------------------------------------------------------
 
 OFFSETS = (0, 130, 260, 390, 520)

@@ -144,7 +144,8 @@ def compare(
     Args:
         texture: the surface, or what names it on the command line: "sandpaper:grit=P60", "cloth",
             the path of a measured file; see :func:`~asperity.textures.catalogue.as_texture`.
-        device: id of the catalogue, TOML file, or a :class:`~asperity.devices.Device`.
+        device: id of the catalogue, TOML file, or a :class:`~asperity.devices.Device`; several:
+            :func:`~asperity.analysis.device_comparisons.compare_devices`.
         laws: letters or names, or user-defined laws.
         stiffness: stiffness of all laws [N/m]; by default the recommended stiffness of each law
             on this device.
@@ -168,12 +169,13 @@ def compare(
         >>> [f"{row.law.letter} {row.stability_limit.stiffness:.0f} N/m" for row in result.rows]
         ['W 5000 N/m', 'A 976 N/m']
     """
+    if "devices" in surface_arguments or isinstance(device, (list, tuple)):
+        raise ParameterError("device", "must be one: asp.compare_devices compares several")
     check_keywords(surface_arguments, SURFACE_KEYWORDS - {"law"}, compare)
     texture = as_texture(texture)
     laws = _renderable_laws(find_laws(laws), texture)
     device = load_device(device)
-    if stiffness is not None:
-        stiffness = check_positive("stiffness", stiffness, "N/m")
+    stiffness = None if stiffness is None else check_positive("stiffness", stiffness, "N/m")
     scan_speed = DEFAULT_SPEED if speed is None else check_positive("speed", speed, "m/s")
     if hint := missing_data_hint(device):
         others = "damping, update_rate and delay_samples"

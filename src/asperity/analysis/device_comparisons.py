@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from asperity.analysis.compare import SCHEMA, Comparison, compare, missing_data_hint
@@ -163,11 +164,7 @@ def compare_devices(
             missing_data.append(MissingData(device.id, hint))
             continue
         for depth in depths:
-
-            def on_law(letter: str, device: Device = device, depth: float | None = depth) -> None:
-                if progress is not None:
-                    progress(device, depth, letter)
-
+            on_law = progress and partial(progress, device, depth)
             comparisons.append(
                 compare(texture, device, laws, max_depth=depth, progress=on_law, **arguments)
             )

@@ -27,7 +27,6 @@ from asperity.cli.options import file_values, surface_values
 from asperity.cli.output import Outputs, check_outputs, output_options, progress_bar
 from asperity.cli.plugins import load_plugin_files, plugin_contents, plugin_files
 from asperity.core.errors import ParameterError, print_message
-from asperity.devices import load_device
 
 if TYPE_CHECKING:
     from asperity.lab.playback import Playback
@@ -239,7 +238,7 @@ _LAB_ARGUMENTS = options.command_arguments("lab")
     )
 )
 @options.file_options
-@options.device_option("Device.  [default: the scene's, else touch-x; with --driver omega.3]")
+@options.device_option("Device.  [default: the scene's, else omega.3]")
 @loop_setup.driver_options
 @options.argument_options(_LAB_ARGUMENTS)
 def lab_command(
@@ -277,7 +276,7 @@ def lab_command(
 def _simulated_scene(source: str, values: dict[str, Any]) -> tuple[SceneState, Playback | None]:
     """Return the initial scene on the simulated device, and the playback of a recording."""
     from asperity.lab.clips import find_recording, load_recorded_clip
-    from asperity.lab.scene_state import DEFAULT_DEVICE, make_scene_state
+    from asperity.lab.scene_state import make_scene_state
     from asperity.scene import load_scene
 
     own, file_options, settings = surface_values(values), file_values(values), values["settings"]
@@ -288,8 +287,8 @@ def _simulated_scene(source: str, values: dict[str, Any]) -> tuple[SceneState, P
             return load_recorded_clip(path, source, own, values["device"], settings.apply_to)
     with progress_bar("reading the surface"):
         scene = load_scene(source, file_options)
-        device = values["device"] or scene.device or load_device(DEFAULT_DEVICE)
-        return make_scene_state(scene, source, own, settings.apply_to(device), file_options), None
+        device = options.select_device(values["device"], scene, values)
+        return make_scene_state(scene, source, own, device, file_options), None
 
 
 def announce_page(name: str, address: str, *, no_browser: bool) -> None:

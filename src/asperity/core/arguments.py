@@ -95,7 +95,7 @@ class Argument:
             return self._validate_choice(value) if self.choices else value
         if self.form == "integer":
             return check_integer(self.name, value, int(self.minimum))
-        if isinstance(value, (list, tuple)):
+        if self.form != "quantity" and isinstance(value, (list, tuple)):
             return type(value)(self.validate(part) for part in value)
         return self._validate_number(value)
 

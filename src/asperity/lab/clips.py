@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from asperity.analysis.compare import DEFAULT_DEVICE
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
 from asperity.core.files import to_plain_data
@@ -20,7 +21,7 @@ from asperity.devices import Device, load_device
 from asperity.lab.messages import COLUMN_NAMES, POSITION
 from asperity.lab.playback import ANCHOR_COLUMNS, Playback, load_playback, make_playback
 from asperity.lab.scene_export import format_scene
-from asperity.lab.scene_state import DEFAULT_DEVICE, SceneState, make_scene_state
+from asperity.lab.scene_state import SceneState, make_scene_state
 from asperity.lab.session import Session
 from asperity.loop.shared_trace import COLUMNS
 from asperity.recording.recorded_field import TEXTURE_FILE, field_attachments, field_metadata

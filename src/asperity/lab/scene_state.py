@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from asperity.analysis.compare import DEFAULT_DEVICE
 from asperity.core.arguments import STIFFNESS
 from asperity.core.checks import check_real
 from asperity.core.errors import ParameterError
@@ -23,7 +24,6 @@ from asperity.textures.texture import Texture
 
 DEFAULT_SURFACE = "sinusoid:amplitude=0.2mm,period=2mm"
 """The default surface."""
-DEFAULT_DEVICE = "touch-x"
 START_LAW = "C"
 START_STIFFNESS = 250.0
 """Initial stiffness without a scene [N/m]."""

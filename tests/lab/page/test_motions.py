@@ -44,6 +44,23 @@ def still_hand(page: Browser) -> Iterator[None]:
     page.ask("lab.hand.isLatched = false; lab.hand.loopSpeed = 20; lab.hand.requestMotion(); 1")
 
 
+def use_device(page: Browser, name: str) -> None:
+    page.ask(
+        f"{{ const field = document.getElementById('device'); field.value = '{name}';"
+        "field.dispatchEvent(new Event('change')); }"
+    )
+    page.until(f"lab.status.settings.device === '{name}' && lab.status.state === 'running'")
+
+
+@pytest.fixture
+def light_device(page: Browser) -> Iterator[None]:
+    """A device of 45 g with a lower limit, so that contacts show what is above it."""
+    used = page.ask("lab.status.settings.device")
+    use_device(page, "touch-x")
+    yield
+    use_device(page, used)
+
+
 @needs_browser
 @pytest.mark.parametrize("x", [0.1e-3, 0.9e-3])
 def test_loops_are_offered_where_the_field_has_curl_and_feed_the_hand(
@@ -98,6 +115,7 @@ def test_the_tour_shows_law_a_alive_without_being_asked(page: Browser) -> None:
 
 
 @needs_browser
+@pytest.mark.usefixtures("light_device")
 def test_a_quiet_contact_above_the_limit_says_that_it_is_conservative(page: Browser) -> None:
     render(page, "C", 800.0)
     page.until("lab.status.limit.stiffness > 0 && lab.status.limit.stiffness < 800")

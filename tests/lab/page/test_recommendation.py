@@ -44,10 +44,10 @@ def test_the_recommendation_comes_from_compare_and_is_applied(page: Browser) -> 
     best = result.recommended_row
     assert best is not None
     assert page.ask("lab.status.recommendation.reason") == result.recommendation
-    named = f"law {best.law.letter} at {best.recommended_stiffness:.0f} N/m"
+    named = f"law {best.law.letter} at {1e-3 * best.recommended_stiffness:.2f} kN/m"
     assert text(page, "recommendation") == f"{named}: {best.tier}"
     note = text(page, "recommendation-note")
-    assert f"limit {best.stability_limit.stiffness:.0f} N/m (plausible)" in note
+    assert f"limit {1e-3 * best.stability_limit.stiffness:.2f} kN/m (plausible)" in note
     assert "Assumed hand: tool held like a pen" in text(page, "recommendation-reason")
     # Applied by the button, as a user does it.
     assert text(page, "apply-recommendation") == f"Use {named}"

@@ -72,6 +72,40 @@ def test_a_is_alive_and_h_is_not_under_one_hand(page: Browser) -> None:
 
 
 @needs_browser
+def test_loops_are_placed_by_the_field_that_has_curl(page: Browser) -> None:
+    """Loops that law H leaves in place go to where law A gains energy, once it is beside it."""
+    page.press("2")
+    page.until("!lab.secondLane.isShown")
+    page.press("h")
+    page.until("lab.status.settings.law === 'H' && lab.hasCurrentPictures")
+    # About a crest, where the halves of a loop gain opposite energies.
+    page.ask("Object.assign(lab.hand, { x: 0.5e-3, y: 0, pressDepth: 2e-4 }); 1")
+    page.ask("document.querySelector('#motion [value=loop]').click()")
+    assert page.ask("lab.hand.x") == 0.5e-3
+    page.ask("lab.secondLane.lastLaw = 'A'")
+    page.press("2")
+    page.until(f"lab.secondLane.status?.settings.law === 'A' && {BOTH}")
+    assert page.ask("[lab.section.hasCurl, lab.secondLane.section.hasCurl]") == [False, True]
+    page.until("lab.hand.x !== 0.5e-3")
+    page.press("r")
+    page.until("/alive: gave/.test(document.getElementById('verdict-second').innerText)")
+    assert text(page, "verdict-first").startswith("not alive")
+    page.ask("document.querySelector('#motion [value=pointer]').click()")
+    hint = "document.getElementById('motion-note').textContent"
+    page.until(
+        f"{hint} === 'The field of law A has curl: loops feed the hand, straight strokes hide it.'"
+    )
+    page.press("2")
+    page.until("!lab.secondLane.isShown")
+    page.press("a")
+    page.until("lab.status.settings.law === 'A'")
+    page.ask("lab.secondLane.lastLaw = 'H'")
+    page.press("2")
+    page.until(f"lab.secondLane.status?.settings.law === 'H' && {BOTH}")
+    assert page.said == []
+
+
+@needs_browser
 @pytest.mark.parametrize("dark", [False, True])
 @pytest.mark.parametrize("size", [(1280, 800), (400, 800)])
 def test_all_can_be_read_and_nothing_is_wider_than_the_page(

@@ -9,7 +9,7 @@ from importlib import resources
 
 import numpy as np
 import pytest
-from matplotlib.colors import to_rgb
+from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
 
 from asperity.report.pictures import style
@@ -138,9 +138,6 @@ def test_palette_colours_become_theme_variables(rendered: tuple[str, Figure]) ->
     for colour in style.THEME_VARIABLES:
         assert f": {colour}" not in rendered[0]
     assert f"var(--p-ink, {style.INK})" in rendered[0]
-    figure = style.new_figure(2.0, 2.0)
-    figure.subplots().plot([0, 1], [0, 1], color=style.unthemed_colour(style.INK))
-    assert f"stroke: {style.unthemed_colour(style.INK)}" in svg_text(figure)
 
 
 def luminance(colour: str) -> float:
@@ -169,3 +166,9 @@ def test_theme_colours_have_enough_contrast() -> None:
             "green": 3.0,
         }.items():
             assert contrast(theme[name], theme["card"]) >= least, (name, theme)
+        # Ink on the full colours of the curl, and these on the ground; no curl is clear.
+        for colour in map(to_hex, style.CURL([0.0, 1.0])):
+            assert contrast(theme["ink"], colour) >= 3.0
+            assert contrast(theme["card"], colour) >= 3.0
+        assert contrast(theme["card"], theme["free"]) > 1.1
+    assert style.CURL([0.0, 0.5, 1.0])[:, 3] == pytest.approx([1.0, 0.0, 1.0], abs=0.005)

@@ -103,7 +103,12 @@ const tour = new Tour({
   get viewWidth() { return viewWidth; }, set viewWidth(width) { viewWidth = width; },
 });
 const tourPanel = new TourPanel(tour), recommendationPanel = new RecommendationPanel(changeScene);
-const motionPanel = new MotionPanel({ hand, section, get isSectionCurrent() { return pictures.isCurrent(section); } });
+const motionPanel = new MotionPanel({
+  hand,
+  // Of two laws the first places loops, unless its field has no curl.
+  get section() { return secondLane.isShown && pictures.isCurrent(section) && !section.hasCurl ? secondLane.section : section; },
+  get isSectionCurrent() { return (this.section === section ? pictures : secondLane.pictures).isCurrent(this.section); },
+});
 
 const player = new Player({
   showFrame(playbackFrame) { showFrame({ ...playbackFrame, number: paintedFrame }); },

@@ -3,10 +3,10 @@
 import { findFeedingLoop } from "./feeding_loop.js";
 
 const $ = name => document.getElementById(name);
-const HINT = "This field has curl: loops feed the hand, straight strokes hide it.";
+const HINT = "has curl: loops feed the hand, straight strokes hide it.";
 
 export class MotionPanel {
-  /** @param host object with hand, section (a view) and isSectionCurrent */
+  /** @param host object with hand, section (the view whose field places loops) and isSectionCurrent */
   constructor(host) {
     this.host = host;
     this.buttons = [...$("motion").children];
@@ -17,7 +17,7 @@ export class MotionPanel {
   choose(motion) {
     const { hand, section, isSectionCurrent } = this.host;
     const loop = motion === "loop" && isSectionCurrent ? findFeedingLoop(section, hand.loop) : null;
-    this.awaitsPicture = motion === "loop" && !isSectionCurrent;
+    this.awaitsCurl = motion === "loop" && !(isSectionCurrent && section.hasCurl);
     if (loop) Object.assign(hand, { x: loop.x, loopRadius: loop.radiusX, loopSpeed: loop.sense * Math.abs(hand.loopSpeed) });
     hand.motion = motion;
     hand.requestMotion();
@@ -26,9 +26,11 @@ export class MotionPanel {
 
   update() {
     const { hand, section, isSectionCurrent } = this.host;
-    if (this.awaitsPicture && isSectionCurrent) this.choose(hand.motion); // the loop is placed once its field is known
+    if (hand.motion !== "loop") this.awaitsCurl = false;
+    if (this.awaitsCurl && isSectionCurrent && section.hasCurl) this.choose("loop"); // placed once a field with curl is known
     for (const button of this.buttons) button.setAttribute("aria-checked", button.value === hand.motion);
-    const hint = isSectionCurrent && section.hasCurl && hand.motion !== "loop" ? HINT : "";
+    const field = section.label ? `The field of ${section.label}` : "This field";
+    const hint = isSectionCurrent && section.hasCurl && hand.motion !== "loop" ? `${field} ${HINT}` : "";
     if ($("motion-note").textContent !== hint) $("motion-note").textContent = hint;
   }
 }

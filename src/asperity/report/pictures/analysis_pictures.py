@@ -34,9 +34,7 @@ _MAX_ASPECT = 2.4
 _PANEL_MARGIN = 1.9
 _GRAPH_HEIGHT = 3.6  # height of a graph [inch]
 _GRID_CELLS = (200, 110)
-# Artists on a field have colours that do not follow the theme.
-_BLUE, _WHITE = style.unthemed_colour(style.BLUE), style.unthemed_colour(style.BACKGROUND)
-_HALO = [withStroke(linewidth=4.0, foreground=_WHITE)]
+_HALO = [withStroke(linewidth=4.0, foreground=style.BACKGROUND)]
 # Limit of the scale for a gain without bound.
 _MAX_GAIN = 1e3
 _ARROW_COUNT = 5
@@ -86,7 +84,7 @@ def draw_field(figure: FigureArea, analysis: Analysis) -> None:
     axes = law_pictures.draw_fields(figure, [analysis.surface], [remark], window)[0]
     for arrows in axes.findobj(Quiver):
         # A halo, for dark colours of the curl.
-        arrows.set_path_effects([withStroke(linewidth=1.2, foreground=_WHITE)])
+        arrows.set_path_effects([withStroke(linewidth=1.2, foreground=style.BACKGROUND)])
     _scale_axes(axes, window)
     field = curl_field(analysis.surface, window.segment, window.bottom, *_GRID_CELLS)
     _fade_beyond_depth(axes, analysis, window, field)
@@ -108,12 +106,12 @@ def _scale_axes(axes: Axes, window: law_pictures.Window) -> None:
 def _draw_loop(axes: Axes, x: FloatArray, z: FloatArray) -> None:
     """Draw a closed polygon with arrows of its direction."""
     x, z = np.append(x, x[0]), np.append(z, z[0])
-    axes.plot(x, z, color=_BLUE, lw=1.6, zorder=5.0, path_effects=_HALO)
+    axes.plot(x, z, color=style.BLUE, lw=1.6, zorder=5.0, path_effects=_HALO)
     (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
     steps = np.hypot(np.diff(x) / (right - left), np.diff(z) / (high - low))
     seen = (np.maximum(x[1:], x[:-1]) > left) & (np.minimum(x[1:], x[:-1]) < right)
     passed = np.concatenate([[0.0], np.cumsum(np.where(seen, steps, 0.0))])
-    arrow = {"arrowstyle": "-|>", "color": _BLUE, "lw": 1.6, "mutation_scale": 14}
+    arrow = {"arrowstyle": "-|>", "color": style.BLUE, "lw": 1.6, "mutation_scale": 14}
     for part in (np.arange(_ARROW_COUNT) + 0.5) / _ARROW_COUNT:
         ends = part * passed[-1] + np.array([-0.004, 0.004])
         start, end = zip(np.interp(ends, passed, x), np.interp(ends, passed, z), strict=True)
@@ -132,7 +130,7 @@ def _fade_beyond_depth(
     places = window.scale(field.along, field.z)
     fade: dict[str, Any] = {"colors": [style.FREE_SPACE], "alpha": 0.8, "zorder": 4.5}
     axes.contourf(*places, beyond, [0.0, math.inf], **fade)
-    border: dict[str, Any] = {"colors": [style.unthemed_colour(style.MUTED)], "linewidths": 0.9}
+    border: dict[str, Any] = {"colors": [style.MUTED], "linewidths": 0.9}
     axes.contour(*places, beyond, [0.0], zorder=4.6, **border)
 
 
@@ -182,9 +180,9 @@ def _gain_remark(analysis: Analysis) -> str:
 
 def _draw_cross(axes: Axes, x: float, y: float) -> None:
     """Draw a cross that is visible on dark and light colours."""
-    halo = [Stroke(linewidth=5.0, foreground=_WHITE), withStroke(linewidth=2.0)]
-    axes.plot(x, y, "x", color=_BLUE, ms=10, mew=2.2, zorder=7, path_effects=halo[:1])
-    axes.plot(x, y, "x", color=_BLUE, ms=10, mew=2.2, zorder=8, clip_on=False)
+    halo = [Stroke(linewidth=5.0, foreground=style.BACKGROUND), withStroke(linewidth=2.0)]
+    axes.plot(x, y, "x", color=style.BLUE, ms=10, mew=2.2, zorder=7, path_effects=halo[:1])
+    axes.plot(x, y, "x", color=style.BLUE, ms=10, mew=2.2, zorder=8, clip_on=False)
 
 
 def draw_top_view(figure: FigureArea, analysis: Analysis) -> None:
@@ -203,7 +201,7 @@ def draw_top_view(figure: FigureArea, analysis: Analysis) -> None:
         x, y = place * unit.scale
         _draw_cross(axes, float(x), float(y))
         dx, dy = analysis.leak.line.direction
-        axes.axline((x, y), (x + dx, y + dy), color=_BLUE, lw=0.8, ls=":", zorder=3)
+        axes.axline((x, y), (x + dx, y + dy), color=style.BLUE, lw=0.8, ls=":", zorder=3)
         axes.set(xlim=(x0, x1), ylim=(y0, y1))
     style.label_axes(axes, f"x [{unit.name}]", f"y [{unit.name}]")
     remark = "greatest of five depths, sampled; dotted: the vertical plane of the other figure"

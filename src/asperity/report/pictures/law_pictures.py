@@ -29,6 +29,7 @@ _WIDTH = 10.0
 _MAX_COLUMNS = 3
 # Panels are drawn true to scale unless that makes them flatter or taller.
 _MAX_ASPECT, _MIN_ASPECT = 2.4, 0.8
+_CURL_ROWS = 180
 _ARROWS = {**style.INCH_ARROWS, "width": 0.011, "headwidth": 4.0, "headlength": 4.5}
 _ARROWS |= {"headaxislength": 4.0, "minlength": 0.6}
 
@@ -125,14 +126,14 @@ def draw_fields(
     panels = style.axes_grid(figure, len(surfaces), columns, x=x, y=y)
     is_true_to_scale = wide == high and _MIN_ASPECT <= window.aspect <= _MAX_ASPECT
     for index, (axes, surface) in enumerate(zip(panels, surfaces, strict=True)):
-        mesh = _draw_curl(axes, curls[index], window, curl_limit)
+        window.limit_axes(axes)
+        image = _draw_curl(axes, curls[index], window, curl_limit)
         quiver = _draw_arrows(axes, arrows[index], window, force_per_inch)
         _draw_outline(axes, surface, window)
         style.title_law(axes, surface.law, remarks[index] if index < len(remarks) else "")
-        window.limit_axes(axes)
         axes.set_aspect("equal" if is_true_to_scale else "auto")
-    label = f"curl{over} [{'1' if over else 'N/m'}]: white is conservative"
-    bar = style.add_colorbar(figure, mesh, panels, label, **style.WIDE_COLORBAR)
+    label = f"curl{over} [{'1' if over else 'N/m'}]: uncoloured is conservative"
+    bar = style.add_colorbar(figure, image, panels, label, **style.WIDE_COLORBAR)
     key = style.nice_length(0.35 * force_per_inch)
     unit = per(key)
     _draw_force_key(bar, quiver, key, f"{'k · ' if over else ''}{key * unit.scale:g} {unit.name}")
@@ -165,32 +166,37 @@ def _choose_scales(
 
 
 def _draw_curl(axes: Axes, field: scan_plane.CurlField, window: Window, limit: float) -> Any:
-    axes.set_facecolor(style.FREE_SPACE)
-    places = window.scale(field.along, field.z)
-    colours: dict[str, Any] = {"cmap": style.CURL, "vmin": -limit, "vmax": limit, "zorder": 1}
-    return axes.pcolormesh(*places, field.curl, shading="flat", rasterized=True, **colours)
+    """Draw the curl in pixels, since transparent cells of a mesh overlap."""
+    heights = (np.arange(_CURL_ROWS) + 0.5) / _CURL_ROWS * (window.top - window.bottom)
+    ends = np.stack([field.z[1:, -1:], field.z[:-1, -1:]]) - window.bottom
+    cells = (field.curl.shape[1] * heights / ends.mean(axis=0)).astype(int)
+    pixels = np.take_along_axis(field.curl, np.minimum(cells, field.curl.shape[1] - 1), axis=1)
+    # One more pixel, in part within a cell, is covered by the free space, but not beyond the axes.
+    pixels[heights > ends.max(axis=0) + 2.0 * heights[0]] = pixels[:, -1] = np.nan
+    place: dict[str, Any] = {"extent": (*axes.get_xlim(), *axes.get_ylim()), "origin": "lower"}
+    place |= {"aspect": "auto", "interpolation": "nearest", "rasterized": True, "zorder": 0.4}
+    return axes.imshow(pixels.T, style.CURL, vmin=-limit, vmax=limit, **place)
 
 
 def _draw_arrows(
     axes: Axes, field: scan_plane.PlaneForces, window: Window, force_per_inch: float
 ) -> Any:
     places = window.scale(field.along, field.z)
-    options = _ARROWS | {"scale": force_per_inch, "color": style.unthemed_colour(style.INK)}
+    options = _ARROWS | {"scale": force_per_inch, "color": style.INK}
     return axes.quiver(*places, field.tangential, field.normal, zorder=4, **options)
 
 
 def _draw_outline(axes: Axes, surface: Surface, window: Window) -> None:
     """Draw the textured body, the contact surface if it is another, and the scan."""
-    along = window.segment.distances(600)
+    along = window.segment.distances(601)
     xy, contact = window.segment.xy(along), surface.law.contact
-    x, heights = window.scale(along, surface.texture.height(xy))
-    on_texture = contact.begins_on_texture
-    ink, green = style.unthemed_colour(style.INK), style.unthemed_colour(style.GREEN)
-    axes.plot(x, heights, color=ink, linewidth=1.3, linestyle="-" if on_texture else ":")
-    if not on_texture:
-        tops = contact.contact_height(surface.texture, xy)
-        axes.plot(*window.scale(along, tops), color=ink, linewidth=1.3)
-    axes.axhline(window.scale(0.0, scan_height(surface))[1], color=green, lw=1.0, ls="--")
+    x, tops = window.scale(along, contact.contact_height(surface.texture, xy))
+    axes.fill_between(x[::3], tops[::3], axes.get_ylim()[1], fc=style.FREE_SPACE, lw=0, zorder=0.5)
+    axes.plot(x, tops, color=style.INK, linewidth=1.3)
+    if not contact.begins_on_texture:
+        heights = window.scale(along, surface.texture.height(xy))[1]
+        axes.plot(x, heights, color=style.INK, linewidth=1.3, linestyle=":")
+    axes.axhline(window.scale(0.0, scan_height(surface))[1], color=style.GREEN, lw=1.0, ls="--")
 
 
 def _draw_force_key(bar: Any, quiver: Any, force: float, text: str) -> None:
@@ -326,7 +332,7 @@ def _draw_witness(axes: Axes, row: LawRow, window: Window) -> None:
     along, aside = segment.project(np.array(row.q.at[:2]))
     if 0.0 <= along <= segment.length and aside < 0.01 * segment.length:
         x, y = window.scale(along, row.q.at[2])
-        axes.plot(x, y, "x", color=style.unthemed_colour(style.BLUE), ms=7, mew=2, zorder=5)
+        axes.plot(x, y, "x", color=style.BLUE, ms=7, mew=2, zorder=5)
 
 
 def draw_gain_field(axes: Axes, field: scan_plane.CurlField, scale: LogNorm, window: Window) -> Any:

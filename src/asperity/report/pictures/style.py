@@ -26,8 +26,8 @@ INK, MUTED, FAINT = "#1d2733", "#5b6673", "#c9ced6"
 BODY = "#d9cdb8"
 # Okabe and Ito's palette, which colour-blind readers can distinguish.
 BLUE, ORANGE, GREEN = "#0072b2", "#d55e00", "#009e73"
-_THEMED = (BACKGROUND, INK, "#000000", MUTED, FAINT, BODY, BLUE, ORANGE, GREEN)
-_VARIABLES = ("card", "ink", "ink", "soft", "faint", "body", "blue", "orange", "green")
+_THEMED = (BACKGROUND, FREE_SPACE, INK, "#000000", MUTED, FAINT, BODY, BLUE, ORANGE, GREEN)
+_VARIABLES = ("card", "free", "ink", "ink", "soft", "faint", "body", "blue", "orange", "green")
 THEME_VARIABLES = dict(zip(_THEMED, _VARIABLES, strict=True))
 """CSS variables of the colours that follow the theme of a page.
 
@@ -41,23 +41,11 @@ WIDE_COLORBAR = {"location": "bottom", "shrink": 0.5, "aspect": 40, "extend": "b
 """Options of a colour bar below all panels."""
 INCH_ARROWS: dict[str, Any] = {"angles": "uv", "units": "inches", "scale_units": "inches"}
 
-# ColorBrewer's PuOr with a pure white centre, which means no curl.
-CURL = LinearSegmentedColormap.from_list(
-    "asperity_curl", ["#4d1a6b", "#8073ac", "#c5bfdf", "#ffffff", "#fbc98a", "#e08214", "#7f3b08"]
-)
-
-
-def unthemed_colour(colour: str) -> str:
-    """Return a colour for artists on a field, which does not follow the theme.
-
-    It differs by one part in 255 from the colour of the palette, so that no variable replaces it.
-
-    Example:
-        >>> unthemed_colour("#1d2733"), unthemed_colour("#ffffff")
-        ('#1d2732', '#fffffe')
-    """
-    value = int(colour[1:], 16)
-    return f"#{value - 1 if value & 1 else value + 1:06x}"
+# Opacity shows the size, so that the pixels fit a light and a dark page; the ink of both has a
+# contrast of at least 3 to 1 on the full colours.
+_CURL_STOPS = ((0.0, "#8d63c8"), (0.5, "#8d63c800"), (0.5, "#c2690e00"), (1.0, "#c2690e"))
+CURL = LinearSegmentedColormap.from_list("asperity_curl", _CURL_STOPS)
+"""Colours of the curl over the background; without colour it is zero."""
 
 
 SizedDrawing = tuple[tuple[float, float], Callable[[Any], object]]

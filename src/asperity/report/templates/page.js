@@ -1,6 +1,7 @@
 "use strict";
 // Interactive tools of a report page: values at the pointer, zoom, export of a figure as SVG and of
-// its data as CSV, sorting and hiding of laws. Without this script the page is complete but static.
+// its data as CSV, sorting and hiding of laws; figures for narrow windows. Without this script the page
+// is complete but static, and figures wider than the window scroll.
 
 const hiddenLaws = new Set();
 
@@ -345,6 +346,198 @@ function addSorting(table) {
   });
 }
 
+// --- narrow windows ------------------------------------------------------------------------------
+
+const narrowWindow = matchMedia("(max-width: 30rem)");
+const NARROW = 300; // units of the SVG across a narrow window, with which its text is readable
+const GAP = 8; // units between blocks
+
+const setAttributes = (element, values) => Object.entries(values).forEach(([name, value]) => element.setAttribute(name, value));
+const isLabel = (element) => /scale\(0\.\d+ -0\.\d+\)/.test(element.getAttribute("transform") ?? "");
+const move = (element, dx, dy) => setAttributes(element, { transform: `translate(${dx} ${dy}) ${element.getAttribute("transform") ?? ""}` });
+const right = (box) => box.x + box.width, bottom = (box) => box.y + box.height;
+
+/** Return the box around boxes. */
+function unite(boxes) {
+  const [x, y] = [Math.min(...boxes.map((box) => box.x)), Math.min(...boxes.map((box) => box.y))];
+  return { x, y, width: Math.max(...boxes.map(right)) - x, height: Math.max(...boxes.map(bottom)) - y };
+}
+
+/** Return the labels of an element: groups of glyphs on one line. */
+const labelsOf = (element) => [...element.querySelectorAll("g[transform]")].filter(isLabel);
+
+/** Break a label at spaces so that it ends at a limit; return the height of the lines after the first. */
+function wrapLabel(label, start, limit) {
+  const box = label.parentNode.getBBox();
+  if (right(box) <= limit) return 0;
+  const scale = Number(/scale\((\S+)/.exec(label.getAttribute("transform"))[1]), height = 130 * scale;
+  const glyphs = [...label.children].filter(({ tagName }) => tagName === "use");
+  const placeOf = (glyph) => Number(/translate\((\S+)/.exec(glyph.getAttribute("transform"))?.[1] ?? 0);
+  const places = glyphs.map(placeOf), ends = [...places.slice(1), box.width / scale];
+  let [line, offset, space] = [0, 0, -1];
+  glyphs.forEach((glyph, i) => {
+    if (!glyph.getBBox().width) space = i;
+    if (box.x + (ends[i] - offset) * scale > limit && space >= 0 && i > space) {
+      line += 1;
+      offset = places[space + 1] + (box.x - start) / scale;
+      for (let k = space + 1; k < i; k++) setAttributes(glyphs[k], { transform: `translate(${places[k] - offset} ${-130 * line})` });
+      space = -1;
+    }
+    if (line) setAttributes(glyph, { transform: `translate(${places[i] - offset} ${-130 * line})` });
+  });
+  return line * height;
+}
+
+/** Move an element by (dx, dy), and what is in a box from x to its new place at the left, squeezed by a factor. */
+function squeeze(element, box, factor, dx, dy) {
+  const matrix = `matrix(${factor} 0 0 1 ${box.x + dx - factor * box.x} ${dy})`;
+  const shiftOf = (x) => dx + (factor - 1) * (Math.min(Math.max(x, box.x), right(box)) - box.x);
+  if (element.tagName === "defs") return;
+  if (isLabel(element)) {
+    const { x, width } = element.parentNode.getBBox();
+    return move(element, shiftOf(x + width / 2), dy);
+  }
+  if (element.tagName === "use" && element.hasAttribute("x")) {
+    const [x, y] = [Number(element.getAttribute("x")), Number(element.getAttribute("y"))];
+    return setAttributes(element, { x: x + shiftOf(x), y: y + dy });
+  }
+  if (element.tagName === "g" && !element.hasAttribute("clip-path")) return [...element.children].forEach((child) => squeeze(child, box, factor, dx, dy));
+  setAttributes(element, { transform: `${matrix} ${element.getAttribute("transform") ?? ""}` });
+  if (factor === 1) return;
+  for (const path of [element, ...element.querySelectorAll("path")]) setAttributes(path, { "vector-effect": "non-scaling-stroke" });
+  for (const mark of element.querySelectorAll("use[x]")) {
+    const x = Number(mark.getAttribute("x"));
+    // A shape that is not a mark is at 0.
+    if (x) setAttributes(mark, { transform: `translate(${x} 0) scale(${1 / factor} 1) translate(${-x} 0)` });
+  }
+}
+
+/** Return the parts of axes: the box of their frame, all they show but data, and legends beside the frame. */
+function partsOf(group) {
+  const frame = [...group.querySelectorAll(":scope > image, :scope > g > path")].find((path) => path.getBBox().width > 1)?.getBBox();
+  const shared = [...group.querySelectorAll(":scope > .shared")];
+  const children = [...group.children].filter((child) => shared.includes(child) // grids of axes are clipped
+    || !child.matches("[clip-path], image") && !child.querySelector("[clip-path]"));
+  return { frame, children, legends: !frame ? [] : shared.slice(2).filter((legend) => legend.getBBox().x > right(frame) - 1), shared };
+}
+
+/** Give axes without labels at their left those of axes in the same row, as they share their scale. */
+function copyLabels(axes) {
+  const hasLabels = ({ shared: [, vertical] }) => labelsOf(vertical).length > 1;
+  for (const one of axes.filter((axis) => !hasLabels(axis))) {
+    const other = axes.find((axis) => hasLabels(axis) && Math.abs(axis.frame.y - one.frame.y) < 1 && axis.frame.x < one.frame.x);
+    if (!other) continue;
+    const copy = other.shared[1].cloneNode(true), moved = createGroup(...copy.children);
+    copy.querySelectorAll("defs").forEach((defs) => defs.remove()); // names are unique
+    copy.removeAttribute("class"); // hidden with its law
+    copy.append(moved);
+    move(moved, one.frame.x - other.frame.x, 0);
+    one.shared[1].replaceWith(copy);
+    one.children.splice(one.children.indexOf(one.shared[1]), 1, copy);
+    one.shared[1] = copy;
+  }
+}
+
+/** Return a group of elements of an SVG. */
+function createGroup(...children) {
+  const group = document.createElementNS(document.querySelector("svg").namespaceURI, "g");
+  group.append(...children);
+  return group;
+}
+
+/** Hide the labels of a horizontal axis that overlap others at their left. */
+function hideOverlaps(axis) {
+  const labels = labelsOf(axis).map((label) => ({ label, box: label.parentNode.getBBox() }));
+  const top = Math.min(...labels.map(({ box }) => box.y));
+  let end = -Infinity;
+  for (const { label, box } of labels.filter((one) => one.box.y < top + 5).sort((a, b) => a.box.x - b.box.x)) {
+    if (box.x < end + 2) setAttributes(label, { visibility: "hidden" });
+    else end = right(box);
+  }
+}
+
+/** Put the panels of a figure below each other, and squeeze those that are wider than a narrow window. */
+function stackPanels(svg, panels) {
+  const whole = svg.querySelector("g"), [ground, ...groups] = whole.children;
+  const isPanel = (frame) => (panel) => Math.abs(panel.box[0] - frame.x) + Math.abs(panel.box[1] - frame.y) < 2;
+  const axes = groups.map((group) => ({ group, ...partsOf(group) })).filter(({ frame, shared }) => frame && shared.length > 1);
+  for (const one of axes) one.panel = panels.find(isPanel(one.frame));
+  const [stacked, bars] = [axes.filter(({ panel }) => panel), axes.filter(({ panel }) => !panel)];
+  if (!stacked.length) return;
+  copyLabels(stacked);
+  const isUpright = ({ frame }) => frame.height > frame.width;
+  for (const bar of bars.filter(isUpright)) {
+    const beside = stacked.filter(({ frame }) => right(frame) <= bar.frame.x && Math.abs(frame.y - bar.frame.y) < 0.5 * frame.height);
+    (beside.sort((a, b) => right(b.frame) - right(a.frame))[0] ?? stacked[0]).bar = bar;
+  }
+  const boxOf = (one) => unite([one.frame, ...one.children.filter((child) => !one.legends.includes(child) && child.getBBox().width).map((child) => child.getBBox())]);
+  for (const one of stacked) {
+    one.left = Math.max(one.frame.x - boxOf({ ...one, children: one.shared }).x, 0) + 2;
+    one.rest = one.bar ? right(boxOf(one.bar)) - right(one.frame) : 14;
+  }
+  const left = Math.max(...stacked.map((one) => one.left));
+  const widths = stacked.map(({ frame, rest }) => left + frame.width + rest), fitting = widths.filter((width) => width <= 1.2 * NARROW);
+  const width = Math.max(fitting.length < widths.length ? NARROW : 0.85 * NARROW, ...fitting);
+  let y = 0;
+  const addRow = (element, box) => {
+    const factor = Math.min(1, width / box.width);
+    setAttributes(element, { transform: `translate(${factor < 1 ? 0 : Math.min(left, width - box.width)} ${y}) scale(${factor}) translate(${-box.x} ${-box.y})` });
+    y += factor * box.height + GAP;
+  };
+  const others = groups.filter((group) => !axes.some((one) => one.group === group) && group.getBBox().width);
+  const figureHeight = ground.getBBox().height, isAbove = (group) => group.getBBox().y < 0.3 * figureHeight;
+  for (const group of others.filter(isAbove)) addRow(group, group.getBBox());
+  const addAxes = (one, start) => {
+    const { frame, legends } = one, factor = Math.min(1, (width - start - (one.rest ?? 14)) / frame.width);
+    const whole = unite([boxOf(one), ...(one.bar ? [boxOf(one.bar)] : [])]), [dx, shrinkage] = [start - frame.x, (1 - factor) * frame.width];
+    const texts = one.children.filter((child) => !one.shared.includes(child) && labelsOf(child).length).map((child) => ({ child, box: child.getBBox() }));
+    const isRight = (box) => box.x > frame.x + 3 && Math.abs(right(box) - right(frame)) < 3, isAbove = (box) => bottom(box) < frame.y + 2;
+    let raised = 0;
+    for (const { child, box } of texts.filter((text) => isAbove(text.box) && !isRight(text.box))) {
+      const lines = wrapLabel(labelsOf(child)[0], frame.x, width - dx);
+      texts.filter((text) => text.box.y < bottom(box) - 1).forEach((text) => { text.raised = (text.raised ?? 0) + lines; });
+      raised += lines;
+    }
+    const dy = y - whole.y + raised, text = new Map(texts.map((one) => [one.child, one]));
+    for (const child of [...one.group.children]) {
+      const at = child.getBBox(), middle = at.x + at.width / 2, share = Math.min(Math.max((middle - frame.x) / frame.width, 0), 1);
+      if (text.has(child)) {
+        const { box } = text.get(child), shift = isRight(box) ? 1 : isAbove(box) ? 0 : share;
+        const x = Math.max(0, Math.min(box.x + dx - shift * shrinkage, isAbove(box) && !isRight(box) ? Infinity : width - 1 - box.width));
+        move(child, x - box.x, dy - (text.get(child).raised ?? 0));
+      } else if (one.shared.indexOf(child) < 2) squeeze(child, frame, factor, dx, dy);
+      else if (!legends.includes(child)) move(child, dx - shrinkage * (share > 0.6 ? 1 : share > 0.4 ? 0.5 : 0), dy);
+    }
+    if (one.bar) for (const child of one.bar.group.children) move(child, dx - shrinkage, dy);
+    hideOverlaps(one.shared[0]);
+    y = bottom(whole) + dy + GAP;
+    for (const legend of legends) addRow(legend, legend.getBBox());
+    if (one.panel) one.panel.box = [start, frame.y + dy, factor * frame.width, frame.height];
+  };
+  for (const one of stacked) addAxes(one, left);
+  for (const bar of bars.filter((one) => !isUpright(one))) {
+    // What is far from the bar, such as the key of arrows, comes before it.
+    const key = createGroup(...bar.children.filter((one) => one.getBBox().width && bottom(one.getBBox()) < bar.frame.y - 30));
+    bar.children = bar.children.filter((child) => child.parentNode !== key);
+    whole.append(key);
+    if (key.children.length) addRow(key, key.getBBox());
+    addAxes(bar, Math.max(14, (width - bar.frame.width) / 2));
+  }
+  for (const group of others.filter((one) => !isAbove(one))) addRow(group, group.getBBox());
+  setAttributes(ground.querySelector("path"), { d: `M 0 0 H ${width} V ${y} H 0 Z` });
+  setAttributes(svg, { viewBox: `0 0 ${width} ${y}` });
+}
+
+/** Draw a figure for a narrow window. */
+function reflow(figure) {
+  const svg = figure.querySelector("svg"), script = figure.querySelector("script");
+  const panels = JSON.parse(script.textContent);
+  if (figure.closest(".cards") || !panels.length) return;
+  stackPanels(svg, panels);
+  script.textContent = JSON.stringify(panels);
+  figure.classList.add("narrow");
+}
+
 // --- page ----------------------------------------------------------------------------------------
 
 /** Add zoom, values at the pointer and export to a figure. */
@@ -376,7 +569,30 @@ function addScrolling(regions) {
   for (const region of regions) observer.observe(region);
 }
 
-document.querySelectorAll("figure").forEach(addTools);
-addScrolling(document.querySelectorAll(".view, .scroll"));
+/** Set a figure up for the width of the window, also when that changes. */
+function setUpFigure(figure) {
+  const original = figure.cloneNode(true);
+  let current = figure, isNarrow;
+  const setUp = () => {
+    isNarrow = narrowWindow.matches;
+    if (isNarrow) reflow(current);
+    addTools(current);
+    addScrolling(current.querySelectorAll(".view"));
+  };
+  const update = () => {
+    if (narrowWindow.matches === isNarrow) return;
+    const next = original.cloneNode(true);
+    current.replaceWith(next);
+    current = next;
+    setUp();
+    hiddenLaws.forEach((law) => setLawVisible(law, false));
+  };
+  // Later, as a window has other widths for a moment, such as during a screenshot.
+  narrowWindow.addEventListener("change", () => setTimeout(update, 300));
+  setUp();
+}
+
+document.querySelectorAll("figure").forEach(setUpFigure);
+addScrolling(document.querySelectorAll(".scroll"));
 document.querySelectorAll("table:has(tr[data-law])").forEach(addSorting);
 addLawFilter();
