@@ -14,7 +14,7 @@ from asperity.analysis.energy.loop_integral import loop_work
 from asperity.core.checks import FloatArray
 from asperity.core.files import read_toml
 from asperity.paper.cases import SCANNING, random_settings
-from asperity.paper.claim import Check, Claim, check_values, combine_checks
+from asperity.paper.claim import Check, check_values, combine_checks
 from asperity.paper.formula_checks import (
     check_continuity,
     check_curl,
@@ -29,17 +29,12 @@ _SYMBOLS = "k d z p h1 h2 n rx rz r fx fz Jxx Jxz Jzx Jzz xx xz zx zz"
 
 @dataclass(frozen=True)
 class FormulaRow:
-    """A row of ``formulas.toml``, where the attributes and the symbols are explained."""
+    """What is compared; ``formulas.toml`` explains the attributes and the symbols."""
 
-    id: str = ""
-    section: str = ""
-    equations: Sequence[str] = ()
-    statement: str = ""
     law: str = ""
     quantity: str = ""
     printed: str = ""
     corrected: str = ""
-    correction: str = ""
     true: str = ""
     label: str = ""
     is_zero_outside: bool = False
@@ -48,13 +43,6 @@ class FormulaRow:
     loop_energy: Mapping[str, str] = field(default_factory=dict)
     potential: str = ""
     energy: str = ""
-    flips_under: str = ""
-
-    def to_claim(self) -> Claim:
-        """Return the claim that compares this row."""
-        place = tuple(self.equations), self.section
-        about = *place, self.statement, self.check, self.flips_under, self.correction
-        return Claim(self.id, *about)
 
     def check(self) -> Check:
         """Compare the formula of each law, and check the laws' properties."""
@@ -128,5 +116,5 @@ def _closest_point_values() -> list[list[float]]:
     ]
 
 
-_TABLE = read_toml("formulas", Path(__file__).with_name("formulas.toml"))
-FORMULA_CLAIMS = [FormulaRow(**row).to_claim() for row in _TABLE["claim"]]
+FORMULAS = read_toml("formulas", Path(__file__).with_name("formulas.toml"))
+"""Rows by the id of the claim; each also describes the claim."""

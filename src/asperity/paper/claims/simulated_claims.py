@@ -257,13 +257,11 @@ def divided_walls_are_passive() -> claim.Check:
         f"without lag W is quiet to {wall:.0f} N/m; of {', '.join(textured)} cycle below κ₀/q: "
         f"{summary or 'none'}; D has no finite q there",
         printed=not violating,
-        correction="a wall that stays quiet proves no damping: κ₀ q⁺ <= 2σ₀/T does, where the "
-        "field is conservative and nothing is late",
         numbers=numbers,
     )
 
 
 SIMULATED_CLAIM_IDS = tuple(
-    name for name, row in claim.CATALOGUE.items() if row["function"].startswith("simulated_claims")
+    name for name, row in claim.CATALOGUE.items() if "simulated_claims" in row.get("function", "")
 )
 """Ids of the claims that are judged in this module."""
