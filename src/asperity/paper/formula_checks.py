@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -16,10 +16,14 @@ from asperity.core.checks import FloatArray
 from asperity.laws import find_law
 from asperity.paper.cases import SCANNING, random_settings
 from asperity.paper.claim import Check, check_statement, check_values, combine_checks
-from asperity.paper.probes import ProbePoint, find_closest_point, generic_probes
+from asperity.paper.probes import (
+    Potential,
+    ProbePoint,
+    find_closest_point,
+    generic_probes,
+    numerical_gradient,
+)
 from asperity.surface import Surface
-
-Potential = Callable[[Any, Any], Any]
 
 
 def format_by_name(values: Mapping[str, float], spec: str = ".2f", unit: str = "") -> str:
@@ -68,19 +72,6 @@ def max_loop_share(law: str) -> float:
         / (case.stiffness * case.amplitude**2)
         for case in [SCANNING, *random_settings()]
     )
-
-
-def numerical_gradient(potential: Potential, at_x: float, at_z: float) -> list[float]:
-    """Return the gradient by central differences in 60 digits."""
-    import mpmath
-
-    with mpmath.workdps(60):
-        x, z, step = mpmath.mpf(at_x), mpmath.mpf(at_z), mpmath.mpf(10) ** -20
-        pairs = [
-            (potential(x + step, z), potential(x - step, z)),
-            (potential(x, z + step), potential(x, z - step)),
-        ]
-        return [float((ahead - behind) / (2 * step)) for ahead, behind in pairs]
 
 
 def check_potential(law: str) -> Check:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -177,17 +177,10 @@ def limit_4() -> Check:
     return combine_checks(count, _check_dimensions(4))
 
 
-def limit_5() -> Check:
-    """Gain: 2πA/l < A₀.
-
-    Checked with the greatest slope of the force of every law.
-    """
-    quotients = check_difference_quotients(
-        8,
-        "the greatest difference of forces of 4250 pairs of probes is, for A, B, C, E, G,",
-        "q k per length",
-    )
-    return combine_checks(_check_dimensions(5), quotients)
+def check_slopes(seed: int, before: str, after: str, dimensions: Sequence[int] = ()) -> Check:
+    """Check the greatest slopes of the force of five laws, and the dimensions of limits."""
+    quotients = check_difference_quotients(seed, before, after)
+    return combine_checks(*map(_check_dimensions, dimensions), quotients)
 
 
 def limit_6() -> Check:

@@ -58,14 +58,14 @@ class FormulaRow:
     def _compare(self, law: str) -> Check:
         if self.true:
             points = _closest_point_values()
-            reference = _evaluate(self.true, points)
+            reference = evaluate_formula(self.true, points)
         else:
             probes = list(generic_probes(law))
             points = [_probe_values(probe) for probe in probes]
             pairs = [probe.references(self.quantity) for probe in probes]
             reference = np.array(pairs).swapaxes(0, 1)
         printed, corrected = (
-            np.broadcast_to(_evaluate(formula, points), reference.shape) if formula else None
+            np.broadcast_to(evaluate_formula(formula, points), reference.shape) if formula else None
             for formula in (self.printed, self.corrected)
         )
         name = self.quantity.replace("jacobian", "Jacobian")
@@ -83,12 +83,12 @@ def _check_loop_energy(law: str, formula: str) -> Check:
     parameters = [[case.stiffness, case.amplitude, case.period] for case in cases]
     return check_values(
         f"energy of {law} around the path for {len(cases)} parameter sets",
-        printed=_evaluate(formula, parameters, "k A l"),
+        printed=evaluate_formula(formula, parameters, "k A l"),
         reference=[loop_work(case.surface(law), case.groove_path()) for case in cases],
     )
 
 
-def _evaluate(
+def evaluate_formula(
     formula: str, points: Sequence[Sequence[float]], symbol_names: str = _SYMBOLS
 ) -> FloatArray:
     """Evaluate a formula at points, each given by the values of the first symbols."""

@@ -19,8 +19,8 @@ from asperity.paper.cases import (
     random_friction_cases,
     random_settings,
 )
-from asperity.paper.formula_checks import Potential, numerical_gradient
-from asperity.paper.probes import generic_probes
+from asperity.paper.claims.formula_claims import evaluate_formula
+from asperity.paper.probes import Potential, generic_probes, numerical_gradient
 
 _TWO_PI = 2.0 * math.pi
 
@@ -262,40 +262,14 @@ def compliant_materials() -> claim.Check:
     )
 
 
-def expand_bound(r: FrictionCase, *, as_printed: bool) -> float:
-    """Evaluate the last expression of (31) term by term, with lengths in millimetres.
-
-    Corrected: μ instead of μ⁴ in two terms, μ² d p instead of μ (μ² d p) in a third, and a square
-    root over the inner bracket.
-    """
-    mu, p, d = r.friction, r.depth * 1e3, r.deflection * 1e3
-    e = math.pi * r.amplitude / (r.period * 1e3)
-    outer = 4 * (mu * p) ** 2 + 8 * (mu * p) ** 2 * e * d + 4 * (mu * p * e * d) ** 2
-    outer += 4 * (mu * d) ** 2 + d**2
-    first, second, third = mu * p, mu**2 * d * p, mu * d
-    if as_printed:
-        first, second, third = mu**4 * p, mu * mu**2 * d * p, mu**4 * d
-    inner = (
-        16 * first**4
-        + 32 * second**2
-        + 64 * (mu * p) ** 4 * e * d
-        + d**4
-        + 96 * (mu * p) ** 4 * (e * d) ** 2
-        + 64 * (mu * p) ** 4 * (e * d) ** 3
-        + 64 * mu**4 * d**3 * p**2 * e
-        - 16 * d**3 * (mu * p) ** 2 * e
-        + 16 * (mu * p * e * d) ** 4
-        + 32 * third**4 * (p * e) ** 2
-        - 8 * d**4 * (mu * p * e) ** 2
-        + 16 * (mu * d) ** 4
-        + 8 * mu**2 * d**4
-        - 8 * (mu * p * d) ** 2
-    )
-    whole = outer + (inner if as_printed else math.sqrt(inner))
-    return math.sqrt(2.0) / (2.0 * d) * math.sqrt(max(whole, 0.0))
+def expand_bound(r: FrictionCase, formula: str) -> float:
+    """Evaluate an expression for (31) in μ, the depth p, d_max = d and e = πA/l, in millimetres."""
+    lengths = r.depth * 1e3, r.deflection * 1e3
+    values = r.friction, *lengths, math.pi * r.amplitude / (r.period * 1e3)
+    return float(evaluate_formula(formula, [values], "mu p d e")[0])
 
 
-def friction_number_bound() -> claim.Check:
+def friction_number_bound(printed: str, corrected: str) -> claim.Check:
     """An upper bound on q_F, and its expression written out."""
     cases = [PAPER_CASE, *random_friction_cases(6)]
     norms = [case.sticking_norm() for case in cases]
@@ -305,8 +279,8 @@ def friction_number_bound() -> claim.Check:
     )
     written_out = claim.check_values(
         f"expression written out against that norm, {len(cases)} parameter sets",
-        printed=[expand_bound(case, as_printed=True) for case in cases],
-        corrected=[expand_bound(case, as_printed=False) for case in cases],
+        printed=[expand_bound(case, printed) for case in cases],
+        corrected=[expand_bound(case, corrected) for case in cases],
         reference=norms,
     )
     return claim.combine_checks(bound, written_out)

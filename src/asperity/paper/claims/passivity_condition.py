@@ -19,7 +19,7 @@ from asperity.paper.cases import (
     random_settings,
 )
 from asperity.paper.claim import Check, check_statement, check_values, combine_checks
-from asperity.paper.formula_checks import check_difference_quotients, find_max_norm, format_by_name
+from asperity.paper.formula_checks import find_max_norm, format_by_name
 from asperity.paper.probes import generic_probes
 from asperity.surface import Surface
 
@@ -171,19 +171,6 @@ def product_bound() -> Check:
         printed=worst < 1e-5 and abs(most - 1.0) < 1e-5,
         greatest_difference=worst,
         greatest_share=most,
-    )
-
-
-def step_bound() -> Check:
-    """With (1), the force changes by at most σ₀/(2T) |Δ|.
-
-    With the smallest σ₀ that (1) allows, for random pairs of probes and close pairs at the witness.
-    """
-    return check_difference_quotients(
-        3,
-        "at equality in (1) the force of A, B, C, E, G changes over 4250 pairs of probes by "
-        "at most",
-        "σ₀/(2T) |Δ|",
     )
 
 

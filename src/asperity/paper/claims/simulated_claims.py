@@ -96,9 +96,9 @@ def divided_walls_settle() -> claim.Check:
         if count_cycles(law, 1.0, d).cycles
     ]
     cycling, starts = sum(one.cycles for one in counts), sum(one.starts for one in counts)
-    lags = ", ".join(f"{one.law}/{one.divisor:g} at {one.delay}" for one in counts)
+    lags = ", ".join(f"{one.wall} at {one.delay}" for one in counts)
     summary = f"where the undivided cycle (lags: {lags}), {cycling} of {starts} starts cycle"
-    numbers = {f"{one.law}/{one.divisor:g}, lag {one.delay}": float(one.cycles) for one in counts}
+    numbers = {f"{one.wall}, lag {one.delay}": float(one.cycles) for one in counts}
     settles = [one.cycles == 0 for one in counts]
     return check_over_assumptions(summary, settles, settles, numbers)
 

@@ -11,7 +11,7 @@ from typing import Any
 from asperity.paper import VERDICTS, Result
 from asperity.paper.claim import Number
 from asperity.paper.experiments import Experiments
-from asperity.paper.experiments.cycle_counts import CycleCount, PassivityExperiment
+from asperity.paper.experiments.cycle_counts import PassivityExperiment
 from asperity.paper.experiments.device_onsets import DeviceExperiment, DeviceOnset
 from asperity.paper.experiments.strokes import BumpExperiment, ScanningExperiment
 from asperity.paper.figures import loop_energies
@@ -170,14 +170,9 @@ def experiment_sections(experiments: Experiments) -> list[Section]:
 def _cycle_section(experiment: PassivityExperiment) -> Section:
     first, notes = experiment.counts[0], _fitted_notes(experiment.fitted)
     figure = partial(paper_pictures.cycles_figure, experiment)
-    counts = ", ".join(f"{one.cycles} with {_wall_text(one)}" for one in experiment.counts)
+    counts = ", ".join(f"{one.cycles} with {one.wall}" for one in experiment.counts)
     values: dict[str, Any] = {"lag": first.delay, "starts": first.starts, "counts": counts}
     return page.figure_section("paper.cycles", figure, notes, **values)
-
-
-def _wall_text(wall: CycleCount) -> str:
-    """Return the law of a wall with the divisor of its stiffness."""
-    return wall.law if wall.divisor == 1.0 else f"{wall.law}/{wall.divisor:g}"
 
 
 def _fitted_notes(sentences: Sequence[str]) -> list[str]:
