@@ -223,47 +223,43 @@ def check_values(
     target = np.asarray(reference, dtype=float)
     if np.isnan(target).any() or target.size == 0:
         return Check(f"{quantity}: could not be computed")
-    printed_error = relative_error(printed, target)
-    corrected_error = relative_error(corrected, target)
-    agrees = printed_error <= tolerance
-    shown = None if agrees else corrected
-    if target.ndim == 0:
-        errors = _format_values(printed, shown, target)
-    elif shown is None:
-        errors = _format_error(printed_error)
-    else:
-        errors = (
-            f"as printed {_format_error(printed_error)}, corrected {_format_error(corrected_error)}"
-        )
+    agrees = relative_error(printed, target) <= tolerance
+    compared = {"as printed": printed}
+    if corrected is not None and not agrees:
+        compared["corrected"] = corrected
     return check_statement(
-        f"{quantity}: {errors}",
+        f"{quantity}: {_format_errors(compared, target)}",
         printed=agrees,
-        corrected=None if corrected is None else corrected_error <= tolerance,
+        corrected=None if corrected is None else relative_error(corrected, target) <= tolerance,
         correction=correction,
-        numbers=_error_numbers(quantity, printed, shown, target),
+        numbers=_error_numbers(quantity, compared, target),
     )
 
 
-def _format_values(
-    printed: ArrayLike | None, corrected: ArrayLike | None, reference: FloatArray
-) -> str:
-    known = {"printed": printed, "corrected": corrected, "true": reference}
-    shown = {name: value for name, value in known.items() if value is not None}
-    return ", ".join(f"{name} {float(np.asarray(value)):.6g}" for name, value in shown.items())
+def _format_errors(compared: Mapping[str, ArrayLike | None], target: FloatArray) -> str:
+    if target.ndim == 0:
+        shown = {name.removeprefix("as "): value for name, value in compared.items()}
+        known = {
+            name: value for name, value in (shown | {"true": target}).items() if value is not None
+        }
+        return ", ".join(f"{name} {float(np.asarray(value)):.6g}" for name, value in known.items())
+    errors = {name: _format_error(relative_error(one, target)) for name, one in compared.items()}
+    if len(errors) == 1:
+        return errors["as printed"]
+    return ", ".join(f"{name} {error}" for name, error in errors.items())
 
 
 def _error_numbers(
-    quantity: str, printed: ArrayLike | None, corrected: ArrayLike | None, reference: FloatArray
+    quantity: str, compared: Mapping[str, ArrayLike | None], target: FloatArray
 ) -> dict[str, Number]:
     """Return the relative errors, and for scalars the values themselves."""
     numbers: dict[str, Number] = {}
-    for name, values in (("as printed", printed), ("corrected", corrected)):
-        if values is not None or name == "as printed":
-            numbers[f"{quantity}, error {name}"] = relative_error(values, reference)
-        if values is not None and reference.ndim == 0:
+    for name, values in compared.items():
+        numbers[f"{quantity}, error {name}"] = relative_error(values, target)
+        if values is not None and target.ndim == 0:
             numbers[f"{quantity}, {name}"] = float(np.asarray(values))
-    if reference.ndim == 0:
-        numbers[f"{quantity}, true"] = float(reference)
+    if target.ndim == 0:
+        numbers[f"{quantity}, true"] = float(target)
     return numbers
 
 

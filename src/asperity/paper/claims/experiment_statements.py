@@ -120,13 +120,9 @@ def division_ensures_passivity() -> claim.Check:
         surface = cases.PASSIVITY.surface(law, stiffness=cases.PASSIVITY.stiffness / number)
         loop = cases.PASSIVITY.groove_path() if law == "A" else cases.PASSIVITY.friction_path(1e-5)
         length = float(np.linalg.norm(loop - np.roll(loop, 1, axis=0), axis=1).sum())
-        speeds[law] = loop_work(surface, loop) / (damping * length)
-    in_mm = {law: 1e3 * speed for law, speed in speeds.items()}
+        speeds[f"speed for {law}"] = loop_work(surface, loop) / (damping * length)
     return claim.check_statement(
-        f"with κ₀/5.1 and κ₀/8.3 and σ₀ = {damping:.2f} N·s/m, the loops of Fig. 3 supply energy "
-        f"to a hand slower than: {formula_checks.format_by_name(in_mm, '.1f', ' mm/s')}",
-        printed=max(speeds.values()) <= 0.0,
-        numbers={f"speed for {law}": speed for law, speed in speeds.items()},
+        f"σ₀ = {damping:.2f} N·s/m", printed=max(speeds.values()) <= 0.0, numbers=speeds
     )
 
 
@@ -220,7 +216,6 @@ def scaling_with_texture() -> claim.Check:
     q_error = max(abs(q_by_a - 1.0), abs(q_by_l + 1.0))
     energy_error = max(abs(energy_by_a - 2.0), abs(energy_by_l))
     return claim.check_statement(
-        f"exponents in V.C's setting: {formula_checks.format_by_name(exponents, '+.3f')}; "
         f"along a horizontal path forth and back {straight:g} J",
         printed=q_error < 1e-6 and energy_error < 1e-6,
         corrected=q_error < 0.05 and energy_error < 1e-6 and straight == 0.0,
@@ -334,8 +329,7 @@ def conclusion_f() -> claim.Check:
     length, depth = 10.0 * cases.SCANNING.deflection, -cases.SCANNING.depth
     work = loop_work(cases.SCANNING.surface("F"), [[0, 0, depth], [length, 0, depth]])
     return claim.check_statement(
-        f"q_F = {numbers['F']:.3f} ({bound:.3f} by (26)) against 1 for E and the wall; a "
-        f"stroke of 10 mm forth and back gives {work * 1e3:+.2f} mJ",
+        f"{bound:.3f} by (26)",
         printed=min(numbers["F"], bound) > 1.1 * numbers["E"] and work < 0.0,
         numbers={f"q_{law}": q for law, q in numbers.items()},
         work_of_a_stroke=work,

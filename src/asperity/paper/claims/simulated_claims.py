@@ -151,7 +151,7 @@ def decrease_indicates_supply() -> claim.Check:
     closure = max(one.closure for one in strokes)
     return claim.check_statement(
         f"of {len(strokes)} strokes in which A and E supply energy to the hand, by a balance of "
-        f"all energies that closes within {closure:.0e}, the paper's sum of f Δp rises in {rising}",
+        f"all energies that closes within {closure:.0e}",
         printed=rising == 0,
         corrected=rising == len(strokes),
         rising=float(rising),

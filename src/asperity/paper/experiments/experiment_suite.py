@@ -102,7 +102,7 @@ class Experiments:
 
     def _summarize_devices(self) -> str:
         found = self.devices.onsets
-        missed = sum(one.is_limit_violated for one in found)
+        missed = sum(one.catalogue_rule_missed for one in found)
         rules = sum(one.prediction.violates_delay_rule for one in found)
         return (
             f"{missed} of {len(found)} cases cycle at a stiffness that the catalogue's K0/q "

@@ -212,7 +212,7 @@ def _device_section(experiments: Experiments) -> Section:
     if devices.wall_summary:
         notes.append(f"Few misses on the left are weak evidence: {devices.wall_summary}.")
     notes.append(f"Not simulated for lack of an apparent mass: {', '.join(devices.skipped)}.")
-    count, missed = len(devices.onsets), sum(one.is_limit_violated for one in devices.onsets)
+    count, missed = len(devices.onsets), sum(one.catalogue_rule_missed for one in devices.onsets)
     figure = partial(paper_pictures.devices_figure, experiments)
     return page.figure_section("paper.devices", figure, notes, missed=missed, count=count)
 
@@ -228,7 +228,7 @@ def _device_cells(device_onset: DeviceOnset) -> Cells:
     law, _delay, _quiet, cycling, starts, depth, q, _paper, rule, _wall = sweep_report.onset_cells(
         device_onset.prediction
     )
-    kind = "no" if device_onset.is_limit_violated else ""
-    allowed = Cell(sweep_report.stiffness_number(device_onset.catalogue_limit), kind)
+    kind = "no" if device_onset.catalogue_rule_missed else ""
+    allowed = Cell(sweep_report.stiffness_number(device_onset.catalogue_rule), kind)
     names = [device_onset.device, device_onset.surface]
     return [*names, law, q, allowed, rule, cycling, starts, depth]

@@ -281,7 +281,7 @@ def devices_figure(experiments: Experiments) -> Figure:
     devices = dict.fromkeys(one.device for one in experiments.devices.onsets)
     markers = {**dict(zip(devices, "osD^vP*" * len(devices), strict=False)), _PAPER_DEVICE: "X"}
     wall_rule = [
-        _OnsetPoint(one.catalogue_limit, one.prediction, one.device, one.is_limit_violated)
+        _OnsetPoint(one.catalogue_rule, one.prediction, one.device, one.catalogue_rule_missed)
         for one in experiments.devices.onsets
     ]
     wall_rule += [
