@@ -13,7 +13,7 @@ from asperity.core.errors import ParameterError, nearest_names
 from asperity.core.processes import precompute
 from asperity.paper import claims
 from asperity.paper.claim import CATALOGUE, Claim, Computation, Result
-from asperity.paper.claims.formula_claims import FORMULAS, FormulaRow
+from asperity.paper.formula_checks import FORMULAS, FormulaRow
 
 Progress = Callable[[Result, int, int], None]
 """Called after each claim with its result, the number of finished claims and their total."""

@@ -14,8 +14,8 @@ from asperity.paper import CLAIMS, VERDICTS, Result, get_claim, reproduce_claims
 from asperity.paper.claim import CATALOGUE
 from asperity.paper.claim_registry import find_claims
 from asperity.paper.claims import simulated_claims
-from asperity.paper.claims.formula_claims import FORMULAS, FormulaRow
 from asperity.paper.claims.simulated_claims import SIMULATED_CLAIM_IDS
+from asperity.paper.formula_checks import FORMULAS, FormulaRow
 
 SIMULATED = set(SIMULATED_CLAIM_IDS)
 

@@ -21,7 +21,7 @@ from asperity.paper.claim import CATALOGUE
 from asperity.paper.claims import design_limits as claims_limits
 from asperity.paper.claims import friction_law as claims_appendix
 from asperity.paper.claims import passivity_condition as claims_passivity
-from asperity.paper.claims.formula_claims import FormulaRow
+from asperity.paper.formula_checks import FormulaRow
 from asperity.paper.probes import closest_point_derivatives, find_closest_point, generic_probes
 
 BOUND = CATALOGUE["eq-31"]["arguments"]

@@ -19,7 +19,7 @@ from asperity.paper.cases import (
     random_friction_cases,
     random_settings,
 )
-from asperity.paper.claims.formula_claims import evaluate_formula
+from asperity.paper.formula_checks import evaluate_formula
 from asperity.paper.probes import Potential, generic_probes, numerical_gradient
 
 _TWO_PI = 2.0 * math.pi

@@ -11,7 +11,7 @@ from asperity.analysis.energy.loop_integral import loop_work
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
 from asperity.paper import cases, formula_checks
 from asperity.paper.claim import Check, check_statement, check_values, combine_checks
-from asperity.paper.claims.formula_claims import FormulaRow
+from asperity.paper.formula_checks import FormulaRow
 from asperity.paper.probes import generic_probes
 
 _LABEL = "f_x of D at generic probes, by definition and kernel"
