@@ -16,6 +16,7 @@ from asperity.paper.claim import (
     check_statement,
     check_values,
     combine_checks,
+    format_summary,
     relative_error,
 )
 
@@ -141,6 +142,46 @@ def test_parameter_error_is_undecided_and_other_errors_propagate() -> None:
     assert "depth must be positive" in result.evidence.summary
     with pytest.raises(ZeroDivisionError):
         Claim("x", (), "I", "", raise_other_error).run()
+
+
+NUMBERS = {"net gain of A": 2e-3, "net gain of E": -1e-3, "a.b [J]": [3.0, 1.0, 2.0], "laws": "AB"}
+
+
+@pytest.mark.parametrize(
+    ("template", "sentence"),
+    [
+        ("{net gain of A:+.1f*1e3} mJ", "+2.0 mJ"),
+        ("{net gain of A:.3f J}", "0.002 J"),
+        ("{net gain of *:+.0f*1e3 mJ}", "A +2 mJ, E -1 mJ"),
+        ("{a.b [J]:.1f}", "1.0 to 3.0"),
+        ("{a* [J]:g N}", ".b 1 N to 3 N"),
+        ("laws {laws}", "laws AB"),
+    ],
+)
+def test_numbers_are_inserted_into_a_sentence(template: str, sentence: str) -> None:
+    assert format_summary(template, NUMBERS) == sentence
+
+
+def test_sentence_without_its_number_is_an_error() -> None:
+    with pytest.raises(KeyError, match="net gain of B"):
+        format_summary("{net gain of B}", NUMBERS)
+
+
+@pytest.mark.parametrize(
+    ("is_true", "corrected", "correction"),
+    [(True, None, ""), (False, True, "right"), (False, None, "1.0 kg")],
+)
+def test_texts_of_a_claim_follow_its_verdict(
+    is_true: bool, corrected: bool | None, correction: str
+) -> None:
+    def compute() -> Check:
+        part = check_statement("own", printed=True)
+        return combine_checks(part, check_statement(printed=is_true, corrected=corrected, m=1.0))
+
+    texts = {"correction": "right", "instead": "{m:.1f kg}", "summary": "{found}; {m} kg"}
+    result = Claim("x", (), "I", "", compute, **texts).run()
+    assert result.evidence.summary == "own; 1.0 kg"
+    assert result.evidence.correction == correction
 
 
 def test_there_are_four_verdicts() -> None:

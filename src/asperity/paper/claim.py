@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+import string
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -105,6 +106,10 @@ class Claim:
         correction: the corrected statement, which the evidence carries if it holds and the printed
             one does not.
         fitted: parameters that were fitted or guessed; by default those that the check names.
+        summary: sentence of the evidence for :func:`format_summary`; by default that of the check,
+            which is inserted for ``{found}``.
+        instead: what is true if the printed statement does not hold and no correction is computed;
+            also for :func:`format_summary`.
     """
 
     id: str
@@ -115,6 +120,8 @@ class Claim:
     flips_under: str = ""
     correction: str = ""
     fitted: str = ""
+    summary: str = ""
+    instead: str = ""
 
     def run(self) -> Result:
         """Compute the evidence and return it with the verdict.
@@ -125,12 +132,62 @@ class Claim:
             check = self.compute()
         except AsperityError as error:
             check = Check(f"could not be computed: {error}")
-        if self.correction and check.verdict == "holds with correction":
-            check = replace(check, correction=self.correction)
-        if self.fitted:
-            check = replace(check, fitted=self.fitted)
+        else:
+            check = self._add_texts(check)
         about = self.id, self.equations, self.section, self.statement
         return Result(*about, check.verdict, check, self.flips_under)
+
+    def _add_texts(self, check: Check) -> Check:
+        numbers = {"found": check.summary, **check.numbers}
+        summary = format_summary(self.summary or "{found}", numbers)
+        right = {
+            "holds with correction": self.correction,
+            "does not hold": format_summary(self.instead, numbers),
+        }
+        correction = right.get(check.verdict) or check.correction
+        fitted = self.fitted or check.fitted
+        return replace(check, summary=summary, correction=correction, fitted=fitted)
+
+
+def format_summary(template: str, numbers: Mapping[str, Number]) -> str:
+    """Return a sentence with numbers inserted.
+
+    A field is ``{name:FORMAT*FACTOR UNIT}``: the number is multiplied by the factor, formatted and
+    followed by the unit; each part may be left out. A list is shown as its least and greatest
+    value. A star in a name stands for any text, with which each number that fits is shown.
+
+    Args:
+        template: the sentence with its fields.
+        numbers: computed values by name.
+
+    Example:
+        >>> found = {"work": 0.0123, "q": [1.0, 2.5, 2.0], "gain of A": 3.0, "gain of E": 4.0}
+        >>> format_summary("{work:.1f*1e3} mJ, q from {q:.1f}, {gain of *:.0f J}", found)
+        '12.3 mJ, q from 1.0 to 2.5, A 3 J, E 4 J'
+    """
+    return _SummaryFormatter().vformat(template, (), numbers)
+
+
+class _SummaryFormatter(string.Formatter):
+    """Look numbers up by their whole names, which may contain dots and brackets."""
+
+    def get_field(self, field_name: str, _args: Sequence[Any], numbers: Any) -> tuple[Any, str]:
+        start, star, end = field_name.partition("*")
+        if not star:
+            return numbers[field_name], field_name
+        stop = -len(end) or None
+        fitting = [name for name in numbers if name.startswith(start) and name.endswith(end)]
+        return {name[len(start) : stop]: numbers[name] for name in fitting}, field_name
+
+    def format_field(self, value: Any, format_spec: str) -> str:
+        if isinstance(value, dict):
+            parts = (f"{name} {self.format_field(one, format_spec)}" for name, one in value.items())
+            return ", ".join(parts)
+        if isinstance(value, list):
+            return " to ".join(self.format_field(end(value), format_spec) for end in (min, max))
+        number_format, space, unit = format_spec.partition(" ")
+        number_format, star, factor = number_format.partition("*")
+        return format(value * float(factor) if star else value, number_format) + space + unit
 
 
 CATALOGUE = read_toml("claims", Path(__file__).with_name("claims.toml"))
@@ -166,52 +223,48 @@ def check_values(
     target = np.asarray(reference, dtype=float)
     if np.isnan(target).any() or target.size == 0:
         return Check(f"{quantity}: could not be computed")
-    printed_error = relative_error(printed, target)
-    corrected_error = relative_error(corrected, target)
-    agrees = printed_error <= tolerance
-    shown = None if agrees else corrected
-    if target.ndim == 0:
-        errors = _format_values(printed, shown, target)
-    elif shown is None:
-        errors = _format_error(printed_error)
-    else:
-        errors = (
-            f"as printed {_format_error(printed_error)}, corrected {_format_error(corrected_error)}"
-        )
+    agrees = relative_error(printed, target) <= tolerance
+    compared = {"as printed": printed}
+    if corrected is not None and not agrees:
+        compared["corrected"] = corrected
     return check_statement(
-        f"{quantity}: {errors}",
+        f"{quantity}: {_format_errors(compared, target)}",
         printed=agrees,
-        corrected=None if corrected is None else corrected_error <= tolerance,
+        corrected=None if corrected is None else relative_error(corrected, target) <= tolerance,
         correction=correction,
-        numbers=_error_numbers(quantity, printed, shown, target),
+        numbers=_error_numbers(quantity, compared, target),
     )
 
 
-def _format_values(
-    printed: ArrayLike | None, corrected: ArrayLike | None, reference: FloatArray
-) -> str:
-    known = {"printed": printed, "corrected": corrected, "true": reference}
-    shown = {name: value for name, value in known.items() if value is not None}
-    return ", ".join(f"{name} {float(np.asarray(value)):.6g}" for name, value in shown.items())
+def _format_errors(compared: Mapping[str, ArrayLike | None], target: FloatArray) -> str:
+    if target.ndim == 0:
+        shown = {name.removeprefix("as "): value for name, value in compared.items()}
+        known = {
+            name: value for name, value in (shown | {"true": target}).items() if value is not None
+        }
+        return ", ".join(f"{name} {float(np.asarray(value)):.6g}" for name, value in known.items())
+    errors = {name: _format_error(relative_error(one, target)) for name, one in compared.items()}
+    if len(errors) == 1:
+        return errors["as printed"]
+    return ", ".join(f"{name} {error}" for name, error in errors.items())
 
 
 def _error_numbers(
-    quantity: str, printed: ArrayLike | None, corrected: ArrayLike | None, reference: FloatArray
+    quantity: str, compared: Mapping[str, ArrayLike | None], target: FloatArray
 ) -> dict[str, Number]:
     """Return the relative errors, and for scalars the values themselves."""
     numbers: dict[str, Number] = {}
-    for name, values in (("as printed", printed), ("corrected", corrected)):
-        if values is not None or name == "as printed":
-            numbers[f"{quantity}, error {name}"] = relative_error(values, reference)
-        if values is not None and reference.ndim == 0:
+    for name, values in compared.items():
+        numbers[f"{quantity}, error {name}"] = relative_error(values, target)
+        if values is not None and target.ndim == 0:
             numbers[f"{quantity}, {name}"] = float(np.asarray(values))
-    if reference.ndim == 0:
-        numbers[f"{quantity}, true"] = float(reference)
+    if target.ndim == 0:
+        numbers[f"{quantity}, true"] = float(target)
     return numbers
 
 
 def check_statement(
-    summary: str,
+    summary: str = "",
     *,
     printed: bool | np.bool_ | None,
     corrected: bool | np.bool_ | None = None,
@@ -222,7 +275,7 @@ def check_statement(
     """Judge a statement that is either true or false.
 
     Args:
-        summary: one line with the computed numbers.
+        summary: one line with the computed numbers; by default the claim has it.
         printed: whether the printed statement is true; ``None`` if it cannot be computed.
         corrected: whether the corrected one is true; ``None`` if no correction is known.
         correction: the corrected statement.
@@ -241,16 +294,16 @@ def check_statement(
     return Check(summary, known, known_correction, verdict="does not hold")
 
 
-def check_observation(summary: str, numbers: Mapping[str, Number] | None = None) -> Check:
+def check_observation(numbers: Mapping[str, Number] | None = None) -> Check:
     """Leave a statement on perception or on materials undecided, since it cannot be computed."""
-    return check_statement(summary, printed=None, numbers=numbers)
+    return check_statement(printed=None, numbers=numbers)
 
 
 def combine_checks(*checks: Check) -> Check:
     """Combine checks: a claim is as good as the weakest of its parts."""
     worst = max(checks, key=lambda check: _SEVERITY.index(check.verdict))
     numbers = {name: value for check in checks for name, value in check.numbers.items()}
-    summary = "; ".join(check.summary for check in checks)
+    summary = "; ".join(check.summary for check in checks if check.summary)
     correction, fitted = (
         "; ".join(dict.fromkeys(text for text in texts if text))
         for texts in zip(*((check.correction, check.fitted) for check in checks), strict=True)

@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from importlib import import_module
 from typing import Any
 
 from asperity.core.errors import ParameterError, nearest_names
 from asperity.core.processes import precompute
 from asperity.paper import claims
-from asperity.paper.claim import CATALOGUE, Claim, Result
-from asperity.paper.claims.formula_claims import FORMULA_CLAIMS
-from asperity.paper.claims.tables_and_remarks import TABLE_TWO_CLAIMS
+from asperity.paper.claim import CATALOGUE, Claim, Computation, Result
+from asperity.paper.formula_checks import FORMULAS, FormulaRow
 
 Progress = Callable[[Result, int, int], None]
 """Called after each claim with its result, the number of finished claims and their total."""
@@ -27,19 +27,24 @@ def _paper_order(claim: Claim) -> tuple[bool, str, float]:
 
 
 def _catalogued_claim(claim_id: str, row: Mapping[str, Any]) -> Claim:
-    """Return a claim of ``claims.toml``; the first line of a docstring is the statement."""
-    module, function = row["function"].split(".")
-    compute = getattr(import_module(f"{claims.__name__}.{module}"), function)
-    statement = (compute.__doc__ or "").partition("\n")[0]
-    place = tuple(row.get("equations", ())), row["section"]
-    texts = (row.get(name, "") for name in ("flips_under", "correction", "fitted"))
-    return Claim(claim_id, *place, statement, compute, *texts)
+    """Return a claim of a table: its other entries are a function or what a formula needs."""
+    about = {name: value for name, value in row.items() if name in Claim.__dataclass_fields__}
+    about["equations"] = tuple(row.get("equations", ()))
+    compute: Computation
+    if "function" in row:
+        module, name = row["function"].split(".")
+        function = getattr(import_module(f"{claims.__name__}.{module}"), name)
+        about.setdefault("statement", function.__doc__.partition("\n")[0])
+        compute = partial(function, **row.get("arguments", {}))
+    else:
+        formula = {name: value for name, value in row.items() if name not in about}
+        compute = FormulaRow(**formula).check
+    return Claim(claim_id, compute=compute, **about)
 
 
-_CATALOGUED_CLAIMS = [_catalogued_claim(claim_id, row) for claim_id, row in CATALOGUE.items()]
+_ROWS = [*FORMULAS.items(), *CATALOGUE.items()]
 CLAIMS: dict[str, Claim] = {
-    one.id: one
-    for one in sorted([*FORMULA_CLAIMS, *_CATALOGUED_CLAIMS, *TABLE_TWO_CLAIMS], key=_paper_order)
+    one.id: one for one in sorted((_catalogued_claim(*pair) for pair in _ROWS), key=_paper_order)
 }
 _PAPER_CLAIM_IDS = frozenset(CLAIMS)
 

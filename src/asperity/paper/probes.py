@@ -14,6 +14,8 @@ from asperity.core.checks import FloatArray
 from asperity.surface import Surface
 from asperity.textures.kinds.fourier import Fourier
 
+Potential = Callable[[Any, Any], Any]
+
 _DIGITS = 25
 
 
@@ -138,7 +140,7 @@ def _profile(surface: Surface) -> Callable[[Any, int], Any]:
 
 
 def find_closest_point(surface: Surface, x: Any, z: Any, digits: int = _DIGITS) -> tuple[Any, Any]:
-    """Return the closest point (p_h^x, p_h^z) in mpmath, by a scan and Newton iterations."""
+    """Return the closest point (p_h^x, p_h^z) in mpmath, by a scan and secants."""
     import mpmath
 
     profile = _profile(surface)
@@ -147,23 +149,30 @@ def find_closest_point(surface: Surface, x: Any, z: Any, digits: int = _DIGITS) 
         grid = float(x) + np.linspace(-reach, reach, 4001)
         heights = surface.texture.height(np.column_stack([grid, 0 * grid]))
         start = float(grid[np.argmin((grid - float(x)) ** 2 + (heights - float(z)) ** 2)])
-        return _solve_closest_point(profile, mpmath.mpf(start), mpmath.mpf(x), mpmath.mpf(z))
+
+        def slope_of_distance(at: Any) -> Any:
+            return at - x + (profile(at, 0) - z) * profile(at, 1)
+
+        closest = mpmath.findroot(slope_of_distance, (start, start + 1e-9))
+        return closest, profile(closest, 0)
 
 
-def _solve_closest_point(
-    profile: Callable[[Any, int], Any], initial_x: Any, x: Any, z: Any
-) -> tuple[Any, Any]:
-    """Solve (X - x) + (h(X) - z) h'(X) = 0 for X by Newton iterations."""
+def numerical_gradient(potential: Potential, at_x: float, at_z: float) -> list[float]:
+    """Return the gradient by central differences in 60 digits."""
     import mpmath
 
-    for _ in range(40):
-        offset, slope = profile(initial_x, 0) - z, profile(initial_x, 1)
-        rate = 1 + slope**2 + offset * profile(initial_x, 2)
-        step = (initial_x - x + offset * slope) / rate
-        initial_x -= step
-        if abs(step) <= 10 * mpmath.eps * abs(initial_x):
-            break
-    return initial_x, profile(initial_x, 0)
+    with mpmath.workdps(60):
+        return [
+            float(mpmath.diff(potential, (at_x, at_z), order, h=1e-20))
+            for order in ((1, 0), (0, 1))
+        ]
+
+
+def _closest_point_gradient(probe: ProbePoint, axis: int) -> list[float]:
+    def coordinate(x: Any, z: Any) -> Any:
+        return find_closest_point(probe.surface, x, z, 60)[axis]
+
+    return numerical_gradient(coordinate, probe.x, probe.z)
 
 
 @dataclass(frozen=True)
@@ -186,26 +195,14 @@ class ClosestPointDerivatives:
 def closest_point_derivatives(count: int = 4) -> list[ClosestPointDerivatives]:
     """Return derivatives of the closest point at generic probes, three entries for each probe.
 
-    The first two have central differences of Newton's solution, with force and Jacobian by the
+    The first two have central differences of the solution, with force and Jacobian by the
     definition and by D's kernel. The third derives them from the kernel's Jacobian, which is
     -κ₀ (I - derivatives), with force and Jacobian by the definition.
     """
-    import mpmath
-
     result = []
     for probe in generic_probes("D", count):
-        digits = 3 * _DIGITS
-        with mpmath.workdps(digits):
-            step = mpmath.mpf(10) ** -_DIGITS
-            columns = []
-            for dx, dz in ((step, 0), (0, step)):
-                x, z = mpmath.mpf(probe.x), mpmath.mpf(probe.z)
-                ahead = find_closest_point(probe.surface, x + dx, z + dz, digits)
-                behind = find_closest_point(probe.surface, x - dx, z - dz, digits)
-                columns.append(
-                    [float((a - b) / (2 * step)) for a, b in zip(ahead, behind, strict=True)]
-                )
-        rates, kernel = np.array(columns).T, probe.compiled_jacobian()
+        rates = np.array([_closest_point_gradient(probe, axis) for axis in (0, 1)])
+        kernel = probe.compiled_jacobian()
         defined = probe.force(), probe.jacobian()
         result.append(ClosestPointDerivatives(probe, rates, *defined))
         result.append(ClosestPointDerivatives(probe, rates, probe.compiled_force(), kernel))

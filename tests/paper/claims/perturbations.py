@@ -214,7 +214,7 @@ def _replace_limit(description: str, number: int, inequality: Inequality) -> Per
 
 
 def _observed(_original: Callable[..., Check]) -> Callable[..., Check]:
-    return lambda summary, numbers=None: check_statement(summary, printed=True, numbers=numbers)
+    return lambda numbers=None: check_statement(printed=True, numbers=numbers)
 
 
 def _double_deflection(original: Callable[..., Surface]) -> Callable[..., Surface]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import json
 import re
 from typing import Any
@@ -16,6 +15,7 @@ from asperity.paper.claim import CATALOGUE
 from asperity.paper.claim_registry import find_claims
 from asperity.paper.claims import simulated_claims
 from asperity.paper.claims.simulated_claims import SIMULATED_CLAIM_IDS
+from asperity.paper.formula_checks import FORMULAS, FormulaRow
 
 SIMULATED = set(SIMULATED_CLAIM_IDS)
 
@@ -138,9 +138,11 @@ def test_undecided_claims(results: dict[str, Result]) -> None:
         assert "comput" in results[name].evidence.summary
 
 
-def test_catalogue_lists_the_claims_with_a_function() -> None:
-    with_function = {name for name, item in CLAIMS.items() if inspect.isfunction(item.compute)}
-    assert set(CATALOGUE) == with_function
+def test_every_row_of_the_tables_is_a_claim() -> None:
+    assert sorted([*CATALOGUE, *FORMULAS]) == sorted(CLAIMS)
+    for name, row in {**CATALOGUE, **FORMULAS}.items():
+        is_formula = isinstance(getattr(CLAIMS[name].compute, "__self__", None), FormulaRow)
+        assert is_formula is ("function" not in row)
 
 
 def test_every_numbered_item_of_the_paper_has_a_claim() -> None:

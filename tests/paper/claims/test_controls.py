@@ -17,11 +17,14 @@ from asperity.analysis.gain.characteristic import characteristic_number
 from asperity.laws import find_law
 from asperity.paper import CLAIMS, Claim, get_claim
 from asperity.paper.cases import PAPER_CASE, matrix_norm, random_friction_cases
+from asperity.paper.claim import CATALOGUE
 from asperity.paper.claims import design_limits as claims_limits
 from asperity.paper.claims import friction_law as claims_appendix
 from asperity.paper.claims import passivity_condition as claims_passivity
-from asperity.paper.claims.formula_claims import FormulaRow
+from asperity.paper.formula_checks import FormulaRow
 from asperity.paper.probes import closest_point_derivatives, find_closest_point, generic_probes
+
+BOUND = CATALOGUE["eq-31"]["arguments"]
 
 
 def replace_everywhere(monkeypatch: pytest.MonkeyPatch, name: str, replacement: object) -> None:
@@ -173,7 +176,7 @@ def test_random_motions_on_c_gain_energy_below_the_limit() -> None:
 def test_corrected_appendix_holds(monkeypatch: pytest.MonkeyPatch) -> None:
     original = claims_appendix.expand_bound
     monkeypatch.setattr(
-        claims_appendix, "expand_bound", lambda r, **_options: original(r, as_printed=False)
+        claims_appendix, "expand_bound", lambda r, _formula: original(r, BOUND["corrected"])
     )
     assert get_claim("eq-31").run().verdict == "holds"
 
@@ -184,11 +187,11 @@ def test_corrected_expansion_is_the_matrix_norm() -> None:
         a, b = case.sticking_entries()
         t = 1.0 + a * a + b * b
         eigenvalue = np.roots([1.0, -t, a * a]).real.max()
-        assert claims_appendix.expand_bound(case, as_printed=False) ** 2 == pytest.approx(
-            eigenvalue
-        )
+        corrected = claims_appendix.expand_bound(case, BOUND["corrected"])
+        assert corrected**2 == pytest.approx(eigenvalue)
         assert matrix_norm(a, b) ** 2 == pytest.approx(eigenvalue)
-        assert claims_appendix.expand_bound(case, as_printed=True) ** 2 != pytest.approx(eigenvalue)
+        printed = claims_appendix.expand_bound(case, BOUND["printed"])
+        assert printed**2 != pytest.approx(eigenvalue)
 
 
 def test_number_of_friction_modulation_by_brute_force() -> None:

@@ -158,10 +158,10 @@ def test_onsets_include_the_rule_of_the_wall(experiments: Experiments) -> None:
 def test_device_limit_is_derived_from_the_catalogue(experiments: Experiments) -> None:
     (onset,) = experiments.devices.onsets
     assert onset.catalogue_stiffness == 400.0
-    assert onset.catalogue_limit == pytest.approx(400.0 / onset.prediction.q)
-    assert not onset.is_limit_violated
+    assert onset.catalogue_rule == pytest.approx(400.0 / onset.prediction.q)
+    assert not onset.catalogue_rule_missed
     violating = DeviceOnset(onset.device, onset.surface, 1e9, onset.prediction)
-    assert violating.is_limit_violated
+    assert violating.catalogue_rule_missed
 
 
 def test_summary_compares_simulated_walls_with_the_catalogue(experiments: Experiments) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import lru_cache, partial
+from functools import lru_cache
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from asperity.paper.cases import PAPER_CASE, SCANNING, ExperimentCase
 from asperity.paper.figures import loop_energies
 from asperity.paper.formula_checks import format_by_name
 from asperity.paper.probes import generic_profile
-from asperity.paper.table_two import TABLE_TWO, TableTwoRow, table_two
+from asperity.paper.table_two import TableTwoRow, table_two
 from asperity.surface import Surface
 from asperity.textures.kinds.fourier import Fourier
 from asperity.textures.kinds.sinusoid import Sinusoid
@@ -114,11 +114,9 @@ def _check_continuity(row: TableTwoRow) -> claim.Check:
 # --- Remarks --------------------------------------------------------------------------------------
 
 
-def remark_1() -> claim.Check:
-    """What a texture feels like depends on more than the algorithm."""
-    return claim.check_observation(
-        "a statement on perception and on real contacts: nothing here can be computed"
-    )
+def observe() -> claim.Check:
+    """Leave a statement undecided on which nothing can be computed."""
+    return claim.check_observation()
 
 
 def remark_2() -> claim.Check:
@@ -184,7 +182,6 @@ def remark_3() -> claim.Check:
     bounded = "".join(law for law, ratio in lateral.items() if ratio <= 1.0 + 1e-6)
     return claim.combine_checks(
         claim.check_statement(
-            f"50 times deeper ‖J‖ grows {format_by_name(growth)} times",
             printed=min(growth.values()) > 1.5,
             numbers={f"growth of {law}": value for law, value in growth.items()},
         ),
@@ -235,12 +232,3 @@ def _max_norm_at_depth(law: str, clamp: str, depth_factor: float) -> float:
             jacobian = surface.jacobian(points, deflection=d, sliding=np.full(len(x), slides))
             norms.append(np.linalg.norm(jacobian, 2, axis=(1, 2)).max())
     return float(max(norms))
-
-
-TABLE_TWO_CLAIMS = [
-    claim.Claim(
-        f"table-2-{law}", ("Table II",), "IV.H", row["statement"],
-        partial(check_table_two_row, law), row["flips_under"], row["correction"],
-    )
-    for law, row in TABLE_TWO.items()
-]  # fmt: skip

@@ -60,6 +60,11 @@ class CycleCount(Serializable):
     z: FloatArray
 
     @property
+    def wall(self) -> str:
+        """The law, with the divisor of its stiffness if it is not 1."""
+        return self.law if self.divisor == 1.0 else f"{self.law}/{self.divisor:g}"
+
+    @property
     def stiffness(self) -> float:
         """Stiffness [N/m]."""
         return _STIFFNESS / self.divisor

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from asperity.core.errors import ParameterError
-from asperity.core.files import Serializable, to_plain_data
+from asperity.core.files import Serializable
 from asperity.devices import device_names, load_device
 from asperity.paper.experiments.experiment_setups import GUESSED_DEVICES, device_setup
 from asperity.scene.setup import Setup
@@ -27,7 +27,7 @@ PRESSING_HAND = SpringHand((300.0, 300.0, 0.0), 3.0, 0.0, (0.0, 0.0, -1.0))
 
 
 @dataclass(frozen=True)
-class DeviceOnset:
+class DeviceOnset(Serializable):
     """One law on one device and surface.
 
     Attributes:
@@ -37,33 +37,30 @@ class DeviceOnset:
         prediction: simulated onset, and the limits by the criteria with the hand's damping.
     """
 
+    serialized_attributes = (
+        "device surface catalogue_stiffness catalogue_rule catalogue_rule_missed"
+    )
+
     device: str
     surface: str
     catalogue_stiffness: float
     prediction: Prediction
 
     @property
-    def catalogue_limit(self) -> float:
+    def catalogue_rule(self) -> float:
         """K₀/q with the K₀ of the catalogue and the q of the depth reached [N/m]."""
         q = self.prediction.q
         return self.catalogue_stiffness / q if q > 0.0 else math.inf
 
     @property
-    def is_limit_violated(self) -> bool:
+    def catalogue_rule_missed(self) -> bool:
         """Whether a limit cycle occurs at a stiffness that K₀/q of the catalogue allows."""
         cycling = self.prediction.onset.cycling
-        return math.isfinite(cycling) and cycling <= self.catalogue_limit
+        return math.isfinite(cycling) and cycling <= self.catalogue_rule
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""
-        data = {
-            "device": self.device,
-            "surface": self.surface,
-            "catalogue_stiffness": self.catalogue_stiffness,
-            "catalogue_rule": self.catalogue_limit,
-            "catalogue_rule_missed": self.is_limit_violated,
-        }
-        return to_plain_data(data) | self.prediction.to_dict()
+        return super().to_dict() | self.prediction.to_dict()
 
 
 @dataclass(frozen=True)

@@ -56,10 +56,7 @@ class Experiments:
         )
 
     def _summarize_cycles(self) -> str:
-        parts = [
-            f"{one.law}{'' if one.divisor == 1.0 else f'/{one.divisor:g}'} {one.cycles}"
-            for one in self.passivity.counts
-        ]
+        parts = [f"{one.wall} {one.cycles}" for one in self.passivity.counts]
         first = self.passivity.counts[0]
         return (
             f"of {first.starts} starts cycle at 2000 N/m and a lag of {first.delay} samples: "
@@ -105,7 +102,7 @@ class Experiments:
 
     def _summarize_devices(self) -> str:
         found = self.devices.onsets
-        missed = sum(one.is_limit_violated for one in found)
+        missed = sum(one.catalogue_rule_missed for one in found)
         rules = sum(one.prediction.violates_delay_rule for one in found)
         return (
             f"{missed} of {len(found)} cases cycle at a stiffness that the catalogue's K0/q "

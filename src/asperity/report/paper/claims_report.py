@@ -11,7 +11,7 @@ from typing import Any
 from asperity.paper import VERDICTS, Result
 from asperity.paper.claim import Number
 from asperity.paper.experiments import Experiments
-from asperity.paper.experiments.cycle_counts import CycleCount, PassivityExperiment
+from asperity.paper.experiments.cycle_counts import PassivityExperiment
 from asperity.paper.experiments.device_onsets import DeviceExperiment, DeviceOnset
 from asperity.paper.experiments.strokes import BumpExperiment, ScanningExperiment
 from asperity.paper.figures import loop_energies
@@ -170,14 +170,9 @@ def experiment_sections(experiments: Experiments) -> list[Section]:
 def _cycle_section(experiment: PassivityExperiment) -> Section:
     first, notes = experiment.counts[0], _fitted_notes(experiment.fitted)
     figure = partial(paper_pictures.cycles_figure, experiment)
-    counts = ", ".join(f"{one.cycles} with {_wall_text(one)}" for one in experiment.counts)
+    counts = ", ".join(f"{one.cycles} with {one.wall}" for one in experiment.counts)
     values: dict[str, Any] = {"lag": first.delay, "starts": first.starts, "counts": counts}
     return page.figure_section("paper.cycles", figure, notes, **values)
-
-
-def _wall_text(wall: CycleCount) -> str:
-    """Return the law of a wall with the divisor of its stiffness."""
-    return wall.law if wall.divisor == 1.0 else f"{wall.law}/{wall.divisor:g}"
 
 
 def _fitted_notes(sentences: Sequence[str]) -> list[str]:
@@ -217,7 +212,7 @@ def _device_section(experiments: Experiments) -> Section:
     if devices.wall_summary:
         notes.append(f"Few misses on the left are weak evidence: {devices.wall_summary}.")
     notes.append(f"Not simulated for lack of an apparent mass: {', '.join(devices.skipped)}.")
-    count, missed = len(devices.onsets), sum(one.is_limit_violated for one in devices.onsets)
+    count, missed = len(devices.onsets), sum(one.catalogue_rule_missed for one in devices.onsets)
     figure = partial(paper_pictures.devices_figure, experiments)
     return page.figure_section("paper.devices", figure, notes, missed=missed, count=count)
 
@@ -233,7 +228,7 @@ def _device_cells(device_onset: DeviceOnset) -> Cells:
     law, _delay, _quiet, cycling, starts, depth, q, _paper, rule, _wall = sweep_report.onset_cells(
         device_onset.prediction
     )
-    kind = "no" if device_onset.is_limit_violated else ""
-    allowed = Cell(sweep_report.stiffness_number(device_onset.catalogue_limit), kind)
+    kind = "no" if device_onset.catalogue_rule_missed else ""
+    allowed = Cell(sweep_report.stiffness_number(device_onset.catalogue_rule), kind)
     names = [device_onset.device, device_onset.surface]
     return [*names, law, q, allowed, rule, cycling, starts, depth]

@@ -24,7 +24,6 @@ from asperity.report.html import template_environment
 from asperity.report.page import default_style
 from asperity.report.pictures import paper_pictures as pictures
 from asperity.report.pictures.loop_pictures import onset_figure
-from asperity.report.pictures.paper_pictures import figure_three, figure_two
 from asperity.report.sentences.texts import slide_texts, table_data
 
 FileFormat = Literal["svg", "png", "slides"]
@@ -63,24 +62,21 @@ def _devices_figure(experiments: Experiments | None) -> Figure:
     return pictures.devices_figure(experiments)
 
 
-def _cycles_figure(experiments: Experiments | None) -> Figure:
-    # This figure needs no onsets, which take minutes.
-    return pictures.cycles_figure(
-        experiments.passivity if experiments else passivity_experiment(delays=())
-    )
+def _drawing(
+    draw: Callable[[Any], Figure], experiment: str, simulate: Callable[[], Any]
+) -> Callable[[Experiments | None], Figure]:
+    """Return a drawing of one experiment, which is simulated if none have been."""
+    return lambda found: draw(getattr(found, experiment) if found else simulate())
 
 
 _DRAWINGS: dict[str, Callable[[Experiments | None], Figure]] = {
-    "fig-2": lambda _found: figure_two(),
-    "fig-3": lambda _found: figure_three(),
-    "fig-5": _cycles_figure,
-    "onsets": lambda found: onset_figure(
-        (found.passivity if found else passivity_experiment()).onsets
-    ),
-    "fig-6": lambda found: pictures.energies_figure(
-        found.scanning if found else scanning_experiment()
-    ),
-    "fig-7": lambda found: pictures.bumps_figure(found.bump if found else bump_experiment()),
+    "fig-2": lambda _found: pictures.figure_two(),
+    "fig-3": lambda _found: pictures.figure_three(),
+    # Figure 5 needs no onsets, which take minutes.
+    "fig-5": _drawing(pictures.cycles_figure, "passivity", lambda: passivity_experiment(delays=())),
+    "onsets": _drawing(lambda one: onset_figure(one.onsets), "passivity", passivity_experiment),
+    "fig-6": _drawing(pictures.energies_figure, "scanning", scanning_experiment),
+    "fig-7": _drawing(pictures.bumps_figure, "bump", bump_experiment),
     "devices": _devices_figure,
 }
 PAPER_FIGURES = tuple(

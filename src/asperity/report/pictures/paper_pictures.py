@@ -198,12 +198,11 @@ def _draw_wall(axes: Axes, count: CycleCount) -> None:
     colour = style.ORANGE if count.cycles else style.BLUE
     axes.plot(count.time, 1e3 * count.z, color=colour, lw=0.8, label="height")
     axes.set_ylim(-13.0, 6.5)
-    name = count.law if count.divisor == 1.0 else f"{count.law}/{count.divisor:g}"
     remark = f"{count.cycles} of {count.starts} starts cycle"
     if count.slow:
         remark += f", {count.slow} decay slowly"
     style.mark_law(axes, count.law)
-    style.set_panel_title(axes, name, format_quantity(round(count.stiffness), "N/m"), remark)
+    style.set_panel_title(axes, count.wall, format_quantity(round(count.stiffness), "N/m"), remark)
 
 
 # --- section V.B ----------------------------------------------------------------------------------
@@ -282,7 +281,7 @@ def devices_figure(experiments: Experiments) -> Figure:
     devices = dict.fromkeys(one.device for one in experiments.devices.onsets)
     markers = {**dict(zip(devices, "osD^vP*" * len(devices), strict=False)), _PAPER_DEVICE: "X"}
     wall_rule = [
-        _OnsetPoint(one.catalogue_limit, one.prediction, one.device, one.is_limit_violated)
+        _OnsetPoint(one.catalogue_rule, one.prediction, one.device, one.catalogue_rule_missed)
         for one in experiments.devices.onsets
     ]
     wall_rule += [
