@@ -29,6 +29,7 @@ MISTAKES: list[tuple[str, tuple[str, ...]]] = [
     ("--vresion", ("--vresion", "did you mean '--version'?")),
     ("envelop --device touch", ("'envelop'", "did you mean 'envelope'?")),
     ("envelope --device tuoch", ("device is unknown: 'tuoch'", "did you mean 'touch'")),
+    ("design cloth --texture-force 3kg", ("texture_force", "'3kg'")),
     ("sweep cloth --vary texture.magnifi=1,2", ("texture.magnifi", "texture.magnify")),
     # Options misspelt.
     ("compare cloth --devise touch", ("--devise", "did you mean '--device'?")),
@@ -48,7 +49,7 @@ MISTAKES: list[tuple[str, tuple[str, ...]]] = [
     ("compare cloth --law H", ("compare has no option --law", "'--laws'", "analyze, limits")),
     (
         "analyze cloth --laws WA",
-        ("analyze has no option --laws", "'--law'", "compare, sweep, envelope, onset"),
+        ("analyze has no option --laws", "'--law'", "compare, sweep, envelope, design, onset"),
     ),
     (
         "compare cloth --output r.html",
