@@ -50,7 +50,7 @@ def _x3p(folder: Path) -> Seeds:
         writer.X3pSpec(_heights() * 1e-6),
         writer.X3pSpec(_heights(), code="I", z_type="I", z_increment="1e-9"),
         writer.X3pSpec(_heights(), valid=_heights() > -20),
-        writer.X3pSpec(_heights()[:1], inline=[str(z) for z in _heights()[0]], feature="PRF"),
+        writer.X3pSpec(_heights()[:1] * 1e-6, feature="PRF"),
     )
     return [writer.write_x3p(folder / "seed.x3p", spec).read_bytes() for spec in specs]
 

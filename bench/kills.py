@@ -33,7 +33,6 @@ COMMANDS = (
     "compare map.npy --pitch 20um --max-depth 0.1mm --laws B,C --html out.csv",
     f"analyze {WAVE} --law D --json out.csv",
     "prepare map.npy --pitch 20um -o out.csv",
-    "simulate scene.toml --trace out.csv",
     "simulate scene.toml --trace out.mcap",
     f"limits {WAVE} --device omega.3 --json out.csv",
     "scan scene.toml --laws B,F --json out.csv",

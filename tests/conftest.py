@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import math
 import os
+import signal
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from types import SimpleNamespace
@@ -48,7 +49,12 @@ TEXTURES: dict[str, Callable[[], Texture]] = {
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Use a cache of the test suite, in ``.pytest_cache``, instead of the user's cache."""
+    """Use a cache of the test suite, in ``.pytest_cache``, and take interrupts.
+
+    A shell starts a job in the background with interrupts ignored, and programs inherit that.
+    """
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     cache = getattr(config, "cache", None)  # missing with -p no:cacheprovider
     if cache is not None and "ASPERITY_CACHE_DIR" not in os.environ:
         os.environ["ASPERITY_CACHE_DIR"] = str(cache.mkdir("asperity"))

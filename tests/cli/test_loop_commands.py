@@ -88,7 +88,7 @@ def test_simulate_prints_the_energy_ledger(call: Call, still: str) -> None:
 def test_final_velocity_is_the_same_with_and_without_a_trace(
     call: Call, still: str, tmp_path: Path
 ) -> None:
-    path, page = tmp_path / "trace.csv", tmp_path / "run.html"
+    path, page = tmp_path / "trace.mcap", tmp_path / "run.html"
     _code, plain, _err = call("simulate", still)
     _code, traced, _err = call("simulate", still, "--trace", str(path))
     assert traced.startswith(plain)
@@ -120,10 +120,12 @@ def test_simulate_writes_json_and_html(call: Call, strokes: str, tmp_path: Path)
 
 
 def test_trace_columns_have_units(call: Call, still: str, tmp_path: Path) -> None:
-    path, page = str(tmp_path / "trace.csv"), str(tmp_path / "run.html")
-    code, out, _err = call("simulate", still, "--trace", path, "--every", "2", "--html", page)
+    recorded, path = str(tmp_path / "trace.mcap"), str(tmp_path / "trace.csv")
+    page = str(tmp_path / "run.html")
+    code, out, _err = call("simulate", still, "--trace", recorded, "--every", "2", "--html", page)
     assert code == 0
-    assert f"Trace: {path}" in out
+    assert f"Trace: {recorded}" in out
+    assert call("recording", "export", recorded, "-o", path)[0] == 0
     with open(path, encoding="utf-8") as file:
         names = file.readline().strip().split(",")
     assert names[:4] == ["time [s]", "x [m]", "y [m]", "z [m]"]
@@ -251,11 +253,11 @@ def test_invalid_recording_input_gives_a_one_line_error(
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
 def test_full_disk_is_reported(call: Call, still: str, tmp_path: Path) -> None:
-    full = tmp_path / "full.csv"
+    full = tmp_path / "full.mcap"
     os.symlink("/dev/full", full)
     code, out, err = call("simulate", still, "--trace", str(full))
     assert (code, out) == (2, "")
-    assert "cannot be written any further" in err
+    assert "trace cannot be written" in err
     assert "Traceback" not in err
 
 
@@ -310,8 +312,8 @@ BAD = [
     (["simulate", "{still}", "--duration", "0s"], "duration must be positive"),
     (["simulate", "{still}", "--every", "1.5"], "every must be a whole number"),
     (["simulate", "{still}", "--every", "0"], "every must be a whole number"),
-    (["simulate", "{still}", "--trace", "trace.xls"], "must be the path of a .mcap"),
-    (["simulate", "{still}", "--trace", "no/trace.csv"], "folder that exists"),
+    (["simulate", "{still}", "--trace", "trace.xls"], "trace must end in .mcap"),
+    (["simulate", "{still}", "--trace", "no/trace.mcap"], "folder that exists"),
     (["simulate", "{still}", "--json", "-", "--html", "-"], "cannot both"),
     (["simulate", "{still}", "--trace", "a.csv", "--json", "a.csv"], "cannot both"),
     (["simulate", "{still}", "--html", "a.html", "--json", "./a.html"], "cannot both"),

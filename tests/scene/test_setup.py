@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from asperity.core.errors import ParameterError
+from asperity.recording.recording import open_recording
+from asperity.recording.table_export import export_recording
 from asperity.scene import load_scene
 from asperity.scene.setup import Setup, make_setup
 from asperity.simulation import BandHand, Cartesian, Pantograph, PrescribedHand, SpringHand, Strokes
@@ -96,8 +98,8 @@ def test_prescribed_motion_needs_no_mass(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["trace.csv", "trace.mcap"])
 def test_trace_of_one_scene_is_the_path_of_another(tmp_path: Path, name: str) -> None:
     first = make_scene_setup(tmp_path, MASS, SPRING, STILL, '[run]\nduration = "0.05 s"\n')
-    run = first.simulate(trace=str(tmp_path / name))
-    assert run.path
+    run = first.simulate(trace=str(tmp_path / "trace.mcap"))
+    export_recording(open_recording(run.path), tmp_path / "trace.csv")
     second = make_scene_setup(
         tmp_path, MASS, f'[hand]\nkind = "moved"\n[motion]\nkind = "path"\nfile = "{name}"\n'
     )

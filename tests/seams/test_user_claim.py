@@ -10,6 +10,7 @@ import pytest
 from tests.helpers.pages import page_example
 
 from asperity.core.errors import ParameterError
+from asperity.core.processes import limit_processes
 from asperity.paper import get_claim, reproduce_claims
 from asperity.paper.claim import Claim
 from asperity.paper.claim_registry import CLAIMS, register
@@ -57,7 +58,8 @@ def test_reproduce_claims_computes_it(claim: Claim) -> None:
 
 @pytest.mark.usefixtures("claim")
 def test_it_is_computed_with_worker_processes() -> None:
-    results = reproduce_claims(["own-wall", "eq-12", "eq-10"], workers=2)
+    with limit_processes(2):
+        results = reproduce_claims(["own-wall", "eq-12", "eq-10"])
     assert [result.id for result in results] == ["eq-10", "eq-12", "own-wall"]
     assert results[-1].verdict == "holds"
 

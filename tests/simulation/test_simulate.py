@@ -16,6 +16,7 @@ from tests.helpers.allocations import traced_peak
 from tests.simulation.limit_cycles.limit_cycle_definition import is_cycling, velocity_spread
 
 from asperity.core.errors import ParameterError
+from asperity.recording.recording import open_recording
 from asperity.simulation import (
     BandHand,
     Cartesian,
@@ -33,7 +34,7 @@ from asperity.simulation import (
     simulate_many,
 )
 from asperity.simulation.limit_cycles.onset_search import felt_speed
-from asperity.simulation.trace import HEADER, DecimatedTrace, load_trace
+from asperity.simulation.trace import COLUMNS, DecimatedTrace
 from asperity.surface import Surface
 from asperity.textures.kinds.sinusoid import Sinusoid
 
@@ -150,12 +151,11 @@ def test_chunked_run_equals_whole_run(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_trace_file_contains_the_trace(tmp_path: FilePath) -> None:
-    path = tmp_path / "run.csv"
+    path = tmp_path / "run.mcap"
     run, whole = run_of(trace=path), run_of()
-    assert path.read_text().splitlines()[0] == HEADER
-    assert HEADER.startswith("time [s],x [m],y [m],z [m],vx [m/s]")
-    loaded = np.loadtxt(path, delimiter=",", skiprows=1)
-    np.testing.assert_allclose(loaded, whole.table, rtol=1e-11, atol=1e-20)
+    recording = open_recording(path)
+    assert recording.columns == COLUMNS
+    np.testing.assert_array_equal(recording.table(), whole.table)
     assert run.ledger == whole.ledger
     assert run.path == str(path)
     assert run.to_dict()["trace"] == str(path)
@@ -163,11 +163,9 @@ def test_trace_file_contains_the_trace(tmp_path: FilePath) -> None:
 
 def test_unwritable_trace_is_an_error_with_its_name(tmp_path: FilePath) -> None:
     with pytest.raises(ParameterError, match="trace cannot be written"):
-        run_of(trace=tmp_path / "missing" / "run.csv")
-    with pytest.raises(ParameterError, match="trace cannot be written"):
         run_of(trace=tmp_path / "missing" / "run.mcap")
-    with pytest.raises(ParameterError, match=r"\.mcap.*\.csv"):
-        run_of(trace=tmp_path / "run.npy")
+    with pytest.raises(ParameterError, match=r"\.mcap.*export.*run\.csv"):
+        run_of(trace=tmp_path / "run.csv")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -196,10 +194,10 @@ job = dict(
 """
 
 
-def test_full_disk_ends_the_run_with_complete_lines(tmp_path: FilePath) -> None:
+def test_full_disk_ends_the_run_with_whole_blocks(tmp_path: FilePath) -> None:
     """A limit on file size simulates a full disk: a short write, then an error."""
     (tmp_path / "tests_job.py").write_text(_JOB)
-    path, size = tmp_path / "run.csv", 5_000_000
+    path, size = tmp_path / "run.mcap", 5_000_000
     # Compile first, so that the size limit affects only the trace.
     script = "from tests_job import job\nfrom asperity.simulation import simulate\nsimulate(**job)"
     subprocess.run([sys.executable, "-c", script], cwd=tmp_path, check=True, timeout=60)
@@ -207,33 +205,30 @@ def test_full_disk_ends_the_run_with_complete_lines(tmp_path: FilePath) -> None:
     process = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=True
     )
-    text = path.read_text()
-    rows = text.count("\n") - 1
+    recording = open_recording(path)
     assert "trace cannot be written any further (File too large)" in process.stdout
-    assert f"{rows} rows are in {path}" in process.stdout
-    assert text.endswith("\n")
-    assert size - 1000 < len(text) <= size
-    loaded = np.loadtxt(path, delimiter=",", skiprows=1)
-    assert loaded.shape == (rows, 30)
-    np.testing.assert_allclose(loaded[:, 0], 1e-4 * np.arange(rows), atol=1e-12)
+    assert f"{recording.rows} rows are in {path}" in process.stdout
+    assert size - 2_000_000 < path.stat().st_size <= size
+    times = recording["time"]
+    assert len(times) == recording.rows > 10_000
+    np.testing.assert_allclose(times, 1e-4 * np.arange(len(times)), atol=1e-12)
 
 
 @pytest.mark.skipif(not FilePath("/dev/full").exists(), reason="this system has no /dev/full")
 def test_disk_without_space_is_an_error(tmp_path: FilePath) -> None:
-    full = tmp_path / "run.csv"
+    full = tmp_path / "run.mcap"
     full.symlink_to("/dev/full")
-    with pytest.raises(ParameterError, match=r"No space left on device.*0 rows"):
+    with pytest.raises(ParameterError, match=r"trace cannot be written.*No space left on device"):
         run_of(trace=full)
 
 
-@pytest.mark.parametrize("name", ["run.csv", "run.mcap"])
-def test_memory_with_trace_file_does_not_grow_with_duration(tmp_path: FilePath, name: str) -> None:
+def test_memory_with_trace_file_does_not_grow_with_duration(tmp_path: FilePath) -> None:
     """Peak of the allocations by Python and NumPy at ten times the duration."""
     peaks = []
     options: dict[str, Any] = {"servo": Servo(1e-4), "every": 5}
     for duration in (4.0, 40.0):
-        run = partial(run_of, trace=tmp_path / name, duration=duration, **options)
-        run_of(trace=tmp_path / name, every=5)
+        run = partial(run_of, trace=tmp_path / "run.mcap", duration=duration, **options)
+        run_of(trace=tmp_path / "run.mcap", every=5)
         peaks.append(traced_peak(run))
     assert peaks[1] < 1.1 * peaks[0]
     # Negative control: a trace in memory grows.
@@ -379,20 +374,21 @@ def test_invalid_parameters_of_parts_are_named_in_the_error(
         kind(*arguments, **keywords)
 
 
-@pytest.mark.parametrize("name", ["run.csv", "run.mcap", "run"])
+@pytest.mark.parametrize("name", ["run.mcap", "run"])
 @pytest.mark.parametrize("max_rows", [1000, 40, 7, 1])
-def test_loaded_trace_is_decimated_evenly(tmp_path: FilePath, max_rows: int, name: str) -> None:
+def test_trace_in_a_file_is_decimated_evenly(tmp_path: FilePath, max_rows: int, name: str) -> None:
     parts = (WALL, Cartesian(0.1, 1.0), SpringHand(100.0, 2.0), Servo(1e-3))
     run = partial(simulate, *parts, Stationary((0.0, 0.0, -1e-3)), 0.04)
-    whole, loaded = run().table, load_trace(run(trace=tmp_path / name), max_rows).table
+    whole = run().table
+    loaded = open_recording(run(trace=tmp_path / name).path).table(max_rows)
     step = -(-len(whole) // max_rows)
     assert len(loaded) <= max_rows
-    np.testing.assert_allclose(loaded, whole[::step], rtol=1e-11)
+    np.testing.assert_array_equal(loaded, whole[::step])
 
 
 def test_trace_attributes_are_the_columns_of_that_name() -> None:
     run = run_of()
-    names = [name.split(" [")[0] for name in HEADER.split(",")]
+    names = [name for name, _unit in COLUMNS]
     for part, prefix in (("velocity", "v"), ("applied", "applied "), ("anchor", "anchor ")):
         columns = [names.index(prefix + axis) for axis in "xyz"]
         np.testing.assert_array_equal(getattr(run, part), run.table[:, columns])

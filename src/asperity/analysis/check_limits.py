@@ -17,7 +17,8 @@ from asperity.analysis.energy.merit import merit
 from asperity.analysis.gain.characteristic import cached_number
 from asperity.analysis.limits import limit_rules
 from asperity.analysis.limits.limit_result import Limits, RenderedWave, limits_assumptions
-from asperity.analysis.limits.perceptibility import Perceptibility, assess_perceptibility
+from asperity.analysis.limits.perceptibility import assess_perceptibility
+from asperity.analysis.limits.perceptibility_result import Perceptibility
 from asperity.analysis.limits.spectrum import MIN_SHARE, Spectrum, compute_spectrum, wave_forces
 from asperity.analysis.passivity import verdict
 from asperity.core.arguments import DEFAULT_STIFFNESS, FIELD

@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import Any
 
 from asperity.analysis.bounds.bound import NORM, ONE_SIDED
+from asperity.analysis.comparison_assumptions import comparison_assumptions
 from asperity.analysis.energy.continuity import continuity
 from asperity.analysis.energy.leak import worst_loop
 from asperity.analysis.energy.merit import merit as compute_merit
@@ -17,7 +18,7 @@ from asperity.analysis.limits.limit_rules import DEFAULT_SPEED
 from asperity.analysis.limits.perceptibility import assess_perceptibility
 from asperity.analysis.passivity.assess_passivity import passivity
 from asperity.analysis.passivity.verdict import at_recommended_stiffness, recommend_stiffness
-from asperity.analysis.recommendation import comparison_assumptions, recommend, recommendation_text
+from asperity.analysis.recommendation import recommend, recommendation_text
 from asperity.analysis.results import LawRow
 from asperity.core.arguments import DEFAULT_STIFFNESS, FIELD
 from asperity.core.checks import check_keywords, check_positive
@@ -169,7 +170,7 @@ def compare(
     """
     check_keywords(surface_arguments, SURFACE_KEYWORDS - {"law"}, compare)
     texture = as_texture(texture)
-    laws = _renderable_laws(find_laws(list(laws) if not isinstance(laws, str) else laws), texture)
+    laws = _renderable_laws(find_laws(laws), texture)
     device = load_device(device)
     if stiffness is not None:
         stiffness = check_positive("stiffness", stiffness, "N/m")

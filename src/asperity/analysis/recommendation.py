@@ -1,23 +1,18 @@
-"""The recommended law of a comparison, the sentences that give the reasons, and the assumptions."""
+"""The recommended law of a comparison, and the sentences that give the reasons."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from asperity.analysis import surface_sentences
-from asperity.analysis.limits.limit_rules import DEFAULT_SPEED
-from asperity.analysis.limits.perceptibility import Perceptibility
+from asperity.analysis.limits.perceptibility_result import Perceptibility
 from asperity.analysis.limits.perceptibility_sentences import (
     force_magnitude_text,
-    form_removal_sentences,
     masking_text,
-    perceptibility_assumptions,
     remedies_text,
-    speed_text,
     texture_amount_text,
     unverified_text,
 )
@@ -27,14 +22,11 @@ from asperity.analysis.passivity.assess_passivity import (
     delivery_text,
     stiffness_limit_text,
 )
-from asperity.analysis.passivity.criteria import buzz_goal, damping_assumption
+from asperity.analysis.passivity.criteria import buzz_goal
 from asperity.analysis.passivity.verdict import Margin, load_margins
 from asperity.analysis.results import LawRow
 from asperity.core.units import format_quantity, round_down, round_up
 from asperity.devices import Device
-from asperity.perception.grip import Grip
-from asperity.rendering import rendering_sentences
-from asperity.textures.texture import TexturePart
 
 EQUAL_STRENGTH_RATIO = 0.8
 """Laws whose texture forces differ by less than a fifth count as equally strong."""
@@ -276,7 +268,7 @@ def _margin_text(row: LawRow) -> str:
     start = "equals" if margin.factor == 1.0 else f"is {margin.factor:g} times"
     whole = "this limit" if row.conservative else "K₀/q, the gain of that wall"
     calibrated = next(o.factor for o in load_margins(True).values() if o.law == margin.law)
-    text = f"The recommended stiffness {start} {whole}: there {_simulated_loops_text(margin)}."
+    text = f"The recommended stiffness {start} {whole}: there {simulated_loops_text(margin)}."
     if calibrated <= margin.factor:
         return text
     gain = f"{calibrated:g}: up to {calibrated / margin.factor:.2g} times stiffer"
@@ -284,7 +276,7 @@ def _margin_text(row: LawRow) -> str:
     return f"{text} {whose} {gain} (asperity calibrate)."
 
 
-def _simulated_loops_text(margin: Margin) -> str:
+def simulated_loops_text(margin: Margin) -> str:
     """Return how many random simulated loops cycle, and how large a motion."""
     text = f"{margin.cycles} of {margin.loops} random simulated loops cycle"
     if not margin.cycles:
@@ -340,95 +332,3 @@ def _saturation_warning(best: LawRow, device: Device) -> str:
     depth = format_quantity(best.surface.max_depth, "m")
     needed, available = format_quantity(force, "N"), format_quantity(limit, "N")
     return f"Pressed to {depth} it needs {needed}; the device gives {available}."
-
-
-def comparison_assumptions(
-    rows: Sequence[LawRow],
-    part: TexturePart,
-    device: Device,
-    grip: Grip,
-    defaults: Mapping[str, bool],
-) -> tuple[str, ...]:
-    """Return the assumptions of a comparison, in sentences.
-
-    Args:
-        rows: the laws compared.
-        part: the part of the surface that is texture.
-        device: the device.
-        grip: the hand.
-        defaults: whether max_depth and speed are defaults.
-    """
-    first = rows[0].surface
-    assessed = [row.perceptibility for row in rows if row.perceptibility is not None]
-    # Laws differ in their waves, and the wall has none: one extrapolated law is enough to report.
-    texture = max(assessed, key=lambda one: one.extrapolated, default=None)
-    rendered = [text for row in rows for text in rendering_sentences(row.surface)]
-    searched = [row.rendering.sentence(row.law) for row in rows]
-    steps = dict.fromkeys((*first.texture.preparation, *rendered))
-    sentences = [*steps, *filter(None, searched), *_default_sentences(rows, defaults)]
-    sentences += form_removal_sentences(texture, part.form, part.waviness)
-    sentences += _wall_assumptions(rows, device)
-    sentences += _margin_assumptions(rows)
-    unverified = [
-        field.replace("_", " ")
-        for field, datum in device.data.items()
-        if not datum.verified and field != "max_stiffness"
-    ]
-    if unverified:
-        sentences.append(f"Not verified for the {device.name}: {', '.join(unverified)}")
-    if texture is not None:
-        sentences += perceptibility_assumptions(texture, device, grip)
-    if any("sampled" in (row.q.method, row.one_sided.method) for row in rows):
-        sentences.append(
-            "Numbers marked sampled are the greatest found over "
-            f"{first.texture.domain.description} and depths to "
-            f"{format_quantity(first.max_depth, 'm')}, not bounds"
-        )
-    sentences.append(
-        "The leak is the work of the field on one slow traversal of its worst loop, without "
-        "delay, quantisation and friction of the device"
-    )
-    return (*sentences, surface_sentences.SCOPE_SENTENCE)
-
-
-def _margin_assumptions(rows: Sequence[LawRow]) -> list[str]:
-    """Return the basis of the safety margins."""
-    # A user-defined law borrows the margin of a shipped one, which may be compared too.
-    margins = {row.margin.law: row.margin for row in rows if row.margin.loops}
-    if not margins:
-        return []
-    listed = "; ".join(
-        f"{law} {one.factor:g}: {_simulated_loops_text(one)}" for law, one in margins.items()
-    )
-    return [
-        f"Safety margins from simulation ({listed}): random loops in which a smooth wall of K₀ is "
-        "just passive, over masses, damping per direction, grips up to 500 N/m, delays of 0 to 6 "
-        "samples and places on random profiles; not this surface on this device"
-    ]
-
-
-def _wall_assumptions(rows: Sequence[LawRow], device: Device) -> list[str]:
-    """Return the source of K₀, and the assumptions of using it as a limit."""
-    test = device.wall_test
-    if test is None:
-        return []
-    sentences = [f"K₀ = {test.value:g} N/m for the {device.name} ({test.pedigree}): {test.source}"]
-    if any(row.stability_limit.basis == "plausible" for row in rows):
-        sentences.append(
-            "Plausible, not proved. Assumed: the wall of stiffness K₀ was close to its stability "
-            f"limit (heavy handle, loose grip); {damping_assumption(test)}"
-        )
-    return sentences
-
-
-def _default_sentences(rows: Sequence[LawRow], defaults: Mapping[str, bool]) -> list[str]:
-    sentences = []
-    if defaults["speed"]:
-        sentences.append(f"Default scanning speed {speed_text(DEFAULT_SPEED)}")
-    if defaults["max_depth"]:
-        sentences.append(surface_sentences.default_depth_text(rows[0].surface))
-    return sentences + [
-        f"{parameter} for law {row.law.letter}"
-        for row in rows
-        for parameter in surface_sentences.law_parameter_sentences(row.surface)
-    ]

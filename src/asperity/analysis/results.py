@@ -9,7 +9,7 @@ from typing import Any
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.continuity import Continuity
 from asperity.analysis.energy.leak import Leak
-from asperity.analysis.limits.perceptibility import Perceptibility, Tier
+from asperity.analysis.limits.perceptibility_result import Perceptibility, Tier
 from asperity.analysis.limits.perceptibility_sentences import texture_amount_text
 from asperity.analysis.passivity.assess_passivity import (
     Passivity,

@@ -12,10 +12,10 @@ import click
 from asperity.clamps import BACKED
 from asperity.cli import options
 from asperity.cli.main import declare_command
-from asperity.cli.output import check_output, progress_bar, step_bar
+from asperity.cli.output import progress_bar, step_bar
 from asperity.core.arguments import STIFFNESS
 from asperity.core.errors import ParameterError, escape_unprintable
-from asperity.core.files import write_bytes
+from asperity.core.files import check_output, write_bytes
 
 if TYPE_CHECKING:
     from asperity.devices import Device

@@ -9,9 +9,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from datetime import timedelta
 from itertools import count
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -19,6 +17,7 @@ import click
 from asperity.core import files
 from asperity.core.cache import bypass
 from asperity.core.errors import ParameterError, escape_unprintable
+from asperity.core.files import STANDARD_OUTPUT, check_output
 
 if TYPE_CHECKING:
     from asperity.report.page import Page
@@ -41,25 +40,20 @@ def progress_bar(description: str) -> Iterator[Callable[..., None]]:
         return
     from rich import progress
     from rich.console import Console
-    from rich.text import Text
 
     from asperity.core.compiled import COMPILE_CALLBACKS
-
-    class TimeLeftColumn(progress.ProgressColumn):
-        """The time left; unlike Rich's column, from the first step on."""
-
-        def render(self, task: progress.Task) -> Text:
-            """Return the text of the column."""
-            return Text(f"left: {format_time_left(task.elapsed or 0.0, task.completed)}")
 
     columns = (
         progress.TextColumn("{task.description:<24}"),
         progress.BarColumn(),
         progress.TaskProgressColumn(),
         progress.TimeElapsedColumn(),
-        TimeLeftColumn(),
+        progress.TextColumn("left:"),
+        progress.TimeRemainingColumn(),
     )
-    with progress.Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    err = Console(stderr=True)
+    # Rich forgets steps after the period [s], and needs two for the time left; some take minutes.
+    with progress.Progress(*columns, console=err, transient=True, speed_estimate_period=1e5) as bar:
         task, loops = bar.add_task(description, total=1.0), count(1)
         current = [description]
 
@@ -78,31 +72,12 @@ def progress_bar(description: str) -> Iterator[Callable[..., None]]:
             COMPILE_CALLBACKS.remove(report_compilation)
 
 
-def format_time_left(elapsed: float, fraction: float) -> str:
-    """Return the estimated time left as text.
-
-    Args:
-        elapsed: elapsed time [s].
-        fraction: completed fraction in [0, 1].
-
-    Example:
-        >>> format_time_left(30.0, 0.25), format_time_left(30.0, 0.0)
-        ('0:01:30', '-:--:--')
-    """
-    if fraction <= 0.0:
-        return "-:--:--"
-    return str(timedelta(seconds=round(elapsed * (1.0 - fraction) / fraction)))
-
-
 @contextmanager
 def step_bar(description: str, steps: int) -> Iterator[Callable[[str], None]]:
     """Show the progress over a number of steps; yield a function to call before each step."""
     with progress_bar(description) as update:
         done = count()
         yield lambda name: update(next(done) / steps, name)
-
-
-STANDARD_OUTPUT = "-"
 
 
 @dataclass(frozen=True)
@@ -227,40 +202,6 @@ def check_outputs(*, force: bool, **paths: str | None) -> None:
             raise ParameterError(taken[target], f"and {name} cannot both {place}")
         taken[target] = name
         check_output(name, path, force=force)
-
-
-def check_output(name: str, path: str | None, *, force: bool) -> None:
-    """Check before a computation that a path can be written.
-
-    Raises:
-        ParameterError: if the file exists and ``force`` is false, the folder does not exist or is
-            not writable, or the path is too long, a folder, a link to itself, or a device or a pipe
-            that is not writable.
-    """
-    if path is None or path == STANDARD_OUTPUT:
-        return
-    try:
-        os.lstat(path)
-    except (FileNotFoundError, NotADirectoryError):
-        pass
-    except (OSError, ValueError) as error:  # the name is too long
-        reason = getattr(error, "strerror", None) or str(error)
-        raise ParameterError(name, f"cannot be written: {reason}", path) from None
-    if Path(path).is_dir():
-        raise ParameterError(name, "must be a file, not a folder", path)
-    if files.is_special_file(path):
-        if not os.access(path, os.W_OK):
-            raise ParameterError(name, "must be a file that can be written", path)
-        return
-    target = Path(os.path.realpath(path))
-    if target.is_symlink():
-        raise ParameterError(name, "must be a file, not a link to itself", path)
-    folder = target.parent
-    if not folder.is_dir():
-        raise ParameterError(name, f"must lie in a folder that exists, {folder} does not")
-    if not os.access(folder, os.W_OK):
-        raise ParameterError(name, f"must lie in a folder that can be written, not {folder}")
-    files.check_not_existing(name, path, force=force)
 
 
 def write_output(name: str, path: str, text: str) -> None:

@@ -10,8 +10,9 @@ import click
 
 from asperity.cli.main import StrictGroup
 from asperity.cli.options import plugin_option
-from asperity.cli.output import Outputs, check_output, force_option, output_options, progress_bar
+from asperity.cli.output import Outputs, force_option, output_options, progress_bar
 from asperity.core.errors import ParameterError, escape_unprintable
+from asperity.core.files import check_output
 
 
 @click.group("recording", cls=StrictGroup)

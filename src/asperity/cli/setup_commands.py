@@ -13,6 +13,7 @@ from asperity.cli.main import declare_command
 from asperity.cli.options import jobs_option
 from asperity.core import cache
 from asperity.core.errors import AsperityError, ParameterError, escape_unprintable
+from asperity.core.files import check_output
 
 if TYPE_CHECKING:
     from asperity.laws import Law
@@ -32,7 +33,7 @@ def init_command(scene: str, *, force: bool) -> None:
     path = Path(scene)
     if path.suffix.lower() != ".toml":
         raise ParameterError("scene", "must be a file that ends in .toml", scene)
-    output.check_output("scene", scene, force=force)
+    check_output("scene", scene, force=force)
     output.write_output("scene", scene, scene_template(path.name))
     name = escape_unprintable(scene)
     click.echo(f"Written: {name}; now: asperity simulate {name}")

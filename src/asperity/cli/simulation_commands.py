@@ -37,10 +37,7 @@ _SIMULATE_ARGUMENTS = options.command_arguments("simulate")
 @loop_options(_STIFFNESS)
 @options.argument_options(_SIMULATE_ARGUMENTS)
 @click.option(
-    "--trace",
-    "trace_path",
-    metavar="PATH",
-    help="Write the samples to a recording ('run.mcap') or to a text table ('run.csv').",
+    "--trace", "trace_path", metavar="PATH", help="Write the samples to a recording ('run.mcap')."
 )
 @click.option("--yes", is_flag=True, help="Simulate a long duration without confirmation.")
 @output_options()

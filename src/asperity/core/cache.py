@@ -4,9 +4,8 @@ Each entry is a file in a namespace (a folder) of the cache folder: ``ASPERITY_C
 else the user's cache directory. A file starts with a digest of its key and content; a damaged or
 exchanged file is moved aside before its content is used. Since entries hold machine code, no format
 could make foreign ones harmless: a folder or a file that another user owns or may write, other than
-root, is not used. A cache that cannot be used costs
-time only. The total size is limited, see :func:`size_limit`; the least recently used entries are
-deleted first.
+root, is not used. A cache that cannot be used costs time only. The total size is limited, see
+:func:`size_limit`; the least recently used entries are deleted first.
 
 A result is stored under the digest of all that it depends on, which includes this package and its
 numerical libraries. Results of user-defined code are not stored, since their dependencies are
@@ -60,8 +59,7 @@ class CacheWarning(UserWarning):
 
 def cache_folder() -> Path:
     """Return the cache folder, whether or not it exists."""
-    chosen = os.environ.get(_FOLDER_VARIABLE)
-    if chosen:
+    if chosen := os.environ.get(_FOLDER_VARIABLE):
         return Path(chosen)
     from platformdirs import user_cache_path
 
@@ -125,9 +123,8 @@ def list_entries() -> list[CacheEntry]:
     for path in paths:
         if _ENTRY_NAME.fullmatch(path.name):
             with suppress(OSError):  # another process may have deleted it
-                status = path.stat()
-                size, last_used = status.st_size, status.st_mtime_ns
-                entries.append(CacheEntry(path.parent.name, path, size, last_used))
+                found = path.stat()
+                entries.append(CacheEntry(path.parent.name, path, found.st_size, found.st_mtime_ns))
     return entries
 
 
@@ -298,8 +295,7 @@ def _is_trusted(folder: Path) -> bool:
     Raises:
         OSError: for a folder that does not exist.
     """
-    reason = _distrust_reason(folder.stat())
-    if reason:
+    if reason := _distrust_reason(folder.stat()):
         advice = "set ASPERITY_CACHE_DIR to a folder of your own"
         _warn_about_folder(f"is not used: {reason}; {advice}", folder)
     return not reason
@@ -367,8 +363,7 @@ def get_or_compute_each(
     Args:
         name: name of the results.
         contents: digest for each result, see :func:`get_or_compute`.
-        compute: yields index and value of the missing results, in any order; each is stored at
-            once.
+        compute: yields index and value of the missing results, in any order, which are stored.
     """
     keys = [_result_key(name, content) for content in contents]
     results: dict[int, Value] = {}
@@ -383,8 +378,7 @@ def get_or_compute_each(
     missing = [index for index in range(len(keys)) if index not in results]
     for index, value in compute(missing) if missing else ():
         results[index] = value
-        key = keys[index]
-        if key is not None:
+        if (key := keys[index]) is not None:
             put_entry(RESULTS_NAMESPACE, key, pickle.dumps(value, protocol=5))
     return [results[index] for index in range(len(keys))]
 

@@ -20,6 +20,8 @@ from asperity.core.errors import ParameterError, escape_unprintable
 
 _MAX_DOTS = 10_000  # in a line of TOML
 
+STANDARD_OUTPUT = "-"
+
 
 def is_special_file(path: str | os.PathLike[str]) -> bool:
     """Return whether a path exists and is not a regular file (a pipe, a device, a folder)."""
@@ -275,3 +277,37 @@ def check_not_existing(name: str, path: str | os.PathLike[str], *, force: bool) 
     """
     if not force and os.path.lexists(path):
         raise ParameterError(name, f"exists: {escape_unprintable(path)}; --force replaces it")
+
+
+def check_output(name: str, path: str | None, *, force: bool) -> None:
+    """Check before a computation that a path can be written.
+
+    Raises:
+        ParameterError: if the file exists and ``force`` is false, the folder does not exist or is
+            not writable, or the path is too long, a folder, a link to itself, or a device or a pipe
+            that is not writable.
+    """
+    if path is None or path == STANDARD_OUTPUT:
+        return
+    try:
+        os.lstat(path)
+    except (FileNotFoundError, NotADirectoryError):
+        pass
+    except (OSError, ValueError) as error:  # the name is too long
+        reason = getattr(error, "strerror", None) or str(error)
+        raise ParameterError(name, f"cannot be written: {reason}", path) from None
+    if Path(path).is_dir():
+        raise ParameterError(name, "must be a file, not a folder", path)
+    if is_special_file(path):
+        if not os.access(path, os.W_OK):
+            raise ParameterError(name, "must be a file that can be written", path)
+        return
+    target = Path(os.path.realpath(path))
+    if target.is_symlink():
+        raise ParameterError(name, "must be a file, not a link to itself", path)
+    folder = target.parent
+    if not folder.is_dir():
+        raise ParameterError(name, f"must lie in a folder that exists, {folder} does not")
+    if not os.access(folder, os.W_OK):
+        raise ParameterError(name, f"must lie in a folder that can be written, not {folder}")
+    check_not_existing(name, path, force=force)

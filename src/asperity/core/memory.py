@@ -7,7 +7,6 @@ sets a limit.
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
@@ -109,7 +108,10 @@ def _format_size(count: int) -> str:
 
 def free_memory() -> int | None:
     """Return the free memory of the machine or of the control group [bytes], if it is known."""
-    known = [_free_machine_memory()]
+    known = []
+    with suppress(OSError, ValueError, IndexError):  # another system
+        text = Path("/proc/meminfo").read_text(encoding="ascii")  # includes reclaimable caches
+        known.append(int(text.split("MemAvailable:")[1].split()[0]) * 1024)
     group = Path("/sys/fs/cgroup")
     for most, used in (
         (group / "memory.max", group / "memory.current"),
@@ -117,14 +119,4 @@ def free_memory() -> int | None:
     ):
         with suppress(OSError, ValueError):  # another version, or no limit: "max"
             known.append(int(most.read_text()) - int(used.read_text()))
-    sizes = [size for size in known if size is not None]
-    return max(0, min(sizes)) if sizes else None
-
-
-def _free_machine_memory() -> int | None:
-    with suppress(OSError, ValueError, IndexError):
-        text = Path("/proc/meminfo").read_text(encoding="ascii")  # includes reclaimable caches
-        return int(text.split("MemAvailable:")[1].split()[0]) * 1024
-    with suppress(AttributeError, OSError, ValueError):  # not on Windows
-        return os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    return None
+    return max(0, min(known)) if known else None

@@ -282,7 +282,7 @@ def make_cases(
             raise ParameterError("device", f"{one.id} needs max_stiffness: add {hint} to its file")
     if len({one.id for one in devices}) < len(devices):
         raise ParameterError("device", "names one device twice", [one.id for one in devices])
-    chosen = textured_laws() if laws is None else find_laws(laws)  # type: ignore[arg-type]
+    chosen = textured_laws() if laws is None else find_laws(laws)
     parameters = distribute_parameters(law_parameters or {}, chosen)
     checked = make_conditions(function, **conditions)
     return [

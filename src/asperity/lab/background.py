@@ -20,7 +20,7 @@ from asperity.core.checks import FloatArray
 from asperity.core.errors import AsperityError
 from asperity.core.processes import make_pool
 from asperity.devices import Device
-from asperity.lab.messages import ViewRequest, encode_relief, encode_section
+from asperity.lab.messages import BESIDE, ViewRequest, encode_relief, encode_section
 from asperity.laws import REGISTERED_LAWS
 from asperity.surface import Surface, default_max_depth
 from asperity.textures.texture import Texture
@@ -69,20 +69,20 @@ class BackgroundWorker:
         self._pool.shutdown()
 
 
-def set_surface(surface: Surface) -> None:
-    """Set the surface of the pictures, and compile what they need."""
+def set_surface(surface: Surface, lane: str = "") -> None:
+    """Set the surface of the pictures of a lane, and compile what they need."""
     surface.texture.nearest([(0.0, 0.0, 0.0)])
-    _STATE["surface"] = surface
+    _STATE[lane] = surface
 
 
 def render_view(kind: str, numbers: tuple[float, ...]) -> bytes:
     """Return a picture of the surface as a message; empty without a surface.
 
     Args:
-        kind: "relief" or "section".
+        kind: "relief", "section" or ``BESIDE``, the section of the second lane.
         numbers: the arguments of ``encode_relief`` or ``encode_section`` after the surface.
     """
-    surface = _STATE.get("surface")
+    surface = _STATE.get(kind if kind == BESIDE else "")
     if surface is None:
         return b""
     encode = encode_relief if kind == "relief" else encode_section
@@ -213,6 +213,7 @@ class BackgroundRenderer:
         picture_worker: process for pictures.
         limit_worker: process for limits, which take longer.
         on_update: called when a result or a message is new.
+        lane: ``BESIDE`` for the second lane.
 
     Attributes:
         version: incremented with each surface whose pictures are available.
@@ -225,7 +226,9 @@ class BackgroundRenderer:
         picture_worker: BackgroundWorker,
         limit_worker: BackgroundWorker,
         on_update: Callable[[], Coroutine[Any, Any, None]],
+        lane: str = "",
     ) -> None:
+        self._lane = lane
         self._picture_worker, self._on_update = picture_worker, on_update
         self._limit = BackgroundResult(limit_worker, compute_limit, on_update)
         self._requested_surface: Surface | None = None
@@ -264,7 +267,7 @@ class BackgroundRenderer:
     async def _prepare_pictures(self, surface: Surface) -> None:
         while surface is self._requested_surface and len(self._crash_times) < MAX_CRASHES:
             try:
-                await _run_in_worker(self._picture_worker, set_surface, surface)
+                await _run_in_worker(self._picture_worker, set_surface, surface, self._lane)
             except BrokenProcessPool:
                 await self._record_crash(surface)
                 continue

@@ -74,7 +74,7 @@ async def serve_lab(
         fetch = lab.clip_store.fetch
         _handle_signals(lab.session, stopped)
         try:
-            with lab.session:
+            with lab.session, lab.second_lane.session:
                 async with serve(
                     lab.serve_client,
                     sock=listener,
@@ -88,6 +88,7 @@ async def serve_lab(
             for task in (*tasks, *lab.pending_tasks):
                 task.cancel()
             lab.pictures.close()
+            lab.second_lane.pictures.close()
             # The loop has ended; remaining processes compute pictures and limits, maybe for long.
             for child in active_children():
                 child.terminate()

@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,6 +23,10 @@ MAX_ANGULAR_SPEED = 400.0
 """Greatest angular speed of a periodic motion of the hand [rad/s]."""
 MIN_VIEW_SIZE, MAX_VIEW_SIZE = 1e-5, 0.2
 """Least and greatest side of a picture [m]."""
+
+
+BESIDE = "beside"
+"""Name of the second lane: of the change that chooses its law, and of its section."""
 
 
 @dataclass(frozen=True)
@@ -46,8 +51,8 @@ class Message(NamedTuple):
     """A message of the page.
 
     Attributes:
-        kind: "steer", "change", "relief", "section", "take_control", "start", "stop", "save_clip"
-            or "acknowledge" (the newest painted frame).
+        kind: "steer", "change", "relief", "section", ``BESIDE``, "take_control", "start", "stop",
+            "save_clip" or "acknowledge" (the newest painted frame).
         content: a :class:`SteerRequest`, the changes by name, a :class:`ViewRequest`, the number of
             a frame, or ``None``.
     """
@@ -120,26 +125,26 @@ def _parse_relief(x: object, y: object, size: object) -> ViewRequest:
     return ViewRequest("relief", (*middle, side))
 
 
-def _parse_section(box: object, y: object) -> ViewRequest:
+def _parse_section(kind: str, *code: float, box: object, y: object) -> ViewRequest:
     sides = left, right, bottom, top = _parse_numbers("box", box, 4, 1.0)
     if not all(MIN_VIEW_SIZE <= side <= MAX_VIEW_SIZE for side in (right - left, top - bottom)):
         limits = f"must have sides of {MIN_VIEW_SIZE:g} to {MAX_VIEW_SIZE:g} m"
         raise ParameterError("box", limits, box)
-    return ViewRequest("section", (*sides, _parse_number("y", y, -1.0, 1.0)))
+    return ViewRequest(kind, (*sides, _parse_number("y", y, -1.0, 1.0), *code))
 
+
+STATE, RELIEF, SECTION, BESIDE_SECTION = 1.0, 2.0, 3.0, 4.0
+"""First number of a message: its kind."""
 
 _PARSERS: dict[str, tuple[tuple[str, ...], Callable[..., Any]]] = {
     "steer": (("target", "cosine", "sine", "speed"), _parse_steer),
     "change": (("changes",), _parse_change),
     "relief": (("x", "y", "size"), _parse_relief),
-    "section": (("box", "y"), _parse_section),
+    "section": (("box", "y"), partial(_parse_section, "section")),
+    BESIDE: (("box", "y"), partial(_parse_section, BESIDE, BESIDE_SECTION)),
     "acknowledge": (("frame",), lambda frame: _parse_number("frame", frame, 0.0, math.inf)),
     **{kind: ((), lambda: None) for kind in ("take_control", "start", "stop", "save_clip")},
 }
-
-
-STATE, RELIEF, SECTION = 1.0, 2.0, 3.0
-"""First number of a message: its kind."""
 
 COLUMN_NAMES = [name for name, _unit in COLUMNS]
 FORCE_COLUMNS = slice(COLUMN_NAMES.index("applied x"), COLUMN_NAMES.index("applied z") + 1)
@@ -147,7 +152,7 @@ POSITION = slice(COLUMN_NAMES.index("x"), COLUMN_NAMES.index("z") + 1)
 _LAW_FORCE = slice(COLUMN_NAMES.index("commanded x"), COLUMN_NAMES.index("commanded z") + 1)
 _STEP_STATISTICS = ("path_length", "squared_steps", "max_force_step", "position_step")
 HEADER = (
-    *("kind", "frame", "rows", "first", "acknowledged", "forces"),
+    *("kind", "lane", "frame", "rows", "first", "acknowledged", "forces"),
     *("late", "skipped", "lateness", "truncated"),
     *_STEP_STATISTICS,
 )
@@ -174,12 +179,13 @@ def encode_frame(
     Args:
         rows: at least one, with the columns ``loop.shared_layout.COLUMNS``.
         first: number of the first row.
-        counts: ``frame`` (its number), ``acknowledged``, ``late`` and ``skipped`` ticks,
-            ``lateness`` (greatest delay of a start [s]) and ``truncated`` (ticks whose search was).
+        counts: ``lane`` (default 0; 1 for the second), ``frame`` (its number),
+            ``acknowledged``, ``late`` and ``skipped`` ticks, ``lateness`` (greatest delay of a
+            start [s]) and ``truncated`` (ticks whose search was).
         positions: of closest point and hand (6,) [m].
     """
     forces = rows[-MAX_FORCE_ROWS:, FORCE_COLUMNS]
-    sizes = {"kind": STATE, "rows": len(rows), "first": first, "forces": len(forces)}
+    sizes = {"kind": STATE, "lane": 0.0, "rows": len(rows), "first": first, "forces": len(forces)}
     values = {**sizes, **counts, **step_statistics(rows)}
     head = [float(values[name]) for name in HEADER]
     parts = (head, positions, rows[-1], rows.min(axis=0), rows.max(axis=0), forces.ravel())
@@ -232,8 +238,9 @@ def encode_relief(surface: Surface, x: float, y: float, size: float) -> bytes:
 
 
 def encode_section(
-    surface: Surface, left: float, right: float, bottom: float, top: float, y: float
-) -> bytes:
+    surface: Surface, left: float, right: float, bottom: float, top: float, y: float,
+    code: float = SECTION,
+) -> bytes:  # fmt: skip
     """Return a section along x, with the field and its curl, as a message.
 
     SECTION, PROFILE_POINTS, SECTION_COLUMNS, SECTION_ROWS, y and the box, then the heights [m],
@@ -247,6 +254,7 @@ def encode_section(
         bottom: least z [m].
         top: greatest z [m].
         y: of the section [m].
+        code: first number of the message: SECTION, or BESIDE_SECTION of the second lane.
     """
     line = np.linspace(left, right, PROFILE_POINTS)
     heights = surface.texture.height(np.column_stack([line, np.full(PROFILE_POINTS, y)]))
@@ -256,5 +264,5 @@ def encode_section(
     points = np.column_stack([xs.ravel(), np.full(xs.size, y), zs.ravel()])
     force, jacobian = map(np.nan_to_num, surface.force_and_jacobian(points))
     curl = jacobian[:, 0, 2] - jacobian[:, 2, 0]
-    head = [SECTION, PROFILE_POINTS, SECTION_COLUMNS, SECTION_ROWS, y, left, right, bottom, top]
+    head = [code, PROFILE_POINTS, SECTION_COLUMNS, SECTION_ROWS, y, left, right, bottom, top]
     return np.concatenate([head, heights, force[:, 0], force[:, 2], curl]).tobytes()

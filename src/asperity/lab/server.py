@@ -12,11 +12,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from websockets.asyncio.server import ServerConnection
 from websockets.exceptions import ConnectionClosed
 
-from asperity.contacts.warm_start import TRUNCATED_TICKS
 from asperity.core.errors import ParameterError
 from asperity.core.files import to_plain_data
 from asperity.devices import device_names
@@ -24,11 +22,12 @@ from asperity.lab import background, messages
 from asperity.lab.access import MalformedMessageError, RateLimit
 from asperity.lab.background import BackgroundRenderer, BackgroundResult, BackgroundWorker
 from asperity.lab.clips import ClipStore
+from asperity.lab.lanes import FrameReader, Lane, SecondLane
+from asperity.lab.messages import BESIDE
 from asperity.lab.playback import Playback
 from asperity.lab.scene_state import RANGES, SceneState
 from asperity.lab.session import Handle, Session
 from asperity.laws import REGISTERED_LAWS
-from asperity.servo.loop_memory import LoopStatistics
 from asperity.servo.process import PrestartedProcess
 from asperity.servo.safety import excess_stiffness_reason
 from asperity.textures.catalogue import KINDS
@@ -141,6 +140,9 @@ class LabServer:
         self.recommendation = BackgroundResult(
             comparisons, background.compute_recommendation, self._broadcast_state
         )
+        self.lane = Lane(self.session, self.pictures)
+        beside = BackgroundRenderer(pictures, limits, self._broadcast_state, BESIDE)
+        self.second_lane = SecondLane(self.session, beside)
         self.clip_store = ClipStore(self.session)
         if options.playback is not None:
             words = {"title": Path(scene_state.source).name, "opens_at_start": True}
@@ -167,6 +169,7 @@ class LabServer:
             self._state_changed.clear()
             if self.session.state in {"running", "stopped"}:
                 self._update_background()
+            self.second_lane.update()
             await self._broadcast_state()
 
     async def watch_steering(self) -> None:
@@ -242,7 +245,10 @@ class LabServer:
             self.session.steer(content)
             client.hand_moved.set()
         elif kind == "change":
-            self.session.change(content)
+            changes = dict(content)
+            if BESIDE in changes:
+                self.second_lane.choose(str(changes.pop(BESIDE)))
+            self.session.change(changes)
         elif kind == "start":
             self.session.start()
         elif kind == "stop":
@@ -263,18 +269,15 @@ class LabServer:
         lowest, highest = map(float, setup.surface.texture.extremes)
         electronics = session.scene_state.electronics
         status = {
-            "state": session.state, "message": session.message,
-            "start_count": session.start_count,
-            "settings": session.scene_state.settings, "assumptions": setup.assumptions,
+            **self.lane.status, BESIDE: self.second_lane.status,
+            "settings": session.scene_state.settings | {BESIDE: self.second_lane.law},
+            "assumptions": setup.assumptions,
             "control_available": self._controller is None,
             "request_count": session.steering_progress["requested"], "handle": session.handle,
             "update_rate": 1.0 / setup.servo.period, "max_force": setup.servo.max_force,
             "position_resolution": electronics.position_resolution,
             "force_resolution": electronics.force_resolution,
             "lowest": lowest, "highest": highest, "centre": session.scene_state.centre,
-            "limit": self.pictures.limit, "surface_version": self.pictures.version,
-            "picture_message": self.pictures.message,
-            "pictures_current": self.pictures.is_current,
             "recommendation": self.recommendation.value,
         }  # fmt: skip
         for page in tuple(self._clients):
@@ -291,7 +294,7 @@ class LabServer:
 
     async def _send_frames(self, client: Client) -> None:
         """Send the rows since the last frame, at once after a motion."""
-        session, starts, seen = self.session, -1, 0
+        first, second = map(FrameReader, (self.lane, self.second_lane))
         while True:
             await asyncio.sleep(MIN_FRAME_INTERVAL)
             with suppress(TimeoutError):
@@ -301,27 +304,15 @@ class LabServer:
                 client.hand_moved.clear()
                 await self._wait_for_response()
             await client.wait_until_ready()
-            if session.shared is None:
+            contents = [first.read(client.last_sent + 1)]
+            if not contents[0]:
                 continue
-            shared, progress = session.shared, session.steering_progress
-            if session.start_count != starts:
-                starts, seen = session.start_count, max(shared.row_count - 1, 0)
-            rows, first = shared.rows(seen)
-            if not len(rows):
-                continue
-            seen = first + len(rows)
-            counted = LoopStatistics.from_status(shared.status)
             client.last_sent += 1
-            counts = {
-                "frame": client.last_sent, "acknowledged": progress["acknowledged"],
-                "late": counted.late, "skipped": counted.skipped, "lateness": counted.max_lateness,
-                "truncated": shared.search_state[TRUNCATED_TICKS],
-            }  # fmt: skip
-            places = [self.pictures.nearest(rows[-1, 1:4]), session.anchor]
+            if self.second_lane.law:
+                contents.append(second.read(client.last_sent))
             async with asyncio.timeout(_SEND_TIMEOUT):
-                await client.connection.send(
-                    messages.encode_frame(rows, first, counts, np.concatenate(places))
-                )
+                for content in filter(None, contents):
+                    await client.connection.send(content)
 
     async def _send_pictures(self, client: Client) -> None:
         """Send the requested pictures."""
@@ -329,7 +320,8 @@ class LabServer:
             await client.view_requested.wait()
             client.view_requested.clear()
             for kind in tuple(client.view_requests):
-                content = await self.pictures.render(client.view_requests.pop(kind))
+                pictures = self.second_lane.pictures if kind == BESIDE else self.pictures
+                content = await pictures.render(client.view_requests.pop(kind))
                 if content:
                     await client.connection.send(content)
                 else:

@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, replace
 from queue import Empty, Queue
 from typing import Any, Literal
 
@@ -123,8 +123,11 @@ class Session:
         prestarted: the process of the first loop.
         handle: of a real device; ``None`` for the simulated device.
         assess_risk: of surfaces on a real device; ``None`` if risks are accepted.
+        leader: session whose hand moves this one's, sample by sample; the first change starts the
+            loop.
 
     Attributes:
+        on_change: as given.
         scene_state: the current scene.
         saved_scenes: other scenes by name.
         shared: rows of the loop; replaced at each start.
@@ -140,17 +143,19 @@ class Session:
         prestarted: PrestartedProcess | None = None,
         handle: Handle | None = None,
         assess_risk: RiskAssessor | None = None,
+        leader: Session | None = None,
     ) -> None:
-        self.scene_state, self._on_change, self._prestarted = scene_state, on_change, prestarted
+        self.scene_state, self.on_change, self._prestarted = scene_state, on_change, prestarted
         self.saved_scenes = SavedScenes()
-        self.handle, self._assess_risk = handle, assess_risk
+        self.handle, self._assess_risk, self.leader = handle, assess_risk, leader
         highest = float(scene_state.setup.surface.texture.extremes[1])
-        self.pointer_hand = (
-            None if handle else PointerHand((*scene_state.centre, highest + START_HEIGHT))
-        )
+        is_steered = handle is None and leader is None
+        self.pointer_hand: PointerHand | None = leader.pointer_hand if leader else None
+        if is_steered:
+            self.pointer_hand = PointerHand((*scene_state.centre, highest + START_HEIGHT))
         self.shared: LoopMemory | None = None
         self.start_count = 0
-        self.state: LoopState = "stopped" if handle else "starting"
+        self.state: LoopState = "starting" if is_steered else "stopped"
         self.message = handle.start_prompt if handle else ""
         self._loop: ServoProcess | None = None
         self._active_shared: LoopMemory | None = None
@@ -166,7 +171,7 @@ class Session:
         self._is_closing = True
         self.release_force("")
         self._thread.join()
-        if self.pointer_hand is not None:
+        if self.pointer_hand is not None and self.leader is None:
             self.pointer_hand.close()
 
     @property
@@ -219,11 +224,11 @@ class Session:
 
     def _set_state(self, state: LoopState, message: str = "") -> None:
         self.state, self.message = state, message
-        self._on_change()
+        self.on_change()
 
     def _run(self) -> None:
         try:
-            if self.handle is None:
+            if self.state == "starting":
                 self._run_guarded(self._start, self.scene_state)
             while not self._is_closing:
                 for request in self._next_requests():
@@ -303,7 +308,8 @@ class Session:
         if self.handle is not None:
             return self.handle.driver
         assert self.pointer_hand is not None  # as there is no handle
-        return pointer_driver(setup.plant, setup.hand, setup.servo, self.pointer_hand)
+        driver = pointer_driver(setup.plant, setup.hand, setup.servo, self.pointer_hand)
+        return replace(driver, follows=self.leader is not None)
 
     def _run_duration(self, setup: Setup) -> float | None:
         """Return the time after which the loop ends by itself [s]."""

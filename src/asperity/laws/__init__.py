@@ -130,7 +130,7 @@ def find_law(law: str | Law) -> Law:
     raise ParameterError("law", f"is unknown: {law!r}; {suggest_names(law, names)}")
 
 
-def find_laws(laws: str | list[str | Law] | tuple[str | Law, ...]) -> tuple[Law, ...]:
+def find_laws(laws: str | Sequence[str | Law]) -> tuple[Law, ...]:
     """Return several laws from letters ("WABC"), a name, or a sequence of both.
 
     A string with commas or semicolons is split there; otherwise each of its letters is a law,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -215,10 +216,7 @@ def _check_at_most(name: str, length: float, max_length: float) -> None:
         raise ParameterError(name, limit, length)
 
 
-Offsets = NDArray[np.intp]
-_TILE = 256
 _MAX_COMPARISONS = 5e10  # about a minute at 1 to 3 ns each
-_CHECK_EVERY = 32
 
 
 def dilate(heights: FloatArray, pitch: Pitch, radius: float) -> FloatArray:
@@ -251,17 +249,21 @@ def dilate(heights: FloatArray, pitch: Pitch, radius: float) -> FloatArray:
         >>> dilate(spike, (1.0,), 2.0).round(3)
         array([0.   , 0.   , 0.   , 0.732, 1.   , 0.732, 0.   , 0.   , 0.   ])
     """
+    from scipy.ndimage import grey_dilation
+
     check_positive("tip_radius", radius, "m")
     span = float(heights.max()) - float(heights.min())
-    offsets, drops = _ball_offsets(heights.shape, pitch, radius, span)
-    if len(drops) * heights.size > _MAX_COMPARISONS:
+    rises, is_compared = _ball(heights.shape, pitch, radius, span)
+    count = int(is_compared.sum())
+    if count * heights.size > _MAX_COMPARISONS:
         raise ParameterError(
             "tip_radius",
-            f"needs {len(drops)} comparisons at each of {heights.size} points, too many to wait"
+            f"needs {count} comparisons at each of {heights.size} points, too many to wait"
             " for; crop the map or take every second point",
             radius,
         )
-    return _dilate_tiles(heights, offsets, drops) if len(drops) else np.array(heights)
+    ball: Any = -rises  # typed as if it had to be whole numbers
+    return np.asarray(grey_dilation(heights, footprint=is_compared, structure=ball, mode="mirror"))
 
 
 def check_tip_radius(shape: Shape, pitch: Pitch, radius: float) -> None:
@@ -297,46 +299,16 @@ def apply_tip(heights: FloatArray, pitch: Pitch, radius: float) -> tuple[FloatAr
     return felt, sentence
 
 
-def _ball_offsets(
+def _ball(
     shape: Shape, pitch: Pitch, radius: float, span: float
-) -> tuple[Offsets, FloatArray]:
-    """Return offsets in samples, (m, axes), y first, and the ball's drops [m] there, sorted."""
+) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Return how far a ball rises [m] around its lowest point, and where that is compared."""
     # Where the ball has risen by more than the height range, the point below its centre is higher.
     reach = math.sqrt(max(span * (2.0 * radius - span), 0.0)) if span < radius else radius
     limits = [math.floor(reach / p * (1 + 1e-12)) for p in pitch[::-1]]
     counts = np.minimum(limits, np.array(shape) - 1)
-    grids = np.meshgrid(*(np.arange(-count, count + 1) for count in counts), indexing="ij")
-    offsets = np.stack([grid.ravel() for grid in grids], axis=1)
-    squares = ((offsets * np.array(pitch[::-1])) ** 2).sum(axis=1)
-    used = (squares > 0.0) & (squares <= reach**2 * (1 + 1e-12))
-    offsets, squares = offsets[used], squares[used]
+    sides = [p * np.arange(-n, n + 1) for n, p in zip(counts, pitch[::-1], strict=True)]
+    squares = np.sum(np.square(np.meshgrid(*sides, indexing="ij")), axis=0)
     # R - √(R² - u²), without cancellation for large balls.
-    drops = squares / (radius + np.sqrt(np.maximum(radius**2 - squares, 0.0)))
-    order = np.argsort(drops, kind="stable")
-    return offsets[order], drops[order]
-
-
-def _dilate_tiles(heights: FloatArray, offsets: Offsets, drops: FloatArray) -> FloatArray:
-    """Dilate tile by tile, which fit into the cache, up to the reach that each tile needs."""
-    result, shape = np.array(heights), heights.shape
-    reach = np.abs(offsets).max(axis=0)
-    mirrored = np.pad(heights, [(r, r) for r in reach], mode="reflect")
-    starts = np.indices([math.ceil(n / _TILE) for n in shape]).reshape(len(shape), -1).T * _TILE
-    for start in starts:
-        part = tuple(slice(a, a + _TILE) for a in start)
-        around = tuple(slice(a, a + _TILE + 2 * r) for a, r in zip(start, reach, strict=True))
-        _dilate_tile(mirrored[around], result[part], offsets + reach, drops)
-    return result
-
-
-def _dilate_tile(
-    neighbourhood: FloatArray, tile: FloatArray, corners: Offsets, drops: FloatArray
-) -> None:
-    highest = float(neighbourhood.max())
-    work = np.empty_like(tile)
-    for k, (corner, drop) in enumerate(zip(corners, drops, strict=True)):
-        if k % _CHECK_EVERY == 0 and highest - drop <= float(tile.min()):
-            return
-        window = tuple(slice(c, c + n) for c, n in zip(corner, tile.shape, strict=True))
-        np.subtract(neighbourhood[window], drop, out=work)
-        np.maximum(tile, work, out=tile)
+    rises = squares / (radius + np.sqrt(np.maximum(radius**2 - squares, 0.0)))
+    return rises, squares <= reach**2 * (1 + 1e-12)

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from asperity.core import files
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.core.files import Serializable, json_text, open_atomic, open_input, to_plain_data
@@ -215,17 +216,11 @@ def check_output_path(path: Path, source: Path) -> None:
     """Refuse a path that cannot be written, before any work is done.
 
     Raises:
-        ParameterError: the folder is missing, or the path is a folder or the source itself.
+        ParameterError: the path is the source itself; see also :func:`check_output`.
     """
-    folder = path.absolute().parent
-    if not folder.is_dir():
-        raise ParameterError("output", f"must lie in a folder that exists, {folder} does not")
-    if path.is_dir():
-        raise ParameterError("output", "must be a file, not a folder", str(path))
     if path.exists() and source.exists() and path.samefile(source):
         raise ParameterError("output", "must be another file than the surface", str(path))
-    if not os.access(folder, os.W_OK):
-        raise ParameterError("output", f"must lie in a folder that can be written, not {folder}")
+    files.check_output("output", str(path), force=True)
 
 
 def is_prepared(path: FilePath) -> bool:

@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import nullcontext
 from importlib import import_module
 from typing import Any
 
 from asperity.core.errors import ParameterError, nearest_names
-from asperity.core.processes import limit_processes, precompute
+from asperity.core.processes import precompute
 from asperity.paper import claims
 from asperity.paper.claim import CATALOGUE, Claim, Result
 from asperity.paper.claims.formula_claims import FORMULA_CLAIMS
@@ -112,32 +111,27 @@ def _claim_references(entry: Claim) -> set[str]:
 
 
 def reproduce_claims(
-    ids: Iterable[str] | None = None, progress: Progress | None = None, workers: int | None = None
+    ids: Iterable[str] | None = None, progress: Progress | None = None
 ) -> tuple[Result, ...]:
     """Compute claims and return their results in the order of the paper.
 
     Args:
         ids: references, see :func:`find_claims`; all claims by default.
         progress: called after each claim.
-        workers: number of processes; 1 by default, one per core on the command line.
 
     Raises:
-        ParameterError: if an id is unknown or ``workers`` is not a positive integer.
+        ParameterError: if an id is unknown.
 
     Example:
         >>> [result.verdict for result in reproduce_claims(["eq-10", "eq-12"])]
         ['holds with correction', 'holds']
     """
-    count = 1 if workers is None else workers
-    if isinstance(count, bool) or count != int(count) or count < 1:
-        raise ParameterError("workers", "must be a whole number, 1 or more", workers)
     if isinstance(ids, str):
         raise ParameterError("ids", "must be a sequence of ids, not one text", ids)
     wanted = None if ids is None else {found.id for given in ids for found in find_claims(given)}
     names = [name for name in CLAIMS if wanted is None or name in wanted]
     results = []
-    limit = nullcontext() if workers is None else limit_processes(int(count))
-    with limit, precompute(_run_in_worker, names) as precomputed:
+    with precompute(_run_in_worker, names) as precomputed:
         for name, found in zip(names, precomputed, strict=True):
             results.append(CLAIMS[name].run() if found is None else found)
             if progress is not None:

@@ -191,7 +191,6 @@ def analysis_page(analysis: Analysis, texture_code: str = "") -> page.Page:
             Section("Worst loop", [page.pairs_table(leak_facts(analysis))], media=_MEDIA),
             *_figure_sections(analysis, "field"),
             _continuity_section(analysis),
-            *_figure_sections(analysis, "jumps"),
             Section("On a straight scan", [page.pairs_table(merit_facts(analysis))], media=_MEDIA),
             Section("Reproduce q", [page.Paragraph(code, "code")], media=_MEDIA),
             *page.user_sections(Analysis, analysis),
@@ -263,7 +262,6 @@ def _figure_sections(analysis: Analysis, *names: str) -> list[Section]:
         "letter": analysis.surface.law.letter,
         "q": number_text.interval_text(analysis.q),
         "loop": f"; the worst loop gains {gained}" if len(leak.vertices) else "",
-        "jumps": len(analysis.continuity.jumps),
     }
     for name in names:
         if name in analysis_figure_names(analysis):

@@ -66,8 +66,7 @@ def recommend_law_and_stiffness(
     result = compare(texture, device, laws, progress=progress, **keywords)
     row = result.rows[0] if "law" in surface else result.recommended_row or result.nearest_row
     if row is None:
-        reason = f"is missing, and none can be recommended: {result.recommendation}"
-        raise ParameterError("law", reason)
+        raise ParameterError("law", f"is missing, and none is recommended: {result.recommendation}")
     chosen = {**surface, "law": row.law}
     if "stiffness" in surface:
         return chosen, f"Law {row.law.letter}, as asperity compare recommends"

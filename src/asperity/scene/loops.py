@@ -76,9 +76,7 @@ def make_loop(
 
 def _find_laws(laws: Laws | None) -> tuple[Law, ...]:
     """Return the laws of a sweep; all registered ones by default."""
-    if laws is None:
-        return tuple(REGISTERED_LAWS.values())
-    return find_laws(laws if isinstance(laws, str) else list(laws))
+    return tuple(REGISTERED_LAWS.values()) if laws is None else find_laws(laws)
 
 
 def simulate(

@@ -268,9 +268,9 @@ class _LoopServer:
     def __init__(self, connection: Connection, memory: LoopMemory, job: LoopJob) -> None:
         self._connection, self._job, self._memory = connection, job, memory
         self._block = memory.block()
-        self._loop = DriverLoop(
-            job.driver, job.servo, job.safety, job.reach, self._block, system_clock()
-        )
+        # A device that follows another loop waits for each of its samples.
+        clock = no_clock() if job.driver.follows else system_clock()
+        self._loop = DriverLoop(job.driver, job.servo, job.safety, job.reach, self._block, clock)
         self._loop.search_state = memory.search_state
         self._program = self._next_program = job.program
 

@@ -41,9 +41,7 @@ from asperity.simulation.trace import (
     Run,
     StopReason,
     TailStatistics,
-    TextTrace,
     TraceWriter,
-    is_text_path,
 )
 from asperity.surface import Surface
 
@@ -199,8 +197,8 @@ def simulate(
         start: initial position of the handle [m], shape (3,); default: where the motion starts.
         velocity: initial velocity of the handle [m/s], shape (3,); default: at rest.
         trace: whether to store the trace in memory, or the path of its file: a recording (.mcap),
-            or a table of text (.csv). Rows are written as they come, so memory does not depend on
-            the duration.
+            which :func:`~asperity.recording.table_export.export_recording` writes as a table. Rows
+            are written as they come, so memory does not depend on the duration.
         every: samples per row of the trace.
         max_rows: largest number of rows in memory, decimated evenly; by default all rows, so that
             memory grows with the duration. Tail statistics always use all rows.
@@ -212,7 +210,7 @@ def simulate(
 
     Raises:
         ParameterError: for parts that do not fit together, or a trace file that cannot be written
-            (what was written stays, in whole lines or blocks).
+            (what was written stays, in whole blocks).
 
     Example:
         >>> from asperity.textures.kinds.sinusoid import Sinusoid
@@ -363,8 +361,9 @@ def _open_trace(
         return DecimatedTrace(rows if trace else 0, most)
     if not isinstance(trace, (str, os.PathLike)):
         raise ParameterError("trace", "must be True, False or a path", trace)
-    if is_text_path(Path(trace)):
-        return TextTrace(trace)
+    if Path(trace).suffix.lower() not in (".mcap", ""):
+        words = "must end in .mcap; asperity recording export writes such a recording as .csv"
+        raise ParameterError("trace", words, os.fspath(trace))
     return RecordingWriter(trace, COLUMNS, metadata(), field_attachments(surface), "trace")
 
 

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import os
-from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
-from itertools import islice
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,7 +12,6 @@ from asperity.core.checks import FloatArray
 from asperity.core.display import Plottable
 from asperity.core.errors import ParameterError
 from asperity.core.files import attributes_to_dict, to_plain_data
-from asperity.recording.recording import open_recording
 from asperity.recording.row_encoding import NamedColumns
 from asperity.recording.writer import RecordingWriter
 from asperity.surface import Surface
@@ -35,23 +30,6 @@ COLUMNS = (
     ("law held", "1"),
 )
 """Columns of the trace with their units."""
-
-HEADER = ",".join(f"{name} [{unit}]" for name, unit in COLUMNS)
-_TEXT_SUFFIXES, _RECORDING_SUFFIXES = (".csv", ".txt"), (".mcap", "")
-_ROW_FORMAT = ",".join(["%.12g"] * len(COLUMNS)) + "\n"
-
-
-def is_text_path(path: Path) -> bool:
-    """Return whether a trace file is a text table, not a recording, by its suffix.
-
-    Raises:
-        ParameterError: for another suffix.
-    """
-    suffix = path.suffix.lower()
-    if suffix not in (*_TEXT_SUFFIXES, *_RECORDING_SUFFIXES):
-        words = "must be the path of a .mcap file (a recording), or of a .csv file (text)"
-        raise ParameterError("trace", words, str(path))
-    return suffix in _TEXT_SUFFIXES
 
 
 class DecimatedTrace:
@@ -92,57 +70,7 @@ class DecimatedTrace:
         """Do nothing: there is no file."""
 
 
-class TextTrace:
-    """A trace in a CSV file, written in whole lines.
-
-    The first line names the columns with their units, ``time [s],x [m],...``.
-    """
-
-    def __init__(self, path: str | os.PathLike[str]) -> None:
-        self._path = Path(path)
-        self.rows = 0
-        try:
-            self._file = open(self._path, "wb", buffering=0)  # noqa: SIM115 - closed by close()
-        except OSError as error:
-            raise ParameterError("trace", f"cannot be written: {error}") from None
-        self._size = 0
-        self._write((HEADER + "\n").encode())
-
-    def append(self, rows: FloatArray) -> None:
-        """Write rows as lines.
-
-        Raises:
-            ParameterError: if the file cannot grow; it then ends with a whole line.
-        """
-        self._write((_ROW_FORMAT * len(rows) % tuple(rows.ravel().tolist())).encode())
-
-    def _write(self, text: bytes) -> None:
-        left = memoryview(text)
-        try:
-            while left:
-                left = left[self._file.write(left) or 0 :]
-        except OSError as error:
-            whole = self._truncate_to_line(text[: len(text) - len(left)])
-            words = f"cannot be written any further ({error.strerror})"
-            raise ParameterError("trace", f"{words}: {whole} rows are in {self._path}") from None
-        self._size += len(text)
-        self.rows += text.count(b"\n") - (self._size == len(text))
-
-    def _truncate_to_line(self, written: bytes) -> int:
-        """Truncate the file after its last whole line; return its number of rows."""
-        whole = written.rfind(b"\n") + 1
-        with suppress(OSError):  # a device such as /dev/full has no length
-            self._file.truncate(self._size + whole)
-        header = self._size == 0 and whole > 0
-        self.close()
-        return self.rows + written.count(b"\n") - header
-
-    def close(self) -> None:
-        """Close the file."""
-        self._file.close()
-
-
-TraceWriter = DecimatedTrace | TextTrace | RecordingWriter
+TraceWriter = DecimatedTrace | RecordingWriter
 """What takes the rows of a run, chunk by chunk."""
 _MIN_ROWS = 4
 _NAMES = [name for name, _unit in COLUMNS]
@@ -258,11 +186,8 @@ class Ledger:
     @classmethod
     def from_sums(cls, sums: FloatArray, stored_before: float, stored_after: float) -> Ledger:
         """Return the ledger of the sums of a run; see ``kernels/energy_ledger.py``."""
-        x, y, z, px, py, pz, lost, hand, friction, sampling, exchanged = map(float, sums)
-        work, same = (x, y, z), (px, py, pz)
-        return cls(
-            work, same, lost, hand, friction, sampling, exchanged, stored_before, stored_after
-        )
+        x, y, z, px, py, pz, *others = map(float, sums)
+        return cls((x, y, z), (px, py, pz), *(*others, stored_before, stored_after))
 
     @property
     def total(self) -> float:
@@ -360,24 +285,3 @@ class Run(NamedColumns, Plottable):
         names = "duration samples period stop_message state ledger truncated_ticks search_error"
         own = attributes_to_dict(self, *names.split(), infinity=None)
         return own | {"trace": self.path or None, "notes": list(self.notes)}
-
-
-def load_trace(run: Run, max_rows: int = MAX_ROWS) -> Run:
-    """Return a run with the trace of its file, decimated evenly.
-
-    Args:
-        run: a run whose trace is in ``run.path``.
-        max_rows: largest number of rows.
-
-    Raises:
-        OSError: if the file is gone.
-        ParameterError: likewise, for a recording.
-    """
-    if not is_text_path(Path(run.path)):
-        return replace(run, table=open_recording(run.path).table(max_rows))
-    with open(run.path, encoding="utf-8") as file:
-        rows = sum(1 for _line in file) - 1
-        file.seek(0)
-        step = max(1, -(-rows // max_rows))
-        table = np.loadtxt(islice(file, 1, None, step), delimiter=",", ndmin=2)
-    return replace(run, table=table)

@@ -143,8 +143,7 @@ class Texture(Plottable, ABC):
 
     def constructor_values(self) -> dict[str, Any]:
         """Return the arguments of the constructor by name, SI units."""
-        names = [argument.name for argument in self.constructor_arguments]
-        return {name: getattr(self, name) for name in names}
+        return {one.name: getattr(self, one.name) for one in self.constructor_arguments}
 
     def __repr__(self) -> str:
         values = ", ".join(f"{name}={value!r}" for name, value in self.constructor_values().items())

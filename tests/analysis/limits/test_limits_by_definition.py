@@ -19,13 +19,12 @@ from asperity.analysis.limits.limit_rules import (
     evaluate_limit,
 )
 from asperity.analysis.limits.perceptibility import (
-    MaskingSource,
-    Perceptibility,
     WaveScan,
     assess_perceptibility,
     classify_perceptibility,
     respond,
 )
+from asperity.analysis.limits.perceptibility_result import MaskingSource, Perceptibility
 from asperity.analysis.limits.perceptibility_sentences import unverified_text
 from asperity.analysis.limits.spectrum import Spectrum, Wave
 from asperity.analysis.passivity.verdict import StabilityLimit

@@ -13,7 +13,8 @@ import pytest
 from asperity.analysis.check_limits import limits
 from asperity.analysis.compare import compare
 from asperity.analysis.energy.merit import merit
-from asperity.analysis.limits.perceptibility import Perceptibility, Remedy, assess_perceptibility
+from asperity.analysis.limits.perceptibility import assess_perceptibility
+from asperity.analysis.limits.perceptibility_result import Perceptibility, Remedy
 from asperity.analysis.limits.perceptibility_sentences import (
     form_removal_sentences,
     masking_text,

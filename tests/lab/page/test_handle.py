@@ -415,3 +415,9 @@ def test_a_recording_moves_the_handle_and_ends_with_its_rows(folder: Path) -> No
             heard(line, lambda m: frames(m) and column(m, "newest", "inside") == 1.0)
             heard(line, news(state="stopped", message="end of the recording; Start replays it"))
     assert started.end()[0] == 0
+
+
+def test_a_second_law_beside_is_refused_with_the_reason(page: Any) -> None:
+    say(page, "change", changes={"beside": "H"})
+    words = heard(page, refused)["message"]
+    assert "beside needs the simulated device: one handle has one law" in words

@@ -31,7 +31,7 @@ class X3pSpec:
     feature: str = "SUR"
     size: tuple[str, str, str] | None = None
     folder: str = ""
-    inline: list[str] | None = None
+    inline: bool = False
     valid: NDArray[np.bool_] | None = None
     prolog: str = '<?xml version="1.0" encoding="UTF-8"?>'
     revision: str = "ISO5436 – 2000"
@@ -75,9 +75,8 @@ def main_xml(spec: X3pSpec, points: bytes, valid: bytes | None) -> bytes:
     """Return main.xml."""
     ny, nx = spec.stored.shape
     size = spec.size or (str(nx), str(ny), "1")
-    if spec.inline is not None:
-        datums = "".join(f"<Datum>{text}</Datum>" if text else "<Datum/>" for text in spec.inline)
-        data = f"<DataList>{datums}</DataList>"
+    if spec.inline:
+        data = "<DataList><Datum>0;0;1</Datum></DataList>"
     else:
         md5 = spec.point_md5 if spec.point_md5 is not None else _md5(points)
         data = f"<PointDataLink>bindata/data.bin</PointDataLink><MD5ChecksumPointData>{md5}"
@@ -112,7 +111,7 @@ def write_x3p(path: Path, spec: X3pSpec) -> Path:
     members = dict(spec.extra)
     if spec.with_main:
         members["main.xml"] = main
-    if spec.inline is None:
+    if not spec.inline:
         members["bindata/data.bin"] = points
     if valid is not None:
         members["bindata/valid.bin"] = valid

@@ -53,7 +53,7 @@ def test_every_picture_can_be_plotted_alone(
 ) -> None:
     expected = {
         "groove": (groove, ["field", "gain", "depth"]),
-        "god": (god_object, ["field", "gain", "depth", "jumps"]),
+        "god": (god_object, ["field", "gain", "depth"]),
         "hills": (hills, ["field", "gain", "top", "depth"]),
     }
     for tag, (result, names) in expected.items():
@@ -67,7 +67,7 @@ def test_every_picture_can_be_plotted_alone(
             assert path.stat().st_size > 3000
         plot(result).savefig(tmp_path / f"{tag}.svg")
     with pytest.raises(ParameterError, match="one of field, gain, depth"):
-        plot(groove, picture="jumps")
+        plot(groove, picture="top")
 
 
 def test_worst_loop_is_drawn_at_its_vertices(groove: Analysis) -> None:
@@ -160,12 +160,3 @@ def test_top_view_of_law_a_shows_the_slope(hills: Analysis) -> None:
     slope = np.hypot(*HILLS.gradient(xy).T).reshape(rows, columns)
     np.testing.assert_allclose(gain, np.hypot(1.0, slope), rtol=1e-6)
     assert gain.max() <= hills.q.upper
-
-
-def test_jumps_are_plotted_against_depth(god_object: Analysis) -> None:
-    axes = plot(god_object, "jumps").axes[0]
-    depth, size = axes.lines[0].get_data()
-    jumps = god_object.continuity.jumps
-    unit = 1e3 if "mN" in axes.get_ylabel() else 1.0
-    np.testing.assert_allclose(size, [unit * jump.size for jump in jumps], rtol=1e-12)
-    np.testing.assert_allclose(depth, [1e3 * jump.depth for jump in jumps], rtol=1e-12)

@@ -11,7 +11,7 @@ from typing import Any
 from asperity.analysis import surface_sentences
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.limits.limit_rules import Limit
-from asperity.analysis.limits.perceptibility import Perceptibility
+from asperity.analysis.limits.perceptibility_result import Perceptibility
 from asperity.analysis.limits.perceptibility_sentences import (
     masking_text,
     perceptibility_assumptions,

@@ -12,7 +12,7 @@ function decodeFrame(numbers, layout) {
   const value = name => numbers[header[name]];
   const point = name => ["x", "y", "z"].map(axis => value(`${name} ${axis}`));
   return {
-    number: value("frame"), rowCount: value("rows"), firstRow: value("first"),
+    number: value("frame"), lane: value("lane"), rowCount: value("rows"), firstRow: value("first"),
     acknowledged: value("acknowledged"), late: value("late"), skipped: value("skipped"),
     lateness: value("lateness"), truncated: value("truncated"),
     pathLength: value("path_length"), squaredSteps: value("squared_steps"),

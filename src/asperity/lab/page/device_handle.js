@@ -17,7 +17,7 @@ export class DeviceHandle {
     this.isPresent = Boolean(handle);
     document.body.classList.toggle("real-device", this.isPresent);
     $("handle-note").hidden = !this.isPresent;
-    if (handle) $("handle-note").textContent = `${handle.motion_source}. The guided tour needs the simulated device; asperity run --record records.`;
+    if (handle) $("handle-note").textContent = `${handle.motion_source}. The guided tour and a second law beside need the simulated device: one handle has one law; asperity run --record records.`;
     $("start").textContent = handle ? "Start" : "Start again";
     $("start").hidden = state !== "stopped" || !hasControl;
     $("release").hidden = !handle || state === "stopped";

@@ -36,7 +36,7 @@ function keyActions(host) {
     PageUp: () => { hand.z = Math.min(hand.height + host.viewWidth / 80, MAX_KEY_HEIGHT); hand.requestMotion(); },
     PageDown: () => { hand.z = Math.max(hand.height - host.viewWidth / 80, -MAX_KEY_HEIGHT); hand.requestMotion(); },
     m: () => handle.isPresent || host.motionPanel.choose(hand.nextMotion),
-    x: () => $("swap-laws").click(), r: () => host.energyMeter.reset(), s: () => $("sound").click(),
+    2: () => handle.isPresent || host.secondLane.toggle(), x: () => $("swap-laws").click(), r: () => $("reset-energy").click(), s: () => $("sound").click(),
     k: () => handle.isPresent || $("save-clip").click(),
     j: () => player.isOpen && $("play").click(), l: () => player.isOpen && $("return-to-live").click(),
     t: () => handle.isPresent || host.tourPanel.toggle(), v: () => tour.isActive && $("tour-demo").click(),
@@ -47,7 +47,7 @@ function keyActions(host) {
 
 /**
  * Obey the keys.
- * @param host object with hand, handle, player, tour, tourPanel, motionPanel, energyMeter, viewWidth [m], hasControl and zoom(factor)
+ * @param host object with hand, handle, player, tour, tourPanel, motionPanel, secondLane, viewWidth [m], hasControl and zoom(factor)
  */
 export function obeyKeys(host) {
   const { hand } = host, actions = keyActions(host);

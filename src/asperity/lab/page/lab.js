@@ -10,6 +10,8 @@ import { fromSliderValue, showLimit, toSliderFraction } from "./stiffness_slider
 import { Connection } from "./connection.js";
 import { download, toPng, toSvg } from "./image_export.js";
 import { readTheme } from "./canvas.js";
+import { probeStateOf } from "./probe_overlay.js";
+import { SecondLane } from "./second_lane.js";
 import { ForceSound } from "./sound.js";
 import { Player } from "./player.js";
 import { ClipsPanel } from "./clips_panel.js";
@@ -19,7 +21,7 @@ import { RecommendationPanel } from "./recommendation_panel.js";
 import { Tour } from "./tour.js";
 import { TourPanel } from "./tour_panel.js";
 import { SpectrumPlot, TracePlot } from "./traces.js";
-import { ReliefView, SectionView, isRelief } from "./views.js";
+import { ReliefView, SectionView, isBeside, isRelief } from "./views.js";
 import { formatMillimetres, formatQuantity } from "./format.js";
 
 const $ = id => document.getElementById(id);
@@ -39,6 +41,7 @@ const connection = new Connection({
   hello(message) {
     laws = message.laws;
     fillSelect($("other-law"), laws.map(law => [law.letter, `${law.letter} ${law.name}`]), "A");
+    secondLane.setLaws(laws);
     fillSelect($("device"), message.devices.map(name => [name, name]));
     $("textures").replaceChildren(...message.textures.map(name => new Option(name)));
     $("law-buttons").replaceChildren(...laws.map(law => {
@@ -64,22 +67,24 @@ const connection = new Connection({
     hand.surfaceHeight = status.highest;
     lastRun.requestPictures = -Infinity; // they may have changed
     showStatus();
+    secondLane.setStatus(status);
   },
   error({ message }) { showAlarm(message); },
   clip(clip) { clipsPanel.add(clip); },
   frame(newFrame) {
+    if (newFrame.lane) { secondLane.addFrame(newFrame, connection.layout.columns); return; }
     if (player.isOpen) { acknowledge(newFrame); return; } // the recording is shown instead
     tour.addFrame(newFrame, connection.layout.columns);
     showFrame(newFrame);
     if (document.hidden) acknowledge(newFrame); // nothing is painted
   },
-  picture(numbers) { pictures.receive(isRelief(numbers) ? relief : section, numbers); },
-  picture_unavailable({ kind }) { pictures.noteUnavailable(kind); },
+  picture(numbers) { if (isBeside(numbers)) secondLane.receivePicture(numbers); else pictures.receive(isRelief(numbers) ? relief : section, numbers); },
+  picture_unavailable({ kind }) { for (const one of [pictures, secondLane.pictures]) one.noteUnavailable(kind); },
   disconnected(reason) {
     const notice = status?.handle ? " The force is released when no page with control is connected." : "";
     isFirstStatus = false;
     status = null;
-    pictures.setStatus(null);
+    for (const one of [pictures, secondLane]) one.setStatus(null);
     $("state").className = "stopped";
     $("state").textContent = "connection lost";
     showAlarm(`${reason ? `The server closed the connection: ${reason}.` : "Connection lost. Is asperity lab still running?"}${notice} Reconnecting …`);
@@ -113,6 +118,7 @@ const clipsPanel = new ClipsPanel({
   get columns() { return connection.layout.columns; }, get surfaceVersion() { return status?.surface_version; },
 });
 
+const secondLane = new SecondLane({ changeScene, send(kind, content) { return connection.send(kind, content); }, energyMeter, player, tour });
 const updateRate = () => (player.isOpen ? player.updateRate : status?.update_rate ?? 1000);
 
 /** Tell the server that a frame was processed, so that it sends further ones. */
@@ -124,6 +130,7 @@ function showFrame(newFrame) {
   if (status) for (const metrics of [energyMeter, quietContact]) metrics.addFrame(frame, connection.layout.columns, status);
   traces.addFrame(frame, connection.layout.columns);
   spectrum.addForces(frame.forces);
+  if (status) secondLane.addFirstFrame(frame, connection.layout.columns, status);
   sound.addForces(frame.forces, updateRate());
 }
 
@@ -173,6 +180,15 @@ function showStatus() {
   if (hasControl && state === "running" && !status.handle) storeUrlSettings(settings);
 }
 
+/** Name the first lane, if there are two. */
+function showLanes() {
+  const { law } = status.settings, { isShown } = secondLane;
+  secondLane.update(law);
+  for (const view of [section, traces]) view.label = isShown ? `law ${law}` : "";
+  $("section-title").textContent = isShown ? `Law ${law}` : "Section below the probe";
+  $("trace-title").textContent = isShown ? `Law ${law}` : "Position, force and energy";
+}
+
 function showCurrentLimit() { showLimit(status.settings, status.limit, player.isOpen ? "" : quietContact.text); }
 
 function magnificationText(settings) {
@@ -214,29 +230,20 @@ function applyUrlSettings() {
   const changes = {};
   for (const [name, text] of new URLSearchParams(location.hash.slice(1))) {
     const isParameter = laws.some(law => law.parameters.some(parameter => parameter.name === name));
-    if (name in status.settings || isParameter) changes[name] = ["law", "texture", "device"].includes(name) ? text : Number(text);
+    if (name in status.settings || isParameter) changes[name] = ["law", "beside", "texture", "device"].includes(name) ? text : Number(text);
   }
   const values = Object.values(changes);
   if (values.length && !values.some(Number.isNaN)) changeScene(changes);
 }
 
 function storeUrlSettings(settings) {
-  const entries = Object.entries(settings).filter(([, value]) => value !== null);
+  const entries = Object.entries(settings).filter(([, value]) => value !== null && value !== "");
   history.replaceState(null, "", `#${new URLSearchParams(entries)}`);
 }
 
 // --- painting -------------------------------------------------------------------------------------
 
-/** Return the probe of the current frame, for the views. */
-function probeState() {
-  if (!frame) return null;
-  const { columns } = connection.layout, value = name => frame.newest[columns[name]];
-  return {
-    probe: [value("x"), value("y"), value("z")], closest: frame.closest, hand: frame.hand,
-    force: [value("applied x"), value("applied y"), value("applied z")], isInside: value("inside") > 0,
-    energy: energyMeter.energy,
-  };
-}
+const probeState = () => frame && probeStateOf(frame, connection.layout.columns, energyMeter.energy);
 
 /** Return the box of the section to be shown: left, right, bottom, top [m]. */
 function sectionBox() {
@@ -253,7 +260,9 @@ function requestPictures(state) {
     if (Math.abs(x - viewCentre[0]) > 0.45 * viewWidth || Math.abs(y - viewCentre[1]) > 0.45 * viewWidth) viewCentre = [x, y];
   }
   pictures.request("relief", { x: viewCentre[0], y: viewCentre[1], size: viewWidth });
-  pictures.request("section", { box: sectionBox(), y: state ? Math.round(state.probe[1] / 5e-5) * 5e-5 : 0 });
+  const cut = { box: sectionBox(), y: state ? Math.round(state.probe[1] / 5e-5) * 5e-5 : 0 };
+  pictures.request("section", cut);
+  secondLane.requestPicture(cut);
 }
 
 const lastRun = { texts: 0, traces: 0, requestPictures: 0 }; // time of the last run of each periodic task [ms]
@@ -277,10 +286,17 @@ function paint(time) {
   }
   relief.draw(state);
   section.draw(state, sectionBox());
-  if (isDue("traces", time, 60)) traces.draw(energyMeter.offset);
+  secondLane.drawSection(sectionBox());
+  if (isDue("traces", time, 60)) drawTraces();
   latencyMonitor.recordDrawn(frame?.acknowledged ?? 0);
   if (isDue("requestPictures", time, 200)) requestPictures(state);
   if (state && isDue("texts", time, 150)) updateTexts(state);
+}
+
+/** Draw the traces of both lanes, to the same scales. */
+function drawTraces() {
+  traces.draw(energyMeter.offset, secondLane.scale);
+  secondLane.drawTraces({ plot: traces, offset: energyMeter.offset });
 }
 
 /** Return the counts of ticks since the start of the loop; a recording has none. */
@@ -294,13 +310,13 @@ function updateTexts({ probe, force, energy, isInside }) {
   tourPanel.update();
   clipsPanel.update();
   motionPanel.update();
-  if (status) showCurrentLimit();
+  if (status) { showCurrentLimit(); showLanes(); }
   setField("press-depth", 1e3 * hand.pressDepth);
   $("press-depth-value").textContent = formatQuantity(hand.pressDepth, "m");
   $("energy").textContent = formatQuantity(energy, "J");
   $("energy-card").classList.toggle("supplies-energy", energyMeter.suppliesEnergy);
   $("verdict").textContent = energyMeter.verdict;
-  const [frequency, amplitude] = spectrum.draw(updateRate());
+  const [frequency, amplitude] = spectrum.draw(updateRate(), secondLane.otherSpectrum);
   $("peak").textContent = amplitude > 1e-3 ? `strongest ${formatQuantity(frequency, "Hz")}, ${formatQuantity(amplitude, "N")}` : "quiet";
   $("trace-note").textContent = tickText(frame);
   const forceText = `force ${formatQuantity(Math.hypot(...force), "N")}`, position = probe.map(formatMillimetres).join(", ");
@@ -322,12 +338,14 @@ function updateTexts({ probe, force, energy, isInside }) {
 function zoom(factor) { viewWidth = Math.max(MIN_VIEW_WIDTH, Math.min(MAX_VIEW_WIDTH, viewWidth * factor)); }
 
 const inputHost = {
-  hand, handle, player, tour, tourPanel, motionPanel, energyMeter, zoom,
+  hand, handle, player, tour, tourPanel, motionPanel, secondLane, zoom,
   get viewWidth() { return viewWidth; }, get hasControl() { return Boolean(status?.has_control); },
   get canFollowPointer() { return Boolean(relief.heights) && !handle.isPresent; },
 };
 followPointer($("relief"), inputHost, event => { [hand.x, hand.y] = relief.pointAt(event.offsetX, event.offsetY); hand.z = null; });
-followPointer($("section"), inputHost, event => { [hand.x, hand.z] = section.pointAt(event.offsetX, event.offsetY, sectionBox()); });
+for (const view of [section, secondLane.section]) {
+  followPointer(view.scaledCanvas.element, inputHost, event => { [hand.x, hand.z] = view.pointAt(event.offsetX, event.offsetY, sectionBox()); });
+}
 obeyKeys(inputHost);
 
 $("stiffness").oninput = event => { $("stiffness-value").textContent = formatQuantity(fromSliderValue(event.target.value), "N/m"); };
@@ -345,7 +363,7 @@ $("swap-laws").onclick = () => {
   changeScene({ law: $("other-law").value });
   $("other-law").value = previousLaw;
 };
-$("reset-energy").onclick = () => energyMeter.reset();
+$("reset-energy").onclick = () => secondLane.reset();
 $("take-control").onclick = () => connection.send("take_control");
 $("volume").oninput = event => sound.setVolume(Number(event.target.value));
 $("sound").onclick = async () => {
@@ -353,12 +371,13 @@ $("sound").onclick = async () => {
   $("sound").setAttribute("aria-pressed", isOn);
   $("sound").textContent = isOn ? "Sound off" : "Sound on";
 };
-const views = [
+const views = () => [
   [relief, () => relief.draw(probeState())], [section, () => section.draw(probeState(), sectionBox())],
-  [traces, () => traces.draw(energyMeter.offset)], [spectrum, () => spectrum.draw(updateRate())],
+  [traces, drawTraces], [spectrum, () => spectrum.draw(updateRate(), secondLane.otherSpectrum)],
+  ...secondLane.views(sectionBox(), drawTraces),
 ];
-$("save-png").onclick = async () => download(await toPng(views), "asperity-lab.png");
-$("save-svg").onclick = () => download(new Blob([toSvg(views)], { type: "image/svg+xml" }), "asperity-lab.svg");
+$("save-png").onclick = async () => download(await toPng(views()), "asperity-lab.png");
+$("save-svg").onclick = () => download(new Blob([toSvg(views())], { type: "image/svg+xml" }), "asperity-lab.svg");
 
 for (const type of ["error", "unhandledrejection"]) addEventListener(type, () => errorCount++);
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", readTheme);
@@ -367,7 +386,7 @@ requestAnimationFrame(paint);
 // For the tests and for the console of the browser.
 globalThis.lab = {
   connection, hand, pictures, quietContact, tour, energyMeter, player, relief, section, probeState, sectionBox,
-  latencies: latencyMonitor.latencies, toSvg: () => toSvg(views), toPng: () => toPng(views),
+  latencies: latencyMonitor.latencies, toSvg: () => toSvg(views()), toPng: () => toPng(views()), secondLane,
   get viewWidth() { return viewWidth; }, get frame() { return frame; }, get status() { return status; },
   get errorCount() { return errorCount; },
   /** Whether both views have a picture. */

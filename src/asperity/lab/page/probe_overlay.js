@@ -53,6 +53,15 @@ function enclosingInterval(coordinates, limit) {
   return [Math.min(start, Math.ceil(limit) - length), length];
 }
 
+/** Return the probe of a frame, for the views. */
+export function probeStateOf(frame, columns, energy) {
+  const value = name => frame.newest[columns[name]];
+  return {
+    probe: [value("x"), value("y"), value("z")], closest: frame.closest, hand: frame.hand,
+    force: [value("applied x"), value("applied y"), value("applied z")], isInside: value("inside") > 0, energy,
+  };
+}
+
 export class ProbeOverlay {
   /** @param base scaled canvas of the view */
   constructor(base) {

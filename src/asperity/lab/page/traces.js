@@ -19,6 +19,7 @@ export class TracePlot {
     this.maxima = TRACES.map(() => new Float64Array(BINS));
     this.newestBin = -1; // counted from the start of the loop
     this.binCount = 0; // bins with data
+    this.label = ""; // of the lane, if there are two
   }
 
   addFrame(frame, columns) {
@@ -40,15 +41,19 @@ export class TracePlot {
   /** Discard all data: the time of another loop starts at zero. */
   clear() { this.binCount = 0; this.newestBin = -1; }
 
-  /** Draw the traces, the energy relative to an offset [J]. */
-  draw(energyOffset) {
+  /**
+   * Draw the traces, the energy relative to an offset [J].
+   * @param other plot and energy offset whose values are within the scales, too; null for none
+   */
+  draw(energyOffset, other = null) {
     const [context, width, height] = this.scaledCanvas.clear();
     if (!this.binCount) return;
     const stripHeight = height / STRIPS.length;
     let firstTrace = 0;
     STRIPS.forEach(([name, unit, traces], strip) => {
       const offset = unit === "J" ? energyOffset : 0, indices = traces.map((_, k) => firstTrace + k);
-      const [low, high] = this.range(indices).map(value => value - offset);
+      const others = other?.plot.range(indices).map(value => value - (unit === "J" ? other.offset : 0)) ?? [Infinity, -Infinity];
+      const own = this.range(indices).map(value => value - offset), [low, high] = [Math.min(own[0], others[0]), Math.max(own[1], others[1])];
       const span = Math.max(high - low, MIN_SPAN[unit]), middle = (low + high) / 2, top = strip * stripHeight;
       const y = value => top + 4 + (0.5 - (value - offset - middle) / span) * (stripHeight - 22) + 11;
       context.strokeStyle = colours().line;
@@ -57,7 +62,7 @@ export class TracePlot {
       if (Math.abs(middle) < span / 2) { context.moveTo(0, y(offset)); context.lineTo(width, y(offset)); }
       context.stroke();
       indices.forEach((index, k) => this.drawTrace(context, width, index, y, colours()[traces[k][1]]));
-      drawLabels(context, width, top + 12, `${name}, ${formatQuantity(low, unit)} to ${formatQuantity(high, unit)}`, traces);
+      drawLabels(context, width, top + 12, `${this.label && `${this.label}: `}${name}, ${formatQuantity(low, unit)} to ${formatQuantity(high, unit)}`, traces);
       firstTrace += traces.length;
     });
   }
@@ -89,11 +94,13 @@ function drawLabels(context, width, y, title, traces) {
   context.font = "11px system-ui, sans-serif";
   context.fillStyle = colours().soft;
   context.fillText(title, 4, y);
+  const titleEnd = 8 + context.measureText(title).width;
   let x = width - 4;
   for (const [name, colour] of [...traces].reverse()) {
     context.fillStyle = colours()[colour];
     const label = name.replace("applied ", "f").replace("supplied", "given to the hand");
     x -= context.measureText(label).width;
+    if (x < titleEnd) break; // a narrow plot
     context.fillText(label, x, y);
     x -= 10;
   }
@@ -127,9 +134,8 @@ function transform(real, imaginary) {
   }
 }
 
-export class SpectrumPlot {
-  constructor(element) {
-    this.scaledCanvas = new ScaledCanvas(element);
+export class Spectrum {
+  constructor() {
     this.samples = new Float64Array(SIZE);
     this.amplitudes = new Float64Array(SIZE / 2);
   }
@@ -154,26 +160,42 @@ export class SpectrumPlot {
     }
     return [peak * updateRate / SIZE, this.amplitudes[peak]];
   }
+}
 
-  /** Draw the spectrum; return frequency and amplitude of its peak. */
-  draw(updateRate) {
+export class SpectrumPlot extends Spectrum {
+  constructor(element) {
+    super();
+    this.scaledCanvas = new ScaledCanvas(element);
+  }
+
+  /**
+   * Draw the spectrum; return frequency and amplitude of its peak.
+   * @param other spectrum of the second lane; null for none
+   */
+  draw(updateRate, other = null) {
     const [context, width, height] = this.scaledCanvas.clear(), theme = colours(), peak = this.compute(updateRate);
     const x = f => Math.log(f / MIN_SHOWN_FREQUENCY) / Math.log(updateRate / 2 / MIN_SHOWN_FREQUENCY) * width;
     const y = amplitude => height - 18 - (Math.log10(Math.max(amplitude, 1e-6)) + 6) / 7 * (height - 22);
     drawGrid(context, width, height, updateRate, x, y);
-    context.strokeStyle = theme.orange;
     context.lineWidth = 1.6;
-    context.beginPath();
-    // Of the frequencies within one pixel, the greatest amplitude is drawn.
-    for (let k = Math.ceil(MIN_SHOWN_FREQUENCY * SIZE / updateRate), pixel = -1, maximum = 0; k < SIZE / 2; k++) {
-      const column = Math.round(x(k * updateRate / SIZE));
-      maximum = Math.max(column === pixel ? maximum : 0, this.amplitudes[k]);
-      if (column !== Math.round(x((k + 1) * updateRate / SIZE))) context.lineTo(column, y(maximum));
-      pixel = column;
-    }
-    context.stroke();
+    other?.compute(updateRate);
+    if (other) drawCurve(context, other.amplitudes, theme.blue, updateRate, x, y);
+    drawCurve(context, this.amplitudes, theme.orange, updateRate, x, y);
     return peak;
   }
+}
+
+/** Draw amplitudes; of the frequencies within one pixel, the greatest amplitude is drawn. */
+function drawCurve(context, amplitudes, colour, updateRate, x, y) {
+  context.strokeStyle = colour;
+  context.beginPath();
+  for (let k = Math.ceil(MIN_SHOWN_FREQUENCY * SIZE / updateRate), pixel = -1, maximum = 0; k < SIZE / 2; k++) {
+    const column = Math.round(x(k * updateRate / SIZE));
+    maximum = Math.max(column === pixel ? maximum : 0, amplitudes[k]);
+    if (column !== Math.round(x((k + 1) * updateRate / SIZE))) context.lineTo(column, y(maximum));
+    pixel = column;
+  }
+  context.stroke();
 }
 
 function drawGrid(context, width, height, updateRate, x, y) {

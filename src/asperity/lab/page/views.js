@@ -5,7 +5,7 @@ import { projectionGeometry, renderRelief } from "./relief_renderer.js";
 import { ScaledCanvas, colours, toRgb } from "./canvas.js";
 import { formatQuantity, roundStep } from "./format.js";
 
-const RELIEF = 2; // first number of a picture of the relief
+const RELIEF = 2, BESIDE_SECTION = 4; // first numbers of a picture of the relief, and of the section of the second lane
 const SECTION_HEADER = 9; // numbers before the heights of a section
 const ARROW_LENGTH = 16; // of the greatest force [px]
 const MAX_LIFT = 40; // greatest exaggeration of heights
@@ -76,6 +76,7 @@ export class SectionView {
     this.overlay = new ProbeOverlay(this.scaledCanvas);
     this.curlImage = document.createElement("canvas");
     this.box = null; // of the picture: left, right, bottom, top [m]
+    this.label = ""; // of the lane, if there are two
   }
 
   setPicture(numbers) {
@@ -103,7 +104,7 @@ export class SectionView {
   draw(probeState, shownBox) {
     const { width, height, needsRepaint } = this.scaledCanvas, [left, right, bottom, top] = shownBox;
     const project = ([x, , z]) => [(x - left) / (right - left) * width, (top - z) / (top - bottom) * height];
-    const paintKey = [colours().plus, ...shownBox].join();
+    const paintKey = [this.label, colours().plus, ...shownBox].join();
     if (needsRepaint || this.paintKey !== paintKey) this.paint(project, right - left);
     this.paintKey = paintKey;
     if (probeState) this.overlay.draw(project, probeState, ([x, , z]) => [x, -z]);
@@ -115,6 +116,8 @@ export class SectionView {
     context.fillRect(0, 0, width, height);
     if (this.box) this.drawSection(context, project);
     this.drawScaleBar(context, width, height, span);
+    context.font = "bold 15px system-ui, sans-serif";
+    if (this.label) context.fillText(this.label, 12, 22);
   }
 
   drawSection(context, project) {
@@ -189,3 +192,4 @@ export class SectionView {
 }
 
 export const isRelief = numbers => numbers[0] === RELIEF;
+export const isBeside = numbers => numbers[0] === BESIDE_SECTION;

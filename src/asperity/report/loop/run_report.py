@@ -12,7 +12,7 @@ from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
 from asperity.core.files import json_text, text_digest, write_bytes
 from asperity.core.units import format_quantity
-from asperity.recording.recording import Recording
+from asperity.recording.recording import Recording, open_recording
 from asperity.recording.replay import Replay
 from asperity.report import page
 from asperity.report.comparison_columns import describe_texture, texture_name
@@ -24,7 +24,7 @@ from asperity.scene.setup import Setup
 from asperity.simulation import Run
 from asperity.simulation.limit_cycles.onset import is_at_rest
 from asperity.simulation.limit_cycles.onset_search import felt_speed
-from asperity.simulation.trace import load_trace
+from asperity.simulation.trace import MAX_ROWS
 from asperity.surface import Surface
 
 if TYPE_CHECKING:
@@ -195,7 +195,7 @@ def figure_sections(run: Run) -> list[Section]:
 def _draw_run(run: Run) -> Figure:
     from asperity.report.pictures.loop_pictures import run_figure
 
-    traced = load_trace(run) if run.path else run
+    traced = open_recording(run.path).to_columns(MAX_ROWS) if run.path else run
     return run_figure(traced, run.surface.texture.height)
 
 

@@ -1,4 +1,4 @@
-"""Figures of an analysis: field and worst loop, loop gain, singular values, jumps."""
+"""Figures of an analysis: field and worst loop, loop gain, singular values."""
 
 from __future__ import annotations
 
@@ -49,7 +49,6 @@ def available_pictures(analysis: Analysis) -> dict[str, style.SizedDrawing]:
         "gain": (draw_gain, lambda: _plane_height(analysis_windows.gain_window(analysis))),
         "top": (draw_top_view, lambda: _map_height(analysis)),
         "depth": (draw_depth, lambda: _GRAPH_HEIGHT),
-        "jumps": (draw_jumps, lambda: _GRAPH_HEIGHT),
     }
     pictures: dict[str, style.SizedDrawing] = {}
     for name in analysis_figure_names(analysis):
@@ -274,21 +273,3 @@ def _annotate_line(axes: Axes, fraction: float, text: str) -> None:
     left = fraction > 0.5
     side, away = ("right", -4) if left else ("left", 4)
     style.add_note(axes, text, (min(fraction, 1.0), 0.5), xytext=(away, 0), ha=side, va="center")
-
-
-def draw_jumps(figure: FigureArea, analysis: Analysis) -> None:
-    """Draw the size of the force jump at each depth where one was located."""
-    jumps = analysis.continuity.jumps
-    depth = np.array([jump.depth for jump in jumps])
-    size = np.array([jump.size for jump in jumps])
-    wide, high = style.length_unit(float(depth.max())), style.force_unit(float(size.max()))
-    axes = style.single_axes(figure)
-    x, y = depth * wide.scale, size * high.scale
-    axes.plot(x, y, "o-", color=style.BLUE, lw=1.0, ms=5.5, label="jump")
-    right = 1.05 * max(float(depth.max()), 1e-12) * wide.scale
-    axes.set(xlim=(0.0, right), ylim=(0.0, 1.12 * float(y.max())))
-    axes.grid(color=style.FAINT, lw=0.5)
-    style.label_axes(axes, f"depth [{wide.name}]", f"jump of the force [{high.name}]")
-    surface = analysis.surface
-    remark = f"at {surface.stiffness:g} N/m; every point has two witnesses on either side"
-    style.set_panel_title(axes, surface.law.letter, "how far the force jumps", remark)

@@ -31,16 +31,13 @@ _KEY_FORCE = 2.0  # force of the arrow in the key [N]
 _MIN_ENERGY_RANGE = 40.0  # least half range of an energy axis, so that rounding stays small [µJ]
 
 
-def figure_two(panels: Sequence[ForceField] | None = None) -> Figure:
+def figure_two() -> Figure:
     """Return the force of each law in the x-z plane, and at a handle on either flank of a crest.
-
-    Args:
-        panels: see :func:`~asperity.paper.figures.force_fields`; computed by default.
 
     Reference:
         The paper's Fig. 2.
     """
-    panels = force_fields() if panels is None else panels
+    panels = force_fields()
     figure = style.new_figure(10.0, 6.6)
     grid: Any = figure.subplots(2, _COLUMNS, sharex=True, sharey=True)
     places = list(grid.ravel())

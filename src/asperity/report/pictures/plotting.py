@@ -41,8 +41,8 @@ def plot(result: Any, picture: str | None = None) -> Figure:
             :class:`~asperity.simulation.Run` or a :class:`~asperity.Recording` (motion, force,
             energy, phase).
         picture: name of one figure of the report: of a comparison "surface", "spectrum", "hand",
-            "force", "field", "gain" or "merit", of an analysis "field", "gain", "depth", for a
-            map also "top", and where the force jumps "jumps".
+            "force", "field", "gain" or "merit", of an analysis "field", "gain", "depth", and for
+            a map "top".
 
     Returns:
         A figure; ``figure.savefig(path)`` writes it, as PNG or SVG by the path.

@@ -113,5 +113,4 @@ def comparison_alt_text(comparison: Comparison, name: str) -> str:
 def analysis_figure_names(analysis: Analysis) -> list[str]:
     """Return the names of the figures that an analysis has."""
     top = [] if analysis.surface.texture.is_profile else ["top"]
-    jumps = ["jumps"] if analysis.continuity.jumps else []
-    return ["field", "gain", *top, "depth", *jumps]
+    return ["field", "gain", *top, "depth"]

@@ -90,12 +90,15 @@ class Driver(ABC):
         can_reopen: whether opening the device moves nothing and closing it leaves no force, so that
             both release a force that a dead process has left.
         loss_notice: what the device does if the process of the loop dies, in a sentence.
+        follows: whether the device itself waits for the next sample, so that the loop needs no
+            clock.
     """
 
     name: ClassVar[str]
     has_moving_handle: ClassVar[bool] = True
     can_reopen: ClassVar[bool] = False
     loss_notice: ClassVar[str]
+    follows = False
 
     @property
     def frame(self) -> Frame:

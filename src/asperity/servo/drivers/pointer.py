@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from asperity.core.checks import FloatArray, check_array, check_real
 from asperity.core.errors import ParameterError
+from asperity.servo.driver_loop import no_clock, system_clock
 from asperity.servo.drivers.simulated import SimulatedDriver, simulated_driver
 from asperity.servo.kernels import pointer_anchor
 from asperity.simulation.hands import Hand
@@ -103,6 +104,13 @@ class PointerHand:
         return int(self.table[pointer_anchor.STATE_ROW, pointer_anchor.REQUEST_NUMBER])
 
     @property
+    def follower_lag(self) -> tuple[int, int]:
+        """Samples by which a following loop is behind, and samples that it has left out."""
+        sample, left_out, _ = self.table[pointer_anchor.FOLLOWER_ROW]
+        count = self.table[pointer_anchor.STATE_ROW, pointer_anchor.SAMPLE_COUNT]
+        return max(int(count - sample), 0), int(left_out)
+
+    @property
     def anchor(self) -> FloatArray:
         """Position of the anchor (3,) [m]."""
         return np.array(self.table[pointer_anchor.ANCHOR])
@@ -147,10 +155,12 @@ class PointerDriver(SimulatedDriver):
 
     Attributes:
         pointer_file: name of the file of its memory.
+        follows: whether another loop moves the anchor, and this one repeats its motion.
     """
 
     name: ClassVar[str] = "simulated"
     pointer_file: str = ""
+    follows: bool = False
 
     def kernel_modules(self) -> tuple[ModuleType, ...]:
         """Return the modules of a simulated device, with the anchor of the pointer first."""
@@ -166,9 +176,15 @@ class PointerDriver(SimulatedDriver):
             table = open_pointer_table(self.pointer_file)
         except FileNotFoundError:
             raise ParameterError("pointer", "is closed: nothing moves the hand") from None
-        table[pointer_anchor.STATE_ROW] = 0.0
-        device = super().open()
-        return SimulatedDevice(*device)._replace(anchor=table)
+        device = SimulatedDevice(*super().open())._replace(anchor=table)
+        if not self.follows:
+            table[pointer_anchor.STATE_ROW] = 0.0
+            return device
+        count = table[pointer_anchor.STATE_ROW, pointer_anchor.SAMPLE_COUNT]
+        device.counters[2] = max(count - 1.0, 0.0)
+        table[pointer_anchor.FOLLOWER_ROW] = device.counters[2], 0.0, 0.0
+        wait = np.array([0, pointer_anchor.POLL_TIME])
+        return device._replace(clock=system_clock()._replace(timespec=wait))
 
 
 def pointer_driver(plant: Plant, hand: Hand, servo: Servo, pointer: PointerHand) -> PointerDriver:
@@ -187,5 +203,5 @@ def pointer_driver(plant: Plant, hand: Hand, servo: Servo, pointer: PointerHand)
         raise ParameterError("hand", "must be a spring or a band: the pointer moves its anchor")
     start = Stationary(tuple(pointer.anchor))
     driver = simulated_driver(plant, hand, servo, start, servo.period)
-    device = driver.device._replace(anchor=np.zeros((_ROW_COUNT, 3)))
+    device = driver.device._replace(anchor=np.zeros((_ROW_COUNT, 3)), clock=no_clock())
     return PointerDriver(driver.body_modules, device, pointer.name)

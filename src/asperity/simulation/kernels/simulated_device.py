@@ -1,6 +1,6 @@
 """A simulated device: delay, body and hand, which advance by a sample with each force."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from asperity.core.compiled import FloatArray, IntArray, Kernels
 from asperity.kernels.tick import flush_subnormal, quantize
@@ -27,6 +27,7 @@ class SimulatedDevice(NamedTuple):
         plant: record of the body.
         position_step: step of the device's own encoders [m]; 0 for none.
         force_step: step of the device's own force [N]; 0 for none.
+        clock: clock of an ``anchor_segment`` that waits, see :mod:`asperity.loop.clock`.
     """
 
     x: FloatArray
@@ -38,6 +39,7 @@ class SimulatedDevice(NamedTuple):
     plant: object
     position_step: float = 0.0
     force_step: float = 0.0
+    clock: Any = ()
 
 
 def flush_subnormals(values: FloatArray) -> None:

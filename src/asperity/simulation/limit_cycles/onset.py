@@ -116,16 +116,8 @@ def find_onset(
     servo: Servo,
     motion: Motion,
     *,
-    start: ArrayLike | None = None,
-    velocity: ArrayLike | None = None,
-    duration: float = 0.5,
-    starts: int = 24,
-    tolerance: float = 0.02,
-    threshold: float | None = None,
-    lowest: float = MIN_STIFFNESS,
-    highest: float = MAX_STIFFNESS,
     near: float | None = None,
-    progress: Callable[[], None] | None = None,
+    **options: Any,
 ) -> Onset:
     """Find the stiffness at which limit cycles begin, by bisection over many starting phases.
 
@@ -135,34 +127,18 @@ def find_onset(
         hand: the hand that holds it.
         servo: period, delay, resolutions.
         motion: motion of the hand's anchor; it must be at rest in the second half of the run.
-        start: initial position of the handle [m], shape (3,); default: where the motion starts.
-        velocity: initial velocity of the handle [m/s], shape (3,); default: at rest.
-        duration: duration of a run [s]; a run that still oscillates is extended, up to 16 times as
-            long.
-        starts: number of phases of the texture at which the handle starts.
-        tolerance: width of the bracket over its lower end.
-        threshold: sum over the axes of the standard deviations of the velocity above which an
-            oscillation counts as a limit cycle [m/s]. By default an oscillation counts that a hand
-            feels (:func:`~asperity.simulation.limit_cycles.onset_search.felt_speed`) and that lasts
-            without steps of position and force, whose chatter belongs to the encoder.
-        lowest: stiffness at which the search starts [N/m]; a surface too soft for the hand's force
-            lets the handle sink to depths at which the numbers of the law do not hold.
-        highest: stiffness at which the search ends [N/m].
         near: expected onset [N/m]. The search then starts at the nearest of the stiffnesses a
             factor of 2 apart, and goes up from a quiet one, down from one that cycles. For loops
             that cycle above a single stiffness the answer is the same, with a quarter of the runs;
             a window of cycles below a quiet stiffness is missed.
-        progress: called after every stiffness; not for an onset from the cache.
+        **options: ``start``, ``velocity``, ``duration``, ``starts``, ``tolerance``, ``threshold``,
+            ``lowest``, ``highest`` and ``progress``; see :func:`find_onsets`.
 
     Raises:
         ParameterError: for a prescribed motion of the handle, a motion that does not come to rest,
             or an invalid number.
     """
-    (onset,) = find_onsets(
-        surface, plant, hand, servo, motion, [servo.delay], [near], start=start, velocity=velocity,
-        duration=duration, starts=starts, tolerance=tolerance, threshold=threshold, lowest=lowest,
-        highest=highest, progress=progress,
-    )  # fmt: skip
+    (onset,) = find_onsets(surface, plant, hand, servo, motion, [servo.delay], [near], **options)
     return onset
 
 
@@ -188,8 +164,34 @@ def find_onsets(
 ) -> list[Onset]:
     """Find the onsets for several delays [samples], each with its expected onset [N/m].
 
-    The searches run together, so that as many runs as possible are simulated at once. The arguments
-    are those of :func:`find_onset`; ``onset_callback`` is called after every onset.
+    The searches run together, so that as many runs as possible are simulated at once.
+
+    Args:
+        surface: see :func:`find_onset`.
+        plant: see :func:`find_onset`.
+        hand: see :func:`find_onset`.
+        servo: see :func:`find_onset`; its delay is replaced.
+        motion: see :func:`find_onset`.
+        delays: delays [samples].
+        nears: expected onset of each [N/m], or ``None``; see :func:`find_onset`.
+        start: initial position of the handle [m], shape (3,); default: where the motion starts.
+        velocity: initial velocity of the handle [m/s], shape (3,); default: at rest.
+        duration: duration of a run [s]; a run that still oscillates is extended, up to 16 times as
+            long.
+        starts: number of phases of the texture at which the handle starts.
+        tolerance: width of the bracket over its lower end.
+        threshold: sum over the axes of the standard deviations of the velocity above which an
+            oscillation counts as a limit cycle [m/s]. By default an oscillation counts that a hand
+            feels (:func:`~asperity.simulation.limit_cycles.onset_search.felt_speed`) and that lasts
+            without steps of position and force, whose chatter belongs to the encoder.
+        lowest: stiffness at which the search starts [N/m]; a surface too soft for the hand's force
+            lets the handle sink to depths at which the numbers of the law do not hold.
+        highest: stiffness at which the search ends [N/m].
+        progress: called after every stiffness; not for an onset from the cache.
+        onset_callback: called after every onset.
+
+    Raises:
+        ParameterError: see :func:`find_onset`.
     """
     _check_arguments(hand, motion, servo, duration, starts)
     width = check_positive("tolerance", tolerance)

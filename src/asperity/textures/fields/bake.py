@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -34,10 +33,9 @@ _ONSET = 10e-6, 0.02
 # Depth at which the place of a body's surface is measured, over the greatest.
 SHALLOW = 0.04
 _TRIAL_BYTES = 2**19
-# Steps to finer resolutions, and limits of the power of the resolution with which the difference
-# falls: steps of corners and of smooth surfaces.
-_SECOND_STEP, _LARGEST_STEP = 0.7, 0.2
-_POWERS = 1.3, 1.8
+# Share of the goal that is aimed at, relative error of the resolution predicted for it, and the
+# probes of a prediction: every third.
+_AIM, _PREDICTION_STEP, _PREDICTION_PART = 0.94, 0.04, 3
 _MAX_TRIALS = 12
 _FLAT = 1e-9  # of the greatest force: less is rounding
 _BYTES_PER_NODE = 4
@@ -190,24 +188,52 @@ class BakePlan:
     def bake_coarsest(self, progress: Progress | None) -> PotentialField:
         """Return the field of the coarsest resolution that reaches the goal.
 
-        The resolution is corrected by the measured difference, first of a field of few nodes.
+        The share of a field that is not smoothed is computed for any resolution from few nodes, and
+        corrected by that of the fields that were tried, first one of few nodes.
         """
         finest, coarsest = self.finest_resolution(), max(self.grid(math.inf).spacing)
         resolution, goal = max(self.finest_resolution(_TRIAL_BYTES), finest), self.goal.share
-        tried: list[tuple[float, float]] = []
+        lower, upper, tried = finest, coarsest, set[float]()
         for trial in range(_MAX_TRIALS):
             done = 1.0 - 0.5**trial
             field = self.bake(resolution, scale_progress(progress, done, 0.5 * (1.0 - done)))
             share = max(field.accuracy.share, goal * field.accuracy.onset / self.onset_limit)
             if resolution == (coarsest if share <= goal else finest) or 0.5 * goal <= share <= goal:
                 break
-            tried.append((resolution, max(share, 0.01 * goal)))
-            resolution = min(max(_next_resolution(tried, goal), finest), coarsest)
+            tried.add(resolution)
+            lower, upper = (lower, resolution) if share > goal else (resolution, upper)
+            ratio = max(share, 0.01 * goal) / max(self.predict_share(resolution), 0.01 * goal)
+            resolution = self.predict_resolution(lower, upper, _AIM ** (trial + 1) * goal / ratio)
+            if resolution in tried:
+                resolution = math.sqrt(lower * upper)
         if resolution == finest and share > goal:
             field.accuracy = replace(field.accuracy, is_limited=True)
         if progress is not None:
             progress(1.0)
         return field
+
+    def predict_resolution(self, finest: float, coarsest: float, share: float) -> float:
+        """Return the resolution [m] between limits at which an unsmoothed field has a share."""
+        from scipy.optimize import brentq
+
+        def excess(exponent: float) -> float:
+            return math.log(max(self.predict_share(math.exp(exponent)), 1e-9) / share)
+
+        limits = math.log(finest), math.log(coarsest)
+        for limit, sign in zip(limits, (1.0, -1.0), strict=True):
+            if sign * excess(limit) >= 0.0:
+                return finest if limit == limits[0] else coarsest
+        return math.exp(brentq(excess, *limits, xtol=_PREDICTION_STEP))
+
+    def predict_share(self, resolution: float) -> float:
+        """Return the share of a field that is not smoothed, from the nodes around the probes."""
+        grid, part = self.grid(resolution), slice(None, None, _PREDICTION_PART)
+        force = node_potentials.interpolate_force(self.node_columns(grid), grid, self.probes[part])
+        return float(self.shares(force - self.force[part], self.rows[part]).max())
+
+    def node_columns(self, _grid: FieldGrid) -> node_potentials.ColumnFunction:
+        """Return the function of the exact depth at columns of nodes of a grid."""
+        return self.columns
 
     def finest_resolution(self, max_bytes: float = math.inf) -> float:
         """Return the finest resolution [m] of a field within the size allowed, to three digits."""
@@ -285,16 +311,6 @@ class BakePlan:
             onset=float(shift.max()),
         )
         return field
-
-
-def _next_resolution(tried: Sequence[tuple[float, float]], goal: float) -> float:
-    """Return the resolution [m] that should reach the goal, after those tried and their shares."""
-    (resolution, share), power, least = tried[-1], _POWERS[0], _SECOND_STEP
-    if len(tried) > 1:
-        coarser, before = tried[-2]
-        power, least = math.log(share / before) / math.log(resolution / coarser), _LARGEST_STEP
-    ratio = (0.92 * goal / share) ** (1.0 / min(max(power, _POWERS[0]), _POWERS[1]))
-    return float(resolution * max(ratio, least))
 
 
 def _mean_of_rows(values: FloatArray, rows: NDArray[np.intp], count: int) -> FloatArray:

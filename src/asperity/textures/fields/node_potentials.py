@@ -24,7 +24,7 @@ _MODES: Any = {PERIODIC: "wrap", MIRRORED: "mirror", ZERO: "nearest"}
 # Writes the depth [m] in single precision, (n, levels), at columns of nodes at x, y (n, 2) and
 # rising z (levels,) [m]: sqrt(2U) inside, the negative distance of the surface outside, at least
 # -margin, the third argument; called by several threads at once.
-ColumnFunction = Callable[[FloatArray, FloatArray, float, SingleArray], None]
+ColumnFunction = Callable[[FloatArray, FloatArray, float, SingleArray], object]
 
 
 def split_columns(texture: Texture, continuity: float) -> ColumnFunction:
@@ -52,6 +52,46 @@ def compute_potentials(
 
     run_in_threads(fill, range(0, len(result), at_once), progress)
     return result.reshape(grid.node_counts)
+
+
+def interpolate_force(columns: ColumnFunction, grid: FieldGrid, points: FloatArray) -> FloatArray:
+    """Return the force over the stiffness [m], (n, 3), at points above the floor (n, 3) [m].
+
+    It is that of the spline of a field that is not smoothed, of which only the nodes around the
+    points are computed.
+    """
+    rates = np.linalg.pinv(grid.steps)
+    level = (points[:, 2:] - grid.height(0)) / grid.level_spacing
+    index = np.column_stack([(points[:, :2] - grid.start) @ rates, level])
+    nearest = np.rint(index)
+    plane = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * len(grid.cells), indexing="ij"), axis=-1)
+    plane = plane.reshape(-1, len(grid.cells))
+    nodes = np.empty((len(points), len(plane), 3), np.float32)
+
+    def fill(row: int) -> None:
+        xy = grid.positions(nearest[row, :-1] + plane)
+        z = grid.height(nearest[row, -1] + np.array([-1.0, 0.0, 1.0]))
+        columns(xy, z, grid.margin, nodes[row])
+
+    run_in_threads(fill, range(len(points)), None)
+    part = index - nearest
+    weights = np.stack([0.5 * (0.5 - part) ** 2, 0.75 - part**2, 0.5 * (0.5 + part) ** 2], axis=-1)
+    rises = np.stack([part - 0.5, -2.0 * part, part + 0.5], axis=-1)
+    values = np.maximum(nodes.astype(float) + grid.margin, 0.0)
+    values = values.reshape(len(points), *[3] * part.shape[1])
+    depth = _weighted_sum(values, weights) - grid.margin
+    chosen = np.eye(part.shape[1], dtype=bool)[:, :, None]
+    slopes = [_weighted_sum(values, np.where(axis, rises, weights)) for axis in chosen]
+    slope = np.stack(slopes, axis=-1)
+    gradient = np.column_stack([slope[:, :-1] @ rates.T, slope[:, -1] / grid.level_spacing])
+    return np.asarray(-np.maximum(depth, 0.0)[:, None] * gradient)
+
+
+def _weighted_sum(values: FloatArray, weights: FloatArray) -> FloatArray:
+    """Return the sum of values (n, 3, ..., 3) with products of weights (n, axes, 3)."""
+    for axis in reversed(range(weights.shape[1])):
+        values = np.einsum("n...i,ni->n...", values, weights[:, axis])
+    return values
 
 
 def smooth(depths: SingleArray, weights: NDArray[np.uint8], grid: FieldGrid) -> SingleArray:

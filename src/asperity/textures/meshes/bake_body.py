@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from asperity.contacts.split import optimality, solver
 from asperity.core.checks import FloatArray, check_positive
@@ -12,7 +11,7 @@ from asperity.measured.lengths import format_length, format_lengths
 from asperity.textures.fields import bake
 from asperity.textures.fields.field_certificate import Progress
 from asperity.textures.fields.field_grid import FieldGrid, SingleArray
-from asperity.textures.fields.node_potentials import compute_potentials
+from asperity.textures.fields.node_potentials import ColumnFunction, compute_potentials
 from asperity.textures.fields.potential_field import PotentialField, ThinRegion
 from asperity.textures.meshes import mesh_potential, triangle_tree
 from asperity.textures.meshes.mesh_body import MeshBody
@@ -120,9 +119,14 @@ class _BodyLoops:
         points = np.einsum("nk,nkd->nd", weights, corners[chosen])
         return np.asarray(points + inward * depths[:, None])
 
-    def prepare(self, grid: FieldGrid, tolerance: float) -> None:
+    def set_tolerance(self, grid: FieldGrid) -> None:
+        """Set the duality gap [m²] that suits the nodes of a grid."""
+        self.law = self.law._replace(tolerance=_GAP * grid.spacing[0] ** 2)
+
+    def prepare(self, grid: FieldGrid) -> None:
         """Set the grid, and check that no column of nodes finds the mesh overlapping itself."""
-        self.grid, self.law = grid, self.law._replace(tolerance=tolerance)
+        self.grid = grid
+        self.set_tolerance(grid)
         width, depth, _levels = grid.node_counts
         index = np.stack(np.unravel_index(np.arange(width * depth), (width, depth)), axis=-1)
         self._xy = grid.positions(index)
@@ -138,12 +142,9 @@ class _BodyLoops:
         self, xy: FloatArray, z: FloatArray, margin: float, out: SingleArray
     ) -> None:
         """Write the depths of columns of the grid, and keep their summaries."""
-        rows = self._rows(xy)
-        self._summary[rows] = self.columns(xy, z, margin, out)
-
-    def _rows(self, xy: FloatArray) -> NDArray[np.intp]:
         steps = np.rint((xy - self.grid.start) / self.grid.spacing[0]).astype(np.intp)
-        return np.asarray(steps[:, 0] * self.grid.node_counts[1] + steps[:, 1])
+        rows = steps[:, 0] * self.grid.node_counts[1] + steps[:, 1]
+        self._summary[rows] = self.columns(xy, z, margin, out)
 
     def upper_envelope(
         self, body: MeshBody, thin: tuple[ThinRegion, ...]
@@ -224,7 +225,7 @@ class _BodyPlan(bake.BakePlan):
     def bake(self, resolution: float, progress: Progress | None) -> PotentialField:
         """See :class:`BakePlan`."""
         grid, loops = self.checked_grid(resolution), self.loops
-        loops.prepare(grid.extend_down(self.goal.passes), _GAP * resolution**2)
+        loops.prepare(grid.extend_down(self.goal.passes))
         part = bake.scale_progress(progress, 0.05, 0.85)
         depths = compute_potentials(loops.record_columns, loops.grid, part)
         thin_map = loops.thin_map(self.max_depth)
@@ -236,6 +237,11 @@ class _BodyPlan(bake.BakePlan):
         field = self.certify(depths, grid, bake.scale_progress(progress, 0.9, 0.1))
         field.thin_regions, field.thin_map = thin, thin_map if thin else None
         return field
+
+    def node_columns(self, grid: FieldGrid) -> ColumnFunction:
+        """See :class:`BakePlan`."""
+        self.loops.set_tolerance(grid)
+        return self.loops.columns
 
     def grid(self, resolution: float) -> FieldGrid:
         """Return the grid around the body.

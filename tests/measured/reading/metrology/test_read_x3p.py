@@ -175,24 +175,10 @@ def test_md5_of_data(tmp_path: Path) -> None:
     assert "no MD5" in read_spec(tmp_path, replace(SPEC, point_md5="")).notes[0]
 
 
-def test_inline_data(tmp_path: Path) -> None:
-    texts = [f"{j};{i};{float(HEIGHTS[i, j])!r}" for i in range(3) for j in range(5)]
-    expected = HEIGHTS.copy()
-    texts[6], expected[1, 1] = "", np.nan
-    np.testing.assert_array_equal(
-        read_spec(tmp_path, replace(SPEC, inline=texts)).heights, expected
-    )
-    alone = [text.rpartition(";")[2] for text in texts]
-    np.testing.assert_array_equal(
-        read_spec(tmp_path, replace(SPEC, inline=alone)).heights, expected
-    )
-    swapped = [texts[1], texts[0], *texts[2:]]
-    assert_refused(tmp_path, replace(SPEC, inline=swapped), "CX of a Datum contradicts")
+def test_points_inside_of_main_xml_are_refused(tmp_path: Path) -> None:
     assert_refused(
-        tmp_path, replace(SPEC, inline=texts[:-1]), "14 Datum elements; the matrix has 15"
+        tmp_path, replace(SPEC, inline=True), "main.xml has no Record3/DataLink/PointDataLink"
     )
-    assert_refused(tmp_path, replace(SPEC, inline=["1_0", *alone[1:]]), "Datum 1 is '1_0'")
-    assert_refused(tmp_path, replace(SPEC, inline=["1;2", *alone[1:]]), "a Datum has 2 numbers")
 
 
 def test_profile(tmp_path: Path) -> None:

@@ -27,8 +27,8 @@ def read_x3p(file: reader.SurfaceFile, _options: reader.ReadingOptions) -> reade
     """Read an X3P surface or profile.
 
     Heights are offset + increment * stored for an incremental height axis, and offset + stored
-    for an absolute one, whatever their data type. A point is missing where its height is NaN,
-    its validity bit is 0 or its Datum is empty.
+    for an absolute one, whatever their data type. A point is missing where its height is NaN
+    or its validity bit is 0.
 
     Returns:
         Heights [m], pitch [m] and notes on peculiarities of the file.
@@ -285,12 +285,6 @@ def _read_coordinates(
     archive: _Archive, header: X3pHeader, notes: list[str]
 ) -> dict[str, FloatArray]:
     """Return the stored coordinates [m], one flat array by name of each stored axis."""
-    inline = header.root.find("Record3/DataList")
-    if (inline is None) == (header.root.find("Record3/DataLink") is None):
-        raise SurfaceFileError("Record3 must have either a DataLink or a DataList")
-    if inline is not None:
-        datums = [(datum.text or "").strip() for datum in inline.iter("Datum")]
-        return _read_inline(header, datums)
     count, axes = header.shape[0] * header.shape[1], header.stored_axes
     record = np.dtype([(axis.name, axis.dtype) for axis in axes])
     content = _read_linked(archive, header, "PointData", count * record.itemsize, notes)
@@ -320,46 +314,6 @@ def _read_linked(
 def _to_metres(axis: CoordinateAxis, stored: NDArray[np.generic]) -> FloatArray:
     with np.errstate(over="ignore", invalid="ignore"):  # infinities are refused by the caller
         return axis.offset + axis.factor * stored.astype(np.float64)
-
-
-def _read_inline(header: X3pHeader, datums: list[str]) -> dict[str, FloatArray]:
-    """Return the coordinates of a DataList; a Datum holds the stored axes, or all three."""
-    count, axes = header.shape[0] * header.shape[1], header.stored_axes
-    if len(datums) != count:
-        raise SurfaceFileError(f"{len(datums)} Datum elements; the matrix has {count} points")
-    width = max((text.count(";") + 1 for text in datums if text), default=len(axes))
-    if width not in (len(axes), 3):
-        raise SurfaceFileError(f"a Datum has {width} numbers; {len(axes)} or 3 are expected")
-    table = np.full((count, width), np.nan)
-    for index, text in enumerate(datums):
-        if text:
-            table[index] = _parse_datum(text, index, width)
-    given = header.axes if width == 3 else axes
-    columns = {axis.name: table[:, k] for k, axis in enumerate(given)}
-    if width == 3:
-        _check_indices(header, columns)
-    return {axis.name: _to_metres(axis, columns[axis.name]) for axis in axes}
-
-
-def _parse_datum(text: str, index: int, width: int) -> list[float]:
-    parts = [part.strip() for part in text.split(";")]
-    what = f"Datum {index + 1}"
-    if len(parts) != width:
-        raise SurfaceFileError(f"{what} has {len(parts)} numbers instead of {width}")
-    return [np.nan if p.lower() in ("", "nan") else parse_number(p, what) for p in parts]
-
-
-def _check_indices(header: X3pHeader, columns: dict[str, FloatArray]) -> None:
-    """Refuse coordinates of an incremental axis that contradict the order of the points."""
-    rows, numbers = np.divmod(np.arange(header.shape[0] * header.shape[1]), header.shape[1])
-    for axis, index in zip(header.axes[:2], (numbers, rows), strict=True):
-        if not axis.is_incremental:
-            continue
-        given = columns[axis.name]
-        by_index = np.abs(given - index)
-        by_metre = np.abs(given - (axis.offset + axis.factor * index)) / axis.factor
-        if np.nanmax(np.minimum(by_index, by_metre), initial=0.0) > 1e-3:
-            raise SurfaceFileError(f"{axis.name} of a Datum contradicts the order of the points")
 
 
 def _find_step(

@@ -1,0 +1,131 @@
+"""Two laws side by side on the page: chosen by key, judged at a glance, not offered with clips."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from tests.lab.browser import Browser, needs_browser
+from tests.lab.test_state import CONTRASTS
+
+BOTH = (
+    "lab.secondLane.isShown && lab.secondLane.status.state === 'running' && lab.secondLane.frame"
+    " && lab.hasCurrentPictures && lab.secondLane.pictures.areCurrent"
+)
+
+
+def text(page: Browser, name: str) -> str:
+    return str(page.ask(f"document.getElementById('{name}').innerText"))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def two_lanes(page: Browser) -> Iterator[None]:
+    """Law A with law H beside it, chosen by keys."""
+    page.ask("document.activeElement.blur()")
+    assert not page.ask("document.getElementById('beside-section').checkVisibility()")
+    page.press("a")
+    page.until("lab.status.settings.law === 'A'")
+    page.press("2")
+    page.until(f"lab.secondLane.status?.settings.law === 'H' && {BOTH}")
+    yield
+    page.until("!lab.player.isOpen && !lab.tour.isActive")
+    if page.ask("lab.secondLane.isShown"):
+        page.press("2")
+        page.until("!lab.secondLane.isShown")
+    page.press("c")
+    page.until("lab.status.settings.law === 'C' && lab.status.state === 'running'")
+
+
+@needs_browser
+def test_a_is_alive_and_h_is_not_under_one_hand(page: Browser) -> None:
+    assert [text(page, name) for name in ("section-title", "beside-title")] == ["Law A", "Law H"]
+    assert page.ask("[lab.section.hasCurl, lab.secondLane.section.hasCurl]") == [True, False]
+    page.ask("Object.assign(lab.hand, { x: 1e-4, y: 0, pressDepth: 2e-4 }); 1")
+    page.ask("document.querySelector('#motion [value=loop]').click()")
+    page.press("r")
+    page.until("/alive: gave/.test(document.getElementById('verdict-first').innerText)")
+    assert "⚠" in text(page, "verdict-first")
+    page.until("lab.energyMeter.energy > 1e-4")
+    assert text(page, "verdict-second").startswith("not alive")
+    faulty = "[...document.querySelectorAll('figure.faulty')].map(one => one.innerText.slice(0, 5))"
+    assert page.ask(faulty) == ["Law A"]
+    # The energies count from one moment, and the scales are common.
+    assert page.ask("lab.secondLane.energyMeter.energy < 0.3 * lab.energyMeter.energy")
+    note = text(page, "beside-note")
+    assert note.startswith("Same for both: hand (its motion sample by sample)")
+    assert f"{page.ask('lab.status.settings.stiffness'):.0f} N/m" in note
+    assert "behind" in text(page, "beside-trace-note")
+    # Other laws beside each other are other verdicts: here both feed the hand.
+    page.ask(
+        "{ const field = document.getElementById('beside'); field.value = 'A';"
+        "field.dispatchEvent(new Event('change')); }"
+    )
+    page.until("/alive: gave/.test(document.getElementById('verdict-second').innerText)")
+    page.press("2")
+    page.until("!lab.secondLane.isShown && lab.status.beside.state === 'stopped'")
+    assert text(page, "section-title") == "Section below the probe"
+    page.ask("document.querySelector('#motion [value=pointer]').click()")
+    page.ask("lab.secondLane.lastLaw = 'H'")
+    page.press("2")
+    page.until(f"lab.secondLane.status?.settings.law === 'H' && {BOTH}")
+    assert page.said == []
+
+
+@needs_browser
+@pytest.mark.parametrize("dark", [False, True])
+@pytest.mark.parametrize("size", [(1280, 800), (400, 800)])
+def test_all_can_be_read_and_nothing_is_wider_than_the_page(
+    page: Browser, dark: bool, size: tuple[int, int]
+) -> None:
+    page.resize(*size, dark=dark)
+    page.ask("new Promise(done => setTimeout(done, 300))")
+    first, second = page.ask(
+        "['section', 'beside-section'].map(id => document.getElementById(id))"
+        ".map(one => one.getBoundingClientRect())"
+        ".map(({ x, y, width, height }) => [x, y, width, height])"
+    )
+    assert first[2:] == pytest.approx(second[2:], abs=1.0)
+    is_stacked = second[1] > first[1] + 100
+    assert is_stacked == (size[0] == 400)
+    assert page.ask("document.documentElement.scrollWidth") <= size[0]
+    count, low = page.ask(f"{CONTRASTS}(4.5, 3, 3)")
+    assert count > 60
+    assert low == []
+    page.resize(1280, 900)
+
+
+@needs_browser
+def test_a_file_shows_both_laws(page: Browser) -> None:
+    drawing = page.ask("lab.toSvg()")
+    assert drawing.count("<svg") == 7
+    for law in "AH":
+        assert f">law {law}<" in drawing
+        assert f">law {law}: force" in drawing
+
+
+@needs_browser
+def test_clips_and_tour_show_one_law(page: Browser) -> None:
+    page.ask("lab.hand.z = null; lab.hand.isLatched = false; lab.hand.requestMotion(); 1")
+    page.until("!lab.probeState().isInside")
+    page.ask("new Promise(done => setTimeout(done, 800))")
+    page.ask("document.getElementById('save-clip').click()")
+    saved = "Boolean(document.querySelector('#clips button'))"
+    page.until(f"{saved} || !document.getElementById('alarm').hidden")
+    assert page.ask(saved), text(page, "alarm")
+    page.ask("document.querySelector('#clips button').click()")
+    page.until(
+        "lab.player.isOpen && !lab.secondLane.isShown && document.getElementById('beside').disabled"
+    )
+    page.until("/a recording holds one law/.test(document.getElementById('beside-note').innerText)")
+    page.press("l")
+    page.until(f"!lab.player.isOpen && {BOTH}")
+    starts = page.ask("lab.status.start_count")
+    page.press("t")
+    page.until(f"lab.tour.isActive && lab.status.start_count > {starts}")
+    page.until("!lab.secondLane.isShown && lab.status.settings.beside === ''")
+    page.until("/guided tour/.test(document.getElementById('beside-note').innerText)")
+    page.press("2")
+    page.press("t")
+    page.until(f"!lab.tour.isActive && lab.status.start_count === {starts} + 2")
+    assert page.ask("lab.status.settings.beside") == ""
+    assert page.said == []
