@@ -19,16 +19,12 @@ from asperity.core.processes import precompute
 from asperity.core.units import round_down
 from asperity.devices import DeviceLike
 from asperity.envelopes.envelope import make_cases
-from asperity.envelopes.searches import FORCE, MOTOR, Answer, MagnifiedSearch, Search, Target, agree
+from asperity.envelopes.searches import FORCE, MET, MOTOR, Candidate, Search, Target, agree
 from asperity.laws import Law
 from asperity.textures.catalogue import TextureLike, as_texture
 
 SCHEMA = 1
 PLACES = (MOTOR, "hand")
-MET = 0.995
-"""Ratio from which a requirement counts as met: factor and stiffness are rounded."""
-NEAR = 1.01
-"""Factor within which margins count as equal."""
 _COMPARISONS = 3
 
 
@@ -41,10 +37,10 @@ class Design(Plottable, Reportable, Tabular):
         factor: factor of the texture: of its height for a single wave, else in all directions.
         comparison: comparison of the law on that texture at that stiffness.
         margins: by which factor each requirement is exceeded; it is met from 1 on.
-        reachable: texture force that can be reached [N], at most that of the target; 0 for none.
-        binding: requirements that limit the answer. Where the target cannot be reached, each that,
-            relaxed by 10 %, makes more force possible; for the largest texture, a larger one; else
-            those with the least margin besides the force.
+        reachable: texture force that can be reached [N], at most that of the target, or factor of
+            the largest texture; 0 for none.
+        binding: requirements that limit the answer: those that are just met, or with the least
+            margin.
     """
 
     target: Target
@@ -158,16 +154,15 @@ def design(
     base = as_texture(texture)
     if base.peak_to_valley == 0.0:
         raise ParameterError("texture", "must have a height: this one is flat")
-    kind = MagnifiedSearch if base.single_wave is None else Search
     searches = [
-        kind(case, base, Target(force, at, leak))
+        Search(case, base, Target(force, at, leak))
         for case in make_cases(device, laws, law_parameters, design, conditions)
     ]
     report = progress or (lambda _step: None)
     return _confirm(*_best_law(searches, report), report)
 
 
-Found = tuple[Search, Answer]
+Found = tuple[Search, Candidate]
 
 
 def search_law(search: Search | None) -> Found | None:
@@ -196,61 +191,49 @@ def _best_law(searches: Sequence[Search], report: Progress) -> Found:
 
 
 def _preference(found: Found) -> tuple[Any, ...]:
-    """Return what is preferred: to meet the target, or nearly; then the margin or the size."""
-    search, (is_met, reach, candidate) = found
-    value = candidate.margin if is_met or not reach else reach
-    if is_met and search.target.texture_force is None:
-        value = candidate.x
-    return is_met, reach > 0.0, search.is_conservative, value
+    """Return what is preferred: to meet the target, or nearly; no curl; the margin or the size."""
+    search, answer = found
+    return answer.is_met, answer.reach > 0.0, search.is_conservative, answer.score
 
 
-def _confirm(search: Search, answer: Answer, report: Progress) -> Design:
+def _confirm(search: Search, answer: Candidate, report: Progress) -> Design:
     """Return the design of an answer whose numbers are those of a comparison.
 
     Where they differ from the ones that were searched, these are corrected, and searched again.
     """
     designs: list[Design] = []
     for _ in range(_COMPARISONS):
-        found = answer.found
-        factor, k = float(f"{math.exp(found.x):.4g}"), round_down(found.stiffness, 4)
+        factor, k = float(f"{math.exp(answer.x):.5g}"), round_down(answer.stiffness, 4)
         report(f"comparison of law {search.case.letter}, factor {factor:g}")
-        designs.append(one := _make_design(search, answer, factor, _compare(search, factor, k)))
+        designs.append(one := _make_design(search, answer, factor, k))
         expected = search.ratios(math.log(factor), one.row.surface.stiffness)
-        if agree(expected, one.margins) and (one.is_feasible or not answer.is_met):
+        if agree(expected, one.margins):
             break
-        relaxed = {
-            name: search.relaxed.get(name, 1.0) * one.margins.get(name, value) / value
-            for name, value in expected.items()
-        }
+        scale = {name: value / expected[name] for name, value in one.margins.items()}
+        relaxed = {name: search.relaxed.get(name, 1.0) * scale[name] for name in scale}
         search = replace(search, relaxed=relaxed)
         answer = search.answer()
-    return max(designs, key=_worth)
+    return max(designs, key=lambda one: (one.is_feasible, one.reachable))
 
 
-def _worth(one: Design) -> tuple[bool, float]:
-    """Return what the best of several confirmed designs has most of."""
-    if not one.is_feasible:
-        return False, one.reachable
-    return True, one.factor if one.target.texture_force is None else min(one.margins.values())
-
-
-def _compare(search: Search, factor: float, stiffness: float) -> Comparison:
-    case, limits = search.case, search.case.conditions
-    options: dict[str, Any] = {"speed": limits.speed, "grip": limits.grip}
-    options |= {"law_parameters": case.law_parameters, "max_depth": limits.max_depth}
-    texture = search.scaled(factor)
-    return compare(texture, case.device, [case.law], stiffness or None, **options)
-
-
-def _make_design(search: Search, answer: Answer, factor: float, result: Comparison) -> Design:
-    x, force = math.log(factor), search.target.texture_force
-    ratios = search.certified(x).ratios(search.target, result.rows[0].surface.stiffness)
+def _make_design(search: Search, answer: Candidate, factor: float, stiffness: float) -> Design:
+    case, target = search.case, search.target
+    result = compare(
+        search.scaled(factor),
+        case.device,
+        [case.law],
+        stiffness or None,
+        law_parameters=case.law_parameters,
+        max_depth=case.conditions.max_depth,
+        speed=case.conditions.speed,
+        grip=case.conditions.grip,
+    )
+    sample = search.certified(math.log(factor))
+    ratios = sample.ratios(target, result.rows[0].surface.stiffness)
     margins = {name: ratio for name, ratio in ratios.items() if ratio < 1e20}
-    others = {name: ratio for name, ratio in margins.items() if name != FORCE}
-    least, reachable = min(others.values()), 0.0
-    if force is not None and least >= MET:
-        reachable = force * min(1.0, margins[FORCE])
-    binding = tuple(name for name, ratio in others.items() if ratio < NEAR * least)
-    if not answer.is_met or force is None:
-        binding = search.binding(answer)
-    return Design(search.target, factor, result, margins, reachable, binding)
+    reach = factor
+    if target.texture_force is not None:
+        reach = target.texture_force * min(1.0, margins[FORCE])
+    if min(ratio for name, ratio in margins.items() if name != FORCE) < MET:
+        reach = 0.0
+    return Design(target, factor, result, margins, reach, search.binding(answer, ratios))

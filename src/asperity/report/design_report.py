@@ -6,7 +6,8 @@ from asperity.analysis.limits.limit_result import percent
 from asperity.analysis.limits.perceptibility_sentences import force_magnitude_text
 from asperity.analysis.passivity.assess_passivity import stiffness_limit_text
 from asperity.core.units import format_quantity
-from asperity.envelopes.find_design import MET, Design
+from asperity.envelopes.find_design import Design
+from asperity.envelopes.searches import MET
 from asperity.report import page
 from asperity.report.comparison_report import comparison_page
 from asperity.report.page import Cell, Media, Row, Section, Table
