@@ -19,7 +19,7 @@ from asperity.core.processes import precompute
 from asperity.core.units import round_down
 from asperity.devices import DeviceLike
 from asperity.envelopes.envelope import make_cases
-from asperity.envelopes.searches import FORCE, MET, MOTOR, Candidate, Search, Target, agree
+from asperity.envelopes.searches import FORCE, MET, MOTOR, Answer, Search, Target, agree
 from asperity.laws import Law
 from asperity.textures.catalogue import TextureLike, as_texture
 
@@ -162,7 +162,7 @@ def design(
     return _confirm(*_best_law(searches, report), report)
 
 
-Found = tuple[Search, Candidate]
+Found = tuple[Search, Answer]
 
 
 def search_law(search: Search | None) -> Found | None:
@@ -193,17 +193,17 @@ def _best_law(searches: Sequence[Search], report: Progress) -> Found:
 def _preference(found: Found) -> tuple[Any, ...]:
     """Return what is preferred: to meet the target, or nearly; no curl; the margin or the size."""
     search, answer = found
-    return answer.is_met, answer.reach > 0.0, search.is_conservative, answer.score
+    return answer.is_met, answer.reach > 0.0, search.is_conservative, answer.found.score
 
 
-def _confirm(search: Search, answer: Candidate, report: Progress) -> Design:
+def _confirm(search: Search, answer: Answer, report: Progress) -> Design:
     """Return the design of an answer whose numbers are those of a comparison.
 
     Where they differ from the ones that were searched, these are corrected, and searched again.
     """
     designs: list[Design] = []
     for _ in range(_COMPARISONS):
-        factor, k = float(f"{math.exp(answer.x):.5g}"), round_down(answer.stiffness, 4)
+        factor, k = float(f"{math.exp(answer.found.x):.5g}"), round_down(answer.found.stiffness, 4)
         report(f"comparison of law {search.case.letter}, factor {factor:g}")
         designs.append(one := _make_design(search, answer, factor, k))
         expected = search.ratios(math.log(factor), one.row.surface.stiffness)
@@ -216,7 +216,7 @@ def _confirm(search: Search, answer: Candidate, report: Progress) -> Design:
     return max(designs, key=lambda one: (one.is_feasible, one.reachable))
 
 
-def _make_design(search: Search, answer: Candidate, factor: float, stiffness: float) -> Design:
+def _make_design(search: Search, answer: Answer, factor: float, stiffness: float) -> Design:
     case, target = search.case, search.target
     result = compare(
         search.scaled(factor),

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -18,8 +18,9 @@ from asperity.analysis.energy.leak import worst_loop
 from asperity.analysis.energy.merit import contact_lost
 from asperity.analysis.limits import perceptibility
 from asperity.core.arguments import FIELD, SEARCH
+from asperity.core.checks import FloatArray
 from asperity.core.files import Serializable
-from asperity.envelopes.borders import AMPLITUDE_RANGE, find_root
+from asperity.envelopes.borders import AMPLITUDE_RANGE
 from asperity.envelopes.wave_case import Trial, WaveCase
 from asperity.surface import Surface
 from asperity.textures.synthetic import prepare_texture
@@ -35,14 +36,14 @@ NEAR = 1.01
 _FALLING, _RISING = {"stability", "leak"}, {"least stiffness", "perceptibility", FORCE}
 """Requirements that a greater stiffness exceeds by less, and by more."""
 _LEAST = 1e-30
-_FAINT = 1e-6
-"""Least stiffness that is searched, relative to the recommended one."""
 _PENALTY = 100.0
 """Weight of the logarithm by which a requirement is missed, against force and size."""
 _TOLERANCE = 3e-4
 _MAX_FACTOR = 100.0
 _SAMPLES_PER_DECADE = 4
 _REFINED = 3
+_STIFFNESSES = 48
+"""Stiffnesses tried at a factor: the force on the hand has resonances."""
 
 
 @dataclass(frozen=True)
@@ -62,22 +63,36 @@ class Target(Serializable):
 
 
 class Candidate(NamedTuple):
-    """A factor of the texture with a stiffness; candidates are ordered by their score.
+    """A factor of the texture with a stiffness.
 
     Attributes:
-        score: logarithm of the margin, of the force or of the factor.
+        score: what is maximized.
         x: natural logarithm of the factor.
         stiffness: [N/m].
-        reach: texture force [N], at most the target's, that meets all other requirements; for the
-            largest texture its factor; 0 where they are not met.
-        is_met: whether the target is met.
     """
 
     score: float
     x: float
     stiffness: float
-    reach: float = 0.0
-    is_met: bool = False
+
+
+class Answer(NamedTuple):
+    """The best candidate of a search.
+
+    Attributes:
+        is_met: whether it meets the target.
+        reach: texture force [N], at most the target's, or factor of the largest texture that meets
+            all other requirements; 0 for none.
+        found: the candidate.
+    """
+
+    is_met: bool
+    reach: float
+    found: Candidate
+
+
+Score = Callable[[Mapping[str, float]], float]
+Scored = TypeVar("Scored", bound=tuple[float, ...])
 
 
 class Sample(NamedTuple):
@@ -189,78 +204,83 @@ class Search:
         """Return the search for another texture force [N]."""
         return replace(self, target=replace(self.target, texture_force=force))
 
-    def margin(self, x: float) -> Candidate:
-        """Return the stiffness with the greatest margin at a factor."""
-        if not (top := self.top(x)):
-            return Candidate(math.log(_LEAST), x, 0.0)
+    def margin(self, ratios: Mapping[str, float]) -> float:
+        """Return the logarithm of the least ratio."""
+        return math.log(min(ratios.values()))
 
-        def excess(y: float) -> float:
-            found = self.ratios(x, math.exp(y))
-            falling = min(found.pop(name) for name in _FALLING)
-            return math.log(min(found.values()) / falling)
-
-        low, high = math.log(_FAINT * top), math.log(top)
-        y = find_root(excess, low, high, _TOLERANCE) if excess(low) < 0.0 < excess(high) else high
-        score = math.log(min(self.ratios(x, math.exp(y)).values()))
-        return Candidate(score, x, math.exp(y), self.target.texture_force or 0.0, score >= 0.0)
-
-    def reach(self, x: float) -> Candidate:
-        """Return the greatest stiffness at a factor; its score is the force, or the factor.
+    def reach(self, ratios: Mapping[str, float]) -> float:
+        """Return the logarithm of the ratio of the force, or 0 for the largest texture.
 
         What the other requirements miss is subtracted, with a weight by which the best candidate
         meets them where any does.
         """
+        others = dict(ratios)
+        force = math.log(others.pop(FORCE)) if self.target.texture_force else 0.0
+        return force + _PENALTY * min(0.0, self.margin(others))
+
+    def candidate(self, x: float, score: Score) -> Candidate:
+        """Return the stiffness with the greatest score at a factor."""
         if not (top := self.top(x)):
             return Candidate(_PENALTY * math.log(_LEAST), x, 0.0)
-        stiffness = top * min(1.0, self.ratios(x, top)["leak"])
-        others, force = self.ratios(x, stiffness), self.target.texture_force
-        ratio = others.pop(FORCE)
-        missed = min(0.0, math.log(min(others.values())))
-        value = math.exp(x) if force is None else min(ratio, 1.0) * force
-        reach, is_met = value if math.exp(missed) >= MET else 0.0, force is None or ratio >= 1.0
-        return Candidate(
-            math.log(value) + _PENALTY * missed, x, stiffness, reach, bool(reach) and is_met
-        )
+        if self.target.texture_force is None:  # as stiff as it may be
+            k = top * min(1.0, self.ratios(x, top)["leak"])
+            return Candidate(x + score(self.ratios(x, k)), x, k)
+        least = 0.1 * min(top, self.case.conditions.min_stiffness)
+        grid = np.linspace(math.log(least), math.log(top), _STIFFNESSES)
+        found = _maximize(lambda y: (score(self.ratios(x, math.exp(y))), y), grid, 1)
+        return Candidate(found[0], x, math.exp(found[1]))
 
-    def best(self, candidate: Callable[[float], Candidate]) -> Candidate:
+    def best(self, score: Score) -> Candidate:
         """Return the candidate with the greatest score of all factors."""
-        from scipy.optimize import minimize_scalar
+        decades = (self.bounds[1] - self.bounds[0]) / math.log(10.0)
+        grid = np.linspace(*self.bounds, round(decades * _SAMPLES_PER_DECADE) + 1)
+        return _maximize(lambda x: self.candidate(x, score), grid, _REFINED)
 
-        low, high = self.bounds
-        count = round((high - low) / math.log(10.0) * _SAMPLES_PER_DECADE) + 1
-        grid = [float(x) for x in np.linspace(low, high, count)]
-        found = [candidate(x) for x in grid]
-        scores = [-math.inf, *(one.score for one in found), -math.inf]
-        peaks = [i for i in range(count) if scores[i + 1] > max(scores[i], scores[i + 2])]
-        for at in sorted(peaks, key=lambda i: found[i].score)[-_REFINED:]:
-            refined = minimize_scalar(
-                lambda x: -candidate(x).score,
-                bounds=(grid[max(at - 1, 0)], grid[min(at + 1, count - 1)]),
-                method="bounded",
-                options={"xatol": _TOLERANCE},
-            )
-            found.append(candidate(float(refined.x)))
-        return max(found)
-
-    def answer(self) -> Candidate:
+    def answer(self) -> Answer:
         """Return the candidate that meets the target with the greatest margin, or the nearest."""
-        if self.target.texture_force is None:
-            return self.best(self.reach)
-        found = self.best(self.margin)
-        return found if found.is_met else self.best(self.reach)
+        force = self.target.texture_force
+        if force is not None and (found := self.best(self.margin)).score >= 0.0:
+            return Answer(True, force, found)
+        found = self.best(self.reach)
+        ratios = self.ratios(found.x, found.stiffness or 1.0)
+        reach = math.exp(found.x) if force is None else force * min(1.0, ratios.pop(FORCE))
+        ratios.pop(FORCE, None)
+        is_reached = min(ratios.values()) >= MET
+        return Answer(force is None and is_reached, reach if is_reached else 0.0, found)
 
-    def binding(self, answer: Candidate, ratios: Mapping[str, float]) -> tuple[str, ...]:
+    def binding(self, answer: Answer, ratios: Mapping[str, float]) -> tuple[str, ...]:
         """Return the requirements that limit an answer, of its ratios."""
         others, force = dict(ratios), self.target.texture_force
-        others[FORCE] *= (force or 0.0) / answer.reach if answer.reach else 0.0
-        if not others[FORCE]:
+        if force is None or not answer.reach:
             del others[FORCE]
+        else:
+            others[FORCE] *= force / answer.reach
         least = NEAR * min(others.values())
         names = {name for name, ratio in others.items() if ratio < least}
         if not names & _RISING:  # a greater stiffness would not help
             names -= _FALLING
-        at_end = min(abs(answer.x - end) for end in self.bounds) < NEAR - 1.0
-        return (*(name for name in others if name in names - {FORCE}), *[RANGE] * at_end)
+        if min(abs(answer.found.x - end) for end in self.bounds) < NEAR - 1.0:
+            others[RANGE] = 1.0
+            names.add(RANGE)
+        return tuple(name for name in others if name in names - {FORCE}) or (FORCE,)
+
+
+def _maximize(function: Callable[[float], Scored], grid: FloatArray, refined: int) -> Scored:
+    """Return the greatest tuple, by its first item, at a grid or between its best neighbours."""
+    from scipy.optimize import minimize_scalar
+
+    found = [function(float(x)) for x in grid]
+    scores, last = [-math.inf, *(one[0] for one in found), -math.inf], len(grid) - 1
+    peaks = [i for i in range(last + 1) if scores[i + 1] > max(scores[i], scores[i + 2])]
+    for at in sorted(peaks, key=lambda i: scores[i + 1])[-refined:]:
+        one = minimize_scalar(
+            lambda x: -function(x)[0],
+            bounds=(grid[max(at - 1, 0)], grid[min(at + 1, last)]),
+            method="bounded",
+            options={"xatol": _TOLERANCE},
+        )
+        found.append(function(float(one.x)))
+    return max(found, key=lambda one: one[0])
 
 
 def agree(first: Mapping[str, float], second: Mapping[str, float]) -> bool:
