@@ -203,7 +203,8 @@ def _confirm(search: Search, answer: Answer, report: Progress) -> Design:
     """
     designs: list[Design] = []
     for _ in range(_COMPARISONS):
-        factor, k = float(f"{math.exp(answer.found.x):.5g}"), round_down(answer.found.stiffness, 4)
+        factor = float(f"{math.exp(answer.found.x):.5g}")
+        k = round_down(min(answer.found.stiffness, search.top(math.log(factor))), 4)
         report(f"comparison of law {search.case.letter}, factor {factor:g}")
         designs.append(one := _make_design(search, answer, factor, k))
         expected = search.ratios(math.log(factor), one.row.surface.stiffness)

@@ -114,11 +114,10 @@ class Sample(NamedTuple):
             return {"stability": _LEAST, FORCE: _LEAST}
         waves = self.trial.waves.at_stiffness(stiffness)
         response = perceptibility.respond(waves)
-        forces = waves.case.forces
+        amplitude = float(np.linalg.norm(waves.case.forces))
         if target.at != MOTOR:
-            hand = response.motions / waves.grip.compliance(response.frequencies)
-            forces = hand[response.is_resolved]
-        force = float(np.linalg.norm(forces)) / math.sqrt(2.0)
+            felt = perceptibility.classify_perceptibility(waves, self.trial.doubtful, 0, 0, None)
+            amplitude = felt.hand_force
         found = {
             "stability": self.trial.recommended.stiffness / stiffness,
             "least stiffness": stiffness / self.trial.min_stiffness,
@@ -126,7 +125,7 @@ class Sample(NamedTuple):
             "workspace": _workspace_ratio(self.trial.surface.texture, waves.reach),
             "contact": perceptibility.MAX_CONTACT_LOST / max(self.lost, _LEAST),
             "leak": target.max_leak / max(self.leak * stiffness, _LEAST),
-            FORCE: force / (target.texture_force or _LEAST),
+            FORCE: amplitude / math.sqrt(2.0) / (target.texture_force or _LEAST),
         }
         return {name: min(max(x, _LEAST), 1.0 / _LEAST) for name, x in found.items()}
 

@@ -102,6 +102,7 @@ class Trial:
         q: characteristic number.
         waves: waves of the texture on a scan; ``None`` without a recommended stiffness.
         min_stiffness: least stiffness of the wall [N/m].
+        doubtful: numbers of the device that are not trusted.
     """
 
     surface: Surface
@@ -109,6 +110,7 @@ class Trial:
     q: Bound
     waves: perceptibility.WaveScan | None
     min_stiffness: float
+    doubtful: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def firm(self) -> float:
@@ -216,7 +218,7 @@ class WaveCase:
         if not trial.recommended.stiffness:
             return trial
         surface, points = trial.surface, _SCAN_POINTS if texture.single_wave else None
-        waves, _doubtful, _rms = perceptibility.scan_waves(
+        waves, doubtful, _rms = perceptibility.scan_waves(
             surface,
             self.device,
             texture.texture_part(),
@@ -226,7 +228,7 @@ class WaveCase:
             points=points,
             **conditions.scan,
         )
-        return replace(trial, waves=waves)
+        return replace(trial, waves=waves, doubtful=doubtful)
 
     def try_wave(self, wavelength: float, amplitude: float) -> Trial:
         """Return the trial of a sinusoid [m]."""
