@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from asperity.analysis.compare import Comparison
     from asperity.analysis.device_comparisons import DeviceComparisons
     from asperity.devices import Device
-    from asperity.envelopes.find_design import Design
     from asperity.laws import Law
     from asperity.textures import Texture
 
@@ -218,12 +217,6 @@ _CONDITIONS = (SPEED, *options.command_arguments("envelope"), MAX_DEPTH, GRIP, *
 _LAW_PARAMETERS = tuple(SHIPPED_LAW_ARGUMENTS.values())
 
 
-def _output_option(table: str, figure: str) -> Callable[[Any], Any]:
-    """Return a decorator that adds ``--output`` for a table or a figure."""
-    what = f"Write the {table} (.csv) or the {figure} (.svg, .pdf, .png); may be repeated."
-    return click.option("-o", "--output", metavar="PATH", multiple=True, help=what)
-
-
 def _check_paths(outputs: Outputs, paths: Sequence[str]) -> None:
     """Check the paths of ``--output`` before anything is computed."""
     from asperity.report.envelope_report import check_suffix
@@ -248,7 +241,13 @@ def _check_paths(outputs: Outputs, paths: Sequence[str]) -> None:
 )
 @options.argument_options(_CONDITIONS)
 @options.law_options(_LAW_PARAMETERS)
-@_output_option("borders", "diagram")
+@click.option(
+    "-o",
+    "--output",
+    metavar="PATH",
+    multiple=True,
+    help="Write the borders (.csv) or the diagram (.svg, .pdf, .png); may be repeated.",
+)
 @options.jobs_option
 @output_options()
 def envelope_command(
@@ -265,7 +264,7 @@ def envelope_command(
     the texture is felt at that stiffness on a scan, as in asperity compare.
     """
     from asperity.envelopes.envelope import envelope, textured_laws
-    from asperity.report.envelope_report import envelope_page, write_table_or_figure
+    from asperity.report.envelope_report import envelope_page, write_envelope
 
     _check_paths(outputs, output)
     devices = [
@@ -282,7 +281,7 @@ def envelope_command(
             **options.provided_values(values, _CONDITIONS),
         )
     for path in output:
-        write_table_or_figure(result, path)
+        write_envelope(result, path)
     outputs.write(result, envelope_page(result))
 
 
@@ -296,14 +295,12 @@ _TARGET = (*options.command_arguments("design"), *_CONDITIONS[:4])
 @options.argument_options(_TARGET)
 @options.law_options(_LAW_PARAMETERS)
 @options.file_options
-@_output_option("numbers", "figure of the answer")
 @options.jobs_option
 @output_options()
 def design_command(
     surface: str,
     device: Device | None,
     laws: tuple[Law, ...] | None,
-    output: tuple[str, ...],
     outputs: Outputs,
     **values: Any,
 ) -> None:
@@ -316,10 +313,8 @@ def design_command(
     from asperity.envelopes.envelope import textured_laws
     from asperity.envelopes.find_design import design
     from asperity.report.design_report import design_page
-    from asperity.report.envelope_report import write_table_or_figure
     from asperity.scene import load_scene
 
-    _check_paths(outputs, output)
     chosen = laws or textured_laws()
     with step_bar("reading the surface", len(chosen) + 4) as step:
         step("reading the surface")
@@ -332,30 +327,7 @@ def design_command(
             progress=step,
             **options.provided_values(values, _TARGET),
         )
-    for path in output:
-        write_table_or_figure(result, path)
-    outputs.write(result, design_page(result), extra_line=_compare_command(surface, result, values))
-
-
-def _compare_command(surface: str, result: Design, values: Mapping[str, Any]) -> str:
-    """Return the command that compares the answer, for a surface that is not a scene."""
-    if surface.endswith(".toml"):
-        return ""
-    lateral = values["magnify"] or 1.0
-    height = result.factor * (values["magnify_height"] or lateral)
-    if result.comparison.texture.single_wave is None:
-        lateral *= result.factor
-    sizes = [("--magnify", lateral, 1.0), ("--magnify-height", height, lateral)]
-    scaled = [f"{name}={value:.6g}" for name, value, default in sizes if value != default]
-    row, names = result.row, {"device", "speed", "grip", "max_depth", "plugin", "settings"}
-    typed = repeat_options({*names, *result.row.law.arguments}, ())
-    for name, _value, _default in sizes:
-        if name in typed:
-            del typed[(at := typed.index(name)) : at + 2]
-    device = [] if "--device" in typed else ["--device", result.comparison.device.id]
-    law = ["--laws", row.law.letter, "--stiffness", f"{row.surface.stiffness:g}N/m"]
-    command = shlex.join([surface, *device, *law, *scaled, *typed])
-    return f"\nNext:\n  asperity compare {command}"
+    outputs.write(result, design_page(result))
 
 
 def _law_parameters(values: dict[str, Any]) -> dict[str, Any]:

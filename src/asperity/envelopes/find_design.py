@@ -12,7 +12,7 @@ from asperity.analysis.compare import DEFAULT_DEVICE, Comparison, Progress, comp
 from asperity.analysis.results import LawRow
 from asperity.core.cache import bypass_results
 from asperity.core.checks import check_keywords, check_positive
-from asperity.core.display import Plottable, Reportable, Tabular
+from asperity.core.display import Reportable, Tabular
 from asperity.core.errors import ParameterError
 from asperity.core.files import attributes_to_dict
 from asperity.core.processes import precompute
@@ -29,7 +29,7 @@ _COMPARISONS = 3
 
 
 @dataclass(frozen=True)
-class Design(Plottable, Reportable, Tabular):
+class Design(Reportable, Tabular):
     """The texture that meets a target on a device with the greatest margin.
 
     Attributes:

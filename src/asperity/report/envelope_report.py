@@ -13,7 +13,6 @@ from asperity.core.files import write_bytes
 from asperity.core.units import format_quantity
 from asperity.envelopes.borders import WaveBorders
 from asperity.envelopes.envelope import LISTED, DeviceEnvelope, Envelope
-from asperity.envelopes.find_design import Design
 from asperity.report import page
 from asperity.report.page import SCREEN, Cell, Media, Picture, Row, Section, Table, TableLayout
 from asperity.report.sentences.number_text import NOT_AVAILABLE
@@ -21,7 +20,7 @@ from asperity.report.sentences.texts import figure_text, glossary
 
 _ALL = SCREEN | Media.HEADING
 SUFFIXES = (".csv", *page.FIGURE_SUFFIXES)
-"""Suffixes of the files to which an envelope or a design is written."""
+"""Suffixes of the files to which an envelope is written."""
 
 
 def envelope_page(result: Envelope) -> page.Page:
@@ -100,8 +99,8 @@ def _points_section(result: Envelope) -> Section:
     return Section(title, [Table(headings, rows, (1, 2))], media=_ALL)
 
 
-def write_table_or_figure(result: Envelope | Design, path: str) -> None:
-    """Write the rows of a result as CSV, or its figure, by the suffix of the path.
+def write_envelope(result: Envelope, path: str) -> None:
+    """Write the borders as CSV, or the diagram, by the suffix of the path.
 
     Raises:
         ParameterError: for another suffix, or a file that cannot be written.

@@ -13,7 +13,6 @@ from asperity.analysis.compare import Comparison
 from asperity.analysis.limits.limit_result import Limits
 from asperity.core.errors import ParameterError
 from asperity.envelopes.envelope import Envelope
-from asperity.envelopes.find_design import Design
 from asperity.recording.recording import Recording
 from asperity.report.pictures import law_pictures, style
 from asperity.report.pictures.analysis_pictures import available_pictures
@@ -94,11 +93,6 @@ def _plot_analysis(result: Analysis, picture: str | None = None) -> Figure:
 def _plot_limits(result: Limits, picture: str | None = None) -> Figure:
     _check_picture_name(picture)
     return limits_figure(result)
-
-
-@plot.register
-def _plot_design(result: Design, picture: str | None = None) -> Figure:
-    return plot(result.comparison, picture)
 
 
 @plot.register
