@@ -176,11 +176,6 @@ def _columns(_: Path) -> Seeds:
     return ["\n".join(table).encode() for table in tables]
 
 
-def _uneven(_: Path) -> Seeds:
-    rows = (f"{k + 0.2 * (k % 2):g} {z:g}" for k, z in enumerate(_heights()[0]))
-    return ["\n".join(rows).encode()]
-
-
 def _stl(folder: Path) -> Seeds:
     writer = _writer("mesh_writer")
     vertices, faces = writer.grid_mesh(_heights() / 100, 0.5)
@@ -288,7 +283,6 @@ SEEDS: dict[str, Callable[[Path], Seeds]] = {
     "tiff-lengths": _tiff_lengths,
     "esri": _esri,
     "columns": _columns,
-    "uneven": _uneven,
     "stl-binary": _stl,
     "stl-text": _stl_text,
     "obj": _obj,
@@ -301,7 +295,7 @@ SEEDS: dict[str, Callable[[Path], Seeds]] = {
 }
 OPTIONS: dict[str, dict[str, Any]] = {
     name: {"unit": "mm"} for name in ("stl-binary", "stl-text", "obj", "hdf5", "matlab")
-} | {"uneven": {"unit": "m", "resample": 0.5}}
+}
 
 
 def available_readers() -> list[str]:

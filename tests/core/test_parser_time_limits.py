@@ -114,9 +114,9 @@ PARSERS: dict[str, tuple[Callable[[str], object], tuple[str, ...]]] = {
         lambda text: read_text(to_surface_file(text), ReadingOptions()),
         ("", "# Width: ", "x [um] "),
     ),
-    "text, resampled": (
-        lambda text: read_text(to_surface_file(text), ReadingOptions(resample=1.0)),
-        ("", "x;z;valid\n[mm];[mm];[1/0]\n", "index,x [m],z [m]\n"),
+    "text with columns": (
+        lambda text: read_text(to_surface_file(text), ReadingOptions()),
+        ("x;z;valid\n[mm];[mm];[1/0]\n", "index,x [m],z [m]\n"),
     ),
     "ESRI grid": (
         lambda text: read_esri(to_surface_file(text), ReadingOptions()),

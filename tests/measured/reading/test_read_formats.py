@@ -210,7 +210,7 @@ def test_missing_unit_is_required_and_missing_size_gives_no_pitch(
 
 
 def test_unusable_channels_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(SurfaceFileError, match="sampling is not uniform"):
+    with pytest.raises(SurfaceFileError, match="not evenly spaced"):
         read(tmp_path, monkeypatch, Channel(0, "H", is_uniform=False))
     with pytest.raises(SurfaceFileError, match="more than are read or the file can hold"):
         read(tmp_path, monkeypatch, Channel(0, "H", nb_grid_pts=(5000, 5000)))

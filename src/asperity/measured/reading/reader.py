@@ -168,13 +168,11 @@ class ReadingOptions:
         channel: name or number (from 0) of the height channel, for a file with several.
         unit: unit of length of a file that has none.
         integrate_normals: integrate a normal map (an image of slopes) to heights.
-        resample: pitch [m] to which points on no regular grid are interpolated.
     """
 
     channel: str | int | None = None
     unit: str | None = None
     integrate_normals: bool = False
-    resample: float | None = None
 
     @property
     def metres_per_unit(self) -> float | None:
@@ -249,7 +247,6 @@ class Reader:
             ("channel", "has no channels to choose from"),
             ("unit", "has its own unit, or none at all"),
             ("integrate_normals", "is no image"),
-            ("resample", "is no list of points"),
         ):
             value = getattr(options, argument)
             is_given = value is not None and value is not False  # a channel may be number 0

@@ -16,7 +16,6 @@ from pathlib import Path
 
 import numpy as np
 
-from asperity.core.checks import check_positive
 from asperity.core.errors import AsperityError, ParameterError, SurfaceFileError, nearest_names
 from asperity.measured.reading import unsupported
 from asperity.measured.reading.grids import NPY_MAGIC, is_esri, read_esri, read_npy
@@ -66,14 +65,12 @@ SIGNATURE_READERS = (
 
 FALLBACK_READERS = (
     Reader("a file of another kind", lambda _: True, unsupported.reject_unsupported),
-    Reader(
-        "a text file", lambda file: file.is_text, _read_text, ("unit", "resample"), certain=False
-    ),
+    Reader("a text file", lambda file: file.is_text, _read_text, ("unit",), certain=False),
     Reader(
         "an instrument's file",
         lambda _: surface_topography.has_library(),
         surface_topography.read_instrument,
-        ("channel", "unit", "resample"),
+        ("channel", "unit"),
         certain=False,
         is_isolated=True,
     ),
@@ -191,7 +188,6 @@ def read_surface(
     channel: str | int | None = None,
     unit: str | None = None,
     integrate_normals: bool = False,
-    resample: float | None = None,
 ) -> RawSurface:
     r"""Read a measured or synthetic surface; the content of the file decides its format.
 
@@ -207,9 +203,6 @@ def read_surface(
             optional for NPY (metres if not given)
             and for text that does not state it.
         integrate_normals: integrate a normal map (an image of slopes) to heights.
-        resample: pitch [m] of the map interpolated through a list of x, y, z points that are on no
-            regular grid, or of the profile through unevenly spaced ones; the interpolation error
-            is in the notes.
 
     Returns:
         The heights [m] of the file, and the pitch if the file has one. Heights of images have no
@@ -229,9 +222,7 @@ def read_surface(
         ((4,), ['5.0e-07'])
     """
     name = Path(path).name or str(path)
-    if resample is not None:
-        resample = check_positive("resample", resample, "m")
-    options = ReadingOptions(channel, unit, integrate_normals, resample)
+    options = ReadingOptions(channel, unit, integrate_normals)
     try:
         _ = options.metres_per_unit  # refuses an unknown unit, whatever the file is
         _check_file(Path(path), name)

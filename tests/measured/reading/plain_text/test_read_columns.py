@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from asperity.core.errors import ParameterError, SurfaceFileError
+from asperity.core.errors import SurfaceFileError
 from asperity.measured.reading import RawSurface, read_surface
-from asperity.measured.reading.resampling import resample_profile
 
 PROFILE = "X;Y;valid\n[mm];[mm];[1/0]\n"
 ROWS = "8.6722;106.25;1\n8.6727;-999;0\n8.6732;106.5;1\n8.6737;106.75;1\n"
@@ -82,33 +81,12 @@ def test_index_column_is_dropped(tmp_path: Path) -> None:
 # --- uneven profiles ------------------------------------------------------------------------------
 
 
-def test_uneven_profile_is_interpolated_only_with_resample(tmp_path: Path) -> None:
-    text = "x [um] z [nm]\n0 0\n1 2\n4 8\n5 10\n6.5 13\n8 16\n"
-    with pytest.raises(SurfaceFileError, match=r"resample=1.6e-06 \(--resample 1.6um\)"):
-        read_text(tmp_path, text)
-    raw = read_text(tmp_path, text, resample=1e-6)
-    assert raw.pitch == (1e-6,)
-    np.testing.assert_allclose(raw.heights, 2e-9 * np.arange(9), atol=1e-20)
-    assert (
-        raw.notes
-        == (
-            "6 points interpolated linearly to 9 of pitch 1 µm; from every other point the rest are"
-            " missed by 1 nm rms",
-        )
-        or "missed by" in raw.notes[0]
-    )
-
-
-def test_stated_error_is_that_of_interpolating_every_other_point() -> None:
-    x = np.array([0.0, 1.0, 2.0, 3.0, 4.0])
-    heights, note = resample_profile(x, np.array([0.0, 5.0, 0.0, 3.0, np.nan]), 0.5)
-    np.testing.assert_allclose(heights, [0, 2.5, 5, 2.5, 0, 1.5, 3])
-    rms = (0.5 * (5.0**2 + 3.0**2)) ** 0.5  # constant continuation from 2 to the point at 3
-    assert f"missed by {rms:.4g} m rms" in note
-    with pytest.raises(ParameterError, match="too fine for 4 points"):
-        resample_profile(x, np.array([0.0, 5.0, 0.0, 3.0, np.nan]), 1e-9)
-    with pytest.raises(SurfaceFileError, match="two points"):
-        resample_profile(x, np.array([0.0, np.nan, np.nan, np.nan, np.nan]), 0.5)
+def test_points_on_no_grid_are_refused_with_advice(tmp_path: Path) -> None:
+    profile = "x [um] z [nm]\n0 0\n1 2\n4 8\n5 10\n6.5 13\n8 16\n"
+    scattered = "x [um] y [um] z [nm]\n0 0 1\n1 0.3 2\n0.2 1 3\n1.1 1.2 4\n0.6 0.5 5\n2 2 6\n"
+    for text in (profile, scattered):
+        with pytest.raises(SurfaceFileError, match=r"interpolate them to a grid first.*griddata"):
+            read_text(tmp_path, text)
 
 
 def test_uneven_profile_of_an_instrument_file(tmp_path: Path) -> None:
@@ -119,11 +97,8 @@ def test_uneven_profile_of_an_instrument_file(tmp_path: Path) -> None:
     line = NonuniformLineScan([0.0, 1.0, 4.0, 5.0, 8.0], [0.0, 2.0, 8.0, 10.0, 16.0], unit="um")
     path = tmp_path / "line.nc"
     line.to_netcdf(str(path))
-    with pytest.raises(SurfaceFileError, match=r"not uniform; .* \(--resample 2um\)"):
+    with pytest.raises(SurfaceFileError, match="not evenly spaced: interpolate them"):
         read_surface(path)
-    raw = read_surface(path, resample=1e-6)
-    assert raw.pitch == pytest.approx((1e-6,), rel=1e-12)
-    np.testing.assert_allclose(raw.heights, 2e-6 * np.arange(9), atol=1e-18)
 
 
 # --- ESRI ASCII grids -----------------------------------------------------------------------------
