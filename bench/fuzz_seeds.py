@@ -157,14 +157,6 @@ def _tiff_lengths(folder: Path) -> Seeds:
     ]
 
 
-def _esri(_: Path) -> Seeds:
-    rows = "\n".join(" ".join(f"{z:g}" for z in row) for row in _heights())
-    return [
-        f"ncols 12\nnrows 9\n{corner}\ncellsize 2.5\nNODATA_value -9999\n{rows}\n".encode()
-        for corner in ("xllcorner 10\nyllcorner 20", "xllcenter 1.5\nyllcenter -3")
-    ]
-
-
 def _columns(_: Path) -> Seeds:
     """Profiles and points with a column of validity or of numbering."""
     line = [f"{0.5 * k:g};{z:g};{k % 3 > 0:d}" for k, z in enumerate(_heights()[0])]
@@ -281,7 +273,6 @@ SEEDS: dict[str, Callable[[Path], Seeds]] = {
     "png": _png,
     "tiff": _tiff,
     "tiff-lengths": _tiff_lengths,
-    "esri": _esri,
     "columns": _columns,
     "stl-binary": _stl,
     "stl-text": _stl_text,

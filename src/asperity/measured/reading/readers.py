@@ -18,7 +18,7 @@ import numpy as np
 
 from asperity.core.errors import AsperityError, ParameterError, SurfaceFileError, nearest_names
 from asperity.measured.reading import unsupported
-from asperity.measured.reading.grids import NPY_MAGIC, is_esri, read_esri, read_npy
+from asperity.measured.reading.grids import NPY_MAGIC, read_npy
 from asperity.measured.reading.images.image_files import PNG_MAGIC, TIFF_MAGIC, read_png, read_tiff
 from asperity.measured.reading.isolation import describe_exception, read_isolated
 from asperity.measured.reading.mesh import is_binary_stl, is_obj, is_text_stl, read_mesh
@@ -55,7 +55,6 @@ SIGNATURE_READERS = (
         ("integrate_normals", "unit"),
         is_isolated=True,
     ),
-    Reader("an ESRI ASCII grid", is_esri, read_esri, ("unit",)),
     Reader("an SDF file", lambda file: is_sdf(file.head), read_sdf),
     Reader("a binary STL mesh", is_binary_stl, read_mesh, ("unit",)),
     Reader("a text STL mesh", is_text_stl, read_mesh, ("unit",), is_isolated=True),

@@ -1,4 +1,4 @@
-"""Text files with non-length columns, unevenly sampled profiles, and ESRI ASCII grids."""
+"""Text files with non-length columns, and points on no grid."""
 
 from __future__ import annotations
 
@@ -101,59 +101,9 @@ def test_uneven_profile_of_an_instrument_file(tmp_path: Path) -> None:
         read_surface(path)
 
 
-# --- ESRI ASCII grids -----------------------------------------------------------------------------
-
-GRID = "ncols 4\nnrows 3\nxllcorner 378923.0\nyllcorner 4072345\ncellsize 30\nNODATA_value -32768\n"
-NUMBERS = "1 2 3 4\n5 -32768 7 8\n9 10 11 12.5\n"
-EXPECTED = np.array([[9, 10, 11, 12.5], [5, np.nan, 7, 8], [1, 2, 3, 4]])
-
-
-def test_esri_grid_is_read_southern_row_first(tmp_path: Path) -> None:
-    raw = read_text(tmp_path, GRID + NUMBERS)
-    np.testing.assert_array_equal(raw.heights, EXPECTED)  # the first row is the northern one
-    assert (raw.pitch, raw.has_units) == ((30.0, 30.0), False)
-    assert raw.notes == (
-        "no unit in the file: taken as metres",
-        "1 points hold -32768, which marks a missing point",
-    )
-    micro = read_text(tmp_path, GRID + NUMBERS, unit="um")
-    np.testing.assert_allclose(micro.heights, 1e-6 * EXPECTED, rtol=1e-15)
-    assert micro.pitch == pytest.approx((3e-5, 3e-5), rel=1e-12)
-    assert micro.has_units
-
-
-def test_header_variants_of_esri_grids(tmp_path: Path) -> None:
-    wrapped = GRID.upper() + " ".join(NUMBERS.split())  # rows end by count, not by line
-    np.testing.assert_array_equal(read_text(tmp_path, wrapped).heights, EXPECTED)
-    centre = "nrows 3\r\nncols 4\r\nxllcenter 0\r\nyllcenter 0\r\ndx 2\r\ndy 3\r\n"
-    raw = read_text(tmp_path, centre + NUMBERS.replace("-32768", "-9999").replace("\n", "\r\n"))
-    np.testing.assert_array_equal(raw.heights, EXPECTED)
-    assert raw.pitch == (2.0, 3.0)
-    commas = GRID.replace("30", "0,5") + NUMBERS.replace("12.5", "12,5")
-    np.testing.assert_array_equal(read_text(tmp_path, commas).heights, EXPECTED)
-
-
-@pytest.mark.parametrize(
-    ("text", "match"),
-    [
-        (GRID + NUMBERS + "13\n", "3 rows of 4 heights, there are 13 numbers"),
-        (GRID + NUMBERS[:-5], "there are 11 numbers"),
-        (GRID.replace("ncols 4", "ncols 0") + NUMBERS, "ncols must be a whole number from 1"),
-        (GRID.replace("ncols 4", "ncols 4.5") + NUMBERS, "ncols must be a whole number from 1"),
-        (GRID.replace("ncols 4", "ncols 999999999") + NUMBERS, "999999999 x 3 points; at most"),
-        (
-            GRID.replace("ncols 4", "ncols 99999").replace("nrows 3", "nrows 99999") + NUMBERS,
-            "at most",
-        ),
-        (GRID.replace("size 30", "size 0") + NUMBERS, "must be positive"),
-        (GRID.replace("cellsize 30\n", "") + NUMBERS, "must be positive"),
-        (GRID.replace("size 30", "size thirty") + NUMBERS, "a finite number is expected"),
-        (GRID.replace("size 30", "size 30 40") + NUMBERS, "must have one value"),
-        (GRID + NUMBERS.replace("7", "x"), "height 6 is '-32x68'; a finite number"),
-        (GRID + NUMBERS.replace("7", "7_0"), "height 6 is '-327_068'"),
-        (GRID + NUMBERS.replace("11", "inf"), "infinite height"),
-    ],
-)
-def test_invalid_esri_grids_are_refused(tmp_path: Path, text: str, match: str) -> None:
-    with pytest.raises(SurfaceFileError, match=match):
-        read_text(tmp_path, text)
+def test_esri_grid_is_refused_with_advice(tmp_path: Path) -> None:
+    """Its first row is the northern one: as a matrix it would be mirrored."""
+    grid = "ncols 4\nnrows 3\nxllcorner 3.0\nyllcorner 4\ncellsize 30\n1 2 3 4\n5 6 7 8\n9 8 7 6\n"
+    for text in (grid, grid.upper()):
+        with pytest.raises(SurfaceFileError, match=r"ESRI ASCII grid.*save its numbers as a text"):
+            read_text(tmp_path, text)

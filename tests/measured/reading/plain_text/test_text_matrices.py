@@ -264,7 +264,7 @@ def test_several_maps_in_one_file_are_refused(tmp_path: Path) -> None:
 
 
 def test_declared_value_of_missing_points(tmp_path: Path) -> None:
-    raw = read_text(tmp_path, "ncols 4\nNODATA_value -9999\n1 2 3 -9999\n5 6 7 8\n-9999 2 3 4\n")
+    raw = read_text(tmp_path, "columns 4\nNODATA_value -9999\n1 2 3 -9999\n5 6 7 8\n-9999 2 3 4\n")
     n = np.nan
     np.testing.assert_array_equal(raw.heights, [[1, 2, 3, n], [5, 6, 7, 8], [n, 2, 3, 4]])
     assert any("points hold -9999, which marks a missing point" in note for note in raw.notes)
