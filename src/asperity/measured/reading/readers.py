@@ -47,12 +47,12 @@ def _read_text(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
 SIGNATURE_READERS = (
     Reader("an X3P file", _is_x3p, read_x3p),
     Reader("an NPY file", lambda file: file.head.startswith(NPY_MAGIC), read_npy, ("unit",)),
-    Reader("a PNG image", lambda f: f.head.startswith(PNG_MAGIC), read_png, ("integrate_normals",)),
+    Reader("a PNG image", lambda f: f.head.startswith(PNG_MAGIC), read_png),
     Reader(
         "a TIFF image",
         lambda file: file.head.startswith(TIFF_MAGIC),
         read_tiff,
-        ("integrate_normals", "unit"),
+        ("unit",),
         is_isolated=True,
     ),
     Reader("an SDF file", lambda file: is_sdf(file.head), read_sdf),
@@ -182,11 +182,7 @@ def _describe_error(error: Exception) -> str:
 
 
 def read_surface(
-    path: str | os.PathLike[str],
-    *,
-    channel: str | int | None = None,
-    unit: str | None = None,
-    integrate_normals: bool = False,
+    path: str | os.PathLike[str], *, channel: str | int | None = None, unit: str | None = None
 ) -> RawSurface:
     r"""Read a measured or synthetic surface; the content of the file decides its format.
 
@@ -201,7 +197,6 @@ def read_surface(
         unit: unit of length of a file that has none, such as "mm": required for STL and OBJ,
             optional for NPY (metres if not given)
             and for text that does not state it.
-        integrate_normals: integrate a normal map (an image of slopes) to heights.
 
     Returns:
         The heights [m] of the file, and the pitch if the file has one. Heights of images have no
@@ -221,7 +216,7 @@ def read_surface(
         ((4,), ['5.0e-07'])
     """
     name = Path(path).name or str(path)
-    options = ReadingOptions(channel, unit, integrate_normals)
+    options = ReadingOptions(channel, unit)
     try:
         _ = options.metres_per_unit  # refuses an unknown unit, whatever the file is
         _check_file(Path(path), name)
