@@ -1,17 +1,16 @@
 """Read a surface file of any supported format, recognised by content rather than by name.
 
-The readers are tried in this order: those that recognise a signature; the user's, first the
-registered ones in the order of registration, then the entry points of the group
-``asperity.readers`` by name, which are loaded only if no reader before them took the file; last the
-readers of text and of instruments' files, which recognise almost anything.
+The readers are tried in this order: those that recognise a signature; the user's in the order of
+registration; last the readers of text and of instruments' files, which recognise almost anything.
 """
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
-from importlib.metadata import EntryPoint, entry_points, version
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -76,9 +75,6 @@ FALLBACK_READERS = (
 )
 """Readers of files without a signature, tried last."""
 
-ENTRY_POINT_GROUP = "asperity.readers"
-"""Group of the entry points with which an installed package provides a :class:`Reader`."""
-
 _EXPECTED_ERRORS = (AsperityError, OSError, MemoryError)  # errors that a reader may raise
 USER_READERS: dict[str, Reader] = {}
 
@@ -98,19 +94,10 @@ def register(reader: Reader) -> None:
     USER_READERS[reader.name] = reader
 
 
-def iter_readers(problems: list[str]) -> Iterator[Reader]:
-    """Yield all readers in the order in which they are tried.
-
-    Args:
-        problems: receives a sentence for each user-defined reader that cannot be used.
-    """
+def iter_readers() -> Iterator[Reader]:
+    """Yield all readers in the order in which they are tried."""
     yield from SIGNATURE_READERS
-    for reader in USER_READERS.values():
-        yield _guard_reader(reader, problems)
-    for point in sorted(entry_points(group=ENTRY_POINT_GROUP), key=lambda point: point.name):
-        loaded = _load_entry_point(point, problems)
-        if loaded is not None:
-            yield _guard_reader(loaded, problems)
+    yield from map(_guard_reader, USER_READERS.values())
     yield from FALLBACK_READERS
 
 
@@ -119,43 +106,31 @@ def external_reader_version() -> str | None:
 
     ``None`` if there are user-defined readers, whose versions are unknown.
     """
-    if USER_READERS or entry_points(group=ENTRY_POINT_GROUP):
+    if USER_READERS:
         return None
     return version(surface_topography.LIBRARY) if surface_topography.has_library() else ""
 
 
-def _load_entry_point(point: EntryPoint, problems: list[str]) -> Reader | None:
-    try:
-        reader = point.load()
-        if not isinstance(reader, Reader):
-            raise TypeError(f"{point.value} is no Reader")
-    except Exception as error:  # another package may raise anything
-        problems.append(f"the reader {point.name!r} cannot be used ({_describe_error(error)})")
-        return None
-    return reader
+def _guard_reader(reader: Reader) -> Reader:
+    """Return a user-defined reader whose programming errors are refusals of the file."""
 
-
-def _guard_reader(reader: Reader, problems: list[str]) -> Reader:
-    """Return a user-defined reader whose programming errors do not stop the others."""
-
-    def recognises(file: SurfaceFile) -> bool:
+    @contextmanager
+    def refuse_errors(file: SurfaceFile) -> Iterator[None]:
         try:
-            return bool(reader.recognises(file))
+            yield
         except _EXPECTED_ERRORS:
             raise
         except Exception as error:  # a user's code may raise anything
-            message = f"the reader of {reader.name} cannot be used ({_describe_error(error)})"
-            problems.append(message)
-            return False
-
-    def read(file: SurfaceFile, options: ReadingOptions) -> RawSurface | None:
-        try:
-            return _check_result(_run(reader, file, options))
-        except _EXPECTED_ERRORS:
-            raise
-        except Exception as error:  # as above
             message = f"{file.name}: the reader of {reader.name} failed ({_describe_error(error)})"
             raise SurfaceFileError(message) from error
+
+    def recognises(file: SurfaceFile) -> bool:
+        with refuse_errors(file):
+            return bool(reader.recognises(file))
+
+    def read(file: SurfaceFile, options: ReadingOptions) -> RawSurface | None:
+        with refuse_errors(file):
+            return _check_result(_run(reader, file, options))
 
     return replace(reader, recognises=recognises, read=read, is_isolated=False)
 
@@ -231,8 +206,7 @@ def read_surface(
 def _read_first(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
     """Return the result of the first reader that can read the file."""
     refusal: AsperityError | None = None
-    problems: list[str] = []
-    for reader in iter_readers(problems):
+    for reader in iter_readers():
         if not reader.recognises(file):
             continue
         try:
@@ -244,14 +218,10 @@ def _read_first(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
             continue
         if raw is not None:
             reader.check_options(file, options)
-            notes = (*raw.notes, *problems)
-            if not raw.has_units and not raw.relative:
-                notes = ("no unit in the file: taken as metres", *notes)
-            return replace(raw, notes=notes)
-    refusal = refusal or unsupported.unrecognised_error(file)
-    if problems and isinstance(refusal, SurfaceFileError):
-        raise SurfaceFileError("; ".join((str(refusal), *problems))) from refusal
-    raise refusal
+            if raw.has_units or raw.relative:
+                return raw
+            return replace(raw, notes=("no unit in the file: taken as metres", *raw.notes))
+    raise refusal or unsupported.unrecognised_error(file)
 
 
 def _run(reader: Reader, file: SurfaceFile, options: ReadingOptions) -> RawSurface | None:
