@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.measured.lengths import format_lengths, unit_to_metres
-from asperity.measured.reading.images.normal_maps import is_normal_map
 from asperity.measured.reading.reader import RawSurface, ReadingOptions, check_point_count
 
 _MAX_DESCRIPTION = 10**6
@@ -226,18 +225,13 @@ def pixels_to_surface(
         has one.
 
     Raises:
-        SurfaceFileError: colours, transparency, or a normal map.
+        SurfaceFileError: colours or transparency.
         ParameterError: a unit for a file that names its own.
     """
     notes = (*notes, *scale.notes)
     if has_alpha:
         _check_opaque(values[..., -1])
         values, notes = values[..., :-1], (*notes, "alpha channel dropped: opaque everywhere")
-    if is_normal_map(values):
-        raise SurfaceFileError(
-            "looks like a normal map (slopes as colours), not like heights; save the height map"
-            " from which it was made"
-        )
     grey, notes = _to_grey(values, notes)
     with np.errstate(invalid="ignore"):  # a signalling NaN is a missing point too
         heights = scale.factor * grey.astype(np.float64) + scale.offset
@@ -273,5 +267,6 @@ def _to_grey(values: NDArray[Any], notes: tuple[str, ...]) -> tuple[NDArray[Any]
         return first, (*notes, "three equal channels: read as one grey image")
     raise SurfaceFileError(
         "is a colour image: its three channels differ, and a colour is no height;"
-        " save the heights as a grey image (16 bit if possible)"
+        " save the heights, for a normal map those from which it was made, as a grey image (16 bit"
+        " if possible)"
     )
