@@ -157,14 +157,6 @@ def _tiff_lengths(folder: Path) -> Seeds:
     ]
 
 
-def _esri(_: Path) -> Seeds:
-    rows = "\n".join(" ".join(f"{z:g}" for z in row) for row in _heights())
-    return [
-        f"ncols 12\nnrows 9\n{corner}\ncellsize 2.5\nNODATA_value -9999\n{rows}\n".encode()
-        for corner in ("xllcorner 10\nyllcorner 20", "xllcenter 1.5\nyllcenter -3")
-    ]
-
-
 def _columns(_: Path) -> Seeds:
     """Profiles and points with a column of validity or of numbering."""
     line = [f"{0.5 * k:g};{z:g};{k % 3 > 0:d}" for k, z in enumerate(_heights()[0])]
@@ -174,11 +166,6 @@ def _columns(_: Path) -> Seeds:
     ]
     tables = (["X;Y;valid", "[mm];[mm];[1/0]", *line], ["index,x in um,y in um,z in um", *points])
     return ["\n".join(table).encode() for table in tables]
-
-
-def _uneven(_: Path) -> Seeds:
-    rows = (f"{k + 0.2 * (k % 2):g} {z:g}" for k, z in enumerate(_heights()[0]))
-    return ["\n".join(rows).encode()]
 
 
 def _stl(folder: Path) -> Seeds:
@@ -286,9 +273,7 @@ SEEDS: dict[str, Callable[[Path], Seeds]] = {
     "png": _png,
     "tiff": _tiff,
     "tiff-lengths": _tiff_lengths,
-    "esri": _esri,
     "columns": _columns,
-    "uneven": _uneven,
     "stl-binary": _stl,
     "stl-text": _stl_text,
     "obj": _obj,
@@ -301,7 +286,7 @@ SEEDS: dict[str, Callable[[Path], Seeds]] = {
 }
 OPTIONS: dict[str, dict[str, Any]] = {
     name: {"unit": "mm"} for name in ("stl-binary", "stl-text", "obj", "hdf5", "matlab")
-} | {"uneven": {"unit": "m", "resample": 0.5}}
+}
 
 
 def available_readers() -> list[str]:

@@ -321,14 +321,6 @@ def _one_unit(s: Sheet) -> tuple[str, str]:
     return f"x y z [{s.unit}]\n", s.points(separator=" ")
 
 
-def _esri(s: Sheet) -> tuple[str, str]:
-    s.gap, s.pitch = "-9999", (s.pitch[0], s.pitch[0])
-    head = f"ncols {s.columns}\nnrows {s.rows}\nxllcorner 0\nyllcorner 0\ncellsize {s.pitch[0]}\n"
-    numbers = s.matrix(" ", "m")
-    s.heights = s.heights[::-1]
-    return head + "NODATA_value -9999\n", numbers
-
-
 def _ntmdt(s: Sheet) -> tuple[str, str]:
     head = f"File Format = ASCII\nNX = {s.columns}\nNY = {s.rows}\nScale X = {s.step(0)}\n"
     return head + f"Unit X = {s.lateral}\nScale Z = 0.01\nUnit Z = {s.unit}\n", s.matrix()
@@ -428,7 +420,6 @@ STYLES: dict[str, Style] = {
     "profile z, x": _reversed_profile,
     "points with intensity": _with_intensity,
     "points, one unit": _one_unit,
-    "ESRI grid": _esri,
     "NT-MDT": _ntmdt,
     "WSxM points": _wsxm,
     "Filmetrics": _filmetrics,
@@ -453,8 +444,6 @@ def make_file(style: str, trial: int) -> tuple[str, Sheet]:
     sign = "# " if head.startswith("#") or rng.random() < 0.3 else ""
     if re.search("pixel|spacing|pitch", head, re.IGNORECASE) and rng.random() < 0.3:
         extra.append("Dx=2um")  # which contradicts the pitch
-    if style == "ESRI grid":  # recognised by its first words
-        extra = []
     return "".join(f"{sign}{line}\n" for line in extra) + head + numbers, sheet
 
 
@@ -482,11 +471,7 @@ Reading = Callable[[Path], RawSurface]
 
 def read_plain(path: Path) -> RawSurface:
     """Read a file as asperity does, without the readers of instruments."""
-    from asperity.measured.reading import read_surface
-    from asperity.measured.reading.grids import is_esri
-
-    file = SurfaceFile.open(path)
-    return read_surface(path) if is_esri(file) else read_text(file, ReadingOptions())
+    return read_text(SurfaceFile.open(path), ReadingOptions())
 
 
 def read_by_any_unit(path: Path) -> RawSurface:

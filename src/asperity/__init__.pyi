@@ -27,6 +27,8 @@ from asperity.devices import Device as Device
 from asperity.devices import load_device as load_device
 from asperity.envelopes.envelope import Envelope as Envelope
 from asperity.envelopes.envelope import envelope as envelope
+from asperity.envelopes.find_design import Design as Design
+from asperity.envelopes.find_design import design as design
 from asperity.export.export_surface import export_code as export_code
 from asperity.laws import Law as Law
 from asperity.recording.recording import Recording as Recording

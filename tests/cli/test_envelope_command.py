@@ -1,4 +1,4 @@
-"""Output, files and errors of ``asperity envelope``."""
+"""Output, files and errors of ``asperity envelope`` and ``asperity design``."""
 
 from __future__ import annotations
 
@@ -36,6 +36,30 @@ def test_envelope_writes_what_python_returns(call: Call, tmp_path: Path) -> None
     assert "Which sinusoids are rendered" in Path(paths[3]).read_text("utf-8")
 
 
+WAVE = "sinusoid:period=2mm,amplitude=0.1mm"
+DESIGN = ("design", WAVE, "--device", "touch", "--laws", "C")
+
+
+def test_design_writes_what_python_returns(call: Call, tmp_path: Path) -> None:
+    paths = [str(tmp_path / name) for name in ("data.json", "report.html")]
+    files = ("--json", paths[0], "--html", paths[1])
+    code, out, err = call(*DESIGN, "--texture-force", "5mN", *files, width=80)
+    assert (code, err) == (0, "")
+    assert max(len(line) for line in out.splitlines() if not line.startswith("Report: ")) <= 80
+    assert "…" not in out
+    result = asp.design(WAVE, "touch", "C", texture_force=5e-3)
+    data = json.loads(Path(paths[0]).read_text("utf-8"))
+    assert data == json.loads(json.dumps(result.to_dict()))
+    assert data["is_feasible"] is True
+    assert "Margins: by which factor" in Path(paths[1]).read_text("utf-8")
+
+
+def test_design_beyond_reach_is_an_answer(call: Call) -> None:
+    code, out, err = call(*DESIGN, "--texture-force=1N")
+    assert (code, err) == (0, "")
+    assert "Not met. 50 mN RMS can be reached; stability limits it." in " ".join(out.split())
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -45,6 +69,11 @@ def test_envelope_writes_what_python_returns(call: Call, tmp_path: Path) -> None
         (("envelope", "--min-stiffness", "0N/m"), "min_stiffness must be positive"),
         (("envelope", "--laws", "C", "--friction", "0.5"), "friction"),
         (("envelope", "--surface", "nix.x3p"), "nix.x3p"),
+        ((*DESIGN, "--at", "elbow"), "at must be motor or hand"),
+        ((*DESIGN, "--texture-force", "3kg"), "texture_force must be a quantity"),
+        ((*DESIGN, "--texture-force", "0mN"), "texture_force must be positive"),
+        (("design", WAVE, "--device", "touch,omega.3"), "single device"),
+        (("design", "nix"), "surface is neither"),
     ],
 )
 def test_bad_input_is_one_line(

@@ -30,6 +30,7 @@ MISTAKES: list[tuple[str, tuple[str, ...]]] = [
     ("envelop --device touch", ("'envelop'", "did you mean 'envelope'?")),
     ("envelope --device tuoch", ("device is unknown: 'tuoch'", "did you mean 'touch'")),
     ("study report nowhere", ("folder", "asperity study run makes one")),
+    ("design cloth --texture-force 3kg", ("texture_force", "'3kg'")),
     ("sweep cloth --vary texture.magnifi=1,2", ("texture.magnifi", "texture.magnify")),
     # Options misspelt.
     ("compare cloth --devise touch", ("--devise", "did you mean '--device'?")),
@@ -49,7 +50,7 @@ MISTAKES: list[tuple[str, tuple[str, ...]]] = [
     ("compare cloth --law H", ("compare has no option --law", "'--laws'", "analyze, limits")),
     (
         "analyze cloth --laws WA",
-        ("analyze has no option --laws", "'--law'", "compare, sweep, envelope, onset"),
+        ("analyze has no option --laws", "'--law'", "compare, sweep, envelope, design, onset"),
     ),
     (
         "compare cloth --output r.html",

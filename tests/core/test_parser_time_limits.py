@@ -18,7 +18,6 @@ from asperity.core.errors import AsperityError
 from asperity.core.units import parse_quantity
 from asperity.devices.device_file import load_device
 from asperity.measured.reading import ReadingOptions, SurfaceFile
-from asperity.measured.reading.grids import read_esri
 from asperity.measured.reading.images.pixels import ome_scale
 from asperity.measured.reading.metrology.sdf import read_sdf
 from asperity.measured.reading.metrology.x3p import parse_header
@@ -101,7 +100,6 @@ BOMB = '<!DOCTYPE a [<!ENTITY a "aaaaaaaa">' + "".join(
 SDF = (
     "aISO-1.0\nManufacID = x\nNumPoints = 4\nNumProfiles = 2\nXscale = 1\nYscale = 1\nZscale = 1\n"
 )
-ESRI = "ncols 4\nnrows 3\ncellsize 1\n"
 PARSERS: dict[str, tuple[Callable[[str], object], tuple[str, ...]]] = {
     "quantity": (lambda text: parse_quantity("period", text, "m"), ("", "1 ", "1 mm")),
     "argument": (parse_every_form, ("",)),
@@ -114,13 +112,9 @@ PARSERS: dict[str, tuple[Callable[[str], object], tuple[str, ...]]] = {
         lambda text: read_text(to_surface_file(text), ReadingOptions()),
         ("", "# Width: ", "x [um] "),
     ),
-    "text, resampled": (
-        lambda text: read_text(to_surface_file(text), ReadingOptions(resample=1.0)),
-        ("", "x;z;valid\n[mm];[mm];[1/0]\n", "index,x [m],z [m]\n"),
-    ),
-    "ESRI grid": (
-        lambda text: read_esri(to_surface_file(text), ReadingOptions()),
-        ("ncols ", ESRI, f"{ESRI}1 "),
+    "text with columns": (
+        lambda text: read_text(to_surface_file(text), ReadingOptions()),
+        ("x;z;valid\n[mm];[mm];[1/0]\n", "index,x [m],z [m]\n"),
     ),
     "OME": (ome_scale, ("", "<Pixels ", '<a:Pixels PhysicalSizeX="1" ')),
     "SDF": (

@@ -41,6 +41,7 @@ EXAMPLES: dict[str, Callable[[], Any]] = {
     "Analysis": lambda: asp.analyze(surface("B"), "touch"),
     "Bound": lambda: asp.characteristic_number(surface("F")),
     "Comparison": lambda: asp.compare(MANY, "touch", "WC", max_depth=1e-5),
+    "Design": lambda: asp.design("sinusoid:amplitude=0.1mm,period=2mm", "touch", "C"),
     "Device": lambda: asp.load_device("touch"),
     "DeviceComparisons": lambda: compare_devices(MANY, ["touch"], laws="WC", max_depths=[1e-5]),
     "Envelope": lambda: asp.envelope("touch", "C", wavelengths=[1e-3, 2e-3]),

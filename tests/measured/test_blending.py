@@ -28,44 +28,31 @@ def smooth_step(s: float) -> float:
 @pytest.mark.parametrize("band", [4, 7, 12])
 @pytest.mark.parametrize("seed", range(8))
 def test_profile_matches_a_reference_loop(band: int, seed: int) -> None:
-    n, step = 40, 2e-6
+    n = 40
     heights = np.random.default_rng(seed).standard_normal(n)
-    blended, seam = blend_borders(heights, (band,), (step,))
-    expected, changes, pieces = heights[: n - band].copy(), [], []
+    blended, jump = blend_borders(heights, (band,))
+    expected = heights[: n - band].copy()
     for i in range(band):
         t = smooth_step((i + 1) / (band + 1))
         expected[i] = t * heights[i] + (1 - t) * heights[n - band + i]
-        pieces.append("end" if i < band // 2 else "start")
-        changes.append(expected[i] - heights[n - band + i if pieces[-1] == "end" else i])
     np.testing.assert_allclose(blended, expected, atol=1e-14)
-    assert seam.rms == pytest.approx(np.sqrt(np.mean(np.square(changes))), rel=1e-12)
-    assert seam.jump == pytest.approx(abs(heights[0] - heights[-1]))
-    slopes = []
-    for i in range(-1, band):  # the step from i to i + 1, compared with the original step(s)
-        step_change = expected[(i + 1) % (n - band)] - expected[i % (n - band)]
-        if i < band // 2:
-            slopes.append(step_change - (heights[n - band + i + 1] - heights[n - band + i]))
-        if i >= band // 2:
-            slopes.append(step_change - (heights[i + 1] - heights[i]))
-    assert seam.slope == pytest.approx(np.abs(slopes).max() / step, rel=1e-12)
+    assert jump == pytest.approx(abs(heights[0] - heights[-1]))
 
 
 def test_periodic_surface_is_only_shortened() -> None:
     y, x = np.mgrid[:48, :66]
     periodic = np.sin(2 * np.pi * x / 60) + np.cos(2 * np.pi * y / 20)
-    blended, seam = blend_borders(periodic, (6, 8), (1.0, 1.0))
+    blended, _ = blend_borders(periodic, (6, 8))
     np.testing.assert_allclose(blended, periodic[:40, :60], atol=1e-14)
-    assert seam.rms < 1e-14
-    assert seam.slope < 1e-14
 
 
 def test_seam_is_as_smooth_as_the_surface() -> None:
     heights = bumpy()
-    blended, seam = blend_borders(heights, (10, 12), (1.0, 1.0))
+    blended, _ = blend_borders(heights, (10, 12))
     assert blended.shape == (48, 40)
     steps_inside = np.abs(np.diff(heights, axis=1)).max()
     across = np.abs(blended[:, 0] - blended[:, -1]).max()
-    assert across < steps_inside + seam.slope
+    assert across < 1.1 * steps_inside
     assert (
         np.abs(heights[:, 0] - heights[:, 39]).max() > 3 * steps_inside
     )  # shortening alone is not smooth
@@ -75,7 +62,7 @@ def test_seam_is_as_smooth_as_the_surface() -> None:
 
 def test_heights_beyond_the_bands_are_unchanged() -> None:
     heights = bumpy()
-    blended, _ = blend_borders(heights, (10, 12), (1.0, 1.0))
+    blended, _ = blend_borders(heights, (10, 12))
     np.testing.assert_array_equal(blended[12:, 10:], heights[12:48, 10:40])
 
 

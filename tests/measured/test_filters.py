@@ -85,16 +85,6 @@ def test_transmission_at_the_cutoff_is_one_half() -> None:
     np.testing.assert_allclose(rough, wave_at_cutoff / 2, atol=1e-18)
 
 
-@pytest.mark.parametrize("block", [1, 100, 700])
-def test_result_is_independent_of_the_block_size(
-    monkeypatch: pytest.MonkeyPatch, block: int
-) -> None:
-    heights = np.random.default_rng(2).standard_normal((31, 23))
-    whole = gaussian_filter(heights, (1.0, 2.0), 7.0)
-    monkeypatch.setattr(filters, "_BLOCK", block)
-    np.testing.assert_allclose(gaussian_filter(heights, (1.0, 2.0), 7.0), whole, atol=1e-14)
-
-
 def test_input_is_not_changed() -> None:
     heights = np.random.default_rng(2).standard_normal((9, 8))
     before = heights.copy()

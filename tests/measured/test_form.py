@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from asperity.core.errors import ParameterError
-from asperity.measured import form as module
 from asperity.measured.form import fit_form, subtract_form
 from asperity.measured.preparation import prepare
 from asperity.measured.reading import RawSurface
@@ -34,7 +33,7 @@ def test_fit_is_the_least_squares_polynomial(degree: int, holes: bool) -> None:
     valid = ~np.isnan(heights)
     basis = monomials(heights.shape, degree)
     coefficients, *_ = np.linalg.lstsq(basis[valid], heights[valid], rcond=None)
-    fitted = fit_form(heights, degree).evaluate_rows(slice(None))
+    fitted = fit_form(heights, degree).evaluate()
     np.testing.assert_allclose(fitted, basis @ coefficients, atol=1e-10)
 
 
@@ -58,9 +57,7 @@ def test_form_of_a_profile(degree: int) -> None:
     heights[20:50] = np.nan
     valid = ~np.isnan(heights)
     expected = np.polyval(np.polyfit(x[valid], heights[valid], degree), x)
-    np.testing.assert_allclose(
-        fit_form(heights, degree).evaluate_rows(slice(None)), expected, atol=1e-9
-    )
+    np.testing.assert_allclose(fit_form(heights, degree).evaluate(), expected, atol=1e-9)
 
 
 def test_fit_is_accurate_for_an_ill_conditioned_basis() -> None:
@@ -69,18 +66,8 @@ def test_fit_is_accurate_for_an_ill_conditioned_basis() -> None:
     heights[180:] = np.nan
     x = np.linspace(-1, 1, 300)
     fitted = np.polynomial.Chebyshev.fit(x[:180], heights[:180], 6)  # uses singular values
-    form = fit_form(heights, 6).evaluate_rows(slice(None))[:180]
+    form = fit_form(heights, 6).evaluate()[:180]
     assert np.max(np.abs(form - fitted(x[:180]))) < 1e-13
-
-
-def test_result_is_independent_of_the_block_size(monkeypatch: pytest.MonkeyPatch) -> None:
-    heights = rough((33, 20))
-    whole = heights.copy()
-    step = subtract_form(whole, fit_form(whole, 3), (1e-6, 2e-6))
-    monkeypatch.setattr(module, "_BLOCK", 50)
-    blockwise = heights.copy()
-    assert subtract_form(blockwise, fit_form(blockwise, 3), (1e-6, 2e-6)) == step
-    np.testing.assert_allclose(blockwise, whole, atol=1e-13)
 
 
 def test_step_states_size_and_slopes_of_the_form() -> None:

@@ -117,7 +117,6 @@ def test_prepared_surface_can_be_magnified(saved: Path) -> None:
         {"blend": 1e-5},
         {"unit": "m"},
         {"channel": 0},
-        {"integrate_normals": True},
     ],
 )
 def test_preparation_arguments_are_refused_for_a_prepared_surface(

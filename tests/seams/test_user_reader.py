@@ -1,12 +1,12 @@
-"""User-defined file readers: from the entry point of another package, and registered."""
+"""User-defined file readers: from a plugin, and registered."""
 
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
+from subprocess import CompletedProcess
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,6 @@ from asperity.measured.reading import RawSurface, Reader, read_surface, register
 from asperity.measured.reading import readers as registry
 
 READER = page_example("howto/readers.md", "Add a file format", "{run}")
-POINTS = "[asperity.readers]\nwaffle = waffles:WAFFLE\n"
 HEIGHTS = np.random.default_rng(7).normal(size=(6, 8)).round(3)
 
 
@@ -30,33 +29,27 @@ def write_waffle(folder: Path) -> Path:
 
 
 @pytest.fixture
-def package(tmp_path: Path) -> Path:
-    """Return a folder with an installed distribution: a module and the entry point of a reader."""
-    folder = tmp_path / "site"
-    info = folder / "waffles-1.0.dist-info"
-    info.mkdir(parents=True)
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: waffles\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(POINTS)
-    (folder / "waffles.py").write_text(READER)
-    return folder
+def plugin(tmp_path: Path) -> Path:
+    """Return the file of the page's example."""
+    path = tmp_path / "waffles.py"
+    path.write_text(READER)
+    return path
 
 
-def run_asperity(package: Path | None, *arguments: str) -> subprocess.CompletedProcess[str]:
-    package_paths = [] if package is None else [str(package)]
-    inherited = os.environ.get("PYTHONPATH", "")
-    path = os.pathsep.join([*package_paths, *([inherited] if inherited else [])])
+def run_asperity(plugin: Path | None, command: str, *arguments: str) -> CompletedProcess[str]:
+    loaded = [] if plugin is None else ["--plugin", str(plugin)]
+    main = "from asperity.cli.main import main; main()"
     return subprocess.run(
-        [sys.executable, "-c", "from asperity.cli.main import main; main()", *arguments],
-        env=os.environ | {"PYTHONPATH": path},
+        [sys.executable, "-c", main, command, *loaded, *arguments],
         capture_output=True,
         text=True,
         check=False,
     )
 
 
-def test_every_command_reads_the_file(package: Path, tmp_path: Path) -> None:
+def test_every_command_reads_the_file(plugin: Path, tmp_path: Path) -> None:
     path, page = write_waffle(tmp_path), tmp_path / "page.html"
-    process = run_asperity(package, "compare", str(path), "--laws", "WA", "--json", "-")
+    process = run_asperity(plugin, "compare", str(path), "--laws", "WA", "--json", "-")
     assert process.returncode == 0, process.stderr
     texture = json.loads(process.stdout)["texture"]
     assert texture["preparation"][0] == "a waffle"
@@ -65,61 +58,27 @@ def test_every_command_reads_the_file(package: Path, tmp_path: Path) -> None:
     scene.write_text(f'[texture]\nkind = "file"\npath = "{path.name}"\n[surface]\nlaw = "A"\n')
     json_path = tmp_path / "found.json"
     process = run_asperity(
-        package, "analyze", str(scene), "--json", str(json_path), "--html", str(page)
+        plugin, "analyze", str(scene), "--json", str(json_path), "--html", str(page)
     )
     assert process.returncode == 0, process.stderr
     assert "a waffle" in page.read_text()
     assert json.loads(json_path.read_text())["texture"] == texture
 
     prepared_path = tmp_path / "kept.npz"
-    process = run_asperity(package, "prepare", str(path), "--unit", "mm", "-o", str(prepared_path))
+    process = run_asperity(plugin, "prepare", str(path), "--unit", "mm", "-o", str(prepared_path))
     assert process.returncode == 0, process.stderr
     heights = np.load(prepared_path)["heights"]
     assert heights.shape == HEIGHTS.shape
     assert np.std(heights) > 1e-4  # millimetres now
 
 
-def test_file_is_refused_without_the_package(tmp_path: Path) -> None:
+def test_file_is_refused_without_the_plugin(tmp_path: Path) -> None:
     process = run_asperity(
         None, "prepare", str(write_waffle(tmp_path)), "-o", str(tmp_path / "kept.npz")
     )
     assert (process.returncode, process.stdout) == (2, "")
     assert "map.waffle looks like a binary file" in process.stderr
     assert not (tmp_path / "kept.npz").exists()
-
-
-@pytest.mark.parametrize(
-    ("module", "reason"),
-    [
-        ("import nothing_of_this_name\n", "ModuleNotFoundError"),
-        ("BROKEN = 3\n", "TypeError: broken:BROKEN is no Reader"),
-        (
-            "from asperity.measured.reading import Reader\n"
-            "BROKEN = Reader('a broken file', lambda file: file.nothing, None)\n",
-            "AttributeError",
-        ),
-    ],
-)
-def test_broken_package_is_named_and_other_readers_work(
-    package: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, module: str, reason: str
-) -> None:
-    (package / "broken.py").write_text(module)
-    entry_points = package / "waffles-1.0.dist-info" / "entry_points.txt"
-    entry_points.write_text(POINTS + "a-broken-one = broken:BROKEN\n")
-    monkeypatch.syspath_prepend(str(package))
-    try:
-        raw = read_surface(write_waffle(tmp_path))
-        np.testing.assert_array_equal(raw.heights, 1e-6 * HEIGHTS)
-        assert any("broken" in note and reason in note for note in raw.notes)
-        unknown = tmp_path / "unknown"
-        unknown.write_bytes(bytes(range(256)))
-        with pytest.raises(SurfaceFileError, match=f"looks like a binary file.*broken.*{reason}"):
-            read_surface(unknown)
-        np.save(tmp_path / "a.npy", HEIGHTS)  # recognised by its signature, without packages
-        assert len(read_surface(tmp_path / "a.npy").notes) == 1
-    finally:
-        for name in ("broken", "waffles"):
-            sys.modules.pop(name, None)
 
 
 @pytest.fixture
@@ -164,6 +123,16 @@ def test_heights_without_a_unit_are_noted_as_metres(text_file: Path) -> None:
     registry.USER_READERS.clear()
     register(make_reader(RawSurface(np.ones(5), None, "a.txt", (), has_units=False, relative=True)))
     assert read_surface(text_file).notes == ()
+
+
+@pytest.mark.usefixtures("no_user_readers")
+def test_error_in_recognising_names_the_reader(text_file: Path) -> None:
+    def recognises(file: Any) -> bool:
+        return bool(file.nothing)
+
+    register(Reader("a groove", recognises, lambda *_: None))
+    with pytest.raises(SurfaceFileError, match=r"reader of a groove failed \(AttributeError"):
+        read_surface(text_file)
 
 
 @pytest.mark.usefixtures("no_user_readers")

@@ -11,7 +11,7 @@ import pytest
 from asperity.core.errors import ParameterError
 from asperity.measured.file_arguments import SYNTHETIC_ARGUMENTS
 from asperity.scene import load_scene
-from asperity.textures import Fourier, HeightMap, Profile, Sinusoid, Texture
+from asperity.textures import Fourier, HeightMap, Sinusoid, Texture
 from asperity.textures.catalogue import CATALOGUE
 from asperity.textures.domain import Domain, ScanLine
 from asperity.textures.synthetic import prepare_texture
@@ -85,30 +85,6 @@ def test_periodic_map_is_filtered_across_its_border() -> None:
     assert not np.allclose(mirrored.heights, filtered.heights, atol=1e-6)
 
 
-@pytest.mark.parametrize("shift", [0, 5, 23])
-def test_tip_scans_a_periodic_profile_across_its_border(shift: int) -> None:
-    heights = 2e-5 * RNG.standard_normal(48)
-
-    def scan(values: np.ndarray) -> np.ndarray:
-        scanned = prepare_texture(Profile(values, 1e-5, periodic=True), tip_radius=4e-5)
-        assert isinstance(scanned, Profile)
-        return np.asarray(scanned.heights)
-
-    np.testing.assert_allclose(scan(np.roll(heights, shift)), np.roll(scan(heights), shift))
-    assert (scan(heights) >= heights).all()
-    assert (scan(heights) > heights).any()
-
-
-def test_scanned_sinusoid_is_a_spline_profile() -> None:
-    scanned = prepare_texture(Sinusoid(1e-4, 1e-3), tip_radius=0.9e-3)
-    assert isinstance(scanned, Profile)
-    assert scanned.preparation[0].startswith("made from Sinusoid(amplitude=0.0001")
-    assert scanned.height([[0.25e-3, 0.0]])[0] == pytest.approx(1e-4, rel=1e-3)
-    assert scanned.height([[0.75e-3, 0.0]])[0] > -0.9e-4  # the valley is too narrow
-    with pytest.raises(ParameterError, match="needs a texture whose waves run along x"):
-        prepare_texture(Sinusoid(1e-4, 1e-3, direction=(1, 1)), tip_radius=0.9e-3)
-
-
 class Hill(Texture):
     """A user-defined texture with only the abstract members and the sampler of a sinusoid."""
 
@@ -136,7 +112,7 @@ def test_texture_without_optional_members_is_sampled() -> None:
 
 BAD = [
     ("sinusoid:amplitude=1mm,period=1mm", {"form": 2}, "form applies to measured surfaces only"),
-    ("knurl", {"outliers": 6.0}, "others take height_range, s_cutoff, l_cutoff, tip_radius, magn"),
+    ("knurl", {"outliers": 6.0}, "others take height_range, s_cutoff, l_cutoff, magn"),
     ("knurl", {"magnify": 0.0}, "magnify must be positive"),
     ("knurl", {"s_cutoff": 1.0}, "s_cutoff must be at most"),
     ("sinusoid:amplitude=1mm,period=1mm", {"s_cutoff": -1.0}, "s_cutoff must be positive"),
@@ -176,6 +152,11 @@ def test_texture_argument_precedes_a_preparation_of_the_same_name() -> None:
     assert not any("filtered" in step for step in unfiltered.preparation)
     filtered = load_scene("noise:rms=20um,size=5mm", {"s_cutoff": 0.5e-3}).texture
     assert any("filtered" in step for step in filtered.preparation)
+
+
+def test_tip_is_for_measured_surfaces() -> None:
+    with pytest.raises(ParameterError, match="tip_radius applies to measured surfaces only"):
+        load_scene("sinusoid:amplitude=0.1mm,period=1mm", {"tip_radius": 1e-4})
 
 
 def test_preparation_arguments_are_declared() -> None:

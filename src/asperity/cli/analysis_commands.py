@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shlex
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -217,6 +217,15 @@ _CONDITIONS = (SPEED, *options.command_arguments("envelope"), MAX_DEPTH, GRIP, *
 _LAW_PARAMETERS = tuple(SHIPPED_LAW_ARGUMENTS.values())
 
 
+def _check_paths(outputs: Outputs, paths: Sequence[str]) -> None:
+    """Check the paths of ``--output`` before anything is computed."""
+    from asperity.report.envelope_report import check_suffix
+
+    for path in paths:
+        check_suffix(path)
+    check_outputs(force=outputs.force, **{f"output {i}": path for i, path in enumerate(paths, 1)})
+
+
 @declare_command("envelope")
 @options.device_option(
     "Devices of the catalogue, or TOML files, 'touch,mine.toml'.  [default: omega.3]",
@@ -255,11 +264,9 @@ def envelope_command(
     the texture is felt at that stiffness on a scan, as in asperity compare.
     """
     from asperity.envelopes.envelope import envelope, textured_laws
-    from asperity.report.envelope_report import check_suffix, envelope_page, write_envelope
+    from asperity.report.envelope_report import envelope_page, write_envelope
 
-    for path in output:
-        check_suffix(path)
-    check_outputs(force=outputs.force, **{f"output {i}": path for i, path in enumerate(output, 1)})
+    _check_paths(outputs, output)
     devices = [
         values["settings"].apply_to(one) for one in device or options.parse_devices("omega.3")
     ]
@@ -276,6 +283,51 @@ def envelope_command(
     for path in output:
         write_envelope(result, path)
     outputs.write(result, envelope_page(result))
+
+
+_TARGET = (*options.command_arguments("design"), *_CONDITIONS[:4])
+
+
+@declare_command("design")
+@click.argument("surface")
+@options.device_option()
+@options.laws_option("Laws, of which the best is chosen.  [default: all with a texture]")
+@options.argument_options(_TARGET)
+@options.law_options(_LAW_PARAMETERS)
+@options.file_options
+@options.jobs_option
+@output_options()
+def design_command(
+    surface: str,
+    device: Device | None,
+    laws: tuple[Law, ...] | None,
+    outputs: Outputs,
+    **values: Any,
+) -> None:
+    """Find law, stiffness and size of SURFACE that meet a target with the greatest margin.
+
+    The height of a single sinusoid is scaled; other surfaces are magnified in all directions,
+    further than by --magnify. Without --texture-force the largest texture is found that is stable
+    and felt.
+    """
+    from asperity.envelopes.envelope import textured_laws
+    from asperity.envelopes.find_design import design
+    from asperity.report.design_report import design_page
+    from asperity.scene import load_scene
+
+    chosen = laws or textured_laws()
+    with step_bar("reading the surface", len(chosen) + 4) as step:
+        step("reading the surface")
+        scene = load_scene(surface, options.file_values(values))
+        result = design(
+            scene.texture,
+            options.select_device(device, scene, values),
+            chosen,
+            law_parameters=_law_parameters(values),
+            progress=step,
+            **options.provided_values(values, _TARGET),
+        )
+    outputs.write(result, design_page(result))
 
 
 def _law_parameters(values: dict[str, Any]) -> dict[str, Any]:

@@ -11,9 +11,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from asperity.analysis.bounds.bound import NORM, ONE_SIDED, Bound
+from asperity.analysis.bounds.bound import NORM, ONE_SIDED, Bound, JacobianMeasure
 from asperity.analysis.energy.merit import scan_ripple
-from asperity.analysis.gain.characteristic import cached_number
+from asperity.analysis.gain.characteristic import cached_number, is_shipped_law
 from asperity.analysis.limits import perceptibility
 from asperity.analysis.limits.limit_rules import (
     DEFAULT_SAMPLES,
@@ -22,19 +22,22 @@ from asperity.analysis.limits.limit_rules import (
     check_sample_count,
 )
 from asperity.analysis.passivity.verdict import StiffnessRecommendation, recommend_stiffness
+from asperity.core.arguments import FIELD, SEARCH
 from asperity.core.checks import check_keywords, check_positive
 from asperity.core.files import Serializable
 from asperity.devices import Device
 from asperity.laws import Law, find_law
 from asperity.perception.grip import DEFAULT_GRIP, Grip, load_grip
-from asperity.rendering import rendered_surface
+from asperity.rendering import is_searched, rendered_surface
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
+from asperity.textures.fields.bake import BakeGoal
 from asperity.textures.texture import Texture
 
 DEFAULT_MIN_STIFFNESS = 100.0
 """Least stiffness of a wall [N/m]: a press of 1 N sinks in by at most 10 mm."""
 
+Original = tuple[Texture, float]
 _SCAN_POINTS = 256
 """Points of a period of one wave: forces that bend differ by 1e-4 from those of 16384 points."""
 
@@ -99,6 +102,7 @@ class Trial:
         q: characteristic number.
         waves: waves of the texture on a scan; ``None`` without a recommended stiffness.
         min_stiffness: least stiffness of the wall [N/m].
+        doubtful: numbers of the device that are not trusted.
     """
 
     surface: Surface
@@ -106,6 +110,7 @@ class Trial:
     q: Bound
     waves: perceptibility.WaveScan | None
     min_stiffness: float
+    doubtful: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def firm(self) -> float:
@@ -148,12 +153,14 @@ class WaveCase:
         law_parameters: its parameters.
         device: the device.
         conditions: what rendering means.
+        rendering: how law H is rendered; see :func:`~asperity.rendering.rendered_surface`.
     """
 
     law: str | Law
     law_parameters: Mapping[str, float]
     device: Device
     conditions: RenderConditions
+    rendering: str = FIELD
 
     @property
     def letter(self) -> str:
@@ -164,28 +171,54 @@ class WaveCase:
         """Return a texture with this law, as a loop renders it."""
         depth, parameters = self.conditions.max_depth, self.law_parameters
         return rendered_surface(
-            Surface(texture, self.law, max_depth=depth, law_parameters=parameters)
+            Surface(texture, self.law, max_depth=depth, law_parameters=parameters), self.rendering
         )
 
-    def recommend(self, texture: Texture) -> Trial:
+    def recommend(self, texture: Texture, original: Original | None = None) -> Trial:
         """Return a texture at its recommended stiffness, without its waves."""
         surface = self.surface(texture)
-        q = cached_number(surface, NORM)
+        numbered = surface if original is None else self._unmagnified(surface, *original)
+        q = self._number(numbered, NORM)
         # A law with curl is limited by the wall's gain K₀/q alone, whatever q⁺ is.
         is_conservative = surface.facts.conservative
-        one_sided = cached_number(surface, ONE_SIDED) if is_conservative else q
+        one_sided = self._number(numbered, ONE_SIDED) if is_conservative else q
         recommended = recommend_stiffness(surface, self.device, q, one_sided)
         if recommended.stiffness:
             surface = surface.to_stiffness(recommended.stiffness)
         return Trial(surface, recommended, q, None, self.conditions.min_stiffness)
 
-    def trial(self, texture: Texture) -> Trial:
-        """Return a texture at its recommended stiffness, with its waves."""
-        trial, conditions = self.recommend(texture), self.conditions
+    def _unmagnified(self, surface: Surface, texture: Texture, factor: float) -> Surface:
+        """Return the surface whose lengths are shorter by a factor: q and q⁺ are the same."""
+        if not is_shipped_law(surface.law):  # it may have lengths that are not parameters
+            return surface
+        units = {name: one.unit for name, one in surface.law.arguments.items()}
+        shorter = {
+            name: value / factor if units[name] == "m" else value
+            for name, value in surface.law_parameters.items()
+        }
+        depth = float(f"{surface.max_depth / factor:.9g}")  # one number for equal depths
+        return Surface(texture, self.law, max_depth=depth, law_parameters=shorter)
+
+    def _number(self, surface: Surface, measure: JacobianMeasure) -> Bound:
+        """Return a number of a surface; of law H that is searched, the one to which it is baked."""
+        found = cached_number(surface, measure)
+        if self.rendering == SEARCH and is_searched(surface):
+            return replace(found, upper=BakeGoal.max_gain * found.upper)
+        return found
+
+    def trial(self, texture: Texture, original: Original | None = None) -> Trial:
+        """Return a texture at its recommended stiffness, with its waves.
+
+        Args:
+            texture: the texture.
+            original: a texture of which it is a magnification, and the factor, if q is to be
+                computed there.
+        """
+        trial, conditions = self.recommend(texture, original), self.conditions
         if not trial.recommended.stiffness:
             return trial
         surface, points = trial.surface, _SCAN_POINTS if texture.single_wave else None
-        waves, _doubtful, _rms = perceptibility.scan_waves(
+        waves, doubtful, _rms = perceptibility.scan_waves(
             surface,
             self.device,
             texture.texture_part(),
@@ -195,7 +228,7 @@ class WaveCase:
             points=points,
             **conditions.scan,
         )
-        return replace(trial, waves=waves)
+        return replace(trial, waves=waves, doubtful=doubtful)
 
     def try_wave(self, wavelength: float, amplitude: float) -> Trial:
         """Return the trial of a sinusoid [m]."""

@@ -25,7 +25,7 @@ PREPARATION_ARGUMENTS = (*read_arguments(_TABLES, "preparation").values(), *MAGN
 FILE_ARGUMENTS = (*READING_ARGUMENTS, *PREPARATION_ARGUMENTS)
 """All arguments of a measured file."""
 
-_SYNTHETIC_NAMES = {"height_range", "s_cutoff", "l_cutoff", "tip_radius"}
+_SYNTHETIC_NAMES = {"height_range", "s_cutoff", "l_cutoff"}
 _SYNTHETIC_NAMES |= {argument.name for argument in MAGNIFICATION_ARGUMENTS}
 SYNTHETIC_ARGUMENTS = tuple(
     replace(argument, default_description="none") if argument.name == "s_cutoff" else argument

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from asperity.core.checks import FloatArray
+from asperity.core.errors import ParameterError
 from asperity.measured.lengths import Pitch
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-_DIRECT_LIMIT = 100_000  # points solved together by the direct solver; larger holes one by one
-_TOLERANCE = 1e-10  # relative residual of the iterative solver
+_GROUP_SIZE = 100_000  # points solved together; larger holes one by one
+_MAX_HOLE = 2_000_000  # points of a hole: some 20 s and 3 GB
 
 Indices = NDArray[np.int64]
 
@@ -29,12 +29,14 @@ def fill_in_place(heights: FloatArray, pitch: Pitch) -> None:
     a hole the result has no extremum, and a plane around an interior hole is continued
     exactly. On a profile this is linear interpolation, constant beyond the ends.
 
-    Holes are independent of each other: small ones are solved directly in groups, each large one by
-    conjugate gradients with a multigrid preconditioner.
+    Holes are independent of each other: small ones are solved in groups, each large one by itself.
 
     Args:
         heights: [m], shape (ny, nx) or (n,), with at least one valid point; changed in place.
         pitch: (px, py) [m]; only the ratio matters.
+
+    Raises:
+        ParameterError: a hole is too large.
 
     Example:
         >>> heights = np.array([0.0, np.nan, 2.0, np.nan])
@@ -55,11 +57,11 @@ def fill_in_place(heights: FloatArray, pitch: Pitch) -> None:
     mean = float(np.nanmean(heights))
     weights = (1.0, (pitch[0] / pitch[1]) ** 2)
     for points in _hole_groups(missing):
+        if len(points) > _MAX_HOLE:
+            words = f"has a hole of {len(points)} points; at most {_MAX_HOLE} are filled: crop it"
+            raise ParameterError("surface", words)
         matrix, right = _laplace_system(heights, points, weights, mean)
-        if len(points) <= _DIRECT_LIMIT:
-            solution = spsolve(matrix.tocsc(), right, permc_spec="MMD_AT_PLUS_A")
-        else:
-            solution = solve_multigrid(matrix, right, divmod(points, heights.shape[1]), weights)
+        solution = spsolve(matrix.tocsc(), right, permc_spec="MMD_AT_PLUS_A")
         heights.reshape(-1)[points] = solution + mean
 
 
@@ -76,7 +78,7 @@ def _hole_groups(missing: NDArray[np.bool_]) -> Iterator[Indices]:
     first = 0
     size = 0
     for count in sizes:
-        if size and size + count > _DIRECT_LIMIT:
+        if size and size + count > _GROUP_SIZE:
             yield np.sort(points[order[first : first + size]])
             first, size = first + size, 0
         size += int(count)
@@ -112,110 +114,3 @@ def _laplace_system(
     starts = np.concatenate([[0], np.cumsum(used.sum(axis=1))])
     matrix = csr_array((values[used], columns[used], starts), shape=(count, count))
     return matrix, right
-
-
-_COARSEST_SIZE = 3000  # unknowns of the coarsest grid, solved directly
-_AGGREGATE_SIDE = 3  # points along the side of a group that becomes one unknown of the next grid
-_STRONG_RATIO = 0.3  # a direction with less than this weight ratio is not coarsened
-_DAMPING = 0.7
-_SWEEPS = 2
-
-
-@dataclass(frozen=True, eq=False)
-class _Level:
-    """A grid: its matrix, the inverse of its diagonal, and the interpolation from the next one."""
-
-    matrix: csr_array
-    inverse_diagonal: FloatArray
-    interpolation: csr_array | None
-
-
-def solve_multigrid(
-    matrix: csr_array,
-    rhs: FloatArray,
-    indices: tuple[Indices, Indices],
-    weights: tuple[float, float],
-) -> FloatArray:
-    """Solve the five-point equation on the unknown points of a grid.
-
-    An unknown of a coarser grid represents a square of points (a line along the stronger direction
-    if the pitches differ much); the interpolation P is the smoothed constant on each group, and the
-    coarse matrices are PᵀAP, so that the V-cycle is symmetric and positive definite for a hole of
-    any shape.
-
-    Args:
-        matrix: symmetric positive definite, one row for each unknown point.
-        rhs: right side.
-        indices: row and column of each unknown point.
-        weights: weights of the second differences along x and y.
-
-    Returns:
-        The unknown values.
-
-    Reference:
-        Vaněk, Mandel and Brezina, Computing 56 (1996) 179 (smoothed aggregation).
-    """
-    from scipy.sparse.linalg import LinearOperator, cg, splu
-
-    levels = _build_levels(matrix, indices, weights)
-    bottom = splu(levels[-1].matrix.tocsc()).solve
-    cycle = LinearOperator(
-        matrix.shape, matvec=lambda rest: _v_cycle(levels, 0, rest, bottom), dtype=np.float64
-    )
-    solution, _ = cg(matrix, rhs, M=cycle, rtol=_TOLERANCE, maxiter=500)
-    return np.asarray(solution)
-
-
-def _build_levels(
-    matrix: csr_array, indices: tuple[Indices, Indices], weights: tuple[float, float]
-) -> list[_Level]:
-    levels: list[_Level] = []
-    wx, wy = weights
-    while True:
-        inverse = 1.0 / matrix.diagonal()
-        side = (
-            _AGGREGATE_SIDE if wy >= _STRONG_RATIO * wx else 1,
-            _AGGREGATE_SIDE if wx >= _STRONG_RATIO * wy else 1,
-        )
-        p, indices = _build_interpolation(matrix, inverse, indices, side)
-        if matrix.shape[0] <= _COARSEST_SIZE or p.shape[1] >= 0.9 * matrix.shape[0]:
-            levels.append(_Level(matrix, inverse, None))
-            return levels
-        levels.append(_Level(matrix, inverse, p))
-        matrix = (p.T @ (matrix @ p)).tocsr()
-        wx, wy = wx / side[1] ** 2, wy / side[0] ** 2
-
-
-def _build_interpolation(
-    matrix: csr_array, inverse: FloatArray, indices: tuple[Indices, Indices], side: tuple[int, int]
-) -> tuple[csr_array, tuple[Indices, Indices]]:
-    """Return the interpolation from groups of points, and the row and column of each group."""
-    from scipy.sparse import csr_array, diags_array
-
-    count, width = len(inverse), int(indices[1].max()) // side[1] + 1
-    aggregate = indices[0] // side[0] * width + indices[1] // side[1]
-    groups, group = np.unique(aggregate, return_inverse=True)
-    constant = csr_array((np.ones(count), group, np.arange(count + 1)), shape=(count, len(groups)))
-    smoothed = constant - diags_array(_DAMPING * inverse) @ (matrix @ constant)
-    return smoothed.tocsr(), (groups // width, groups % width)
-
-
-def _v_cycle(
-    levels: list[_Level],
-    depth: int,
-    residual: FloatArray,
-    solve_coarsest: Callable[[FloatArray], FloatArray],
-) -> FloatArray:
-    """Return one V-cycle from zero: smooth, correct on the coarser grid, smooth again."""
-    level = levels[depth]
-    if level.interpolation is None:
-        return solve_coarsest(residual)
-    step = _DAMPING * level.inverse_diagonal
-    values = step * residual
-    for _ in range(_SWEEPS - 1):
-        values += step * (residual - level.matrix @ values)
-    coarse = level.interpolation.T @ (residual - level.matrix @ values)
-    values += level.interpolation @ _v_cycle(levels, depth + 1, coarse, solve_coarsest)
-    for _ in range(_SWEEPS):
-        values += step * (residual - level.matrix @ values)
-    return values

@@ -1,9 +1,9 @@
-"""ISO 16610 filters, exact and in blocks: Gaussian S- and L-filters, and dilation by a ball."""
+"""ISO 16610 filters, exact: Gaussian S- and L-filters, and dilation by a ball."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,8 +22,6 @@ SECTION_COUNT = 5
 
 DEFAULT_SAMPLES = 4
 """Default cut-off wavelength in samples."""
-
-_BLOCK = 2**22  # points transformed at once: fast, and small compared with a large map
 
 
 def gaussian_filter(
@@ -63,8 +61,7 @@ def lowpass_in_place(
 ) -> None:
     """Filter heights in place; see :func:`gaussian_filter`.
 
-    The Gaussian is separable: each axis is transformed separately and in blocks, so that a large
-    map needs no second copy.
+    The Gaussian is separable: each axis is transformed separately.
     """
     from scipy.fft import dct, idct, irfft, rfft, rfftfreq
 
@@ -74,13 +71,10 @@ def lowpass_in_place(
         transmission = np.exp(-np.pi * (ALPHA * cutoff * frequency) ** 2)
         other = tuple(k for k in range(heights.ndim) if k != axis)
         response = np.expand_dims(transmission, other)
-        for block in _blocks(heights, axis):
-            spectrum = rfft(block, axis=axis) if periodic else dct(block, type=1, axis=axis)
-            spectrum *= response
-            if periodic:
-                block[...] = irfft(spectrum, n, axis=axis)
-            else:
-                block[...] = idct(spectrum, type=1, axis=axis, overwrite_x=True)
+        if periodic:
+            heights[...] = irfft(response * rfft(heights, axis=axis), n, axis=axis)
+        else:
+            heights[...] = idct(response * dct(heights, 1, axis=axis), 1, axis=axis)
 
 
 def highpass_in_place(heights: FloatArray, pitch: Pitch, cutoff: float) -> None:
@@ -183,18 +177,6 @@ def short_trace_text(shape: Shape, pitch: Pitch, l_cutoff: float) -> str:
         return f"too small for this L-filter: {side} wide, ISO 25178-3 takes at least {length}"
     sections = f"{shortest / l_cutoff:.3g} section lengths of {length}"
     return f"too short for this L-filter: {side} are {sections}, ISO 21920-3 takes {SECTION_COUNT}"
-
-
-def _blocks(heights: FloatArray, axis: int) -> Iterator[FloatArray]:
-    """Yield views of whole lines along the axis."""
-    if heights.ndim == 1:
-        yield heights
-        return
-    across = 1 - axis
-    count = max(1, _BLOCK // heights.shape[axis])
-    for first in range(0, heights.shape[across], count):
-        part = slice(first, first + count)
-        yield heights[part] if across == 0 else heights[:, part]
 
 
 def _s_cutoff(max_pitch: float, max_length: float, s_cutoff: float | None) -> tuple[float, str]:

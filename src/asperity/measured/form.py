@@ -20,7 +20,6 @@ MAX_DEGREE = 10
 # Beyond this the points do not determine the coefficients; up to it the second pass of the fit,
 # with the square of the first one's error, is accurate to rounding.
 _MAX_CONDITION = 1e10
-_BLOCK = 2**22
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,12 +39,11 @@ class FormPolynomial:
     coefficients: FloatArray
     shape: Shape
 
-    def evaluate_rows(self, selection: slice) -> FloatArray:
-        """Return the heights [m] in some rows of a map, or points of a profile."""
+    def evaluate(self) -> FloatArray:
+        """Return the heights [m] at all points of the grid."""
         bases = _legendre_bases(self.shape, self.degree)
-        if len(self.shape) == 1:
-            return np.asarray(bases[0][selection] @ self.coefficients)
-        return np.asarray(bases[0][selection] @ self.coefficients @ bases[1].T)
+        values = bases[0] @ self.coefficients
+        return np.asarray(values if len(self.shape) == 1 else values @ bases[1].T)
 
 
 def check_degree(degree: int) -> int:
@@ -87,7 +85,7 @@ def fit_form(heights: FloatArray, degree: int = 1) -> FormPolynomial:
     Example:
         >>> x = np.arange(9.0)
         >>> parabola = 3.0 - x + 0.5 * x**2
-        >>> bool(np.allclose(fit_form(parabola, 2).evaluate_rows(slice(None)), parabola))
+        >>> bool(np.allclose(fit_form(parabola, 2).evaluate(), parabola))
         True
     """
     degree, most = check_degree(degree), max_degree(heights)
@@ -119,20 +117,12 @@ def subtract_form(heights: FloatArray, form: FormPolynomial, pitch: Pitch) -> st
     Returns:
         A sentence that describes the form.
     """
-    total, squares, low, high, count = 0.0, 0.0, np.inf, -np.inf, 0
-    middle = float(form.coefficients.flat[0])
-    for part in _row_blocks(heights.shape):
-        values = form.evaluate_rows(part)
-        heights[part] -= values
-        measured = values[~np.isnan(heights[part])] - middle
-        if measured.size:
-            low, high = min(low, float(measured.min())), max(high, float(measured.max()))
-        total, squares = total + float(measured.sum()), squares + float(measured @ measured)
-        count += measured.size
-    mean = total / count
-    rms = float(np.sqrt(max(squares / count - mean**2, 0.0)))
+    values = form.evaluate()
+    heights -= values
+    measured = HeightStatistics.of(values[~np.isnan(heights)])
     if form.degree == 0:
-        return f"mean height {format_length(middle)} subtracted; not levelled"
+        mean = format_length(float(form.coefficients.flat[0]))
+        return f"mean height {mean} subtracted; not levelled"
     slopes = " and ".join(f"{slope:.2g}" for slope in _central_slopes(form, pitch))
     is_profile = heights.ndim == 1
     if form.degree == 1:
@@ -140,7 +130,7 @@ def subtract_form(heights: FloatArray, form: FormPolynomial, pitch: Pitch) -> st
         return f"levelled: subtracted the least-squares {kind} {slopes}"
     return (
         f"form removed: subtracted the least-squares polynomial of degree {form.degree}, its RMS"
-        f" {format_length(rms)}, peak to valley {format_length(high - low)},"
+        f" {format_length(measured.rms)}, peak to valley {format_length(measured.range)},"
         f" {'slope' if is_profile else 'slopes'} in the middle {slopes}"
     )
 
@@ -150,11 +140,6 @@ def _legendre_bases(shape: Shape, degree: int) -> list[FloatArray]:
     return [np.asarray(legvander(np.linspace(-1.0, 1.0, n), degree)) for n in shape]
 
 
-def _row_blocks(shape: Shape) -> list[slice]:
-    count = _BLOCK if len(shape) == 1 else max(1, _BLOCK // shape[1])
-    return [slice(first, first + count) for first in range(0, shape[0], count)]
-
-
 def _normal_equations(
     heights: FloatArray, degree: int, previous: FormPolynomial | None
 ) -> tuple[FloatArray, FloatArray]:
@@ -162,23 +147,15 @@ def _normal_equations(
     bases = _legendre_bases(heights.shape, degree)
     k = degree + 1
     pairs = [(b[:, :, None] * b[:, None, :]).reshape(-1, k * k) for b in bases]
-    gram: FloatArray = np.zeros((k * k,) * heights.ndim)
-    right: FloatArray = np.zeros((k,) * heights.ndim)
-    for part in _row_blocks(heights.shape):
-        rest = heights[part] if previous is None else heights[part] - previous.evaluate_rows(part)
-        valid = ~np.isnan(rest)
-        rest = np.where(valid, rest, 0.0)
-        weight = valid.astype(np.float64)
-        if heights.ndim == 1:
-            gram += weight @ pairs[0][part]
-            right += rest @ bases[0][part]
-        else:
-            gram += pairs[0][part].T @ (weight @ pairs[1])
-            right += bases[0][part].T @ (rest @ bases[1])
+    rest = heights if previous is None else heights - previous.evaluate()
+    weight = (~np.isnan(rest)).astype(np.float64)
+    rest = np.nan_to_num(rest)
     if heights.ndim == 1:
-        return gram.reshape(k, k), right
+        return (weight @ pairs[0]).reshape(k, k), rest @ bases[0]
+    gram = pairs[0].T @ (weight @ pairs[1])
     # Indices b, b', a, a' become the pairs (b, a), (b', a').
-    return gram.reshape(k, k, k, k).transpose(0, 2, 1, 3).reshape(k * k, k * k), right
+    gram = gram.reshape(k, k, k, k).transpose(0, 2, 1, 3).reshape(k * k, k * k)
+    return gram, bases[0].T @ (rest @ bases[1])
 
 
 def _count_valid_coordinates(heights: FloatArray) -> int:
@@ -322,7 +299,7 @@ def decompose_surface(
             raise ParameterError("nesting", f"must be at most the length {longest:g} m", nesting)
     missing = np.isnan(heights)
     degree = 0 if periodic else min(FORM_DEGREE, max_degree(heights))
-    form = fit_form(heights, degree).evaluate_rows(slice(None))
+    form = fit_form(heights, degree).evaluate()
     rest = heights - form
     fill_in_place(rest, pitch)
     waviness = gaussian_filter(rest, pitch, nesting, periodic=periodic)

@@ -105,8 +105,9 @@ def compute_parameters(
         '0.7071 0.6364 1.5000 4.420'
     """
     rows, steps = np.atleast_2d(heights), (pitch[0], pitch[-1])
-    mean, low, high = _mean_and_range(rows)
-    a, q, skewness, kurtosis = _height_moments(rows, mean, high - low)
+    measured = rows[~np.isnan(rows)]
+    mean, low, high = (float(x) for x in (measured.mean(), measured.min(), measured.max()))
+    a, q, skewness, kurtosis = _height_moments(measured, mean, high - low)
     gradient, ratio = _facet_parameters(rows, steps)
     if heights.ndim > 1:
         values = (q, a, high - low, high - mean, mean - low, skewness, kurtosis, gradient, ratio)
@@ -128,37 +129,17 @@ def _row_blocks(rows: FloatArray, overlap: int = 0) -> Iterator[FloatArray]:
         yield rows[first : first + count + overlap]
 
 
-def _measured_heights(block: FloatArray) -> FloatArray:
-    """Return the heights that are not missing, shape (n,)."""
-    missing = np.isnan(block)
-    return block[~missing] if missing.any() else block.ravel()
-
-
-def _mean_and_range(rows: FloatArray) -> tuple[float, float, float]:
-    total, count, low, high = 0.0, 0, math.inf, -math.inf
-    for block in _row_blocks(rows):
-        z = _measured_heights(block)
-        if z.size:
-            total, count = total + float(z.sum()), count + z.size
-            low, high = min(low, float(z.min())), max(high, float(z.max()))
-    return total / count, low, high
-
-
 def _height_moments(
-    rows: FloatArray, mean: float, span: float
+    heights: FloatArray, mean: float, span: float
 ) -> tuple[float, float, float | None, float | None]:
     """Return Sa, Sq, Ssk and Sku; powers are taken of z / range, which cannot overflow."""
     if not 0.0 < span < math.inf:
         return span, span, None, None
-    sums, count = np.zeros(4), 0
-    for block in _row_blocks(rows):
-        z = (_measured_heights(block) - mean) / span
-        square = z * z
-        sums += np.abs(z).sum(), square.sum(), (square * z).sum(), (square * square).sum()
-        count += z.size
-    a, second, third, fourth = (float(value) for value in sums / count)
-    q = math.sqrt(second)
-    return a * span, q * span, third / q**3, fourth / q**4
+    z = (heights - mean) / span
+    square = z * z
+    q = math.sqrt(square.mean())
+    third, fourth = float((square * z).mean()), float((square * square).mean())
+    return float(np.abs(z).mean()) * span, q * span, third / q**3, fourth / q**4
 
 
 def _facet_parameters(rows: FloatArray, pitch: Pitch) -> tuple[float | None, float | None]:

@@ -177,7 +177,6 @@ def prepare(  # noqa: D417 - the others are described by their declarations
         magnified 20 times laterally and in height
     """
     start, record = progress or (lambda _stage: None), StageRecorder(on_stage)
-    raw = raw.in_metres(raw.pitch if pitch is None else pitch)
     steps = list(raw.notes)
     _check_shape(raw.heights, max_missing)
     lateral = _resolve_pitch(raw, pitch, steps)

@@ -17,9 +17,11 @@ from asperity.core.files import json_text, text_digest
 from asperity.core.units import format_quantity
 from asperity.devices import Device
 from asperity.envelopes.envelope import Envelope
+from asperity.envelopes.find_design import Design
 from asperity.report.analysis_report import analysis_page, criteria_table
 from asperity.report.comparison_columns import describe_texture
 from asperity.report.comparison_report import comparison_page, comparisons_page
+from asperity.report.design_report import design_page
 from asperity.report.device_report import device_page
 from asperity.report.envelope_report import envelope_page
 from asperity.report.html import Origin, render_notebook, render_page
@@ -43,6 +45,7 @@ def find_page(result: Any) -> Page | None:
 
 find_page.register(Analysis, analysis_page)
 find_page.register(Comparison, comparison_page)
+find_page.register(Design, design_page)
 find_page.register(Device, device_page)
 find_page.register(DeviceComparisons, comparisons_page)
 find_page.register(Envelope, envelope_page)

@@ -87,8 +87,6 @@ def load_texture(  # noqa: D417 - the others are described where they are declar
     *,
     channel: str | int | None = None,
     unit: str | None = None,
-    integrate_normals: bool = False,
-    resample: float | None = None,
     pitch: float | Sequence[float] | None = None,
     height_range: float | None = None,
     outliers: float | None = None,

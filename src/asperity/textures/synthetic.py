@@ -33,13 +33,12 @@ def prepare_texture(  # noqa: D417 - the others are described where they are dec
     height_range: float | None = None,
     s_cutoff: float | None = None,
     l_cutoff: float | None = None,
-    tip_radius: float | None = None,
     magnify: float = 1.0,
     magnify_height: float | None = None,
 ) -> Texture:
     """Return a texture prepared like a measured surface.
 
-    The steps are, in this order: scale, filter (S, then L), scan with a tip, magnify. Only the
+    The steps are, in this order: scale, filter (S, then L), magnify. Only the
     requested ones are done; the ``preparation`` of the result lists them.
 
     Args:
@@ -61,7 +60,7 @@ def prepare_texture(  # noqa: D417 - the others are described where they are dec
         steps.append(f"heights scaled from {before} to {after} peak to valley")
         scale = _height_scale(texture, height_range)
     prepared: Texture
-    if texture.waves is not None and tip_radius is None:
+    if texture.waves is not None:
         amplitudes = _filter_amplitudes(texture.waves, scale * vertical, s_cutoff, l_cutoff)
         prepared = _scaled_waves(texture, texture.waves, amplitudes, lateral)
         steps += _filter_steps(s_cutoff, l_cutoff)
@@ -71,9 +70,6 @@ def prepare_texture(  # noqa: D417 - the others are described where they are dec
         heights, pitch, periodic = _sample(texture)
         heights = _filter_heights(scale * heights, pitch, periodic, s_cutoff, l_cutoff)
         steps += _filter_steps(s_cutoff, l_cutoff)
-        if tip_radius is not None:
-            heights, sentence = _apply_periodic_tip(heights, pitch, tip_radius, periodic=periodic)
-            steps.append(sentence)
         grown, spacing = heights * vertical, tuple(step * lateral for step in pitch)
         mask = texture.filled_mask
         prepared = fit_spline(grown, spacing, periodic=periodic, filled_mask=mask)
@@ -114,10 +110,10 @@ def _scaled_waves(
 
 
 def _sample(texture: Texture) -> tuple[FloatArray, tuple[float, ...], bool]:
-    """Return heights, (n,) or (ny, nx), pitch and whether they are periodic, densely for waves."""
-    nodes, spacing, periodic = texture.samples(dense=texture.waves is not None)
+    """Return heights, (n,) or (ny, nx), pitch and whether they are periodic."""
+    nodes, spacing, periodic = texture.samples()
     if abs(float(texture.domain.spans[0] @ (0.0, 1.0))) > 0.0:
-        raise ParameterError("tip_radius", "needs a texture whose waves run along x")
+        raise ParameterError("texture", "must have its period along x to be sampled")
     heights = np.array(nodes[0] if texture.is_profile else nodes)
     return heights, spacing[: heights.ndim], periodic
 
@@ -145,19 +141,6 @@ def _filter_steps(s_cutoff: float | None, l_cutoff: float | None) -> Iterator[st
         yield f"filtered: Gaussian S-filter, cut-off {format_length(s_cutoff)}"
     if l_cutoff is not None:
         yield f"waviness removed: Gaussian L-filter, cut-off {format_length(l_cutoff)}"
-
-
-def _apply_periodic_tip(
-    heights: FloatArray, pitch: tuple[float, ...], radius: float, *, periodic: bool
-) -> tuple[FloatArray, str]:
-    """Return the heights scanned with a tip, which touches neighbouring periods too."""
-    if not periodic:
-        return filters.apply_tip(heights, pitch, radius)
-    filters.check_tip_radius(heights.shape, pitch, radius)
-    margins = [(math.ceil(radius / step),) * 2 for step in reversed(pitch)]
-    scanned, sentence = filters.apply_tip(np.pad(heights, margins, mode="wrap"), pitch, radius)
-    inner = tuple(slice(before, -after) for before, after in margins)
-    return np.ascontiguousarray(scanned[inner]), sentence
 
 
 Patch = tuple[FloatArray, tuple[float, float]]

@@ -279,18 +279,14 @@ class Texture(Plottable, ABC):
         """
         return TexturePart(self)
 
-    def samples(self, dense: bool = False) -> GridValues:
+    def samples(self) -> GridValues:
         """Return heights on a grid of the domain, at the nodes of a spline.
-
-        Args:
-            dense: whether to sample each wave as densely as a search does, so that a tip feels it.
 
         Returns:
             Heights [m], shape (ny, nx), (1, nx) for a profile; spacing (x, y) [m]; whether they
             are periodic, so that no window is needed.
         """
-        counts = self.sample_counts() if dense else self.grid_counts()
-        points, spacing, repeats = self.domain.grid(counts)
+        points, spacing, repeats = self.domain.grid(self.grid_counts())
         return self.height(points.reshape(-1, 2)).reshape(points.shape[:2]), spacing, repeats
 
     # --- values -----------------------------------------------------------------------------------

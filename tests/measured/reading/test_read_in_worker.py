@@ -118,7 +118,7 @@ def test_result_is_returned_unchanged(readers: Any, file: SurfaceFile) -> None:
     np.testing.assert_array_equal(raw.heights, readers.HEIGHTS)
     assert (raw.pitch, raw.source) == ((1e-6, 2e-6), file.name)
     assert raw.notes == ("mm", "2", "head")
-    assert (raw.has_units, raw.relative, raw.per_pitch) == (False, True, False)
+    assert (raw.has_units, raw.relative) == (False, True)
     assert isolation.read_isolated(readers.nothing, file, ReadingOptions()) is None
 
 

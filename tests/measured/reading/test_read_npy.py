@@ -147,7 +147,6 @@ def test_unit_scales_the_heights(tmp_path: Path) -> None:
     [
         ("channel", "Height", "must not be given.*an NPY file.*no channels"),
         ("channel", 0, "must not be given.*no channels"),
-        ("integrate_normals", True, "must not be given.*is no image"),
         ("unit", "furlong", "must be a unit of length: m, cm, mm, um"),
         ("unit", "", "must be a unit of length"),
         ("unit", "MM", "must be a unit of length"),

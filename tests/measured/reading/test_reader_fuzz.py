@@ -73,7 +73,7 @@ def test_seed_files_are_read(
             refused.append(str(error))
         else:
             assert raw.heights.size > 0
-    reasons = {"archive": "archive", "png": "normal map", "tiff": "normal map", "marks": ""}
+    reasons = {"archive": "archive", "png": "colour image", "tiff": "colour image", "marks": ""}
     expected = reasons.get(reader)
     assert all(expected is not None and expected in message for message in refused)
 

@@ -77,6 +77,12 @@ def scan_ripple(surface: Surface, points: int | None = None) -> float:
     return _rms_of_oscillation(_scan_forces_and_slopes(surface, line, height, points)[0])
 
 
+def contact_lost(surface: Surface) -> float:
+    """Return the fraction of the scan of :func:`merit` without contact, alone."""
+    line, height = surface.texture.scan_line(), scan_height(surface)
+    return _scan_forces_and_slopes(surface, line, height)[2]
+
+
 def _rms_of_oscillation(forces: FloatArray) -> float:
     """Return the RMS of forces (lines, points, 3) about the mean of each line."""
     variance = float(np.mean(np.var(forces, axis=1).sum(axis=1)))

@@ -83,6 +83,13 @@ class WaveScan:
         case = replace(self.case, wavelengths=wavelengths, forces=factor * self.case.forces)
         return replace(self, case=case, components=factor * self.components)
 
+    def at_stiffness(self, stiffness: float) -> WaveScan:
+        """Return the scan at another stiffness [N/m], to which the force is proportional."""
+        factor = stiffness / self.contact_stiffness
+        case = replace(self.case, forces=factor * self.case.forces)
+        components = factor * self.components
+        return replace(self, case=case, components=components, contact_stiffness=stiffness)
+
     def at_speed(self, speed: float) -> WaveScan:
         """Return the scan at another speed [m/s]."""
         return replace(self, case=replace(self.case, speed=speed))

@@ -1,9 +1,7 @@
-"""Read grids of heights without a unit: NumPy arrays (NPY) and ESRI ASCII grids (Arc/Info)."""
+"""Read NumPy arrays (NPY), which have no unit."""
 
 from __future__ import annotations
 
-import math
-import re
 import warnings
 from pathlib import Path
 from typing import Any
@@ -11,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from asperity.core.errors import SurfaceFileError
-from asperity.measured.lengths import parse_heights, parse_number
 from asperity.measured.reading import reader
 from asperity.measured.reading.isolation import describe_exception
 
@@ -65,78 +62,3 @@ def _check_array(array: np.ndarray[Any, np.dtype[Any]]) -> None:
         wanted = "(ny, nx) for a map or (n,) for a profile is expected"
         raise SurfaceFileError(f"array of shape {array.shape}; {wanted}")
     reader.check_point_count(*array.shape[::-1])
-
-
-_SIGNATURE = re.compile(rb"\s{0,100}(?:ncols|nrows)\s{1,100}[0-9]")
-_SIZE_KEYS = ("ncols", "nrows", "cellsize", "dx", "dy", "nodata_value")
-_HEADER_KEYS = (*_SIZE_KEYS, "xllcorner", "yllcorner", "xllcenter", "yllcenter")
-_DEFAULT_NODATA = -9999.0
-_MAX_HEADER_LENGTH = 4000
-
-
-def is_esri(file: reader.SurfaceFile) -> bool:
-    """Whether a file starts with the header of an ESRI ASCII grid."""
-    first = file.head[:1000].lower()
-    return _SIGNATURE.match(first) is not None and b"ncols" in first and b"nrows" in first
-
-
-def read_esri(file: reader.SurfaceFile, options: reader.ReadingOptions) -> reader.RawSurface:
-    """Read an ESRI ASCII grid.
-
-    The format has no unit: lengths and heights are in metres, or in the unit that is given. The
-    first row is the northern one; rows are reversed, so that y points north.
-
-    Raises:
-        SurfaceFileError: the header has no size, or the number of heights differs from it.
-
-    Reference:
-        Esri, ASCII raster format (ArcGIS Desktop 10, "Esri ASCII raster format").
-    """
-    text = file.content.decode("ascii", errors="replace")
-    header, start = _parse_header(text)
-    rows, columns = _header_count(header, "nrows"), _header_count(header, "ncols")
-    reader.check_point_count(columns, rows)
-    body = text[start:] if "." in text[start:] else text[start:].replace(",", ".")
-    stored = parse_heights(body)
-    if len(stored) != rows * columns:
-        stated = f"the header says {rows} rows of {columns} heights"
-        raise SurfaceFileError(f"{stated}, there are {len(stored)} numbers")
-    code = header.get("nodata_value", _DEFAULT_NODATA)
-    heights, notes = reader.mask_missing(stored.reshape(rows, columns), code)
-    unit, assumed = options.resolve_unit(file.name)
-    scale = unit or 1.0
-    pitch = (_header_cell_size(header, "dx") * scale, _header_cell_size(header, "dy") * scale)
-    heights = np.ascontiguousarray(heights[::-1] * scale)
-    return reader.RawSurface(
-        heights, pitch, file.name, (*notes, *assumed), has_units=unit is not None
-    )
-
-
-def _parse_header(text: str) -> tuple[dict[str, float], int]:
-    """Return the values by key, and the position where the heights start."""
-    found: dict[str, float] = {}
-    start = 0
-    for line in text[:_MAX_HEADER_LENGTH].splitlines(keepends=True):
-        words = line.split()
-        if words and words[0].lower() not in _HEADER_KEYS:
-            break
-        if len(words) == 2:
-            found[words[0].lower()] = parse_number(words[1].replace(",", "."), words[0])
-        elif words:
-            raise SurfaceFileError(f"the header's {words[0]!r} must have one value")
-        start += len(line)
-    return found, start
-
-
-def _header_count(header: dict[str, float], name: str) -> int:
-    value = header.get(name, 0.0)
-    if not 1 <= value < math.inf or value != math.floor(value):
-        raise SurfaceFileError(f"the header's {name} must be a whole number from 1")
-    return int(value)
-
-
-def _header_cell_size(header: dict[str, float], name: str) -> float:
-    value = header.get(name, header.get("cellsize", 0.0))
-    if not (math.isfinite(value) and value > 0.0):
-        raise SurfaceFileError("the header's cellsize (or dx and dy) must be positive")
-    return value

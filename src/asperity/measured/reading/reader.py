@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -37,9 +37,6 @@ class RawSurface:
             ``read_surface`` notes.
         relative: whether the heights are not lengths (pixel values of an image): a height range
             converts them to lengths.
-        per_pitch: whether the heights are multiples of the pitch (an integrated normal map,
-            whose slopes have no unit): ``in_metres`` converts them to lengths. Such a surface
-            is ``relative`` until then.
         unit_question: how to state the unit of relative heights, to end a sentence.
 
     Example:
@@ -54,42 +51,12 @@ class RawSurface:
     notes: tuple[str, ...]
     has_units: bool = True
     relative: bool = False
-    per_pitch: bool = False
     unit_question: str = ""
 
     @property
     def is_profile(self) -> bool:
         """Whether the surface is a profile h(x) rather than a map h(x, y)."""
         return self.heights.ndim == 1
-
-    def in_metres(self, pitch: float | Sequence[float] | None) -> RawSurface:
-        """Return the surface with heights that are multiples of the pitch converted to lengths.
-
-        Any other surface, and any surface without a pitch, is returned unchanged.
-
-        Args:
-            pitch: distance of the points [m] given by the user, or None.
-
-        Raises:
-            ParameterError: the pitches along x and y differ, so that the slopes of a normal map
-                have no common unit; or a pitch is not positive.
-
-        Example:
-            >>> slopes = RawSurface(np.eye(4), None, "n.to_png", (), relative=True, per_pitch=True)
-            >>> metres = slopes.in_metres(2e-5)
-            >>> float(metres.heights.max()), metres.relative
-            (2e-05, False)
-        """
-        if not self.per_pitch or pitch is None:
-            return self
-        values = np.atleast_1d(np.asarray(pitch, dtype=np.float64))
-        if values.size == 0 or not (np.isfinite(values).all() and np.all(values > 0)):
-            raise ParameterError("pitch", "must be positive and finite [m]", pitch)
-        if np.any(values != values[0]):
-            requirement = "must be the same along x and y for an integrated normal map [m]"
-            raise ParameterError("pitch", requirement, pitch)
-        heights = self.heights * float(values[0])
-        return replace(self, heights=heights, has_units=True, relative=False, per_pitch=False)
 
 
 def check_point_count(*counts: int) -> None:
@@ -167,14 +134,10 @@ class ReadingOptions:
     Attributes:
         channel: name or number (from 0) of the height channel, for a file with several.
         unit: unit of length of a file that has none.
-        integrate_normals: integrate a normal map (an image of slopes) to heights.
-        resample: pitch [m] to which points on no regular grid are interpolated.
     """
 
     channel: str | int | None = None
     unit: str | None = None
-    integrate_normals: bool = False
-    resample: float | None = None
 
     @property
     def metres_per_unit(self) -> float | None:
@@ -248,11 +211,8 @@ class Reader:
         for argument, reason in (
             ("channel", "has no channels to choose from"),
             ("unit", "has its own unit, or none at all"),
-            ("integrate_normals", "is no image"),
-            ("resample", "is no list of points"),
         ):
             value = getattr(options, argument)
-            is_given = value is not None and value is not False  # a channel may be number 0
-            if is_given and argument not in self.arguments:
+            if value is not None and argument not in self.arguments:
                 requirement = f"must not be given: {file.name} ({self.name}) {reason}"
                 raise ParameterError(argument, requirement, value)

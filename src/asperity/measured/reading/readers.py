@@ -1,25 +1,23 @@
 """Read a surface file of any supported format, recognised by content rather than by name.
 
-The readers are tried in this order: those that recognise a signature; the user's, first the
-registered ones in the order of registration, then the entry points of the group
-``asperity.readers`` by name, which are loaded only if no reader before them took the file; last the
-readers of text and of instruments' files, which recognise almost anything.
+The readers are tried in this order: those that recognise a signature; the user's in the order of
+registration; last the readers of text and of instruments' files, which recognise almost anything.
 """
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
-from importlib.metadata import EntryPoint, entry_points, version
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 
-from asperity.core.checks import check_positive
 from asperity.core.errors import AsperityError, ParameterError, SurfaceFileError, nearest_names
 from asperity.measured.reading import unsupported
-from asperity.measured.reading.grids import NPY_MAGIC, is_esri, read_esri, read_npy
+from asperity.measured.reading.grids import NPY_MAGIC, read_npy
 from asperity.measured.reading.images.image_files import PNG_MAGIC, TIFF_MAGIC, read_png, read_tiff
 from asperity.measured.reading.isolation import describe_exception, read_isolated
 from asperity.measured.reading.mesh import is_binary_stl, is_obj, is_text_stl, read_mesh
@@ -48,15 +46,14 @@ def _read_text(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
 SIGNATURE_READERS = (
     Reader("an X3P file", _is_x3p, read_x3p),
     Reader("an NPY file", lambda file: file.head.startswith(NPY_MAGIC), read_npy, ("unit",)),
-    Reader("a PNG image", lambda f: f.head.startswith(PNG_MAGIC), read_png, ("integrate_normals",)),
+    Reader("a PNG image", lambda f: f.head.startswith(PNG_MAGIC), read_png),
     Reader(
         "a TIFF image",
         lambda file: file.head.startswith(TIFF_MAGIC),
         read_tiff,
-        ("integrate_normals", "unit"),
+        ("unit",),
         is_isolated=True,
     ),
-    Reader("an ESRI ASCII grid", is_esri, read_esri, ("unit",)),
     Reader("an SDF file", lambda file: is_sdf(file.head), read_sdf),
     Reader("a binary STL mesh", is_binary_stl, read_mesh, ("unit",)),
     Reader("a text STL mesh", is_text_stl, read_mesh, ("unit",), is_isolated=True),
@@ -66,22 +63,17 @@ SIGNATURE_READERS = (
 
 FALLBACK_READERS = (
     Reader("a file of another kind", lambda _: True, unsupported.reject_unsupported),
-    Reader(
-        "a text file", lambda file: file.is_text, _read_text, ("unit", "resample"), certain=False
-    ),
+    Reader("a text file", lambda file: file.is_text, _read_text, ("unit",), certain=False),
     Reader(
         "an instrument's file",
         lambda _: surface_topography.has_library(),
         surface_topography.read_instrument,
-        ("channel", "unit", "resample"),
+        ("channel", "unit"),
         certain=False,
         is_isolated=True,
     ),
 )
 """Readers of files without a signature, tried last."""
-
-ENTRY_POINT_GROUP = "asperity.readers"
-"""Group of the entry points with which an installed package provides a :class:`Reader`."""
 
 _EXPECTED_ERRORS = (AsperityError, OSError, MemoryError)  # errors that a reader may raise
 USER_READERS: dict[str, Reader] = {}
@@ -102,19 +94,10 @@ def register(reader: Reader) -> None:
     USER_READERS[reader.name] = reader
 
 
-def iter_readers(problems: list[str]) -> Iterator[Reader]:
-    """Yield all readers in the order in which they are tried.
-
-    Args:
-        problems: receives a sentence for each user-defined reader that cannot be used.
-    """
+def iter_readers() -> Iterator[Reader]:
+    """Yield all readers in the order in which they are tried."""
     yield from SIGNATURE_READERS
-    for reader in USER_READERS.values():
-        yield _guard_reader(reader, problems)
-    for point in sorted(entry_points(group=ENTRY_POINT_GROUP), key=lambda point: point.name):
-        loaded = _load_entry_point(point, problems)
-        if loaded is not None:
-            yield _guard_reader(loaded, problems)
+    yield from map(_guard_reader, USER_READERS.values())
     yield from FALLBACK_READERS
 
 
@@ -123,43 +106,31 @@ def external_reader_version() -> str | None:
 
     ``None`` if there are user-defined readers, whose versions are unknown.
     """
-    if USER_READERS or entry_points(group=ENTRY_POINT_GROUP):
+    if USER_READERS:
         return None
     return version(surface_topography.LIBRARY) if surface_topography.has_library() else ""
 
 
-def _load_entry_point(point: EntryPoint, problems: list[str]) -> Reader | None:
-    try:
-        reader = point.load()
-        if not isinstance(reader, Reader):
-            raise TypeError(f"{point.value} is no Reader")
-    except Exception as error:  # another package may raise anything
-        problems.append(f"the reader {point.name!r} cannot be used ({_describe_error(error)})")
-        return None
-    return reader
+def _guard_reader(reader: Reader) -> Reader:
+    """Return a user-defined reader whose programming errors are refusals of the file."""
 
-
-def _guard_reader(reader: Reader, problems: list[str]) -> Reader:
-    """Return a user-defined reader whose programming errors do not stop the others."""
-
-    def recognises(file: SurfaceFile) -> bool:
+    @contextmanager
+    def refuse_errors(file: SurfaceFile) -> Iterator[None]:
         try:
-            return bool(reader.recognises(file))
+            yield
         except _EXPECTED_ERRORS:
             raise
         except Exception as error:  # a user's code may raise anything
-            message = f"the reader of {reader.name} cannot be used ({_describe_error(error)})"
-            problems.append(message)
-            return False
-
-    def read(file: SurfaceFile, options: ReadingOptions) -> RawSurface | None:
-        try:
-            return _check_result(_run(reader, file, options))
-        except _EXPECTED_ERRORS:
-            raise
-        except Exception as error:  # as above
             message = f"{file.name}: the reader of {reader.name} failed ({_describe_error(error)})"
             raise SurfaceFileError(message) from error
+
+    def recognises(file: SurfaceFile) -> bool:
+        with refuse_errors(file):
+            return bool(reader.recognises(file))
+
+    def read(file: SurfaceFile, options: ReadingOptions) -> RawSurface | None:
+        with refuse_errors(file):
+            return _check_result(_run(reader, file, options))
 
     return replace(reader, recognises=recognises, read=read, is_isolated=False)
 
@@ -186,12 +157,7 @@ def _describe_error(error: Exception) -> str:
 
 
 def read_surface(
-    path: str | os.PathLike[str],
-    *,
-    channel: str | int | None = None,
-    unit: str | None = None,
-    integrate_normals: bool = False,
-    resample: float | None = None,
+    path: str | os.PathLike[str], *, channel: str | int | None = None, unit: str | None = None
 ) -> RawSurface:
     r"""Read a measured or synthetic surface; the content of the file decides its format.
 
@@ -206,10 +172,6 @@ def read_surface(
         unit: unit of length of a file that has none, such as "mm": required for STL and OBJ,
             optional for NPY (metres if not given)
             and for text that does not state it.
-        integrate_normals: integrate a normal map (an image of slopes) to heights.
-        resample: pitch [m] of the map interpolated through a list of x, y, z points that are on no
-            regular grid, or of the profile through unevenly spaced ones; the interpolation error
-            is in the notes.
 
     Returns:
         The heights [m] of the file, and the pitch if the file has one. Heights of images have no
@@ -229,9 +191,7 @@ def read_surface(
         ((4,), ['5.0e-07'])
     """
     name = Path(path).name or str(path)
-    if resample is not None:
-        resample = check_positive("resample", resample, "m")
-    options = ReadingOptions(channel, unit, integrate_normals, resample)
+    options = ReadingOptions(channel, unit)
     try:
         _ = options.metres_per_unit  # refuses an unknown unit, whatever the file is
         _check_file(Path(path), name)
@@ -246,8 +206,7 @@ def read_surface(
 def _read_first(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
     """Return the result of the first reader that can read the file."""
     refusal: AsperityError | None = None
-    problems: list[str] = []
-    for reader in iter_readers(problems):
+    for reader in iter_readers():
         if not reader.recognises(file):
             continue
         try:
@@ -259,14 +218,10 @@ def _read_first(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
             continue
         if raw is not None:
             reader.check_options(file, options)
-            notes = (*raw.notes, *problems)
-            if not raw.has_units and not raw.relative:
-                notes = ("no unit in the file: taken as metres", *notes)
-            return replace(raw, notes=notes)
-    refusal = refusal or unsupported.unrecognised_error(file)
-    if problems and isinstance(refusal, SurfaceFileError):
-        raise SurfaceFileError("; ".join((str(refusal), *problems))) from refusal
-    raise refusal
+            if raw.has_units or raw.relative:
+                return raw
+            return replace(raw, notes=("no unit in the file: taken as metres", *raw.notes))
+    raise refusal or unsupported.unrecognised_error(file)
 
 
 def _run(reader: Reader, file: SurfaceFile, options: ReadingOptions) -> RawSurface | None:

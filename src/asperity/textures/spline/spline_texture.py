@@ -182,7 +182,7 @@ class Spline(Texture):
         """See :class:`Texture`; the nodes."""
         return list(self.heights.shape[::-1])
 
-    def samples(self, dense: bool = False) -> GridValues:  # noqa: ARG002 - always the nodes
+    def samples(self) -> GridValues:
         """See :class:`Texture`; the nodes."""
         spacing = self._pitches[0], self._pitches[-1]
         return np.atleast_2d(self.heights), spacing, self.periodic

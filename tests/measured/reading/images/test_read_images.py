@@ -225,8 +225,6 @@ def test_arguments_of_other_formats_are_refused(tmp_path: Path) -> None:
         read_surface(path, channel="R")
     with pytest.raises(ParameterError, match=r"unit must not be given.*none at all"):
         read_surface(path, unit="mm")
-    with pytest.raises(ParameterError, match=r"integrate_normals must be False: grey\.png is not"):
-        read_surface(path, integrate_normals=True)
 
 
 def test_pillow_and_tifffile_agree_with_the_writers(tmp_path: Path) -> None:

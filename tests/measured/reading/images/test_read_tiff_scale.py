@@ -161,13 +161,3 @@ def test_unusable_imagej_metadata_are_ignored(metadata: dict[str, Any]) -> None:
 def test_print_resolution_is_not_a_pitch(tmp_path: Path) -> None:
     tags = {282: (5, rational(300)), 283: (5, rational(300)), 296: (3, struct.pack("<H", 2))}
     assert read_surface(write_tiff(tmp_path / "a.tif", HEIGHTS, tags=tags)).pitch is None
-
-
-def test_unit_is_refused_for_a_normal_map(tmp_path: Path) -> None:
-    normals = np.zeros((8, 8, 3), np.uint8)
-    normals[..., :2], normals[..., 2] = 128, 255
-    normals[2:5, 2:5, 0] = 140
-    path = write_tiff(tmp_path / "n.tif", normals, photometric=2)
-    assert read_surface(path, integrate_normals=True).per_pitch
-    with pytest.raises(ParameterError, match="holds slopes"):
-        read_surface(path, integrate_normals=True, unit="um")

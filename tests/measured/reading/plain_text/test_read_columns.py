@@ -1,4 +1,4 @@
-"""Text files with non-length columns, unevenly sampled profiles, and ESRI ASCII grids."""
+"""Text files with non-length columns, and points on no grid."""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from asperity.core.errors import ParameterError, SurfaceFileError
+from asperity.core.errors import SurfaceFileError
 from asperity.measured.reading import RawSurface, read_surface
-from asperity.measured.reading.resampling import resample_profile
 
 PROFILE = "X;Y;valid\n[mm];[mm];[1/0]\n"
 ROWS = "8.6722;106.25;1\n8.6727;-999;0\n8.6732;106.5;1\n8.6737;106.75;1\n"
@@ -82,33 +81,12 @@ def test_index_column_is_dropped(tmp_path: Path) -> None:
 # --- uneven profiles ------------------------------------------------------------------------------
 
 
-def test_uneven_profile_is_interpolated_only_with_resample(tmp_path: Path) -> None:
-    text = "x [um] z [nm]\n0 0\n1 2\n4 8\n5 10\n6.5 13\n8 16\n"
-    with pytest.raises(SurfaceFileError, match=r"resample=1.6e-06 \(--resample 1.6um\)"):
-        read_text(tmp_path, text)
-    raw = read_text(tmp_path, text, resample=1e-6)
-    assert raw.pitch == (1e-6,)
-    np.testing.assert_allclose(raw.heights, 2e-9 * np.arange(9), atol=1e-20)
-    assert (
-        raw.notes
-        == (
-            "6 points interpolated linearly to 9 of pitch 1 µm; from every other point the rest are"
-            " missed by 1 nm rms",
-        )
-        or "missed by" in raw.notes[0]
-    )
-
-
-def test_stated_error_is_that_of_interpolating_every_other_point() -> None:
-    x = np.array([0.0, 1.0, 2.0, 3.0, 4.0])
-    heights, note = resample_profile(x, np.array([0.0, 5.0, 0.0, 3.0, np.nan]), 0.5)
-    np.testing.assert_allclose(heights, [0, 2.5, 5, 2.5, 0, 1.5, 3])
-    rms = (0.5 * (5.0**2 + 3.0**2)) ** 0.5  # constant continuation from 2 to the point at 3
-    assert f"missed by {rms:.4g} m rms" in note
-    with pytest.raises(ParameterError, match="too fine for 4 points"):
-        resample_profile(x, np.array([0.0, 5.0, 0.0, 3.0, np.nan]), 1e-9)
-    with pytest.raises(SurfaceFileError, match="two points"):
-        resample_profile(x, np.array([0.0, np.nan, np.nan, np.nan, np.nan]), 0.5)
+def test_points_on_no_grid_are_refused_with_advice(tmp_path: Path) -> None:
+    profile = "x [um] z [nm]\n0 0\n1 2\n4 8\n5 10\n6.5 13\n8 16\n"
+    scattered = "x [um] y [um] z [nm]\n0 0 1\n1 0.3 2\n0.2 1 3\n1.1 1.2 4\n0.6 0.5 5\n2 2 6\n"
+    for text in (profile, scattered):
+        with pytest.raises(SurfaceFileError, match=r"interpolate them to a grid first.*griddata"):
+            read_text(tmp_path, text)
 
 
 def test_uneven_profile_of_an_instrument_file(tmp_path: Path) -> None:
@@ -119,66 +97,13 @@ def test_uneven_profile_of_an_instrument_file(tmp_path: Path) -> None:
     line = NonuniformLineScan([0.0, 1.0, 4.0, 5.0, 8.0], [0.0, 2.0, 8.0, 10.0, 16.0], unit="um")
     path = tmp_path / "line.nc"
     line.to_netcdf(str(path))
-    with pytest.raises(SurfaceFileError, match=r"not uniform; .* \(--resample 2um\)"):
+    with pytest.raises(SurfaceFileError, match="not evenly spaced: interpolate them"):
         read_surface(path)
-    raw = read_surface(path, resample=1e-6)
-    assert raw.pitch == pytest.approx((1e-6,), rel=1e-12)
-    np.testing.assert_allclose(raw.heights, 2e-6 * np.arange(9), atol=1e-18)
 
 
-# --- ESRI ASCII grids -----------------------------------------------------------------------------
-
-GRID = "ncols 4\nnrows 3\nxllcorner 378923.0\nyllcorner 4072345\ncellsize 30\nNODATA_value -32768\n"
-NUMBERS = "1 2 3 4\n5 -32768 7 8\n9 10 11 12.5\n"
-EXPECTED = np.array([[9, 10, 11, 12.5], [5, np.nan, 7, 8], [1, 2, 3, 4]])
-
-
-def test_esri_grid_is_read_southern_row_first(tmp_path: Path) -> None:
-    raw = read_text(tmp_path, GRID + NUMBERS)
-    np.testing.assert_array_equal(raw.heights, EXPECTED)  # the first row is the northern one
-    assert (raw.pitch, raw.has_units) == ((30.0, 30.0), False)
-    assert raw.notes == (
-        "no unit in the file: taken as metres",
-        "1 points hold -32768, which marks a missing point",
-    )
-    micro = read_text(tmp_path, GRID + NUMBERS, unit="um")
-    np.testing.assert_allclose(micro.heights, 1e-6 * EXPECTED, rtol=1e-15)
-    assert micro.pitch == pytest.approx((3e-5, 3e-5), rel=1e-12)
-    assert micro.has_units
-
-
-def test_header_variants_of_esri_grids(tmp_path: Path) -> None:
-    wrapped = GRID.upper() + " ".join(NUMBERS.split())  # rows end by count, not by line
-    np.testing.assert_array_equal(read_text(tmp_path, wrapped).heights, EXPECTED)
-    centre = "nrows 3\r\nncols 4\r\nxllcenter 0\r\nyllcenter 0\r\ndx 2\r\ndy 3\r\n"
-    raw = read_text(tmp_path, centre + NUMBERS.replace("-32768", "-9999").replace("\n", "\r\n"))
-    np.testing.assert_array_equal(raw.heights, EXPECTED)
-    assert raw.pitch == (2.0, 3.0)
-    commas = GRID.replace("30", "0,5") + NUMBERS.replace("12.5", "12,5")
-    np.testing.assert_array_equal(read_text(tmp_path, commas).heights, EXPECTED)
-
-
-@pytest.mark.parametrize(
-    ("text", "match"),
-    [
-        (GRID + NUMBERS + "13\n", "3 rows of 4 heights, there are 13 numbers"),
-        (GRID + NUMBERS[:-5], "there are 11 numbers"),
-        (GRID.replace("ncols 4", "ncols 0") + NUMBERS, "ncols must be a whole number from 1"),
-        (GRID.replace("ncols 4", "ncols 4.5") + NUMBERS, "ncols must be a whole number from 1"),
-        (GRID.replace("ncols 4", "ncols 999999999") + NUMBERS, "999999999 x 3 points; at most"),
-        (
-            GRID.replace("ncols 4", "ncols 99999").replace("nrows 3", "nrows 99999") + NUMBERS,
-            "at most",
-        ),
-        (GRID.replace("size 30", "size 0") + NUMBERS, "must be positive"),
-        (GRID.replace("cellsize 30\n", "") + NUMBERS, "must be positive"),
-        (GRID.replace("size 30", "size thirty") + NUMBERS, "a finite number is expected"),
-        (GRID.replace("size 30", "size 30 40") + NUMBERS, "must have one value"),
-        (GRID + NUMBERS.replace("7", "x"), "height 6 is '-32x68'; a finite number"),
-        (GRID + NUMBERS.replace("7", "7_0"), "height 6 is '-327_068'"),
-        (GRID + NUMBERS.replace("11", "inf"), "infinite height"),
-    ],
-)
-def test_invalid_esri_grids_are_refused(tmp_path: Path, text: str, match: str) -> None:
-    with pytest.raises(SurfaceFileError, match=match):
-        read_text(tmp_path, text)
+def test_esri_grid_is_refused_with_advice(tmp_path: Path) -> None:
+    """Its first row is the northern one: as a matrix it would be mirrored."""
+    grid = "ncols 4\nnrows 3\nxllcorner 3.0\nyllcorner 4\ncellsize 30\n1 2 3 4\n5 6 7 8\n9 8 7 6\n"
+    for text in (grid, grid.upper()):
+        with pytest.raises(SurfaceFileError, match=r"ESRI ASCII grid.*save its numbers as a text"):
+            read_text(tmp_path, text)

@@ -19,7 +19,7 @@ from tests.helpers.text_files import (
 from asperity.core.errors import AsperityError, ParameterError, SurfaceFileError
 from asperity.measured.reading import RawSurface, read_surface
 from asperity.measured.reading import readers as registry
-from asperity.measured.reading.resampling import measure_spacing
+from asperity.measured.reading.spacing import measure_spacing
 
 DATA = Path(__file__).parents[4].parent / "shared" / "data"
 needs_data = pytest.mark.skipif(not DATA.is_dir(), reason="real surfaces (../shared/data) missing")
@@ -264,7 +264,7 @@ def test_several_maps_in_one_file_are_refused(tmp_path: Path) -> None:
 
 
 def test_declared_value_of_missing_points(tmp_path: Path) -> None:
-    raw = read_text(tmp_path, "ncols 4\nNODATA_value -9999\n1 2 3 -9999\n5 6 7 8\n-9999 2 3 4\n")
+    raw = read_text(tmp_path, "columns 4\nNODATA_value -9999\n1 2 3 -9999\n5 6 7 8\n-9999 2 3 4\n")
     n = np.nan
     np.testing.assert_array_equal(raw.heights, [[1, 2, 3, n], [5, 6, 7, 8], [n, 2, 3, 4]])
     assert any("points hold -9999, which marks a missing point" in note for note in raw.notes)

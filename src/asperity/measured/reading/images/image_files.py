@@ -6,7 +6,6 @@ import io
 import struct
 import zlib
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -132,7 +131,7 @@ _MAX_TIFF_RATIO = 2000  # no compression that is read packs more bytes into one
 _MINISWHITE, _RGB = 0, 2
 _GREY = (0, 1)
 _REDUCED, _MASK = 1, 4
-_ORIENTATION, _BOTTOM_UP, _RIGHT_TO_LEFT = 274, (3, 4, 7, 8), (2, 3, 6, 7)  # tag and values
+_ORIENTATION = 274
 _NODATA = 42113  # GDAL's tag for the value of a missing point
 
 
@@ -159,9 +158,6 @@ def read_tiff(file: SurfaceFile, options: ReadingOptions) -> RawSurface | None:
         _check_page(page, len(content))
         values, notes = _to_heights(page, _decode_page(page, content))
         scale = _read_scale(tiff, page)
-    if (orientation := _orientation(page)) != 1:
-        values, scale = _turn_upright(values, scale, orientation)
-        notes = (*notes, f"turned upright as the tag Orientation {orientation} says")
     colours = 3 if int(page.photometric) == _RGB else 1
     has_alpha = values.shape[-1] == colours + 1
     return pixels.pixels_to_surface(
@@ -201,8 +197,9 @@ def _check_page(page: Any, size: int) -> None:
     pixels.check_image_size(int(page.imagelength), int(page.imagewidth))
     if int(page.photometric) == _PALETTE:
         raise SurfaceFileError(_PALETTE_FAULT)
-    if _orientation(page) not in range(1, 9):
-        raise SurfaceFileError(f"has the Orientation {_orientation(page)}; 1 to 8 are defined")
+    tag = page.tags.get(_ORIENTATION)
+    if tag is not None and int(tag.value) != 1:
+        raise SurfaceFileError(f"is stored turned or mirrored (Orientation {tag.value}): turn it")
     if int(page.imagedepth) != 1:
         raise SurfaceFileError(f"has {page.imagedepth} layers; one is expected")
     if int(page.photometric) not in (*_GREY, _RGB):
@@ -222,22 +219,6 @@ def _check_page(page: Any, size: int) -> None:
         raise SurfaceFileError(f"truncated: {packed} bytes cannot hold {pixel_count}")
 
 
-def _orientation(page: Any) -> int:
-    tag = page.tags.get(_ORIENTATION)
-    return 1 if tag is None else int(tag.value)
-
-
-def _turn_upright(
-    values: NDArray[Any], scale: pixels.ImageScale, orientation: int
-) -> tuple[NDArray[Any], pixels.ImageScale]:
-    """Return the pixels with row 0 at the top and column 0 on the left, and their lengths."""
-    if orientation > 4:  # stored rows are columns of the image
-        values = values.swapaxes(0, 1)
-        scale = replace(scale, pitch=scale.pitch and scale.pitch[::-1])
-    rows, columns = (-1 if orientation in turned else 1 for turned in (_BOTTOM_UP, _RIGHT_TO_LEFT))
-    return values[::rows, ::columns], scale
-
-
 def _decode_page(page: Any, content: bytes) -> NDArray[Any]:
     try:
         return np.asarray(page.asarray())
@@ -245,8 +226,6 @@ def _decode_page(page: Any, content: bytes) -> NDArray[Any]:
         if "imagecodecs" not in str(error):
             raise
     # The codec is an extra of tifffile; Pillow has the common ones for its own pixel types.
-    if _orientation(page) != 1:  # Pillow turns some of them itself
-        raise SurfaceFileError("is compressed and stored turned or mirrored; save it uncompressed")
     from PIL import Image
 
     name = getattr(page.compression, "name", str(page.compression))

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.measured.lengths import format_lengths, unit_to_metres
-from asperity.measured.reading.images.normal_maps import integrate_normal_map, is_normal_map
 from asperity.measured.reading.reader import RawSurface, ReadingOptions, check_point_count
 
 _MAX_DESCRIPTION = 10**6
@@ -209,7 +208,7 @@ def pixels_to_surface(
     has_alpha: bool,
     notes: tuple[str, ...] = (),
 ) -> RawSurface:
-    """Convert pixels to heights: their values, or the integrated slopes of a normal map.
+    """Convert pixels to heights.
 
     Row i is row i of the image from the top, so that y runs down the image.
 
@@ -217,7 +216,7 @@ def pixels_to_surface(
         values: pixels, shape (rows, columns, channels), unsigned, signed or float.
         scale: lengths that the file names.
         name: name of the file.
-        options: ``integrate_normals``, without which a normal map is refused, and ``unit``.
+        options: ``unit``.
         has_alpha: whether the last channel is opacity.
         notes: peculiarities of the file.
 
@@ -226,30 +225,13 @@ def pixels_to_surface(
         has one.
 
     Raises:
-        SurfaceFileError: colours, transparency, or a normal map without ``integrate_normals``.
-        ParameterError: ``integrate_normals`` for an image that is no normal map; a unit for slopes,
-            or for a file that names its own.
+        SurfaceFileError: colours or transparency.
+        ParameterError: a unit for a file that names its own.
     """
     notes = (*notes, *scale.notes)
     if has_alpha:
         _check_opaque(values[..., -1])
         values, notes = values[..., :-1], (*notes, "alpha channel dropped: opaque everywhere")
-    if is_normal_map(values):
-        if not options.integrate_normals:
-            raise SurfaceFileError(
-                "looks like a normal map (slopes as colours), not like heights;"
-                " have it integrated to heights with integrate_normals=True (--integrate-normals)"
-            )
-        if options.unit is not None:
-            raise ParameterError("unit", f"must not be given: {name} holds slopes, without unit")
-        heights, found = integrate_normal_map(values)
-        notes = (*notes, *found)
-        return RawSurface(
-            heights, scale.pitch, name, notes, has_units=False, relative=True, per_pitch=True
-        )
-    if options.integrate_normals:
-        requirement = f"must be False: {name} is not a normal map"
-        raise ParameterError("integrate_normals", requirement, True)
     grey, notes = _to_grey(values, notes)
     with np.errstate(invalid="ignore"):  # a signalling NaN is a missing point too
         heights = scale.factor * grey.astype(np.float64) + scale.offset
@@ -285,5 +267,6 @@ def _to_grey(values: NDArray[Any], notes: tuple[str, ...]) -> tuple[NDArray[Any]
         return first, (*notes, "three equal channels: read as one grey image")
     raise SurfaceFileError(
         "is a colour image: its three channels differ, and a colour is no height;"
-        " save the heights as a grey image (16 bit if possible)"
+        " save the heights, for a normal map those from which it was made, as a grey image (16 bit"
+        " if possible)"
     )

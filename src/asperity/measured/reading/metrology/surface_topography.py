@@ -18,7 +18,7 @@ from asperity.measured.lengths import unit_to_metres
 from asperity.measured.reading.isolation import reject_on_error
 from asperity.measured.reading.plain_text.text_header import WORDS, split_words
 from asperity.measured.reading.reader import MAX_POINTS, RawSurface, ReadingOptions, SurfaceFile
-from asperity.measured.reading.resampling import resample_profile, resampling_hint
+from asperity.measured.reading.spacing import INTERPOLATE
 
 LIBRARY = "SurfaceTopography"
 """Name of the library that reads the files of instruments."""
@@ -131,8 +131,8 @@ def _to_surface(
     if unit is None:
         requirement = f"is required: {file.name} has no unit; give one, such as 'um'"
         raise ParameterError("unit", requirement)
-    heights, pitch, found = _read_channel(channel, unit, options.resample)
-    notes = [f"{reader.name()} file, read by SurfaceTopography", *found]
+    heights, pitch = _read_channel(channel)
+    notes = [f"{reader.name()} file, read by SurfaceTopography"]
     notes += [] if reader.format() in WITNESSED_FORMATS else [NO_WITNESS]
     if len(reader.channels) > 1:
         notes.append(f"channel {channel.name!r} of {len(reader.channels)}")
@@ -164,10 +164,8 @@ def _select_channel(reader: Any, name: str, channel: str | int | None) -> Any | 
     return matching[0]
 
 
-def _read_channel(
-    channel: Any, unit: float, resample: float | None
-) -> tuple[FloatArray, tuple[float, ...] | None, list[str]]:
-    """Return heights with x along the last axis and the pitch, in the file's unit, and notes."""
+def _read_channel(channel: Any) -> tuple[FloatArray, tuple[float, ...] | None]:
+    """Return heights with x along the last axis and the pitch, in the file's unit."""
     options: dict[str, Any] = {}
     # The library requires a size, unless the points are uneven; the pitch is dropped below.
     if channel.physical_sizes is None and channel.is_uniform is not False:
@@ -175,31 +173,11 @@ def _read_channel(
     if channel.unit is None:
         options["unit"] = "m"
     topography = channel.topography(**options)
-    if not topography.is_uniform:
-        return _read_uneven_profile(topography, unit, resample)
-    if channel.is_uniform is False:
-        raise SurfaceFileError("sampling is not uniform, yet the points have no positions")
-    if resample is not None:
-        raise ParameterError("resample", "must not be given: the points are on a grid", resample)
+    if not topography.is_uniform or channel.is_uniform is False:
+        raise SurfaceFileError(f"the points are not evenly spaced: {INTERPOLATE}")
     stored = np.ma.masked_array(topography.heights(), dtype=np.float64)
     heights = np.ascontiguousarray(stored.filled(np.nan).T)
     if channel.physical_sizes is None:
-        return heights, None, []
+        return heights, None
     sizes = np.atleast_1d(np.asarray(channel.physical_sizes, dtype=np.float64))
-    return heights, tuple(sizes / np.array(heights.shape[::-1])), []
-
-
-def _read_uneven_profile(
-    topography: Any, unit: float, resample: float | None
-) -> tuple[FloatArray, tuple[float, ...], list[str]]:
-    """Return a profile interpolated through uneven points; see :func:`_read_channel`."""
-    positions = np.asarray(topography.positions(), dtype=np.float64).ravel()
-    heights = np.ma.masked_array(topography.heights(), dtype=np.float64).filled(np.nan).ravel()
-    steps = np.diff(positions)
-    if len(positions) != len(heights) or len(steps) == 0 or not np.all(steps > 0):
-        raise SurfaceFileError("sampling is not uniform, and the positions do not increase")
-    if resample is None:
-        hint = resampling_hint(float(steps.mean()) * unit)
-        raise SurfaceFileError(f"sampling is not uniform; {hint}")
-    line, note = resample_profile(positions * unit, heights * unit, resample)
-    return line / unit, (resample / unit,), [note]
+    return heights, tuple(sizes / np.array(heights.shape[::-1]))

@@ -16,7 +16,7 @@ from asperity.core.checks import FloatArray
 from asperity.core.errors import SurfaceFileError
 from asperity.measured.lengths import parse_number
 from asperity.measured.reading import reader
-from asperity.measured.reading.resampling import measure_spacing
+from asperity.measured.reading.spacing import measure_spacing
 from asperity.measured.reading.unsupported import ARCHIVE_ERRORS
 
 DTYPES = {"I": "<i2", "L": "<i4", "F": "<f4", "D": "<f8"}

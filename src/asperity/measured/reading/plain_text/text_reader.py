@@ -10,7 +10,7 @@ import numpy as np
 
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError, SurfaceFileError
-from asperity.measured.reading import reader, resampling
+from asperity.measured.reading import reader, spacing
 from asperity.measured.reading.plain_text import text_columns, text_header
 from asperity.measured.reading.plain_text.text_table import TextTable, find_table
 
@@ -46,10 +46,8 @@ def read_text(file: reader.SurfaceFile, options: reader.ReadingOptions) -> reade
     if is_list:
         units, assumed = _find_units(names, header, file.name, options)
         read = _read_profile if columns == 2 else _read_points
-        raw = read(table, units, file.name, options.resample)
+        raw = read(table, units, file.name)
         marked = (*marked, *assumed)
-    elif options.resample is not None:
-        raise ParameterError("resample", f"must not be given: {file.name} is no list of points")
     else:
         raw = _read_matrix(table, header, file.name, options)
     found += ["a comma is read as the decimal sign"] * (table.dialect.decimal == ",")
@@ -121,9 +119,7 @@ def _find_units(
     return [unit or given for unit in own], notes
 
 
-def _read_profile(
-    table: TextTable, units: list[float], name: str, resample: float | None
-) -> reader.RawSurface:
+def _read_profile(table: TextTable, units: list[float], name: str) -> reader.RawSurface:
     positions, heights = table.values[:, 0], table.values[:, 1] * units[-1]
     resolution, lines = _printed_resolution(table, 0), table.line_numbers
     notes: tuple[str, ...] = ()
@@ -131,39 +127,23 @@ def _read_profile(
         positions, heights = positions[::-1], heights[::-1]
         resolution, lines = resolution[::-1], lines[::-1]
         notes = ("positions decrease: the profile is reversed",)
-    result = resampling.measure_spacing(positions, resolution)
+    result = spacing.measure_spacing(positions, resolution)
     pitch = result.step * units[0]
-    if resample is not None:
-        heights, note = resampling.resample_profile(positions * units[0], heights, resample)
-        return reader.RawSurface(heights, (resample,), name, (*notes, note))
     if not result.is_uniform:
         raise SurfaceFileError(
             f"sampling is not uniform: line {lines[result.index]} is"
             f" {result.deviation * units[0]:.3g} m from a grid of {pitch:.3g} m;"
-            f" {resampling.resampling_hint(pitch)}"
+            f" {spacing.INTERPOLATE}"
         )
     return reader.RawSurface(np.ascontiguousarray(heights), (pitch,), name, notes)
 
 
-def _read_points(
-    table: TextTable, units: list[float], name: str, resample: float | None
-) -> reader.RawSurface:
+def _read_points(table: TextTable, units: list[float], name: str) -> reader.RawSurface:
     """Return the map, or the profile along one axis, of a list of points."""
     if np.isnan(table.values[:, :2]).any():
         raise SurfaceFileError(f"a position is missing; {_EXPECTED_LAYOUT}")
-    points = table.values * np.array(units)
-    if resample is not None:
-        heights, note = resampling.resample_points(points, resample)
-        return reader.RawSurface(heights, (resample, resample), name, (note,))
-    try:
-        resolution = _printed_resolution(table, 0), _printed_resolution(table, 1)
-        heights, steps = points_to_grid(table.values, resolution)
-    except _NoGridError as error:
-        suited = resampling.suggest_pitch(points[:, :2])
-        hint = f"{error}; {_EXPECTED_LAYOUT}"
-        if suited is not None:
-            hint += f"; {resampling.resampling_hint(suited)}, one grid point for each of theirs"
-        raise SurfaceFileError(hint) from None
+    resolution = _printed_resolution(table, 0), _printed_resolution(table, 1)
+    heights, steps = points_to_grid(table.values, resolution)
     heights, pitch = heights * units[2], (steps[0] * units[0], steps[1] * units[1])
     if 1 not in heights.shape:
         return reader.RawSurface(heights, pitch, name, ())
@@ -185,10 +165,6 @@ def _read_matrix(
     return reader.RawSurface(
         heights, known, name, notes, not question, bool(question), unit_question=question
     )
-
-
-class _NoGridError(SurfaceFileError):
-    """Points that are on no regular grid, but may be interpolated."""
 
 
 def _printed_resolution(table: TextTable, column: int) -> FloatArray:
@@ -218,6 +194,7 @@ def _to_decimal(text: str) -> Decimal:
 
 _MAX_SPARSITY = 4  # grid points for each point of the list, beyond which there is no grid
 _EXPECTED_LAYOUT = "three columns are x, y, z of points on a regular grid, in any order"
+_NO_GRID = f"{_EXPECTED_LAYOUT}; {spacing.INTERPOLATE}"
 
 
 def points_to_grid(
@@ -245,7 +222,7 @@ def points_to_grid(
     x, column = np.unique(points[:, 0], return_inverse=True)
     y, row = np.unique(points[:, 1], return_inverse=True)
     if len(x) * len(y) > _MAX_SPARSITY * len(points):
-        raise _NoGridError("the points are on no regular grid")
+        raise SurfaceFileError(f"the points are on no regular grid; {_NO_GRID}")
     if len(np.unique(row * len(x) + column)) < len(points):
         raise SurfaceFileError(f"two points have the same position; {_EXPECTED_LAYOUT}")
     heights = np.full((len(y), len(x)), np.nan)
@@ -256,8 +233,8 @@ def points_to_grid(
 def _grid_step(axis: str, positions: FloatArray, resolution: FloatArray) -> float:
     if len(positions) == 1:
         return 0.0
-    result = resampling.measure_spacing(positions, float(resolution.max()))
+    result = spacing.measure_spacing(positions, float(resolution.max()))
     if not result.is_uniform:
         fault = f"one is {result.deviation:.3g} from a grid of {result.step:.3g}"
-        raise _NoGridError(f"the {axis} positions are not uniform: {fault}")
+        raise SurfaceFileError(f"the {axis} positions are not uniform: {fault}; {_NO_GRID}")
     return result.step

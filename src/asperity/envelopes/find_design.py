@@ -1,0 +1,240 @@
+"""The texture that meets a target on a device with the greatest margin."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
+from typing import Any
+
+from asperity.analysis.compare import DEFAULT_DEVICE, Comparison, Progress, compare
+from asperity.analysis.results import LawRow
+from asperity.core.cache import bypass_results
+from asperity.core.checks import check_keywords, check_positive
+from asperity.core.display import Reportable, Tabular
+from asperity.core.errors import ParameterError
+from asperity.core.files import attributes_to_dict
+from asperity.core.processes import precompute
+from asperity.core.units import round_down
+from asperity.devices import DeviceLike
+from asperity.envelopes.envelope import make_cases
+from asperity.envelopes.searches import FORCE, MET, MOTOR, Answer, Search, Target, agree
+from asperity.laws import Law
+from asperity.textures.catalogue import TextureLike, as_texture
+
+SCHEMA = 1
+PLACES = (MOTOR, "hand")
+_COMPARISONS = 3
+
+
+@dataclass(frozen=True)
+class Design(Reportable, Tabular):
+    """The texture that meets a target on a device with the greatest margin.
+
+    Attributes:
+        target: the target.
+        factor: factor of the texture: of its height for a single wave, else in all directions.
+        comparison: comparison of the law on that texture at that stiffness.
+        margins: by which factor each requirement is exceeded; it is met from 1 on.
+        reachable: texture force that can be reached [N], at most that of the target, or factor of
+            the largest texture; 0 for none.
+        binding: requirements that limit the answer: those that are just met, or with the least
+            margin.
+    """
+
+    target: Target
+    factor: float
+    comparison: Comparison
+    margins: Mapping[str, float]
+    reachable: float
+    binding: tuple[str, ...]
+
+    @property
+    def row(self) -> LawRow:
+        """The law in the comparison."""
+        return self.comparison.rows[0]
+
+    @property
+    def is_feasible(self) -> bool:
+        """Whether every requirement is met, and the comparison agrees."""
+        is_stable = self.row.recommended_stiffness >= MET * self.row.surface.stiffness
+        return min(self.margins.values()) >= MET and is_stable and self.row.tier == "felt"
+
+    @property
+    def lost(self) -> dict[str, float]:
+        """What the device takes away, without what is zero: by name, with units.
+
+        RMS of the texture's force and lengths of waves that it does not resolve; parts of the
+        height below the depth to which it is pressed, and of the scan without contact.
+        """
+        felt, surface = self.row.perceptibility, self.row.surface
+        if felt is None:
+            return {}
+        waves = felt.speed / felt.spectrum.frequencies[~felt.spectrum.is_resolved]
+        is_long = waves > self.comparison.device.workspace_size
+        found = {
+            "texture force [N]": math.sqrt(1.0 - min(felt.resolved, 1.0)) * felt.texture_rms,
+            "waves up to [m]": waves[~is_long].max(initial=0.0),
+            "waves from [m]": waves[is_long].min(initial=math.inf),
+            "height": 1.0 - surface.max_depth / surface.texture.peak_to_valley,
+            "contact": self.row.contact_lost,
+        }
+        return {name: float(value) for name, value in found.items() if 1e-6 < value < math.inf}
+
+    def __repr__(self) -> str:
+        state = "meets" if self.is_feasible else f"is kept by {self.binding[0]} from"
+        k = self.row.surface.stiffness
+        return f"<Design: law {self.row.law.letter} at {k:g} N/m {state} the target>"
+
+    def table_rows(self) -> list[dict[str, Any]]:
+        """Return factor, margins and the numbers of the law, in one row; SI units."""
+        margins = {f"margin of {name}": value for name, value in self.margins.items()}
+        return [{"factor": self.factor} | margins | self.comparison.table_rows()[0]]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data, SI units, with a schema number."""
+        names = "target factor is_feasible margins reachable binding lost comparison"
+        return {"schema": SCHEMA} | attributes_to_dict(self, *names.split())
+
+
+def design(
+    texture: TextureLike,
+    device: DeviceLike = DEFAULT_DEVICE,
+    laws: str | Sequence[str | Law] | None = None,
+    *,
+    texture_force: float | None = None,
+    at: str = MOTOR,
+    max_leak: float | None = None,
+    law_parameters: Mapping[str, float] | None = None,
+    progress: Progress | None = None,
+    **conditions: Any,
+) -> Design:
+    """Find law, stiffness and factor of a texture that meet a target with the greatest margin.
+
+    Requirements: the stiffness is at most the recommended and at least the least one, the texture
+    is felt, its force is at least ``texture_force``, the leak at most ``max_leak``, contact is kept
+    on half of the scan, and a texture with a border fits into the workspace. The margin is the
+    least factor by which they are exceeded. Without a texture force the answer is the largest
+    texture that meets the others, at its recommended stiffness. The height of a single wave is
+    scaled; other textures are magnified in all directions. A law without curl is preferred where
+    one meets the target.
+
+    Args:
+        texture: the surface; see :func:`~asperity.analysis.compare.compare`.
+        device: see :func:`~asperity.analysis.compare.compare`.
+        laws: letters or names, of which the best one is chosen; by default all with a texture.
+        texture_force: least RMS of the texture's force [N].
+        at: where it acts, ``"motor"`` or ``"hand"``.
+        max_leak: greatest energy gained on the worst loop per period [J].
+        law_parameters: parameters of laws by name.
+        progress: called with what is computed next: each law, and each comparison.
+        **conditions: ``speed``, ``min_stiffness``, ``max_depth`` and ``grip``; see
+            :func:`~asperity.envelopes.envelope.envelope`.
+
+    Returns:
+        The design; for a target that cannot be reached the nearest one that can.
+
+    Raises:
+        ParameterError: for a value that cannot be used.
+
+    Reference:
+        docs/theory/envelopes.md.
+
+    Example:
+        >>> result = design("sinusoid:period=2mm,amplitude=0.1mm", "touch", "C", texture_force=5e-3)
+        >>> result.is_feasible, result.binding
+        (True, ('stability', 'least stiffness'))
+    """
+    if at not in PLACES:
+        raise ParameterError("at", f"must be {' or '.join(PLACES)}", at)
+    check_keywords(conditions, {"speed", "min_stiffness", "max_depth", "grip"}, design)
+    force = None if texture_force is None else check_positive("texture_force", texture_force, "N")
+    leak = math.inf if max_leak is None else check_positive("max_leak", max_leak, "J")
+    base = as_texture(texture)
+    if base.peak_to_valley == 0.0:
+        raise ParameterError("texture", "must have a height: this one is flat")
+    searches = [
+        Search(case, base, Target(force, at, leak))
+        for case in make_cases(device, laws, law_parameters, design, conditions)
+    ]
+    report = progress or (lambda _step: None)
+    return _confirm(*_best_law(searches, report), report)
+
+
+Found = tuple[Search, Answer]
+
+
+def search_law(search: Search | None) -> Found | None:
+    """Return a search and its answer, also in a worker process."""
+    if search is None:
+        return None
+    # Many waves are tried, and each takes less time than the cache.
+    with nullcontext() if search.texture.single_wave is None else bypass_results():
+        return search, search.answer()
+
+
+def _best_law(searches: Sequence[Search], report: Progress) -> Found:
+    """Return the search of the best law; those with curl only if no other meets the target."""
+    found: list[Found] = []
+    for is_conservative in (True, False):
+        group = [one for one in searches if one.is_conservative is is_conservative]
+        # A user-defined law cannot be sent to another process.
+        shared = [one if isinstance(one.case.law, str) else None for one in group]
+        with precompute(search_law, shared) as precomputed:
+            for search, computed in zip(group, precomputed, strict=True):
+                report(f"law {search.case.letter}")
+                found += filter(None, [computed or search_law(search)])
+        if any(answer.is_met for _search, answer in found):
+            break
+    return max(found, key=_preference)
+
+
+def _preference(found: Found) -> tuple[Any, ...]:
+    """Return what is preferred: to meet the target, or nearly; no curl; the margin or the size."""
+    search, answer = found
+    return answer.is_met, answer.reach > 0.0, search.is_conservative, answer.found.score
+
+
+def _confirm(search: Search, answer: Answer, report: Progress) -> Design:
+    """Return the design of an answer whose numbers are those of a comparison.
+
+    Where they differ from the ones that were searched, these are corrected, and searched again.
+    """
+    designs: list[Design] = []
+    for _ in range(_COMPARISONS):
+        factor = float(f"{math.exp(answer.found.x):.5g}")
+        k = round_down(min(answer.found.stiffness, search.top(math.log(factor))), 4)
+        report(f"comparison of law {search.case.letter}, factor {factor:g}")
+        designs.append(one := _make_design(search, answer, factor, k))
+        expected = search.ratios(math.log(factor), one.row.surface.stiffness)
+        if agree(expected, one.margins):
+            break
+        scale = {name: value / expected[name] for name, value in one.margins.items()}
+        relaxed = {name: search.relaxed.get(name, 1.0) * scale[name] for name in scale}
+        search = replace(search, relaxed=relaxed)
+        answer = search.answer()
+    return max(designs, key=lambda one: (one.is_feasible, one.reachable))
+
+
+def _make_design(search: Search, answer: Answer, factor: float, stiffness: float) -> Design:
+    case, target = search.case, search.target
+    result = compare(
+        search.scaled(factor),
+        case.device,
+        [case.law],
+        stiffness or None,
+        law_parameters=case.law_parameters,
+        max_depth=case.conditions.max_depth,
+        speed=case.conditions.speed,
+        grip=case.conditions.grip,
+    )
+    sample = search.certified(math.log(factor))
+    ratios = sample.ratios(target, result.rows[0].surface.stiffness)
+    margins = {name: ratio for name, ratio in ratios.items() if ratio < 1e20}
+    reach = factor
+    if target.texture_force is not None:
+        reach = target.texture_force * min(1.0, margins[FORCE])
+    if min(ratio for name, ratio in margins.items() if name != FORCE) < MET:
+        reach = 0.0
+    return Design(target, factor, result, margins, reach, search.binding(answer, ratios))

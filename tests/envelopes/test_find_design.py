@@ -1,0 +1,225 @@
+"""Designs against comparisons, and against random searches."""
+
+from __future__ import annotations
+
+import math
+import random
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import asperity as asp
+from asperity.core.cache import bypass_results
+from asperity.core.errors import ParameterError
+from asperity.envelopes.find_design import Design, design
+from asperity.envelopes.searches import FORCE, RANGE, Search, Target
+from asperity.envelopes.wave_case import RenderConditions, WaveCase
+
+LAND = Path(__file__).parents[2].parent / "shared" / "data" / "sample-land.x3p"
+DEVICES = ("touch", "omega.3", "pantograph", "falcon")
+COUNT = 6  # python -m bench.designs checks 200
+POINTS = 1000
+Case = tuple[Search, Design, float, float]
+"""Search, design, and by random search the greatest margin and the greatest force [N]."""
+
+
+def random_search(search: Search, draw: random.Random) -> tuple[float, float]:
+    """Return the greatest margin, and the greatest force that meets all other requirements."""
+    force, margin, reach = search.target.texture_force or 1.0, 0.0, 0.0
+    for _ in range(POINTS // 10):
+        x = draw.uniform(*search.bounds)
+        top = search.top(x)
+        for share in [1.0, *(10.0 ** draw.uniform(-2.0, 0.0) for _ in range(9))] if top else ():
+            ratios = search.ratios(x, share * top)
+            margin = max(margin, min(ratios.values()))
+            if min(value for name, value in ratios.items() if name != FORCE) >= 1.0:
+                reach = max(reach, ratios[FORCE] * force)
+    return margin, reach
+
+
+def dense_reach(search: Search, x: float, stiffness: float) -> float:
+    """Return the greatest force [N] at factors and stiffnesses around those of an answer."""
+    low, high = search.bounds
+    near = [x + 1e-3 * step for step in range(-150, 151)]
+    reach, force = 0.0, search.target.texture_force or 1.0
+    for y in (x for x in [*near, high] if low <= x <= high):
+        if not (top := search.top(y)):
+            continue
+        top *= min(1.0, search.ratios(y, top)["leak"])
+        for k in {top, *(min(top, stiffness * share) for share in (0.97, 0.99, 1.0, 1.01, 1.03))}:
+            ratios = search.ratios(y, k)
+            if min(value for name, value in ratios.items() if name != FORCE) >= 1.0 - 1e-9:
+                reach = max(reach, ratios[FORCE] * force)
+    return reach
+
+
+def random_target(draw: random.Random) -> tuple[Search, float]:
+    """Return a random search, and the force that its random points reach [N]; 0 for none."""
+    conditions = RenderConditions(speed=10.0 ** draw.uniform(-1.5, -0.5))
+    case = WaveCase(draw.choice("ABCDEFGH"), {}, asp.load_device(draw.choice(DEVICES)), conditions)
+    wave = asp.Sinusoid(1e-4, 10.0 ** draw.uniform(-3.3, -2.0))
+    leak = draw.choice([math.inf] * 5 + [10.0 ** draw.uniform(-6.0, -4.0)])
+    search = Search(case, wave, Target(1e-3, draw.choice(["motor", "hand"]), leak))
+    return search, random_search(search, draw)[1]
+
+
+@cache
+def random_designs(count: int, is_feasible: bool) -> list[Case]:
+    """Return random designs whose target is, or is not, met by a point of a random search."""
+    draw, found = random.Random(11 + is_feasible), list[Case]()
+    with bypass_results():
+        while len(found) < count:
+            search, reach = random_target(draw)
+            if not reach:
+                continue
+            share = draw.uniform(0.1, 0.9) if is_feasible else draw.uniform(1.5, 4.0)
+            search = search.with_force(share * reach)
+            target, conditions = search.target, search.case.conditions
+            answer = design(
+                search.texture,
+                search.case.device,
+                [search.case.law],
+                texture_force=target.texture_force,
+                at=target.at,
+                max_leak=None if math.isinf(target.max_leak) else target.max_leak,
+                speed=conditions.speed,
+            )
+            found.append((search, answer, *random_search(search, draw)))
+    return found
+
+
+def meets_target(search: Search, answer: Design, force: float) -> bool:
+    """Return whether a comparison of its own meets the requirements, with this force [N]."""
+    target, surface = search.target, answer.row.surface
+    wave = search.texture.single_wave
+    assert wave is not None
+    with bypass_results():
+        row = asp.compare(
+            asp.Sinusoid(answer.factor * wave.amplitude, wave.period),
+            search.case.device,
+            [search.case.law],
+            surface.stiffness,
+            speed=search.case.conditions.speed,
+        ).rows[0]
+    felt = row.perceptibility
+    assert felt is not None
+    rms = felt.texture_rms if target.at == "motor" else felt.hand_force / math.sqrt(2.0)
+    return (
+        felt.tier == "felt"
+        and rms >= 0.99 * force
+        and row.recommended_stiffness >= 0.99 * surface.stiffness >= 0.98 * 100.0
+        and row.leak.worst_per_period <= 1.01 * target.max_leak
+    )
+
+
+def test_feasible_targets_are_met_with_the_greatest_margin() -> None:
+    for search, answer, margin, _reach in random_designs(COUNT, is_feasible=True):
+        assert answer.is_feasible, answer
+        assert meets_target(search, answer, search.target.texture_force or 0.0), answer
+        assert min(answer.margins.values()) >= margin / 1.01, (answer, margin)
+
+
+def test_targets_beyond_reach_get_the_nearest_one() -> None:
+    for search, answer, margin, reach in random_designs(COUNT, is_feasible=False):
+        assert not answer.is_feasible
+        assert margin < 1.01
+        assert answer.reachable >= reach / 1.01, (answer, answer.reachable, reach)
+        assert meets_target(search, answer, answer.reachable), answer
+
+
+def test_a_requirement_binds_if_and_only_if_relaxing_it_extends_the_reach() -> None:
+    """Relaxed by 10 %, a requirement that binds makes more force possible; no other one does."""
+    for search, answer, _margin, _reach in random_designs(COUNT, is_feasible=False):
+        names, x = {*answer.margins} - {FORCE}, math.log(answer.factor)
+        with bypass_results():
+            k = answer.row.surface.stiffness
+            relaxed = {name: replace(search, relaxed={name: 1.1}) for name in names}
+            reach = {name: dense_reach(one, x, k) for name, one in relaxed.items()}
+            base = dense_reach(search, x, k)
+        assert base == pytest.approx(answer.reachable, rel=0.01), answer
+        assert (RANGE in answer.binding) == (min(abs(x - end) for end in search.bounds) < 0.01)
+        for name in names:
+            binds, gain = name in answer.binding, reach[name] / base
+            assert gain > 1.002 if binds else gain < 1.008, (answer, answer.binding, reach, base)
+
+
+def test_half_of_the_stiffness_is_a_smaller_margin() -> None:
+    """The checks above detect a design that is worse by a factor of two."""
+    search, answer, margin, _reach = random_designs(COUNT, is_feasible=True)[0]
+    x = math.log(answer.factor)
+    worse = search.ratios(x, 2.0 * answer.row.surface.stiffness)
+    assert min(worse.values()) < margin / 1.01
+
+
+WAVE = "sinusoid:period=2mm,amplitude=0.1mm"
+
+
+def test_largest_texture_ends_at_the_border_of_the_envelope() -> None:
+    result = design(WAVE, "touch", "C")
+    border = asp.envelope("touch", "C", wavelengths=[2e-3])["touch"]["C"].borders[0]
+    assert result.factor * 1e-4 == pytest.approx(border.felt_up_to, rel=3e-3)
+    assert (result.is_feasible, {*result.binding}) == (True, {"stability", "least stiffness"})
+    assert result.row.tier == "felt"
+
+
+def test_best_law_has_no_curl_where_one_meets_the_target() -> None:
+    result = design(WAVE, "touch", "FAC", texture_force=5e-3)
+    assert result.row.law.letter == "C"
+    assert result.is_feasible
+
+
+def test_nothing_is_reachable_where_no_stiffness_suffices() -> None:
+    result = design(WAVE, "touch", "A", texture_force=5e-3)
+    assert (result.is_feasible, result.reachable) == (False, 0.0)
+    assert result.margins[result.binding[0]] < 1.0
+
+
+def test_measured_textures_are_magnified_in_all_directions() -> None:
+    result = design("cloth", "omega.3", "C", texture_force=30e-3)
+    plain = asp.named_surface("cloth")
+    scaled = result.comparison.texture
+    assert scaled.peak_to_valley == pytest.approx(result.factor * plain.peak_to_valley, rel=1e-6)
+    assert scaled.domain.spans == pytest.approx(result.factor * plain.domain.spans, rel=1e-6)
+    assert result.is_feasible
+    assert result.row.perceptibility is not None
+    assert result.row.perceptibility.texture_rms >= 30e-3
+
+
+def test_largest_measured_texture_states_what_is_lost() -> None:
+    """E on the measured surface: half of the scan has no contact, as it is 1 mm deep at most."""
+    if not LAND.exists():
+        pytest.skip(f"{LAND} is missing")
+    texture = asp.load_texture(LAND, magnify=20)
+    result = design(texture, "omega.3", "E")
+    assert (result.is_feasible, result.binding) == (True, ("contact",))
+    assert 0.49 < result.row.contact_lost <= 0.5
+    assert result.lost["contact"] == result.row.contact_lost
+    assert result.lost["height"] == pytest.approx(
+        1.0 - 1e-3 / result.comparison.texture.peak_to_valley
+    )
+    felt = result.row.perceptibility
+    assert felt is not None
+    lost = math.hypot(result.lost["texture force [N]"], felt.resolved_rms)
+    assert lost == pytest.approx(felt.texture_rms, rel=1e-6)
+    larger = asp.load_texture(LAND, magnify=20 * 1.03 * result.factor)
+    assert asp.compare(larger, "omega.3", "E").rows[0].contact_lost > 0.5
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"at": "elbow"}, "at must be motor or hand"),
+        ({"texture_force": 0.0}, "texture_force must be positive"),
+        ({"max_leak": -1.0}, "max_leak must be positive"),
+        ({"time_samples": 7.0}, "time_samples is unknown"),
+        ({"device": "2diy"}, "needs max_stiffness"),
+        ({"texture": asp.HeightMap(np.zeros((8, 8)), 1e-4)}, "this one is flat"),
+    ],
+)
+def test_bad_input_names_the_argument(arguments: dict[str, Any], words: str) -> None:
+    with pytest.raises(ParameterError, match=words):
+        design(**{"texture": WAVE, "device": "touch", "laws": "C", **arguments})
