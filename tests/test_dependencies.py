@@ -85,7 +85,6 @@ STREAMS = {
     "permutation": [677, 501, 102],
     "choice": [971, 269, 398],
     "dirichlet": [0.30178547, 0.644342917, 0.0538716134],
-    "binomial": [27, 28, 21],
 }
 
 
@@ -96,7 +95,6 @@ ARGUMENTS: dict[str, tuple[object, ...]] = {
     "permutation": (1000,),
     "choice": (1000, 3),
     "dirichlet": ((1.0, 1.0, 1.0),),
-    "binomial": (100, 0.3, 3),
 }
 
 

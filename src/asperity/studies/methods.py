@@ -8,7 +8,7 @@ from pathlib import Path
 from asperity.core.arguments import Argument, read_arguments
 from asperity.studies.design import MethodKind
 from asperity.studies.kinds import pairs
-from asperity.studies.kinds.onset import run_onset, score_onset
+from asperity.studies.kinds.adjustment import run_onset, score_onset
 from asperity.studies.kinds.rating import run_rating, score_rating
 from asperity.studies.kinds.thresholds import run_thresholds, score_thresholds
 
