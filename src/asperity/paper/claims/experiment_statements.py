@@ -280,12 +280,11 @@ def always_passive() -> claim.Check:
     """
     length = 2.0 * (0.25 * cases.SCANNING.period + cases.SCANNING.amplitude)
     speeds: dict[str, list[float]] = {}
+    path = cases.SCANNING.groove_path()
     for law in "AC":
         speeds[law] = []
         for stiffness, damping in ((1000.0, 1.0), (10.0, 1.0), (1000.0, 100.0)):
-            work = loop_work(
-                cases.SCANNING.surface(law, stiffness=stiffness), cases.SCANNING.groove_path()
-            )
+            work = loop_work(cases.SCANNING.surface(law, stiffness=stiffness), path)
             speeds[law].append(max(work, 0.0) / (damping * length))
     greatest = {law: max(values) for law, values in speeds.items()}
     return claim.check_statement(

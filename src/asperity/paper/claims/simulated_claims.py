@@ -45,14 +45,12 @@ def check_over_assumptions(
         numbers: computed values by name.
     """
     outcomes = {*by_paper_measure, *by_exact_measure}
-    verdict: claim.Verdict = "undecided"
-    if len(outcomes) == 1:
-        verdict = "holds" if True in outcomes else "does not hold"
+    agreed = outcomes.pop() if len(outcomes) == 1 else None
     tally = (
         f"as printed in {sum(by_paper_measure)} of {len(by_paper_measure)} guesses by the paper's "
         f"measure, {sum(by_exact_measure)} by ours"
     )
-    return claim.Check(f"{tally}: {summary}", numbers, verdict=verdict)
+    return claim.check_statement(f"{tally}: {summary}", printed=agreed, numbers=numbers)
 
 
 def textured_walls_cycle() -> claim.Check:
