@@ -218,7 +218,7 @@ def test_other_comparisons_are_ignored(text: str) -> None:
 
 # --- size, annotations, documentation ------------------------------------------------------------
 
-MAX_LINES = 43_800  # with 1800 for sweeps and envelopes
+MAX_LINES = 43_533  # with 1800 for sweeps and envelopes
 """Lines of code without docstrings, comments, blank lines and generated files."""
 
 
