@@ -76,14 +76,12 @@ def reproduce_command(
 
         figures = find_figures(names, include_simulated=not skip_experiments)
         create_folder(folder)
-        check_outputs(
-            force=outputs.force, json=outputs.json, html=outputs.html
-        )  # the folder may be one of the files
+        # The folder may be one of the files.
+        check_outputs(force=outputs.force, json=outputs.json, html=outputs.html)
     elif values["format"] is not None:
         raise ParameterError(_FORMAT.name, "applies to figures: give --figures DIR")
-    results, experiments = _reproduce(
-        names or None, measured, with_experiments=not (names or skip_experiments)
-    )
+    simulates = not (names or skip_experiments)
+    results, experiments = _reproduce(names or None, measured, with_experiments=simulates)
     from asperity.report.paper.claims_report import claims_page, evidence_page
 
     written = ""

@@ -106,10 +106,10 @@ class Claim:
         correction: the corrected statement, which the evidence carries if it holds and the printed
             one does not.
         fitted: parameters that were fitted or guessed; by default those that the check names.
-        summary: sentence of the evidence for :func:`format_summary`; by default that of the check,
-            which is inserted for ``{found}``.
+        summary: sentence of the evidence for :func:`~asperity.paper.claim.format_summary`; by
+            default that of the check, which is inserted for ``{found}``.
         instead: what is true if the printed statement does not hold and no correction is computed;
-            also for :func:`format_summary`.
+            also with numbers inserted.
     """
 
     id: str

@@ -243,49 +243,9 @@ def segment_work(surface: Surface, start: FloatArray, end: FloatArray) -> float:
     return integrate(lambda s: surface.force(start + s[:, None] * along) @ along, 8, 1e-10)
 
 
-def check_difference_quotients(seed: int, before: str, after: str) -> Check:
-    """Check that the difference quotients of the force of five laws reach q k and no more.
-
-    Taken over 4000 random pairs of probes, both no deeper than ``max_depth``, and 250 pairs close
-    to the witness of q.
-
-    Args:
-        seed: of the random pairs.
-        before: text before the range of the greatest quotients over q k.
-        after: text after it.
-    """
-    rng, case, shares = np.random.default_rng(seed), SCANNING, {}
-    for law in "ABCEG":
-        surface = case.surface(law)
-        q = characteristic_number(surface)
-        start = _random_pairs(law, rng, 4000)
-        close = np.array(q.at) - [0.0, 0.0, 1e-8] + 1e-9 * rng.normal(size=(500, 3)) * [1, 0, 1]
-        pairs = np.concatenate([start, np.stack([close[:250], close[250:]])], axis=1)
-        shares[law] = max_difference_quotient(surface, pairs) / (case.stiffness * q.value)
-    best, worst = min(shares.values()), max(shares.values())
-    return check_statement(
-        f"{before} {best:.6f} to {worst:.6f} {after}",
-        printed=worst <= 1.0 + 1e-6 and best > 0.97,
-        numbers={f"greatest share for {law}": share for law, share in shares.items()},
-    )
-
-
 def max_difference_quotient(surface: Surface, pairs: FloatArray) -> float:
     """Return the greatest |f(b) - f(a)| / |b - a| of pairs of probes, shape (2, n, 3) [N/m]."""
     forces = [surface.force(points) for points in pairs]
     changes = np.linalg.norm(forces[1] - forces[0], axis=1)
     distances = np.linalg.norm(pairs[1] - pairs[0], axis=1)
     return float((changes / distances).max())
-
-
-def _random_pairs(law: str, rng: np.random.Generator, count: int) -> FloatArray:
-    """Return the ends of short random steps, no deeper than ``max_depth``, shape (2, n, 3)."""
-    case = SCANNING
-    x = rng.uniform(0.0, case.period, count)
-    top = case.texture.height(np.column_stack([x, 0 * x])) if law in "ABC" else 0.0 * x
-    depth = case.depth * rng.uniform(0.1, 0.9, count)
-    if law == "E":
-        depth = depth + case.amplitude
-    points = np.column_stack([x, 0 * x, top - depth])
-    step = case.depth * 1e-3 * rng.normal(size=(count, 3)) * [1, 0, 1]
-    return np.stack([points, points + step])

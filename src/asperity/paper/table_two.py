@@ -201,14 +201,9 @@ def _printed_rows() -> dict[str, PrintedRow]:
     f_energy = 0.5 * k * case.friction * 0.5 * case.deflection * (case.depth - TURNING_DEPTH)
     values = {"A": math.hypot(1.0, slope), "D": 1.0, "E": 1.0, "F": PAPER_CASE.sticking_norm()}
     energies = {"A": half, "B": b_energy, "C": 0.0, "D": 0.0, "F": f_energy}
+    cells = {law: (row["conservative"], row["continuous"]) for law, row in TABLE_TWO.items()}
     return {
-        law: PrintedRow(
-            row["number"],
-            values.get(law),
-            row["conservative"],
-            row["continuous"],
-            energies.get(law),
-        )
+        law: PrintedRow(row["number"], values.get(law), *cells[law], energies.get(law))
         for law, row in TABLE_TWO.items()
     }
 

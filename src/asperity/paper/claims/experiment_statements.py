@@ -207,19 +207,16 @@ def scaling_with_texture() -> claim.Check:
     straight = loop_work(
         cases.BUMP.surface("A"), [[0.0, 0.0, 0.0], [0.37 * cases.BUMP.period, 0.0, 0.0]]
     )
-    exponents = {
-        "q by A": q_by_a,
-        "energy by A": energy_by_a,
-        "q by l": q_by_l,
-        "energy by l": energy_by_l,
-    }
     q_error = max(abs(q_by_a - 1.0), abs(q_by_l + 1.0))
     energy_error = max(abs(energy_by_a - 2.0), abs(energy_by_l))
     return claim.check_statement(
         f"along a horizontal path forth and back {straight:g} J",
         printed=q_error < 1e-6 and energy_error < 1e-6,
         corrected=q_error < 0.05 and energy_error < 1e-6 and straight == 0.0,
-        numbers=exponents,
+        q_by_A=q_by_a,
+        energy_by_A=energy_by_a,
+        q_by_l=q_by_l,
+        energy_by_l=energy_by_l,
     )
 
 
@@ -283,12 +280,11 @@ def always_passive() -> claim.Check:
     """
     length = 2.0 * (0.25 * cases.SCANNING.period + cases.SCANNING.amplitude)
     speeds: dict[str, list[float]] = {}
+    path = cases.SCANNING.groove_path()
     for law in "AC":
         speeds[law] = []
         for stiffness, damping in ((1000.0, 1.0), (10.0, 1.0), (1000.0, 100.0)):
-            work = loop_work(
-                cases.SCANNING.surface(law, stiffness=stiffness), cases.SCANNING.groove_path()
-            )
+            work = loop_work(cases.SCANNING.surface(law, stiffness=stiffness), path)
             speeds[law].append(max(work, 0.0) / (damping * length))
     greatest = {law: max(values) for law, values in speeds.items()}
     return claim.check_statement(

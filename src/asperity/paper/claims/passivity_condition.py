@@ -157,10 +157,9 @@ def product_bound() -> Check:
             steps = draw.normal(size=(200, 2))
             steps[:100] = np.linalg.svd(matrix)[2][0]
             steps *= size / np.linalg.norm(steps, axis=1)[:, None]
-            ends = np.array([[spot.x, 0.0, spot.z]]) + 0.5 * steps[:, [0, 0, 1]] * [1, 0, 1]
-            change = spot.surface.force(ends) - spot.surface.force(
-                ends - steps[:, [0, 0, 1]] * [1, 0, 1]
-            )
+            in_space = steps[:, [0, 0, 1]] * [1, 0, 1]
+            ends = np.array([[spot.x, 0.0, spot.z]]) + 0.5 * in_space
+            change = spot.surface.force(ends) - spot.surface.force(ends - in_space)
             off = np.linalg.norm(change[:, ::2] - steps @ matrix.T, axis=1)
             worst = max(worst, float(off.max() / (size * norm)))
             most = max(most, float(np.linalg.norm(change, axis=1).max() / (size * norm)))

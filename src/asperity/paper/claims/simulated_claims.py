@@ -45,14 +45,12 @@ def check_over_assumptions(
         numbers: computed values by name.
     """
     outcomes = {*by_paper_measure, *by_exact_measure}
-    verdict: claim.Verdict = "undecided"
-    if len(outcomes) == 1:
-        verdict = "holds" if True in outcomes else "does not hold"
+    agreed = outcomes.pop() if len(outcomes) == 1 else None
     tally = (
         f"as printed in {sum(by_paper_measure)} of {len(by_paper_measure)} guesses by the paper's "
         f"measure, {sum(by_exact_measure)} by ours"
     )
-    return claim.Check(f"{tally}: {summary}", numbers, verdict=verdict)
+    return claim.check_statement(f"{tally}: {summary}", printed=agreed, numbers=numbers)
 
 
 def textured_walls_cycle() -> claim.Check:
@@ -123,22 +121,31 @@ def _format_ranges(energies: list[tuple[float, float]]) -> str:
 
 
 def _check_strokes(
-    strokes: tuple[Stroke, ...], predicate: Callable[[float, float], bool], suffix: str = ""
+    law: str,
+    predicate: Callable[[float, float], bool],
+    format_field: Callable[[Sequence[Stroke]], str] = lambda _strokes: "",
 ) -> claim.Check:
     """Check the energies along x and z of all hands and speeds by both measures."""
+    strokes = _simulated_strokes(law)
     paper = [(1e3 * one.same_sample[0], 1e3 * one.same_sample[2]) for one in strokes]  # [mJ]
     exact = [(1e3 * one.energy[0], 1e3 * one.energy[2]) for one in strokes]
     return check_over_assumptions(
-        f"the paper's sum {_format_ranges(paper)}; exact ledger {_format_ranges(exact)}{suffix}",
+        f"the paper's sum {_format_ranges(paper)}; exact ledger {_format_ranges(exact)}"
+        f"{format_field(strokes)}",
         [predicate(*one) for one in paper],
         [predicate(*one) for one in exact],
         _stroke_numbers(strokes),
     )
 
 
-def _format_gain_count(strokes: tuple[Stroke, ...]) -> str:
+def _format_gain_count(strokes: Sequence[Stroke]) -> str:
     count = sum(one.gains_energy for one in strokes)
     return f"; its field supplies energy in {count} of {len(strokes)}"
+
+
+def _format_greatest_supply(strokes: Sequence[Stroke]) -> str:
+    field = max(abs(1e3 * one.field) for one in strokes)
+    return f"; its field supplies at most {field:.2g} mJ, the rest is sampling"
 
 
 def decrease_indicates_supply() -> claim.Check:
@@ -160,8 +167,7 @@ def decrease_indicates_supply() -> claim.Check:
 
 def law_a_gains() -> claim.Check:
     """On a stroke A gains energy along z, none along x (Fig. 6)."""
-    strokes = _simulated_strokes("A")
-    return _check_strokes(strokes, lambda x, z: z > 0.0 and x == 0.0, _format_gain_count(strokes))
+    return _check_strokes("A", lambda x, z: z > 0.0 and x == 0.0, _format_gain_count)
 
 
 def law_g_is_passive() -> claim.Check:
@@ -169,30 +175,25 @@ def law_g_is_passive() -> claim.Check:
 
     Marginally: the energy supplied along one axis is at most a small share of the largest one.
     """
-    strokes = _simulated_strokes("G")
-    return _check_strokes(
-        strokes,
-        lambda x, z: max(x, z) <= MARGINAL_SHARE * max(abs(x), abs(z)),
-        _format_gain_count(strokes),
-    )
+
+    def is_marginal(x: float, z: float) -> bool:
+        return max(x, z) <= MARGINAL_SHARE * max(abs(x), abs(z))
+
+    return _check_strokes("G", is_marginal, _format_gain_count)
 
 
 def law_d_is_passive() -> claim.Check:
     """On a stroke D is marginally passive along z, clearly along x (Fig. 6)."""
-    strokes = _simulated_strokes("D")
-    field = max(abs(1e3 * one.field) for one in strokes)
-    return _check_strokes(
-        strokes,
-        lambda x, z: abs(z) <= MARGINAL_SHARE and x < -CLEAR_ENERGY,
-        f"; its field supplies at most {field:.2g} mJ, the rest is sampling",
-    )
+
+    def is_passive(x: float, z: float) -> bool:
+        return abs(z) <= MARGINAL_SHARE and x < -CLEAR_ENERGY
+
+    return _check_strokes("D", is_passive, _format_greatest_supply)
 
 
 def law_f_is_passive() -> claim.Check:
     """On a stroke F is marginally passive along z, passive along x (Fig. 6)."""
-    return _check_strokes(
-        _simulated_strokes("F"), lambda x, z: x < 0.0 and abs(z) <= MARGINAL_SHARE * abs(x)
-    )
+    return _check_strokes("F", lambda x, z: x < 0.0 and abs(z) <= MARGINAL_SHARE * abs(x))
 
 
 def law_a_loses_contact() -> claim.Check:

@@ -10,13 +10,7 @@ import numpy as np
 
 from asperity.core.checks import FloatArray
 from asperity.core.files import Serializable
-from asperity.paper.experiments.experiment_setups import (
-    ALL_LAWS,
-    FITTED_ASSUMPTIONS,
-    FITTED_DELAY,
-    TRACE_STRIDE,
-    band_setup,
-)
+from asperity.paper.experiments import experiment_setups as setups
 from asperity.scene.sweeps import map_threads, sweep_onsets
 from asperity.simulation.batch import BatchSimulation, StopRule
 from asperity.simulation.limit_cycles.onset import Prediction, run_starts, start_offsets
@@ -82,22 +76,22 @@ class PassivityExperiment(Serializable):
 
     counts: tuple[CycleCount, ...]
     onsets: tuple[Prediction, ...]
-    fitted: tuple[str, ...] = FITTED_ASSUMPTIONS
+    fitted: tuple[str, ...] = setups.FITTED_ASSUMPTIONS
 
 
 @lru_cache(maxsize=64)
 def count_cycles(
-    law: str, divisor: float, delay: int = FITTED_DELAY, starts: int = CYCLE_COUNT_STARTS
+    law: str, divisor: float, delay: int = setups.FITTED_DELAY, starts: int = CYCLE_COUNT_STARTS
 ) -> CycleCount:
     """Count the starts that end in a limit cycle at 2000 N/m over a divisor."""
-    setup = band_setup(law, _STIFFNESS / divisor, delay)
+    setup = setups.band_setup(law, _STIFFNESS / divisor, delay)
     servo, duration = setup.servo.without_steps(), setup.duration
     loop = BatchSimulation(setup.surface, setup.plant, setup.hand, servo, setup.motion, setup.start)
     stiffness, shifts = setup.surface.stiffness, start_offsets(setup.surface, starts)
     runs = run_starts(loop, stiffness, servo, shifts, duration)
     cycling = sum(bool(run.verdict) for run in runs)
     slow = sum(run.samples * servo.period > duration and not run.verdict for run in runs)
-    samples = range(0, round(duration / servo.period), TRACE_STRIDE)
+    samples = range(0, round(duration / servo.period), setups.TRACE_STRIDE)
     first = loop.new_trajectory(stiffness, delay, shifts[0], _observe_at(samples[1:]))
     path = [first.state[[0, 2]].copy()]
     while first.verdict is None:
@@ -119,12 +113,12 @@ def _observe_at(sample_counts: Sequence[int]) -> StopRule:
 def passivity_onsets(laws: str, delays: tuple[int, ...], starts: int) -> tuple[Prediction, ...]:
     """Return the onsets of laws at delays, including W, and the limits by the criteria."""
     return sweep_onsets(
-        band_setup("W"), laws, delays, n_phases=starts, tolerance=0.05, min_stiffness=50.0
+        setups.band_setup("W"), laws, delays, n_phases=starts, tolerance=0.05, min_stiffness=50.0
     ).onsets
 
 
 def passivity_experiment(
-    laws: str = ALL_LAWS, delays: tuple[int, ...] = DELAYS, starts: int = STARTS
+    laws: str = setups.ALL_LAWS, delays: tuple[int, ...] = DELAYS, starts: int = STARTS
 ) -> PassivityExperiment:
     """Simulate section V.A: counts at the fitted delay, and onsets against delay.
 

@@ -141,10 +141,7 @@ def device_onset(name: str, surface_name: str, surface: Surface) -> DeviceOnset:
         lowest=LOWEST_STIFFNESS,
     )
     prediction = predict(surface, setup.plant, setup.hand, setup.servo, onset)
-    max_stiffness = catalogue_stiffness(name)
-    return DeviceOnset(
-        name, surface_name, math.inf if max_stiffness is None else max_stiffness, prediction
-    )
+    return DeviceOnset(name, surface_name, catalogue_stiffness(name) or math.inf, prediction)
 
 
 def device_experiment(
