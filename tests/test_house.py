@@ -218,7 +218,7 @@ def test_other_comparisons_are_ignored(text: str) -> None:
 
 # --- size, annotations, documentation ------------------------------------------------------------
 
-MAX_LINES = 43_743
+MAX_LINES = 43_738
 """Lines of code without docstrings, comments, blank lines and generated files."""
 
 
