@@ -77,7 +77,8 @@ def random_designs(count: int, is_feasible: bool) -> list[Case]:
             if not reach:
                 continue
             share = draw.uniform(0.1, 0.9) if is_feasible else draw.uniform(1.5, 4.0)
-            search = search.with_force(share * reach)
+            target = replace(search.target, texture_force=share * reach)
+            search = replace(search, target=target)
             target, conditions = search.target, search.case.conditions
             answer = design(
                 search.texture,

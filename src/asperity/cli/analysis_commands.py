@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shlex
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -217,15 +217,6 @@ _CONDITIONS = (SPEED, *options.command_arguments("envelope"), MAX_DEPTH, GRIP, *
 _LAW_PARAMETERS = tuple(SHIPPED_LAW_ARGUMENTS.values())
 
 
-def _check_paths(outputs: Outputs, paths: Sequence[str]) -> None:
-    """Check the paths of ``--output`` before anything is computed."""
-    from asperity.report.envelope_report import check_suffix
-
-    for path in paths:
-        check_suffix(path)
-    check_outputs(force=outputs.force, **{f"output {i}": path for i, path in enumerate(paths, 1)})
-
-
 @declare_command("envelope")
 @options.device_option(
     "Devices of the catalogue, or TOML files, 'touch,mine.toml'.  [default: omega.3]",
@@ -264,9 +255,11 @@ def envelope_command(
     the texture is felt at that stiffness on a scan, as in asperity compare.
     """
     from asperity.envelopes.envelope import envelope, textured_laws
-    from asperity.report.envelope_report import envelope_page, write_envelope
+    from asperity.report.envelope_report import check_suffix, envelope_page, write_envelope
 
-    _check_paths(outputs, output)
+    for path in output:
+        check_suffix(path)
+    check_outputs(force=outputs.force, **{f"output {i}": path for i, path in enumerate(output, 1)})
     devices = [
         values["settings"].apply_to(one) for one in device or options.parse_devices("omega.3")
     ]

@@ -199,10 +199,6 @@ class Search:
         found = self.sample(x).ratios(self.target, stiffness)
         return {name: ratio * self.relaxed.get(name, 1.0) for name, ratio in found.items()}
 
-    def with_force(self, force: float) -> Search:
-        """Return the search for another texture force [N]."""
-        return replace(self, target=replace(self.target, texture_force=force))
-
     def margin(self, ratios: Mapping[str, float]) -> float:
         """Return the logarithm of the least ratio."""
         return math.log(min(ratios.values()))
