@@ -427,8 +427,9 @@ function copyLabels(axes) {
   for (const one of axes.filter((axis) => !hasLabels(axis))) {
     const other = axes.find((axis) => hasLabels(axis) && Math.abs(axis.frame.y - one.frame.y) < 1 && axis.frame.x < one.frame.x);
     if (!other) continue;
-    const copy = other.shared[1].cloneNode(true), moved = createGroup(...copy.children);
+    const copy = other.shared[1].cloneNode(true);
     copy.querySelectorAll("defs").forEach((defs) => defs.remove()); // names are unique
+    const moved = createGroup(...copy.children);
     copy.removeAttribute("class"); // hidden with its law
     copy.append(moved);
     move(moved, one.frame.x - other.frame.x, 0);
