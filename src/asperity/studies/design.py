@@ -1,20 +1,14 @@
-"""What a study is: its design, what is presented, and what a kind of method provides."""
+"""What a study is: its design, what is presented, the run of a method, and its trials."""
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Generator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from collections.abc import Generator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
-import numpy as np
-
-from asperity.core.arguments import Argument
 from asperity.core.errors import ParameterError, suggest_names
-
-if TYPE_CHECKING:
-    from asperity.studies.statistics.scores import Score
 
 Values = Mapping[str, Any]
 """Values of varied keys of a scene [SI]: ``{"surface.law": "A", "texture.amplitude": 1e-4}``."""
@@ -177,50 +171,3 @@ class TrialRecord:
 
 Answers = Mapping[str, Sequence[TrialRecord]]
 """Answered trials of each participant."""
-
-
-@dataclass(frozen=True)
-class MethodKind:
-    """A kind of method.
-
-    Attributes:
-        name: name in study files.
-        description: a short description.
-        arguments: options; a unit "level" stands for that of the level.
-        run: the method, from a design with all options, the number of the participant and random
-            numbers.
-        score: estimates from the answers; see
-            :class:`~asperity.studies.statistics.scores.Score`.
-        label: names of what is estimated: conditions, unless their pairs are.
-        consistency: share of repeated questions that a participant answers alike; ``None`` where
-            the method has no such share.
-        has_function: whether the answers are those of a psychometric function of a level.
-    """
-
-    name: str
-    description: str
-    arguments: tuple[Argument, ...]
-    run: Callable[[StudyDesign, int, np.random.Generator], Steps]
-    score: Callable[[StudyDesign, Answers], Score]
-    label: Callable[[StudyDesign], Sequence[dict[str, Any]]] = lambda design: design.conditions
-    consistency: Callable[[Sequence[TrialRecord]], float | None] = lambda _answers: None
-    has_function: bool = False
-
-    def complete(self, design: StudyDesign) -> StudyDesign:
-        """Return the design with the defaults of the options that it does not state."""
-        given = {one.name: one.default for one in self.arguments if one.default is not None}
-        return replace(design, options={**given, **design.options})
-
-    def make(self, design: StudyDesign, participant_number: int, seed: int) -> Method:
-        """Return a run of the method.
-
-        Args:
-            design: the study.
-            participant_number: number of the participant, from 0; it sets the order.
-            seed: seed of the random choices.
-
-        Raises:
-            ParameterError: for options or factors that the method cannot use.
-        """
-        rng = np.random.default_rng([seed, participant_number])
-        return Method(self.run(self.complete(design), participant_number, rng))

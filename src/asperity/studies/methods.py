@@ -1,16 +1,69 @@
-"""The kinds of methods by name, and the rules by which trials and participants are excluded."""
+"""What a kind of method provides, the kinds by name, and the rules of exclusion."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from asperity.core.arguments import Argument, read_arguments
-from asperity.studies.design import MethodKind
+from asperity.studies.design import Answers, Method, Steps, StudyDesign, TrialRecord
 from asperity.studies.kinds import pairs
 from asperity.studies.kinds.adjustment import run_onset, score_onset
 from asperity.studies.kinds.rating import run_rating, score_rating
 from asperity.studies.kinds.thresholds import run_thresholds, score_thresholds
+from asperity.studies.statistics.scores import Score
+
+
+@dataclass(frozen=True)
+class MethodKind:
+    """A kind of method.
+
+    Attributes:
+        name: name in study files.
+        description: a short description.
+        arguments: options; a unit "level" stands for that of the level.
+        run: the method, from a design with all options, the number of the participant and random
+            numbers.
+        score: estimates from the answers; see
+            :class:`~asperity.studies.statistics.scores.Score`.
+        label: names of what is estimated: conditions, unless their pairs are.
+        consistency: share of repeated questions that a participant answers alike; ``None`` where
+            the method has no such share.
+        has_function: whether the answers are those of a psychometric function of a level.
+    """
+
+    name: str
+    description: str
+    arguments: tuple[Argument, ...]
+    run: Callable[[StudyDesign, int, np.random.Generator], Steps]
+    score: Callable[[StudyDesign, Answers], Score]
+    label: Callable[[StudyDesign], Sequence[dict[str, Any]]] = lambda design: design.conditions
+    consistency: Callable[[Sequence[TrialRecord]], float | None] = lambda _answers: None
+    has_function: bool = False
+
+    def complete(self, design: StudyDesign) -> StudyDesign:
+        """Return the design with the defaults of the options that it does not state."""
+        given = {one.name: one.default for one in self.arguments if one.default is not None}
+        return replace(design, options={**given, **design.options})
+
+    def make(self, design: StudyDesign, participant_number: int, seed: int) -> Method:
+        """Return a run of the method.
+
+        Args:
+            design: the study.
+            participant_number: number of the participant, from 0; it sets the order.
+            seed: seed of the random choices.
+
+        Raises:
+            ParameterError: for options or factors that the method cannot use.
+        """
+        rng = np.random.default_rng([seed, participant_number])
+        return Method(self.run(self.complete(design), participant_number, rng))
+
 
 _FILE = Path(__file__).with_suffix(".toml")
 
