@@ -11,7 +11,7 @@ from asperity.report.loop.loop_pages import find_loop_page
 from asperity.report.page import Cell, Media, Page, Row, Section, Table, TableLayout
 from asperity.report.sentences.number_text import NOT_AVAILABLE
 from asperity.studies.methods import METHODS
-from asperity.studies.study_result import POOLED, StudyResult, exclusion_rules
+from asperity.studies.study_result import POOLED, StudyResult, exclusion_rules, label_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -71,12 +71,6 @@ def _answer(result: StudyResult) -> str:
     label = f" for {text}{which}" if (text := label_text(result, best)) else ""
     people = f"{len(result.included)} participants"
     return f"{result.score.quantity}: {_interval_text(best)}{label}; {people}."
-
-
-def label_text(result: StudyResult, row: Mapping[str, Any]) -> str:
-    """Return the condition of a row."""
-    values = [row[key] for key in result.design.factors]
-    return ", ".join(f"{x:.4g}" if isinstance(x, float) else str(x) for x in values)
 
 
 def _number(value: float | None) -> str:

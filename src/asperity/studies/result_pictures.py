@@ -13,8 +13,7 @@ from asperity.core.compiled import FloatArray
 from asperity.report.pictures import style
 from asperity.studies.design import TrialRecord
 from asperity.studies.kinds.thresholds import level_answers, log_levels
-from asperity.studies.result_page import label_text
-from asperity.studies.study_result import StudyResult
+from asperity.studies.study_result import StudyResult, label_text
 
 _MAX_GROUPS = 8
 _FAINT, _STRONG = "0.6", "C0"

@@ -163,6 +163,12 @@ class StudyResult(Reportable, TableFiles):
         return {"schema": SCHEMA, "study": self.metadata, "rows": rows, **people}
 
 
+def label_text(result: StudyResult, row: Mapping[str, Any]) -> str:
+    """Return the condition of a row."""
+    values = [row[key] for key in result.design.factors]
+    return ", ".join(f"{x:.4g}" if isinstance(x, float) else str(x) for x in values)
+
+
 def exclusion_rules(design: StudyDesign) -> dict[str, float]:
     """Return the rules of a design, with their defaults; a rule without a limit is infinite."""
     rules = {one.name: math.inf if one.default is None else one.default for one in EXCLUSIONS}
