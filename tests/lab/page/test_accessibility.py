@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import pytest
 from tests.lab.axe import AXE, needs_axe
 from tests.lab.browser import Browser, needs_browser
+from tests.lab.page.test_motions import use_device
 
 _RUN = (
     "axe.run(document, {resultTypes: ['violations']}).then(({violations, passes}) => ["
@@ -43,7 +44,9 @@ def everything_open(page: Browser) -> Iterator[None]:
 def test_axe_finds_nothing(page: Browser, dark: bool, width: int) -> None:
     page.resize(width, 800, dark=dark)
     assert violations(page) == []
-    # A field that feeds the hand, above its limit, with a hint; then the loops.
+    # A field that feeds the hand, above the limit of a light device, with a hint; then the loops.
+    former = page.ask("lab.status.settings.device")
+    use_device(page, "touch-x")
     page.press("a")
     page.until("lab.status.settings.law === 'A' && lab.hasCurrentPictures")
     page.ask(
@@ -73,6 +76,7 @@ def test_axe_finds_nothing(page: Browser, dark: bool, width: int) -> None:
     assert violations(page) == []
     page.press("t")
     page.until("lab.status.state === 'running' && !lab.tour.isActive")
+    use_device(page, former)
 
 
 @needs_browser
