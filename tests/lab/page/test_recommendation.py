@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 
 from tests.lab.browser import Browser, needs_browser
+from tests.lab.page.test_motions import render
 
 import asperity as asp
 from asperity.lab.scene_state import make_scene_state
@@ -60,6 +61,9 @@ def test_the_recommendation_comes_from_compare_and_is_applied(page: Browser) -> 
     assert text(page, "recommendation") == f"{named}: {best.tier}"
     assert page.ask("document.getElementById('apply-recommendation').disabled")
     assert page.said == []
+    # Other tests continue with the same lab.
+    change_depth(page, settings["max_depth"])
+    render(page, settings["law"], settings["stiffness"])
 
 
 @needs_browser
