@@ -19,6 +19,11 @@ def text(page: Browser, name: str) -> str:
     return str(page.ask(f"document.getElementById('{name}').textContent"))
 
 
+def stiffness_text(value: float) -> str:
+    """Return a stiffness [N/m] as the page shows it."""
+    return f"{1e-3 * value:.2f} kN/m" if value >= 1000.0 else f"{value:.0f} N/m"
+
+
 def change_depth(page: Browser, depth: float) -> None:
     page.ask(
         "{ const field = document.getElementById('max_depth');"
@@ -39,16 +44,17 @@ def test_the_recommendation_comes_from_compare_and_is_applied(page: Browser) -> 
     page.until(f"lab.frame.firstRow > {row} + 100 && !lab.status.recommendation.reason")
     page.until("lab.status.recommendation.reason")
     depth = page.ask("lab.status.settings.max_depth")
-    state = make_scene_state(load_scene(settings["texture"])).with_changes({"max_depth": depth})
+    used = {"max_depth": depth, "device": settings["device"]}
+    state = make_scene_state(load_scene(settings["texture"])).with_changes(used)
     surface = state.setup.surface
     result = asp.compare(surface.texture, state.rated_device, max_depth=depth, clamp=surface.clamp)
     best = result.recommended_row
     assert best is not None
     assert page.ask("lab.status.recommendation.reason") == result.recommendation
-    named = f"law {best.law.letter} at {1e-3 * best.recommended_stiffness:.2f} kN/m"
+    named = f"law {best.law.letter} at {stiffness_text(best.recommended_stiffness)}"
     assert text(page, "recommendation") == f"{named}: {best.tier}"
     note = text(page, "recommendation-note")
-    assert f"limit {1e-3 * best.stability_limit.stiffness:.2f} kN/m (plausible)" in note
+    assert f"limit {stiffness_text(best.stability_limit.stiffness)} (plausible)" in note
     assert "Assumed hand: tool held like a pen" in text(page, "recommendation-reason")
     # Applied by the button, as a user does it.
     assert text(page, "apply-recommendation") == f"Use {named}"

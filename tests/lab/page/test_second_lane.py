@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 from tests.lab.browser import Browser, needs_browser
+from tests.lab.page.test_recommendation import stiffness_text
 from tests.lab.test_state import CONTRASTS
 
 BOTH = (
@@ -53,7 +54,7 @@ def test_a_is_alive_and_h_is_not_under_one_hand(page: Browser) -> None:
     assert page.ask("lab.secondLane.energyMeter.energy < 0.3 * lab.energyMeter.energy")
     note = text(page, "beside-note")
     assert note.startswith("Same for both: hand (its motion sample by sample)")
-    assert f"{page.ask('lab.status.settings.stiffness'):.0f} N/m" in note
+    assert stiffness_text(page.ask("lab.status.settings.stiffness")) in note
     assert "behind" in text(page, "beside-trace-note")
     # Other laws beside each other are other verdicts: here both feed the hand.
     page.ask(
