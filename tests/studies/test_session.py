@@ -17,6 +17,7 @@ from tests.studies.study_texts import (
     make_study,
 )
 
+from asperity.core.errors import ParameterError
 from asperity.studies.live.screens import DOWN, GO_ON, PAUSE, STOP, UP, View
 from asperity.studies.live.trial_session import ADJUSTMENT_STEPS, SessionStopped, StudySession
 from asperity.studies.study_store import Participant, TrialRecord, read_trials, write_study
@@ -93,6 +94,23 @@ def test_a_stopped_session_goes_on_where_it_stopped(tmp_path: Path) -> None:
     assert [(one.run, one.trial, one.answer) for one in trials] == [
         (1, 1, "1"), (2, 2, "2"), (2, 3, "2"),
     ]  # fmt: skip
+
+
+def test_an_answer_is_kept_if_the_loop_ends_after_it(tmp_path: Path) -> None:
+    class EndingPlayer(FakePlayer):
+        def end_trial(self, answer: float, response_time: float) -> None:
+            super().end_trial(answer, response_time)
+            raise ParameterError("driver", "has ended")
+
+    study, player = make_study(tmp_path, COMPARISON), EndingPlayer()
+    write_study(tmp_path / "data", study)
+    with (
+        Participant(tmp_path / "data", study, "P01") as person,
+        pytest.raises(ParameterError, match="driver has ended"),
+    ):
+        StudySession(person, player, ScriptedScreen(answer_with("2"))).run()
+    assert [trial.answer for trial in read_trials(tmp_path / "data")] == ["2"]
+    assert player.calls[-1] == "stop"
 
 
 def test_a_number_is_typed_corrected_and_confirmed(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ import re
 import shutil
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from asperity.core.errors import ParameterError
 from asperity.core.files import append_bytes, json_text, text_digest, write_bytes
@@ -28,7 +28,7 @@ STUDY_FILE, ANSWERS_FILE, KEY_FILE = "study.json", "answers.jsonl", "key.json"
 DERIVED_FILES = (
     KEY_FILE, "report.html", "trials.csv", "table.csv", "trials.parquet", "table.parquet",
 )  # fmt: skip
-# Files that a report writes; they hold data of all participants.
+"""Files that a report writes; they hold data of all participants."""
 _NUMBER_FILE = "number.txt"
 SCHEMA = 1
 _CODE = re.compile(r"(?=.*\d)[A-Za-z0-9][A-Za-z0-9_-]{0,15}")
@@ -139,7 +139,7 @@ def _replay(path: Path, study: Study, number: int) -> tuple[Method, list[TrialRe
     return method, records
 
 
-class Participant(ExitStack):
+class Participant:
     """A participant whose answers are recorded; use it in a ``with``, which locks its folder.
 
     Args:
@@ -163,7 +163,6 @@ class Participant(ExitStack):
     """
 
     def __init__(self, folder: Path, study: Study, code: str, *, resume: bool = False) -> None:
-        super().__init__()
         self.path, self.code, self.study = folder / check_participant(code), code, study
         answers = self.path / ANSWERS_FILE
         with lock_folder(folder), ExitStack() as stack:
@@ -177,7 +176,7 @@ class Participant(ExitStack):
             if self.method.next() is None:
                 words = f"{code} has answered all {len(records)} trials"
                 raise ParameterError("participant", words)
-            self.callback(stack.pop_all().close)
+            self._release = stack.pop_all().close
         self.trial = len(records) + 1
         self.run = 1 + max((record.run for record in records), default=0)
 
@@ -200,6 +199,12 @@ class Participant(ExitStack):
         append_bytes("output", self._stream, json.dumps(line).encode() + b"\n", durable=True)
         self.method.answer(answer)
         self.trial += 1
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._release()
 
 
 def write_key(folder: str | Path) -> None:

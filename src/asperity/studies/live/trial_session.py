@@ -45,7 +45,6 @@ class StudySession:
     def __init__(self, participant: Participant, player: LoopPlayer, screen: Screen) -> None:
         self._settings, self._participant = participant.study.settings, participant
         self._player, self._screen = player, screen
-        participant.callback(player.stop)  # whatever ends the session
 
     def run(self) -> None:
         """Present trials until the method ends.
@@ -54,8 +53,15 @@ class StudySession:
             SessionStopped: if the participant stops.
             DeviceFault: for a fault; the trial under way is presented again by a later session.
         """
-        count, break_every = 0, self._settings["break_every"]
-        self._rest("Welcome", self._settings["instructions"])
+        try:
+            self._rest("Welcome", self._settings["instructions"])
+            self._present_trials(self._settings["break_every"])
+        finally:
+            self._player.stop()
+        self._screen.show(View("The end", self._settings["thanks"], is_last=True))
+
+    def _present_trials(self, break_every: int) -> None:
+        count = 0
         while (presentation := self._participant.method.next()) is not None:
             if count and break_every and count % break_every == 0:
                 self._rest("A break", "Rest your hand as long as you like.")
@@ -64,8 +70,6 @@ class StudySession:
                 count += 1
             except _Paused:
                 self._rest("Pause", "The trial is presented again when you go on.")
-        self._player.stop()
-        self._screen.show(View("The end", self._settings["thanks"], is_last=True))
 
     def _rest(self, title: str, text: str) -> None:
         """Show a text without force until the participant goes on; then start the loop."""
@@ -88,8 +92,8 @@ class StudySession:
         begin = time.monotonic()
         answer = self._ask(presentation)
         seconds = time.monotonic() - begin
+        participant.record(answer, seconds, started)  # first: a fault of the loop must not lose it
         self._player.end_trial(float(answer), seconds)
-        participant.record(answer, seconds, started)
 
     def _present_intervals(self, presentation: Presentation) -> None:
         for number, values in enumerate(presentation.intervals, start=1):
