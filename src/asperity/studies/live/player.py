@@ -17,6 +17,7 @@ import numpy as np
 
 from asperity.analysis.energy.merit import scan_ripple
 from asperity.core.errors import AsperityError, ParameterError
+from asperity.devices import Device
 from asperity.loop.shared_trace import COLUMNS
 from asperity.recording.writer import RecordingWriter
 from asperity.scene.device_run import without_hand
@@ -30,6 +31,7 @@ from asperity.servo.fault import EndReason
 from asperity.servo.process import ServoProcess
 from asperity.servo.safety import excess_stiffness_reason
 from asperity.studies.study_file import Study
+from asperity.surface import Surface
 
 _LEVEL_COUNT = 9  # levels in the range of a level that are analysed before the first trial
 # A simulated device is harmless: late samples and deep presses do not end its loop.
@@ -91,10 +93,10 @@ class Stimuli:
             stimulus = ", ".join(texts) or "the stimulus"
             try:
                 setup = self._make_setup(values)
-                assert setup.rendered  # it may have to be baked
+                rendered = setup.rendered  # it may have to be baked
             except AsperityError as error:
                 raise ParameterError("vary", f"{stimulus} cannot be rendered: {error}") from None
-            _check_limit(stimulus, setup)
+            _check_limit(stimulus, rendered, setup.device)
             self._checked[key] = setup
         return self._checked[key]
 
@@ -129,12 +131,12 @@ def smooth_wall(setup: Setup) -> Setup:
     """
     # Its gain is the same at every depth: at 0.1 m no press is too deep.
     wall = replace(setup, surface=setup.surface.to_law("W").to_depth(0.1))
-    _check_limit("the smooth wall between stimuli", wall)
+    _check_limit("the smooth wall between stimuli", wall.rendered, wall.device)
     return wall
 
 
-def _check_limit(stimulus: str, setup: Setup) -> None:
-    if reason := excess_stiffness_reason(setup.rendered, setup.device, keeps_margin=True):
+def _check_limit(stimulus: str, surface: Surface, device: Device) -> None:
+    if reason := excess_stiffness_reason(surface, device, keeps_margin=True):
         raise ParameterError("vary", f"{stimulus} is refused: {reason}")
 
 
