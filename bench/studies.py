@@ -13,7 +13,8 @@ from __future__ import annotations
 import math
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -44,11 +45,13 @@ def score_strength(values: Values) -> float:
     return math.exp(SCORES[LAWS["surface.law"].index(values["surface.law"])])
 
 
-def threshold_study(seed: int, **options: object) -> Iterator[Interval]:
-    """Yield the threshold of one participant, whose slope is drawn from its prior."""
+def threshold_study(
+    seed: int, own: Mapping[str, float] | None = None, **options: object
+) -> Iterator[Interval]:
+    """Yield the threshold of one participant, whose slope is drawn from its prior unless given."""
     rng = np.random.default_rng([seed, 9])
     threshold, slope = np.exp(rng.normal((0.0, math.log(USUAL_SLOPE)), (0.5, SLOPE_SPREAD)))
-    observer = Observer(float(threshold), float(slope))
+    observer = Observer(**{"threshold": float(threshold), "slope": float(slope), **(own or {})})
     kind = METHODS["detection"]
     design = StudyDesign("detection", {}, {**UNFELT, **options}, seed=seed)
     design = kind.complete(design)
@@ -101,6 +104,10 @@ TRUTHS: dict[str, Callable[..., list[Interval]]] = {
 STUDIES: dict[str, Callable[[int], Iterator[Interval]]] = {
     "staircase, 2 intervals": threshold_study,
     "staircase, 3 intervals": lambda seed: threshold_study(seed, intervals=3),
+    "staircase, slopes of 2": lambda seed: threshold_study(seed, {"slope": 2.0}),
+    "staircase, slopes of 8": lambda seed: threshold_study(seed, {"slope": 8.0}),
+    "staircase, 7.5 % wrong": lambda seed: threshold_study(seed, {"lapse": 0.15}),
+    "staircase, low threshold": lambda seed: threshold_study(seed, {"threshold": 0.12}),
     "comparison, differences": lambda seed: pooled_study("comparison", seed),
     "rating, ratios": lambda seed: pooled_study("rating", seed),
     "onset, pooled": lambda seed: pooled_study("onset", seed, **LEVELS),
@@ -144,10 +151,10 @@ def trials_needed(count: int, most: int = 100) -> tuple[float, float]:
     return float(np.median(needed)), float(np.median(reached))
 
 
-def _deviation(function: object) -> float:
+def _deviation(function: Any) -> float:  # SweetSpot states no types
     """Return the deviation of the posterior of the threshold."""
-    values = np.ravel(function.alpha)  # type: ignore[attr-defined]
-    share = np.ravel(function.Posterior("alpha"))  # type: ignore[attr-defined]
+    values = np.ravel(function.alpha)
+    share = np.ravel(function.Posterior("alpha"))
     share = share / share.sum()
     return float(np.sqrt(share @ np.square(values - share @ values)))
 
