@@ -10,10 +10,12 @@ after its 50 trials, with the same observer, and whether a study of the same see
 
 from __future__ import annotations
 
+import io
 import math
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import redirect_stdout
 from typing import Any
 
 import numpy as np
@@ -137,7 +139,8 @@ def trials_needed(count: int, most: int = 100) -> tuple[float, float]:
     truth, needed, reached = -2.5, [], []
     for seed in range(count):
         np.random.seed(seed)  # noqa: NPY002  # the library draws from the global generator
-        demonstration = Library.Simulate()[0]
+        with redirect_stdout(io.StringIO()):  # it prints its estimates
+            demonstration = Library.Simulate()[0]
         goal = _deviation(demonstration.pf)
         levels = LogLevels(math.exp(-5.0), math.exp(5.0), 1e-9, 0.0, guess=0.5, lapse=0.02)
         track, rng = BayesianTrack(levels), np.random.default_rng(seed)
