@@ -16,9 +16,9 @@ from asperity.laws import REGISTERED_LAWS
 OWN_LAW = str(Path(__file__).parents[2] / "examples" / "own_law.py")
 
 
-@pytest.fixture(scope="package")
+@pytest.fixture(scope="module")
 def lab() -> Iterator[Started]:
-    """A lab that runs in a process of its own, as a user starts it.
+    """A lab that runs in a process of its own, as a user starts it; each module has a new one.
 
     The device has 1000 samples a second: with the 4000 of the default, two labs and two browsers
     are too much for two cores, and samples are late.
