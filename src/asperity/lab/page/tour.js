@@ -87,7 +87,7 @@ export const STEPS = [
   }, {
     title: "A feels alive", watch: "The energy given to the hand: it grows with every loop, and turns red.",
     explanation: "Law A pushes straight up by the depth below the groove, without pushing sideways. Such a field has curl: a probe that moves down on one flank and up on the other gains energy.",
-    result: "The field has fed the hand, by more than sampling and quantisation explain. A surface that supplies energy feels alive.",
+    result: "The field has fed the hand, by more than sampling and quantisation explain: it feels alive.",
     showsItself: true, // the pointer is moved straight, which shows nothing
     tasks: [{ law: "A", stiffness: 1500, instruction: "Watch the hand move in small loops on a slope; then “Try it”: in the section, move the pointer right, down, left and up again.", demo: LOOP, evaluate: checkEnergySupplied }],
   }, {
