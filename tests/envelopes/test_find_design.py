@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import asperity as asp
+from asperity.analysis.energy.merit import scan_force
 from asperity.core.cache import bypass_results
 from asperity.core.errors import ParameterError
 from asperity.envelopes.find_design import Design, design
@@ -188,6 +189,25 @@ def test_measured_textures_are_magnified_in_all_directions() -> None:
     assert result.is_feasible
     assert result.row.perceptibility is not None
     assert result.row.perceptibility.texture_rms >= 30e-3
+
+
+@pytest.mark.parametrize("letter", "CFH")
+@pytest.mark.parametrize("factor", [0.2, 30.0])
+def test_numbers_of_a_magnified_texture_are_those_of_the_original(
+    letter: str, factor: float
+) -> None:
+    base = asp.named_surface("knurl")
+    case = WaveCase(letter, {}, asp.load_device("omega.3"), RenderConditions(), "search")
+    search = Search(case, base, Target(1e-3))
+    scaled = case.trial(search.scaled(factor))
+    sample = search.certified(factor, "search")
+    assert sample.trial.recommended.stiffness == scaled.recommended.stiffness
+    assert scaled.waves is not None
+    assert sample.trial.waves is not None
+    components = sample.trial.waves.components
+    np.testing.assert_allclose(components, scaled.waves.components, rtol=1e-6, atol=1e-12)
+    lost = scan_force(scaled.surface).contact_lost
+    assert sample.lost == pytest.approx(lost, abs=1e-3)
 
 
 def test_largest_measured_texture_states_what_is_lost() -> None:

@@ -229,7 +229,7 @@ def _make_design(search: Search, answer: Answer, factor: float, stiffness: float
         speed=case.conditions.speed,
         grip=case.conditions.grip,
     )
-    sample = search.certified(math.log(factor))
+    sample = search.certified(factor)
     ratios = sample.ratios(target, result.rows[0].surface.stiffness)
     margins = {name: ratio for name, ratio in ratios.items() if ratio < 1e20}
     reach = factor

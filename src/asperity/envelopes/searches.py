@@ -15,7 +15,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from asperity.analysis.energy.leak import worst_loop
-from asperity.analysis.energy.merit import contact_lost
+from asperity.analysis.energy.merit import scan_force
 from asperity.analysis.limits import perceptibility
 from asperity.core.arguments import FIELD, SEARCH
 from asperity.core.checks import FloatArray
@@ -38,7 +38,7 @@ _FALLING, _RISING = {"stability", "leak"}, {"least stiffness", "perceptibility",
 _LEAST = 1e-30
 _PENALTY = 100.0
 """Weight of the logarithm by which a requirement is missed, against force and size."""
-_TOLERANCE = 3e-4
+_TOLERANCE = 1e-3
 _MAX_FACTOR = 100.0
 _SAMPLES_PER_DECADE = 4
 _REFINED = 3
@@ -173,21 +173,21 @@ class Search:
         name = "magnify" if self.texture.single_wave is None else "magnify_height"
         return prepare_texture(self.texture, **{name: factor})
 
-    def certified(self, x: float, rendering: str = FIELD) -> Sample:
-        """Return the sample of a factor, from its logarithm, with the numbers of a comparison."""
-        factor, case = math.exp(x), replace(self.case, rendering=rendering)
+    def certified(self, factor: float, rendering: str = FIELD) -> Sample:
+        """Return the sample of a factor, with the numbers of a comparison."""
+        case = replace(self.case, rendering=rendering)
         is_magnified = rendering == SEARCH and self.texture.single_wave is None
         original = (self.texture, factor) if is_magnified else None
         trial = case.trial(self.scaled(factor), original)
         surface, leak = trial.surface, 0.0
         if math.isfinite(self.target.max_leak) and not surface.facts.conservative:
             leak = worst_loop(surface).worst_per_period / surface.stiffness
-        return Sample(trial, leak, contact_lost(surface))
+        return Sample(trial, leak, scan_force(trial.numbered).contact_lost)
 
     def sample(self, x: float) -> Sample:
         """Return the sample of a factor, from its logarithm; law H is searched, not baked."""
         if x not in self.samples:
-            self.samples[x] = self.certified(x, SEARCH)
+            self.samples[x] = self.certified(math.exp(x), SEARCH)
         return self.samples[x]
 
     def top(self, x: float) -> float:

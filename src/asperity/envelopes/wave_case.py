@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from asperity.analysis.bounds.bound import NORM, ONE_SIDED, Bound, JacobianMeasure
-from asperity.analysis.energy.merit import scan_ripple
+from asperity.analysis.energy.merit import scan_force
 from asperity.analysis.gain.characteristic import cached_number, is_shipped_law
 from asperity.analysis.limits import perceptibility
 from asperity.analysis.limits.limit_rules import (
@@ -102,6 +102,8 @@ class Trial:
         q: characteristic number.
         waves: waves of the texture on a scan; ``None`` without a recommended stiffness.
         min_stiffness: least stiffness of the wall [N/m].
+        numbered: surface of which the numbers are computed: it is smaller by the factor.
+        factor: lengths of the surface over those of ``numbered``.
         doubtful: numbers of the device that are not trusted.
     """
 
@@ -110,6 +112,8 @@ class Trial:
     q: Bound
     waves: perceptibility.WaveScan | None
     min_stiffness: float
+    numbered: Surface
+    factor: float
     doubtful: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -177,7 +181,10 @@ class WaveCase:
     def recommend(self, texture: Texture, original: Original | None = None) -> Trial:
         """Return a texture at its recommended stiffness, without its waves."""
         surface = self.surface(texture)
-        numbered = surface if original is None else self._unmagnified(surface, *original)
+        numbered, factor = surface, 1.0
+        if original is not None and is_shipped_law(surface.law):
+            # A law of the user may have lengths that are not parameters.
+            numbered, factor = self._unmagnified(surface, *original), original[1]
         q = self._number(numbered, NORM)
         # A law with curl is limited by the wall's gain K₀/q alone, whatever q⁺ is.
         is_conservative = surface.facts.conservative
@@ -185,12 +192,11 @@ class WaveCase:
         recommended = recommend_stiffness(surface, self.device, q, one_sided)
         if recommended.stiffness:
             surface = surface.to_stiffness(recommended.stiffness)
-        return Trial(surface, recommended, q, None, self.conditions.min_stiffness)
+        least = self.conditions.min_stiffness
+        return Trial(surface, recommended, q, None, least, numbered, factor)
 
     def _unmagnified(self, surface: Surface, texture: Texture, factor: float) -> Surface:
-        """Return the surface whose lengths are shorter by a factor: q and q⁺ are the same."""
-        if not is_shipped_law(surface.law):  # it may have lengths that are not parameters
-            return surface
+        """Return the surface whose lengths are shorter by a factor: its numbers are the same."""
         units = {name: one.unit for name, one in surface.law.arguments.items()}
         shorter = {
             name: value / factor if units[name] == "m" else value
@@ -218,12 +224,13 @@ class WaveCase:
         if not trial.recommended.stiffness:
             return trial
         surface, points = trial.surface, _SCAN_POINTS if texture.single_wave else None
+        ripple = trial.factor * scan_force(trial.numbered, points).ripple
         waves, doubtful, _rms = perceptibility.scan_waves(
             surface,
             self.device,
             texture.texture_part(),
             conditions.grip,
-            rms=scan_ripple(surface, points) * surface.stiffness,
+            rms=ripple * surface.stiffness,
             explicit_depth=conditions.max_depth is not None,
             points=points,
             **conditions.scan,

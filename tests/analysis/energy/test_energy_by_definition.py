@@ -423,9 +423,7 @@ def test_ripple_below_rounding_is_zero(stiffness: float, monkeypatch: pytest.Mon
     for part, is_counted in ((1e-13, False), (1e-11, True)):
         for size in (1e-6, 1.0, 1e6):
 
-            def scan(
-                _s: Surface, _l: ScanLine, _h: float, part: float = part, size: float = size
-            ) -> Any:
+            def scan(*_scan: Any, part: float = part, size: float = size) -> Any:
                 forces = np.zeros((1, 4, 3))
                 forces[0, :, 2] = size * (1.0 + part * np.array([1.0, -1.0, 1.0, -1.0]))
                 return forces, np.ones((1, 4)), 0.0

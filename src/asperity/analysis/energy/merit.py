@@ -53,34 +53,48 @@ def merit(surface: Surface) -> Merit:
 
 
 def _compute_merit(surface: Surface) -> Merit:
-    line = surface.texture.scan_line()
-    height = scan_height(surface)
-    forces, slopes, lost = _scan_forces_and_slopes(surface, line, height)
-    ripple = _rms_of_oscillation(forces)
+    line, height = surface.texture.scan_line(), scan_height(surface)
+    scan = scan_force(surface)
     gain = _gain_above_height(surface, height)
     unit = line.length if line.periodic else 1.0
     if math.isinf(gain) or gain == 0.0:  # a constant force has neither
         strength = support = 0.0
     else:
-        strength, support = ripple / (gain * unit), float(slopes.mean()) / gain
-    return Merit(strength, support, ripple, gain, height, lost)
+        strength, support = scan.ripple / (gain * unit), scan.slope / gain
+    return Merit(strength, support, scan.ripple, gain, height, scan.contact_lost)
 
 
-def scan_ripple(surface: Surface, points: int | None = None) -> float:
-    """Return the ripple of :func:`merit` [m] alone, without the gain and without the cache.
+@dataclass(frozen=True)
+class ScanForce:
+    """The force on the scan of :func:`merit`, per stiffness.
+
+    Attributes:
+        ripple: RMS of the oscillating force over the stiffness [m].
+        slope: mean of d f_z/d depth over the stiffness [1].
+        contact_lost: fraction of the scan without contact.
+    """
+
+    ripple: float
+    slope: float
+    contact_lost: float
+
+
+def scan_force(surface: Surface, points: int | None = None) -> ScanForce:
+    """Return what :func:`merit` tells of the force on its scan, without the gain.
 
     Args:
         surface: the surface.
-        points: of each scan line; by default those of ``merit``.
+        points: of each scan line, without the cache; by default those of ``merit``.
     """
-    line, height = surface.texture.scan_line(), scan_height(surface)
-    return _rms_of_oscillation(_scan_forces_and_slopes(surface, line, height, points)[0])
+    if points is not None:
+        return _scan_force(surface, points)
+    return cached_result("scan force", surface, _scan_force)
 
 
-def contact_lost(surface: Surface) -> float:
-    """Return the fraction of the scan of :func:`merit` without contact, alone."""
+def _scan_force(surface: Surface, points: int | None = None) -> ScanForce:
     line, height = surface.texture.scan_line(), scan_height(surface)
-    return _scan_forces_and_slopes(surface, line, height)[2]
+    forces, slopes, lost = _scan_forces_and_slopes(surface, line, height, points)
+    return ScanForce(_rms_of_oscillation(forces), float(slopes.mean()), lost)
 
 
 def _rms_of_oscillation(forces: FloatArray) -> float:

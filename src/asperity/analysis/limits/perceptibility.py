@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.analysis.energy.merit import merit
+from asperity.analysis.energy.merit import scan_force
 from asperity.analysis.limits.limit_rules import LIMIT_RULES, LimitCase, evaluate_limit
 from asperity.analysis.limits.perceptibility_result import (
     HandSpectrum,
@@ -179,7 +179,7 @@ def scan_waves(
     if part.nesting is not None:
         depth = surface.max_depth if explicit_depth else default_max_depth(part.texture)
         scanned = surface.to_texture(part.texture, depth)
-        texture_rms = merit(scanned).ripple * surface.stiffness
+        texture_rms = scan_force(scanned).ripple * surface.stiffness
     spectrum = compute_spectrum(part.texture)
     components = wave_force_components(scanned, spectrum, points)
     forces = np.hypot(*components.T)
@@ -207,10 +207,10 @@ def _is_felt_magnified(
         return False
     depth = scaled if options["explicit_depth"] else default_max_depth(texture)
     larger = surface.to_texture(texture, depth)
-    strokes, part = merit(larger), texture.texture_part()
-    rms = strokes.ripple * larger.stiffness
+    scanned, part = scan_force(larger), texture.texture_part()
+    rms = scanned.ripple * larger.stiffness
     assessed = assess_perceptibility(larger, device, part, rms=rms, find_remedies=False, **options)
-    return assessed.tier == "felt" and strokes.contact_lost <= MAX_CONTACT_LOST
+    return assessed.tier == "felt" and scanned.contact_lost <= MAX_CONTACT_LOST
 
 
 def classify_perceptibility(

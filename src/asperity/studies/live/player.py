@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from asperity.analysis.energy.merit import scan_ripple
+from asperity.analysis.energy.merit import scan_force
 from asperity.core.errors import AsperityError, ParameterError
 from asperity.devices import Device
 from asperity.loop.shared_trace import COLUMNS
@@ -105,7 +105,7 @@ class Stimuli:
         setup, force = self._build_setup(values), self._study.settings.get("texture_force")
         if force is None:
             return setup
-        ripple = scan_ripple(setup.rendered)
+        ripple = scan_force(setup.rendered).ripple
         if not ripple:
             raise ParameterError("study.texture_force", "needs surfaces with a texture force")
         return replace(setup, surface=setup.surface.to_stiffness(force / ripple))
