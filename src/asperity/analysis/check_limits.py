@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from asperity.analysis.bounds.bound import NORM, ONE_SIDED, Bound
 from asperity.analysis.compare import DEFAULT_DEVICE, recommended_law
-from asperity.analysis.energy.merit import merit
+from asperity.analysis.energy.merit import scan_force
 from asperity.analysis.gain.characteristic import cached_number
 from asperity.analysis.limits import limit_rules
 from asperity.analysis.limits.limit_result import Limits, RenderedWave, limits_assumptions
@@ -102,7 +102,7 @@ def limits(
     recommended = verdict.recommend_stiffness(surface, device, q, one_sided)
     if stiffness is None:
         surface = verdict.at_recommended_stiffness(surface, device, recommended)
-    scan, hand = merit(surface), load_grip(grip)
+    scan, hand = scan_force(surface), load_grip(grip)
     perceptibility = assess_perceptibility(
         surface,
         device,
