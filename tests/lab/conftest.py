@@ -23,7 +23,7 @@ def lab() -> Iterator[Started]:
     The device has 1000 samples a second: with the 4000 of the default, two labs and two browsers
     are too much for two cores, and samples are late.
     """
-    started = Started("--device", "touch-x")
+    started = Started("--device", "touch-x", "--law", "C", "--stiffness", "250N/m")
     yield started
     assert started.end() == (0, "")
 

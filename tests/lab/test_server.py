@@ -16,7 +16,9 @@ from tests.lab.client import STILL, column, frames, head, heard, joined, news, r
 from tests.lab.started import Started
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
+import asperity as asp
 from asperity.lab.access import MAX_MESSAGE_BYTES, page_files
+from asperity.lab.scene_state import DEFAULT_SURFACE, START_LAW, START_STIFFNESS
 from asperity.lab.server import MAX_PENDING_FRAMES, MIN_FRAME_INTERVAL
 
 
@@ -217,3 +219,28 @@ def test_the_next_port_is_named(lab: Started) -> None:
     port = lab.host.split(":")[1]
     with pytest.raises(AssertionError, match=rf"port {port} is not available; \d+ is free"):
         Started("--port", port)
+
+
+UNKNOWN = 'id = "unknown"\napparent_mass = "60 g"\n'
+
+
+def test_a_lab_starts_with_what_compare_recommends() -> None:
+    row = asp.compare(DEFAULT_SURFACE, "omega.3").recommended_row
+    assert row is not None
+    assert started_settings() == ("omega.3", row.law.letter, row.recommended_stiffness)
+
+
+def test_a_lab_starts_where_nothing_is_recommended(tmp_path: Path) -> None:
+    device = tmp_path / "unknown.toml"
+    device.write_text(UNKNOWN)
+    assert started_settings("--device", str(device)) == ("unknown", START_LAW, START_STIFFNESS)
+
+
+def started_settings(*arguments: str) -> tuple[str, str, float]:
+    lab = Started("--port", "0", *arguments)
+    try:
+        with joined(lab) as page:
+            settings = heard(page, news(state="running"))["settings"]
+    finally:
+        lab.close()
+    return settings["device"], settings["law"], settings["stiffness"]

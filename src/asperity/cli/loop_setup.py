@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from asperity.servo.drivers.driver import Driver
     from asperity.servo.process import PrestartedProcess
     from asperity.simulation.servo import Servo
+    from asperity.textures.texture import Texture
 
 
 def stiffness_option(default: str) -> Argument:
@@ -78,7 +79,7 @@ def load_setup(
         ParameterError: for a missing, unknown or invalid value.
     """
     from asperity.scene import load_scene
-    from asperity.scene.device_run import recommend_law_and_stiffness, without_hand
+    from asperity.scene.device_run import without_hand
     from asperity.scene.setup import make_setup
 
     if driver is None and not source.lower().endswith(".toml"):
@@ -96,10 +97,7 @@ def load_setup(
         # A clamp bounds the force, and the analysis then holds at every depth.
         surface = {"clamp": BACKED.name, **surface}
         if not {"law", "stiffness"} <= surface.keys() and "hand" not in scene.loop:
-            with step_bar(
-                "comparing the laws", 1 if "law" in surface else len(REGISTERED_LAWS)
-            ) as step:
-                surface, note = recommend_law_and_stiffness(scene.texture, device, surface, step)
+            surface, note = recommend(scene.texture, device, surface)
     if driver not in (None, SIMULATED):
         scene = without_hand(scene)
     if laws or "law" in surface:
@@ -115,6 +113,21 @@ def load_setup(
     )
     with progress_bar("baking the field") as update:
         return setup.with_rendering([note], update)
+
+
+def recommend(
+    texture: Texture, device: Device, surface: dict[str, Any]
+) -> tuple[dict[str, Any], str]:
+    """Return surface arguments with the recommended law and stiffness; shows the progress.
+
+    Raises:
+        ParameterError: if nothing can be recommended.
+    """
+    from asperity.scene.device_run import recommend_law_and_stiffness
+
+    count = 1 if "law" in surface else len(REGISTERED_LAWS)
+    with step_bar("comparing the laws", count) as step:
+        return recommend_law_and_stiffness(texture, device, surface, step)
 
 
 def _check_driver(name: str, device: Device) -> None:

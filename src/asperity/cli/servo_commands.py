@@ -11,7 +11,7 @@ import sys
 import time
 import webbrowser
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -227,12 +227,12 @@ _LAB_ARGUMENTS = options.command_arguments("lab")
 @declare_command("lab")
 @click.argument("surface", required=False)
 @options.law_option(
-    "Initial law.  [default: the scene's, else C; with --driver the recommended law]"
+    "Initial law.  [default: the scene's, else the recommended law, or C if there is none]"
 )
 @options.law_options(
     (
         loop_setup.stiffness_option(
-            "the scene's, else 250 N/m; with --driver the recommended stiffness"
+            "the scene's, else the recommended stiffness, or 250 N/m if there is none"
         ),
         *options.LAW_OPTIONS[1:],
     )
@@ -287,8 +287,14 @@ def _simulated_scene(source: str, values: dict[str, Any]) -> tuple[SceneState, P
             return load_recorded_clip(path, source, own, values["device"], settings.apply_to)
     with progress_bar("reading the surface"):
         scene = load_scene(source, file_options)
-        device = options.select_device(values["device"], scene, values)
-        return make_scene_state(scene, source, own, device, file_options), None
+    device = options.select_device(values["device"], scene, values)
+    requested = {**scene.surface, **own}
+    if not {"law", "stiffness"} <= requested.keys():
+        # Without a recommendation, and for wrong parameters, the defaults of the lab apply.
+        with suppress(ParameterError):
+            requested, note = loop_setup.recommend(scene.texture, device, requested)
+            print_message(note)
+    return make_scene_state(scene, source, requested, device, file_options), None
 
 
 def announce_page(name: str, address: str, *, no_browser: bool) -> None:
