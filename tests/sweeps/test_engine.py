@@ -19,6 +19,7 @@ import pytest
 
 import asperity as asp
 from asperity.core.errors import ParameterError
+from asperity.rendering import rendered_surface
 from asperity.sweeps.case_runs import compute_cases
 from asperity.sweeps.engine import LOST, Place, local_place, run_cases
 from asperity.sweeps.result_store import CASES_FILE, ResultStore
@@ -293,3 +294,18 @@ def test_results_stay_readable_without_a_folder() -> None:
     assert path.exists()
     del result
     assert not path.exists()
+
+
+@pytest.mark.caches_results
+def test_fields_are_baked_by_the_engine_and_kept() -> None:
+    depths = {"surface.max_depth": "10um,20um"}
+    result = asp.sweep("knurl", depths, "bake", processes=2)
+    rows = result.table_rows()
+    texture = asp.named_surface("knurl")
+    for row, depth in zip(rows, (1e-5, 2e-5), strict=True):
+        surface = asp.Surface(texture, "H", max_depth=depth)
+        field = rendered_surface(surface, progress=lambda _part: pytest.fail("baked anew"))
+        assert row["q"] == asp.characteristic_number(field).upper
+        assert row["nodes"] * 4 == row["size [B]"]
+    with pytest.raises(ParameterError, match="needs no field: its contact has a closed form"):
+        asp.sweep("sinusoid:amplitude=1mm,period=5mm", depths, "bake", processes=1)

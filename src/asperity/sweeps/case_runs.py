@@ -1,4 +1,7 @@
-"""What a sweep computes for a case: a comparison, limits, onsets or strokes, in any process."""
+"""What a sweep computes for a case: a comparison, limits, onsets, strokes or a field.
+
+It is computed in any process; fields stay in the cache of its machine.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -23,17 +26,22 @@ from asperity.core.digests import content_digest, package_digest
 from asperity.core.display import Tabular
 from asperity.core.errors import AsperityError, ParameterError, suggest_names
 from asperity.core.files import to_plain_data
-from asperity.laws import REGISTERED_LAWS, find_laws
+from asperity.laws import REGISTERED_LAWS, find_law, find_laws
+from asperity.rendering import is_searched, rendered_surface
 from asperity.scene.loops import onset, scan
 from asperity.scene.scene_file import Scene, build_scene
 from asperity.scene.scene_keys import with_values
 from asperity.scene.sections import surface_keywords
+from asperity.surface import Surface
 
 LAW_KEY = "surface.law"
 Case = tuple[int, Mapping[str, Any]]
 """Number of a case, and the values of its keys as written in a scene."""
 Laws = tuple[str, ...] | None
-_SCENE_ARGUMENTS = {"scene", "texture", "device", "laws", "law", "progress", "law_parameters"}
+_SCENE_ARGUMENTS = {
+    *("scene", "texture", "surface", "device", "laws", "law", "law_parameters", "rendering"),
+    "progress",
+}
 
 
 @dataclass(frozen=True)
@@ -82,6 +90,18 @@ def _limits(scene: Scene, _laws: Laws, options: Mapping[str, Any], _seed: int) -
     return limits(scene.texture, scene.device or DEFAULT_DEVICE, **{**arguments, **options})
 
 
+def _bake(scene: Scene, _laws: Laws, options: Mapping[str, Any], _seed: int) -> Tabular:
+    values = {**scene.surface, "law": "H"}
+    values.pop("rendering", None)
+    surface = Surface(scene.texture, **surface_keywords(values, find_law("H")))
+    if not is_searched(surface):
+        raise ParameterError("texture", "needs no field: its contact has a closed form")
+    rendered = rendered_surface(surface, **options)
+    if is_searched(rendered):
+        raise ParameterError("extent", "is missing: this texture never repeats")
+    return cast("Tabular", rendered.texture)  # a potential field
+
+
 _FORCE, _STIFFNESS = "resolved force RMS [N]", "recommended stiffness [N/m]"
 RUN_KINDS = {
     kind.name: kind
@@ -92,6 +112,7 @@ RUN_KINDS = {
                 ("law", "delay [samples]"), ("cycling [N/m]",)),
         RunKind("scan", scan, lambda scene, laws, options, _: scan(scene, laws, **options),
                 ("law", "speed [m/s]", "depth [m]"), ("energy of the field [J]",)),
+        RunKind("bake", rendered_surface, _bake, (), ("size [B]", "q"), takes_laws=False),
     )
 }  # fmt: skip
 """Runs by name; a plugin may define one."""

@@ -44,7 +44,8 @@ def sweep(
         scene: path of a scene file, or a surface as for :func:`asperity.compare`.
         vary: values by key, as on the command line: ``{"texture.period": "0.5mm:4mm:40log",
             "device": "touch,omega.3"}``. The last key changes fastest.
-        run: ``"compare"``, ``"limits"``, ``"onset"`` or ``"scan"``.
+        run: ``"compare"``, ``"limits"``, ``"onset"``, ``"scan"`` or ``"bake"``, which makes the
+            fields of law H and keeps them in the cache.
         laws: letters or names, for runs with several laws; all by default.
         design: ``"sobol:64"`` for that many points of a Sobol sequence over the ranges, which are
             then ``"0.5mm:4mm"`` or ``"0.5mm:4mm:log"``; by default all combinations.

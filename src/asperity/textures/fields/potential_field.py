@@ -13,6 +13,7 @@ import numpy as np
 from asperity.contacts.contact import Contact
 from asperity.core.checks import FloatArray
 from asperity.core.digests import content_digest
+from asperity.core.display import Tabular
 from asperity.core.errors import ParameterError
 from asperity.core.files import to_plain_data
 from asperity.measured.lengths import format_length
@@ -79,7 +80,7 @@ def _of_source(name: str) -> property:
     return property(lambda self: getattr(self.source, name), doc="See :class:`Texture`.")
 
 
-class PotentialField(Texture):
+class PotentialField(Texture, Tabular):
     """A potential field baked from law H of a texture, which is rendered without a search.
 
     T = S²/2 where S(p) = Σ c_n Π β((p - p_n)_i/h_i) is positive, β the quadratic B-spline, c_n
@@ -199,6 +200,21 @@ class PotentialField(Texture):
             **{name: np.ravel(getattr(source, name, ())).tolist() for name in ("pitch", "origin")},
             "periodic": source.domain.periodic,
         }
+
+    def table_rows(self) -> list[dict[str, Any]]:
+        """Return size and accuracy, in one row."""
+        numbers, accuracy = self.arguments.c, self.accuracy
+        return [
+            {
+                "nodes": int(numbers.size),
+                "spacing [m]": max(self.grid.spacing),
+                "size [B]": int(numbers.nbytes),
+                "q": self.gain.upper,
+                "share of force": accuracy.share,
+                "greatest distance of onset [m]": accuracy.onset,
+                "max depth [m]": self.max_depth,
+            }
+        ]
 
     # --- the texture that was baked ---------------------------------------------------------------
 
