@@ -115,6 +115,15 @@ class Browser:
         """Wait until an expression is true."""
         until(lambda: bool(self.ask(script)), patience, script)
 
+    def expect_text(self, name: str, text: str, *, exact: bool = True) -> None:
+        """Wait until the element of an id has a text, or begins with it."""
+        content = f"document.getElementById('{name}').textContent"
+        reached = f"=== {text!r}" if exact else f".startsWith({text!r})"
+        end = time.monotonic() + PATIENCE
+        while not self.ask(f"{content}{reached}"):
+            assert time.monotonic() < end, f"{name}: {self.ask(content)!r}, not {text!r}"
+            time.sleep(0.02)
+
     def resize(self, width: int, height: int, *, dark: bool = False) -> None:
         self.call(
             "Emulation.setDeviceMetricsOverride",

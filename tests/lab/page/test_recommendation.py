@@ -52,19 +52,19 @@ def test_the_recommendation_comes_from_compare_and_is_applied(page: Browser) -> 
     assert best is not None
     assert page.ask("lab.status.recommendation.reason") == result.recommendation
     named = f"law {best.law.letter} at {stiffness_text(best.recommended_stiffness)}"
-    assert text(page, "recommendation") == f"{named}: {best.tier}"
+    page.expect_text("recommendation", f"{named}: {best.tier}")
     note = text(page, "recommendation-note")
     assert f"limit {stiffness_text(best.stability_limit.stiffness)} (plausible)" in note
     assert "Assumed hand: tool held like a pen" in text(page, "recommendation-reason")
     # Applied by the button, as a user does it.
-    assert text(page, "apply-recommendation") == f"Use {named}"
+    page.expect_text("apply-recommendation", f"Use {named}")
     page.ask("document.getElementById('apply-recommendation').click()")
     page.until(
         f"lab.status.settings.law === '{best.law.letter}' && lab.status.state === 'running'"
         f"&& lab.status.settings.stiffness === {best.recommended_stiffness}"
     )
     # The law is no reason to compare again.
-    assert text(page, "recommendation") == f"{named}: {best.tier}"
+    page.expect_text("recommendation", f"{named}: {best.tier}")
     assert page.ask("document.getElementById('apply-recommendation').disabled")
     assert page.said == []
     # Other tests continue with the same lab.
@@ -80,7 +80,7 @@ def test_a_device_that_cannot_be_compared_says_why(page: Browser) -> None:
         "field.dispatchEvent(new Event('change')); }"
     )
     page.until("lab.status.settings.device === '2diy' && lab.status.recommendation.reason")
-    assert text(page, "recommendation") == "none"
+    page.expect_text("recommendation", "none")
     assert "needs max_stiffness to compare laws" in text(page, "recommendation-note")
     assert page.ask("document.getElementById('apply-recommendation').hidden")
     page.ask(
