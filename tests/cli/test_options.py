@@ -191,5 +191,6 @@ def test_default_device_is_the_same_everywhere(command: str) -> None:
 def test_help_of_the_lab_states_its_initial_scene() -> None:
     result = CliRunner().invoke(cli, ["lab", "--help"], env={"COLUMNS": "200"})
     text = " ".join(result.output.split())
-    assert f"else {START_LAW}; with --driver" in text
-    assert f"else {format_quantity(START_STIFFNESS, 'N/m')}; with --driver" in text
+    assert f"else the recommended law, or {START_LAW} if there is none" in text
+    start = format_quantity(START_STIFFNESS, "N/m")
+    assert f"else the recommended stiffness, or {start} if there is none" in text

@@ -288,13 +288,12 @@ def _simulated_scene(source: str, values: dict[str, Any]) -> tuple[SceneState, P
     with progress_bar("reading the surface"):
         scene = load_scene(source, file_options)
     device = options.select_device(values["device"], scene, values)
-    requested = {**scene.surface, **own}
-    if not {"law", "stiffness"} <= requested.keys():
+    if not {"law", "stiffness"} <= scene.surface.keys() | own.keys():
         # Without a recommendation, and for wrong parameters, the defaults of the lab apply.
         with suppress(ParameterError):
-            requested, note = loop_setup.recommend(scene.texture, device, requested)
+            own, note = loop_setup.recommend(scene.texture, device, {**scene.surface, **own})
             print_message(note)
-    return make_scene_state(scene, source, requested, device, file_options), None
+    return make_scene_state(scene, source, own, device, file_options), None
 
 
 def announce_page(name: str, address: str, *, no_browser: bool) -> None:

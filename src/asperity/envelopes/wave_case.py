@@ -190,8 +190,8 @@ class WaveCase:
         is_conservative = surface.facts.conservative
         one_sided = self._number(numbered, ONE_SIDED) if is_conservative else q
         recommended = recommend_stiffness(surface, self.device, q, one_sided)
-        if recommended.stiffness:
-            surface = surface.to_stiffness(recommended.stiffness)
+        if k := recommended.stiffness:
+            surface, numbered = surface.to_stiffness(k), numbered.to_stiffness(k)
         least = self.conditions.min_stiffness
         return Trial(surface, recommended, q, None, least, numbered, factor)
 

@@ -3,7 +3,7 @@
 const RADII = [1, 0.5, 0.25]; // relative to the greatest radius along x
 const STEPS = Array.from({ length: 15 }, (_, k) => (k - 7) / 7.5);
 const DISC = STEPS.flatMap(u => STEPS.map(v => [u, v])).filter(([u, v]) => u * u + v * v <= 1); // points of the unit disc
-const EQUAL_SHARE = 0.9; // of the greatest gain: loops that gain more than this are equally good
+const EQUAL_SHARE = 0.6; // of the greatest gain: best loops of their flanks that gain more than this are equally good
 
 /**
  * Return the integral of the curl over an ellipse of the x-z plane [N].
@@ -34,10 +34,16 @@ export function findFeedingLoop(section, { x, z, radiusX, radiusZ }) {
   if (!section.box || !section.hasCurl) return null;
   const [left, right] = section.box, step = (right - left) / (section.columns - 1), loops = [];
   for (const radius of RADII.map(factor => factor * radiusX).filter(value => value > 1.5 * step || value === radiusX)) {
-    for (let centre = left + radius; centre <= right - radius; centre += step) {
-      const gain = -integrateCurl(section, centre, z, radius, radiusZ);
-      loops.push({ x: centre, radiusX: radius, gain: Math.abs(gain), sense: Math.sign(gain) });
+    const gains = [];
+    for (let centre = left + radius; centre <= right - radius; centre += step / 2) {
+      gains.push([centre, -integrateCurl(section, centre, z, radius, radiusZ)]);
     }
+    const sizeAt = index => Math.abs(gains[index]?.[1] ?? 0);
+    gains.forEach(([centre, gain], index) => {
+      const size = sizeAt(index);
+      if (size < sizeAt(index - 1) || size < sizeAt(index + 1)) return; // not the best of its flank
+      loops.push({ x: centre, radiusX: radius, gain: size, sense: Math.sign(gain) });
+    });
   }
   const most = Math.max(0, ...loops.map(({ gain }) => gain));
   if (!(most > 0)) return null;
