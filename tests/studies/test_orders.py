@@ -58,7 +58,7 @@ def test_runs_replay_from_seed_and_answers(kind: str) -> None:
 
 
 def test_bayesian_runs_replay() -> None:
-    pytest.importorskip("SweetSpot")
+    pytest.importorskip("SweetSpot", reason="not run: no SweetSpot here")
     design = design_of("detection", procedure="bayesian", trials=5)
     assert answers(design) == answers(design) != answers(design, seed=6)
 

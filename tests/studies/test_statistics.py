@@ -166,7 +166,7 @@ def test_thresholds_of_laws_come_out() -> None:
 
 
 def test_bayesian_thresholds_come_out() -> None:
-    pytest.importorskip("SweetSpot")
+    pytest.importorskip("SweetSpot", reason="not run: no SweetSpot here")
     from asperity.studies.methods import METHODS
 
     design = design_of("detection", procedure="bayesian", trials=60)

@@ -125,7 +125,7 @@ def test_reports_and_tables(kind: str, tmp_path: Path) -> None:
 
 
 def test_tables_as_parquet(tmp_path: Path) -> None:
-    parquet = pytest.importorskip("pyarrow.parquet")
+    parquet = pytest.importorskip("pyarrow.parquet", reason="not run: no pyarrow here")
     result = analyse(design_of("rating"), records(design_of("rating"), 3))
     result.trial_table.to_parquet(tmp_path / "trials.parquet")
     table = parquet.read_table(tmp_path / "trials.parquet")

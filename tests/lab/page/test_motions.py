@@ -88,6 +88,43 @@ def test_loops_are_offered_where_the_field_has_curl_and_feed_the_hand(
     assert not page.ask(FED)
 
 
+# Wrong places of loops in random pictures of law A on sin(π x), whose points are as far apart as
+# those of the page (72 x 36), at most 0.2 mm.
+WRONG_PLACES = """
+import("./feeding_loop.js").then(({ findFeedingLoop }) => {
+  let state = 1;
+  const random = (low, high) => {
+    state = state * 48271 % 2147483647;
+    return low + (high - low) * state / 2147483647;
+  };
+  const wrong = [];
+  for (let n = 0; n < 1000; n++) {
+    const left = random(-6, -3), bottom = random(-4, -1);
+    const dx = random(0.05, 0.2), dz = random(0.05, 0.2), curl = [];
+    const columns = Math.ceil((random(3, 6) - left) / dx), rows = Math.ceil((1 - bottom) / dz);
+    for (let j = 0; j < rows; j++) for (let i = 0; i < columns; i++) {
+      const x = left + i * dx, z = bottom + j * dz;
+      const isTextured = z < 0.2 * Math.sin(Math.PI * x) && z > -0.2;
+      curl.push(isTextured ? -Math.cos(Math.PI * x) : 0);
+    }
+    const box = [left, left + (columns - 1) * dx, bottom, bottom + (rows - 1) * dz];
+    const section = { box, columns, rows, curl, hasCurl: true };
+    for (const x of [-0.9, 0.1, 0.9]) {
+      const loop = findFeedingLoop(section, { x, z: -0.12, radiusX: 0.5, radiusZ: 0.12 });
+      const flank = Math.round(x), isNear = loop && Math.abs(loop.x - flank) < 0.3;
+      if (!isNear || loop.sense !== (flank ? -1 : 1)) wrong.push([n, x]);
+    }
+  }
+  return wrong;
+})
+"""
+
+
+@needs_browser
+def test_the_nearest_flank_is_found_wherever_the_points_of_the_picture_are(page: Browser) -> None:
+    assert page.ask(WRONG_PLACES) == []
+
+
 @needs_browser
 def test_without_curl_there_is_no_hint_and_loops_stay_in_place(page: Browser) -> None:
     render(page, "C", 250.0)
