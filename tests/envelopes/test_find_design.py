@@ -195,12 +195,15 @@ def test_measured_textures_are_magnified_in_all_directions() -> None:
     assert result.row.perceptibility.texture_rms >= 30e-3
 
 
+WAVES = asp.Fourier([1e-4, 5e-5], [[3000.0, 0.0], [0.0, 5000.0]], [0.0, 0.5])
+
+
+@pytest.mark.parametrize("base", [asp.named_surface("knurl"), WAVES], ids=["spline", "waves"])
 @pytest.mark.parametrize("letter", "CFH")
 @pytest.mark.parametrize("factor", [0.2, 30.0])
 def test_numbers_of_a_magnified_texture_are_those_of_the_original(
-    letter: str, factor: float
+    base: Any, letter: str, factor: float
 ) -> None:
-    base = asp.named_surface("knurl")
     case = WaveCase(letter, {}, asp.load_device("omega.3"), RenderConditions(), "search")
     search = Search(case, base, Target(1e-3))
     scaled = case.trial(search.scaled(factor))
