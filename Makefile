@@ -41,6 +41,7 @@ check: $(VENV)/development  ## Lint, types, import layers, generated files fresh
 	$(BIN)/lint-imports
 	$(BIN)/python -m asperity.derive.generate --check
 	$(MAKE) --no-print-directory docs
+	$(BIN)/python -m pytest -n 0 -q tests/docs/test_docs.py -k built_pages
 
 docs: $(VENV)/development  ## Build the documentation into docs/_build/html
 	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html
