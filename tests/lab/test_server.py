@@ -230,6 +230,15 @@ def test_a_lab_starts_with_what_compare_recommends() -> None:
     assert started_settings() == ("omega.3", row.law.letter, row.recommended_stiffness)
 
 
+def test_a_lab_starts_with_the_stiffness_that_holds_with_its_clamp() -> None:
+    row, free = (
+        asp.compare(DEFAULT_SURFACE, "omega.3", "G", clamp=clamp).rows[0]
+        for clamp in ("backed", "none")
+    )
+    assert row.recommended_stiffness < 0.99 * free.recommended_stiffness
+    assert started_settings("--law", "G") == ("omega.3", "G", row.recommended_stiffness)
+
+
 def test_a_lab_starts_where_nothing_is_recommended(tmp_path: Path) -> None:
     device = tmp_path / "unknown.toml"
     device.write_text(UNKNOWN)

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from asperity.clamps import BACKED
 from asperity.cli import loop_setup, options
 from asperity.cli.main import declare_command
 from asperity.cli.options import file_values, surface_values
@@ -291,7 +292,8 @@ def _simulated_scene(source: str, values: dict[str, Any]) -> tuple[SceneState, P
     if not {"law", "stiffness"} <= scene.surface.keys() | own.keys():
         # Without a recommendation, and for wrong parameters, the defaults of the lab apply.
         with suppress(ParameterError):
-            own, note = loop_setup.recommend(scene.texture, device, {**scene.surface, **own})
+            requested = {"clamp": BACKED.name, **scene.surface, **own}  # as the lab renders it
+            own, note = loop_setup.recommend(scene.texture, device, requested)
             print_message(note)
     return make_scene_state(scene, source, own, device, file_options), None
 
