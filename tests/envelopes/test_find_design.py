@@ -14,6 +14,8 @@ import pytest
 
 import asperity as asp
 from asperity.analysis.energy.merit import scan_force
+from asperity.analysis.limits.spectrum import scan_forces
+from asperity.clamps import CLAMPS
 from asperity.core.cache import bypass_results
 from asperity.core.errors import ParameterError
 from asperity.envelopes.find_design import Design, design
@@ -24,6 +26,7 @@ LAND = Path(__file__).parents[2].parent / "shared" / "data" / "sample-land.x3p"
 DEVICES = ("touch", "omega.3", "pantograph", "falcon")
 COUNT = 6  # python -m bench.designs checks 200
 POINTS = 1000
+FORCE_NAMES = {"RMS": "texture_force", "peak": "peak_force"}
 Case = tuple[Search, Design, float, float]
 """Search, design, and by random search the greatest margin and the greatest force [N]."""
 
@@ -64,7 +67,9 @@ def random_target(draw: random.Random) -> tuple[Search, float]:
     case = WaveCase(draw.choice("ABCDEFGH"), {}, asp.load_device(draw.choice(DEVICES)), conditions)
     wave = asp.Sinusoid(1e-4, 10.0 ** draw.uniform(-3.3, -2.0))
     leak = draw.choice([math.inf] * 5 + [10.0 ** draw.uniform(-6.0, -4.0)])
-    search = Search(case, wave, Target(1e-3, draw.choice(["motor", "hand"]), leak))
+    support = draw.choice([0.0] * 4 + [draw.uniform(0.05, 0.95)])
+    at, measure = draw.choice([("motor", "RMS"), ("motor", "peak"), ("hand", "RMS")])
+    search = Search(case, wave, Target(1e-3, at, leak, support, measure))
     return search, random_search(search, draw)[1]
 
 
@@ -85,13 +90,21 @@ def random_designs(count: int, is_feasible: bool) -> list[Case]:
                 search.texture,
                 search.case.device,
                 [search.case.law],
-                texture_force=target.texture_force,
+                **{FORCE_NAMES[target.measure]: target.texture_force},
                 at=target.at,
                 max_leak=None if math.isinf(target.max_leak) else target.max_leak,
+                min_support=target.min_support or None,
                 speed=conditions.speed,
             )
             found.append((search, answer, *random_search(search, draw)))
     return found
+
+
+def peak_on_period(surface: asp.Surface, period: float) -> float:
+    """Return the greatest oscillating force [N] at 3001 points of a period, at constant height."""
+    x = np.linspace(0.0, period, 3001)[:-1]
+    forces = scan_forces(surface, np.column_stack([x, 0.0 * x]))
+    return float(np.linalg.norm(forces - forces.mean(axis=0), axis=1).max())
 
 
 def meets_target(search: Search, answer: Design, force: float) -> bool:
@@ -109,10 +122,13 @@ def meets_target(search: Search, answer: Design, force: float) -> bool:
         ).rows[0]
     felt = row.perceptibility
     assert felt is not None
-    rms = felt.texture_rms if target.at == "motor" else felt.hand_force / math.sqrt(2.0)
+    reached = felt.texture_rms if target.at == "motor" else felt.hand_force / math.sqrt(2.0)
+    if target.measure == "peak":
+        reached = peak_on_period(row.surface, wave.period)
     return (
         felt.tier == "felt"
-        and rms >= 0.99 * force
+        and reached >= 0.99 * force
+        and row.support >= 0.99 * target.min_support
         and row.recommended_stiffness >= 0.99 * surface.stiffness >= 0.98 * 100.0
         and row.leak.worst_per_period <= 1.01 * target.max_leak
     )
@@ -162,6 +178,76 @@ def test_half_of_the_stiffness_is_a_smaller_margin() -> None:
 
 
 WAVE = "sinusoid:period=2mm,amplitude=0.1mm"
+
+
+def margins_on_touch(
+    letter: str, texture: Any, clamp: str = "none", **parameters: float
+) -> tuple[float, float]:
+    """Return logarithms of the greatest margin for 3 mN: of any size, and of the texture itself."""
+    conditions = RenderConditions(clamp=clamp)
+    case = WaveCase(letter, parameters, asp.load_device("touch"), conditions, "search")
+    search = Search(case, texture, Target(3e-3))
+    return search.best(search.margin).score, search.candidate(0.0, search.margin).score
+
+
+STEEP = asp.Sinusoid(0.2e-3, 1e-3)
+
+
+@pytest.mark.parametrize("letter", "ABCFG")
+def test_no_clamp_increases_the_margin(letter: str) -> None:
+    """Requirements hold down to max_depth, where no clamp acts: it may add a greater gain below."""
+    plain = margins_on_touch(letter, STEEP)
+    for clamp in CLAMPS:
+        clamped = margins_on_touch(letter, STEEP, clamp)
+        assert np.all(np.array(clamped) <= np.array(plain) + 2e-3), clamp
+
+
+@pytest.mark.parametrize("texture", [STEEP, asp.named_surface("tile")], ids=["steep", "tile"])
+def test_more_continuity_than_1_does_not_increase_the_margin(texture: Any) -> None:
+    values = (1.0, 1.5, 3.0, 10.0)
+    found = [margins_on_touch("H", texture, continuity=c) for c in values]
+    best, own = zip(*found, strict=True)
+    assert max(best) <= best[0] + 2e-3
+    # On the texture itself, where the god-object splits.
+    assert list(own) == sorted(own, reverse=True)
+    assert own[-1] < own[0] - 0.1
+
+
+def test_a_peak_is_that_of_the_force_on_the_scan() -> None:
+    """Of law A, whose force is along z, it is the amplitude; of law C the force turns."""
+    for letter, crest in (("A", math.sqrt(2.0)), ("C", None)):
+        result = design(WAVE, "pantograph", letter, peak_force=5e-3)
+        peak = peak_on_period(result.row.surface, 2e-3)
+        assert peak == pytest.approx(5e-3 * result.margins[FORCE], rel=1e-3)
+        assert result.row.perceptibility is not None
+        if crest:
+            assert peak == pytest.approx(crest * result.row.perceptibility.texture_rms, rel=1e-3)
+
+
+def test_a_peak_excludes_form_and_waviness() -> None:
+    if not LAND.exists():
+        pytest.skip(f"{LAND} is missing")
+    texture = asp.load_texture(LAND, magnify=20)
+    part = texture.texture_part()
+    assert part.nesting is not None
+    case = WaveCase("C", {}, asp.load_device("omega.3"), RenderConditions())
+    search = Search(case, texture, Target(1e-3, measure="peak"))
+    ratios = search.certified(1.0).ratios(search.target, 500.0)
+    own = asp.Surface(part.texture, "C", stiffness=500.0)
+    scan = scan_force(own)
+    assert scan.peak > 2.0 * scan.ripple
+    whole = scan_force(asp.Surface(texture, "C", stiffness=500.0))
+    assert whole.peak != pytest.approx(scan.peak, rel=0.1)
+    assert ratios[FORCE] == pytest.approx(500.0 * scan.peak / 1e-3, rel=1e-6)
+
+
+def test_support_is_that_of_a_comparison() -> None:
+    result = design(WAVE, "touch", "C", texture_force=10e-3, min_support=0.9)
+    assert result.row.support == pytest.approx(0.9 * result.margins["support"], rel=1e-6)
+    assert result.is_feasible
+    free = design(WAVE, "touch", "C", texture_force=10e-3)
+    assert free.row.support < 0.9
+    assert "support" not in free.margins
 
 
 def test_largest_texture_ends_at_the_border_of_the_envelope() -> None:
@@ -243,6 +329,11 @@ def test_largest_measured_texture_states_what_is_lost() -> None:
         ({"at": "elbow"}, "at must be motor or hand"),
         ({"texture_force": 0.0}, "texture_force must be positive"),
         ({"max_leak": -1.0}, "max_leak must be positive"),
+        ({"min_support": 0.0}, "min_support must be positive"),
+        ({"peak_force": -1.0}, "peak_force must be positive"),
+        ({"peak_force": 1.0, "texture_force": 1.0}, "peak_force is one at the motor"),
+        ({"peak_force": 1.0, "at": "hand"}, "peak_force is one at the motor"),
+        ({"clamp": "hard"}, "clamp must be one of none"),
         ({"time_samples": 7.0}, "time_samples is unknown"),
         ({"device": "2diy"}, "needs max_stiffness"),
         ({"texture": asp.HeightMap(np.zeros((8, 8)), 1e-4)}, "this one is flat"),

@@ -82,18 +82,15 @@ def recommend(rows: Sequence[LawRow], stiffness: float | None = None) -> Recomme
         smooth = [row for row in candidates if row.continuous]
         best = min(smooth or candidates, key=_relative_leak)
         return Recommendation(best, tuple(rows), False, textured, stiffness=stiffness)
-    nearest = _nearest_to_perceptible(textured)
+    # The row whose texture comes nearest to being felt, of sound laws if there are any.
+    sound = _sound_rows(textured) or list(textured)
+    nearest = max(sound, key=lambda row: row.resolved_force, default=None)
     return Recommendation(None, tuple(rows), False, textured, nearest, stiffness)
 
 
 def _sound_rows(rows: Sequence[LawRow]) -> list[LawRow]:
     """Return the rows of conservative and continuous laws."""
     return [row for row in rows if row.conservative and row.continuous]
-
-
-def _nearest_to_perceptible(rows: Sequence[LawRow]) -> LawRow | None:
-    """Return the row whose texture comes nearest to being felt, of sound laws if there are any."""
-    return max(_sound_rows(rows) or rows, key=lambda row: row.resolved_force, default=None)
 
 
 def _strongest(rows: Sequence[LawRow]) -> LawRow:

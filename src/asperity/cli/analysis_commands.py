@@ -278,7 +278,7 @@ def envelope_command(
     outputs.write(result, envelope_page(result))
 
 
-_TARGET = (*options.command_arguments("design"), *_CONDITIONS[:4])
+_TARGET = (*options.command_arguments("design"), *_CONDITIONS[:5])
 
 
 @declare_command("design")

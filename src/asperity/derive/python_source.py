@@ -89,12 +89,9 @@ def function_source(derivation: Derivation, name: str, values: list[Any], summar
     )
     lines += [f"{symbol} = {printer.doprint(value)}" for symbol, value in shared]
     lines.append("return (")
-    lines += [f"    {_float_literal(printer.doprint(value))}," for value in results]
+    texts = [printer.doprint(value) for value in results]
+    lines += [f"    {text}.0," if text.lstrip("-").isdigit() else f"    {text}," for text in texts]
     lines.append(")")
     body = textwrap.indent("\n".join(lines), "    ")
     header = f"def {name}({', '.join(map(printer.doprint, arguments))}):"
     return f'{header}\n    """{summary}"""\n{body}\n'
-
-
-def _float_literal(text: str) -> str:
-    return f"{text}.0" if text.lstrip("-").isdigit() else text

@@ -19,7 +19,7 @@ from asperity.core.processes import precompute
 from asperity.core.units import round_down
 from asperity.devices import DeviceLike
 from asperity.envelopes.envelope import make_cases
-from asperity.envelopes.searches import FORCE, MET, MOTOR, Answer, Search, Target, agree
+from asperity.envelopes.searches import FORCE, MET, MOTOR, RMS, Answer, Search, Target, agree
 from asperity.laws import Law
 from asperity.textures.catalogue import TextureLike, as_texture
 
@@ -104,8 +104,10 @@ def design(
     laws: str | Sequence[str | Law] | None = None,
     *,
     texture_force: float | None = None,
+    peak_force: float | None = None,
     at: str = MOTOR,
     max_leak: float | None = None,
+    min_support: float | None = None,
     law_parameters: Mapping[str, float] | None = None,
     progress: Progress | None = None,
     **conditions: Any,
@@ -113,23 +115,26 @@ def design(
     """Find law, stiffness and factor of a texture that meet a target with the greatest margin.
 
     Requirements: the stiffness is at most the recommended and at least the least one, the texture
-    is felt, its force is at least ``texture_force``, the leak at most ``max_leak``, contact is kept
-    on half of the scan, and a texture with a border fits into the workspace. The margin is the
-    least factor by which they are exceeded. Without a texture force the answer is the largest
-    texture that meets the others, at its recommended stiffness. The height of a single wave is
-    scaled; other textures are magnified in all directions. A law without curl is preferred where
-    one meets the target.
+    is felt, its force is at least ``texture_force`` or ``peak_force``, the leak at most
+    ``max_leak``, the support at least ``min_support``, contact is kept on half of the scan, and a
+    texture with a border fits into the workspace. The margin is the least factor by which they are
+    exceeded. Without a force the answer is the largest texture that meets the others, at its
+    recommended stiffness. The height of a single wave is scaled; other textures are magnified in
+    all directions. A law without curl is preferred where one meets the target. Law parameters and
+    the clamp are taken as given: no clamp, and of law H no c above 1, increases the margin.
 
     Args:
         texture: the surface; see :func:`~asperity.analysis.compare.compare`.
         device: see :func:`~asperity.analysis.compare.compare`.
         laws: letters or names, of which the best one is chosen; by default all with a texture.
         texture_force: least RMS of the texture's force [N].
-        at: where it acts, ``"motor"`` or ``"hand"``.
+        peak_force: least peak of the texture's force at the motor [N], in place of its RMS.
+        at: where ``texture_force`` acts, ``"motor"`` or ``"hand"``.
         max_leak: greatest energy gained on the worst loop per period [J].
+        min_support: least support S [1]; see :func:`~asperity.analysis.energy.merit.merit`.
         law_parameters: parameters of laws by name.
         progress: called with what is computed next: each law, and each comparison.
-        **conditions: ``speed``, ``min_stiffness``, ``max_depth`` and ``grip``; see
+        **conditions: ``speed``, ``min_stiffness``, ``max_depth``, ``clamp`` and ``grip``; see
             :func:`~asperity.envelopes.envelope.envelope`.
 
     Returns:
@@ -148,18 +153,22 @@ def design(
     """
     if at not in PLACES:
         raise ParameterError("at", f"must be {' or '.join(PLACES)}", at)
-    check_keywords(conditions, {"speed", "min_stiffness", "max_depth", "grip"}, design)
-    force = None if texture_force is None else check_positive("texture_force", texture_force, "N")
+    check_keywords(conditions, {"speed", "min_stiffness", "max_depth", "clamp", "grip"}, design)
+    forces = {"texture_force": texture_force, "peak_force": peak_force}
+    given = [check_positive(name, x, "N") for name, x in forces.items() if x is not None]
+    if peak_force is not None and (len(given) > 1 or at != MOTOR):
+        reason = "is one at the motor, in place of texture_force: no data give a hand's phases"
+        raise ParameterError("peak_force", reason)
     leak = math.inf if max_leak is None else check_positive("max_leak", max_leak, "J")
+    support = 0.0 if min_support is None else check_positive("min_support", min_support)
+    measure = RMS if peak_force is None else "peak"
+    target = Target(given[0] if given else None, at, leak, support, measure)
     base = as_texture(texture)
     if base.peak_to_valley == 0.0:
         raise ParameterError("texture", "must have a height: this one is flat")
-    searches = [
-        Search(case, base, Target(force, at, leak))
-        for case in make_cases(device, laws, law_parameters, design, conditions)
-    ]
+    cases = make_cases(device, laws, law_parameters, design, conditions)
     report = progress or (lambda _step: None)
-    return _confirm(*_best_law(searches, report), report)
+    return _confirm(*_best_law([Search(case, base, target) for case in cases], report), report)
 
 
 Found = tuple[Search, Answer]
@@ -219,16 +228,9 @@ def _confirm(search: Search, answer: Answer, report: Progress) -> Design:
 
 def _make_design(search: Search, answer: Answer, factor: float, stiffness: float) -> Design:
     case, target = search.case, search.target
-    result = compare(
-        search.scaled(factor),
-        case.device,
-        [case.law],
-        stiffness or None,
-        law_parameters=case.law_parameters,
-        max_depth=case.conditions.max_depth,
-        speed=case.conditions.speed,
-        grip=case.conditions.grip,
-    )
+    own = {name: getattr(case.conditions, name) for name in ("max_depth", "clamp", "speed", "grip")}
+    own |= {"law_parameters": case.law_parameters}
+    result = compare(search.scaled(factor), case.device, [case.law], stiffness or None, **own)
     sample = search.certified(factor)
     ratios = sample.ratios(target, result.rows[0].surface.stiffness)
     margins = {name: ratio for name, ratio in ratios.items() if ratio < 1e20}

@@ -15,7 +15,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from asperity.analysis.energy.leak import worst_loop
-from asperity.analysis.energy.merit import scan_force
+from asperity.analysis.energy.merit import merit, scan_force
 from asperity.analysis.limits import perceptibility
 from asperity.core.arguments import FIELD, SEARCH
 from asperity.core.checks import FloatArray
@@ -29,6 +29,7 @@ from asperity.textures.texture import Texture
 RANGE = "range of factors"
 FORCE = "texture force"
 MOTOR = "motor"
+RMS = "RMS"
 MET = 0.995
 """Ratio from which a requirement counts as met: factor and stiffness are rounded."""
 NEAR = 1.01
@@ -51,15 +52,19 @@ class Target(Serializable):
     """What a texture has to reach.
 
     Attributes:
-        texture_force: least RMS of the texture's force [N]; ``None``: the texture is to be as large
-            as possible.
+        texture_force: least RMS or peak of the texture's force [N]; ``None``: the texture is to be
+            as large as possible.
         at: where that force acts: ``"motor"`` or ``"hand"``.
         max_leak: greatest energy gained on the worst loop per period [J].
+        min_support: least support S [1].
+        measure: what the texture's force is: ``"RMS"`` or ``"peak"``.
     """
 
     texture_force: float | None = None
     at: str = MOTOR
     max_leak: float = math.inf
+    min_support: float = 0.0
+    measure: str = RMS
 
 
 class Candidate(NamedTuple):
@@ -102,11 +107,15 @@ class Sample(NamedTuple):
         trial: the trial of :class:`~asperity.envelopes.wave_case.WaveCase`.
         leak: energy gained on the worst loop per period and per stiffness [m²].
         lost: fraction of the scan without contact.
+        support: S [1], computed if there is a least one.
+        crest: peak of the texture's force on the scan over its RMS if the target is a peak, else 1.
     """
 
     trial: Trial
     leak: float
     lost: float
+    support: float
+    crest: float
 
     def ratios(self, target: Target, stiffness: float) -> dict[str, float]:
         """Return by which factor each requirement is exceeded; all are met from 1 on."""
@@ -114,10 +123,10 @@ class Sample(NamedTuple):
             return {"stability": _LEAST, FORCE: _LEAST}
         waves = self.trial.waves.at_stiffness(stiffness)
         response = perceptibility.respond(waves)
-        amplitude = float(np.linalg.norm(waves.case.forces))
+        force = self.crest * float(np.linalg.norm(waves.case.forces)) / math.sqrt(2.0)
         if target.at != MOTOR:
             felt = perceptibility.classify_perceptibility(waves, self.trial.doubtful, 0, 0, None)
-            amplitude = felt.hand_force
+            force = felt.hand_force / math.sqrt(2.0)
         found = {
             "stability": self.trial.recommended.stiffness / stiffness,
             "least stiffness": stiffness / self.trial.min_stiffness,
@@ -125,7 +134,8 @@ class Sample(NamedTuple):
             "workspace": _workspace_ratio(self.trial.surface.texture, waves.reach),
             "contact": perceptibility.MAX_CONTACT_LOST / max(self.lost, _LEAST),
             "leak": target.max_leak / max(self.leak * stiffness, _LEAST),
-            FORCE: amplitude / math.sqrt(2.0) / (target.texture_force or _LEAST),
+            "support": self.support / max(target.min_support, _LEAST),
+            FORCE: force / (target.texture_force or _LEAST),
         }
         return {name: min(max(x, _LEAST), 1.0 / _LEAST) for name, x in found.items()}
 
@@ -182,7 +192,10 @@ class Search:
         surface, leak = trial.surface, 0.0
         if math.isfinite(self.target.max_leak) and not surface.facts.conservative:
             leak = worst_loop(surface).worst_per_period / surface.stiffness
-        return Sample(trial, leak, scan_force(trial.numbered).contact_lost)
+        support = merit(trial.numbered).support if self.target.min_support else 1.0
+        scan = scan_force(trial.scanned)
+        crest = scan.peak / scan.ripple if self.target.measure != RMS and scan.ripple else 1.0
+        return Sample(trial, leak, scan_force(trial.numbered).contact_lost, support, crest)
 
     def sample(self, x: float) -> Sample:
         """Return the sample of a factor, from its logarithm; law H is searched, not baked."""

@@ -22,6 +22,7 @@ from asperity.analysis.limits.limit_rules import (
     check_sample_count,
 )
 from asperity.analysis.passivity.verdict import StiffnessRecommendation, recommend_stiffness
+from asperity.clamps import NONE, find_clamp
 from asperity.core.arguments import FIELD, SEARCH
 from asperity.core.checks import check_keywords, check_positive
 from asperity.core.files import Serializable
@@ -55,6 +56,7 @@ class RenderConditions(Serializable):
         grip: the hand.
         max_depth: depth to which the texture is pressed [m]; ``None`` for its peak-to-valley
             height, at most 1 mm.
+        clamp: the clamp; see :class:`~asperity.surface.Surface`.
         time_samples: α, updates that a wave needs.
         position_samples: β, position steps that a wave needs.
         force_steps: γ, force steps that an amplitude needs.
@@ -64,6 +66,7 @@ class RenderConditions(Serializable):
     min_stiffness: float = DEFAULT_MIN_STIFFNESS
     grip: Grip = field(default_factory=load_grip)
     max_depth: float | None = None
+    clamp: str = NONE.name
     time_samples: float = DEFAULT_SAMPLES
     position_samples: float = DEFAULT_SAMPLES
     force_steps: float = DEFAULT_SAMPLES
@@ -83,12 +86,13 @@ def make_conditions(function: Callable[..., Any], **keywords: Any) -> RenderCond
     Raises:
         ParameterError: for an unknown keyword or a value that cannot be used.
     """
-    check_keywords(keywords, {*_UNITS, *LEAST_SAMPLES, "grip"}, function)
+    check_keywords(keywords, {*_UNITS, *LEAST_SAMPLES, "grip", "clamp"}, function)
     values = {name: value for name, value in keywords.items() if value is not None}
     for name in _UNITS.keys() & values.keys():
         values[name] = check_positive(name, values[name], _UNITS[name])
     for name in LEAST_SAMPLES.keys() & values.keys():
         values[name] = check_sample_count(name, values[name])
+    values["clamp"] = find_clamp(values.get("clamp", NONE.name)).name
     return RenderConditions(**values | {"grip": load_grip(values.get("grip", DEFAULT_GRIP))})
 
 
@@ -104,6 +108,7 @@ class Trial:
         min_stiffness: least stiffness of the wall [N/m].
         numbered: surface of which the numbers are computed: it is smaller by the factor.
         factor: lengths of the surface over those of ``numbered``.
+        scanned: surface without form and waviness, whose scan has the force of the texture.
         doubtful: numbers of the device that are not trusted.
     """
 
@@ -114,6 +119,7 @@ class Trial:
     min_stiffness: float
     numbered: Surface
     factor: float
+    scanned: Surface
     doubtful: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -173,10 +179,9 @@ class WaveCase:
 
     def surface(self, texture: Texture) -> Surface:
         """Return a texture with this law, as a loop renders it."""
-        depth, parameters = self.conditions.max_depth, self.law_parameters
-        return rendered_surface(
-            Surface(texture, self.law, max_depth=depth, law_parameters=parameters), self.rendering
-        )
+        own = {name: getattr(self.conditions, name) for name in ("max_depth", "clamp")}
+        surface = Surface(texture, self.law, law_parameters=self.law_parameters, **own)
+        return rendered_surface(surface, self.rendering)
 
     def recommend(self, texture: Texture, original: Original | None = None) -> Trial:
         """Return a texture at its recommended stiffness, without its waves."""
@@ -193,7 +198,7 @@ class WaveCase:
         if k := recommended.stiffness:
             surface, numbered = surface.to_stiffness(k), numbered.to_stiffness(k)
         least = self.conditions.min_stiffness
-        return Trial(surface, recommended, q, None, least, numbered, factor)
+        return Trial(surface, recommended, q, None, least, numbered, factor, numbered)
 
     def _unmagnified(self, surface: Surface, texture: Texture, factor: float) -> Surface:
         """Return the surface whose lengths are shorter by a factor: its numbers are the same."""
@@ -203,7 +208,8 @@ class WaveCase:
             for name, value in surface.law_parameters.items()
         }
         depth = float(f"{surface.max_depth / factor:.9g}")  # one number for equal depths
-        return Surface(texture, self.law, max_depth=depth, law_parameters=shorter)
+        conditions = replace(self.conditions, max_depth=depth)
+        return replace(self, conditions=conditions, law_parameters=shorter).surface(texture)
 
     def _number(self, surface: Surface, measure: JacobianMeasure) -> Bound:
         """Return a number of a surface; of law H that is searched, the one to which it is baked."""
@@ -225,7 +231,7 @@ class WaveCase:
             return trial
         surface, points = trial.surface, _SCAN_POINTS if texture.single_wave else None
         ripple = trial.factor * scan_force(trial.numbered, points).ripple
-        waves, doubtful, _rms = perceptibility.scan_waves(
+        waves, doubtful, _rms, scanned = perceptibility.scan_waves(
             surface,
             self.device,
             texture.texture_part(),
@@ -235,7 +241,8 @@ class WaveCase:
             points=points,
             **conditions.scan,
         )
-        return replace(trial, waves=waves, doubtful=doubtful)
+        scanned = trial.numbered if scanned is surface else scanned
+        return replace(trial, waves=waves, doubtful=doubtful, scanned=scanned)
 
     def try_wave(self, wavelength: float, amplitude: float) -> Trial:
         """Return the trial of a sinusoid [m]."""

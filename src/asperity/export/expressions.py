@@ -282,9 +282,6 @@ class ExpressionPrinter(ast.NodeVisitor):
     def _to_real(self, node: ast.Call) -> CExpression:
         return CExpression(self.as_type(node.args[0], c.FLOAT, _UNARY), _UNARY)
 
-    def _to_boolean(self, node: ast.Call) -> CExpression:
-        return CExpression(self.condition(node.args[0], _PRIMARY))
-
     def _helper_call(
         self, helper: c.HelperFunction, arguments: list[ast.expr], value_type: ValueType
     ) -> CExpression:
@@ -299,7 +296,7 @@ class ExpressionPrinter(ast.NodeVisitor):
 
 _BUILTINS: dict[str, Callable[[ExpressionPrinter, ast.Call], CExpression]] = {
     "abs": ExpressionPrinter._absolute,
-    "bool": ExpressionPrinter._to_boolean,
+    "bool": lambda printer, node: CExpression(printer.condition(node.args[0], _PRIMARY)),
     **dict.fromkeys(("float", "float64"), ExpressionPrinter._to_real),
     **dict.fromkeys(("max", "min"), ExpressionPrinter._minimum_or_maximum),
     **dict.fromkeys(("ceil", "floor", "int", "int64", "round"), ExpressionPrinter._to_integer),

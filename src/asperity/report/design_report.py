@@ -57,8 +57,9 @@ def design_answer(result: Design) -> str:
         f"{' and '.join(result.binding)} {'limits' if len(result.binding) == 1 else 'limit'} it"
     )
     if not result.is_feasible:
-        reach = f"{force_magnitude_text(result.reachable)} RMS" if result.reachable else "Nothing"
-        return f"Not met. {reach} can be reached; {limits}. Nearest: {text}."
+        force = f"{force_magnitude_text(result.reachable)} {result.target.measure}"
+        most = force if result.reachable else "Nothing"
+        return f"Not met. {most} can be reached; {limits}. Nearest: {text}."
     if result.target.texture_force is None:
         return f"The largest is l{text[1:]}. {limits[0].upper()}{limits[1:]}."
     least = min(result.margins.values())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -198,13 +199,8 @@ def _card(entry: SurfaceEntry) -> Section:
     blocks: list[page.Block] = [
         page.Picture(partial(_draw_card, entry.texture), f"{kind.name}: {kind.summary}.", dpi=110),
         page.Paragraph(f"{entry.size_text}, {entry.height_text} from peak to valley", "note"),
-        page.Paragraph(f"asperity compare {_shell_quote(entry.specification)}", "mono"),
+        page.Paragraph(f"asperity compare {shlex.quote(entry.specification)}", "mono"),
         Table(("argument", "default", "meaning"), rows),
     ]
     notes = [f"Sizes: {kind.source}."] if kind.source else []
     return Section(kind.name, blocks, kind.summary, notes, level=3, id=kind.name)
-
-
-def _shell_quote(specification: str) -> str:
-    """Return a specification quoted for a shell, which splits at blanks and semicolons."""
-    return f"'{specification}'" if set(" ;") & set(specification) else specification

@@ -163,10 +163,6 @@ class CaseTemplate:
         content["scene"] = with_values(self.sections, values)
         return json.dumps(content, sort_keys=True, ensure_ascii=False, default=str)
 
-    def case_seed(self, values: Mapping[str, Any]) -> int:
-        """Return the seed of a case, which depends on its text alone."""
-        return int(content_digest(self.case_text(values))[:16], 16)
-
 
 @dataclass(frozen=True)
 class Outcome:
@@ -215,7 +211,7 @@ def _prepare(function: bytes) -> None:
 
 def _compute_case(template: CaseTemplate, index: int, values: Mapping[str, Any]) -> Outcome:
     # The generators of the process are a convenience: threads of Dask draw from random, too.
-    seed = template.case_seed(values)
+    seed = int(content_digest(template.case_text(values))[:16], 16)
     random.seed(seed)
     np.random.seed(seed % 2**32)  # noqa: NPY002 - the generator of code that has none of its own
     run, laws = find_run(template.run), template.laws

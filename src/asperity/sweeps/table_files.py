@@ -90,7 +90,7 @@ class TableFiles(Tabular):
         with parquet.ParquetWriter(stream, schema) as writer:
             while block := list(islice(rows, _BLOCK)):
                 columns = [
-                    [_convert(row.get(name), kind) for row in block]
+                    [None if (value := row.get(name)) is None else kind(value) for row in block]
                     for name, kind in self.columns.items()
                 ]
                 arrays = [arrow.array(*one) for one in zip(columns, schema.types, strict=True)]
@@ -102,10 +102,6 @@ def _common_type(types: set[type]) -> type:
     if types == {int, float}:
         return float
     return next(iter(types)) if len(types) == 1 else str
-
-
-def _convert(value: Any, kind: type) -> Any:
-    return None if value is None else kind(value)
 
 
 def _csv_value(value: Any) -> Any:

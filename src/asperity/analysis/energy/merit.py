@@ -70,11 +70,13 @@ class ScanForce:
 
     Attributes:
         ripple: RMS of the oscillating force over the stiffness [m].
+        peak: greatest magnitude of the oscillating force over the stiffness [m].
         slope: mean of d f_z/d depth over the stiffness [1].
         contact_lost: fraction of the scan without contact.
     """
 
     ripple: float
+    peak: float
     slope: float
     contact_lost: float
 
@@ -94,15 +96,13 @@ def scan_force(surface: Surface, points: int | None = None) -> ScanForce:
 def _scan_force(surface: Surface, points: int | None = None) -> ScanForce:
     line, height = surface.texture.scan_line(), scan_height(surface)
     forces, slopes, lost = _scan_forces_and_slopes(surface, line, height, points)
-    return ScanForce(_rms_of_oscillation(forces), float(slopes.mean()), lost)
-
-
-def _rms_of_oscillation(forces: FloatArray) -> float:
-    """Return the RMS of forces (lines, points, 3) about the mean of each line."""
-    variance = float(np.mean(np.var(forces, axis=1).sum(axis=1)))
-    size = float(np.mean(np.square(forces).sum(axis=2)))
+    squares = np.square(forces - forces.mean(axis=1, keepdims=True)).sum(axis=2)
+    size, variance = float(np.mean(np.square(forces).sum(axis=2))), float(squares.mean())
     # The variance of a constant force is rounding.
-    return math.sqrt(variance) if variance > 1e-24 * size else 0.0
+    peak = float(squares.max()) if variance > 1e-24 * size else 0.0
+    return ScanForce(
+        math.sqrt(variance if peak else 0.0), math.sqrt(peak), float(slopes.mean()), lost
+    )
 
 
 def _scan_forces_and_slopes(

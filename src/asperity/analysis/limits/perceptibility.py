@@ -138,7 +138,7 @@ def assess_perceptibility(
         ['magnify 2.5', 'speed 0.029', 'apparent_mass 0.017']
     """
     hand = load_grip() if grip is None else grip
-    waves, doubtful, texture_rms = scan_waves(
+    waves, doubtful, texture_rms, _scanned = scan_waves(
         surface, device, part, hand, rms=rms, explicit_depth=explicit_depth, points=None, **scan
     )
     result = classify_perceptibility(waves, doubtful, rms, texture_rms, part.nesting)
@@ -159,7 +159,7 @@ def scan_waves(
     explicit_depth: bool,
     points: int | None = None,
     **scan: float,
-) -> tuple[WaveScan, dict[str, float], float]:
+) -> tuple[WaveScan, dict[str, float], float, Surface]:
     """Return the waves of a surface on a scan with the trusted numbers of a device.
 
     Args:
@@ -173,7 +173,8 @@ def scan_waves(
         **scan: see :func:`assess_perceptibility`.
 
     Returns:
-        The waves; the numbers of the device that are not trusted; RMS of the force of the texture.
+        The waves; the numbers of the device that are not trusted; RMS of the force of the texture;
+        the surface without form and waviness, whose scan has that force.
     """
     texture_rms, scanned = rms, surface
     if part.nesting is not None:
@@ -194,7 +195,7 @@ def scan_waves(
     }
     case = LimitCase(data, spectrum.wavelengths, scale * forces, spectrum.shares, **scan)
     waves = WaveScan(case, scale * components, grip, surface.stiffness, device.workspace_size)
-    return waves, doubtful, texture_rms
+    return waves, doubtful, texture_rms, scanned
 
 
 def _is_felt_magnified(

@@ -168,13 +168,17 @@ def stiffness_limit_text(stiffness: float) -> str:
     return "infinite" if stiffness == math.inf else f"{round_down(stiffness):.10g} N/m"
 
 
+_OBSTACLE_TEXT = {
+    Obstacle.CURL: "the law is not conservative ({})",
+    Obstacle.JUMPS: "the force is not continuous: {}",
+}
 _HOLDS_TEXT = {True: "holds", False: "does not hold", None: "not decidable"}
 
 
 def _conclusion(loop: DeviceLoop, criterion: Criterion) -> str:
     """Return the conclusion of a criterion in words."""
     if criterion.obstacle is not None:
-        return f"not applicable: {_obstacle_text(loop, criterion.obstacle)}"
+        return f"not applicable: {_OBSTACLE_TEXT[criterion.obstacle].format(loop.reason)}"
     answer, limit, most = _HOLDS_TEXT[criterion.holds], criterion.limit, criterion.upper_limit
     if criterion.holds is None and criterion.missing:
         missing = ", ".join(criterion.missing)
@@ -188,13 +192,6 @@ def _conclusion(loop: DeviceLoop, criterion: Criterion) -> str:
     if criterion.holds is None and most is not None:
         return f"{answer}: the limit is between {limit_text} and {stiffness_limit_text(most)}"
     return f"{answer}: the limit is {limit_text}"
-
-
-def _obstacle_text(loop: DeviceLoop, obstacle: Obstacle) -> str:
-    return {
-        Obstacle.CURL: f"the law is not conservative ({loop.reason})",
-        Obstacle.JUMPS: f"the force is not continuous: {loop.reason}",
-    }[obstacle]
 
 
 def _proved_delays_text(loop: DeviceLoop, criterion: Criterion) -> str:

@@ -24,7 +24,7 @@ def _simulated_strokes(law: str) -> tuple[Stroke, ...]:
 
 
 def _simulated_bumps(law: str) -> tuple[BumpRun, ...]:
-    return bump_experiment(law).runs_of(law)
+    return tuple(one for one in bump_experiment(law).bumps if one.law == law)
 
 
 def check_over_assumptions(

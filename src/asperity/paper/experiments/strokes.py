@@ -71,10 +71,6 @@ class BumpExperiment(Serializable):
     bumps: tuple[BumpRun, ...]
     guessed: tuple[str, ...] = setups.GUESSED_BUMP
 
-    def runs_of(self, law: str) -> tuple[BumpRun, ...]:
-        """Return the runs of a law for all entries."""
-        return tuple(one for one in self.bumps if one.law == law)
-
 
 @lru_cache(maxsize=16)
 def simulate_bump(law: str, entry: str) -> BumpRun:

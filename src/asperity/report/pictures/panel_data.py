@@ -269,12 +269,9 @@ def ranges_text(panels: Sequence[Panel]) -> str:
     elif points:
         listed = "; ".join(f"{one.name} at {one.x[0]:.3g}, {one.y[0]:.3g}" for one in points)
         parts.append(f"{panels[0].x} and {panels[0].y}: {listed}")
-    return "".join(f" {_capitalize(text)}." for text in parts)
-
-
-def _capitalize(text: str) -> str:
-    """Return text with a capital, unless it begins with a symbol: σ is not Σ."""
-    return text[0].upper() + text[1:] if text[0].isascii() else text
+    # Symbols keep their case: σ is not Σ.
+    firsts = [text[0].upper() if text[0].isascii() else text[0] for text in parts]
+    return "".join(f" {first}{text[1:]}." for first, text in zip(firsts, parts, strict=True))
 
 
 def _group_ranges(

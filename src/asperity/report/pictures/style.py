@@ -281,13 +281,10 @@ def svg_text(figure: Figure, dpi: int = 160) -> str:
     # The page sets the size; namespaces are needed in a separate file only.
     root = re.sub(r' (?:width|height|version|xmlns[:\w]*)="[^"]*"', "", text[: text.index(">")])
     text = root.replace("<svg", f'<svg style="{whole}"') + text[text.index(">") :]
-    text = re.sub(r'style="[^"]*"', lambda found: _theme_style(found[0]), _shorten_paths(text))
+    text = re.sub(r'style="[^"]*"', lambda found: _theme_style(found[0]), text)
+    # Three decimals in paths: a thousandth of a point is invisible.
+    text = re.sub(r' d="[^"]*"', lambda found: re.sub(r"(\.\d{3})\d+", r"\1", found[0]), text)
     return _renumber_ids(text)
-
-
-def _shorten_paths(text: str) -> str:
-    """Return the text with three decimals in paths: a thousandth of a point is invisible."""
-    return re.sub(r' d="[^"]*"', lambda found: re.sub(r"(\.\d{3})\d+", r"\1", found[0]), text)
 
 
 def _theme_style(styles: str) -> str:

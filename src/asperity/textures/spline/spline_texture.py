@@ -72,10 +72,6 @@ class Spline(Texture):
         """See :class:`Texture`."""
         return self.heights
 
-    def with_heights(self, heights: ArrayLike) -> Spline:
-        """Return the spline through other heights at the same nodes."""
-        return fit_spline(heights, self._pitches, periodic=self.periodic, origin=self.origin)
-
     @abstractmethod
     def _compute_extremes(self) -> tuple[float, float]: ...
 
@@ -115,7 +111,8 @@ class Spline(Texture):
         """See :class:`Texture` and :func:`~asperity.measured.form.decompose_surface`."""
         found = get_or_compute("texture part", self.digest, self._separate_texture)
         heights, nesting, form, waviness = found
-        return TexturePart(self.with_heights(heights), nesting, form, waviness)
+        rest = fit_spline(heights, self._pitches, periodic=self.periodic, origin=self.origin)
+        return TexturePart(rest, nesting, form, waviness)
 
     def _separate_texture(self) -> tuple[FloatArray, float, float, float]:
         """Return the heights without form and waviness, the nesting index and both ranges."""
