@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
+import platform
+import re
 import sys
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 from rich.console import Console
 
@@ -44,12 +49,23 @@ PARTS: dict[str, Callable[[Console], None]] = {
 }
 
 
+def processor_name() -> str:
+    """Return the name of the processor, on which the ratios depend too."""
+    with contextlib.suppress(OSError):
+        names = re.findall(
+            r"^model name\s*: (.*)$", Path("/proc/cpuinfo").read_text(), re.MULTILINE
+        )
+        return names[0] if names else platform.machine()
+    return platform.processor()
+
+
 def main(arguments: Sequence[str]) -> int:
     unknown = [name for name in arguments if name not in PARTS]
     if unknown:
         print(f"unknown part {unknown[0]!r}; choose from {', '.join(PARTS)}", file=sys.stderr)
         return 2
     console = Console(width=100, highlight=False)
+    console.print(f"{processor_name()}, {os.cpu_count()} processors")
     for name in arguments or PARTS:
         console.rule(name)
         PARTS[name](console)
