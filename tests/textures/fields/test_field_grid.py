@@ -106,16 +106,6 @@ def test_arguments_contain_the_position_of_the_first_node() -> None:
     assert (arguments.levels, arguments.border) == (6, MIRRORED)
 
 
-def test_extending_down_keeps_the_floor_and_the_upper_levels() -> None:
-    fitted = grid(SQUARE, (4, 4))
-    deep = fitted.extend_down(3)
-    assert deep.levels == fitted.levels + 3
-    assert (deep.floor, deep.below) == (fitted.floor, fitted.below + 3)
-    np.testing.assert_allclose(
-        deep.height(np.arange(3, deep.levels)), fitted.height(np.arange(fitted.levels)), rtol=1e-14
-    )
-
-
 # --- error bounds ---------------------------------------------------------------------------------
 
 

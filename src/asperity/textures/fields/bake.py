@@ -41,7 +41,7 @@ _FLAT = 1e-9  # of the greatest force: less is rounding
 _BYTES_PER_NODE = 4
 # Height of the cells in which a field fades below its floor, over the range of the vertical force
 # there.
-_FADE = 1.0
+_FADE = 0.5
 
 
 @dataclass(frozen=True)
@@ -181,8 +181,8 @@ class BakePlan:
         """Return the field of a resolution [m]."""
         grid = self.grid(resolution)
         self.check_size(grid)
-        deep, first_part = grid.extend_down(self.goal.passes), scale_progress(progress, 0.0, 0.9)
-        potentials = node_potentials.compute_potentials(self.columns, deep, first_part)
+        first_part = scale_progress(progress, 0.0, 0.9)
+        potentials = node_potentials.compute_potentials(self.columns, grid, first_part)
         return self.certify(potentials, grid, scale_progress(progress, 0.9, 0.1))
 
     def bake_coarsest(self, progress: Progress | None) -> PotentialField:
@@ -271,25 +271,23 @@ class BakePlan:
         """Return the field, smoothed until its certified gain reaches the goal.
 
         Args:
-            potentials: at the nodes of the grid, and at one level below for each smoothing pass.
+            potentials: at the nodes of the grid.
             grid: the nodes.
             progress: called with the finished fraction.
         """
-        passes, most, before, ramp = 0, self.goal.passes, np.inf, RAMP
+        passes, before, ramp = 0, np.inf, RAMP
         cells, limit = np.ones(grid.node_counts, np.uint8), self.goal.max_gain * self.gain
         while True:
-            below = most - passes
-            arguments = grid.arguments(potentials[..., below:], self.lift)
+            arguments = grid.arguments(potentials, self.lift)
             cells = cells_above(arguments, limit, cells)
             count = int(np.count_nonzero(cells))
-            if passes == most or count == 0:
+            if passes == self.goal.passes or count == 0:
                 break
             # What is left is due to the borders of smoothed parts: they are widened.
             ramp, before = 2 * ramp + 1 if count > _STALLED * before else ramp, count
-            marks = np.pad(cells, [(0, 0)] * (cells.ndim - 1) + [(below, 0)])
-            weights, cells = node_potentials.spread_marks(marks, grid.border, ramp)
-            cells = np.ascontiguousarray(cells[..., below:])
-            potentials, passes = node_potentials.smooth(potentials, weights, grid), passes + 1
+            weights, cells = node_potentials.spread_marks(cells, grid.border, ramp)
+            node_potentials.smooth(potentials, weights, grid)
+            passes += 1
         upper, attained = curvature_bounds(grid, arguments, progress)
         one_sided, other = (certified_number(float(upper[i]), attained[i]) for i in range(2))
         larger = max(one_sided, other, key=lambda number: number.lower)

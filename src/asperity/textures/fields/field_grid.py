@@ -133,10 +133,6 @@ class FieldGrid:
         """Return x and y [m], (n, 2), of nodes of the plane (n, d)."""
         return np.asarray(self.start + index @ self.steps)
 
-    def extend_down(self, count: int) -> FieldGrid:
-        """Return the grid with further levels below the lowest."""
-        return replace(self, levels=self.levels + count, below=self.below + count)
-
     def stored_nodes(self, axis: int) -> NDArray[np.intp]:
         """Return the node stored at each place along an axis, beyond the borders too; -1: none."""
         count, last = self.cells[axis], self.node_counts[axis] - 1

@@ -94,14 +94,15 @@ def _weighted_sum(values: FloatArray, weights: FloatArray) -> FloatArray:
     return values
 
 
-def smooth(depths: SingleArray, weights: NDArray[np.uint8], grid: FieldGrid) -> SingleArray:
-    """Return means of depths with weights w/8, 1 - w/4, w/8 along each axis.
+def smooth(depths: SingleArray, weights: NDArray[np.uint8], grid: FieldGrid) -> None:
+    """Replace depths by means with weights w/8, 1 - w/4, w/8 along each axis, plane by plane.
 
-    They lower the gain where second derivatives jump. The lowest level is lost, since it has no
-    neighbour; above the highest the depth is that of the highest.
+    They lower the gain where second derivatives jump. The lowest level has no neighbour below and
+    stays the same along z, on which the field no longer depends there; above the highest the depth
+    is that of the highest.
 
     Args:
-        depths: [m], shape ``grid.node_counts``; changed in place, plane by plane.
+        depths: [m], shape ``grid.node_counts``.
         weights: 255 w at the nodes.
         grid: the nodes.
     """
@@ -113,8 +114,9 @@ def smooth(depths: SingleArray, weights: NDArray[np.uint8], grid: FieldGrid) -> 
         planes = np.moveaxis(depths, other, 0), np.moveaxis(weights, other, 0)
         for plane, shares in zip(*planes, strict=True):
             change = ndimage.correlate1d(plane, [1.0, -2.0, 1.0], axis - (axis > other), mode=mode)
+            if axis == depths.ndim - 1:
+                change[..., 0] = 0.0
             np.add(plane, np.float32(NEIGHBOUR_WEIGHT / 255.0) * shares * change, out=plane)
-    return depths[..., 1:]
 
 
 def spread_marks(marks: NDArray[np.uint8], border: int, ramp: int = RAMP) -> tuple[Any, Any]:

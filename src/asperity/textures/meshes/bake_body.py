@@ -225,7 +225,7 @@ class _BodyPlan(bake.BakePlan):
     def bake(self, resolution: float, progress: Progress | None) -> PotentialField:
         """See :class:`BakePlan`."""
         grid, loops = self.checked_grid(resolution), self.loops
-        loops.prepare(grid.extend_down(self.goal.passes))
+        loops.prepare(grid)
         part = bake.scale_progress(progress, 0.05, 0.85)
         depths = compute_potentials(loops.record_columns, loops.grid, part)
         thin_map = loops.thin_map(self.max_depth)
