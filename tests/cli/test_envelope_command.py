@@ -61,6 +61,24 @@ def test_design_beyond_reach_is_an_answer(call: Call) -> None:
 
 
 @pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--peak-force", "15mN"), "20 mN RMS of texture, 25 mN peak at the motor, felt."),
+        (("--texture-force", "5mN", "--at", "hand"), "RMS of texture, 6.1 mN RMS at the hand,"),
+        (("--peak-force", "1N"), "Not met. 69 mN peak can be reached; stability limits it."),
+        (("--texture-force", "10mN", "--min-support", "0.9"), "stability and support limit it."),
+        (("--texture-force", "10mN", "--clamp", "backed"), "17 mN RMS of texture, felt."),
+    ],
+)
+def test_design_states_what_the_target_is_about(
+    call: Call, options: tuple[str, ...], words: str
+) -> None:
+    code, out, err = call(*DESIGN, *options)
+    assert (code, err) == (0, "")
+    assert words in " ".join(out.split())
+
+
+@pytest.mark.parametrize(
     ("arguments", "words"),
     [
         (("envelope", "--device", "nope"), "device is unknown"),
@@ -72,6 +90,10 @@ def test_design_beyond_reach_is_an_answer(call: Call) -> None:
         ((*DESIGN, "--at", "elbow"), "at must be motor or hand"),
         ((*DESIGN, "--texture-force", "3kg"), "texture_force must be a quantity"),
         ((*DESIGN, "--texture-force", "0mN"), "texture_force must be positive"),
+        ((*DESIGN, "--peak-force", "3kg"), "peak_force must be a quantity"),
+        ((*DESIGN, "--peak-force", "3mN", "--at", "hand"), "peak_force is one at the motor"),
+        ((*DESIGN, "--min-support", "0"), "min_support must be positive"),
+        ((*DESIGN, "--clamp", "hard"), "clamp must be one of none"),
         (("design", WAVE, "--device", "touch,omega.3"), "single device"),
         (("design", "nix"), "surface is neither"),
     ],
