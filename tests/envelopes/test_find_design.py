@@ -86,15 +86,16 @@ def random_designs(count: int, is_feasible: bool) -> list[Case]:
             target = replace(search.target, texture_force=share * reach)
             search = replace(search, target=target)
             target, conditions = search.target, search.case.conditions
+            options: Any = {FORCE_NAMES[target.measure]: target.texture_force}
             answer = design(
                 search.texture,
                 search.case.device,
                 [search.case.law],
-                **{FORCE_NAMES[target.measure]: target.texture_force},
                 at=target.at,
                 max_leak=None if math.isinf(target.max_leak) else target.max_leak,
                 min_support=target.min_support or None,
                 speed=conditions.speed,
+                **options,
             )
             found.append((search, answer, *random_search(search, draw)))
     return found
