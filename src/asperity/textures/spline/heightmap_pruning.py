@@ -97,24 +97,29 @@ def narrow_window(
     return window, budget - cost
 
 
-def shrink_to_boxes(ball: Ball, level: int, window: Window, texture: HeightMapArguments) -> Window:
-    """Return the part of a window whose boxes of a level may hold a point of the ball."""
+def may_hold_point(ball: Ball, level: int, i: int, j: int, texture: HeightMapArguments) -> bool:
+    """Return whether box (i, j) of a level, from 1 on, may hold a point of the ball."""
     x, y, z, threshold = ball
-    west, east, south, north = window
     half = 0.5 * 2.0**level
     u = (x - texture.x0) * texture.ix
     v = (y - texture.y0) * texture.iy
+    away_x = max(abs((2 * j + 1) * half - u) - half, 0.0) / texture.ix
+    away_y = max(abs((2 * i + 1) * half - v) - half, 0.0) / texture.iy
+    row = texture.levels[level - 1, 0] + i * texture.levels[level - 1, 2]
+    low, high, _hessian, _third = box_bounds(texture.boxes, row + j)
+    gap = max(low - z, z - high, 0.0)
+    return away_x * away_x + away_y * away_y + gap * gap < threshold
+
+
+def shrink_to_boxes(ball: Ball, level: int, window: Window, texture: HeightMapArguments) -> Window:
+    """Return the part of a window whose boxes of a level may hold a point of the ball."""
+    west, east, south, north = window
     first_i = north
     first_j = east
     last_i = last_j = -1
     for i in range(south >> level, (north >> level) + 1):
-        away_y = max(abs((2 * i + 1) * half - v) - half, 0.0) / texture.iy
-        row = texture.levels[level - 1, 0] + i * texture.levels[level - 1, 2]
         for j in range(west >> level, (east >> level) + 1):
-            away_x = max(abs((2 * j + 1) * half - u) - half, 0.0) / texture.ix
-            low, high, _hessian, _third = box_bounds(texture.boxes, row + j)
-            gap = max(low - z, z - high, 0.0)
-            if away_x * away_x + away_y * away_y + gap * gap < threshold:
+            if may_hold_point(ball, level, i, j, texture):
                 first_i = min(first_i, i)
                 first_j = min(first_j, j)
                 last_i = i

@@ -8,7 +8,6 @@ from asperity.contacts.sampler_interface import PlanePoint as Point
 from asperity.core.compiled import EVERY_FUNCTION, Kernels, local_array
 from asperity.textures.spline.bspline_kernels import (
     box_bounds,
-    is_taylor_conclusive,
     lateral_reach,
     max_copy_distance,
     tile_transform,
@@ -20,6 +19,7 @@ from asperity.textures.spline.heightmap_pruning import (
     certified_minimum_at,
     is_empty,
     is_within,
+    may_hold_point,
     min_coefficients_in_row,
     narrow_window,
 )
@@ -27,15 +27,17 @@ from asperity.textures.spline.heightmap_sampler import HeightMapArguments, cell_
 
 KERNELS = Kernels(
     provides=EVERY_FUNCTION,
-    not_inlined=("search_cell", "search_tile", "search_tree"),
+    not_inlined=("search_cell", "search_tile", "search_parts"),
     shared=("search_plane",),
-    merged=("search_rows", "search_window"),
+    merged=("search_window",),
     iterates=True,
 )
 
 # A window with at most so many cells, and cells along x, is searched cell by cell.
-MAX_ROW_SEARCH_CELLS = 4000
-MAX_ROW_SEARCH_COLUMNS = 64
+MAX_ROW_SEARCH_CELLS = 600
+MAX_ROW_SEARCH_COLUMNS = 32
+# Level of the boxes by which a larger one is searched.
+BOX_LEVEL = 3
 # Costs, in evaluations: of the coefficients of a row, of each of its cells, of subdividing a cell.
 ROW_COST = 0.4
 CELL_COST = 0.075
@@ -57,8 +59,7 @@ def search_plane(
 
     Only points within the distance of the best one can be closer. The plane is tiled by copies of
     the map, every other one mirrored if it is finite; what ``narrow_window`` leaves of each copy is
-    searched from the coarsest boxes of the pyramid down. The parameters are those of
-    ``plane_search``.
+    searched by boxes, rows and cells. The parameters are those of ``plane_search``.
     """
     nx, ny = cell_counts(texture.c)
     query = (x, y, z, pruning_factor)
@@ -122,22 +123,25 @@ def search_window(
 ) -> tuple[Point, float]:
     """Return the best point after a search of a window, and the remaining budget.
 
-    A small window is searched cell by cell, a larger one from the level down at which it has at
-    most two by two boxes.
+    A small window is searched cell by cell, of a larger one the boxes that may hold a closer point.
     """
+    x, y, z, pruning_factor = query
     west, east, south, north = window
     count = (east - west + 1) * (north - south + 1)
     if count <= MAX_ROW_SEARCH_CELLS and east - west < MAX_ROW_SEARCH_COLUMNS:
         return search_rows(query, best, window, budget, texture)
-    top = 1
-    span = ((east >> 1) - (west >> 1)) | ((north >> 1) - (south >> 1))
-    while top < texture.levels.shape[0] and span >> (top - 1) > 0:
-        top += 1
-    for i in range(south >> top, (north >> top) + 1):
-        for j in range(west >> top, (east >> top) + 1):
-            if budget > 0.0:
-                best, budget = search_tree(query, top, i, j, best, window, budget, texture)
-    return best, budget
+    level = min(BOX_LEVEL, texture.levels.shape[0])
+    for i in range(south >> level, (north >> level) + 1):
+        for j in range(west >> level, (east >> level) + 1):
+            budget -= PRUNED_BOX_COST
+            ball = (x, y, z, best[2] * pruning_factor)
+            if budget > 0.0 and may_hold_point(ball, level, i, j, texture):
+                part = (
+                    max(west, j << level), min(east, ((j + 1) << level) - 1),
+                    max(south, i << level), min(north, ((i + 1) << level) - 1),
+                )  # fmt: skip
+                best, budget = search_rows(query, best, part, budget, texture)
+    return best, max(budget, 0.0)
 
 
 def search_rows(
@@ -199,52 +203,41 @@ def search_cell(
             if can_prune_cell((x, y, z, best[2] * pruning_factor), last, i, j, texture):
                 return best, near, last, budget
     if budget > 0.0:
-        best, budget = search_tree(query, 0, i, j, best, (j, j, i, i), budget, texture)
+        best, budget = search_parts(query, i, j, best, budget, texture)
     return best, near, last, budget
 
 
-def search_tree(
-    query: Query, top: int, i: int, j: int, best: Point, window: Window, budget: float,
-    texture: HeightMapArguments,
-) -> tuple[Point, float]:  # fmt: skip
-    """Return the best point after a search of box (i, j) of level top, and the remaining budget.
+def search_parts(
+    query: Query, i: int, j: int, best: Point, budget: float, texture: HeightMapArguments
+) -> tuple[Point, float]:
+    """Return the best point after a search of cell (i, j) and its parts, and the remaining budget.
 
-    The sides of the box are 2^top cells; parts outside the window are skipped.
+    Parts of level -n have sides of 2^-n cells.
     """
     x, y, z, pruning_factor = query
-    west, east, south, north = window
     ix = texture.ix
-    x0 = texture.x0
-    y0 = texture.y0
     px = 1.0 / ix
     py = 1.0 / texture.iy
-    u = (x - x0) * ix
-    v = (y - y0) * texture.iy
-    level = top
-    side = 2.0**top
-    low, high, hessian, third = box_bounds(
-        texture.boxes, texture.levels[0, 0] + (i >> 1) * texture.levels[0, 2] + (j >> 1)
-    )  # for cells and their parts, if the search starts with those
-    while level <= top and budget > 0.0:
+    u = (x - texture.x0) * ix
+    v = (y - texture.y0) * texture.iy
+    k = texture.levels[0, 0] + (i >> 1) * texture.levels[0, 2] + (j >> 1)
+    low, high, hessian, third = box_bounds(texture.boxes, k)
+    gap = max(low - z, z - high, 0.0)
+    level = 0
+    side = 1.0
+    while level <= 0 and budget > 0.0:
         budget -= PRUNED_BOX_COST
-        i_end = min((i + 1) * side, texture.c.shape[0] - 3.0)
-        j_end = min((j + 1) * side, texture.c.shape[1] - 3.0)
-        inside = max(j * side, west) < min(j_end, east + 1)
-        deeper = inside and max(i * side, south) < min(i_end, north + 1)
+        half = 0.5 * side
+        middle_x = j * side + half
+        middle_y = i * side + half
+        near_x = max(abs(middle_x - u) - half, 0.0) * px
+        near_y = max(abs(middle_y - v) - half, 0.0) * py
+        deeper = near_x * near_x + near_y * near_y + gap * gap < best[2] * pruning_factor
         if deeper:
-            if level > 0:
-                k = texture.levels[level - 1, 0] + i * texture.levels[level - 1, 2] + j
-                low, high, hessian, third = box_bounds(texture.boxes, k)
-            near_x = max(j * side - u, u - j_end, 0.0) * px
-            near_y = max(i * side - v, v - i_end, 0.0) * py
-            gap = max(low - z, z - high, 0.0)
-            deeper = near_x * near_x + near_y * near_y + gap * gap < best[2] * pruning_factor
-        if deeper and (level <= 1 or is_taylor_conclusive(z, low, high, hessian, third, side, ix)):
             best, deeper, budget = evaluate_box(
-                x, y, z, x0 + 0.5 * (j * side + j_end) * px, y0 + 0.5 * (i * side + i_end) * py,
-                0.5 * (j_end - j * side) * px, 0.5 * (i_end - i * side) * py,
-                hessian * ix, third * ix * ix, best, pruning_factor, budget, texture,
+                x, y, z, texture.x0 + middle_x * px, texture.y0 + middle_y * py, half * px,
+                half * py, hessian * ix, third * ix * ix, best, pruning_factor, budget, texture,
             )  # fmt: skip
             deeper = deeper and level > -20
-        level, side, i, j = next_box(deeper, level, side, i, j, top, u, v)
+        level, side, i, j = next_box(deeper, level, side, i, j, 0, u, v)
     return best, budget
