@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from asperity.analysis.bounds.bound import spectral_norm
+from asperity.analysis.bounds.bound import NORM, spectral_norm
 from asperity.analysis.bounds.sampling import dense_maximum
 from asperity.analysis.energy.scan_lines import parallel_line_points, scan_height
-from asperity.analysis.gain.characteristic import cached_result
+from asperity.analysis.gain.characteristic import cached_number, cached_result
 from asperity.analysis.gain.theorems import theorem_on
 from asperity.core.checks import FloatArray
 from asperity.surface import Surface
@@ -128,8 +128,8 @@ def _scan_forces_and_slopes(
 def _gain_above_height(surface: Surface, height: float) -> float:
     """Return sup‖J‖/k over the body above a height: by theorem, else sampled."""
     proved = theorem_on(surface).gain_above_height
-    if proved is not None:
-        return proved(surface, height)
+    if proved is not None:  # q covers this part of the body, and may be less
+        return min(proved(surface, height), cached_number(surface, NORM).upper)
 
     def limit(derivatives: FloatArray) -> FloatArray:
         return surface.law.contact.depth_at_height(height, derivatives)

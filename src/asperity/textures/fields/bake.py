@@ -41,7 +41,7 @@ _FLAT = 1e-9  # of the greatest force: less is rounding
 _BYTES_PER_NODE = 4
 # Height of the cells in which a field fades below its floor, over the range of the vertical force
 # there.
-_FADE = 0.5
+_FADE = 0.8
 
 
 @dataclass(frozen=True)

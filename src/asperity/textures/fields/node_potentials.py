@@ -97,9 +97,8 @@ def _weighted_sum(values: FloatArray, weights: FloatArray) -> FloatArray:
 def smooth(depths: SingleArray, weights: NDArray[np.uint8], grid: FieldGrid) -> None:
     """Replace depths by means with weights w/8, 1 - w/4, w/8 along each axis, plane by plane.
 
-    They lower the gain where second derivatives jump. The lowest level has no neighbour below and
-    stays the same along z, on which the field no longer depends there; above the highest the depth
-    is that of the highest.
+    They lower the gain where second derivatives jump. The lowest level, which has no neighbour
+    below, is left out along z; above the highest the depth is that of the highest.
 
     Args:
         depths: [m], shape ``grid.node_counts``.
