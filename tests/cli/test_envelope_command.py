@@ -37,7 +37,8 @@ def test_envelope_writes_what_python_returns(call: Call, tmp_path: Path) -> None
 
 
 WAVE = "sinusoid:period=2mm,amplitude=0.1mm"
-DESIGN = ("design", WAVE, "--device", "touch", "--laws", "C")
+DESIGN_H = ("design", WAVE, "--device", "touch", "--laws", "H")
+DESIGN = (*DESIGN_H[:-1], "C")
 
 
 def test_design_writes_what_python_returns(call: Call, tmp_path: Path) -> None:
@@ -57,7 +58,9 @@ def test_design_writes_what_python_returns(call: Call, tmp_path: Path) -> None:
 def test_design_beyond_reach_is_an_answer(call: Call) -> None:
     code, out, err = call(*DESIGN, "--texture-force=1N")
     assert (code, err) == (0, "")
-    assert "Not met. 50 mN RMS can be reached; stability limits it." in " ".join(out.split())
+    assert "Not met. 50 mN RMS at the motor can be reached; stability limits it." in " ".join(
+        out.split()
+    )
 
 
 @pytest.mark.parametrize(
@@ -65,9 +68,11 @@ def test_design_beyond_reach_is_an_answer(call: Call) -> None:
     [
         (("--peak-force", "15mN"), "20 mN RMS of texture, 25 mN peak at the motor, felt."),
         (("--texture-force", "5mN", "--at", "hand"), "RMS of texture, 6.1 mN RMS at the hand,"),
-        (("--peak-force", "1N"), "Not met. 69 mN peak can be reached; stability limits it."),
-        (("--texture-force", "10mN", "--min-support", "0.9"), "stability and support limit it."),
-        (("--texture-force", "10mN", "--clamp", "backed"), "17 mN RMS of texture, felt."),
+        (("--peak-force", "1N"), "Not met. 69 mN peak at the motor can be reached; stability"),
+        (
+            ("--texture-force", "10mN", "--min-support", "0.9"),
+            "RMS of texture, support 0.98, felt.",
+        ),
     ],
 )
 def test_design_states_what_the_target_is_about(
@@ -76,6 +81,14 @@ def test_design_states_what_the_target_is_about(
     code, out, err = call(*DESIGN, *options)
     assert (code, err) == (0, "")
     assert words in " ".join(out.split())
+
+
+def test_design_tries_several_values_of_a_parameter(call: Call) -> None:
+    values = ("--texture-force=0.1N", "--at=hand", "--speed=20mm/s", "--continuity=1,1.5")
+    surface = ("sinusoid:period=1mm,amplitude=0.2mm", "--device=omega.3", "--laws=H")
+    code, out, err = call("design", *surface, *values)
+    assert (code, err) == (0, "")
+    assert "Given continuity 1.5 for law H" in out
 
 
 @pytest.mark.parametrize(
@@ -91,9 +104,9 @@ def test_design_states_what_the_target_is_about(
         ((*DESIGN, "--texture-force", "3kg"), "texture_force must be a quantity"),
         ((*DESIGN, "--texture-force", "0mN"), "texture_force must be positive"),
         ((*DESIGN, "--peak-force", "3kg"), "peak_force must be a quantity"),
-        ((*DESIGN, "--peak-force", "3mN", "--at", "hand"), "peak_force is one at the motor"),
-        ((*DESIGN, "--min-support", "0"), "min_support must be positive"),
-        ((*DESIGN, "--clamp", "hard"), "clamp must be one of none"),
+        ((*DESIGN, "--peak-force", "3mN", "--at", "hand"), "peak_force is at the motor"),
+        ((*DESIGN, "--min-support", "30"), "min_support must be in [0, 1]"),
+        ((*DESIGN_H, "--continuity=1,x"), "continuity must be"),
         (("design", WAVE, "--device", "touch,omega.3"), "single device"),
         (("design", "nix"), "surface is neither"),
     ],

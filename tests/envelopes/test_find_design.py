@@ -154,7 +154,8 @@ def test_a_requirement_binds_if_and_only_if_relaxing_it_extends_the_reach() -> N
     """Relaxed by 10 %, a requirement that binds makes more force possible.
 
     Another one makes at most 2 % more possible: it may admit another local optimum, as a smaller
-    least stiffness did in one of 200 (1.3 %).
+    least stiffness did in one of 200 (1.3 %). The answer may be as much below the best of a dense
+    search: the recommended stiffness is rounded down to three digits.
     """
     for search, answer, _margin, _reach in random_designs(COUNT, is_feasible=False):
         names, x = {*answer.margins} - {FORCE}, math.log(answer.factor)
@@ -163,7 +164,7 @@ def test_a_requirement_binds_if_and_only_if_relaxing_it_extends_the_reach() -> N
             relaxed = {name: replace(search, relaxed={name: 1.1}) for name in names}
             reach = {name: dense_reach(one, x, k) for name, one in relaxed.items()}
             base = dense_reach(search, x, k)
-        assert base == pytest.approx(answer.reachable, rel=0.01), answer
+        assert base == pytest.approx(answer.reachable, rel=0.02), answer
         assert (RANGE in answer.binding) == (min(abs(x - end) for end in search.bounds) < 0.01)
         for name in names:
             binds, gain = name in answer.binding, reach[name] / base
@@ -181,37 +182,53 @@ def test_half_of_the_stiffness_is_a_smaller_margin() -> None:
 WAVE = "sinusoid:period=2mm,amplitude=0.1mm"
 
 
-def margins_on_touch(
-    letter: str, texture: Any, clamp: str = "none", **parameters: float
-) -> tuple[float, float]:
-    """Return logarithms of the greatest margin for 3 mN: of any size, and of the texture itself."""
-    conditions = RenderConditions(clamp=clamp)
-    case = WaveCase(letter, parameters, asp.load_device("touch"), conditions, "search")
-    search = Search(case, texture, Target(3e-3))
-    return search.best(search.margin).score, search.candidate(0.0, search.margin).score
-
-
 STEEP = asp.Sinusoid(0.2e-3, 1e-3)
 
 
-@pytest.mark.parametrize("letter", "ABCFG")
-def test_no_clamp_increases_the_margin(letter: str) -> None:
-    """Requirements hold down to max_depth, where no clamp acts: it may add a greater gain below."""
-    plain = margins_on_touch(letter, STEEP)
-    for clamp in CLAMPS:
-        clamped = margins_on_touch(letter, STEEP, clamp)
-        assert np.all(np.array(clamped) <= np.array(plain) + 2e-3), clamp
-
-
 @pytest.mark.parametrize("texture", [STEEP, asp.named_surface("tile")], ids=["steep", "tile"])
-def test_more_continuity_than_1_does_not_increase_the_margin(texture: Any) -> None:
-    values = (1.0, 1.5, 3.0, 10.0)
-    found = [margins_on_touch("H", texture, continuity=c) for c in values]
-    best, own = zip(*found, strict=True)
-    assert max(best) <= best[0] + 2e-3
-    # On the texture itself, where the god-object splits.
-    assert list(own) == sorted(own, reverse=True)
-    assert own[-1] < own[0] - 0.1
+@pytest.mark.parametrize("letter", "ABCFG")
+def test_no_clamp_improves_what_a_design_requires(letter: str, texture: Any) -> None:
+    """Requirements hold down to max_depth, where no clamp acts: it may add a greater gain below."""
+    plain = asp.compare(texture, "touch", letter, max_depth=2e-4).rows[0]
+    for clamp in CLAMPS:
+        row = asp.compare(texture, "touch", letter, max_depth=2e-4, clamp=clamp).rows[0]
+        assert row.recommended_stiffness <= plain.recommended_stiffness, clamp
+        assert row.support <= plain.support * (1.0 + 1e-9), clamp
+        assert row.leak.worst_per_period >= row.surface.stiffness / plain.surface.stiffness * (
+            plain.leak.worst_per_period * (1.0 - 1e-9)
+        )
+        assert row.contact_lost == plain.contact_lost
+
+
+def test_the_best_of_several_values_of_a_parameter_is_chosen() -> None:
+    """On the hand the force of H is greatest below the limit, where more continuity adds force."""
+    target: Any = {"texture_force": 0.1, "at": "hand", "speed": 0.02}
+    found = {
+        c: design(STEEP, "omega.3", "H", law_parameters={"continuity": c}, **target)
+        for c in (1.0, 1.5, 4.0)
+    }
+    margins = {c: min(one.margins.values()) for c, one in found.items()}
+    assert margins[1.5] > 1.05 * max(margins[1.0], margins[4.0])
+    best = design(STEEP, "omega.3", "H", law_parameters={"continuity": [1.0, 1.5, 4.0]}, **target)
+    assert best.row.surface.law_parameters == {"continuity": 1.5}
+    assert min(best.margins.values()) == margins[1.5]
+
+
+def test_a_law_without_the_parameter_is_searched_once() -> None:
+    steps: list[str] = []
+    values = {"continuity": [1.0, 2.0], "friction": [0.4, 0.8]}
+    design(WAVE, "touch", "CHF", law_parameters=values, progress=steps.append, texture_force=5e-3)
+    assert sorted(one for one in steps if one.startswith("law")) == ["law C", "law H", "law H"]
+
+
+def test_support_of_a_field_that_does_not_split_is_that_of_its_own_gain() -> None:
+    """Law H with c = 3 is law D here, with q = 1."""
+    one, three = (
+        design(WAVE, "touch", "H", texture_force=5e-3, min_support=0.5, law_parameters=values)
+        for values in ({}, {"continuity": 3.0})
+    )
+    assert three.row.support == pytest.approx(one.row.support, rel=1e-3)
+    assert min(three.margins.values()) == pytest.approx(min(one.margins.values()), rel=1e-2)
 
 
 def test_a_peak_is_that_of_the_force_on_the_scan() -> None:
@@ -330,11 +347,12 @@ def test_largest_measured_texture_states_what_is_lost() -> None:
         ({"at": "elbow"}, "at must be motor or hand"),
         ({"texture_force": 0.0}, "texture_force must be positive"),
         ({"max_leak": -1.0}, "max_leak must be positive"),
-        ({"min_support": 0.0}, "min_support must be positive"),
+        ({"min_support": 2.0}, r"min_support must be in \[0, 1\]"),
         ({"peak_force": -1.0}, "peak_force must be positive"),
-        ({"peak_force": 1.0, "texture_force": 1.0}, "peak_force is one at the motor"),
-        ({"peak_force": 1.0, "at": "hand"}, "peak_force is one at the motor"),
-        ({"clamp": "hard"}, "clamp must be one of none"),
+        ({"peak_force": 1.0, "texture_force": 1.0}, "peak_force replaces texture_force: leave one"),
+        ({"peak_force": 1.0, "at": "hand"}, "peak_force is at the motor, at='hand' is not"),
+        ({"law_parameters": {"continuity": [1.0]}}, "no parameter of the laws C"),
+        ({"law_parameters": {"continuity": []}}, "continuity must be one or several"),
         ({"time_samples": 7.0}, "time_samples is unknown"),
         ({"device": "2diy"}, "needs max_stiffness"),
         ({"texture": asp.HeightMap(np.zeros((8, 8)), 1e-4)}, "this one is flat"),

@@ -278,7 +278,7 @@ def envelope_command(
     outputs.write(result, envelope_page(result))
 
 
-_TARGET = (*options.command_arguments("design"), *_CONDITIONS[:5])
+_TARGET = (*options.command_arguments("design"), *_CONDITIONS[:4])
 
 
 @declare_command("design")
@@ -286,7 +286,8 @@ _TARGET = (*options.command_arguments("design"), *_CONDITIONS[:5])
 @options.device_option()
 @options.laws_option("Laws, of which the best is chosen.  [default: all with a texture]")
 @options.argument_options(_TARGET)
-@options.law_options(_LAW_PARAMETERS)
+@options.argument_options(_LAW_PARAMETERS, options.list_parser)
+@options.law_options(())
 @options.file_options
 @options.jobs_option
 @output_options()
@@ -300,8 +301,8 @@ def design_command(
     """Find law, stiffness and size of SURFACE that meet a target with the greatest margin.
 
     The height of a single sinusoid is scaled; other surfaces are magnified in all directions,
-    further than by --magnify. Without --texture-force the largest texture is found that is stable
-    and felt.
+    further than by --magnify. Without a force the largest texture is found that is stable and felt.
+    Of several values of a parameter, '1,1.5,2', the best one is chosen.
     """
     from asperity.envelopes.envelope import textured_laws
     from asperity.envelopes.find_design import design

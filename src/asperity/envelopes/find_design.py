@@ -6,12 +6,13 @@ import math
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
 
 from asperity.analysis.compare import DEFAULT_DEVICE, Comparison, Progress, compare
 from asperity.analysis.results import LawRow
 from asperity.core.cache import bypass_results
-from asperity.core.checks import check_keywords, check_positive
+from asperity.core.checks import check_fraction, check_items, check_keywords, check_positive
 from asperity.core.display import Reportable, Tabular
 from asperity.core.errors import ParameterError
 from asperity.core.files import attributes_to_dict
@@ -108,7 +109,7 @@ def design(
     at: str = MOTOR,
     max_leak: float | None = None,
     min_support: float | None = None,
-    law_parameters: Mapping[str, float] | None = None,
+    law_parameters: Mapping[str, float | Sequence[float]] | None = None,
     progress: Progress | None = None,
     **conditions: Any,
 ) -> Design:
@@ -120,8 +121,7 @@ def design(
     texture with a border fits into the workspace. The margin is the least factor by which they are
     exceeded. Without a force the answer is the largest texture that meets the others, at its
     recommended stiffness. The height of a single wave is scaled; other textures are magnified in
-    all directions. A law without curl is preferred where one meets the target. Law parameters and
-    the clamp are taken as given: no clamp, and of law H no c above 1, increases the margin.
+    all directions. A law without curl is preferred where one meets the target.
 
     Args:
         texture: the surface; see :func:`~asperity.analysis.compare.compare`.
@@ -132,9 +132,9 @@ def design(
         at: where ``texture_force`` acts, ``"motor"`` or ``"hand"``.
         max_leak: greatest energy gained on the worst loop per period [J].
         min_support: least support S [1]; see :func:`~asperity.analysis.energy.merit.merit`.
-        law_parameters: parameters of laws by name.
+        law_parameters: parameters of laws by name, each a value or several that are tried.
         progress: called with what is computed next: each law, and each comparison.
-        **conditions: ``speed``, ``min_stiffness``, ``max_depth``, ``clamp`` and ``grip``; see
+        **conditions: ``speed``, ``min_stiffness``, ``max_depth`` and ``grip``; see
             :func:`~asperity.envelopes.envelope.envelope`.
 
     Returns:
@@ -153,22 +153,27 @@ def design(
     """
     if at not in PLACES:
         raise ParameterError("at", f"must be {' or '.join(PLACES)}", at)
-    check_keywords(conditions, {"speed", "min_stiffness", "max_depth", "clamp", "grip"}, design)
+    check_keywords(conditions, {"speed", "min_stiffness", "max_depth", "grip"}, design)
     forces = {"texture_force": texture_force, "peak_force": peak_force}
     given = [check_positive(name, x, "N") for name, x in forces.items() if x is not None]
     if peak_force is not None and (len(given) > 1 or at != MOTOR):
-        reason = "is one at the motor, in place of texture_force: no data give a hand's phases"
-        raise ParameterError("peak_force", reason)
+        reason = "replaces texture_force" if len(given) > 1 else "is at the motor, at='hand' is not"
+        raise ParameterError("peak_force", f"{reason}: leave one out")
     leak = math.inf if max_leak is None else check_positive("max_leak", max_leak, "J")
-    support = 0.0 if min_support is None else check_positive("min_support", min_support)
+    support = 0.0 if min_support is None else check_fraction("min_support", min_support)
     measure = RMS if peak_force is None else "peak"
     target = Target(given[0] if given else None, at, leak, support, measure)
     base = as_texture(texture)
     if base.peak_to_valley == 0.0:
         raise ParameterError("texture", "must have a height: this one is flat")
-    cases = make_cases(device, laws, law_parameters, design, conditions)
+    values = {name: check_items(name, one) for name, one in (law_parameters or {}).items()}
+    searches = {}
+    for chosen in product(*values.values()):
+        own = dict(zip(values, chosen, strict=True))
+        for case in make_cases(device, laws, own, design, conditions):
+            searches[case.letter, str(case.law_parameters)] = Search(case, base, target)
     report = progress or (lambda _step: None)
-    return _confirm(*_best_law([Search(case, base, target) for case in cases], report), report)
+    return _confirm(*_best_law([*searches.values()], report), report)
 
 
 Found = tuple[Search, Answer]
@@ -228,7 +233,7 @@ def _confirm(search: Search, answer: Answer, report: Progress) -> Design:
 
 def _make_design(search: Search, answer: Answer, factor: float, stiffness: float) -> Design:
     case, target = search.case, search.target
-    own = {name: getattr(case.conditions, name) for name in ("max_depth", "clamp", "speed", "grip")}
+    own = {name: getattr(case.conditions, name) for name in ("max_depth", "speed", "grip")}
     own |= {"law_parameters": case.law_parameters}
     result = compare(search.scaled(factor), case.device, [case.law], stiffness or None, **own)
     sample = search.certified(factor)

@@ -22,7 +22,6 @@ from asperity.analysis.limits.limit_rules import (
     check_sample_count,
 )
 from asperity.analysis.passivity.verdict import StiffnessRecommendation, recommend_stiffness
-from asperity.clamps import NONE, find_clamp
 from asperity.core.arguments import FIELD, SEARCH
 from asperity.core.checks import check_keywords, check_positive
 from asperity.core.files import Serializable
@@ -56,7 +55,6 @@ class RenderConditions(Serializable):
         grip: the hand.
         max_depth: depth to which the texture is pressed [m]; ``None`` for its peak-to-valley
             height, at most 1 mm.
-        clamp: the clamp; see :class:`~asperity.surface.Surface`.
         time_samples: α, updates that a wave needs.
         position_samples: β, position steps that a wave needs.
         force_steps: γ, force steps that an amplitude needs.
@@ -66,7 +64,6 @@ class RenderConditions(Serializable):
     min_stiffness: float = DEFAULT_MIN_STIFFNESS
     grip: Grip = field(default_factory=load_grip)
     max_depth: float | None = None
-    clamp: str = NONE.name
     time_samples: float = DEFAULT_SAMPLES
     position_samples: float = DEFAULT_SAMPLES
     force_steps: float = DEFAULT_SAMPLES
@@ -86,13 +83,12 @@ def make_conditions(function: Callable[..., Any], **keywords: Any) -> RenderCond
     Raises:
         ParameterError: for an unknown keyword or a value that cannot be used.
     """
-    check_keywords(keywords, {*_UNITS, *LEAST_SAMPLES, "grip", "clamp"}, function)
+    check_keywords(keywords, {*_UNITS, *LEAST_SAMPLES, "grip"}, function)
     values = {name: value for name, value in keywords.items() if value is not None}
     for name in _UNITS.keys() & values.keys():
         values[name] = check_positive(name, values[name], _UNITS[name])
     for name in LEAST_SAMPLES.keys() & values.keys():
         values[name] = check_sample_count(name, values[name])
-    values["clamp"] = find_clamp(values.get("clamp", NONE.name)).name
     return RenderConditions(**values | {"grip": load_grip(values.get("grip", DEFAULT_GRIP))})
 
 
@@ -179,8 +175,8 @@ class WaveCase:
 
     def surface(self, texture: Texture) -> Surface:
         """Return a texture with this law, as a loop renders it."""
-        own = {name: getattr(self.conditions, name) for name in ("max_depth", "clamp")}
-        surface = Surface(texture, self.law, law_parameters=self.law_parameters, **own)
+        depth, own = self.conditions.max_depth, self.law_parameters
+        surface = Surface(texture, self.law, max_depth=depth, law_parameters=own)
         return rendered_surface(surface, self.rendering)
 
     def recommend(self, texture: Texture, original: Original | None = None) -> Trial:

@@ -7,7 +7,7 @@ from asperity.analysis.limits.perceptibility_sentences import force_magnitude_te
 from asperity.analysis.passivity.assess_passivity import stiffness_limit_text
 from asperity.core.units import format_quantity
 from asperity.envelopes.find_design import Design
-from asperity.envelopes.searches import FORCE, MET, MOTOR, RMS
+from asperity.envelopes.searches import FORCE, MET
 from asperity.report import page
 from asperity.report.comparison_report import comparison_page
 from asperity.report.page import Cell, Media, Row, Section, Table
@@ -50,17 +50,17 @@ def design_answer(result: Design) -> str:
     k, felt = stiffness_limit_text(row.surface.stiffness), row.perceptibility
     height = format_quantity(texture.peak_to_valley, "m")
     way = "as high" if texture.single_wave is not None else "as large"
+    unit = f"{target.measure} at the {target.at}"
     text = f"law {row.law.letter} at {k}, {result.factor:.4g} times {way}: {height} peak to valley"
     if felt is not None:
         text += f"; {force_magnitude_text(felt.texture_rms)} RMS of texture, "
-        if target.texture_force and (target.measure, target.at) != (RMS, MOTOR):
-            reached = force_magnitude_text(result.margins[FORCE] * target.texture_force)
-            text += f"{reached} {target.measure} at the {target.at}, "
-        text += felt.tier
+        if target.texture_force and unit != "RMS at the motor":
+            text += f"{force_magnitude_text(result.margins[FORCE] * target.texture_force)} {unit}, "
+        text += (f"support {row.support:.2g}, " if target.min_support else "") + felt.tier
     verb = "limits" if len(result.binding) == 1 else "limit"
     limits = f"{' and '.join(result.binding)} {verb} it"
     if not result.is_feasible:
-        force = f"{force_magnitude_text(result.reachable)} {target.measure}"
+        force = f"{force_magnitude_text(result.reachable)} {unit}"
         most = force if result.reachable else "Nothing"
         return f"Not met. {most} can be reached; {limits}. Nearest: {text}."
     if target.texture_force is None:
