@@ -32,7 +32,7 @@ LEAST_DEPTH = 0.03
 _ONSET = 10e-6, 0.02
 # Depth at which the place of a body's surface is measured, over the greatest.
 SHALLOW = 0.04
-_TRIAL_BYTES = 2**19
+_TRIAL_BYTES = 2**20
 # Share of the goal that is aimed at, relative error of the resolution predicted for it, and the
 # probes of a prediction: every third.
 _AIM, _PREDICTION_STEP, _PREDICTION_PART = 0.94, 0.04, 3
