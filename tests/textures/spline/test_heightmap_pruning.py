@@ -255,6 +255,42 @@ def test_search_rows_visits_all_open_cells_in_full_registers(
         assert opened == [(i, j) for i in rows for j in range(west, east + 1) if j % 3 == 0]
 
 
+@pytest.mark.parametrize("window", [(0, 39, 0, 39), (3, 48, 5, 20), (7, 71, 8, 8), (16, 23, 1, 79)])
+def test_boxes_of_a_large_window_cover_it_once(
+    window: tuple[int, int, int, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All its cells are searched but those of boxes that hold no closer point."""
+    record = record_of(np.zeros((83, 83)))
+    searched = np.zeros((80, 80), int)
+    pruned: list[tuple[int, int]] = []
+
+    def search_rows(*arguments: Any) -> Any:
+        west, east, south, north = arguments[2]
+        searched[south : north + 1, west : east + 1] += 1
+        return arguments[1], arguments[3]
+
+    def may_hold_point(ball: Any, level: int, i: int, j: int, _texture: Any) -> bool:
+        assert ball == (0.0, 0.0, -1.0, BEST[2] * FACTOR)
+        if i == 1 and j == 2:
+            pruned.append((i << level, j << level))
+        return not (i == 1 and j == 2)
+
+    monkeypatch.setattr(search, "search_rows", search_rows)
+    monkeypatch.setattr(search, "may_hold_point", may_hold_point)
+    west, east, south, north = window
+    _best, budget = search.search_window((0.0, 0.0, -1.0, FACTOR), BEST, window, 1e3, record)
+    expected = np.zeros_like(searched)
+    expected[south : north + 1, west : east + 1] = 1
+    for i, j in pruned:
+        expected[i : i + 8, j : j + 8] = 0
+    np.testing.assert_array_equal(searched, expected)
+    assert 0.0 < budget <= 1e3
+    searched[:] = 0
+    _best, budget = search.search_window((0.0, 0.0, -1.0, FACTOR), BEST, window, 0.1, record)
+    if east - west >= 32:  # else it is searched row by row, with a budget of its own
+        assert (budget, searched.sum()) == (0.0, 0)
+
+
 @pytest.mark.parametrize("closer", [True, False])
 def test_cell_is_pruned_against_the_current_best_point(
     closer: bool, monkeypatch: pytest.MonkeyPatch
