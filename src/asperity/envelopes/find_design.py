@@ -25,7 +25,6 @@ from asperity.laws import Law
 from asperity.textures.catalogue import TextureLike, as_texture
 
 SCHEMA = 1
-PLACES = (MOTOR, "hand")
 _COMPARISONS = 3
 
 
@@ -151,8 +150,8 @@ def design(
         >>> result.is_feasible, result.binding
         (True, ('stability', 'least stiffness'))
     """
-    if at not in PLACES:
-        raise ParameterError("at", f"must be {' or '.join(PLACES)}", at)
+    if at not in (MOTOR, "hand"):
+        raise ParameterError("at", "must be motor or hand", at)
     check_keywords(conditions, {"speed", "min_stiffness", "max_depth", "grip"}, design)
     forces = {"texture_force": texture_force, "peak_force": peak_force}
     given = [check_positive(name, x, "N") for name, x in forces.items() if x is not None]

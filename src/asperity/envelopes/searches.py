@@ -193,9 +193,10 @@ class Search:
         if math.isfinite(self.target.max_leak) and not surface.facts.conservative:
             leak = worst_loop(surface).worst_per_period / surface.stiffness
         support = merit(trial.numbered).support if self.target.min_support else 1.0
-        scan = scan_force(trial.scanned)
-        crest = scan.peak / scan.ripple if self.target.measure != RMS and scan.ripple else 1.0
-        return Sample(trial, leak, scan_force(trial.numbered).contact_lost, support, crest)
+        scan = scan_force(trial.numbered)
+        felt = scan if trial.scanned is trial.numbered else scan_force(trial.scanned)
+        crest = felt.peak / felt.ripple if self.target.measure != RMS and felt.ripple else 1.0
+        return Sample(trial, leak, scan.contact_lost, support, crest)
 
     def sample(self, x: float) -> Sample:
         """Return the sample of a factor, from its logarithm; law H is searched, not baked."""
