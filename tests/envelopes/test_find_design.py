@@ -153,6 +153,7 @@ def test_targets_beyond_reach_get_the_nearest_one() -> None:
 def test_a_requirement_binds_if_and_only_if_relaxing_it_extends_the_reach() -> None:
     """Relaxed by 10 %, a requirement that binds makes more force possible.
 
+    By little (0.1 % in one of 200) where the greatest force happens to be just beyond it.
     Another one makes at most 2 % more possible: it may admit another local optimum, as a smaller
     least stiffness did in one of 200 (1.3 %). The answer may be as much below the best of a dense
     search: the recommended stiffness is rounded down to three digits.
@@ -168,7 +169,7 @@ def test_a_requirement_binds_if_and_only_if_relaxing_it_extends_the_reach() -> N
         assert (RANGE in answer.binding) == (min(abs(x - end) for end in search.bounds) < 0.01)
         for name in names:
             binds, gain = name in answer.binding, reach[name] / base
-            assert gain > 1.002 if binds else gain < 1.02, (answer, answer.binding, reach, base)
+            assert gain > 1.0005 if binds else gain < 1.02, (answer, answer.binding, reach, base)
 
 
 def test_half_of_the_stiffness_is_a_smaller_margin() -> None:
