@@ -194,8 +194,8 @@ class Search:
             leak = worst_loop(surface).worst_per_period / surface.stiffness
         support = merit(trial.numbered).support if self.target.min_support else 1.0
         scan = scan_force(trial.numbered)
-        felt = scan if trial.scanned is trial.numbered else scan_force(trial.scanned)
-        crest = felt.peak / felt.ripple if self.target.measure != RMS and felt.ripple else 1.0
+        part = scan if trial.scanned is trial.numbered else scan_force(trial.scanned)
+        crest = part.peak / part.ripple if self.target.measure != RMS and part.ripple else 1.0
         return Sample(trial, leak, scan.contact_lost, support, crest)
 
     def sample(self, x: float) -> Sample:
