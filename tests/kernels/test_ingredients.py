@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -92,6 +92,41 @@ def run(x):
     assert original.made is not redefined.made
     assert original.first is redefined.first
     assert (original.run(3.0), redefined.run(3.0)) == (3.0, 6.0)
+
+
+@pytest.mark.usefixtures("empty_code_cache")
+def test_shared_function_has_code_for_each_record_of_a_name() -> None:
+    """Numba names both types alike."""
+    text = """
+@shared
+def first(record):
+    return record.a
+
+
+@loop
+def run(record):
+    return 2.0 * first(record)
+
+
+@loop
+def run_later(record):
+    return 3.0 * first(record)
+"""
+
+    class Record(NamedTuple):
+        a: float
+        b: float
+
+    original = Record
+
+    class Record(NamedTuple):  # type: ignore[no-redef]  # as in a notebook
+        b: float
+        a: float
+
+    module = fuse.load_fused(HEAD + text)
+    assert module.run(original(3.0, 4.0)) == 6.0
+    assert module.run(Record(3.0, 4.0)) == 8.0
+    assert module.run_later(original(3.0, 4.0)) == 9.0
 
 
 def test_recursive_function_is_not_shared() -> None:

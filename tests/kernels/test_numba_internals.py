@@ -31,6 +31,8 @@ USED: dict[str, tuple[Any, str, tuple[str, ...] | None, str]] = {
         ("self",),
         "LinkOnlyLibrary",
     ),
+    "link": (codegen.CPUCodeLibrary, "_get_module_for_linking", ("self",), "SharedLibrary"),
+    "empty": (codegen.CPUCodegen, "_create_empty_module", ("self", "name"), "SharedLibrary"),
     "add": (codegen.CodeLibrary, "add_ir_module", ("self", "ir_module"), "WideVectorLibrary"),
     "lower": (typed_passes.NativeLowering, "run_pass", ("self", "state"), "LinkOnlyLowering"),
     "pipeline": (compiler.Compiler, "define_pipelines", ("self",), "LoopCompiler"),
@@ -66,11 +68,22 @@ def test_dispatcher_has_a_cache_and_a_compiler() -> None:
     assert function._compiler.pipeline_class is compiler.Compiler, message + "_is_link_only"
 
 
+def test_libraries_know_what_they_link() -> None:
+    message = f"Numba {numba.__version__}: CPUCodeLibrary changed; adapt "
+    library = codegen.JITCPUCodegen("a test").create_library("a test")
+    assert library._linking_libraries == [], message + "_shared_callees"
+    assert library._shared_module is None, message + "SharedLibrary"
+
+
 def test_pipeline_has_one_lowering_pass() -> None:
     message = f"Numba {numba.__version__}: the pipeline changed; adapt _CustomLoweringCompiler"
     state = compiler.StateDict()
     state.flags, state.func_ir = compiler.Flags(), None
-    for kind in (numba_internals.LinkOnlyCompiler, numba_internals.LoopCompiler):
+    for kind in (
+        numba_internals.LinkOnlyCompiler,
+        numba_internals.LoopCompiler,
+        numba_internals.SharedCompiler,
+    ):
         instance = object.__new__(kind)
         instance.state = state
         (manager,) = instance.define_pipelines()

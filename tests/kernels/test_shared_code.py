@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -30,6 +31,7 @@ def unit(
 
 PROVIDER = unit("finds", SEARCH, {"FAR": 100.0}, provides=("search", "step"), shared=("search",))
 TIMES = unit("times", "def times(x): return search(x) * step(3.0 * x)", loops=("times",))
+FAR = "1.000000e+02"  # as LLVM writes it
 MINUS = unit("minus", "def minus(x): return -search(x)", loops=("minus",))
 
 
@@ -116,6 +118,8 @@ def test_shared_function_is_compiled_once(monkeypatch: pytest.MonkeyPatch) -> No
     assert len(finished) == 2
     assert load(MINUS).minus(2.0) == -106.0
     assert len(finished) == 3
+    # Only the shared function itself holds its code.
+    assert [FAR in module for module in finished] == [True, False, False]
     search = sys.modules[load(MINUS).search.__module__].search
     assert search is load(TIMES).search
     assert sum(search.stats.cache_misses.values()) == 1
@@ -134,3 +138,33 @@ def test_link_only_function_has_no_machine_code() -> None:
     (compiled,) = step.overloads.values()
     assert isinstance(compiled.library, LinkOnlyLibrary)
     assert compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name) == 0
+
+
+PROGRAM = """
+import sys
+from tests.kernels.test_shared_code import MINUS, TIMES, load
+loops = {"times": TIMES, "minus": MINUS}
+print(*(getattr(load(loops[name]), name)(2.0) for name in sys.argv[1:]))
+"""
+
+
+def run_in_new_process(*names: str) -> list[float]:
+    command = [sys.executable, "-c", PROGRAM, *names]
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    return [float(word) for word in done.stdout.split()]
+
+
+@pytest.mark.usefixtures("empty_cache")
+def test_cached_code_finds_the_shared_functions_that_it_calls(tmp_path: Path) -> None:
+    """Whatever of a program is cached, and in whatever order the rest is compiled."""
+    assert run_in_new_process("times") == [742.0]
+    assert run_in_new_process("minus", "times") == [-106.0, 742.0]
+    entries = [path for path in tmp_path.rglob("*") if path.is_file()]
+    contents = {path: path.read_bytes() for path in entries}
+    assert len(entries) >= 3
+    for path in entries:
+        for other, content in contents.items():
+            other.write_bytes(content)
+        path.unlink()
+        assert run_in_new_process("minus", "times") == [-106.0, 742.0]
+        assert path.exists()

@@ -52,7 +52,7 @@ import numpy as np
 from numba import njit
 
 from asperity.kernels.numba_internals import cache_machine_code
-from asperity.kernels.numba_internals import LinkOnlyCompiler, LoopCompiler
+from asperity.kernels.numba_internals import LinkOnlyCompiler, LoopCompiler, SharedCompiler
 
 # Nothing allocates, so reference counting is off: counting references to the arrays of a texture at
 # every call costs more than the arithmetic. Only the loops are called from Python; the others need
@@ -63,7 +63,7 @@ scalar = njit(**internal, pipeline_class=LinkOnlyCompiler)
 inlined = njit(**internal, forceinline=True, pipeline_class=LinkOnlyCompiler)
 merged = njit(error_model="numpy", inline="always")
 loop = cache_machine_code(njit(**plain, nogil=True, pipeline_class=LoopCompiler))
-shared = cache_machine_code(njit(**internal, pipeline_class=LoopCompiler))
+shared = cache_machine_code(njit(**internal, pipeline_class=SharedCompiler))
 
 
 '''

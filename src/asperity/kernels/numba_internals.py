@@ -1,16 +1,18 @@
-"""Everything that uses private parts of Numba: two compilers, and a cache of machine code.
+"""Everything that uses private parts of Numba: three compilers, and a cache of machine code.
 
 Private names: ``JITCodeLibrary`` with its methods ``_optimize_final_module``,
-``_finalize_final_module``, ``_finalize_dynamic_globals`` and ``_verify_declare_only_symbols``,
-``_dynfunc.make_function``, ``caching._Cache``, ``Dispatcher._cache`` and ``_compiler``,
-``CompileResult._rebuild`` and ``_reduce``. The dependency on Numba has an upper bound for their
-sake, and ``tests/kernels/test_numba_internals.py`` says which of them a new version changes.
+``_finalize_final_module``, ``_finalize_dynamic_globals``, ``_verify_declare_only_symbols`` and
+``_get_module_for_linking`` and its ``_linking_libraries`` and ``_shared_module``,
+``CPUCodegen._create_empty_module``, ``_dynfunc.make_function``, ``caching._Cache``,
+``Dispatcher._cache`` and ``_compiler``, ``CompileResult._rebuild`` and ``_reduce``. The dependency
+on Numba has an upper bound for their sake, and ``tests/kernels/test_numba_internals.py`` says which
+of them a new version changes.
 
 Compilers. Numba optimises each function and generates machine code for it with everything that it
 calls, again at each level of a chain of calls. Only functions that Python calls need that. The
-others are link-only: their code is optimised once, in the loop that they are linked into. Identical
-link-only functions of several modules are lowered once. Loops are compiled for the widest vector
-registers of the processor.
+others are link-only: their code is optimised in the loop that they are linked into. Identical
+link-only functions of several modules are lowered once. A shared function has machine code of its
+own, which its callers call. Loops are compiled for the widest vector registers of the processor.
 
 Cache. Numba's own cache unpickles an index and code without verification: a flipped bit crashes
 every start, a planted file is executed. Here each compiled overload is one entry of
@@ -20,6 +22,7 @@ processes that need the same code at the same time one compiles it and the other
 
 from __future__ import annotations
 
+import hashlib
 import pickle
 import sys
 from collections.abc import Callable
@@ -103,14 +106,40 @@ class WideVectorLibrary(_Library):  # type: ignore[misc]  # see above
 class WideVectorLowering(_Lowering):  # type: ignore[misc]  # see above
     """Numba's lowering from typed code to machine code, in wide registers."""
 
-    _name = "wide_lowering"
+    _name, library_class = "wide_lowering", WideVectorLibrary
 
     def run_pass(self, state: Any) -> bool:
         """Lower a function."""
-        state.library = WideVectorLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library = self.library_class(state.targetctx.codegen(), state.func_id.func_qualname)
         state.library.enable_object_caching()
         changed: bool = super().run_pass(state)
         return changed
+
+
+class SharedLibrary(WideVectorLibrary):
+    """Code that its callers call by its symbol; other code is copied into every caller."""
+
+    def _get_module_for_linking(self) -> Any:
+        return self._shared_module
+
+    def _finalize_final_module(self) -> None:
+        empty = self._codegen._create_empty_module(self.name)
+        self._shared_module = llvmlite.binding.parse_assembly(str(empty))
+        super()._finalize_final_module()
+
+
+@_register(mutates_CFG=True, analysis_only=False)
+class SharedLowering(WideVectorLowering):
+    """The same, with a symbol that is equal in all processes."""
+
+    _name, library_class = "shared_lowering", SharedLibrary
+
+    def run_pass(self, state: Any) -> bool:
+        """Lower a function."""
+        # Instead of a counter; Numba's symbols contain the names of records, but not their fields.
+        fields = repr([_record_fields(one) for one in state.args])
+        state.func_ir.func_id.unique_id = hashlib.sha256(fields.encode()).hexdigest()[:16]
+        return super().run_pass(state)
 
 
 class _CustomLoweringCompiler(_Compiler):  # type: ignore[misc]  # see above
@@ -136,9 +165,15 @@ class LinkOnlyCompiler(_CustomLoweringCompiler):
 
 
 class LoopCompiler(_CustomLoweringCompiler):
-    """Compiler of loops over points or samples, and of the functions that loops share."""
+    """Compiler of loops over points or samples."""
 
     lowering = WideVectorLowering
+
+
+class SharedCompiler(_CustomLoweringCompiler):
+    """Compiler of the functions that loops share."""
+
+    lowering = SharedLowering
 
 
 _FUNCTION_IDS: dict[tuple[object, ...], int] = {}
@@ -232,21 +267,31 @@ class MachineCodeCache(caching._Cache):
         if content is None:
             return None
         try:
-            return _CompileResult._rebuild(target_context, *pickle.loads(content))
+            *parts, callees = pickle.loads(content)
+            for module, name, types in callees:
+                getattr(sys.modules[module], name).compile(types)
+            return self._mark(_CompileResult._rebuild(target_context, *parts))
         except Exception:  # of another build of Numba: whatever it raises, compile again
             cache.quarantine(CODE_NAMESPACE, key)
             return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Store a compiled overload."""
-        *parts, environments = data._reduce()
+        *parts, environments = self._mark(data)._reduce()
         # A link-only function may be of a module that does not exist where this code is loaded; no
         # compiled function uses its environment.
         own = self._function.__module__
         mine = tuple(one for one in environments if one.globals["__name__"] == own)
         key = self._key(sig, data.codegen)
-        cache.put_entry(CODE_NAMESPACE, key, _serialize((*parts, mine)))
+        content = (*parts, mine, _shared_callees(data.library))
+        cache.put_entry(CODE_NAMESPACE, key, _serialize(content))
         cache.unlock(CODE_NAMESPACE, key)
+
+    def _mark(self, result: Any) -> Any:
+        """Return compiled code with what its callers find it by in another process."""
+        function = self._function
+        result.library.origin = (function.__module__, function.__name__, result.signature.args)
+        return result
 
     def _key(self, sig: Any, codegen: Any) -> str:
         """Return what the machine code depends on: source, types, processor and versions."""
@@ -254,6 +299,19 @@ class MachineCodeCache(caching._Cache):
         types = (str(sig), *map(_record_fields, sig))
         function = (self._function.__module__, self._function.__name__, types)
         return repr((*function, codegen.magic_tuple(), *versions))
+
+
+def _shared_callees(library: Any) -> tuple[Any, ...]:
+    """Return module, name and argument types of the shared functions that code calls."""
+    found, waiting = dict[Any, None](), [library]
+    for one in waiting:
+        for linked in one._linking_libraries:
+            origin = getattr(linked, "origin", None)
+            if origin is not None:
+                found[origin] = None
+            elif linked not in waiting:
+                waiting.append(linked)
+    return tuple(found)
 
 
 def _record_fields(numba_type: Any) -> tuple[Any, ...]:

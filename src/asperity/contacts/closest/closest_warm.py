@@ -18,7 +18,7 @@ from asperity.contacts.warm_start import (
 )
 from asperity.core.compiled import EVERY_FUNCTION, FloatArray, Kernels
 
-KERNELS = Kernels(provides=EVERY_FUNCTION, not_inlined=("closest_point_warm",))
+KERNELS = Kernels(provides=EVERY_FUNCTION)
 
 
 def record_error_bound(warm_start: FloatArray, error_bound: float, evaluations: float) -> None:

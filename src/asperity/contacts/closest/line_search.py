@@ -14,9 +14,7 @@ from asperity.contacts.sampler_interface import LinePoint as Point
 from asperity.core.compiled import EPS, EVERY_FUNCTION, SQRT_EPS, Kernels
 
 KERNELS = Kernels(
-    provides=EVERY_FUNCTION,
-    not_inlined=("evaluate_box", "search_line_within_budget"),
-    shared=("descend_within_budget",),
+    provides=EVERY_FUNCTION, shared=("descend_within_budget", "search_line_within_budget")
 )
 
 

@@ -16,9 +16,7 @@ from asperity.contacts.closest.plane_search import descend, descend_within_budge
 from asperity.contacts.sampler_interface import ROUNDING_SLACK, ClosestPoint, search_plane
 from asperity.core.compiled import EPS, EVERY_FUNCTION, Kernels
 
-KERNELS = Kernels(
-    provides=EVERY_FUNCTION, not_inlined=("closest_point", "closest_point_within_budget")
-)
+KERNELS = Kernels(provides=EVERY_FUNCTION, shared=("closest_point", "closest_point_within_budget"))
 
 
 def closest_point(x: float, y: float, z: float, texture: object) -> ClosestPoint:

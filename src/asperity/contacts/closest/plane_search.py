@@ -22,11 +22,7 @@ from asperity.contacts.sampler_interface import Derivatives, sample_hessian
 from asperity.contacts.sampler_interface import PlanePoint as Point
 from asperity.core.compiled import EPS, EVERY_FUNCTION, SQRT_EPS, Kernels
 
-KERNELS = Kernels(
-    provides=EVERY_FUNCTION,
-    not_inlined=("evaluate_box", "newton_step", "search_box"),
-    shared=("descend_within_budget",),
-)
+KERNELS = Kernels(provides=EVERY_FUNCTION, shared=("descend_within_budget",))
 
 
 def evaluation_cost(texture: object) -> float:

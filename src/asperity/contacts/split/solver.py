@@ -49,9 +49,7 @@ from asperity.contacts.split.optimality import (
 )
 from asperity.core.compiled import EPS, FloatArray, Kernels, local_array
 
-KERNELS = Kernels(
-    provides=("split_compute_atoms",), merged=("split_newton", "split_try_newton"), iterates=True
-)
+KERNELS = Kernels(provides=("split_compute_atoms",), shared=("split_compute_atoms",), iterates=True)
 
 # Newton steps of each atom before the joint solution; more do not pay.
 NEWTON_STEPS = 2

@@ -24,12 +24,7 @@ from asperity.contacts.split.solver import split_compute_atoms
 from asperity.contacts.warm_start import BUDGET, FIRST_POINT, POINT_COUNT, UNLIMITED
 from asperity.core.compiled import EVERY_FUNCTION, FloatArray, Kernels, local_array
 
-KERNELS = Kernels(
-    provides=EVERY_FUNCTION,
-    loops=("split_batch",),
-    merged=("split_contact", "split_derivative", "split_energy"),
-    iterates=True,
-)
+KERNELS = Kernels(provides=EVERY_FUNCTION, loops=("split_batch",), iterates=True)
 
 
 def split_contact(
