@@ -28,6 +28,7 @@ from asperity.kernels.link import (
     MissingFunctionError,
     SourceUnit,
     link,
+    link_modules,
     loops_of,
     unit_from_module,
     unit_from_source,
@@ -72,8 +73,7 @@ def disagreements(module: ModuleType) -> list[str]:
     faults += [f"binds {name}" for name in {*kernels.native} - external_calls]
     faults += [f"offers {name}" for name in offered - defined]
     faults += [f"hides {name}" for name in defined - internal_calls - offered]
-    hinted = {*kernels.not_inlined, *kernels.shared, *kernels.merged}
-    return faults + [f"hints {name}" for name in hinted - defined]
+    return faults + [f"shares {name}" for name in {*kernels.shared} - defined]
 
 
 @pytest.mark.parametrize("module", MODULES, ids=lambda module: module.__name__)
@@ -93,7 +93,7 @@ FAULTS = {
     "binds c": "KERNELS = Kernels(provides=('a',), native=('c',))\ndef a(x): return x",
     "offers b": "KERNELS = Kernels(provides=('a', 'b'))\ndef a(x): return x",
     "hides b": "KERNELS = Kernels(provides=('a',))\ndef a(x): return x\ndef b(x): return x",
-    "hints c": "KERNELS = Kernels(provides=('a',), not_inlined=('c',))\ndef a(x): return x",
+    "shares c": "KERNELS = Kernels(provides=('a',), shared=('c',))\ndef a(x): return x",
 }
 
 
@@ -182,17 +182,14 @@ def decorators(text: str) -> dict[str, str]:
     return {line[4 : line.index("(")]: lines[i - 1] for i, line in names.items()}
 
 
-@pytest.mark.parametrize(
-    ("iterates", "expected"),
-    [(False, "@inlined @scalar @inlined"), (True, "@scalar @scalar @merged")],
-)
+@pytest.mark.parametrize(("iterates", "expected"), [(False, "@inlined"), (True, "@scalar")])
 def test_compilation_hints_become_decorators(iterates: bool, expected: str) -> None:
-    text = "def run(x): return a(x) + b(x) + c(x)\n" + "".join(
-        f"def {name}(x): return x\n" for name in "abc"
-    )
-    module = unit("m", text, loops=("run",), not_inlined=("b",), merged=("c",), iterates=iterates)
-    result = decorators(link(loops_of(module), (module,)))
-    assert result == dict(zip(["run", "a", "b", "c"], ["@loop", *expected.split()], strict=True))
+    bodies = {"run": "a(x) + b(x)", "a": "x", "b": "c(x)", "c": "x"}
+    text = "".join(f"def {name}(x): return {body}\n" for name, body in bodies.items())
+    module = unit("m", text, loops=("run",), shared=("b",), iterates=iterates)
+    shared, loops = (decorators(part.source) for part in link_modules(loops_of(module), (module,)))
+    assert shared == {"b": "@shared", "c": expected}
+    assert loops == {"run": "@loop", "a": expected}
 
 
 # --- textures -------------------------------------------------------------------------------------

@@ -40,11 +40,8 @@ class Kernels:
         provides: functions for other modules, or ``EVERY_FUNCTION``; the first module that
             provides a name is used.
         loops: functions called from Python.
-        not_inlined: functions that are too large to be inlined in every caller.
-        shared: large functions compiled once for all modules that call them, together with the
-            functions they call: see :func:`asperity.kernels.link.link_modules`.
-        merged: functions merged into their caller before compilation in iterative code: the
-            compiler repeats all optimisations at each level of a chain of calls.
+        shared: large functions with machine code of their own, which contains the functions that
+            they call and which other modules call: see :func:`asperity.kernels.link.link_modules`.
         native: those of ``call_address``, ``load_acquire`` and ``store_release`` that the module
             calls; see :mod:`asperity.kernels.intrinsics`.
         for_blocks: whether its functions replace those of the same names in loops over blocks of
@@ -54,9 +51,7 @@ class Kernels:
 
     provides: tuple[str, ...] = ()
     loops: tuple[str, ...] = ()
-    not_inlined: tuple[str, ...] = ()
     shared: tuple[str, ...] = ()
-    merged: tuple[str, ...] = ()
     native: tuple[str, ...] = ()
     for_blocks: bool = False
     iterates: bool = False

@@ -61,7 +61,6 @@ plain = dict(error_model="numpy", _nrt=False)
 internal = dict(**plain, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 scalar = njit(**internal, pipeline_class=LinkOnlyCompiler)
 inlined = njit(**internal, forceinline=True, pipeline_class=LinkOnlyCompiler)
-merged = njit(error_model="numpy", inline="always")
 loop = cache_machine_code(njit(**plain, nogil=True, pipeline_class=LoopCompiler))
 shared = cache_machine_code(njit(**internal, pipeline_class=SharedCompiler))
 
@@ -88,8 +87,8 @@ def law_units(law: Law, clamp: Clamp) -> tuple[SourceUnit, ...]:
     code = LawCode(law, kernel_source(law), clamp)
     title, probe = f"law {law}", f"law {law} at a probe"
     return (
-        generated_unit(title, code.source, merged=("law_force", "law_jacobian")),
-        generated_unit(probe, probe_source(code), merged=("probe_force", "probe_jacobian")),
+        generated_unit(title, code.source),
+        generated_unit(probe, probe_source(code)),
         unit_from_module(loop_functions),
     )
 

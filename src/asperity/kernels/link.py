@@ -79,14 +79,11 @@ class SourceUnit:
 
     def decorator(self, name: str, iterates: bool) -> str:
         """Return the decorator of one of its functions, defined in the header of a fused module."""
-        kernels = self.kernels
-        if name in kernels.loops:
+        if name in self.kernels.loops:
             return "@loop"
-        if name in kernels.shared:
+        if name in self.kernels.shared:
             return "@shared"
-        if iterates:
-            return "@merged" if name in kernels.merged else "@scalar"
-        return "@scalar" if name in kernels.not_inlined else "@inlined"
+        return "@scalar" if iterates else "@inlined"
 
 
 def unit_from_source(
@@ -135,9 +132,9 @@ def _used_definitions(
     return lines
 
 
-def generated_unit(name: str, source: str, merged: tuple[str, ...] = ()) -> SourceUnit:
+def generated_unit(name: str, source: str) -> SourceUnit:
     """Return the unit of a generated source text, which provides all of its functions."""
-    return unit_from_source(name, source, Kernels(EVERY_FUNCTION, merged=merged))
+    return unit_from_source(name, source, Kernels(EVERY_FUNCTION))
 
 
 _UNITS: dict[ModuleType, SourceUnit] = {}

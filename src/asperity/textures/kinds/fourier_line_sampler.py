@@ -18,7 +18,7 @@ from asperity.contacts.sampler_interface import LinePoint as Point
 from asperity.core.compiled import EPS, EVERY_FUNCTION, Kernels
 from asperity.textures.kinds.fourier_sampler import FourierArguments
 
-KERNELS = Kernels(provides=EVERY_FUNCTION, not_inlined=("closest_point",), shared=("search_line",))
+KERNELS = Kernels(provides=EVERY_FUNCTION, shared=("closest_point", "search_line"))
 
 
 def sample_profile(t: float, texture: FourierArguments) -> tuple[float, float, float]:

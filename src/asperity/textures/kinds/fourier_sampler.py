@@ -9,7 +9,7 @@ from asperity.contacts.sampler_interface import PlanePoint as Point
 from asperity.core.compiled import EVERY_FUNCTION, FloatArray, Kernels, local_array
 from asperity.textures.kinds.sine import cosine, sine, sine_and_cosine
 
-KERNELS = Kernels(provides=EVERY_FUNCTION, shared=("search_plane",))
+KERNELS = Kernels(provides=EVERY_FUNCTION, shared=("search_plane",), iterates=True)
 
 
 # Cost of a wave, in evaluations; of a box, and of a wave in its expansion.

@@ -20,7 +20,7 @@ from asperity.contacts.sampler_interface import ClosestPoint, Derivatives
 from asperity.core.compiled import EPS, EVERY_FUNCTION, FloatArray, Kernels
 from asperity.textures.kinds.sine import cosine, sine
 
-KERNELS = Kernels(provides=EVERY_FUNCTION, not_inlined=("closest_point",))
+KERNELS = Kernels(provides=EVERY_FUNCTION)
 
 
 class SinusoidArguments(NamedTuple):

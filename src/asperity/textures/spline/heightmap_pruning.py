@@ -39,11 +39,7 @@ from asperity.core.compiled import EPS, EVERY_FUNCTION, FloatArray, Kernels, loc
 from asperity.textures.spline.bspline_kernels import Vector4, box_bounds
 from asperity.textures.spline.heightmap_sampler import HeightMapArguments, sample_hessian
 
-KERNELS = Kernels(
-    provides=EVERY_FUNCTION,
-    merged=("shrink_to_boxes", "narrow_window", "is_unique_minimum"),
-    not_inlined=("min_coefficients_in_row", "can_prune_cell"),
-)
+KERNELS = Kernels(provides=EVERY_FUNCTION)
 
 # Least side [cells] of a window that is narrowed by boxes; boxes along a side at first and at most.
 MIN_BOX_WINDOW = 20

@@ -25,13 +25,7 @@ from asperity.textures.spline.heightmap_pruning import (
 )
 from asperity.textures.spline.heightmap_sampler import HeightMapArguments, cell_counts
 
-KERNELS = Kernels(
-    provides=EVERY_FUNCTION,
-    not_inlined=("search_cell", "search_tile", "search_parts"),
-    shared=("search_plane",),
-    merged=("search_window",),
-    iterates=True,
-)
+KERNELS = Kernels(provides=EVERY_FUNCTION, shared=("search_plane",), iterates=True)
 
 # A window with at most so many cells, and cells along x, is searched cell by cell.
 MAX_ROW_SEARCH_CELLS = 600

@@ -34,11 +34,7 @@ from asperity.textures.spline.bspline_kernels import (
     tile_transform,
 )
 
-KERNELS = Kernels(
-    provides=EVERY_FUNCTION,
-    not_inlined=("closest_point", "search_tile", "search_tree"),
-    shared=("search_line",),
-)
+KERNELS = Kernels(provides=EVERY_FUNCTION, shared=("closest_point", "search_line"))
 
 
 class ProfileArguments(NamedTuple):
