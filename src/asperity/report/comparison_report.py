@@ -79,7 +79,7 @@ def _facts(comparison: Comparison) -> list[tuple[str, str]]:
 def _requested_stiffness_text(comparison: Comparison) -> str:
     stiffness = comparison.stiffness
     recommended = "the recommended one of each law"
-    return recommended if stiffness is None else format_quantity(stiffness, "N/m")
+    return recommended if stiffness is None else format_quantity(stiffness, "N/m", 4)
 
 
 def _figure_sections(comparison: Comparison) -> list[Section]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from asperity.analysis.limits.limit_result import percent
 from asperity.analysis.limits.perceptibility_sentences import force_magnitude_text
-from asperity.analysis.passivity.assess_passivity import stiffness_limit_text
 from asperity.core.units import format_quantity
 from asperity.envelopes.find_design import Design
 from asperity.envelopes.searches import FORCE, MET
@@ -47,7 +46,7 @@ def _lost_table(result: Design) -> Table:
 def design_answer(result: Design) -> str:
     """Return the design, and whether it meets the target, in a few sentences."""
     row, texture, target = result.row, result.comparison.texture, result.target
-    k, felt = stiffness_limit_text(row.surface.stiffness), row.perceptibility
+    k, felt = format_quantity(row.surface.stiffness, "N/m", 4), row.perceptibility
     height = format_quantity(texture.peak_to_valley, "m")
     way = "as high" if texture.single_wave is not None else "as large"
     unit = f"{target.measure} at the {target.at}"
