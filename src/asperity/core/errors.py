@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import copyreg
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from typing import ClassVar
+from typing import ClassVar, TypeVar
+
+_Entry = TypeVar("_Entry")
 
 
 class AsperityError(Exception):
@@ -94,6 +96,17 @@ def print_message(text: str) -> None:
     with suppress(OSError, ValueError):
         line = escape_unprintable(" ".join(text.splitlines()))
         print(f"asperity: {line}", file=sys.stderr, flush=True)
+
+
+def find_named(argument: str, name: str, table: Mapping[str, _Entry]) -> _Entry:
+    """Return the entry of a name.
+
+    Raises:
+        ParameterError: for an unknown name of an argument, with the nearest.
+    """
+    if name not in table:
+        raise ParameterError(argument, f"is unknown: {name!r}; {suggest_names(name, table)}")
+    return table[name]
 
 
 def suggest_names(name: str, choices: Iterable[str]) -> str:

@@ -8,7 +8,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-from asperity.core.errors import ParameterError, escape_unprintable, suggest_names
+from asperity.core.errors import ParameterError, escape_unprintable, find_named
 from asperity.core.files import check_not_existing, open_atomic
 from asperity.export.c99 import c99_files
 from asperity.export.export_request import ExportRequest
@@ -53,9 +53,7 @@ def find_target(name: str) -> ExportTarget:
     Raises:
         ParameterError: for an unknown name.
     """
-    if name.lower() not in TARGETS:
-        raise ParameterError("lang", f"is unknown: {name!r}; {suggest_names(name, TARGETS)}")
-    return TARGETS[name.lower()]
+    return find_named("lang", name.lower(), TARGETS)
 
 
 def check_name(path: Path, target: ExportTarget) -> None:

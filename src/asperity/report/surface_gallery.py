@@ -9,7 +9,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from asperity.core.arguments import Argument
-from asperity.core.errors import ParameterError, suggest_names
+from asperity.core.errors import find_named
 from asperity.core.units import format_quantity
 from asperity.report import page
 from asperity.report.page import Cell, Page, Row, Section, Table, TableLayout
@@ -83,9 +83,7 @@ def find_surfaces(names: Sequence[str] = ()) -> list[SurfaceEntry]:
     """
     wanted = [name.lower().rstrip(":") for name in names]
     for name in wanted:
-        if name not in CATALOGUE:
-            hint = suggest_names(name, CATALOGUE)
-            raise ParameterError("surface", f"is unknown: {name!r}; {hint}")
+        find_named("surface", name, CATALOGUE)
     return [
         SurfaceEntry(kind, kind.factory(**kind.example), name in LIBRARY)
         for name, kind in CATALOGUE.items()

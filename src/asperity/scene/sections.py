@@ -20,7 +20,7 @@ from asperity.core.arguments import (
     parse_arguments,
     read_arguments,
 )
-from asperity.core.errors import ParameterError, suggest_names
+from asperity.core.errors import ParameterError, find_named
 from asperity.core.files import open_input, to_plain_data
 from asperity.laws import SHIPPED_LAW_ARGUMENTS, Law, registered_arguments
 from asperity.recording.recording import is_recording, open_recording
@@ -160,10 +160,7 @@ def build_section(
     if not isinstance(kind, str):
         names = " | ".join(f'"{name}"' for name in kinds)
         raise ParameterError(section, f"needs kind = {names}", kind)
-    if kind not in kinds:
-        hint = suggest_names(kind, kinds)
-        raise ParameterError(f"{section}.kind", f"is unknown: {kind!r}; {hint}")
-    part = kinds[kind]
+    part = find_named(f"{section}.kind", kind, kinds)
     values = parse_arguments(section, arguments, part.arguments, folder)
     for argument in part.arguments:
         if argument.required and argument.name not in values:

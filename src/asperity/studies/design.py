@@ -8,7 +8,7 @@ from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from asperity.core.errors import ParameterError, suggest_names
+from asperity.core.errors import ParameterError, find_named
 
 Values = Mapping[str, Any]
 """Values of varied keys of a scene [SI]: ``{"surface.law": "A", "texture.amplitude": 1e-4}``."""
@@ -126,9 +126,7 @@ def _check_answer(presentation: Presentation | None, answer: str) -> None:
     if presentation is None:
         raise ParameterError("answer", "comes after the end of the run", answer)
     if presentation.answers:
-        if answer not in presentation.answers:
-            hint = suggest_names(answer, presentation.answers)
-            raise ParameterError("answer", f"is unknown: {answer!r}; {hint}")
+        find_named("answer", answer, dict.fromkeys(presentation.answers))
         return
     low, high = presentation.range or (-math.inf, math.inf)
     try:

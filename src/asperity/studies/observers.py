@@ -11,7 +11,7 @@ import numpy as np
 from scipy.special import expit
 
 from asperity.core.compiled import FloatArray
-from asperity.core.errors import ParameterError, suggest_names
+from asperity.core.errors import find_named
 from asperity.studies.design import Presentation, StudyDesign, TrialRecord, Values
 from asperity.studies.methods import METHODS
 
@@ -102,9 +102,7 @@ def find_observer(name: str) -> Observer:
     Raises:
         ParameterError: for an unknown one, with the nearest.
     """
-    if name not in OBSERVERS:
-        raise ParameterError("observer", f"is unknown: {name!r}; {suggest_names(name, OBSERVERS)}")
-    return OBSERVERS[name]
+    return find_named("observer", name, OBSERVERS)
 
 
 def surface_strength(surface: Surface, device: Device) -> float:

@@ -24,7 +24,7 @@ from asperity.analysis.compare import DEFAULT_DEVICE, compare
 from asperity.core.checks import check_keywords
 from asperity.core.digests import content_digest, package_digest
 from asperity.core.display import Tabular
-from asperity.core.errors import AsperityError, ParameterError, suggest_names
+from asperity.core.errors import AsperityError, ParameterError, find_named
 from asperity.core.files import to_plain_data
 from asperity.laws import REGISTERED_LAWS, find_law, find_laws
 from asperity.rendering import is_searched, rendered_surface
@@ -129,9 +129,7 @@ def find_run(name: str) -> RunKind:
     Raises:
         ParameterError: for an unknown one, with the nearest.
     """
-    if name not in RUN_KINDS:
-        raise ParameterError("run", f"is unknown: {name!r}; {suggest_names(name, RUN_KINDS)}")
-    return RUN_KINDS[name]
+    return find_named("run", name, RUN_KINDS)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from asperity.core.arguments import SEED, Argument
-from asperity.core.errors import ParameterError, suggest_names
+from asperity.core.errors import ParameterError, find_named, suggest_names
 from asperity.textures.library.random_surfaces import brush_metal, glue_sandpaper, plane_wood
 from asperity.textures.library.regular_surfaces import lay_tiles, press_knurl, weave_cloth
 from asperity.textures.spline.spline_texture import HeightMap
@@ -87,9 +87,7 @@ def named_surface(name: str, **parameters: Any) -> NamedSurface:
         asperity.core.errors.ParameterError: name is unknown: 'cotton'; known: brushed-metal, cloth, knurl, sandpaper, tile, wood
     """  # noqa: E501  # doctest compares the whole message
     key = str(name).lower().replace("_", "-").replace(" ", "-")
-    if key not in LIBRARY:
-        raise ParameterError("name", f"is unknown: {name!r}; {suggest_names(str(name), LIBRARY)}")
-    declared = {argument.name: argument for argument in LIBRARY[key].arguments}
+    declared = {argument.name: argument for argument in find_named("name", key, LIBRARY).arguments}
     for unknown in parameters.keys() - declared.keys():
         raise ParameterError(unknown, f"is unknown to {key}; {suggest_names(unknown, declared)}")
     values = {
