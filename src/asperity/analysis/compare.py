@@ -173,7 +173,9 @@ def compare(
         raise ParameterError("device", "must be one: asp.compare_devices compares several")
     check_keywords(surface_arguments, SURFACE_KEYWORDS - {"law"}, compare)
     texture = as_texture(texture)
-    laws = _renderable_laws(find_laws(laws), texture)
+    laws = find_laws(laws)
+    if texture.baked_numbers and len(laws) >= len(ALL_LAWS):  # the one that was baked
+        laws = tuple(law for law in laws if law.contact.has_potential_field)
     device = load_device(device)
     stiffness = None if stiffness is None else check_positive("stiffness", stiffness, "N/m")
     scan_speed = DEFAULT_SPEED if speed is None else check_positive("speed", speed, "m/s")
@@ -212,13 +214,6 @@ def compare(
         recommendation=recommendation_text(recommended, device),
         assumptions=comparison_assumptions(rows, part, device, query.grip, defaults),
     )
-
-
-def _renderable_laws(laws: tuple[Law, ...], texture: Texture) -> tuple[Law, ...]:
-    """Return the laws, of all laws on a baked field the one that was baked."""
-    if not texture.baked_numbers or len(laws) < len(ALL_LAWS):
-        return laws
-    return tuple(law for law in laws if law.contact.has_potential_field)
 
 
 def missing_data_hint(device: Device) -> str:

@@ -25,7 +25,7 @@ from asperity.lab.scene_state import SceneState, make_scene_state
 from asperity.lab.session import Session
 from asperity.loop.shared_trace import COLUMNS
 from asperity.recording.recorded_field import TEXTURE_FILE, field_attachments, field_metadata
-from asperity.recording.recording import Recording, is_recording, open_recording
+from asperity.recording.recording import is_recording, open_recording
 from asperity.recording.replay import recorded_surface_on
 from asperity.recording.writer import RecordingWriter
 from asperity.scene.recorded_scene import load_recorded_scene
@@ -296,16 +296,12 @@ def load_recorded_clip(
         ParameterError: for a recording that cannot be shown, with the missing data.
     """
     recording = open_recording(path)
-    _require_surface(recording)
+    if "surface" in recording.metadata and recording.attachment(TEXTURE_FILE) is None:
+        reason = "does not contain its surface, which was too large: asperity lab SURFACE shows it"
+        raise ParameterError("recording", f"{reason}, asperity recording plot the recording")
     scene, assumed = load_recorded_scene(recording)
     playback = load_playback(recording, recorded_surface_on(recording, scene.texture))
     used = modify_device(device or scene.device or load_device(DEFAULT_DEVICE))
     state = make_scene_state(scene, source, surface, used)
     assumptions = (*assumed, *state.setup.assumptions)
     return replace(state, setup=replace(state.setup, assumptions=assumptions)), playback
-
-
-def _require_surface(recording: Recording) -> None:
-    if "surface" in recording.metadata and recording.attachment(TEXTURE_FILE) is None:
-        reason = "does not contain its surface, which was too large: asperity lab SURFACE shows it"
-        raise ParameterError("recording", f"{reason}, asperity recording plot the recording")

@@ -125,10 +125,13 @@ def draw_fields(
     x, y = f"along the scan line [{wide.name}]", f"z [{high.name}]"
     panels = style.axes_grid(figure, len(surfaces), columns, x=x, y=y)
     is_true_to_scale = wide == high and _MIN_ASPECT <= window.aspect <= _MAX_ASPECT
+    options = _ARROWS | {"scale": force_per_inch, "color": style.INK}
     for index, (axes, surface) in enumerate(zip(panels, surfaces, strict=True)):
         window.limit_axes(axes)
         image = _draw_curl(axes, curls[index], window, curl_limit)
-        quiver = _draw_arrows(axes, arrows[index], window, force_per_inch)
+        field = arrows[index]
+        places = window.scale(field.along, field.z)
+        quiver = axes.quiver(*places, field.tangential, field.normal, zorder=4, **options)
         _draw_outline(axes, surface, window)
         style.title_law(axes, surface.law, remarks[index] if index < len(remarks) else "")
         axes.set_aspect("equal" if is_true_to_scale else "auto")
@@ -176,14 +179,6 @@ def _draw_curl(axes: Axes, field: scan_plane.CurlField, window: Window, limit: f
     place: dict[str, Any] = {"extent": (*axes.get_xlim(), *axes.get_ylim()), "origin": "lower"}
     place |= {"aspect": "auto", "interpolation": "nearest", "rasterized": True, "zorder": 0.4}
     return axes.imshow(pixels.T, style.CURL, vmin=-limit, vmax=limit, **place)
-
-
-def _draw_arrows(
-    axes: Axes, field: scan_plane.PlaneForces, window: Window, force_per_inch: float
-) -> Any:
-    places = window.scale(field.along, field.z)
-    options = _ARROWS | {"scale": force_per_inch, "color": style.INK}
-    return axes.quiver(*places, field.tangential, field.normal, zorder=4, **options)
 
 
 def _draw_outline(axes: Axes, surface: Surface, window: Window) -> None:
