@@ -16,7 +16,7 @@ from typing import Any
 import numba
 import pytest
 from numba import _dynfunc
-from numba.core import caching, codegen, compiler, dispatcher, typed_passes
+from numba.core import codegen, compiler, dispatcher, typed_passes
 
 from asperity.kernels import numba_internals
 
@@ -37,13 +37,6 @@ USED: dict[str, tuple[Any, str, tuple[str, ...] | None, str]] = {
     "lower": (typed_passes.NativeLowering, "run_pass", ("self", "state"), "LinkOnlyLowering"),
     "pipeline": (compiler.Compiler, "define_pipelines", ("self",), "LoopCompiler"),
     "function": (_dynfunc, "make_function", None, "LinkOnlyLowering"),
-    "load": (
-        caching._Cache,
-        "load_overload",
-        ("self", "sig", "target_context"),
-        "MachineCodeCache",
-    ),
-    "save": (caching._Cache, "save_overload", ("self", "sig", "data"), "MachineCodeCache"),
     "rebuild": (compiler.CompileResult, "_rebuild", None, "MachineCodeCache._load_cached"),
     "reduce": (compiler.CompileResult, "_reduce", ("self",), "MachineCodeCache.save_overload"),
     "magic": (codegen.CPUCodegen, "magic_tuple", ("self",), "MachineCodeCache._key"),

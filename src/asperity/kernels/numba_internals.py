@@ -3,7 +3,7 @@
 Private names: ``JITCodeLibrary`` with its methods ``_optimize_final_module``,
 ``_finalize_final_module``, ``_finalize_dynamic_globals``, ``_verify_declare_only_symbols`` and
 ``_get_module_for_linking`` and its ``_linking_libraries`` and ``_shared_module``,
-``CPUCodegen._create_empty_module``, ``_dynfunc.make_function``, ``caching._Cache``,
+``CPUCodegen._create_empty_module``, ``_dynfunc.make_function``,
 ``Dispatcher._cache`` and ``_compiler``, ``CompileResult._rebuild`` and ``_reduce``. The dependency
 on Numba has an upper bound for their sake, and ``tests/kernels/test_numba_internals.py`` says which
 of them a new version changes.
@@ -32,15 +32,7 @@ from typing import Any
 import llvmlite  # type: ignore[import-untyped]  # it has no types
 import numba
 from numba import _dynfunc  # type: ignore[attr-defined]  # of compiled code
-from numba.core import (
-    caching,
-    codegen,
-    compiler,
-    compiler_machinery,
-    dispatcher,
-    serialize,
-    typed_passes,
-)
+from numba.core import codegen, compiler, compiler_machinery, dispatcher, serialize, typed_passes
 
 from asperity.core import cache
 from asperity.core.compiled import COMPILE_CALLBACKS
@@ -224,7 +216,7 @@ _CompileResult: Any = compiler.CompileResult
 _serialize: Any = serialize.dumps
 
 
-class MachineCodeCache(caching._Cache):
+class MachineCodeCache:
     """Cache of the compiled overloads of one function, as Numba's dispatcher uses it.
 
     Args:
@@ -238,15 +230,6 @@ class MachineCodeCache(caching._Cache):
     def cache_path(self) -> str:
         """The folder of the entries."""
         return str(cache.cache_folder() / CODE_NAMESPACE)
-
-    def enable(self) -> None:
-        """Do nothing: the cache is always enabled."""
-
-    def disable(self) -> None:
-        """Do nothing: the cache is always enabled."""
-
-    def flush(self) -> None:
-        """Do nothing: keys contain everything that is compiled, so no entry is stale."""
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the compiled overload of a signature, or ``None`` to compile it."""
