@@ -17,6 +17,10 @@ from asperity.textures.fields.field_sampler import MIRRORED, PERIODIC, ZERO, Fie
 NEIGHBOUR_WEIGHT = 0.125
 # Steps over which the share of a smoothing pass rises from 0 to 1.
 RAMP = 5
+# Below the surface the depth is computed at every so many levels and interpolated, with a share
+# that rises from 0 to 1 over so many levels.
+COARSE_STEP = 2
+BLENDED = 5
 _MIN_STEPS = 4
 _MIN_BELOW = 2
 # Height above the surface at which coefficients end, in nodes: a cell with contact has no node
@@ -41,6 +45,7 @@ class FieldGrid:
         below: number of cells below the floor, at least 1; the lowest ends halfway between the two
             lowest levels.
         border: what the field is beyond its first and last node.
+        deep: number of levels below the surface, whose depth is interpolated along z.
     """
 
     steps: FloatArray
@@ -51,6 +56,7 @@ class FieldGrid:
     floor: float
     below: int
     border: int
+    deep: int = 0
 
     @staticmethod
     def fit(
@@ -84,6 +90,7 @@ class FieldGrid:
             floor=floor,
             below=below,
             border=PERIODIC if domain.periodic else MIRRORED,
+            deep=below + int(max_depth / spacing),
         )
         return replace(grid, levels=grid.levels + math.ceil(grid.margin / grid.level_spacing))
 
@@ -129,6 +136,31 @@ class FieldGrid:
         """Return z of a level [m]."""
         return self.floor + (level - self.below - 0.5) * self.level_spacing
 
+    def level_weights(self) -> tuple[NDArray[np.intp], FloatArray]:
+        """Return the levels of which depths are computed, and their weights at all levels.
+
+        Deep levels are interpolated by a quadratic B-spline, whose coefficients are computed.
+
+        Returns:
+            The numbers of the levels, rising, shape (n,), and the weights (n, levels).
+        """
+        from scipy.interpolate import BSpline
+
+        if not self.deep:
+            return np.arange(self.levels), np.eye(self.levels)
+        deep, exact = np.arange(self.deep), np.arange(max(self.deep - BLENDED + 1, 0), self.levels)
+        coarse = np.arange(-COARSE_STEP, self.deep + COARSE_STEP + 1, COARSE_STEP)
+        computed = np.union1d(coarse, exact)
+        weights = np.zeros((len(computed), self.levels))
+        weights[np.searchsorted(computed, exact), exact] = 1.0
+        rise = np.minimum((self.deep - deep) / BLENDED, 1.0)
+        share = rise**3 * (10.0 - 15.0 * rise + 6.0 * rise**2)
+        knots = COARSE_STEP * (np.arange(len(coarse) + 3) - 2.5)
+        weights[:, : self.deep] *= 1.0 - share
+        spline = BSpline.design_matrix(deep, knots, 2).toarray()
+        weights[np.searchsorted(computed, coarse), : self.deep] += share * spline.T
+        return computed, weights
+
     def positions(self, index: NDArray[np.intp] | FloatArray) -> FloatArray:
         """Return x and y [m], (n, 2), of nodes of the plane (n, d)."""
         return np.asarray(self.start + index @ self.steps)
@@ -147,9 +179,11 @@ class FieldGrid:
         """Return the greatest variance [m²] of the points of which S is the mean of the depth.
 
         A quadratic B-spline has the variance 1/4 of a squared step along each axis, and a smoothing
-        pass adds at most 1/4.
+        pass adds at most 1/4; the spline by which depths are interpolated has that of its steps.
         """
-        return (0.25 + 2.0 * NEIGHBOUR_WEIGHT * passes) * float(np.square(self.spacing).sum())
+        coarse = 0.25 * (COARSE_STEP * self.level_spacing) ** 2 if self.deep else 0.0
+        own = 0.25 + 2.0 * NEIGHBOUR_WEIGHT * passes
+        return own * float(np.square(self.spacing).sum()) + coarse
 
     def error_bounds(
         self, gain: float, passes: int = 0, largest: float = 0.0
@@ -162,7 +196,9 @@ class FieldGrid:
         distances from p. For every point x, D(p) (D(x) - D(p)) is ∇U(p) · (x - p) up to
         (L + 1) |x - p|²/2, so D(p) times the derivative is that of U up to (L + 1) τ²/h; and S
         differs from D(p) by at most σ. The derivative of S is at most 1, and a smoothing pass may
-        add to it, since its weights differ between nodes. T is at most the mean of U; it is less by
+        add to it, since its weights differ between nodes. So does the share of an interpolated
+        depth along z, by at most 1.875/n between levels; that depth differs by at most a quarter of
+        a coarse step, since the depth falls along z. T is at most the mean of U; it is less by
         at most the variance of S where all points are inside, and by σ times the depth otherwise.
         Single precision rounds a coefficient at most twice, and less than 5 times in a pass.
 
@@ -177,12 +213,15 @@ class FieldGrid:
         change = NEIGHBOUR_WEIGHT * (1.0 / RAMP + 3.0 / 255.0)  # of the weight, and its rounding
         growth = 1.0 + 2.0 * change * steps.max() / steps.min()
         slope = growth ** (passes * (len(steps) - 1))
+        if self.deep:
+            slope *= 1.0 + 1.875 / BLENDED * 0.25 * COARSE_STEP
         components = (gain + 1.0) * (spread + 0.25 * square) / steps + slope * math.sqrt(spread)
         components += rounding * (slope + 2.0 * largest / steps)
         rates = np.linalg.pinv(self.steps).T * np.hypot(*self.steps.T)[:, None]
         # Derivatives along non-orthogonal steps amplify an error of the gradient.
         skew = max(1.0, float(np.linalg.norm(rates, 2)))
-        reach = (1.5 + passes) * math.sqrt(float(square.sum()))
+        width = 1.5 * (1 + COARSE_STEP) if self.deep else 1.5
+        reach = (width + passes) * math.sqrt(float(square.sum()))
         potential = max(0.5 * (gain + 1.0) * spread, reach * math.sqrt(spread))
         return skew * float(np.linalg.norm(components)), potential + largest * rounding
 

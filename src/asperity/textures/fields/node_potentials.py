@@ -43,12 +43,15 @@ def compute_potentials(
     *plane, levels = grid.node_counts
     result = np.empty((math.prod(plane), levels), np.float32)
     at_once = max(_NODES_PER_BLOCK // levels, 1)
-    z = grid.height(np.arange(levels))
+    computed, weights = grid.level_weights()
+    z = grid.height(computed)
 
     def fill(first: int) -> None:
         part = np.arange(first, min(first + at_once, len(result)))
         xy = grid.positions(np.stack(np.unravel_index(part, plane), axis=-1))
-        columns(xy, z, grid.margin, result[first : first + at_once])
+        depths = np.empty((len(part), len(z)), np.float32)
+        columns(xy, z, grid.margin, depths)
+        result[first : first + at_once] = depths @ weights if grid.deep else depths
 
     run_in_threads(fill, range(0, len(result), at_once), progress)
     return result.reshape(grid.node_counts)
