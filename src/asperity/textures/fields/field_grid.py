@@ -200,14 +200,14 @@ class FieldGrid:
         depth along z, by at most 1.875/n between levels; that depth differs by at most a quarter of
         a coarse step, since the depth falls along z. T is at most the mean of U; it is less by
         at most the variance of S where all points are inside, and by σ times the depth otherwise.
-        Single precision rounds a coefficient at most twice, and less than 5 times in a pass.
+        Single precision rounds a coefficient at most three times, and less than 5 times in a pass.
 
         Args:
             gain: Lipschitz constant L of ∇U [1].
             passes: number of smoothing passes.
             largest: greatest coefficient that is stored in single precision [m].
         """
-        rounding = (2.0 + 5.0 * passes) * largest * 0.5 * float(np.finfo(np.float32).eps)
+        rounding = (3.0 + 5.0 * passes) * largest * 0.5 * float(np.finfo(np.float32).eps)
         steps, spread = np.array(self.spacing), self.spread(passes)
         square = np.square(steps)
         change = NEIGHBOUR_WEIGHT * (1.0 / RAMP + 3.0 / 255.0)  # of the weight, and its rounding
