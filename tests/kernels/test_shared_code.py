@@ -31,12 +31,22 @@ def unit(
 
 PROVIDER = unit("finds", SEARCH, {"FAR": 100.0}, provides=("search", "step"), shared=("search",))
 TIMES = unit("times", "def times(x): return search(x) * step(3.0 * x)", loops=("times",))
+CHAIN = unit(
+    "chain",
+    "def outer(x): return middle(x) + 1.0\ndef middle(x): return inner(x)\n"
+    "def inner(x): return 3.0 * x",
+    provides=("outer", "inner"),
+    shared=("outer", "inner"),
+)
+DEEP = unit("deep", "def deep(x): return outer(x)", loops=("deep",))
 FAR = "1.000000e+02"  # as LLVM writes it
 MINUS = unit("minus", "def minus(x): return -search(x)", loops=("minus",))
 
 
 def test_shared_function_is_a_separate_part() -> None:
-    first, second = (link_modules(loops_of(loop), (PROVIDER, loop)) for loop in (TIMES, MINUS))
+    first, second = (
+        link_modules(loops_of(loop), (PROVIDER, CHAIN, loop)) for loop in (TIMES, MINUS)
+    )
     assert first[0] == second[0]  # for any importing loop
     assert (first[0].name, first[0].imports) == ("search", ())
     assert first[0].title == "Function search of finds."
@@ -91,7 +101,9 @@ def test_shared_functions_of_one_name_are_an_error() -> None:
 
 
 def load(loop: SourceUnit) -> Any:
-    return fuse.load_fused(fuse._assemble(f"Of {loop.name}.", loops_of(loop), (PROVIDER, loop)))
+    return fuse.load_fused(
+        fuse._assemble(f"Of {loop.name}.", loops_of(loop), (PROVIDER, CHAIN, loop))
+    )
 
 
 @pytest.fixture
@@ -142,8 +154,8 @@ def test_link_only_function_has_no_machine_code() -> None:
 
 PROGRAM = """
 import sys
-from tests.kernels.test_shared_code import MINUS, TIMES, load
-loops = {"times": TIMES, "minus": MINUS}
+from tests.kernels.test_shared_code import DEEP, MINUS, TIMES, load
+loops = {"times": TIMES, "minus": MINUS, "deep": DEEP}
 print(*(getattr(load(loops[name]), name)(2.0) for name in sys.argv[1:]))
 """
 
@@ -159,12 +171,13 @@ def test_cached_code_finds_the_shared_functions_that_it_calls(tmp_path: Path) ->
     """Whatever of a program is cached, and in whatever order the rest is compiled."""
     assert run_in_new_process("times") == [742.0]
     assert run_in_new_process("minus", "times") == [-106.0, 742.0]
+    assert run_in_new_process("deep") == [7.0]
     entries = [path for path in tmp_path.rglob("*") if path.is_file()]
     contents = {path: path.read_bytes() for path in entries}
-    assert len(entries) >= 3
+    assert len(entries) >= 6
     for path in entries:
         for other, content in contents.items():
             other.write_bytes(content)
         path.unlink()
-        assert run_in_new_process("minus", "times") == [-106.0, 742.0]
+        assert run_in_new_process("minus", "times", "deep") == [-106.0, 742.0, 7.0]
         assert path.exists()

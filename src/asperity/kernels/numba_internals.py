@@ -42,6 +42,7 @@ from asperity.core.processes import defer_interrupt
 _Library: Any = codegen.JITCodeLibrary
 _Lowering: Any = typed_passes.NativeLowering
 _Compiler: Any = compiler.Compiler
+_compiler: Any = compiler
 _Dispatcher: Any = dispatcher.Dispatcher
 _register: Any = compiler_machinery.register_pass
 
@@ -316,7 +317,8 @@ def cache_machine_code(decorator: Callable[..., Any]) -> Callable[..., Any]:
         compile_overload = dispatcher.compile
 
         def compile_whole(signature: Any) -> Any:
-            with defer_interrupt():
+            # No options of the caller are inherited: they are part of the symbol.
+            with defer_interrupt(), _compiler.ConfigStack().enter(_compiler.Flags()):
                 return compile_overload(signature)
 
         dispatcher.compile = compile_whole
