@@ -48,7 +48,8 @@ def exact_jacobian(
     anchor sticks, the deflection follows the probe; while it slides, only the part across d does.
     """
     with mpmath.workdps(3 * digits):
-        p, d = [mpmath.mpf(c) for c in point], [mpmath.mpf(c) for c in deflection]
+        p = [mpmath.mpf(c) for c in point]
+        d = [mpmath.mpf(c) for c in deflection]
         step = mpmath.mpf(10) ** (-digits) * mpmath.mpf(surface.max_depth)
         square = d[0] ** 2 + d[1] ** 2
         columns = []
@@ -71,7 +72,8 @@ def _offset(point: list[Any], sign: int, step: list[Any]) -> list[Any]:
 
 
 def _force(surface: Surface, p: list[Any], d: list[Any]) -> Any:
-    law, h = surface.law, surface.texture.exact_height()
+    law = surface.law
+    h = surface.texture.exact_height()
     contact = law.contact.exact_contact(surface.texture, h, p)
     if contact is None:
         raise ParameterError("surface", f"with law {law} has no reference implementation")

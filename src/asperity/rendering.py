@@ -136,7 +136,8 @@ def bake_mesh(
     Reference:
         docs/theory/split.md.
     """
-    body, wanted = load_mesh(path, unit, repair=repair), _goal(**goal)
+    body = load_mesh(path, unit, repair=repair)
+    wanted = _goal(**goal)
     if texture is not None:
         body = lay_texture(body, as_texture(texture), texture_side)
     field = bake_body(
@@ -229,7 +230,8 @@ class Rendering(Serializable):
         text = f"Law {law.letter} finds its contact by a search within the time of a sample:"
         if not self.truncated:
             return f"{text} it was complete in all of {stroke}"
-        part, bound = self.truncated / self.samples, format_quantity(self.error_bound, "m")
+        part = self.truncated / self.samples
+        bound = format_quantity(self.error_bound, "m")
         return (
             f"{text} it was truncated in {100.0 * part:.2g} % of {stroke}, with an error of up to "
             f"{bound} in the contact; there, statements about the law do not hold for its rendering"
@@ -248,7 +250,8 @@ def assess_rendering(
         speed: of the stroke [m/s].
         update_rate: of the loop [Hz]; 1 kHz where it is not known.
     """
-    texture, contact = surface.texture, surface.law.contact
+    texture = surface.texture
+    contact = surface.law.contact
     if texture.baked_numbers:
         return Rendering(FIELD)
     if not contact.has_warm_start or texture.finds_contacts:
@@ -264,7 +267,8 @@ def assess_rendering(
 
 def _try_search(surface: Surface, step: float) -> tuple[int, int, float]:
     """Return the samples of a stroke, those with a truncated search, and its error bound [m]."""
-    line, top = surface.texture.scan_line(), surface.texture.extremes[1]
+    line = surface.texture.scan_line()
+    top = surface.texture.extremes[1]
     along = step * np.arange(_STROKE_SAMPLES)
     path = np.full((_STROKE_SAMPLES, 3), top - surface.max_depth)
     path[:, :2] = line.start + along[:, None] * line.direction

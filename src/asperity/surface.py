@@ -105,7 +105,8 @@ class Surface(Plottable):
         continuity: float | None = None,
         law_parameters: Mapping[str, float] | None = None,
     ) -> None:
-        law, texture = find_law(law), as_texture(texture)
+        law = find_law(law)
+        texture = as_texture(texture)
         names = ("friction", "max_deflection", "modulation_depth", "continuity")
         values = (friction, max_deflection, modulation_depth, continuity)
         keywords = {
@@ -142,7 +143,8 @@ class Surface(Plottable):
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Set all attributes; parameters that are not given get the defaults of the law."""
-        law, given = find_law(state["law"]), state["_explicit_parameters"]
+        law = find_law(state["law"])
+        given = state["_explicit_parameters"]
         parameters = {
             name: argument.validate(given[name]) if name in given else float(law.parameters[name])
             for name, argument in law.arguments.items()
@@ -264,7 +266,8 @@ class Surface(Plottable):
         clamp = self.effective_clamp
         if not clamp.changes_force:
             return self.max_depth
-        whole, texture = clamp.holds_whole_force, self.texture
+        whole = clamp.holds_whole_force
+        texture = self.texture
         low, high = self.law.contact.extremes(texture) if whole else texture.extremes
         return self.max_depth + (high - low)
 
@@ -374,7 +377,8 @@ class Surface(Plottable):
             state = (*state, probes.check_flags_per_point("sliding", sliding))
         elif sliding is not None:
             raise ParameterError("sliding", f"is meaningless for law {self.law}, without state")
-        forces, jacobians = np.empty((probes.count, 3)), np.empty((probes.count, 3, 3))
+        forces = np.empty((probes.count, 3))
+        jacobians = np.empty((probes.count, 3, 3))
         self._loops.jacobian_batch(
             probes.rows, *state, forces, jacobians, self.texture.arguments, self.law_arguments
         )
@@ -409,7 +413,8 @@ class Surface(Plottable):
         if not (self.law.stateful or self.law.contact.has_warm_start):
             return self.force(probes)
         state = new_warm_start(UNLIMITED) if warm_start is None else check_warm_start(warm_start)
-        out, diagnostics = np.empty((len(probes), 3)), np.empty((len(probes), 2))
+        out = np.empty((len(probes), 3))
+        diagnostics = np.empty((len(probes), 2))
         arguments = (self.texture.arguments, self.law_arguments)
         self._path_loops.path_batch(probes, out, diagnostics, state, *arguments)
         return out

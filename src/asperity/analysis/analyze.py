@@ -88,7 +88,8 @@ class Analysis(Plottable, Reportable):
         """Sup |curl f| [N/m]: the greatest work of a small loop per area [J/m²]."""
         if self.curl is None:
             return None
-        k, upper = self.surface.stiffness, self.curl.upper
+        k = self.surface.stiffness
+        upper = self.curl.upper
         # One unit in the last place covers the rounding of the product.
         top = math.nextafter(k * upper, math.inf) if upper > 0.0 else 0.0
         return replace(self.curl, lower=k * self.curl.lower, upper=top)
@@ -110,7 +111,8 @@ class Analysis(Plottable, Reportable):
     @cached_property
     def answer(self) -> str:
         """The verdict in one sentence."""
-        surface, passivity = self.surface, self.passivity
+        surface = self.surface
+        passivity = self.passivity
         depth = format_quantity(surface.max_depth, "m")
         subject = f"law {surface.law.letter} at {surface.stiffness:g} N/m, pressed to {depth}, "
         subject += f"on the {self.device.name}"
@@ -136,8 +138,10 @@ class Analysis(Plottable, Reportable):
     @cached_property
     def assumptions(self) -> tuple[str, ...]:
         """Used defaults, unverified device data and preparation of the surface, in sentences."""
-        surface, leak = self.surface, self.leak
-        texture, depth = surface.texture, format_quantity(surface.max_depth, "m")
+        surface = self.surface
+        leak = self.leak
+        texture = surface.texture
+        depth = format_quantity(surface.max_depth, "m")
         searched = self.rendering.sentence(surface.law)
         sentences = [*texture.preparation, *filter(None, [searched]), *_default_sentences(surface)]
         region = texture.domain.description
@@ -164,7 +168,8 @@ class Analysis(Plottable, Reportable):
         return (*sentences, SCOPE_SENTENCE)
 
     def __repr__(self) -> str:
-        law, verdict = self.surface.law.letter, self.passivity.verdict
+        law = self.surface.law.letter
+        verdict = self.passivity.verdict
         return f"<Analysis of law {law} on {self.device.id}: q = {self.q.value:.4g}, {verdict}>"
 
     def to_dict(self) -> dict[str, Any]:

@@ -84,7 +84,8 @@ def limits(
         (('force_resolution',), (0.0, 0.4))
     """
     check_keywords(surface_arguments, SURFACE_KEYWORDS, limits)
-    device, texture = load_device(device), as_texture(texture)
+    device = load_device(device)
+    texture = as_texture(texture)
     v = limit_rules.DEFAULT_SPEED if speed is None else check_positive("speed", speed, "m/s")
     samples = time_samples, position_samples, force_steps
     settings: dict[str, Any] = {"speed": v} | {
@@ -98,11 +99,13 @@ def limits(
     k = DEFAULT_STIFFNESS if stiffness is None else stiffness
     surface = Surface(texture, law, k, max_depth, **surface_arguments)
     surface = rendered_surface(surface, rendering)
-    q, one_sided = cached_number(surface, NORM), cached_number(surface, ONE_SIDED)
+    q = cached_number(surface, NORM)
+    one_sided = cached_number(surface, ONE_SIDED)
     recommended = verdict.recommend_stiffness(surface, device, q, one_sided)
     if stiffness is None:
         surface = verdict.at_recommended_stiffness(surface, device, recommended)
-    scan, hand = scan_force(surface), load_grip(grip)
+    scan = scan_force(surface)
+    hand = load_grip(grip)
     perceptibility = assess_perceptibility(
         surface,
         device,

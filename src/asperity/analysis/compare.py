@@ -189,7 +189,8 @@ def compare(
         Surface(texture, law, law_parameters=own, **surface_arguments)
         for law, own in zip(laws, parameters, strict=True)
     ]
-    part, explicit_depth = texture.texture_part(), max_depth is not None
+    part = texture.texture_part()
+    explicit_depth = max_depth is not None
     query = _ComparisonQuery(
         device, stiffness, scan_speed, part, explicit_depth, rendering, load_grip(grip)
     )
@@ -286,12 +287,15 @@ def precompute_row(task: Task | None) -> None:
 
 
 def _compute_row(surface: Surface, query: _ComparisonQuery) -> LawRow:
-    device, surface = query.device, rendered_surface(surface, query.rendering)
-    q, one_sided = cached_number(surface, NORM), cached_number(surface, ONE_SIDED)
+    device = query.device
+    surface = rendered_surface(surface, query.rendering)
+    q = cached_number(surface, NORM)
+    one_sided = cached_number(surface, ONE_SIDED)
     recommended = recommend_stiffness(surface, device, q, one_sided)
     if query.stiffness is None:
         surface = at_recommended_stiffness(surface, device, recommended)
-    leak, merit = worst_loop(surface), compute_merit(surface)
+    leak = worst_loop(surface)
+    merit = compute_merit(surface)
     perceptibility = None
     if query.stiffness or recommended.stiffness:
         perceptibility = assess_perceptibility(

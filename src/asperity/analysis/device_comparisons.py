@@ -92,7 +92,8 @@ class DeviceComparisons(Reportable, Tabular):
         sentences = []
         if any(one.recommended_row for one in self.comparisons):
             sentences.append(_best_case_text(self.comparisons))
-        count, tiers = len(self.comparisons), Counter(map(_best_tier, self.comparisons))
+        count = len(self.comparisons)
+        tiers = Counter(map(_best_tier, self.comparisons))
         if count:
             order = ("felt", "borderline", "not felt", _NO_LAW)
             counts = ", ".join(f"{tier} in {tiers[tier]}" for tier in order if tiers[tier])
@@ -158,7 +159,9 @@ def compare_devices(
     depths = [None] if max_depths is None else check_items("max_depth", max_depths)
     if len(set(depths)) < len(depths):
         raise ParameterError("max_depth", "contains a depth twice", list(depths))
-    texture, comparisons, missing_data = as_texture(texture), [], []
+    texture = as_texture(texture)
+    comparisons = []
+    missing_data = []
     for device in loaded:
         if hint := missing_data_hint(device):
             missing_data.append(MissingData(device.id, hint))

@@ -131,7 +131,8 @@ def recommendation_text(recommended: Recommendation, device: Device) -> str:
 
 def _choice_text(row: LawRow, recommended: Recommendation, device: Device) -> str:
     """Return the recommended law and its stiffness."""
-    law, start = _law_title(row), stiffness_limit_text(row.recommended_stiffness)
+    law = _law_title(row)
+    start = stiffness_limit_text(row.recommended_stiffness)
     if recommended.stiffness is None:
         return f"Use law {law} on the {device.name} and start at {start}"
     given = format_quantity(recommended.stiffness, "N/m")
@@ -166,11 +167,14 @@ def _contact_loss_text(row: LawRow) -> str:
 def _size_text(row: LawRow, device: Device) -> str:
     """Return a warning where surface or period are larger than the workspace, and what fits."""
     domain = row.surface.texture.domain
-    size, room = float(np.hypot(*domain.spans.T).max()), device.workspace_size
+    size = float(np.hypot(*domain.spans.T).max())
+    room = device.workspace_size
     if size <= room or not (domain.periodic or row.surface.texture.is_mirrored):
         return ""
-    length, width = format_quantity(size, "m"), format_quantity(room, "m")
-    factor, whole = round_down(room / size, 2), "A period" if domain.periodic else "The surface"
+    length = format_quantity(size, "m")
+    width = format_quantity(room, "m")
+    factor = round_down(room / size, 2)
+    whole = "A period" if domain.periodic else "The surface"
     return (
         f"{whole} is {length} long and the workspace {width}: only a part can be touched, "
         f"or all of it magnified {factor:g} times more."
@@ -189,7 +193,8 @@ def _no_recommendation_text(recommended: Recommendation, device: Device) -> str:
             f"No stable stiffness is known on the {device.name} for any of the laws compared: "
             "they need a known delay, or have no bound at this depth."
         )
-    texture, at = row.perceptibility, stiffness_limit_text(row.surface.stiffness)
+    texture = row.perceptibility
+    at = stiffness_limit_text(row.surface.stiffness)
     sentences = [
         f"Nothing of this texture will be felt on the {device.name}: law {_law_title(row)}, which "
         f"comes nearest, gives at {at} {texture_amount_text(texture)}; {masking_text(texture)}.",
@@ -327,5 +332,6 @@ def _saturation_warning(best: LawRow, device: Device) -> str:
     if limit is None or force <= limit:
         return ""
     depth = format_quantity(best.surface.max_depth, "m")
-    needed, available = format_quantity(force, "N"), format_quantity(limit, "N")
+    needed = format_quantity(force, "N")
+    available = format_quantity(limit, "N")
     return f"Pressed to {depth} it needs {needed}; the device gives {available}."

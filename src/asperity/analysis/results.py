@@ -207,7 +207,8 @@ class LawRow:
 
 def _passivity_text(row: LawRow) -> str:
     """Return the passivity of a conservative law at its stiffness."""
-    passivity, stiffness = row.passivity, stiffness_limit_text(row.surface.stiffness)
+    passivity = row.passivity
+    stiffness = stiffness_limit_text(row.surface.stiffness)
     if passivity.verdict == "bounded" and passivity.buzz is not None:
         return f"passive at {stiffness} but for steps: {buzz_text(passivity.buzz)}"
     if passivity.verdict == "plausible":

@@ -107,12 +107,14 @@ def calibrate_command(
     ):
         result = Calibrator(rig, RAMP_TIME, lambda step: update(0.0, step)).run()
     suspend_if_requested(signals)
-    date, stem = time.strftime("%Y-%m-%d"), Path(output).stem
+    date = time.strftime("%Y-%m-%d")
+    stem = Path(output).stem
     calibrated = measured_device(base, result, stem, date, simulated=simulated)
     write_output("output", output, to_device_toml(calibrated))
     from asperity.report.loop.servo_report import calibration_page
 
-    before, after = unit_starts(base), unit_starts(calibrated)
+    before = unit_starts(base)
+    after = unit_starts(calibrated)
     starts = {law: (before[law], after[law]) for law in after}
     data = {"schema": 1, "device": calibrated, "measured": result, "unit_starts": starts}
     outputs.write(data, calibration_page(calibrated, result, output, starts))
@@ -128,7 +130,8 @@ def default_force(device: Device, *, real: bool) -> float:
     Raises:
         ParameterError: for a real device without a maximum force.
     """
-    maximum, continuous = device.value("max_force"), device.value("continuous_force")
+    maximum = device.value("max_force")
+    continuous = device.value("continuous_force")
     if maximum is None and real:
         raise ParameterError("max_force", "is unknown: give --set max_force=3N")
     force = MAX_CALIBRATION_FORCE if maximum is None else _FORCE_FRACTION * maximum
@@ -188,7 +191,8 @@ def simulated_bench_driver(device: Device, servo: Servo) -> Any:
     own, servo_notes = make_servo(device)
     for note in (*assumed, *plant_notes, *servo_notes):
         print_message(note)
-    own, motion = replace(own, period=servo.period), Stationary((0.0, 0.0, 0.0))
+    own = replace(own, period=servo.period)
+    motion = Stationary((0.0, 0.0, 0.0))
     return simulated_driver(plant, SpringHand(), own, motion, servo.period, device_resolution=True)
 
 

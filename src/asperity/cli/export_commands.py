@@ -66,7 +66,8 @@ def export_command(
         if "max_evaluations" in request:
             raise ParameterError("exact", "searches without a budget: leave out --max-evaluations")
         request["max_evaluations"] = math.inf
-    target, path = targets.find_target(values["lang"] or "c99"), Path(output)
+    target = targets.find_target(values["lang"] or "c99")
+    path = Path(output)
     targets.check_name(path, target)
     check_output("output", output, force=force)
     field = path.with_suffix(".field") if load and not is_field(surface) else None

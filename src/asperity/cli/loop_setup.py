@@ -90,7 +90,8 @@ def load_setup(
         requested.setdefault("law", find_law("W"))
     with progress_bar("reading the surface"):
         scene = load_scene(source, file_values(values))
-    device, note = options.select_device(values["device"], scene, values), ""
+    device = options.select_device(values["device"], scene, values)
+    note = ""
     surface = {**scene.surface, **requested}
     if driver is not None:
         _check_driver(driver, device)

@@ -158,12 +158,14 @@ def _unknown_option_text(option: str, ctx: click.Context) -> str:
     """Return the message for an unknown option; it names the commands that have it."""
     pattern = re.compile(rf"-[a-z]*{re.escape(option[1:])}.*")  # -device is parsed as -d
     name = next(filter(pattern.fullmatch, sys.argv), option) if len(option) == 2 else option
-    options, group = _options_of(ctx.command), cast("click.Group", ctx.find_root().command)
+    options = _options_of(ctx.command)
+    group = cast("click.Group", ctx.find_root().command)
     usual = read_toml("synonyms", _SYNONYMS)["options"].get(name.lower())
     near = f"did you mean {usual!r}? " if usual in options else nearest_names(name, options)
     known = {one: group.get_command(ctx, one) for one in group.list_commands(ctx)}
     having = ", ".join(one for one in known if name in _options_of(known[one]))
-    taken, path = f"option of {having}; " if having else "", ctx.command_path
+    taken = f"option of {having}; " if having else ""
+    path = ctx.command_path
     return f"{path.split()[-1]} has no option {name}; {near}{taken}see {path} --help"
 
 

@@ -66,7 +66,8 @@ def parse_settings(
     """
     law: dict[str, Any] = {}
     device: dict[str, str] = {}
-    earlier, parameters = dict[tuple[bool, str], str](), registered_arguments()
+    earlier = dict[tuple[bool, str], str]()
+    parameters = registered_arguments()
     for text in texts:
         name, equals, value = text.partition("=")
         if not equals:
@@ -135,7 +136,8 @@ def option_help(argument: Argument) -> str:
         >>> option_help(Argument("length", "of the scan", "m", 0.1, example="5mm"))
         "Of the scan, such as '5mm'.  [default: 100 mm]"
     """
-    first, rest = argument.description[:1], argument.description[1:]
+    first = argument.description[:1]
+    rest = argument.description[1:]
     # A leading symbol keeps its case: "c of law H".
     words = f"{first.upper()}{rest}" if rest[:1].isalpha() else f"{first}{rest}"
     example = f", such as '{argument.example}'" if argument.example else ""
@@ -159,7 +161,8 @@ def argument_options(
 
     def decorate(command: Command) -> Command:
         for argument in reversed(list(arguments)):
-            flag, words = f"--{argument.name.replace('_', '-')}", option_help(argument)
+            flag = f"--{argument.name.replace('_', '-')}"
+            words = option_help(argument)
             if argument.form == "switch":
                 command = click.option(flag, is_flag=True, default=None, help=words)(command)
                 continue

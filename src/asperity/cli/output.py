@@ -54,7 +54,8 @@ def progress_bar(description: str) -> Iterator[Callable[..., None]]:
     err = Console(stderr=True)
     # Rich forgets steps after the period [s], and needs two for the time left; some take minutes.
     with progress.Progress(*columns, console=err, transient=True, speed_estimate_period=1e5) as bar:
-        task, loops = bar.add_task(description, total=1.0), count(1)
+        task = bar.add_task(description, total=1.0)
+        loops = count(1)
         current = [description]
 
         def report_compilation(_loop: str) -> None:

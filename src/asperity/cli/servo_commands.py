@@ -154,7 +154,8 @@ def suspend_if_requested(signals: list[int]) -> None:
 
 def leave_lost_terminal() -> bool:
     """Return whether the terminal of this program is gone; its output then goes nowhere."""
-    poller, is_lost = select.poll(), False
+    poller = select.poll()
+    is_lost = False
     for stream in range(3):
         poller.register(stream, 0)
     for stream, event in poller.poll(0):
@@ -280,7 +281,9 @@ def _simulated_scene(source: str, values: dict[str, Any]) -> tuple[SceneState, P
     from asperity.lab.scene_state import make_scene_state
     from asperity.scene import load_scene
 
-    own, file_options, settings = surface_values(values), file_values(values), values["settings"]
+    own = surface_values(values)
+    file_options = file_values(values)
+    settings = values["settings"]
     if (path := find_recording(source, _temporary_folder())) is not None:
         for name in file_options:
             raise ParameterError(name, "has no effect on a recording, which holds its surface")

@@ -51,7 +51,8 @@ def cache_command(outputs: output.Outputs, *, clear: bool) -> None:
     """
     before = cache.list_entries()
     entries = cache.clear() if clear else before
-    folder, limit = cache.cache_folder(), cache.size_limit()
+    folder = cache.cache_folder()
+    limit = cache.size_limit()
     names = sorted({*_NAMESPACE_LABELS, *(entry.namespace for entry in entries)})
     sizes = {name: [one.size for one in entries if one.namespace == name] for name in names}
     total = _format_megabytes(entry.size for entry in entries)
@@ -86,7 +87,8 @@ def warm_command() -> None:
     """
     from asperity.laws import LAWS
 
-    laws, textures = tuple(LAWS.values()), sample_textures()
+    laws = tuple(LAWS.values())
+    textures = sample_textures()
     with output.step_bar("compiling", len(textures) * len(laws)) as step:
         precompile(laws, textures, step)
     click.echo(f"Compiled: {len(laws)} laws on {', '.join(textures)}")

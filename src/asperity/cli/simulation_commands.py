@@ -66,8 +66,11 @@ def simulate_command(
     outputs.write({"schema": 2, "scene": setup, "run": run}, run_page(setup, run))
 
 
-_SAMPLE_TIME, _ROW_TIME, _ROW_BYTES = 2e-7, 5e-7, 300  # [s], [s], [bytes], about
-_MAX_UNASKED_TIME, _MAX_UNASKED_SIZE = 600.0, 1e10
+_SAMPLE_TIME = 2e-7  # [s], [s], [bytes], about
+_ROW_TIME = 5e-7
+_ROW_BYTES = 300
+_MAX_UNASKED_TIME = 600.0
+_MAX_UNASKED_SIZE = 1e10
 """Estimated time [s] and trace [bytes] of a simulation above which it is asked for."""
 
 
@@ -79,7 +82,8 @@ def _confirm_long_run(setup: Setup, *, has_trace: bool) -> None:
     """
     samples = setup.duration / setup.servo.period
     rows = samples / setup.every if has_trace else 0.0
-    seconds, size = samples * _SAMPLE_TIME + rows * _ROW_TIME, rows * _ROW_BYTES
+    seconds = samples * _SAMPLE_TIME + rows * _ROW_TIME
+    size = rows * _ROW_BYTES
     if seconds <= _MAX_UNASKED_TIME and size <= _MAX_UNASKED_SIZE:
         return
     words = f"{samples:.3g} samples, which take about {timedelta(seconds=round(seconds))} here"
@@ -116,7 +120,8 @@ def onset_command(
     from asperity.scene.sweeps import DEFAULT_DELAYS, sweep_onsets
 
     delays = values["delays"] or DEFAULT_DELAYS
-    done, total = count(1), len(chosen) * len(delays)
+    done = count(1)
+    total = len(chosen) * len(delays)
     search = options.provided_values(values, _ONSET_SEARCH)
     with progress_bar("simulating onsets") as update:
         result = sweep_onsets(

@@ -38,11 +38,13 @@ if TYPE_CHECKING:
 
 _MAGIC = b"asperity cache 1\n"
 _HEADER_SIZE = len(_MAGIC) + 32
-_QUARANTINE_SUFFIX, _LOCK_SUFFIX = ".damaged", ".lock"
+_QUARANTINE_SUFFIX = ".damaged"
+_LOCK_SUFFIX = ".lock"
 # Files of this package; others in the folder are neither counted nor deleted.
 _ENTRY_NAME = re.compile(r"[0-9a-f]{40}(\.damaged|\.lock)?|\.[0-9a-f]{16}\.tmp")
 
-_FOLDER_VARIABLE, _SIZE_VARIABLE = "ASPERITY_CACHE_DIR", "ASPERITY_CACHE_SIZE"
+_FOLDER_VARIABLE = "ASPERITY_CACHE_DIR"
+_SIZE_VARIABLE = "ASPERITY_CACHE_SIZE"
 DEFAULT_SIZE_LIMIT = 2 * 10**9
 """Size limit of the cache [bytes] unless ``ASPERITY_CACHE_SIZE`` is set."""
 _ENTRIES_PER_LIMIT = 8
@@ -116,7 +118,8 @@ class CacheEntry:
 
 def list_entries() -> list[CacheEntry]:
     """Return the entries of the cache that can be read."""
-    entries, paths = [], list[Path]()
+    entries = []
+    paths = list[Path]()
     for folder in cache_folder().glob("*"):
         with suppress(OSError):  # no folder, or another process has deleted it
             paths += folder.iterdir()
@@ -205,7 +208,8 @@ def _evict(written: int) -> None:
     _unchecked_bytes["left"] -= written
     if _unchecked_bytes["left"] > 0:
         return
-    limit, entries = size_limit(), list_entries()
+    limit = size_limit()
+    entries = list_entries()
     size = sum(entry.size for entry in entries)
     if size > limit:
         for oldest in sorted(entries, key=lambda entry: entry.last_used):

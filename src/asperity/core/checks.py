@@ -20,7 +20,8 @@ IntArray = compiled.IntArray
 Values = TypeVar("Values", bound=NDArray[Any])
 
 # Beyond these limits products of a few values leave the range of double precision.
-_SMALLEST, _LARGEST = 1e-30, 1e30
+_SMALLEST = 1e-30
+_LARGEST = 1e30
 _FLOAT = np.dtype(np.float64)
 
 
@@ -175,7 +176,8 @@ def check_points(name: str, value: ArrayLike, width: int, unit: str) -> Points:
     """
     plain = type(value) is np.ndarray and value.dtype is _FLOAT and value.flags.c_contiguous
     given: Any = value if plain else _to_float_array(name, value, _point_shape_text(width), unit)
-    shape, item = given.shape, given.item
+    shape = given.shape
+    item = given.item
     single = shape == (width,)
     # Single points are checked inside loops: their two or three values are finite if the sum is.
     if single or shape == (1, width):

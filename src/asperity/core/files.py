@@ -179,7 +179,8 @@ def append_bytes(name: str, stream: FileIO, content: bytes, *, durable: bool = F
     Raises:
         ParameterError: if it cannot be written; what was in the file before stays.
     """
-    end, left = os.fstat(stream.fileno()).st_size, memoryview(content)
+    end = os.fstat(stream.fileno()).st_size
+    left = memoryview(content)
     try:
         while left:  # the disk may have room for a part
             left = left[stream.write(left) :]

@@ -17,7 +17,8 @@ from asperity.core.errors import ParameterError
 
 # Measured peaks of commands on maps of 256² to 2048² points, see tests/core/test_memory.py: base
 # memory of libraries, compiled code and pictures; then heights, splines and their pyramids.
-_BASE_MEMORY, _PREPARATION_BASE_MEMORY = 420_000_000, 100_000_000
+_BASE_MEMORY = 420_000_000
+_PREPARATION_BASE_MEMORY = 100_000_000
 _BYTES_PER_POINT = 70
 
 
@@ -82,7 +83,8 @@ def require_memory(*counts: int) -> None:
     Raises:
         ParameterError: if there is not; the message states the size that fits.
     """
-    budget, points = _BUDGET.get(), math.prod(counts)
+    budget = _BUDGET.get()
+    points = math.prod(counts)
     if budget is None or points <= budget.max_points:
         return
     wanted = f"must be about {_format_size(budget.base + _BYTES_PER_POINT * points)}"

@@ -165,10 +165,13 @@ class _TaskQueue:
     """Tasks that are left, and the results of the others."""
 
     def __init__(self, work: Callable[[Any], Any], tasks: Sequence[Any], workers: int) -> None:
-        self.work, self.tasks, self.workers = work, tasks, workers
+        self.work = work
+        self.tasks = tasks
+        self.workers = workers
         self.pending = deque(range(len(tasks)))
         self.results: dict[int, Future[Any]] = {}
-        self.lock, self.started = threading.RLock(), threading.Lock()
+        self.lock = threading.RLock()
+        self.started = threading.Lock()
         self.timer = threading.Timer(START_DELAY, self.start)
         self.pool: ProcessPoolExecutor | None = None
         self.other_children: set[BaseProcess] = set()

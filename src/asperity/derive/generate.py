@@ -27,7 +27,8 @@ def main(arguments: list[str]) -> int:
     """Write the generated files, or with ``--check`` list those that are out of date."""
     stale = []
     for law in LAWS.values():
-        path, text = generated_kernel_path(law), kernel_file_text(law)
+        path = generated_kernel_path(law)
+        text = kernel_file_text(law)
         current = path.read_text(encoding="utf-8") if path.exists() else ""
         if current == text:
             continue

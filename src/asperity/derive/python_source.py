@@ -57,7 +57,9 @@ def law_source(law: Law) -> str:
         LawError: see :func:`asperity.derive.jacobian.derive`.
     """
     d = derive(law)
-    force, jacobian, saturated = list(d.force), list(d.jacobian), list(d.jacobian_saturated)
+    force = list(d.force)
+    jacobian = list(d.jacobian)
+    saturated = list(d.jacobian_saturated)
     both = "Force [N] and Jacobian [N/m]: fx, fy, fz, then J row by row."
     fixed = "Jacobian [N/m], row by row, where a clamp holds the depth constant."
     parts = [

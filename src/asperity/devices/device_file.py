@@ -151,7 +151,8 @@ def _check_text(name: str, value: Any) -> str:
 
 
 def _check_forces(data: Mapping[str, Datum]) -> None:
-    most, lasting = data.get("max_force"), data.get("continuous_force")
+    most = data.get("max_force")
+    lasting = data.get("continuous_force")
     if most is not None and lasting is not None and lasting.value > most.value:
         limit = f"must not be greater than max_force, {most.text}"
         raise ParameterError("device.continuous_force", limit, lasting.text)

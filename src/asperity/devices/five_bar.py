@@ -55,10 +55,12 @@ def joint_angles(linkage: FiveBar, point: ArrayLike) -> FloatArray:
         ParameterError: the arms do not reach the point.
     """
     position = check_array("point", point, (2,), "m")
-    first, second = linkage.proximal, linkage.distal
+    first = linkage.proximal
+    second = linkage.distal
     angles = np.empty(2)
     for arm, (motor, side) in enumerate(((0.0, -1.0), (-linkage.base, 1.0))):
-        x, y = float(position[0]) - motor, float(position[1])
+        x = float(position[0]) - motor
+        y = float(position[1])
         reach = math.hypot(x, y)
         if not abs(first - second) < reach < first + second:
             limit = f"must be reached by both arms, {first:g} m and {second:g} m long"

@@ -98,7 +98,8 @@ class ProductCells(Cells):
     """
 
     def __init__(self, base: Cells, upper_limits: dict[str, float]) -> None:
-        self._base, self._extra = base, upper_limits
+        self._base = base
+        self._extra = upper_limits
         self.max_cells = base.max_cells
         self._upper = np.array(list(upper_limits.values()))
         self.dimensions = base.dimensions + len(upper_limits)
@@ -122,7 +123,8 @@ class ProductCells(Cells):
         self, centres: FloatArray, half: FloatArray, names: Sequence[str]
     ) -> dict[str, TaylorNumber]:
         """See :class:`Cells`; the further coordinates are included."""
-        n, flat = len(centres), self._base.dimensions
+        n = len(centres)
+        flat = self._base.dimensions
         result: dict[str, TaylorNumber] = {}
         for name, model in self._base.enclosures(centres[:, :flat], half[:flat], names).items():
             result[name] = self._lift(model) if isinstance(model, TaylorModel) else model
@@ -164,7 +166,8 @@ class ProductCells(Cells):
 
 
 DEPTH_COORDINATE = "depth"
-LENGTH_COORDINATE, ANGLE_COORDINATE = "deflection_length", "deflection_angle"
+LENGTH_COORDINATE = "deflection_length"
+ANGLE_COORDINATE = "deflection_angle"
 
 
 def cells_with_depth(cells: Cells, depth: float) -> ProductCells:
@@ -186,7 +189,8 @@ def anchor_enclosures(
     The deflection of a dragged anchor has its greatest length.
     """
     angle = enclosures[ANGLE_COORDINATE]
-    ux, uy = TaylorMath.cos(angle), TaylorMath.sin(angle)
+    ux = TaylorMath.cos(angle)
+    uy = TaylorMath.sin(angle)
     length = max_deflection if sliding else enclosures[LENGTH_COORDINATE]
     state: dict[str, TaylorNumber] = {"dx": length * ux, "dy": length * uy}
     if not sliding:

@@ -81,7 +81,8 @@ class TaylorModel:
                 return self
             c = self.c + other
             return TaylorModel(c, self.g, _add_rounding(self.e, np.abs(c)))
-        c, g = self.c + other.c, self.g + other.g
+        c = self.c + other.c
+        g = self.g + other.g
         scale = np.abs(c) + self.linear_radius + other.linear_radius
         return TaylorModel(c, g, _add_rounding(self.e + other.e, scale))
 
@@ -98,12 +99,14 @@ class TaylorModel:
             return self._multiply_scalar(float(other))
         if self is other:
             return self._square()
-        radius, other_radius = self.linear_radius, other.linear_radius
+        radius = self.linear_radius
+        other_radius = other.linear_radius
         mixed = 0.5 * self.g * other.g
         c = self.c * other.c + mixed.sum(axis=0)
         g = self.c * other.g + other.c * self.g
         rest = np.abs(mixed).sum(axis=0) + _bound_cross_terms(self.g, other.g)
-        size, other_size = np.abs(self.c) + radius, np.abs(other.c) + other_radius
+        size = np.abs(self.c) + radius
+        other_size = np.abs(other.c) + other_radius
         e = rest + self.e * (other_size + other.e) + other.e * size
         return TaylorModel(c, g, _add_rounding(e, size * other_size))
 
@@ -114,7 +117,8 @@ class TaylorModel:
             return 0.0
         if factor == 1.0:
             return self
-        c, g = factor * self.c, factor * self.g
+        c = factor * self.c
+        g = factor * self.g
         e = _add_rounding(abs(factor) * self.e, np.abs(c) + np.abs(g).sum(axis=0))
         return TaylorModel(c, g, e)
 
@@ -153,7 +157,8 @@ class TaylorModel:
         # If the sign is undetermined, 0 <= |f| <= |c| + radius.
         definite = np.abs(self.c) > radius
         top = 0.5 * (np.abs(self.c) + radius)
-        c, g = np.where(definite, np.abs(self.c), top), np.where(definite, sign * self.g, 0.0)
+        c = np.where(definite, np.abs(self.c), top)
+        g = np.where(definite, sign * self.g, 0.0)
         return TaylorModel(c, g, np.where(definite, self.e, top))
 
 
@@ -204,9 +209,11 @@ def _enclose_smooth(
     if not isinstance(x, TaylorModel):
         return float(function(x))
     radius = x.radius
-    low, high = x.c - radius, x.c + radius
+    low = x.c - radius
+    high = x.c + radius
     with np.errstate(all="ignore"):
-        value, rate = function(x.c), derivative(x.c)
+        value = function(x.c)
+        rate = derivative(x.c)
         e = np.abs(rate) * x.e + 0.5 * second_derivative_bound(low, high) * radius * radius
         charge = _FUNCTION_ROUNDING * (np.abs(value) + np.abs(rate) * (np.abs(x.c) + radius))
         e = (e + charge) * (1.0 + _FUNCTION_ROUNDING)
@@ -273,7 +280,8 @@ class TaylorMath(metaclass=_SmoothFunctions):
     x may be at a pole. Any other function raises TypeError, as a comparison does.
     """
 
-    pi, e = np.pi, np.e
+    pi = np.pi
+    e = np.e
 
     @staticmethod
     def tan(x: TaylorNumber) -> TaylorNumber:

@@ -111,7 +111,8 @@ def find_root(function: LogRatio, low: float, high: float, tolerance: float = _T
 
 def _root_near(function: LogRatio, near: float, low: float, high: float) -> float:
     """Return a root between two values, in a narrow interval about a third one if there is one."""
-    first, last = max(near - _NEAR, low), min(near + _NEAR, high)
+    first = max(near - _NEAR, low)
+    last = min(near + _NEAR, high)
     if first < last and (function(first) < 0.0) != (function(last) < 0.0):
         return find_root(function, first, last)
     return find_root(function, low, high)

@@ -227,7 +227,8 @@ def envelope(
         ['20.5 to 201 µm', '18.7 to 403 µm']
     """
     cases = make_cases(device, laws, law_parameters, envelope, conditions)
-    devices, checked = list(dict.fromkeys(case.device.id for case in cases)), cases[0].conditions
+    devices = list(dict.fromkeys(case.device.id for case in cases))
+    checked = cases[0].conditions
     given = [] if surface is None else check_items("surface", surface)
     textures = [(_surface_name(one), as_texture(one)) for one in given]
     lengths = WAVELENGTHS if wavelengths is None else _check_wavelengths(wavelengths)
@@ -293,7 +294,8 @@ def make_cases(
 
 
 def _wavelength_limits(case: WaveCase) -> tuple[WavelengthLimit, ...]:
-    device, conditions = case.device, case.conditions
+    device = case.device
+    conditions = case.conditions
     samples = conditions.speed, conditions.time_samples, conditions.position_samples
     fields = {rule.number: rule.device_field for rule in LIMIT_RULES}
     return tuple(
@@ -321,7 +323,8 @@ def _compute(
     with precompute(compute_task, shared) as precomputed:
         for (case, wavelengths), computed in zip(tasks, precomputed, strict=True):
             surface = Surface(_GENTLE_WAVE, case.law)
-            letter, is_conservative = surface.law.letter, surface.facts.conservative
+            letter = surface.law.letter
+            is_conservative = surface.facts.conservative
             if progress is not None:
                 progress(f"{case.device.id}, law {letter}")
             borders = computed or find_borders(case, wavelengths)
@@ -370,7 +373,8 @@ def _assumptions(
         f"Hand: {grip_text(conditions.grip)}",
     ]
     for one in regions:
-        name, words = one.device.name, unverified_sentences(one.device, _USED_FIELDS)
+        name = one.device.name
+        words = unverified_sentences(one.device, _USED_FIELDS)
         sentences += [text if name in text else f"{name}: {text}" for text in words]
     for law in regions[0].laws:
         parts = law_parameter_sentences(law.case.surface(_GENTLE_WAVE))

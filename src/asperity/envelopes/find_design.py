@@ -68,7 +68,8 @@ class Design(Reportable, Tabular):
         RMS of the texture's force and lengths of waves that it does not resolve; parts of the
         height below the depth to which it is pressed, and of the scan without contact.
         """
-        felt, surface = self.row.perceptibility, self.row.surface
+        felt = self.row.perceptibility
+        surface = self.row.surface
         if felt is None:
             return {}
         waves = felt.speed / felt.spectrum.frequencies[~felt.spectrum.is_resolved]
@@ -231,7 +232,8 @@ def _confirm(search: Search, answer: Answer, report: Progress) -> Design:
 
 
 def _make_design(search: Search, answer: Answer, factor: float, stiffness: float) -> Design:
-    case, target = search.case, search.target
+    case = search.case
+    target = search.target
     own = {name: getattr(case.conditions, name) for name in ("max_depth", "speed", "grip")}
     own |= {"law_parameters": case.law_parameters}
     result = compare(search.scaled(factor), case.device, [case.law], stiffness or None, **own)

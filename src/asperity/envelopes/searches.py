@@ -34,7 +34,8 @@ MET = 0.995
 """Ratio from which a requirement counts as met: factor and stiffness are rounded."""
 NEAR = 1.01
 """Factor within which ratios count as equal."""
-_FALLING, _RISING = {"stability", "leak"}, {"least stiffness", "perceptibility", FORCE}
+_FALLING = {"stability", "leak"}
+_RISING = {"least stiffness", "perceptibility", FORCE}
 """Requirements that a greater stiffness exceeds by less, and by more."""
 _LEAST = 1e-30
 _PENALTY = 100.0
@@ -172,10 +173,12 @@ class Search:
     def bounds(self) -> tuple[float, float]:
         """Natural logarithms of the least and the greatest factor."""
         if self.texture.single_wave is not None:
-            greatest, decades = 2.0 * AMPLITUDE_RANGE[1] / self.texture.peak_to_valley, 6
+            greatest = 2.0 * AMPLITUDE_RANGE[1] / self.texture.peak_to_valley
+            decades = 6
         else:
             fits = _workspace_ratio(self.texture, self.case.device.workspace_size)
-            greatest, decades = min(_MAX_FACTOR, 1.5 * fits), 4
+            greatest = min(_MAX_FACTOR, 1.5 * fits)
+            decades = 4
         return math.log(greatest / 10**decades), math.log(greatest)
 
     def scaled(self, factor: float) -> Texture:
@@ -189,7 +192,8 @@ class Search:
         is_magnified = rendering == SEARCH and self.texture.single_wave is None
         original = (self.texture, factor) if is_magnified else None
         trial = case.trial(self.scaled(factor), original)
-        surface, leak = trial.surface, 0.0
+        surface = trial.surface
+        leak = 0.0
         if math.isfinite(self.target.max_leak) and not surface.facts.conservative:
             leak = worst_loop(surface).worst_per_period / surface.stiffness
         support = merit(trial.numbered).support if self.target.min_support else 1.0
@@ -259,7 +263,8 @@ class Search:
 
     def binding(self, answer: Answer, ratios: Mapping[str, float]) -> tuple[str, ...]:
         """Return the requirements that limit an answer, of its ratios."""
-        others, force = dict(ratios), self.target.texture_force
+        others = dict(ratios)
+        force = self.target.texture_force
         if force is None or not answer.reach:
             del others[FORCE]
         else:
@@ -279,7 +284,8 @@ def _maximize(function: Callable[[float], Scored], grid: FloatArray, refined: in
     from scipy.optimize import minimize_scalar
 
     found = [function(float(x)) for x in grid]
-    scores, last = [-math.inf, *(one[0] for one in found), -math.inf], len(grid) - 1
+    scores = [-math.inf, *(one[0] for one in found), -math.inf]
+    last = len(grid) - 1
     peaks = [i for i in range(last + 1) if scores[i + 1] > max(scores[i], scores[i + 2])]
     for at in sorted(peaks, key=lambda i: scores[i + 1])[-refined:]:
         one = minimize_scalar(

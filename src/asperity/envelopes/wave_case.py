@@ -175,24 +175,28 @@ class WaveCase:
 
     def surface(self, texture: Texture) -> Surface:
         """Return a texture with this law, as a loop renders it."""
-        depth, own = self.conditions.max_depth, self.law_parameters
+        depth = self.conditions.max_depth
+        own = self.law_parameters
         surface = Surface(texture, self.law, max_depth=depth, law_parameters=own)
         return rendered_surface(surface, self.rendering)
 
     def recommend(self, texture: Texture, original: Original | None = None) -> Trial:
         """Return a texture at its recommended stiffness, without its waves."""
         surface = self.surface(texture)
-        numbered, factor = surface, 1.0
+        numbered = surface
+        factor = 1.0
         if original is not None and is_shipped_law(surface.law):
             # A law of the user may have lengths that are not parameters.
-            numbered, factor = self._unmagnified(surface, *original), original[1]
+            numbered = self._unmagnified(surface, *original)
+            factor = original[1]
         q = self._number(numbered, NORM)
         # A law with curl is limited by the wall's gain K₀/q alone, whatever q⁺ is.
         is_conservative = surface.facts.conservative
         one_sided = self._number(numbered, ONE_SIDED) if is_conservative else q
         recommended = recommend_stiffness(surface, self.device, q, one_sided)
         if k := recommended.stiffness:
-            surface, numbered = surface.to_stiffness(k), numbered.to_stiffness(k)
+            surface = surface.to_stiffness(k)
+            numbered = numbered.to_stiffness(k)
         least = self.conditions.min_stiffness
         return Trial(surface, recommended, q, None, least, numbered, factor, numbered)
 
@@ -222,10 +226,12 @@ class WaveCase:
             original: a texture of which it is a magnification, and the factor, if q is to be
                 computed there.
         """
-        trial, conditions = self.recommend(texture, original), self.conditions
+        trial = self.recommend(texture, original)
+        conditions = self.conditions
         if not trial.recommended.stiffness:
             return trial
-        surface, points = trial.surface, _SCAN_POINTS if texture.single_wave else None
+        surface = trial.surface
+        points = _SCAN_POINTS if texture.single_wave else None
         ripple = trial.factor * scan_force(trial.numbered, points).ripple
         waves, doubtful, _rms, scanned = perceptibility.scan_waves(
             surface,

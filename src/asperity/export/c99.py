@@ -72,7 +72,8 @@ def _program_files(
     """
     link = f"{words['NAME']}_API" if request.as_library else "static inline"
     words = {**words, "link": link}
-    contract, public = _render("contract.h", words), _render("public.c", words)
+    contract = _render("contract.h", words)
+    public = _render("public.c", words)
     if request.loads_field:
         contract += _render("field.h", words)
         public += _render("field.c", words)
@@ -94,7 +95,8 @@ def _program_files(
 def _substitutions(
     request: ExportRequest, functions: SurfaceFunctions, stem: str
 ) -> dict[str, str]:
-    surface, single = request.surface, request.is_single_precision
+    surface = request.surface
+    single = request.is_single_precision
     q_upper = f"{request.name}_q()" if request.loads_field else _bound_literal(request.q_upper)
     return {
         "name": request.name,

@@ -231,7 +231,11 @@ def power_helper(exponent: int, base: ScalarType) -> HelperFunction:
         <BLANKLINE>
     """
     kind = "real" if base == FLOAT else "int64_t"
-    lines, factors, left, name, step = [], [], abs(exponent), "a", 1
+    lines = []
+    factors = []
+    left = abs(exponent)
+    name = "a"
+    step = 1
     while left:
         if left & 1:
             factors.append(name)

@@ -81,7 +81,8 @@ def export_code(
         >>> [file.name for file in files]
         ['texture.h', 'texture_data.c']
     """
-    target, place = targets.find_target(lang), Path(path)
+    target = targets.find_target(lang)
+    place = Path(path)
     targets.check_name(place, target)
     names = ("name", "precision", "max_data_size", "max_evaluations")
     request = {name: arguments.pop(name) for name in names if name in arguments}

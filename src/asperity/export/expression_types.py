@@ -69,7 +69,9 @@ class ExpressionTypes(ast.NodeVisitor):
     def __init__(
         self, node: ast.FunctionDef, types: dict[str, ValueType], program: ProgramContext
     ) -> None:
-        self.node, self.types, self.program = node, types, program
+        self.node = node
+        self.types = types
+        self.program = program
         self._conditions = set(_iterate_conditions(node))
 
     def not_exportable(self, construct: str, node: ast.AST | None = None) -> NotExportableError:
@@ -126,7 +128,8 @@ class ExpressionTypes(ast.NodeVisitor):
                 return math.prod(kind.shape) if node.attr == "size" else len(kind.shape)
         if isinstance(node, ast.Subscript) and getattr(node.value, "attr", "") == "shape":
             assert isinstance(node.value, ast.Attribute)  # only that has an attribute
-            index, kind = self.constant_integer(node.slice), self.infer(node.value.value)
+            index = self.constant_integer(node.slice)
+            kind = self.infer(node.value.value)
             if index is not None and isinstance(kind, c.ArrayType) and not kind.lengths:
                 return kind.shape[index] if -len(kind.shape) <= index < len(kind.shape) else None
         return None
@@ -197,7 +200,8 @@ class ExpressionTypes(ast.NodeVisitor):
 
     def visit_BinOp(self, node: ast.BinOp) -> ValueType:
         """Return the type of a binary operation."""
-        left, right = self.infer_scalar(node.left), self.infer_scalar(node.right)
+        left = self.infer_scalar(node.left)
+        right = self.infer_scalar(node.right)
         both = max(left, right)
         if left == right == c.SINGLE:
             words = "computes with two numbers of single precision: use float()"

@@ -12,9 +12,16 @@ from asperity.export.c_language import ValueType
 from asperity.export.expression_types import ProgramContext, called_name, indices_of
 from asperity.export.type_inference import FunctionTypes
 
-_PRIMARY, _UNARY, _PRODUCT, _SUM, _SHIFT, _ORDER, _EQUAL, _AND, _OR, _CHOICE = (
-    12, 11, 10, 9, 8, 7, 6, 3, 2, 1,
-)  # fmt: skip
+_PRIMARY = 12
+_UNARY = 11
+_PRODUCT = 10
+_SUM = 9
+_SHIFT = 8
+_ORDER = 7
+_EQUAL = 6
+_AND = 3
+_OR = 2
+_CHOICE = 1
 
 
 class CExpression(NamedTuple):
@@ -54,7 +61,9 @@ class ExpressionPrinter(ast.NodeVisitor):
     def __init__(
         self, types: FunctionTypes, program: ProgramContext, names: dict[str, str]
     ) -> None:
-        self.types, self.program, self.names = types, program, names
+        self.types = types
+        self.program = program
+        self.names = names
 
     def text(self, node: ast.expr, min_precedence: int = 0) -> str:
         """Return an expression, in parentheses if its precedence is below a minimum."""
@@ -180,7 +189,8 @@ class ExpressionPrinter(ast.NodeVisitor):
         if type(node.op) not in BINARY_OPERATORS:
             return self._floor_division(node, kind)
         sign, rank = BINARY_OPERATORS[type(node.op)]
-        left, right = self.as_type(node.left, kind, rank), self.as_type(node.right, kind, rank + 1)
+        left = self.as_type(node.left, kind, rank)
+        right = self.as_type(node.right, kind, rank + 1)
         return CExpression(f"{left} {sign} {right}", rank)
 
     def _floor_division(self, node: ast.BinOp, value_type: ValueType) -> CExpression:
@@ -212,7 +222,8 @@ class ExpressionPrinter(ast.NodeVisitor):
         sides = [node.left, *node.comparators]
         parts = []
         for left, op, right in zip(sides[:-1], node.ops, sides[1:], strict=True):
-            first, second = self.types.infer_scalar(left), self.types.infer_scalar(right)
+            first = self.types.infer_scalar(left)
+            second = self.types.infer_scalar(right)
             real = c.FLOAT in {first, second} or c.SINGLE in {first, second}
             kind = c.FLOAT if real else c.INT
             sign, rank = _COMPARE[type(op)]
@@ -259,7 +270,8 @@ class ExpressionPrinter(ast.NodeVisitor):
         return CExpression(f"{callee}({', '.join(given)})")
 
     def _minimum_or_maximum(self, node: ast.Call) -> CExpression:
-        name, kind = called_name(node), self.types.infer(node)
+        name = called_name(node)
+        kind = self.types.infer(node)
         helper = self.program.helper_name(c.find_helper(name if kind == c.FLOAT else f"{name}_int"))
         text = self.as_type(node.args[0], kind)
         for argument in node.args[1:]:
@@ -320,6 +332,7 @@ def real_literal(value: float, single: bool) -> str:
     if single and 0.0 < abs(value) < float(np.finfo(np.float32).tiny):
         value = math.copysign(float(np.finfo(np.float32).tiny), value)
     if math.isinf(value) or (single and abs(value) > float(np.finfo(np.float32).max)):
-        sign, size = "-" if value < 0 else "", "INFINITY" if single else "HUGE_VAL"
+        sign = "-" if value < 0 else ""
+        size = "INFINITY" if single else "HUGE_VAL"
         return f"{sign}{size}"
     return f"{np.float32(value)!s}f" if single else repr(float(value))

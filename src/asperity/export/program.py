@@ -71,7 +71,9 @@ class Program:
         single: bool,
         reserved: frozenset[str] = frozenset(),
     ) -> None:
-        self.linked, self.prefix, self.single = linked, prefix, single
+        self.linked = linked
+        self.prefix = prefix
+        self.single = single
         own = _SINGLE_PRECISION_ROUNDINGS if single else {}
         self.numbers: Mapping[str, float] = linked.numbers | own
         self.records: Mapping[str, tuple[str, ...]] = linked.records
@@ -143,7 +145,8 @@ class Program:
 
     def _unique_name(self, name: str) -> str:
         """Return a unique name with the prefix."""
-        whole, number = name, 1
+        whole = name
+        number = 1
         while whole in self._used_names:
             number += 1
             whole = f"{name}_{number}"

@@ -25,7 +25,8 @@ class FunctionPrinter(ast.NodeVisitor):
     """
 
     def __init__(self, types: FunctionTypes, program: ProgramContext) -> None:
-        self.types, self.program = types, program
+        self.types = types
+        self.program = program
         self.names = {
             name: c.constant_name(kind) or (f"{name}_" if name in RESERVED_WORDS else name)
             for name, kind in types.types.items()
@@ -68,9 +69,11 @@ class FunctionPrinter(ast.NodeVisitor):
     def _argument_conversions(self) -> Iterator[str]:
         """Yield the conversions of arguments to variables of another type."""
         for name in self.types.argument_names:
-            given, kind = self.types.argument_types[name], self.types.types[name]
+            given = self.types.argument_types[name]
+            kind = self.types.types[name]
             if given != kind and isinstance(kind, c.ScalarType):
-                cname, kind_name = self.names[name], self.program.c_type(kind)
+                cname = self.names[name]
+                kind_name = self.program.c_type(kind)
                 yield f"{kind_name} {cname} = ({kind_name}){cname}_given;"
 
     def _declarations(self) -> Iterator[str]:
@@ -255,7 +258,8 @@ class FunctionPrinter(ast.NodeVisitor):
         """Return the lines that assign the items of a tuple to targets or their parts."""
         lines = []
         for index, target in self._wanted_items(targets, tuple_type):
-            item, place = tuple_type.items[index], tuple_type.item_expression(source, index)
+            item = tuple_type.items[index]
+            place = tuple_type.item_expression(source, index)
             if isinstance(target, ast.Tuple) and isinstance(item, c.TupleType):
                 lines += self._unpack_items(node, target.elts, item, place)
                 continue

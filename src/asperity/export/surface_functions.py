@@ -60,7 +60,8 @@ class ProgramData:
 
     def _record_definition(self, record: c.ConstantRecord, places: Sequence[str]) -> str:
         """Return the definition of a record with the used fields; empty if there are none."""
-        fields, values = "", []
+        fields = ""
+        values = []
         for name, kind in zip(record.names, record.items, strict=True):
             place = f"{record.c_name}.{name}"
             if place in places and isinstance(kind, c.ScalarType):
@@ -166,7 +167,8 @@ def _fits_32_bits(values: NDArray[Any]) -> bool:
 
 def _wrap_lines(texts: Sequence[str]) -> str:
     """Return numbers separated by commas, in lines of limited length."""
-    lines, line = [], ""
+    lines = []
+    line = ""
     for text in texts:
         if line and len(line) + len(text) > _WIDTH:
             lines.append(line)
@@ -239,8 +241,11 @@ def surface_functions(request: ExportRequest) -> SurfaceFunctions:
     Raises:
         ParameterError: for a law or a texture that cannot be exported.
     """
-    surface, prefix, single = request.surface, request.name, request.is_single_precision
-    law, clamp = surface.law, surface.effective_clamp
+    surface = request.surface
+    prefix = request.name
+    single = request.is_single_precision
+    law = surface.law
+    clamp = surface.effective_clamp
     probe = next(unit for unit in law_units(law, clamp) if "probe_tick" in unit.sources)
     energy = energy_units(law, clamp)
     roots = [("probe_tick", probe), *[("probe_energy", unit) for unit in energy[:1]]]

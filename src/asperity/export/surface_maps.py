@@ -25,7 +25,8 @@ from asperity.textures.texture import Texture
 
 # Number of equal rows in the map of a profile.
 _PROFILE_ROWS = 16
-_MIN_POINTS, _MAX_POINTS = 4, 8192
+_MIN_POINTS = 4
+_MAX_POINTS = 8192
 Pair = float | Sequence[float]
 
 
@@ -90,7 +91,8 @@ def sample_map(
     if extent is None and spacing is None:
         points, steps, repeats = domain.grid(texture.grid_counts())
         if len(points) == 1:  # all rows of a profile are equal
-            points, steps = np.repeat(points, _PROFILE_ROWS, axis=0), (steps[0], steps[0])
+            points = np.repeat(points, _PROFILE_ROWS, axis=0)
+            steps = (steps[0], steps[0])
         spans = domain.orthogonal_spans()[0]
         along = spans[0] / np.hypot(*spans[0])
         return _evaluate_map(texture, points, steps, along, repeats, domain.description)
@@ -127,8 +129,10 @@ def _evaluate_map(
     texture: Texture, points: FloatArray, steps: tuple[float, float], along: FloatArray,
     is_periodic: bool, region: str,
 ) -> SampledMap:  # fmt: skip
-    shape, flat = points.shape[:2], np.ascontiguousarray(points.reshape(-1, 2))
-    heights, slopes = texture.height(flat), texture.gradient(flat)
+    shape = points.shape[:2]
+    flat = np.ascontiguousarray(points.reshape(-1, 2))
+    heights = texture.height(flat)
+    slopes = texture.gradient(flat)
     across = np.array([-along[1], along[0]])
     normals = np.column_stack([-slopes @ along, -slopes @ across, np.ones(len(flat))])
     normals /= np.sqrt((normals**2).sum(axis=1))[:, None]
@@ -281,7 +285,8 @@ def normal_error(surface_map: SampledMap, convention: str) -> float:
 
 def _height_range(heights: FloatArray) -> tuple[float, float]:
     """Return the minimum height and the range [m]; the range of a flat map is 1 nm."""
-    low, high = float(heights.min()), float(heights.max())
+    low = float(heights.min())
+    high = float(heights.max())
     return low, high - low if high > low else 1e-9
 
 
@@ -296,7 +301,8 @@ def _encode_png(
     text.add_text("Description", words.encode("latin-1", "replace").decode("latin-1"))
     stream = io.BytesIO()
     Image.fromarray(pixels).save(stream, "png", pnginfo=text)
-    size, chunks = "\0".join(repr(step) for step in surface_map.spacing), io.BytesIO()
+    size = "\0".join(repr(step) for step in surface_map.spacing)
+    chunks = io.BytesIO()
     PngImagePlugin.putchunk(chunks, b"sCAL", b"\x01" + size.encode())
     if kind:
         PngImagePlugin.putchunk(chunks, kind, data)
@@ -308,7 +314,8 @@ _PNG_HEADER_SIZE = 8 + 25  # signature and chunk IHDR
 
 
 def _x3p_main_xml(surface_map: SampledMap, digest: str) -> bytes:
-    (ny, nx), (dx, dy) = surface_map.heights.shape, surface_map.spacing
+    (ny, nx) = surface_map.heights.shape
+    (dx, dy) = surface_map.spacing
     values = {"nx": str(nx), "ny": str(ny), "dx": repr(dx), "dy": repr(dy)}
     values |= {"version": __version__, "comment": surface_map.description}
     declaration, *lines = load_template("x3p_main.xml").splitlines()

@@ -54,7 +54,8 @@ class FunctionTypes(ExpressionTypes):
         unknown: UnknownTypeError | None = None
         self._changed = True
         while self._changed:
-            self._changed, unknown = False, None
+            self._changed = False
+            unknown = None
             for statement in _iterate_statements(self.node.body):
                 try:
                     self._infer_statement(statement)
@@ -115,7 +116,8 @@ class FunctionTypes(ExpressionTypes):
         if both is None:
             raise self.not_exportable(f"uses {name!r} for values of different types")
         if self.types.get(name) != both:
-            self.types[name], self._changed = both, True
+            self.types[name] = both
+            self._changed = True
 
     def _unpack(self, target: ast.Tuple, value_type: ValueType, value: ast.expr) -> None:
         if not isinstance(value_type, c.TupleType):

@@ -85,7 +85,8 @@ def law_units(law: Law, clamp: Clamp) -> tuple[SourceUnit, ...]:
     from asperity.kernels import loop_functions
 
     code = LawCode(law, kernel_source(law), clamp)
-    title, probe = f"law {law}", f"law {law} at a probe"
+    title = f"law {law}"
+    probe = f"law {law} at a probe"
     return (
         generated_unit(title, code.source),
         generated_unit(probe, probe_source(code)),
@@ -220,7 +221,8 @@ def fuse_contact(law: Law) -> ModuleType:
     """Return the compiled loop of a law over given contacts, ``contact_batch``."""
     from asperity.kernels.loops import contact_loop
 
-    loop, code = unit_from_module(contact_loop), LawCode(law, kernel_source(law), NONE)
+    loop = unit_from_module(contact_loop)
+    code = LawCode(law, kernel_source(law), NONE)
     contact = generated_unit(f"law {law} at a contact", contact_source(code))
     available = (loop, contact, *law_units(law, NONE))
     return load_fused(_assemble(f"Law {law} at contacts.", loops_of(loop), available))
@@ -259,7 +261,8 @@ def fuse_sampler(sampler: Modules, *further: ModuleType) -> ModuleType:
 
     units = tuple(map(unit_from_module, (sampler_loops, *further)))
     available = (unit_from_module(batch_sine), *map(unit_from_module, sampler), *units)
-    complete, errors = [], {}
+    complete = []
+    errors = {}
     for loop in loops_of(*units):
         try:
             link([loop], available)

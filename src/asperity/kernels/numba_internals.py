@@ -67,7 +67,8 @@ class LinkOnlyLowering(_Lowering):  # type: ignore[misc]  # see above
 
     def run_pass(self, state: Any) -> bool:
         """Lower a function."""
-        context, name = state.targetctx, state.func_id.func_qualname
+        context = state.targetctx
+        name = state.func_id.func_qualname
         state.library = LinkOnlyLibrary(context.codegen(), name)
         state.flags.no_compile = True
         changed: bool = super().run_pass(state)
@@ -99,7 +100,8 @@ class WideVectorLibrary(_Library):  # type: ignore[misc]  # see above
 class WideVectorLowering(_Lowering):  # type: ignore[misc]  # see above
     """Numba's lowering from typed code to machine code, in wide registers."""
 
-    _name, library_class = "wide_lowering", WideVectorLibrary
+    _name = "wide_lowering"
+    library_class = WideVectorLibrary
 
     def run_pass(self, state: Any) -> bool:
         """Lower a function."""
@@ -125,7 +127,8 @@ class SharedLibrary(WideVectorLibrary):
 class SharedLowering(WideVectorLowering):
     """The same, with a symbol that is equal in all processes."""
 
-    _name, library_class = "shared_lowering", SharedLibrary
+    _name = "shared_lowering"
+    library_class = SharedLibrary
 
     def run_pass(self, state: Any) -> bool:
         """Lower a function."""
@@ -180,7 +183,8 @@ def share_identical_functions(module: ModuleType) -> None:
     code are: numbers, records, and functions that are identical themselves. This happens before
     compilation, since a function looks up what it calls in the module that it comes from.
     """
-    names, known_ids = vars(module), dict[FunctionType, int]()
+    names = vars(module)
+    known_ids = dict[FunctionType, int]()
     for name, value in list(names.items()):
         if _is_link_only(value) and value.py_func.__globals__ is names:
             names[name] = _CANONICAL_FUNCTIONS.setdefault(_function_id(value, known_ids), value)
@@ -195,7 +199,8 @@ def _function_id(dispatcher: Any, known_ids: dict[FunctionType, int]) -> int:
     function: FunctionType = dispatcher.py_func
     if function not in known_ids:
         known_ids[function] = id(function)  # a recursive function is identical to no other
-        code, names = function.__code__, function.__globals__
+        code = function.__code__
+        names = function.__globals__
         content = (code.co_code, repr(code.co_consts), code.co_names, code.co_varnames)
         options = repr(sorted(dispatcher.targetoptions.items()))
         used = tuple(_global_key(names.get(name), known_ids) for name in code.co_names)
@@ -287,7 +292,8 @@ class MachineCodeCache:
 
 def _shared_callees(library: Any) -> tuple[Any, ...]:
     """Return module, name and argument types of the shared functions that code calls."""
-    found, waiting = dict[Any, None](), [library]
+    found = dict[Any, None]()
+    waiting = [library]
     for one in waiting:
         for linked in one._linking_libraries:
             origin = getattr(linked, "origin", None)

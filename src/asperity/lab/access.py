@@ -17,7 +17,8 @@ from asperity.core.errors import AsperityError
 
 MAX_MESSAGE_BYTES = 4096
 """Greatest size of a message from the page."""
-MAX_MESSAGE_RATE, MAX_MESSAGE_BURST = 500.0, 1000.0
+MAX_MESSAGE_RATE = 500.0
+MAX_MESSAGE_BURST = 1000.0
 """Messages per second that a page may send, and in a burst."""
 
 # Nothing is loaded from elsewhere and nothing is sent there.
@@ -81,7 +82,8 @@ class RateLimit:
     """
 
     def __init__(self, now: float | None = None) -> None:
-        self._tokens, self._last_time = MAX_MESSAGE_BURST, time.monotonic() if now is None else now
+        self._tokens = MAX_MESSAGE_BURST
+        self._last_time = time.monotonic() if now is None else now
 
     def consume(self, now: float | None = None) -> None:
         """Count a message.
@@ -91,7 +93,8 @@ class RateLimit:
         """
         moment = time.monotonic() if now is None else now
         refilled = self._tokens + MAX_MESSAGE_RATE * (moment - self._last_time)
-        self._tokens, self._last_time = min(MAX_MESSAGE_BURST, refilled) - 1.0, moment
+        self._tokens = min(MAX_MESSAGE_BURST, refilled) - 1.0
+        self._last_time = moment
         if self._tokens < 0.0:
             raise MalformedMessageError(f"more than {MAX_MESSAGE_RATE:g} messages per second")
 

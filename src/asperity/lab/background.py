@@ -97,7 +97,8 @@ def compute_limit(surface: Surface, device: Device) -> dict[str, Any]:
     number, ``one_sided`` the one-sided number.
     """
     try:
-        q, one_sided = characteristic_number(surface), one_sided_number(surface)
+        q = characteristic_number(surface)
+        one_sided = one_sided_number(surface)
         limit = recommend_stiffness(surface, device, q, one_sided).stability_limit
     except AsperityError as error:
         return {"stiffness": None, "basis": str(error), "q": None, "one_sided": None}
@@ -125,13 +126,15 @@ def compute_recommendation(
     from asperity.analysis.limits.perceptibility_sentences import texture_amount_text
     from asperity.perception.grip import grip_text
 
-    laws, is_default = tuple(REGISTERED_LAWS.values()), max_depth == default_max_depth(texture)
+    laws = tuple(REGISTERED_LAWS.values())
+    is_default = max_depth == default_max_depth(texture)
     depth = None if is_default else max_depth
     try:
         result = compare(texture, device, laws, max_depth=depth, clamp=clamp)
     except AsperityError as error:
         return {"reason": str(error)}
-    row, words = result.recommended_row or result.nearest_row, {"reason": result.recommendation}
+    row = result.recommended_row or result.nearest_row
+    words = {"reason": result.recommendation}
     if row is None or row.perceptibility is None:
         return words
     settings = {"law": row.law.letter, "stiffness": row.recommended_stiffness}
@@ -172,12 +175,14 @@ class BackgroundResult:
         old = self._arguments
         if old and old[0] is subject and old[1:] == conditions:
             return False
-        self._arguments, self.value = (subject, *conditions), {}
+        self._arguments = (subject, *conditions)
+        self.value = {}
         return True
 
     async def compute(self) -> None:
         """Compute the result, after one that is being computed; only the newest one counts."""
-        arguments, value = self._arguments, _CRASH_RESULT
+        arguments = self._arguments
+        value = _CRASH_RESULT
         async with self._lock:
             for _attempt in range(2):  # the crash may have had another cause
                 if arguments is not self._arguments or self.value:
@@ -197,7 +202,8 @@ def start_task(pending: set[asyncio.Task[None]], work: Coroutine[Any, Any, None]
     task.add_done_callback(pending.discard)
 
 
-MAX_CRASHES, CRASH_WINDOW = 3, 600.0
+MAX_CRASHES = 3
+CRASH_WINDOW = 600.0
 """Crashes of the picture process, within so many seconds, after which it is not restarted."""
 _RESTART_TEXT = "the picture process has crashed and is restarted"
 _NO_PICTURES_TEXT = "no pictures of this surface: the picture process crashed each time"
@@ -229,13 +235,15 @@ class BackgroundRenderer:
         lane: str = "",
     ) -> None:
         self._lane = lane
-        self._picture_worker, self._on_update = picture_worker, on_update
+        self._picture_worker = picture_worker
+        self._on_update = on_update
         self._limit = BackgroundResult(limit_worker, compute_limit, on_update)
         self._requested_surface: Surface | None = None
         self._ready_surface: Surface | None = None
         self._crash_times: list[float] = []
         self._tasks: set[asyncio.Task[None]] = set()
-        self.version, self.is_current = 0, False
+        self.version = 0
+        self.is_current = False
         self.message = ""
 
     @property
@@ -250,8 +258,10 @@ class BackgroundRenderer:
         if surface is self._requested_surface:
             start_task(self._tasks, self._limit.compute())
             return
-        self._requested_surface, self.is_current = surface, False
-        self._crash_times, self.message = [], ""
+        self._requested_surface = surface
+        self.is_current = False
+        self._crash_times = []
+        self.message = ""
         start_task(self._tasks, self._compute(surface))
 
     def close(self) -> None:
@@ -272,8 +282,10 @@ class BackgroundRenderer:
                 await self._record_crash(surface)
                 continue
             if surface is self._requested_surface:
-                self._ready_surface, self.message = surface, ""
-                self.version, self.is_current = self.version + 1, True
+                self._ready_surface = surface
+                self.message = ""
+                self.version = self.version + 1
+                self.is_current = True
                 await self._on_update()
             return
 

@@ -35,7 +35,9 @@ from asperity.servo.drivers.pointer import PointerHand
 from asperity.servo.kernels.pointer_anchor import HISTORY_SAMPLES
 from asperity.servo.loop_memory import LoopMemory
 
-RECORDING_FILE, SCENE_FILE, HAND_FILE = "recording.mcap", "scene.toml", "hand.csv"
+RECORDING_FILE = "recording.mcap"
+SCENE_FILE = "scene.toml"
+HAND_FILE = "hand.csv"
 """Files of a clip: rows of the loop, the scene that reproduces them, and the motion of the hand,
 besides the plugins of the user."""
 MAX_CLIP_ROWS = HISTORY_SAMPLES - 4000
@@ -87,10 +89,12 @@ class Clip:
             "every": 1,
             **setup.recording_metadata(SIMULATED_DRIVER),
         }
-        field, columns = field_attachments(setup.rendered), (*COLUMNS, *ANCHOR_COLUMNS)
+        field = field_attachments(setup.rendered)
+        columns = (*COLUMNS, *ANCHOR_COLUMNS)
         with RecordingWriter(folder / RECORDING_FILE, columns, metadata, field) as writer:
             writer.append(self._table)
-        path, header = np.column_stack([self.rows[:, 0], self.anchors]), ",".join(PATH_COLUMNS)
+        path = np.column_stack([self.rows[:, 0], self.anchors])
+        header = ",".join(PATH_COLUMNS)
         np.savetxt(folder / HAND_FILE, path, "%.17g", ",", header=header, comments="")
         start = self.duration, self.rows[0, POSITION], self.velocity
         text = format_scene(self.scene_state, HAND_FILE, RECORDING_FILE if field else "", *start)
@@ -164,7 +168,8 @@ def _track_indices(points: FloatArray, first: int, track: FloatArray) -> Any:
 
 MAX_CLIPS = 4
 """Greatest number of stored clips; each takes some megabytes."""
-_ARCHIVE_TYPE, _CHUNK_TYPE = "application/zip", "application/octet-stream"
+_ARCHIVE_TYPE = "application/zip"
+_CHUNK_TYPE = "application/octet-stream"
 
 
 class ClipStore:
@@ -182,7 +187,8 @@ class ClipStore:
         self._playbacks: dict[str, Playback] = {}
         self._archives: dict[str, bytes] = {}
         self.announcements: list[dict[str, Any]] = []
-        self._saved_count, self._is_saving = 0, False
+        self._saved_count = 0
+        self._is_saving = False
 
     def add(
         self, name: str, playback: Playback, scene_state: SceneState, **words: Any

@@ -29,12 +29,14 @@ class Lane:
     """
 
     def __init__(self, session: Session, pictures: BackgroundRenderer) -> None:
-        self.session, self.pictures = session, pictures
+        self.session = session
+        self.pictures = pictures
 
     @property
     def status(self) -> dict[str, Any]:
         """State of loop and pictures, for the page."""
-        session, pictures = self.session, self.pictures
+        session = self.session
+        pictures = self.pictures
         return {
             "state": session.state, "message": session.message, "start_count": session.start_count,
             "settings": session.scene_state.settings,
@@ -57,7 +59,9 @@ class SecondLane(Lane):
     def __init__(self, leader: Session, pictures: BackgroundRenderer) -> None:
         super().__init__(Session(leader.scene_state, leader.on_change, leader=leader), pictures)
         # Scene and start of the first loop, and law, that were requested last.
-        self._leader, self.law, self._followed = leader, "", (0, 0, "")
+        self._leader = leader
+        self.law = ""
+        self._followed = (0, 0, "")
 
     def choose(self, letter: str) -> None:
         """Render a law, by its letter, or none.
@@ -67,13 +71,15 @@ class SecondLane(Lane):
         """
         if self._leader.handle is not None:
             raise ParameterError(BESIDE, "needs the simulated device: one handle has one law")
-        self.law, self._followed = find_law(letter).letter if letter else "", (0, 0, "")
+        self.law = find_law(letter).letter if letter else ""
+        self._followed = (0, 0, "")
         if not letter:
             self.session.release_force("", now=True)
 
     def update(self) -> None:
         """Follow the first loop, and show the pictures of what is rendered."""
-        leader, session = self._leader, self.session
+        leader = self._leader
+        session = self.session
         wanted = id(leader.scene_state), leader.start_count, self.law
         if self.law and leader.state == "running" and wanted != self._followed:
             if wanted[1] != self._followed[1]:
@@ -94,15 +100,19 @@ class FrameReader:
     """
 
     def __init__(self, lane: Lane) -> None:
-        self._lane, self._starts, self._seen = lane, -1, 0
+        self._lane = lane
+        self._starts = -1
+        self._seen = 0
 
     def read(self, frame: float) -> bytes:
         """Return the rows since the last call as a frame with a number; empty without any."""
-        session, shared = self._lane.session, self._lane.session.shared
+        session = self._lane.session
+        shared = self._lane.session.shared
         if shared is None:
             return b""
         if session.start_count != self._starts:
-            self._starts, self._seen = session.start_count, max(shared.row_count - 1, 0)
+            self._starts = session.start_count
+            self._seen = max(shared.row_count - 1, 0)
         rows, first = shared.rows(self._seen)
         if not len(rows):
             return b""

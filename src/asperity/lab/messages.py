@@ -21,7 +21,8 @@ MAX_REACH = 0.1
 """Greatest distance of the hand from the origin of the surface, along each axis [m]."""
 MAX_ANGULAR_SPEED = 400.0
 """Greatest angular speed of a periodic motion of the hand [rad/s]."""
-MIN_VIEW_SIZE, MAX_VIEW_SIZE = 1e-5, 0.2
+MIN_VIEW_SIZE = 1e-5
+MAX_VIEW_SIZE = 0.2
 """Least and greatest side of a picture [m]."""
 
 
@@ -133,7 +134,10 @@ def _parse_section(kind: str, *code: float, box: object, y: object) -> ViewReque
     return ViewRequest(kind, (*sides, _parse_number("y", y, -1.0, 1.0), *code))
 
 
-STATE, RELIEF, SECTION, BESIDE_SECTION = 1.0, 2.0, 3.0, 4.0
+STATE = 1.0
+RELIEF = 2.0
+SECTION = 3.0
+BESIDE_SECTION = 4.0
 """First number of a message: its kind."""
 
 _PARSERS: dict[str, tuple[tuple[str, ...], Callable[..., Any]]] = {
@@ -163,7 +167,8 @@ MAX_FORCE_ROWS = 2048
 
 def frame_layout() -> dict[str, Any]:
     """Return the index of each number of a frame, for the page."""
-    parts, after = ("newest", "minima", "maxima", "forces"), len(HEADER) + len(_POSITION_NAMES)
+    parts = ("newest", "minima", "maxima", "forces")
+    after = len(HEADER) + len(_POSITION_NAMES)
     return {
         "header": {name: place for place, name in enumerate((*HEADER, *_POSITION_NAMES))},
         "columns": {name: place for place, name in enumerate(COLUMN_NAMES)},
@@ -214,7 +219,8 @@ def step_statistics(rows: FloatArray) -> dict[str, float]:
 
 RELIEF_POINTS = 96
 """Number of heights along each side of the relief."""
-SECTION_COLUMNS, SECTION_ROWS = 72, 36
+SECTION_COLUMNS = 72
+SECTION_ROWS = 36
 """Grid of the field in a section."""
 PROFILE_POINTS = 288
 """Number of heights along a section."""

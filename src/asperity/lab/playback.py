@@ -27,7 +27,8 @@ NEAREST_POINT_INTERVAL = 5e-3
 ANCHOR_COLUMNS = tuple((f"anchor {axis}", "m") for axis in "xyz")
 """Columns of the hand, which follow those of the loop."""
 
-_POSITION_COLUMNS, _FORCE_COLUMNS = ("x", "y", "z"), ("applied x", "applied y", "applied z")
+_POSITION_COLUMNS = ("x", "y", "z")
+_FORCE_COLUMNS = ("applied x", "applied y", "applied z")
 
 
 @dataclass(frozen=True)
@@ -97,7 +98,8 @@ def load_playback(recording: Recording, surface: Surface) -> Playback:
     layout = _ColumnLayout(recording.columns, surface)
     if recording.rows < 2:
         raise ParameterError("recording", f"{recording.path} has {recording.rows} rows, too few")
-    force, before = _ForceRange(recording.rows), -math.inf
+    force = _ForceRange(recording.rows)
+    before = -math.inf
     required = layout.indices((*_POSITION_COLUMNS, *_FORCE_COLUMNS))
     for block in recording.blocks():
         times = block[:, 0]
@@ -119,7 +121,8 @@ class _ForceRange:
     """Least and greatest magnitude of the force in equal parts of a number of rows."""
 
     def __init__(self, count: int) -> None:
-        self._count, self._processed = count, 0
+        self._count = count
+        self._processed = 0
         self.bins = np.tile([np.inf, 0.0], (min(FORCE_BINS, count), 1))
 
     def update(self, rows: FloatArray, columns: list[int]) -> None:
@@ -136,7 +139,8 @@ class _ColumnLayout:
     """Order of the columns of a recording for the page."""
 
     def __init__(self, columns: Columns, surface: Surface) -> None:
-        self._names, self._surface = [name for name, _unit in columns], surface
+        self._names = [name for name, _unit in columns]
+        self._surface = surface
         for name in (*_POSITION_COLUMNS, *_FORCE_COLUMNS):
             if name not in self._names:
                 raise ParameterError("recording", f"has no column {name!r}: it cannot be shown")
@@ -162,7 +166,8 @@ class _ColumnLayout:
             },
         }
         if "inside" not in self._names:
-            texture, contact = self._surface.texture, self._surface.law.contact
+            texture = self._surface.texture
+            contact = self._surface.law.contact
             tops = contact.contact_height(texture, positions[:, :2])
             computed["inside"] = (positions[:, 2] < tops).astype(float)
         zeros = np.zeros(len(rows))

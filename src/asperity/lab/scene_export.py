@@ -39,7 +39,8 @@ def format_scene(
         start: of the handle [m], shape (3,).
         velocity: of the handle at the start [m/s], shape (3,).
     """
-    setup, surface = scene_state.setup, scene_state.setup.surface
+    setup = scene_state.setup
+    surface = scene_state.setup.surface
     values = {name: getattr(surface, name) for name in ("stiffness", "max_depth", "clamp")}
     surface_fields = (*SURFACE_FIELDS, *surface.law.arguments.values())
     course = {"duration": duration, "start": list(start), "velocity": list(velocity)}

@@ -88,7 +88,8 @@ class SceneState:
         for name, value in sorted(changes.items(), key=lambda item: item[0] not in _APPLIED_FIRST):
             if self.device_servo is not None and name in _SIMULATED_ONLY:
                 raise ParameterError(name, "is given by the real device and its user")
-            setter, surface = _SETTERS.get(name), state.setup.surface
+            setter = _SETTERS.get(name)
+            surface = state.setup.surface
             if setter is not None:
                 state = setter(state, check_range(name, value) if name in RANGES else str(value))
             elif name in surface.law.arguments:
@@ -124,7 +125,8 @@ class SceneState:
     @property
     def rated_device(self) -> Device:
         """The device of the stability limit, with the chosen delay."""
-        device, delay = self.setup.device, self.setup.servo.delay
+        device = self.setup.device
+        delay = self.setup.servo.delay
         if self.device_servo is not None or delay == (device.value("delay_samples") or 0):
             return device
         datum = {"value": float(delay), "unit": "1", "source": "chosen in the lab"}
@@ -186,7 +188,8 @@ def _apply_magnification(state: SceneState, *factors: float) -> SceneState:
 def _with_device(state: SceneState, name: str) -> SceneState:
     if name.lower().endswith(".toml"):
         raise ParameterError("device", "must be a device of the catalogue", name)
-    delay, surface = state.electronics.delay, state.setup.surface
+    delay = state.electronics.delay
+    surface = state.setup.surface
     scene = _build_scene_state(Scene(surface.texture), load_device(name), state.source)
     setup = replace(scene.setup, surface=surface, hand=state.setup.hand)
     return _with_delay(replace(state, setup=setup), delay)
@@ -275,7 +278,8 @@ def _build_scene_state(
 
 SCENE_KEY = "saved_scene"
 """Name of the change to a saved scene; other changes are applied to that scene."""
-TOUR_SCENE, PREVIOUS_SCENE = "tour", "previous"
+TOUR_SCENE = "tour"
+PREVIOUS_SCENE = "previous"
 """The first scene of the guided tour, and the scene before the tour."""
 
 
@@ -310,7 +314,8 @@ class SavedScenes:
             self._previous = self._previous or scene_state
             return make_scene_state(load_scene(DEFAULT_SURFACE))
         if name == PREVIOUS_SCENE:
-            before, self._previous = self._previous, None
+            before = self._previous
+            self._previous = None
             return before or scene_state
         if name not in self.clip_scenes:
             raise ParameterError(SCENE_KEY, "is no longer stored", name)

@@ -82,7 +82,8 @@ class Client:
     def __init__(self, connection: ServerConnection) -> None:
         self.connection = connection
         self.view_requests: dict[str, messages.ViewRequest] = {}
-        self.view_requested, self.hand_moved = asyncio.Event(), asyncio.Event()
+        self.view_requested = asyncio.Event()
+        self.hand_moved = asyncio.Event()
         self.last_sent = self._last_acknowledged = 0.0
         self._acknowledgement = asyncio.Event()
 
@@ -131,7 +132,8 @@ class LabServer:
         self._controller: Client | None = None
         self._state_changed = asyncio.Event()
         self._last_contact = 0.0  # time of the last message of the controlling page [s]
-        handle, assess_risk = options.handle, None
+        handle = options.handle
+        assess_risk = None
         pictures, limits, comparisons = workers
         if handle is not None and not options.accept_risk:
             assess_risk = partial(limits.submit, excess_stiffness_reason)
@@ -155,7 +157,8 @@ class LabServer:
             self._loop.call_soon_threadsafe(self._state_changed.set)
 
     def _update_background(self) -> None:
-        scene, surface = self.session.scene_state, self.session.scene_state.setup.surface
+        scene = self.session.scene_state
+        surface = self.session.scene_state.setup.surface
         self.pictures.show(scene.setup.rendered, scene.rated_device)
         conditions = scene.rated_device, surface.max_depth, surface.clamp
         if self.recommendation.request(surface.texture, *conditions):
@@ -265,7 +268,8 @@ class LabServer:
 
     async def _broadcast_state(self) -> None:
         """Send the state to all pages."""
-        session, setup = self.session, self.session.scene_state.setup
+        session = self.session
+        setup = self.session.scene_state.setup
         lowest, highest = map(float, setup.surface.texture.extremes)
         electronics = session.scene_state.electronics
         status = {

@@ -145,9 +145,13 @@ class Session:
         assess_risk: RiskAssessor | None = None,
         leader: Session | None = None,
     ) -> None:
-        self.scene_state, self.on_change, self._prestarted = scene_state, on_change, prestarted
+        self.scene_state = scene_state
+        self.on_change = on_change
+        self._prestarted = prestarted
         self.saved_scenes = SavedScenes()
-        self.handle, self._assess_risk, self.leader = handle, assess_risk, leader
+        self.handle = handle
+        self._assess_risk = assess_risk
+        self.leader = leader
         highest = float(scene_state.setup.surface.texture.extremes[1])
         is_steered = handle is None and leader is None
         self.pointer_hand: PointerHand | None = leader.pointer_hand if leader else None
@@ -159,7 +163,8 @@ class Session:
         self.message = handle.start_prompt if handle else ""
         self._loop: ServoProcess | None = None
         self._active_shared: LoopMemory | None = None
-        self._stop_count, self._is_closing = 0, False
+        self._stop_count = 0
+        self._is_closing = False
         self._requests: Queue[_Request] = Queue()
         self._thread = threading.Thread(target=self._run, name="lab session", daemon=True)
 
@@ -217,13 +222,15 @@ class Session:
     def release_force(self, reason: str, *, now: bool = False) -> None:
         """Stop the loop at once, whatever the thread is doing: by a ramp, or with no force now."""
         self._stop_count += 1  # makes earlier start requests stale
-        active, self._active_shared = self._active_shared, None
+        active = self._active_shared
+        self._active_shared = None
         if active is not None:
             active.request_stop(now=now)
         self._requests.put(_StopRequest(reason))
 
     def _set_state(self, state: LoopState, message: str = "") -> None:
-        self.state, self.message = state, message
+        self.state = state
+        self.message = message
         self.on_change()
 
     def _run(self) -> None:
@@ -244,7 +251,8 @@ class Session:
         except Empty:
             return []
         while not self._requests.empty():
-            last, new = requests[-1], self._requests.get()
+            last = requests[-1]
+            new = self._requests.get()
             # Changes queued before a scene change apply to the previous scene.
             if isinstance(last, Mapping) and isinstance(new, Mapping) and SCENE_KEY not in new:
                 requests[-1] = {**last, **new}
@@ -280,9 +288,11 @@ class Session:
             self._apply_changes(request)
 
     def _start(self, scene_state: SceneState) -> None:
-        stop_count, setup = self._stop_count, scene_state.setup
+        stop_count = self._stop_count
+        setup = scene_state.setup
         self._set_state("starting", "compiling the loop: the first time takes some seconds")
-        prestarted, self._prestarted = self._prestarted, None
+        prestarted = self._prestarted
+        self._prestarted = None
         loop = ServoProcess(
             setup.rendered,
             self._make_driver(setup),
@@ -300,7 +310,9 @@ class Session:
         except BaseException:  # also for an interrupt
             self._active_shared = None
             raise
-        self._loop, self.shared, self.scene_state = loop, loop.memory, scene_state
+        self._loop = loop
+        self.shared = loop.memory
+        self.scene_state = scene_state
         self.start_count += 1
         self._set_state("running", " ".join(loop.notes))
 
@@ -351,7 +363,8 @@ class Session:
 
     def _is_done(self, work: Future[Any], text: str) -> bool:
         """Wait for work in the background while polling the loop; false if the loop ended."""
-        loop, stop_count = self._loop, self._stop_count
+        loop = self._loop
+        stop_count = self._stop_count
         if loop is not None:
             self._set_state("changing", f"{text}; the previous one is still rendered")
         while not wait([work], POLL_INTERVAL).done:
@@ -389,6 +402,8 @@ class Session:
             self._set_state("stopped", "end of the recording; Start replays it")
 
     def _stop(self) -> None:
-        loop, self._loop, self._active_shared = self._loop, None, None
+        loop = self._loop
+        self._loop = None
+        self._active_shared = None
         if loop is not None:
             loop.stop()

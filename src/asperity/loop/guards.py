@@ -170,7 +170,8 @@ def requested_end(
     sample: int, end_sample: int, force: GuardedForce, guards: Guards
 ) -> tuple[int, bool]:
     """Return the requested end cause, or ``RUNNING``, and whether the force is released for it."""
-    block, end = guards.block, RUNNING
+    block = guards.block
+    end = RUNNING
     stop = load_acquire(block.control, STOP_WORD)
     if stop == STOP_NOW:
         return STOPPED, True
@@ -236,7 +237,8 @@ def guard_force(
     settings: ServoSettings, guards: Guards,
 ) -> GuardedForce:  # fmt: skip
     """Return the force to hold: the law's, ramped, damped and limited."""
-    limits, status = guards.limits, guards.block.status
+    limits = guards.limits
+    status = guards.block.status
     ramp = next_ramp(force.ramp, is_ending, limits.ramp_step)
     dx = servo.x - before.x
     dy = servo.y - before.y

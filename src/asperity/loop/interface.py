@@ -15,7 +15,8 @@ OK = 0
 RUNNING, STOPPED, SWAP, FINISHED, NOT_FINITE, DEVICE, WORKSPACE, DEPTH = range(8)
 LATE_SAMPLE, NO_HEARTBEAT = range(8, 10)
 # Requests to stop: with a ramp, or with the next sample.
-STOP_RAMPED, STOP_NOW = 1, 2
+STOP_RAMPED = 1
+STOP_NOW = 2
 
 
 class Reading(NamedTuple):

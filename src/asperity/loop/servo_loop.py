@@ -65,7 +65,8 @@ def servo_loop(
     """
     position = local_array((3,))
     servo, force, timing = state
-    cause, code = RUNNING, OK
+    cause = RUNNING
+    code = OK
     if end_sample < 0:
         return cause, code, state
     timing = start_timing(timing, clock)
@@ -76,9 +77,14 @@ def servo_loop(
             break
         start = clock_wait_until(timing.due, clock)
         reading = read_position(position, start - timing.due, guards, device)
-        cause, code, in_contact, before = reading.cause, reading.code, False, servo
+        cause = reading.cause
+        code = reading.code
+        in_contact = False
+        before = servo
         if cause == RUNNING:
-            x, y, z = reading.x, reading.y, reading.z
+            x = reading.x
+            y = reading.y
+            z = reading.z
             before = state_before_tick(servo, timing.sample, x, y, z, settings)
             servo = servo_tick(before, settings, x, y, z, memory, texture, law)
             force = guard_force(force, before, servo, end != RUNNING, settings, guards)
@@ -91,7 +97,8 @@ def servo_loop(
         )
         answer = write_force(force.fx, force.fy, force.fz, in_contact, guards, device)
         if cause == RUNNING and answer != OK:
-            cause, code = DEVICE, answer
+            cause = DEVICE
+            code = answer
         now = clock_now(timing.due, clock)
         trace_timing(trace, start - timing.due, now - start)
         timing_fault, timing = finish_timing(timing, start, now, guards)

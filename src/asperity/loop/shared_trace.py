@@ -19,11 +19,18 @@ KERNELS = Kernels(
 )
 
 # Words written by the supervising process.
-HEARTBEAT_WORD, STOP_WORD = 0, 1
+HEARTBEAT_WORD = 0
+STOP_WORD = 1
 CONTROL_SIZE = 2
 # Words written by the loop: rows, then counts since the start, then histograms.
-ROW_COUNT, LATE_COUNT, SKIPPED_COUNT, MAX_LATENESS = 0, 1, 2, 3
-FORCE_LIMIT_COUNT, SLEW_LIMIT_COUNT, DEEP_COUNT, LAST_START_TIME = 4, 5, 6, 7
+ROW_COUNT = 0
+LATE_COUNT = 1
+SKIPPED_COUNT = 2
+MAX_LATENESS = 3
+FORCE_LIMIT_COUNT = 4
+SLEW_LIMIT_COUNT = 5
+DEEP_COUNT = 6
+LAST_START_TIME = 7
 HISTOGRAM_BINS = 40
 LATENESS_HISTOGRAM = 8
 PERIOD_HISTOGRAM = LATENESS_HISTOGRAM + HISTOGRAM_BINS
@@ -65,9 +72,15 @@ def trace_sample(
     rows = trace.rows
     row = trace.status[ROW_COUNT] % rows.shape[0]
     rows[row, 0] = sample * settings.period
-    rows[row, 1], rows[row, 2], rows[row, 3] = reading.x, reading.y, reading.z
-    rows[row, 4], rows[row, 5], rows[row, 6] = servo.fx, servo.fy, servo.fz
-    rows[row, 7], rows[row, 8], rows[row, 9] = force.fx, force.fy, force.fz
+    rows[row, 1] = reading.x
+    rows[row, 2] = reading.y
+    rows[row, 3] = reading.z
+    rows[row, 4] = servo.fx
+    rows[row, 5] = servo.fy
+    rows[row, 6] = servo.fz
+    rows[row, 7] = force.fx
+    rows[row, 8] = force.fy
+    rows[row, 9] = force.fz
     rows[row, 10] = force.ramp
     rows[row, 11] = force.energy
     rows[row, 12] = force.damping

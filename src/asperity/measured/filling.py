@@ -80,7 +80,8 @@ def _hole_groups(missing: NDArray[np.bool_]) -> Iterator[Indices]:
     for count in sizes:
         if size and size + count > _GROUP_SIZE:
             yield np.sort(points[order[first : first + size]])
-            first, size = first + size, 0
+            first = first + size
+            size = 0
         size += int(count)
     yield np.sort(points[order[first : first + size]])
 
@@ -91,7 +92,8 @@ def _laplace_system(
     """Return the symmetric positive definite system of whole holes."""
     from scipy.sparse import csr_array
 
-    count, (ny, nx) = len(points), heights.shape
+    count = len(points)
+    (ny, nx) = heights.shape
     row, column = divmod(points, nx)
     small = np.int32 if 5 * count < 2**31 else np.int64
     columns = np.full((count, 5), -1, dtype=small)  # neighbours and, last, the point itself

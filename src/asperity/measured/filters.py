@@ -172,7 +172,8 @@ def short_trace_text(shape: Shape, pitch: Pitch, l_cutoff: float) -> str:
     count = SECTION_COUNT if len(shape) == 1 else 1
     if shortest * (1 + 1e-9) >= count * l_cutoff:
         return ""
-    side, length = format_length(shortest), format_length(l_cutoff)
+    side = format_length(shortest)
+    length = format_length(l_cutoff)
     if len(shape) > 1:
         return f"too small for this L-filter: {side} wide, ISO 25178-3 takes at least {length}"
     sections = f"{shortest / l_cutoff:.3g} section lengths of {length}"

@@ -88,7 +88,8 @@ def fit_form(heights: FloatArray, degree: int = 1) -> FormPolynomial:
         >>> bool(np.allclose(fit_form(parabola, 2).evaluate(), parabola))
         True
     """
-    degree, most = check_degree(degree), max_degree(heights)
+    degree = check_degree(degree)
+    most = max_degree(heights)
     if degree > most:
         points = f"{_count_valid_coordinates(heights)} points along the shorter side"
         raise ParameterError("form", f"must be at most {most} for {points}", degree)
@@ -166,7 +167,8 @@ def _count_valid_coordinates(heights: FloatArray) -> int:
 
 def _central_slopes(form: FormPolynomial, pitch: Pitch) -> list[float]:
     """Return the slopes along x and y in the middle of the surface."""
-    shape, c = form.shape, form.coefficients
+    shape = form.shape
+    c = form.coefficients
     at_zero = legval(0.0, np.eye(form.degree + 1))
     rise = legval(0.0, legder(np.eye(form.degree + 1)))
     scales = [2.0 / ((n - 1) * p) for n, p in zip(shape[::-1], pitch, strict=True)]
@@ -288,7 +290,8 @@ def decompose_surface(
         >>> f"{1e6 * parts.form.range:.0f} {1e6 * parts.texture.rms:.3f} {1e3 * parts.nesting}"
         '100 0.707 0.8'
     """
-    whole, heights = heights.shape, np.squeeze(heights)
+    whole = heights.shape
+    heights = np.squeeze(heights)
     pitch = pitch[: heights.ndim]
     if nesting is None:
         nesting = default_nesting_index(heights.shape, pitch, periodic)

@@ -119,7 +119,8 @@ def _pad_by_reflection(heights: FloatArray, half_window: int) -> FloatArray:
         lines = np.moveaxis(heights, axis, 0)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)  # of three missing points: NaN
-            first, last = np.nanmedian(lines[:3], axis=0), np.nanmedian(lines[-3:], axis=0)
+            first = np.nanmedian(lines[:3], axis=0)
+            last = np.nanmedian(lines[-3:], axis=0)
         before = 2.0 * first - lines[3 : 3 + half_window][::-1]
         after = 2.0 * last - lines[-3 - half_window : -3][::-1]
         heights = np.moveaxis(np.concatenate([before, lines, after]), 0, axis)

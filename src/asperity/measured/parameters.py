@@ -104,7 +104,8 @@ def compute_parameters(
         >>> f"{wave['Sq']:.4f} {wave['Sa']:.4f} {wave['Sku']:.4f} {wave['Sdq']:.3f}"
         '0.7071 0.6364 1.5000 4.420'
     """
-    rows, steps = np.atleast_2d(heights), (pitch[0], pitch[-1])
+    rows = np.atleast_2d(heights)
+    steps = (pitch[0], pitch[-1])
     measured = rows[~np.isnan(rows)]
     mean, low, high = (float(x) for x in (measured.mean(), measured.min(), measured.max()))
     a, q, skewness, kurtosis = _height_moments(measured, mean, high - low)
@@ -112,7 +113,8 @@ def compute_parameters(
     if heights.ndim > 1:
         values = (q, a, high - low, high - mean, mean - low, skewness, kurtosis, gradient, ratio)
         return dict(zip((one.symbol for one in AREAL_PARAMETERS), values, strict=True))
-    kind, sections = "P", 1
+    kind = "P"
+    sections = 1
     if nesting is not None:
         kind = "R"
         sections = max(1, math.floor((len(heights) - 1) * pitch[0] / nesting * (1 + 1e-9)))
@@ -138,7 +140,8 @@ def _height_moments(
     z = (heights - mean) / span
     square = z * z
     q = math.sqrt(square.mean())
-    third, fourth = float((square * z).mean()), float((square * square).mean())
+    third = float((square * z).mean())
+    fourth = float((square * square).mean())
     return float(np.abs(z).mean()) * span, q * span, third / q**3, fourth / q**4
 
 
@@ -146,10 +149,16 @@ def _facet_parameters(rows: FloatArray, pitch: Pitch) -> tuple[float | None, flo
     """Return Sdq and Sdr of the facets; None if no cell has four measured corners."""
     if rows.shape[0] == 1:
         rows = np.repeat(rows, 2, axis=0)  # a profile: the same along y
-    squares, excess, cells = 0.0, 0.0, 0
+    squares = 0.0
+    excess = 0.0
+    cells = 0
     for block in _row_blocks(rows, overlap=1):
-        along, across = np.diff(block, axis=1) / pitch[0], np.diff(block, axis=0) / pitch[1]
-        lower, upper, left, right = along[:-1], along[1:], across[:, :-1], across[:, 1:]
+        along = np.diff(block, axis=1) / pitch[0]
+        across = np.diff(block, axis=0) / pitch[1]
+        lower = along[:-1]
+        upper = along[1:]
+        left = across[:, :-1]
+        right = across[:, 1:]
         corners = [part**2 for part in (lower, upper, left, right)]
         known = ~np.isnan(lower + upper)
         if not known.all():
@@ -169,7 +178,8 @@ def _mean_peak_and_pit(z: FloatArray, sections: int) -> tuple[float, float]:
     """Return the means over the sections of their greatest heights and depths."""
     parts = [part[~np.isnan(part)] for part in np.array_split(z, sections)]
     parts = [part for part in parts if part.size]
-    peaks, pits = [float(part.max()) for part in parts], [-float(part.min()) for part in parts]
+    peaks = [float(part.max()) for part in parts]
+    pits = [-float(part.min()) for part in parts]
     return sum(peaks) / len(parts), sum(pits) / len(parts)
 
 

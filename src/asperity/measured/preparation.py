@@ -176,7 +176,8 @@ def prepare(  # noqa: D417 - the others are described by their declarations
         filtered: Gaussian ISO 16610-21, cut-off 40 µm (chosen from the sampling: 4 samples)
         magnified 20 times laterally and in height
     """
-    start, record = progress or (lambda _stage: None), StageRecorder(on_stage)
+    start = progress or (lambda _stage: None)
+    record = StageRecorder(on_stage)
     steps = list(raw.notes)
     _check_shape(raw.heights, max_missing)
     lateral = _resolve_pitch(raw, pitch, steps)
@@ -217,7 +218,8 @@ def prepare(  # noqa: D417 - the others are described by their declarations
         record("periodic", heights, lateral)
         steps.append(sentence)
     start("magnify")
-    mask, stages = filled if filled.any() else None, tuple(record.stages)
+    mask = filled if filled.any() else None
+    stages = tuple(record.stages)
     ready = PreparedSurface(heights, lateral, tuple(steps), mask, bool(periodic), stages)
     return magnify_surface(ready, magnify, magnify_height)
 
@@ -236,7 +238,8 @@ def magnify_surface(
         ParameterError: a factor is not positive, or the result overflows.
     """
     lateral, upward = magnification_factors(magnify, magnify_height)
-    heights, pitch = prepared.heights, prepared.pitch
+    heights = prepared.heights
+    pitch = prepared.pitch
     greatest = max(float(heights.max()), -float(heights.min()))
     with np.errstate(over="ignore"):
         wider = tuple(p * lateral for p in pitch)
@@ -316,7 +319,8 @@ def _check_missing(heights: FloatArray, max_missing: float) -> None:
 
 def _resolve_pitch(raw: RawSurface, pitch: GivenPitch, steps: list[str]) -> Pitch:
     """Return the given pitch or that of the file [m], one value for each axis."""
-    axes, chosen = raw.heights.ndim, raw.pitch if pitch is None else pitch
+    axes = raw.heights.ndim
+    chosen = raw.pitch if pitch is None else pitch
     if chosen is None:
         raise ParameterError("pitch", f"must be given [m]: {raw.source} has none")
     values = np.atleast_1d(np.asarray(chosen, dtype=np.float64))
@@ -341,7 +345,8 @@ def _resolve_pitch(raw: RawSurface, pitch: GivenPitch, steps: list[str]) -> Pitc
 def _scale_heights(
     heights: FloatArray, raw: RawSurface, pitch: Pitch, height_range: float | None, steps: list[str]
 ) -> None:
-    low, high = float(np.nanmin(heights)), float(np.nanmax(heights))
+    low = float(np.nanmin(heights))
+    high = float(np.nanmax(heights))
     span = high - low
     if not math.isfinite(span):
         raise ParameterError("surface", "has heights too large for floating-point numbers")

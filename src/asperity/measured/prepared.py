@@ -167,9 +167,11 @@ class PreparedSurface:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data without the heights, SI units."""
-        pitch, steps = list(self.pitch), list(self.steps)
+        pitch = list(self.pitch)
+        steps = list(self.steps)
         data = {"pitch": pitch, "periodic": self.periodic, "steps": steps}
-        points, stages = list(self.heights.shape[::-1]), to_plain_data(self.history)
+        points = list(self.heights.shape[::-1])
+        stages = to_plain_data(self.history)
         return {"schema": SCHEMA, "points": points, **data, "stages": stages}
 
 

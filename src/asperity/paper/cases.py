@@ -79,19 +79,23 @@ class ExperimentCase:
 
     def groove_path(self) -> FloatArray:
         """Return the path for A, B and E: along the wall, up at the crest, and back."""
-        quarter, top = 0.25 * self.period, self.amplitude
+        quarter = 0.25 * self.period
+        top = self.amplitude
         return path_points((0.0, 0.0), (quarter, 0.0), (quarter, top), (0.0, top))
 
     def friction_path(self, shallow_depth: float = TURNING_DEPTH) -> FloatArray:
         """Return the path of (27), for F: out at the shallow depth a, back at the full depth."""
-        x, deep = self.deflection, -self.depth
+        x = self.deflection
+        deep = -self.depth
         return path_points(
             (0.0, 1e-3), (0.0, -shallow_depth), (x, -shallow_depth), (x, deep), (0.0, deep)
         )
 
     def crossing_path(self, turning_depth: float = TURNING_DEPTH) -> FloatArray:
         """Return the path of (29), for G: down at the crest, along at depth a, up at the trough."""
-        a, crest, trough = turning_depth, 0.25 * self.period, 0.75 * self.period
+        a = turning_depth
+        crest = 0.25 * self.period
+        trough = 0.75 * self.period
         return path_points((crest, a), (crest, -a), (trough, -a), (trough, a))
 
     def loop_path(self, law: str) -> FloatArray:
@@ -160,7 +164,8 @@ class FrictionCase:
 
         The first axes are: sliding and sticking; d = -d_max and d_max; points along a period.
         """
-        surface, x = self.surface(), np.linspace(0.0, self.period, count)
+        surface = self.surface()
+        x = np.linspace(0.0, self.period, count)
         points = np.column_stack([x, 0 * x, np.full(count, -self.depth)])
         phases = [
             [

@@ -12,7 +12,9 @@ from asperity.core.files import Serializable
 from asperity.paper.cases import PAPER_LAWS, SCANNING
 from asperity.surface import Surface
 
-_COLUMNS, _ROWS, _PROFILE = 33, 13, 401
+_COLUMNS = 33
+_ROWS = 13
+_PROFILE = 401
 _HANDLE_DEPTH = 0.6e-3  # of the handles in figure 2 [m]
 _STEPS_PER_SEGMENT = 400  # on each leg of a path of figure 3
 _EQUATIONS = {"B": "(12)", "F": "(27)", "G": "(29)"}  # that give the energies of figure 3
@@ -97,7 +99,8 @@ def force_fields() -> tuple[ForceField, ...]:
         ['A', 'B', 'C', 'D', 'E', 'F', 'G']
     """
     x, height = _profile()
-    length, top = SCANNING.period, SCANNING.amplitude
+    length = SCANNING.period
+    top = SCANNING.amplitude
     columns = np.linspace(0.0, 1.0, _COLUMNS) * length
     rows = np.linspace(-top - _HANDLE_DEPTH, top, _ROWS)
     points = np.stack(np.meshgrid(columns, rows), axis=-1)
@@ -133,7 +136,8 @@ def _loop_energy(law: str) -> LoopEnergy:
     x, height = _profile()
     surface = SCANNING.surface(law)
     if law == "F":
-        surface, height = SCANNING.untextured_friction(), np.zeros_like(height)
+        surface = SCANNING.untextured_friction()
+        height = np.zeros_like(height)
     corners = SCANNING.loop_path(law)
     legs = zip(corners, np.roll(corners, -1, axis=0), strict=True)
     share = np.linspace(0.0, 1.0, _STEPS_PER_SEGMENT, endpoint=False)[:, None]
@@ -141,7 +145,8 @@ def _loop_energy(law: str) -> LoopEnergy:
     step = np.diff(path, axis=0)
     # By midpoints: corners of the path may lie where the force jumps.
     dense = np.empty((2 * len(path) - 1, 3))
-    dense[::2], dense[1::2] = path, path[:-1] + 0.5 * step
+    dense[::2] = path
+    dense[1::2] = path[:-1] + 0.5 * step
     work = np.sum(surface.trace(dense)[1::2] * step, axis=1)
     return LoopEnergy(
         law=law,

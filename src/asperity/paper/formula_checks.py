@@ -197,7 +197,8 @@ def _printed_potential(probe: ProbePoint) -> Potential:
     """Return -κ₀/2 times the squared distance to the contact point, above the probe or closest."""
 
     def potential(x: Any, z: Any) -> Any:
-        at_x, at_z = x, probe.profile()(x, 0)
+        at_x = x
+        at_z = probe.profile()(x, 0)
         if probe.surface.law.letter == "D":
             at_x, at_z = find_closest_point(probe.surface, x, z, 60)
         return -probe.k * ((x - at_x) ** 2 + (z - at_z) ** 2) / 2

@@ -127,7 +127,8 @@ def generic_probes(law: str, count: int = 4, seed: int = 5) -> Iterator[ProbePoi
         h, slope = (float(profile(contact, order)) for order in (0, 1))
         depth = radius * draw.uniform(0.2, 0.7)
         size = math.hypot(1.0, slope)
-        x, z = contact + depth * slope / size, h - depth / size
+        x = contact + depth * slope / size
+        z = h - depth / size
         if law in "FG":
             z = -depth
         at = float(find_closest_point(surface, x, z)[0]) if law in "DE" else x

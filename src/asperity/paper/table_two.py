@@ -176,7 +176,8 @@ def _row(letter: str) -> TableTwoRow:
     # Law F without texture, as in (27).
     changes = {"modulation_depth": 0.0} if letter == "F" else {}
     looped = SCANNING.surface(letter, **changes)
-    q, printed = characteristic_number(surface), _printed_rows()[letter]
+    q = characteristic_number(surface)
+    printed = _printed_rows()[letter]
     return TableTwoRow(
         law=letter,
         printed=printed,
@@ -193,7 +194,8 @@ def _row(letter: str) -> TableTwoRow:
 def _printed_rows() -> dict[str, PrintedRow]:
     """Return the rows as printed, with the values of their formulas."""
     slope = 2.0 * math.pi * PASSIVITY.amplitude / PASSIVITY.period
-    case, k = SCANNING, SCANNING.stiffness
+    case = SCANNING
+    k = SCANNING.stiffness
     root = math.hypot(1.0, 2.0 * math.pi * case.amplitude / case.period)
     half = 0.5 * k * case.amplitude**2
     b_energy = half + k * case.period**2 / (4.0 * math.pi**2) * (1.0 - root)
@@ -210,7 +212,8 @@ def _printed_rows() -> dict[str, PrintedRow]:
 
 def _explain_correction(law: str, printed: PrintedRow, q: Bound) -> str:
     """Return the explanation of the differences."""
-    case, number = PASSIVITY, printed.value or 0.0
+    case = PASSIVITY
+    number = printed.value or 0.0
     return TABLE_TWO[law]["change"].format(
         y=4.0 * math.pi**2 * case.amplitude * case.depth / case.period**2,
         radius=1e3 * case.crest_radius,

@@ -57,7 +57,8 @@ class Grip(Serializable):
 
     def __post_init__(self) -> None:
         for name, unit in _UNITS.items():
-            number, above = getattr(self, name), name == "stiffness"
+            number = getattr(self, name)
+            above = name == "stiffness"
             if not 0.0 <= number < math.inf or (above and number == 0.0):
                 least = "positive" if above else "at least 0"
                 raise ParameterError(
@@ -78,7 +79,8 @@ class Grip(Serializable):
         Interpolated linearly in the logarithms of both; constant beyond the frequencies of the
         data.
         """
-        f, known = np.log(np.asarray(frequency, dtype=float)), np.log(self.frequency)
+        f = np.log(np.asarray(frequency, dtype=float))
+        known = np.log(self.frequency)
         lower, upper = (
             np.exp(np.interp(f, known, np.log(level))) for level in (self.unnoticed, self.felt)
         )
@@ -125,7 +127,8 @@ def load_grip(grip: str | os.PathLike[str] | Grip = DEFAULT_GRIP) -> Grip:
     """
     if isinstance(grip, Grip):
         return grip
-    name, shipped = os.fspath(grip), _shipped_grips()
+    name = os.fspath(grip)
+    shipped = _shipped_grips()
     if name in shipped:
         return parse_grip(shipped[name], name)
     if not os.path.exists(name):

@@ -173,7 +173,8 @@ def _statistics(ops: list[int], chunks: list[Chunk], rows: int) -> bytes:
 
 
 def _chunk_index(chunk: Chunk) -> bytes:
-    begin, end = chunk.start, chunk.end
+    begin = chunk.start
+    end = chunk.end
     data = struct.pack("<QQQQ", *chunk.times, begin, end - begin)
     data += struct.pack("<IHQQ", 10, CHANNEL, end, chunk.index_size)
     return encode_record(Opcode.CHUNK_INDEX, data, struct.pack("<IQQ", 0, chunk.size, chunk.size))
@@ -209,7 +210,8 @@ class ContentReader:
         """Return a number of bytes."""
         if size > len(self._remaining):
             raise DamagedError("a record ends within a field")
-        part, self._remaining = self._remaining[:size], self._remaining[size:]
+        part = self._remaining[:size]
+        self._remaining = self._remaining[size:]
         return part
 
     def number(self, size: int) -> int:
@@ -225,7 +227,8 @@ class ContentReader:
 
     def texts(self) -> dict[str, str]:
         """Return texts by name."""
-        inner, found = ContentReader(self.read(self.number(4))), {}
+        inner = ContentReader(self.read(self.number(4)))
+        found = {}
         while inner._remaining:
             name = inner.text()
             found[name] = inner.text()
@@ -240,7 +243,8 @@ def read_attachment(content: bytes | memoryview) -> tuple[str, str, bytes]:
     """
     reader = ContentReader(content)
     reader.read(16)  # times: unused
-    name, kind = reader.text(), reader.text()
+    name = reader.text()
+    kind = reader.text()
     data = bytes(reader.read(reader.number(8)))
     checksum = reader.number(4)
     if checksum not in {0, zlib.crc32(content[: len(content) - 4])}:

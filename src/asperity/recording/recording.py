@@ -87,7 +87,8 @@ class Recording(Plottable):
         Raises:
             ParameterError: see :meth:`blocks`.
         """
-        start, end = max(start, 0), min(end, self.rows)
+        start = max(start, 0)
+        end = min(end, self.rows)
         if start >= end:
             return np.empty((0, len(self.columns)))
         least, most = self._chunk_starts.searchsorted([start, end - 1], "right")
@@ -104,7 +105,8 @@ class Recording(Plottable):
 
     def _read_block(self, stream: IO[bytes], number: int) -> FloatArray:
         """Return the rows of a block."""
-        chunk, first_row = self._chunks[number], self._chunk_starts[number]
+        chunk = self._chunks[number]
+        first_row = self._chunk_starts[number]
         stream.seek(chunk.rows_start)
         data = stream.read(chunk.size)
         if zlib.crc32(data) != chunk.checksum:
@@ -124,7 +126,8 @@ class Recording(Plottable):
             ParameterError: see :meth:`blocks`.
         """
         step = 1 if max_rows is None else max(1, -(-self.rows // max_rows))
-        parts, seen = [np.empty((0, len(self.columns)))], 0
+        parts = [np.empty((0, len(self.columns)))]
+        seen = 0
         for block in self.blocks():
             parts.append(block[-seen % step :: step])
             seen += len(block)
@@ -147,7 +150,8 @@ class Recording(Plottable):
         """Return the least and the greatest value of each column; NaN if there are no rows."""
         low, high = np.full((2, len(self.columns)), np.nan)
         for block in self.blocks():
-            low, high = np.fmin(low, block.min(axis=0)), np.fmax(high, block.max(axis=0))
+            low = np.fmin(low, block.min(axis=0))
+            high = np.fmax(high, block.max(axis=0))
         return low, high
 
     def attachment(self, name: str) -> bytes | None:
@@ -231,7 +235,9 @@ def _read(path: Path, stream: IO[bytes], size: int) -> Recording:
     texts: dict[str, str] = {}
     chunks: list[mcap.Chunk] = []
     attached: dict[str, tuple[int, int]] = {}
-    whole, foreign, end = False, False, len(mcap.MAGIC)
+    whole = False
+    foreign = False
+    end = len(mcap.MAGIC)
     for op, at, length in mcap.iterate_records(stream, size):
         if op == mcap.Opcode.DATA_END:
             whole = True
@@ -272,7 +278,8 @@ def _record_content(stream: IO[bytes], at: int, length: int) -> mcap.ContentRead
 
 def _columns(content: mcap.ContentReader) -> row_encoding.Columns:
     content.read(2)
-    name, encoding = content.text(), content.text()
+    name = content.text()
+    encoding = content.text()
     if encoding != "ros2msg":
         raise mcap.DamagedError(f"its rows are {name!r} in {encoding!r}, none that asperity writes")
     return row_encoding.schema_columns(content.text())

@@ -175,7 +175,8 @@ def recorded_field(recording: Recording) -> RecordedField:
     Raises:
         ParameterError: if it holds none, or one that is not known here.
     """
-    metadata, data = _surface_metadata(recording), recording.attachment(TEXTURE_FILE)
+    metadata = _surface_metadata(recording)
+    data = recording.attachment(TEXTURE_FILE)
     if data is None:
         words = "does not hold its surface, which was too large: name it, --surface SURFACE"
         raise ParameterError("recording", words)
@@ -184,7 +185,8 @@ def recorded_field(recording: Recording) -> RecordedField:
 
 def _servo_settings(metadata: Mapping[str, Any]) -> ServoSettings:
     """Return the settings of the servo that a recording names."""
-    every, servo = metadata.get("every", 1), metadata.get("servo")
+    every = metadata.get("every", 1)
+    servo = metadata.get("servo")
     if every != 1:
         words = f"holds each {every}th sample only; the state of the loop goes from one to the next"
         raise ParameterError("recording", f"cannot be replayed: it {words}")
@@ -208,7 +210,8 @@ def _replay_blocks(
     compared = [0, *(names.index(name) for name in COMPARED_COLUMNS)]
     parts = servo_loop, no_guards, replayed_device, replay_trace, tick
     loops = fuse_on_texture(field.law, field.sampler, field.clamp, parts)
-    state, first = LoopState(), 0
+    state = LoopState()
+    first = 0
     memory = new_warm_start(field.law.contact.max_evaluations)
     for block in recording.blocks():
         _check_times(block[:, 0], first, settings.period)
@@ -243,11 +246,13 @@ def _compare(result: Replay, first: int, block: FloatArray, replayed: FloatArray
     if not len(rows):
         return result
     greatest = np.nanmax(np.abs(recorded[rows, :3] - replayed[rows, :3]), initial=0.0)
-    difference, row = result.first_difference, int(rows[0])
+    difference = result.first_difference
+    row = int(rows[0])
     if difference is None:
         column = int(np.flatnonzero(differs[row])[0])
         values = float(recorded[row, column]), float(replayed[row, column])
-        time, name = float(block[row, 0]), COMPARED_COLUMNS[column]
+        time = float(block[row, 0])
+        name = COMPARED_COLUMNS[column]
         difference = Difference(first + row, time, name, *values)
     force = max(result.max_force_difference, float(greatest))
     return replace(result, first_difference=difference, max_force_difference=force)

@@ -77,7 +77,9 @@ def message_template(row_count: int, column_count: int) -> NDArray[np.void]:
     """Return message records without number, time and values."""
     kind = row_type(column_count)
     blank = np.zeros(row_count, kind)
-    blank["op"], blank["channel"], blank["cdr"] = _MESSAGE, CHANNEL, _CDR_HEADER
+    blank["op"] = _MESSAGE
+    blank["channel"] = CHANNEL
+    blank["cdr"] = _CDR_HEADER
     blank["length"] = kind.itemsize - 9  # all but code and length
     return blank
 

@@ -49,7 +49,8 @@ def export_recording(
 def _write_csv(recording: Recording, stream: IO[bytes], progress: Progress) -> None:
     head = ",".join(f"{name} [{unit}]" for name, unit in recording.columns)
     stream.write(f"{head}\n".encode())
-    row, done = ",".join(["%.17g"] * len(recording.columns)) + "\n", 0
+    row = ",".join(["%.17g"] * len(recording.columns)) + "\n"
+    done = 0
     for block in recording.blocks():
         stream.write((row * len(block) % tuple(block.ravel().tolist())).encode())
         done += len(block)

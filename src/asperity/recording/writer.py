@@ -69,14 +69,17 @@ class RecordingWriter:
         attachments: Mapping[str, bytes] | None = None,
         argument: str = "path",
     ) -> None:
-        self._path, self._columns, self._argument = Path(path), columns, argument
+        self._path = Path(path)
+        self._columns = columns
+        self._argument = argument
         texts = {"format": str(FORMAT), "version": __version__, "about": json_text(metadata or {})}
         library = f"asperity {__version__}"
         self._head = mcap.encode_head(
             SCHEMA_NAME, library, row_encoding.schema_text(columns), texts, attachments or {}
         )
         self._messages = row_encoding.message_template(_BLOCK_ROWS, len(columns))
-        self._pending_rows, self._last_flush = 0, time.monotonic()
+        self._pending_rows = 0
+        self._last_flush = time.monotonic()
         self._chunks: list[mcap.Chunk] = []
         self.rows = 0
         """Rows that are written."""
@@ -120,7 +123,8 @@ class RecordingWriter:
         if not self._pending_rows:
             return
         rows = self._messages[: self._pending_rows]
-        logged, size = rows["logged"], np.uint64(rows.dtype.itemsize)
+        logged = rows["logged"]
+        size = np.uint64(rows.dtype.itemsize)
         index = np.stack([logged, np.arange(len(rows), dtype=np.uint64) * size], axis=1)
         times = int(logged[0]), int(logged[-1])
         data = rows.view(np.uint8).data

@@ -70,7 +70,8 @@ def critical_speed_text(analysis: Analysis) -> str:
 
 def thrust_text(analysis: Analysis) -> str:
     """Return the mean thrust on a straight scan as text."""
-    thrust, surface = analysis.leak.thrust, analysis.surface
+    thrust = analysis.leak.thrust
+    surface = analysis.surface
     if surface.law.stateful:
         return "not defined: friction resists in any case"
     if thrust is None:
@@ -82,7 +83,9 @@ def thrust_text(analysis: Analysis) -> str:
 
 def leak_facts(analysis: Analysis) -> list[tuple[str, str]]:
     """Return names and values of the worst loop."""
-    leak, density, line = analysis.leak, analysis.curl_density, analysis.leak.line
+    leak = analysis.leak
+    density = analysis.curl_density
+    line = analysis.leak.line
     x, y = (float(part) + 0.0 for part in line.direction)
     start = ", ".join(f"{1e3 * float(part) + 0.0:.6g}" for part in line.start)
     plane = f"vertical, along ({x:.6g}, {y:.6g}) through ({start}) mm"
@@ -106,7 +109,8 @@ def leak_facts(analysis: Analysis) -> list[tuple[str, str]]:
 
 def merit_facts(analysis: Analysis) -> list[tuple[str, str]]:
     """Return strength, support and force on the scan that compares laws."""
-    scan, surface = analysis.merit, analysis.surface
+    scan = analysis.merit
+    surface = analysis.surface
     unit = "" if surface.texture.scan_line().periodic else " m"
     facts = [
         ("strength T", f"{number_text.merit_text(scan.strength)}{unit}"),
@@ -124,7 +128,8 @@ def merit_facts(analysis: Analysis) -> list[tuple[str, str]]:
 
 def bounds_table(analysis: Analysis) -> Table:
     """Return one row per number: lower, upper, method and the point that attains lower."""
-    bounds, density = _computed_bounds(analysis), analysis.curl_density
+    bounds = _computed_bounds(analysis)
+    density = analysis.curl_density
     if density is not None and density.upper > 0.0:
         bounds.append(("|curl f| [N/m]", density))
     rows = []
@@ -179,7 +184,8 @@ def analysis_page(analysis: Analysis, texture_code: str = "") -> page.Page:
             :func:`reproduction_lines`.
     """
     code = "\n".join(reproduction_lines(analysis, texture_code))
-    surface, name = analysis.surface, analysis.device.name
+    surface = analysis.surface
+    name = analysis.device.name
     return page.Page(
         title=f"{texture_name(surface.texture)}, law {surface.law.letter}, on the {name}",
         answer=analysis.answer,
@@ -230,7 +236,8 @@ def _bounds_section(analysis: Analysis) -> Section:
 
 def _criteria_sections(analysis: Analysis) -> list[Section]:
     """Return the criteria for a page, and in short for a terminal."""
-    passivity, table = analysis.passivity, criteria_table(analysis.passivity)
+    passivity = analysis.passivity
+    table = criteria_table(analysis.passivity)
     title = f"Passive on the {analysis.device.name}?"
     marked = [replace(one, cells=["→" if one.kind else "", *one.cells]) for one in table.rows]
     layout = TableLayout(wrap=(1,), max_widths={1: 18}, omit=(6,))
@@ -256,7 +263,8 @@ def _continuity_section(analysis: Analysis) -> Section:
 
 def _figure_sections(analysis: Analysis, *names: str) -> list[Section]:
     """Return the figures of these names that the analysis has."""
-    sections, leak = [], analysis.leak
+    sections = []
+    leak = analysis.leak
     gained = number_text.range_text(leak.energy, leak.upper_per_period, "J")
     values: dict[str, object] = {
         "letter": analysis.surface.law.letter,
@@ -309,13 +317,16 @@ def reproduction_lines(analysis: Analysis, texture_code: str = "") -> list[str]:
 
 def _evaluate_witness(analysis: Analysis) -> tuple[np.ndarray, float, str] | None:
     """Return the point of the evaluation, its value and a remark; ``None`` without a witness."""
-    surface, q = analysis.surface, analysis.q
+    surface = analysis.surface
+    q = analysis.q
     if q.at is None:
         return None
-    at, remark = np.array(q.at), ""
+    at = np.array(q.at)
+    remark = ""
     if math.isinf(q.lower):
         closest = surface.texture.nearest(at[None])[0]
-        at, remark = at + _ONSET_OFFSET * (closest - at), f": {_UNBOUNDED_TEXT}"
+        at = at + _ONSET_OFFSET * (closest - at)
+        remark = f": {_UNBOUNDED_TEXT}"
     state = () if q.deflection is None else (np.array([q.deflection]), np.array([q.sliding]))
     jacobian = surface.jacobian(at[None], *state)[0]
     return at, float(np.linalg.norm(jacobian, 2)) / surface.stiffness, remark

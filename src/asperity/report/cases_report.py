@@ -23,7 +23,8 @@ _LEFT_OUT = "Failed cases and unbounded values are left out."
 
 def sweep_page(result: SweepResult) -> Page:
     """Return the report of a sweep."""
-    plan, failed = result.plan, len(result.errors)
+    plan = result.plan
+    failed = len(result.errors)
     keys = ", ".join(plan.column(key) for key in plan.arguments)
     count = "1 case fails" if failed == 1 else f"{failed or 'no'} cases fail"
     table = _range_table(result)

@@ -64,7 +64,8 @@ def comparison_page(comparison: Comparison, full: bool = False) -> Page:
 
 
 def _facts(comparison: Comparison) -> list[tuple[str, str]]:
-    texture, device = comparison.texture, comparison.device
+    texture = comparison.texture
+    device = comparison.device
     return [
         ("Surface", describe_texture(texture.describe())),
         ("Peak to valley", format_quantity(texture.peak_to_valley, "m")),
@@ -152,8 +153,10 @@ def cases_table(comparisons: DeviceComparisons) -> Table:
 
 def comparisons_page(comparisons: DeviceComparisons) -> Page:
     """Return the report: the table, then each device and depth with its laws and assumptions."""
-    texture, missing = comparisons.texture, [one.sentence for one in comparisons.missing_data]
-    cases, table = comparisons.comparisons, cases_table(comparisons)
+    texture = comparisons.texture
+    missing = [one.sentence for one in comparisons.missing_data]
+    cases = comparisons.comparisons
+    table = cases_table(comparisons)
     answers = [f"{_case_title(one)}: {one.recommendation}" for one in cases]
     common = [
         sentence
@@ -195,7 +198,8 @@ def _case_section(comparison: Comparison) -> Section:
 
     rows = law_rows(comparison, cells)
     table = Table(("law", "start at", "felt?", "verdict"), rows, (1,))
-    answer, assumptions = comparison.recommendation, comparison.assumptions
+    answer = comparison.recommendation
+    assumptions = comparison.assumptions
     return Section(
         _case_title(comparison), [page.Paragraph(answer), table, page.BulletList(assumptions)]
     )

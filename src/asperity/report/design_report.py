@@ -45,8 +45,11 @@ def _lost_table(result: Design) -> Table:
 
 def design_answer(result: Design) -> str:
     """Return the design, and whether it meets the target, in a few sentences."""
-    row, texture, target = result.row, result.comparison.texture, result.target
-    k, felt = format_quantity(row.surface.stiffness, "N/m", 4), row.perceptibility
+    row = result.row
+    texture = result.comparison.texture
+    target = result.target
+    k = format_quantity(row.surface.stiffness, "N/m", 4)
+    felt = row.perceptibility
     height = format_quantity(texture.peak_to_valley, "m")
     way = "as high" if texture.single_wave is not None else "as large"
     unit = f"{target.measure} at the {target.at}"

@@ -62,7 +62,8 @@ def devices_page(devices: Sequence[Device], *, detailed: bool = False) -> Page:
 
 def _devices_table(devices: Sequence[Device]) -> Table:
     """Return one row per device, the first column its id alone."""
-    rows, columns = [], table_data("devices")
+    rows = []
+    columns = table_data("devices")
     for device in devices:
         texts = [datum_text(device.data.get(field)) for field in columns.values()]
         rows.append(Row([Cell(device.id, "l"), device.name, *texts]))
@@ -100,7 +101,8 @@ def device_numbers_table(device: Device, fields: Sequence[str]) -> Table:
     """
     rows = []
     for field in fields:
-        name, datum = readable_name(field), device.data.get(field)
+        name = readable_name(field)
+        datum = device.data.get(field)
         if datum is None:
             missing = Cell("not known", "open")
             rows.append(Row([name, "", missing, FIELD_TABLE[field].description]))

@@ -50,7 +50,8 @@ def envelope_page(result: Envelope) -> page.Page:
 
 
 def _answer(one: DeviceEnvelope) -> str:
-    law, largest = one.widest, max(one.laws, key=lambda other: other.decades)
+    law = one.widest
+    largest = max(one.laws, key=lambda other: other.decades)
     if not law.decades:
         return f"{one.device.name} renders no sinusoid with these laws."
     lengths = [border.wavelength for border in law.borders if border.decades]
@@ -109,7 +110,8 @@ def write_envelope(result: Envelope, path: str) -> None:
     if suffix in page.FIGURE_SUFFIXES:
         content = page.figure_bytes(result, suffix)
     else:
-        text, rows = io.StringIO(), result.table_rows()
+        text = io.StringIO()
+        rows = result.table_rows()
         writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
         writer.writeheader()
         writer.writerows(rows)

@@ -19,7 +19,9 @@ from asperity.report.sentences.number_text import (
 from asperity.report.sentences.texts import glossary, sentence, table_data, table_notes
 
 _LIMIT_HEADINGS = ("", "limit", "condition", "left", "right", "holds", "for", "at speeds")
-_NAME_COLUMN, _SHARE_COLUMN, _SPEEDS_COLUMN = 1, 6, 7
+_NAME_COLUMN = 1
+_SHARE_COLUMN = 6
+_SPEEDS_COLUMN = 7
 _WIDE_CONSOLE = 96
 """Console width [characters] from which names have one line and shares are shown."""
 _LIMITS_LAYOUT = TableLayout(
@@ -99,7 +101,8 @@ def _waves_table(result: limit_result.Limits, *, short: bool) -> Table:
 
 def symbol_lines(result: limit_result.Limits) -> list[str]:
     """Return the symbols of the limits with their values."""
-    device, surface = result.device, result.surface
+    device = result.device
+    surface = result.surface
     values = []
     for symbol, field in table_data("symbols").items():
         if field in device.data:
@@ -108,7 +111,8 @@ def symbol_lines(result: limit_result.Limits) -> list[str]:
             values.append(f"{symbol} = {text}{'' if datum.verified else ' (not verified)'}")
     q = INFINITY_SIGN if result.gain.value == float("inf") else f"{result.gain.value:.4g}"
     numbers = ", ".join(values) or "no data"
-    speed, stiffness = speed_text(result.speed), limit_result.stiffness_text(result)
+    speed = speed_text(result.speed)
+    stiffness = limit_result.stiffness_text(result)
     return [
         sentence("symbols", speed=speed, limits=result, device=device.name, numbers=numbers),
         sentence("gain_symbol", law=surface.law.letter, stiffness=stiffness, limits=result, q=q),
@@ -119,7 +123,9 @@ def limits_page(result: limit_result.Limits) -> page.Page:
     """Return the report: answer, limits, figure, waves and assumptions."""
     fields = [*dict.fromkeys(limit.device_field for limit in result.limits), "friction"]
     notes = [*symbol_lines(result), *table_notes("limits")]
-    limits, surface, name = [six_limits_table(result)], result.surface, result.device.name
+    limits = [six_limits_table(result)]
+    surface = result.surface
+    name = result.device.name
     return page.Page(
         title=f"Limits of {texture_name(surface.texture)}, law {surface.law.letter}, on the {name}",
         answer=result.answer,
@@ -139,7 +145,8 @@ def limits_page(result: limit_result.Limits) -> page.Page:
 
 
 def _facts(result: limit_result.Limits) -> list[tuple[str, str]]:
-    texture, law = result.texture, result.surface.law
+    texture = result.texture
+    law = result.surface.law
     perceptibility = result.perceptibility
     return [
         ("Surface", str(texture.describe()["kind"])),
@@ -155,7 +162,8 @@ def _facts(result: limit_result.Limits) -> list[tuple[str, str]]:
 
 def _figure_section(result: limit_result.Limits) -> Section:
     met = sum(all(wave.holds.values()) for wave in result.waves)
-    figure, media = page.plot_later(result), Media.HTML | Media.NOTEBOOK
+    figure = page.plot_later(result)
+    media = Media.HTML | Media.NOTEBOOK
     count = len(result.waves)
     return page.figure_section("limits.waves", figure, media=media, count=count, met=met)
 

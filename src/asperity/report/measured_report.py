@@ -41,9 +41,11 @@ def stages_table(stages: Sequence[PreparationStage]) -> Table:
     """Return the parameters after each step, and what it removed; one unit per column."""
     kinds = "/".join(dict.fromkeys(next(iter(stage.values))[0] for stage in stages))
     columns = [("after", [Cell(stage.name, "l") for stage in stages])]
-    keys, legend = [""], {}
+    keys = [""]
+    legend = {}
     for index, symbol in enumerate(stages[-1].values):
-        parameter, name = find_parameter(symbol), kinds + symbol[1:]
+        parameter = find_parameter(symbol)
+        name = kinds + symbol[1:]
         numbers = [list(stage.values.values())[index] for stage in stages]
         legend[len(columns)] = (name, parameter.description)
         columns.append(_number_column(name, parameter, numbers))
@@ -71,9 +73,11 @@ def _number_column(
     name: str, parameter: SurfaceParameter, values: Sequence[float | None]
 ) -> _Column:
     """Return a column of values in their best unit, its heading broken into lines."""
-    unit, size = "", 1.0
+    unit = ""
+    size = 1.0
     if parameter.symbol == "Sdr":
-        unit, size = "%", 0.01
+        unit = "%"
+        size = 0.01
     elif parameter.unit:
         unit, size = _choose_unit(values)
     texts = [NOT_AVAILABLE if value is None else decimal_text(value / size) for value in values]
@@ -129,11 +133,13 @@ def measured_sections(texture: Texture) -> list[Section]:
     """Return the section of the parameters of a measured surface; none for other textures."""
     if not texture.history:
         return []
-    table, more = stages_table(texture.history), "More: asperity show."
+    table = stages_table(texture.history)
+    more = "More: asperity show."
     if text := roughness_text(texture.history):
         return [Section("Surface parameters", [table], text, [more])]
     parts = get_or_compute("parts", texture.digest, lambda: _compute_parts(texture))
-    blocks, notes = [table, parts_table(parts)], [parts_text(parts), more]
+    blocks = [table, parts_table(parts)]
+    notes = [parts_text(parts), more]
     return [Section("Surface parameters", blocks, texture_text(parts), notes)]
 
 
@@ -160,7 +166,8 @@ def roughness_text(history: Sequence[PreparationStage]) -> str:
     if not history or (nesting := history[-1].nesting) is None:
         return ""
     symbol, rms = next(iter(history[-1].values.items()))
-    rms_text, nesting_text = format_quantity(rms or 0.0, "m"), format_quantity(nesting, "m")
+    rms_text = format_quantity(rms or 0.0, "m")
+    nesting_text = format_quantity(nesting, "m")
     return sentence("roughness", symbol=symbol, rms=rms_text, nesting=nesting_text)
 
 
@@ -189,7 +196,8 @@ def surface_summary_text(prepared: PreparedSurface) -> str:
 
 def lay_text(summary: MeasurementSummary) -> str:
     """Return autocorrelation length and texture aspect ratio as text; empty for a profile."""
-    heights, (length, ratio) = summary.prepared.heights, summary.correlation
+    heights = summary.prepared.heights
+    (length, ratio) = summary.correlation
     if heights.ndim == 1:
         return ""
     if heights.size > MAX_CORRELATION_POINTS:
@@ -207,7 +215,8 @@ def lay_text(summary: MeasurementSummary) -> str:
 
 def surface_summary_page(summary: MeasurementSummary) -> page.Page:
     """Return the report: parameters, parts, and the surface before and after each step."""
-    prepared, title = summary.prepared, "After each step"
+    prepared = summary.prepared
+    title = "After each step"
     definitions = [_parameter_definitions(prepared.history)] if prepared.history else []
     sections = [
         page.terminal_section(page.Paragraph(surface_summary_text(prepared))),
@@ -229,7 +238,8 @@ def surface_summary_page(summary: MeasurementSummary) -> page.Page:
 def _answer(summary: MeasurementSummary) -> str:
     if summary.parts is not None:
         return texture_text(summary.parts)
-    prepared, nesting = summary.prepared, summary.prepared.history[-1].nesting
+    prepared = summary.prepared
+    nesting = summary.prepared.history[-1].nesting
     warning = short_trace_text(prepared.heights.shape, prepared.pitch, nesting or 0.0)
     warning = f" {warning[:1].upper()}{warning[1:]}." if warning else ""
     return f"{roughness_text(prepared.history)}{warning}"
@@ -261,10 +271,12 @@ def _step_sections(prepared: PreparedSurface) -> list[Section]:
 
 
 def _parts_sections(summary: MeasurementSummary) -> list[Section]:
-    lay, media = [text for text in [lay_text(summary)] if text], SCREEN | Media.NOTEBOOK
+    lay = [text for text in [lay_text(summary)] if text]
+    media = SCREEN | Media.NOTEBOOK
     if summary.parts is None:
         return [Section("Lay", [], notes=lay, media=media)] if lay else []
-    notes, table = [parts_text(summary.parts), *lay], parts_table(summary.parts)
+    notes = [parts_text(summary.parts), *lay]
+    table = parts_table(summary.parts)
     return [Section("Form, waviness and texture", [table], notes=notes, media=media)]
 
 
@@ -281,7 +293,8 @@ def _figure_sections(summary: MeasurementSummary) -> list[Section]:
         title = change.stage.name[0].upper() + change.stage.name[1:]
         removed = change.before - change.after
         maps = {"before": change.before, "after": change.after, "removed": removed}
-        figure, text = partial(_draw_heights, maps, change.sides), f"{title}. {caption}."
+        figure = partial(_draw_heights, maps, change.sides)
+        text = f"{title}. {caption}."
         level = 3 if number else 2
         sections.append(page.picture_section(title, figure, text, caption, level=level))
     return sections
@@ -297,7 +310,8 @@ def removed_text(stage: PreparationStage) -> str:
     """Return what a step removed: "12.3 nm RMS, range 1.2 µm"."""
     if stage.removed is None:
         return "nothing"
-    rms, span = format_quantity(stage.removed.rms, "m"), format_quantity(stage.removed.range, "m")
+    rms = format_quantity(stage.removed.rms, "m")
+    span = format_quantity(stage.removed.range, "m")
     return f"{rms} RMS, range {span}"
 
 
@@ -324,5 +338,6 @@ def thin_sections(texture: Texture) -> list[Section]:
 
     depth = format_quantity(texture.depth_limit, "m")
     half = format_quantity(texture.thin_regions[0].half_thickness, "m")
-    figure, count = partial(thin_parts_figure, texture, texture.thin_map), len(texture.thin_regions)
+    figure = partial(thin_parts_figure, texture, texture.thin_map)
+    count = len(texture.thin_regions)
     return [page.figure_section("field.thin", figure, depth=depth, count=count, half=half)]

@@ -81,7 +81,8 @@ def _hidden_columns(table: pages.Table, width: int) -> set[int]:
 
 def _dropped_columns(table: pages.Table, width: int) -> set[int]:
     """Return the columns of the drop order to leave out, so that the others fit uncut."""
-    order, gap = table.layout.drop_order, table.layout.gap + 1
+    order = table.layout.drop_order
+    gap = table.layout.gap + 1
     if not order:
         return set()
     cells = [table.headings, *(row.cells for row in table.rows)]
@@ -97,7 +98,8 @@ def _dropped_columns(table: pages.Table, width: int) -> set[int]:
 
 def rich_table(table: pages.Table, width: int) -> RichTable:
     """Return a table for a console of a width [characters], without tooltips and details."""
-    layout, headings = table.layout, table.headings or [""] * len(table.rows[0].cells)
+    layout = table.layout
+    headings = table.headings or [""] * len(table.rows[0].cells)
     columns = sorted(set(range(len(headings))) - _hidden_columns(table, width))
     is_limited = layout.max_widths_below is None or width < layout.max_widths_below
     max_widths = layout.max_widths if is_limited else {}

@@ -75,7 +75,8 @@ def _texture_page(result: Texture) -> Page:
 
 @find_page.register
 def _surface_page(result: Surface) -> Page:
-    law, texture = result.law, describe_texture(result.texture.describe())
+    law = result.law
+    texture = describe_texture(result.texture.describe())
     stiffness = format_quantity(result.stiffness, "N/m")
     depth = format_quantity(result.max_depth, "m")
     name = f"law {law.letter}, {readable_name(law.name)}"

@@ -153,7 +153,8 @@ def run(
     """
     loaded = as_scene(scene)
     chosen = load_device(device or loaded.device or DEFAULT_DEVICE)
-    surface, note = {"clamp": BACKED.name, **loaded.surface, **surface_arguments}, ""
+    surface = {"clamp": BACKED.name, **loaded.surface, **surface_arguments}
+    note = ""
     if not {"law", "stiffness"} <= surface.keys() and "hand" not in loaded.loop:
         surface, note = recommend_law_and_stiffness(loaded.texture, chosen, surface)
     loaded = replace(loaded, surface=surface)

@@ -39,13 +39,16 @@ def load_recorded_scene(recording: Recording) -> tuple[Scene, tuple[str, ...]]:
     surface = recorded_surface_on(recording, recorded_texture(recording))
     numbers = {"stiffness": surface.stiffness, "max_depth": surface.max_depth}
     clamp = {"clamp": surface.clamp} if surface.law.clampable else {}
-    metadata, notes = recording.metadata, [*describe_changes(recording, surface.law)]
-    device, servo = _parse_device(metadata), _parse_servo(metadata)
+    metadata = recording.metadata
+    notes = [*describe_changes(recording, surface.law)]
+    device = _parse_device(metadata)
+    servo = _parse_servo(metadata)
     if device is None:
         notes.append("The recording names no known device; the default one is simulated")
     elif metadata.get("driver", SIMULATED_DRIVER) == SIMULATED_DRIVER:
         device = _with_servo(device, servo)  # a real device has its own servo
-    hand, run = hand_section(metadata.get("hand")), run_section(metadata.get("plant"), servo)
+    hand = hand_section(metadata.get("hand"))
+    run = run_section(metadata.get("plant"), servo)
     if not hand:
         notes.append("The recording has no hand that can be simulated; the default one is")
     values = {"law": surface.law, **numbers, **clamp, **surface.law_parameters}
@@ -67,7 +70,8 @@ def _parse_device(metadata: Mapping[str, Any]) -> Device | None:
 
 def _with_servo(device: Device, servo: Servo) -> Device:
     """Return a device with the numbers of a servo that differ from its own."""
-    own, changed = make_servo(device)[0], {}
+    own = make_servo(device)[0]
+    changed = {}
     for field, name in _SERVO_FIELDS.items():
         value = float(getattr(servo, name))
         if value != getattr(own, name) and math.isfinite(value):

@@ -110,7 +110,8 @@ def make_servo(device: Device, *, uses_delay: bool = True) -> tuple[Servo, list[
         device: the device.
         uses_delay: whether the device's delay is used; if not, no assumption is made about it.
     """
-    rate, notes = device.value("update_rate"), []
+    rate = device.value("update_rate")
+    notes = []
     if rate is None:
         rate = DEFAULT_RATE
         notes.append(f"The update rate of {device.name} is not known; {rate:g} Hz is simulated")
@@ -125,8 +126,10 @@ def make_servo(device: Device, *, uses_delay: bool = True) -> tuple[Servo, list[
 DEFAULT_STROKE_DURATION = 10.0
 """Default length of a run [s] for a surface without a scene."""
 _ASSUMED_MASS = 0.1  # [kg], if the apparent mass is unknown
-_LATERAL_STIFFNESS, _HAND_VALUES = "300 N/m", {"damping": "3 N*s/m", "mass": "50 g"}
-_STROKE, _SPEED = 10e-3, 0.05  # [m], [m/s]
+_LATERAL_STIFFNESS = "300 N/m"
+_HAND_VALUES = {"damping": "3 N*s/m", "mass": "50 g"}
+_STROKE = 10e-3  # [m], [m/s]
+_SPEED = 0.05
 _DEPTH_FRACTION = 0.8  # depth of the anchor over max_depth, which bounds that of the hand
 
 

@@ -119,7 +119,8 @@ def read_sections(
         ParameterError: if it cannot be read, has an unknown section or something else than
             sections, or names code.
     """
-    content, known = read_toml(argument, path), (*own, *SECTIONS)
+    content = read_toml(argument, path)
+    known = (*own, *SECTIONS)
     _reject_code(content)
     for name in content:
         if name not in known:

@@ -38,7 +38,8 @@ def scene_template(name: str = "scene.toml") -> str:
     names = {argument.name for argument in sinusoid}
     others = [argument for argument in SYNTHETIC_ARGUMENTS if argument.name not in names]
     texture = _kind_line("sinusoid", TEXTURE_KINDS, "asperity surfaces lists their arguments")
-    hand, motion = _kind_line("spring", HANDS), _kind_line("strokes", MOTIONS)
+    hand = _kind_line("spring", HANDS)
+    motion = _kind_line("strokes", MOTIONS)
     return _TEMPLATE.read_text("utf-8").format(
         name=name,
         texture=texture + _argument_lines((*sinusoid, *others), _TEXTURE),

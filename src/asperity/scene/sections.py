@@ -138,7 +138,8 @@ MOTIONS: dict[str, SectionKind] = {
 RUN_ARGUMENTS = _read("run")
 """Arguments of [run]."""
 _RUN = {argument.name: argument for argument in RUN_ARGUMENTS}
-DURATION, BRAKES = _RUN["duration"], _RUN["brakes"]
+DURATION = _RUN["duration"]
+BRAKES = _RUN["brakes"]
 
 
 def build_section(

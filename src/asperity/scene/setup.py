@@ -184,7 +184,8 @@ def make_setup(
     limits = parse_arguments("servo", scene.loop.get("servo", {}), safety.ARGUMENTS)
     chosen = device or scene.device or load_device(DEFAULT_DEVICE)
     needs_plant = not hand.is_prescribed
-    brakes, share = run.pop("brakes", None), run.pop("velocity_share", None)
+    brakes = run.pop("brakes", None)
+    share = run.pop("velocity_share", None)
     plant, assumed = scene_defaults.make_plant(
         chosen, centre=run.pop("centre", None), has_resonance=run.pop("resonance", False),
         brakes=brakes, needs_dynamics=needs_plant,

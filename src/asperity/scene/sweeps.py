@@ -30,7 +30,8 @@ from asperity.simulation.scan import Stroke, scan_strokes
 DEFAULT_DELAYS = tuple(range(6))  # [samples]
 DEFAULT_SPEEDS = (0.02, 0.05, 0.1, 0.2)  # m/s
 DEFAULT_STROKES = 5
-DEFAULT_STARTS, DEFAULT_TOLERANCE = 12, 0.05
+DEFAULT_STARTS = 12
+DEFAULT_TOLERANCE = 0.05
 
 
 ResultT = TypeVar("ResultT")
@@ -82,7 +83,8 @@ def sweep_onsets(
         ParameterError: the hand does not come to rest, see
             :func:`~asperity.simulation.find_onset`.
     """
-    cancelled, delays = Event(), check_items("delays", delays)
+    cancelled = Event()
+    delays = check_items("delays", delays)
 
     def check_cancelled() -> None:
         if cancelled.is_set():

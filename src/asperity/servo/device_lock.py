@@ -24,7 +24,8 @@ def lock_device(driver: Driver) -> Iterator[None]:
     Raises:
         ParameterError: if another loop uses it; the message names that program.
     """
-    kind, device = driver.name, driver.device_name
+    kind = driver.name
+    device = driver.device_name
     names = [kind, f"{kind}:{device}"] if device else [kind]
     with ExitStack() as stack:
         for name in names if driver.has_moving_handle else ():
@@ -61,7 +62,8 @@ def _lock(file: int, *, shared: bool) -> None:
 
 def _supervisor() -> str:
     """Return number and command of the process that supervises this one."""
-    number, command = os.getppid(), b""
+    number = os.getppid()
+    command = b""
     with suppress(OSError):
         command = Path(f"/proc/{number}/cmdline").read_bytes()
     words = " ".join(command.decode(errors="replace").split("\0")).strip()

@@ -117,10 +117,8 @@ def function_address(function: Any) -> int:
 def system_clock() -> Clock:
     """Return the system's clock."""
     library = ctypes.CDLL(None)
-    gettime, sleep = (
-        function_address(library.clock_gettime),
-        function_address(library.clock_nanosleep),
-    )
+    gettime = function_address(library.clock_gettime)
+    sleep = function_address(library.clock_nanosleep)
     return Clock(gettime, sleep, np.zeros(2, np.int64))
 
 
@@ -148,9 +146,13 @@ class DriverLoop:
         self, driver: Driver, servo: Servo, safety: Safety, reach: float, block: SharedBlock,
         clock: Clock,
     ) -> None:  # fmt: skip
-        self._servo, self._safety, self._reach = servo, safety, reach
+        self._servo = servo
+        self._safety = safety
+        self._reach = reach
         self._frame: FloatArray = driver.frame.matrix
-        self._block, self._clock, self._placeholder = block, clock, driver.placeholder_record()
+        self._block = block
+        self._clock = clock
+        self._placeholder = driver.placeholder_record()
         self.state = LoopState()
         self.search_state = new_warm_start(UNLIMITED)
 
@@ -266,7 +268,9 @@ class _LoopServer:
     """A running loop, and the thread that compiles the next surface for it."""
 
     def __init__(self, connection: Connection, memory: LoopMemory, job: LoopJob) -> None:
-        self._connection, self._job, self._memory = connection, job, memory
+        self._connection = connection
+        self._job = job
+        self._memory = memory
         self._block = memory.block()
         # A device that follows another loop waits for each of its samples.
         clock = no_clock() if job.driver.follows else system_clock()
@@ -286,9 +290,11 @@ class _LoopServer:
         try:
             threading.Thread(target=self._receive_programs, daemon=True).start()
             self._connection.send(("ready", request_realtime_priority()))
-            cause, code = EndReason.SWAP, 0
+            cause = EndReason.SWAP
+            code = 0
             while cause is EndReason.SWAP:
-                self._program, self._block.swap[0] = self._next_program, 0
+                self._program = self._next_program
+                self._block.swap[0] = 0
                 cause, code = self._loop.run(self._program, device, self._job.end_sample)
                 self._loop.reset_contact()
         finally:
@@ -306,7 +312,8 @@ class _LoopServer:
                 except Exception as error:  # on any error the current surface goes on
                     self._connection.send(("refused", f"{type(error).__name__}: {error}"))
                     continue
-                self._next_program, self._block.swap[0] = program, 1
+                self._next_program = program
+                self._block.swap[0] = 1
                 self._connection.send(("loaded", None))
         self._memory.request_stop(now=True)
 

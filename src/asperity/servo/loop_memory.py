@@ -68,7 +68,8 @@ class LoopMemory:
 
     def rows(self, first_row: int) -> tuple[FloatArray, int]:
         """Return the available rows from a number on, and the number of the first."""
-        table, count = self.block().rows, self.row_count
+        table = self.block().rows
+        count = self.row_count
         first_row = max(first_row, count - len(table))
         rows = table[np.arange(first_row, count) % len(table)]
         # The row after the newest may be half written: it counts as overwritten.
@@ -107,7 +108,8 @@ class LoopStatistics(Serializable):
     def from_status(cls, status: Sequence[int]) -> LoopStatistics:
         """Return the statistics of the words of a loop, see :mod:`asperity.loop.shared_trace`."""
         rows, late, skipped, lateness, forces, slews, deep = status[: words.LAST_START_TIME]
-        first, second = words.LATENESS_HISTOGRAM, words.PERIOD_HISTOGRAM
+        first = words.LATENESS_HISTOGRAM
+        second = words.PERIOD_HISTOGRAM
         histograms = tuple(status[first:second]), tuple(status[second : words.STATUS_SIZE])
         return cls(rows, late, skipped, 1e-9 * lateness, forces, slews, deep, *histograms)
 
@@ -128,7 +130,8 @@ class LoopStatistics(Serializable):
 
 def _quantile(histogram: tuple[int, ...], fraction: float) -> float:
     """Return the upper end of the bin that completes a share of the counts [s]; 0 for none."""
-    target, total = fraction * sum(histogram), 0
+    target = fraction * sum(histogram)
+    total = 0
     for exponent, count in enumerate(histogram):
         total += count
         if count and total >= target:

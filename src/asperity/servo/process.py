@@ -113,7 +113,9 @@ class ServoProcess:
         device: Device | None = None, prestarted: PrestartedProcess | None = None,
     ) -> None:  # fmt: skip
         require_max_force(driver, servo)
-        self.driver, self._safety, self._device = driver, safety or Safety(), device
+        self.driver = driver
+        self._safety = safety or Safety()
+        self._device = device
         if device is not None:
             check_passivity_damping(self._safety, device, servo)
         last = driver_loop.NO_END if duration is None else round(duration / servo.period)
@@ -126,8 +128,11 @@ class ServoProcess:
         self._prestarted = prestarted
         self.memory = LoopMemory() if prestarted is None else prestarted.memory
         self.notes: tuple[str, ...] = ()
-        self._end_reason, self._driver_message = EndReason.RUNNING, ""
-        self._last_row_count, self._last_progress, self._was_released = 0, 0.0, False
+        self._end_reason = EndReason.RUNNING
+        self._driver_message = ""
+        self._last_row_count = 0
+        self._last_progress = 0.0
+        self._was_released = False
         self._heartbeat_stop = threading.Event()
 
     def __enter__(self) -> Self:
@@ -142,7 +147,8 @@ class ServoProcess:
             DeviceFault: if the process ends or hangs.
         """
         self._prestarted = self._prestarted or PrestartedProcess(self.memory)
-        self._connection, self.process = self._prestarted.connection, self._prestarted.process
+        self._connection = self._prestarted.connection
+        self.process = self._prestarted.process
         threading.Thread(target=self._send_heartbeats, daemon=True).start()
         try:
             self._connection.send(_pickle(self._job))
@@ -271,9 +277,11 @@ class ServoProcess:
         except (EOFError, OSError):
             if self._end_reason is EndReason.RUNNING:
                 self._end_reason = EndReason.DIED
-        now, count = time.monotonic(), self.memory.row_count
+        now = time.monotonic()
+        count = self.memory.row_count
         if count != self._last_row_count:
-            self._last_row_count, self._last_progress = count, now
+            self._last_row_count = count
+            self._last_progress = now
         elif (
             self._end_reason is EndReason.RUNNING
             and now - self._last_progress > self._safety.silence
@@ -363,7 +371,9 @@ class LoopRecorder:
         about: dict[str, Any] = {"made_by": "run", "surface": field_metadata(surface)}
         about |= {"servo": to_plain_data(servo), "every": 1, **metadata}
         self._what = path, COLUMNS, about, field_attachments(surface), "record"
-        self._loop, self._next_row, self.lost_rows = loop, 0, 0
+        self._loop = loop
+        self._next_row = 0
+        self.lost_rows = 0
 
     def write_new_rows(self) -> None:
         """Write the rows that are new.

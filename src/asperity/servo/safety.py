@@ -19,7 +19,8 @@ from asperity.surface import Surface
 
 DEFAULT_RISE_TIME = 5e-3
 """Time for the force to rise from zero to its maximum, unless a slew limit is given [s]."""
-LATE_PERIODS, MIN_LATENESS = 10, 0.02
+LATE_PERIODS = 10
+MIN_LATENESS = 0.02
 """Time for which the loop may be late unless one is given: in periods, and at least [s]."""
 REACH_FACTOR = 1.5
 """Largest distance of a reading, over the radius of the device's workspace."""
@@ -108,7 +109,8 @@ def check_passivity_damping(safety: Safety, device: Device, servo: Servo) -> Non
     Raises:
         ParameterError: for a damping above the bound, or a device whose mass is not known.
     """
-    mass, given = device.value("apparent_mass"), safety.passivity_damping
+    mass = device.value("apparent_mass")
+    given = safety.passivity_damping
     if not given:
         return
     if mass is None:
@@ -146,7 +148,8 @@ def excess_stiffness_reason(surface: Surface, device: Device, *, keeps_margin: b
     """
     q = characteristic_number(surface)
     recommended = recommend_stiffness(surface, device, q, one_sided_number(surface))
-    basis, allowed = recommended.stability_limit.basis, recommended.stability_limit.stiffness
+    basis = recommended.stability_limit.basis
+    allowed = recommended.stability_limit.stiffness
     allowed = recommended.stiffness if keeps_margin else allowed
     context = f"for law {surface.law.letter} on {device.id}"
     if not allowed:

@@ -83,8 +83,11 @@ class Trajectory:
         self, state: FloatArray, offset: FloatArray, stiffness: float, delay: int,
         max_evaluations: float, stop_rule: StopRule,
     ) -> None:  # fmt: skip
-        self.initial_state, self.offset, self.stiffness = state, offset, float(stiffness)
-        self.delay, self._stop_rule = simulate.check_delay(delay), stop_rule
+        self.initial_state = state
+        self.offset = offset
+        self.stiffness = float(stiffness)
+        self.delay = simulate.check_delay(delay)
+        self._stop_rule = stop_rule
         self.max_evaluations = max_evaluations
         self.verdict: bool | None = None
         self.next_evaluation = next(stop_rule)
@@ -93,7 +96,8 @@ class Trajectory:
     def reset(self) -> None:
         """Reset to the initial state."""
         self.state = self.initial_state.copy()
-        self.queue, self.ledger = np.zeros((self.delay + 1, 3)), np.zeros(LEDGER_SIZE)
+        self.queue = np.zeros((self.delay + 1, 3))
+        self.ledger = np.zeros(LEDGER_SIZE)
         self.servo_state = np.zeros(batch_loop.SERVO_STATE_SIZE)
         self.memory = new_warm_start(self.max_evaluations)
         self.statistics = np.zeros(batch_loop.STATISTICS_SIZE)
@@ -164,12 +168,17 @@ class BatchSimulation:
         start: ArrayLike | None = None, velocity: ArrayLike | None = None,
     ) -> None:  # fmt: skip
         simulate.check_parts(surface, plant, hand, servo, motion)
-        self._surface, self._plant, self._servo, self._motion = surface, plant, servo, motion
+        self._surface = surface
+        self._plant = plant
+        self._servo = servo
+        self._motion = motion
         origin = motion.at(np.zeros(1))[0]
         self._origin = origin if start is None else check_array("start", start, (3,), "m")
-        self._velocity, self._hand = velocity, hand
+        self._velocity = velocity
+        self._hand = hand
         self._body = sampled_plant(plant, hand, servo)
-        self._anchor, self._anchor_count = np.empty((0, 3)), 0
+        self._anchor = np.empty((0, 3))
+        self._anchor_count = 0
 
     @cached_property
     def _compiled(self) -> ModuleType:

@@ -51,8 +51,10 @@ class Resonance(Serializable):
         self, mass: FloatArray, hand_mass: float
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Return near and far mass [kg], stiffness [N/m] and damping [N s/m] between them."""
-        near, far = (1.0 - self.mass_fraction) * mass, self.mass_fraction * mass + hand_mass
-        omega, reduced = 2.0 * math.pi * self.frequency, near * far / (near + far)
+        near = (1.0 - self.mass_fraction) * mass
+        far = self.mass_fraction * mass + hand_mass
+        omega = 2.0 * math.pi * self.frequency
+        reduced = near * far / (near + far)
         return near, far, omega**2 * reduced, 2.0 * self.damping_ratio * omega * reduced
 
 
@@ -103,10 +105,12 @@ def linear_body(
     """
     e, w, r, s, force, push = np.eye(18).reshape(6, 3, 18)
     near, far, spring, damper = np.asarray(mass) + hand.mass, *np.zeros((3, 3))
-    held, held_rate = e, w
+    held = e
+    held_rate = w
     if resonance is not None:
         near, far, spring, damper = resonance.split_mass(np.asarray(mass), hand.mass)
-        held, held_rate = r, s
+        held = r
+        held_rate = s
     between = spring[:, None] * (r - e) + damper[:, None] * (s - w)
     push = push - np.diag(hand.stiffness) @ held - np.diag(hand.damping) @ held_rate
     dynamics = np.zeros((18, 18))
@@ -115,7 +119,8 @@ def linear_body(
     if resonance is None:
         dynamics[3:6] += push
     else:
-        dynamics[6:9], dynamics[9:12] = s, (push - between) / far[:, None]
+        dynamics[6:9] = s
+        dynamics[9:12] = (push - between) / far[:, None]
     dynamics[3:6] /= near[:, None]
     loss = w.T @ damping @ w + held_rate.T @ np.diag(hand.damping) @ held_rate
     loss += (s - w).T @ np.diag(damper) @ (s - w)
@@ -151,7 +156,8 @@ def integrate(
     Returns:
         e^{AT} - 1 and the symmetric matrix of ∫ zᵀ Q z dt as a form of z(0), (..., n, n).
     """
-    n, zero = dynamics.shape[-1], np.zeros_like(dynamics)
+    n = dynamics.shape[-1]
+    zero = np.zeros_like(dynamics)
     # e^{AT} - 1 = A ∫ e^{At} dt: no difference of nearly equal numbers.
     unit = np.broadcast_to(np.eye(n), dynamics.shape)
     wide = exponential(span * np.block([[dynamics, unit], [zero, zero]]))

@@ -229,8 +229,11 @@ class BandHand(Hand):
 
     def record(self) -> HandRecord:
         """Return the hand as compiled bodies take it."""
-        k, b, zero = float(self.stiffness), float(self.damping), (0.0, 0.0, 0.0)
-        length, rest_length = float(self.length), float(self.rest_length)
+        k = float(self.stiffness)
+        b = float(self.damping)
+        zero = (0.0, 0.0, 0.0)
+        length = float(self.length)
+        rest_length = float(self.rest_length)
         return HandRecord(True, (k, k, k), (b, b, b), zero, length, rest_length)
 
 

@@ -131,7 +131,8 @@ class Strokes(NamedPart):
         strokes = check_array("times", times, (None,), "s") / self.period
         strokes = np.clip(strokes, 0.0, self.count)
         share = 1.0 - np.abs(1.0 - strokes % 2.0)
-        begin, way = np.array(self.start), np.subtract(self.end, self.start)
+        begin = np.array(self.start)
+        way = np.subtract(self.end, self.start)
         return np.asarray(begin + share[:, None] * way)
 
 

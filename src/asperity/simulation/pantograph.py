@@ -141,10 +141,12 @@ class Pantograph(Plant):
 
     def workspace_violation(self, position: FloatArray) -> str:
         """Return why a position [m] is outside the workspace; empty if it is inside."""
-        x, z = self.centre[0] + position[0], self.centre[1] + position[2]
+        x = self.centre[0] + position[0]
+        z = self.centre[1] + position[2]
         if z <= 0.0:
             return f"the handle is behind the motors, at ({x:.4g}, {z:.4g}) m"
-        near, far = self.linkage.proximal, self.linkage.distal
+        near = self.linkage.proximal
+        far = self.linkage.distal
         for name, motor in (("right", 0.0), ("left", -self.linkage.base)):
             reach = float(np.hypot(x - motor, z))
             cosine = (near**2 + far**2 - reach**2) / (2.0 * near * far)
@@ -155,8 +157,12 @@ class Pantograph(Plant):
 
     def describe_exit(self, state: FloatArray) -> str:
         """Return where the handle left the workspace."""
-        x, z, vx, vz = state[0], state[2], state[3], state[5]
-        place, speed = f"({x:.4g}, 0, {z:.4g}) m", f"({vx:.3g}, 0, {vz:.3g}) m/s"
+        x = state[0]
+        z = state[2]
+        vx = state[3]
+        vz = state[5]
+        place = f"({x:.4g}, 0, {z:.4g}) m"
+        speed = f"({vx:.3g}, 0, {vz:.3g}) m/s"
         return f"at {place} with {speed} an arm is almost stretched or folded"
 
     def min_damping(
@@ -168,7 +174,8 @@ class Pantograph(Plant):
         """
         if self.joint_damping == 0.0:
             return 0.0
-        (x0, _, z0), (x1, _, z1) = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
+        (x0, _, z0) = np.asarray(low, dtype=float)
+        (x1, _, z1) = np.asarray(high, dtype=float)
         grid = [
             np.array([x, 0.0, z])
             for x in np.unique(np.linspace(x0, x1, 9))  # of a box without width each place once
@@ -187,7 +194,8 @@ class Pantograph(Plant):
 
 def linkage_record(plant: Pantograph, hand_mass: float = 0.0) -> LinkageRecord:
     """Return the linkage of a pantograph, with a mass [kg] held at the handle."""
-    bars, masses = plant.linkage, plant.masses
+    bars = plant.linkage
+    masses = plant.masses
     first = masses.rotor + masses.proximal * bars.proximal**2 / 3.0
     inertia = first + masses.distal * bars.proximal**2 / 3.0
     numbers = (

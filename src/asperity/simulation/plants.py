@@ -272,7 +272,8 @@ class Cartesian(Plant):
 
 def _axis_plant(plant: Cartesian, hand: SpringHand, period: float) -> SampledPlant:
     """Return a rigid body without coupling between its axes."""
-    parts, body = _substeps(plant), linear_body(plant.mass, plant.damping, hand)
+    parts = _substeps(plant)
+    body = linear_body(plant.mass, plant.damping, hand)
     span = period / parts
     used = np.arange(18).reshape(6, 3).T[:, [0, 1, 4]]  # e, w and F of each axis
     axes = used[:, :, None], used[:, None, :]
@@ -289,7 +290,8 @@ def _axis_plant(plant: Cartesian, hand: SpringHand, period: float) -> SampledPla
 
 def coupled_plant(plant: Cartesian, hand: SpringHand, period: float) -> SampledPlant:
     """Return a linear body with any coupling, moved by whole matrices."""
-    parts, body = _substeps(plant), linear_body(plant.mass, plant.damping, hand, plant.resonance)
+    parts = _substeps(plant)
+    body = linear_body(plant.mass, plant.damping, hand, plant.resonance)
     span = period / parts
     change, loss = integrate(body.dynamics, body.loss, span)
     stops = np.asarray(span * np.linalg.inv(change[3:6, 12:15]))

@@ -124,7 +124,8 @@ def scan_strokes(
     for speed in speeds:
         for depth in depths:
             check_positive("speeds", speed, "m/s")
-            (x0, y0, _), (x1, y1, _) = motion.start, motion.end
+            (x0, y0, _) = motion.start
+            (x1, y1, _) = motion.end
             strokes = Strokes((x0, y0, -depth), (x1, y1, -depth), speed, motion.count)
             run = simulate(
                 surface, plant, hand, servo, strokes, strokes.duration, start=start,
@@ -137,7 +138,9 @@ def scan_strokes(
 
 
 def _analyze_stroke(surface: Surface, motion: Strokes, run: Run, depth: float) -> Stroke:
-    law, speed, ledger = surface.law.letter, float(motion.speed), run.ledger
+    law = surface.law.letter
+    speed = float(motion.speed)
+    ledger = run.ledger
     mean_depth = -float(run.position[:, 2].mean())
     closure = abs(ledger.closure) / max(ledger.exchanged, 1e-300)
     if run.stop_message:
@@ -213,7 +216,8 @@ def field_work(surface: Surface, path: FloatArray) -> tuple[FloatArray, FloatArr
     """
     middle = 0.5 * (path[1:] + path[:-1])
     points = np.empty((2 * len(path) - 1, 3))
-    points[::2], points[1::2] = path, middle
+    points[::2] = path
+    points[1::2] = middle
     force = surface.trace(points)
     step = np.diff(path, axis=0)
     ends = np.einsum("ij,ij->i", force[:-2:2] + force[2::2], step)

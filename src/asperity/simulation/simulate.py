@@ -87,13 +87,17 @@ class Simulation:
         self, surface: Surface, plant: SampledPlant, servo: Servo, start: FloatArray,
         velocity: FloatArray | None = None, max_evaluations: float | None = None,
     ) -> None:  # fmt: skip
-        self._plant, self._servo, self._surface = plant, servo, surface
+        self._plant = plant
+        self._servo = servo
+        self._surface = surface
         self.state = plant.initial_state(start, np.zeros(3) if velocity is None else velocity)
         self.queue = np.zeros((check_delay(servo.delay) + 1, 3))
         budget = surface.law.contact.max_evaluations
         self.memory = new_warm_start(budget if max_evaluations is None else max_evaluations)
-        self.samples, self._counters = 0, np.zeros(3, np.int64)
-        self._loop_state, self.ledger_sums = LoopState(), np.zeros(LEDGER_SIZE)
+        self.samples = 0
+        self._counters = np.zeros(3, np.int64)
+        self._loop_state = LoopState()
+        self.ledger_sums = np.zeros(LEDGER_SIZE)
         self._energy_at_start = 0.0
 
     @cached_property
@@ -132,7 +136,8 @@ class Simulation:
         if table.ndim != 2 or table.shape[1] != len(COLUMNS):
             words = f"must have rows of {len(COLUMNS)} numbers, got shape {table.shape}"
             raise ParameterError("trace", words)
-        first, surface = self.samples, self._surface
+        first = self.samples
+        surface = self._surface
         self._counters[2] = first
         device = SimulatedDevice(
             self.state, self.queue, self._counters, anchor, self.ledger_sums,

@@ -77,7 +77,8 @@ _NAMES = [name for name, _unit in COLUMNS]
 _POSITION = slice(_NAMES.index("x"), _NAMES.index("z") + 1)
 _VELOCITY = slice(_NAMES.index("vx"), _NAMES.index("vz") + 1)
 _SUPPLIED = slice(_NAMES.index("supplied x"), _NAMES.index("supplied z") + 1)
-_LOST, _FRICTION = _NAMES.index("lost"), _NAMES.index("friction")
+_LOST = _NAMES.index("lost")
+_FRICTION = _NAMES.index("friction")
 # Smallest share of the loss that the texture supplies in a cycle: not always all, as amplitudes
 # beat.
 SUPPLY_SHARE = 0.2
@@ -93,8 +94,11 @@ class TailStatistics:
     def __init__(self, rows: int) -> None:
         self._tail_start = rows - rows // 4
         self._energy_start = rows - max(rows // 4, 2)
-        self._rows_total, self._rows_seen, self._count_in_tail = rows, 0, 0
-        self._mean, self._squares = np.zeros((2, 3)), np.zeros((2, 3))
+        self._rows_total = rows
+        self._rows_seen = 0
+        self._count_in_tail = 0
+        self._mean = np.zeros((2, 3))
+        self._squares = np.zeros((2, 3))
         self._first_row = self._last_row = np.zeros(len(COLUMNS))
 
     @property
@@ -121,7 +125,8 @@ class TailStatistics:
 
     def update(self, rows: FloatArray) -> None:
         """Update the statistics with the next rows of the trace, shape (n, columns)."""
-        first, self._rows_seen = self._rows_seen, self._rows_seen + len(rows)
+        first = self._rows_seen
+        self._rows_seen = self._rows_seen + len(rows)
         if first <= self._energy_start < self._rows_seen:
             self._first_row = rows[self._energy_start - first].copy()
         part = rows[max(self._tail_start - first, 0) :]
@@ -255,7 +260,8 @@ class Run(NamedColumns, Plottable):
     columns = COLUMNS
 
     def __repr__(self) -> str:
-        law, stopped = self.surface.law.letter, f", {self.stop_message}" if self.stop else ""
+        law = self.surface.law.letter
+        stopped = f", {self.stop_message}" if self.stop else ""
         work = f"{self.ledger.total:+.4g} J to the hand"
         return f"<Run of law {law}, {self.duration:g} s, {work}{stopped}>"
 

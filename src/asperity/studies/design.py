@@ -61,7 +61,8 @@ class StudyDesign:
     @property
     def conditions(self) -> tuple[dict[str, Any], ...]:
         """All combinations of the values of the factors; the last factor varies fastest."""
-        names, values = self.factors.keys(), self.factors.values()
+        names = self.factors.keys()
+        values = self.factors.values()
         return tuple(dict(zip(names, one, strict=True)) for one in itertools.product(*values))
 
     def check_conditions(self, minimum: int) -> int:
@@ -100,7 +101,8 @@ class Method:
     """
 
     def __init__(self, steps: Steps) -> None:
-        self._steps, self._now = steps, next(steps, None)
+        self._steps = steps
+        self._now = next(steps, None)
 
     def next(self) -> Presentation | None:
         """Return what to present now, the same until it is answered; ``None`` at the end."""

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 Strength = Callable[[Values], float]
 """How strong a stimulus is at the hand; what a typical observer just feels is 1."""
 _NONE = 1e-9
-_SPREAD_OF_RATINGS, _SPREAD_OF_ONSETS = 0.2, 0.1  # of logarithms
+_SPREAD_OF_RATINGS = 0.2  # of logarithms
+_SPREAD_OF_ONSETS = 0.1
 _POINTS = 33  # of the search for an onset
 _LEVELS = 9  # at which strengths are computed
 
@@ -136,7 +137,8 @@ def hand_strength(
         design: the study with all options.
         make: makes the surface and the device of a stimulus.
     """
-    options, key = design.options, str(design.options.get("level", ""))
+    options = design.options
+    key = str(design.options.get("level", ""))
     low = min(options["range"][0], options.get("reference", math.inf)) if key else 1.0
     levels = np.geomspace(low, options["range"][1], _LEVELS) if key else np.ones(1)
     tables: dict[str, FloatArray] = {}

@@ -80,17 +80,22 @@ def plan(
         ParameterError: for fewer than three participants or two conditions, or an effect or a
             number of simulations that is not positive.
     """
-    effect, count = check_positive("effect", effect), participants or design.participants
+    effect = check_positive("effect", effect)
+    count = participants or design.participants
     check_positive("simulations", simulations)
     if count < 3:
         raise ParameterError("participants", "must be at least 3 for an interval", count)
     design.check_conditions(2)
-    kind, base = METHODS[design.kind], find_observer(observer)
+    kind = METHODS[design.kind]
+    base = find_observer(observer)
     design = kind.complete(design)
-    strength, found, trials = _planned_strength(design, effect), 0, 0
+    strength = _planned_strength(design, effect)
+    found = 0
+    trials = 0
     for number in range(simulations):
         rng = np.random.default_rng([seed, number])
-        own, answered = int(rng.integers(2**31)), {}
+        own = int(rng.integers(2**31))
+        answered = {}
         for i in range(count):
             threshold = base.threshold * math.exp(SPREAD * rng.standard_normal())
             person = replace(base, threshold=threshold)
@@ -103,7 +108,8 @@ def plan(
 
 def _planned_strength(design: StudyDesign, effect: float) -> Strength:
     """Return strengths: 1 in the middle of the range, ``effect`` times in the first condition."""
-    first, key = design.conditions[0], str(design.options.get("level", ""))
+    first = design.conditions[0]
+    key = str(design.options.get("level", ""))
     middle = math.sqrt(math.prod(design.range)) if key else 1.0
 
     def strength(values: Values) -> float:

@@ -24,8 +24,10 @@ _RULES = "The rules stand in the study file, and were stated before the study."
 @find_loop_page.register
 def study_page(result: StudyResult) -> Page:
     """Return the report of a study."""
-    score, design = result.score, result.design
-    kind, table = METHODS[design.kind], _score_table(result)
+    score = result.score
+    design = result.design
+    kind = METHODS[design.kind]
+    table = _score_table(result)
     scores = f"{score.quantity} by participant and pooled"
     functions = [_figure(result, "Psychometric functions", _FUNCTIONS)]
     pooled = Section("Pooled", [table], notes=[result.included_score.pooled_interval])
@@ -78,7 +80,8 @@ def _number(value: float | None) -> str:
 
 
 def _interval_text(row: Mapping[str, Any]) -> str:
-    low, high = _number(row["lower"]), _number(row["upper"])
+    low = _number(row["lower"])
+    high = _number(row["upper"])
     return f"{_number(row['estimate'])} ({low} to {high})"
 
 
@@ -100,14 +103,16 @@ def _participant_table(result: StudyResult) -> Table:
             for row in _rows_of(result, name)
         ]
         text = NOT_AVAILABLE if share is None else f"{share:.0%}"
-        omitted, reason = str(result.omitted[name]), result.excluded.get(name, "")
+        omitted = str(result.omitted[name])
+        reason = result.excluded.get(name, "")
         rows.append(Row([Cell(name, "l"), " · ".join(found), text, omitted, reason]))
     headings = ("participant", result.score.quantity, "consistency", "left out", "excluded")
     return Table(headings, rows, (2, 3), TableLayout(wrap=(1, 4)))
 
 
 def _figure(result: StudyResult, title: str, text: str, caption: str = "") -> Section:
-    media, draw = Media.HTML | Media.NOTEBOOK, partial(_draw, result, title)
+    media = Media.HTML | Media.NOTEBOOK
+    draw = partial(_draw, result, title)
     return page.picture_section(title, draw, text, caption or f"{text}.", media=media)
 
 

@@ -16,7 +16,8 @@ from asperity.studies.kinds.thresholds import level_answers, log_levels
 from asperity.studies.study_result import StudyResult, label_text
 
 _MAX_GROUPS = 8
-_FAINT, _STRONG = "0.6", "C0"
+_FAINT = "0.6"
+_STRONG = "C0"
 
 
 def scores_figure(result: StudyResult) -> Figure:
@@ -24,7 +25,8 @@ def scores_figure(result: StudyResult) -> Figure:
     labels = [label_text(result, one) or "all" for one in result.labels]
     figure = style.new_figure(7.0, 1.2 + 0.45 * len(labels))
     axes = style.single_axes(figure)
-    score, places = result.included_score, np.arange(len(labels))
+    score = result.included_score
+    places = np.arange(len(labels))
     values = score.to_scale(score.values)
     for row, offset in zip(values, np.linspace(-0.3, -0.1, len(values)), strict=True):
         axes.plot(row, places + offset, "o", color=_FAINT, markersize=3)
@@ -48,7 +50,8 @@ def functions_figure(result: StudyResult) -> Figure:
 
     Levels are grouped, with as many answers in each.
     """
-    levels, name = log_levels(result.design), str(result.design.options["level"])
+    levels = log_levels(result.design)
+    name = str(result.design.options["level"])
     figure = style.new_figure(7.0, 3.4)
     axes = style.single_axes(figure)
     answered = [one for found in result.included.values() for one in found]

@@ -53,7 +53,8 @@ def load_study(path: str | Path) -> Study:
         ParameterError: for an unknown section, key, kind or factor, with the nearest names, or a
             value that cannot be used.
     """
-    content, folder = read_sections(Path(path), "study", _OWN_SECTIONS), Path(path).parent
+    content = read_sections(Path(path), "study", _OWN_SECTIONS)
+    folder = Path(path).parent
     scene = content.get("study", {}).pop("scene", None)
     if scene is not None:
         for name in filter(content.__contains__, SECTIONS):
@@ -76,13 +77,15 @@ def build_study(content: Mapping[str, Any], folder: Path) -> Study:
     """
     settings = _parse_section("study", content, STUDY_ARGUMENTS.values())
     sections = {name: content[name] for name in SECTIONS if name in content}
-    vary, method = content.get("vary", {}), dict(content.get("method", {}))
+    vary = content.get("vary", {})
+    method = dict(content.get("method", {}))
     for key, values in vary.items():
         if not isinstance(values, list):
             raise ParameterError("vary", f"{key} must be a list of values", values)
     levels = [str(method["level"])] if "level" in method else []
     texts = {key: [str(value) for value in values] for key, values in vary.items()}
-    found, unit = find_varied_arguments(sections, texts, *levels), ""
+    found = find_varied_arguments(sections, texts, *levels)
+    unit = ""
     arguments = {argument.name: argument for argument in found.values()}
     for name in arguments:
         if not name.startswith(("texture.", "surface.")):
@@ -91,7 +94,8 @@ def build_study(content: Mapping[str, Any], folder: Path) -> Study:
     if _STIFFNESS_KEY in arguments and "texture_force" in settings:
         raise ParameterError("study.texture_force", f"sets {_STIFFNESS_KEY}, which is varied, too")
     for level in levels:
-        method["level"], unit = found[level].name, found[level].unit
+        method["level"] = found[level].name
+        unit = found[level].unit
     kind = METHODS[settings["kind"]]
     options = _parse_section("method", {"method": method}, kind.arguments, unit)
     options["exclusion"] = _parse_section("exclusion", content, EXCLUSIONS)

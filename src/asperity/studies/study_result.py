@@ -134,7 +134,8 @@ class StudyResult(Reportable, TableFiles):
 
         Differences of a logarithmic quantity are ratios.
         """
-        score, labels = self.score, self.labels
+        score = self.score
+        labels = self.labels
         for row, name in enumerate(score.participants):
             for column, label in enumerate(labels):
                 numbers = self._numbers(score.estimates[:, row, column].tolist())

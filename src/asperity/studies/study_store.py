@@ -24,7 +24,9 @@ from asperity.studies.methods import METHODS
 from asperity.studies.study_file import Study, build_study
 from asperity.sweeps.result_store import check_plan, lock_folder
 
-STUDY_FILE, ANSWERS_FILE, KEY_FILE = "study.json", "answers.jsonl", "key.json"
+STUDY_FILE = "study.json"
+ANSWERS_FILE = "answers.jsonl"
+KEY_FILE = "key.json"
 DERIVED_FILES = (
     KEY_FILE, "report.html", "trials.csv", "table.csv", "trials.parquet", "table.parquet",
 )  # fmt: skip
@@ -110,7 +112,8 @@ def read_trials(folder: str | Path) -> list[TrialRecord]:
     Raises:
         ParameterError: for another folder, a damaged file, or answers of another version.
     """
-    study, known = read_study(folder), list_participants(folder)
+    study = read_study(folder)
+    known = list_participants(folder)
     found = (_replay(Path(folder) / code, study, number)[1] for code, number in known.items())
     return [record for records in found for record in records]
 
@@ -163,7 +166,9 @@ class Participant:
     """
 
     def __init__(self, folder: Path, study: Study, code: str, *, resume: bool = False) -> None:
-        self.path, self.code, self.study = folder / check_participant(code), code, study
+        self.path = folder / check_participant(code)
+        self.code = code
+        self.study = study
         answers = self.path / ANSWERS_FILE
         with lock_folder(folder), ExitStack() as stack:
             known = _check_known(folder, code, is_new=not resume)

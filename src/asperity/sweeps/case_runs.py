@@ -102,7 +102,8 @@ def _bake(scene: Scene, _laws: Laws, options: Mapping[str, Any], _seed: int) -> 
     return cast("Tabular", rendered.texture)  # a potential field
 
 
-_FORCE, _STIFFNESS = "resolved force RMS [N]", "recommended stiffness [N/m]"
+_FORCE = "resolved force RMS [N]"
+_STIFFNESS = "recommended stiffness [N/m]"
 RUN_KINDS = {
     kind.name: kind
     for kind in (
@@ -212,7 +213,8 @@ def _compute_case(template: CaseTemplate, index: int, values: Mapping[str, Any])
     seed = int(content_digest(template.case_text(values))[:16], 16)
     random.seed(seed)
     np.random.seed(seed % 2**32)  # noqa: NPY002 - the generator of code that has none of its own
-    run, laws = find_run(template.run), template.laws
+    run = find_run(template.run)
+    laws = template.laws
     if LAW_KEY in values and run.takes_laws:
         laws = (values[LAW_KEY],)
     try:

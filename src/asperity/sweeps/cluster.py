@@ -13,7 +13,8 @@ from typing import Any
 from asperity.core.errors import ParameterError
 from asperity.sweeps.engine import TASKS_PER_WORKER, Place
 
-TASK_TIME, TASK_TIME_PER_WORKER = 0.5, 2e-3
+TASK_TIME = 0.5
+TASK_TIME_PER_WORKER = 2e-3
 """Time that a task is to take at least [s]: all workers together then finish at most 500 tasks in a
 second, half of what the scheduler manages (0.2 to 1 ms for each)."""
 _CONNECT_TIME = 10.0

@@ -61,7 +61,8 @@ def _open_pool(processes: int) -> Iterator[Executor]:
     """Open a pool of processes, which end at once if the block ends with an error."""
     from multiprocessing import active_children
 
-    others, pool = set(active_children()), make_pool(processes)
+    others = set(active_children())
+    pool = make_pool(processes)
     try:
         try:
             pool.submit(int).result()
@@ -100,7 +101,8 @@ def _run_until_lost(
     """Compute cases until a worker process ends; return the cases that are lost."""
     lost: list[Case] = []
     tasks: dict[Future[Any], list[Case]] = {}
-    done, size = SimpleQueue[Future[Any]](), 1
+    done = SimpleQueue[Future[Any]]()
+    size = 1
     with place.open() as executor:
         while True:
             while not lost and len(tasks) < n_tasks() and (batch := list(islice(cases, size))):

@@ -22,7 +22,9 @@ from asperity.core.files import append_bytes, json_text, open_input, write_bytes
 from asperity.core.processes import defer_interrupt
 from asperity.sweeps.case_runs import Outcome
 
-PLAN_FILE, CASES_FILE, _LOCK_FILE = "sweep.json", "cases.jsonl", ".lock"
+PLAN_FILE = "sweep.json"
+CASES_FILE = "cases.jsonl"
+_LOCK_FILE = ".lock"
 _MISSING = -1
 _LINE = re.compile(rb'\{"case": (\d+), .*\}\n')
 
@@ -44,7 +46,8 @@ class ResultStore:
     """
 
     def __init__(self, folder: Path, plan: Mapping[str, Any], n_cases: int) -> None:
-        self.path, self._offsets = folder, array("q", [_MISSING]) * n_cases
+        self.path = folder
+        self._offsets = array("q", [_MISSING]) * n_cases
         with ExitStack() as stack:
             stack.enter_context(lock_folder(folder))
             check_plan(folder / PLAN_FILE, plan, "sweep")
@@ -136,7 +139,8 @@ def check_plan(path: Path, plan: Mapping[str, Any], kind: str) -> None:
     Raises:
         ParameterError: for a folder that holds something else; others see :func:`lock_folder`.
     """
-    folder, text = path.parent, json_text(plan)
+    folder = path.parent
+    text = json_text(plan)
     if not path.exists():
         if any(one.name != _LOCK_FILE for one in folder.iterdir()):
             words = f"is neither empty nor the folder of a {kind}"
@@ -144,7 +148,8 @@ def check_plan(path: Path, plan: Mapping[str, Any], kind: str) -> None:
         write_bytes("output", path, text.encode())
         return
     with open_input(path) as stream:
-        recorded, given = json.loads(stream.read()), json.loads(text)
+        recorded = json.loads(stream.read())
+        given = json.loads(text)
     differing = [name for name, value in given.items() if recorded.get(name) != value]
     if differing:
         words = f"holds another {kind} (other {', '.join(differing)}): choose another folder"

@@ -71,7 +71,8 @@ class SweepPlan:
 
     def describe(self) -> dict[str, Any]:
         """Return plain data that identifies the sweep, with its files and versions."""
-        template, texts = self.template, set[str]()
+        template = self.template
+        texts = set[str]()
         for choices in (*template.sections.values(), *(one for axis in self.axes for one in axis)):
             texts.update(value for value in choices.values() if isinstance(value, str))
         digests = {text: file_digest(template.folder / text) for text in sorted(texts)}
@@ -137,7 +138,8 @@ def _parse_axes(
     ranges: dict[str, variations.Range] = {}
     axes: list[list[dict[str, Any]]] = []
     for key, text in vary.items():
-        argument, name = found[key], found[key].name
+        argument = found[key]
+        name = found[key].name
         if design and variations.is_range(argument, text):
             ranges[name], _ = variations.parse_range(argument, text, in_design=True)
             continue

@@ -16,7 +16,8 @@ from asperity.sweeps.sweep_plan import SweepPlan
 from asperity.sweeps.table_files import UNIT, TableFiles
 
 SCHEMA = 1
-CASE, ERROR = "case", "error"
+CASE = "case"
+ERROR = "error"
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +84,8 @@ class SweepResult(Reportable, TableFiles):
         Raises:
             ParameterError: if xarray or pandas is not installed.
         """
-        frame, plan = self.to_dataframe(), self.plan
+        frame = self.to_dataframe()
+        plan = self.plan
         keys = [CASE] if plan.design else [plan.column(key) for key in plan.arguments]
         index = [name for name in self.run.index if name in frame]
         found = frame[frame[ERROR].isna()].drop(columns=[ERROR])

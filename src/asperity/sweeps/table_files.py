@@ -86,7 +86,8 @@ class TableFiles(Tabular):
             unit = {"unit": match[2]} if match else None
             fields.append(arrow.field(name, types.get(kind, arrow.string()), metadata=unit))
         metadata = {"asperity": json_text(self.metadata)}
-        schema, rows = arrow.schema(fields, metadata=metadata), self.iterate_rows()
+        schema = arrow.schema(fields, metadata=metadata)
+        rows = self.iterate_rows()
         with parquet.ParquetWriter(stream, schema) as writer:
             while block := list(islice(rows, _BLOCK)):
                 columns = [

@@ -233,7 +233,8 @@ def build_texture(
     """
     if kind not in kinds:
         raise ParameterError("surface", f"kind is unknown: {kind!r}; {suggest_names(kind, kinds)}")
-    entry, synthetic = kinds[kind], () if kind == "file" else SYNTHETIC_ARGUMENTS
+    entry = kinds[kind]
+    synthetic = () if kind == "file" else SYNTHETIC_ARGUMENTS
     own = {argument.name for argument in entry.arguments}
     preparing = [argument for argument in synthetic if argument.name not in own]
     read = parse_arguments(kind, arguments, (*entry.arguments, *preparing), folder)
@@ -303,10 +304,12 @@ def rebuild_texture(
 
 
 def _rebuild_spline(record: ProfileArguments | HeightMapArguments) -> Texture:
-    heights, origin = record.c, cast(Any, record.x0)
+    heights = record.c
+    origin = cast(Any, record.x0)
     pitch: tuple[float, ...] = (1.0 / record.ix,)
     if isinstance(record, HeightMapArguments):
-        pitch, origin = (*pitch, 1.0 / record.iy), (record.x0, record.y0)
+        pitch = (*pitch, 1.0 / record.iy)
+        origin = (record.x0, record.y0)
     for _axis in pitch:  # the heights at the nodes along an axis are (c₋ + 4 c + c₊)/6
         last = len(heights) - (2 if record.periodic else 1)
         heights = (heights[: last - 1] + 4.0 * heights[1:last] + heights[2 : last + 1]).T / 6.0

@@ -61,7 +61,8 @@ class Domain:
             they cover a whole period.
         """
         spans, repeats = self.orthogonal_spans()
-        sides, number = np.hypot(*spans.T), np.array(counts, dtype=np.intp)
+        sides = np.hypot(*spans.T)
+        number = np.array(counts, dtype=np.intp)
         # A finite map has nodes at both ends; a periodic one does not repeat its first node.
         steps = sides / (number if self.periodic else number - 1)
         first = np.zeros_like(number)

@@ -21,7 +21,8 @@ def exact_waves(waves: list[tuple[Any, Any, Any, Any]]) -> ExactHeight:
     def height(x: Any, y: Any, m: int, n: int) -> Any:
         total = mpmath.mpf(0)
         for a, kx, ky, phase in waves:
-            u, v = mpmath.mpf(kx), mpmath.mpf(ky)
+            u = mpmath.mpf(kx)
+            v = mpmath.mpf(ky)
             angle = u * x + v * y + mpmath.mpf(phase)
             total += mpmath.mpf(a) * u**m * v**n * mpmath.sin(angle + (m + n) * mpmath.pi / 2)
         return total
@@ -35,7 +36,8 @@ def taylor_continuation(derivatives: Callable[[FloatArray], FloatArray]) -> Exac
     def height(x: Any, y: Any, m: int, n: int) -> Any:
         near = [float(x), float(y)]
         h, hx, hy, hxx, hxy, hyy = (mpmath.mpf(float(v)) for v in derivatives([near])[0])  # type: ignore[arg-type]  # a list is accepted
-        dx, dy = x - mpmath.mpf(near[0]), y - mpmath.mpf(near[1])
+        dx = x - mpmath.mpf(near[0])
+        dy = y - mpmath.mpf(near[1])
         if m + n == 2:
             return (hyy, hxy, hxx)[m]
         if m + n == 1:

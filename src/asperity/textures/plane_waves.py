@@ -13,7 +13,8 @@ import numpy as np
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
 
-_MIN_CURVATURE, _MAX_CURVATURE = 1e-30, 1e30
+_MIN_CURVATURE = 1e-30
+_MAX_CURVATURE = 1e30
 
 
 @dataclass(frozen=True, eq=False)

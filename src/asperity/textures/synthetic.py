@@ -54,9 +54,11 @@ def prepare_texture(  # noqa: D417 - the others are described where they are dec
         (0.0015, 0.006, 'magnified 3 times laterally and in height')
     """
     lateral, vertical = magnification_factors(magnify, magnify_height)
-    steps, scale = [*texture.preparation], 1.0
+    steps = [*texture.preparation]
+    scale = 1.0
     if height_range is not None:
-        before, after = format_length(texture.peak_to_valley), format_length(height_range)
+        before = format_length(texture.peak_to_valley)
+        after = format_length(height_range)
         steps.append(f"heights scaled from {before} to {after} peak to valley")
         scale = _height_scale(texture, height_range)
     prepared: Texture
@@ -70,7 +72,8 @@ def prepare_texture(  # noqa: D417 - the others are described where they are dec
         heights, pitch, periodic = _sample(texture)
         heights = _filter_heights(scale * heights, pitch, periodic, s_cutoff, l_cutoff)
         steps += _filter_steps(s_cutoff, l_cutoff)
-        grown, spacing = heights * vertical, tuple(step * lateral for step in pitch)
+        grown = heights * vertical
+        spacing = tuple(step * lateral for step in pitch)
         mask = texture.filled_mask
         prepared = fit_spline(grown, spacing, periodic=periodic, filled_mask=mask)
     if not lateral == vertical == 1.0:
@@ -194,7 +197,9 @@ def random_field(
         m, n = _half_shell(shell)
         phase = 2.0 * np.pi * rng.random(len(m))
         inside = (np.abs(m) <= columns) & (n <= rows)
-        m, n, phase = m[inside], n[inside], phase[inside]
+        m = m[inside]
+        n = n[inside]
+        phase = phase[inside]
         spectrum[n, m] = _amplitude(np.hypot(m / size[0], n / size[1]), band) * np.exp(1j * phase)
     return np.ascontiguousarray(np.fft.ifft2(spectrum).real) * (nx * ny)
 

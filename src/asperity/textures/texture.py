@@ -30,13 +30,18 @@ __all__ = ["Domain", "ExactHeight", "ScanLine", "Texture", "TextureKind"]
 
 # Points of a grid that resolves a texture: along a profile and along each side of a map, at most;
 # per shortest wave, where it is known.
-_LINE_POINTS, _SIDE_POINTS, _POINTS_PER_WAVE = 2**15, 1024, 8.0
+_LINE_POINTS = 2**15
+_SIDE_POINTS = 1024
+_POINTS_PER_WAVE = 8.0
 # Greatest number of independent phases of waves over which suprema are searched.
 _MAX_PHASES = 4
 # Samples of a dense search: along a profile and along each side of a map whose waves are unknown;
 # otherwise per shortest wave, within limits.
-_PROFILE_SAMPLES, _SIDE_SAMPLES, _SAMPLES_PER_WAVE = 4096, 512, 24
-_MIN_SAMPLES, _MAX_SAMPLES = 64, 1000
+_PROFILE_SAMPLES = 4096
+_SIDE_SAMPLES = 512
+_SAMPLES_PER_WAVE = 24
+_MIN_SAMPLES = 64
+_MAX_SAMPLES = 1000
 
 
 @dataclass(frozen=True)

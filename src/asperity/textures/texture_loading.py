@@ -160,7 +160,8 @@ class MeasurementSummary(Reportable):
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""
-        names, parts = ("form", "waviness", "texture", "nesting"), self.parts
+        names = ("form", "waviness", "texture", "nesting")
+        parts = self.parts
         return {
             **self.prepared.to_dict(),
             "source": self.source,
@@ -196,7 +197,8 @@ def show(
     prepared = prepare_file(path, progress=progress, watch=watch, **arguments)
     if progress is not None:
         progress("measure")
-    heights, pitch = prepared.heights, prepared.pitch
+    heights = prepared.heights
+    pitch = prepared.pitch
     parts = None
     if not prepared.history or prepared.history[-1].nesting is None:
         parts = decompose_surface(heights, pitch, periodic=prepared.periodic)

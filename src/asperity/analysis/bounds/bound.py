@@ -133,7 +133,8 @@ def _witness_rounding(surface: Surface, witness: Witness, upper: float) -> float
     Rounded coordinates change the depth relative to its size, and J is sensitive to that by
     1/(1 - y) = 1 + y/(1 - y) <= 1 + q. The effect of rounded heights grows with their size.
     """
-    xy, depth = np.array(witness.at[:2]), surface.max_depth
+    xy = np.array(witness.at[:2])
+    depth = surface.max_depth
     height = float(surface.texture.derivatives(xy[None])[0, 0])
     moved = surface.law.contact.coordinate_scale(xy, height) / depth * (1.0 + upper)
     return ROUNDING_ERROR * (DIFFERENCE_AMPLIFICATION * (1.0 + abs(height) / depth) + moved)
@@ -154,7 +155,8 @@ def witness_in_contact(
     slides = None if deflection is None else np.array([sliding])
     jacobian = surface.jacobian(probe[None], state, slides)
     scaled = jacobian / surface.stiffness
-    value, size = float(measure.accurate(scaled)[0]), float(np.linalg.norm(scaled))
+    value = float(measure.accurate(scaled)[0])
+    size = float(np.linalg.norm(scaled))
     x, y, z = (float(v) for v in probe)
     held = None if deflection is None else (float(deflection[0]), float(deflection[1]))
     return Witness(value, size, (x, y, z), held, sliding)
@@ -218,7 +220,9 @@ _LAPACK_ERROR = 1e-14
 
 def spectral_norm(matrices: FloatArray) -> FloatArray:
     """Return the largest singular values, shape (n,), of matrices (n, 3, 3)."""
-    a, b, c = matrices[:, :, 0].T, matrices[:, :, 1].T, matrices[:, :, 2].T
+    a = matrices[:, :, 0].T
+    b = matrices[:, :, 1].T
+    c = matrices[:, :, 2].T
     pairs = ((a, a), (b, b), (c, c), (a, b), (a, c), (b, c))
     products = (x[0] * y[0] + x[1] * y[1] + x[2] * y[2] for x, y in pairs)
     return np.sqrt(_largest_eigenvalue(*products))
@@ -234,7 +238,9 @@ def one_sided(matrices: FloatArray) -> FloatArray:
 def curl_norm(matrices: FloatArray) -> FloatArray:
     """Return |curl f|, shape (n,), of Jacobians (n, 3, 3)."""
     m = matrices
-    x, y, z = m[:, 2, 1] - m[:, 1, 2], m[:, 0, 2] - m[:, 2, 0], m[:, 1, 0] - m[:, 0, 1]
+    x = m[:, 2, 1] - m[:, 1, 2]
+    y = m[:, 0, 2] - m[:, 2, 0]
+    z = m[:, 1, 0] - m[:, 0, 1]
     return np.sqrt(x * x + y * y + z * z)
 
 
@@ -246,7 +252,9 @@ def _largest_eigenvalue(
     Accurate to about 1e-14 of the norm, but only to 1e-8 for nearly equal greatest eigenvalues.
     """
     centre = (xx + yy + zz) / 3.0
-    x, y, z = xx - centre, yy - centre, zz - centre
+    x = xx - centre
+    y = yy - centre
+    z = zz - centre
     spread = np.sqrt((x * x + y * y + z * z + 2.0 * (xy * xy + xz * xz + yz * yz)) / 6.0)
     det = x * (y * z - yz * yz) - xy * (xy * z - yz * xz) + xz * (xy * yz - y * xz)
     cube = np.where(spread > 0.0, spread, 1.0) ** 3
@@ -301,7 +309,8 @@ class JacobianMeasure:
             e: shape (n, 3, 3), not negative, entry by entry.
             threshold: cells whose coarse bound is below this are not refined.
         """
-        size, unknown = _frobenius_norms(c), self.lipschitz * _frobenius_norms(e) * (1.0 + 1e-12)
+        size = _frobenius_norms(c)
+        unknown = self.lipschitz * _frobenius_norms(e) * (1.0 + 1e-12)
         moved = np.sqrt(np.einsum("dnij,dnij->dn", g, g)).sum(axis=0)
         moved *= self.lipschitz * (1.0 + 1e-12)
         slack = self.fast_error * (size + moved)

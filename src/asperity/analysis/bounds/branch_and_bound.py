@@ -133,9 +133,11 @@ def supremum(
     # A few samples first, so that most cells are pruned at once.
     best = _BestValue(problem)
     best.try_points(problem.cells.sample_coordinates())
-    pruned, evaluated = problem.floor, 0
+    pruned = problem.floor
+    evaluated = 0
     while True:
-        remaining, bounds = [], []
+        remaining = []
+        bounds = []
         for centres in chunks:
             evaluated += len(centres)
             upper = problem.upper_bounds(centres, half, problem.prune_threshold(best.value, goal))
@@ -145,10 +147,12 @@ def supremum(
             pruned = max(pruned, float(upper[~keep].max(initial=0.0)))
             remaining.append(centres[keep])
             bounds.append(upper[keep])
-        centres, upper = np.concatenate(remaining), np.concatenate(bounds)
+        centres = np.concatenate(remaining)
+        upper = np.concatenate(bounds)
         keep = upper > problem.prune_threshold(best.value, goal)
         pruned = max(pruned, float(upper[~keep].max(initial=0.0)))
-        centres, upper = centres[keep], upper[keep]
+        centres = centres[keep]
+        upper = upper[keep]
         left = float(upper.max(initial=0.0))
         parts = _subdivision_count(len(centres), problem.cells.dimensions)
         children = len(centres) * parts**problem.cells.dimensions
@@ -158,7 +162,8 @@ def supremum(
             break
         half = half / parts
         chunks = _subdivide(centres, half, parts, problem.cells.chunk_size())
-    value, at = best.value, best.at
+    value = best.value
+    at = best.at
     if at is not None:
         value, at = polish(problem, at, half, value)
     proved = max(pruned, left)
@@ -172,7 +177,8 @@ class _BestValue:
     """The greatest value attained so far, and where."""
 
     def __init__(self, problem: Problem) -> None:
-        self.problem, self.value = problem, problem.floor
+        self.problem = problem
+        self.value = problem.floor
         self.at: FloatArray | None = None
 
     def try_cells(self, centres: FloatArray, half: FloatArray, upper: FloatArray) -> None:
@@ -188,7 +194,8 @@ class _BestValue:
         values = self.problem.values(points)
         first = _argmax_ignoring_nan(values)
         if values[first] > self.value:
-            self.value, self.at = float(values[first]), points[first]
+            self.value = float(values[first])
+            self.at = points[first]
 
 
 def _argmax_ignoring_nan(values: FloatArray) -> int:
@@ -230,13 +237,15 @@ def polish(
     size = len(half)
     offsets = np.concatenate([_cell_stencil(size)[1:], np.eye(size), -np.eye(size)])
     offsets = (_POLISH_SCALES[:, None, None] * offsets).reshape(-1, size)
-    scale, step = np.repeat(_POLISH_SCALES, len(offsets) // len(_POLISH_SCALES)), 2.0
+    scale = np.repeat(_POLISH_SCALES, len(offsets) // len(_POLISH_SCALES))
+    step = 2.0
     for _ in range(_POLISH_STEPS):
         points = problem.cells.clip_to_region(at + offsets * (step * half))
         values = problem.values(points)
         first = _argmax_ignoring_nan(values)
         if values[first] > best:
-            best, at = float(values[first]), points[first]
+            best = float(values[first])
+            at = points[first]
             step *= min(2.0 * float(scale[first]), 1.0)
         else:
             step *= 0.5 * float(_POLISH_SCALES[-1])

@@ -54,8 +54,10 @@ class MatrixProblem(Problem):
         measure: JacobianMeasure,
         floor: float = RESOLUTION,
     ) -> None:
-        self.cells, self.floor = cells, floor
-        self._names, self._measure = names, measure
+        self.cells = cells
+        self.floor = floor
+        self._names = names
+        self._measure = measure
 
     @abstractmethod
     def matrices(self, models: dict[str, TaylorNumber]) -> list[Entries]:
@@ -67,7 +69,8 @@ class MatrixProblem(Problem):
 
     def upper_bounds(self, centres: FloatArray, half: FloatArray, threshold: float) -> FloatArray:
         """See :class:`Problem`."""
-        n, d = len(centres), len(half)
+        n = len(centres)
+        d = len(half)
         best = np.full(n, -np.inf)
         with np.errstate(all="ignore"):
             models = self.cells.enclosures(centres, half, self._names)
@@ -87,11 +90,15 @@ class MatrixProblem(Problem):
 
 def stack_entries(entries: Entries, n: int, d: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return centres (n, 3, 3), gradients (d, n, 3, 3) and errors (n, 3, 3) of matrices."""
-    c, g, e = np.zeros((n, 3, 3)), np.zeros((d, n, 3, 3)), np.zeros((n, 3, 3))
+    c = np.zeros((n, 3, 3))
+    g = np.zeros((d, n, 3, 3))
+    e = np.zeros((n, 3, 3))
     for i, row in enumerate(entries):
         for j, entry in enumerate(row):
             if isinstance(entry, TaylorModel):
-                c[:, i, j], g[:, :, i, j], e[:, i, j] = entry.c, entry.g, entry.e
+                c[:, i, j] = entry.c
+                g[:, :, i, j] = entry.g
+                e[:, i, j] = entry.e
             else:
                 c[:, i, j] = entry
     return c, g, e
@@ -161,7 +168,9 @@ class LawProblem(MatrixProblem):
     """
 
     def __init__(self, surface: Surface, cells: Cells, measure: JacobianMeasure) -> None:
-        self._surface, self._kernel, depth = surface, LawKernel(surface), surface.max_depth
+        self._surface = surface
+        self._kernel = LawKernel(surface)
+        depth = surface.max_depth
         self._depths = (0.0, depth) if surface.facts.affine_in_depth else (None,)
         if surface.law.stateful:
             level = None if self._depths[0] is not None else depth
@@ -254,7 +263,8 @@ class ClampKernel:
             return [
                 self.rows_at_depth(derivatives, derivatives[DEPTH_BELOW_CLAMP] + surface.max_depth)
             ]
-        clamp, depths = surface.effective_clamp, [surface.max_depth]
+        clamp = surface.effective_clamp
+        depths = [surface.max_depth]
         if not clamp.holds_whole_force:
             depths.append(surface.clamped_depth)
         above = [self.rows_at_depth(derivatives, depth) for depth in depths]
@@ -279,7 +289,8 @@ class ClampProblem(MatrixProblem):
             cells = ProductCells(
                 cells, {DEPTH_BELOW_CLAMP: surface.clamped_depth - surface.max_depth}
             )
-        self._models, self._numbers = ClampKernel(surface), ClampKernel(surface, np)
+        self._models = ClampKernel(surface)
+        self._numbers = ClampKernel(surface, np)
         super().__init__(cells, self._models.names, measure, floor)
 
     def matrices(self, models: dict[str, TaylorNumber]) -> list[Entries]:

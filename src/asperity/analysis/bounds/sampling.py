@@ -57,8 +57,11 @@ def contact_jacobians(
     sliding: bool = False,
 ) -> FloatArray:
     """Return J/k of a surface at contacts, shape (n, 3, 3)."""
-    n, law = len(xy), surface.law
-    points, force, jacobian = np.zeros((n, 3)), np.empty((n, 3)), np.empty((n, 3, 3))
+    n = len(xy)
+    law = surface.law
+    points = np.zeros((n, 3))
+    force = np.empty((n, 3))
+    jacobian = np.empty((n, 3, 3))
     if uses_position(law):
         points = law.contact.probe_positions(xy, depth, derivatives)
     contact = points, depth, derivatives, deflection, np.full(n, sliding)
@@ -141,7 +144,8 @@ def dense_maximum(surface: Surface, measure: Measure, depth_limit: DepthLimit) -
     centres = _zoom_in(values, centres, np.append(spacing, 0.25), bounded)
     best = contacts(centres[[int(np.argmax(values(centres)))]])
     accurate = precise_norm if measure is spectral_norm else precise_one_sided
-    value, ((x, y),) = accurate(contact_jacobians(surface, *best))[0], best[0].tolist()
+    value = accurate(contact_jacobians(surface, *best))[0]
+    ((x, y),) = best[0].tolist()
     return DenseMaximum(float(value), (x, y), float(best[1][0]))
 
 
@@ -189,11 +193,13 @@ def sample_supremum(problem: Problem) -> Supremum:
     points = problem.cells.sample_coordinates(_SAMPLE_COUNT)
     values = np.concatenate([problem.values(part) for part in np.array_split(points, 16)])
     _chunks, half = problem.cells.initial_cells()
-    best, at = problem.floor, None
+    best = problem.floor
+    at = None
     for index in np.argsort(-values)[:_POLISHED_SAMPLES]:
         top, where = polish(problem, points[index], half, float(values[index]))
         if top > best:
-            best, at = top, where
+            best = top
+            at = where
     return Supremum(best, math.inf, at, len(points), converged=False)
 
 

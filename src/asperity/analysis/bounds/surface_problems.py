@@ -100,10 +100,14 @@ class CrestProblem(SurfaceProblem):
         square = 1.0 + hx * hx + hy * hy
         s = root(square)
         share = 1.0 / (square + s)
-        a, b, c = 1.0 - hx * hx * share, -(hx * hy * share), 1.0 - hy * hy * share
+        a = 1.0 - hx * hx * share
+        b = -(hx * hy * share)
+        c = 1.0 - hy * hy * share
         # Columns of H G^(-1/2), then G^(-1/2) from the left.
-        p, q = hxx * a + hxy * b, hxx * b + hxy * c
-        r, t = hxy * a + hyy * b, hxy * b + hyy * c
+        p = hxx * a + hxy * b
+        q = hxx * b + hxy * c
+        r = hxy * a + hyy * b
+        t = hxy * b + hyy * c
         return [
             [(a * p + b * r) / s, (a * q + b * t) / s],
             [(b * p + c * r) / s, (b * q + c * t) / s],

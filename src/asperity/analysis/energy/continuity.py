@@ -206,7 +206,8 @@ def _jump_at_contact(surface: Surface) -> list[Jump]:
     xy = surface.texture.scan_line().points(_SCAN_POINTS)
     level = surface.law.contact.contact_height(surface.texture, xy)
     half = 0.5 * _PAIR_DISTANCE * _shortest_span(surface.texture)
-    outside, inside = np.column_stack([xy, level + half]), np.column_stack([xy, level - half])
+    outside = np.column_stack([xy, level + half])
+    inside = np.column_stack([xy, level - half])
     sizes = np.linalg.norm(surface.force(inside) - surface.force(outside), axis=1)
     worst = int(np.argmax(sizes))
     return [Jump(0.0, float(sizes[worst]), _to_point(outside[worst]), _to_point(inside[worst]))]
@@ -276,7 +277,8 @@ class _Ridge:
         toward = self.texture.nearest(pair) - pair
         lengths = np.linalg.norm(toward, axis=1)
         first, second = toward / lengths[:, None]
-        self.position, self.depth = pair.mean(axis=0), float(lengths.mean())
+        self.position = pair.mean(axis=0)
+        self.depth = float(lengths.mean())
         self.across = (second - first) / np.linalg.norm(second - first)
         self._update_direction(0.5 * (first + second))
         return pair
@@ -298,7 +300,8 @@ class _Ridge:
         gaps = np.linalg.norm(np.diff(ends, axis=0), axis=1)
         wide = np.flatnonzero(gaps >= 0.5 * gaps.max())
         best = int(wide[np.argmin(np.abs(wide + 0.5 - 0.5 * (_CROSSING_SAMPLES - 1)))])
-        part, width = slice(best, best + 2), _PAIR_DISTANCE * self.extent
+        part = slice(best, best + 2)
+        width = _PAIR_DISTANCE * self.extent
         low, high = _bisect(closest_points, offsets[part], ends[part], width)
         pair = middle + np.array([[low], [high]]) * self.across
         left, right = self.texture.nearest(pair)
@@ -313,14 +316,17 @@ def _bisect(
     width: float,
 ) -> tuple[float, float]:
     """Return an interval of that width by bisection towards the greater change."""
-    (low, high), (left, right) = ends, values
+    (low, high) = ends
+    (left, right) = values
     while high - low > width:
         middle = 0.5 * (low + high)
         value = closest_points(np.array([middle]))[0]
         if np.linalg.norm(value - left) > np.linalg.norm(right - value):
-            high, right = middle, value
+            high = middle
+            right = value
         else:
-            low, left = middle, value
+            low = middle
+            left = value
     return float(low), float(high)
 
 

@@ -25,12 +25,14 @@ from asperity.surface import Surface
 from asperity.textures.bounds.bounded_cells import LineSegments
 from asperity.textures.texture import ScanLine, Texture
 
-_MIN_PIECES, _MAX_PIECES = 512, 65_536
+_MIN_PIECES = 512
+_MAX_PIECES = 65_536
 _RELATIVE_ERROR = 1e-4
 # Layers of depth where the curl is not affine in the depth.
 _LAYER_COUNT = 64
 _MIN_NODES = 1024
-_NODES_PER_CELL, _MAX_NODES = 4, 4096
+_NODES_PER_CELL = 4
+_MAX_NODES = 4096
 
 
 @dataclass(frozen=True)
@@ -58,8 +60,10 @@ def depth_layers(surface: Surface, extra_depth: float = 0.0) -> list[Layer]:
         surface: the surface.
         extra_depth: additional depth [m].
     """
-    clamp, facts = surface.effective_clamp, surface.facts
-    top, bottom = surface.max_depth, surface.clamped_depth + extra_depth
+    clamp = surface.effective_clamp
+    facts = surface.facts
+    top = surface.max_depth
+    bottom = surface.clamped_depth + extra_depth
     result: list[Layer] = []
     if not clamp.changes_force or not law_facts(surface.law).conservative:
         count = 1 if facts.affine_in_depth else _LAYER_COUNT
@@ -98,7 +102,8 @@ def curl_integral_bounds(
                 ]
         except TypeError:
             return None
-        low, high = max(low for low, _ in sides), max(high for _, high in sides)
+        low = max(low for low, _ in sides)
+        high = max(high for _, high in sides)
         enough = math.isfinite(high) and high - low <= _RELATIVE_ERROR * high
         if enough or 2 * len(pieces.centres) > _MAX_PIECES:
             return sides[0], sides[1]
@@ -108,7 +113,8 @@ def curl_integral_bounds(
 def _signed_integral_bounds(
     surface: Surface, line: ScanLine, pieces: LineSegments, layers: Sequence[Layer], sign: float
 ) -> tuple[float, float]:
-    scale, affine = surface.stiffness * pieces.length, surface.facts.affine_in_depth
+    scale = surface.stiffness * pieces.length
+    affine = surface.facts.affine_in_depth
     low = high = 0.0
     for layer in layers:
         ends = (layer.top, layer.bottom)
@@ -131,7 +137,8 @@ def _signed_integral_bounds(
 
 def _mean_positive_part(alpha: FloatArray, gamma: FloatArray) -> FloatArray:
     """Return the mean of (α + (γ - α) s)⁺ over s in [0, 1]."""
-    low, high = np.minimum(alpha, gamma), np.maximum(alpha, gamma)
+    low = np.minimum(alpha, gamma)
+    high = np.maximum(alpha, gamma)
     width = np.where(high > low, high - low, 1.0)
     mixed = 0.5 * high * high / width
     return np.where(low >= 0.0, 0.5 * (low + high), np.where(high <= 0.0, 0.0, mixed))
@@ -142,7 +149,8 @@ def _chord_error(
 ) -> FloatArray:
     """Return a bound of the difference between the curl in a layer and the chord of its edges."""
     n = len(pieces.centres)
-    middle, reach = 0.5 * (layer.top + layer.bottom), 0.5 * (layer.bottom - layer.top)
+    middle = 0.5 * (layer.top + layer.bottom)
+    reach = 0.5 * (layer.bottom - layer.top)
     slopes = np.zeros((2, n))
     slopes[1] = reach
     depth = TaylorModel(np.full(n, middle), slopes, np.zeros(n))
@@ -166,7 +174,8 @@ def _curl_model(
 ) -> TaylorModel:
     """Return the enclosure of the curl over k on every piece at a depth."""
     kernel = ClampKernel(surface) if is_clamped else LawKernel(surface)
-    models, dimensions = pieces.models(kernel.names), 1
+    models = pieces.models(kernel.names)
+    dimensions = 1
     if isinstance(depth, TaylorModel):
         dimensions = 2
         models = {name: _with_depth_axis(model) for name, model in models.items()}
@@ -203,7 +212,8 @@ def _curls_at_layer_ends(
 ) -> list[FloatArray]:
     """Return the curl [N/m] at distances along a line, at the top and the bottom of a layer."""
     xy = np.ascontiguousarray(line.start + along[:, None] * line.direction)
-    derivatives, n = surface.texture.derivatives(xy), len(xy)
+    derivatives = surface.texture.derivatives(xy)
+    n = len(xy)
     result = []
     for level in (layer.top, layer.bottom):
         depth = np.full(n, level)
@@ -252,9 +262,11 @@ def positive_interval(levels: Sequence[float], values: FloatArray) -> tuple[Floa
     Linear between the levels; empty intervals have equal ends.
     """
     count = values.shape[1]
-    top, bottom = np.zeros(count), np.zeros(count)
+    top = np.zeros(count)
+    bottom = np.zeros(count)
     for column in range(count):
-        start, best = None, 0.0
+        start = None
+        best = 0.0
         v = values[:, column]
         for i in range(len(levels)):
             if v[i] > 0.0 and start is None:
@@ -263,7 +275,9 @@ def positive_interval(levels: Sequence[float], values: FloatArray) -> tuple[Floa
             if start is not None and (v[i] <= 0.0 or last):
                 end = levels[i] if v[i] > 0.0 else _zero_crossing(levels, v, i)
                 if end - start > best:
-                    best, top[column], bottom[column] = end - start, start, end
+                    best = end - start
+                    top[column] = start
+                    bottom[column] = end
                 start = None
     return top, bottom
 
@@ -296,11 +310,15 @@ def column_polygon(
         order = (first + np.arange(n + 1)) % n
         turns = (first + np.arange(n + 1)) // n
         xy = xy[order] + turns[:, None] * (xy[-1] - xy[0])
-        top, bottom, full = top[order], bottom[order], full[order]
+        top = top[order]
+        bottom = bottom[order]
+        full = full[order]
     inside = np.flatnonzero(full)
     # One empty column on either side closes the region.
     span = slice(max(inside[0] - 1, 0), inside[-1] + 2)
-    xy, top, bottom = xy[span], top[span], bottom[span]
+    xy = xy[span]
+    top = top[span]
+    bottom = bottom[span]
     forth = np.column_stack([xy, top])
     back = np.column_stack([xy, bottom])[::-1]
     vertices = np.concatenate([forth, back])
@@ -310,9 +328,12 @@ def column_polygon(
 
 def _after_widest_gap(full: np.ndarray[Any, np.dtype[np.bool_]]) -> int:
     n = len(full)
-    best, where, run = -1, 0, 0
+    best = -1
+    where = 0
+    run = 0
     for i in range(2 * n):
         run = 0 if full[i % n] else run + 1
         if run > best:
-            best, where = run, i % n
+            best = run
+            where = i % n
     return where

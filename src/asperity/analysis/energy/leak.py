@@ -253,7 +253,8 @@ def _nearest_outlines(
         top, bottom = curl_columns.positive_interval(parts.tolist(), sign * curls)
         chosen = (parts[:, None] >= top) & (parts[:, None] <= bottom) & (sign * curls > 0.0)
         estimate = float((np.where(chosen, np.abs(curls), 0.0) * area).sum())
-        low, high = tops - bottom * reach, tops - top * reach
+        low = tops - bottom * reach
+        high = tops - top * reach
         yield estimate, curl_columns.column_polygon(xy, high, low, periodic=line.periodic), line
 
 
@@ -267,7 +268,8 @@ def _region_depth(surface: Surface, xy: FloatArray, heights: FloatArray) -> Floa
         points = np.column_stack([xy, heights - middle])
         closest = surface.texture.nearest(points)
         near = np.linalg.norm(closest - points, axis=1) <= surface.max_depth
-        low, high = np.where(near, middle, low), np.where(near, high, middle)
+        low = np.where(near, middle, low)
+        high = np.where(near, high, middle)
     return low
 
 
@@ -323,7 +325,8 @@ def friction_path(surface: Surface, start: FloatArray, along: FloatArray) -> Flo
 
     Down to light contact, along by max_deflection, down to max_depth, back, and up.
     """
-    depth, light = surface.max_depth, 1e-6 * surface.max_depth
+    depth = surface.max_depth
+    light = 1e-6 * surface.max_depth
     end = start + surface.parameter("max_deflection") * along
     above = 0.1 * depth
     return np.array(
@@ -373,13 +376,15 @@ def _in_plane_outline(
     """Return ∬|∇m × d| within the outline, up to a factor, and the polygon."""
     longest = surface.parameter("max_deflection")
     t = np.linspace(-1.0, 1.0, _COLUMNS + 1) * longest * _RADIUS_FACTOR
-    along, across = line.direction, np.array([-line.direction[1], line.direction[0]])
+    along = line.direction
+    across = np.array([-line.direction[1], line.direction[0]])
     xy = anchor + t[:, None] * along
     slope = surface.texture.gradient(xy) @ along
     width = np.sqrt(np.maximum((_RADIUS_FACTOR * longest) ** 2 - t * t, 0.0))
     estimate = float((np.abs(slope) * width * width).sum())
     side = sign * np.where(slope >= 0.0, width, -width)
-    low, high = np.minimum(side, 0.0), np.maximum(side, 0.0)
+    low = np.minimum(side, 0.0)
+    high = np.maximum(side, 0.0)
     forth = xy + low[:, None] * across
     back = (xy + high[:, None] * across)[::-1]
     plane = np.concatenate([anchor[None], forth, back, anchor[None]])

@@ -21,7 +21,8 @@ from asperity.core.units import format_quantity
 from asperity.surface import Surface
 
 # Steps to find where an edge enters and leaves contact: per wave of the height, and at most.
-_CONTACT_STEPS_PER_WAVE, _MAX_CONTACT_STEPS = 16, 65_536
+_CONTACT_STEPS_PER_WAVE = 16
+_MAX_CONTACT_STEPS = 65_536
 _CONTACT_BISECTIONS = 52
 
 DeflectionFunction = Callable[[FloatArray], FloatArray]
@@ -86,11 +87,13 @@ def _contact_intervals(
     s: FloatArray = np.linspace(0.0, 1.0, steps + 1)
     inside = contact.is_in_contact(surface.texture, points(s))
     turns = np.flatnonzero(inside[1:] != inside[:-1])
-    low, high = s[turns], s[turns + 1]
+    low = s[turns]
+    high = s[turns + 1]
     for _ in range(_CONTACT_BISECTIONS if len(turns) else 0):
         middle = 0.5 * (low + high)
         same = contact.is_in_contact(surface.texture, points(middle)) == inside[turns]
-        low, high = np.where(same, middle, low), np.where(same, high, middle)
+        low = np.where(same, middle, low)
+        high = np.where(same, high, middle)
     places = [start, *points(high), end]
     held = [bool(inside[0]), *inside[turns + 1].tolist()]
     return [(a, b, kind) for (a, b), kind in zip(pairwise(places), held, strict=True)]
@@ -166,7 +169,8 @@ _ORDER = 16
 
 def _clenshaw_curtis(order: int) -> FloatArray:
     """Return the weights on [0, 1] at s_j = (1 - cos(πj/order))/2; order even."""
-    j, k = np.arange(order + 1), np.arange(1, order // 2 + 1)
+    j = np.arange(order + 1)
+    k = np.arange(1, order // 2 + 1)
     factor = np.where(k == order // 2, 1.0, 2.0) / (4.0 * k * k - 1.0)
     weights = 1.0 - np.cos(2.0 * np.pi * np.outer(j, k) / order) @ factor
     ends = np.where((j == 0) | (j == order), 1.0, 2.0)
@@ -235,7 +239,8 @@ def _field_work(
     first = np.concatenate([np.arange(count) for count in counts])
     parts = np.repeat(1.0 / np.array(counts), counts)
     # The abscissa of panel p of edge e is e + part; its integrand is the work per edge.
-    left, width = edge + first * parts, parts
+    left = edge + first * parts
+    width = parts
 
     def integrand(s: FloatArray) -> FloatArray:
         which = np.minimum(np.floor(s).astype(np.int64), len(along) - 1)
@@ -253,7 +258,8 @@ def _check_panel_count(panels: float, surface: Surface, path_length: float, wave
     """
     if panels <= _MAX_TOTAL_PANELS:
         return
-    length, turn = format_quantity(path_length, "m"), format_quantity(wave, "m")
+    length = format_quantity(path_length, "m")
+    turn = format_quantity(wave, "m")
     size = "max_deflection" if surface.law.stateful else "max_depth"
     raise ParameterError(
         "surface",
@@ -317,7 +323,8 @@ def _integrate_adaptively(
     tolerance: float,
 ) -> float:
     """Return the integral over panels, halved until two nested rules agree."""
-    total, scale = 0.0, 0.0
+    total = 0.0
+    scale = 0.0
     for level in range(_MAX_REFINEMENTS):
         nodes = left[:, None] + width[:, None] * _QUADRATURE_NODES
         # The last node must not be taken for the first one of the next edge.

@@ -53,14 +53,16 @@ def merit(surface: Surface) -> Merit:
 
 
 def _compute_merit(surface: Surface) -> Merit:
-    line, height = surface.texture.scan_line(), scan_height(surface)
+    line = surface.texture.scan_line()
+    height = scan_height(surface)
     scan = scan_force(surface)
     gain = _gain_above_height(surface, height)
     unit = line.length if line.periodic else 1.0
     if math.isinf(gain) or gain == 0.0:  # a constant force has neither
         strength = support = 0.0
     else:
-        strength, support = scan.ripple / (gain * unit), scan.slope / gain
+        strength = scan.ripple / (gain * unit)
+        support = scan.slope / gain
     return Merit(strength, support, scan.ripple, gain, height, scan.contact_lost)
 
 
@@ -94,10 +96,12 @@ def scan_force(surface: Surface, points: int | None = None) -> ScanForce:
 
 
 def _scan_force(surface: Surface, points: int | None = None) -> ScanForce:
-    line, height = surface.texture.scan_line(), scan_height(surface)
+    line = surface.texture.scan_line()
+    height = scan_height(surface)
     forces, slopes, lost = _scan_forces_and_slopes(surface, line, height, points)
     squares = np.square(forces - forces.mean(axis=1, keepdims=True)).sum(axis=2)
-    size, variance = float(np.mean(np.square(forces).sum(axis=2))), float(squares.mean())
+    size = float(np.mean(np.square(forces).sum(axis=2)))
+    variance = float(squares.mean())
     # The variance of a constant force is rounding.
     peak = float(squares.max()) if variance > 1e-24 * size else 0.0
     return ScanForce(

@@ -60,7 +60,8 @@ def parallel_scan_lines(surface: Surface, line: ScanLine) -> list[ScanLine]:
         return [line]
     across = np.array([-line.direction[1], line.direction[0]])
     reach = domain.spans @ across
-    low, high = float(np.minimum(reach, 0.0).sum()), float(np.maximum(reach, 0.0).sum())
+    low = float(np.minimum(reach, 0.0).sum())
+    high = float(np.maximum(reach, 0.0).sum())
     count = _SCAN_LINES if surface.law.contact.is_above_probe else _NEAREST_SCAN_LINES
     first = float((domain.origin - line.start) @ across) + low
     shifts = first + (high - low) * (np.arange(count) + 0.5) / count

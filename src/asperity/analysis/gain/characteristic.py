@@ -186,7 +186,8 @@ def _bound_without_search(
     surface: Surface, measure: JacobianMeasure, options: SearchOptions
 ) -> Bound | None:
     """Return a number above max_depth by theorem or closed form, ``None`` if it needs a search."""
-    theorem, wave = theorem_on(surface), surface.texture.single_wave
+    theorem = theorem_on(surface)
+    wave = surface.texture.single_wave
     constant = theorem.constants.get(measure)
     if constant is not None:
         # Just inside the highest point the normal is e_z.
@@ -196,12 +197,14 @@ def _bound_without_search(
         )
     if wave is None or options.extent is not None:
         return None
-    proof, form = theorem.special_proofs.get(measure), theorem.closed_forms.get(measure)
+    proof = theorem.special_proofs.get(measure)
+    form = theorem.closed_forms.get(measure)
     if proof is not None:
         return proof(surface, options)
     if form is None:
         return None
-    value, phase = form.value(wave, surface.max_depth), form.phase(wave, surface.max_depth)
+    value = form.value(wave, surface.max_depth)
+    phase = form.phase(wave, surface.max_depth)
     xy = point_at_phase(wave, phase)
     # At full depth; on the nearest contact wherever the closest point is unique.
     depth = surface.max_depth if surface.law.contact.single_valued else 0.0
@@ -250,7 +253,8 @@ def surface_content(surface: Surface, *extra: str) -> str | None:
 
     ``None`` where code of the user takes part.
     """
-    law, texture = surface.law, surface.texture.digest
+    law = surface.law
+    texture = surface.texture.digest
     formula: tuple[str | float, ...] = (law.letter,)
     if not is_shipped_law(law):
         if law in THEOREMS or not is_shipped(type(law.contact)):

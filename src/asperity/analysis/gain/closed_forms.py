@@ -49,9 +49,12 @@ def _feasible_root(wave: SingleWave, depth: float) -> float:
     Feasible are t >= 1 - 2 G₁/E. Where the left side is stationary there, it exceeds 1, so it
     crosses 1 at most once before it reaches 1 + G₁² at t = 1.
     """
-    g, e = _max_slope(wave), 2.0 * math.pi * depth / wave.period
-    quarter, rate = e * e / 4.0, 1.0 + g * g
-    low, high = max(1.0 - 2.0 * g / e, 0.0), 1.0
+    g = _max_slope(wave)
+    e = 2.0 * math.pi * depth / wave.period
+    quarter = e * e / 4.0
+    rate = 1.0 + g * g
+    low = max(1.0 - 2.0 * g / e, 0.0)
+    high = 1.0
     if (quarter * (1.0 - low) ** 2 + rate) * low > 1.0:
         return 0.0
     t = max(1.0 / rate, low)

@@ -40,7 +40,8 @@ def largest_symmetric_eigenvalue(a: FloatArray, b: FloatArray) -> FloatArray:
 
 def norm_bound_f(surface: Surface) -> float:
     """Return the bound of q_F from the greatest entries that |∇h| <= M allows."""
-    swing, friction = surface.parameter("modulation_depth"), surface.parameter("friction")
+    swing = surface.parameter("modulation_depth")
+    friction = surface.parameter("friction")
     low, high = surface.texture.extremes
     steep = swing * surface.texture.bounds[0] / max(high - low, 1e-300)
     still = 0.5 * (1.0 + swing)
@@ -57,12 +58,16 @@ class FrictionProblem(Problem):
     """
 
     def __init__(self, surface: Surface, cells: Cells, measure: EntryMeasure) -> None:
-        self.cells, self._measure = cells, measure
-        self._surface, self._texture = surface, surface.texture
+        self.cells = cells
+        self._measure = measure
+        self._surface = surface
+        self._texture = surface.texture
         _k, middle, half = surface.law_arguments[:3]
         swing = surface.parameter("modulation_depth")
-        self._offset, self._share = 0.5 * (1.0 + swing * middle / half), 0.5 * swing / half
-        self._friction, self._depth = surface.parameter("friction"), surface.max_depth
+        self._offset = 0.5 * (1.0 + swing * middle / half)
+        self._share = 0.5 * swing / half
+        self._friction = surface.parameter("friction")
+        self._depth = surface.max_depth
         self._max_deflection = surface.parameter("max_deflection")
 
     def _entries(self, h: FloatArray, slope: FloatArray) -> FloatArray:
@@ -78,7 +83,8 @@ class FrictionProblem(Problem):
     ) -> FloatArray:
         """See :class:`Problem`."""
         models = self.cells.enclosures(centres, half, ("h", "hx", "hy"))
-        n, d = len(centres), len(half)
+        n = len(centres)
+        d = len(half)
         zero = TaylorModel(np.zeros(n), np.zeros((d, n)), np.zeros(n))
         h, x, y = (m if isinstance(m, TaylorModel) else zero for m in models.values())
         rest = np.hypot(x.e, y.e) * (1.0 + 1e-12)
@@ -110,7 +116,8 @@ class FrictionProblem(Problem):
         if wave is None:
             return None
         touch, corner, radius = _half_circle()
-        height, slope = wave.amplitude, self._texture.bounds[0]
+        height = wave.amplitude
+        slope = self._texture.bounds[0]
         values = self._entries(height * np.sin(touch), slope * np.cos(touch))
         beyond = self._entries(height * radius * np.sin(corner), slope * radius * np.cos(corner))
         upper = max(float(values.max()), float(beyond.max())) * (1.0 + 1e-13)

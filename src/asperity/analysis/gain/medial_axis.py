@@ -160,7 +160,8 @@ def crest_number(surface: Surface, options: SearchOptions) -> bound.Bound:
     ‖J‖/k at depth δ below a surface point of crest curvature κ is max(1, δκ/(1 - δκ)), and every
     point stays the closest one down to the least radius of all crests (see ``medial_axis.py``).
     """
-    texture, depth = surface.texture, surface.max_depth
+    texture = surface.texture
+    depth = surface.max_depth
     if texture.single_wave is not None and options.extent is None:
         return _crest_number_of_wave(surface, texture.single_wave)
     if depth * texture.bounds[1] <= 0.5:
@@ -170,12 +171,14 @@ def crest_number(surface: Surface, options: SearchOptions) -> bound.Bound:
         )
     crest = options.crest(surface)
     if crest is None:
-        note, xy = "the surface has no crest", highest_point(texture)
+        note = "the surface has no crest"
+        xy = highest_point(texture)
         return bound.bound_from_theorem(surface, bound.NORM, 1.0, "certified", note, xy, [0.0])
     if depth >= crest.radius:
         method: bound.Method = "certified" if crest.min_radius > 0.0 else "sampled"
         return bound.Bound(math.inf, math.inf, method, crest.centre, _ONSET_NOTE)
-    xy, least = np.array(crest.point[:2]), crest.min_radius
+    xy = np.array(crest.point[:2])
+    least = crest.min_radius
     cells = texture.cells(options.extent, options.margin(surface))
     if cells is not None:
         found = options.supremum(CrestProblem(cells, depth))
@@ -194,12 +197,14 @@ def crest_number(surface: Surface, options: SearchOptions) -> bound.Bound:
 
 
 def _crest_number_of_wave(surface: Surface, wave: SingleWave) -> bound.Bound:
-    value, note = closed_forms.q_d(wave, surface.max_depth), "formula on a sinusoid"
+    value = closed_forms.q_d(wave, surface.max_depth)
+    note = "formula on a sinusoid"
     if math.isinf(value):
         crest = sharpest_crest(surface.texture)
         assert crest is not None
         return bound.Bound(math.inf, math.inf, "closed form", crest.centre, _ONSET_NOTE)
-    xy, depths = point_at_phase(wave, 0.5 * math.pi), [surface.max_depth]
+    xy = point_at_phase(wave, 0.5 * math.pi)
+    depths = [surface.max_depth]
     return bound.bound_from_theorem(surface, bound.NORM, value, "closed form", note, xy, depths)
 
 
@@ -211,7 +216,8 @@ def gain_above_crest(surface: Surface, height: float) -> float:
     crest = sharpest_crest(surface.texture)
     if crest is None:
         return 1.0
-    above, reach = crest.point[2] - height, crest.point[2] - crest.centre[2]
+    above = crest.point[2] - height
+    reach = crest.point[2] - crest.centre[2]
     if reach <= 0.0:  # a radius below the precision of the height
         return math.inf if above > 0.0 else 1.0
     return _norm_from_curvature(above / reach)

@@ -134,7 +134,8 @@ class Limits(Plottable, Reportable, Tabular):
             text = f"Yes: all six limits hold at {speed}."
         if undecided:
             missing = dict.fromkeys(one for limit in undecided for one in limit.missing_data)
-            numbers, data = _limit_numbers(undecided), _join_words([*missing])
+            numbers = _limit_numbers(undecided)
+            data = _join_words([*missing])
             text += f" Not decidable: {numbers}; missing: {data}."
         return f"{text} {texture_force_text(self)}"
 
@@ -147,13 +148,15 @@ class Limits(Plottable, Reportable, Tabular):
         return {limit.number: limit for limit in self.limits}[number]
 
     def __repr__(self) -> str:
-        law, count = self.surface.law.letter, sum(bool(limit.holds) for limit in self.limits)
+        law = self.surface.law.letter
+        count = sum(bool(limit.holds) for limit in self.limits)
         outcome = f"{count} of 6 hold, {self.perceptibility.tier}"
         return f"<Limits of law {law} on {self.device.id} at {self.speed:g} m/s: {outcome}>"
 
     def table_rows(self) -> list[dict[str, Any]]:
         """Return one row: law, stiffness, whether each limit holds, what is felt; SI units."""
-        surface, felt = self.surface, self.perceptibility
+        surface = self.surface
+        felt = self.perceptibility
         holds = {f"limit {limit.number} holds": limit.holds for limit in self.limits}
         return [{
             "device": self.device.id, "law": surface.law.letter,
@@ -229,7 +232,8 @@ def _speed_advice(result: Limits, failing: Sequence[Limit]) -> str:
 
 def texture_force_text(result: Limits) -> str:
     """Return the texture force, its perceptibility, and remedies."""
-    texture, law = result.perceptibility, result.surface.law.letter
+    texture = result.perceptibility
+    law = result.surface.law.letter
     text = f"At {stiffness_text(result)} law {law} gives {texture_amount_text(texture)}: "
     if texture.tier == "felt":
         return f"{text}felt."
@@ -305,7 +309,8 @@ def _default_sentences(result: Limits, defaults: Mapping[str, bool]) -> list[str
         shown = ", ".join(f"{name} = {n:g}" for name, n in zip("αβγ", counts, strict=True))
         sentences.append(f"Samples in a wave: {shown}; the paper recommends 5 to 10")
     if defaults["stiffness"]:
-        share, limit = result.margin.factor, result.stability_limit
+        share = result.margin.factor
+        limit = result.stability_limit
         default = "" if limit.stiffness else ", a default"
         part = f"{share:g} of what is " if limit.stiffness and share < 1.0 else ""
         sentences.append(

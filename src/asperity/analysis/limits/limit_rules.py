@@ -160,13 +160,16 @@ def evaluate_limit(rule: LimitRule, case: LimitCase, inequality: str | None = No
         case: the conditions.
         inequality: the inequality in symbols, where it differs from the rule's.
     """
-    field, symbols, on_waves = rule.device_field, inequality or rule.inequality, rule.number != 5
+    field = rule.device_field
+    symbols = inequality or rule.inequality
+    on_waves = rule.number != 5
     limit = Limit(rule.number, rule.name, symbols, rule.unit, device_field=field)
     missing = [] if field in case.device else [field]
     if on_waves and not len(case.wavelengths):
         missing.append("waves: the surface is flat")
     if missing:
-        limit, n = replace(limit, missing_data=tuple(missing)), len(case.wavelengths)
+        limit = replace(limit, missing_data=tuple(missing))
+        n = len(case.wavelengths)
         return Decision(limit, np.full(n, True), np.full(n, math.inf))
     number = case.device[field]
     left, right = np.broadcast_arrays(*map(np.atleast_1d, rule.sides(case, number)))
@@ -196,7 +199,8 @@ def shortest_wavelengths(
     Limits 1, 2, 3 and 6 of the paper's section II.B, α v T < l, β δ < l, α δ < l and v/l < F₀; 3
     only where it differs from 2.
     """
-    rate, step = device.value("update_rate"), device.value("position_resolution")
+    rate = device.value("update_rate")
+    step = device.value("position_resolution")
     bandwidth = device.value("bandwidth")
     found = []
     if rate is not None:

@@ -176,7 +176,8 @@ def scan_waves(
         The waves; the numbers of the device that are not trusted; RMS of the force of the texture;
         the surface without form and waviness, whose scan has that force.
     """
-    texture_rms, scanned = rms, surface
+    texture_rms = rms
+    scanned = surface
     if part.nesting is not None:
         depth = surface.max_depth if explicit_depth else default_max_depth(part.texture)
         scanned = surface.to_texture(part.texture, depth)
@@ -203,12 +204,14 @@ def _is_felt_magnified(
 ) -> bool:
     """Return whether the surface, magnified by a factor, is felt, touched and within reach."""
     texture = prepare_texture(surface.texture, magnify=factor)
-    size, scaled = np.hypot(*texture.domain.spans.T).max(), factor * surface.max_depth
+    size = np.hypot(*texture.domain.spans.T).max()
+    scaled = factor * surface.max_depth
     if texture.is_mirrored and size > device.workspace_size:
         return False
     depth = scaled if options["explicit_depth"] else default_max_depth(texture)
     larger = surface.to_texture(texture, depth)
-    scanned, part = scan_force(larger), texture.texture_part()
+    scanned = scan_force(larger)
+    part = texture.texture_part()
     rms = scanned.ripple * larger.stiffness
     assessed = assess_perceptibility(larger, device, part, rms=rms, find_remedies=False, **options)
     return assessed.tier == "felt" and scanned.contact_lost <= MAX_CONTACT_LOST
@@ -241,8 +244,10 @@ def classify_perceptibility(
         tiers = {name: respond(waves.with_device(name, data[name])).tier for name in doubtful}
         # Numbers may hide a texture together that none of them hides alone.
         masking = [one for one in doubtful if tiers[one] != response.tier] or list(doubtful)
-    forces, resolved = waves.case.forces, response.is_resolved
-    motions, total = np.where(resolved, response.motions, 0.0), float(forces @ forces)
+    forces = waves.case.forces
+    resolved = response.is_resolved
+    motions = np.where(resolved, response.motions, 0.0)
+    total = float(forces @ forces)
     levels = motions / response.felt
     step = known.get("force_resolution", 0.0)
     amplitude = math.sqrt(float(np.square(forces[resolved]).sum()))
@@ -282,8 +287,10 @@ def respond(waves: WaveScan) -> HandSpectrum:
     of force of at least γ steps. Not felt: the same with the unnoticed amplitude below 1, or less
     than one step of force, in waves with at least two samples.
     """
-    case, grip = waves.case, waves.grip
-    frequencies, damping = case.speed / case.wavelengths, case.device.get("damping", 0.0)
+    case = waves.case
+    grip = waves.grip
+    frequencies = case.speed / case.wavelengths
+    damping = case.device.get("damping", 0.0)
     # To a motion across the stroke, dry friction of constant size is viscous.
     across = damping + case.device.get("friction", 0.0) / case.speed
     mass = case.device.get("apparent_mass", DEFAULT_APPARENT_MASS)
@@ -314,7 +321,8 @@ def felt_ratio(waves: WaveScan, response: HandSpectrum) -> float:
     The lesser of the ratio of motion and felt amplitude, root of the sum of squares, and of that
     of the amplitude of the force and γ force steps, over the waves that the device resolves.
     """
-    case, resolved = waves.case, response.is_resolved
+    case = waves.case
+    resolved = response.is_resolved
     level = float(np.linalg.norm((response.motions / response.felt)[resolved]))
     return min(level, force_step_ratio(case, resolved))
 
@@ -330,7 +338,8 @@ def force_step_ratio(case: LimitCase, resolved: NDArray[np.bool_]) -> float:
 
 def _find_remedies(waves: WaveScan, is_felt_magnified: Callable[[float], bool]) -> list[Remedy]:
     """Return the changes that make a texture felt, each by itself and confirmed."""
-    case, found = waves.case, []
+    case = waves.case
+    found = []
     first = _first_felt(_FACTORS, waves.magnified)
     if first is not None:
         tries = (round_up(first * share, 2) for share in _MAGNIFICATION_TRIES)

@@ -194,9 +194,11 @@ def band_variances(values: FloatArray, spacing: tuple[float, float], is_periodic
     import scipy.fft
 
     _components, ny, nx = values.shape
-    across, along = _hann_window(ny, is_periodic), _hann_window(nx, is_periodic)
+    across = _hann_window(ny, is_periodic)
+    along = _hann_window(nx, is_periodic)
     power = float(across @ across) * float(along @ along) * nx * ny
-    fx, fy = np.fft.rfftfreq(nx, spacing[0]), np.fft.fftfreq(ny, spacing[1])
+    fx = np.fft.rfftfreq(nx, spacing[0])
+    fy = np.fft.fftfreq(ny, spacing[1])
     twice = np.full(len(fx), 2.0)
     twice[0] = 1.0
     if nx % 2 == 0:
@@ -224,7 +226,8 @@ def _add_to_bands(
 ) -> None:
     """Add the variance of bins, and its product with ln f, to their bands."""
     moving = frequency > 0.0
-    f, v = frequency[moving], variance[moving]
+    f = frequency[moving]
+    v = variance[moving]
     number = np.floor(BANDS_PER_OCTAVE * np.log2(f)).astype(int)
     lowest = int(number.min(initial=0))
     totals = np.bincount(number - lowest, weights=v)
@@ -325,7 +328,8 @@ def _fit_waves(surface: Surface, spectrum: Spectrum, points: int | None = None) 
 
 def _fit_points(texture: Texture, spectrum: Spectrum, count: int) -> FloatArray:
     """Return points (n, 2) [m] spread evenly over one period, or over many wavelengths."""
-    domain, steps = texture.domain, np.arange(count)
+    domain = texture.domain
+    steps = np.arange(count)
     spans = domain.spans
     if not domain.periodic:
         side = _APERIODIC_FIT_LENGTH * float(spectrum.wavelengths.max())
@@ -337,10 +341,12 @@ def _fit_points(texture: Texture, spectrum: Spectrum, count: int) -> FloatArray:
 
 def _band_force_amplitudes(surface: Surface, spectrum: Spectrum) -> FloatArray:
     """Return the amplitude of each band, from the ratio of force to height on a patch."""
-    texture, costly = surface.texture, surface.law.contact.requires_search
+    texture = surface.texture
+    costly = surface.law.contact.requires_search
     max_count = (_LINE_POINTS if texture.is_profile else _SIDE_POINTS)[costly]
     points, spacing, repeats = texture.domain.grid(texture.grid_counts(), max_count)
-    flat, shape = points.reshape(-1, 2), points.shape[:2]
+    flat = points.reshape(-1, 2)
+    shape = points.shape[:2]
     pushed = scan_forces(surface, flat)
     if not pushed.any():  # nothing is touched here: take the patch around the highest point
         flat = flat + _highest_point(texture) - flat.mean(axis=0)

@@ -59,7 +59,8 @@ def verdict_reason(
         ground: ground of the verdict.
         buzz: bound of the motion that quantisation may cause, if there is one.
     """
-    formula, conclusion = criterion.formula, criterion.conclusion
+    formula = criterion.formula
+    conclusion = criterion.conclusion
     at = f"{formula} at {loop.surface.stiffness:g} N/m; {conclusion}"
     cycling = loop.cycling_stiffness
     wall = "" if cycling is None else f"a smooth wall of {float(cycling):g} N/m cycled"
@@ -87,7 +88,8 @@ _IF_DAMPED = "if damping there is σ₀"
 
 def buzz_text(buzz: BuzzBound) -> str:
     """Return the bound of the motion that steps of positions and forces may cause."""
-    speed, power = format_quantity(buzz.speed, "m/s"), format_quantity(buzz.power, "W")
+    speed = format_quantity(buzz.speed, "m/s")
+    power = format_quantity(buzz.power, "W")
     return f"a sustained buzz moves at {speed} RMS and draws {power} at most"
 
 
@@ -179,7 +181,9 @@ def _conclusion(loop: DeviceLoop, criterion: Criterion) -> str:
     """Return the conclusion of a criterion in words."""
     if criterion.obstacle is not None:
         return f"not applicable: {_OBSTACLE_TEXT[criterion.obstacle].format(loop.reason)}"
-    answer, limit, most = _HOLDS_TEXT[criterion.holds], criterion.limit, criterion.upper_limit
+    answer = _HOLDS_TEXT[criterion.holds]
+    limit = criterion.limit
+    most = criterion.upper_limit
     if criterion.holds is None and criterion.missing:
         missing = ", ".join(criterion.missing)
         return f"{answer}: needs {missing}{_proved_delays_text(loop, criterion)}"
@@ -355,7 +359,8 @@ def passivity(
         if not isinstance(value, kind):
             raise ParameterError(name, f"must be a {kind.__name__}", value)
     loop = make_device_loop(surface, load_device(device), q, one_sided, leak)
-    criteria, buzz = evaluate_criteria(loop), buzz_bound(loop)
+    criteria = evaluate_criteria(loop)
+    buzz = buzz_bound(loop)
     verdict, decided_by, ground = decide_verdict(loop, criteria, buzz)
     limit = stability_limit(loop, criteria)
     return Passivity(loop, criteria, decided_by, verdict, ground, limit, buzz)

@@ -131,13 +131,15 @@ def _round_down(value: Number) -> float:
 _COMMON_ASSUMPTIONS = (
     "conservative law, zero-order hold, symmetric damping >= σ₀ wherever the force acts"
 )
-_ZERO, _ONE = Fraction(0), Fraction(1)
+_ZERO = Fraction(0)
+_ONE = Fraction(1)
 _DAMPING_FIELDS = ("update_rate", "damping")
 
 
 def _paper_rule(loop: DeviceLoop) -> StiffnessRule:
     note = "zero-order hold; no certificate for a field with curl, nor from 2 samples of delay on"
-    formula, twice = "k q <= σ₀/(2T)", Fraction(2)
+    formula = "k q <= σ₀/(2T)"
+    twice = Fraction(2)
     return StiffnessRule(PAPER, formula, _ZERO, twice, loop.damping_gain, _DAMPING_FIELDS, note)
 
 
@@ -149,8 +151,10 @@ def _one_sided_rule(loop: DeviceLoop) -> StiffnessRule:
 
 def _delay_rule(loop: DeviceLoop) -> StiffnessRule:
     note = f"{_COMMON_ASSUMPTIONS}, d whole samples of delay, no virtual damping, no quantisation"
-    fields, delay = (*_DAMPING_FIELDS, "delay_samples"), loop.known_delay
-    formula, budget = "k (q⁺/2 + d q) <= σ₀/T", loop.damping_gain
+    fields = (*_DAMPING_FIELDS, "delay_samples")
+    delay = loop.known_delay
+    formula = "k (q⁺/2 + d q) <= σ₀/T"
+    budget = loop.damping_gain
     return StiffnessRule(DELAY, formula, HALF, delay, budget, fields, note, loop.obstacle)
 
 
@@ -163,7 +167,8 @@ def _virtual_damping_rule(loop: DeviceLoop) -> StiffnessRule:
     note = f"{_COMMON_ASSUMPTIONS}, {delay}, b_v on the last step's mean velocity"
     fields = (*_DAMPING_FIELDS, "virtual_damping")
     formula = "k (q⁺/2 + d q) T + |b_v| <= σ₀" if loop.delay else "k q⁺ T/2 + |b_v| <= σ₀"
-    weights, more = (HALF, loop.known_delay), ("delay_samples",)
+    weights = (HALF, loop.known_delay)
+    more = ("delay_samples",)
     return StiffnessRule(VIRTUAL, formula, *weights, budget, fields, note, loop.obstacle, more)
 
 
@@ -182,7 +187,8 @@ def _wall_test_rule(loop: DeviceLoop) -> StiffnessRule:
     For a delay d the test admits σ₀/T >= K₀ (1/2 + d), so the delay rule allows
     K₀ (1/2 + d)/(q⁺/2 + d q). That falls with d, since q⁺ <= q: to K₀/q for unbounded d.
     """
-    longest, budget = loop.longest_delay, loop.wall_stiffness
+    longest = loop.longest_delay
+    budget = loop.wall_stiffness
     note = (
         "plausible, not proved: the wall of stiffness K₀ was close to its stability limit (heavy "
         f"handle, loose grip); {damping_assumption(loop.wall_test)}; conservative law"
@@ -194,14 +200,17 @@ def _wall_test_rule(loop: DeviceLoop) -> StiffnessRule:
         note = "no limit: with delay, the wall test does not show the effect of virtual damping"
     if longest is None:
         budget = None
-    formula, weights = "k q <= K₀", (_ZERO, _ONE)
+    formula = "k q <= K₀"
+    weights = (_ZERO, _ONE)
     if longest is not None and longest != math.inf:
-        formula, weights = "k (q⁺/2 + d q) <= K₀ (1/2 + d)", (HALF, Fraction(longest))
+        formula = "k (q⁺/2 + d q) <= K₀ (1/2 + d)"
+        weights = (HALF, Fraction(longest))
         if budget is not None:
             budget *= HALF + Fraction(longest)
             if loop.damping_gain is not None:
                 budget = min(budget, loop.damping_gain)  # the one admissible pair is known
-    needed, more = ("max_stiffness",), ("delay_samples", "damping", "update_rate")
+    needed = ("max_stiffness",)
+    more = ("delay_samples", "damping", "update_rate")
     return StiffnessRule(WALL_TEST, formula, *weights, budget, needed, note, loop.obstacle, more)
 
 
@@ -223,10 +232,12 @@ def _quantization_criterion(loop: DeviceLoop) -> Criterion:
     A quantised position is off by at most |δ|/2, so a held force is off by φ = k q |δ|/2 + |b|/2,
     and by |b_v| |δ|/T more with virtual damping; friction dissipates f_c per metre.
     """
-    formula, fields = "k q |δ|/2 + |b|/2 <= f_c", ("position_resolution", "force_resolution")
+    formula = "k q |δ|/2 + |b|/2 <= f_c"
+    fields = ("position_resolution", "force_resolution")
     note = f"{_COMMON_ASSUMPTIONS}; |δ|, |b|: a step along three axes at once; f_c: least_friction"
     result = Criterion(QUANTIZATION, formula, assumptions=note, used_fields=fields)
-    test, step = loop.wall_test, loop.position_step
+    test = loop.wall_test
+    step = loop.position_step
     if test is not None and test.positions == "stepped" and not step:
         return replace(result, missing=("position_resolution",))
     if not (step or loop.force_step):
@@ -278,7 +289,8 @@ def buzz_bound(loop: DeviceLoop) -> BuzzBound | None:
     if margin <= 0:
         return None
     excess = max(loop.stiffness * per_stiffness + fixed, _ZERO)
-    speed, power = excess * loop.rate / margin, excess**2 * loop.rate / (4 * margin)
+    speed = excess * loop.rate / margin
+    power = excess**2 * loop.rate / (4 * margin)
     return BuzzBound(_round_up(speed), _round_up(power))
 
 
@@ -341,7 +353,8 @@ def _round_up(value: Fraction) -> float:
 
 def _leak_criterion(loop: DeviceLoop) -> Criterion:
     """A field that gains energy on a loop gains it at any speed: no k is safe."""
-    formula, fields = "W <= 0 for every loop", ("damping",)
+    formula = "W <= 0 for every loop"
+    fields = ("damping",)
     if loop.conservative:
         note = "the law's curl is identically zero; no data of the device are needed"
         return Criterion(LEAK, formula, True, math.inf, math.inf, note)

@@ -120,7 +120,8 @@ def stability_limit(
 
     Comparison, analysis and the six limits of the device share this limit.
     """
-    main, steps = by_name[_main_rule(loop)], by_name[criteria.QUANTIZATION]
+    main = by_name[_main_rule(loop)]
+    steps = by_name[criteria.QUANTIZATION]
     if not loop.conservative:
         return _limit_from_criterion("wall gain", by_name[criteria.WALL])
     plausible = _limit_from_criterion("plausible", by_name[criteria.WALL_TEST], loop.longest_delay)

@@ -14,7 +14,8 @@ from asperity.cli.servo_commands import announce_page
 from asperity.core.errors import ParameterError, escape_unprintable
 
 _TEMPLATES = Path(__file__).parents[2] / "studies" / "templates"
-_RUN, _PLAN = options.command_arguments("study_run"), options.command_arguments("study_plan")
+_RUN = options.command_arguments("study_run")
+_PLAN = options.command_arguments("study_plan")
 
 
 @click.group("study", cls=StrictGroup)
@@ -65,8 +66,10 @@ def run_command(file: str, participant: str, folder: str | None, driver: str, **
     check_participant(participant)
     if driver.startswith(loop_setup.REPLAY_PREFIX):
         raise ParameterError("driver", "must be a device that a participant holds", driver)
-    study, path = load_study(file), Path(folder or Path(file).stem)
-    observer, is_real = find_observer(own["simulate"] or "typical"), driver != loop_setup.SIMULATED
+    study = load_study(file)
+    path = Path(folder or Path(file).stem)
+    observer = find_observer(own["simulate"] or "typical")
+    is_real = driver != loop_setup.SIMULATED
     stimuli = Stimuli(study, is_real=is_real)
     with output.progress_bar("analyzing the stimuli") as update:
         first = stimuli.check_all(update)

@@ -118,15 +118,25 @@ class NearestContact(Contact):
         import mpmath
 
         start = texture.nearest([[float(c) for c in p]])[0]
-        fx, fy = mpmath.mpf(start[0]), mpmath.mpf(start[1])
+        fx = mpmath.mpf(start[0])
+        fy = mpmath.mpf(start[1])
         for _ in range(60):
-            gap, hx, hy = h(fx, fy, 0, 0) - p[2], h(fx, fy, 1, 0), h(fx, fy, 0, 1)
-            hxx, hxy, hyy = h(fx, fy, 2, 0), h(fx, fy, 1, 1), h(fx, fy, 0, 2)
-            a, b = fx - p[0] + gap * hx, fy - p[1] + gap * hy
-            qxx, qxy, qyy = 1 + hx * hx + gap * hxx, hx * hy + gap * hxy, 1 + hy * hy + gap * hyy
+            gap = h(fx, fy, 0, 0) - p[2]
+            hx = h(fx, fy, 1, 0)
+            hy = h(fx, fy, 0, 1)
+            hxx = h(fx, fy, 2, 0)
+            hxy = h(fx, fy, 1, 1)
+            hyy = h(fx, fy, 0, 2)
+            a = fx - p[0] + gap * hx
+            b = fy - p[1] + gap * hy
+            qxx = 1 + hx * hx + gap * hxx
+            qxy = hx * hy + gap * hxy
+            qyy = 1 + hy * hy + gap * hyy
             det = qxx * qyy - qxy * qxy
-            sx, sy = (qxy * b - qyy * a) / det, (qxy * a - qxx * b) / det
-            fx, fy = fx + sx, fy + sy
+            sx = (qxy * b - qyy * a) / det
+            sy = (qxy * a - qxx * b) / det
+            fx = fx + sx
+            fy = fy + sy
             if abs(sx) + abs(sy) <= mpmath.eps * (abs(fx) + abs(fy) + abs(gap)):
                 break
         away = [fx - p[0], fy - p[1], h(fx, fy, 0, 0) - p[2]]

@@ -125,7 +125,9 @@ def split_derivative(
         x, y, z, continuity, none, UNLIMITED, p, atoms, offset, texture
     )
     split_contact_derivative(p, continuity, atoms, count, offset, m, texture)
-    mxy, mxz, myz = 0.5 * (m[0, 1] + m[1, 0]), 0.5 * (m[0, 2] + m[2, 0]), 0.5 * (m[1, 2] + m[2, 1])
+    mxy = 0.5 * (m[0, 1] + m[1, 0])
+    mxz = 0.5 * (m[0, 2] + m[2, 0])
+    myz = 0.5 * (m[1, 2] + m[2, 1])
     return offset[0], offset[1], offset[2], m[0, 0], mxy, mxz, m[1, 1], myz, m[2, 2]
 
 

@@ -15,7 +15,8 @@ def force_batch(
 ) -> None:
     """Write the forces (n, 3) [N] at points (n, 3) with deflections (n, 2) [m]."""
     for i in range(points.shape[0]):
-        dx, dy = deflection[i, 0], deflection[i, 1]
+        dx = deflection[i, 0]
+        dy = deflection[i, 1]
         force = probe_force(points[i, 0], points[i, 1], points[i, 2], dx, dy, texture, law)
         store_force(out, i, force)
 

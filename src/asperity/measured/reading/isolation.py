@@ -29,7 +29,9 @@ TIME_LIMIT = 20.0
 MEMORY_LIMIT = 10**9
 """Memory [bytes] allowed for a small file."""
 _WALL_CLOCK_FACTOR = 6  # wall-clock limit over processor limit: other processes may use the cores
-_SECONDS_PER_BYTE, _BYTES_PER_BYTE = 1e-6, 50  # additional limits for each byte of the file
+# additional limits for each byte of the file
+_SECONDS_PER_BYTE = 1e-6
+_BYTES_PER_BYTE = 50
 
 
 def read_isolated(

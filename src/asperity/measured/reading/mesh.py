@@ -126,7 +126,9 @@ def _to_surface(corners: FloatArray, name: str) -> RawSurface:
     valid = areas > 0.0
     if not valid.all():
         notes.append(f"{int((~valid).sum())} triangles without area ignored")
-        corners, cross, areas = corners[valid], cross[valid], areas[valid]
+        corners = corners[valid]
+        cross = cross[valid]
+        areas = areas[valid]
     if len(corners) < 2:
         raise SurfaceFileError(f"a mesh of {len(corners)} triangles is no surface")
     centre, axes, note = fit_plane(corners, cross, areas)
@@ -142,7 +144,8 @@ def _to_surface(corners: FloatArray, name: str) -> RawSurface:
 def _check_overhangs(areas: FloatArray, overhanging: NDArray[np.bool_]) -> None:
     if not overhanging.any():
         return
-    area, total = float(areas[overhanging].sum()), float(areas.sum())
+    area = float(areas[overhanging].sum())
+    total = float(areas.sum())
     advice = (
         "it looks like a whole body: cut off the textured side"
         if area > _CLOSED_BODY_FRACTION * total

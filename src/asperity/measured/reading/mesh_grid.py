@@ -61,7 +61,8 @@ def rasterise(corners: FloatArray) -> tuple[FloatArray, tuple[float, float], tup
         lowest = np.where(known, lowest, rim)
     covered = np.where(np.isfinite(lowest), lowest, np.nan)
     heights, trimmed = _trim_border(covered)
-    px, py = float(pitch[0]), float(pitch[1])
+    px = float(pitch[0])
+    py = float(pitch[1])
     note = (
         f"{len(corners)} triangles resampled at {shape[1]} x {shape[0]} points,"
         f" pitch {1e6 * px:.5g} x {1e6 * py:.5g} µm from the median edge ({1e6 * target:.5g} µm)"
@@ -120,14 +121,16 @@ def _sample_triangles(
     which = np.repeat(np.arange(len(corners)), counts)
     index = np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)
     row, column = np.divmod(index, width[which, 0])
-    column, row = column + first[which, 0], row + first[which, 1]
+    column = column + first[which, 0]
+    row = row + first[which, 1]
     a, b, c = (corners[which, k] for k in range(3))
     # Barycentric coordinates from areas; a vertical triangle has none.
     area = _cross(b - a, c - a)
     upright = np.abs(area) > 1e-12
     p = np.stack((column, row, np.zeros(len(row))), axis=1).astype(np.float64)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        u, v = _cross(p - a, c - a) / area, _cross(b - a, p - a) / area
+        u = _cross(p - a, c - a) / area
+        v = _cross(b - a, p - a) / area
         z = a[:, 2] + u * (b[:, 2] - a[:, 2]) + v * (c[:, 2] - a[:, 2])
         inside = upright & (u >= -tolerance) & (v >= -tolerance) & (u + v <= 1.0 + tolerance)
     at = (row[inside], column[inside])
@@ -141,7 +144,8 @@ def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
 
 def _trim_border(heights: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
     """Return the heights without border rows and columns of which more than half is missing."""
-    rows, columns = slice(0, heights.shape[0]), slice(0, heights.shape[1])
+    rows = slice(0, heights.shape[0])
+    columns = slice(0, heights.shape[1])
     missing = np.isnan(heights)
     for _ in range(min(sum(heights.shape) // 10, _MAX_TRIM)):
         if min(rows.stop - rows.start, columns.stop - columns.start) <= _MIN_SIDE:
@@ -166,7 +170,8 @@ def _describe_fit(heights: FloatArray, vertices: FloatArray) -> str:
     rows, columns = heights.shape
     j = np.clip(np.floor(vertices[:, 0]).astype(np.int64), 0, columns - 2)
     i = np.clip(np.floor(vertices[:, 1]).astype(np.int64), 0, rows - 2)
-    u, v = vertices[:, 0] - j, vertices[:, 1] - i
+    u = vertices[:, 0] - j
+    v = vertices[:, 1] - i
     near = (1 - u) * heights[i, j] + u * heights[i, j + 1]
     far = (1 - u) * heights[i + 1, j] + u * heights[i + 1, j + 1]
     error = vertices[:, 2] - ((1 - v) * near + v * far)

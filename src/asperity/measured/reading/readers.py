@@ -239,7 +239,8 @@ def _run(reader: Reader, file: SurfaceFile, options: ReadingOptions) -> RawSurfa
 def _check_file(path: Path, name: str) -> None:
     """Refuse what is no file of a size that can be read, with a hint."""
     try:
-        is_folder, size = path.is_dir(), path.stat().st_size
+        is_folder = path.is_dir()
+        size = path.stat().st_size
     except FileNotFoundError as error:
         near = nearest_names(path.name, [one.name for one in path.parent.glob("*")])
         raise SurfaceFileError(f"{path}: no such file{near and f'; {near.strip()}'}") from error

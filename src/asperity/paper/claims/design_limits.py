@@ -46,7 +46,8 @@ def unit_invariant_share(inequality: Inequality, seed: int) -> float:
 
 def _check_dimensions(number: int) -> Check:
     """Check that both sides of a limit, or of the corrected one, have the same dimension."""
-    share, corrected = unit_invariant_share(PRINTED_LIMITS[number], 1), CORRECTED_LIMITS.get(number)
+    share = unit_invariant_share(PRINTED_LIMITS[number], 1)
+    corrected = CORRECTED_LIMITS.get(number)
     corrected_share = None if corrected is None else unit_invariant_share(corrected, 1)
     tail = f", corrected in {corrected_share:.2f}" if corrected and share < 1.0 else ""
     return check_statement(
@@ -103,7 +104,8 @@ def check_reconstruction(number: int, *, is_quantized: bool) -> Check:
     That is, with a smaller error than from the required number of samples per period, of a force
     that is held from update to update, or is computed at the position that an encoder reads.
     """
-    draw, wrong = np.random.default_rng(number + 1), 0
+    draw = np.random.default_rng(number + 1)
+    wrong = 0
     for _ in range(100):
         wanted = float(draw.uniform(5.0, 10.0))
         values = {name: float(draw.uniform(0.5, 2.0)) for name in _DIMENSIONS}
@@ -139,8 +141,11 @@ def limit_3() -> Check:
 
     With α in place of β; checked for cases in which it differs from limit 2.
     """
-    rng, differing, merged = np.random.default_rng(4), 0, 0
-    second, third = PRINTED_LIMITS[2], PRINTED_LIMITS[3]
+    rng = np.random.default_rng(4)
+    differing = 0
+    merged = 0
+    second = PRINTED_LIMITS[2]
+    third = PRINTED_LIMITS[3]
     for _ in range(4000):
         values = {name: float(10.0 ** rng.uniform(-2.0, 1.0)) for name in _DIMENSIONS}
         greater = max(values["alpha"], values["beta"])
@@ -177,7 +182,9 @@ def check_slopes(seed: int, before: str, after: str, dimensions: Sequence[int] =
         after: text after it.
         dimensions: numbers of limits whose dimensions are checked, too.
     """
-    rng, case, shares = np.random.default_rng(seed), SCANNING, {}
+    rng = np.random.default_rng(seed)
+    case = SCANNING
+    shares = {}
     for law in "ABCEG":
         surface = case.surface(law)
         q = characteristic_number(surface)
@@ -185,7 +192,8 @@ def check_slopes(seed: int, before: str, after: str, dimensions: Sequence[int] =
         close = np.array(q.at) - [0.0, 0.0, 1e-8] + 1e-9 * rng.normal(size=(500, 3)) * [1, 0, 1]
         pairs = np.concatenate([start, np.stack([close[:250], close[250:]])], axis=1)
         shares[law] = max_difference_quotient(surface, pairs) / (case.stiffness * q.value)
-    best, worst = min(shares.values()), max(shares.values())
+    best = min(shares.values())
+    worst = max(shares.values())
     slopes = check_statement(
         f"{before} {best:.6f} to {worst:.6f} {after}",
         printed=worst <= 1.0 + 1e-6 and best > 0.97,
@@ -214,7 +222,8 @@ def limit_6() -> Check:
     """
     error = 0.0
     for case in random_settings(4, 17):
-        surface, v = case.surface("C"), 0.07
+        surface = case.surface("C")
+        v = 0.07
         duration = 16 * case.period / v
         time = np.arange(4096) * duration / 4096
         path = np.column_stack([v * time, 0 * time, np.full(len(time), -1.5 * case.amplitude)])

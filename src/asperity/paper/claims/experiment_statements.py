@@ -31,7 +31,8 @@ def samples_per_period() -> claim.Check:
     """
     periods = [case.period for case in cases.SETTINGS.values()]
     length = 1e-3
-    alpha, beta = length / (_SPEED * cases.SAMPLING_PERIOD), length / _RESOLUTION
+    alpha = length / (_SPEED * cases.SAMPLING_PERIOD)
+    beta = length / _RESOLUTION
     return claim.combine_checks(
         claim.check_statement(
             printed=alpha >= 50.0 * (1 - 1e-12) and beta > 50.0 and _SPEED / length < 400.0,
@@ -50,7 +51,8 @@ def samples_per_period() -> claim.Check:
 
 def force_w() -> claim.Check:
     """Force of the smooth wall W."""
-    surface, rng = cases.PASSIVITY.surface("W"), np.random.default_rng(1)
+    surface = cases.PASSIVITY.surface("W")
+    rng = np.random.default_rng(1)
     points = rng.uniform(-2e-3, 2e-3, (200, 3)) * [1, 0, 1]
     z = points[:, 2]
     printed = np.column_stack([0 * z, np.where(z < 0.0, -cases.PASSIVITY.stiffness * z, 0.0)])
@@ -64,7 +66,8 @@ def force_w() -> claim.Check:
 
 def number_f() -> claim.Check:
     """q_F = 8.3 for the stated parameters."""
-    own, true = PAPER_CASE.sticking_norm(), PAPER_CASE.max_norm_ratio()
+    own = PAPER_CASE.sticking_norm()
+    true = PAPER_CASE.max_norm_ratio()
     package = cases.PASSIVITY.q("F")
     return claim.check_statement(
         printed=any(round(value, 1) == 8.3 for value in (own, true, package)),
@@ -94,7 +97,8 @@ def _handle_damping(x: float) -> float:
 
 def stability_rule() -> claim.Check:
     """At 2000 N/m W is within (1), A and F are not, and are when divided by their numbers."""
-    q_a, q_f = cases.PASSIVITY.q("A"), PAPER_CASE.sticking_norm()
+    q_a = cases.PASSIVITY.q("A")
+    q_f = PAPER_CASE.sticking_norm()
     numbers = {"W": 1.0, "A": q_a, "F": q_f, "A/5.1": q_a / 5.1, "F/8.3": q_f / 8.3}
     loads = {name: cases.PASSIVITY.stiffness * number for name, number in numbers.items()}
     limits = [_handle_damping(x) / (2 * cases.SAMPLING_PERIOD) for x in (-0.0125, 0.0375)]
@@ -143,7 +147,8 @@ def energy_sums() -> claim.Check:
     rng = np.random.default_rng(23)
     surface = cases.SCANNING.surface("W")
     path = np.cumsum(rng.normal(size=(400, 3)), axis=0) * 1e-6 * [0, 0, 1] - [0, 0, 1e-3]
-    force, step = surface.force(path), np.diff(path, axis=0)
+    force = surface.force(path)
+    step = np.diff(path, axis=0)
     held = held_force_work(path, force[:-1])
     # The work of the field along the path is the change of its energy.
     stored = 0.5 * surface.stiffness * path[[0, -1], 2] ** 2
@@ -168,9 +173,11 @@ def passivity_margins() -> claim.Check:
 
 def no_lateral_energy() -> claim.Check:
     """A exchanges no energy along the surface."""
-    surface, rng = cases.SCANNING.surface("A"), np.random.default_rng(5)
+    surface = cases.SCANNING.surface("A")
+    rng = np.random.default_rng(5)
     force = surface.force(rng.uniform(-2e-3, 2e-3, (1000, 3)) * [1, 0, 1])
-    lateral, normal = float(np.abs(force[:, 0]).max()), float(np.abs(force[:, 2]).max())
+    lateral = float(np.abs(force[:, 0]).max())
+    normal = float(np.abs(force[:, 2]).max())
     return claim.check_statement(printed=lateral == 0.0 < normal, lateral=lateral, normal=normal)
 
 
@@ -225,7 +232,8 @@ def passive_along_normal() -> claim.Check:
 
     As passive as a smooth wall, with the least damping that a wall requires: σ₀ = κ₀T/2.
     """
-    rng, gains = np.random.default_rng(29), []
+    rng = np.random.default_rng(29)
+    gains = []
     for case in [cases.PASSIVITY, *cases.random_settings()]:
         surface = case.surface("A")
         for size in 10.0 ** rng.uniform(-3.0, 0.0, 20):
@@ -301,7 +309,8 @@ def always_passive() -> claim.Check:
 def conclusion_d() -> claim.Check:
     """D is conservative and leaves the effective stiffness as it is, but jumps."""
     surface = cases.SCANNING.surface("D")
-    q, plus = characteristic_number(surface).value, one_sided_number(surface).value
+    q = characteristic_number(surface).value
+    plus = one_sided_number(surface).value
     return claim.combine_checks(
         formula_checks.check_curl("D", is_conservative=True),
         claim.check_statement(
@@ -322,7 +331,8 @@ def conclusion_f() -> claim.Check:
     """
     numbers = {law: cases.SCANNING.q(law) for law in "AEFG"}
     bound = SCANNING_CASE.sticking_norm()
-    length, depth = 10.0 * cases.SCANNING.deflection, -cases.SCANNING.depth
+    length = 10.0 * cases.SCANNING.deflection
+    depth = -cases.SCANNING.depth
     work = loop_work(cases.SCANNING.surface("F"), [[0, 0, depth], [length, 0, depth]])
     return claim.check_statement(
         f"{bound:.3f} by (26)",

@@ -53,15 +53,19 @@ def _check_force(seed: int, printed: Callable[[float, float], float]) -> claim.C
     from asperity.reference import exact_force
 
     rng = np.random.default_rng(seed)
-    printed_forces, corrected_forces, reference = [], [], []
+    printed_forces = []
+    corrected_forces = []
+    reference = []
     for spot in generic_probes("F"):
         surface = spot.surface
         k, middle, half = surface.law_arguments[:3]
         m = 0.5 * (1.0 + surface.modulation_depth * (spot.h - middle) / half)
         share = rng.uniform(-1.0, 1.0)
         pull = k * surface.friction * (1.0 - m) * spot.z * share
-        probe, d = [spot.x, 0.0, spot.z], [share * surface.max_deflection, 0.0]
-        exact, kernel = exact_force(surface, probe, d), surface.force([probe], [d])[0]
+        probe = [spot.x, 0.0, spot.z]
+        d = [share * surface.max_deflection, 0.0]
+        exact = exact_force(surface, probe, d)
+        kernel = surface.force([probe], [d])[0]
         printed_forces += [[printed(pull, share), -k * spot.z]] * 2
         corrected_forces += [[pull, -k * spot.z]] * 2
         reference += [[float(exact[0]), float(exact[2])], [kernel[0], kernel[2]]]
@@ -85,9 +89,12 @@ def jacobian_f() -> claim.Check:
     Compared with differences of (22) as printed, and, with opposite friction, with the kernel.
     """
     rng = np.random.default_rng(13)
-    printed, corrected, reference = [], [], []
+    printed = []
+    corrected = []
+    reference = []
     for case in random_friction_cases(6):
-        x, d = rng.uniform(0.0, case.period), rng.uniform(-1.0, 1.0) * case.deflection
+        x = rng.uniform(0.0, case.period)
+        d = rng.uniform(-1.0, 1.0) * case.deflection
         for rate in (1.0, 0.0):  # sticking, sliding
             force = _printed_force_components(case, x, d, rate)
             probe = [x, 0.0, -case.depth]
@@ -95,7 +102,8 @@ def jacobian_f() -> claim.Check:
             # The kernel's friction opposes the motion, see (22).
             mirrored = kernel[np.ix_([0, 2], [0, 2])] * [[-1.0], [1.0]]
             reference += [[numerical_gradient(part, 0.0, -case.depth) for part in force], mirrored]
-            h, slope = float(case.modulation(x)), float(case.modulation(x, 1))
+            h = float(case.modulation(x))
+            slope = float(case.modulation(x, 1))
             printed += [_printed_jacobian(case, d, h, rate, slope)] * 2
             corrected += [_printed_jacobian(case, d, h, rate, slope * d)] * 2
     return claim.check_values(
@@ -139,7 +147,8 @@ def stick_slip_phases() -> claim.Check:
     rate = np.diff(d) / np.diff(x)
     # Steps in which sticking ends are excluded: they belong to neither phase.
     pure = (np.abs(rate) < 1e-6) | (np.abs(rate - 1.0) < 1e-6)
-    end, rate = d[1:][pure], rate[pure]
+    end = d[1:][pure]
+    rate = rate[pure]
     is_sliding = np.abs(rate) < 0.5
     forward = is_sliding == (np.abs(end - reach) < 1e-9 * reach)
     both = is_sliding == (np.abs(np.abs(end) - reach) < 1e-9 * reach)
@@ -197,8 +206,11 @@ def energy_f() -> claim.Check:
 
     Without texture, twice the friction makes the law's m = 1/2 equal to the paper's h = 0.
     """
-    cases, share = [SCANNING, *random_settings(4)], 0.2
-    printed, reference, limit = [], [], 0.0
+    cases = [SCANNING, *random_settings(4)]
+    share = 0.2
+    printed = []
+    reference = []
+    limit = 0.0
     for case in cases:
         surface = case.untextured_friction()
         whole = 0.5 * case.stiffness * case.friction * case.depth * case.deflection
@@ -220,14 +232,16 @@ def energy_f() -> claim.Check:
 def sticking_generates_energy() -> claim.Check:
     """F generates energy while sticking only, which is at most 2 d_max wide."""
     case = SCANNING
-    surface, reach = case.surface("F"), case.deflection
+    surface = case.surface("F")
+    reach = case.deflection
     x = np.concatenate([np.linspace(0.0, 4.0, 8001), np.linspace(4.0, -2.0, 12001)[1:]]) * reach
     path = np.column_stack([x, 0.0 * x, np.full(len(x), -case.depth)])
     force = surface.trace(path)[:, 0]
     gain = 0.5 * (force[1:] + force[:-1]) * np.diff(x)
     d = _anchor_deflection(x, reach)
     sliding = np.abs(np.abs(d[1:]) - reach) + np.abs(np.abs(d[:-1]) - reach) < 1e-9 * reach
-    slip_gain, stick_gain = float(gain[sliding].max()), float(gain[~sliding].max())
+    slip_gain = float(gain[sliding].max())
+    stick_gain = float(gain[~sliding].max())
     back = np.flatnonzero(~sliding & (np.arange(len(gain)) >= 8000))
     width = float(np.abs(np.diff(x)[back]).sum()) / reach
     return claim.check_statement(
@@ -253,7 +267,8 @@ def compliant_materials() -> claim.Check:
         case = replace(SCANNING, deflection=deflection)
         path = case.friction_path(1e-7 * case.depth)
         energies.append(loop_work(case.untextured_friction(), path))
-    ratio, energy = energies[1] / energies[0], energies[1] * 1e3
+    ratio = energies[1] / energies[0]
+    energy = energies[1] * 1e3
     return claim.check_statement(
         f"d_max from 1 mm to 1 cm multiplies the energy by {ratio:.6f}, to {energy:.2f} mJ",
         printed=abs(ratio - 10.0) < 1e-6,

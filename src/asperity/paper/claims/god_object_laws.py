@@ -60,7 +60,8 @@ def number_d() -> Check:
     """‖J_D‖ = κ₀ whatever the surface, and q_D = 1."""
     norms = [float(s.norms().max()) / s.k for s in generic_probes("D", 12)]
     surface = cases.PASSIVITY.surface("D")
-    q, plus = characteristic_number(surface), one_sided_number(surface)
+    q = characteristic_number(surface)
+    plus = one_sided_number(surface)
     shallow = characteristic_number(
         cases.BUMP.surface("D", max_depth=0.8 * cases.BUMP.crest_radius)
     )
@@ -102,8 +103,10 @@ def _check_jumps(name: str, case: cases.ExperimentCase) -> Check:
 def _check_potential_kink() -> Check:
     """Check that the potential of D is continuous across the ridge but not differentiable."""
     case = cases.SCANNING
-    surface, crest = case.surface("D"), 0.25 * case.period
-    level, step = case.amplitude - case.depth, 1e-9
+    surface = case.surface("D")
+    crest = 0.25 * case.period
+    level = case.amplitude - case.depth
+    step = 1e-9
     points = cases.path_points((crest - step, level), (crest, level), (crest + step, level))
     energy = 0.5 * case.stiffness * ((surface.texture.nearest(points) - points) ** 2).sum(axis=1)
     left, right = np.diff(energy) / step
@@ -134,7 +137,8 @@ def norm_e() -> Check:
 
 def _check_lipschitz_e() -> Check:
     """Check |f(a) - f(b)| <= κ₀ |a - b| for pairs of probes, also across ridges."""
-    surface, rng = cases.PASSIVITY.surface("E"), np.random.default_rng(3)
+    surface = cases.PASSIVITY.surface("E")
+    rng = np.random.default_rng(3)
     ends = rng.uniform(0.0, 1e-3, (2, 4000, 3)) - np.array([0.0, 0.0, 1e-3])
     ends[..., 1] = 0.0
     ends[1] = ends[0] + (ends[1] - ends[0]) * rng.uniform(1e-4, 1.0, (4000, 1))
@@ -144,13 +148,16 @@ def _check_lipschitz_e() -> Check:
 
 def energy_e() -> Check:
     """Around the path of Fig. 3 E gains energy, on the rising leg only."""
-    least, other = math.inf, 0.0
+    least = math.inf
+    other = 0.0
     for case in [cases.SCANNING, *cases.random_settings()]:
-        surface, points = case.surface("E"), case.groove_path()
+        surface = case.surface("E")
+        points = case.groove_path()
         scale = case.stiffness * case.amplitude**2
         gain = formula_checks.segment_work(surface, points[1], points[2])
         total = loop_work(surface, points, 1e-9)
-        least, other = min(least, total / scale), max(other, abs(total - gain) / scale)
+        least = min(least, total / scale)
+        other = max(other, abs(total - gain) / scale)
     is_true = least > 0.0 and other < 1e-7
     gain_of_one_leg = check_statement(printed=is_true, least_gain=least, other_legs=other)
     return combine_checks(gain_of_one_leg, formula_checks.check_curl("E", is_conservative=False))

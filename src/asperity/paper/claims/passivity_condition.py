@@ -33,7 +33,8 @@ def energy_gained(surface: Surface, path: FloatArray, loss: float, delay: int = 
     hand is at rest initially. With d = -1 it is the paper's own sum of each force times the step
     before it.
     """
-    force, step = surface.force(path), np.diff(path, axis=0)
+    force = surface.force(path)
+    step = np.diff(path, axis=0)
     held = np.concatenate([np.repeat(force[:1], max(delay, 0), axis=0), force[max(-delay, 0) :]])
     held = held[: len(step)]
     return float(np.sum(held * step) - loss * np.sum(step**2))
@@ -64,7 +65,8 @@ def _max_random_gain(delay: int, seed: int, damping_share: float = 1.0) -> float
     Motions are random, and oscillations at the witness of q. ``damping_share`` scales the damping
     that (1) requires.
     """
-    rng, gains = np.random.default_rng(seed), []
+    rng = np.random.default_rng(seed)
+    gains = []
     for case in [SCANNING, *random_settings(2, seed)]:
         low, high = case.texture.extremes
         floor = low - case.depth
@@ -149,7 +151,10 @@ def product_bound() -> Check:
 
     Checked with forces over small steps, half of them along the stiffest direction.
     """
-    draw, size, worst, most = np.random.default_rng(2), 1e-9, 0.0, 0.0
+    draw = np.random.default_rng(2)
+    size = 1e-9
+    worst = 0.0
+    most = 0.0
     for law in "ABCDEG":
         for spot in generic_probes(law, 3):
             matrix = spot.compiled_jacobian()
@@ -291,7 +296,8 @@ def condition_with_conservative_law() -> Check:
 
 def smooth_then_textured() -> Check:
     """A smooth surface that is rendered passively may lose this once textured."""
-    wall, textured = SCANNING.surface("W"), SCANNING.surface("C")
+    wall = SCANNING.surface("W")
+    textured = SCANNING.surface("C")
     loss = wall.stiffness  # twice the σ₀/T = k/2 that the plain wall requires
     on_wall = energy_gained(wall, oscillating_path(wall, 1e-8), loss)
     on_texture = energy_gained(textured, oscillating_path(textured, 1e-8), loss)

@@ -135,7 +135,8 @@ def curvature_c() -> Check:
 
     At crests and troughs the norm is κ₀ times the greater of 1 and depth times curvature.
     """
-    printed, reference = [], []
+    printed = []
+    reference = []
     for case in [PASSIVITY, SCANNING, *random_settings()]:
         x = np.array([0.25, 0.75]) * case.period
         xy = np.column_stack([x, 0 * x])
@@ -185,9 +186,11 @@ def remark_5() -> Check:
 
 def energy_g() -> Check:
     """Around its path of Fig. 3 G gains energy on one leg."""
-    errors, gains = [], []
+    errors = []
+    gains = []
     for case in [SCANNING, *random_settings()]:
-        a, surface = 0.5 * case.depth, case.surface("G")
+        a = 0.5 * case.depth
+        surface = case.surface("G")
         points = case.crossing_path(a)
         scale = case.stiffness * a**2
         ends = np.roll(points, -1, axis=0)
@@ -196,7 +199,8 @@ def energy_g() -> Check:
         errors += [abs(leg - value) for leg, value in zip(legs, expected, strict=True)]
         errors.append(abs(loop_work(surface, points) / scale - legs[1]))
         gains.append(legs[1])
-    error, gain = max(errors), min(gains)
+    error = max(errors)
+    gain = min(gains)
     is_true = error < 1e-9 and gain > 0.0
     gain_of_one_leg = check_statement(printed=is_true, worst_leg=error, least_gain=gain)
     return combine_checks(gain_of_one_leg, check_curl("G", is_conservative=False))

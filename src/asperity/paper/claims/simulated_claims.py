@@ -93,7 +93,8 @@ def divided_walls_settle() -> claim.Check:
         for d in TRIED_DELAYS
         if count_cycles(law, 1.0, d).cycles
     ]
-    cycling, starts = sum(one.cycles for one in counts), sum(one.starts for one in counts)
+    cycling = sum(one.cycles for one in counts)
+    starts = sum(one.starts for one in counts)
     lags = ", ".join(f"{one.wall} at {one.delay}" for one in counts)
     summary = f"where the undivided cycle (lags: {lags}), {cycling} of {starts} starts cycle"
     numbers = {f"{one.wall}, lag {one.delay}": float(one.cycles) for one in counts}

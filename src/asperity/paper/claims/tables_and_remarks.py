@@ -74,7 +74,8 @@ def _check_number(row: TableTwoRow) -> claim.Check:
 
 def _check_appendix_bound(row: TableTwoRow) -> claim.Check:
     """Check the bound of Appendix I on law F; the package's law has a number of its own."""
-    bound, true = PAPER_CASE.sticking_norm(), PAPER_CASE.max_norm_ratio()
+    bound = PAPER_CASE.sticking_norm()
+    true = PAPER_CASE.max_norm_ratio()
     return claim.check_statement(
         printed=abs(bound / true - 1.0) < 1e-6,
         corrected=bound > max(true, row.q.value),
@@ -149,7 +150,8 @@ def _least_bound_ratio() -> float:
     for seed, dk in ((5, 0.45), (6, 0.45), (5, 6.0)):
         texture: Fourier = generic_profile(seed)
         slope, curvature = texture.bounds
-        root, depth = math.hypot(1.0, slope), dk / curvature
+        root = math.hypot(1.0, slope)
+        depth = dk / curvature
         bounds = {"A": root, "B": root + dk, "C": 1.0 + slope**2 + dk, "G": max(1.0, dk)}
         if dk <= 0.5:
             bounds["D"] = 1.0

@@ -85,9 +85,11 @@ def count_cycles(
 ) -> CycleCount:
     """Count the starts that end in a limit cycle at 2000 N/m over a divisor."""
     setup = setups.band_setup(law, _STIFFNESS / divisor, delay)
-    servo, duration = setup.servo.without_steps(), setup.duration
+    servo = setup.servo.without_steps()
+    duration = setup.duration
     loop = BatchSimulation(setup.surface, setup.plant, setup.hand, servo, setup.motion, setup.start)
-    stiffness, shifts = setup.surface.stiffness, start_offsets(setup.surface, starts)
+    stiffness = setup.surface.stiffness
+    shifts = start_offsets(setup.surface, starts)
     runs = run_starts(loop, stiffness, servo, shifts, duration)
     cycling = sum(bool(run.verdict) for run in runs)
     slow = sum(run.samples * servo.period > duration and not run.verdict for run in runs)

@@ -100,9 +100,11 @@ class DeviceExperiment(Serializable):
 
 def reference_textures(measured_texture: Texture | None = None) -> dict[str, Texture]:
     """Return a gentle sinusoid and a measured surface, or a synthetic one in its place."""
-    name, texture = "yours", measured_texture
+    name = "yours"
+    texture = measured_texture
     if texture is None:
-        name, texture = "knurl", named_surface("knurl")
+        name = "knurl"
+        texture = named_surface("knurl")
     return {"sinusoid A/l = 0.1": Sinusoid(0.1e-3, 1e-3), name: texture}
 
 

@@ -32,7 +32,8 @@ def band_setup(
 ) -> Setup:
     """Return the loop of section V.A: an elastic band pulls the handle into the wall."""
     plant = Pantograph(joint_damping=PASSIVITY.joint_damping, centre=(0.0375, 0.1))
-    surface, motion = PASSIVITY.surface(law, stiffness=stiffness), Stationary((0.0, 0.0, 0.0))
+    surface = PASSIVITY.surface(law, stiffness=stiffness)
+    motion = Stationary((0.0, 0.0, 0.0))
     start = (0.0, 0.0, 4e-3)
     return _setup(surface, plant, BandHand(), motion, 0.5, delay=delay, start=start)
 

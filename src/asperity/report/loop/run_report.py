@@ -165,8 +165,10 @@ def ledger_table(run: Run) -> Table:
 
 def run_page(setup: Setup, run: Run) -> Page:
     """Return the report of a run."""
-    caption, ledger = closure_text(run), ledger_table(run)
-    surface, name = setup.surface, setup.device.name
+    caption = closure_text(run)
+    ledger = ledger_table(run)
+    surface = setup.surface
+    name = setup.device.name
     return Page(
         title=f"{texture_name(surface.texture)}, law {surface.law.letter}, in the loop, {name}",
         answer=run_answer(setup, run),
@@ -212,7 +214,8 @@ def _motion_section(
 
 def recording_answer(recording: Recording) -> str:
     """Return size, surface and completeness of a recording in one or two sentences."""
-    period, surface = _row_period(recording.metadata), _surface_metadata(recording.metadata)
+    period = _row_period(recording.metadata)
+    surface = _surface_metadata(recording.metadata)
     rate = f" at {format_quantity(1.0 / period, 'Hz')}" if period else ""
     text = f"{recording.rows} rows, {format_quantity(recording.duration, 's')}{rate}"
     if surface is not None:
@@ -245,7 +248,8 @@ def _surface_metadata(metadata: Mapping[str, Any]) -> Mapping[str, Any] | None:
 
 def _row_period(metadata: Mapping[str, Any]) -> float:
     """Return the time from row to row [s]; 0 if it is not recorded."""
-    servo, every = metadata.get("servo"), metadata.get("every", 1)
+    servo = metadata.get("servo")
+    every = metadata.get("every", 1)
     period: Any = servo.get("period") if isinstance(servo, Mapping) else None
     return float(period) * every if _are_positive_numbers(period, every) else 0.0
 
@@ -257,7 +261,8 @@ def _are_positive_numbers(*values: Any) -> bool:
 def recording_facts(recording: Recording) -> list[tuple[str, str]]:
     """Return names and values of surface, device, hand and motion."""
     about = recording.metadata
-    surface, device = _surface_metadata(about), about.get("device")
+    surface = _surface_metadata(about)
+    device = about.get("device")
     rows = [("Recorded by", f"asperity {recording.version}, {about.get('made_by', 'unknown')}")]
     if surface is not None:
         law = f"{surface['law']}, {readable_name(str(surface['law_name']))}"
@@ -310,7 +315,8 @@ def recording_page(
 ) -> Page:
     """Return the report of a recording; ``ranges`` of its columns are read from it by default."""
     columns = columns_table(recording, ranges or recording.ranges())
-    facts, media = recording_facts(recording), Media.HTML | Media.NOTEBOOK
+    facts = recording_facts(recording)
+    media = Media.HTML | Media.NOTEBOOK
     figure = _motion_section(page.plot_later(recording), recording.duration, "", media)
     return Page(
         title=f"Recording {recording.path.name}",

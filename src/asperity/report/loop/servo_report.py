@@ -58,7 +58,8 @@ def _start_cells(law: str, before: float, after: float) -> tuple[str, ...]:
 
 
 def _calibration_cells(axis: AxisCalibration) -> tuple[str, ...]:
-    wall, motion = axis.wall, axis.dynamics
+    wall = axis.wall
+    motion = axis.dynamics
     cycling = wall.cycling_stiffness
     return (
         axis.name,
@@ -72,7 +73,9 @@ def _calibration_cells(axis: AxisCalibration) -> tuple[str, ...]:
 
 def _calibration_lines(calibration: Calibration) -> list[str]:
     """Return resolution, rate, delay and K₀, and the axes that could not be measured."""
-    step, delay, weakest = calibration.position_step, calibration.delay, calibration.weakest_axis
+    step = calibration.position_step
+    delay = calibration.delay
+    weakest = calibration.weakest_axis
     resolution = "exact" if step is None else f"step {format_uncertainty(step, 1e6)} µm"
     noise = format_uncertainty(calibration.noise, 1e6)
     effective = format_quantity(effective_resolution(calibration).value, "m")
@@ -132,8 +135,10 @@ def timing_lines(statistics: LoopStatistics) -> list[str]:
 
 def device_run_page(setup: Setup, loop: ServoProcess, cause: EndReason, path: str | None) -> Page:
     """Return timing, limits and energy of a loop that has ended, for a terminal."""
-    statistics, rows = loop.statistics, loop.rows(loop.memory.row_count - 1)[0]
-    surface, period = setup.surface, setup.servo.period
+    statistics = loop.statistics
+    rows = loop.rows(loop.memory.row_count - 1)[0]
+    surface = setup.surface
+    period = setup.servo.period
     driver = "" if loop.driver.has_moving_handle else f", {loop.driver.name}"
     span = format_quantity(period * statistics.samples, "s", digits=3)
     limited = [(getattr(statistics, name), text) for name, text in table_data("limited").items()]

@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 
 def onset_cells(prediction: Prediction) -> list[Cell]:
     """Return the cells of a row; rules that allowed a stiffness that cycled are coloured."""
-    onset, rule = prediction.onset, stiffness_number(prediction.delay_rule)
+    onset = prediction.onset
+    rule = stiffness_number(prediction.delay_rule)
     cycling = "none" if math.isinf(onset.cycling) else stiffness_number(onset.cycling)
     wall = prediction.wall_rule
     wall_text = NOT_AVAILABLE if wall is None else stiffness_number(wall)
@@ -88,7 +89,8 @@ def _case_name(prediction: Prediction) -> str:
 
 def onset_page(result: OnsetSweep) -> Page:
     """Return the report of the onsets."""
-    setup, predictions = result.setup, result.onsets
+    setup = result.setup
+    predictions = result.onsets
     cycle = "A limit cycle: motion that lasts without steps of position and force and is felt."
     in_numbers = onset_section("In numbers, N/m", predictions, cycle)
     return Page(
@@ -172,7 +174,8 @@ def _group_laws(strokes: Sequence[Stroke], gains_energy: Callable[[Stroke], bool
 
 def strokes_page(result: StrokeSweep) -> Page:
     """Return the report of the strokes."""
-    setup, strokes = result.setup, result.strokes
+    setup = result.setup
+    strokes = result.strokes
     laws = ", ".join(dict.fromkeys(stroke.law for stroke in strokes))
     stops = sorted({stroke.stop_message for stroke in strokes if stroke.stop_message})
     (note,) = table_notes("strokes")

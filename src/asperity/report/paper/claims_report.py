@@ -86,7 +86,8 @@ def _terminal_sections(results: Sequence[Result], experiments: Experiments | Non
 
 def evidence_page(results: Sequence[Result]) -> Page:
     """Return the report of chosen claims; a terminal shows everything that a verdict rests on."""
-    whole, evidence = claims_page(results, None), map(_evidence_section, results)
+    whole = claims_page(results, None)
+    evidence = map(_evidence_section, results)
     sections = [section for section in whole.sections if Media.HTML in section.media]
     return replace(whole, answer="", sections=[*evidence, *sections])
 
@@ -146,7 +147,8 @@ def paper_sections() -> list[Section]:
     """Return figures 2 and 3 of the paper."""
     panels = loop_energies()
     gained = "; ".join(f"{panel.law} {loop_energy_text(panel)}" for panel in panels)
-    loops, count = partial(paper_pictures.figure_three, panels), len(panels)
+    loops = partial(paper_pictures.figure_three, panels)
+    count = len(panels)
     return [
         page.figure_section("paper.forces", paper_pictures.figure_two),
         page.figure_section("paper.loops", loops, count=count, gained=gained),
@@ -168,7 +170,8 @@ def experiment_sections(experiments: Experiments) -> list[Section]:
 
 
 def _cycle_section(experiment: PassivityExperiment) -> Section:
-    first, notes = experiment.counts[0], _fitted_notes(experiment.fitted)
+    first = experiment.counts[0]
+    notes = _fitted_notes(experiment.fitted)
     figure = partial(paper_pictures.cycles_figure, experiment)
     counts = ", ".join(f"{one.cycles} with {one.wall}" for one in experiment.counts)
     values: dict[str, Any] = {"lag": first.delay, "starts": first.starts, "counts": counts}
@@ -212,7 +215,8 @@ def _device_section(experiments: Experiments) -> Section:
     if devices.wall_summary:
         notes.append(f"Few misses on the left are weak evidence: {devices.wall_summary}.")
     notes.append(f"Not simulated for lack of an apparent mass: {', '.join(devices.skipped)}.")
-    count, missed = len(devices.onsets), sum(one.catalogue_rule_missed for one in devices.onsets)
+    count = len(devices.onsets)
+    missed = sum(one.catalogue_rule_missed for one in devices.onsets)
     figure = partial(paper_pictures.devices_figure, experiments)
     return page.figure_section("paper.devices", figure, notes, missed=missed, count=count)
 

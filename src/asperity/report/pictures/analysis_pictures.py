@@ -28,7 +28,9 @@ FigureArea = Figure | SubFigure
 
 _WIDTH = 10.0
 # Width and greatest and least height of a panel [inch].
-_PANEL_WIDTH, _MAX_PANEL_HEIGHT, _MIN_PANEL_HEIGHT = 9.0, 4.6, 2.4
+_PANEL_WIDTH = 9.0
+_MAX_PANEL_HEIGHT = 4.6
+_MIN_PANEL_HEIGHT = 2.4
 _MAX_ASPECT = 2.4
 # Titles, labels and the colour bar below a panel [inch].
 _PANEL_MARGIN = 1.9
@@ -74,7 +76,8 @@ def draw_field(figure: FigureArea, analysis: Analysis) -> None:
     Points deeper than the working region are faded; the vertices of the loop are projected on the
     plane.
     """
-    window, leak = analysis_windows.loop_window(analysis), analysis.leak
+    window = analysis_windows.loop_window(analysis)
+    leak = analysis.leak
     remark = "conservative: no loop gains energy"
     if len(leak.vertices):
         gain = range_text(leak.energy, leak.upper_per_period, "J")
@@ -105,9 +108,11 @@ def _scale_axes(axes: Axes, window: law_pictures.Window) -> None:
 
 def _draw_loop(axes: Axes, x: FloatArray, z: FloatArray) -> None:
     """Draw a closed polygon with arrows of its direction."""
-    x, z = np.append(x, x[0]), np.append(z, z[0])
+    x = np.append(x, x[0])
+    z = np.append(z, z[0])
     axes.plot(x, z, color=style.BLUE, lw=1.6, zorder=5.0, path_effects=_HALO)
-    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+    (left, right) = axes.get_xlim()
+    (low, high) = axes.get_ylim()
     steps = np.hypot(np.diff(x) / (right - left), np.diff(z) / (high - low))
     seen = (np.maximum(x[1:], x[:-1]) > left) & (np.minimum(x[1:], x[:-1]) < right)
     passed = np.concatenate([[0.0], np.cumsum(np.where(seen, steps, 0.0))])
@@ -156,7 +161,8 @@ def _gain_scale(analysis: Analysis, values: FloatArray) -> LogNorm:
 
 def draw_gain(figure: FigureArea, analysis: Analysis) -> None:
     """Draw ‖J‖/k in the vertical plane through the witness of q, and the witness."""
-    window, surface = analysis_windows.gain_window(analysis), analysis.surface
+    window = analysis_windows.gain_window(analysis)
+    surface = analysis.surface
     field = curl_field(surface, window.segment, window.bottom, *_GRID_CELLS)
     scale = _gain_scale(analysis, field.gain)
     axes = style.single_axes(figure)
@@ -187,7 +193,8 @@ def _draw_cross(axes: Axes, x: float, y: float) -> None:
 
 def draw_top_view(figure: FigureArea, analysis: Analysis) -> None:
     """Draw the greatest sampled ‖J‖/k over depth, from above, with the witness of q."""
-    (grid, gain), surface = analysis_windows.top_view(analysis), analysis.surface
+    (grid, gain) = analysis_windows.top_view(analysis)
+    surface = analysis.surface
     scale = _gain_scale(analysis, gain)
     unit, (x0, x1, y0, y1) = grid.frame
     axes = style.single_axes(figure)
@@ -222,7 +229,8 @@ def _wrap_into_domain(
 
 def draw_depth(figure: FigureArea, analysis: Analysis) -> None:
     """Draw the singular values of J/k over depth at the witness, with the bounds of q."""
-    column, surface = analysis_windows.witness_profile(analysis), analysis.surface
+    column = analysis_windows.witness_profile(analysis)
+    surface = analysis.surface
     unit = style.length_unit(surface.max_depth)
     axes = style.single_axes(figure)
     for index, colour in enumerate((style.BLUE, style.GREEN, style.MUTED)):

@@ -21,7 +21,8 @@ _MAX_FEATURES = 4.0
 _MARGIN = 0.05
 _COLUMN_POINTS = 600
 # Cells of a map along its longer side, and what the map may cost, in heights found in that time.
-_TOP_CELLS, _TOP_BUDGET = 260, 1.7e7
+_TOP_CELLS = 260
+_TOP_BUDGET = 1.7e7
 # Just inside the surface, where the Jacobian is its limit.
 _RELATIVE_OFFSET = 1e-6
 TOP_VIEW_DEPTHS = (_RELATIVE_OFFSET, 0.25, 0.5, 0.75, 1.0)
@@ -47,12 +48,14 @@ def witness_point(analysis: Analysis) -> FloatArray:
 
 def loop_window(analysis: Analysis) -> Window:
     """Return the part of the plane that contains the loop, or its richest part if it is long."""
-    leak, surface = analysis.leak, analysis.surface
+    leak = analysis.leak
+    surface = analysis.surface
     length = _feature_size(surface)
     if not len(leak.vertices):
         return gain_window(analysis)
     along = (leak.vertices[:, :2] - leak.line.start) @ leak.line.direction
-    low, high = float(along.min()), float(along.max())
+    low = float(along.min())
+    high = float(along.max())
     if high - low <= _MAX_FEATURES * length:
         margin = _MARGIN * (high - low)
         segment = ScanSegment(leak.line, low - margin, high - low + 2.0 * margin)
@@ -80,7 +83,8 @@ def _largest_area_start(
 
 def gain_window(analysis: Analysis) -> Window:
     """Return the part of the vertical plane through the witness of q, along the loop's line."""
-    surface, line = analysis.surface, analysis.leak.line
+    surface = analysis.surface
+    line = analysis.leak.line
     texture = surface.texture
     at = witness_point(analysis)
     across = np.array([-line.direction[1], line.direction[0]])
@@ -152,7 +156,8 @@ class DepthProfile:
 
 def witness_profile(analysis: Analysis) -> DepthProfile:
     """Return the line through the witness: vertical, or along the normal of the closest point."""
-    surface, bound = analysis.surface, analysis.q
+    surface = analysis.surface
+    bound = analysis.q
     at = witness_point(analysis)
     place, below = surface.law.contact.depth_axis(surface.texture, at)
     reach = surface.max_depth * np.linspace(0.0, 1.0, _COLUMN_POINTS)

@@ -16,7 +16,8 @@ from asperity.envelopes.borders import AMPLITUDE_RANGE
 from asperity.envelopes.envelope import DeviceEnvelope, Envelope, LawEnvelope, SurfacePeaks
 from asperity.report.pictures import style
 
-_MILLI, _MICRO = 1e3, 1e6
+_MILLI = 1e3
+_MICRO = 1e6
 # Okabe and Ito's palette; laws in the order of the result.
 _COLOURS = "#e69f00", "#56b4e9", "#009e73", "#cc79a7", "#0072b2", "#882255", "#8a7a00", "#1d2733"
 _MARKERS = "osD^vP"
@@ -51,7 +52,8 @@ def envelope_figure(result: Envelope) -> Figure:
 
 
 def _draw_device(axes: Axes, one: DeviceEnvelope) -> None:
-    lengths, widest = [border.wavelength * _MILLI for border in one.laws[0].borders], one.widest
+    lengths = [border.wavelength * _MILLI for border in one.laws[0].borders]
+    widest = one.widest
     axes.set(xscale="log", yscale="log", xlim=(lengths[0], lengths[-1]))
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_formatter(FuncFormatter(lambda value, _place: f"{value:g}"))

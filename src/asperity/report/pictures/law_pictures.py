@@ -28,7 +28,8 @@ from asperity.textures.texture import Texture
 _WIDTH = 10.0
 _MAX_COLUMNS = 3
 # Panels are drawn true to scale unless that makes them flatter or taller.
-_MAX_ASPECT, _MIN_ASPECT = 2.4, 0.8
+_MAX_ASPECT = 2.4
+_MIN_ASPECT = 0.8
 _CURL_ROWS = 180
 _ARROWS = {**style.INCH_ARROWS, "width": 0.011, "headwidth": 4.0, "headlength": 4.5}
 _ARROWS |= {"headaxislength": 4.0, "minlength": 0.6}
@@ -116,13 +117,17 @@ def draw_fields(
         :func:`asperity.report.pictures.style.length_unit` gives for width and height of the window.
     """
     window = window or field_window(surfaces)
-    segment, bottom, top = window.segment, window.bottom, window.top
+    segment = window.segment
+    bottom = window.bottom
+    top = window.top
     surfaces, over, per = _to_one_stiffness(surfaces)
     curls = [scan_plane.curl_field(surface, segment, bottom) for surface in surfaces]
     arrows = [scan_plane.arrow_field(surface, segment, bottom, top) for surface in surfaces]
     curl_limit, force_per_inch = _choose_scales(surfaces, curls, arrows)
-    (wide, high), columns = window.units, _column_count(len(surfaces))
-    x, y = f"along the scan line [{wide.name}]", f"z [{high.name}]"
+    (wide, high) = window.units
+    columns = _column_count(len(surfaces))
+    x = f"along the scan line [{wide.name}]"
+    y = f"z [{high.name}]"
     panels = style.axes_grid(figure, len(surfaces), columns, x=x, y=y)
     is_true_to_scale = wide == high and _MIN_ASPECT <= window.aspect <= _MAX_ASPECT
     options = _ARROWS | {"scale": force_per_inch, "color": style.INK}
@@ -184,7 +189,8 @@ def _draw_curl(axes: Axes, field: scan_plane.CurlField, window: Window, limit: f
 def _draw_outline(axes: Axes, surface: Surface, window: Window) -> None:
     """Draw the textured body, the contact surface if it is another, and the scan."""
     along = window.segment.distances(601)
-    xy, contact = window.segment.xy(along), surface.law.contact
+    xy = window.segment.xy(along)
+    contact = surface.law.contact
     x, tops = window.scale(along, contact.contact_height(surface.texture, xy))
     axes.fill_between(x[::3], tops[::3], axes.get_ylim()[1], fc=style.FREE_SPACE, lw=0, zorder=0.5)
     axes.plot(x, tops, color=style.INK, linewidth=1.3)
@@ -227,7 +233,8 @@ def draw_forces(figure: Figure | SubFigure, surfaces: Sequence[Surface]) -> None
     limits = _shared_limits(forces)
     unit = choose_unit(max(map(abs, limits)))
     wide = style.length_unit(segment.length)
-    x, y = f"along the scan line [{wide.name}]", f"force{over} [{unit.name}]"
+    x = f"along the scan line [{wide.name}]"
+    y = f"force{over} [{unit.name}]"
     panels = style.axes_grid(figure, len(surfaces), _FORCE_COLUMNS, x=x, y=y)
     for axes, surface, force in zip(panels, surfaces, forces, strict=True):
         _draw_force_panel(axes, surface, force, (wide, unit))
@@ -244,7 +251,8 @@ def _shared_limits(forces: Sequence[scan_plane.PlaneForces]) -> tuple[float, flo
     spans = sorted(max(high, -low) for low, high in zip(lows, highs, strict=True))
     usual = spans[(len(spans) - 1) // 2]
     limit = _MAX_FORCE_RATIO * usual if usual > 0.0 else (spans[-1] or 1.0)
-    low, high = max(min(lows), -limit), min(max(highs), limit)
+    low = max(min(lows), -limit)
+    high = min(max(highs), limit)
     margin = 0.08 * ((high - low) or 1.0)
     return low - margin, high + margin
 
@@ -270,7 +278,8 @@ def _annotate_clipping(
 ) -> None:
     """Add the extremes of a curve that leaves the panel."""
     both = np.concatenate([force.tangential, force.normal])
-    low, high = float(both.min()), float(both.max())
+    low = float(both.min())
+    high = float(both.max())
     words = []
     if high > limits[1]:
         words.append(f"up to {high * unit.scale:.2g} {unit.name}")
@@ -308,7 +317,8 @@ def gain_figure(comparison: Comparison) -> Figure:
     highest = max(float(np.quantile(values[np.isfinite(values)], 0.995)), 2.0)
     scale = LogNorm(min(0.5, float(np.quantile(values[values > 0.0], 0.02))), highest)
     wide, high = window.units
-    x, y = f"along the scan line [{wide.name}]", f"z [{high.name}]"
+    x = f"along the scan line [{wide.name}]"
+    y = f"z [{high.name}]"
     figure, panels = style.law_panels(len(surfaces), 2.2, 0.9, x=x, y=y)
     for axes, row, field in zip(panels, comparison.rows, fields, strict=True):
         mesh = draw_gain_field(axes, field, scale, window)
@@ -360,7 +370,8 @@ def merit_figure(comparison: Comparison) -> Figure:
     widest = max(max(row.strength for row in comparison.rows) * scale, 1e-12)
     for row in comparison.rows:
         sound = row.conservative and row.continuous
-        x, y = row.strength * scale, row.support
+        x = row.strength * scale
+        y = row.support
         colour = style.GREEN if sound else style.ORANGE
         name = f"_{row.law.letter}"
         (point,) = axes.plot(x, y, "o", ms=8, color=colour, clip_on=False, label=name)

@@ -77,7 +77,8 @@ def _scan_axis(run: NamedColumns) -> int:
 def _draw_motion(
     axes: Axes, run: NamedColumns, height_at: HeightFunction, selection: slice
 ) -> None:
-    time, place = run.time[selection], run.position[selection]
+    time = run.time[selection]
+    place = run.position[selection]
     height = height_at(place[:, :2])
     unit = style.length_unit(float(np.abs(np.append(place[:, 2], height)).max()))
     low = min(float(place[:, 2].min()), float(height.min())) * unit.scale
@@ -115,7 +116,8 @@ def _draw_energy(axes: Axes, run: NamedColumns, selection: slice) -> None:
         supplied = energies["supplied"][selection] * 1e3
         for i in _nonzero_axes(supplied):
             axes.plot(time, supplied[:, i], color=_AXIS_COLOURS[i], lw=0.8, label=_AXIS_NAMES[i])
-        total, paper = supplied.sum(axis=1), energies["same_sample"][selection].sum(axis=1) * 1e3
+        total = supplied.sum(axis=1)
+        paper = energies["same_sample"][selection].sum(axis=1) * 1e3
         axes.plot(time, total, color=style.INK, lw=1.4, label="sum, exact")
         axes.plot(time, paper, color=style.MUTED, lw=0.9, ls="--", label="the paper's sum")
     else:  # a real device records the sum alone
@@ -132,13 +134,15 @@ def _draw_path(axes: Axes, run: NamedColumns, height_at: HeightFunction, selecti
     place = run.position[selection]
     wide = style.length_unit(float(np.abs(place[:, i]).max()))
     high = style.length_unit(float(np.abs(place[:, 2]).max()))
-    low, top = float(place[:, i].min()), float(place[:, i].max())
+    low = float(place[:, i].min())
+    top = float(place[:, i].max())
     line = np.repeat(np.median(run.position, axis=0)[None, :2], 600, axis=0)
     line[:, i] = np.linspace(low, top, 600) if top > low else low
     height = height_at(line)
     floor = min(float(place[:, 2].min()), float(height.min()))
     style.fill_below(axes, line[:, i] * wide.scale, height * high.scale, floor * high.scale)
-    x, z = place[:, i] * wide.scale, place[:, 2] * high.scale
+    x = place[:, i] * wide.scale
+    z = place[:, 2] * high.scale
     axes.plot(x, z, color=style.BLUE, lw=0.7, label="path")
     style.label_axes(axes, f"{_AXIS_NAMES[i]} [{wide.name}]", f"z [{high.name}]")
     style.set_panel_title(axes, "Path", f"in the {_AXIS_NAMES[i]}-z plane")
@@ -153,7 +157,8 @@ def _axis_velocity(run: NamedColumns, i: int) -> FloatArray:
 
 
 def _draw_phase(axes: Axes, run: NamedColumns, i: int, selection: slice) -> None:
-    place, speed = run.position[selection, i], _axis_velocity(run, i)[selection]
+    place = run.position[selection, i]
+    speed = _axis_velocity(run, i)[selection]
     unit = style.length_unit(float(np.abs(place).max()))
     fast = style.length_unit(float(np.abs(speed).max()))
     last = len(place) - max(len(place) // 4, 1)
@@ -176,7 +181,8 @@ def onset_figure(predictions: Sequence[Prediction]) -> Figure:
         proved = mine[0].conservative
         axes.set_yscale("log")
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-        delays, dashes = [one.onset.delay for one in mine], "-" if proved else ":"
+        delays = [one.onset.delay for one in mine]
+        dashes = "-" if proved else ":"
         lines: list[tuple[str, list[float], dict[str, Any]]] = [
             ("onset", [one.onset.value for one in mine], _line_style(style.BLUE, "-", 1.2, "o")),
             ("delay rule", [one.delay_rule for one in mine], _line_style(style.GREEN, dashes)),

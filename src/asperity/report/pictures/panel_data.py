@@ -25,7 +25,8 @@ from asperity.report.pictures import style
 _COLORBAR_LABEL = "<colorbar>"  # what matplotlib calls the axes of a colour bar
 _MAX_POINTS = 2000  # of a line
 _MAX_CELLS = (64, 40)  # at most, of a field: along and up
-_DIGITS, _FIELD_DIGITS = 5, 3
+_DIGITS = 5
+_FIELD_DIGITS = 3
 
 
 @dataclass(frozen=True)
@@ -143,7 +144,8 @@ def _extract_field(figure: Figure, axes: Axes) -> FieldData | None:
     images = [one for one in axes.images if np.asarray(one.get_array()).ndim == 2]
     if not (meshes or images):
         return None
-    (x0, x1), (y0, y1) = axes.get_xlim(), axes.get_ylim()
+    (x0, x1) = axes.get_xlim()
+    (y0, y1) = axes.get_ylim()
     x, y = (
         low + (np.arange(count) + 0.5) * (high - low) / count
         for low, high, count in ((x0, x1, _MAX_CELLS[0]), (y0, y1, _MAX_CELLS[1]))
@@ -159,7 +161,8 @@ def _extract_field(figure: Figure, axes: Axes) -> FieldData | None:
 def _resample_mesh(mesh: QuadMesh, x: FloatArray, y: FloatArray) -> FloatArray:
     """Return values (rows, columns) of a mesh whose first axis is the columns."""
     corners = np.asarray(mesh.get_coordinates())
-    count, height = corners.shape[0] - 1, corners.shape[1] - 1
+    count = corners.shape[0] - 1
+    height = corners.shape[1] - 1
     values = np.asarray(mesh.get_array(), dtype=float).reshape(count, height)
     found = np.full((len(y), len(x)), math.nan)
     for column, i in enumerate(np.searchsorted(corners[:, 0, 0], x) - 1):

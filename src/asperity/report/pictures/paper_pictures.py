@@ -23,7 +23,8 @@ from asperity.report.sentences.texts import table_notes
 from asperity.simulation.limit_cycles.onset import Prediction
 
 _COLUMNS = 4
-_MILLI, _MICRO = 1e3, 1e6
+_MILLI = 1e3
+_MICRO = 1e6
 _FORCE_PER_INCH = 4.0  # of arrows at a handle [N]
 _MAX_ARROW_LENGTH = 0.24  # of the arrows of the field, in every panel [inch]
 _HANDLE_ARROW = {"color": style.ORANGE, "width": 0.024, "scale": _FORCE_PER_INCH}
@@ -49,7 +50,8 @@ def figure_two() -> Figure:
         start = "flat wall" if _is_measured_from_wall(panel.law) else "texture"
         remark = f"depth below the {start}"
         style.set_panel_title(axes, panel.law, readable_name(panel.name), remark)
-        lowest, first = number + _COLUMNS >= len(panels), number % _COLUMNS == 0
+        lowest = number + _COLUMNS >= len(panels)
+        first = number % _COLUMNS == 0
         style.label_axes(axes, "x [mm]" if lowest else "", "z [mm]" if first else "")
         axes.tick_params(labelbottom=lowest)
         axes.set_aspect("equal")
@@ -68,7 +70,8 @@ def _is_measured_from_wall(law: str) -> bool:
 
 def _draw_body(axes: Axes, panel: ForceField) -> None:
     """Draw the body, and limit the axes to the field."""
-    low, high = panel.points[..., 1].min() * _MILLI, panel.points[..., 1].max() * _MILLI
+    low = panel.points[..., 1].min() * _MILLI
+    high = panel.points[..., 1].max() * _MILLI
     _draw_solid(axes, panel, low, 1.2)
     x = panel.points[..., 0] * _MILLI
     axes.set(xlim=(x.min(), x.max()), ylim=(low, high + 0.15))
@@ -76,7 +79,8 @@ def _draw_body(axes: Axes, panel: ForceField) -> None:
 
 def _draw_solid(axes: Axes, panel: ForceField | LoopEnergy, low: float, width: float) -> None:
     """Draw the body, the texture, and the wall if depth is measured from it."""
-    x, height = panel.x * _MILLI, panel.height * _MILLI
+    x = panel.x * _MILLI
+    height = panel.height * _MILLI
     flat = _is_measured_from_wall(panel.law)
     style.fill_below(axes, x, 0.0 * height if flat else height, low)
     axes.plot(x, height, color=style.INK, lw=width, ls=":" if flat else "-")
@@ -85,7 +89,8 @@ def _draw_solid(axes: Axes, panel: ForceField | LoopEnergy, low: float, width: f
 
 
 def _draw_forces(axes: Axes, panel: ForceField) -> None:
-    points, forces = panel.points[::2, ::2] * _MILLI, panel.forces[::2, ::2]
+    points = panel.points[::2, ::2] * _MILLI
+    forces = panel.forces[::2, ::2]
     acts = np.abs(forces).max(axis=-1) > 0.0
     scale = float(np.linalg.norm(forces, axis=-1).max()) / _MAX_ARROW_LENGTH
     handles = panel.handle_positions * _MILLI
@@ -132,7 +137,8 @@ def figure_three(panels: Sequence[LoopEnergy] | None = None) -> Figure:
     for axes in places[2 * len(panels) :]:
         axes.set_axis_off()
     for number, panel in enumerate(panels):
-        path, work = places[2 * number], places[2 * number + 1]
+        path = places[2 * number]
+        work = places[2 * number + 1]
         for axes in (path, work):
             style.style_axes(axes)
             style.mark_law(axes, panel.law)
@@ -146,12 +152,14 @@ def figure_three(panels: Sequence[LoopEnergy] | None = None) -> Figure:
 
 
 def _draw_path(axes: Axes, panel: LoopEnergy) -> None:
-    x, height = panel.x * _MILLI, panel.height * _MILLI
+    x = panel.x * _MILLI
+    height = panel.height * _MILLI
     closed = np.concatenate([panel.vertices, panel.vertices[:1]]) * _MILLI
     low = min(float(closed[:, 1].min()), float(height.min())) - 0.2
     _draw_solid(axes, panel, low, 0.9)
     axes.plot(closed[:, 0], closed[:, 1], color=style.ORANGE, lw=1.4)
-    middle, leg = 0.5 * (closed[1:] + closed[:-1]), np.diff(closed, axis=0)
+    middle = 0.5 * (closed[1:] + closed[:-1])
+    leg = np.diff(closed, axis=0)
     head = {"width": 0.02, "headwidth": 5.0, "headlength": 6.0, "minlength": 0.0, "minshaft": 0.0}
     options = style.INCH_ARROWS | head | {"angles": "xy", "scale": 1e6, "pivot": "middle"}
     axes.quiver(*middle.T, *leg.T, color=style.ORANGE, zorder=4, **options)
@@ -161,7 +169,8 @@ def _draw_path(axes: Axes, panel: LoopEnergy) -> None:
 
 
 def _draw_work(axes: Axes, panel: LoopEnergy) -> None:
-    length, work = panel.arc_length * _MILLI, panel.work * _MICRO
+    length = panel.arc_length * _MILLI
+    work = panel.work * _MICRO
     axes.set_label(panel.law)
     axes.plot(length, work, color=style.BLUE, lw=1.3, label="energy")
     axes.plot(length[-1:], work[-1:], "o", color=style.BLUE, ms=4.0, clip_on=False)
@@ -310,7 +319,8 @@ def _draw_rule(axes: Axes, points: Sequence[_OnsetPoint], markers: Mapping[str, 
     axes.set(xscale="log", yscale="log")
     named: dict[tuple[int, int], list[_OnsetPoint]] = {}  # by position
     for point in points:
-        allowed, onset = point.allowed, point.prediction.onset
+        allowed = point.allowed
+        onset = point.prediction.onset
         if not (math.isfinite(onset.value) and math.isfinite(allowed) and allowed > 0.0):
             continue
         place = round(3.0 * math.log10(allowed)), round(8.0 * math.log10(onset.value))
@@ -318,7 +328,8 @@ def _draw_rule(axes: Axes, points: Sequence[_OnsetPoint], markers: Mapping[str, 
         edge = style.ORANGE if point.is_missed else style.BLUE
         face = edge if point.is_missed else style.BACKGROUND
         options: dict[str, Any] = {"mec": edge, "mfc": face, "mew": 0.9, "ms": 5.5}
-        label, marker = f"_{onset.law}, {point.device}", markers[point.device]
+        label = f"_{onset.law}, {point.device}"
+        marker = markers[point.device]
         (drawn,) = axes.plot(allowed, onset.value, marker, label=label, **options)
         style.mark_law(drawn, onset.law)
     for near in named.values():

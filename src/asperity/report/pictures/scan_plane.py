@@ -15,7 +15,8 @@ from asperity.surface import Surface
 from asperity.textures.texture import ScanLine, Texture
 
 _SURVEY_POINTS = 4096
-_ARROW_COLUMNS, _ARROW_ROWS = 20, 12
+_ARROW_COLUMNS = 20
+_ARROW_ROWS = 12
 # Greatest cost of a field, in evaluations of the height of a map; beyond it the grid is coarser.
 _BUDGET = 2.2e6
 
@@ -184,8 +185,10 @@ def curl_field(
     edges = segment.distances(columns + 1)
     middles = 0.5 * (edges[1:] + edges[:-1])
     xy = segment.xy(middles)
-    begin, texture = surface.law.contact.contact_height, surface.texture
-    tops, corner_tops = begin(texture, xy), begin(texture, segment.xy(edges))
+    begin = surface.law.contact.contact_height
+    texture = surface.texture
+    tops = begin(texture, xy)
+    corner_tops = begin(texture, segment.xy(edges))
     fractions = (np.arange(rows) + 0.5) / rows
     z = bottom + (tops - bottom)[:, None] * fractions
     points = np.column_stack([np.repeat(xy, rows, axis=0), z.ravel()])

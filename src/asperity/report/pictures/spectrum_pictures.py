@@ -63,7 +63,8 @@ def spectrum_figure(texture: Texture, device: Device) -> Figure:
     shown = amplitude > 1e-6 * max(float(amplitude.max()), 1e-300)
     unit = style.length_unit(float(amplitude.max()))
     limits = device_wavelength_limits(device)
-    x, y = wavelength[shown] * _MILLI, amplitude[shown] * unit.scale
+    x = wavelength[shown] * _MILLI
+    y = amplitude[shown] * unit.scale
     if shown.sum() <= 40:
         axes.vlines(x, 0.0, y, color=style.BLUE)
     marker = {"lw": 1.0} if shown.sum() > 40 else {"marker": "o", "ls": ""}
@@ -91,8 +92,10 @@ def hand_figure(comparison: Comparison) -> Figure:
     if row is None or row.perceptibility is None or not len(row.perceptibility.spectrum.motions):
         style.add_note(axes, "no texture at a known stiffness", (0.5, 0.5), ha="center")
         return figure
-    found, waves = row.perceptibility, row.perceptibility.spectrum
-    frequencies, motions = waves.frequencies, waves.motions * _MICRO
+    found = row.perceptibility
+    waves = row.perceptibility.spectrum
+    frequencies = waves.frequencies
+    motions = waves.motions * _MICRO
     span = np.geomspace(min(5.0, frequencies.min() / 1.5), max(600.0, frequencies.max() * 1.5), 300)
     unnoticed, felt = (level * _MICRO for level in comparison.grip.threshold(span))
     axes.plot(span, felt, color=style.GREEN, lw=1.2, ls="--", label="felt above")
@@ -154,7 +157,8 @@ def limits_figure(result: Limits) -> Figure:
     waves = np.array([(wave.wavelength, wave.amplitude, wave.force) for wave in result.waves])
     lengths, heights, forces = waves.T
     met = [all(wave.holds.values()) for wave in result.waves]
-    unit, push = style.length_unit(float(heights.max())), style.force_unit(float(forces.max()))
+    unit = style.length_unit(float(heights.max()))
+    push = style.force_unit(float(forces.max()))
     _draw_waves(upper, lengths, heights * unit.scale, met, result.spectrum.exact)
     _draw_waves(lower, lengths, forces * push.scale, met, result.spectrum.exact)
     least = _draw_wavelength_limits(result, (upper, lower))
@@ -211,7 +215,8 @@ def _draw_wavelength_limits(result: Limits, panels: Sequence[Axes]) -> list[floa
 
 def _draw_force_limits(result: Limits, axes: Axes, scale: float) -> None:
     """Draw the force that each wave needs to be felt, and the force steps of the device."""
-    step, steps = result.device.value("force_resolution"), result.force_steps
+    step = result.device.value("force_resolution")
+    steps = result.force_steps
     texture = result.perceptibility
     low, high = axes.get_ylim()
     lengths = np.geomspace(*axes.get_xlim(), 200) / _MILLI
@@ -231,5 +236,6 @@ def _draw_force_limits(result: Limits, axes: Axes, scale: float) -> None:
         place = {"xycoords": ("axes fraction", "data"), "xytext": (0, 4), "color": style.ORANGE}
         text = f"4: {steps:g} steps of force, {format_quantity(steps * step, 'N')}"
         style.add_note(axes, text, (0.005, steps * step * scale), **place)
-        low, high = min(low, steps * step * scale / 3.0), max(high, steps * step * scale * 4.0)
+        low = min(low, steps * step * scale / 3.0)
+        high = max(high, steps * step * scale * 4.0)
     axes.set_ylim(low, high)

@@ -22,10 +22,14 @@ BACKGROUND = "#ffffff"
 """Background of every picture."""
 FREE_SPACE = "#eceef1"
 """Background of a field where the probe is not in contact."""
-INK, MUTED, FAINT = "#1d2733", "#5b6673", "#c9ced6"
+INK = "#1d2733"
+MUTED = "#5b6673"
+FAINT = "#c9ced6"
 BODY = "#d9cdb8"
 # Okabe and Ito's palette, which colour-blind readers can distinguish.
-BLUE, ORANGE, GREEN = "#0072b2", "#d55e00", "#009e73"
+BLUE = "#0072b2"
+ORANGE = "#d55e00"
+GREEN = "#009e73"
 _THEMED = (BACKGROUND, FREE_SPACE, INK, "#000000", MUTED, FAINT, BODY, BLUE, ORANGE, GREEN)
 _VARIABLES = ("card", "free", "ink", "ink", "soft", "faint", "body", "blue", "orange", "green")
 THEME_VARIABLES = dict(zip(_THEMED, _VARIABLES, strict=True))
@@ -34,7 +38,9 @@ THEME_VARIABLES = dict(zip(_THEMED, _VARIABLES, strict=True))
 Their dark values are in ``templates/style.css``; light, in print and as a file a figure has the
 colours above.
 """
-TITLE, LABEL, TICK = 10.0, 9.0, 8.0
+TITLE = 10.0
+LABEL = 9.0
+TICK = 8.0
 HEIGHTS = "cividis"
 WIDE_COLORBAR: dict[str, Any]
 WIDE_COLORBAR = {"location": "bottom", "shrink": 0.5, "aspect": 40, "extend": "both"}

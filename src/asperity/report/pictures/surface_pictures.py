@@ -38,7 +38,8 @@ class MapGrid:
     def frame(self) -> tuple[style.AxisUnit, tuple[float, float, float, float]]:
         """Unit of its axes, and left, right, lower and upper border in that unit."""
         unit = style.length_unit(float(self.size.max()))
-        (x0, y0), (x1, y1) = self.low * unit.scale, (self.low + self.size) * unit.scale
+        (x0, y0) = self.low * unit.scale
+        (x1, y1) = (self.low + self.size) * unit.scale
         return unit, (x0, x1, y0, y1)
 
 
@@ -115,9 +116,12 @@ def _draw_body(
         width: of the line [points].
     """
     along = segment.distances(count)
-    wide, high = style.length_unit(segment.length), style.length_unit(texture.peak_to_valley)
-    x, z = along * wide.scale, texture.height(segment.xy(along)) * high.scale
-    low, top = float(z.min()), float(z.max())
+    wide = style.length_unit(segment.length)
+    high = style.length_unit(texture.peak_to_valley)
+    x = along * wide.scale
+    z = texture.height(segment.xy(along)) * high.scale
+    low = float(z.min())
+    top = float(z.max())
     below, above = (margin * max(top - low, 1e-9) for margin in margins)
     style.fill_below(axes, x, z, low - below)
     axes.plot(x, z, color=style.INK, linewidth=width, label="height")
@@ -195,12 +199,15 @@ def _draw_scan_line(axes: Axes, texture: Texture, unit: style.AxisUnit) -> None:
 
 def _draw_scale_bar(axes: Axes, width: float) -> None:
     """Draw a bar of a round length in the lower right corner of a map of that width [m]."""
-    unit, length = style.length_unit(width), style.nice_length(0.22 * width)
-    right, span = 0.97, length / width
+    unit = style.length_unit(width)
+    length = style.nice_length(0.22 * width)
+    right = 0.97
+    span = length / width
     for colour, thickness in (("white", 6.0), (style.INK, 3.0)):
         options: dict[str, Any] = {"color": colour, "lw": thickness, "solid_capstyle": "butt"}
         axes.plot([right - span, right], [0.06, 0.06], transform=axes.transAxes, **options)
-    text, middle = f"{length * unit.scale:g} {unit.name}", right - 0.5 * span
+    text = f"{length * unit.scale:g} {unit.name}"
+    middle = right - 0.5 * span
     style.add_note(axes, text, (middle, 0.085), ha="center", va="bottom", color=style.INK)
 
 
@@ -249,7 +256,8 @@ def gallery_figure(texture: Texture) -> Figure:
 
 def _draw_card_map(axes: Axes, texture: Texture) -> None:
     grid = map_grid(texture, _CARD_MAP_POINTS)
-    size, heights = grid.size, texture.height(grid.xy).reshape(grid.shape)
+    size = grid.size
+    heights = texture.height(grid.xy).reshape(grid.shape)
     colours = LinearSegmentedColormap.from_list("material", _MATERIAL_COLOURS)
     shaded = _shade_relief(heights, size, colours, steepest_slope=0.7, altitude=45.0)
     axes.imshow(shaded, origin="lower", extent=(0.0, size[0], 0.0, size[1]))

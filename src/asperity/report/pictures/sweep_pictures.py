@@ -30,7 +30,8 @@ def sweep_figure(result: SweepResult, name: str) -> Figure:
         result: the sweep.
         name: the column.
     """
-    plan, columns = result.plan, result.columns
+    plan = result.plan
+    columns = result.columns
     keys = [plan.column(key) for key in plan.arguments]
     axes_names = [key for key in keys if columns[key] in (int, float)][:2] or keys[:1]
     others = [*(key for key in keys if key not in axes_names), *result.run.index]
@@ -114,7 +115,8 @@ def _map_figure(
 
 def _draw_map(axes: Axes, table: FloatArray, is_grid: bool, colours: dict[str, Any]) -> Any:
     """Draw the values of a grid, or of points anywhere."""
-    x, y = np.unique(table[:, 0]), np.unique(table[:, 1])
+    x = np.unique(table[:, 0])
+    y = np.unique(table[:, 1])
     if not is_grid or min(len(x), len(y)) < 2:
         return axes.scatter(table[:, 0], table[:, 1], c=table[:, 2], s=14, **colours)
     values = np.full((len(y), len(x)), np.nan)

@@ -48,8 +48,10 @@ def describe_shading(texture: Texture, stiffness: float | None) -> str:
     """
     surface = Surface(texture, _SHADING_LAW)
     surface = surface if stiffness is None else surface.to_stiffness(stiffness)
-    q, leak = characteristic_number(surface), worst_loop(surface)
+    q = characteristic_number(surface)
+    leak = worst_loop(surface)
     has_gain = leak.energy > 0.0
     energy = f"a loop gains {energy_text(leak.energy)}" if has_gain else "no loop gains energy"
-    at, depth = format_quantity(surface.stiffness, "N/m"), format_quantity(surface.max_depth, "m")
+    at = format_quantity(surface.stiffness, "N/m")
+    depth = format_quantity(surface.max_depth, "m")
     return sentence("shading", law=_SHADING_LAW, at=at, depth=depth, energy=energy, q=q)

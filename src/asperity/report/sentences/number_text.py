@@ -132,7 +132,8 @@ def interval_text(bound: Bound) -> str:
         >>> interval_text(Bound(1, 1, "theorem")), interval_text(Bound(2.0, math.inf, "sampled"))
         ('1', '~2')
     """
-    low, high = lower_bound_text(bound.lower), upper_bound_text(bound.upper)
+    low = lower_bound_text(bound.lower)
+    high = upper_bound_text(bound.upper)
     if low == high:
         return low
     if math.isinf(bound.upper):
@@ -173,7 +174,8 @@ def range_text(low: float, high: float, unit: str, digits: int = 5) -> str:
     if size == 0.0:
         return f"0 {unit}"
     name, scale = _choose_unit(size, unit)
-    lower, upper = lower_bound_text(low * scale, digits), upper_bound_text(high * scale, digits)
+    lower = lower_bound_text(low * scale, digits)
+    upper = upper_bound_text(high * scale, digits)
     if math.isinf(high):
         return f"at least {lower} {name}"
     return f"{lower} {name}" if lower == upper else f"{lower} to {upper} {name}"

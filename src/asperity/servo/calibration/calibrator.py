@@ -37,7 +37,9 @@ HOLDING_STIFFNESS = 30.0
 MAX_TRAVEL = 0.02
 """Largest displacement of a pushed handle [m]; beyond it the force ends."""
 _GAP_PERIODS = 100.0  # rows further apart than these periods belong to two loops
-_REST_TIME, _TRIAL_TIME, _PUSH_TIME = 0.5, 0.4, 2.4  # [s]
+_REST_TIME = 0.5  # [s]
+_TRIAL_TIME = 0.4
+_PUSH_TIME = 2.4
 _PUSH_DURATIONS = (0.006, 0.04)  # [s] initial and largest duration of a push
 _SUFFICIENT_TRAVEL = 2e-3  # [m] range that determines mass and damping
 _IMMOBILE_TRAVEL = 0.2e-3  # [m] range below which a handle under the largest push is immobile
@@ -49,7 +51,9 @@ WALL_FORCE_FRACTION = 0.35
 _TRIP_STEPS = 1.7  # steps: an oscillation of this size does not decay
 _BRAKE_DAMPING = 1.0  # [N s/m] damping that brings the handle to rest, on a velocity
 _VELOCITY_TIME_CONSTANT = 2e-3  # smoothed over this time [s]
-_MAX_SETTLES, _SETTLE_TIME = 12, 0.25  # number and duration [s] of the rests before a measurement
+# number and duration [s] of the rests before a measurement
+_MAX_SETTLES = 12
+_SETTLE_TIME = 0.25
 _REST_TRAVEL = 20e-6  # [m] range of a handle at rest
 _WALL_DELAY = 0.05  # [s] before the step of a wall, after the ramp
 _OSCILLATIONS = (15.0, 150.0)  # oscillations to observe a wall for
@@ -118,10 +122,15 @@ class Calibrator:
         ramp: float,
         progress: Callable[[str], None] = lambda _words: None,
     ) -> None:
-        self._rig, self._ramp, self._report_progress = rig, ramp, progress
-        self._period, self._max_force = rig.servo.period, rig.servo.max_force
-        self._centre, self._excitation_number = np.full(3, math.nan), 0
-        self._noise_floor, self._times = 0.0, np.zeros(0)
+        self._rig = rig
+        self._ramp = ramp
+        self._report_progress = progress
+        self._period = rig.servo.period
+        self._max_force = rig.servo.max_force
+        self._centre = np.full(3, math.nan)
+        self._excitation_number = 0
+        self._noise_floor = 0.0
+        self._times = np.zeros(0)
 
     def run(self) -> Calibration:
         """Run all measurements.
@@ -181,13 +190,15 @@ class Calibrator:
 
         ``None`` if it does not move.
         """
-        push, span = _FIRST_PUSH_FRACTION * self._max_force, _PUSH_DURATIONS[0]
+        push = _FIRST_PUSH_FRACTION * self._max_force
+        span = _PUSH_DURATIONS[0]
         most = 0.6 * self._max_force
         while True:
             rows = self._apply_pushes(axis, push, span, _TRIAL_TIME)
             way = float(np.ptp(rows[:, 1 + axis]))
             if _tripped(rows):
-                push, span = 0.5 * push, 0.7 * span
+                push = 0.5 * push
+                span = 0.7 * span
             elif way > _SUFFICIENT_TRAVEL or span >= _PUSH_DURATIONS[1]:
                 break
             elif push < most:
@@ -203,7 +214,8 @@ class Calibrator:
 
     def _apply_pushes(self, axis: int, push: float, duration: float, time: float) -> FloatArray:
         self._settle()
-        span, time = float(self._samples(duration)), max(time, 6.0 * duration)
+        span = float(self._samples(duration))
+        time = max(time, 6.0 * duration)
         return self._apply(PUSHING, axis, time, push_force=push, push_samples=span)
 
     def _update_rate(self, records: list[PushRecord], step: Estimate | None) -> Estimate:

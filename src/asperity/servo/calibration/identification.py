@@ -244,7 +244,8 @@ def _fit(segments: Sequence[NormalEquations]) -> tuple[FloatArray, float]:
     size = np.sqrt(np.diag(square))
     size[size == 0.0] = 1.0
     scaled = square / np.outer(size, size)
-    active, answer = [0, 1, 2], np.full(3, -1.0)
+    active = [0, 1, 2]
+    answer = np.full(3, -1.0)
     while active and answer.min() < 0.0:
         answer = np.zeros(3)
         square_part = scaled[np.ix_(active, active)]
@@ -285,7 +286,8 @@ STIFFNESS_FACTOR = 1.3
 """Factor between stiffnesses until a wall cycles."""
 BRACKET_RATIO = 1.03
 """Ratio of the bracket at which the bisection ends."""
-MIN_STIFFNESS, MAX_STIFFNESS = 50.0, 50e3
+MIN_STIFFNESS = 50.0
+MAX_STIFFNESS = 50e3
 """Range of the search [N/m]."""
 STEADY_RATIO = 0.99
 """Ratio of the amplitudes of two halves above which an oscillation persists."""
@@ -359,14 +361,17 @@ def find_wall_onset(
         highest: largest stiffness tried [N/m].
         lowest: least stiffness tried [N/m].
     """
-    stable, cycling, trials = 0.0, math.inf, 0
+    stable = 0.0
+    cycling = math.inf
+    trials = 0
     stiffness = lowest
     while math.isinf(cycling) and stiffness <= highest:
         trials += 1
         if cycles(stiffness):
             cycling = stiffness
         else:
-            stable, stiffness = stiffness, stiffness * STIFFNESS_FACTOR
+            stable = stiffness
+            stiffness = stiffness * STIFFNESS_FACTOR
     while stable > 0.0 and math.isfinite(cycling) and cycling > BRACKET_RATIO * stable:
         trials += 1
         middle = math.sqrt(stable * cycling)

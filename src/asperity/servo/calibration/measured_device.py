@@ -47,7 +47,8 @@ def measured_device(
     wall = _wall_test(calibration, source, origin)
     if wall is not None:
         data["max_stiffness"] = wall
-    resolution, rate = effective_resolution(calibration), calibration.update_rate
+    resolution = effective_resolution(calibration)
+    rate = calibration.update_rate
     if resolution.value:
         noise = format_quantity(calibration.noise.value, "m", digits=2)
         words = f"{_with_uncertainty(resolution, 'm')}, noise at rest {noise}"
@@ -146,7 +147,8 @@ def format_uncertainty(estimate: Estimate, scale: float = 1.0) -> str:
         >>> format_uncertainty(Estimate(5.5e-5, 0.0), 1e6)
         '55'
     """
-    value, uncertainty = scale * estimate.value, scale * estimate.uncertainty
+    value = scale * estimate.value
+    uncertainty = scale * estimate.uncertainty
     if uncertainty <= 1e-4 * abs(value):
         return f"{value:.4g}"
     digits = -math.floor(math.log10(uncertainty))

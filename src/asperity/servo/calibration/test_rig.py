@@ -90,12 +90,16 @@ class UnclockedRig:
     def __init__(
         self, driver: Driver, servo: Servo, safety: Safety, check: Callable[[], None] = lambda: None
     ) -> None:
-        self.servo, self.axes, self._check = servo, frame_axes(driver.frame), check
-        self._driver, self._loop_memory = driver, LoopMemory()
+        self.servo = servo
+        self.axes = frame_axes(driver.frame)
+        self._check = check
+        self._driver = driver
+        self._loop_memory = LoopMemory()
         unsupervised = replace(safety, silence=_NO_SUPERVISION)
         block = self._loop_memory.block()
         self._loop = DriverLoop(driver, servo, unsupervised, math.inf, block, no_clock())
-        self._device, self._to_program = driver.open(), excitation_renderer(driver)
+        self._device = driver.open()
+        self._to_program = excitation_renderer(driver)
 
     def apply(self, excitation: Excitation) -> FloatArray:
         """See :class:`CalibrationRig`."""
@@ -127,7 +131,9 @@ class ClockedRig:
         self, driver: Driver, servo: Servo, safety: Safety, reach: float,
         check: Callable[[], None] = lambda: None,
     ) -> None:  # fmt: skip
-        self.servo, self.axes, self._check = servo, frame_axes(driver.frame), check
+        self.servo = servo
+        self.axes = frame_axes(driver.frame)
+        self._check = check
         self._to_program = excitation_renderer(driver)
         rest = Excitation(*[0.0] * len(Excitation._fields))
         self.loop = ServoProcess(self._to_program(rest), driver, servo, safety, reach)
@@ -141,7 +147,8 @@ class ClockedRig:
 
     def apply(self, excitation: Excitation) -> FloatArray:
         """See :class:`CalibrationRig`."""
-        first, parts = self.loop.memory.row_count, []
+        first = self.loop.memory.row_count
+        parts = []
         self.loop.change_program(self._to_program(excitation))
         end = time.monotonic() + self.servo.period * excitation.samples + _TIMEOUT
         while time.monotonic() < end:

@@ -49,7 +49,8 @@ class Frame:
     @property
     def matrix(self) -> FloatArray:
         """Matrix for the compiled loop: to the surface, then to the device (6, 4)."""
-        turn, origin = np.array(self.rotation), np.array(self.origin)
+        turn = np.array(self.rotation)
+        origin = np.array(self.origin)
         table = np.zeros((6, 4))
         table[:3, :3] = self.unit * turn.T
         table[:3, 3] = 0.0 - self.unit * turn.T @ origin
@@ -60,7 +61,9 @@ class Frame:
 IDENTITY_FRAME = Frame()
 """The surface's own frame."""
 
-RIGHT, AWAY, UP = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+RIGHT = (1.0, 0.0, 0.0)
+AWAY = (0.0, 1.0, 0.0)
+UP = (0.0, 0.0, 1.0)
 TOWARDS = (0.0, -1.0, 0.0)
 WALL_AXES = {"lying": (RIGHT, AWAY, UP), "standing": (RIGHT, UP, TOWARDS)}
 """Directions of the surface's x, y and z, seen by the user: on a table, or facing the user."""

@@ -27,7 +27,9 @@ from asperity.servo.drivers.websocket_client import ProtocolError, WebSocketClie
 from asperity.servo.kernels.ring_buffer import FORCE_TIMEOUT, LOOP_SILENT, STALE
 from asperity.servo.kernels.threaded_device import ThreadedDevice
 
-CONNECTION_LOST, INVALID_STATE, DEVICE_GONE = 3, 4, 5
+CONNECTION_LOST = 3
+INVALID_STATE = 4
+DEVICE_GONE = 5
 """Failures of the thread: no connection, no state in a message, no device."""
 KEEP_ALIVE = 5e-3
 """Time without a new force after which the last one is sent again [s]: states keep coming."""
@@ -97,13 +99,17 @@ class HaplyThread(threading.Thread):
 
     def __init__(self, connection: WebSocketClient, device: str, force_timeout: float) -> None:
         super().__init__(daemon=True)
-        self.buffer, self.reason = threaded.ThreadBuffer(force_timeout), ""
-        self._connection, self._device_id = connection, device
+        self.buffer = threaded.ThreadBuffer(force_timeout)
+        self.reason = ""
+        self._connection = connection
+        self._device_id = device
         self._wakeup_reader, self.wakeup = os.pipe()
         for end in (self._wakeup_reader, self.wakeup):
             os.set_blocking(end, False)
         self._pending: deque[int] = deque()
-        self._last_force, self._last_force_time, self._stopping = _ZERO_FORCE, 0, False
+        self._last_force = _ZERO_FORCE
+        self._last_force_time = 0
+        self._stopping = False
 
     def run(self) -> None:
         """Exchange until a failure or :meth:`stop`; the last message is no force."""
@@ -217,7 +223,8 @@ class HaplyDriver(threaded.ThreadedDriver):
         except BaseException:  # also for an interrupt
             connection.close()
             raise
-        self._exchange, self._previous_switch_interval = exchange, sys.getswitchinterval()
+        self._exchange = exchange
+        self._previous_switch_interval = sys.getswitchinterval()
         sys.setswitchinterval(_SWITCH_INTERVAL)
         exchange.start()
         try:

@@ -28,7 +28,8 @@ from asperity.servo.kernels.open_haptics_frame import BEGIN_FRAME, BUFFER_ADDRES
 from asperity.servo.kernels.ring_buffer import BUFFER_WORDS, FAILURE_CODE, RingBuffer
 from asperity.servo.kernels.threaded_device import ThreadedDevice
 
-AXES, MILLIMETRE = (RIGHT, UP, TOWARDS), 1e-3
+AXES = (RIGHT, UP, TOWARDS)
+MILLIMETRE = 1e-3
 LYING_FRAME = surface_frame(AXES, "lying", (0.0, 0.0, 0.0), MILLIMETRE)
 LIBRARY = "ASPERITY_LIBHD"
 """Environment variable of the path of the library."""
@@ -117,7 +118,8 @@ class OpenHapticsDriver(ThreadedDriver):
         library = _library()
         words = self._buffer.words
         words[FAILURE_CODE] = words[FAILURE_CODE] or _CLOSED
-        done, end = words[FRAMES], time.monotonic() + _RELEASE_TIMEOUT
+        done = words[FRAMES]
+        end = time.monotonic() + _RELEASE_TIMEOUT
         while words[FRAMES] < done + 2 and time.monotonic() < end:
             time.sleep(1e-3)
         library.hdDisable(_FORCE_OUTPUT)

@@ -94,7 +94,8 @@ class ThreadedDriver(Driver):
             buffer: ring buffer of the thread.
             wakeup: file that wakes the thread; ``None`` for a thread that polls.
         """
-        max_age, clock = round(1e9 * self.max_reading_age), system_clock()
+        max_age = round(1e9 * self.max_reading_age)
+        clock = system_clock()
         if wakeup is None:
             return ThreadedDevice(*buffer, max_age, clock, 0, -1)
         write = function_address(ctypes.CDLL(None).write)
@@ -102,7 +103,8 @@ class ThreadedDriver(Driver):
 
     def describe_error(self, code: int) -> str:
         """Return what went wrong between loop and thread."""
-        age, held = 1e3 * self.max_reading_age, 1e3 * self.force_timeout
+        age = 1e3 * self.max_reading_age
+        held = 1e3 * self.force_timeout
         words = {
             ring_buffer.STALE: f"the newest reading of the device is older than {age:g} ms",
             ring_buffer.LOOP_SILENT: f"the loop held a force for {held:g} ms without renewing it",

@@ -38,7 +38,8 @@ class WebSocketClient:
         address = parse_uri(f"ws://{host}:{port}/")
         self._protocol = ClientProtocol(address, max_size=MAX_MESSAGE_BYTES)
         self._messages: list[bytes] = []
-        self._fragments, self._has_answered = bytearray(), False
+        self._fragments = bytearray()
+        self._has_answered = False
         try:
             self._protocol.send_request(self._protocol.connect())
             self._flush()
@@ -71,7 +72,8 @@ class WebSocketClient:
         """
         if not self._messages:
             self._read()
-        messages, self._messages = self._messages, []
+        messages = self._messages
+        self._messages = []
         return messages
 
     def close(self) -> None:

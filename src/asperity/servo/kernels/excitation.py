@@ -16,14 +16,17 @@ from asperity.core.compiled import FloatArray, Kernels
 KERNELS = Kernels(provides=("probe_depth", "probe_in_contact", "probe_tick"))
 
 # Kinds of excitation.
-REST, PUSHING, WALL = 0.0, 1.0, 2.0
+REST = 0.0
+PUSHING = 1.0
+WALL = 2.0
 
 # Places in the memory of a contact, which is unused here; POINT_COUNT is 0 at the start.
 CENTRE = FIRST_POINT
 SAMPLE_INDEX, RANDOM_STATE, PUSH_SIGN, PUSH_REMAINING, TRIPPED = range(
     FIRST_POINT + 3, FIRST_POINT + 8
 )
-LAST_POSITION, FILTERED_VELOCITY = FIRST_POINT + 8, FIRST_POINT + 11
+LAST_POSITION = FIRST_POINT + 8
+FILTERED_VELOCITY = FIRST_POINT + 11
 
 
 class Excitation(NamedTuple):

@@ -33,7 +33,9 @@ def device_read(position: FloatArray, device: ForceDimensionDevice) -> int:
     y = local_array((1,))
     z = local_array((1,))
     answer = call_address(device.get_position, x, y, z, device.number)
-    position[0], position[1], position[2] = x[0], y[0], z[0]
+    position[0] = x[0]
+    position[1] = y[0]
+    position[2] = z[0]
     return min(answer, 0)
 
 

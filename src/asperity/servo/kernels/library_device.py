@@ -27,5 +27,7 @@ def device_read(position: FloatArray, device: LibraryDevice) -> int:
 def device_write(fx: float, fy: float, fz: float, in_contact: bool, device: LibraryDevice) -> int:
     """Command a force by the library; see ``interface``."""
     force = local_array((3,))
-    force[0], force[1], force[2] = fx, fy, fz
+    force[0] = fx
+    force[1] = fy
+    force[2] = fz
     return call_address(device.write, force, in_contact)

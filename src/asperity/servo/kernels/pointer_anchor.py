@@ -21,12 +21,16 @@ KERNELS = Kernels(provides=("anchor_segment",), native=("call_address",))
 TARGET, COSINE, SINE, REQUEST_ROW, ANCHOR, VELOCITY, STATE_ROW, FOLLOWER_ROW = range(8)
 HEADER_ROWS = 8
 # Then follow anchor [m], velocity [m/s] and position [m] of each of the newest samples.
-HISTORY_SAMPLES, ROWS_PER_SAMPLE = 40_000, 3
+HISTORY_SAMPLES = 40_000
+ROWS_PER_SAMPLE = 3
 # REQUEST_ROW: angular velocity [rad/s] and number of the newest request; STATE_ROW: angle [rad],
 # number of the newest acknowledged request, and number of samples whose rows are complete.
-ANGLE, REQUEST_NUMBER, SAMPLE_COUNT = 0, 1, 2
+ANGLE = 0
+REQUEST_NUMBER = 1
+SAMPLE_COUNT = 2
 # FOLLOWER_ROW: number of the next sample that is repeated, and number of samples left out.
-NEXT_SAMPLE, LEFT_OUT = 0, 1
+NEXT_SAMPLE = 0
+LEFT_OUT = 1
 
 TRACKING_BANDWIDTH = 250.0
 """Bandwidth of the anchor [rad/s]; it lags by 2/ω, 8 ms."""

@@ -20,10 +20,15 @@ KERNELS = Kernels(
 
 # Words: counts of positions and of forces, failure code or 0, and the time after which the thread
 # releases a force that the loop does not renew [ns]. The rest is free for a driver.
-POSITIONS, FORCES, FAILURE_CODE, FORCE_TIMEOUT, DRIVER_WORDS = 0, 1, 2, 3, 4
+POSITIONS = 0
+FORCES = 1
+FAILURE_CODE = 2
+FORCE_TIMEOUT = 3
+DRIVER_WORDS = 4
 HEADER_WORDS = 16
 # Failure codes: of the loop, a position that is too old; of the thread, a force not renewed.
-STALE, LOOP_SILENT = 1, 2
+STALE = 1
+LOOP_SILENT = 2
 RING_ROWS = 1024
 """Rows of each direction: a tenth of a second of the fastest loop."""
 ROW_WORDS = 4

@@ -48,7 +48,9 @@ def device_read(position: FloatArray, device: ThreadedDevice) -> int:
     if wrong != OK:
         return wrong
     newest = latest_row(device.words, device.numbers, POSITIONS)
-    position[0], position[1], position[2] = newest.x, newest.y, newest.z
+    position[0] = newest.x
+    position[1] = newest.y
+    position[2] = newest.z
     return STALE if clock_now(0, device.clock) - newest.time > device.max_age else OK
 
 

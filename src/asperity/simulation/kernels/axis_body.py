@@ -21,7 +21,11 @@ KERNELS = Kernels(provides=("advance_body", "stored_energy"))
 
 # Columns of an axis after the changes of e and w and the loss: damping and mass of the device,
 # stiffness and constant force of the hand, and the duration of a part.
-DEVICE_DAMPING, MASS, HAND_STIFFNESS, HAND_FORCE, SUBSTEP = 12, 13, 14, 15, 16
+DEVICE_DAMPING = 12
+MASS = 13
+HAND_STIFFNESS = 14
+HAND_FORCE = 15
+SUBSTEP = 16
 
 
 class AxisBodyRecord(NamedTuple):

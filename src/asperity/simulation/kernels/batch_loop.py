@@ -29,9 +29,17 @@ DELAY = 2
 # the number of samples, the first velocity, and the sums of the deviations from it and of their
 # squares; energies supplied by the texture and dissipated, before the last sample; the same sums
 # of positions.
-LOW, HIGH, SAMPLE_COUNT, BASE_VELOCITY = 0, 3, 6, 7
-VELOCITY_SUM, VELOCITY_SQUARES, PREVIOUS_ENERGIES = 10, 13, 16
-BASE_POSITION, POSITION_SUM, POSITION_SQUARES, STATISTICS_SIZE = 18, 21, 24, 27
+LOW = 0
+HIGH = 3
+SAMPLE_COUNT = 6
+BASE_VELOCITY = 7
+VELOCITY_SUM = 10
+VELOCITY_SQUARES = 13
+PREVIOUS_ENERGIES = 16
+BASE_POSITION = 18
+POSITION_SUM = 21
+POSITION_SQUARES = 24
+STATISTICS_SIZE = 27
 
 
 def load_servo_state(states: FloatArray, lane: int) -> ServoState:
@@ -45,12 +53,18 @@ def load_servo_state(states: FloatArray, lane: int) -> ServoState:
 
 def store_servo_state(states: FloatArray, lane: int, servo: ServoState) -> None:
     """Write the state of a servo into its row."""
-    states[lane, 0], states[lane, 1], states[lane, 2] = servo.x, servo.y, servo.z
-    states[lane, 3], states[lane, 4], states[lane, 5] = servo.vx, servo.vy, servo.vz
+    states[lane, 0] = servo.x
+    states[lane, 1] = servo.y
+    states[lane, 2] = servo.z
+    states[lane, 3] = servo.vx
+    states[lane, 4] = servo.vy
+    states[lane, 5] = servo.vz
     states[lane, 6] = servo.anchor_x
     states[lane, 7] = servo.anchor_y
     states[lane, 8] = 1.0 if servo.held else 0.0
-    states[lane, 9], states[lane, 10], states[lane, 11] = servo.fx, servo.fy, servo.fz
+    states[lane, 9] = servo.fx
+    states[lane, 10] = servo.fy
+    states[lane, 11] = servo.fz
 
 
 def simulate_lanes(

@@ -9,9 +9,12 @@ from typing import NamedTuple
 from asperity.core.checks import FloatArray
 
 # Why a run stops: it does not, its state diverged, or the body left its workspace.
-RUNNING, DIVERGED, LEFT_WORKSPACE = 0, 1, 2
+RUNNING = 0
+DIVERGED = 1
+LEFT_WORKSPACE = 2
 # Columns of the progress of several runs: stop reason and samples done.
-STOP, SAMPLES = 0, 1
+STOP = 0
+SAMPLES = 1
 # Largest number of runs that advance together.
 LANES = 8
 

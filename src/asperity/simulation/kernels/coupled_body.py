@@ -17,7 +17,9 @@ from asperity.simulation.kernels.energy_ledger import add_energies
 KERNELS = Kernels(provides=("advance_body", "friction_force", "stored_energy"))
 
 # First components of forces in z, and the number of all.
-FORCE, HAND_PUSH, SIZE = 12, 15, 18
+FORCE = 12
+HAND_PUSH = 15
+SIZE = 18
 
 
 class CoupledBodyRecord(NamedTuple):
@@ -91,7 +93,9 @@ def coupled_substep(
     weights = local_array((18,))
     fx, fy, fz, _ax, _ay, _az, ux, uy, uz, _in_contact = inputs
     velocity = (ux, uy, uz)
-    damping, span, hand_mass = plant.damping, plant.substep, x.shape[0] - 6
+    damping = plant.damping
+    span = plant.substep
+    hand_mass = x.shape[0] - 6
     gx = gy = gz = 0.0
     multiply_columns(plant.changes, z, change)
     if plant.friction > 0.0:

@@ -6,7 +6,13 @@ KERNELS = Kernels(provides=("add_energies",))
 
 # Work of the held force, per axis; the paper's same-sample sum, per axis; loss; work of the hand;
 # work of dry friction; what sampling adds; all without their signs.
-SUPPLIED, SAME_SAMPLE, LOST, HAND, FRICTION, SAMPLING, EXCHANGED = 0, 3, 6, 7, 8, 9, 10
+SUPPLIED = 0
+SAME_SAMPLE = 3
+LOST = 6
+HAND = 7
+FRICTION = 8
+SAMPLING = 9
+EXCHANGED = 10
 LEDGER_SIZE = 11
 
 

@@ -50,9 +50,15 @@ def write_row(
     trace[row, 0] = time
     for i in range(6):
         trace[row, 1 + i] = device.x[i]
-    trace[row, 7], trace[row, 8], trace[row, 9] = servo.fx, servo.fy, servo.fz
-    trace[row, 10], trace[row, 11], trace[row, 12] = fx, fy, fz
-    trace[row, 13], trace[row, 14], trace[row, 15] = ax, ay, az
+    trace[row, 7] = servo.fx
+    trace[row, 8] = servo.fy
+    trace[row, 9] = servo.fz
+    trace[row, 10] = fx
+    trace[row, 11] = fy
+    trace[row, 12] = fz
+    trace[row, 13] = ax
+    trace[row, 14] = ay
+    trace[row, 15] = az
     for i in range(10):
         trace[row, 16 + i] = device.ledger[i]
     trace[row, 26] = stored_energy(device.x, ax, ay, az, device.plant)

@@ -119,7 +119,9 @@ def linkage_arm(
         side: 1 for the elbow to the right of the line from motor to handle, -1 to the left.
         linkage: the linkage.
     """
-    proximal, distal, inertia = linkage.proximal, linkage.distal, linkage.inertia
+    proximal = linkage.proximal
+    distal = linkage.distal
+    inertia = linkage.inertia
     square = x * x + z * z
     twice = square + proximal * proximal - distal * distal
     root = math.sqrt(4.0 * proximal * proximal * square - twice * twice)  # 2 |D|² across
@@ -233,18 +235,25 @@ def linkage_step(
     """
     ax1, az1, lost1, hand1 = linkage_rates(x1, z1, vx1, vz1, 0.0, inputs, plant)
     q = 0.25 * h
-    vx2, vz2 = vx1 + q * ax1, vz1 + q * az1
+    vx2 = vx1 + q * ax1
+    vz2 = vz1 + q * az1
     ax2, az2, _, _ = linkage_rates(x1 + q * vx1, z1 + q * vz1, vx2, vz2, q, inputs, plant)
     e = 0.125 * h
-    vx3, vz3 = vx1 + e * (ax1 + ax2), vz1 + e * (az1 + az2)
-    x3, z3 = x1 + e * (vx1 + vx2), z1 + e * (vz1 + vz2)
+    vx3 = vx1 + e * (ax1 + ax2)
+    vz3 = vz1 + e * (az1 + az2)
+    x3 = x1 + e * (vx1 + vx2)
+    z3 = z1 + e * (vz1 + vz2)
     ax3, az3, lost3, hand3 = linkage_rates(x3, z3, vx3, vz3, q, inputs, plant)
-    vx4, vz4 = vx1 + h * (ax3 - 0.5 * ax2), vz1 + h * (az3 - 0.5 * az2)
-    x4, z4 = x1 + h * (vx3 - 0.5 * vx2), z1 + h * (vz3 - 0.5 * vz2)
+    vx4 = vx1 + h * (ax3 - 0.5 * ax2)
+    vz4 = vz1 + h * (az3 - 0.5 * az2)
+    x4 = x1 + h * (vx3 - 0.5 * vx2)
+    z4 = z1 + h * (vz3 - 0.5 * vz2)
     ax4, az4, lost4, hand4 = linkage_rates(x4, z4, vx4, vz4, 2.0 * q, inputs, plant)
     s = h / 16.0
-    vx5, vz5 = vx1 + s * (3.0 * ax1 + 9.0 * ax4), vz1 + s * (3.0 * az1 + 9.0 * az4)
-    x5, z5 = x1 + s * (3.0 * vx1 + 9.0 * vx4), z1 + s * (3.0 * vz1 + 9.0 * vz4)
+    vx5 = vx1 + s * (3.0 * ax1 + 9.0 * ax4)
+    vz5 = vz1 + s * (3.0 * az1 + 9.0 * az4)
+    x5 = x1 + s * (3.0 * vx1 + 9.0 * vx4)
+    z5 = z1 + s * (3.0 * vz1 + 9.0 * vz4)
     ax5, az5, lost5, hand5 = linkage_rates(x5, z5, vx5, vz5, 3.0 * q, inputs, plant)
     s = h / 7.0
     vx6 = vx1 + s * (2.0 * ax2 - 3.0 * ax1 + 12.0 * (ax3 - ax4) + 8.0 * ax5)
@@ -300,7 +309,10 @@ def advance_body(
     fx, _fy, fz, ax, _ay, az, ux, _uy, uz, in_contact = inputs
     bar, hand, _friction, rate, fewest, period, share, inside_only, least = plant
     damping = bar.joint_damping if in_contact or not inside_only else 0.0
-    px, pz, vx, vz = x[0], x[2], x[3], x[5]
+    px = x[0]
+    pz = x[2]
+    vx = x[3]
+    vz = x[5]
     parts = max(fewest, linkage_step_count(vx, vz, rate, period / share, bar))
     wx = wz = lost = work = rubbed = time = 0.0
     part = fine = 0
@@ -308,7 +320,10 @@ def advance_body(
     while part < parts:
         bx = ax + time * ux
         bz = az + time * uz
-        sx, sz, tx, tz = x[0], x[2], x[3], x[5]
+        sx = x[0]
+        sz = x[2]
+        tx = x[3]
+        tz = x[5]
         gx, gz = linkage_friction(x, StepInput(fx, fz, bx, bz, ux, uz, damping), h, plant)
         pull = StepInput(fx + gx, fz + gz, bx, bz, ux, uz, damping)
         dx, dz, dvx, dvz, loss, pulled = linkage_step(sx, sz, tx, tz, pull, h, plant)
@@ -317,10 +332,16 @@ def advance_body(
         x[3] = tx + dvx
         x[5] = tz + dvz
         if not linkage_reaches(x[0], x[2], least, bar):
-            x[0], x[2], x[3], x[5] = px, pz, vx, vz
+            x[0] = px
+            x[2] = pz
+            x[3] = vx
+            x[5] = vz
             return LEFT_WORKSPACE
         if fine == 0 and linkage_band_changes_state(x[0], x[2], dx, dz, h, pull, hand):
-            x[0], x[2], x[3], x[5] = sx, sz, tx, tz
+            x[0] = sx
+            x[2] = sz
+            x[3] = tx
+            x[5] = tz
             fine = 256  # the force has a kink there: again, in small steps
             h = period / parts / 256.0
             continue

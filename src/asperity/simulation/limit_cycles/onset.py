@@ -27,7 +27,8 @@ from asperity.simulation.servo import Servo
 from asperity.simulation.simulate import count_samples
 from asperity.surface import Surface
 
-MIN_STIFFNESS, MAX_STIFFNESS = 1.0, 1e6  # stiffness [N/m]
+MIN_STIFFNESS = 1.0  # stiffness [N/m]
+MAX_STIFFNESS = 1e6
 _MIN_TOLERANCE = 1e-9
 _MIN_SAMPLES = 16
 _MAX_STARTS = 10_000
@@ -357,7 +358,8 @@ def predict(
         The paper's (1) and III.B; the delay rule is derived on the page "Passivity".
     """
     bottom, top = surface.law.contact.extremes(surface.texture)
-    depth, limit = max(top - onset.low[2], 0.0), surface.texture.depth_limit
+    depth = max(top - onset.low[2], 0.0)
+    limit = surface.texture.depth_limit
     damping = plant.min_damping(onset.low, onset.high, hand, top)
     q = plus = 0.0
     if onset.low[2] < bottom - limit:  # below a baked field nothing is certified

@@ -45,7 +45,8 @@ def felt_speed(speed: float, extent: float, grip: Grip | None = None) -> float:
         0.267
     """
     held = _default_grip() if grip is None else grip
-    lowest, highest = held.frequency[0], held.frequency[-1]
+    lowest = held.frequency[0]
+    highest = held.frequency[-1]
     frequency = speed / (2.0 * math.pi * extent) if extent > 0.0 else highest
     frequency = min(max(frequency, lowest), highest)
     return math.sqrt(2.0) * math.pi * frequency * float(held.threshold(frequency)[1])
@@ -173,8 +174,10 @@ class OnsetSearch:
         bracketing: Generator[float, bool, tuple[float, float]],
         progress: Callable[[], None] | None,
     ) -> None:  # fmt: skip
-        self._start, self._count = start, count
-        self._bracketing, self._progress = bracketing, progress
+        self._start = start
+        self._count = count
+        self._bracketing = bracketing
+        self._progress = progress
         self._results: dict[tuple[float, int], tuple[bool, FloatArray]] = {}
         self._running: dict[tuple[float, int], Trajectory] = {}
         # The selection does not change until a run ends.
@@ -274,7 +277,8 @@ def bracket_onset(
             index += 1
         if index == len(steps):
             return steps[-1], math.inf
-    quiet, cycling = (steps[index - 1] if index else 0.0), steps[index]
+    quiet = steps[index - 1] if index else 0.0
+    cycling = steps[index]
     while quiet > 0.0 and cycling > quiet * (1.0 + width):
         middle = math.sqrt(quiet * cycling)
         if (yield middle):

@@ -20,8 +20,10 @@ _JITTER = 0.25  # of the logarithmic range; a fixed way to the onset could be co
 
 def run_onset(design: StudyDesign, participant: int, rng: np.random.Generator) -> Steps:
     """Yield ascending and descending series by turns, from scattered ends of the range."""
-    count, series = len(design.conditions), int(design.options["series"])
-    (low, high), key = design.range, str(design.options["level"])
+    count = len(design.conditions)
+    series = int(design.options["series"])
+    (low, high) = design.range
+    key = str(design.options["level"])
     away = (high / low) ** (_JITTER * rng.random((series, count)))
     for turn, one in repeated_order(count, series, participant):
         is_ascending = (turn + participant) % 2 == 0
@@ -38,7 +40,8 @@ def score_onset(design: StudyDesign, answered: Answers) -> Score:
     The two differ systematically (habituation, anticipation), so the values of which the mean is
     taken are those of an ascending series and the descending one with it.
     """
-    key, middle = str(design.options["level"]), math.sqrt(math.prod(design.range))
+    key = str(design.options["level"])
+    middle = math.sqrt(math.prod(design.range))
 
     def estimate(trials: Sequence[TrialRecord]) -> Interval:
         found: tuple[list[float], list[float]] = ([], [])

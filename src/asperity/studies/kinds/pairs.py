@@ -21,7 +21,8 @@ _INTERVAL = "Fisher information; half a choice added either way where scores had
 
 def run_comparison(design: StudyDesign, participant: int, rng: np.random.Generator) -> Steps:
     """Yield every pair as often as stated, first in either place by turns."""
-    pairs, repeats = list_pairs(design), int(design.options["repeats"])
+    pairs = list_pairs(design)
+    repeats = int(design.options["repeats"])
     first = rng.integers(2, size=len(pairs))
     for repeat, index in repeated_order(len(pairs), repeats, participant):
         pair = pairs[index][:: -1 if (first[index] + repeat) % 2 else 1]
@@ -69,7 +70,8 @@ def pair_consistency(answered: Sequence[TrialRecord]) -> float | None:
 
 def run_axb(design: StudyDesign, participant: int, rng: np.random.Generator) -> Steps:
     """Yield A, X and B, where X equals A or B, as often either way as the repeats allow."""
-    pairs, repeats = list_pairs(design), int(design.options["repeats"])
+    pairs = list_pairs(design)
+    repeats = int(design.options["repeats"])
     kinds = [rng.permutation(np.arange(repeats) % 4) for _ in pairs]
     for repeat, index in repeated_order(len(pairs), repeats, participant):
         is_last, is_swapped = divmod(int(kinds[index][repeat]), 2)

@@ -28,7 +28,8 @@ def log_levels(design: StudyDesign) -> LogLevels:
     Raises:
         ParameterError: for a range or a reference that cannot be used.
     """
-    options, (low, high) = design.options, design.range
+    options = design.options
+    (low, high) = design.range
     reference = float(options.get("reference", low))
     base = _BASES[options["scale"]] * reference
     if base >= low:
@@ -42,8 +43,10 @@ def log_levels(design: StudyDesign) -> LogLevels:
 
 def run_thresholds(design: StudyDesign, participant: int, rng: np.random.Generator) -> Steps:
     """Yield the trials of one condition after another, in the order of a balanced square."""
-    levels, options = log_levels(design), design.options
-    key, count = str(options["level"]), int(options["intervals"])
+    levels = log_levels(design)
+    options = design.options
+    key = str(options["level"])
+    count = int(options["intervals"])
     answers = tuple(str(one + 1) for one in range(count))
     for condition in balanced_order(len(design.conditions), participant):
         values = design.conditions[condition]

@@ -12,7 +12,8 @@ from asperity.core.errors import ParameterError
 from asperity.studies.statistics.psychometric import LogLevels
 
 _FASTER = (4.0, 2.0, 2.0)  # multiples of the step before each of the first reversals
-_THRESHOLDS, _CANDIDATES = 101, 51
+_THRESHOLDS = 101
+_CANDIDATES = 51
 _SLOPES = (-2.0, 3.0, 15)  # logarithm of the slope at the threshold: ends, number
 
 
@@ -56,8 +57,11 @@ class Staircase:
             words = f"must be above {levels.guess:.3g}, the share of right answers of a guess"
             raise ParameterError("method.target", words, target)
         self._low, self._high = levels.ends
-        self._level, self._down, self._up = self._high, step, step * target / (1.0 - target)
-        self._reversals, self._last = 0, True
+        self._level = self._high
+        self._down = step
+        self._up = step * target / (1.0 - target)
+        self._reversals = 0
+        self._last = True
 
     def level(self) -> float:
         """Return the level to present now."""

@@ -53,7 +53,8 @@ class Stimuli:
     """
 
     def __init__(self, study: Study, *, is_real: bool = False) -> None:
-        self._study, self._is_real = study, is_real
+        self._study = study
+        self._is_real = is_real
         self._checked: dict[str, Setup] = {}
 
     def check_all(self, progress: Callable[[float], None] = lambda _share: None) -> Setup:
@@ -87,7 +88,8 @@ class Stimuli:
         Raises:
             ParameterError: if it cannot be rendered, or is above its limit.
         """
-        key, known = str(sorted(values.items())), self._study.arguments
+        key = str(sorted(values.items()))
+        known = self._study.arguments
         if key not in self._checked:
             texts = (f"{name} = {known[name].format_value(one)}" for name, one in values.items())
             stimulus = ", ".join(texts) or "the stimulus"
@@ -102,7 +104,8 @@ class Stimuli:
 
     def _make_setup(self, values: Mapping[str, Any]) -> Setup:
         """Return the loop of a stimulus, whose stiffness gives the texture force of the study."""
-        setup, force = self._build_setup(values), self._study.settings.get("texture_force")
+        setup = self._build_setup(values)
+        force = self._study.settings.get("texture_force")
         if force is None:
             return setup
         ripple = scan_force(setup.rendered).ripple
@@ -153,12 +156,17 @@ class LoopPlayer:
     _writer: RecordingWriter
 
     def __init__(self, stimuli: Stimuli, first: Setup, driver: Driver | None = None) -> None:
-        self._stimuli, self._setup, self._wall = stimuli, first, smooth_wall(first)
+        self._stimuli = stimuli
+        self._setup = first
+        self._wall = smooth_wall(first)
         self._driver = driver or simulated_driver(
             first.plant, first.hand, first.servo, first.motion, first.duration
         )
-        self._running, self._recording = ExitStack(), ExitStack()
-        self._marks, self._interval, self._next_row = np.full(4, math.nan), 0, 0
+        self._running = ExitStack()
+        self._recording = ExitStack()
+        self._marks = np.full(4, math.nan)
+        self._interval = 0
+        self._next_row = 0
         self._ramp_end = self._full_row = 0.0  # numbers of rows; infinite during a ramp
 
     def start(self) -> None:
@@ -168,10 +176,12 @@ class LoopPlayer:
             ParameterError: for a device that cannot be opened.
             DeviceFault: for a fault.
         """
-        servo, safety = self._setup.servo, self._setup.safety
+        servo = self._setup.servo
+        safety = self._setup.safety
         reach = safety.reach_limit(self._setup.device)
         loop = ServoProcess(self._wall.rendered, self._driver, servo, safety, reach)
-        self._loop, self._next_row = self._running.enter_context(loop), 0
+        self._loop = self._running.enter_context(loop)
+        self._next_row = 0
 
     def stop(self) -> None:
         """Release the force by a ramp, and end the loop; an open recording ends there."""
@@ -202,7 +212,8 @@ class LoopPlayer:
         self._marks[1] = 0.0
         self._loop.change_surface(setup.rendered, accept_risk=True)  # its limit was checked
         ramps = 2.0 * self._setup.safety.ramp / self._setup.servo.period
-        self._ramp_end, self._full_row = self._loop.memory.row_count + ramps, math.inf
+        self._ramp_end = self._loop.memory.row_count + ramps
+        self._full_row = math.inf
         self._interval = interval
 
     def elapsed(self) -> float:
@@ -219,7 +230,8 @@ class LoopPlayer:
         if self._loop.poll() is not EndReason.RUNNING:
             raise ParameterError("driver", "has ended: --resume goes on where it stopped")
         if len(rows) and self._next_row > self._ramp_end and rows[-1, _SHARE] > 1.0 - 1e-9:
-            self._full_row, self._marks[1] = min(self._full_row, self._next_row), self._interval
+            self._full_row = min(self._full_row, self._next_row)
+            self._marks[1] = self._interval
         return max(0.0, (self._next_row - self._full_row) * self._setup.servo.period)
 
     def end_trial(self, answer: float, response_time: float) -> None:

@@ -22,7 +22,12 @@ from asperity.lab.access import MAX_MESSAGE_BYTES, AccessToken, respond
 from asperity.lab.launch import bind_socket
 
 # Keys, as browsers name them.
-GO_ON, PAUSE, STOP, BACK, UP, DOWN = "Enter", "p", "Escape", "Backspace", "ArrowUp", "ArrowDown"
+GO_ON = "Enter"
+PAUSE = "p"
+STOP = "Escape"
+BACK = "Backspace"
+UP = "ArrowUp"
+DOWN = "ArrowDown"
 PAGE_PACKAGE = "asperity.studies.live"
 _SEQUENCES = {
     b"\n": GO_ON, b" ": GO_ON, b"\x1b": STOP, b"\x7f": BACK, b"\x1b[A": UP, b"\x1b[B": DOWN,
@@ -109,8 +114,11 @@ class PageScreen:
     def __init__(self, *, masking_noise: bool = False) -> None:
         listener = bind_socket(None)
         token = AccessToken(listener.getsockname()[1])
-        self.url, self._masking_noise, self._lock = token.url, masking_noise, threading.Lock()
-        self._keys, self._pages = Queue[str](), set[ServerConnection]()
+        self.url = token.url
+        self._masking_noise = masking_noise
+        self._lock = threading.Lock()
+        self._keys = Queue[str]()
+        self._pages = set[ServerConnection]()
         self._view = View("One moment", "The study is being prepared.")
         # A page that does not answer for two seconds is gone.
         self._server = serve(

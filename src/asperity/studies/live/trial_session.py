@@ -20,7 +20,8 @@ from asperity.studies.observers import Observer, hand_strength, simulate_run
 from asperity.studies.study_store import Participant
 
 ADJUSTMENT_STEPS = 40  # of equal ratios, from the least to the greatest value
-_NUMERAL, _NUMBER = "0123456789.-", re.compile(r"-?(\d+\.?\d*|\.\d+)")
+_NUMERAL = "0123456789.-"
+_NUMBER = re.compile(r"-?(\d+\.?\d*|\.\d+)")
 _ALWAYS = ((PAUSE, "pause"), (STOP, "stop"))
 _TITLES = ("First", "Second", "Third")
 
@@ -43,8 +44,10 @@ class StudySession:
     """
 
     def __init__(self, participant: Participant, player: LoopPlayer, screen: Screen) -> None:
-        self._settings, self._participant = participant.study.settings, participant
-        self._player, self._screen = player, screen
+        self._settings = participant.study.settings
+        self._participant = participant
+        self._player = player
+        self._screen = screen
 
     def run(self) -> None:
         """Present trials until the method ends.
@@ -82,7 +85,8 @@ class StudySession:
         self._player.start()
 
     def _present_trial(self, presentation: Presentation) -> None:
-        participant, started = self._participant, _current_time()
+        participant = self._participant
+        started = _current_time()
         codes = participant.codes(presentation)
         path = participant.path / f"trial-{participant.trial:04d}-{'-'.join(codes)}.mcap"
         about = {"participant": participant.code, "codes": codes, "started": started}
@@ -138,13 +142,16 @@ class StudySession:
     def _ask_number(self, presentation: Presentation) -> str:
         """Return a number in the range of a presentation, typed and confirmed."""
         low, high = presentation.range or (-math.inf, math.inf)
-        text, typed, note = f"Type a number from {low:g} to {high:g}.", "", ""
+        text = f"Type a number from {low:g} to {high:g}."
+        typed = ""
+        note = ""
         keys = ((GO_ON, "confirm"), (BACK, "delete"))
         while True:
             view = View(presentation.question, note + text, keys, typed=typed or "_")
             key = self._press(view, _NUMERAL)
             if key != GO_ON:
-                note, typed = "", typed[:-1] if key == BACK else typed + key
+                note = ""
+                typed = typed[:-1] if key == BACK else typed + key
             elif _NUMBER.fullmatch(typed) and low <= float(typed) <= high:
                 return typed
             else:
@@ -152,7 +159,8 @@ class StudySession:
 
     def _adjust(self, presentation: Presentation, key: str) -> str:
         """Return the value of a key that the participant chooses."""
-        values, limits = presentation.intervals[0], presentation.range or (1.0, 1.0)
+        values = presentation.intervals[0]
+        limits = presentation.range or (1.0, 1.0)
         levels = np.geomspace(*limits, ADJUSTMENT_STEPS + 1).tolist()
         at = min(range(len(levels)), key=lambda i: abs(levels[i] - values[key]))
         view = View(presentation.question, keys=((UP, "more"), (DOWN, "less"), (GO_ON, "done")))
@@ -178,7 +186,8 @@ def simulate_session(participant: Participant, stimuli: Stimuli, observer: Obser
         stimuli: of the study, which are checked.
         observer: the observer.
     """
-    design, setup = participant.study.design, stimuli.setup
+    design = participant.study.design
+    setup = stimuli.setup
     strength = hand_strength(design, lambda one: (setup(one).surface, setup(one).device))
     answered = simulate_run(design, participant.number, observer, strength, design.seed)
     for one in answered[participant.trial - 1 :]:

@@ -37,7 +37,8 @@ def mean_interval(values: FloatArray, resamples: int = 0, seed: int = 0) -> Inte
         >>> f"{low:.3f} {high:.3f}"
         '0.446 4.554'
     """
-    count, mean = len(values), float(np.mean(values)) if len(values) else math.nan
+    count = len(values)
+    mean = float(np.mean(values)) if len(values) else math.nan
     error = float(np.std(values, ddof=1)) / math.sqrt(count) if count > 2 else 0.0
     if not error > 0.0:
         return mean, -math.inf, math.inf

@@ -17,7 +17,8 @@ from scipy.special import expit
 from asperity.core.compiled import FloatArray
 from asperity.studies.statistics.intervals import Interval
 
-USUAL_SLOPE, SLOPE_SPREAD = 4.0, 0.7
+USUAL_SLOPE = 4.0
+SLOPE_SPREAD = 0.7
 """Prior of the slope: median, and deviation of the logarithm."""
 _SLOPES = np.geomspace(0.5, 32.0, 25)
 _THRESHOLDS = 241

@@ -69,7 +69,8 @@ class BoundedCells(Cells):
         bounds: proved bounds.
     """
 
-    default_gap, refined_gap = 1e-3, None
+    default_gap = 1e-3
+    refined_gap = None
 
     def __init__(
         self,
@@ -77,7 +78,9 @@ class BoundedCells(Cells):
         derivatives: Callable[[FloatArray], FloatArray],
         bounds: DerivativeBounds,
     ) -> None:
-        self._region, self._evaluate, self._bounds = region, derivatives, bounds
+        self._region = region
+        self._evaluate = derivatives
+        self._bounds = bounds
         self.dimensions = len(region.spans)
         self.hessian_bound = bounds.hessian_bound * _INFLATION
         self.max_cells = None if math.isfinite(bounds.third_derivative_bound) else _MAX_CELLS
@@ -112,7 +115,8 @@ class BoundedCells(Cells):
         return {name: self._model(name, values, steps, reach) for name in names}
 
     def _model(self, name: str, values: FloatArray, steps: FloatArray, reach: float) -> TaylorModel:
-        order, b = sum(DERIVATIVE_ORDERS[name]), self._bounds
+        order = sum(DERIVATIVE_ORDERS[name])
+        b = self._bounds
         value = np.ascontiguousarray(values[:, DERIVATIVE_NAMES.index(name)])
         linear = np.zeros((len(steps), len(value)))
         by_taylor = 0.5 * b.third_derivative_bound * reach * reach
@@ -129,7 +133,8 @@ class BoundedCells(Cells):
         middle = 0.5 * (b.low + b.high) if order == 0 else 0.0
         limit = (0.5 * (b.high - b.low), b.slope_bound, b.hessian_bound)[order]
         wide = model.radius > limit
-        c, e = np.where(wide, middle, model.c), np.where(wide, limit, model.e)
+        c = np.where(wide, middle, model.c)
+        e = np.where(wide, limit, model.e)
         g = np.where(wide, 0.0, model.g)
         return TaylorModel(c, g, (e + self._rounding_errors[order]) * (1.0 + 8.0 * EPS))
 
@@ -142,7 +147,8 @@ class BoundedCells(Cells):
         points = self.to_plane(coordinates)
         values = self._evaluate(points)
         b = self._bounds
-        slopes, second = np.hypot(values[:, 1], values[:, 2]), values[:, 3:]
+        slopes = np.hypot(values[:, 1], values[:, 2])
+        second = values[:, 3:]
         height = np.abs(values[:, 0] - 0.5 * (b.low + b.high))
         checks = [
             ("extremes", 0, height, 0.5 * (b.high - b.low)),
@@ -240,7 +246,8 @@ def _segments_along_axis(
     centres = np.tile(ends[0], (nodes * parts, 1))
     centres[:, axis] = round(low) + half[axis] * (2.0 * np.arange(nodes * parts) + 1.0)
     if line.direction[axis] < 0.0:
-        centres, half = centres[::-1].copy(), -half
+        centres = centres[::-1].copy()
+        half = -half
     return LineSegments(cells, centres, np.abs(half), line.length / (nodes * parts))
 
 
@@ -252,7 +259,8 @@ class _WavesAlongLine(WaveCells):
         self._phases = self._phases + self._waves @ line.start
         self._multiples = self._waves @ line.direction[:, None]
         self._line = line
-        self.dimensions, self._extent = 1, (line.length,)
+        self.dimensions = 1
+        self._extent = (line.length,)
 
     def to_plane(self, coordinates: FloatArray) -> FloatArray:
         """See :class:`Cells`."""

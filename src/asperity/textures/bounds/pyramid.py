@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from asperity.core.checks import FloatArray
 
 # Cells of a map that are processed together, so that they fit the processor caches.
-_TILE_ROWS, _TILE_COLUMNS = 128, 512
+_TILE_ROWS = 128
+_TILE_COLUMNS = 512
 # Relative rounding error of a few operations in single precision.
 _ROUNDING_ALLOWANCE = 1e-6
 
@@ -74,7 +75,9 @@ def plane_pyramid(c: FloatArray, pitch: tuple[float, float]) -> Pyramid:
 
 def _plane_bounds(c: FloatArray, pitch: tuple[float, float], spread: float) -> list[FloatArray]:
     """Return the five bounds of every two by two cells, the lower one negated."""
-    xx, yy, xy = np.diff(c, 2, axis=1), np.diff(c, 2, axis=0), np.diff(np.diff(c, axis=0), axis=1)
+    xx = np.diff(c, 2, axis=1)
+    yy = np.diff(c, 2, axis=0)
+    xy = np.diff(np.diff(c, axis=0), axis=1)
     aspect = pitch[0] / pitch[1]
     fxx = _upper_bounds(np.abs, xx, (3, 1), 2)
     fyy = aspect**2 * _upper_bounds(np.abs, yy, (1, 3), 2)
@@ -96,7 +99,8 @@ def _plane_bounds(c: FloatArray, pitch: tuple[float, float], spread: float) -> l
 
 def _midrange(c: FloatArray) -> tuple[float, float]:
     """Return the middle of the range of the values and half of the range."""
-    low, high = float(c.min()), float(c.max())
+    low = float(c.min())
+    high = float(c.max())
     middle = 0.5 * (low + high)
     return middle, max(high - middle, middle - low)
 
@@ -186,8 +190,10 @@ def _round_outward(middle: float, bounds: list[FloatArray]) -> Float32Array:
 
 def _build_levels(finest: Float32Array) -> Pyramid:
     """Return all levels; each box is the maximum of two (by two) boxes of the finer level."""
-    level, shape = finest, finest.shape[:-1]
-    parts, starts = [finest.reshape(-1, BOUNDS_PER_BOX)], [(0, *shape)]
+    level = finest
+    shape = finest.shape[:-1]
+    parts = [finest.reshape(-1, BOUNDS_PER_BOX)]
+    starts = [(0, *shape)]
     while max(shape) > 1:
         for axis in range(len(shape)):
             odd = [(0, 0)] * level.ndim

@@ -96,7 +96,8 @@ class SplineCells(cells.Cells):
         origin: FloatArray,
         derivatives: Callable[[FloatArray], FloatArray],
     ) -> None:
-        self._coefficients, self._origin = coefficients, origin
+        self._coefficients = coefficients
+        self._origin = origin
         self._nodes_per_metre = 1.0 / np.array(pitch)
         self._counts = np.array(coefficients.shape[::-1]) - 3
         self._evaluate = derivatives
@@ -225,7 +226,8 @@ def _subdivision(degree: int, left: FloatArray, right: FloatArray) -> FloatArray
 def _fit_linear(bernstein: FloatArray, scale: float, slack: FloatArray) -> TaylorModel:
     """Return the linear function through the corners, and the hull of the remainder."""
     rows, columns, _ = bernstein.shape
-    left, right = bernstein[:, 0], bernstein[:, -1]
+    left = bernstein[:, 0]
+    right = bernstein[:, -1]
     gx = 0.25 * (right[0] + right[-1] - left[0] - left[-1])
     slopes = [gx]
     rest = bernstein - gx * np.linspace(-1.0, 1.0, columns)[:, None]
@@ -261,6 +263,8 @@ def _enclose_remainder(
     slopes: list[FloatArray], rest: FloatArray, scale: float, slack: FloatArray
 ) -> TaylorModel:
     """Return ``scale`` times a linear function plus the hull of the remainder's coefficients."""
-    low, high = rest.min(axis=(0, 1)), rest.max(axis=(0, 1))
-    c, e = 0.5 * (low + high), 0.5 * (high - low) * (1.0 + 8.0 * cells.EPS) + slack
+    low = rest.min(axis=(0, 1))
+    high = rest.max(axis=(0, 1))
+    c = 0.5 * (low + high)
+    e = 0.5 * (high - low) * (1.0 + 8.0 * cells.EPS) + slack
     return TaylorModel(scale * c, scale * np.stack(slopes), scale * e * (1.0 + 8.0 * cells.EPS))

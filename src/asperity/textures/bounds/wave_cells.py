@@ -40,18 +40,21 @@ class WaveCells(cells.Cells):
     ) -> None:
         self._extent = None if extent is None else tuple(side + 2.0 * margin for side in extent)
         self._margin = margin
-        self._amplitudes, self._phases = waves.amplitudes, waves.phases
+        self._amplitudes = waves.amplitudes
+        self._phases = waves.phases
         self._waves = waves.wavevectors
         if extent is None:
             self._basis, self._multiples = waves.lattice
         else:
-            self._basis, self._multiples = np.eye(2), self._waves
+            self._basis = np.eye(2)
+            self._multiples = self._waves
             self._phases = self._phases - self._waves.sum(axis=1) * margin
         self._weights = {
             name: self._weight(*cells.DERIVATIVE_ORDERS[name]) for name in cells.DERIVATIVE_NAMES
         }
         every = np.stack(list(self._weights.values()), axis=-1)
-        self._even, self._odd = every[:, _EVEN], every[:, _ODD]
+        self._even = every[:, _EVEN]
+        self._odd = every[:, _ODD]
         self.dimensions = self._multiples.shape[1]
         self.max_cells = _MAX_CELLS.get(self.dimensions)
         self.default_gap = cells.DEFAULT_GAPS.get(self.dimensions, 1e-3)
@@ -90,7 +93,8 @@ class WaveCells(cells.Cells):
         ρ is the greatest change of the wave's phase on the cell.
         """
         angles = centres @ self._multiples.T + self._phases
-        sine, cosine = np.sin(angles), np.cos(angles)
+        sine = np.sin(angles)
+        cosine = np.cos(angles)
         reach = np.abs(self._multiples) @ half
         second = 0.5 * reach * reach
         rest = [second * np.minimum(1.0, np.abs(part) + reach) for part in (sine, cosine)]
@@ -100,7 +104,8 @@ class WaveCells(cells.Cells):
         slack = 16.0 * cells.EPS * (1.0 + largest + len(sine[0]))
         result: dict[str, TaylorNumber] = {}
         for name in names:
-            weight, odd = self._weights[name], sum(cells.DERIVATIVE_ORDERS[name]) % 2
+            weight = self._weights[name]
+            odd = sum(cells.DERIVATIVE_ORDERS[name]) % 2
             values, slopes = (cosine, -sine) if odd else (sine, cosine)
             if not weight.any():
                 result[name] = 0.0
@@ -120,7 +125,8 @@ class WaveCells(cells.Cells):
         """See :class:`Cells`."""
         angles = coordinates @ self._multiples.T + self._phases
         result = np.empty((len(coordinates), len(cells.DERIVATIVE_NAMES)))
-        result[:, _EVEN], result[:, _ODD] = np.sin(angles) @ self._even, np.cos(angles) @ self._odd
+        result[:, _EVEN] = np.sin(angles) @ self._even
+        result[:, _ODD] = np.cos(angles) @ self._odd
         return result
 
     def to_plane(self, coordinates: FloatArray) -> FloatArray:

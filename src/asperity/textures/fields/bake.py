@@ -35,7 +35,9 @@ SHALLOW = 0.04
 _TRIAL_BYTES = 2**20
 # Share of the goal that is aimed at, relative error of the resolution predicted for it, and the
 # probes of a prediction: every third.
-_AIM, _PREDICTION_STEP, _PREDICTION_PART = 0.94, 0.04, 3
+_AIM = 0.94
+_PREDICTION_STEP = 0.04
+_PREDICTION_PART = 3
 _MAX_TRIALS = 12
 _FLAT = 1e-9  # of the greatest force: less is rounding
 _BYTES_PER_NODE = 4
@@ -113,13 +115,16 @@ class BakePlan:
     def __init__(
         self, texture: Texture, max_depth: float, continuity: float, goal: BakeGoal
     ) -> None:
-        self.texture, self.max_depth, self.continuity = texture, max_depth, continuity
+        self.texture = texture
+        self.max_depth = max_depth
+        self.continuity = continuity
         self.goal = goal
         self.gain = self.lipschitz = max(1.0, continuity)
         self.columns = node_potentials.split_columns(texture, continuity)
         self._law_arguments = (1.0, 0.0, 1.0, max_depth, 0.0, continuity)
         low, top = texture.extremes
-        self.floor, self.onset_limit = low - max_depth, max(_ONSET[0], _ONSET[1] * (top - low))
+        self.floor = low - max_depth
+        self.onset_limit = max(_ONSET[0], _ONSET[1] * (top - low))
         size = (PROBES, len(texture.domain.spans))
         xy = texture.domain.points(np.random.default_rng(0).uniform(size=size))
         depths = (top - self.floor) * np.geomspace(LEAST_DEPTH, 1.0, DEPTHS)
@@ -127,7 +132,8 @@ class BakePlan:
         points = np.column_stack([np.tile(xy, (DEPTHS, 1)), level])
         self.set_probes(points, np.repeat(np.arange(DEPTHS), PROBES), depths)
         forces = self.force[-PROBES:, 2]
-        self.lift, self.fade = float(forces.min()), _FADE * float(np.ptp(forces))
+        self.lift = float(forces.min())
+        self.fade = _FADE * float(np.ptp(forces))
         self.set_shallow(np.column_stack([xy, texture.height(xy) - 2.0 * self.onset_limit]))
 
     def set_probes(self, points: FloatArray, rows: NDArray[np.intp], depths: FloatArray) -> None:
@@ -141,8 +147,10 @@ class BakePlan:
         force = self.exact(points)[0]
         felt = _mean_of_rows(np.linalg.norm(force, axis=1), rows, len(depths)) >= LIGHT_TOUCH
         felt[-1] = True
-        self.depths, used = depths[felt], felt[rows]
-        self.probes, self.rows = points[used], (np.cumsum(felt) - 1)[rows[used]]
+        self.depths = depths[felt]
+        used = felt[rows]
+        self.probes = points[used]
+        self.rows = (np.cumsum(felt) - 1)[rows[used]]
         self.force, count = force[used], len(self.depths)
         mean = np.column_stack([_mean_of_rows(part, self.rows, count) for part in self.force.T])
         around = np.square(self.force - mean[self.rows]).sum(axis=1)
@@ -161,14 +169,16 @@ class BakePlan:
         from asperity.kernels.fuse import fuse_surface
 
         loops = fuse_surface(LAWS["H"], texture.sampler, NONE)
-        force, split = np.empty(points.shape), np.empty(points.shape)
+        force = np.empty(points.shape)
+        split = np.empty(points.shape)
         loops.force_batch(points, force, texture.arguments, self._law_arguments)
         loops.split_batch(points, split, self.continuity, texture.arguments)
         return force, np.sqrt(np.maximum(2.0 * split[:, 0], 0.0))
 
     def grid(self, resolution: float) -> FieldGrid:
         """Return the coarsest grid of a resolution [m]."""
-        heights, domain = self.texture.extremes, self.texture.domain
+        heights = self.texture.extremes
+        domain = self.texture.domain
         return FieldGrid.fit(domain, heights, self.max_depth, self.fade, resolution)
 
     def shares(self, difference: FloatArray, rows: NDArray[np.intp]) -> FloatArray:
@@ -191,9 +201,13 @@ class BakePlan:
         The share of a field that is not smoothed is computed for any resolution from few nodes, and
         corrected by that of the fields that were tried, first one of few nodes.
         """
-        finest, coarsest = self.finest_resolution(), max(self.grid(math.inf).spacing)
-        resolution, goal = max(self.finest_resolution(_TRIAL_BYTES), finest), self.goal.share
-        lower, upper, tried = finest, coarsest, set[float]()
+        finest = self.finest_resolution()
+        coarsest = max(self.grid(math.inf).spacing)
+        resolution = max(self.finest_resolution(_TRIAL_BYTES), finest)
+        goal = self.goal.share
+        lower = finest
+        upper = coarsest
+        tried = set[float]()
         for trial in range(_MAX_TRIALS):
             done = 1.0 - 0.5**trial
             field = self.bake(resolution, scale_progress(progress, done, 0.5 * (1.0 - done)))
@@ -227,7 +241,8 @@ class BakePlan:
 
     def predict_share(self, resolution: float) -> float:
         """Return the share of a field that is not smoothed, from the nodes around the probes."""
-        grid, part = self.grid(resolution), slice(None, None, _PREDICTION_PART)
+        grid = self.grid(resolution)
+        part = slice(None, None, _PREDICTION_PART)
         force = node_potentials.interpolate_force(self.node_columns(grid), grid, self.probes[part])
         return float(self.shares(force - self.force[part], self.rows[part]).max())
 
@@ -255,9 +270,11 @@ class BakePlan:
         Raises:
             ParameterError: it states a resolution that fits.
         """
-        size, limit = _BYTES_PER_NODE * math.prod(grid.node_counts), self.goal.max_bytes
+        size = _BYTES_PER_NODE * math.prod(grid.node_counts)
+        limit = self.goal.max_bytes
         if size > limit:
-            nodes, least = " x ".join(map(str, grid.node_counts)), self._bytes(math.inf)
+            nodes = " x ".join(map(str, grid.node_counts))
+            least = self._bytes(math.inf)
             fits = f"even the coarsest one takes {least} byte"
             if least <= limit:  # rounded up, so that the resolution in the message fits
                 fits = f"{round_up(self.finest_resolution()):.3g} m fits"
@@ -275,8 +292,11 @@ class BakePlan:
             grid: the nodes.
             progress: called with the finished fraction.
         """
-        passes, before, ramp = 0, np.inf, RAMP
-        cells, limit = np.ones(grid.node_counts, np.uint8), self.goal.max_gain * self.gain
+        passes = 0
+        before = np.inf
+        ramp = RAMP
+        cells = np.ones(grid.node_counts, np.uint8)
+        limit = self.goal.max_gain * self.gain
         while True:
             arguments = grid.arguments(potentials, self.lift)
             cells = cells_above(arguments, limit, cells)
@@ -284,7 +304,8 @@ class BakePlan:
             if passes == self.goal.passes or count == 0:
                 break
             # What is left is due to the borders of smoothed parts: they are widened.
-            ramp, before = 2 * ramp + 1 if count > _STALLED * before else ramp, count
+            ramp = 2 * ramp + 1 if count > _STALLED * before else ramp
+            before = count
             weights, cells = node_potentials.spread_marks(cells, grid.border, ramp)
             node_potentials.smooth(potentials, weights, grid)
             passes += 1

@@ -98,7 +98,8 @@ def hull_weights(field: FieldArguments) -> tuple[FloatArray, FloatArray]:
         (9, 6, 9), those along the second axis first, or (3, 6, 3) for a profile; and of the 3
         levels in 1, ∂z, ∂zz at the 3 coefficients along z, (3, 3, 3).
     """
-    along, iz = _BERNSTEIN, field.iz
+    along = _BERNSTEIN
+    iz = field.iz
     across = along if field.columns.shape[0] > 1 else np.array([1.0, 0.0, 0.0]).reshape(3, 1, 1)
     size = 3 * across.shape[1]
 
@@ -122,7 +123,8 @@ def product_weights(field: FieldArguments) -> tuple[NDArray[np.int64], FloatArra
     """
     place = np.add.outer(np.arange(3), np.arange(3))
     weight = np.outer([1, 2, 1], [1, 2, 1]) / np.array([1, 4, 6, 4, 1])[place]
-    places, weights = place, weight
+    places = place
+    weights = weight
     for _ in range(2 if field.columns.shape[0] > 1 else 1):
         size = 3 * len(places)
         places = (5 * places[:, None, :, None] + place[:, None]).reshape(size, size)

@@ -81,20 +81,25 @@ def _encode(field: PotentialField) -> tuple[NDArray[Any], list[tuple[int, bytes]
         np.ascontiguousarray(heights, "<f8").tobytes(),
         description,
     ]
-    offsets, end = [], HEADER.itemsize
+    offsets = []
+    end = HEADER.itemsize
     for part in parts:
         offsets.append(-(-end // _ALIGNMENT) * _ALIGNMENT)
         end = offsets[-1] + len(part)
     header = np.zeros((), HEADER)
-    header["magic"], header["version"], header["byte_order"] = MAGIC, VERSION, _BYTE_ORDER
-    header["file_bytes"], header["count"] = end, record.c.size
+    header["magic"] = MAGIC
+    header["version"] = VERSION
+    header["byte_order"] = _BYTE_ORDER
+    header["file_bytes"] = end
+    header["count"] = record.c.size
     header["rows"], header["columns"] = record.columns.shape[:2]
     names = ("columns_offset", "values_offset", "heights_offset", "json_offset")
     for name, offset in zip(names, offsets, strict=True):
         header[name] = offset
     for name in (*_SCALARS, *_COUNTS):
         header[name] = getattr(record, name)
-    header["q"], header["floor"] = field.gain.upper, field.grid.floor
+    header["q"] = field.gain.upper
+    header["floor"] = field.grid.floor
     sections = list(zip(offsets, parts, strict=True))
     header["checksum"] = _checksum(sections, HEADER.itemsize)
     header["header_checksum"] = zlib.crc32(header.tobytes()[:-4])
@@ -132,7 +137,8 @@ def load_field(path: str | os.PathLike[str], build_texture: BuildTexture) -> Pot
     name = Path(path).name
     try:
         with open_input(path, 2**40) as stream:
-            size, free = os.fstat(stream.fileno()).st_size, free_memory()
+            size = os.fstat(stream.fileno()).st_size
+            free = free_memory()
             if free is not None and size > free:
                 raise SurfaceFileError(f"its {size:,} bytes exceed the free memory, {free:,} bytes")
             data = np.memmap(stream, np.uint8, "c")
@@ -190,7 +196,8 @@ def assemble_field(
         for name in ("gain", "one_sided")
     )
     names = ("max_depth", "continuity", "passes")
-    regions, thin_map = described.get("thin_regions", ()), described.get("thin_map")
+    regions = described.get("thin_regions", ())
+    thin_map = described.get("thin_map")
     return PotentialField(
         _source(described, heights, build_texture), grid, record, gain=gain, one_sided=one_sided,
         accuracy=FieldAccuracy(**described["accuracy"]),

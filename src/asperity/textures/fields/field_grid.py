@@ -148,7 +148,8 @@ class FieldGrid:
 
         if not self.deep:
             return np.arange(self.levels), np.eye(self.levels)
-        deep, exact = np.arange(self.deep), np.arange(max(self.deep - BLENDED + 1, 0), self.levels)
+        deep = np.arange(self.deep)
+        exact = np.arange(max(self.deep - BLENDED + 1, 0), self.levels)
         coarse = np.arange(-COARSE_STEP, self.deep + COARSE_STEP + 1, COARSE_STEP)
         computed = np.union1d(coarse, exact)
         weights = np.zeros((len(computed), self.levels))
@@ -167,7 +168,8 @@ class FieldGrid:
 
     def stored_nodes(self, axis: int) -> NDArray[np.intp]:
         """Return the node stored at each place along an axis, beyond the borders too; -1: none."""
-        count, last = self.cells[axis], self.node_counts[axis] - 1
+        count = self.cells[axis]
+        last = self.node_counts[axis] - 1
         index = np.arange(-1, count + 2)
         if self.border == PERIODIC:
             return np.asarray(index % count, dtype=np.intp)
@@ -208,7 +210,8 @@ class FieldGrid:
             largest: greatest coefficient that is stored in single precision [m].
         """
         rounding = (3.0 + 5.0 * passes) * largest * 0.5 * float(np.finfo(np.float32).eps)
-        steps, spread = np.array(self.spacing), self.spread(passes)
+        steps = np.array(self.spacing)
+        spread = self.spread(passes)
         square = np.square(steps)
         change = NEIGHBOUR_WEIGHT * (1.0 / RAMP + 3.0 / 255.0)  # of the weight, and its rounding
         growth = 1.0 + 2.0 * change * steps.max() / steps.min()

@@ -126,7 +126,8 @@ def spread_marks(marks: NDArray[np.uint8], border: int, ramp: int = RAMP) -> tup
     from scipy import ndimage
 
     weights: Any = 255 * (marks > 0).astype(np.uint8)
-    largest, mean = ndimage.maximum_filter1d, ndimage.uniform_filter1d
+    largest = ndimage.maximum_filter1d
+    mean = ndimage.uniform_filter1d
     steps = [(largest, ramp), (mean, ramp), (largest, 3)]
     for function, size in steps:
         before = weights

@@ -131,11 +131,18 @@ class PotentialField(Texture, Tabular):
         thin_regions: tuple[ThinRegion, ...] = (),
         thin_map: FloatArray | None = None,
     ) -> None:
-        self.source, self.grid, self.max_depth = source, grid, max_depth
-        self.thin_regions, self.thin_map = thin_regions, thin_map
-        self.continuity, self.passes = continuity, passes
-        self.gain, self.one_sided, self.accuracy = gain, one_sided, accuracy
-        self.filled_mask, self.history = source.filled_mask, source.history
+        self.source = source
+        self.grid = grid
+        self.max_depth = max_depth
+        self.thin_regions = thin_regions
+        self.thin_map = thin_map
+        self.continuity = continuity
+        self.passes = passes
+        self.gain = gain
+        self.one_sided = one_sided
+        self.accuracy = accuracy
+        self.filled_mask = source.filled_mask
+        self.history = source.history
         vars(self)["arguments"] = arguments
 
     @property
@@ -143,8 +150,11 @@ class PotentialField(Texture, Tabular):
         """See :class:`Texture`; the last step is the baking."""
         smoothed = {0: "not smoothed", 1: "smoothed locally once"}
         how = smoothed.get(self.passes, f"smoothed locally {self.passes} times")
-        nodes, spacing, accuracy = self.arguments.c.size, max(self.grid.spacing), self.accuracy
-        depth, onset = format_length(accuracy.worst_depth), format_length(accuracy.onset)
+        nodes = self.arguments.c.size
+        spacing = max(self.grid.spacing)
+        accuracy = self.accuracy
+        depth = format_length(accuracy.worst_depth)
+        onset = format_length(accuracy.onset)
         missed = ": more than asked for, the memory allows no finer field"
         text = (
             f"Law H baked as a potential field: {nodes} nodes, {1e6 * spacing:.3g} µm apart, {how};"
@@ -155,7 +165,8 @@ class PotentialField(Texture, Tabular):
         return (*self.source.preparation, text)
 
     def __repr__(self) -> str:
-        size, q = self.arguments.c.size, self.gain.upper
+        size = self.arguments.c.size
+        q = self.gain.upper
         return f"<PotentialField of {self.source!r}, {size} nodes, q at most {q:.4g}>"
 
     @property
@@ -183,7 +194,9 @@ class PotentialField(Texture, Tabular):
 
     def describe(self) -> dict[str, Any]:
         """See :class:`Texture`; the whole field but for its record and the stored heights."""
-        grid, source, heights = self.grid, self.source, self.stored_heights()
+        grid = self.grid
+        source = self.source
+        heights = self.stored_heights()
         names = ("max_depth", "continuity", "passes", "thin_regions")
         numbers = {name: getattr(self, name) for name in names}
         parts = {name: vars(getattr(self, name)) for name in ("gain", "one_sided", "accuracy")}
@@ -203,7 +216,8 @@ class PotentialField(Texture, Tabular):
 
     def table_rows(self) -> list[dict[str, Any]]:
         """Return size and accuracy, in one row."""
-        numbers, accuracy = self.arguments.c, self.accuracy
+        numbers = self.arguments.c
+        accuracy = self.accuracy
         return [
             {
                 "nodes": int(numbers.size),

@@ -205,7 +205,8 @@ class Fourier(Texture):
         ticks = half * (2.0 * np.arange(start) + 1.0)
         centres = np.stack(np.meshgrid(*[ticks] * rank, indexing="ij"), axis=-1).reshape(-1, rank)
         corners = np.stack(np.meshgrid(*[[-0.5, 0.5]] * rank, indexing="ij"), -1).reshape(-1, rank)
-        best, outer = -math.inf, total
+        best = -math.inf
+        outer = total
         while True:
             angles = centres @ multiples.T + self.phases
             values = np.sin(angles) @ amplitudes

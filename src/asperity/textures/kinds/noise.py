@@ -45,7 +45,8 @@ class _SelfAffine(Spline):
         cutoff: float | None = None,
         seed: int = 0,
     ) -> None:
-        self.rms, self.hurst = check_positive("rms", rms, "m"), check_fraction("hurst", hurst)
+        self.rms = check_positive("rms", rms, "m")
+        self.hurst = check_fraction("hurst", hurst)
         self.seed = check_integer("seed", seed)
         self.size = self._check_size(size)
         counts, pitches, spectrum = self._plan_grid(pitch, rolloff, cutoff)
@@ -87,7 +88,8 @@ class _SelfAffine(Spline):
             raise ParameterError("size", f"{reason}: reduce it, or increase cut-off and pitch")
         counts = tuple(max(math.ceil(count), MIN_NODES) for count in numbers)
         require_memory(*counts)
-        self.rolloff, self.cutoff = float(rolloff), cutoff
+        self.rolloff = float(rolloff)
+        self.cutoff = cutoff
         # Power q^(-d-2H) is the square of the amplitude.
         band = SelfAffineSpectrum(0.5 * len(sides) + self.hurst, self.rolloff, self.cutoff)
         return counts, tuple(side / n for side, n in zip(sides, counts, strict=True)), band

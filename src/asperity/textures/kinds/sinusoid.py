@@ -75,7 +75,8 @@ class Sinusoid(Texture):
     def arguments(self) -> SinusoidArguments:
         """See :class:`Texture`."""
         k = 2.0 * math.pi / self.period
-        kx, ky = k * self.direction[0], k * self.direction[1]
+        kx = k * self.direction[0]
+        ky = k * self.direction[1]
         return SinusoidArguments(self.amplitude, kx, ky, self.phase)
 
     @cached_property

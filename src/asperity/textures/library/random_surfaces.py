@@ -57,7 +57,8 @@ def _add_scratch(
 ) -> None:
     """Add a slightly tilted groove with raised lips and tapered ends."""
     ny, nx = heights.shape
-    x0, y0 = random_numbers[0] * nx * pitch[0], random_numbers[1] * ny * pitch[1]
+    x0 = random_numbers[0] * nx * pitch[0]
+    y0 = random_numbers[1] * ny * pitch[1]
     wide = width * (0.5 + random_numbers[2] ** 2)
     half = 0.5 * length * (0.3 + 0.7 * random_numbers[3])
     # Few scratches are deep.
@@ -192,7 +193,8 @@ def _add_pore(
     ring = nx * pitch[0] / _RINGS
     x0 = (place - sway[row, round(place * nx / _RINGS) % nx]) * ring
     half = 0.5 * _PORE_LENGTH * wide * (0.4 + random_numbers[4])
-    rows, columns = _nodes_around(y0, half, ny, pitch[1]), _nodes_around(x0, wide, nx, pitch[0])
+    rows = _nodes_around(y0, half, ny, pitch[1])
+    columns = _nodes_around(x0, wide, nx, pitch[0])
     along = (rows * pitch[1] - y0)[:, None] / half
     u = (columns * pitch[0] - x0)[None, :] / (0.5 * wide)
     trough = np.clip(1.0 - u**2, 0.0, 1.0) ** 0.5 * np.clip(1.0 - along**4, 0.0, 1.0)

@@ -73,7 +73,8 @@ _KNURL_NODES = (384, 320)
 def press_knurl(spacing: float, groove_angle: float, profile_angle: float, flat: float) -> Patch:
     """Return 4 x 2 cells of the lattice, two pyramids each."""
     cell = spacing / np.array([math.cos(groove_angle), math.sin(groove_angle)])
-    (cx, cy), (nx, ny) = _KNURL_CELLS, _KNURL_NODES
+    (cx, cy) = _KNURL_CELLS
+    (nx, ny) = _KNURL_NODES
     u = (np.arange(nx) + 0.5) * cx / nx
     v = (np.arange(ny)[:, None] + 0.5) * cy / ny
     # Distance from the bottom of the nearest groove [spacings], for both families of grooves.

@@ -78,7 +78,8 @@ class _BodyLoops:
         from asperity.kernels.fuse import fuse_module
 
         self._loops = fuse_module(mesh_potential, triangle_tree, solver, optimality)
-        self.body, self.law = body, law
+        self.body = body
+        self.law = law
         self._tolerance = 1e-9 * float(np.ptp(np.array(body.box), axis=0).max())
 
     def evaluate(self, points: FloatArray) -> FloatArray:
@@ -108,7 +109,8 @@ class _BodyLoops:
     def surface_probes(self, depths: FloatArray) -> FloatArray:
         """Return random points of the surface, moved inward by depths [m], (n, 3) [m]."""
         # The areas of all triangles of a large mesh would take much memory.
-        rng, step = np.random.default_rng(0), 1 + len(self.body.triangles) // 2**16
+        rng = np.random.default_rng(0)
+        step = 1 + len(self.body.triangles) // 2**16
         corners = self.body.triangles[::step]
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         areas = np.linalg.norm(normals, axis=1)
@@ -132,7 +134,8 @@ class _BodyLoops:
         self._xy = grid.positions(index)
         empty = np.zeros((len(self._xy), 0), np.float32)
         self._summary = self.columns(self._xy, np.empty(0), grid.margin, empty)
-        least, greatest = self._summary[:, 4], self._summary[:, 5]
+        least = self._summary[:, 4]
+        greatest = self._summary[:, 5]
         wrong = (least < 0.0) | (greatest > 1.0)
         places = np.column_stack([self._xy, self._summary[:, 6]])[wrong]
         if fault := make_fault(INTERSECTING, places):
@@ -200,8 +203,11 @@ class _BodyPlan(bake.BakePlan):
     def __init__(
         self, body: MeshBody, max_depth: float, continuity: float, goal: bake.BakeGoal
     ) -> None:
-        self.max_depth, self.continuity, self.goal = max_depth, continuity, goal
-        self.gain, self.lipschitz = continuity, continuity + 1.0
+        self.max_depth = max_depth
+        self.continuity = continuity
+        self.goal = goal
+        self.gain = continuity
+        self.lipschitz = continuity + 1.0
         self._law_arguments = (1.0, 0.0, 1.0, max_depth, 0.0, continuity)
         self.loops = _BodyLoops(body, BodyLaw(continuity, max_depth, 0.0))
         thinnest = float(np.ptp(np.array(body.box), axis=0).min())
@@ -224,7 +230,8 @@ class _BodyPlan(bake.BakePlan):
 
     def bake(self, resolution: float, progress: Progress | None) -> PotentialField:
         """See :class:`BakePlan`."""
-        grid, loops = self.checked_grid(resolution), self.loops
+        grid = self.checked_grid(resolution)
+        loops = self.loops
         loops.prepare(grid)
         part = bake.scale_progress(progress, 0.05, 0.85)
         depths = compute_potentials(loops.record_columns, loops.grid, part)
@@ -235,7 +242,8 @@ class _BodyPlan(bake.BakePlan):
             reason = f"must be at most {format_length(deepest)}, the greatest depth of the body"
             raise ParameterError("max_depth", reason, self.max_depth)
         field = self.certify(depths, grid, bake.scale_progress(progress, 0.9, 0.1))
-        field.thin_regions, field.thin_map = thin, thin_map if thin else None
+        field.thin_regions = thin
+        field.thin_map = thin_map if thin else None
         return field
 
     def node_columns(self, grid: FieldGrid) -> ColumnFunction:

@@ -47,7 +47,8 @@ def _write_boxes(corners: FloatArray, boxes: NDArray[np.float32]) -> None:
     """Write the boxes of all nodes, rounded outwards, from the corners (leaves, m, 3)."""
     leaves = len(corners)
     last = boxes[leaves - 1 :]
-    lower, upper = corners.min(axis=1).astype(np.float32), corners.max(axis=1).astype(np.float32)
+    lower = corners.min(axis=1).astype(np.float32)
+    upper = corners.max(axis=1).astype(np.float32)
     last[:, :3] = np.nextafter(lower, np.float32(-np.inf))
     last[:, 3:] = np.nextafter(upper, np.float32(np.inf))
     while leaves > 1:

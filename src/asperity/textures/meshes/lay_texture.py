@@ -17,7 +17,8 @@ from asperity.textures.texture import Texture
 
 SIDES = ("+x", "+y", "+z", "-x", "-y", "-z")
 # Cosines of the angles of normal and axis at which the texture begins and is whole.
-_STEEPEST, _WHOLE = 0.5, math.sqrt(0.5)
+_STEEPEST = 0.5
+_WHOLE = math.sqrt(0.5)
 # Triangles that meet at more than 45 degrees have an edge, across which no normal is smooth.
 _EDGE = math.sqrt(0.5)
 _EDGES_PER_WAVE = 8

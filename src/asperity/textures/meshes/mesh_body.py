@@ -81,10 +81,12 @@ class MeshBody:
             raise SurfaceFileError(f"{name} has corners that are not finite numbers")
         vertices, faces = merge_vertices(vertices, faces)
         before = find_faults(vertices, faces)
-        after, repaired = before, False
+        after = before
+        repaired = False
         if repair and _unsound(before):
             vertices, faces = _repair(vertices, faces)
-            after, repaired = find_faults(vertices, faces), True
+            after = find_faults(vertices, faces)
+            repaired = True
         if wrong := _unsound(after):
             tried = " after the repair" if repaired else "; the repair option may close and turn it"
             faults = "; ".join(map(str, wrong))

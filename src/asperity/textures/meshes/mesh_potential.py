@@ -171,7 +171,8 @@ def note_thin_spans(
             z = crossings[k, 0] - half
             distance = math.sqrt(tree_closest(p[0], p[1], z, half * half, 0, tree)[0])
             if _PARALLEL * half <= distance < out[row, THIN]:
-                out[row, THIN], out[row, THIN_Z] = distance, z
+                out[row, THIN] = distance
+                out[row, THIN_Z] = z
 
 
 def column_batch(
@@ -206,7 +207,8 @@ def column_batch(
         summarize_column(min(total, crossings.shape[0]), crossings, tolerance, i, summary)
         if total > crossings.shape[0]:
             summary[i, GREATEST_WINDING] = np.inf
-        count, spans = min(total, crossings.shape[0]), (tolerance, law.max_depth)
+        count = min(total, crossings.shape[0])
+        spans = (tolerance, law.max_depth)
         note_thin_spans(p, count, crossings, spans, i, summary, tree)
         for m in range(out.shape[1]):
             p[2] = z[m]

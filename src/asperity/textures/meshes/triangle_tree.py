@@ -72,7 +72,9 @@ def closest_on_side(
     square = ux * ux + uy * uy + uz * uz
     along = ux * (x - ax) + uy * (y - ay) + uz * (z - az)
     s = min(max(along / square, 0.0), 1.0) if square > 0.0 else 0.0
-    px, py, pz = ax + s * ux, ay + s * uy, az + s * uz
+    px = ax + s * ux
+    py = ay + s * uy
+    pz = az + s * uz
     return (px - x) ** 2 + (py - y) ** 2 + (pz - z) ** 2, px, py, pz
 
 
@@ -81,7 +83,9 @@ def closest_on_triangle(x: float, y: float, z: float, t: int, tree: TriangleTree
     ax, ay, az = corner(t, 0, tree)
     ux, uy, uz = side_vector(t, 0, 3, tree)
     vx, vy, vz = side_vector(t, 0, 6, tree)
-    wx, wy, wz = x - ax, y - ay, z - az
+    wx = x - ax
+    wy = y - ay
+    wz = z - az
     uu = ux * ux + uy * uy + uz * uz
     uv = ux * vx + uy * vy + uz * vz
     vv = vx * vx + vy * vy + vz * vz
@@ -124,7 +128,11 @@ def tree_closest(
     least, cx, cy, cz = closest_on_triangle(x, y, z, near, tree)
     found = near
     if least >= limit:
-        least, cx, cy, cz, found = limit, x, y, z, -1
+        least = limit
+        cx = x
+        cy = y
+        cz = z
+        found = -1
     stack = local_array((64, 2))
     stack[0, 0] = 0.0
     stack[0, 1] = box_distance(x, y, z, 0, tree)
@@ -139,7 +147,11 @@ def tree_closest(
             for t in range(first, min(first + LEAF_SIZE, tree.corners.shape[0])):
                 square, px, py, pz = closest_on_triangle(x, y, z, t, tree)
                 if square < least:
-                    least, cx, cy, cz, found = square, px, py, pz, t
+                    least = square
+                    cx = px
+                    cy = py
+                    cz = pz
+                    found = t
             continue
         left = box_distance(x, y, z, 2 * node + 1, tree)
         right = box_distance(x, y, z, 2 * node + 2, tree)

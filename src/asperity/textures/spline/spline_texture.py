@@ -76,7 +76,8 @@ class Spline(Texture):
     def _compute_extremes(self) -> tuple[float, float]: ...
 
     def _compute_bounds(self) -> tuple[float, float]:
-        c, pitches = self.coefficients, self._pitches
+        c = self.coefficients
+        pitches = self._pitches
         axes = range(c.ndim)[::-1]  # x first, as the pitches
         slopes = [np.abs(np.diff(c, axis=i)).max() / p for i, p in zip(axes, pitches, strict=True)]
         turns = [np.abs(np.diff(c, 2, axis=i)).max() for i in axes]
@@ -289,7 +290,9 @@ class Profile(Spline):
         c = np.lib.stride_tricks.sliding_window_view(self.coefficients, 4)
         c0, c1, c2, c3 = c.T
         # h'(t) = a t² + b t + d on the cell, t in [0, 1].
-        a, b, d = 0.5 * (c3 - 3 * c2 + 3 * c1 - c0), c0 - 2 * c1 + c2, 0.5 * (c2 - c0)
+        a = 0.5 * (c3 - 3 * c2 + 3 * c1 - c0)
+        b = c0 - 2 * c1 + c2
+        d = 0.5 * (c2 - c0)
         root = np.sqrt(np.maximum(b * b - 4 * a * d, 0.0))
         half = -0.5 * (b + np.copysign(root, b))
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -365,7 +368,8 @@ class HeightMap(Spline):
     def arguments(self) -> HeightMapArguments:
         """See :class:`Texture`."""
         x0, y0 = (float(value) for value in self.origin)
-        c, (px, py) = self.coefficients, self.pitch
+        c = self.coefficients
+        (px, py) = self.pitch
         pyramid = plane_pyramid(c, self.pitch)
         return HeightMapArguments(c, 1.0 / px, 1.0 / py, x0, y0, self.periodic, *pyramid)
 

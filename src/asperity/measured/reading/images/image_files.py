@@ -69,7 +69,8 @@ def _read_png(chunks: list[tuple[bytes, bytes]]) -> tuple[NDArray[Any], pixels.I
     channels, mode = _COLOUR_TYPES[colour]
     needed = 0  # bytes of all rows, each with its filter
     for x, y, step_x, step_y in _ADAM7 if interlaced else _PASSES:
-        width, height = len(range(x, columns, step_x)), len(range(y, rows, step_y))
+        width = len(range(x, columns, step_x))
+        height = len(range(y, rows, step_y))
         needed += height * (width * channels * depth // 8 + 1) if width else 0
     if _MAX_DEFLATE_RATIO * len(packed) < needed:  # before any memory is allocated
         size = f"{columns} x {rows} pixels"
@@ -120,7 +121,8 @@ def _decode_png(
         return unpack("I;16", "I;16B")
     if mode == "LA":  # two values of two bytes, taken for four of one
         return np.asarray(unpack("RGBA", "RGBA").view(">u2"), dtype=np.uint16)
-    high, low = unpack(mode, f"{mode};16B"), unpack(mode, f"{mode};16L")
+    high = unpack(mode, f"{mode};16B")
+    low = unpack(mode, f"{mode};16L")
     return np.asarray(high.astype(np.uint16) << 8 | low)
 
 
@@ -128,9 +130,11 @@ def _decode_png(
 
 TIFF_MAGIC = (b"II*\x00", b"MM\x00*", b"II+\x00", b"MM\x00+")
 _MAX_TIFF_RATIO = 2000  # no compression that is read packs more bytes into one
-_MINISWHITE, _RGB = 0, 2
+_MINISWHITE = 0
+_RGB = 2
 _GREY = (0, 1)
-_REDUCED, _MASK = 1, 4
+_REDUCED = 1
+_MASK = 4
 _ORIENTATION = 274
 _NODATA = 42113  # GDAL's tag for the value of a missing point
 
@@ -209,7 +213,8 @@ def _check_page(page: Any, size: int) -> None:
         raise SurfaceFileError(f"has pixels of type {page.dtype}; integers or floats are expected")
     if int(page.bitspersample) not in (8, 16, 32, 64):
         raise SurfaceFileError(f"has {page.bitspersample} bit per pixel; 8, 16 and float are read")
-    channels, colours = int(page.samplesperpixel), 3 if int(page.photometric) == _RGB else 1
+    channels = int(page.samplesperpixel)
+    colours = 3 if int(page.photometric) == _RGB else 1
     if channels not in (colours, colours + 1):
         raise SurfaceFileError(f"has {channels} channels; one channel of heights is expected")
     bytes_needed = page.imagelength * page.imagewidth * channels * page.dtype.itemsize

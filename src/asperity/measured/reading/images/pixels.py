@@ -69,7 +69,8 @@ def imagej_scale(metadata: Mapping[str, Any], resolution: tuple[float, float] | 
     offset = _parse_float(str(metadata.get("c0") or 0.0))
     is_linear = metadata.get("cf") == _IMAGEJ_LINEAR and factor != 0.0
     if not (is_linear and math.isfinite(factor) and math.isfinite(offset)):
-        factor, offset = 1.0, 0.0
+        factor = 1.0
+        offset = 0.0
     notes = []
     if pitch is not None:
         notes.append(f"pixel size {format_lengths(pitch)} from ImageJ's metadata")
@@ -123,7 +124,8 @@ def _valid_pitch(pitch: tuple[float, float]) -> tuple[float, float] | None:
     return pitch if all(math.isfinite(p) and p > 0.0 for p in pitch) else None
 
 
-_SCAL_METRE, _PCAL_LINEAR = 1, 0
+_SCAL_METRE = 1
+_PCAL_LINEAR = 0
 
 
 def png_scale(chunks: Mapping[bytes, bytes], depth: int) -> ImageScale:
@@ -231,7 +233,8 @@ def pixels_to_surface(
     notes = (*notes, *scale.notes)
     if has_alpha:
         _check_opaque(values[..., -1])
-        values, notes = values[..., :-1], (*notes, "alpha channel dropped: opaque everywhere")
+        values = values[..., :-1]
+        notes = (*notes, "alpha channel dropped: opaque everywhere")
     grey, notes = _to_grey(values, notes)
     with np.errstate(invalid="ignore"):  # a signalling NaN is a missing point too
         heights = scale.factor * grey.astype(np.float64) + scale.offset
@@ -257,7 +260,8 @@ def _check_opaque(alpha: NDArray[Any]) -> None:
 
 def _to_grey(values: NDArray[Any], notes: tuple[str, ...]) -> tuple[NDArray[Any], tuple[str, ...]]:
     """Return the only channel, or the first of three equal ones."""
-    channels, first = values.shape[-1], values[..., 0]
+    channels = values.shape[-1]
+    first = values[..., 0]
     if channels == 1:
         return first, notes
     if channels != 3:

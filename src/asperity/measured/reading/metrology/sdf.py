@@ -87,7 +87,8 @@ def read_sdf(file: reader.SurfaceFile, _options: reader.ReadingOptions) -> reade
 
 
 def _check_header(header: _Header) -> _Header:
-    points, profiles = header.points, header.profiles
+    points = header.points
+    profiles = header.profiles
     if points < 1 or profiles < 1:
         raise SurfaceFileError(f"NumPoints is {points}, NumProfiles {profiles}: both must be > 0")
     reader.check_point_count(points, profiles)
@@ -111,8 +112,10 @@ def _parse_binary(content: bytes) -> tuple[_Header, FloatArray]:
     if len(content) < start:
         raise SurfaceFileError(f"truncated: {len(content)} bytes; the header has {start}")
     header = _check_header(_Header(*layout.unpack_from(content)[4:]))
-    dtype, count = np.dtype(_DATA_TYPES[header.data_type][0]), header.points * header.profiles
-    expected, rest = count * dtype.itemsize, len(content) - start
+    dtype = np.dtype(_DATA_TYPES[header.data_type][0])
+    count = header.points * header.profiles
+    expected = count * dtype.itemsize
+    rest = len(content) - start
     if rest < expected:
         raise SurfaceFileError(f"truncated: {rest} bytes of heights, {expected} are expected")
     if rest == expected + _OLYMPUS_PADDING and content.startswith(b"bISO-1.0"):

@@ -285,7 +285,8 @@ def _read_coordinates(
     archive: _Archive, header: X3pHeader, notes: list[str]
 ) -> dict[str, FloatArray]:
     """Return the stored coordinates [m], one flat array by name of each stored axis."""
-    count, axes = header.shape[0] * header.shape[1], header.stored_axes
+    count = header.shape[0] * header.shape[1]
+    axes = header.stored_axes
     record = np.dtype([(axis.name, axis.dtype) for axis in axes])
     content = _read_linked(archive, header, "PointData", count * record.itemsize, notes)
     table = np.frombuffer(content, dtype=record)

@@ -30,8 +30,11 @@ def select_columns(table: TextTable) -> tuple[TextTable, list[str], list[str]]:
     Raises:
         SurfaceFileError: the names contradict a profile or a list of points.
     """
-    names, notes, invalid = _find_names(table), list[str](), np.zeros(len(table.values), bool)
-    roles, rest = [_find_role(name) for name in names], list(range(len(names)))
+    names = _find_names(table)
+    notes = list[str]()
+    invalid = np.zeros(len(table.values), bool)
+    roles = [_find_role(name) for name in names]
+    rest = list(range(len(names)))
     if "valid" in roles and len(rest) > 2:
         rest.remove(roles.index("valid"))
         invalid = _find_invalid(table, roles.index("valid"))
@@ -126,7 +129,8 @@ def reject_positions(table: TextTable) -> None:
     values = table.values
     if min(values.shape) < 3:
         return
-    across, down = _is_axis(values[:, 1:]), _is_axis(values[1:].T)
+    across = _is_axis(values[:, 1:])
+    down = _is_axis(values[1:].T)
     rows, columns = np.array(values.shape) > _MIN_POSITIONS
     if (across and (down or columns)) or (down and rows):
         fault = "the first row or column looks like positions or numbers of the others"

@@ -190,7 +190,8 @@ class HeaderEntry:
         key, _, value = line.partition(sign) if sign else (line, "", "")
         found = None if sign else re.search(r"(?<=[^\d\s])\s(?=[+-]?[0-9])", line)
         if found:
-            key, value = line[: found.start()], line[found.end() :]
+            key = line[: found.start()]
+            value = line[found.end() :]
         value = re.sub(r"[\s;,](?=\S*$)" if sign in ("\t", ";", ",") else r"\s+", " ", value)
         return cls(key, split_words(key), value.strip(), shorten(line, 60))
 
@@ -270,7 +271,8 @@ def _find_pitch(entries: Sequence[HeaderEntry]) -> tuple[float | None, float | N
 
 def _find_missing_code(entries: Sequence[HeaderEntry]) -> float | None:
     """Return the only number that the header declares to mark missing points."""
-    fillers, known = WORDS["missing_fillers"], WORDS["missing"]
+    fillers = WORDS["missing_fillers"]
+    known = WORDS["missing"]
     texts = {e.value for e in entries if e.words - fillers and e.words - fillers <= known}
     with suppress(ValueError):
         return _single({float(text) for text in texts})

@@ -120,12 +120,16 @@ def _find_units(
 
 
 def _read_profile(table: TextTable, units: list[float], name: str) -> reader.RawSurface:
-    positions, heights = table.values[:, 0], table.values[:, 1] * units[-1]
-    resolution, lines = _printed_resolution(table, 0), table.line_numbers
+    positions = table.values[:, 0]
+    heights = table.values[:, 1] * units[-1]
+    resolution = _printed_resolution(table, 0)
+    lines = table.line_numbers
     notes: tuple[str, ...] = ()
     if positions[0] > positions[-1]:
-        positions, heights = positions[::-1], heights[::-1]
-        resolution, lines = resolution[::-1], lines[::-1]
+        positions = positions[::-1]
+        heights = heights[::-1]
+        resolution = resolution[::-1]
+        lines = lines[::-1]
         notes = ("positions decrease: the profile is reversed",)
     result = spacing.measure_spacing(positions, resolution)
     pitch = result.step * units[0]
@@ -144,7 +148,8 @@ def _read_points(table: TextTable, units: list[float], name: str) -> reader.RawS
         raise SurfaceFileError(f"a position is missing; {_EXPECTED_LAYOUT}")
     resolution = _printed_resolution(table, 0), _printed_resolution(table, 1)
     heights, steps = points_to_grid(table.values, resolution)
-    heights, pitch = heights * units[2], (steps[0] * units[0], steps[1] * units[1])
+    heights = heights * units[2]
+    pitch = (steps[0] * units[0], steps[1] * units[1])
     if 1 not in heights.shape:
         return reader.RawSurface(heights, pitch, name, ())
     return reader.RawSurface(heights.ravel(), (pitch[0 if heights.shape[0] == 1 else 1],), name, ())
@@ -159,7 +164,8 @@ def _read_matrix(
     heights = np.ascontiguousarray(table.values * (unit or 1.0))
     pitch = tuple(p for p in header.pitch if p is not None)
     if heights.shape[1] == 1:
-        heights, pitch = heights[:, 0], tuple(set(pitch))
+        heights = heights[:, 0]
+        pitch = tuple(set(pitch))
     known = pitch if len(pitch) == heights.ndim else None
     question = "" if unit else f", or their unit, such as unit='um' (--unit um){header.question}"
     return reader.RawSurface(

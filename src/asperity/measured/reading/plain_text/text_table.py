@@ -155,19 +155,23 @@ def _detect_dialect(lines: list[str]) -> Dialect:
     step = max(1, len(lines) // _SAMPLE_LINES)
     sample = [_strip_comment(line) for line in lines[::step]]
     sample = [line for line in sample if line.strip(" \t,;")]
-    best, most = _DIALECTS[0], 0
+    best = _DIALECTS[0]
+    most = 0
     for dialect in _DIALECTS:
         rows = (_parse_row(line, dialect) for line in sample)
         widths = Counter(len(row) for row in rows if row)
         count = max(widths.values(), default=0)
         if count > most:
-            best, most = dialect, count
+            best = dialect
+            most = count
     return best
 
 
 def _check_other_blocks(blocks: list[_Block], index: int, dialect: Dialect) -> None:
     """Refuse a block that is a part of a longer table, or has a damaged first or last row."""
-    table, before, after = blocks[index], blocks[:index], blocks[index + 1 :]
+    table = blocks[index]
+    before = blocks[:index]
+    after = blocks[index + 1 :]
     if before and before[-1].width:
         raise _ragged_error(before[-1], -1, table)
     for k, block in enumerate(before):
