@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from tests.helpers.source_modules import find_places, parse, read_modules
+from tests.helpers.source_modules import find_places, modules_outside, parse, read_modules
 
 import asperity
+from asperity.cli.main import COMMANDS
 
 ROOT = Path(__file__).parents[1]
 
@@ -110,3 +112,97 @@ def test_import_cycles_inside_functions_are_detected() -> None:
     }
     assert import_cycles(texts) == ["a", "b", "c.d", "c.e"]
     assert import_cycles(texts | {"c.e": "import b_b\n"}) == []
+
+
+# --- directions between folders ------------------------------------------------------------------
+
+CATALOGUES = {"catalogue", "readers", "driver_registry", "__init__"}
+"""Modules of a folder that may import its subfolders: they list what is in them."""
+
+
+def folder_of(name: str, texts: Mapping[str, str]) -> str:
+    """Return the package of a module; a package is its own."""
+    is_package = any(other.startswith(f"{name}.") for other in texts)
+    return name if is_package else name.rpartition(".")[0]
+
+
+def folder_imports(texts: Mapping[str, str]) -> Iterator[tuple[str, str, str]]:
+    """Yield each module with its folder and the folder of a module that it imports."""
+    for name, text in texts.items():
+        for target in imported_modules(text, texts):
+            if target in texts:
+                yield name, folder_of(name, texts), folder_of(target, texts)
+
+
+def two_way_folders(texts: Mapping[str, str]) -> list[tuple[str, str]]:
+    """Return the pairs of folders, neither inside the other, that import each other."""
+    pairs = {(folder, target) for _, folder, target in folder_imports(texts)}
+    return sorted(
+        (a, b)
+        for a, b in pairs
+        if a < b and (b, a) in pairs and not b.startswith(f"{a}.") and not a.startswith(f"{b}.")
+    )
+
+
+def imports_of_subfolders(texts: Mapping[str, str]) -> list[str]:
+    """Return the modules, catalogues excepted, that import a subfolder of their own folder."""
+    return sorted(
+        {
+            f"{name} imports {target}"
+            for name, folder, target in folder_imports(texts)
+            if target.startswith(f"{folder}.")
+            and name != folder
+            and name.rpartition(".")[2] not in CATALOGUES
+        }
+    )
+
+
+def test_folders_beside_each_other_import_one_way() -> None:
+    assert two_way_folders(read_modules()) == []
+
+
+def test_only_catalogues_import_the_subfolders_of_their_folder() -> None:
+    inside = {name: text for name, text in read_modules().items() if name.count(".") > 1}
+    assert imports_of_subfolders(inside) == []
+
+
+def test_directions_between_folders_are_detected() -> None:
+    texts = {
+        "p": "",
+        "p.a": "",
+        "p.a.x": "from p.b import y",
+        "p.b": "",
+        "p.b.y": "from p.a import x\nfrom p.b.c import z",
+        "p.b.c": "",
+        "p.b.c.z": "from p.b import y",
+        "p.b.catalogue": "from p.b.c import z",
+    }
+    assert two_way_folders(texts) == [("p.a", "p.b")]
+    assert imports_of_subfolders(texts) == ["p.b.y imports p.b.c"]
+
+
+# --- options and commands are known to the command line only -------------------------------------
+
+
+def strings_with_options(text: str) -> list[int]:
+    """Return the lines of one-line strings that name an option or a command of the program."""
+    commands = "|".join(sorted(COMMANDS))
+    pattern = re.compile(rf"(^|[\s(])--[a-z]|\basperity ({commands})\b")
+    return [
+        node.lineno
+        for node in ast.walk(parse(text))
+        if isinstance(node, ast.Constant)
+        and isinstance(node.value, str)
+        and "\n" not in node.value
+        and pattern.search(node.value)
+    ]
+
+
+def test_only_the_command_line_names_options_and_commands() -> None:
+    texts = modules_outside("cli", "__main__", "derive.generate")
+    assert find_places(texts, strings_with_options) == []
+
+
+def test_options_and_commands_in_strings_are_detected() -> None:
+    assert strings_with_options("a = 'give it with --pitch'\nb = 'asperity compare x'") == [1, 2]
+    assert strings_with_options("a = 'the pitch -- in metres'") == []
