@@ -22,8 +22,7 @@ from rich.console import Console
 from rich.table import Table
 
 from asperity.analysis.bounds.bound import NORM, Bound
-from asperity.analysis.gain.certificate import certify
-from asperity.analysis.gain.characteristic import characteristic_number
+from asperity.analysis.gain.characteristic import certify, characteristic_number
 from asperity.analysis.gain.medial_axis import SearchOptions
 from asperity.core.checks import FloatArray
 from asperity.surface import Surface

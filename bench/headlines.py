@@ -20,7 +20,7 @@ import numpy as np
 from rich.console import Console
 from rich.progress import track
 
-from asperity.analysis.compare import Comparison, compare
+from asperity.analysis.results.compare import Comparison, compare
 from asperity.devices import Device, device_names, load_device
 from asperity.scene import load_scene
 from asperity.scene.scene_defaults import make_servo

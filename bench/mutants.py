@@ -107,7 +107,7 @@ ROOMS = {
         ),
     ),
     "limits": Room(
-        ("analysis/limits", "analysis/check_limits.py"),
+        ("analysis/limits", "analysis/results/check_limits.py"),
         (
             "tests/analysis/limits/test_limits_by_definition.py",
             "tests/analysis/limits/test_limits.py",
@@ -161,14 +161,14 @@ ROOMS = {
         ),
     ),
     "split": Room(
-        ("analysis/split", "contacts/split"),
+        ("contacts/split",),
         (
             "tests/contacts/split/test_split_kernels.py",
             "tests/contacts/split/test_split_solver.py",
-            "tests/analysis/split/test_split.py",
-            "tests/analysis/split/test_split_map.py",
-            "tests/analysis/split/test_split_definition.py",
-            "tests/analysis/split/test_split_closed_form.py",
+            "tests/analysis/energy/test_split.py",
+            "tests/analysis/energy/test_split_map.py",
+            "tests/analysis/energy/test_split_definition.py",
+            "tests/analysis/energy/test_split_closed_form.py",
         ),
     ),
     "simulation": Room(

@@ -19,7 +19,7 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from asperity.analysis.split.split_state import split_state
+from asperity.analysis.energy.field_energy import split_state
 from asperity.core.checks import FloatArray
 from asperity.rendering import bake
 from asperity.surface import Surface

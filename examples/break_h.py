@@ -24,7 +24,7 @@ from rich.progress import track
 from rich.table import Table
 
 import asperity as asp
-from asperity.analysis.split.split_state import split_state
+from asperity.analysis.energy.field_energy import split_state
 from asperity.textures.texture import Texture
 
 K, L = 1000.0, 1e-3

@@ -7,8 +7,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from asperity.analysis.analyze import analyze
-from asperity.analysis.compare import compare
+from asperity.analysis.results.analyze import analyze
+from asperity.analysis.results.compare import compare
 from asperity.contacts.split.split_contact import SplitContact
 from asperity.core.errors import ParameterError
 from asperity.kernels.link import unit_from_module

@@ -9,7 +9,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import asperity as asp
-from asperity.analysis.gain.closed_forms import q_b, q_c, q_g
+from asperity.analysis.gain.proofs import q_b, q_c, q_g
 
 texture = asp.Sinusoid(amplitude=0.1e-3, period=1e-3)
 depths = np.linspace(0.0, 0.8e-3, 200)[1:]

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import asperity as asp
-from asperity.analysis.analyze import STEPS, Analysis, analyze
+from asperity.analysis.results.analyze import STEPS, Analysis, analyze
 from asperity.core.errors import ParameterError
 from asperity.devices import Device, parse_device
 from asperity.devices.device import Datum

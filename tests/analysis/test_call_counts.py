@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 
 import asperity
-from asperity.analysis import characteristic_number, compare
+from asperity.analysis import characteristic_number
+from asperity.analysis.results import compare
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
 
@@ -60,7 +61,7 @@ def test_cached_row_of_a_comparison_enters_few_functions(
     law: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     compare(_TEXTURE, laws=law)
-    module, entered = sys.modules["asperity.analysis.compare"], set()
+    module, entered = sys.modules["asperity.analysis.results.compare"], set()
     compute_row = module._compute_row
 
     def count(*arguments: Any) -> Any:

@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from asperity.analysis.check_limits import limits
-from asperity.analysis.compare import Comparison, compare
-from asperity.analysis.results import LawRow
+from asperity.analysis.results.check_limits import limits
+from asperity.analysis.results.compare import Comparison, compare
+from asperity.analysis.results.recommendation import LawRow
 from asperity.core.errors import ParameterError
 from asperity.devices import Device, device_names, load_device
 from asperity.scene import load_scene

@@ -15,8 +15,8 @@ import pytest
 from click.testing import CliRunner
 
 import asperity as asp
-from asperity.analysis.compare import DEFAULT_DEVICE
 from asperity.analysis.limits.limit_rules import DEFAULT_SAMPLES, DEFAULT_SPEED
+from asperity.analysis.results.compare import DEFAULT_DEVICE
 from asperity.cli import analysis_commands as analyze
 from asperity.cli import analysis_commands as compare
 from asperity.cli import analysis_commands as limits

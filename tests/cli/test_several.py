@@ -13,7 +13,7 @@ import pytest
 from rich.console import Console
 
 import asperity as asp
-from asperity.analysis.device_comparisons import compare_devices
+from asperity.analysis.results.device_comparisons import compare_devices
 from asperity.cli.main import main
 from asperity.core.errors import ParameterError
 from asperity.core.units import format_quantity

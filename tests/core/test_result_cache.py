@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from asperity.analysis import characteristic_number, compare
+from asperity.analysis import characteristic_number
 from asperity.analysis.energy.leak import worst_loop
-from asperity.analysis.energy.merit import merit
+from asperity.analysis.energy.scan import merit
 from asperity.analysis.gain import characteristic
+from asperity.analysis.results import compare
 from asperity.core import cache, digests
 from asperity.core.files import json_text
 from asperity.laws import LAWS, Law

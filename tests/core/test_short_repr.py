@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import asperity as asp
-from asperity.analysis.device_comparisons import compare_devices
+from asperity.analysis.results.device_comparisons import compare_devices
 from asperity.simulation import Cartesian, Servo, SpringHand, Stationary, simulate
 
 MANY = asp.Fourier(np.full(60, 1e-6), 1e3 * np.random.default_rng(0).normal(size=(60, 2)))

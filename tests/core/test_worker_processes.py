@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from asperity.analysis import compare
-from asperity.analysis.compare import precompute_row
+from asperity.analysis.results import compare
+from asperity.analysis.results.compare import precompute_row
 from asperity.core import cache, processes
 from asperity.core.compiled import COMPILE_CALLBACKS
 from asperity.core.files import json_text
@@ -250,7 +250,7 @@ def test_every_surface_can_be_pickled(name: str) -> None:
 @pytest.mark.caches_results
 @pytest.mark.usefixtures("empty_cache")
 def test_precomputed_row_stores_all_results(monkeypatch: pytest.MonkeyPatch) -> None:
-    module = import_module("asperity.analysis.compare")
+    module = import_module("asperity.analysis.results.compare")
     tasks: list[Any] = []
 
     def record(surfaces: Any, query: Any) -> list[Any]:

@@ -13,9 +13,14 @@ import asperity as asp
 from asperity.core.cache import bypass_results
 from asperity.core.errors import ParameterError
 from asperity.devices import override_device
-from asperity.envelopes.borders import AMPLITUDE_RANGE, WaveBorders, find_borders
 from asperity.envelopes.envelope import Envelope, envelope
-from asperity.envelopes.wave_case import RenderConditions, WaveCase
+from asperity.envelopes.wave_borders import (
+    AMPLITUDE_RANGE,
+    RenderConditions,
+    WaveBorders,
+    WaveCase,
+    find_borders,
+)
 
 DEVICES = ("touch", "omega.3", "pantograph", "falcon")
 LAWS = "ABCDEFGH"

@@ -15,7 +15,7 @@ from tests.lab.browser import Browser, needs_browser
 from tests.lab.started import Started
 
 import asperity as asp
-from asperity.analysis.compare import DEFAULT_DEVICE
+from asperity.analysis.results.compare import DEFAULT_DEVICE
 from asperity.core.errors import ParameterError
 from asperity.core.files import to_plain_data
 from asperity.lab.clips import RECORDING_FILE, find_recording, load_recorded_clip

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from tests.report.pages import check_alone, check_alts, terminal
 
-from asperity.analysis.analyze import Analysis, analyze
+from asperity.analysis.results.analyze import Analysis, analyze
 from asperity.devices import parse_device
 from asperity.report import html_text
 from asperity.report.analysis_report import analysis_page

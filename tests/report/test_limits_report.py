@@ -7,8 +7,7 @@ import pytest
 from markupsafe import escape
 from tests.report.pages import check_alone, check_alts, terminal
 
-from asperity.analysis.check_limits import limits
-from asperity.analysis.limits.limit_result import Limits
+from asperity.analysis.results.check_limits import Limits, limits
 from asperity.devices import parse_device
 from asperity.report import html_text
 from asperity.report.limits_report import MAX_WAVES, limits_page, listed_waves

@@ -23,7 +23,7 @@ from rich.console import Console
 
 import asperity as asp
 from asperity import report
-from asperity.analysis.device_comparisons import compare_devices
+from asperity.analysis.results.device_comparisons import compare_devices
 from asperity.core.display import Displayable, Plottable, Reportable
 from asperity.devices import parse_device
 from asperity.paper.table_two import TableTwo

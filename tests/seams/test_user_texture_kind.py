@@ -23,8 +23,8 @@ from tests.helpers.user_modules import imported
 import asperity as asp
 from asperity.analysis import one_sided_number
 from asperity.analysis.bounds.branch_and_bound import supremum
-from asperity.analysis.bounds.surface_problems import CrestProblem
 from asperity.analysis.gain.characteristic import surface_content
+from asperity.analysis.gain.proofs import CrestProblem
 from asperity.core.errors import InternalError, ParameterError
 from asperity.enclosures.cells import DERIVATIVE_NAMES
 from asperity.reference import exact_force, exact_jacobian

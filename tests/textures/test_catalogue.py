@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner
 
 import asperity as asp
-from asperity.analysis.device_comparisons import compare_devices
+from asperity.analysis.results.device_comparisons import compare_devices
 from asperity.cli.analysis_commands import analyze_command, compare_command, limits_command
 from asperity.scene import load_scene
 from asperity.textures.catalogue import as_texture

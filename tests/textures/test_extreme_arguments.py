@@ -10,8 +10,8 @@ from contextlib import suppress
 
 import pytest
 
-from asperity.analysis.analyze import analyze
-from asperity.analysis.compare import compare
+from asperity.analysis.results.analyze import analyze
+from asperity.analysis.results.compare import compare
 from asperity.core.errors import ParameterError
 from asperity.scene import load_scene
 from asperity.surface import Surface

@@ -1,10 +1,9 @@
 """Analysis: frozen results from a surface and a device."""
 
 from asperity.analysis.bounds.bound import Bound
-from asperity.analysis.compare import Comparison, compare
 from asperity.analysis.energy.continuity import Continuity, Jump
+from asperity.analysis.energy.field_energy import loop_work
 from asperity.analysis.energy.leak import Leak, worst_loop
-from asperity.analysis.energy.loop_integral import loop_work
 from asperity.analysis.gain.characteristic import (
     characteristic_number,
     curl_number,
@@ -12,7 +11,8 @@ from asperity.analysis.gain.characteristic import (
 )
 from asperity.analysis.passivity.assess_passivity import Passivity
 from asperity.analysis.passivity.criteria import Criterion
-from asperity.analysis.results import LawRow
+from asperity.analysis.results.compare import Comparison, compare
+from asperity.analysis.results.recommendation import LawRow
 
 __all__ = [
     "Bound",

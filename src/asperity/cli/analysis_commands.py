@@ -20,8 +20,8 @@ from asperity.core.errors import ParameterError
 from asperity.laws import REGISTERED_LAWS, SHIPPED_LAW_ARGUMENTS, registered_arguments
 
 if TYPE_CHECKING:
-    from asperity.analysis.compare import Comparison
-    from asperity.analysis.device_comparisons import DeviceComparisons
+    from asperity.analysis.results.compare import Comparison
+    from asperity.analysis.results.device_comparisons import DeviceComparisons
     from asperity.devices import Device
     from asperity.laws import Law
     from asperity.textures import Texture
@@ -50,7 +50,7 @@ def analyze_command(surface: str, device: Device | None, outputs: Outputs, **val
     SURFACE is a texture with its arguments (sinusoid:amplitude=0.8mm,period=1mm), a measured file
     or a scene file (TOML).
     """
-    from asperity.analysis.analyze import STEPS, analyze
+    from asperity.analysis.results.analyze import STEPS, analyze
 
     with step_bar("reading the surface", len(STEPS)) as step:
         texture, device, arguments = options.load_surface(surface, device, values)
@@ -124,7 +124,7 @@ def compare_command(
     (X3P, SDF, NPY, text, PNG, TIFF, STL, OBJ ...) or a scene file (TOML). Several devices and
     depths are compared in one table.
     """
-    from asperity.analysis.device_comparisons import compare_devices
+    from asperity.analysis.results.device_comparisons import compare_devices
 
     chosen = laws or tuple(REGISTERED_LAWS.values())
     first, *others = device or (None,)
@@ -199,7 +199,7 @@ def limits_command(surface: str, device: Device | None, outputs: Outputs, **valu
     SURFACE is a texture with its arguments (sinusoid:amplitude=0.8mm,period=1mm), a measured file
     or a scene file (TOML).
     """
-    from asperity.analysis.check_limits import limits
+    from asperity.analysis.results.check_limits import limits
 
     with step_bar("reading the surface", 2) as step:
         step("reading the surface")

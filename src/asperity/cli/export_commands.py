@@ -74,7 +74,7 @@ def export_command(
     check_output("output", str(field) if field else None, force=force)
     ExportRequest.validate(**request)
 
-    from asperity.analysis.analyze import STEPS, analyze
+    from asperity.analysis.results.analyze import STEPS, analyze
     from asperity.export.export_surface import export_analysis
 
     clamp = {"clamp": values["clamp"]} if values["clamp"] is not None else {}

@@ -355,7 +355,7 @@ def surface_values(values: Mapping[str, Any]) -> dict[str, Any]:
 
 def select_device(device: Device | None, scene: Scene, values: Mapping[str, Any]) -> Device:
     """Return the device of ``--device``, of the scene, or the default, with the overrides."""
-    from asperity.analysis.compare import DEFAULT_DEVICE
+    from asperity.analysis.results.compare import DEFAULT_DEVICE
 
     chosen = device or scene.device or load_device(DEFAULT_DEVICE)
     settings: Overrides = values["settings"]

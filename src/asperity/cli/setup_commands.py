@@ -118,7 +118,7 @@ def precompile(
         textures: textures by name.
         step: called with a description of each step.
     """
-    from asperity.analysis.compare import compare
+    from asperity.analysis.results.compare import compare
 
     for name, texture in textures.items():
 

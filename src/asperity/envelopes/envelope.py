@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from asperity.analysis.compare import DEFAULT_DEVICE, Progress, missing_data_hint
 from asperity.analysis.gain.characteristic import is_shipped_law
 from asperity.analysis.limits.limit_rules import LIMIT_RULES, shortest_wavelengths
 from asperity.analysis.limits.perceptibility_sentences import speed_text
 from asperity.analysis.limits.spectrum import MIN_SHARE, Wave, compute_spectrum
+from asperity.analysis.results.compare import DEFAULT_DEVICE, Progress, missing_data_hint
 from asperity.analysis.surface_sentences import law_parameter_sentences, unverified_sentences
 from asperity.core.checks import check_array, check_items
 from asperity.core.display import Plottable, Reportable, Tabular
@@ -24,8 +24,13 @@ from asperity.core.processes import precompute
 from asperity.core.units import format_quantity
 from asperity.devices import Device, DeviceLike, load_device
 from asperity.devices.device import USER_SOURCE
-from asperity.envelopes.borders import WaveBorders, find_borders
-from asperity.envelopes.wave_case import RenderConditions, WaveCase, make_conditions
+from asperity.envelopes.wave_borders import (
+    RenderConditions,
+    WaveBorders,
+    WaveCase,
+    find_borders,
+    make_conditions,
+)
 from asperity.laws import REGISTERED_LAWS, Law, distribute_parameters, find_laws
 from asperity.perception.grip import grip_text
 from asperity.surface import Surface
@@ -198,11 +203,11 @@ def envelope(
 
     A device renders a texture with a law if the recommended stiffness is at least ``min_stiffness``
     and the texture is felt at that stiffness on a scan, as in
-    :func:`~asperity.analysis.compare.compare`. Borders are roots of these conditions in the
+    :func:`~asperity.analysis.results.compare.compare`. Borders are roots of these conditions in the
     amplitude at each wavelength.
 
     Args:
-        device: one or several devices; see :func:`~asperity.analysis.compare.compare`.
+        device: one or several devices; see :func:`~asperity.analysis.results.compare.compare`.
         laws: letters or names; by default all with a texture.
         surface: one or several surfaces, of which the greatest waves are located.
         wavelengths: [m], ascending; by default 60 from 0.05 mm to 20 mm.
@@ -212,7 +217,7 @@ def envelope(
             stiffness of the wall [N/m], 100 by default; ``max_depth`` to which textures are pressed
             [m], by default the peak-to-valley height of each, at most 1 mm; ``time_samples``,
             ``position_samples`` and ``force_steps`` as in
-            :func:`~asperity.analysis.check_limits.limits`; ``grip``, the hand.
+            :func:`~asperity.analysis.results.check_limits.limits`; ``grip``, the hand.
 
     Raises:
         ParameterError: for a value that cannot be used, or a device with too little data.

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
-from asperity.analysis.compare import DEFAULT_DEVICE, Comparison, Progress, compare
-from asperity.analysis.results import LawRow
+from asperity.analysis.results.compare import DEFAULT_DEVICE, Comparison, Progress, compare
+from asperity.analysis.results.recommendation import LawRow
 from asperity.core.cache import bypass_results
 from asperity.core.checks import check_fraction, check_items, check_keywords, check_positive
 from asperity.core.display import Reportable, Tabular
@@ -124,14 +124,14 @@ def design(
     all directions. A law without curl is preferred where one meets the target.
 
     Args:
-        texture: the surface; see :func:`~asperity.analysis.compare.compare`.
-        device: see :func:`~asperity.analysis.compare.compare`.
+        texture: the surface; see :func:`~asperity.analysis.results.compare.compare`.
+        device: see :func:`~asperity.analysis.results.compare.compare`.
         laws: letters or names, of which the best one is chosen; by default all with a texture.
         texture_force: least RMS of the texture's force [N].
         peak_force: least peak of the texture's force at the motor [N], in place of its RMS.
         at: where ``texture_force`` acts, ``"motor"`` or ``"hand"``.
         max_leak: greatest energy gained on the worst loop per period [J].
-        min_support: least support S [1]; see :func:`~asperity.analysis.energy.merit.merit`.
+        min_support: least support S [1]; see :func:`~asperity.analysis.energy.scan.merit`.
         law_parameters: parameters of laws by name, each a value or several that are tried.
         progress: called with what is computed next: each law, and each comparison.
         **conditions: ``speed``, ``min_stiffness``, ``max_depth`` and ``grip``; see

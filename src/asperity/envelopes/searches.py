@@ -15,13 +15,12 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from asperity.analysis.energy.leak import worst_loop
-from asperity.analysis.energy.merit import merit, scan_force
+from asperity.analysis.energy.scan import merit, scan_force
 from asperity.analysis.limits import perceptibility
 from asperity.core.arguments import FIELD, SEARCH
 from asperity.core.checks import FloatArray
 from asperity.core.files import Serializable
-from asperity.envelopes.borders import AMPLITUDE_RANGE
-from asperity.envelopes.wave_case import Trial, WaveCase
+from asperity.envelopes.wave_borders import AMPLITUDE_RANGE, Trial, WaveCase
 from asperity.surface import Surface
 from asperity.textures.synthetic import prepare_texture
 from asperity.textures.texture import Texture
@@ -105,7 +104,7 @@ class Sample(NamedTuple):
     """A texture at its recommended stiffness.
 
     Attributes:
-        trial: the trial of :class:`~asperity.envelopes.wave_case.WaveCase`.
+        trial: the trial of :class:`~asperity.envelopes.wave_borders.WaveCase`.
         leak: energy gained on the worst loop per period and per stiffness [m²].
         lost: fraction of the scan without contact.
         support: S [1], computed if there is a least one.

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from asperity.analysis.analyze import Analysis, Progress, analyze
 from asperity.analysis.bounds.bound import Bound
-from asperity.analysis.compare import DEFAULT_DEVICE
+from asperity.analysis.results.analyze import Analysis, Progress, analyze
+from asperity.analysis.results.compare import DEFAULT_DEVICE
 from asperity.analysis.surface_sentences import depth_range_text, leak_energy_text
 from asperity.clamps import BACKED
 from asperity.core.files import check_not_existing
@@ -52,7 +52,8 @@ def export_code(
 ) -> tuple[Path, ...]:
     """Export a surface and its law as C code with one function, ``texture_force()``.
 
-    The numbers at the top of the file are those of :func:`~asperity.analysis.analyze.analyze`.
+    The numbers at the top of the file are those of
+    :func:`~asperity.analysis.results.analyze.analyze`.
 
     Args:
         surface: the surface; or a texture, or what names one, which gets the law and the stiffness
@@ -66,7 +67,7 @@ def export_code(
         progress: called with the name of each step of the analysis.
         **arguments: ``name``, ``precision``, ``max_data_size``, ``max_evaluations`` of
             :class:`~asperity.export.export_request.ExportRequest`; those of
-            :func:`~asperity.analysis.analyze.analyze` otherwise.
+            :func:`~asperity.analysis.results.analyze.analyze` otherwise.
 
     Returns:
         The files that were written.

@@ -114,7 +114,7 @@ def compute_limit(surface: Surface, device: Device) -> dict[str, Any]:
 def compute_recommendation(
     texture: Texture, device: Device, max_depth: float, clamp: str
 ) -> dict[str, Any]:
-    """Return what :func:`~asperity.analysis.compare.compare` recommends among all registered laws.
+    """Return what a comparison recommends among all registered laws.
 
     ``reason`` is the recommendation in words. If there is a law to show, ``changes`` are those of
     the scene that apply it, ``is_recommended`` is false for the law that comes nearest where no
@@ -122,8 +122,8 @@ def compute_recommendation(
     amount of texture, and ``grip`` the assumed hand.
     """
     # Imported by the worker process alone: the server starts sooner.
-    from asperity.analysis.compare import compare
     from asperity.analysis.limits.perceptibility_sentences import texture_amount_text
+    from asperity.analysis.results.compare import compare
     from asperity.perception.grip import grip_text
 
     laws = tuple(REGISTERED_LAWS.values())

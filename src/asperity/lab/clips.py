@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from asperity.analysis.compare import DEFAULT_DEVICE
+from asperity.analysis.results.compare import DEFAULT_DEVICE
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
 from asperity.core.files import to_plain_data

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from asperity.analysis.compare import DEFAULT_DEVICE
+from asperity.analysis.results.compare import DEFAULT_DEVICE
 from asperity.core.arguments import STIFFNESS
 from asperity.core.checks import check_real
 from asperity.core.errors import ParameterError

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from asperity.analysis.energy.loop_integral import loop_work
+from asperity.analysis.energy.field_energy import loop_work
 from asperity.core.checks import FloatArray
 from asperity.core.files import Serializable
 from asperity.paper.cases import PAPER_LAWS, SCANNING

@@ -18,7 +18,7 @@ import numpy as np
 from asperity.analysis.bounds.bound import spectral_norm
 from asperity.analysis.bounds.sampling import dense_maximum
 from asperity.analysis.energy.continuity import continuity
-from asperity.analysis.energy.loop_integral import integrate, loop_work
+from asperity.analysis.energy.field_energy import integrate, loop_work
 from asperity.analysis.gain.characteristic import characteristic_number
 from asperity.core.checks import FloatArray
 from asperity.core.files import read_toml

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.continuity import continuity
-from asperity.analysis.energy.loop_integral import loop_work
+from asperity.analysis.energy.field_energy import loop_work
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
 from asperity.core.display import Displayable
 from asperity.core.files import Serializable, read_toml

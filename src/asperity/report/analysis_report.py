@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from asperity.analysis.analyze import PASSIVITY_FIELDS, Analysis
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.passivity.assess_passivity import Passivity, stability_limit_text
+from asperity.analysis.results.analyze import PASSIVITY_FIELDS, Analysis
 from asperity.clamps import NONE
 from asperity.core.units import format_quantity
 from asperity.laws import LAWS, SHIPPED_LAW_ARGUMENTS

@@ -9,10 +9,10 @@ from typing import Any
 from rich.table import Table as RichTable
 
 from asperity.analysis.bounds.bound import Bound
-from asperity.analysis.compare import Comparison
 from asperity.analysis.limits.perceptibility_sentences import texture_amount_text, tier_text
 from asperity.analysis.passivity.assess_passivity import stability_limit_text
-from asperity.analysis.results import LawRow
+from asperity.analysis.results.compare import Comparison
+from asperity.analysis.results.recommendation import LawRow
 from asperity.core.arguments import Argument
 from asperity.core.units import format_quantity, round_down
 from asperity.report.page import Cell, Media, Row, Section, Table, TableLayout, terminal_section

@@ -5,10 +5,10 @@ from __future__ import annotations
 from functools import partial
 from operator import attrgetter
 
-from asperity.analysis.compare import Comparison
-from asperity.analysis.device_comparisons import DeviceComparisons
 from asperity.analysis.limits import perceptibility_sentences
-from asperity.analysis.results import LawRow
+from asperity.analysis.results.compare import Comparison
+from asperity.analysis.results.device_comparisons import DeviceComparisons
+from asperity.analysis.results.recommendation import LawRow
 from asperity.core.units import format_quantity
 from asperity.report import page
 from asperity.report.comparison_columns import (

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from asperity.analysis.limits.limit_result import percent
 from asperity.analysis.limits.perceptibility_sentences import force_magnitude_text
+from asperity.analysis.results.check_limits import percent
 from asperity.core.units import format_quantity
 from asperity.envelopes.find_design import Design
 from asperity.envelopes.searches import FORCE, MET

@@ -11,8 +11,8 @@ from asperity.analysis.limits.perceptibility_sentences import speed_text
 from asperity.core.errors import ParameterError
 from asperity.core.files import write_bytes
 from asperity.core.units import format_quantity
-from asperity.envelopes.borders import WaveBorders
 from asperity.envelopes.envelope import LISTED, DeviceEnvelope, Envelope
+from asperity.envelopes.wave_borders import WaveBorders
 from asperity.report import page
 from asperity.report.page import SCREEN, Cell, Media, Picture, Row, Section, Table, TableLayout
 from asperity.report.sentences.number_text import NOT_AVAILABLE

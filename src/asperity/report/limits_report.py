@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from asperity.analysis.limits import limit_result
 from asperity.analysis.limits.limit_rules import LIMIT_RULES
 from asperity.analysis.limits.perceptibility_sentences import speed_text, texture_amount_text
+from asperity.analysis.results import check_limits
 from asperity.core.units import format_quantity
 from asperity.report import page
 from asperity.report.comparison_columns import texture_name
@@ -48,7 +48,7 @@ def side_text(side: float | None, unit: str) -> str:
     return INFINITY_SIGN if side == float("inf") else format_quantity(side, unit)
 
 
-def six_limits_table(result: limit_result.Limits) -> Table:
+def six_limits_table(result: check_limits.Limits) -> Table:
     """Return one row per limit: number, name, condition, both sides, result, share and speeds."""
     rows = []
     for limit in result.limits:
@@ -60,21 +60,21 @@ def six_limits_table(result: limit_result.Limits) -> Table:
             side_text(limit.left, limit.unit),
             side_text(limit.right, limit.unit),
             page.holds_cell(limit.holds),
-            "" if limit.share is None else limit_result.percent(limit.share),
-            missing or limit_result.speeds_text(limit.speeds),
+            "" if limit.share is None else check_limits.percent(limit.share),
+            missing or check_limits.speeds_text(limit.speeds),
         ]
         style = "bold red" if limit.holds is False else "dim" if limit.holds is None else ""
         rows.append(Row(cells, style=style))
     return Table(_LIMIT_HEADINGS, rows, (3, 4, _SHARE_COLUMN), _LIMITS_LAYOUT)
 
 
-def listed_waves(result: limit_result.Limits) -> list[limit_result.RenderedWave]:
+def listed_waves(result: check_limits.Limits) -> list[check_limits.RenderedWave]:
     """Return the waves of the table, the longest first."""
     largest = sorted(result.waves, key=lambda wave: -wave.share)[:MAX_WAVES]
     return sorted(largest, key=lambda wave: -wave.wavelength)
 
 
-def _waves_table(result: limit_result.Limits, *, short: bool) -> Table:
+def _waves_table(result: check_limits.Limits, *, short: bool) -> Table:
     """Return wave, force and the limits met, a row per wave; ``short`` abbreviates the limits."""
 
     def cell(holds: bool | None) -> str | Cell:
@@ -85,11 +85,11 @@ def _waves_table(result: limit_result.Limits, *, short: bool) -> Table:
             [
                 format_quantity(wave.wavelength, "m"),
                 format_quantity(wave.amplitude, "m"),
-                limit_result.percent(wave.share),
+                check_limits.percent(wave.share),
                 format_quantity(wave.frequency, "Hz"),
                 format_quantity(wave.force, "N", digits=2),
                 *[cell(wave.holds.get(number)) for number in WAVE_LIMITS],
-                limit_result.speeds_text((0.0, wave.top_speed)),
+                check_limits.speeds_text((0.0, wave.top_speed)),
             ]
         )
         for wave in listed_waves(result)
@@ -99,7 +99,7 @@ def _waves_table(result: limit_result.Limits, *, short: bool) -> Table:
     return Table(headings, rows, range(len(_WAVE_HEADINGS)))
 
 
-def symbol_lines(result: limit_result.Limits) -> list[str]:
+def symbol_lines(result: check_limits.Limits) -> list[str]:
     """Return the symbols of the limits with their values."""
     device = result.device
     surface = result.surface
@@ -112,14 +112,14 @@ def symbol_lines(result: limit_result.Limits) -> list[str]:
     q = INFINITY_SIGN if result.gain.value == float("inf") else f"{result.gain.value:.4g}"
     numbers = ", ".join(values) or "no data"
     speed = speed_text(result.speed)
-    stiffness = limit_result.stiffness_text(result)
+    stiffness = check_limits.stiffness_text(result)
     return [
         sentence("symbols", speed=speed, limits=result, device=device.name, numbers=numbers),
         sentence("gain_symbol", law=surface.law.letter, stiffness=stiffness, limits=result, q=q),
     ]
 
 
-def limits_page(result: limit_result.Limits) -> page.Page:
+def limits_page(result: check_limits.Limits) -> page.Page:
     """Return the report: answer, limits, figure, waves and assumptions."""
     fields = [*dict.fromkeys(limit.device_field for limit in result.limits), "friction"]
     notes = [*symbol_lines(result), *table_notes("limits")]
@@ -134,7 +134,7 @@ def limits_page(result: limit_result.Limits) -> page.Page:
             Section("The six limits", limits, notes=notes, media=SCREEN | Media.NOTEBOOK),
             _figure_section(result),
             *(_waves_sections(result) if result.waves else ()),
-            *page.user_sections(limit_result.Limits, result),
+            *page.user_sections(check_limits.Limits, result),
             *page.assumption_sections(
                 result.assumptions, device_numbers_table(result.device, fields)
             ),
@@ -144,7 +144,7 @@ def limits_page(result: limit_result.Limits) -> page.Page:
     )
 
 
-def _facts(result: limit_result.Limits) -> list[tuple[str, str]]:
+def _facts(result: check_limits.Limits) -> list[tuple[str, str]]:
     texture = result.texture
     law = result.surface.law
     perceptibility = result.perceptibility
@@ -154,13 +154,13 @@ def _facts(result: limit_result.Limits) -> list[tuple[str, str]]:
         ("Law", f"{law.letter}, {readable_name(law.name)}"),
         ("Device", result.device.name),
         ("Scanning speed", speed_text(result.speed)),
-        ("Stiffness", limit_result.stiffness_text(result)),
-        ("Speeds at which all decided limits hold", limit_result.speeds_text(result.speeds)),
+        ("Stiffness", check_limits.stiffness_text(result)),
+        ("Speeds at which all decided limits hold", check_limits.speeds_text(result.speeds)),
         ("Texture force", f"{texture_amount_text(perceptibility)}: {perceptibility.tier}"),
     ]
 
 
-def _figure_section(result: limit_result.Limits) -> Section:
+def _figure_section(result: check_limits.Limits) -> Section:
     met = sum(all(wave.holds.values()) for wave in result.waves)
     figure = page.plot_later(result)
     media = Media.HTML | Media.NOTEBOOK
@@ -168,7 +168,7 @@ def _figure_section(result: limit_result.Limits) -> Section:
     return page.figure_section("limits.waves", figure, media=media, count=count, met=met)
 
 
-def _waves_sections(result: limit_result.Limits) -> list[Section]:
+def _waves_sections(result: check_limits.Limits) -> list[Section]:
     """Return the waves in numbers, for a page and for a terminal."""
     more = len(result.waves) - MAX_WAVES
     notes = [f"And {more} more with less of the height variance."] if more > 0 else []

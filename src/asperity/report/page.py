@@ -377,7 +377,7 @@ def add_section(result_type: type, section: Callable[..., Section | None]) -> No
     """Add a section to the page of every result of a type, before the assumptions.
 
     Args:
-        result_type: the type, such as :class:`~asperity.analysis.compare.Comparison`.
+        result_type: the type, such as :class:`~asperity.analysis.results.compare.Comparison`.
         section: called with the arguments of the page: a comparison, an analysis, limits; of a run
             its setup and the run. It returns a :class:`Section`, or ``None`` for none.
     """

@@ -7,12 +7,12 @@ from typing import Any
 
 from rich.console import RenderableType
 
-from asperity.analysis.analyze import Analysis
 from asperity.analysis.bounds.bound import Bound
-from asperity.analysis.compare import Comparison
-from asperity.analysis.device_comparisons import DeviceComparisons
-from asperity.analysis.limits.limit_result import Limits
 from asperity.analysis.passivity.assess_passivity import Passivity
+from asperity.analysis.results.analyze import Analysis
+from asperity.analysis.results.check_limits import Limits
+from asperity.analysis.results.compare import Comparison
+from asperity.analysis.results.device_comparisons import DeviceComparisons
 from asperity.core.files import json_text, text_digest
 from asperity.core.units import format_quantity
 from asperity.devices import Device

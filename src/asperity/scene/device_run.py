@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from asperity.analysis.compare import DEFAULT_DEVICE, compare
+from asperity.analysis.results.compare import DEFAULT_DEVICE, compare
 from asperity.clamps import BACKED
 from asperity.core.errors import ParameterError
 from asperity.core.files import Serializable, check_not_existing

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from asperity.analysis.compare import DEFAULT_DEVICE
+from asperity.analysis.results.compare import DEFAULT_DEVICE
 from asperity.analysis.surface_sentences import law_parameter_sentences
 from asperity.core.arguments import FIELD, parse_arguments
 from asperity.core.errors import ParameterError

@@ -19,8 +19,8 @@ from typing import Any, cast
 
 import numpy as np
 
-from asperity.analysis.check_limits import limits
-from asperity.analysis.compare import DEFAULT_DEVICE, compare
+from asperity.analysis.results.check_limits import limits
+from asperity.analysis.results.compare import DEFAULT_DEVICE, compare
 from asperity.core.checks import check_keywords
 from asperity.core.digests import content_digest, package_digest
 from asperity.core.display import Tabular

@@ -16,7 +16,7 @@ from asperity.analysis.bounds.bound import NORM, ONE_SIDED, Witness, one_sided, 
 from asperity.analysis.bounds.branch_and_bound import Problem
 from asperity.analysis.bounds.problems import LawProblem
 from asperity.analysis.bounds.sampling import highest_point, sample_supremum
-from asperity.analysis.gain import closed_forms as forms
+from asperity.analysis.gain import proofs as forms
 from asperity.core.checks import FloatArray
 from asperity.core.errors import InternalError
 from asperity.enclosures.cells import Cells

@@ -21,17 +21,15 @@ from asperity.analysis.bounds.bound import (
 )
 from asperity.analysis.bounds.branch_and_bound import Problem, Supremum, polish, supremum
 from asperity.analysis.bounds.sampling import HeightProblem
-from asperity.analysis.bounds.surface_problems import (
+from asperity.analysis.gain.medial_axis import crest_curvature
+from asperity.analysis.gain.proofs import (
     CrestProblem,
+    FrictionProblem,
     NormalChangeProblem,
     SlopeProblem,
-)
-from asperity.analysis.gain.friction_problem import (
-    FrictionProblem,
     largest_singular_value,
     largest_symmetric_eigenvalue,
 )
-from asperity.analysis.gain.medial_axis import crest_curvature
 from asperity.core.checks import FloatArray
 from asperity.core.errors import InternalError
 from asperity.enclosures.cells import Cells

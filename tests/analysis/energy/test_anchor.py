@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from asperity.analysis import loop_work
-from asperity.analysis.energy.loop_integral import anchored_segments
+from asperity.analysis.energy.field_energy import anchored_segments
 from asperity.contacts.contact import Contact
 from asperity.contacts.height_contacts import VerticalContact
 from asperity.core.arguments import Argument

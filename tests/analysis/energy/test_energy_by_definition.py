@@ -10,9 +10,10 @@ import pytest
 
 from asperity.analysis import loop_work
 from asperity.analysis.energy import curl_columns as columns
-from asperity.analysis.energy import leak, merit
-from asperity.analysis.energy import loop_integral as anchor
-from asperity.analysis.energy import loop_integral as loops
+from asperity.analysis.energy import field_energy as anchor
+from asperity.analysis.energy import field_energy as loops
+from asperity.analysis.energy import leak
+from asperity.analysis.energy import scan as scan_module
 from asperity.analysis.energy.curl_columns import Layer, column_polygon, positive_interval
 from asperity.analysis.energy.leak import worst_loop
 from asperity.core.checks import FloatArray
@@ -399,7 +400,7 @@ def test_merit_is_the_ripple_and_mean_slope_along_the_scan(letter: str) -> None:
     """Strength, support and lost contact are recomputed from points along the line."""
     texture = Sinusoid(0.2e-3, L, 0.4, (0.6, 0.8)) if letter != "D" else Sinusoid(2e-5, L)
     surface = Surface(texture, letter, K, 0.25e-3)
-    result, line = merit.merit(surface), texture.scan_line()
+    result, line = scan_module.merit(surface), texture.scan_line()
     t = (np.arange(2048) + 0.5) / 2048 * line.length
     xy = line.start + t[:, None] * line.direction
     height = surface.law.contact.extremes(texture)[1] - 0.25e-3
@@ -428,8 +429,8 @@ def test_ripple_below_rounding_is_zero(stiffness: float, monkeypatch: pytest.Mon
                 forces[0, :, 2] = size * (1.0 + part * np.array([1.0, -1.0, 1.0, -1.0]))
                 return forces, np.ones((1, 4)), 0.0
 
-            monkeypatch.setattr(merit, "_scan_forces_and_slopes", scan)
-            result = merit.merit(Surface(SAW, "A", stiffness, D))
+            monkeypatch.setattr(scan_module, "_scan_forces_and_slopes", scan)
+            result = scan_module.merit(Surface(SAW, "A", stiffness, D))
             assert (result.ripple > 0.0) is is_counted
             if is_counted:
                 assert result.ripple == pytest.approx(part * size, rel=1e-3)

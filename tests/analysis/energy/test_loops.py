@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import quad
 
 from asperity.analysis import loop_work
-from asperity.analysis.energy.loop_integral import initial_panels
+from asperity.analysis.energy.field_energy import initial_panels
 from asperity.core.errors import ParameterError
 from asperity.surface import Surface
 from asperity.textures.kinds.sinusoid import Sinusoid

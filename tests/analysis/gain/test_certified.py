@@ -27,12 +27,11 @@ from tests.analysis.gain.bound_checks import (
 
 from asperity.analysis import characteristic_number, one_sided_number
 from asperity.analysis.bounds.bound import CURL, NORM, ONE_SIDED, Bound, precise_norm
-from asperity.analysis.gain import closed_forms
-from asperity.analysis.gain import friction_problem as friction
-from asperity.analysis.gain.certificate import certify
-from asperity.analysis.gain.characteristic import curl_number
-from asperity.analysis.gain.friction_problem import largest_singular_value
+from asperity.analysis.gain import proofs
+from asperity.analysis.gain import proofs as friction
+from asperity.analysis.gain.characteristic import certify, curl_number
 from asperity.analysis.gain.medial_axis import SearchOptions
+from asperity.analysis.gain.proofs import largest_singular_value
 from asperity.analysis.gain.theorems import derivative_bound
 from asperity.reference import exact_jacobian
 from asperity.surface import Surface
@@ -95,15 +94,15 @@ def test_trials_detect_wrong_bounds(
 
 
 CLOSED_FORMS = [
-    ("A", "norm", closed_forms.q_a),
-    ("B", "norm", closed_forms.q_b),
-    ("C", "norm", closed_forms.q_c),
-    ("D", "norm", closed_forms.q_d),
-    ("G", "norm", closed_forms.q_g),
-    ("A", "one-sided", closed_forms.one_sided_a),
-    ("C", "one-sided", closed_forms.q_c),
-    ("A", "curl", closed_forms.curl_a),
-    ("E", "curl", closed_forms.curl_e),
+    ("A", "norm", proofs.q_a),
+    ("B", "norm", proofs.q_b),
+    ("C", "norm", proofs.q_c),
+    ("D", "norm", proofs.q_d),
+    ("G", "norm", proofs.q_g),
+    ("A", "one-sided", proofs.one_sided_a),
+    ("C", "one-sided", proofs.q_c),
+    ("A", "curl", proofs.curl_a),
+    ("E", "curl", proofs.curl_e),
 ]
 shapes = st.tuples(st.floats(-2.5, 1.0), st.floats(-2.0, 1.0), st.floats(-8.0, 3.0))
 

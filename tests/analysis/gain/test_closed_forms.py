@@ -10,8 +10,7 @@ import pytest
 
 from asperity.analysis import characteristic_number, one_sided_number
 from asperity.analysis.bounds.bound import one_sided, spectral_norm
-from asperity.analysis.gain.closed_forms import q_c, q_d
-from asperity.analysis.gain.friction_problem import largest_singular_value
+from asperity.analysis.gain.proofs import largest_singular_value, q_c, q_d
 from asperity.reference import exact_jacobian
 from asperity.surface import Surface
 from asperity.textures.kinds.fourier import Fourier

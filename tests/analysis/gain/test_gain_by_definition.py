@@ -13,13 +13,13 @@ from asperity.analysis import characteristic_number
 from asperity.analysis.bounds.bound import CURL, NORM, ONE_SIDED, precise_norm, precise_one_sided
 from asperity.analysis.bounds.branch_and_bound import supremum
 from asperity.analysis.bounds.problems import LawProblem
-from asperity.analysis.gain import closed_forms as forms
-from asperity.analysis.gain.friction_problem import (
+from asperity.analysis.gain import proofs as forms
+from asperity.analysis.gain.medial_axis import crest_curvature, gain_above_crest, sharpest_crest
+from asperity.analysis.gain.proofs import (
     FrictionProblem,
     largest_singular_value,
     largest_symmetric_eigenvalue,
 )
-from asperity.analysis.gain.medial_axis import crest_curvature, gain_above_crest, sharpest_crest
 from asperity.analysis.gain.theorems import derivative_bound, theorem_on
 from asperity.enclosures.cells import Cells
 from asperity.enclosures.taylor import TaylorModel

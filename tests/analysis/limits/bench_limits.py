@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from asperity.analysis.check_limits import limits
-from asperity.analysis.limits.limit_result import Limits
+from asperity.analysis.results.check_limits import Limits, limits
 from asperity.devices import Device, parse_device
 from asperity.textures import Sinusoid, Texture
 

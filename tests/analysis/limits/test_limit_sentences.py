@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from tests.analysis.limits.bench_limits import NUMBERS, A, L, V, default_limits, device, verdicts
 
-from asperity.analysis.check_limits import limits
+from asperity.analysis.results.check_limits import limits
 from asperity.textures import Fourier, HeightMap, Sinusoid
 
 TWO = Fourier([5e-5, 2.4e-5], [2 * math.pi / 0.8e-3, 2 * math.pi / 0.32e-3], [0.2, 1.0])

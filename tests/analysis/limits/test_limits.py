@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from tests.analysis.limits.bench_limits import A, D, L, V, default_limits, device, verdicts
 
 from asperity.analysis import characteristic_number, one_sided_number
-from asperity.analysis.check_limits import limits
-from asperity.analysis.compare import compare
-from asperity.analysis.energy.merit import merit
+from asperity.analysis.energy.scan import merit
+from asperity.analysis.results.check_limits import limits
+from asperity.analysis.results.compare import compare
 from asperity.core.errors import ParameterError
 from asperity.devices import parse_device
 from asperity.surface import Surface

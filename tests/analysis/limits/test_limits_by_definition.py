@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from asperity.analysis import check_limits
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.limits import perceptibility, spectrum
 from asperity.analysis.limits.limit_rules import (
@@ -19,15 +18,17 @@ from asperity.analysis.limits.limit_rules import (
     evaluate_limit,
 )
 from asperity.analysis.limits.perceptibility import (
+    MaskingSource,
+    Perceptibility,
     WaveScan,
     assess_perceptibility,
     classify_perceptibility,
     respond,
 )
-from asperity.analysis.limits.perceptibility_result import MaskingSource, Perceptibility
 from asperity.analysis.limits.perceptibility_sentences import unverified_text
 from asperity.analysis.limits.spectrum import Spectrum, Wave
 from asperity.analysis.passivity.verdict import StabilityLimit
+from asperity.analysis.results import check_limits
 from asperity.core.errors import ParameterError
 from asperity.devices import parse_device
 from asperity.perception.grip import Grip

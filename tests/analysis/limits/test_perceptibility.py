@@ -10,17 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from asperity.analysis.check_limits import limits
-from asperity.analysis.compare import compare
-from asperity.analysis.energy.merit import merit
-from asperity.analysis.limits.perceptibility import assess_perceptibility
-from asperity.analysis.limits.perceptibility_result import Perceptibility, Remedy
+from asperity.analysis.energy.scan import merit
+from asperity.analysis.limits.perceptibility import Perceptibility, Remedy, assess_perceptibility
 from asperity.analysis.limits.perceptibility_sentences import (
     form_removal_sentences,
     masking_text,
     remedies_text,
     texture_amount_text,
 )
+from asperity.analysis.results.check_limits import limits
+from asperity.analysis.results.compare import compare
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
 from asperity.devices import Device, device_names, load_device, parse_device

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from asperity.analysis.energy.scan_lines import scan_height
+from asperity.analysis.energy.scan import scan_height
 from asperity.analysis.limits import spectrum as module
 from asperity.analysis.limits.spectrum import (
     Spectrum,

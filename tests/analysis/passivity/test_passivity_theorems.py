@@ -15,9 +15,9 @@ from scipy.linalg import expm
 
 from asperity.analysis import characteristic_number, loop_work, one_sided_number
 from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.energy.field_energy import split_state
 from asperity.analysis.energy.leak import worst_loop
 from asperity.analysis.passivity.assess_passivity import Passivity, passivity
-from asperity.analysis.split.split_state import split_state
 from asperity.devices import parse_device
 from asperity.surface import Surface
 from asperity.textures.kinds.fourier import Fourier

@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from asperity.analysis.analyze import analyze
 from asperity.analysis.bounds.bound import Bound
-from asperity.analysis.check_limits import limits
-from asperity.analysis.compare import compare
 from asperity.analysis.energy.leak import worst_loop
 from asperity.analysis.passivity.assess_passivity import Passivity, passivity
+from asperity.analysis.results.analyze import analyze
+from asperity.analysis.results.check_limits import limits
+from asperity.analysis.results.compare import compare
 from asperity.core.errors import ParameterError
 from asperity.devices import Device, parse_device
 from asperity.rendering import rendered_surface

@@ -12,7 +12,7 @@ import pytest
 from tests.paper.claims.perturbations import replace_name
 
 import asperity.reference
-from asperity.analysis.energy.loop_integral import loop_work
+from asperity.analysis.energy.field_energy import loop_work
 from asperity.analysis.gain.characteristic import characteristic_number
 from asperity.laws import find_law
 from asperity.paper import CLAIMS, Claim, get_claim

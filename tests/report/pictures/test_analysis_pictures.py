@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from asperity.analysis.analyze import Analysis, analyze
+from asperity.analysis.results.analyze import Analysis, analyze
 from asperity.core.errors import ParameterError
 from asperity.devices import parse_device
 from asperity.report import plot

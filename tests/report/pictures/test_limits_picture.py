@@ -7,9 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from asperity.analysis.check_limits import limits
-from asperity.analysis.compare import compare
-from asperity.analysis.limits.limit_result import Limits
+from asperity.analysis.results.check_limits import Limits, limits
+from asperity.analysis.results.compare import compare
 from asperity.devices import parse_device
 from asperity.report.pictures.spectrum_pictures import (
     hand_figure,

@@ -11,7 +11,7 @@ import pytest
 
 import asperity as asp
 from asperity.analysis import loop_work
-from asperity.analysis.split.split_state import split_state
+from asperity.analysis.energy.field_energy import split_state
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.surface import Surface

@@ -7,7 +7,7 @@ import pytest
 from scipy.ndimage import maximum_filter
 
 import asperity as asp
-from asperity.analysis.split.split_state import split_state
+from asperity.analysis.energy.field_energy import split_state
 from asperity.surface import Surface
 from asperity.textures.fields.bake import BakeGoal, bake_texture
 from asperity.textures.fields.field_grid import RAMP, FieldGrid

@@ -10,8 +10,8 @@ import numpy as np
 
 from asperity.analysis.bounds.branch_and_bound import DIFFERENCE_AMPLIFICATION, ROUNDING_ERROR
 from asperity.analysis.energy import curl_columns
-from asperity.analysis.energy.loop_integral import initial_panels, integrate, loop_work
-from asperity.analysis.energy.scan_lines import parallel_scan_lines, scan_height, scan_line_along
+from asperity.analysis.energy.field_energy import initial_panels, integrate, loop_work
+from asperity.analysis.energy.scan import parallel_scan_lines, scan_height, scan_line_along
 from asperity.analysis.gain.characteristic import cached_result, is_shipped_law
 from asperity.core.checks import FloatArray, check_positive
 from asperity.core.errors import InternalError

@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 
 from asperity.analysis.bounds.bound import CURL, NORM, ONE_SIDED, Bound, JacobianMeasure
 from asperity.analysis.bounds.branch_and_bound import Problem
-from asperity.analysis.bounds.surface_problems import NormalChangeProblem, SlopeProblem
-from asperity.analysis.gain import closed_forms as forms
-from asperity.analysis.gain import friction_problem, medial_axis
+from asperity.analysis.gain import medial_axis, proofs
+from asperity.analysis.gain import proofs as forms
+from asperity.analysis.gain.proofs import NormalChangeProblem, SlopeProblem
 from asperity.clamps import BACKED, LATERAL, WHOLE, Clamp
 from asperity.core.errors import ParameterError
 from asperity.enclosures.cells import Cells
@@ -130,10 +130,8 @@ def _norm_bound_from(bound: Callable[[float, float], float]) -> Callable[[Surfac
 _ALL_CLAMPS = (WHOLE, LATERAL, BACKED)
 
 
-def _friction_reduction(entries: friction_problem.EntryMeasure) -> Reduction:
-    return Reduction(
-        lambda surface, cells: friction_problem.FrictionProblem(surface, cells, entries)
-    )
+def _friction_reduction(entries: proofs.EntryMeasure) -> Reduction:
+    return Reduction(lambda surface, cells: proofs.FrictionProblem(surface, cells, entries))
 
 
 THEOREMS: dict[Law, Theorem] = {
@@ -192,10 +190,10 @@ THEOREMS: dict[Law, Theorem] = {
     ),
     LAWS["F"]: Theorem(
         reductions={
-            NORM: _friction_reduction(friction_problem.largest_singular_value),
-            ONE_SIDED: _friction_reduction(friction_problem.largest_symmetric_eigenvalue),
+            NORM: _friction_reduction(proofs.largest_singular_value),
+            ONE_SIDED: _friction_reduction(proofs.largest_symmetric_eigenvalue),
         },
-        norm_bound=friction_problem.norm_bound_f,
+        norm_bound=proofs.norm_bound_f,
         not_raised_by_clamp=dict.fromkeys(_ALL_CLAMPS, (NORM, ONE_SIDED)),
     ),
     LAWS["G"]: Theorem(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from asperity.analysis.limits.perceptibility_result import MaskingSource, Perceptibility, Remedy
+from asperity.analysis.limits.perceptibility import MaskingSource, Perceptibility, Remedy
 from asperity.core.units import format_quantity
 from asperity.devices import Device
 from asperity.perception.grip import Grip, grip_text

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from asperity.analysis.energy.scan_lines import scan_height
+from asperity.analysis.energy.scan import scan_height
 from asperity.analysis.gain.characteristic import cached_result, is_shipped_law
 from asperity.core.cache import get_or_compute
 from asperity.core.checks import FloatArray
@@ -283,7 +283,7 @@ def wave_force_components(
     """Return the force amplitude of every wave of a texture, along the wall and along its normal.
 
     The probe moves at constant height, as deep as
-    :func:`~asperity.analysis.energy.merit.merit` scans; a law with state slides at full
+    :func:`~asperity.analysis.energy.scan.merit` scans; a law with state slides at full
     deflection. For a sum of waves the force is fitted by the same waves (least squares). For bands
     it is the amplitude of the band times the square root of the ratio of force variance to height
     variance on the same patch.

@@ -9,8 +9,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from asperity.analysis.energy.field_energy import loop_work
 from asperity.analysis.energy.leak import worst_loop
-from asperity.analysis.energy.loop_integral import loop_work
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
 from asperity.core.checks import FloatArray
 from asperity.devices import load_device

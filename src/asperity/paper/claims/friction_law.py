@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from asperity.analysis.energy.loop_integral import loop_work
+from asperity.analysis.energy.field_energy import loop_work
 from asperity.core.checks import FloatArray
 from asperity.paper import claim
 from asperity.paper.cases import (

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from asperity.analysis.energy.continuity import continuity
-from asperity.analysis.energy.loop_integral import loop_work
+from asperity.analysis.energy.field_energy import loop_work
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
 from asperity.paper import cases, formula_checks
 from asperity.paper.claim import Check, check_statement, check_values, combine_checks

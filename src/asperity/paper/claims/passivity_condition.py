@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from asperity.analysis.energy.loop_integral import loop_work
+from asperity.analysis.energy.field_energy import loop_work
 from asperity.analysis.gain.characteristic import characteristic_number
 from asperity.core.checks import FloatArray
 from asperity.laws import Law, find_law

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from asperity.analysis.energy.loop_integral import loop_work
-from asperity.analysis.gain.closed_forms import q_b, q_c, q_g
+from asperity.analysis.energy.field_energy import loop_work
+from asperity.analysis.gain.proofs import q_b, q_c, q_g
 from asperity.laws import Law, find_law
 from asperity.paper.cases import PASSIVITY, SCANNING, SETTINGS, ExperimentCase, random_settings
 from asperity.paper.claim import Check, check_statement, check_values, combine_checks

@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from asperity.analysis.energy.loop_integral import loop_work
+from asperity.analysis.energy.field_energy import loop_work
 from asperity.analysis.gain.characteristic import characteristic_number
 from asperity.laws import find_law
 from asperity.paper import claim

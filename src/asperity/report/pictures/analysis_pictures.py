@@ -15,8 +15,8 @@ from matplotlib.patheffects import Stroke, withStroke
 from matplotlib.quiver import Quiver
 from matplotlib.ticker import FuncFormatter, SymmetricalLogLocator
 
-from asperity.analysis.analyze import Analysis
 from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.results.analyze import Analysis
 from asperity.core.checks import FloatArray
 from asperity.core.units import format_quantity
 from asperity.report.pictures import analysis_windows, law_pictures, style

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from asperity.analysis.analyze import Analysis
 from asperity.analysis.bounds.bound import Bound, spectral_norm
 from asperity.analysis.bounds.sampling import highest_point
+from asperity.analysis.results.analyze import Analysis
 from asperity.core.checks import FloatArray
 from asperity.report.pictures.law_pictures import Window
 from asperity.report.pictures.scan_plane import ScanSegment, choose_segment, feature_length

@@ -12,8 +12,8 @@ from matplotlib.ticker import FuncFormatter
 
 from asperity.analysis.limits.perceptibility_sentences import speed_text
 from asperity.core.units import format_quantity
-from asperity.envelopes.borders import AMPLITUDE_RANGE
 from asperity.envelopes.envelope import DeviceEnvelope, Envelope, LawEnvelope, SurfacePeaks
+from asperity.envelopes.wave_borders import AMPLITUDE_RANGE
 from asperity.report.pictures import style
 
 _MILLI = 1e3

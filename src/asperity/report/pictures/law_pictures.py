@@ -16,9 +16,9 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-from asperity.analysis.compare import Comparison
-from asperity.analysis.energy.scan_lines import scan_height
-from asperity.analysis.results import LawRow
+from asperity.analysis.energy.scan import scan_height
+from asperity.analysis.results.compare import Comparison
+from asperity.analysis.results.recommendation import LawRow
 from asperity.core.units import format_quantity
 from asperity.report.pictures import scan_plane, style
 from asperity.report.sentences.number_text import bound_text, number_text, strength_has_unit

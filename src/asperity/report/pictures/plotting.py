@@ -8,9 +8,9 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from asperity.analysis.analyze import Analysis
-from asperity.analysis.compare import Comparison
-from asperity.analysis.limits.limit_result import Limits
+from asperity.analysis.results.analyze import Analysis
+from asperity.analysis.results.check_limits import Limits
+from asperity.analysis.results.compare import Comparison
 from asperity.core.errors import ParameterError
 from asperity.envelopes.envelope import Envelope
 from asperity.recording.recording import Recording
@@ -31,11 +31,12 @@ def plot(result: Any, picture: str | None = None) -> Figure:
     """Return a figure of a result.
 
     Args:
-        result: a :class:`~asperity.analysis.compare.Comparison` (the surface, the forces and
-            the fields of all laws), a :class:`~asperity.surface.Surface` (forces and field of its
-            law), a texture (the surface), an :class:`~asperity.analysis.analyze.Analysis`
+        result: a :class:`~asperity.analysis.results.compare.Comparison` (the surface, the forces
+            and the fields of all laws), a :class:`~asperity.surface.Surface` (forces and field of
+            its law), a texture (the surface), an
+            :class:`~asperity.analysis.results.analyze.Analysis`
             (the field with the worst loop, the loop gain, the singular values), the
-            :class:`~asperity.analysis.limits.limit_result.Limits` (waves and their forces), an
+            :class:`~asperity.analysis.results.check_limits.Limits` (waves and their forces), an
             :class:`~asperity.Envelope` (the sinusoids that devices render), a
             :class:`~asperity.simulation.Run` or a :class:`~asperity.Recording` (motion, force,
             energy, phase).

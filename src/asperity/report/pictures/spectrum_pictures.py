@@ -11,11 +11,11 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 from numpy.typing import NDArray
 
-from asperity.analysis.compare import Comparison
-from asperity.analysis.energy.scan_lines import parallel_line_points
-from asperity.analysis.limits.limit_result import Limits, stiffness_text
+from asperity.analysis.energy.scan import parallel_line_points
 from asperity.analysis.limits.limit_rules import shortest_wavelengths
 from asperity.analysis.limits.perceptibility_sentences import speed_text
+from asperity.analysis.results.check_limits import Limits, stiffness_text
+from asperity.analysis.results.compare import Comparison
 from asperity.core.checks import FloatArray
 from asperity.core.units import format_quantity
 from asperity.devices import Device

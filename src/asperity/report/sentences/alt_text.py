@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from asperity.analysis.analyze import Analysis
-from asperity.analysis.compare import Comparison
+from asperity.analysis.results.analyze import Analysis
+from asperity.analysis.results.compare import Comparison
 from asperity.core.units import format_quantity
 from asperity.report.sentences.number_text import bound_text
 from asperity.report.sentences.texts import sentence

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 
 from asperity.analysis.bounds.bound import Bound
-from asperity.analysis.compare import Comparison
-from asperity.analysis.results import LawRow
+from asperity.analysis.results.compare import Comparison
+from asperity.analysis.results.recommendation import LawRow
 from asperity.core.units import format_quantity, round_down
 
 INFINITY_SIGN = "∞"

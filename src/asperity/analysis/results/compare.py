@@ -9,17 +9,16 @@ from functools import cached_property
 from typing import Any
 
 from asperity.analysis.bounds.bound import NORM, ONE_SIDED
-from asperity.analysis.comparison_assumptions import comparison_assumptions
 from asperity.analysis.energy.continuity import continuity
 from asperity.analysis.energy.leak import worst_loop
-from asperity.analysis.energy.merit import merit as compute_merit
+from asperity.analysis.energy.scan import merit as compute_merit
 from asperity.analysis.gain.characteristic import cached_number, is_shipped_law, surface_content
 from asperity.analysis.limits.limit_rules import DEFAULT_SPEED
 from asperity.analysis.limits.perceptibility import assess_perceptibility
 from asperity.analysis.passivity.assess_passivity import passivity
 from asperity.analysis.passivity.verdict import at_recommended_stiffness, recommend_stiffness
-from asperity.analysis.recommendation import recommend, recommendation_text
-from asperity.analysis.results import LawRow
+from asperity.analysis.results.comparison_assumptions import comparison_assumptions
+from asperity.analysis.results.recommendation import LawRow, recommend, recommendation_text
 from asperity.core.arguments import DEFAULT_STIFFNESS, FIELD
 from asperity.core.checks import check_keywords, check_positive
 from asperity.core.digests import content_digest
@@ -145,7 +144,7 @@ def compare(
         texture: the surface, or what names it on the command line: "sandpaper:grit=P60", "cloth",
             the path of a measured file; see :func:`~asperity.textures.catalogue.as_texture`.
         device: id of the catalogue, TOML file, or a :class:`~asperity.devices.Device`; several:
-            :func:`~asperity.analysis.device_comparisons.compare_devices`.
+            :func:`~asperity.analysis.results.device_comparisons.compare_devices`.
         laws: letters or names, or user-defined laws.
         stiffness: stiffness of all laws [N/m]; by default the recommended stiffness of each law
             on this device.

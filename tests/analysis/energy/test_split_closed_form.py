@@ -8,7 +8,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from asperity.analysis.split.split_state import split_state
+from asperity.analysis.energy.field_energy import split_state
 from asperity.clamps import NONE
 from asperity.core.checks import FloatArray
 from asperity.kernels.fuse import fuse_surface

@@ -16,7 +16,7 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from asperity.analysis import characteristic_number, loop_work, one_sided_number
-from asperity.analysis.split.split_state import split_state
+from asperity.analysis.energy.field_energy import split_state
 from asperity.core.errors import ParameterError
 from asperity.laws import Law
 from asperity.surface import Surface

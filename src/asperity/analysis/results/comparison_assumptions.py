@@ -8,8 +8,7 @@ from asperity.analysis import surface_sentences
 from asperity.analysis.limits import perceptibility_sentences
 from asperity.analysis.limits.limit_rules import DEFAULT_SPEED
 from asperity.analysis.passivity.criteria import damping_assumption
-from asperity.analysis.recommendation import simulated_loops_text
-from asperity.analysis.results import LawRow
+from asperity.analysis.results.recommendation import LawRow, simulated_loops_text
 from asperity.core.units import format_quantity
 from asperity.devices import Device
 from asperity.perception.grip import Grip

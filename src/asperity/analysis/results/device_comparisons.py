@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from asperity.analysis.compare import SCHEMA, Comparison, compare, missing_data_hint
 from asperity.analysis.limits.perceptibility_sentences import texture_amount_text
+from asperity.analysis.results.compare import SCHEMA, Comparison, compare, missing_data_hint
 from asperity.core.checks import check_items
 from asperity.core.display import Reportable, Tabular
 from asperity.core.errors import ParameterError
@@ -134,13 +134,14 @@ def compare_devices(
     """Compare laws on each of several devices, at each of several depths.
 
     Args:
-        texture: the surface, or what names it; see :func:`~asperity.analysis.compare.compare`.
+        texture: the surface, or what names it; see
+            :func:`~asperity.analysis.results.compare.compare`.
         devices: ids of the catalogue, TOML files, or devices.
         max_depths: depths to which the surface is pressed [m]; by default that of
-            :func:`~asperity.analysis.compare.compare`.
+            :func:`~asperity.analysis.results.compare.compare`.
         laws: letters or names; all by default.
         progress: called before each law.
-        **arguments: further arguments of :func:`~asperity.analysis.compare.compare`.
+        **arguments: further arguments of :func:`~asperity.analysis.results.compare.compare`.
 
     Raises:
         ParameterError: without any device, and as for ``compare``. A device with too little data

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import asperity as asp
-from asperity.analysis.split.split_state import split_state
+from asperity.analysis.energy.field_energy import split_state
 from asperity.contacts.split import optimality, solver, split_evaluation
 from asperity.surface import Surface
 from asperity.textures.spline.spline_texture import HeightMap

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from asperity.analysis.split.split_state import split_state
+from asperity.analysis.energy.field_energy import split_state
 from asperity.surface import Surface
 from asperity.textures.kinds.sinusoid import Sinusoid
 from asperity.textures.spline.spline_texture import Profile

@@ -12,10 +12,9 @@ import numpy as np
 
 from asperity.analysis.bounds.bound import NORM, ONE_SIDED, Bound
 from asperity.analysis.bounds.branch_and_bound import DEFAULT_WORK_LIMIT
-from asperity.analysis.compare import DEFAULT_DEVICE, recommended_law
 from asperity.analysis.energy.continuity import Continuity, continuity
 from asperity.analysis.energy.leak import Leak, worst_loop
-from asperity.analysis.energy.merit import Merit, merit
+from asperity.analysis.energy.scan import Merit, merit
 from asperity.analysis.gain.characteristic import cached_number, curl_number, make_options
 from asperity.analysis.passivity.assess_passivity import (
     Passivity,
@@ -26,6 +25,7 @@ from asperity.analysis.passivity.assess_passivity import (
 )
 from asperity.analysis.passivity.criteria import LEAK
 from asperity.analysis.passivity.verdict import at_recommended_stiffness, recommend_stiffness
+from asperity.analysis.results.compare import DEFAULT_DEVICE, recommended_law
 from asperity.analysis.surface_sentences import (
     SCOPE_SENTENCE,
     default_depth_text,

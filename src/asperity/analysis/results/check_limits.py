@@ -1,17 +1,24 @@
-"""The result of checking the six limits for one surface, device and speed, and its sentences."""
+"""The six limits of the paper's section II.B for a surface on a device."""
 
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from asperity.analysis import surface_sentences
-from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.bounds.bound import NORM, ONE_SIDED, Bound
+from asperity.analysis.energy.scan import scan_force
+from asperity.analysis.gain.characteristic import cached_number
+from asperity.analysis.limits import limit_rules
 from asperity.analysis.limits.limit_rules import Limit
-from asperity.analysis.limits.perceptibility_result import Perceptibility
+from asperity.analysis.limits.perceptibility import Perceptibility, assess_perceptibility
 from asperity.analysis.limits.perceptibility_sentences import (
     masking_text,
     perceptibility_assumptions,
@@ -19,15 +26,22 @@ from asperity.analysis.limits.perceptibility_sentences import (
     speed_text,
     texture_amount_text,
 )
-from asperity.analysis.limits.spectrum import Spectrum
+from asperity.analysis.limits.spectrum import MIN_SHARE, Spectrum, compute_spectrum, wave_forces
+from asperity.analysis.passivity import verdict
 from asperity.analysis.passivity.assess_passivity import stability_limit_text
 from asperity.analysis.passivity.verdict import Margin, StabilityLimit
+from asperity.analysis.results.compare import DEFAULT_DEVICE, recommended_law
+from asperity.core.arguments import DEFAULT_STIFFNESS, FIELD
+from asperity.core.checks import FloatArray, check_keywords, check_positive
 from asperity.core.display import Plottable, Reportable, Tabular
 from asperity.core.files import Serializable, attributes_to_dict
 from asperity.core.units import format_quantity, round_down
-from asperity.devices import Device
-from asperity.perception.grip import Grip
-from asperity.surface import Surface
+from asperity.devices import Device, DeviceLike, load_device
+from asperity.laws import Law
+from asperity.perception.grip import DEFAULT_GRIP, Grip, load_grip
+from asperity.rendering import rendered_surface
+from asperity.surface import SURFACE_KEYWORDS, Surface
+from asperity.textures.catalogue import TextureLike, as_texture
 from asperity.textures.texture import Texture
 
 SCHEMA = 4
@@ -319,3 +333,201 @@ def _default_sentences(result: Limits, defaults: Mapping[str, bool]) -> list[str
     if defaults["max_depth"]:
         sentences.append(surface_sentences.default_depth_text(result.surface))
     return sentences + surface_sentences.law_parameter_sentences(result.surface)
+
+
+def limits(
+    texture: TextureLike,
+    device: DeviceLike = DEFAULT_DEVICE,
+    speed: float | None = None,
+    law: str | Law | None = None,
+    stiffness: float | None = None,
+    max_depth: float | None = None,
+    *,
+    time_samples: float | None = None,
+    position_samples: float | None = None,
+    force_steps: float | None = None,
+    rendering: str = FIELD,
+    grip: str | os.PathLike[str] | Grip = DEFAULT_GRIP,
+    **surface_arguments: Any,
+) -> Limits:
+    """Check the six limits of haptic texture synthesis for a surface on a device.
+
+    α v T < l, β δ < l, α δ < l, γ b < A_F, q k <= K₀, v/l < F₀: for every wave of the texture,
+    each with its own length l, amplitude and force A_F. They are necessary, not sufficient, to
+    feel the texture undistorted. Undecidable limits are listed with the missing device data.
+
+    Args:
+        texture: the surface, or what names it; see
+            :func:`~asperity.analysis.results.compare.compare`.
+        device: id of the catalogue, TOML file, or a :class:`~asperity.devices.Device`.
+        speed: v, speed of the scan [m/s]; 0.1 by default.
+        law: letter or name, or a user-defined law; by default the law recommended by a comparison.
+        stiffness: k [N/m]; by default the recommended stiffness, as in a comparison; K₀ where no
+            stable stiffness is known.
+        max_depth: depth to which the surface is pressed [m]; by default its peak-to-valley
+            height, at most 1 mm.
+        time_samples: α, updates that a wave needs; at least 2, by the paper 5 to 10; default 5.
+        position_samples: β, position steps that a wave needs; at least 2, default 5.
+        force_steps: γ, force steps that an amplitude needs; at least 1, default 5.
+        rendering: see :func:`~asperity.analysis.results.analyze.analyze`.
+        grip: see :func:`~asperity.analysis.results.compare.compare`.
+        **surface_arguments: further arguments of :class:`~asperity.surface.Surface`.
+
+    Raises:
+        ParameterError: for a value that cannot be used; it names the argument.
+
+    Reference:
+        Campion and Hayward, section II.B. Limit 4 is printed as γ b/l < A and limit 5 as
+        2πA/l < A₀, with inconsistent dimensions; 2 and 3 are one condition as printed.
+
+    Example:
+        >>> from asperity.textures.kinds.sinusoid import Sinusoid
+        >>> result = limits(Sinusoid(amplitude=1e-4, period=1e-3), "pantograph", law="A")
+        >>> [(limit.number, limit.holds) for limit in result.limits]
+        [(1, True), (2, True), (3, True), (4, None), (5, True), (6, True)]
+        >>> result.limit(4).missing_data, result.speeds
+        (('force_resolution',), (0.0, 0.4))
+    """
+    check_keywords(surface_arguments, SURFACE_KEYWORDS, limits)
+    device = load_device(device)
+    texture = as_texture(texture)
+    v = limit_rules.DEFAULT_SPEED if speed is None else check_positive("speed", speed, "m/s")
+    samples = time_samples, position_samples, force_steps
+    settings: dict[str, Any] = {"speed": v} | {
+        name: limit_rules.check_sample_count(name, value)
+        for name, value in zip(limit_rules.LEAST_SAMPLES, samples, strict=True)
+    }
+    if law is None:
+        law = recommended_law(
+            texture, device, max_depth, speed=v, rendering=rendering, **surface_arguments
+        )
+    k = DEFAULT_STIFFNESS if stiffness is None else stiffness
+    surface = Surface(texture, law, k, max_depth, **surface_arguments)
+    surface = rendered_surface(surface, rendering)
+    q = cached_number(surface, NORM)
+    one_sided = cached_number(surface, ONE_SIDED)
+    recommended = verdict.recommend_stiffness(surface, device, q, one_sided)
+    if stiffness is None:
+        surface = verdict.at_recommended_stiffness(surface, device, recommended)
+    scan = scan_force(surface)
+    hand = load_grip(grip)
+    perceptibility = assess_perceptibility(
+        surface,
+        device,
+        texture.texture_part(),
+        rms=scan.ripple * surface.stiffness,
+        explicit_depth=max_depth is not None,
+        grip=hand,
+        **settings,
+    )
+    gain = _limiting_number(q, one_sided, recommended.stability_limit)
+    result = _evaluate_limits(surface, device, recommended, *gain, perceptibility, hand, settings)
+    given = {"speed": speed, "stiffness": stiffness, "max_depth": max_depth}
+    defaults = {name: value is None for name, value in given.items()}
+    defaults["samples"] = None in {time_samples, position_samples, force_steps}
+    assumptions = limits_assumptions(result, defaults, scan.contact_lost)
+    return replace(result, assumptions=assumptions)
+
+
+def _evaluate_limits(
+    surface: Surface,
+    device: Device,
+    recommended: verdict.StiffnessRecommendation,
+    gain: Bound,
+    gain_symbol: str,
+    perceptibility: Perceptibility,
+    grip: Grip,
+    settings: dict[str, float],
+) -> Limits:
+    """Return the six limits, without sentences."""
+    spectrum = compute_spectrum(surface.texture)
+    forces = wave_forces(surface, spectrum)
+    is_significant = _significant_waves(spectrum, forces)
+    data = {field: datum.value for field, datum in device.data.items()}
+    if recommended.wall_stiffness is not None:
+        data["max_stiffness"] = recommended.wall_stiffness
+    case = limit_rules.LimitCase(
+        device=data,
+        wavelengths=spectrum.wavelengths[is_significant],
+        forces=forces[is_significant],
+        shares=spectrum.shares[is_significant],
+        gain=gain.value,
+        stiffness=surface.stiffness,
+        **settings,
+    )
+    decisions = [
+        limit_rules.evaluate_limit(
+            rule, case, f"{gain_symbol} k ≤ K₀" if rule.number == 5 else None
+        )
+        for rule in limit_rules.LIMIT_RULES
+    ]
+    six = tuple(decision.limit for decision in decisions)
+    top = min((limit.speeds[1] for limit in six if limit.speeds is not None), default=math.inf)
+    return Limits(
+        surface=surface,
+        device=device,
+        gain=gain,
+        gain_symbol=gain_symbol,
+        stability_limit=recommended.stability_limit,
+        margin=recommended.margin,
+        limits=six,
+        waves=_rendered_waves(spectrum, is_significant, case, decisions),
+        spectrum=spectrum,
+        perceptibility=perceptibility,
+        grip=grip,
+        speeds=(0.0, top),
+        assumptions=(),
+        **settings,
+    )
+
+
+def _limiting_number(
+    q: Bound, one_sided: Bound, stability_limit: verdict.StabilityLimit
+) -> tuple[Bound, str]:
+    """Return the number that limits the stiffness on this device, and its symbol.
+
+    It is q for an unknown delay, q⁺ without delay, and in between for d samples of delay.
+    """
+    delay = stability_limit.delay
+    if delay is None or math.isinf(delay):
+        return q, "q"
+    if delay == 0.0:
+        return one_sided, "q⁺"
+    share = delay / (0.5 + delay)
+    lower, upper = (
+        share * full + (1.0 - share) * plus
+        for full, plus in ((q.lower, one_sided.lower), (q.upper, one_sided.upper))
+    )
+    return replace(q, lower=lower, upper=upper), "(q⁺/2 + d q)/(1/2 + d)"
+
+
+def _significant_waves(spectrum: Spectrum, forces: FloatArray) -> NDArray[np.bool_]:
+    """Return which waves count: all waves of a sum, and bands with enough height or force."""
+    if spectrum.exact:
+        return np.ones(len(forces), dtype=bool)
+    squares = forces**2
+    force_shares = squares / (float(squares.sum()) or 1.0)  # the smooth wall has no force
+    return np.asarray((spectrum.shares >= MIN_SHARE) | (force_shares >= MIN_SHARE))
+
+
+def _rendered_waves(
+    spectrum: Spectrum,
+    is_significant: NDArray[np.bool_],
+    case: limit_rules.LimitCase,
+    decisions: Sequence[limit_rules.Decision],
+) -> tuple[RenderedWave, ...]:
+    """Return the significant waves, each with its limits."""
+    on_waves = [one for one in decisions if one.limit.holds is not None and one.limit.number != 5]
+    waves = [spectrum.waves[i] for i in np.flatnonzero(is_significant)]
+    return tuple(
+        RenderedWave(
+            wavelength=wave.wavelength,
+            amplitude=wave.amplitude,
+            share=wave.share,
+            frequency=case.speed / wave.wavelength,
+            force=float(case.forces[i]),
+            holds={one.limit.number: bool(one.holds[i]) for one in on_waves},
+            top_speed=min((float(one.top_speeds[i]) for one in on_waves), default=math.inf),
+        )
+        for i, wave in enumerate(waves)
+    )

@@ -1,0 +1,1 @@
+"""Results: comparisons, analyses and the six limits, from a surface and a device."""
