@@ -39,7 +39,7 @@ heights[side // 8 : side // 4, side // 3 : side // 2] = np.nan
 """
 
 _PREPARE = """
-from asperity.textures.texture_loading import prepare_file
+from asperity.measured.measured_file import prepare_file
 from asperity.measured.prepared import save_prepared
 start = perf_counter()
 prepared = prepare_file(path, pitch=1e-6, magnify=20.0, **json.loads(sys.argv[2]))

@@ -31,6 +31,7 @@ from asperity.envelopes.find_design import Design as Design
 from asperity.envelopes.find_design import design as design
 from asperity.export.export_surface import export_code as export_code
 from asperity.laws import Law as Law
+from asperity.measured.measured_file import show as show
 from asperity.recording.recording import Recording as Recording
 from asperity.recording.recording import open_recording as open_recording
 from asperity.recording.replay import Replay as Replay
@@ -60,4 +61,3 @@ from asperity.textures import named_surface as named_surface
 from asperity.textures import surface_names as surface_names
 from asperity.textures.fields.field_file import save_field as save_field
 from asperity.textures.fields.potential_field import PotentialField as PotentialField
-from asperity.textures.texture_loading import show as show

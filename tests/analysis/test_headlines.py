@@ -25,7 +25,7 @@ from asperity.core.errors import ParameterError
 from asperity.devices import Device, device_names, load_device
 from asperity.scene import load_scene
 from asperity.textures import Sinusoid, load_texture
-from asperity.textures.synthetic import prepare_texture
+from asperity.textures.kinds.prepare_synthetic import prepare_texture
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
 needs_data = pytest.mark.skipif(not DATA.is_dir(), reason=f"no sample surfaces in {DATA}")

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from asperity.measured import measured_file as loading
 from asperity.scene import load_scene
 from asperity.textures import HeightMap, load_texture
-from asperity.textures import texture_loading as loading
 
 Call = Callable[..., tuple[int, str, str]]
 

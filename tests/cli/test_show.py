@@ -12,10 +12,10 @@ import pytest
 from tests.report.pages import check_alone, check_alts
 
 import asperity as asp
+from asperity.measured.measured_file import MeasurementSummary
 from asperity.report import html_text
 from asperity.report.measured_report import measured_sections
 from asperity.report.page import Paragraph, Section, add_section
-from asperity.textures.texture_loading import MeasurementSummary
 
 Call = Callable[..., tuple[int, str, str]]
 PLAIN = ["--pitch", "2um", "--unit", "m"]

@@ -24,7 +24,7 @@ from asperity.report.surface_gallery import find_surfaces, surfaces_page
 from asperity.scene import TEXTURE_KINDS, load_scene
 from asperity.textures import Sinusoid
 from asperity.textures.catalogue import CATALOGUE
-from asperity.textures.library import LIBRARY
+from asperity.textures.kinds.named_surfaces import LIBRARY
 
 
 def call(*arguments: str) -> Result:

@@ -22,9 +22,9 @@ from asperity.analysis.results import compare
 from asperity.core import cache, digests
 from asperity.core.files import json_text
 from asperity.laws import LAWS, Law
+from asperity.measured.measured_file import prepare_file
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Profile, Sinusoid, Texture
-from asperity.textures.texture_loading import prepare_file
 
 pytestmark = pytest.mark.caches_results
 Compute = Callable[[], Any]

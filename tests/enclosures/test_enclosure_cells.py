@@ -23,7 +23,7 @@ from asperity.enclosures.cells import (
 )
 from asperity.enclosures.taylor import TaylorModel
 from asperity.textures import Fourier, HeightMap, Profile, Sinusoid, Texture
-from asperity.textures.bounds.wave_cells import nearest_phases
+from asperity.textures.plane_waves import nearest_phases
 
 RNG = np.random.default_rng(20260611)
 ROUGH = RNG.normal(size=(7, 9))

@@ -13,7 +13,7 @@ from asperity.core.errors import SurfaceFileError
 from asperity.measured.preparation import magnify_surface, prepare
 from asperity.measured.prepared import PreparationStage, load_prepared, parse_stages, save_prepared
 from asperity.measured.reading import RawSurface
-from asperity.textures.texture_loading import texture_from_prepared
+from asperity.textures.catalogue import texture_from_prepared
 
 MICRO = 1e-6
 

@@ -10,6 +10,7 @@ import pytest
 from tests.lab.browser import Browser
 
 import asperity as asp
+from asperity.measured.measured_file import show
 from asperity.paper.experiments.cycle_counts import passivity_experiment
 from asperity.paper.experiments.device_onsets import DeviceExperiment, device_onset
 from asperity.paper.experiments.experiment_suite import Experiments
@@ -24,7 +25,6 @@ from asperity.scene import load_scene
 from asperity.scene.setup import make_setup
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
-from asperity.textures.texture_loading import show
 
 PRESS = Path(__file__).parents[2] / "examples" / "press.toml"
 

@@ -26,11 +26,11 @@ from asperity import report
 from asperity.analysis.results.device_comparisons import compare_devices
 from asperity.core.display import Displayable, Plottable, Reportable
 from asperity.devices import parse_device
+from asperity.measured.measured_file import MeasurementSummary, show
 from asperity.paper.table_two import TableTwo
 from asperity.report.terminal import print_page
 from asperity.report.views import find_page
 from asperity.simulation import Cartesian, Run, Servo, SpringHand, Stationary, simulate
-from asperity.textures.texture_loading import MeasurementSummary, show
 
 WAVE = asp.Sinusoid(2e-4, 2e-3)
 HOSTILE = "<script>alert(1)</script>"

@@ -22,7 +22,7 @@ from asperity.core.checks import FloatArray
 from asperity.core.files import Serializable
 from asperity.envelopes.wave_borders import AMPLITUDE_RANGE, Trial, WaveCase
 from asperity.surface import Surface
-from asperity.textures.synthetic import prepare_texture
+from asperity.textures.kinds.prepare_synthetic import prepare_texture
 from asperity.textures.texture import Texture
 
 RANGE = "range of factors"

@@ -19,7 +19,7 @@ from asperity.servo.safety import Safety
 from asperity.simulation import Servo
 from asperity.surface import Surface
 from asperity.textures.catalogue import KINDS, parse_specification
-from asperity.textures.synthetic import prepare_texture
+from asperity.textures.kinds.prepare_synthetic import prepare_texture
 from asperity.textures.texture import Texture
 
 DEFAULT_SURFACE = "sinusoid:amplitude=0.2mm,period=2mm"

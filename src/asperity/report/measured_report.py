@@ -17,6 +17,7 @@ from asperity.core.units import format_quantity
 from asperity.measured.filters import short_trace_text
 from asperity.measured.form import SurfaceDecomposition, decompose_surface
 from asperity.measured.lengths import format_counts, format_lengths
+from asperity.measured.measured_file import MeasurementSummary, decimate
 from asperity.measured.parameters import MAX_CORRELATION_POINTS, SurfaceParameter, find_parameter
 from asperity.measured.prepared import PreparationStage, PreparedSurface
 from asperity.report import page
@@ -25,7 +26,6 @@ from asperity.report.sentences.number_text import NOT_AVAILABLE
 from asperity.report.sentences.texts import sentence, table_data
 from asperity.textures.fields.potential_field import PotentialField
 from asperity.textures.texture import Texture
-from asperity.textures.texture_loading import MeasurementSummary, decimate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

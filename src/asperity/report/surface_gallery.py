@@ -15,7 +15,7 @@ from asperity.report import page
 from asperity.report.page import Cell, Page, Row, Section, Table, TableLayout
 from asperity.report.sentences.texts import table_notes
 from asperity.textures.catalogue import CATALOGUE
-from asperity.textures.library import LIBRARY
+from asperity.textures.kinds.named_surfaces import LIBRARY
 from asperity.textures.texture import Texture, TextureKind
 
 if TYPE_CHECKING:

@@ -18,6 +18,7 @@ from asperity.core.units import format_quantity
 from asperity.devices import Device
 from asperity.envelopes.envelope import Envelope
 from asperity.envelopes.find_design import Design
+from asperity.measured.measured_file import MeasurementSummary
 from asperity.report.analysis_report import analysis_page, criteria_table
 from asperity.report.comparison_columns import describe_texture
 from asperity.report.comparison_report import comparison_page, comparisons_page
@@ -32,7 +33,6 @@ from asperity.report.sentences.number_text import interval_text, readable_name, 
 from asperity.report.terminal import page_renderables
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
-from asperity.textures.texture_loading import MeasurementSummary
 
 
 @singledispatch

@@ -63,7 +63,8 @@ def load_scene(source: str, file_arguments: Mapping[str, Any] | None = None) -> 
         source: ``kind:argument=value,...`` ("sinusoid:amplitude=0.8mm,period=1mm", or "cloth"
             with its defaults), the path of a scene file (TOML), or of a measured surface.
         file_arguments: arguments of :func:`~asperity.textures.load_texture`; those of
-            :func:`~asperity.textures.synthetic.prepare_texture` apply to any other texture.
+            :func:`~asperity.textures.kinds.prepare_synthetic.prepare_texture` apply to any
+            other texture.
 
     Raises:
         ParameterError: a kind or argument is unknown (the message suggests the nearest), or a

@@ -6,9 +6,14 @@ from asperity.textures.catalogue import load_texture
 from asperity.textures.domain import Domain, ScanLine
 from asperity.textures.kinds.fourier import Fourier
 from asperity.textures.kinds.grating import Grating
+from asperity.textures.kinds.named_surfaces import (
+    LIBRARY,
+    NamedSurface,
+    named_surface,
+    surface_names,
+)
 from asperity.textures.kinds.noise import Noise, NoiseProfile
 from asperity.textures.kinds.sinusoid import Sinusoid
-from asperity.textures.library import LIBRARY, NamedSurface, named_surface, surface_names
 from asperity.textures.spline.spline_texture import HeightMap, Profile
 from asperity.textures.texture import Texture
 

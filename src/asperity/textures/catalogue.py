@@ -17,20 +17,21 @@ from asperity.core.checks import FloatArray
 from asperity.core.digests import content_digest
 from asperity.core.errors import ParameterError, suggest_names
 from asperity.measured.file_arguments import FILE_ARGUMENTS, SYNTHETIC_ARGUMENTS
+from asperity.measured.measured_file import prepare_file
+from asperity.measured.prepared import PreparedSurface
 from asperity.textures.fields.field_file import assemble_field, is_field, load_field
 from asperity.textures.fields.field_sampler import FieldArguments
+from asperity.textures.kinds import KIND_EXAMPLES
 from asperity.textures.kinds.fourier import Fourier
 from asperity.textures.kinds.grating import Grating
-from asperity.textures.kinds.kind_tables import KIND_EXAMPLES
+from asperity.textures.kinds.named_surfaces import LIBRARY
 from asperity.textures.kinds.noise import Noise, NoiseProfile
+from asperity.textures.kinds.prepare_synthetic import prepare_texture
 from asperity.textures.kinds.sinusoid import Sinusoid
-from asperity.textures.library import LIBRARY
 from asperity.textures.spline.heightmap_sampler import HeightMapArguments
 from asperity.textures.spline.profile_sampler import ProfileArguments
-from asperity.textures.spline.spline_texture import fit_spline
-from asperity.textures.synthetic import prepare_texture
+from asperity.textures.spline.spline_texture import HeightMap, Profile, fit_spline
 from asperity.textures.texture import Texture, TextureKind
-from asperity.textures.texture_loading import prepare_file, texture_from_prepared
 
 _KINDS = (Sinusoid, Fourier, Grating, Noise, NoiseProfile)
 CATALOGUE: dict[str, TextureKind] = {
@@ -78,6 +79,19 @@ def _load_file(path: str | os.PathLike[str], **values: Any) -> Texture:
             raise ParameterError(name, f"cannot be applied: {os.fspath(path)} was baked already")
         texture = load_field(path, _build_described)
     texture.file_name = os.path.basename(os.fspath(path))
+    return texture
+
+
+def texture_from_prepared(prepared: PreparedSurface) -> HeightMap | Profile:
+    """Return the spline through a prepared surface."""
+    texture = fit_spline(
+        prepared.heights,
+        prepared.pitch,
+        periodic=prepared.periodic,
+        preparation=prepared.steps,
+        filled_mask=prepared.filled_mask,
+    )
+    texture.history = prepared.history
     return texture
 
 
@@ -150,7 +164,7 @@ def as_texture(
             "sandpaper" with its defaults), or the path of a measured surface. A text that is the
             path of an existing file means that file.
         values: arguments of :func:`~asperity.textures.load_texture` [SI]; synthetic textures accept
-            those of :func:`~asperity.textures.synthetic.prepare_texture`.
+            those of :func:`~asperity.textures.kinds.prepare_synthetic.prepare_texture`.
         name: name of the argument in error messages.
 
     Raises:

@@ -21,10 +21,16 @@ from asperity.core.display import Plottable
 from asperity.core.files import to_plain_data
 from asperity.enclosures.cells import Cells
 from asperity.measured.prepared import PreparationStage
-from asperity.textures.bounds import bounded_cells
-from asperity.textures.bounds.wave_cells import WaveCells
-from asperity.textures.domain import Domain, GridValues, ScanLine
-from asperity.textures.plane_waves import PlaneWaves, SingleWave
+from asperity.textures.domain import (
+    BoundedCells,
+    DerivativeBounds,
+    Domain,
+    GridValues,
+    LineSegments,
+    ScanLine,
+    equal_segments,
+)
+from asperity.textures.plane_waves import PlaneWaves, SingleWave, WaveCells, wave_segments
 
 __all__ = ["Domain", "ExactHeight", "ScanLine", "Texture", "TextureKind"]
 
@@ -248,18 +254,18 @@ class Texture(Plottable, ABC):
             cells = WaveCells(self.waves, tuple(np.abs(self.domain.spans).sum(axis=0).tolist()))
         return cells or self._bounded_cells(self.domain)
 
-    def line_segments(self, line: ScanLine, min_count: int) -> bounded_cells.LineSegments | None:
+    def line_segments(self, line: ScanLine, min_count: int) -> LineSegments | None:
         """Return at least ``min_count`` segments of a line; ``None`` where the kind has none."""
         if self.waves is not None:
-            return bounded_cells.wave_segments(self.waves, line, min_count)
+            return wave_segments(self.waves, line, min_count)
         span = line.length * line.direction[None]
         region = Domain(line.start, span, periodic=False, description="line")
-        return bounded_cells.equal_segments(self._bounded_cells(region), line, min_count, 1.0)
+        return equal_segments(self._bounded_cells(region), line, min_count, 1.0)
 
-    def _bounded_cells(self, region: Domain) -> bounded_cells.BoundedCells:
+    def _bounded_cells(self, region: Domain) -> BoundedCells:
         numbers = (*self.extremes, *self.bounds, self.third_derivative_bound)
-        bounds = bounded_cells.DerivativeBounds(*numbers)
-        return bounded_cells.BoundedCells(region, self.derivatives, bounds)
+        bounds = DerivativeBounds(*numbers)
+        return BoundedCells(region, self.derivatives, bounds)
 
     def sample_counts(self) -> list[int]:
         """Return the numbers of initial samples of a dense search along each span of the domain."""

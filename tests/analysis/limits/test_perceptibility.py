@@ -28,7 +28,7 @@ from asperity.perception.grip import Grip, load_grip
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Sinusoid
 from asperity.textures.catalogue import as_texture
-from asperity.textures.synthetic import prepare_texture
+from asperity.textures.kinds.prepare_synthetic import prepare_texture
 from asperity.textures.texture import TexturePart
 
 RMS = 1.0 / math.sqrt(2.0)

@@ -13,7 +13,7 @@ from asperity.core.checks import FloatArray
 from asperity.core.compiled import EPS
 from asperity.kernels.fuse import fuse_surface
 from asperity.laws import LAWS
-from asperity.textures.library import named_surface
+from asperity.textures.kinds.named_surfaces import named_surface
 
 RNG = np.random.default_rng(33)
 P, Y = np.array([0.1, 0.2, -0.9]), np.array([0.3, -0.2, -0.5])

@@ -14,8 +14,8 @@ from asperity.laws import LAWS
 from asperity.textures.fields.field_grid import BLENDED, COARSE_STEP, FieldGrid
 from asperity.textures.fields.node_potentials import compute_potentials, split_columns
 from asperity.textures.kinds.fourier import Fourier
+from asperity.textures.kinds.named_surfaces import named_surface
 from asperity.textures.kinds.sinusoid import Sinusoid
-from asperity.textures.library import named_surface
 from asperity.textures.spline.spline_texture import HeightMap, Profile
 from asperity.textures.texture import Texture
 

@@ -16,8 +16,7 @@ from asperity.core.errors import ParameterError
 from asperity.textures.fields.potential_field import PotentialField
 from asperity.textures.meshes.bake_body import bake_body
 from asperity.textures.meshes.lay_texture import _corner_normals, _merge, lay_texture
-from asperity.textures.meshes.mesh_body import MeshBody
-from asperity.textures.meshes.mesh_faults import find_faults
+from asperity.textures.meshes.mesh_body import MeshBody, find_faults
 
 MM = 1e-3
 WAVES = asp.Fourier(

@@ -10,10 +10,10 @@ import pytest
 from asperity.contacts.closest import plane_search
 from asperity.core.checks import FloatArray
 from asperity.textures import HeightMap
-from asperity.textures.bounds.pyramid import plane_pyramid
 from asperity.textures.spline import heightmap_pruning as pruning
 from asperity.textures.spline import heightmap_sampler as heightmap
 from asperity.textures.spline.heightmap_sampler import HeightMapArguments
+from asperity.textures.spline.pyramid import plane_pyramid
 
 PITCH = (50e-6, 70e-6)
 Point = tuple[float, float, float, float, float, float]

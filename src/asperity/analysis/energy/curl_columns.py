@@ -22,7 +22,7 @@ from asperity.core.checks import FloatArray
 from asperity.derive.facts import law_facts
 from asperity.enclosures.taylor import TaylorModel, TaylorNumber
 from asperity.surface import Surface
-from asperity.textures.bounds.bounded_cells import LineSegments
+from asperity.textures.domain import LineSegments
 from asperity.textures.texture import ScanLine, Texture
 
 _MIN_PIECES = 512

@@ -28,7 +28,7 @@ from asperity.devices import Device
 from asperity.devices.device import USER_SOURCE
 from asperity.perception.grip import Grip, load_grip
 from asperity.surface import Surface, default_max_depth
-from asperity.textures.synthetic import prepare_texture
+from asperity.textures.kinds.prepare_synthetic import prepare_texture
 from asperity.textures.texture import TexturePart
 
 MIN_SAMPLES = 2.0

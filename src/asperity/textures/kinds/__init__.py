@@ -1,4 +1,4 @@
-"""Texture kinds in closed form, and the random fields of rough surfaces.
+"""Texture kinds with arguments of their own, declared in ``kinds.toml``.
 
 A texture kind has a sampler: modules of scalar functions that are compiled together with a law. The
 record of the texture is their last argument:
@@ -14,3 +14,24 @@ are replaced by polynomials (:mod:`asperity.kernels.batch_sine`), and those of a
 functions without branches (``Kernels(for_blocks=True)``). Sampler functions never raise; positions
 are finite because the public functions check them.
 """
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from asperity.core.arguments import Argument, read_arguments
+
+_PATH = Path(__file__).with_name("kinds.toml")
+
+KIND_EXAMPLES: dict[str, dict[str, Any]] = tomllib.loads(_PATH.read_text("utf-8"))["examples"]
+"""Summary and example arguments [SI] of each kind, by its name."""
+
+
+def kind_arguments(*names: str) -> tuple[Argument, ...]:
+    """Return the arguments in some tables; those of the later ones replace the others."""
+    arguments: dict[str, Argument] = {}
+    for name in names:
+        arguments |= read_arguments(_PATH, name)
+    return tuple(arguments.values())

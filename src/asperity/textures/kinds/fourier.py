@@ -15,8 +15,8 @@ from asperity.core.cache import get_or_compute
 from asperity.core.checks import FloatArray, check_array
 from asperity.core.errors import ParameterError
 from asperity.textures.domain import Domain, ScanLine
+from asperity.textures.kinds import kind_arguments
 from asperity.textures.kinds.fourier_sampler import FourierArguments
-from asperity.textures.kinds.kind_tables import kind_arguments
 from asperity.textures.plane_waves import PlaneWaves, check_curvature
 from asperity.textures.texture import ExactHeight, Texture
 

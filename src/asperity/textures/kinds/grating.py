@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from asperity.core.arguments import Argument
 from asperity.core.checks import FloatArray, check_positive, check_real
 from asperity.core.errors import ParameterError
-from asperity.textures.kinds.kind_tables import kind_arguments
+from asperity.textures.kinds import kind_arguments
 from asperity.textures.spline.spline_texture import Profile
 
 # The spline then follows the closed form to 2e-5 of the height (tested).

@@ -14,7 +14,7 @@ from asperity.core.arguments import Argument
 from asperity.core.checks import check_array, check_positive, check_real
 from asperity.core.errors import ParameterError
 from asperity.textures.domain import Domain, ScanLine
-from asperity.textures.kinds.kind_tables import kind_arguments
+from asperity.textures.kinds import kind_arguments
 from asperity.textures.kinds.sinusoid_sampler import SinusoidArguments
 from asperity.textures.plane_waves import PlaneWaves, SingleWave, check_curvature
 from asperity.textures.texture import ExactHeight, Texture

@@ -14,8 +14,7 @@ from asperity.textures.fields.field_grid import FieldGrid, SingleArray
 from asperity.textures.fields.node_potentials import ColumnFunction, compute_potentials
 from asperity.textures.fields.potential_field import PotentialField, ThinRegion
 from asperity.textures.meshes import mesh_potential, triangle_tree
-from asperity.textures.meshes.mesh_body import MeshBody
-from asperity.textures.meshes.mesh_faults import INTERSECTING, make_fault
+from asperity.textures.meshes.mesh_body import INTERSECTING, MeshBody, make_fault
 from asperity.textures.meshes.mesh_potential import BodyLaw
 from asperity.textures.spline.spline_texture import HeightMap
 

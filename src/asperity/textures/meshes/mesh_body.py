@@ -1,4 +1,4 @@
-"""A closed body from a mesh file."""
+"""A closed body from a mesh file: its faults, their repair, and the tree of its triangles."""
 
 from __future__ import annotations
 
@@ -19,11 +19,9 @@ from numpy.typing import NDArray
 
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError, SurfaceFileError
-from asperity.measured.lengths import unit_to_metres
+from asperity.measured.lengths import format_length, unit_to_metres
 from asperity.measured.reading.isolation import reject_on_error
-from asperity.textures.meshes.build_tree import build_tree
-from asperity.textures.meshes.mesh_faults import UNSOUND, MeshFault, find_faults
-from asperity.textures.meshes.triangle_tree import TriangleTree
+from asperity.textures.meshes.triangle_tree import LEAF_SIZE, TriangleTree
 
 MESH_FORMATS = ("stl", "obj", "ply", "glb", "gltf")
 MAX_TRIANGLES = 30_000_000
@@ -212,3 +210,133 @@ def _repair(vertices: FloatArray, faces: NDArray[np.int32]) -> tuple[FloatArray,
         repair.fill_holes(mesh)
         repair.fix_normals(mesh, multibody=True)
     return size * np.array(mesh.vertices), np.array(mesh.faces, dtype=np.int32)
+
+
+OPEN = "open edges"
+ORIENTATION = "edges of triangles with opposite orientation"
+NON_MANIFOLD = "edges shared by more than two triangles"
+DEGENERATE = "triangles without extent"
+INVERTED = "bodies turned inside out"
+INTERSECTING = "columns of nodes where the mesh overlaps itself"
+UNSOUND = (OPEN, ORIENTATION, INVERTED, INTERSECTING)
+"""Faults with which the inside is undefined."""
+
+
+@dataclass(frozen=True)
+class MeshFault:
+    """A kind of fault.
+
+    Attributes:
+        kind: what is counted.
+        count: how often it occurs.
+        at: one place [m], x, y, z.
+    """
+
+    kind: str
+    count: int
+    at: tuple[float, float, float]
+
+    def __str__(self) -> str:
+        place = ", ".join(map(format_length, self.at))
+        return f"{self.count} {self.kind}, one at ({place})"
+
+
+def make_fault(kind: str, places: FloatArray) -> list[MeshFault]:
+    """Return the fault that occurs at places (n, 3) [m]; nothing if there are none."""
+    if len(places) == 0:
+        return []
+    x, y, z = (float(value) for value in places[0])
+    return [MeshFault(kind, len(places), (x, y, z))]
+
+
+def find_faults(vertices: FloatArray, faces: NDArray[np.int32]) -> list[MeshFault]:
+    """Return the faults of the edges, degenerate triangles, and an inverted mesh.
+
+    Args:
+        vertices: [m], shape (m, 3), each once.
+        faces: indices of vertices, shape (n, 3).
+    """
+    degenerate = (faces == np.roll(faces, 1, axis=1)).any(axis=1)
+    faults = make_fault(DEGENERATE, vertices[faces[degenerate, 0]])
+    faces = faces[~degenerate]
+    keys, start, counts, sums = _edges(faces, len(vertices))
+    if len(keys) == 0:
+        return faults
+    turned = (counts > 1) & (sums != 0)
+    kinds = ((OPEN, counts == 1), (ORIENTATION, turned), (NON_MANIFOLD, counts > 2))
+    for kind, where in kinds:
+        first, second = np.divmod(keys[start[where]], len(vertices))
+        faults += make_fault(kind, 0.5 * (vertices[first] + vertices[second]))
+    if all(fault.kind not in UNSOUND for fault in faults) and signed_volume(vertices, faces) < 0.0:
+        faults += make_fault(INVERTED, vertices[faces[:1, 0]])
+    return faults
+
+
+def _edges(
+    faces: NDArray[np.int32], vertex_count: int
+) -> tuple[NDArray[np.int64], NDArray[np.intp], NDArray[np.intp], NDArray[np.int64]]:
+    """Return the sorted edges; where each begins, how often it occurs, and the sum of its signs."""
+    ends = np.roll(faces, -1, axis=1).ravel()
+    starts = faces.ravel()
+    keys = np.minimum(starts, ends).astype(np.int64) * vertex_count + np.maximum(starts, ends)
+    keys = np.sort(2 * keys + (starts < ends))  # the sign is the last digit: one array is sorted
+    keys, signs = keys >> 1, 2 * (keys & 1) - 1
+    first = np.flatnonzero(np.r_[True, keys[1:] != keys[:-1]]) if len(keys) else np.empty(0, int)
+    counts = np.diff(np.r_[first, len(keys)])
+    return keys, first, counts, np.add.reduceat(signs, first) if len(first) else signs
+
+
+def signed_volume(vertices: FloatArray, faces: NDArray[np.int32]) -> float:
+    """Return the enclosed volume [m³]; negative where the triangles point inwards."""
+    a, b, c = (vertices[faces[:, k]] - vertices[0] for k in range(3))
+    return float(np.einsum("ni,ni->", a, np.cross(b, c))) / 6.0
+
+
+def build_tree(triangles: FloatArray) -> TriangleTree:
+    """Return the tree of triangles (n, 3, 3) [m].
+
+    Each node is halved at the median along the longest side of the box of its triangles' centres.
+    The last leaf is filled with triangles of no extent.
+    """
+    leaves = 1
+    while leaves * LEAF_SIZE < len(triangles):
+        leaves *= 2
+    order = _median_order(triangles, leaves)
+    ordered = triangles[np.minimum(order, len(triangles) - 1)]
+    ordered[order >= len(triangles)] = triangles[-1, 0]
+    boxes = np.empty((2 * leaves - 1, 6), np.float32)
+    _write_boxes(ordered.reshape(leaves, 3 * LEAF_SIZE, 3), boxes)
+    return TriangleTree(ordered.reshape(-1, 9), boxes, leaves)
+
+
+def _median_order(triangles: FloatArray, leaves: int) -> NDArray[np.int32]:
+    """Return the indices of the triangles in the order of the leaves."""
+    order = np.arange(leaves * LEAF_SIZE, dtype=np.int32)[None]
+    centres = np.empty((order.size, 3), np.float32)
+    centres[: len(triangles)] = triangles.mean(axis=1)
+    centres[len(triangles) :] = triangles[-1, 0]
+    while len(order) < leaves:
+        places = centres[order]
+        axis = np.ptp(places, axis=1).argmax(axis=1)
+        keys = np.take_along_axis(places, axis[:, None, None], axis=2)[..., 0]
+        del places
+        half = order.shape[1] // 2
+        parts = np.argpartition(keys, half, axis=1).astype(np.int32)
+        order = np.take_along_axis(order, parts, axis=1).reshape(-1, half)
+    return order.ravel()
+
+
+def _write_boxes(corners: FloatArray, boxes: NDArray[np.float32]) -> None:
+    """Write the boxes of all nodes, rounded outwards, from the corners (leaves, m, 3)."""
+    leaves = len(corners)
+    last = boxes[leaves - 1 :]
+    lower = corners.min(axis=1).astype(np.float32)
+    upper = corners.max(axis=1).astype(np.float32)
+    last[:, :3] = np.nextafter(lower, np.float32(-np.inf))
+    last[:, 3:] = np.nextafter(upper, np.float32(np.inf))
+    while leaves > 1:
+        children = boxes[leaves - 1 : 2 * leaves - 1].reshape(-1, 2, 6)
+        leaves //= 2
+        parents = boxes[leaves - 1 : 2 * leaves - 1]
+        parents[:, :3] = children[:, :, :3].min(axis=1)
+        parents[:, 3:] = children[:, :, 3:].max(axis=1)

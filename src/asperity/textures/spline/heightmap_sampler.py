@@ -30,7 +30,7 @@ class HeightMapArguments(NamedTuple):
         x0: the first node [m].
         y0: likewise.
         periodic: whether the map repeats.
-        boxes: bounds of the boxes of the pyramid, see :mod:`asperity.textures.bounds.pyramid`.
+        boxes: bounds of the boxes of the pyramid, see :mod:`asperity.textures.spline.pyramid`.
         levels: index of the first box and numbers of rows and columns of each level.
     """
 

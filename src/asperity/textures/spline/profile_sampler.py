@@ -45,7 +45,7 @@ class ProfileArguments(NamedTuple):
         ix: nodes per metre.
         x0: the first node [m].
         periodic: whether the profile repeats.
-        boxes: bounds of the boxes of the pyramid, see :mod:`asperity.textures.bounds.pyramid`.
+        boxes: bounds of the boxes of the pyramid, see :mod:`asperity.textures.spline.pyramid`.
         levels: index of the first box and number of boxes of each level.
     """
 

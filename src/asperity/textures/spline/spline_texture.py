@@ -16,12 +16,11 @@ from asperity.core.cache import get_or_compute
 from asperity.core.checks import FloatArray, check_array, check_positive, check_real
 from asperity.core.errors import ParameterError
 from asperity.core.memory import require_memory
-from asperity.textures.bounds.bounded_cells import LineSegments, spline_segments
-from asperity.textures.bounds.pyramid import line_pyramid, plane_pyramid
-from asperity.textures.bounds.spline_bounds import SplineCells, max_height
-from asperity.textures.domain import Domain, GridValues, ScanLine
+from asperity.textures.domain import Domain, GridValues, LineSegments, ScanLine
 from asperity.textures.spline.heightmap_sampler import HeightMapArguments
 from asperity.textures.spline.profile_sampler import ProfileArguments
+from asperity.textures.spline.pyramid import line_pyramid, plane_pyramid
+from asperity.textures.spline.spline_bounds import SplineCells, max_height, spline_segments
 from asperity.textures.texture import ExactHeight, Texture, TexturePart
 
 MIN_NODES = 4

@@ -14,7 +14,7 @@ from asperity.scene import load_scene
 from asperity.textures import Fourier, HeightMap, Sinusoid, Texture
 from asperity.textures.catalogue import CATALOGUE
 from asperity.textures.domain import Domain, ScanLine
-from asperity.textures.synthetic import prepare_texture
+from asperity.textures.kinds.prepare_synthetic import prepare_texture
 
 RNG = np.random.default_rng(5)
 POINTS = RNG.uniform(-5e-3, 5e-3, (40, 2))

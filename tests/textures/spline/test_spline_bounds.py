@@ -9,7 +9,7 @@ from scipy.optimize import minimize
 from tests.helpers.allocations import traced_peak
 
 from asperity.textures import HeightMap
-from asperity.textures.bounds.spline_bounds import max_height
+from asperity.textures.spline.spline_bounds import max_height
 
 
 def spline_values(coefficients: np.ndarray, v: np.ndarray, u: np.ndarray) -> np.ndarray:

@@ -12,15 +12,15 @@ import asperity
 from asperity.core.errors import ParameterError
 from asperity.textures import HeightMap
 from asperity.textures.catalogue import CATALOGUE
-from asperity.textures.library import (
+from asperity.textures.kinds import surface_patches
+from asperity.textures.kinds.named_surfaces import (
     LIBRARY,
     NamedSurface,
     named_surface,
-    random_surfaces,
     surface_names,
 )
-from asperity.textures.library.random_surfaces import GRAIN_SIZES
-from asperity.textures.synthetic import low_pass
+from asperity.textures.kinds.noise import low_pass
+from asperity.textures.kinds.surface_patches import GRAIN_SIZES
 
 NAMES = ("cloth", "brushed-metal", "sandpaper", "wood", "knurl", "tile")
 every_surface = pytest.mark.parametrize("name", NAMES)
@@ -384,9 +384,9 @@ def test_grain_ends_within_its_sieve_to_the_sides_too() -> None:
     for seed in range(5):
         numbers = np.random.default_rng(seed).random(24)
         numbers[:2] = 0.5
-        paper = np.full((random_surfaces._PAPER_NODES,) * 2, -np.inf)
-        random_surfaces._add_grain(paper, numbers)
-        reach = 1.3 * 0.5 * (0.75 + 0.5 * numbers[2]) * random_surfaces._NODES_PER_GRAIN
+        paper = np.full((surface_patches._PAPER_NODES,) * 2, -np.inf)
+        surface_patches._add_grain(paper, numbers)
+        reach = 1.3 * 0.5 * (0.75 + 0.5 * numbers[2]) * surface_patches._NODES_PER_GRAIN
         for axis in (0, 1):
             covered = np.flatnonzero(np.isfinite(paper).any(axis=axis)) - 0.5 * len(paper)
             assert reach - 1.0 <= -covered[0] <= reach + 1.0

@@ -10,10 +10,16 @@ from typing import Any, ClassVar
 
 from asperity.core.arguments import SEED, Argument
 from asperity.core.errors import ParameterError, find_named, suggest_names
-from asperity.textures.library.random_surfaces import brush_metal, glue_sandpaper, plane_wood
-from asperity.textures.library.regular_surfaces import lay_tiles, press_knurl, weave_cloth
+from asperity.textures.kinds.noise import MIN_NODES_PER_WAVE, Patch, low_pass
+from asperity.textures.kinds.surface_patches import (
+    brush_metal,
+    glue_sandpaper,
+    lay_tiles,
+    plane_wood,
+    press_knurl,
+    weave_cloth,
+)
 from asperity.textures.spline.spline_texture import HeightMap
-from asperity.textures.synthetic import MIN_NODES_PER_WAVE, Patch, low_pass
 from asperity.textures.texture import TextureKind
 
 _SYNTHESIZERS: dict[str, Callable[..., Patch]] = {

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from asperity.textures import HeightMap, Profile
-from asperity.textures.bounds import pyramid
+from asperity.textures.spline import pyramid
 
 RNG = np.random.default_rng(31)
 ROUGH = RNG.normal(size=(11, 8))

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from asperity.core.checks import FloatArray
 from asperity.enclosures import cells
 from asperity.enclosures.taylor import TaylorModel, TaylorNumber
+from asperity.textures.domain import LineSegments, ScanLine
 
 # From uniform B-spline to Bernstein coefficients on one cell, by degree.
 _TO_BERNSTEIN = {
@@ -268,3 +269,36 @@ def _enclose_remainder(
     c = 0.5 * (low + high)
     e = 0.5 * (high - low) * (1.0 + 8.0 * cells.EPS) + slack
     return TaylorModel(scale * c, scale * np.stack(slopes), scale * e * (1.0 + 8.0 * cells.EPS))
+
+
+_AXIS_TOLERANCE = 1e-12
+
+
+def spline_segments(cells: SplineCells, line: ScanLine, min_count: int) -> LineSegments | None:
+    """Return at least ``min_count`` segments of a line, separated at the nodes of a spline.
+
+    ``None`` for a line that does not follow an axis from node to node.
+    """
+    for axis in range(cells.dimensions):
+        if abs(abs(line.direction[axis]) - 1.0) < _AXIS_TOLERANCE:
+            return _segments_along_axis(cells, axis, line, min_count)
+    return None
+
+
+def _segments_along_axis(
+    cells: SplineCells, axis: int, line: ScanLine, min_count: int
+) -> LineSegments | None:
+    ends = cells.coordinates(np.stack([line.start, line.start + line.length * line.direction]))
+    low, high = np.sort(ends[:, axis])
+    nodes = round(high - low)
+    if abs(low - round(low)) > 1e-6 or abs(high - low - nodes) > 1e-6 or round(low) < 0:
+        return None
+    parts = max(1, -(-min_count // nodes))
+    half = np.zeros(cells.dimensions)
+    half[axis] = 0.5 / parts
+    centres = np.tile(ends[0], (nodes * parts, 1))
+    centres[:, axis] = round(low) + half[axis] * (2.0 * np.arange(nodes * parts) + 1.0)
+    if line.direction[axis] < 0.0:
+        centres = centres[::-1].copy()
+        half = -half
+    return LineSegments(cells, centres, np.abs(half), line.length / (nodes * parts))

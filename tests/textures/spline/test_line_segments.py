@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from asperity.textures import HeightMap
-from asperity.textures.bounds.bounded_cells import spline_segments
 from asperity.textures.domain import ScanLine
+from asperity.textures.spline.spline_bounds import spline_segments
 
 MAP = HeightMap(
     1e-5 * np.random.default_rng(2).standard_normal((9, 11)), (2e-4, 3e-4), origin=(1e-3, -2e-3)

@@ -1,4 +1,4 @@
-"""Load a measured file as a texture: read, prepare, fit the spline."""
+"""A measured file: read and prepared once, and a summary of its roughness."""
 
 from __future__ import annotations
 
@@ -26,7 +26,6 @@ from asperity.measured.prepared import (
     is_prepared,
     load_prepared,
 )
-from asperity.textures.spline.spline_texture import HeightMap, Profile, fit_spline
 
 
 def prepare_file(
@@ -93,19 +92,6 @@ def _source_digest(path: str | os.PathLike[str], options: Mapping[str, Any]) -> 
         for name, value in sorted(options.items())
     )
     return content_digest(whole, os.path.basename(os.fspath(path)), library, values)
-
-
-def texture_from_prepared(prepared: PreparedSurface) -> HeightMap | Profile:
-    """Return the spline through a prepared surface."""
-    texture = fit_spline(
-        prepared.heights,
-        prepared.pitch,
-        periodic=prepared.periodic,
-        preparation=prepared.steps,
-        filled_mask=prepared.filled_mask,
-    )
-    texture.history = prepared.history
-    return texture
 
 
 Pitch = tuple[float, ...]
