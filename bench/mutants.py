@@ -65,6 +65,7 @@ ROOMS = {
             "contacts/contact.py",
             "contacts/closest",
             "contacts/height_contacts.py",
+            "contacts/proxy_contacts.py",
             "contacts/sampler_interface.py",
             "contacts/symbols.py",
             "contacts/warm_start.py",
@@ -161,10 +162,14 @@ ROOMS = {
         ),
     ),
     "split": Room(
-        ("contacts/split",),
         (
-            "tests/contacts/split/test_split_kernels.py",
-            "tests/contacts/split/test_split_solver.py",
+            "contacts/split_evaluation.py",
+            "contacts/split_optimality.py",
+            "contacts/split_solver.py",
+        ),
+        (
+            "tests/contacts/test_split_kernels.py",
+            "tests/contacts/test_split_solver.py",
             "tests/analysis/energy/test_split.py",
             "tests/analysis/energy/test_split_map.py",
             "tests/analysis/energy/test_split_definition.py",

@@ -9,7 +9,7 @@ import pytest
 
 from asperity.analysis.results.analyze import analyze
 from asperity.analysis.results.compare import compare
-from asperity.contacts.split.split_contact import SplitContact
+from asperity.contacts.proxy_contacts import SplitContact
 from asperity.core.errors import ParameterError
 from asperity.kernels.link import unit_from_module
 from asperity.laws import LAWS

@@ -56,11 +56,11 @@ def test_energy_of_law_h_on_a_sinusoid_equals_that_of_the_general_solver(
     program = library(tmp_path, "gcc", {"h": header(surface, "h")}, "-O1")
     points = np.array([[1e-4, 2e-4, -3e-4], [3e-4, -2e-4, -1e-4], [0.0, 0.0, 5e-3]])
     split = np.empty((3, 3))
-    from asperity.contacts.split import optimality, solver, split_evaluation
+    from asperity.contacts import split_evaluation, split_optimality, split_solver
     from asperity.kernels.fuse import fuse_on_texture
 
     loops = fuse_on_texture(
-        surface.law, texture.sampler, NONE, (split_evaluation, solver, optimality)
+        surface.law, texture.sampler, NONE, (split_evaluation, split_solver, split_optimality)
     )
     loops.split_batch(points, split, surface.continuity, texture.arguments)
     np.testing.assert_array_equal(energies(program, "h", points), surface.stiffness * split[:, 0])

@@ -83,7 +83,7 @@ def test_declaration_of_a_module_matches_its_source(module: ModuleType) -> None:
 
 def test_samplers_and_searches_declare_kernels() -> None:
     names = {module.__name__.removeprefix("asperity.") for module in MODULES}
-    assert names >= {"textures.kinds.sinusoid_sampler", "contacts.split.solver"}
+    assert names >= {"textures.kinds.sinusoid_sampler", "contacts.split_solver"}
     assert "kernels.loops.sampler_loops" in names
     assert len(names) > 15
 

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from asperity.contacts.closest.closest_contact import NEAREST
 from asperity.contacts.contact import Contact
 from asperity.contacts.height_contacts import NOMINAL, VERTICAL
-from asperity.contacts.split.split_contact import SPLIT
+from asperity.contacts.proxy_contacts import NEAREST, SPLIT
 
 __all__ = ["CONTACTS", "Contact"]
 

@@ -12,7 +12,7 @@ import pytest
 
 import asperity as asp
 from asperity.analysis.energy.field_energy import split_state
-from asperity.contacts.split import optimality, solver, split_evaluation
+from asperity.contacts import split_evaluation, split_optimality, split_solver
 from asperity.surface import Surface
 from asperity.textures.spline.spline_texture import HeightMap
 from asperity.textures.texture import Texture
@@ -118,9 +118,9 @@ def test_interpreted_solver_agrees_with_the_compiled_solver(
         fx, fy, _h = texture.nearest([[x, y, z]])[0].tolist()
         return fx, fy, *hessian(fx, fy, None)[:3], 0.0, 1.0
 
-    monkeypatch.setattr(optimality, "sample_hessian", hessian)
-    monkeypatch.setattr(solver, "closest_point_within_budget", closest)
-    for module in (optimality, solver):
+    monkeypatch.setattr(split_optimality, "sample_hessian", hessian)
+    monkeypatch.setattr(split_solver, "closest_point_within_budget", closest)
+    for module in (split_optimality, split_solver):
         monkeypatch.setattr(module, "sample_height", lambda *place: hessian(*place)[0])
         monkeypatch.setattr(module, "evaluation_cost", lambda _texture: 1.0)
     surface = Surface(texture, "H", K, continuity=2.0)

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.contacts.sampler_interface import closest_point_within_budget, sample_height
-from asperity.contacts.split.optimality import split_evaluate_energy
-from asperity.contacts.split.solver import split_compute_atoms
+from asperity.contacts.split_optimality import split_evaluate_energy
+from asperity.contacts.split_solver import split_compute_atoms
 from asperity.contacts.warm_start import UNLIMITED
 from asperity.core.checks import FloatArray
 from asperity.core.compiled import Kernels, local_array

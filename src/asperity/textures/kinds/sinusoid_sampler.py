@@ -3,7 +3,7 @@
 The split god-object below a sinusoid is one root on one flank. Let u be the phase of the probe from
 the nearest crest, ψ that of a closest point, κ the wave number and R = 1/(κ² A) the radius of
 curvature at the crest. Every point with two closest points lies directly below a crest. Where the
-god-object is split, y (``solver.py``) is such a point and its closest points are ±ψ, so
+god-object is split, y (``split_solver``) is such a point and its closest points are ±ψ, so
 p = (1 - μ) y + μ z̄ leaves one equation, independent of u,
 
     (1 - μ) ψ - κ² A sin ψ (A cos ψ - z) = 0,

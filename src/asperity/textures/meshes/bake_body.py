@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from asperity.contacts.split import optimality, solver
+from asperity.contacts import split_optimality, split_solver
 from asperity.core.checks import FloatArray, check_positive
 from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.measured.lengths import format_length, format_lengths
@@ -76,7 +76,7 @@ class _BodyLoops:
     def __init__(self, body: MeshBody, law: BodyLaw) -> None:
         from asperity.kernels.fuse import fuse_module
 
-        self._loops = fuse_module(mesh_potential, triangle_tree, solver, optimality)
+        self._loops = fuse_module(mesh_potential, triangle_tree, split_solver, split_optimality)
         self.body = body
         self.law = law
         self._tolerance = 1e-9 * float(np.ptp(np.array(body.box), axis=0).max())

@@ -1,6 +1,6 @@
 """Exact potential and depth of law H of a closed mesh.
 
-Fully-corrective Frank-Wolfe, as in :mod:`asperity.contacts.split.solver`, with the closest points
+Fully-corrective Frank-Wolfe, as in :mod:`asperity.contacts.split_solver`, with the closest points
 of a mesh. For c >= 1 every y that is queried is at most as far from the probe as its closest point
 is, so y is inside and the mesh's closest point is that of the outside.
 """
@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.contacts.split.optimality import (
+from asperity.contacts.split_optimality import (
     split_duality_gap,
     split_evaluate_energy,
     split_solve_weights,

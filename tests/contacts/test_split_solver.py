@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from asperity.clamps import NONE
-from asperity.contacts.split import solver
+from asperity.contacts import split_solver
 from asperity.core.checks import FloatArray
 from asperity.core.compiled import EPS
 from asperity.kernels.fuse import fuse_surface
@@ -44,15 +44,15 @@ def test_query_writes_the_closest_free_point(row: int, monkeypatch: pytest.Monke
         calls.append(arguments)
         return 0.7, 0.8, 9.0, 9.0, 9.0, 0.05, 21.0
 
-    monkeypatch.setattr(solver, "closest_point_within_budget", search)
-    monkeypatch.setattr(solver, "evaluation_cost", lambda _texture: 1.0)
+    monkeypatch.setattr(split_solver, "closest_point_within_budget", search)
+    monkeypatch.setattr(split_solver, "evaluation_cost", lambda _texture: 1.0)
     for height, is_free in ((-0.5, True), (-0.4, False)):
         monkeypatch.setattr(
-            solver, "sample_height", lambda x, y, _t, h=height: h + (x - 0.3) - (y + 0.2)
+            split_solver, "sample_height", lambda x, y, _t, h=height: h + (x - 0.3) - (y + 0.2)
         )
         atoms = random_atoms(4)
         before = atoms.copy()
-        error, evaluations = solver.split_query(Y, atoms, row, 40.0, "texture")
+        error, evaluations = split_solver.split_query(Y, atoms, row, 40.0, "texture")
         if is_free:
             assert (error, evaluations, calls) == (0.0, 1.0, [])
             np.testing.assert_array_equal(atoms[row], [*Y, 0.0])
@@ -84,13 +84,13 @@ def test_newton_step_is_accepted_unless_the_energy_rises(
         y += 1.0
         return count_left, 13.0
 
-    monkeypatch.setattr(solver, "split_newton", split_newton)
+    monkeypatch.setattr(split_solver, "split_newton", split_newton)
     atoms, y = random_atoms(2), Y.copy()
     if count_left == 1:
         atoms[:2] = [[*(P + 0.2), 0.0], [*(P + 0.9), 1.0]]
     before = atoms.copy()
     mu, a = 1.0 / (1.0 + C), np.zeros((7, 10))
-    result = solver.split_try_newton(atoms, 2, P, y, mu, a, 40.0, "texture")
+    result = split_solver.split_try_newton(atoms, 2, P, y, mu, a, 40.0, "texture")
     assert result == (count_left if accepted else 0, 13.0)
     np.testing.assert_array_equal(y, Y + 1.0 if accepted else Y)
     if not accepted:
@@ -101,11 +101,11 @@ def test_newton_step_may_raise_the_energy_by_rounding(monkeypatch: pytest.Monkey
     for units, count in ((40.0, 3), (45.0, 3), (50.0, 0)):
         values = iter([2.0, 2.0 * (1.0 + units * EPS)])
         monkeypatch.setattr(
-            solver, "split_evaluate_energy", lambda *_arguments, values=values: next(values)
+            split_solver, "split_evaluate_energy", lambda *_arguments, values=values: next(values)
         )
-        monkeypatch.setattr(solver, "split_newton", lambda *_arguments: (3, 5.0))
+        monkeypatch.setattr(split_solver, "split_newton", lambda *_arguments: (3, 5.0))
         args: Any = (random_atoms(3), 3, P, Y.copy(), 0.4, np.zeros((7, 10)), 40.0, None)
-        assert solver.split_try_newton(*args)[0] == count
+        assert split_solver.split_try_newton(*args)[0] == count
 
 
 @pytest.mark.parametrize(("count", "solved"), [(1, 0), (3, 0), (3, 2)])
@@ -120,10 +120,10 @@ def test_dual_point_and_mean_follow_from_each_other(
             arguments[3][:] = Y
         return solved, 7.0
 
-    monkeypatch.setattr(solver, "split_try_newton", split_try_newton)
+    monkeypatch.setattr(split_solver, "split_try_newton", split_try_newton)
     atoms, y, pull = random_atoms(count), np.full(3, np.nan), np.full(3, np.nan)
     mean = energy_and_pull(atoms, count)[1]
-    result = solver.split_update_dual(
+    result = split_solver.split_update_dual(
         atoms, count, P, y, pull, C, np.zeros((7, 10)), 40.0, "texture"
     )
     assert result == (solved, 7.0 if count > 1 else 0.0)
@@ -159,7 +159,7 @@ def test_initialization_from_known_atoms(
     atoms, y, pull = random_atoms(4), np.zeros(3), np.zeros(3)
     weight = 0.5 if known_count == 2 else atoms[0, 3]
     a = np.zeros((7, 10))
-    result = solver.split_initialize(atoms, known_count, P, y, pull, C, a, 160.0, "texture")
+    result = split_solver.split_initialize(atoms, known_count, P, y, pull, C, a, 160.0, "texture")
     assert result == expected
     assert calls == expected_calls
     assert atoms[0, 3] == (1.0 if expected_calls[-1] == "settle 1" else weight)
@@ -170,7 +170,7 @@ def test_atoms_of_a_distant_probe_are_dropped(monkeypatch: pytest.MonkeyPatch) -
     calls = replace_parts(monkeypatch, succeeds=True, height=-0.7)
     atoms, y, pull = random_atoms(4), np.zeros(3), np.zeros(3)
     a = np.zeros((7, 10))
-    solver.split_initialize(atoms, 3, P, y, pull, C, a, 160.0, "texture")
+    split_solver.split_initialize(atoms, 3, P, y, pull, C, a, 160.0, "texture")
     assert calls == ["query", "settle 1"]
 
 
@@ -212,9 +212,9 @@ def replace_parts(
         ("solve_subset", solve_subset),
     )
     for name, function in stand_ins:
-        monkeypatch.setattr(solver, f"split_{name}", function)
-    monkeypatch.setattr(solver, "sample_height", lambda *_: height)
-    monkeypatch.setattr(solver, "evaluation_cost", lambda _texture: 1.0)
+        monkeypatch.setattr(split_solver, f"split_{name}", function)
+    monkeypatch.setattr(split_solver, "sample_height", lambda *_: height)
+    monkeypatch.setattr(split_solver, "evaluation_cost", lambda _texture: 1.0)
     return calls
 
 
@@ -237,13 +237,13 @@ def test_search_for_a_closer_point_ends_with_the_first(
         def gap(*_arguments: Any, c: Any = calls, stage: int = stage_with_progress) -> Any:
             return (1.0 if len(c) == stage + 1 else 0.0), 1e-6
 
-        monkeypatch.setattr(solver, "split_query", query)
-        monkeypatch.setattr(solver, "split_query_nearby", nearby)
-        monkeypatch.setattr(solver, "split_duality_gap", gap)
-        monkeypatch.setattr(solver, "evaluation_cost", lambda _texture: 1.0)
+        monkeypatch.setattr(split_solver, "split_query", query)
+        monkeypatch.setattr(split_solver, "split_query_nearby", nearby)
+        monkeypatch.setattr(split_solver, "split_duality_gap", gap)
+        monkeypatch.setattr(split_solver, "evaluation_cost", lambda _texture: 1.0)
         args = (Y, random_atoms(2), 2, is_final, 0.4, 1.0, 900.0 if is_final else 910.0, None)
-        _gap, _rounding, error_bound, _evaluations = solver.split_query_closer(*args)
-        expected = [900.0] if is_final else ["nearby", solver.SHORT_SEARCH, 900.0]
+        _gap, _rounding, error_bound, _evaluations = split_solver.split_query_closer(*args)
+        expected = [900.0] if is_final else ["nearby", split_solver.SHORT_SEARCH, 900.0]
         count = 1 if is_final else stage_with_progress + 1
         assert calls == expected[:count]
         assert error_bound == (0.0 if is_final else (np.inf, 0.5, 0.0)[stage_with_progress])

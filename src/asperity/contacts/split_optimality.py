@@ -1,4 +1,4 @@
-"""Energy, weights and optimality conditions of law H for given atoms (``solver.py``).
+"""Energy, weights and optimality conditions of law H for given atoms (``split_solver``).
 
 Rows of ``atoms`` are x, y, z [m] and weight. Differences of squared distances are products of
 sums and differences: near a crest the atoms are so close together that the squares would cancel.

@@ -1,4 +1,4 @@
-"""Split contact at a probe: vector to the mean, its derivative and energy; see ``solver.py``.
+"""Split contact at a probe: vector to the mean, its derivative and energy; see ``split_solver``.
 
 The warm-started search starts from the atoms of the last tick. Newton's method on the optimality
 conditions moves them with the probe. One query at the new y then shows that no surface point is
@@ -13,14 +13,14 @@ import numpy as np
 
 from asperity.contacts.closest.closest_warm import record_error_bound
 from asperity.contacts.sampler_interface import sample_height
-from asperity.contacts.split.optimality import (
+from asperity.contacts.split_optimality import (
     split_add_atom_motion,
     split_assemble_system,
     split_closest_derivative,
     split_evaluate_energy,
     split_solve_linear,
 )
-from asperity.contacts.split.solver import split_compute_atoms
+from asperity.contacts.split_solver import split_compute_atoms
 from asperity.contacts.warm_start import BUDGET, FIRST_POINT, POINT_COUNT, UNLIMITED
 from asperity.core.compiled import EVERY_FUNCTION, FloatArray, Kernels, local_array
 

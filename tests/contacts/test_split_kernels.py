@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from asperity.contacts.split import optimality as conditions
-from asperity.contacts.split import solver
-from asperity.contacts.split import split_evaluation as answers
+from asperity.contacts import split_evaluation as answers
+from asperity.contacts import split_optimality as conditions
+from asperity.contacts import split_solver
 from asperity.contacts.warm_start import (
     BUDGET,
     ERROR_BOUND,
@@ -45,7 +45,7 @@ def surface(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(conditions, "sample_hessian", curvature)
     monkeypatch.setattr(conditions, "sample_height", height)
     monkeypatch.setattr(conditions, "evaluation_cost", lambda _texture: 1.0)
-    monkeypatch.setattr(solver, "evaluation_cost", lambda _texture: 1.0)
+    monkeypatch.setattr(split_solver, "evaluation_cost", lambda _texture: 1.0)
 
 
 def random_atoms(count: int) -> FloatArray:
@@ -159,7 +159,7 @@ def test_closest_derivative_agrees_with_differences() -> None:
             conditions.split_closest_derivative(deep_point, atoms, 0, derivative, None)
             is is_minimum
         )
-        assert solver.split_is_local_minimum(atoms, deep_point, None) is is_minimum
+        assert split_solver.split_is_local_minimum(atoms, deep_point, None) is is_minimum
 
 
 def test_tracked_point_follows_its_probe() -> None:
@@ -200,7 +200,7 @@ def test_closest_minimum_near_the_atoms_is_tracked_from_them(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Atoms beside it, of which the first is far off; the row after them is written."""
-    monkeypatch.setattr(solver, "local_array", np.zeros)
+    monkeypatch.setattr(split_solver, "local_array", np.zeros)
     y = np.array([0.1, -0.2, -0.4])
     expected = closest_point(y)
     atoms = np.zeros((5, 4))
@@ -208,7 +208,7 @@ def test_closest_minimum_near_the_atoms_is_tracked_from_them(
         xy = expected[:2] + shift
         atoms[row, :3] = *xy, height(*xy, None)
     before = atoms.copy()
-    evaluations = solver.split_query_nearby(y, atoms, 3, None)
+    evaluations = split_solver.split_query_nearby(y, atoms, 3, None)
     np.testing.assert_allclose(atoms[3], [*expected, 0.0], atol=1e-9)
     np.testing.assert_array_equal(atoms[[0, 1, 2, 4]], before[[0, 1, 2, 4]])
     assert 3.0 <= evaluations <= 30.0
@@ -304,7 +304,7 @@ def test_duality_gap_and_query_error() -> None:
     atoms[3, :3] = y + 100.0
     assert conditions.split_duality_gap(atoms, 3, y, MU, 0.0)[0] == 0.0
     distance = 100.0 * math.sqrt(3.0)
-    error = solver.split_query_error(atoms, 3, y, MU, 5.0)
+    error = split_solver.split_query_error(atoms, 3, y, MU, 5.0)
     assert error == pytest.approx(0.5 * (1.0 - MU) * (distance**2 - (distance - 5.0) ** 2))
 
 
@@ -407,11 +407,11 @@ def test_newton_ends_with_its_budget_or_a_lost_point() -> None:
     for budget in (0.0, 3.0, 5.0):
         atoms = random_atoms(2)
         atoms[:2, :2] = [[0.6, 0.3], [-0.4, -0.3]]
-        count, evaluations = solver.split_newton(atoms, 2, p, y.copy(), MU, a, budget, None)
+        count, evaluations = split_solver.split_newton(atoms, 2, p, y.copy(), MU, a, budget, None)
         assert count == 0
         assert budget < evaluations <= budget + 8.0
     h, hx, hy = curvature(0.1, 0.1, None)[:3]
     deep_point = np.array([0.1 + 30.0 * hx, 0.1 + 30.0 * hy, h - 30.0])
     atoms = random_atoms(2)
     atoms[0, :2] = 0.1, 0.1
-    assert solver.split_newton(atoms, 2, p, deep_point, MU, a, UNLIMITED, None) == (0, 1.0)
+    assert split_solver.split_newton(atoms, 2, p, deep_point, MU, a, UNLIMITED, None) == (0, 1.0)

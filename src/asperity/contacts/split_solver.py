@@ -34,7 +34,7 @@ from asperity.contacts.sampler_interface import (
     evaluation_cost,
     sample_height,
 )
-from asperity.contacts.split.optimality import (
+from asperity.contacts.split_optimality import (
     split_add_atom_motion,
     split_apply_step,
     split_assemble_system,
