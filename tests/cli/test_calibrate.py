@@ -10,7 +10,7 @@ import pytest
 from tests.servo.drivers.test_drivers import EXAMPLE, compile_library
 
 import asperity as asp
-from asperity.cli.device_commands import default_force
+from asperity.cli.setup_commands import default_force
 from asperity.core.errors import ParameterError
 from asperity.devices import load_device
 

@@ -18,11 +18,11 @@ from asperity.core.errors import AsperityError
 from asperity.core.units import parse_quantity
 from asperity.devices.device_file import load_device
 from asperity.measured.reading import ReadingOptions, SurfaceFile
-from asperity.measured.reading.images.pixels import ome_scale
-from asperity.measured.reading.metrology.sdf import read_sdf
-from asperity.measured.reading.metrology.x3p import parse_header
-from asperity.measured.reading.plain_text.text_reader import read_text
+from asperity.measured.reading.grids import read_sdf
+from asperity.measured.reading.pixels import ome_scale
 from asperity.measured.reading.readers import SIGNATURE_READERS
+from asperity.measured.reading.text_reader import read_text
+from asperity.measured.reading.x3p import parse_header
 from asperity.scene.scene_file import load_scene
 from asperity.scene.sections import read_path
 

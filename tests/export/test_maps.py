@@ -162,7 +162,7 @@ def test_pillow_and_tifffile_read_the_files() -> None:
     [b"\x011e-5", b"\x011e-5\x00-1", b"\x02" + b"1\x001", b"\x01nan\x001", b"", b"\x011\x001\x001"],
 )
 def test_invalid_png_sizes_are_ignored(chunk: bytes) -> None:
-    from asperity.measured.reading.images.pixels import png_scale
+    from asperity.measured.reading.pixels import png_scale
 
     assert png_scale({b"sCAL": chunk}, 16).pitch is None
 
@@ -171,7 +171,7 @@ def test_invalid_png_sizes_are_ignored(chunk: bytes) -> None:
     "rest", [b"", b"m\x001", b"V\x000\x001", b"m\x000\x00nan", b"m\x000\x000", b"m\x000\x001\x002"]
 )
 def test_invalid_png_calibrations_are_ignored(rest: bytes) -> None:
-    from asperity.measured.reading.images.pixels import png_scale
+    from asperity.measured.reading.pixels import png_scale
 
     head = b"a\0" + struct.pack(">iiBB", 0, 65535, 0, 2)
     invalid = png_scale({b"pCAL": head + rest}, 16)

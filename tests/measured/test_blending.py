@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from asperity.core.errors import ParameterError
-from asperity.measured.blending import blend_borders
+from asperity.measured.defects import blend_borders
 from asperity.measured.preparation import prepare
 from asperity.measured.reading import RawSurface
 from asperity.textures import load_texture

@@ -7,8 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 from asperity.core.errors import ParameterError
-from asperity.measured import filling
-from asperity.measured.filling import fill_in_place
+from asperity.measured import defects
+from asperity.measured.defects import fill_in_place
 
 P = 1e-6
 
@@ -78,15 +78,15 @@ def test_filling_of_a_large_hole() -> None:
 
 
 def test_hole_that_is_too_large_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(filling, "_GROUP_SIZE", 100)
-    monkeypatch.setattr(filling, "_MAX_HOLE", 400)
+    monkeypatch.setattr(defects, "_GROUP_SIZE", 100)
+    monkeypatch.setattr(defects, "_MAX_HOLE", 400)
     with pytest.raises(ParameterError, match="has a hole of 450 points; at most 400 are filled"):
         fill_harmonic(with_holes(bumpy()))
 
 
 def test_hole_groups_cover_all_missing_points_once() -> None:
     missing = np.random.default_rng(8).random((200, 210)) < 0.4
-    groups = list(filling._hole_groups(missing))
+    groups = list(defects._hole_groups(missing))
     np.testing.assert_array_equal(np.sort(np.concatenate(groups)), np.flatnonzero(missing))
 
 
@@ -94,8 +94,8 @@ def test_result_is_independent_of_the_grouping_of_holes(monkeypatch: pytest.Monk
     heights = bumpy(60, 70)
     heights[np.random.default_rng(9).random(heights.shape) < 0.2] = np.nan
     together = fill_harmonic(heights, (P, 2 * P))
-    monkeypatch.setattr(filling, "_GROUP_SIZE", 40)
-    groups = list(filling._hole_groups(np.isnan(heights)))
+    monkeypatch.setattr(defects, "_GROUP_SIZE", 40)
+    groups = list(defects._hole_groups(np.isnan(heights)))
     assert len(groups) > 10
     apart = fill_harmonic(heights, (P, 2 * P))
     np.testing.assert_allclose(apart, together, atol=1e-12 * np.ptp(together))

@@ -9,8 +9,8 @@ import pytest
 
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
-from asperity.measured import outliers
-from asperity.measured.outliers import (
+from asperity.measured import defects
+from asperity.measured.defects import (
     _half_window,
     _local_median,
     _pad_by_reflection,
@@ -48,7 +48,7 @@ def local_median(heights: FloatArray) -> FloatArray:
 def test_local_median_matches_a_reference_loop(
     monkeypatch: pytest.MonkeyPatch, shape: tuple[int, ...], share: float, block: int
 ) -> None:
-    monkeypatch.setattr(outliers, "_BLOCK", block)
+    monkeypatch.setattr(defects, "_BLOCK", block)
     rng = np.random.default_rng(1)
     heights = rng.standard_normal(shape)
     heights[rng.random(shape) < share] = np.nan

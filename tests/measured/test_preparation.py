@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from asperity.core.errors import ParameterError
-from asperity.measured.filling import fill_in_place
+from asperity.measured.defects import fill_in_place
 from asperity.measured.filters import ALPHA, gaussian_filter
 from asperity.measured.preparation import magnify_surface, prepare
 from asperity.measured.prepared import PreparedSurface

@@ -10,7 +10,7 @@ from numpy.polynomial.legendre import legder, legval, legvander
 
 from asperity.core.checks import FloatArray, check_positive
 from asperity.core.errors import ParameterError
-from asperity.measured.filling import fill_in_place
+from asperity.measured.defects import fill_in_place
 from asperity.measured.filters import SECTION_COUNT, gaussian_filter
 from asperity.measured.lengths import Pitch, Shape, format_length
 

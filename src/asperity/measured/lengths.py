@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-import tomllib
 import warnings
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
@@ -49,10 +47,30 @@ def format_counts(values: Sequence[int]) -> str:
     return " x ".join(str(value) for value in values)
 
 
-_UNITS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
-METRES_PER_UNIT: dict[str, float] = _UNITS["lower_case"]
+METRES_PER_UNIT = {
+    "m": 1.0,
+    "meter": 1.0,
+    "metre": 1.0,
+    "cm": 1e-2,
+    "mm": 1e-3,
+    "millimeter": 1e-3,
+    "millimetre": 1e-3,
+    "um": 1e-6,
+    "µm": 1e-6,  # U+00B5
+    "μm": 1e-6,  # U+03BC
+    "micron": 1e-6,
+    "micrometer": 1e-6,
+    "micrometre": 1e-6,
+    "nm": 1e-9,
+    "nanometer": 1e-9,
+    "nanometre": 1e-9,
+    "angstrom": 1e-10,
+    "ångström": 1e-10,
+    "å": 1e-10,
+    "pm": 1e-12,
+}
 """Lengths of the units [m] by name in lower case."""
-_EXPLICIT_UNITS: dict[str, float] = _UNITS["as_written"]
+_EXPLICIT_UNITS = {"Å": 1e-10, "in": 0.0254, "inch": 0.0254, "km": 1e3, "dm": 0.1}
 _MULTIPLE = re.compile(r"((?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\D+)")
 
 

@@ -13,13 +13,16 @@ from asperity.core.arguments import document_arguments
 from asperity.core.checks import FloatArray, check_positive
 from asperity.core.errors import ParameterError
 from asperity.core.memory import require_memory
-from asperity.measured.blending import make_periodic, to_blend_samples
+from asperity.measured.defects import (
+    fill_in_place,
+    make_periodic,
+    remove_outliers,
+    to_blend_samples,
+)
 from asperity.measured.file_arguments import PREPARATION_ARGUMENTS
-from asperity.measured.filling import fill_in_place
 from asperity.measured.filters import apply_filters, apply_tip, check_tip_radius, find_cutoffs
 from asperity.measured.form import check_degree, fit_form, subtract_form
 from asperity.measured.lengths import Pitch, Shape, format_counts, format_length, format_lengths
-from asperity.measured.outliers import remove_outliers
 from asperity.measured.prepared import PreparedSurface, StageCallback, StageRecorder, resized_stage
 from asperity.measured.reading.reader import RawSurface
 

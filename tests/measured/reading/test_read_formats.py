@@ -16,7 +16,7 @@ import pytest
 from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.measured.reading import RawSurface, read_surface
 from asperity.measured.reading import readers as registry
-from asperity.measured.reading.metrology import surface_topography as instruments
+from asperity.measured.reading import surface_topography as instruments
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "writers"))
 from image_writer import write_tiff

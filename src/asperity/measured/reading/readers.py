@@ -2,11 +2,14 @@
 
 The readers are tried in this order: those that recognise a signature; the user's in the order of
 registration; last the readers of text and of instruments' files, which recognise almost anything.
+Files of formats that hold no surface are refused with the name of the format and a remedy.
 """
 
 from __future__ import annotations
 
 import os
+import tomllib
+import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -16,30 +19,114 @@ from pathlib import Path
 import numpy as np
 
 from asperity.core.errors import AsperityError, ParameterError, SurfaceFileError, nearest_names
-from asperity.measured.reading import unsupported
-from asperity.measured.reading.grids import NPY_MAGIC, read_npy
-from asperity.measured.reading.images.image_files import PNG_MAGIC, TIFF_MAGIC, read_png, read_tiff
+from asperity.measured.reading import surface_topography
+from asperity.measured.reading.grids import NPY_MAGIC, is_sdf, read_npy, read_sdf
+from asperity.measured.reading.image_files import PNG_MAGIC, TIFF_MAGIC, read_png, read_tiff
 from asperity.measured.reading.isolation import describe_exception, read_isolated
 from asperity.measured.reading.mesh import is_binary_stl, is_obj, is_text_stl, read_mesh
-from asperity.measured.reading.metrology import surface_topography
-from asperity.measured.reading.metrology.sdf import is_sdf, read_sdf
-from asperity.measured.reading.metrology.x3p import read_x3p
-from asperity.measured.reading.plain_text.text_reader import read_text
-from asperity.measured.reading.reader import RawSurface, Reader, ReadingOptions, SurfaceFile
+from asperity.measured.reading.reader import (
+    ARCHIVE_ERRORS,
+    ZIP_MAGIC,
+    RawSurface,
+    Reader,
+    ReadingOptions,
+    SurfaceFile,
+)
+from asperity.measured.reading.surface_topography import has_library
+from asperity.measured.reading.text_reader import read_text
+from asperity.measured.reading.x3p import read_x3p
+
+_MAX_UNPACKED_BYTES = 2 * 10**9
+
+
+def classify_archive(path: Path) -> str:
+    """Return "X3P", "NPZ" or "other"; a damaged archive counts as X3P, whose reader refuses it.
+
+    Args:
+        path: a file with the signature of a zip archive.
+
+    Raises:
+        SurfaceFileError: the archive would unpack to gigabytes.
+    """
+    try:
+        with zipfile.ZipFile(path) as file:
+            members = file.infolist()
+    except ARCHIVE_ERRORS:
+        return "X3P"
+    names = [member.filename.replace("\\", "/").lower() for member in members]
+    if any(name.rpartition("/")[2] == "main.xml" for name in names):
+        return "X3P"  # its reader checks the size of each member against main.xml
+    size = sum(member.file_size for member in members)
+    if size > _MAX_UNPACKED_BYTES:
+        limit = f"at most {_MAX_UNPACKED_BYTES / 1e9:.0f} GB are read"
+        raise SurfaceFileError(f"{path.name} unpacks to {size / 1e9:.1f} GB; {limit}")
+    return "NPZ" if any(name.endswith(".npy") for name in names) else "other"
+
+
+SUPPORTED_FORMATS = "X3P, SDF, NPY, text matrix, two-column profile, PNG, TIFF, STL, OBJ"
+_EXTRA_HINT = "the files of most instruments need the extra: pip install 'asperity[formats]'"
+
+# Signatures of formats that are mistaken for surfaces, so that the message can name them.
+_SIGNATURES = tomllib.loads(Path(__file__).with_name("unsupported.toml").read_text("utf-8"))[
+    "signatures"
+]
+
+
+def reject_unsupported(file: SurfaceFile, _options: ReadingOptions) -> None:
+    """Refuse a file of a known format that holds no surface, with a remedy.
+
+    Raises:
+        SurfaceFileError: the file has such a format.
+    """
+    if file.head.startswith(ZIP_MAGIC) and classify_archive(file.path) == "NPZ":
+        fault = "an NPZ archive that asperity did not prepare; save one array of heights as NPY"
+        raise SurfaceFileError(f"{file.name} is {fault}")
+    for signature, kind, advice in _SIGNATURES:
+        magic = signature.encode("latin-1")
+        # Text may start with the same two letters ("BMS profile ..."): require a binary byte too.
+        is_binary = len(magic) > 2 or b"\x00" in file.head[:64] or magic[0] < 32
+        if file.head.startswith(magic) and is_binary:
+            raise _unsupported_error(file, f"a {kind}", advice)
+
+
+def unrecognised_error(file: SurfaceFile) -> SurfaceFileError:
+    """Return the error for a file that no reader recognises."""
+    if file.head.startswith(TIFF_MAGIC):
+        return _unsupported_error(file, "an instrument's TIFF file", _EXTRA_HINT)
+    advice = "" if has_library() else _EXTRA_HINT
+    if file.head.startswith(ZIP_MAGIC):
+        tail = f"; {advice}" if advice else ""
+        return SurfaceFileError(f"{file.name}: a zip archive without a main.xml is no X3P{tail}")
+    return _unsupported_error(file, "a binary file", advice)
+
+
+def _unsupported_error(file: SurfaceFile, kind: str, advice: str) -> SurfaceFileError:
+    tail = f"; {advice}" if advice else ""
+    fault = f"not a surface format that asperity reads: {SUPPORTED_FORMATS}{tail}"
+    return SurfaceFileError(f"{file.name} looks like {kind}: {fault}")
+
+
+def too_large_error(name: str, size: int, limit: int, what: str = "") -> SurfaceFileError:
+    """Return the error for a file that is too large for the memory."""
+    return SurfaceFileError(
+        f"{name} has {size / 1e9:.1f} GB{what}; at most {limit / 1e9:g} GB are read:"
+        " cut out a part, take every second point, or save as X3P or NPY in single precision"
+    )
+
 
 MAX_BYTES = 2 * 10**9
 _MAX_TEXT_BYTES = 5 * 10**8  # parsing text takes several times the size of the file
 
 
 def _is_x3p(file: SurfaceFile) -> bool:
-    is_zip = file.head.startswith(unsupported.ZIP_MAGIC)
-    return is_zip and unsupported.classify_archive(file.path) == "X3P"
+    is_zip = file.head.startswith(ZIP_MAGIC)
+    return is_zip and classify_archive(file.path) == "X3P"
 
 
 def _read_text(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
     size = file.path.stat().st_size
     if size > _MAX_TEXT_BYTES:
-        raise unsupported.too_large_error(file.name, size, _MAX_TEXT_BYTES, " of text")
+        raise too_large_error(file.name, size, _MAX_TEXT_BYTES, " of text")
     return read_text(file, options)
 
 
@@ -62,7 +149,7 @@ SIGNATURE_READERS = (
 """Readers that recognise a signature of their format."""
 
 FALLBACK_READERS = (
-    Reader("a file of another kind", lambda _: True, unsupported.reject_unsupported),
+    Reader("a file of another kind", lambda _: True, reject_unsupported),
     Reader("a text file", lambda file: file.is_text, _read_text, ("unit",), certain=False),
     Reader(
         "an instrument's file",
@@ -221,7 +308,7 @@ def _read_first(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
             if raw.has_units or raw.relative:
                 return raw
             return replace(raw, notes=("no unit in the file: taken as metres", *raw.notes))
-    raise refusal or unsupported.unrecognised_error(file)
+    raise refusal or unrecognised_error(file)
 
 
 def _run(reader: Reader, file: SurfaceFile, options: ReadingOptions) -> RawSurface | None:
@@ -247,12 +334,12 @@ def _check_file(path: Path, name: str) -> None:
     except ValueError as error:  # a NUL in the name
         raise SurfaceFileError(f"{str(path)!r} is not a file name") from error
     if is_folder:
-        formats = unsupported.SUPPORTED_FORMATS
+        formats = SUPPORTED_FORMATS
         raise SurfaceFileError(f"{path} is a directory; a file is expected ({formats})")
     if path.is_file() and size == 0:
         raise SurfaceFileError(f"{name} is empty")
     if size > MAX_BYTES:
-        raise unsupported.too_large_error(name, size, MAX_BYTES)
+        raise too_large_error(name, size, MAX_BYTES)
 
 
 def _check_finite(raw: RawSurface) -> RawSurface:

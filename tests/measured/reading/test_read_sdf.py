@@ -12,7 +12,7 @@ import pytest
 from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.measured.reading import RawSurface, read_surface
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "writers"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "writers"))
 from sdf_writer import SdfSpec, write_ascii, write_binary
 
 STORED = np.array([[120.0, -30, 7, 0], [55, 66, -77, 88], [9, 10, 11, 12.0]])

@@ -16,10 +16,10 @@ import pytest
 from asperity.core.errors import AsperityError, SurfaceFileError
 from asperity.measured.reading import RawSurface, read_surface
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "writers"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "writers"))
 from x3p_writer import X3pSpec, write_x3p
 
-DATA = Path(__file__).parents[4].parent / "shared" / "data"
+DATA = Path(__file__).parents[3].parent / "shared" / "data"
 needs_data = pytest.mark.skipif(not DATA.is_dir(), reason="real surfaces (../shared/data) missing")
 
 HEIGHTS = np.array([[1.5, -2.0, 3.25, 7.0, 0.5], [0.0, 4.0, -5.5, 6.0, 8.0], [9, 1, 2, 3, 4.0]])

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.core.errors import SurfaceFileError
-from asperity.measured.reading.images import pixels
+from asperity.measured.reading import pixels
 from asperity.measured.reading.isolation import reject_on_error
 from asperity.measured.reading.reader import RawSurface, ReadingOptions, SurfaceFile, mask_missing
 

@@ -10,9 +10,8 @@ import numpy as np
 
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError, SurfaceFileError
-from asperity.measured.reading import reader, spacing
-from asperity.measured.reading.plain_text import text_columns, text_header
-from asperity.measured.reading.plain_text.text_table import TextTable, find_table
+from asperity.measured.reading import reader, text_header
+from asperity.measured.reading.text_table import TextTable, find_table
 
 _MIN_POINTS = 4
 
@@ -37,12 +36,12 @@ def read_text(file: reader.SurfaceFile, options: reader.ReadingOptions) -> reade
     header = text_header.parse_map_header(table.header, table.values.shape)
     if text_header.parse_map_header(table.comments).describes_map:
         raise SurfaceFileError("several maps in one file: save each in a file of its own")
-    table, names, found = text_columns.select_columns(table)
+    table, names, found = text_header.select_columns(table)
     rows, columns = table.values.shape
     is_list = (columns == 2 and _is_monotonic(table)) or (columns == 3 and rows > 3)
     is_list = is_list and not header.describes_map
     heights = table.values[:, -1:] if is_list else table.values
-    heights[:], marked = text_columns.mask_codes(heights, header.missing_code)
+    heights[:], marked = text_header.mask_codes(heights, header.missing_code)
     if is_list:
         units, assumed = _find_units(names, header, file.name, options)
         read = _read_profile if columns == 2 else _read_points
@@ -131,13 +130,13 @@ def _read_profile(table: TextTable, units: list[float], name: str) -> reader.Raw
         resolution = resolution[::-1]
         lines = lines[::-1]
         notes = ("positions decrease: the profile is reversed",)
-    result = spacing.measure_spacing(positions, resolution)
+    result = reader.measure_spacing(positions, resolution)
     pitch = result.step * units[0]
     if not result.is_uniform:
         raise SurfaceFileError(
             f"sampling is not uniform: line {lines[result.index]} is"
             f" {result.deviation * units[0]:.3g} m from a grid of {pitch:.3g} m;"
-            f" {spacing.INTERPOLATE}"
+            f" {reader.INTERPOLATE}"
         )
     return reader.RawSurface(np.ascontiguousarray(heights), (pitch,), name, notes)
 
@@ -159,7 +158,7 @@ def _read_matrix(
     table: TextTable, header: text_header.MapHeader, name: str, options: reader.ReadingOptions
 ) -> reader.RawSurface:
     """Return the map, or the profile of one column; heights without a unit are relative."""
-    text_columns.reject_positions(table)
+    text_header.reject_positions(table)
     unit, notes = options.resolve_unit(name, header.unit)
     heights = np.ascontiguousarray(table.values * (unit or 1.0))
     pitch = tuple(p for p in header.pitch if p is not None)
@@ -200,7 +199,7 @@ def _to_decimal(text: str) -> Decimal:
 
 _MAX_SPARSITY = 4  # grid points for each point of the list, beyond which there is no grid
 _EXPECTED_LAYOUT = "three columns are x, y, z of points on a regular grid, in any order"
-_NO_GRID = f"{_EXPECTED_LAYOUT}; {spacing.INTERPOLATE}"
+_NO_GRID = f"{_EXPECTED_LAYOUT}; {reader.INTERPOLATE}"
 
 
 def points_to_grid(
@@ -239,7 +238,7 @@ def points_to_grid(
 def _grid_step(axis: str, positions: FloatArray, resolution: FloatArray) -> float:
     if len(positions) == 1:
         return 0.0
-    result = spacing.measure_spacing(positions, float(resolution.max()))
+    result = reader.measure_spacing(positions, float(resolution.max()))
     if not result.is_uniform:
         fault = f"one is {result.deviation:.3g} from a grid of {result.step:.3g}"
         raise SurfaceFileError(f"the {axis} positions are not uniform: {fault}; {_NO_GRID}")

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "writers"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "writers"))
 from image_writer import write_tiff
 
 from asperity.core.errors import ParameterError
 from asperity.measured.preparation import prepare
 from asperity.measured.reading import read_surface
-from asperity.measured.reading.images.pixels import ImageScale, imagej_scale, ome_scale
+from asperity.measured.reading.pixels import ImageScale, imagej_scale, ome_scale
 
 HEIGHTS = (np.random.default_rng(2).normal(size=(6, 9)) * 3).astype(np.float32)
 RELATIVE = "an image has no unit: heights are pixel values, y runs down the image"

@@ -16,9 +16,14 @@ from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.measured.lengths import unit_to_metres
 from asperity.measured.reading.isolation import reject_on_error
-from asperity.measured.reading.plain_text.text_header import WORDS, split_words
-from asperity.measured.reading.reader import MAX_POINTS, RawSurface, ReadingOptions, SurfaceFile
-from asperity.measured.reading.spacing import INTERPOLATE
+from asperity.measured.reading.reader import (
+    INTERPOLATE,
+    MAX_POINTS,
+    RawSurface,
+    ReadingOptions,
+    SurfaceFile,
+)
+from asperity.measured.reading.text_header import WORDS, split_words
 
 LIBRARY = "SurfaceTopography"
 """Name of the library that reads the files of instruments."""

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from bench import text_headers
 
-from asperity.measured.reading import RawSurface
-from asperity.measured.reading.plain_text import text_header
+from asperity.measured.reading import RawSurface, text_header
 
 TRIALS = range(20_000, 20_013)
 

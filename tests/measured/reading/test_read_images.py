@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.measured.reading import RawSurface, read_surface
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "writers"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "writers"))
 from image_writer import chunk, write_png, write_tiff
 
 RNG = np.random.default_rng(25178)

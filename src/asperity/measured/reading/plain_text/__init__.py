@@ -1,1 +1,0 @@
-"""Readers of text matrices, profiles and point lists."""
