@@ -22,8 +22,8 @@ from rich.table import Table
 
 from asperity.core.checks import FloatArray
 from asperity.core.errors import AsperityError
+from asperity.measured.reader import RawSurface as Surface
 from asperity.measured.reading import RawSurface, ReadingOptions, SurfaceFile
-from asperity.measured.reading.reader import RawSurface as Surface
 from asperity.measured.reading.text_reader import read_text
 
 UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "nm": 1e-9}

@@ -24,7 +24,7 @@ from asperity.measured.filters import apply_filters, apply_tip, check_tip_radius
 from asperity.measured.form import check_degree, fit_form, subtract_form
 from asperity.measured.lengths import Pitch, Shape, format_counts, format_length, format_lengths
 from asperity.measured.prepared import PreparedSurface, StageCallback, StageRecorder, resized_stage
-from asperity.measured.reading.reader import RawSurface
+from asperity.measured.reader import RawSurface
 
 MAX_MEAN_SLOPE = 10.0
 """Greatest plausible mean slope between neighbouring points: flanks of 84°.

@@ -22,7 +22,7 @@ from asperity.core.files import Serializable, json_text, open_atomic, open_input
 from asperity.measured.form import HeightStatistics
 from asperity.measured.lengths import Pitch
 from asperity.measured.parameters import ParameterValues, compute_parameters, find_parameter
-from asperity.measured.reading.reader import ARCHIVE_ERRORS, MAX_POINTS, ZIP_MAGIC
+from asperity.measured.reader import ARCHIVE_ERRORS, MAX_POINTS, ZIP_MAGIC
 
 
 @dataclass(frozen=True)

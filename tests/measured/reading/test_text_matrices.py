@@ -17,9 +17,9 @@ from tests.helpers.text_files import (
 )
 
 from asperity.core.errors import AsperityError, ParameterError, SurfaceFileError
+from asperity.measured.reader import measure_spacing
 from asperity.measured.reading import RawSurface, read_surface
 from asperity.measured.reading import readers as registry
-from asperity.measured.reading.reader import measure_spacing
 
 DATA = Path(__file__).parents[3].parent / "shared" / "data"
 needs_data = pytest.mark.skipif(not DATA.is_dir(), reason="real surfaces (../shared/data) missing")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from asperity.measured.reading.reader import RawSurface, Reader, ReadingOptions, SurfaceFile
+from asperity.measured.reader import RawSurface, Reader, ReadingOptions, SurfaceFile
 from asperity.measured.reading.readers import read_surface, register
 
 __all__ = ["RawSurface", "Reader", "ReadingOptions", "SurfaceFile", "read_surface", "register"]

@@ -19,8 +19,8 @@ import numpy as np
 
 from asperity.core.checks import FloatArray
 from asperity.core.errors import SurfaceFileError
+from asperity.measured import reader
 from asperity.measured.lengths import parse_heights, parse_number
-from asperity.measured.reading import reader
 from asperity.measured.reading.isolation import describe_exception
 
 NPY_MAGIC = b"\x93NUMPY"

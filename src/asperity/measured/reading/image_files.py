@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.core.errors import SurfaceFileError
+from asperity.measured.reader import RawSurface, ReadingOptions, SurfaceFile, mask_missing
 from asperity.measured.reading import pixels
 from asperity.measured.reading.isolation import reject_on_error
-from asperity.measured.reading.reader import RawSurface, ReadingOptions, SurfaceFile, mask_missing
 
 _PALETTE = 3  # in both formats
 _PALETTE_FAULT = "has a palette, whose colours are no heights; save a grey image"

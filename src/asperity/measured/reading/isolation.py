@@ -22,7 +22,7 @@ from typing import IO, Any
 
 from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.core.processes import SINGLE_THREADED
-from asperity.measured.reading.reader import RawSurface, ReadFunction, ReadingOptions, SurfaceFile
+from asperity.measured.reader import RawSurface, ReadFunction, ReadingOptions, SurfaceFile
 
 TIME_LIMIT = 20.0
 """Processor time [s] allowed for a small file."""

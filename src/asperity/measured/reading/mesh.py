@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError, SurfaceFileError
+from asperity.measured.reader import RawSurface, ReadingOptions, SurfaceFile
 from asperity.measured.reading.isolation import reject_on_error
-from asperity.measured.reading.reader import RawSurface, ReadingOptions, SurfaceFile
 
 _STL_HEADER = 84
 _STL_RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.measured.lengths import format_lengths, unit_to_metres
-from asperity.measured.reading.reader import RawSurface, ReadingOptions, check_point_count
+from asperity.measured.reader import RawSurface, ReadingOptions, check_point_count
 
 _MAX_DESCRIPTION = 10**6
 _OME_PIXELS = re.compile(r"<(?:\w{1,20}:)?Pixels\s([^<>]{0,5000})>")

@@ -19,12 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from asperity.core.errors import AsperityError, ParameterError, SurfaceFileError, nearest_names
-from asperity.measured.reading import surface_topography
-from asperity.measured.reading.grids import NPY_MAGIC, is_sdf, read_npy, read_sdf
-from asperity.measured.reading.image_files import PNG_MAGIC, TIFF_MAGIC, read_png, read_tiff
-from asperity.measured.reading.isolation import describe_exception, read_isolated
-from asperity.measured.reading.mesh import is_binary_stl, is_obj, is_text_stl, read_mesh
-from asperity.measured.reading.reader import (
+from asperity.measured.reader import (
     ARCHIVE_ERRORS,
     ZIP_MAGIC,
     RawSurface,
@@ -32,6 +27,11 @@ from asperity.measured.reading.reader import (
     ReadingOptions,
     SurfaceFile,
 )
+from asperity.measured.reading import surface_topography
+from asperity.measured.reading.grids import NPY_MAGIC, is_sdf, read_npy, read_sdf
+from asperity.measured.reading.image_files import PNG_MAGIC, TIFF_MAGIC, read_png, read_tiff
+from asperity.measured.reading.isolation import describe_exception, read_isolated
+from asperity.measured.reading.mesh import is_binary_stl, is_obj, is_text_stl, read_mesh
 from asperity.measured.reading.surface_topography import has_library
 from asperity.measured.reading.text_reader import read_text
 from asperity.measured.reading.x3p import read_x3p

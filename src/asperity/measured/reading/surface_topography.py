@@ -15,14 +15,14 @@ import numpy as np
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.measured.lengths import unit_to_metres
-from asperity.measured.reading.isolation import reject_on_error
-from asperity.measured.reading.reader import (
+from asperity.measured.reader import (
     INTERPOLATE,
     MAX_POINTS,
     RawSurface,
     ReadingOptions,
     SurfaceFile,
 )
+from asperity.measured.reading.isolation import reject_on_error
 from asperity.measured.reading.text_header import WORDS, split_words
 
 LIBRARY = "SurfaceTopography"

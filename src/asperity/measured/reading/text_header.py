@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from asperity.core.checks import FloatArray
 from asperity.core.errors import SurfaceFileError
 from asperity.measured.lengths import METRES_PER_UNIT, format_lengths
-from asperity.measured.reading.reader import mask_missing
+from asperity.measured.reader import mask_missing
 from asperity.measured.reading.text_table import TextTable
 
 _MAX_LINE = 1000  # a longer line is a row of data rather than a header

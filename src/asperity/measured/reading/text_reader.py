@@ -10,7 +10,8 @@ import numpy as np
 
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError, SurfaceFileError
-from asperity.measured.reading import reader, text_header
+from asperity.measured import reader
+from asperity.measured.reading import text_header
 from asperity.measured.reading.text_table import TextTable, find_table
 
 _MIN_POINTS = 4

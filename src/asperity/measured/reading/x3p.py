@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from asperity.core.checks import FloatArray
 from asperity.core.errors import SurfaceFileError
+from asperity.measured import reader
 from asperity.measured.lengths import parse_number
-from asperity.measured.reading import reader
-from asperity.measured.reading.reader import ARCHIVE_ERRORS, measure_spacing
+from asperity.measured.reader import ARCHIVE_ERRORS, measure_spacing
 
 DTYPES = {"I": "<i2", "L": "<i4", "F": "<f4", "D": "<f8"}
 _MAX_XML = 64 * 2**20
