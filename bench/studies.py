@@ -23,10 +23,10 @@ from rich.console import Console
 from rich.table import Table
 
 from asperity.studies.design import StudyDesign, Values
-from asperity.studies.kinds.tracks import BayesianTrack
 from asperity.studies.methods import METHODS
-from asperity.studies.observers import Observer, simulate_run
-from asperity.studies.statistics.psychometric import SLOPE_SPREAD, USUAL_SLOPE, LogLevels
+from asperity.studies.psychometric import SLOPE_SPREAD, USUAL_SLOPE, LogLevels
+from asperity.studies.simulated_participants import Observer, simulate_run
+from asperity.studies.thresholds import BayesianTrack
 
 COUNT, PARTICIPANTS, RESAMPLES, SPREAD = 1000, 12, 400, 0.3
 LAWS = {"surface.law": ("A", "C", "D", "H")}

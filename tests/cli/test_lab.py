@@ -52,7 +52,7 @@ def test_address_is_printed_when_no_browser_is_found(
         server_socket.close()
         ready("http://127.0.0.1:1/token/")
 
-    monkeypatch.setattr("asperity.lab.launch.serve_lab", serve_lab)
+    monkeypatch.setattr("asperity.lab.server.serve_lab", serve_lab)
     opened = []
 
     def open_browser(address: str) -> bool:

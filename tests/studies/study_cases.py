@@ -7,7 +7,7 @@ from typing import Any
 
 from asperity.studies.design import StudyDesign, TrialRecord, Values
 from asperity.studies.methods import METHODS
-from asperity.studies.observers import Observer, simulate_run
+from asperity.studies.simulated_participants import Observer, simulate_run
 
 LAWS = {"surface.law": ("A", "C", "D", "H")}
 AMPLITUDE = "texture.amplitude"

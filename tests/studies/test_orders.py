@@ -9,7 +9,7 @@ import pytest
 from tests.studies.study_cases import answers, design_of
 
 from asperity.core.errors import ParameterError
-from asperity.studies.kinds.orders import balanced_order
+from asperity.studies.design import balanced_order
 from asperity.studies.methods import METHODS
 
 

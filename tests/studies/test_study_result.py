@@ -13,11 +13,15 @@ from tests.studies.study_cases import AMPLITUDE, design_of, records
 
 from asperity.core.errors import ParameterError
 from asperity.devices import load_device
-from asperity.studies import result_page  # noqa: F401  # registers the report of results
 from asperity.studies.design import TrialRecord
 from asperity.studies.methods import METHODS
-from asperity.studies.observers import OBSERVERS, find_observer, hand_strength, surface_strength
-from asperity.studies.plan import plan
+from asperity.studies.simulated_participants import (
+    OBSERVERS,
+    find_observer,
+    hand_strength,
+    plan,
+    surface_strength,
+)
 from asperity.studies.study_result import analyse
 from asperity.surface import Surface
 from asperity.textures import Sinusoid

@@ -13,7 +13,7 @@ from asperity.core.errors import ParameterError
 from asperity.studies.design import Presentation
 from asperity.studies.live.player import Stimuli
 from asperity.studies.live.trial_session import simulate_session
-from asperity.studies.observers import Observer, Strength
+from asperity.studies.simulated_participants import Observer, Strength
 from asperity.studies.study_file import Study
 from asperity.studies.study_store import (
     ANSWERS_FILE,

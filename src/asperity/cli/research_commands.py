@@ -179,7 +179,7 @@ def run_command(file: str, participant: str, folder: str | None, driver: str, **
     from asperity.studies.live.player import LoopPlayer, Stimuli
     from asperity.studies.live.screens import PageScreen, Terminal
     from asperity.studies.live.trial_session import SessionStopped, StudySession, simulate_session
-    from asperity.studies.observers import find_observer
+    from asperity.studies.simulated_participants import find_observer
     from asperity.studies.study_file import load_study
     from asperity.studies.study_store import Participant, check_participant, write_study
 
@@ -222,8 +222,7 @@ def report_command(folder: str, outputs: output.Outputs) -> None:
 
     It unblinds the study: write it when all participants are done.
     """
-    from asperity.studies.result_page import study_page
-    from asperity.studies.study_functions import study_report, write_report
+    from asperity.studies.study_report import study_page, study_report, write_report
 
     with output.progress_bar("analyzing the answers"):
         result = study_report(folder)
@@ -241,7 +240,7 @@ def plan_command(file: str, effect: float, **values: Any) -> None:
 
     The effect is the factor by which the first condition is stronger at the hand than the others.
     """
-    from asperity.studies.study_functions import plan_study
+    from asperity.studies.study_report import plan_study
 
     with output.progress_bar("simulating studies"):
         found = plan_study(file, effect, **options.provided_values(values, _PLAN))

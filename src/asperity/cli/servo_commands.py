@@ -257,9 +257,9 @@ def lab_command(
     """
     # Started first, since it takes long in another process.
     process = loop_setup.prestart_process()
-    from asperity.lab.launch import bind_socket, serve_lab
+    from asperity.lab.access import bind_socket
     from asperity.lab.scene_state import DEFAULT_SURFACE
-    from asperity.lab.server import LabOptions
+    from asperity.lab.server import LabOptions, serve_lab
 
     source = surface or DEFAULT_SURFACE
     playback = handle = None

@@ -1,8 +1,9 @@
-"""Access to the page: token, allowed hosts and origins, rate limit, and HTTP responses."""
+"""Access to the page: socket, token, allowed hosts and origins, rate limit, and HTTP responses."""
 
 from __future__ import annotations
 
 import secrets
+import socket
 import time
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, field
@@ -13,13 +14,45 @@ from importlib.resources import files
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
-from asperity.core.errors import AsperityError
+from asperity.core.errors import AsperityError, ParameterError
 
 MAX_MESSAGE_BYTES = 4096
 """Greatest size of a message from the page."""
 MAX_MESSAGE_RATE = 500.0
 MAX_MESSAGE_BURST = 1000.0
 """Messages per second that a page may send, and in a burst."""
+
+
+LOOPBACK_ADDRESS = "127.0.0.1"
+DEFAULT_PORT = 8137
+"""Port of the lab, if it is free."""
+PORT_COUNT = 65_536
+_PORT_ATTEMPTS = 50  # consecutive ports that are tried
+
+
+def bind_socket(port: int | None) -> socket.socket:
+    """Return a socket that listens on the loopback interface.
+
+    Args:
+        port: the port, 0 for any; ``None`` for the first free one from ``DEFAULT_PORT``.
+
+    Raises:
+        ParameterError: for an invalid port, or one that is not free; the next free one is named.
+    """
+    wanted = DEFAULT_PORT if port is None else port
+    if not 0 <= wanted < PORT_COUNT:
+        raise ParameterError("port", f"must be 0 (any free port) to {PORT_COUNT - 1}", wanted)
+    for number in range(wanted, min(wanted + _PORT_ATTEMPTS, PORT_COUNT)):
+        try:
+            bound = socket.create_server((LOOPBACK_ADDRESS, number))
+        except OSError:
+            continue
+        if port is not None and number != wanted:
+            bound.close()
+            raise ParameterError("port", f"{wanted} is not available; {number} is free")
+        return bound
+    raise ParameterError("port", "is not available, nor are the next ones", wanted)
+
 
 # Nothing is loaded from elsewhere and nothing is sent there.
 CONTENT_SECURITY_POLICY = (

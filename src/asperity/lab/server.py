@@ -4,22 +4,32 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
+import signal
+import socket
 import time
 from collections.abc import Callable, Coroutine, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from functools import partial
+from multiprocessing import active_children
 from pathlib import Path
 from typing import Any
 
-from websockets.asyncio.server import ServerConnection
+from websockets.asyncio.server import ServerConnection, serve
 from websockets.exceptions import ConnectionClosed
 
 from asperity.core.errors import ParameterError
 from asperity.core.files import to_plain_data
 from asperity.devices import device_names
 from asperity.lab import background, messages
-from asperity.lab.access import MalformedMessageError, RateLimit
+from asperity.lab.access import (
+    MAX_MESSAGE_BYTES,
+    AccessToken,
+    MalformedMessageError,
+    RateLimit,
+    respond,
+)
 from asperity.lab.background import BackgroundRenderer, BackgroundResult, BackgroundWorker
 from asperity.lab.clips import ClipStore
 from asperity.lab.lanes import FrameReader, Lane, SecondLane
@@ -358,3 +368,74 @@ def _greeting() -> dict[str, Any]:
         "textures": kinds,
         "ranges": RANGES,
     }
+
+
+async def serve_lab(
+    scene_state: SceneState,
+    listener: socket.socket,
+    on_ready: Callable[[str], None],
+    options: LabOptions,
+) -> None:
+    """Serve the lab until a signal arrives, or the task is cancelled.
+
+    Args:
+        scene_state: the initial scene.
+        listener: the bound socket.
+        on_ready: called with the address once the server answers.
+        options: see :class:`LabOptions`.
+    """
+    token = AccessToken(listener.getsockname()[1])
+    stopped = asyncio.Event()
+    with ExitStack() as stack:
+        workers = [stack.enter_context(BackgroundWorker(options.load_plugins)) for _ in range(3)]
+        lab = LabServer(scene_state, workers, options)
+        tasks = [asyncio.create_task(work()) for work in (lab.watch_session, lab.watch_steering)]
+        fetch = lab.clip_store.fetch
+        _handle_signals(lab.session, stopped)
+        try:
+            with lab.session, lab.second_lane.session:
+                async with serve(
+                    lab.serve_client,
+                    sock=listener,
+                    max_size=MAX_MESSAGE_BYTES,
+                    compression=None,
+                    process_request=lambda _line, request: respond(token, request, fetch),
+                ):
+                    on_ready(token.url)
+                    await stopped.wait()
+        finally:
+            for task in (*tasks, *lab.pending_tasks):
+                task.cancel()
+            lab.pictures.close()
+            lab.second_lane.pictures.close()
+            # The loop has ended; remaining processes compute pictures and limits, maybe for long.
+            for child in active_children():
+                child.terminate()
+
+
+def _handle_signals(session: Session, stopped: asyncio.Event) -> None:
+    """Release the force and stop at a signal; at Ctrl-Z release it, then suspend this process."""
+    events = asyncio.get_running_loop()
+
+    def stop(*, now: bool = False) -> None:
+        session.release_force("", now=now)
+        stopped.set()
+
+    def suspend() -> None:
+        if session.is_ended:
+            os.kill(os.getpid(), signal.SIGSTOP)
+        else:
+            events.call_later(0.01, suspend)
+
+    def release_and_suspend() -> None:
+        session.release_force("stopped by Ctrl-Z; Start runs it again")
+        suspend()
+
+    handlers: dict[int, Callable[[], None]] = dict.fromkeys(
+        (signal.SIGINT, signal.SIGTERM, signal.SIGHUP), stop
+    )
+    handlers |= {signal.SIGQUIT: partial(stop, now=True), signal.SIGTSTP: release_and_suspend}
+    for number, handler in handlers.items():
+        # Without support by system or thread, Ctrl-C cancels the task.
+        with suppress(NotImplementedError, RuntimeError, ValueError):
+            events.add_signal_handler(number, handler)

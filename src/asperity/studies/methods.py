@@ -10,12 +10,11 @@ from typing import Any
 import numpy as np
 
 from asperity.core.arguments import Argument, read_arguments
+from asperity.studies import pairs
 from asperity.studies.design import Answers, Method, Steps, StudyDesign, TrialRecord
-from asperity.studies.kinds import pairs
-from asperity.studies.kinds.adjustment import run_onset, score_onset
-from asperity.studies.kinds.rating import run_rating, score_rating
-from asperity.studies.kinds.thresholds import run_thresholds, score_thresholds
-from asperity.studies.statistics.scores import Score
+from asperity.studies.numeric_answers import run_onset, run_rating, score_onset, score_rating
+from asperity.studies.scores import Score
+from asperity.studies.thresholds import run_thresholds, score_thresholds
 
 
 @dataclass(frozen=True)
@@ -29,7 +28,7 @@ class MethodKind:
         run: the method, from a design with all options, the number of the participant and random
             numbers.
         score: estimates from the answers; see
-            :class:`~asperity.studies.statistics.scores.Score`.
+            :class:`~asperity.studies.scores.Score`.
         label: names of what is estimated: conditions, unless their pairs are.
         consistency: share of repeated questions that a participant answers alike; ``None`` where
             the method has no such share.

@@ -12,8 +12,8 @@ from matplotlib.ticker import MaxNLocator
 from asperity.core.compiled import FloatArray
 from asperity.report.pictures import style
 from asperity.studies.design import TrialRecord
-from asperity.studies.kinds.thresholds import level_answers, log_levels
 from asperity.studies.study_result import StudyResult, label_text
+from asperity.studies.thresholds import level_answers, log_levels
 
 _MAX_GROUPS = 8
 _FAINT = "0.6"

@@ -15,8 +15,7 @@ from asperity.core.errors import ParameterError
 from asperity.core.files import attributes_to_dict, to_plain_data
 from asperity.studies.design import StudyDesign, TrialRecord
 from asperity.studies.methods import EXCLUSIONS, METHODS
-from asperity.studies.statistics.intervals import Interval
-from asperity.studies.statistics.scores import Score
+from asperity.studies.scores import Interval, Score
 from asperity.sweeps.table_files import TableFiles
 
 SCHEMA = 1

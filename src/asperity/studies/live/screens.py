@@ -18,8 +18,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.server import ServerConnection, serve
 
 from asperity.core.errors import ParameterError
-from asperity.lab.access import MAX_MESSAGE_BYTES, AccessToken, respond
-from asperity.lab.launch import bind_socket
+from asperity.lab.access import MAX_MESSAGE_BYTES, AccessToken, bind_socket, respond
 
 # Keys, as browsers name them.
 GO_ON = "Enter"

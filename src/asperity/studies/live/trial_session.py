@@ -16,7 +16,7 @@ from asperity.scene.device_run import POLL_INTERVAL
 from asperity.studies.design import Presentation
 from asperity.studies.live.player import LoopPlayer, Stimuli
 from asperity.studies.live.screens import BACK, DOWN, GO_ON, PAUSE, STOP, UP, Screen, View
-from asperity.studies.observers import Observer, hand_strength, simulate_run
+from asperity.studies.simulated_participants import Observer, hand_strength, simulate_run
 from asperity.studies.study_store import Participant
 
 ADJUSTMENT_STEPS = 40  # of equal ratios, from the least to the greatest value

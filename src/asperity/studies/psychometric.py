@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.special import expit
 
 from asperity.core.compiled import FloatArray
-from asperity.studies.statistics.intervals import Interval
+from asperity.studies.scores import Interval
 
 USUAL_SLOPE = 4.0
 SLOPE_SPREAD = 0.7

@@ -1,1 +1,0 @@
-"""Statistics of studies: psychometric functions, Bradley–Terry scores, intervals, scores."""
