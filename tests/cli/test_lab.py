@@ -32,13 +32,6 @@ def test_invalid_input_is_named_in_the_error(arguments: list[str], words: str) -
     assert words in str(result.exception)
 
 
-@pytest.mark.parametrize("name", ["real", "replay:other.mcap"])
-def test_recording_cannot_be_played_back_on_another_driver(name: str) -> None:
-    result = CliRunner().invoke(cli, ["lab", "--no-browser", "run.mcap", "--driver", name])
-    assert isinstance(result.exception, ParameterError)
-    assert "driver cannot play back the recording run.mcap: leave it out" in str(result.exception)
-
-
 def test_address_is_printed_when_no_browser_is_found(
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -113,15 +113,6 @@ def plugin_files() -> tuple[str, ...]:
     return tuple(dict.fromkeys(_LOADED_FILES))
 
 
-def plugin_contents() -> dict[str, bytes]:
-    """Return the contents of the files that were run, by unique file names."""
-    contents: dict[str, bytes] = {}
-    for file in plugin_files():
-        name = Path(file).name
-        contents[name if name not in contents else f"{len(contents)}_{name}"] = _read_source(file)
-    return contents
-
-
 def load_plugin_files(files: tuple[str, ...]) -> None:
     """Run files and register what they define, in a worker process."""
     for file in files:

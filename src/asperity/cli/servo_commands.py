@@ -12,7 +12,6 @@ import time
 import webbrowser
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -26,11 +25,10 @@ from asperity.cli import loop_setup, options
 from asperity.cli.main import declare_command
 from asperity.cli.options import file_values, surface_values
 from asperity.cli.output import Outputs, check_outputs, output_options, progress_bar
-from asperity.cli.plugins import load_plugin_files, plugin_contents, plugin_files
+from asperity.cli.plugins import load_plugin_files, plugin_files
 from asperity.core.errors import ParameterError, print_message
 
 if TYPE_CHECKING:
-    from asperity.lab.playback import Playback
     from asperity.lab.scene_state import SceneState
     from asperity.lab.session import Handle
     from asperity.scene.setup import Setup
@@ -251,8 +249,7 @@ def lab_command(
 
     On the simulated device the mouse pointer acts as the hand. With --driver the loop runs on a
     real device and is started, changed and stopped from the page: read docs/howto/safety.md first.
-    SURFACE may be a recording (.mcap, or an archive saved by the lab), which is played back;
-    without SURFACE, a sinusoid is used. The page is served on this machine only, to anyone who has
+    Without SURFACE, a sinusoid is used. The page is served on this machine only, to anyone who has
     the printed address, and loads nothing from a network. Ctrl-C stops the lab.
     """
     # Started first, since it takes long in another process.
@@ -262,33 +259,25 @@ def lab_command(
     from asperity.lab.server import LabOptions, serve_lab
 
     source = surface or DEFAULT_SURFACE
-    playback = handle = None
+    handle = None
     if driver == loop_setup.SIMULATED:
-        scene, playback = _simulated_scene(source, values)
-        scene = replace(scene, plugin_files=plugin_contents())
+        scene = _simulated_scene(source, values)
     else:
         scene, handle = _device_scene(source, values, driver, accept_risk=accept_risk)
 
     open_page = partial(announce_page, "lab", no_browser=no_browser)
     load = partial(load_plugin_files, plugin_files())
-    options = LabOptions(load, process, playback, handle, accept_risk)
+    options = LabOptions(load, process, handle, accept_risk)
     asyncio.run(serve_lab(scene, bind_socket(port), open_page, options))
 
 
-def _simulated_scene(source: str, values: dict[str, Any]) -> tuple[SceneState, Playback | None]:
-    """Return the initial scene on the simulated device, and the playback of a recording."""
-    from asperity.lab.clips import find_recording, load_recorded_clip
+def _simulated_scene(source: str, values: dict[str, Any]) -> SceneState:
+    """Return the initial scene on the simulated device."""
     from asperity.lab.scene_state import make_scene_state
     from asperity.scene import load_scene
 
     own = surface_values(values)
     file_options = file_values(values)
-    settings = values["settings"]
-    if (path := find_recording(source, _temporary_folder())) is not None:
-        for name in file_options:
-            raise ParameterError(name, "has no effect on a recording, which holds its surface")
-        with progress_bar("reading the recording"):
-            return load_recorded_clip(path, source, own, values["device"], settings.apply_to)
     with progress_bar("reading the surface"):
         scene = load_scene(source, file_options)
     device = options.select_device(values["device"], scene, values)
@@ -298,7 +287,7 @@ def _simulated_scene(source: str, values: dict[str, Any]) -> tuple[SceneState, P
             requested = {"clamp": BACKED.name, **scene.surface, **own}  # as the lab renders it
             own, note = loop_setup.recommend(scene.texture, device, requested)
             print_message(note)
-    return make_scene_state(scene, source, own, device, file_options), None
+    return make_scene_state(scene, source, own, device)
 
 
 def announce_page(name: str, address: str, *, no_browser: bool) -> None:
@@ -330,22 +319,18 @@ def _device_scene(
     """Return the scene on the device of a driver, and its handle.
 
     Raises:
-        ParameterError: for an unknown driver, a device without a maximum force, a stiffness above
-            the limit, or a recording.
+        ParameterError: for an unknown driver, a device without a maximum force, or a stiffness
+            above the limit.
     """
-    from asperity.lab.clips import find_recording
     from asperity.lab.scene_state import make_device_scene_state
     from asperity.lab.session import make_handle
     from asperity.scene.device_run import check_stiffness_limit
     from asperity.servo.process import require_max_force
 
-    if find_recording(source, _temporary_folder()) is not None:
-        words = f"cannot play back the recording {source}: leave it out, or give a surface and"
-        raise ParameterError("driver", f"{words} --driver {loop_setup.REPLAY_PREFIX}run.mcap")
     setup, servo = loop_setup.driver_setup(source, values, name)
     driver = loop_setup.make_driver(name, setup)
     require_max_force(driver, setup.servo)
     with progress_bar("analyzing the surface"):
         check_stiffness_limit(setup, accept_risk=accept_risk)
-    scene = make_device_scene_state(setup, servo, source, file_values(values))
+    scene = make_device_scene_state(setup, servo, source)
     return scene, make_handle(driver, setup)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import secrets
 import socket
 import time
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from http import HTTPStatus
@@ -132,7 +132,6 @@ class RateLimit:
             raise MalformedMessageError(f"more than {MAX_MESSAGE_RATE:g} messages per second")
 
 
-FetchFile = Callable[[str], Awaitable[tuple[str, bytes] | None]]
 LIVE_PATH = "live"
 """Name of the live connection, below the token."""
 _CONTENT_TYPES = {"html": "text/html", "js": "text/javascript", "css": "text/css"}
@@ -149,18 +148,14 @@ def page_files(package: str = "asperity.lab") -> dict[str, tuple[str, bytes]]:
     return {**found, "": found["index.html"]}
 
 
-async def respond(
-    access_token: AccessToken,
-    request: Request,
-    fetch_file: FetchFile | None = None,
-    package: str = "asperity.lab",
+def respond(
+    access_token: AccessToken, request: Request, package: str = "asperity.lab"
 ) -> Response | None:
     """Return the response to a request; ``None`` to accept a live connection.
 
     Args:
         access_token: authorizes the request.
         request: the request.
-        fetch_file: returns type and content of a file that is not of the page, by name.
         package: of the page.
     """
     name = access_token.authorize(request.path, request.headers.get_all("Host"))
@@ -171,8 +166,6 @@ async def respond(
             return None
         return _text_response(HTTPStatus.FORBIDDEN, "The request comes from another page.")
     found = page_files(package).get(name)
-    if found is None and fetch_file is not None:
-        found = await fetch_file(name)
     if found is None:
         return _text_response(HTTPStatus.NOT_FOUND, "No such file.")
     return _response(HTTPStatus.OK, *found)

@@ -85,7 +85,7 @@ class SecondLane(Lane):
             if wanted[1] != self._followed[1]:
                 session.release_force("", now=True)  # its samples count from zero again
             self._followed = wanted
-            session.saved_scenes.clip_scenes[BESIDE] = leader.scene_state
+            session.saved_scenes.scenes[BESIDE] = leader.scene_state
             session.change({SCENE_KEY: BESIDE, "law": self.law})
         if self.law and session.state == "running":
             scene = session.scene_state

@@ -52,8 +52,8 @@ class Message(NamedTuple):
     """A message of the page.
 
     Attributes:
-        kind: "steer", "change", "relief", "section", ``BESIDE``, "take_control", "start", "stop",
-            "save_clip" or "acknowledge" (the newest painted frame).
+        kind: "steer", "change", "relief", "section", ``BESIDE``, "take_control", "start", "stop"
+            or "acknowledge" (the newest painted frame).
         content: a :class:`SteerRequest`, the changes by name, a :class:`ViewRequest`, the number of
             a frame, or ``None``.
     """
@@ -147,7 +147,7 @@ _PARSERS: dict[str, tuple[tuple[str, ...], Callable[..., Any]]] = {
     "section": (("box", "y"), partial(_parse_section, "section")),
     BESIDE: (("box", "y"), partial(_parse_section, BESIDE, BESIDE_SECTION)),
     "acknowledge": (("frame",), lambda frame: _parse_number("frame", frame, 0.0, math.inf)),
-    **{kind: ((), lambda: None) for kind in ("take_control", "start", "stop", "save_clip")},
+    **{kind: ((), lambda: None) for kind in ("take_control", "start", "stop")},
 }
 
 COLUMN_NAMES = [name for name, _unit in COLUMNS]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from asperity.analysis.results.compare import DEFAULT_DEVICE
@@ -59,8 +59,6 @@ class SceneState:
         base_texture: its texture without the magnification.
         magnification: factors of its size and of its height.
         initial_texture: source and texture at the start, which may be of a file.
-        preparation: arguments of the preparation of that file, by name [SI].
-        plugin_files: contents of the plugins that the scene needs, by name.
         device_servo: steps and delay of a real device by the catalogue; the loop adds none.
     """
 
@@ -69,8 +67,6 @@ class SceneState:
     base_texture: Texture
     initial_texture: tuple[str, Texture]
     magnification: tuple[float, float] = (1.0, 1.0)
-    preparation: Mapping[str, Any] = field(default_factory=dict)
-    plugin_files: Mapping[str, bytes] = field(default_factory=dict)
     device_servo: Servo | None = None
 
     def with_changes(self, changes: Mapping[str, Any]) -> SceneState:
@@ -224,7 +220,6 @@ def make_scene_state(
     source: str = DEFAULT_SURFACE,
     surface: Mapping[str, Any] | None = None,
     device: Device | None = None,
-    preparation: Mapping[str, Any] | None = None,
 ) -> SceneState:
     """Return the initial scene of the lab.
 
@@ -233,30 +228,24 @@ def make_scene_state(
         source: its specification or path.
         surface: arguments of the surface that override the scene's.
         device: overrides the scene's.
-        preparation: arguments of the preparation of the texture, by name [SI].
 
     Raises:
         ParameterError: for a scene that cannot be simulated.
     """
     used = device or scene.device or load_device(DEFAULT_DEVICE)
-    state = _build_scene_state(scene, used, source, surface)
-    return replace(state, preparation=dict(preparation or {}))
+    return _build_scene_state(scene, used, source, surface)
 
 
-def make_device_scene_state(
-    setup: Setup, device_servo: Servo, source: str, preparation: Mapping[str, Any]
-) -> SceneState:
+def make_device_scene_state(setup: Setup, device_servo: Servo, source: str) -> SceneState:
     """Return the initial scene on a real device.
 
     Args:
         setup: of the loop.
         device_servo: steps and delay of the device by the catalogue.
         source: specification or path of the surface.
-        preparation: arguments of the preparation of the texture, by name [SI].
     """
     texture = setup.surface.texture
-    state = SceneState(setup, source, texture, (source, texture))
-    return replace(state, preparation=dict(preparation), device_servo=device_servo)
+    return SceneState(setup, source, texture, (source, texture), device_servo=device_servo)
 
 
 def _build_scene_state(
@@ -287,12 +276,11 @@ class SavedScenes:
     """Scenes by name.
 
     Attributes:
-        clip_scenes: scenes of clips.
+        scenes: the scenes.
     """
 
     def __init__(self) -> None:
-        self.clip_scenes: dict[str, SceneState] = {}
-        self._previous: SceneState | None = None
+        self.scenes: dict[str, SceneState] = {}
 
     def apply_changes(self, scene_state: SceneState, changes: Mapping[str, Any]) -> SceneState:
         """Return the requested scene; see :meth:`SceneState.with_changes`.
@@ -311,12 +299,10 @@ class SavedScenes:
 
     def _find_scene(self, scene_state: SceneState, name: str) -> SceneState:
         if name == TOUR_SCENE:
-            self._previous = self._previous or scene_state
+            self.scenes.setdefault(PREVIOUS_SCENE, scene_state)
             return make_scene_state(load_scene(DEFAULT_SURFACE))
         if name == PREVIOUS_SCENE:
-            before = self._previous
-            self._previous = None
-            return before or scene_state
-        if name not in self.clip_scenes:
-            raise ParameterError(SCENE_KEY, "is no longer stored", name)
-        return self.clip_scenes[name]
+            return self.scenes.pop(name, scene_state)
+        if name not in self.scenes:
+            raise ParameterError(SCENE_KEY, "is not stored", name)
+        return self.scenes[name]

@@ -13,7 +13,6 @@ from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from functools import partial
 from multiprocessing import active_children
-from pathlib import Path
 from typing import Any
 
 from websockets.asyncio.server import ServerConnection, serve
@@ -31,10 +30,8 @@ from asperity.lab.access import (
     respond,
 )
 from asperity.lab.background import BackgroundRenderer, BackgroundResult, BackgroundWorker
-from asperity.lab.clips import ClipStore
 from asperity.lab.lanes import FrameReader, Lane, SecondLane
 from asperity.lab.messages import BESIDE
-from asperity.lab.playback import Playback
 from asperity.lab.scene_state import RANGES, SceneState
 from asperity.lab.session import Handle, Session
 from asperity.laws import REGISTERED_LAWS
@@ -64,14 +61,12 @@ class LabOptions:
     Attributes:
         load_plugins: registers user-defined laws in another process.
         prestarted: the process of the first loop.
-        playback: recorded rows of the initial scene, to be replayed.
         handle: of a real device; ``None`` for the simulated device.
         accept_risk: whether a real device renders a stiffness above the limit.
     """
 
     load_plugins: Callable[[], None] | None = None
     prestarted: PrestartedProcess | None = None
-    playback: Playback | None = None
     handle: Handle | None = None
     accept_risk: bool = False
 
@@ -155,10 +150,6 @@ class LabServer:
         self.lane = Lane(self.session, self.pictures)
         beside = BackgroundRenderer(pictures, limits, self._broadcast_state, BESIDE)
         self.second_lane = SecondLane(self.session, beside)
-        self.clip_store = ClipStore(self.session)
-        if options.playback is not None:
-            words = {"title": Path(scene_state.source).name, "opens_at_start": True}
-            self.clip_store.add("recording", options.playback, scene_state, **words)
         self.pending_tasks: set[asyncio.Task[None]] = set()
 
     def _notify(self) -> None:
@@ -204,8 +195,6 @@ class LabServer:
         tasks: list[asyncio.Task[None]] = []
         try:
             await page.send("hello", **_greeting())
-            for announcement in self.clip_store.announcements:
-                await page.send("clip", **announcement)
             await self._broadcast_state()
             tasks = [
                 asyncio.create_task(_run_while_connected(work, page))
@@ -266,15 +255,6 @@ class LabServer:
             self.session.start()
         elif kind == "stop":
             self.session.release_force("the force was released")
-        elif kind == "save_clip":
-            background.start_task(self.pending_tasks, self._save_clip(client))
-
-    async def _save_clip(self, client: Client) -> None:
-        """Save the newest seconds as a clip."""
-        try:
-            await client.send("clip", **await self.clip_store.save_clip())
-        except ParameterError as error:
-            await client.send("error", message=str(error))
 
     async def _broadcast_state(self) -> None:
         """Send the state to all pages."""
@@ -390,7 +370,6 @@ async def serve_lab(
         workers = [stack.enter_context(BackgroundWorker(options.load_plugins)) for _ in range(3)]
         lab = LabServer(scene_state, workers, options)
         tasks = [asyncio.create_task(work()) for work in (lab.watch_session, lab.watch_steering)]
-        fetch = lab.clip_store.fetch
         _handle_signals(lab.session, stopped)
         try:
             with lab.session, lab.second_lane.session:
@@ -399,7 +378,7 @@ async def serve_lab(
                     sock=listener,
                     max_size=MAX_MESSAGE_BYTES,
                     compression=None,
-                    process_request=lambda _line, request: respond(token, request, fetch),
+                    process_request=lambda _line, request: respond(token, request),
                 ):
                     on_ready(token.url)
                     await stopped.wait()

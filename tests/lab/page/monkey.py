@@ -8,7 +8,7 @@ import random
 from tests.lab.browser import Browser
 
 KEYS = (
-    *"wabcdefghxmrskjltnpv2+- ",
+    *"wabcdefghxmrstnpv2+- ",
     "ArrowLeft",
     "ArrowRight",
     "ArrowUp",

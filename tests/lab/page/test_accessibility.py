@@ -59,13 +59,6 @@ def test_axe_finds_nothing(page: Browser, dark: bool, width: int) -> None:
     page.ask("document.querySelector('#motion [value=loop]').click()")
     page.until("lab.energyMeter.suppliesEnergy")
     assert violations(page) == []
-    # A clip, and its recording.
-    page.press("k")
-    page.until("document.querySelector('#clips button') !== null")
-    page.ask("document.querySelector('#clips button').click()")
-    page.until("lab.player.isOpen && !document.getElementById('playback').hidden")
-    assert violations(page) == []
-    page.press("l")
     page.ask("document.querySelector('#motion [value=pointer]').click()")
     # The tour, before and after its first step.
     page.press("t")

@@ -169,8 +169,6 @@ def test_the_pointer_moves_nothing_and_the_device_stays(page: Any, device: Devic
         words = f"{name} needs the simulated device" if name == "saved_scene" else f"{name} is "
         told = heard(page, lambda m, w=words: news(state="running")(m) and w in m["message"])
         assert told["settings"] == settings
-    say(page, "save_clip")
-    assert "asperity run --record" in heard(page, refused)["message"]
     assert device.pushes
 
 
@@ -290,10 +288,7 @@ def test_the_page_is_the_window_on_the_device(
         browser.until("!document.getElementById('take-control').hidden")
         browser.ask("document.getElementById('take-control').click()")
     browser.until("lab.status.has_control")
-    gone = (
-        "['press-depth', 'motion', 'device', 'delay', 'hand_stiffness', 'save-clip', 'tour-start',"
-        " 'release']"
-    )
+    gone = "['press-depth', 'motion', 'device', 'delay', 'hand_stiffness', 'tour-start', 'release']"
     seen = f"{gone}.filter(id => document.getElementById(id).checkVisibility())"
     assert browser.ask(seen) == []
     assert "You hold the handle" in browser.ask("document.getElementById('handle-note').innerText")
@@ -348,7 +343,7 @@ def test_letting_go_waits_for_no_analysis(folder: Path, monkeypatch: pytest.Monk
     whole = replace(scene, loop={**still, **scene.loop})
     setup = make_setup(whole, surface={"clamp": "backed"})
     handle = make_handle(LibraryDriver(str(folder / LIBRARY)), setup)
-    stage = make_device_scene_state(setup, setup.servo, "scene", {})
+    stage = make_device_scene_state(setup, setup.servo, "scene")
     never: Future[str] = Future()
     with Session(stage, lambda: None, None, handle, lambda _surface, _device: never) as session:
         session.start()

@@ -1,4 +1,4 @@
-"""Two laws side by side on the page: chosen by key, judged at a glance, not offered with clips."""
+"""Two laws side by side on the page: chosen by key, judged at a glance, not offered in the tour."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def two_lanes(page: Browser) -> Iterator[None]:
     page.press("2")
     page.until(f"lab.secondLane.status?.settings.law === 'H' && {BOTH}")
     yield
-    page.until("!lab.player.isOpen && !lab.tour.isActive")
+    page.until("!lab.tour.isActive")
     if page.ask("lab.secondLane.isShown"):
         page.press("2")
         page.until("!lab.secondLane.isShown")
@@ -139,21 +139,7 @@ def test_a_file_shows_both_laws(page: Browser) -> None:
 
 
 @needs_browser
-def test_clips_and_tour_show_one_law(page: Browser) -> None:
-    page.ask("lab.hand.z = null; lab.hand.isLatched = false; lab.hand.requestMotion(); 1")
-    page.until("!lab.probeState().isInside")
-    page.ask("new Promise(done => setTimeout(done, 800))")
-    page.ask("document.getElementById('save-clip').click()")
-    saved = "Boolean(document.querySelector('#clips button'))"
-    page.until(f"{saved} || !document.getElementById('alarm').hidden")
-    assert page.ask(saved), text(page, "alarm")
-    page.ask("document.querySelector('#clips button').click()")
-    page.until(
-        "lab.player.isOpen && !lab.secondLane.isShown && document.getElementById('beside').disabled"
-    )
-    page.until("/a recording holds one law/.test(document.getElementById('beside-note').innerText)")
-    page.press("l")
-    page.until(f"!lab.player.isOpen && {BOTH}")
+def test_the_tour_shows_one_law(page: Browser) -> None:
     starts = page.ask("lab.status.start_count")
     page.press("t")
     page.until(f"lab.tour.isActive && lab.status.start_count > {starts}")

@@ -16,7 +16,6 @@ from asperity.servo.kernels.pointer_anchor import (
     HEADER_ROWS,
     HISTORY_SAMPLES,
     MAX_SPEED,
-    ROWS_PER_SAMPLE,
     STATE_ROW,
     TRACKING_BANDWIDTH,
     anchor_segment,
@@ -100,7 +99,7 @@ def test_invalid_request_is_rejected_and_changes_nothing(
 
 def test_closed_pointer_is_an_error(pointer: PointerHand) -> None:
     driver = pointer_driver(Cartesian(0.05, 1.0), HAND, Servo(1e-3), pointer)
-    assert driver.device.anchor.shape == (HEADER_ROWS + HISTORY_SAMPLES * ROWS_PER_SAMPLE, 3)
+    assert driver.device.anchor.shape == (HEADER_ROWS + HISTORY_SAMPLES, 3)
     pointer.close()
     with pytest.raises(ParameterError, match="nothing moves"):
         driver.open()

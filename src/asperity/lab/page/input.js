@@ -30,15 +30,13 @@ export function followPointer(canvas, host, moveHand) {
 
 /** Return the action of each key. */
 function keyActions(host) {
-  const { hand, handle, player, tour } = host;
+  const { hand, handle, tour } = host;
   return {
     " ": () => { hand.z = null; hand.pressure = 1; hand.isLatched = !hand.isLatched; hand.requestMotion(); },
     PageUp: () => { hand.z = Math.min(hand.height + host.viewWidth / 80, MAX_KEY_HEIGHT); hand.requestMotion(); },
     PageDown: () => { hand.z = Math.max(hand.height - host.viewWidth / 80, -MAX_KEY_HEIGHT); hand.requestMotion(); },
     m: () => handle.isPresent || host.motionPanel.choose(hand.nextMotion),
     2: () => handle.isPresent || host.secondLane.toggle(), x: () => $("swap-laws").click(), r: () => $("reset-energy").click(), s: () => $("sound").click(),
-    k: () => handle.isPresent || $("save-clip").click(),
-    j: () => player.isOpen && $("play").click(), l: () => player.isOpen && $("return-to-live").click(),
     t: () => handle.isPresent || host.tourPanel.toggle(), v: () => tour.isActive && $("tour-demo").click(),
     n: () => tour.isActive && $("tour-next").click(), p: () => tour.isActive && $("tour-back").click(),
     "+": () => host.zoom(1 / ZOOM_FACTOR), "-": () => host.zoom(ZOOM_FACTOR),
@@ -47,7 +45,7 @@ function keyActions(host) {
 
 /**
  * Obey the keys.
- * @param host object with hand, handle, player, tour, tourPanel, motionPanel, secondLane, viewWidth [m], hasControl and zoom(factor)
+ * @param host object with hand, handle, tour, tourPanel, motionPanel, secondLane, viewWidth [m], hasControl and zoom(factor)
  */
 export function obeyKeys(host) {
   const { hand } = host, actions = keyActions(host);

@@ -13,8 +13,6 @@ import { readTheme } from "./canvas.js";
 import { probeStateOf } from "./probe_overlay.js";
 import { SecondLane } from "./second_lane.js";
 import { ForceSound } from "./sound.js";
-import { Player } from "./player.js";
-import { ClipsPanel } from "./clips_panel.js";
 import { MotionPanel } from "./motion_panel.js";
 import { QuietContact } from "./quiet_contact.js";
 import { RecommendationPanel } from "./recommendation_panel.js";
@@ -70,10 +68,8 @@ const connection = new Connection({
     secondLane.setStatus(status);
   },
   error({ message }) { showAlarm(message); },
-  clip(clip) { clipsPanel.add(clip); },
   frame(newFrame) {
     if (newFrame.lane) { secondLane.addFrame(newFrame, connection.layout.columns); return; }
-    if (player.isOpen) { acknowledge(newFrame); return; } // the recording is shown instead
     tour.addFrame(newFrame, connection.layout.columns);
     showFrame(newFrame);
     if (document.hidden) acknowledge(newFrame); // nothing is painted
@@ -110,26 +106,13 @@ const motionPanel = new MotionPanel({
   get isSectionCurrent() { return (this.section === section ? pictures : secondLane.pictures).isCurrent(this.section); },
 });
 
-const player = new Player({
-  showFrame(playbackFrame) { showFrame({ ...playbackFrame, number: paintedFrame }); },
-  clear() {
-    traces.clear(); energyMeter.reset();
-    // The probe may be elsewhere: pictures are requested again at once.
-    pictures.endPauses();
-  },
-});
-const clipsPanel = new ClipsPanel({
-  player, changeScene(changes) { connection.send("change", { changes }); }, saveClip() { connection.send("save_clip"); },
-  get columns() { return connection.layout.columns; }, get surfaceVersion() { return status?.surface_version; },
-});
-
-const secondLane = new SecondLane({ changeScene, send(kind, content) { return connection.send(kind, content); }, energyMeter, player, tour });
-const updateRate = () => (player.isOpen ? player.updateRate : status?.update_rate ?? 1000);
+const secondLane = new SecondLane({ changeScene, send(kind, content) { return connection.send(kind, content); }, energyMeter, tour });
+const updateRate = () => status?.update_rate ?? 1000;
 
 /** Tell the server that a frame was processed, so that it sends further ones. */
 function acknowledge({ number }) { connection.send("acknowledge", { frame: number }); }
 
-/** Show a frame of the live loop or of a clip. */
+/** Show a frame of the loop. */
 function showFrame(newFrame) {
   frame = newFrame;
   if (status) for (const metrics of [energyMeter, quietContact]) metrics.addFrame(frame, connection.layout.columns, status);
@@ -144,8 +127,8 @@ function fillSelect(select, options, initialValue) {
   select.replaceChildren(...options.map(([key, text]) => new Option(text, key, false, key === value)));
 }
 
-/** Request a change of the scene, which closes the player: its surface must be that of the clip. */
-function changeScene(changes) { clipsPanel.close(); connection.send("change", { changes }); }
+/** Request a change of the scene. */
+function changeScene(changes) { connection.send("change", { changes }); }
 
 function showAlarm(text) {
   $("alarm").hidden = !text;
@@ -194,7 +177,7 @@ function showLanes() {
   $("trace-title").textContent = isShown ? `Law ${law}` : "Position, force and energy";
 }
 
-function showCurrentLimit() { showLimit(status.settings, status.limit, player.isOpen ? "" : quietContact.text); }
+function showCurrentLimit() { showLimit(status.settings, status.limit, quietContact.text); }
 
 function magnificationText(settings) {
   const [size, height] = [settings.magnify, settings.magnify_height].map(factor => Number(factor.toPrecision(3)));
@@ -283,7 +266,6 @@ function paint(time) {
   requestAnimationFrame(paint);
   latencyMonitor.recordPresented();
   connection.readBuffer();
-  player.tick(time);
   const state = probeState();
   if (frame && frame.number !== paintedFrame) {
     paintedFrame = frame.number;
@@ -304,16 +286,14 @@ function drawTraces() {
   secondLane.drawTraces({ plot: traces, offset: energyMeter.offset });
 }
 
-/** Return the counts of ticks since the start of the loop; a recording has none. */
+/** Return the counts of ticks since the start of the loop. */
 function tickText({ late, skipped, lateness, truncated }) {
-  if (late === undefined) return "";
   return `${late} late (${formatQuantity(lateness, "s")}), ${skipped} skipped, ${truncated} truncated ticks`;
 }
 
 /** Update the panels, the numbers, and the descriptions of the views for screen readers. */
 function updateTexts({ probe, force, energy, isInside }) {
   tourPanel.update();
-  clipsPanel.update();
   motionPanel.update();
   if (status) { showCurrentLimit(); showLanes(); }
   setField("press-depth", 1e3 * hand.pressDepth);
@@ -343,7 +323,7 @@ function updateTexts({ probe, force, energy, isInside }) {
 function zoom(factor) { viewWidth = Math.max(MIN_VIEW_WIDTH, Math.min(MAX_VIEW_WIDTH, viewWidth * factor)); }
 
 const inputHost = {
-  hand, handle, player, tour, tourPanel, motionPanel, secondLane, zoom,
+  hand, handle, tour, tourPanel, motionPanel, secondLane, zoom,
   get viewWidth() { return viewWidth; }, get hasControl() { return Boolean(status?.has_control); },
   get canFollowPointer() { return Boolean(relief.heights) && !handle.isPresent; },
 };
@@ -390,7 +370,7 @@ readTheme();
 requestAnimationFrame(paint);
 // For the tests and for the console of the browser.
 globalThis.lab = {
-  connection, hand, pictures, quietContact, tour, energyMeter, player, relief, section, probeState, sectionBox,
+  connection, hand, pictures, quietContact, tour, energyMeter, relief, section, probeState, sectionBox,
   latencies: latencyMonitor.latencies, toSvg: () => toSvg(views()), toPng: () => toPng(views()), secondLane,
   get viewWidth() { return viewWidth; }, get frame() { return frame; }, get status() { return status; },
   get errorCount() { return errorCount; },

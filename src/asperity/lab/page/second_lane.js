@@ -8,11 +8,11 @@ import { formatQuantity } from "./format.js";
 import { probeStateOf } from "./probe_overlay.js";
 
 const $ = id => document.getElementById(id);
-const UNAVAILABLE = { clip: "not offered here: a recording holds one law", tour: "not offered in the guided tour, which shows one law at a time" };
+const IN_TOUR = "not offered in the guided tour, which shows one law at a time";
 const setText = (name, text) => { if ($(name).textContent !== text) $(name).textContent = text; };
 
 export class SecondLane {
-  /** @param host object with changeScene(changes), send(kind, content), energyMeter of the first lane, player and tour */
+  /** @param host object with changeScene(changes), send(kind, content), energyMeter of the first lane, and tour */
   constructor(host) {
     this.host = host;
     this.section = new SectionView($("beside-section"));
@@ -28,13 +28,10 @@ export class SecondLane {
 
   get energyMeter() { return this.verdicts[1].energyMeter; }
 
-  /** Whether the page is split: a second law is chosen, and the live loop is shown. */
+  /** Whether the page is split: a second law is chosen, outside the guided tour. */
   get isShown() { return Boolean(this.status) && !this.unavailableText; }
 
-  get unavailableText() {
-    const { player, tour } = this.host;
-    return player.isOpen ? UNAVAILABLE.clip : tour.isActive ? UNAVAILABLE.tour : "";
-  }
+  get unavailableText() { return this.host.tour.isActive ? IN_TOUR : ""; }
 
   /** Fill the choice of laws. */
   setLaws(laws) {

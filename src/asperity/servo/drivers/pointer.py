@@ -24,9 +24,7 @@ from asperity.simulation.motions import Stationary
 from asperity.simulation.plants import Plant
 from asperity.simulation.servo import Servo
 
-_ROW_COUNT = (
-    pointer_anchor.HEADER_ROWS + pointer_anchor.ROWS_PER_SAMPLE * pointer_anchor.HISTORY_SAMPLES
-)
+_ROW_COUNT = pointer_anchor.HEADER_ROWS + pointer_anchor.HISTORY_SAMPLES
 _MEMORY_FOLDER = "/dev/shm" if Path("/dev/shm").is_dir() else None
 
 
@@ -114,17 +112,6 @@ class PointerHand:
     def anchor(self) -> FloatArray:
         """Position of the anchor (3,) [m]."""
         return np.array(self.table[pointer_anchor.ANCHOR])
-
-    @property
-    def history(self) -> FloatArray:
-        """Anchor [m], velocity [m/s] and position [m] of the newest samples (n, 3, 3).
-
-        The k-th sample is at k modulo n, with n = ``HISTORY_SAMPLES``; none is counted twice or
-        left out.
-        """
-        return np.array(self.table[pointer_anchor.HEADER_ROWS :]).reshape(
-            pointer_anchor.HISTORY_SAMPLES, pointer_anchor.ROWS_PER_SAMPLE, 3
-        )
 
     def close(self) -> None:
         """Release the memory; a running loop keeps its own mapping."""

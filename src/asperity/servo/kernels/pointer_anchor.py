@@ -20,9 +20,8 @@ KERNELS = Kernels(provides=("anchor_segment",), native=("call_address",))
 # the last. The request is the point TARGET + COSINE cos(angle) + SINE sin(angle) [m].
 TARGET, COSINE, SINE, REQUEST_ROW, ANCHOR, VELOCITY, STATE_ROW, FOLLOWER_ROW = range(8)
 HEADER_ROWS = 8
-# Then follow anchor [m], velocity [m/s] and position [m] of each of the newest samples.
-HISTORY_SAMPLES = 40_000
-ROWS_PER_SAMPLE = 3
+# Then follow the anchors at the newest samples [m], which a following loop repeats.
+HISTORY_SAMPLES = 8_000
 # REQUEST_ROW: angular velocity [rad/s] and number of the newest request; STATE_ROW: angle [rad],
 # number of the newest acknowledged request, and number of samples whose rows are complete.
 ANGLE = 0
@@ -46,7 +45,7 @@ MAX_LAG = 2000
 
 def history_row(sample: int) -> int:
     """Return the row of the anchor at a sample."""
-    return HEADER_ROWS + ROWS_PER_SAMPLE * (sample % HISTORY_SAMPLES)
+    return HEADER_ROWS + sample % HISTORY_SAMPLES
 
 
 def follow_anchor(device: SimulatedDevice) -> tuple[float, float, float, float, float, float]:
@@ -100,8 +99,6 @@ def anchor_segment(device: SimulatedDevice) -> tuple[float, float, float, float,
     row = history_row(device.counters[1])
     for i in range(3):
         at[row, i] = at[ANCHOR, i]
-        at[row + 1, i] = device.x[3 + i]
-        at[row + 2, i] = device.x[i]
         at[VELOCITY, i] *= share
         at[ANCHOR, i] += step * at[VELOCITY, i]
     at[STATE_ROW, ANGLE] = angle

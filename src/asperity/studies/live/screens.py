@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import json
 import os
 import select
@@ -123,9 +122,7 @@ class PageScreen:
         self._server = serve(
             self._serve_page, sock=listener, max_size=MAX_MESSAGE_BYTES, compression=None,
             ping_interval=2.0, ping_timeout=2.0,
-            process_request=lambda _page, request: asyncio.run(
-                respond(token, request, package=PAGE_PACKAGE)
-            ),
+            process_request=lambda _page, request: respond(token, request, PAGE_PACKAGE),
         )  # fmt: skip
 
     def __enter__(self) -> Self:
