@@ -16,7 +16,7 @@ from asperity.core.errors import ParameterError
 from asperity.core.units import format_quantity
 from asperity.devices import parse_device
 from asperity.laws import Law
-from asperity.report.comparison_columns import FULL_COLUMNS, SUMMARY_COLUMNS, comparison_table
+from asperity.report.pages.comparison_columns import FULL_COLUMNS, SUMMARY_COLUMNS, comparison_table
 from asperity.report.sentences.number_text import limit_text
 
 PAPER = asp.Sinusoid(amplitude=0.8e-3, period=1e-3)

@@ -16,7 +16,7 @@ import click
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from tests.report.pages import check_alone, check_alts
+from tests.report.report_pages import check_alone, check_alts
 
 from asperity.cli.main import COMMANDS, cli
 

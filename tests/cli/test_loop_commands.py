@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from tests.report.pages import check_alone, check_alts
+from tests.report.report_pages import check_alone, check_alts
 
 import asperity as asp
 from asperity.cli.main import cli

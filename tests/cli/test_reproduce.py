@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from rich.cells import cell_len
-from tests.report.pages import check_alone, check_alts
+from tests.report.report_pages import check_alone, check_alts
 
 from asperity.paper import CLAIMS, VERDICTS, get_claim
 
@@ -152,10 +152,9 @@ def test_invalid_input_gives_a_one_line_error_and_writes_no_file(
 def test_table_of_all_claims_fits_80_columns(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
     """Small experiments replace those of the paper, which take minutes."""
     import asperity.paper.experiments as package
-    from asperity.paper.experiments import experiment_suite as suite
-    from asperity.paper.experiments.cycle_counts import passivity_experiment
-    from asperity.paper.experiments.device_onsets import DeviceExperiment
-    from asperity.paper.experiments.strokes import bump_experiment, scanning_experiment
+    from asperity.paper import experiments as suite
+    from asperity.paper.cycle_experiments import DeviceExperiment, passivity_experiment
+    from asperity.paper.experiments import bump_experiment, scanning_experiment
 
     def run_small_experiments(
         measured: object = None, progress: object = None

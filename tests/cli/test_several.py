@@ -17,8 +17,8 @@ from asperity.analysis.results.device_comparisons import compare_devices
 from asperity.cli.main import main
 from asperity.core.errors import ParameterError
 from asperity.core.units import format_quantity
-from asperity.report.comparison_report import comparisons_page
-from asperity.report.terminal import print_page
+from asperity.report.document.terminal import print_page
+from asperity.report.pages.comparison_report import comparisons_page
 
 Call = Callable[..., tuple[int, str, str]]
 SPEC = "sinusoid:amplitude=0.2mm,period=2mm"

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.report.pages import check_alone, check_alts
+from tests.report.report_pages import check_alone, check_alts
 
 import asperity as asp
 from asperity.measured.measured_file import MeasurementSummary
 from asperity.report import html_text
-from asperity.report.measured_report import measured_sections
-from asperity.report.page import Paragraph, Section, add_section
+from asperity.report.document.page import Paragraph, Section, add_section
+from asperity.report.pages.measured_report import measured_sections
 
 Call = Callable[..., tuple[int, str, str]]
 PLAIN = ["--pitch", "2um", "--unit", "m"]

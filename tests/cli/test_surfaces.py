@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 from PIL import Image
-from tests.report.pages import check_alone, check_alts
+from tests.report.report_pages import check_alone, check_alts
 
 from asperity.cli.surface_commands import surfaces_command
 from asperity.core.errors import ParameterError
 from asperity.core.units import parse_quantity
-from asperity.report.html import render_page
+from asperity.report.document.html import render_page
+from asperity.report.pages.surface_gallery import find_surfaces, surfaces_page
 from asperity.report.pictures.style import svg_text
 from asperity.report.pictures.surface_pictures import gallery_figure
-from asperity.report.surface_gallery import find_surfaces, surfaces_page
 from asperity.scene import TEXTURE_KINDS, load_scene
 from asperity.textures import Sinusoid
 from asperity.textures.catalogue import CATALOGUE

@@ -24,9 +24,9 @@ from asperity.analysis.results.compare import precompute_row
 from asperity.core import cache, processes
 from asperity.core.compiled import COMPILE_CALLBACKS
 from asperity.core.files import json_text
-from asperity.paper.experiments.experiment_setups import band_setup
-from asperity.report.html import RenderedPicture
-from asperity.report.surface_gallery import find_surfaces
+from asperity.paper.cycle_experiments import band_setup
+from asperity.report.document.html import RenderedPicture
+from asperity.report.pages.surface_gallery import find_surfaces
 from asperity.report.views import html_text
 from asperity.scene import sweeps
 from asperity.textures import Sinusoid
@@ -180,7 +180,7 @@ def test_report_does_not_depend_on_the_workers(
     with processes.limit_processes(2):
         assert html_text(result) == expected
     assert any(isinstance(value, RenderedPicture) for value in completed_results(futures))
-    html = import_module("asperity.report.html")
+    html = import_module("asperity.report.document.html")
     monkeypatch.setattr(html, "render_picture", lambda _picture: None)
     assert html_text(result) == expected  # pictures of workers are cached
 

@@ -11,16 +11,14 @@ from tests.lab.browser import Browser
 
 import asperity as asp
 from asperity.measured.measured_file import show
-from asperity.paper.experiments.cycle_counts import passivity_experiment
-from asperity.paper.experiments.device_onsets import DeviceExperiment, device_onset
-from asperity.paper.experiments.experiment_suite import Experiments
-from asperity.paper.experiments.strokes import bump_experiment, scanning_experiment
+from asperity.paper.cycle_experiments import DeviceExperiment, device_onset, passivity_experiment
+from asperity.paper.experiments import Experiments, bump_experiment, scanning_experiment
 from asperity.report import html_text
-from asperity.report.html import render_page
-from asperity.report.loop.run_report import run_page
-from asperity.report.page import Page
-from asperity.report.paper.claims_report import experiment_sections
-from asperity.report.surface_gallery import find_surfaces, surfaces_page
+from asperity.report.document.html import render_page
+from asperity.report.document.page import Page
+from asperity.report.pages.paper_report import experiment_sections
+from asperity.report.pages.run_report import run_page
+from asperity.report.pages.surface_gallery import find_surfaces, surfaces_page
 from asperity.scene import load_scene
 from asperity.scene.setup import make_setup
 from asperity.surface import Surface

@@ -13,7 +13,7 @@ from asperity.core.errors import ParameterError
 from asperity.core.processes import limit_processes
 from asperity.paper import get_claim, reproduce_claims
 from asperity.paper.claim import Claim
-from asperity.paper.claim_registry import CLAIMS, register
+from asperity.paper.claims import CLAIMS, register
 
 Call = Callable[..., tuple[int, str, str]]
 Answer = Callable[..., Any]

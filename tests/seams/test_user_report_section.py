@@ -9,8 +9,9 @@ import pytest
 
 import asperity as asp
 from asperity.cli.main import main
-from asperity.report import add_section, html_text, page
-from asperity.report.page import Cell, Row, Section, Table
+from asperity.report import add_section, html_text
+from asperity.report.document import page
+from asperity.report.document.page import Cell, Row, Section, Table
 
 
 def paint_section(comparison: asp.Comparison) -> Section | None:

@@ -58,7 +58,7 @@ def analyze_command(surface: str, device: Device | None, outputs: Outputs, **val
         result = analyze(texture, device, progress=step, **search, **arguments)
     code = _texture_code(surface, options.file_values(values), texture)
 
-    from asperity.report.analysis_report import analysis_page
+    from asperity.report.pages.analysis_report import analysis_page
 
     outputs.write(result, analysis_page(result, code))
 
@@ -171,7 +171,7 @@ def _write_comparisons(
     Raises:
         ParameterError: if the data of no device suffices; the table is written before.
     """
-    from asperity.report import comparison_report as report
+    from asperity.report.pages import comparison_report as report
 
     if len(result.comparisons) == 1 and not result.missing_data:
         one = result.comparisons[0]
@@ -208,7 +208,7 @@ def limits_command(surface: str, device: Device | None, outputs: Outputs, **valu
         sampling = options.provided_values(values, (SPEED, GRIP, *_SAMPLING))
         result = limits(texture, device, **sampling, **arguments)
 
-    from asperity.report.limits_report import limits_page
+    from asperity.report.pages.limits_report import limits_page
 
     outputs.write(result, limits_page(result))
 
@@ -255,7 +255,7 @@ def envelope_command(
     the texture is felt at that stiffness on a scan, as in asperity compare.
     """
     from asperity.envelopes.envelope import envelope, textured_laws
-    from asperity.report.envelope_report import check_suffix, envelope_page, write_envelope
+    from asperity.report.pages.limits_report import check_suffix, envelope_page, write_envelope
 
     for path in output:
         check_suffix(path)
@@ -306,7 +306,7 @@ def design_command(
     """
     from asperity.envelopes.envelope import textured_laws
     from asperity.envelopes.find_design import design
-    from asperity.report.design_report import design_page
+    from asperity.report.pages.comparison_report import design_page
     from asperity.scene import load_scene
 
     chosen = laws or textured_laws()

@@ -20,7 +20,7 @@ from asperity.core.errors import ParameterError, escape_unprintable
 from asperity.core.files import STANDARD_OUTPUT, check_output
 
 if TYPE_CHECKING:
-    from asperity.report.page import Page
+    from asperity.report.document.page import Page
 
 
 @contextmanager
@@ -111,7 +111,7 @@ class Outputs:
         if self.json is not None:
             write_output("json", self.json, files.json_text(data))
         if self.html is not None:
-            from asperity.report.html import Origin, render_page
+            from asperity.report.document.html import Origin, render_page
 
             command_line = escape_unprintable(shlex.join(["asperity", *sys.argv[1:]]))
             origin = Origin(command_line, files.text_digest(files.json_text(data)))
@@ -122,7 +122,7 @@ class Outputs:
             return
         from rich.console import Console
 
-        from asperity.report.terminal import print_page
+        from asperity.report.document.terminal import print_page
 
         console = Console(highlight=False)
         print_page(page, console)

@@ -69,9 +69,9 @@ def plugin_registries() -> tuple[PluginRegistry, ...]:
     from asperity.derive.jacobian import symbolic_force
     from asperity.export import targets
     from asperity.measured.reading import Reader, readers
-    from asperity.paper import claim_registry
+    from asperity.paper import claims as claim_registry
     from asperity.paper.claim import Claim
-    from asperity.report import page
+    from asperity.report.document import page
     from asperity.servo.drivers import driver_registry
     from asperity.servo.drivers.driver import DriverKind
     from asperity.sweeps import case_runs

@@ -18,7 +18,7 @@ from asperity.core.errors import ParameterError, escape_unprintable
 if TYPE_CHECKING:
     from asperity.paper import Result
     from asperity.paper.experiments import Experiments
-    from asperity.report.paper.paper_figures import FileFormat, PaperFigure
+    from asperity.report.pages.paper_report import FileFormat, PaperFigure
     from asperity.textures import Texture
 
 # Fraction of the progress bar for the claims; the rest is for the experiments.
@@ -67,14 +67,14 @@ def reproduce_command(
     Each claim is a function that computes its evidence; the verdict is derived from the computed
     numbers. Without --claim, all claims are listed with their IDs.
     """
-    from asperity.paper.claim_registry import find_claims
+    from asperity.paper.claims import find_claims
 
     for name in names:
         find_claims(name)  # an unknown name is refused before the computation
     measured = _load_measured_texture(surface, values)
     figures: tuple[PaperFigure, ...] = ()
     if folder is not None:
-        from asperity.report.paper.paper_figures import create_folder, find_figures
+        from asperity.report.pages.paper_report import create_folder, find_figures
 
         figures = find_figures(names, include_simulated=not skip_experiments)
         create_folder(folder)
@@ -84,11 +84,11 @@ def reproduce_command(
         raise ParameterError(_FORMAT.name, "applies to figures: give --figures DIR")
     simulates = not (names or skip_experiments)
     results, experiments = _reproduce(names or None, measured, with_experiments=simulates)
-    from asperity.report.paper.claims_report import claims_page, evidence_page
+    from asperity.report.pages.paper_report import claims_page, evidence_page
 
     written = ""
     if folder is not None:
-        from asperity.report.paper.paper_figures import write_figures
+        from asperity.report.pages.paper_report import write_figures
 
         file_format: FileFormat = values["format"] or "svg"
         with step_bar("drawing the figures", len(figures)) as step:
@@ -124,8 +124,7 @@ def _reproduce(
         )
         if not with_experiments:
             return results, None
-        from asperity.paper.experiments import run_experiments
-        from asperity.paper.experiments.experiment_suite import STEPS
+        from asperity.paper.experiments import STEPS, run_experiments
 
         def step(name: str) -> None:
             update(share + (1.0 - share) * STEPS.index(name) / len(STEPS))

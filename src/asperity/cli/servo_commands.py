@@ -76,7 +76,7 @@ def run_command(
     hashes = setup.file_hashes()
     with progress_bar("analyzing the surface"):
         check_stiffness_limit(setup, accept_risk=accept_risk)
-    from asperity.report.loop.servo_report import device_run_page
+    from asperity.report.pages.servo_report import device_run_page
 
     loop = make_loop(setup, driver, duration, process)
     with stop_on_signals(loop.memory) as signals:
@@ -215,7 +215,7 @@ def show_live_state() -> Iterator[Any]:
     from rich.console import Console
     from rich.live import Live
 
-    from asperity.report.loop.servo_report import status_line
+    from asperity.report.pages.servo_report import status_line
 
     with Live(console=Console(stderr=True), transient=True, refresh_per_second=20) as live:
         yield lambda loop: live.update(status_line(loop))

@@ -75,7 +75,7 @@ def cache_command(outputs: output.Outputs, *, clear: bool) -> None:
         {"name": name, "entries": len(parts), "size": sum(parts)} for name, parts in sizes.items()
     ]
     data = {"schema": 1, "folder": str(folder), "limit": limit, "rooms": rooms}
-    from asperity.report.page import Paragraph, terminal_page
+    from asperity.report.document.page import Paragraph, terminal_page
 
     outputs.write(data, terminal_page(Paragraph("\n".join(lines), "code")))
     if clear and entries:
@@ -154,7 +154,7 @@ def devices_command(names: tuple[str, ...], outputs: Outputs, *, template: bool)
     """
     from asperity.devices import device_names, load_device
     from asperity.devices.device_file import device_template
-    from asperity.report.device_report import devices_page
+    from asperity.report.pages.device_report import devices_page
 
     if template:
         if names or outputs.json:
@@ -225,7 +225,7 @@ def calibrate_command(
     stem = Path(output).stem
     calibrated = measured_device(base, result, stem, date, simulated=simulated)
     write_output("output", output, to_device_toml(calibrated))
-    from asperity.report.loop.servo_report import calibration_page
+    from asperity.report.pages.servo_report import calibration_page
 
     before = unit_starts(base)
     after = unit_starts(calibrated)

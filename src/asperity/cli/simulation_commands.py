@@ -59,7 +59,7 @@ def simulate_command(
     setup = setup if every is None else replace(setup, every=every)
     if not yes:
         _confirm_long_run(setup, has_trace=outputs.trace is not None)
-    from asperity.report.loop.run_report import run_page
+    from asperity.report.pages.run_report import run_page
     from asperity.simulation.trace import MAX_ROWS
 
     # Rows are needed for figures only.
@@ -132,7 +132,7 @@ def onset_command(
             setup, chosen, delays, progress=lambda: update(next(done) / total), **search
         )
 
-    from asperity.report.loop.sweep_report import onset_page
+    from asperity.report.pages.sweep_report import onset_page
 
     outputs.write(result, onset_page(result))
 
@@ -159,7 +159,7 @@ def scan_command(scene: str, outputs: Outputs, laws: tuple[Law, ...] | None, **v
     with progress_bar("simulating strokes") as update:
         result = sweep_strokes(setup, chosen, progress=update, **arguments)
 
-    from asperity.report.loop.sweep_report import strokes_page
+    from asperity.report.pages.sweep_report import strokes_page
 
     outputs.write(result, strokes_page(result))
 
@@ -224,7 +224,7 @@ def sweep_command(
     with progress_bar(f"computing {len(plan)} cases") as update:
         result = run_plan(plan, place, output, update)
 
-    from asperity.report.cases_report import sweep_page
+    from asperity.report.pages.sweep_report import sweep_page
 
     extra = "" if output is None else _write_tables(result, Path(output))
     outputs.write(result, sweep_page(result), extra_line=extra)
@@ -287,7 +287,7 @@ def recording_command() -> None:
 def info_command(file: str, outputs: Outputs) -> None:
     """Show surface, law and device of the recording FILE, and the range of each column."""
     from asperity.recording.recording import open_recording
-    from asperity.report.loop.run_report import recording_page
+    from asperity.report.pages.run_report import recording_page
 
     recording = open_recording(file)
     with progress_bar("reading the rows"):
@@ -325,7 +325,7 @@ def _output_option(help_text: str) -> Callable[[Callable[..., None]], Callable[.
 def plot_command(file: str, output: str) -> None:
     """Plot motion, force, energy and phase of the recording FILE."""
     from asperity.recording.recording import open_recording
-    from asperity.report.loop.run_report import write_recording_report
+    from asperity.report.pages.run_report import write_recording_report
 
     with progress_bar("plotting"):
         write_recording_report(open_recording(file), output)
@@ -361,7 +361,7 @@ def replay_command(file: str, outputs: Outputs, surface: str | None) -> None:
     """
     from asperity.recording.recording import open_recording
     from asperity.recording.replay import recorded_surface_on, replay
-    from asperity.report.loop.run_report import replay_page
+    from asperity.report.pages.run_report import replay_page
 
     recording = open_recording(file)
     other = None

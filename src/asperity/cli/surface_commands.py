@@ -37,7 +37,7 @@ def surfaces_command(names: tuple[str, ...], outputs: Outputs) -> None:
     With NAMEs, show details. Other commands accept these names as SURFACE, with arguments after a
     colon: cloth, sandpaper:grit=P60, noise:rms=20um,size=10mm.
     """
-    from asperity.report.surface_gallery import find_surfaces, surfaces_page
+    from asperity.report.pages.surface_gallery import find_surfaces, surfaces_page
 
     surfaces = find_surfaces(names)
     page = surfaces_page(surfaces, detailed=bool(names))
@@ -103,7 +103,7 @@ def prepare_command(file: str, output: str, outputs: Outputs, **values: Any) -> 
         prepared = prepare_file(file, progress=start_stage, **options.file_values(values))
         start_stage("write")
         save_prepared(output, prepared, file)
-    from asperity.report.measured_report import preparation_page
+    from asperity.report.pages.measured_report import preparation_page
 
     outputs.write(prepared, preparation_page(prepared, output))
 
@@ -148,7 +148,7 @@ def bake_command(surface: str, output: str, *, body: bool, outputs: Outputs, **v
             texture = load_scene(surface, options.file_values(values)).texture
             baked = bake(Surface(texture, "H", **given), progress=update, **chosen)
         field = save_field(output, baked.texture)
-    from asperity.report.measured_report import field_page
+    from asperity.report.pages.measured_report import field_page
 
     outputs.write(field.describe(), field_page(field, output))
 
@@ -170,7 +170,7 @@ def show_command(file: str, outputs: Outputs, **values: Any) -> None:
     with preparation_progress() as start_stage:
         summary = show(file, progress=start_stage, **options.file_values(values))
 
-    from asperity.report.measured_report import surface_summary_page
+    from asperity.report.pages.measured_report import surface_summary_page
 
     outputs.write(summary, surface_summary_page(summary))
 

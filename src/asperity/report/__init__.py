@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from asperity.report.comparison_columns import comparison_table as comparison_table
-from asperity.report.page import add_section as add_section
+from asperity.report.document.page import add_section as add_section
+from asperity.report.pages.comparison_columns import comparison_table as comparison_table
 from asperity.report.views import html_text as html_text
 from asperity.report.views import notebook_html as notebook_html
 from asperity.report.views import rich_renderables as rich_renderables

@@ -19,18 +19,16 @@ from asperity.devices import Device
 from asperity.envelopes.envelope import Envelope
 from asperity.envelopes.find_design import Design
 from asperity.measured.measured_file import MeasurementSummary
-from asperity.report.analysis_report import analysis_page, criteria_table
-from asperity.report.comparison_columns import describe_texture
-from asperity.report.comparison_report import comparison_page, comparisons_page
-from asperity.report.design_report import design_page
-from asperity.report.device_report import device_page
-from asperity.report.envelope_report import envelope_page
-from asperity.report.html import Origin, render_notebook, render_page
-from asperity.report.limits_report import limits_page
-from asperity.report.measured_report import surface_summary_page
-from asperity.report.page import Page, Picture, notebook_page, plot_later
+from asperity.report.document.html import Origin, render_notebook, render_page
+from asperity.report.document.page import Page, Picture, notebook_page, plot_later
+from asperity.report.document.terminal import page_renderables
+from asperity.report.pages.analysis_report import analysis_page, criteria_table
+from asperity.report.pages.comparison_columns import describe_texture
+from asperity.report.pages.comparison_report import comparison_page, comparisons_page, design_page
+from asperity.report.pages.device_report import device_page
+from asperity.report.pages.limits_report import envelope_page, limits_page
+from asperity.report.pages.measured_report import surface_summary_page
 from asperity.report.sentences.number_text import interval_text, readable_name, witness_text
-from asperity.report.terminal import page_renderables
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
 
@@ -38,7 +36,7 @@ from asperity.textures.texture import Texture
 @singledispatch
 def find_page(result: Any) -> Page | None:
     """Return the page of a result; ``None`` for a result without one."""
-    from asperity.report.loop.loop_pages import find_loop_page  # needs the simulation and the paper
+    from asperity.report.loop_pages import find_loop_page  # needs the simulation and the paper
 
     return find_loop_page(result)
 

@@ -12,8 +12,7 @@ from asperity.core.errors import ParameterError
 from asperity.core.processes import limit_processes
 from asperity.paper import CLAIMS, VERDICTS, Result, get_claim, reproduce_claims
 from asperity.paper.claim import CATALOGUE
-from asperity.paper.claim_registry import find_claims
-from asperity.paper.claims import simulated_claims
+from asperity.paper.claims import find_claims, simulated_claims
 from asperity.paper.claims.simulated_claims import SIMULATED_CLAIM_IDS
 from asperity.paper.formula_checks import FORMULAS, FormulaRow
 

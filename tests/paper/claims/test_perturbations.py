@@ -12,10 +12,10 @@ from tests.paper.claims.perturbations import (
     replace_name,
 )
 from tests.paper.claims.test_claims import CORRECTED, FAILS, HOLDS
-from tests.paper.experiments.test_experiments import EXPECTED
+from tests.paper.test_experiments import EXPECTED
 
 from asperity.paper import CLAIMS, Claim, get_claim
-from asperity.paper.claim_registry import register
+from asperity.paper.claims import register
 from asperity.paper.probes import ProbePoint
 from asperity.surface import Surface
 from asperity.textures.kinds.sinusoid import Sinusoid

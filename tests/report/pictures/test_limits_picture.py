@@ -10,7 +10,7 @@ import pytest
 from asperity.analysis.results.check_limits import Limits, limits
 from asperity.analysis.results.compare import compare
 from asperity.devices import parse_device
-from asperity.report.pictures.spectrum_pictures import (
+from asperity.report.pictures.device_pictures import (
     hand_figure,
     limits_figure,
     shortest_wavelengths,

@@ -10,8 +10,8 @@ import pytest
 import asperity as asp
 from asperity.core.errors import ParameterError
 from asperity.report import plot
+from asperity.report.pictures.device_pictures import spectrum_figure
 from asperity.report.pictures.law_pictures import gain_figure, merit_figure
-from asperity.report.pictures.spectrum_pictures import spectrum_figure
 from asperity.surface import Surface
 
 TEXTURE = asp.Sinusoid(amplitude=0.2e-3, period=2e-3)

@@ -45,7 +45,7 @@ def test_damping_behind_a_resonance_does_not_damp_the_handle() -> None:
 
 def test_cycle_with_unequal_last_quarters_is_a_cycle() -> None:
     """F at 2000 N/m, delay 6: starts seem to settle at 2 s but cycle at 220 mm/s permanently."""
-    from asperity.paper.experiments.experiment_setups import band_setup
+    from asperity.paper.cycle_experiments import band_setup
 
     setup = band_setup("F", 2000.0, 6)
     for shift in start_offsets(setup.surface, 24)[::2]:

@@ -6,9 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 
 from asperity.paper import claim
 from asperity.paper.cases import PAPER_LAWS
-from asperity.paper.experiments.cycle_counts import STARTS, count_cycles, passivity_onsets
-from asperity.paper.experiments.experiment_setups import ALL_LAWS
-from asperity.paper.experiments.strokes import BumpRun, bump_experiment, scanning_experiment
+from asperity.paper.cycle_experiments import ALL_LAWS, STARTS, count_cycles, passivity_onsets
+from asperity.paper.experiments import BumpRun, bump_experiment, scanning_experiment
 from asperity.simulation.scan import Stroke
 
 TRIED_DELAYS = (0, 4, 5, 6, 7)

@@ -12,10 +12,8 @@ from matplotlib.figure import Figure
 
 from asperity.core.units import format_quantity
 from asperity.laws import find_law
-from asperity.paper.experiments import Experiments
-from asperity.paper.experiments.cycle_counts import CycleCount, PassivityExperiment
-from asperity.paper.experiments.experiment_setups import bump_setup
-from asperity.paper.experiments.strokes import BumpExperiment, ScanningExperiment
+from asperity.paper.cycle_experiments import CycleCount, PassivityExperiment, bump_setup
+from asperity.paper.experiments import BumpExperiment, Experiments, ScanningExperiment
 from asperity.paper.figures import ForceField, LoopEnergy, force_fields, loop_energies
 from asperity.report.pictures import style
 from asperity.report.sentences.number_text import readable_name

@@ -16,9 +16,13 @@ from asperity.envelopes.envelope import Envelope
 from asperity.recording.recording import Recording
 from asperity.report.pictures import law_pictures, style
 from asperity.report.pictures.analysis_pictures import available_pictures
-from asperity.report.pictures.envelope_pictures import envelope_figure
+from asperity.report.pictures.device_pictures import (
+    envelope_figure,
+    hand_figure,
+    limits_figure,
+    spectrum_figure,
+)
 from asperity.report.pictures.loop_pictures import recording_figure, run_figure
-from asperity.report.pictures.spectrum_pictures import hand_figure, limits_figure, spectrum_figure
 from asperity.report.pictures.surface_pictures import draw_surface, surface_size
 from asperity.report.sentences.number_text import leak_text
 from asperity.simulation import Run

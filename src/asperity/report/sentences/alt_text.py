@@ -1,6 +1,6 @@
 """Text alternatives of the figures of a comparison, and the figures of an analysis.
 
-:func:`asperity.report.html.render_picture` appends the ranges of lines and colours.
+:func:`asperity.report.document.html.render_picture` appends the ranges of lines and colours.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def surface_alt_text(texture: Texture) -> str:
 
 def spectrum_alt_text(comparison: Comparison) -> str:
     """Return the strongest wave, and the resolution of the device."""
-    from asperity.report.pictures.spectrum_pictures import device_wavelength_limits, line_spectrum
+    from asperity.report.pictures.device_pictures import device_wavelength_limits, line_spectrum
 
     lengths, amplitudes = line_spectrum(comparison.texture)
     first = amplitudes.argmax()

@@ -7,7 +7,7 @@ import math
 from asperity.analysis import characteristic_number, worst_loop
 from asperity.core.units import format_quantity
 from asperity.export.surface_maps import SampledMap, height_resolution, normal_error
-from asperity.report.loop.run_report import energy_text
+from asperity.report.pages.run_report import energy_text
 from asperity.report.sentences.texts import sentence
 from asperity.surface import Surface
 from asperity.textures.texture import Texture

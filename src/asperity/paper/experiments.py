@@ -1,0 +1,315 @@
+"""The simulated experiments: strokes (V.B), a bump of 20 mm and back (V.C), and all together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from asperity.core.checks import FloatArray
+from asperity.core.files import Serializable, to_plain_data
+from asperity.core.units import format_quantity
+from asperity.paper import cycle_experiments as setups
+from asperity.paper.cycle_experiments import (
+    RESOLUTION,
+    DeviceExperiment,
+    PassivityExperiment,
+    device_experiment,
+    passivity_experiment,
+)
+from asperity.scene.sweeps import map_threads
+from asperity.simulation import Strokes
+from asperity.simulation.scan import Stroke, scan_strokes
+from asperity.textures.texture import Texture
+
+BUMP_LAWS = "ABDEH"
+_WINDOW = 200  # samples, 20 ms
+
+
+@dataclass(frozen=True)
+class BumpRun(Serializable):
+    """One stroke over the bump and back.
+
+    Attributes:
+        law: letter.
+        entry: name of the hand and its path.
+        energy: energy supplied along x and z [J].
+        lost: number of times contact was lost.
+        jump: greatest energy supplied within 20 ms [J].
+        top: greatest height of the handle [m].
+        closure: residual of the energy balance over the energy exchanged [1].
+        time: [s], shape (n,).
+        x: position of the handle [m], shape (n,).
+        z: position of the handle [m], shape (n,).
+        supplied: energy supplied so far, all axes [J], shape (n,).
+        stopped: reason for which the run ended early; empty if it did not.
+    """
+
+    serialized_attributes = "law entry energy lost jump top closure stopped"
+
+    law: str
+    entry: str
+    energy: tuple[float, float]
+    lost: int
+    jump: float
+    top: float
+    closure: float
+    time: FloatArray
+    x: FloatArray
+    z: FloatArray
+    supplied: FloatArray
+    stopped: str
+
+    @property
+    def total(self) -> float:
+        """Energy supplied [J]."""
+        return float(sum(self.energy))
+
+
+@dataclass(frozen=True)
+class BumpExperiment(Serializable):
+    """Section V.C.
+
+    Attributes:
+        bumps: by entry and law.
+        guessed: assumptions that the paper does not state.
+    """
+
+    bumps: tuple[BumpRun, ...]
+    guessed: tuple[str, ...] = setups.GUESSED_BUMP
+
+
+@lru_cache(maxsize=16)
+def simulate_bump(law: str, entry: str) -> BumpRun:
+    """Simulate a hand that moves over the bump and back."""
+    run = setups.bump_setup(law, entry).simulate()
+    contact = np.any(run.applied != 0.0, axis=1)
+    summed = run.energies["supplied"].sum(axis=1)
+    window = min(_WINDOW, len(summed) - 1)
+    x, _y, z = run.ledger.supplied
+    traced = slice(None, None, setups.TRACE_STRIDE)
+    return BumpRun(
+        law=law,
+        entry=entry,
+        energy=(x, z),
+        lost=int(np.count_nonzero(contact[:-1] & ~contact[1:])),
+        jump=float((summed[window:] - summed[:-window]).max()),
+        top=float(run.position[:, 2].max()),
+        closure=abs(run.ledger.closure) / max(run.ledger.exchanged, 1e-300),
+        time=run.time[traced],
+        x=run.position[traced, 0],
+        z=run.position[traced, 2],
+        supplied=summed[traced],
+        stopped=run.stop_message,
+    )
+
+
+def bump_experiment(laws: str = BUMP_LAWS) -> BumpExperiment:
+    """Simulate section V.C for both entries."""
+    jobs = [(law, entry) for entry in setups.ENTRIES for law in laws]
+    return BumpExperiment(map_threads(simulate_bump, jobs))
+
+
+FIGURE_6_LAWS = "AGDFH"  # figure 6, and law H
+
+
+@dataclass(frozen=True)
+class HandStroke:
+    """Energy per stroke with one hand at one speed.
+
+    Attributes:
+        hand: name of the hand.
+        stroke: its energies.
+    """
+
+    hand: str
+    stroke: Stroke
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data, SI units."""
+        return {"hand": self.hand} | self.stroke.to_dict()
+
+
+@dataclass(frozen=True)
+class EnergyTrace:
+    """A panel of figure 6: energy supplied to the hand over one stroke.
+
+    Attributes:
+        law: letter.
+        time: [s], shape (n,).
+        exact: work of the held force along the true motion, x and z [J], shape (n, 2).
+        paper: the paper's sum of force times step of the same sample, x and z [J], shape (n, 2).
+    """
+
+    law: str
+    time: FloatArray
+    exact: FloatArray
+    paper: FloatArray
+
+
+@dataclass(frozen=True)
+class ScanningExperiment(Serializable):
+    """Section V.B.
+
+    Attributes:
+        strokes: energies by law, hand and speed.
+        traces: the first stroke of the first hand at 0.1 m/s.
+        guessed: assumptions that the paper does not state.
+    """
+
+    serialized_attributes = "strokes guessed"
+
+    strokes: tuple[HandStroke, ...]
+    traces: tuple[EnergyTrace, ...]
+    guessed: tuple[str, ...] = setups.GUESSED_HANDS
+
+    def strokes_of(self, law: str) -> tuple[Stroke, ...]:
+        """Return the strokes of a law for all hands and speeds."""
+        return tuple(one.stroke for one in self.strokes if one.stroke.law == law)
+
+
+@lru_cache(maxsize=128)
+def _simulate_stroke(law: str, hand: str, speed: float) -> HandStroke:
+    setup = setups.stroke_setup(law, hand, speed)
+    assert isinstance(setup.motion, Strokes)
+    depth = -setup.motion.start[2]
+    loop = setup.surface, setup.plant, setup.hand, setup.servo, setup.motion
+    (stroke,) = scan_strokes(*loop, speeds=[speed], depths=[depth])
+    return HandStroke(hand, stroke)
+
+
+@lru_cache(maxsize=16)
+def energy_trace(law: str) -> EnergyTrace:
+    """Return the energies of the first stroke, of about a second, as in figure 6."""
+    setup = setups.stroke_setup(law)
+    assert isinstance(setup.motion, Strokes)
+    run = setup.simulate()
+    traced = slice(0, round(setup.motion.period / run.period), setups.TRACE_STRIDE)
+    exact, paper = (run.energies[name][traced][:, [0, 2]] for name in ("supplied", "same_sample"))
+    return EnergyTrace(law, run.time[traced], exact, paper)
+
+
+def scanning_experiment(laws: str = setups.ALL_LAWS) -> ScanningExperiment:
+    """Simulate section V.B for every hand and speed."""
+    jobs = [(law, hand, speed) for law in laws for hand in setups.HANDS for speed in setups.SPEEDS]
+    traces = map_threads(energy_trace, [(law,) for law in FIGURE_6_LAWS if law in laws])
+    return ScanningExperiment(map_threads(_simulate_stroke, jobs), traces)
+
+
+STEPS = (
+    "experiment V.A: limit cycles",
+    "experiment V.B: energy per stroke",
+    "experiment V.C: the bump",
+    "further devices and surfaces",
+)
+
+
+@dataclass(frozen=True)
+class Experiments:
+    """Results of the simulated experiments.
+
+    Attributes:
+        passivity: section V.A, with the onsets of all laws.
+        scanning: section V.B.
+        bump: section V.C.
+        devices: further devices and surfaces.
+    """
+
+    passivity: PassivityExperiment
+    scanning: ScanningExperiment
+    bump: BumpExperiment
+    devices: DeviceExperiment
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data, SI units."""
+        return to_plain_data(
+            {"V.A": self.passivity, "V.B": self.scanning, "V.C": self.bump, "beyond": self.devices}
+        )
+
+    @property
+    def summary_lines(self) -> tuple[tuple[str, str], ...]:
+        """Name and result of each experiment, in words."""
+        return (
+            ("V.A", self._summarize_cycles()),
+            ("V.A onsets", f"{self._summarize_delay_rule()}; {self._summarize_wall_rule()}"),
+            ("V.B", self._summarize_strokes()),
+            ("V.C", self._summarize_bumps()),
+            ("devices", self._summarize_devices()),
+        )
+
+    def _summarize_cycles(self) -> str:
+        parts = [f"{one.wall} {one.cycles}" for one in self.passivity.counts]
+        first = self.passivity.counts[0]
+        return (
+            f"of {first.starts} starts cycle at 2000 N/m and a lag of {first.delay} samples: "
+            f"{', '.join(parts)}"
+        )
+
+    def _summarize_wall_rule(self) -> str:
+        """Count the textures that cycle below the wall's own onset over q."""
+        textured = [
+            one for one in self.passivity.onsets if one.wall_rule and not one.onset.is_smooth_wall
+        ]
+        missed = sum(one.violates_wall_rule for one in textured)
+        # A wall that cycles at the least stiffness tried may also cycle below it.
+        open_cases = sum(one.onset.quiet == 0.0 and not one.violates_wall_rule for one in textured)
+        unknown = f", unknown in {open_cases}" if open_cases else ""
+        return f"below K0/q of the wall's own onset in {missed} of {len(textured)} cases{unknown}"
+
+    def _summarize_delay_rule(self) -> str:
+        found = self.passivity.onsets
+        missed = [
+            f"{one.onset.law} at d = {one.onset.delay}" for one in found if one.violates_delay_rule
+        ]
+        cases = sum(one.conservative for one in found)
+        if not missed:
+            return f"no limit cycle below the delay rule in {cases} cases of conservative laws"
+        return (
+            f"limit cycles below the delay rule in {len(missed)} of {cases} cases of conservative "
+            f"laws, with steps of the encoder of {format_quantity(RESOLUTION, 'm')}; it is proved "
+            f"for exact positions: {', '.join(missed)}"
+        )
+
+    def _summarize_strokes(self) -> str:
+        counts: dict[str, list[bool]] = {}
+        for one in self.scanning.strokes:
+            counts.setdefault(one.stroke.law, []).append(one.stroke.gains_energy)
+        parts = [f"{law} {sum(gains)}" for law, gains in counts.items()]
+        total = max(map(len, counts.values()))
+        return f"of {total} hands and speeds the field supplies energy: {', '.join(parts)}"
+
+    def _summarize_bumps(self) -> str:
+        parts = [f"{one.law} {1e3 * one.total:+.3g} mJ ({one.entry})" for one in self.bump.bumps]
+        return ", ".join(parts)
+
+    def _summarize_devices(self) -> str:
+        found = self.devices.onsets
+        missed = sum(one.catalogue_rule_missed for one in found)
+        rules = sum(one.prediction.violates_delay_rule for one in found)
+        return (
+            f"{missed} of {len(found)} cases cycle at a stiffness that the catalogue's K0/q "
+            f"allows, {rules} below the delay rule"
+        ) + (f"; {self.devices.wall_summary}" if self.devices.wall_summary else "")
+
+
+def run_experiments(
+    measured_texture: Texture | None = None, progress: Callable[[str], None] | None = None
+) -> Experiments:
+    """Run all experiments; this takes one to three minutes on two cores.
+
+    Args:
+        measured_texture: a surface for the last one; by default a synthetic one.
+        progress: called with the name of each step when it starts.
+    """
+    report = progress or (lambda _step: None)
+    report(STEPS[0])
+    passivity = passivity_experiment()
+    report(STEPS[1])
+    scanning = scanning_experiment()
+    report(STEPS[2])
+    bump = bump_experiment()
+    report(STEPS[3])
+    return Experiments(passivity, scanning, bump, device_experiment(measured_texture))

@@ -1,0 +1,394 @@
+"""Pages: the one description of a result, from which terminal, notebook and HTML are rendered.
+
+:mod:`asperity.report.document.terminal` prints a page, :mod:`asperity.report.document.html` writes
+it as an HTML file or as the output of a notebook cell.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass, field
+from enum import Flag, auto
+from functools import partial
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from asperity.report.sentences.number_text import yes_no_text
+from asperity.report.sentences.texts import figure_text
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+PAPER_CITATION = "after Campion and Hayward, “On the Synthesis of Haptic Textures”"
+NO_PERCEPTUAL_TEST = "Not validated by a perceptual test."
+
+
+class Media(Flag):
+    """The media that show a section; ``HEADING`` prints its title in a terminal too."""
+
+    HTML = auto()
+    TERMINAL = auto()
+    NOTEBOOK = auto()
+    HEADING = auto()
+
+
+SCREEN = Media.HTML | Media.TERMINAL
+"""An HTML file, and a terminal without the title of the section."""
+HEADED = Media.TERMINAL | Media.HEADING
+"""A terminal, below the title of the section."""
+
+
+@dataclass(frozen=True)
+class Paragraph:
+    """A paragraph.
+
+    Attributes:
+        text: plain text.
+        kind: "note" is faint, "mono" is one line of code; "code" keeps its line breaks.
+    """
+
+    block_type: ClassVar[str] = "words"
+    text: str
+    kind: str = ""
+
+
+@dataclass(frozen=True)
+class BulletList:
+    """A list of sentences."""
+
+    block_type: ClassVar[str] = "items"
+    sentences: Sequence[str]
+
+
+@dataclass(frozen=True)
+class DefinitionList:
+    """Terms with their meanings."""
+
+    block_type: ClassVar[str] = "definitions"
+    pairs: Sequence[tuple[str, str]]
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure, drawn only by a renderer that shows it.
+
+    Attributes:
+        figure: the figure, or a function that draws it.
+        description: what the figure shows, in a sentence or two for readers who cannot see it, or
+            a function that returns it; the ranges of lines and colours are appended.
+        name: namespace of the rendered figure in the cache.
+        find_digest: returns the content digest of everything the figure depends on; with a digest
+            the rendered figure is cached, and drawn in a helper process if one is available, so
+            functions must then be such that can be pickled. ``None``: it depends on more.
+        dpi: resolution of the parts drawn as pixels.
+    """
+
+    block_type: ClassVar[str] = "picture"
+    figure: Figure | Callable[[], Figure]
+    description: str | Callable[[], str]
+    name: str = ""
+    find_digest: Callable[[], str | None] | None = None
+    dpi: int = 160
+
+    def draw(self) -> Figure:
+        """Return the figure."""
+        return self.figure() if callable(self.figure) else self.figure
+
+    def describe(self) -> str:
+        """Return what the figure shows."""
+        return self.description() if callable(self.description) else self.description
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A cell of a table; a plain string is a cell too.
+
+    Attributes:
+        text: the content.
+        kind: "no", "good" and "part" are coloured, "l" is bold, "open" is faint, "mono" is code,
+            "line" is not broken.
+        note: tooltip.
+        subtext: a faint line below the text.
+        summary: heading of the details.
+        details: names and values of the evidence, folded away on a page.
+    """
+
+    text: str
+    kind: str = ""
+    note: str = ""
+    subtext: str = ""
+    summary: str = "Evidence"
+    details: Sequence[tuple[str, str]] = ()
+
+
+Cells = list[str | Cell]
+
+
+@dataclass(frozen=True)
+class Row:
+    """A row of a table.
+
+    Attributes:
+        cells: one per column.
+        kind: "best" is tinted, and bold in a terminal.
+        id: anchor for links to the row; may be empty.
+        style: Rich style in a terminal.
+        law: letter of the law that the row belongs to; the row is hidden with that law.
+    """
+
+    cells: Sequence[str | Cell]
+    kind: str = ""
+    id: str = ""
+    style: str = ""
+    law: str = ""
+
+
+@dataclass(frozen=True)
+class TableLayout:
+    """How a terminal lays out a table; columns are counted from 0.
+
+    Attributes:
+        wrap: columns whose text is wrapped; no character of them is cut.
+        max_widths: greatest width [characters] of wrapped columns.
+        max_widths_below: console width [characters] below which ``max_widths`` applies; ``None``
+            for every console.
+        min_console: console width [characters] from which a column is shown.
+        drop_order: columns that may be dropped on a narrow console, the most important first.
+        omit: columns that are never shown.
+        legend: heading and meaning of columns, printed below the table for those shown.
+        dropped_note: printed below the table if columns were dropped.
+        gap: characters between columns.
+        tight_below: console width [characters] below which columns are one character apart.
+        has_rule: whether a line is drawn below the headings, if there are any.
+        max_console: console width [characters] up to which the table is shown at all.
+    """
+
+    wrap: Collection[int] = ()
+    max_widths: Mapping[int, int] = field(default_factory=dict)
+    max_widths_below: int | None = None
+    min_console: Mapping[int, int] = field(default_factory=dict)
+    drop_order: Sequence[int] = ()
+    omit: Collection[int] = ()
+    legend: Mapping[int, tuple[str, str]] = field(default_factory=dict)
+    dropped_note: str = ""
+    gap: int = 1
+    tight_below: int = 0
+    has_rule: bool = True
+    max_console: int | None = None
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table.
+
+    Attributes:
+        headings: of the columns; none for a list of pairs.
+        rows: its rows.
+        numeric_columns: columns of numbers, aligned to the right.
+        layout: in a terminal.
+    """
+
+    block_type: ClassVar[str] = "table"
+    headings: Sequence[str]
+    rows: Sequence[Row]
+    numeric_columns: Sequence[int] = ()
+    layout: TableLayout = TableLayout()
+
+
+@dataclass(frozen=True)
+class Cards:
+    """Sections side by side."""
+
+    block_type: ClassVar[str] = "cards"
+    sections: Sequence[Section]
+
+
+Block = Paragraph | BulletList | DefinitionList | Picture | Table | Cards
+
+
+@dataclass(frozen=True)
+class Section:
+    """A heading with the blocks below it.
+
+    Attributes:
+        title: heading; may be empty.
+        blocks: in order.
+        caption: explanation above the blocks, on a page alone.
+        notes: faint paragraphs below the blocks.
+        level: 2, or 3 for a part of the section before it.
+        kind: "assumed" is framed.
+        id: anchor for links to the section; may be empty.
+        media: where the section is shown.
+    """
+
+    title: str
+    blocks: Sequence[Block]
+    caption: str = ""
+    notes: Sequence[str] = ()
+    level: int = 2
+    kind: str = ""
+    id: str = ""
+    media: Media = Media.HTML
+
+
+@dataclass(frozen=True)
+class Page:
+    """A report.
+
+    Attributes:
+        title: heading of the HTML file; empty for a result without one.
+        answer: one or two sentences.
+        facts: names and values of the given arguments, on a page alone.
+        sections: in order.
+        footer: origin of the method.
+    """
+
+    title: str
+    answer: str
+    facts: Sequence[tuple[str, str]] = ()
+    sections: Sequence[Section] = ()
+    footer: str = ""
+
+
+def pairs_table(rows: Sequence[tuple[str, str]]) -> Table:
+    """Return a table without headings: a bold name and its value per row."""
+    layout = TableLayout(wrap=(0, 1), max_widths={0: 26})
+    return Table((), [Row([Cell(name, "l"), text]) for name, text in rows], layout=layout)
+
+
+def terminal_section(*blocks: Block, notes: Sequence[str] = ()) -> Section:
+    """Return a section without a title that only a terminal shows."""
+    return Section("", blocks, notes=notes, media=Media.TERMINAL)
+
+
+def terminal_page(*blocks: Block) -> Page:
+    """Return a page of one section that only a terminal shows."""
+    return Page("", "", (), [terminal_section(*blocks)])
+
+
+def notebook_page(answer: str, *blocks: Block) -> Page:
+    """Return a page without a title, which only a notebook shows."""
+    return Page("", answer, (), [Section("", blocks, media=Media.NOTEBOOK)])
+
+
+def plot_later(result: Any, picture: str | None = None) -> Callable[[], Figure]:
+    """Return a function that draws a figure of a result; see :func:`asperity.report.plot`."""
+    return partial(_plot, result, picture)
+
+
+def _plot(result: Any, picture: str | None) -> Figure:
+    from asperity.report.pictures.plotting import plot  # Matplotlib is needed to draw alone
+
+    return plot(result, picture)
+
+
+def picture_section(
+    title: str,
+    figure: Figure | Callable[[], Figure],
+    description: str,
+    caption: str = "",
+    notes: Sequence[str] = (),
+    level: int = 2,
+    media: Media = Media.HTML,
+) -> Section:
+    """Return a section that shows a figure; see :class:`Picture`."""
+    return Section(title, [Picture(figure, description)], caption, notes, level, media=media)
+
+
+def figure_section(
+    name: str,
+    figure: Figure | Callable[[], Figure],
+    notes: Sequence[str] = (),
+    level: int = 2,
+    media: Media = Media.HTML,
+    **values: object,
+) -> Section:
+    """Return a section that shows a figure with its texts.
+
+    Args:
+        name: of the texts; see :func:`asperity.report.sentences.texts.figure_text`.
+        figure: see :class:`Picture`.
+        notes: below the figure.
+        level: see :class:`Section`.
+        media: where it is shown.
+        values: that replace the names in braces in the texts.
+    """
+    title, caption, description = figure_text(name, **values)
+    return picture_section(title, figure, description, caption, notes, level, media)
+
+
+def facts_section(facts: Sequence[tuple[str, str]]) -> Section:
+    """Return the facts of a page for a terminal, one faint line each."""
+    return terminal_section(notes=[f"{name}: {value}" for name, value in facts])
+
+
+def assumption_sections(sentences: Sequence[str], *blocks: Block) -> list[Section]:
+    """Return the sections of the assumptions; none without any.
+
+    Args:
+        sentences: the assumptions.
+        blocks: shown below them on a page.
+    """
+    if not sentences:
+        return []
+    listed = BulletList(sentences)
+    return [
+        Section("Assumptions", [listed, *blocks], kind="assumed"),
+        Section("Assumed:", [listed], media=HEADED),
+    ]
+
+
+def holds_cell(holds: bool | None) -> Cell:
+    """Return yes, no, or ? for a condition that cannot be decided."""
+    return Cell(yes_no_text(holds), "open" if holds is None else "" if holds else "no")
+
+
+@contextmanager
+def default_style() -> Iterator[None]:
+    """Draw figures with Matplotlib's defaults, whatever the user's settings, which are restored."""
+    import matplotlib
+
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        yield
+
+
+FIGURE_SUFFIXES = (".svg", ".png", ".pdf")
+"""Suffixes of the files to which figures are written."""
+
+
+def figure_bytes(result: Any, suffix: str) -> bytes:
+    """Return the main figure of a result as the content of a file with one of these suffixes."""
+    image = io.BytesIO()
+    # Without a date, the same result gives the same file.
+    metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(suffix)
+    with default_style():
+        _plot(result, None).savefig(image, format=suffix[1:], metadata=metadata)
+    return image.getvalue()
+
+
+# --- user-defined sections ------------------------------------------------------------------------
+
+_USER_SECTIONS: dict[type, list[Callable[..., Section | None]]] = {}
+
+
+def add_section(result_type: type, section: Callable[..., Section | None]) -> None:
+    """Add a section to the page of every result of a type, before the assumptions.
+
+    Args:
+        result_type: the type, such as :class:`~asperity.analysis.results.compare.Comparison`.
+        section: called with the arguments of the page: a comparison, an analysis, limits; of a run
+            its setup and the run. It returns a :class:`Section`, or ``None`` for none.
+    """
+    sections = _USER_SECTIONS.setdefault(result_type, [])
+    if section not in sections:
+        sections.append(section)
+
+
+def user_sections(result_type: type, *arguments: Any) -> list[Section]:
+    """Return the user-defined sections of a type of result."""
+    functions = _USER_SECTIONS.get(result_type, ())
+    with default_style() if functions else nullcontext():
+        sections = [function(*arguments) for function in functions]
+    return [section for section in sections if section is not None]

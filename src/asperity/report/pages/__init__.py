@@ -1,0 +1,1 @@
+"""Pages of results, a file for each kind of result."""

@@ -1,0 +1,354 @@
+"""Report of the analysis of one law."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.passivity.assess_passivity import Passivity, stability_limit_text
+from asperity.analysis.results.analyze import PASSIVITY_FIELDS, Analysis
+from asperity.clamps import NONE
+from asperity.core.units import format_quantity
+from asperity.laws import LAWS, SHIPPED_LAW_ARGUMENTS
+from asperity.report.document import page
+from asperity.report.document.page import HEADED, Cell, Media, Row, Section, Table, TableLayout
+from asperity.report.pages.comparison_columns import texture_name
+from asperity.report.pages.device_report import device_numbers_table
+from asperity.report.sentences import number_text
+from asperity.report.sentences.alt_text import analysis_figure_names
+from asperity.report.sentences.texts import glossary, sentence
+from asperity.surface import Surface
+
+_BOUND_HEADINGS = ("number", "lower", "upper", "method", "attained at")
+_CRITERIA_HEADINGS = ("criterion", "condition", "holds", "limit", "margin", "conclusion, premises")
+_JUMP_HEADINGS = ("at depth", "jumps by", "near (both witnesses are in the JSON)")
+_MEDIA = HEADED | Media.HTML
+
+
+def _computed_bounds(analysis: Analysis) -> list[tuple[str, Bound]]:
+    """Return the numbers that were searched for, from which the others follow."""
+    curl = [] if analysis.curl is None else [("|curl f|/k", analysis.curl)]
+    return [("q", analysis.q), ("q⁺", analysis.one_sided), *curl]
+
+
+def undecided_criteria(analysis: Analysis) -> list[tuple[str, str]]:
+    """Return the criteria that decide nothing, grouped by reason: names and reason."""
+    names: dict[str, list[str]] = {}
+    for criterion in analysis.passivity.criteria:
+        if criterion.holds is None:
+            names.setdefault(criterion.conclusion, []).append(criterion.name)
+    return [("; ".join(group), reason) for reason, group in names.items()]
+
+
+def bound_notes(analysis: Analysis) -> list[str]:
+    """Return how each number was obtained, and whether and why the law is conservative."""
+    notes = [f"{name}: {bound.note}" for name, bound in _computed_bounds(analysis) if bound.note]
+    word = "yes" if analysis.conservative else "no"
+    return [*notes, f"conservative: {word}, {analysis.conservative_reason}"]
+
+
+def critical_speed_text(analysis: Analysis) -> str:
+    """Return v* as text, with its meaning or the missing data."""
+    speed = analysis.v_star
+    if speed is None:
+        if analysis.device.value("damping") is None:
+            return "not decidable: needs damping"
+        return "not known: no loop found that gains energy"
+    if speed == 0.0:
+        return "0 m/s: no energy to absorb"
+    if math.isinf(speed):
+        return "∞: a device without damping never absorbs the energy"
+    datum = analysis.device.data["damping"]
+    mark = "" if datum.verified else " (not verified)"
+    return (
+        f"{format_quantity(speed, 'm/s')}: below it, damping {datum.text}{mark} absorbs too little"
+    )
+
+
+def thrust_text(analysis: Analysis) -> str:
+    """Return the mean thrust on a straight scan as text."""
+    thrust = analysis.leak.thrust
+    surface = analysis.surface
+    if surface.law.stateful:
+        return "not defined: friction resists in any case"
+    if thrust is None:
+        return "not stated: the line is not periodic"
+    # Smaller values are rounding errors of forces up to stiffness times depth.
+    is_zero = abs(thrust) <= 1e-12 * surface.stiffness * surface.max_depth
+    return f"{'0 N' if is_zero else format_quantity(thrust, 'N')} on a straight scan"
+
+
+def leak_facts(analysis: Analysis) -> list[tuple[str, str]]:
+    """Return names and values of the worst loop."""
+    leak = analysis.leak
+    density = analysis.curl_density
+    line = analysis.leak.line
+    x, y = (float(part) + 0.0 for part in line.direction)
+    start = ", ".join(f"{1e3 * float(part) + 0.0:.6g}" for part in line.start)
+    plane = f"vertical, along ({x:.6g}, {y:.6g}) through ({start}) mm"
+    energy = number_text.range_text(leak.energy, leak.upper_per_period, "J")
+    facts = [
+        ("energy", f"{energy} per traversal ({leak.method})"),
+        ("description", leak.description),
+        ("plane", f"{plane}, {format_quantity(line.length, 'm')} of it"),
+    ]
+    if len(leak.vertices):
+        path = f"{len(leak.vertices)} vertices, {format_quantity(leak.length, 'm')} long"
+        mean = format_quantity(leak.per_length, "N")
+        facts.append(("polygon", path))
+        facts.append(("per length", f"{mean}: energy over the length of the line"))
+    facts += [("v*", critical_speed_text(analysis)), ("thrust", thrust_text(analysis))]
+    if density is not None and density.upper > 0.0:
+        area = number_text.range_text(density.lower, density.upper, "J/m²")
+        facts.append(("small loops", f"gain at most {area}: the greatest |curl f|"))
+    return facts
+
+
+def merit_facts(analysis: Analysis) -> list[tuple[str, str]]:
+    """Return strength, support and force on the scan that compares laws."""
+    scan = analysis.merit
+    surface = analysis.surface
+    unit = "" if surface.texture.scan_line().periodic else " m"
+    facts = [
+        ("strength T", f"{number_text.merit_text(scan.strength)}{unit}"),
+        ("support S", number_text.merit_text(scan.support)),
+        ("RMS force", f"{format_quantity(scan.ripple * surface.stiffness, 'N')} RMS at this k"),
+        ("height", f"z = {format_quantity(scan.height, 'm')}"),
+    ]
+    if scan.contact_lost > 0.0:
+        facts.append(("no contact", f"on {100.0 * scan.contact_lost:.0f} % of the scan"))
+    return facts
+
+
+# --- tables ---------------------------------------------------------------------------------------
+
+
+def bounds_table(analysis: Analysis) -> Table:
+    """Return one row per number: lower, upper, method and the point that attains lower."""
+    bounds = _computed_bounds(analysis)
+    density = analysis.curl_density
+    if density is not None and density.upper > 0.0:
+        bounds.append(("|curl f| [N/m]", density))
+    rows = []
+    for name, bound in bounds:
+        ends = [
+            number_text.lower_bound_text(bound.lower),
+            number_text.upper_bound_text(bound.upper),
+        ]
+        rows.append(Row([Cell(name, "l"), *ends, bound.method, number_text.witness_text(bound)]))
+    return Table(_BOUND_HEADINGS, rows, (1, 2), TableLayout(wrap=(4,)))
+
+
+def criteria_table(passivity: Passivity) -> Table:
+    """Return one row per criterion of passivity; the decisive one is marked."""
+    rows = []
+    for criterion in passivity.criteria:
+        decides = criterion.name == passivity.decided_by
+        cells: page.Cells = [
+            Cell(criterion.name, "l"),
+            Cell(criterion.formula, "line"),
+            page.holds_cell(criterion.holds),
+            number_text.limit_text(criterion.limit),
+            number_text.NOT_AVAILABLE
+            if criterion.margin is None
+            else number_text.lower_bound_text(criterion.margin, 3),
+            Cell(criterion.conclusion, subtext=criterion.assumptions),
+        ]
+        style = "dim" if criterion.holds is None and not decides else ""
+        rows.append(Row(cells, "best" if decides else "", style=style))
+    return Table(_CRITERIA_HEADINGS, rows, (3, 4))
+
+
+def _jumps_table(analysis: Analysis) -> Table:
+    """Return one row per depth at which a jump was located."""
+    jumps = analysis.continuity.jumps
+    depths = number_text.format_in_one_unit([jump.depth for jump in jumps], "m")
+    sizes = number_text.format_in_one_unit([jump.size for jump in jumps], "N")
+    places = [number_text.position_text(jump.before) for jump in jumps]
+    rows = [Row(cells) for cells in zip(depths, sizes, places, strict=True)]
+    return Table(_JUMP_HEADINGS, rows, (0, 1), TableLayout(wrap=(2,)))
+
+
+# --- the page -------------------------------------------------------------------------------------
+
+
+def analysis_page(analysis: Analysis, texture_code: str = "") -> page.Page:
+    """Return the report: verdict, numbers, criteria, figures and assumptions.
+
+    Args:
+        analysis: the result.
+        texture_code: a Python expression of the texture; see
+            :func:`reproduction_lines`.
+    """
+    code = "\n".join(reproduction_lines(analysis, texture_code))
+    surface = analysis.surface
+    name = analysis.device.name
+    return page.Page(
+        title=f"{texture_name(surface.texture)}, law {surface.law.letter}, on the {name}",
+        answer=analysis.answer,
+        facts=_facts(analysis),
+        sections=[
+            _bounds_section(analysis),
+            *_figure_sections(analysis, "gain", "top", "depth"),
+            *_criteria_sections(analysis),
+            Section("Worst loop", [page.pairs_table(leak_facts(analysis))], media=_MEDIA),
+            *_figure_sections(analysis, "field"),
+            _continuity_section(analysis),
+            Section("On a straight scan", [page.pairs_table(merit_facts(analysis))], media=_MEDIA),
+            Section("Reproduce q", [page.Paragraph(code, "code")], media=_MEDIA),
+            *page.user_sections(Analysis, analysis),
+            *page.assumption_sections(
+                analysis.assumptions, device_numbers_table(analysis.device, PASSIVITY_FIELDS)
+            ),
+            Section("How to read it", [page.DefinitionList(glossary("analysis"))]),
+        ],
+        footer=f"{page.PAPER_CITATION}. {page.NO_PERCEPTUAL_TEST}",
+    )
+
+
+def _facts(analysis: Analysis) -> list[tuple[str, str]]:
+    surface = analysis.surface
+    decisive = analysis.passivity.criterion(analysis.passivity.decided_by)
+    return [
+        ("Surface", str(surface.texture.describe()["kind"])),
+        ("Peak to valley", format_quantity(surface.texture.peak_to_valley, "m")),
+        ("Law", f"{surface.law.letter}, {number_text.readable_name(surface.law.name)}"),
+        ("Device", analysis.device.name),
+        ("Stiffness", f"{surface.stiffness:g} N/m"),
+        ("Pressed to", format_quantity(surface.max_depth, "m")),
+        ("Characteristic number q", number_text.interval_text(analysis.q)),
+        (f"Greatest stiffness by {decisive.name}", number_text.limit_text(decisive.limit)),
+    ]
+
+
+def _bounds_section(analysis: Analysis) -> Section:
+    law = analysis.surface.law
+    return Section(
+        f"Law {law.letter}, {number_text.readable_name(law.name)}: suprema over the working region",
+        [bounds_table(analysis)],
+        notes=bound_notes(analysis),
+        media=_MEDIA | Media.NOTEBOOK,
+    )
+
+
+def _criteria_sections(analysis: Analysis) -> list[Section]:
+    """Return the criteria for a page, and in short for a terminal."""
+    passivity = analysis.passivity
+    table = criteria_table(analysis.passivity)
+    title = f"Passive on the {analysis.device.name}?"
+    marked = [replace(one, cells=["→" if one.kind else "", *one.cells]) for one in table.rows]
+    layout = TableLayout(wrap=(1,), max_widths={1: 18}, omit=(6,))
+    short = Table(("", *table.headings), marked, (4, 5), layout)
+    limit = stability_limit_text(passivity.stability_limit, passivity.loop)
+    stiffness = f"Stiffness: {limit}"
+    verdict = f"{passivity.verdict}. It rests on: {passivity.decided_by}"
+    caption = sentence("criteria", verdict=verdict, stiffness=stiffness)
+    undecided = page.DefinitionList(undecided_criteria(analysis))
+    blocks: list[page.Block] = [short, undecided, page.Paragraph(stiffness)]
+    return [
+        Section(title, [table], caption, media=Media.HTML | Media.NOTEBOOK),
+        Section(f"{title} {passivity.verdict}", blocks, media=HEADED),
+    ]
+
+
+def _continuity_section(analysis: Analysis) -> Section:
+    blocks: list[page.Block] = [page.Paragraph(analysis.continuity.reason)]
+    if analysis.continuity.jumps:
+        blocks.append(_jumps_table(analysis))
+    return Section("Continuity", blocks, media=_MEDIA)
+
+
+def _figure_sections(analysis: Analysis, *names: str) -> list[Section]:
+    """Return the figures of these names that the analysis has."""
+    sections = []
+    leak = analysis.leak
+    gained = number_text.range_text(leak.energy, leak.upper_per_period, "J")
+    values: dict[str, object] = {
+        "letter": analysis.surface.law.letter,
+        "q": number_text.interval_text(analysis.q),
+        "loop": f"; the worst loop gains {gained}" if len(leak.vertices) else "",
+    }
+    for name in names:
+        if name in analysis_figure_names(analysis):
+            figure = page.plot_later(analysis, name)
+            media = Media.HTML | Media.NOTEBOOK if name == "gain" else Media.HTML
+            text = f"analysis.{name}"
+            sections.append(page.figure_section(text, figure, (), 3, media, **values))
+    return sections
+
+
+# --- Python code that reproduces q ----------------------------------------------------------------
+
+# Distance from the onset of the medial axis, as a fraction of the distance to the surface.
+_ONSET_OFFSET = 1e-6
+_UNBOUNDED_TEXT = "grows without bound towards the onset"
+
+
+def reproduction_lines(analysis: Analysis, texture_code: str = "") -> list[str]:
+    """Return three lines of Python that evaluate ‖J‖/k where it attains q.
+
+    Where q is infinite they evaluate it just above the onset, where it is large.
+
+    Args:
+        analysis: the result.
+        texture_code: an expression of the texture; by default its ``repr`` if that is one.
+    """
+    surface = analysis.surface
+    lines = ["import asperity as asp, numpy as np"]
+    if "load_scene(" in texture_code:
+        lines[0] += "; from asperity.scene import load_scene"
+    texture = _texture_expression(surface, texture_code)
+    lines.append(f"s = asp.Surface({texture}, {_surface_arguments(surface)})")
+    evaluation = _evaluate_witness(analysis)
+    if evaluation is None:
+        q = number_text.interval_text(analysis.q)
+        return [*lines, f"print(asp.characteristic_number(s))  # {q}, {analysis.q.method}"]
+    point, value, remark = evaluation
+    arguments = f"[{[float(v) for v in point]}]"
+    if analysis.q.deflection is not None:
+        deflection = list(analysis.q.deflection)
+        arguments += f", [{deflection}], np.array([{analysis.q.sliding}])"
+    call = f"np.linalg.norm(s.jacobian({arguments})[0], 2) / s.stiffness"
+    return [*lines, f"print({call})  # {value:.12g}{remark}"]
+
+
+def _evaluate_witness(analysis: Analysis) -> tuple[np.ndarray, float, str] | None:
+    """Return the point of the evaluation, its value and a remark; ``None`` without a witness."""
+    surface = analysis.surface
+    q = analysis.q
+    if q.at is None:
+        return None
+    at = np.array(q.at)
+    remark = ""
+    if math.isinf(q.lower):
+        closest = surface.texture.nearest(at[None])[0]
+        at = at + _ONSET_OFFSET * (closest - at)
+        remark = f": {_UNBOUNDED_TEXT}"
+    state = () if q.deflection is None else (np.array([q.deflection]), np.array([q.sliding]))
+    jacobian = surface.jacobian(at[None], *state)[0]
+    return at, float(np.linalg.norm(jacobian, 2)) / surface.stiffness, remark
+
+
+def _texture_expression(surface: Surface, texture_code: str) -> str:
+    if texture_code:
+        return texture_code
+    written = repr(surface.texture)
+    return "texture" if written.startswith("<") else f"asp.{written}"
+
+
+def _surface_arguments(surface: Surface) -> str:
+    law = surface.law
+    shipped = LAWS.get(law.letter) is law
+    parts = [repr(law.letter) if shipped else "law"]
+    parts += [f"stiffness={surface.stiffness!r}", f"max_depth={surface.max_depth!r}"]
+    own = {name: v for name, v in surface.law_parameters.items() if v != law.parameters[name]}
+    parts += [f"{name}={v!r}" for name, v in own.items() if name in SHIPPED_LAW_ARGUMENTS]
+    rest = {name: v for name, v in own.items() if name not in SHIPPED_LAW_ARGUMENTS}
+    if rest:
+        parts.append(f"law_parameters={rest!r}")
+    if surface.clamp != NONE.name:
+        parts.append(f"clamp={surface.clamp!r}")
+    return ", ".join(parts)

@@ -1,0 +1,312 @@
+"""Tables that compare laws, and their columns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from rich.table import Table as RichTable
+
+from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.limits.perceptibility_sentences import texture_amount_text, tier_text
+from asperity.analysis.passivity.assess_passivity import stability_limit_text
+from asperity.analysis.results.compare import Comparison
+from asperity.analysis.results.recommendation import LawRow
+from asperity.core.arguments import Argument
+from asperity.core.units import format_quantity, round_down
+from asperity.report.document.page import (
+    Cell,
+    Media,
+    Row,
+    Section,
+    Table,
+    TableLayout,
+    terminal_section,
+)
+from asperity.report.document.terminal import rich_table
+from asperity.report.sentences import number_text
+from asperity.report.sentences.texts import column_meanings, table_notes
+from asperity.textures.catalogue import CATALOGUE
+from asperity.textures.texture import Texture
+
+VERDICT_MIN_CONSOLE = 72
+"""Console width [characters] from which the verdicts are in the table, not below it."""
+_WIDE_GAP_CONSOLE = 90
+"""Console width [characters] from which columns are two characters apart."""
+
+
+@dataclass(frozen=True)
+class LawColumn:
+    """A column of the table of laws.
+
+    Attributes:
+        heading: in a terminal, broken into lines.
+        cell: returns the cell of a law.
+        is_numeric: whether it is aligned to the right.
+        min_console: console width [characters] from which it is shown.
+    """
+
+    heading: str
+    cell: Callable[[LawRow, Comparison], Cell]
+    is_numeric: bool = False
+    min_console: int = 0
+
+
+_BASIS_TEXT = {"wall gain": "no limit", "none": "–"}
+# Lengths of maps and profiles, which are not arguments of a kind.
+_LENGTH_NAMES = {"pitch", "cutoff"}
+_OMITTED_NAMES = {"kind", "preparation", "phase", "direction", "phases", "wavevectors"}
+_OMITTED_NAMES |= {"thin_regions", "gain", "one_sided", "accuracy", "grid", "source"}  # of fields
+
+
+# --- cells ----------------------------------------------------------------------------------------
+
+
+def row_limit_text(row: LawRow) -> str:
+    """Return the stability limit of the stiffness on the device: "995 N/m", or "none"."""
+    limit = row.stability_limit
+    if not limit.stiffness or not row.conservative:
+        return "none"
+    mark = number_text.SAMPLED_MARK if limit.sampled else ""
+    return f"{mark}{format_quantity(round_down(limit.stiffness), 'N/m')}"
+
+
+def has_sampled(comparison: Comparison) -> bool:
+    """Return whether any number of the table is marked with ~."""
+    rows = comparison.rows
+    numbers = [number for row in rows for number in (row.q, row.one_sided)]
+    leaks = [row.leak.method == "sampled" for row in rows]
+    return any(map(number_text.is_sampled, numbers)) or any(leaks)
+
+
+def describe_texture(description: dict[str, Any]) -> str:
+    """Return the kind of a texture and its plain arguments as text.
+
+    Example:
+        >>> describe_texture({"kind": "sinusoid", "amplitude": 8e-4, "period": 1e-3, "phase": 0.0})
+        'sinusoid: amplitude 0.8 mm, period 1 mm'
+    """
+    kind = CATALOGUE.get(description["kind"])
+    declared = {} if kind is None else {argument.name: argument for argument in kind.arguments}
+    parts = []
+    for name, value in description.items():
+        if name in _OMITTED_NAMES:
+            continue
+        values = value if isinstance(value, list) else [value]
+        if len(values) > 4:
+            parts.append(f"{len(values)} {name}")
+            continue
+        texts = [_value_text(name, one, declared.get(name)) for one in values]
+        parts.append(f"{number_text.readable_name(name)} {' × '.join(texts)}")
+    return f"{description['kind']}: {', '.join(parts)}"
+
+
+def _value_text(name: str, value: Any, argument: Argument | None) -> str:
+    if isinstance(value, bool):
+        return number_text.yes_no_text(value)
+    if argument is not None:
+        return argument.format_value(value)
+    is_length = name in _LENGTH_NAMES and isinstance(value, float)
+    return format_quantity(value, "m") if is_length else f"{value}"
+
+
+def texture_name(texture: Texture) -> str:
+    """Return the file of a texture, its kind, or that of the one that was baked, for a title.
+
+    Example:
+        >>> from asperity.textures import Sinusoid
+        >>> texture_name(Sinusoid(1e-4, 1e-3))
+        'Sinusoid'
+    """
+    description = texture.describe().get("source", texture.describe())
+    return texture.file_name or number_text.readable_name(description["kind"]).capitalize()
+
+
+# --- tables ---------------------------------------------------------------------------------------
+
+
+def recommended_stiffness_text(row: LawRow) -> str:
+    """Return the recommended stiffness: "3050 N/m", or "none"."""
+    stiffness = row.recommended_stiffness
+    return number_text.limit_text(stiffness) if stiffness else "none"
+
+
+def _recommendation_cell(row: LawRow, _comparison: Comparison) -> Cell:
+    return Cell(
+        recommended_stiffness_text(row),
+        note=stability_limit_text(row.stability_limit, row.passivity.loop),
+    )
+
+
+def _given_stiffness_cell(row: LawRow, _comparison: Comparison) -> Cell:
+    limit = stability_limit_text(row.stability_limit)
+    return Cell(number_text.limit_text(row.surface.stiffness), note=limit)
+
+
+def _texture_force_cell(row: LawRow, comparison: Comparison) -> Cell:
+    """Return the RMS texture force that the device resolves, all laws in one unit."""
+    if row.perceptibility is None:
+        return Cell(number_text.NOT_AVAILABLE)
+    forces = [row.resolved_force, *(other.resolved_force for other in comparison.rows)]
+    text = number_text.format_in_one_unit(forces, "N", digits=2)[0]
+    return Cell(text, note=texture_amount_text(row.perceptibility))
+
+
+def _leak_cell(row: LawRow, comparison: Comparison) -> Cell:
+    return Cell(number_text.leak_text(row, comparison), note=row.leak.description)
+
+
+def _continuity_cell(row: LawRow, value: bool | None) -> Cell:
+    return Cell(number_text.yes_no_text(value), note=row.continuous_reason)
+
+
+def _conservation_cell(row: LawRow, _comparison: Comparison) -> Cell:
+    return Cell(number_text.yes_no_text(row.conservative), note=row.conservative_reason)
+
+
+def _basis_cell(row: LawRow, _comparison: Comparison) -> Cell:
+    limit = row.stability_limit
+    return Cell(
+        _BASIS_TEXT.get(limit.basis, limit.basis),
+        note=stability_limit_text(limit, row.passivity.loop),
+    )
+
+
+def _oscillation_cell(row: LawRow, _comparison: Comparison) -> Cell:
+    if row.perceptibility is None and not row.is_textureless:
+        return Cell(number_text.NOT_AVAILABLE)
+    return Cell(number_text.force_text(row.texture_force))
+
+
+def _bound_cell(bound: Bound) -> Cell:
+    return Cell(number_text.bound_text(bound), note=f"{bound.method}: {bound.note}")
+
+
+_LETTER_COLUMN = LawColumn("law", lambda row, _: Cell(row.law.letter, "l"))
+NAME_COLUMN = LawColumn(
+    "name", lambda row, _: Cell(number_text.readable_name(row.law.name)), False, 112
+)
+VERDICT_COLUMN = LawColumn("verdict", lambda row, _: Cell(row.verdict), False, VERDICT_MIN_CONSOLE)
+_START_COLUMN = LawColumn("start at", _recommendation_cell, True)
+_GIVEN_COLUMN = LawColumn("at", _given_stiffness_cell, True)
+SUMMARY_COLUMNS = (
+    _LETTER_COLUMN,
+    NAME_COLUMN,
+    _START_COLUMN,
+    LawColumn("texture", _texture_force_cell, True, 44),
+    LawColumn("felt?", lambda row, _: Cell(tier_text(row.perceptibility))),
+    LawColumn("leak", _leak_cell, True, 44),
+    LawColumn("clicks?", lambda row, _: _continuity_cell(row, not row.continuous), False, 36),
+)
+_CONSOLE_COLUMNS = (*SUMMARY_COLUMNS, VERDICT_COLUMN)
+FULL_COLUMNS = (
+    _LETTER_COLUMN,
+    NAME_COLUMN,
+    LawColumn("q", lambda row, _: _bound_cell(row.q), True),
+    LawColumn("q⁺", lambda row, _: _bound_cell(row.one_sided), True),
+    LawColumn("stiffness\nup to", lambda row, _: Cell(row_limit_text(row)), True),
+    LawColumn("basis", _basis_cell, False, 60),
+    LawColumn("conser-\nvative", _conservation_cell, False, 80),
+    LawColumn("worst\nleak", _leak_cell, True, 60),
+    LawColumn("contin-\nuous", lambda row, _: _continuity_cell(row, row.continuous), False, 80),
+    LawColumn("T", lambda row, _: Cell(number_text.merit_text(row.strength)), True, 80),
+    LawColumn("S", lambda row, _: Cell(number_text.merit_text(row.support)), True, 80),
+    LawColumn("RMS\nforce", _oscillation_cell, True, 80),
+)
+
+
+def single_line(heading: str) -> str:
+    """Return a heading in one line."""
+    return heading.replace("-\n", "").replace("\n", " ")
+
+
+def law_rows(comparison: Comparison, cells: Callable[[LawRow], Sequence[str | Cell]]) -> list[Row]:
+    """Return a row per law, the recommended one first and marked."""
+    best = comparison.recommended_row
+    return [
+        Row(cells(row), "best" if row is best else "", law=row.law.letter)
+        for row in sorted(comparison.rows, key=lambda row: row is not best)
+    ]
+
+
+def laws_table(comparison: Comparison, columns: Sequence[LawColumn]) -> Table:
+    """Return one row per law with these columns."""
+    if comparison.stiffness is not None:
+        columns = [_GIVEN_COLUMN if one is _START_COLUMN else one for one in columns]
+    rows = law_rows(comparison, lambda row: [one.cell(row, comparison) for one in columns])
+    names = [single_line(one.heading) for one in columns]
+    meanings = dict(column_meanings("laws"))
+    if not any("v*" in row.verdict for row in comparison.rows):
+        del meanings["verdict"]
+    layout = TableLayout(
+        wrap=[i for i, one in enumerate(columns) if one in (NAME_COLUMN, VERDICT_COLUMN)],
+        max_widths={i: 24 for i, one in enumerate(columns) if one is NAME_COLUMN},
+        min_console={i: one.min_console for i, one in enumerate(columns)},
+        legend={i: (name, meanings[name]) for i, name in enumerate(names) if name in meanings},
+        tight_below=_WIDE_GAP_CONSOLE,
+    )
+    numeric = [i for i, one in enumerate(columns) if one.is_numeric]
+    units = {"T": " [m]"} if number_text.strength_has_unit(comparison) else {}
+    headings = [f"{one.heading}{units.get(one.heading, '')}" for one in columns]
+    return Table(headings, rows, numeric, layout)
+
+
+def verdicts_table(comparison: Comparison, max_console: int | None) -> Table:
+    """Return letter and verdict of each law, for consoles up to a width [characters]."""
+    rows = law_rows(comparison, lambda row: [Cell(row.law.letter, "l"), row.verdict])
+    return Table((), rows, layout=TableLayout(wrap=(1,), max_console=max_console))
+
+
+# --- sections -------------------------------------------------------------------------------------
+
+
+def comparison_table(comparison: Comparison, width: int = 120, full: bool = False) -> RichTable:
+    """Return one row per law, the first column the letter of the law alone.
+
+    Args:
+        comparison: the result.
+        width: of the console [characters]; on a narrow one columns are left out.
+        full: whether to show q, q⁺, the limit with its basis, leak, T and S instead of the summary.
+
+    Returns:
+        A Rich table.
+    """
+    columns = FULL_COLUMNS if full else _CONSOLE_COLUMNS
+    return rich_table(laws_table(comparison, columns), width)
+
+
+def terminal_sections(comparison: Comparison, full: bool) -> list[Section]:
+    """Return the tables of a terminal and of a notebook; ``full`` for every number."""
+    table = laws_table(comparison, FULL_COLUMNS if full else _CONSOLE_COLUMNS)
+    if has_sampled(comparison):
+        mark = ("~", "sampled, not proved: leak and q may be larger, the limit lower")
+        legend = {**table.layout.legend, len(table.headings): mark}
+        table = replace(table, layout=replace(table.layout, legend=legend))
+    widest = None if full else VERDICT_MIN_CONSOLE - 1
+    summary = _single_line_table(comparison, _CONSOLE_COLUMNS)
+    return [
+        terminal_section(table),
+        terminal_section(verdicts_table(comparison, widest)),
+        Section("", [summary], media=Media.NOTEBOOK),
+    ]
+
+
+def _single_line_table(comparison: Comparison, columns: Sequence[LawColumn]) -> Table:
+    """Return a table whose headings are not broken into lines."""
+    table = laws_table(comparison, columns)
+    return replace(table, headings=[single_line(heading) for heading in table.headings])
+
+
+def law_sections(comparison: Comparison) -> list[Section]:
+    """Return the tables of an HTML page."""
+    summary = _single_line_table(comparison, SUMMARY_COLUMNS)
+    full = _single_line_table(comparison, FULL_COLUMNS)
+    notes = table_notes("sampled") if has_sampled(comparison) else []
+    wrong = law_rows(comparison, lambda row: [Cell(row.law.letter, "l"), "; ".join(row.artefacts)])
+    artefacts = Table((), [row for row in wrong if row.cells[1]])
+    return [
+        Section("The laws compared", [summary]),
+        Section("What will go wrong", [artefacts]),
+        Section("Every number", [full], notes=notes),
+    ]

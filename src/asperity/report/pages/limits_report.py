@@ -1,0 +1,305 @@
+"""Reports of what devices render: the six limits of one, and sinusoids on several, with files."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from pathlib import Path
+
+from asperity.analysis.limits.limit_rules import LIMIT_RULES
+from asperity.analysis.limits.perceptibility_sentences import speed_text, texture_amount_text
+from asperity.analysis.results import check_limits
+from asperity.core.errors import ParameterError
+from asperity.core.files import write_bytes
+from asperity.core.units import format_quantity
+from asperity.envelopes.envelope import LISTED, DeviceEnvelope, Envelope
+from asperity.envelopes.wave_borders import WaveBorders
+from asperity.report.document import page
+from asperity.report.document.page import (
+    SCREEN,
+    Cell,
+    Media,
+    Picture,
+    Row,
+    Section,
+    Table,
+    TableLayout,
+)
+from asperity.report.pages.comparison_columns import texture_name
+from asperity.report.pages.device_report import device_numbers_table
+from asperity.report.sentences.number_text import (
+    INFINITY_SIGN,
+    NOT_AVAILABLE,
+    readable_name,
+    yes_no_text,
+)
+from asperity.report.sentences.texts import figure_text, glossary, sentence, table_data, table_notes
+
+_LIMIT_HEADINGS = ("", "limit", "condition", "left", "right", "holds", "for", "at speeds")
+_NAME_COLUMN = 1
+_SHARE_COLUMN = 6
+_SPEEDS_COLUMN = 7
+_WIDE_CONSOLE = 96
+"""Console width [characters] from which names have one line and shares are shown."""
+_LIMITS_LAYOUT = TableLayout(
+    wrap=(_NAME_COLUMN, _SPEEDS_COLUMN),
+    max_widths={_NAME_COLUMN: len("reconstruction")},
+    max_widths_below=_WIDE_CONSOLE,
+    min_console={_SHARE_COLUMN: _WIDE_CONSOLE},
+)
+_WAVE_HEADINGS = ("wavelength", "amplitude", "share", "frequency", "force")
+MAX_WAVES = 16
+"""Number of waves listed: those with the greatest share of the height variance."""
+WAVE_LIMITS = tuple(rule.number for rule in LIMIT_RULES if rule.number != 5)
+
+
+def side_text(side: float | None, unit: str) -> str:
+    """Return one side of an inequality as text; "–" if it is unknown.
+
+    Example:
+        >>> side_text(5e-5, "m"), side_text(float("inf"), "N/m"), side_text(None, "Hz")
+        ('50 µm', '∞', '–')
+    """
+    if side is None:
+        return NOT_AVAILABLE
+    return INFINITY_SIGN if side == float("inf") else format_quantity(side, unit)
+
+
+def six_limits_table(result: check_limits.Limits) -> Table:
+    """Return one row per limit: number, name, condition, both sides, result, share and speeds."""
+    rows = []
+    for limit in result.limits:
+        missing = f"needs {', '.join(limit.missing_data)}" if limit.missing_data else ""
+        cells: page.Cells = [
+            Cell(str(limit.number), "l"),
+            limit.name,
+            limit.inequality,
+            side_text(limit.left, limit.unit),
+            side_text(limit.right, limit.unit),
+            page.holds_cell(limit.holds),
+            "" if limit.share is None else check_limits.percent(limit.share),
+            missing or check_limits.speeds_text(limit.speeds),
+        ]
+        style = "bold red" if limit.holds is False else "dim" if limit.holds is None else ""
+        rows.append(Row(cells, style=style))
+    return Table(_LIMIT_HEADINGS, rows, (3, 4, _SHARE_COLUMN), _LIMITS_LAYOUT)
+
+
+def listed_waves(result: check_limits.Limits) -> list[check_limits.RenderedWave]:
+    """Return the waves of the table, the longest first."""
+    largest = sorted(result.waves, key=lambda wave: -wave.share)[:MAX_WAVES]
+    return sorted(largest, key=lambda wave: -wave.wavelength)
+
+
+def _waves_table(result: check_limits.Limits, *, short: bool) -> Table:
+    """Return wave, force and the limits met, a row per wave; ``short`` abbreviates the limits."""
+
+    def cell(holds: bool | None) -> str | Cell:
+        return yes_no_text(holds)[0] if short else page.holds_cell(holds)
+
+    rows = [
+        Row(
+            [
+                format_quantity(wave.wavelength, "m"),
+                format_quantity(wave.amplitude, "m"),
+                check_limits.percent(wave.share),
+                format_quantity(wave.frequency, "Hz"),
+                format_quantity(wave.force, "N", digits=2),
+                *[cell(wave.holds.get(number)) for number in WAVE_LIMITS],
+                check_limits.speeds_text((0.0, wave.top_speed)),
+            ]
+        )
+        for wave in listed_waves(result)
+    ]
+    limits = [f"{number}" if short else f"limit {number}" for number in WAVE_LIMITS]
+    headings = (*_WAVE_HEADINGS, *limits, "at speeds")
+    return Table(headings, rows, range(len(_WAVE_HEADINGS)))
+
+
+def symbol_lines(result: check_limits.Limits) -> list[str]:
+    """Return the symbols of the limits with their values."""
+    device = result.device
+    surface = result.surface
+    values = []
+    for symbol, field in table_data("symbols").items():
+        if field in device.data:
+            datum = device.data[field]
+            text = f"1/({datum.text})" if field == "update_rate" else datum.text
+            values.append(f"{symbol} = {text}{'' if datum.verified else ' (not verified)'}")
+    q = INFINITY_SIGN if result.gain.value == float("inf") else f"{result.gain.value:.4g}"
+    numbers = ", ".join(values) or "no data"
+    speed = speed_text(result.speed)
+    stiffness = check_limits.stiffness_text(result)
+    return [
+        sentence("symbols", speed=speed, limits=result, device=device.name, numbers=numbers),
+        sentence("gain_symbol", law=surface.law.letter, stiffness=stiffness, limits=result, q=q),
+    ]
+
+
+def limits_page(result: check_limits.Limits) -> page.Page:
+    """Return the report: answer, limits, figure, waves and assumptions."""
+    fields = [*dict.fromkeys(limit.device_field for limit in result.limits), "friction"]
+    notes = [*symbol_lines(result), *table_notes("limits")]
+    limits = [six_limits_table(result)]
+    surface = result.surface
+    name = result.device.name
+    return page.Page(
+        title=f"Limits of {texture_name(surface.texture)}, law {surface.law.letter}, on the {name}",
+        answer=result.answer,
+        facts=_facts(result),
+        sections=[
+            Section("The six limits", limits, notes=notes, media=SCREEN | Media.NOTEBOOK),
+            _figure_section(result),
+            *(_waves_sections(result) if result.waves else ()),
+            *page.user_sections(check_limits.Limits, result),
+            *page.assumption_sections(
+                result.assumptions, device_numbers_table(result.device, fields)
+            ),
+            Section("How to read it", [page.DefinitionList(glossary("limits"))]),
+        ],
+        footer=f"{page.PAPER_CITATION}, section II.B. {page.NO_PERCEPTUAL_TEST}",
+    )
+
+
+def _facts(result: check_limits.Limits) -> list[tuple[str, str]]:
+    texture = result.texture
+    law = result.surface.law
+    perceptibility = result.perceptibility
+    return [
+        ("Surface", str(texture.describe()["kind"])),
+        ("Peak to valley", format_quantity(texture.peak_to_valley, "m")),
+        ("Law", f"{law.letter}, {readable_name(law.name)}"),
+        ("Device", result.device.name),
+        ("Scanning speed", speed_text(result.speed)),
+        ("Stiffness", check_limits.stiffness_text(result)),
+        ("Speeds at which all decided limits hold", check_limits.speeds_text(result.speeds)),
+        ("Texture force", f"{texture_amount_text(perceptibility)}: {perceptibility.tier}"),
+    ]
+
+
+def _figure_section(result: check_limits.Limits) -> Section:
+    met = sum(all(wave.holds.values()) for wave in result.waves)
+    figure = page.plot_later(result)
+    media = Media.HTML | Media.NOTEBOOK
+    count = len(result.waves)
+    return page.figure_section("limits.waves", figure, media=media, count=count, met=met)
+
+
+def _waves_sections(result: check_limits.Limits) -> list[Section]:
+    """Return the waves in numbers, for a page and for a terminal."""
+    more = len(result.waves) - MAX_WAVES
+    notes = [f"And {more} more with less of the height variance."] if more > 0 else []
+    return [
+        Section("Wave by wave", [_waves_table(result, short=False)], notes=notes),
+        Section("", [_waves_table(result, short=True)], notes=notes, media=Media.TERMINAL),
+    ]
+
+
+_ALL = SCREEN | Media.HEADING
+SUFFIXES = (".csv", *page.FIGURE_SUFFIXES)
+"""Suffixes of the files to which an envelope is written."""
+
+
+def envelope_page(result: Envelope) -> page.Page:
+    """Return the report: answer, diagram, ranges by law, points and assumptions."""
+    names = ", ".join(one.device.name for one in result.devices)
+    stiffness = format_quantity(result.conditions.min_stiffness, "N/m")
+    speed = speed_text(result.conditions.speed)
+    title, caption, alt = figure_text(
+        "envelope.regions", stiffness=stiffness, speed=speed, count=len(result.devices)
+    )
+    figure = Picture(page.plot_later(result), alt)
+    tables = [Section(one.device.name, [_ranges_table(one)], media=_ALL) for one in result.devices]
+    return page.Page(
+        title=f"Sinusoids rendered by {names}",
+        answer=" ".join(map(_answer, result.devices)),
+        facts=[("Devices", names), ("Least stiffness", stiffness), ("Scanning speed", speed)],
+        sections=[
+            Section(title, [figure], caption, media=Media.HTML | Media.NOTEBOOK),
+            *tables,
+            *([_points_section(result)] if result.surfaces else ()),
+            *page.user_sections(Envelope, result),
+            *page.assumption_sections(result.assumptions),
+            Section("How to read it", [page.DefinitionList(glossary("envelope"))]),
+        ],
+        footer=f"{page.PAPER_CITATION}, section II.B. {page.NO_PERCEPTUAL_TEST}",
+    )
+
+
+def _answer(one: DeviceEnvelope) -> str:
+    law = one.widest
+    largest = max(one.laws, key=lambda other: other.decades)
+    if not law.decades:
+        return f"{one.device.name} renders no sinusoid with these laws."
+    lengths = [border.wavelength for border in law.borders if border.decades]
+    span = " to ".join(format_quantity(lengths[i], "m") for i in (0, -1))
+    text = f"{one.device.name} renders most with law {law.letter}, wavelengths from {span}"
+    if largest is law:
+        return f"{text}{'' if law.conservative else '; it feels alive'}."
+    return f"{text}; law {largest.letter} renders more, but feels alive."
+
+
+def _ranges_table(one: DeviceEnvelope) -> Table:
+    """Return the area and the rendered amplitudes at some wavelengths, a row per law."""
+    shown = [i for i, border in enumerate(one.laws[0].borders) if border.wavelength in LISTED]
+    shown = shown or list(range(0, len(one.laws[0].borders), 1 + len(one.laws[0].borders) // 6))
+    lengths = [format_quantity(one.laws[0].borders[i].wavelength, "m") for i in shown]
+    rows = []
+    for law in one.laws:
+        curl = "no" if law.conservative else "yes"
+        ranges = [_range_text(law.borders[i]) for i in shown]
+        cells: page.Cells = [Cell(law.letter, "l"), f"{law.decades:.2f}", curl, *ranges]
+        rows.append(Row(cells, kind="best" if law is one.widest else "", law=law.letter))
+    layout = TableLayout(drop_order=[0, 1, *range(3, 3 + len(shown)), 2], gap=2)
+    return Table(("law", "area", "curl", *lengths), rows, range(3, 3 + len(shown)), layout)
+
+
+def _range_text(border: WaveBorders) -> str:
+    """Return the rendered amplitudes at a wavelength for reading."""
+    if math.isnan(border.felt_from):
+        return NOT_AVAILABLE
+    low = format_quantity(border.felt_from, "m", digits=2)
+    if math.isinf(border.felt_up_to):
+        return f"from {low}"
+    return f"{low} – {format_quantity(border.felt_up_to, 'm', digits=2)}"
+
+
+def _points_section(result: Envelope) -> Section:
+    """Return the greatest waves of the surfaces, and the laws that render each."""
+    headings = ("surface", "wavelength", "amplitude", *[one.device.id for one in result.devices])
+    rows = []
+    for surface in result.surfaces:
+        for index, wave in enumerate(surface.waves):
+            sizes = [format_quantity(x, "m") for x in (wave.wavelength, wave.amplitude)]
+            laws = [letters[index] or "none" for letters in surface.rendered_by]
+            rows.append(Row([surface.name, *sizes, *laws]))
+    title = "Waves of the surfaces, and the laws that render each alone"
+    return Section(title, [Table(headings, rows, (1, 2))], media=_ALL)
+
+
+def write_envelope(result: Envelope, path: str) -> None:
+    """Write the borders as CSV, or the diagram, by the suffix of the path.
+
+    Raises:
+        ParameterError: for another suffix, or a file that cannot be written.
+    """
+    suffix = check_suffix(path)
+    if suffix in page.FIGURE_SUFFIXES:
+        content = page.figure_bytes(result, suffix)
+    else:
+        text = io.StringIO()
+        rows = result.table_rows()
+        writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+        content = text.getvalue().encode()
+    write_bytes("output", path, content)
+
+
+def check_suffix(path: str) -> str:
+    """Return the suffix of a path, checked."""
+    suffix = Path(path).suffix.lower()
+    if suffix not in SUFFIXES:
+        raise ParameterError("output", f"must end in {', '.join(SUFFIXES)}", path)
+    return suffix

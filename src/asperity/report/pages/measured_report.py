@@ -1,0 +1,352 @@
+"""Report of a measured surface: roughness parameters after each preparation step."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asperity.core.cache import get_or_compute
+from asperity.core.checks import FloatArray
+from asperity.core.errors import escape_unprintable
+from asperity.core.units import format_quantity
+from asperity.measured.filters import short_trace_text
+from asperity.measured.form import SurfaceDecomposition, decompose_surface
+from asperity.measured.lengths import format_counts, format_lengths
+from asperity.measured.measured_file import MeasurementSummary, decimate
+from asperity.measured.parameters import MAX_CORRELATION_POINTS, SurfaceParameter, find_parameter
+from asperity.measured.prepared import PreparationStage, PreparedSurface
+from asperity.report.document import page
+from asperity.report.document.page import (
+    HEADED,
+    SCREEN,
+    Cell,
+    Media,
+    Row,
+    Section,
+    Table,
+    TableLayout,
+)
+from asperity.report.sentences.number_text import NOT_AVAILABLE
+from asperity.report.sentences.texts import sentence, table_data
+from asperity.textures.fields.potential_field import PotentialField
+from asperity.textures.texture import Texture
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_RMS = find_parameter("Sq")
+_REMOVED = ("removed, RMS", "removed, range")
+_LENGTH_UNITS = (("m", 1.0), ("mm", 1e-3), ("µm", 1e-6), ("nm", 1e-9))
+_Column = tuple[str, list[Cell]]  # heading and cells
+_REMOVED_MEANING = ("removed", "deviation that the step removed: RMS about the mean, and range")
+
+
+def stages_table(stages: Sequence[PreparationStage]) -> Table:
+    """Return the parameters after each step, and what it removed; one unit per column."""
+    kinds = "/".join(dict.fromkeys(next(iter(stage.values))[0] for stage in stages))
+    columns = [("after", [Cell(stage.name, "l") for stage in stages])]
+    keys = [""]
+    legend = {}
+    for index, symbol in enumerate(stages[-1].values):
+        parameter = find_parameter(symbol)
+        name = kinds + symbol[1:]
+        numbers = [list(stage.values.values())[index] for stage in stages]
+        legend[len(columns)] = (name, parameter.description)
+        columns.append(_number_column(name, parameter, numbers))
+        keys.append(parameter.symbol)
+    removed = [(s.removed.rms, s.removed.range) if s.removed else (None, None) for s in stages]
+    for name, values in zip(_REMOVED, zip(*removed, strict=True), strict=True):
+        columns.append(_number_column(name, _RMS, values))
+    keys += _REMOVED
+    priority = table_data("parameters")
+    layout = TableLayout(
+        drop_order=sorted(range(1, len(keys)), key=lambda i: priority.index(keys[i])),
+        legend={**legend, len(keys): _REMOVED_MEANING},
+        dropped_note="More in a wider terminal, and with --json.",
+    )
+    return _columns_table(columns, layout)
+
+
+def _columns_table(columns: Sequence[_Column], layout: TableLayout) -> Table:
+    headings, cells = zip(*columns, strict=True)
+    rows = [Row(row) for row in zip(*cells, strict=True)]
+    return Table(headings, rows, range(1, len(headings)), layout)
+
+
+def _number_column(
+    name: str, parameter: SurfaceParameter, values: Sequence[float | None]
+) -> _Column:
+    """Return a column of values in their best unit, its heading broken into lines."""
+    unit = ""
+    size = 1.0
+    if parameter.symbol == "Sdr":
+        unit = "%"
+        size = 0.01
+    elif parameter.unit:
+        unit, size = _choose_unit(values)
+    texts = [NOT_AVAILABLE if value is None else decimal_text(value / size) for value in values]
+    heading = f"{name} [{unit}]" if unit else name
+    return heading.replace(", ", ",\n").replace(" [", "\n["), [Cell(text) for text in texts]
+
+
+def _choose_unit(values: Iterable[float | None]) -> tuple[str, float]:
+    greatest = max((abs(value) for value in values if value is not None), default=0.0)
+    if greatest == 0.0:
+        return "", 1.0
+    fitting = ((name, size) for name, size in _LENGTH_UNITS if greatest >= size)
+    return next(fitting, _LENGTH_UNITS[-1])
+
+
+def decimal_text(value: float) -> str:
+    """Return three significant digits, without an exponent if six decimal places suffice.
+
+    Example:
+        >>> [decimal_text(value) for value in (1234.5, 12.345, -0.0012345, 1e-9, 0.0)]
+        ['1234', '12.3', '-0.00123', '1e-09', '0']
+    """
+    if value == 0.0 or not math.isfinite(value):
+        return f"{value:g}"
+    places = max(0, 2 - math.floor(math.log10(abs(value))))
+    return f"{value:.{places}f}" if places <= 6 else f"{value:.0e}"
+
+
+def _parameter_definitions(stages: Sequence[PreparationStage]) -> Table:
+    """Return symbol, name, formula and standard of each parameter."""
+    rows = []
+    for symbol in stages[-1].values:
+        one = find_parameter(symbol)
+        rows.append(Row([Cell(symbol, "l"), one.description, one.formula, one.reference]))
+    return Table(("symbol", "parameter", "formula", "standard"), rows)
+
+
+# --- form, waviness, texture ----------------------------------------------------------------------
+
+
+def parts_table(parts: SurfaceDecomposition) -> Table:
+    """Return RMS and range of form, waviness and texture."""
+    named = {"form": parts.form, "waviness": parts.waviness, "texture": parts.texture}
+    columns = [
+        ("part", [Cell(name, "l") for name in named]),
+        _number_column("RMS", _RMS, [part.rms for part in named.values()]),
+        _number_column("range", _RMS, [part.range for part in named.values()]),
+    ]
+    return _columns_table(columns, TableLayout())
+
+
+def measured_sections(texture: Texture) -> list[Section]:
+    """Return the section of the parameters of a measured surface; none for other textures."""
+    if not texture.history:
+        return []
+    table = stages_table(texture.history)
+    more = "More: asperity show."
+    if text := roughness_text(texture.history):
+        return [Section("Surface parameters", [table], text, [more])]
+    parts = get_or_compute("parts", texture.digest, lambda: _compute_parts(texture))
+    blocks = [table, parts_table(parts)]
+    notes = [parts_text(parts), more]
+    return [Section("Surface parameters", blocks, texture_text(parts), notes)]
+
+
+def _compute_parts(texture: Texture) -> SurfaceDecomposition:
+    heights, pitch, periodic = texture.samples()
+    parts = decompose_surface(heights, pitch, periodic=periodic)
+    return replace(parts, heights=np.zeros(0))  # the cache needs the numbers alone
+
+
+def parts_text(parts: SurfaceDecomposition) -> str:
+    """Return how form, waviness and texture are separated, in one sentence."""
+    return sentence("parts", nesting=format_quantity(parts.nesting, "m"))
+
+
+def texture_text(parts: SurfaceDecomposition) -> str:
+    """Return the RMS of texture, form and waviness, in one sentence."""
+    lengths = (parts.texture.rms, parts.nesting, parts.form.rms, parts.waviness.rms)
+    texture, nesting, form, waviness = (format_quantity(length, "m") for length in lengths)
+    return sentence("texture", texture=texture, nesting=nesting, form=form, waviness=waviness)
+
+
+def roughness_text(history: Sequence[PreparationStage]) -> str:
+    """Return the RMS of what the requested L-filter left, in one sentence; empty for none."""
+    if not history or (nesting := history[-1].nesting) is None:
+        return ""
+    symbol, rms = next(iter(history[-1].values.items()))
+    rms_text = format_quantity(rms or 0.0, "m")
+    nesting_text = format_quantity(nesting, "m")
+    return sentence("roughness", symbol=symbol, rms=rms_text, nesting=nesting_text)
+
+
+def surface_summary_text(prepared: PreparedSurface) -> str:
+    """Return a surface in one line: size, pitch, heights.
+
+    Example:
+        >>> import numpy as np
+        >>> surface_summary_text(PreparedSurface(np.array([0.0, 1e-6, 0.0, 1e-6]), (1e-5,), ()))
+        '4 points, pitch 10 µm, peak to valley 1 µm, RMS 500 nm'
+    """
+    heights = prepared.heights
+    span = float(heights.max()) - float(heights.min())
+    parts = [
+        f"{format_counts(heights.shape[::-1])} points",
+        f"pitch {format_lengths(prepared.pitch)}",
+        f"peak to valley {format_quantity(span, 'm')}",
+        f"RMS {format_quantity(float(heights.std()), 'm')}",
+    ]
+    if prepared.filled_mask is not None:
+        parts.append(f"{100.0 * float(prepared.filled_mask.mean()):.2g} % filled")
+    if prepared.periodic:
+        parts.append("periodic")
+    return ", ".join(parts)
+
+
+def lay_text(summary: MeasurementSummary) -> str:
+    """Return autocorrelation length and texture aspect ratio as text; empty for a profile."""
+    heights = summary.prepared.heights
+    (length, ratio) = summary.correlation
+    if heights.ndim == 1:
+        return ""
+    if heights.size > MAX_CORRELATION_POINTS:
+        return f"Sal and Str are computed for at most {MAX_CORRELATION_POINTS} points."
+    if length is None:
+        return "Sal: none; the correlation falls to 0.2 in no direction within half of the map."
+    text = f"Sal {format_quantity(length, 'm')} (autocorrelation length)"
+    if ratio is None:
+        return f"{text}; Str: none, the correlation stays above 0.2 in some direction (a lay)."
+    return f"{text}, Str {ratio:.2g} (texture aspect ratio: 1 isotropic, 0 a lay)."
+
+
+# --- pages ----------------------------------------------------------------------------------------
+
+
+def surface_summary_page(summary: MeasurementSummary) -> page.Page:
+    """Return the report: parameters, parts, and the surface before and after each step."""
+    prepared = summary.prepared
+    title = "After each step"
+    definitions = [_parameter_definitions(prepared.history)] if prepared.history else []
+    sections = [
+        page.terminal_section(page.Paragraph(surface_summary_text(prepared))),
+        *_stage_sections(prepared, title),
+        *_parts_sections(summary),
+        *_figure_sections(summary),
+        *_step_sections(prepared),
+        *page.user_sections(MeasurementSummary, summary),
+        *([Section("Definitions of the parameters", definitions)] if definitions else ()),
+    ]
+    return page.Page(
+        title=f"Parameters of the surface {summary.source}",
+        answer=_answer(summary),
+        facts=[("Surface", surface_summary_text(prepared))],
+        sections=sections,
+    )
+
+
+def _answer(summary: MeasurementSummary) -> str:
+    if summary.parts is not None:
+        return texture_text(summary.parts)
+    prepared = summary.prepared
+    nesting = summary.prepared.history[-1].nesting
+    warning = short_trace_text(prepared.heights.shape, prepared.pitch, nesting or 0.0)
+    warning = f" {warning[:1].upper()}{warning[1:]}." if warning else ""
+    return f"{roughness_text(prepared.history)}{warning}"
+
+
+def preparation_page(prepared: PreparedSurface, path: str) -> page.Page:
+    """Return the steps of a preparation, for a terminal: parameters, size and path of the file."""
+    blocks = [
+        page.Paragraph(surface_summary_text(prepared), "code"),
+        page.Paragraph(f"Saved: {escape_unprintable(path)}", "code"),
+    ]
+    last = page.terminal_section(*blocks)
+    return page.Page("", "", (), [*_step_sections(prepared), *_stage_sections(prepared, ""), last])
+
+
+def _stage_sections(prepared: PreparedSurface, title: str) -> list[Section]:
+    if not prepared.history:
+        return []
+    return [Section(title, [stages_table(prepared.history)], media=SCREEN)]
+
+
+def _step_sections(prepared: PreparedSurface) -> list[Section]:
+    """Return the preparation steps, numbered in a terminal."""
+    numbered = [(f"{number}", step) for number, step in enumerate(prepared.steps, start=1)]
+    return [
+        Section("Preparation", [page.BulletList(prepared.steps)]),
+        Section("Preparation:", [page.pairs_table(numbered)], media=HEADED),
+    ]
+
+
+def _parts_sections(summary: MeasurementSummary) -> list[Section]:
+    lay = [text for text in [lay_text(summary)] if text]
+    media = SCREEN | Media.NOTEBOOK
+    if summary.parts is None:
+        return [Section("Lay", [], notes=lay, media=media)] if lay else []
+    notes = [parts_text(summary.parts), *lay]
+    table = parts_table(summary.parts)
+    return [Section("Form, waviness and texture", [table], notes=notes, media=media)]
+
+
+def _figure_sections(summary: MeasurementSummary) -> list[Section]:
+    if not summary.changes:
+        size = surface_summary_text(summary.prepared)
+        description = f"The surface after preparation: {size}."
+        heights = {"heights": decimate(summary.prepared.heights)}
+        figure = partial(_draw_heights, heights, summary.sides)
+        return [page.picture_section("The surface", figure, description, "After preparation.")]
+    sections = []
+    for number, change in enumerate(summary.changes):
+        caption = f"Before, after, and what the step removed: {removed_text(change.stage)}"
+        title = change.stage.name[0].upper() + change.stage.name[1:]
+        removed = change.before - change.after
+        maps = {"before": change.before, "after": change.after, "removed": removed}
+        figure = partial(_draw_heights, maps, change.sides)
+        text = f"{title}. {caption}."
+        level = 3 if number else 2
+        sections.append(page.picture_section(title, figure, text, caption, level=level))
+    return sections
+
+
+def _draw_heights(heights_by_title: Mapping[str, FloatArray], sides: tuple[float, ...]) -> Figure:
+    from asperity.report.pictures.surface_pictures import heights_figure
+
+    return heights_figure(heights_by_title, sides)
+
+
+def removed_text(stage: PreparationStage) -> str:
+    """Return what a step removed: "12.3 nm RMS, range 1.2 µm"."""
+    if stage.removed is None:
+        return "nothing"
+    rms = format_quantity(stage.removed.rms, "m")
+    span = format_quantity(stage.removed.range, "m")
+    return f"{rms} RMS, range {span}"
+
+
+def field_page(field: PotentialField, path: str) -> page.Page:
+    """Return the numbers of a baked field, for a terminal, and the path of its file."""
+    lowest = round(max(field.grid.floor, field.extremes[0] - field.max_depth), 12)
+    floor, bound = (format_quantity(x, "m") for x in (lowest, field.accuracy.bound))
+    *others, baked = field.preparation
+    texts = (
+        *(f"{text}." for text in others),
+        f"{baked}; at most {bound} times the stiffness from it, proved.",
+        f"q⁺ at most {field.one_sided.upper:.4g}. Valid down to z = {floor}. {field.bytes} bytes.",
+        f"Saved: {escape_unprintable(path)}",
+    )
+    numbers = Section("", [page.Paragraph(text) for text in texts], media=SCREEN)
+    return page.Page("Baked field", "", (), [numbers, *thin_sections(field)])
+
+
+def thin_sections(texture: Texture) -> list[Section]:
+    """Return the picture of the thin parts of a body; none without any."""
+    if texture.thin_map is None:
+        return []
+    from asperity.report.pictures.surface_pictures import thin_parts_figure
+
+    depth = format_quantity(texture.depth_limit, "m")
+    half = format_quantity(texture.thin_regions[0].half_thickness, "m")
+    figure = partial(thin_parts_figure, texture, texture.thin_map)
+    count = len(texture.thin_regions)
+    return [page.figure_section("field.thin", figure, depth=depth, count=count, half=half)]

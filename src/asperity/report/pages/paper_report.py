@@ -1,0 +1,427 @@
+"""Report of the paper's claims: verdicts and simulated experiments; its figures as files."""
+
+from __future__ import annotations
+
+import base64
+import io
+import os
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import groupby
+from pathlib import Path
+from typing import Any, Literal
+
+import matplotlib
+from matplotlib.figure import Figure
+
+from asperity.core.errors import ParameterError
+from asperity.core.files import write_bytes
+from asperity.core.version import __version__
+from asperity.paper import VERDICTS, Result
+from asperity.paper.claim import Number
+from asperity.paper.claims import find_claims
+from asperity.paper.cycle_experiments import (
+    DeviceExperiment,
+    DeviceOnset,
+    PassivityExperiment,
+    passivity_experiment,
+)
+from asperity.paper.experiments import (
+    BumpExperiment,
+    Experiments,
+    ScanningExperiment,
+    bump_experiment,
+    scanning_experiment,
+)
+from asperity.paper.figures import loop_energies
+from asperity.report.document import page
+from asperity.report.document.html import template_environment
+from asperity.report.document.page import (
+    HEADED,
+    Cell,
+    Cells,
+    Media,
+    Page,
+    Row,
+    Section,
+    Table,
+    TableLayout,
+    default_style,
+)
+from asperity.report.pages import sweep_report
+from asperity.report.pages.run_report import energy_text
+from asperity.report.pictures import paper_pictures
+from asperity.report.pictures import paper_pictures as pictures
+from asperity.report.pictures.loop_pictures import onset_figure
+from asperity.report.pictures.paper_pictures import loop_energy_text
+from asperity.report.sentences.texts import sentence, slide_texts, table_data, table_notes
+
+_MORE_NOTE = "The evidence of one claim: asperity reproduce --claim ID"
+
+
+def verdict_counts_text(results: Sequence[Result]) -> str:
+    """Return the number of claims by verdict: "Of 60 claims 55 hold, ..."."""
+    counts = {verdict: sum(r.verdict == verdict for r in results) for verdict in VERDICTS}
+    verdicts = table_data("verdicts")
+    parts = [f"{count} {verdicts[verdict]['plural']}" for verdict, count in counts.items()]
+    return f"Of {len(results)} claims {', '.join(parts)}."
+
+
+def evidence_text(value: Number) -> str:
+    """Return a number of the evidence as text."""
+    if isinstance(value, list):
+        return ", ".join(f"{item:.10g}" for item in value)
+    return value if isinstance(value, str) else f"{value:.10g}"
+
+
+def claims_page(results: Sequence[Result], experiments: Experiments | None) -> Page:
+    """Return the report: counts, claims by section with their evidence, figures, experiments."""
+    sections = _terminal_sections(results, experiments)
+    sections += [_claims_section(name, members) for name, members in _group_by_section(results)]
+    sections += paper_sections()
+    guesses: list[str] = []
+    if experiments is not None:
+        sections += experiment_sections(experiments)
+        guesses += [*experiments.passivity.fitted, *experiments.scanning.guessed]
+        guesses += [*experiments.bump.guessed, *experiments.devices.guessed]
+    sections += page.user_sections(Result, results, experiments)
+    sections += [one for one in page.assumption_sections(guesses) if Media.HTML in one.media]
+    title = "“On the Synthesis of Haptic Textures”, claim by claim"
+    facts = [(one["fact"], verdict) for verdict, one in table_data("verdicts").items()]
+    return Page(title, verdict_counts_text(results), facts, sections, sentence("claims"))
+
+
+def _verdict_cell(result: Result) -> Cell:
+    return Cell(result.verdict, table_data("verdicts")[result.verdict]["kind"])
+
+
+def _terminal_sections(results: Sequence[Result], experiments: Experiments | None) -> list[Section]:
+    """Return one row per claim and one line per experiment, for a terminal."""
+    rows = []
+    for section, members in _group_by_section(results):
+        rows.append(Row([f"§ {section}", "", ""], style="bold"))
+        for result in members:
+            numbers = ", ".join(result.equations)
+            statement = f"{numbers}: {result.statement}" if numbers else result.statement
+            if result.evidence.fitted:
+                statement += f" ({result.evidence.fitted})"
+            rows.append(Row([result.id, _verdict_cell(result), statement]))
+    layout = TableLayout(wrap=(2,), gap=2, has_rule=False)
+    table = Table(("claim", "verdict", "states"), rows, layout=layout)
+    lines = experiments.summary_lines if experiments is not None else ()
+    summary = [page.Paragraph(f"{name}: {text}") for name, text in lines]
+    return [
+        page.terminal_section(table),
+        *([page.terminal_section(*summary)] if summary else ()),
+        page.terminal_section(notes=[_MORE_NOTE]),
+    ]
+
+
+def evidence_page(results: Sequence[Result]) -> Page:
+    """Return the report of chosen claims; a terminal shows everything that a verdict rests on."""
+    whole = claims_page(results, None)
+    evidence = map(_evidence_section, results)
+    sections = [section for section in whole.sections if Media.HTML in section.media]
+    return replace(whole, answer="", sections=[*evidence, *sections])
+
+
+def _evidence_section(result: Result) -> Section:
+    places = ", ".join((*result.equations, f"section {result.section}"))
+    details = _evidence_details(result)[1:]
+    blocks: list[page.Block] = [
+        page.Paragraph(result.statement),
+        Table((), [Row([_verdict_cell(result)])]),
+        page.Paragraph(result.evidence.summary),
+        *[page.Paragraph(f"{name[0].upper()}{name[1:]}: {text}") for name, text in details],
+    ]
+    numbers = result.evidence.numbers.items()
+    notes = [f"  {name}: {evidence_text(value)}" for name, value in numbers]
+    return Section(f"{result.id} ({places})", blocks, notes=notes, media=HEADED)
+
+
+def _group_by_section(results: Sequence[Result]) -> list[tuple[str, list[Result]]]:
+    grouped = groupby(results, key=lambda result: result.section)
+    return [(section, [*members]) for section, members in grouped]
+
+
+def _claims_section(section: str, members: Sequence[Result]) -> Section:
+    headings = ("claim", "equations", "states", "verdict")
+    table = Table(headings, [_claim_row(result) for result in members])
+    return Section(section if section == "Abstract" else f"Section {section}", [table])
+
+
+def _evidence_details(result: Result) -> list[tuple[str, str]]:
+    """Return names and texts of the evidence of a claim."""
+    evidence = result.evidence
+    details = [
+        ("found", evidence.summary),
+        ("not stated by the paper", evidence.fitted),
+        ("correction", evidence.correction),
+        ("another verdict with", result.flips_under),
+    ]
+    return [(name, text) for name, text in details if text]
+
+
+def _claim_row(result: Result) -> Row:
+    evidence = result.evidence
+    details = _evidence_details(result)
+    details += [(name, evidence_text(value)) for name, value in evidence.numbers.items()]
+    details.append(("reproduce", f"asperity reproduce --claim {result.id}"))
+    cells: Cells = [
+        Cell(result.id, "l"),
+        ", ".join(result.equations),
+        Cell(result.statement, subtext=evidence.fitted, details=details),
+        _verdict_cell(result),
+    ]
+    return Row(cells, id=result.id)
+
+
+def paper_sections() -> list[Section]:
+    """Return figures 2 and 3 of the paper."""
+    panels = loop_energies()
+    gained = "; ".join(f"{panel.law} {loop_energy_text(panel)}" for panel in panels)
+    loops = partial(paper_pictures.figure_three, panels)
+    count = len(panels)
+    return [
+        page.figure_section("paper.forces", paper_pictures.figure_two),
+        page.figure_section("paper.loops", loops, count=count, gained=gained),
+    ]
+
+
+def experiment_sections(experiments: Experiments) -> list[Section]:
+    """Return the sections of the experiments in order."""
+    return [
+        _cycle_section(experiments.passivity),
+        sweep_report.onset_figure_section("paper.onsets", experiments.passivity.onsets),
+        sweep_report.onset_section("V.A, onsets in numbers", experiments.passivity.onsets),
+        _energy_section(experiments.scanning),
+        _stroke_section(experiments.scanning),
+        _bump_section(experiments.bump),
+        _device_section(experiments),
+        _device_table_section(experiments.devices),
+    ]
+
+
+def _cycle_section(experiment: PassivityExperiment) -> Section:
+    first = experiment.counts[0]
+    notes = _fitted_notes(experiment.fitted)
+    figure = partial(paper_pictures.cycles_figure, experiment)
+    counts = ", ".join(f"{one.cycles} with {one.wall}" for one in experiment.counts)
+    values: dict[str, Any] = {"lag": first.delay, "starts": first.starts, "counts": counts}
+    return page.figure_section("paper.cycles", figure, notes, **values)
+
+
+def _fitted_notes(sentences: Sequence[str]) -> list[str]:
+    return [f"Not stated by the paper: {'; '.join(sentences)}."]
+
+
+def _energy_section(experiment: ScanningExperiment) -> Section:
+    figure = partial(paper_pictures.energies_figure, experiment)
+    notes = _fitted_notes(experiment.guessed)
+    return page.figure_section("paper.energies", figure, notes, count=len(experiment.traces))
+
+
+def _stroke_section(experiment: ScanningExperiment) -> Section:
+    headings = ("law", "hand", "speed", "x", "z", "sum", "field", "±", "paper's", "lost")
+    rows = []
+    for one in experiment.strokes:
+        law, speed, _depth, x, _y, *rest, _lost = sweep_report.stroke_cells(one.stroke)
+        lost = f"{one.stroke.lost_contact:.1f}"
+        rows.append(Row([law, one.hand, speed, x, *rest, lost], law=one.stroke.law))
+    table = Table(headings, rows, numeric_columns=range(2, len(headings)))
+    return Section("V.B, every hand and speed", [table], notes=table_notes("paper_strokes"))
+
+
+def _bump_section(experiment: BumpExperiment) -> Section:
+    figure = partial(paper_pictures.bumps_figure, experiment)
+    gains = "; ".join(
+        f"{one.law} {energy_text(float(one.supplied[-1]))} ({one.entry})"
+        for one in experiment.bumps
+    )
+    notes = _fitted_notes(experiment.guessed)
+    return page.figure_section("paper.bumps", figure, notes, gains=gains)
+
+
+def _device_section(experiments: Experiments) -> Section:
+    devices = experiments.devices
+    notes = _fitted_notes(devices.guessed)
+    if devices.wall_summary:
+        notes.append(f"Few misses on the left are weak evidence: {devices.wall_summary}.")
+    notes.append(f"Not simulated for lack of an apparent mass: {', '.join(devices.skipped)}.")
+    count = len(devices.onsets)
+    missed = sum(one.catalogue_rule_missed for one in devices.onsets)
+    figure = partial(paper_pictures.devices_figure, experiments)
+    return page.figure_section("paper.devices", figure, notes, missed=missed, count=count)
+
+
+def _device_table_section(experiment: DeviceExperiment) -> Section:
+    headings = ("device", "surface", "law", "q", "K₀/q", "delay rule", "cycles", "starts", "depth")
+    rows = [Row(_device_cells(one), law=one.prediction.onset.law) for one in experiment.onsets]
+    table = Table(headings, rows, numeric_columns=range(3, len(headings)))
+    return Section("Devices in numbers", [table], notes=table_notes("paper_devices"))
+
+
+def _device_cells(device_onset: DeviceOnset) -> Cells:
+    law, _delay, _quiet, cycling, starts, depth, q, _paper, rule, _wall = sweep_report.onset_cells(
+        device_onset.prediction
+    )
+    kind = "no" if device_onset.catalogue_rule_missed else ""
+    allowed = Cell(sweep_report.stiffness_number(device_onset.catalogue_rule), kind)
+    names = [device_onset.device, device_onset.surface]
+    return [*names, law, q, allowed, rule, cycling, starts, depth]
+
+
+FileFormat = Literal["svg", "png", "slides"]
+_DPI = 192  # of a PNG: about 1920 pixels for the 10 inches that all figures are wide
+_MARGIN = 0.15  # around the figure [inch]
+_HASH_SALT = "asperity"  # of the identifiers in an SVG, which are random without one
+
+
+@dataclass(frozen=True)
+class PaperFigure:
+    """A figure of the reproduction.
+
+    Attributes:
+        name: of the file, without its suffix.
+        texts: name of its texts.
+        claim_names: claims that it shows, as names for
+            :func:`~asperity.paper.claims.find_claims`.
+        draw: returns the figure, from all experiments or from the one that it needs.
+        needs_simulation: whether it needs an experiment.
+    """
+
+    name: str
+    texts: str
+    claim_names: Sequence[str]
+    draw: Callable[[Experiments | None], Figure]
+    needs_simulation: bool = True
+
+    def shows_any(self, names: Iterable[str]) -> bool:
+        """Return whether it shows one of the named claims."""
+        ours = {claim.id for name in self.claim_names for claim in find_claims(name)}
+        return any(claim.id in ours for name in names for claim in find_claims(name))
+
+
+def _devices_figure(experiments: Experiments | None) -> Figure:
+    assert experiments is not None, "no claim needs this figure alone"
+    return pictures.devices_figure(experiments)
+
+
+def _drawing(
+    draw: Callable[[Any], Figure], experiment: str, simulate: Callable[[], Any]
+) -> Callable[[Experiments | None], Figure]:
+    """Return a drawing of one experiment, which is simulated if none have been."""
+    return lambda found: draw(getattr(found, experiment) if found else simulate())
+
+
+_DRAWINGS: dict[str, Callable[[Experiments | None], Figure]] = {
+    "fig-2": lambda _found: pictures.figure_two(),
+    "fig-3": lambda _found: pictures.figure_three(),
+    # Figure 5 needs no onsets, which take minutes.
+    "fig-5": _drawing(pictures.cycles_figure, "passivity", lambda: passivity_experiment(delays=())),
+    "onsets": _drawing(lambda one: onset_figure(one.onsets), "passivity", passivity_experiment),
+    "fig-6": _drawing(pictures.energies_figure, "scanning", scanning_experiment),
+    "fig-7": _drawing(pictures.bumps_figure, "bump", bump_experiment),
+    "devices": _devices_figure,
+}
+PAPER_FIGURES = tuple(
+    PaperFigure(name, draw=_DRAWINGS[name], **values)
+    for name, values in table_data("paper_figures").items()
+)
+"""In the order of the paper; additional figures follow those that they belong to."""
+
+
+def find_figures(
+    names: Sequence[str] = (), *, include_simulated: bool = True
+) -> tuple[PaperFigure, ...]:
+    """Return the figures that show claims; all if none is named.
+
+    Args:
+        names: of claims, see :func:`~asperity.paper.claims.find_claims`.
+        include_simulated: whether all figures include those of experiments.
+
+    Raises:
+        ParameterError: if no figure shows a named claim.
+
+    Example:
+        >>> [figure.name for figure in find_figures(["eq-12", "fig-5"])]
+        ['fig-3', 'fig-5']
+    """
+    if not names:
+        return tuple(one for one in PAPER_FIGURES if include_simulated or not one.needs_simulation)
+    found = tuple(one for one in PAPER_FIGURES if one.shows_any(names))
+    if not found:
+        available = ", ".join(name for one in PAPER_FIGURES for name in one.claim_names)
+        reason = f"are not available for {', '.join(names)}, but for {available}"
+        raise ParameterError("figures", reason)
+    return found
+
+
+def create_folder(path: str) -> Path:
+    """Return a writable folder, created if it is missing.
+
+    Raises:
+        ParameterError: if the path is a file, or the folder cannot be created or written.
+    """
+    folder = Path(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError):
+        raise ParameterError("figures", "must be a folder, not a file", path) from None
+    except (OSError, ValueError) as error:  # ValueError: a path with a null byte
+        reason = getattr(error, "strerror", None) or str(error)
+        raise ParameterError("figures", f"cannot be created: {reason}", path) from None
+    if not os.access(folder, os.W_OK):
+        raise ParameterError("figures", "must be a folder that can be written", path)
+    return folder
+
+
+def write_figures(
+    figures: Sequence[PaperFigure],
+    folder: Path,
+    file_format: FileFormat,
+    experiments: Experiments | None = None,
+    progress: Callable[[str], None] = lambda _name: None,
+) -> tuple[Path, ...]:
+    """Draw figures and write each to a file, or all on slides; the same bytes for the same numbers.
+
+    Args:
+        figures: the figures.
+        folder: destination.
+        file_format: of the files.
+        experiments: their data; by default each figure computes what it needs.
+        progress: called with the name of each figure before it is drawn.
+
+    Raises:
+        ParameterError: if a file cannot be written.
+    """
+    ending = "svg" if file_format == "slides" else file_format
+    files: dict[Path, bytes] = {}
+    with default_style():
+        matplotlib.rcParams["svg.hashsalt"] = _HASH_SALT
+        for figure in figures:
+            progress(figure.name)
+            image = _draw_image(figure.draw(experiments), ending)
+            files[folder / f"{figure.name}.{ending}"] = image
+    if file_format == "slides":
+        files = {folder / "slides.html": _slides(figures, files.values()).encode()}
+    for path, content in files.items():
+        write_bytes("figures", path, content)
+    return tuple(files)
+
+
+def _slides(figures: Sequence[PaperFigure], images: Iterable[bytes]) -> str:
+    """Return a page with a slide for each figure: one sentence and the picture."""
+    pictures = [base64.b64encode(image).decode("ascii") for image in images]
+    slides = [slide_texts(figure.texts) for figure in figures]
+    template = template_environment().get_template("slides.html.j2")
+    return template.render(slides=[*zip(slides, pictures, strict=True)], version=__version__)
+
+
+def _draw_image(figure: Figure, file_format: str) -> bytes:
+    metadata: dict[str, Any] = {"svg": {"Date": None, "Creator": None}, "png": {"Software": None}}
+    options: dict[str, Any] = {"dpi": _DPI, "bbox_inches": "tight", "pad_inches": _MARGIN}
+    image = io.BytesIO()
+    figure.savefig(image, format=file_format, metadata=metadata[file_format], **options)
+    return image.getvalue()

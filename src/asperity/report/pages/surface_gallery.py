@@ -1,0 +1,204 @@
+"""Catalogue of named surfaces and kinds of textures, with a picture of each on a page."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from asperity.core.arguments import Argument
+from asperity.core.errors import find_named
+from asperity.core.units import format_quantity
+from asperity.report.document import page
+from asperity.report.document.page import Cell, Page, Row, Section, Table, TableLayout
+from asperity.report.sentences.texts import table_notes
+from asperity.textures.catalogue import CATALOGUE
+from asperity.textures.kinds.named_surfaces import LIBRARY
+from asperity.textures.texture import Texture, TextureKind
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class SurfaceEntry:
+    """A kind of texture or a named surface, with one texture of it.
+
+    Attributes:
+        kind: the entry of the catalogue.
+        texture: the example, or the surface with its defaults.
+        is_named: whether it is a surface of the library.
+    """
+
+    kind: TextureKind
+    texture: Texture
+    is_named: bool
+
+    @property
+    def specification(self) -> str:
+        """The texture as an argument of the command line."""
+        values = [
+            f"{name}={_format_argument(self.kind, name, value)}"
+            for name, value in self.kind.example.items()
+        ]
+        return f"{self.kind.name}:{','.join(values)}"
+
+    @property
+    def size(self) -> tuple[float, ...]:
+        """Length of the period along its spans [m]."""
+        return tuple(float((span @ span) ** 0.5) for span in self.texture.domain.spans)
+
+    @property
+    def size_text(self) -> str:
+        """The period as text."""
+        return " x ".join(format_quantity(length, "m") for length in self.size)
+
+    @property
+    def height_text(self) -> str:
+        """The peak-to-valley height as text."""
+        return format_quantity(self.texture.peak_to_valley, "m")
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data, SI units."""
+        return {
+            "name": self.kind.name,
+            "summary": self.kind.summary,
+            "named": self.is_named,
+            "specification": self.specification,
+            "arguments": [argument.to_dict() for argument in self.kind.arguments],
+            "source": self.kind.source,
+            "size": list(self.size),
+            "peak_to_valley": self.texture.peak_to_valley,
+            "texture": self.texture.describe(),
+        }
+
+
+def find_surfaces(names: Sequence[str] = ()) -> list[SurfaceEntry]:
+    """Return the surfaces of these names, all by default, in the order of the catalogue.
+
+    Raises:
+        ParameterError: for an unknown name; the message suggests similar ones.
+    """
+    wanted = [name.lower().rstrip(":") for name in names]
+    for name in wanted:
+        find_named("surface", name, CATALOGUE)
+    return [
+        SurfaceEntry(kind, kind.factory(**kind.example), name in LIBRARY)
+        for name, kind in CATALOGUE.items()
+        if not wanted or name in wanted
+    ]
+
+
+def _format_argument(kind: TextureKind, name: str, value: Any) -> str:
+    """Return a value as an argument of the command line, micrometres in ASCII."""
+    argument = next(argument for argument in kind.arguments if argument.name == name)
+    if argument.form == "vectors":
+        rows = (" ".join(f"{part:g}" for part in row) for row in value)
+        return "; ".join(f"{row} {argument.unit}" for row in rows)
+    if isinstance(value, list):
+        return "; ".join(_format_quantity(argument, part) for part in value)
+    return _format_quantity(argument, value)
+
+
+def _format_quantity(argument: Argument, value: Any) -> str:
+    return argument.format_value(value).replace("µ", "u").replace(" ", "")
+
+
+def arguments_text(kind: TextureKind) -> str:
+    """Return the arguments on one line: with their defaults, or with their units.
+
+    Example:
+        >>> from asperity.textures.catalogue import CATALOGUE
+        >>> arguments_text(CATALOGUE["grating"])
+        'height [m], period [m], duty=0.5, edge=ridge or groove/4'
+    """
+    parts = []
+    for argument in kind.arguments:
+        # Without spaces, so that no line breaks inside a quantity.
+        default = argument.default_text.replace(" ", "") if argument.default is not None else ""
+        value = f"={default or argument.default_description}"
+        parts.append(_unit_name(argument) if argument.required else f"{argument.name}{value}")
+    return ", ".join(parts)
+
+
+def _unit_name(argument: Argument) -> str:
+    return f"{argument.name} [{argument.unit}]" if argument.unit else argument.name
+
+
+def _argument_text(argument: Argument) -> str:
+    """Return the description of an argument with its choices."""
+    choice = f": {', '.join(argument.choices)}" if argument.choices else ""
+    return argument.description + choice
+
+
+# --- the page -------------------------------------------------------------------------------------
+
+
+def _list_sections(entries: Sequence[SurfaceEntry], *, detailed: bool) -> list[Section]:
+    """Return one row per surface for a terminal; in detail, also its arguments."""
+    rows = []
+    for one in entries:
+        summary = Cell(one.kind.summary, subtext=arguments_text(one.kind))
+        size = one.size_text.replace(" x ", " x\n")
+        rows.append(Row([Cell(one.kind.name, "l"), summary, size, one.height_text]))
+        if one.kind.example:
+            rows.append(Row(["", one.specification, "", ""]))
+    headings = ("name", "summary and arguments", "size", "height")
+    table = Table(headings, rows, (2, 3), TableLayout(wrap=(1,), gap=2))
+    details = [_arguments_section(one) for one in entries] if detailed else []
+    last = details or [page.terminal_section(*map(page.Paragraph, table_notes("surfaces")))]
+    return [page.terminal_section(table), *last]
+
+
+def _arguments_section(entry: SurfaceEntry) -> Section:
+    rows = [
+        Row([Cell(one.name, "l"), one.unit, one.default_text, _argument_text(one)])
+        for one in entry.kind.arguments
+    ]
+    headings = ("argument", "unit", "default", "meaning")
+    table = Table(headings, rows, layout=TableLayout(wrap=(2, 3), gap=2))
+    source = [page.Paragraph(f"Sizes: {entry.kind.source}.")] if entry.kind.source else []
+    return page.terminal_section(table, *source)
+
+
+def surfaces_page(entries: Sequence[SurfaceEntry], *, detailed: bool = False) -> Page:
+    """Return a card with a picture of every surface; in detail, a terminal lists arguments."""
+    groups = {
+        "Named surfaces": [_card(one) for one in entries if one.is_named],
+        "Kinds of textures": [_card(one) for one in entries if not one.is_named],
+    }
+    sections = [Section(title, [page.Cards(cards)]) for title, cards in groups.items() if cards]
+    return Page(
+        title="Named surfaces and kinds of textures",
+        answer="",
+        sections=[
+            *_list_sections(entries, detailed=detailed),
+            Section("", [*map(page.Paragraph, table_notes("cards"))]),
+            *sections,
+            *page.user_sections(SurfaceEntry, entries),
+        ],
+    )
+
+
+def _draw_card(texture: Texture) -> Figure:
+    from asperity.report.pictures.surface_pictures import gallery_figure
+
+    return gallery_figure(texture)
+
+
+def _card(entry: SurfaceEntry) -> Section:
+    kind = entry.kind
+    rows = [
+        Row([Cell(_unit_name(one), "mono"), one.default_text, _argument_text(one)])
+        for one in kind.arguments
+    ]
+    blocks: list[page.Block] = [
+        page.Picture(partial(_draw_card, entry.texture), f"{kind.name}: {kind.summary}.", dpi=110),
+        page.Paragraph(f"{entry.size_text}, {entry.height_text} from peak to valley", "note"),
+        page.Paragraph(f"asperity compare {shlex.quote(entry.specification)}", "mono"),
+        Table(("argument", "default", "meaning"), rows),
+    ]
+    notes = [f"Sizes: {kind.source}."] if kind.source else []
+    return Section(kind.name, blocks, kind.summary, notes, level=3, id=kind.name)

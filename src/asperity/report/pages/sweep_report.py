@@ -1,0 +1,287 @@
+"""Reports of sweeps: ranges over cases, onsets of limit cycles, energy per stroke over speed."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from asperity.core.units import format_quantity
+from asperity.report.document import page
+from asperity.report.document.page import Cell, Cells, Media, Page, Row, Section, Table, TableLayout
+from asperity.report.pages.run_report import LOOP_FOOTER, loop_facts
+from asperity.report.sentences.number_text import INFINITY_SIGN, NOT_AVAILABLE
+from asperity.report.sentences.texts import table_data, table_notes
+from asperity.scene.setup import Setup
+from asperity.scene.sweep_results import OnsetSweep, StrokeSweep
+from asperity.simulation.limit_cycles.onset import Prediction
+from asperity.simulation.scan import Stroke
+from asperity.sweeps.sweep_result import CASE, SweepResult
+from asperity.sweeps.table_files import UNIT
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def onset_cells(prediction: Prediction) -> list[Cell]:
+    """Return the cells of a row; rules that allowed a stiffness that cycled are coloured."""
+    onset = prediction.onset
+    rule = stiffness_number(prediction.delay_rule)
+    cycling = "none" if math.isinf(onset.cycling) else stiffness_number(onset.cycling)
+    wall = prediction.wall_rule
+    wall_text = NOT_AVAILABLE if wall is None else stiffness_number(wall)
+    texts = [
+        str(onset.delay),
+        stiffness_number(onset.quiet),
+        cycling,
+        f"{onset.cycles}/{onset.starts}",
+        format_quantity(prediction.depth, "m", digits=2),
+        stiffness_number(prediction.q),
+        stiffness_number(prediction.paper_limit),
+    ]
+    proved = rule if prediction.conservative else f"({rule})"
+    return [
+        Cell(onset.law, "l"),
+        *map(Cell, texts),
+        Cell(proved, "no" if prediction.violates_delay_rule else ""),
+        Cell(wall_text, "no" if prediction.violates_wall_rule else ""),
+    ]
+
+
+def _sweep_table(headings: Sequence[str], rows: Sequence[Row], omit: Sequence[int] = ()) -> Table:
+    """Return a table whose numbers are wrapped on a narrow console, so that no digit is cut."""
+    columns = range(len(headings))
+    layout = TableLayout(wrap=columns, omit=omit, gap=2, has_rule=False)
+    return Table(headings, rows, columns[1:], layout)
+
+
+def stiffness_number(value: float) -> str:
+    """Return a stiffness [N/m] with three digits, without the unit."""
+    if math.isinf(value):
+        return INFINITY_SIGN
+    return f"{value:.3g}" if value < 1000.0 else f"{float(f'{value:.3g}'):,.0f}".replace(",", " ")
+
+
+def onset_answer(setup: Setup, predictions: Sequence[Prediction]) -> str:
+    """Return the result in two sentences."""
+    missed = [one for one in predictions if one.violates_delay_rule]
+    walls = [one for one in predictions if one.violates_wall_rule]
+    step = setup.servo.position_resolution
+    if missed:
+        shares = [f"{_case_name(one)} ({one.onset.cycling / one.delay_rule:.0%})" for one in missed]
+        answer = f"Limit cycles below the delay rule, at this share of it: {', '.join(shares)}."
+        if step:
+            resolution = format_quantity(step, "m")
+            answer += f" The rule is proved for exact positions, not for steps of {resolution}."
+    else:
+        proved = sum(one.conservative for one in predictions)
+        cases = "case" if proved == 1 else "cases"
+        answer = f"No limit cycle below the delay rule, in {proved} {cases} of conservative laws."
+    if any(one.wall_rule is not None and not one.onset.is_smooth_wall for one in predictions):
+        names = ", ".join(map(_case_name, walls))
+        answer += f" K₀/q was too much for: {names}." if walls else " K₀/q was safe in all of them."
+    return answer
+
+
+def _case_name(prediction: Prediction) -> str:
+    return f"{prediction.onset.law} at d = {prediction.onset.delay}"
+
+
+def onset_page(result: OnsetSweep) -> Page:
+    """Return the report of the onsets."""
+    setup = result.setup
+    predictions = result.onsets
+    cycle = "A limit cycle: motion that lasts without steps of position and force and is felt."
+    in_numbers = onset_section("In numbers, N/m", predictions, cycle)
+    return Page(
+        title=f"Onset of limit cycles, {setup.device.name}",
+        answer=onset_answer(setup, predictions),
+        facts=loop_facts(setup),
+        sections=[
+            replace(in_numbers, title="", caption="", media=Media.TERMINAL),
+            onset_figure_section("loop.onsets", predictions),
+            in_numbers,
+            *page.user_sections(Prediction, setup, predictions),
+            *page.assumption_sections(setup.assumptions),
+        ],
+        footer=LOOP_FOOTER,
+    )
+
+
+def onset_figure_section(name: str, predictions: Sequence[Prediction]) -> Section:
+    """Return the figure of the onsets with the texts of a name."""
+    laws = ", ".join(dict.fromkeys(one.onset.law for one in predictions))
+    return page.figure_section(name, partial(_draw_onsets, predictions), laws=laws)
+
+
+def _draw_onsets(predictions: Sequence[Prediction]) -> Figure:
+    from asperity.report.pictures.loop_pictures import onset_figure
+
+    return onset_figure(predictions)
+
+
+def onset_section(title: str, predictions: Sequence[Prediction], caption: str = "") -> Section:
+    """Return onsets and limits in numbers."""
+    rows = [Row(onset_cells(one), law=one.onset.law) for one in predictions]
+    table = _sweep_table(table_data("onsets"), rows)
+    return Section(title, [table], caption, table_notes("onsets"))
+
+
+STROKE_HEADINGS = ("law", "speed", "depth", "x", "y", "z", "sum", "field", "±", "paper's", "lost")
+
+
+def millijoules(value: float, *, signed: bool = True) -> str:
+    """Return an energy [J] as text in mJ."""
+    size = abs(value)
+    digits = 0 if size >= 1.0 else 1 if size >= 0.1 else 2 if size >= 1e-4 else 4
+    text = f"{1e3 * value:+.{digits}f}" if signed else f"{1e3 * value:.{digits}f}"
+    return "0" if not text.strip("+-0.") else text
+
+
+def stroke_cells(stroke: Stroke) -> Cells:
+    """Return the cells of a row of energies per stroke."""
+    depth = format_quantity(stroke.mean_depth, "m", digits=2)
+    prefix: Cells = [Cell(stroke.law, "l"), format_quantity(stroke.speed, "m/s"), depth]
+    if stroke.stop_message:
+        stopped = Cell("stopped", summary="Why", details=[("stopped", stroke.stop_message)])
+        return [*prefix, "", "", "", stopped, "", "", "", ""]
+    return [
+        *prefix,
+        *[millijoules(value) for value in stroke.energy],
+        millijoules(stroke.total),
+        Cell(millijoules(stroke.field), "no" if stroke.gains_energy else ""),
+        millijoules(stroke.spread + stroke.error, signed=False),
+        millijoules(sum(stroke.same_sample)),
+        f"{stroke.lost_contact:.3g}",
+    ]
+
+
+def stroke_answer(strokes: Sequence[Stroke]) -> str:
+    """Return which laws deliver energy, and which do so by their field, in two sentences."""
+    by_all = _group_laws(strokes, lambda stroke: stroke.total > stroke.spread + stroke.error)
+    by_field = _group_laws(strokes, lambda stroke: stroke.gains_energy)
+    return f"A stroke delivers energy: {by_all}. The field of the law itself does: {by_field}."
+
+
+def _group_laws(strokes: Sequence[Stroke], gains_energy: Callable[[Stroke], bool]) -> str:
+    laws = list(dict.fromkeys(stroke.law for stroke in strokes))
+    groups: dict[str, list[str]] = {"always": [], "at times": [], "never": []}
+    for law in laws:
+        gains = [gains_energy(stroke) for stroke in strokes if stroke.law == law]
+        groups["always" if all(gains) else "at times" if any(gains) else "never"].append(law)
+    return ", ".join(f"{', '.join(laws)} {when}" for when, laws in groups.items() if laws)
+
+
+def strokes_page(result: StrokeSweep) -> Page:
+    """Return the report of the strokes."""
+    setup = result.setup
+    strokes = result.strokes
+    laws = ", ".join(dict.fromkeys(stroke.law for stroke in strokes))
+    stops = sorted({stroke.stop_message for stroke in strokes if stroke.stop_message})
+    (note,) = table_notes("strokes")
+    notes = [f"{note} The y axis: --html, --json.", *(f"Stopped: it {one}" for one in stops)]
+    rows = [Row(stroke_cells(one), law=one.law) for one in strokes]
+    table = _sweep_table(STROKE_HEADINGS, rows, omit=(STROKE_HEADINGS.index("y"),))
+    return Page(
+        title=f"Energy per stroke, {setup.device.name}",
+        answer=stroke_answer(strokes),
+        facts=loop_facts(setup),
+        sections=[
+            page.terminal_section(table, notes=notes),
+            page.figure_section("loop.strokes", partial(_draw_strokes, strokes), laws=laws),
+            Section("In numbers", [table], notes=[note]),
+            *page.user_sections(Stroke, setup, strokes),
+            *page.assumption_sections(setup.assumptions),
+        ],
+        footer=LOOP_FOOTER,
+    )
+
+
+def _draw_strokes(strokes: Sequence[Stroke]) -> Figure:
+    from asperity.report.pictures.loop_pictures import strokes_figure
+
+    return strokes_figure(strokes)
+
+
+_HEADINGS = ("number", "of", "least", "at", "greatest", "at")
+_MAX_ERRORS = 20
+_LEFT_OUT = "Failed cases and unbounded values are left out."
+
+
+def sweep_page(result: SweepResult) -> Page:
+    """Return the report of a sweep."""
+    plan = result.plan
+    failed = len(result.errors)
+    keys = ", ".join(plan.column(key) for key in plan.arguments)
+    count = "1 case fails" if failed == 1 else f"{failed or 'no'} cases fail"
+    table = _range_table(result)
+    errors = [_error_table(result)] if failed else []
+    names = [name for name in result.run.shown if name in result.columns]
+    return Page(
+        title=f"Sweep of {plan.source}: {plan.template.run}",
+        answer=f"{len(plan)} cases of {plan.template.run} over {keys}: {count}.",
+        facts=[(key, text) for key, text in plan.vary.items()],
+        sections=[
+            page.terminal_section(table, *errors),
+            *(_figure_section(result, name, keys) for name in names),
+            Section("Ranges", [table]),
+            *([Section("Failed cases", errors)] if failed else ()),
+            *page.user_sections(SweepResult, result),
+        ],
+        footer=page.PAPER_CITATION,
+    )
+
+
+def _figure_section(result: SweepResult, name: str, keys: str) -> Section:
+    text = f"{name} over {keys}"
+    caption = f"{text}: a line for each other choice, or a map on one scale of colours. {_LEFT_OUT}"
+    media = Media.HTML | Media.NOTEBOOK
+    return page.picture_section(name, partial(_draw, result, name), text, caption, media=media)
+
+
+def _draw(result: SweepResult, name: str) -> Figure:
+    from asperity.report.pictures.loop_pictures import sweep_figure
+
+    return sweep_figure(result, name)
+
+
+def _range_table(result: SweepResult) -> Table:
+    """Return least and greatest value of each shown number, by law or other columns of a case."""
+    found: dict[tuple[str, ...], list[dict[str, Any]]] = {}
+    for row in result.iterate_rows():
+        group = " ".join(str(row[name]) for name in result.run.index[:1] if name in row)
+        for name in result.run.shown:
+            if row.get(name) is not None:
+                least, greatest = found.setdefault((name, group), [row, row])
+                least = row if row[name] < least[name] else least
+                greatest = row if row[name] > greatest[name] else greatest
+                found[name, group] = [least, greatest]
+    rows = [
+        Row([Cell(UNIT.sub(r"\1", name), "l"), group, *_extreme(result, name, least),
+             *_extreme(result, name, greatest)])
+        for (name, group), (least, greatest) in found.items()
+    ]  # fmt: skip
+    return Table(_HEADINGS, rows, (2, 4), TableLayout(wrap=(0, 3, 5), gap=2, has_rule=False))
+
+
+def _extreme(result: SweepResult, name: str, row: dict[str, Any]) -> list[str]:
+    columns = [result.plan.column(key) for key in result.plan.arguments]
+    return [_value_text(name, row[name]), ", ".join(_value_text(one, row[one]) for one in columns)]
+
+
+def _value_text(column: str, value: Any) -> str:
+    match = UNIT.fullmatch(column)
+    return (
+        str(value) if isinstance(value, str) else format_quantity(value, match[2] if match else "")
+    )
+
+
+def _error_table(result: SweepResult) -> Table:
+    """Return the errors, how often each occurred, and its first case."""
+    firsts = {error: index for index, error in reversed(result.errors.items())}
+    counts: Iterable[tuple[str, int]] = Counter(result.errors.values()).most_common(_MAX_ERRORS)
+    rows = [Row([str(count), str(firsts[error]), error]) for error, count in counts]
+    return Table(("cases", f"first {CASE}", "error"), rows, (0, 1), TableLayout(wrap=(2,)))
