@@ -13,9 +13,9 @@ import numpy as np
 
 from asperity.contacts.warm_start import UNLIMITED, new_warm_start
 from asperity.export.c99 import c99_files
-from asperity.export.export_request import ExportRequest
+from asperity.export.surface_functions import ExportRequest
+from asperity.kernels import path_loop
 from asperity.kernels.fuse import fuse_on_texture
-from asperity.kernels.loops import path_loop
 from asperity.rendering import bake, is_searched
 from asperity.surface import Surface
 from asperity.textures import Texture

@@ -24,7 +24,7 @@ from rich.table import Table
 
 from asperity.contacts.warm_start import EVALUATIONS
 from asperity.export.c99 import c99_files
-from asperity.export.export_request import ExportRequest
+from asperity.export.surface_functions import ExportRequest
 from asperity.laws import LAWS
 from asperity.rendering import bake
 from asperity.surface import Surface

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from asperity.export.c99 import c99_files
-from asperity.export.export_request import ExportRequest
+from asperity.export.surface_functions import ExportRequest
 from asperity.surface import Surface
 
 SKETCH = Path(__file__).parents[1] / "examples" / "export" / "cortex_m.c"

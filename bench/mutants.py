@@ -81,7 +81,7 @@ ROOMS = {
     "kernels": Room(
         ("kernels",),
         (
-            "tests/kernels/loops/test_loops_by_definition.py",
+            "tests/kernels/test_loops_by_definition.py",
             "tests/kernels/test_link.py",
             "tests/kernels/test_fuse.py",
             "tests/kernels/test_tick.py",
@@ -92,7 +92,7 @@ ROOMS = {
             "tests/test_reference.py",
             "tests/core/test_cache.py",
             "tests/kernels/test_batch_sine.py",
-            "tests/kernels/loops/test_block_loops.py",
+            "tests/kernels/test_block_loops.py",
             "tests/enclosures/test_taylor.py",
         ),
     ),

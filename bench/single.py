@@ -21,7 +21,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from asperity.export.export_request import is_searching
+from asperity.export.surface_functions import is_searching
 from asperity.laws import LAWS
 from asperity.surface import Surface
 from bench import cases

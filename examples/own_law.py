@@ -8,9 +8,8 @@ too: ``asperity compare cloth --plugin examples/own_law.py --set reference_depth
 
 import asperity as asp
 from asperity.core.arguments import Argument
-from asperity.derive.curl import curl_verdict
-from asperity.derive.jacobian import derive
-from asperity.derive.python_source import law_source
+from asperity.derive.derivatives import curl_verdict, derive
+from asperity.derive.generate import law_source
 
 STIFFENING = asp.Law(
     letter="S",

@@ -151,7 +151,7 @@ def test_only_contacts_checks_for_a_contact() -> None:
 
 
 def test_only_clamps_and_paper_check_for_a_clamp() -> None:
-    assert find_places(modules_outside("clamps", "paper"), clamp_checks) == []
+    assert find_places(modules_outside("laws.clamps", "paper"), clamp_checks) == []
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ import sympy as sp
 
 from asperity.contacts.symbols import DEPTH, DX, DY, H_HALF, H_MID, HX, HY, POSITION, H, K
 from asperity.core.errors import ParameterError
-from asperity.derive.jacobian import symbolic_force
+from asperity.derive.derivatives import symbolic_force
 from asperity.surface import Surface
 
 

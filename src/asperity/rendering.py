@@ -14,9 +14,8 @@ from asperity.contacts.warm_start import MAX_ERROR_BOUND, TRUNCATED_TICKS, new_w
 from asperity.core.arguments import DEFAULT_STIFFNESS, FIELD, RENDERING, SEARCH
 from asperity.core.cache import get_or_compute
 from asperity.core.checks import check_positive
-from asperity.core.digests import content_digest
 from asperity.core.errors import ParameterError
-from asperity.core.files import Serializable
+from asperity.core.files import Serializable, content_digest
 from asperity.core.units import format_quantity
 from asperity.laws import Law
 from asperity.surface import Surface

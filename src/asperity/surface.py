@@ -11,15 +11,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from asperity.clamps import CLAMPS, NONE, Clamp, find_clamp
 from asperity.contacts.warm_start import UNLIMITED, check_warm_start, new_warm_start
 from asperity.core.arguments import DEFAULT_STIFFNESS, MAX_DEPTH, STIFFNESS
 from asperity.core.checks import FloatArray, Points, check_array, check_points, check_positive
-from asperity.core.digests import content_digest
 from asperity.core.display import Plottable
 from asperity.core.errors import ParameterError, suggest_names
+from asperity.core.files import content_digest
 from asperity.derive.facts import LawFacts, clamped_facts
 from asperity.laws import REGISTERED_LAWS, SHIPPED_LAW_ARGUMENTS, Law, find_law
+from asperity.laws.clamps import CLAMPS, NONE, Clamp, find_clamp
 from asperity.textures.catalogue import TextureLike, as_texture
 from asperity.textures.texture import Texture
 
@@ -278,7 +278,7 @@ class Surface(Plottable):
 
     @cached_property
     def law_arguments(self) -> tuple[float, ...]:
-        """Arguments of the law's kernels: see ``asperity.kernels.law_codegen``."""
+        """Arguments of the law's kernels: see ``asperity.kernels.probe_functions``."""
         from asperity.kernels.fuse import kernel_source
 
         # The extremes of a map take time to compute: only for laws that use the relative height.

@@ -15,7 +15,7 @@ from tests.helpers.c_programs import STRICT, run_command, tool
 
 import asperity as asp
 from asperity.export import c99
-from asperity.export import targets as writing
+from asperity.export import c99 as writing
 
 Call = Callable[..., tuple[int, str, str]]
 WAVE = "sinusoid:amplitude=0.2mm,period=2mm"

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from asperity.clamps import NONE
 from asperity.contacts import split_solver
 from asperity.core.checks import FloatArray
 from asperity.core.compiled import EPS
 from asperity.kernels.fuse import fuse_surface
 from asperity.laws import LAWS
+from asperity.laws.clamps import NONE
 from asperity.textures.kinds.named_surfaces import named_surface
 
 RNG = np.random.default_rng(33)

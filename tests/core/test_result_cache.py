@@ -19,7 +19,7 @@ from asperity.analysis.energy.leak import worst_loop
 from asperity.analysis.energy.scan import merit
 from asperity.analysis.gain import characteristic
 from asperity.analysis.results import compare
-from asperity.core import cache, digests
+from asperity.core import cache, files
 from asperity.core.files import json_text
 from asperity.laws import LAWS, Law
 from asperity.measured.measured_file import prepare_file
@@ -146,7 +146,7 @@ def test_key_without_a_field_gives_wrong_results(
     expected = without_cache(lambda: numbers(after()))
     numbers(before())
     assert numbers(after()) == expected
-    content_digest = digests.content_digest
+    content_digest = files.content_digest
 
     def incomplete(*parts: Any) -> str:
         return content_digest(*parts[:field], "omitted", *parts[field + 1 :])
@@ -197,7 +197,7 @@ def test_every_shipped_law_is_proportional_to_the_stiffness() -> None:
     import sympy as sp
 
     from asperity.contacts.symbols import K
-    from asperity.derive.jacobian import symbolic_force
+    from asperity.derive.derivatives import symbolic_force
 
     for law in LAWS.values():
         force = symbolic_force(law)
@@ -236,20 +236,20 @@ def test_cached_results_depend_on_the_package_source(monkeypatch: pytest.MonkeyP
 def test_package_digest_depends_on_library_versions(
     library: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    digest = digests.package_digest.__wrapped__
-    before, version = digest(), digests.version
+    digest = files.package_digest.__wrapped__
+    before, version = digest(), files.version
     assert digest() == before
     if library in ("numpy", "scipy"):
         monkeypatch.setattr(f"{library}.__version__", "another")
     else:
         other = lambda name: "another" if name == library else version(name)  # noqa: E731 - one use
-        monkeypatch.setattr(digests, "version", other)
+        monkeypatch.setattr(files, "version", other)
     assert digest() != before
 
 
 @pytest.mark.filterwarnings("ignore::asperity.core.cache.CacheWarning")
 def test_incompatible_entry_is_recomputed() -> None:
-    key = f"letter\ncontent\n{digests.package_digest()}"
+    key = f"letter\ncontent\n{files.package_digest()}"
     cache.put_entry(cache.RESULTS_NAMESPACE, key, b"no pickle")
     assert cache.get_or_compute("letter", "content", lambda: "made") == "made"
     assert cache.get_or_compute("letter", "content", lambda: "again") == "made"
@@ -304,7 +304,7 @@ def test_comparison_does_not_depend_on_problems_of_the_cache(
 
 def test_value_without_a_digest_is_refused() -> None:
     with pytest.raises(TypeError, match="cannot compute a content digest"):
-        digests.content_digest({"a": 1})
+        files.content_digest({"a": 1})
 
 
 # --- measured surfaces ----------------------------------------------------------------------------

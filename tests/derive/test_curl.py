@@ -10,7 +10,7 @@ import pytest
 import sympy as sp
 
 from asperity.contacts.symbols import ContactSymbols
-from asperity.derive.curl import curl_verdict
+from asperity.derive.derivatives import curl_verdict
 from asperity.laws import LAWS, Law
 from asperity.surface import Surface
 from asperity.textures import Sinusoid

@@ -8,9 +8,9 @@ import sys
 import pytest
 import sympy as sp
 
-from asperity.clamps import LATERAL
 from asperity.derive.facts import clamped_facts, derive_facts, law_facts
 from asperity.laws import LAWS, Law
+from asperity.laws.clamps import LATERAL
 
 CONSERVATIVE = "WCD"
 # Laws whose force depends on slope or height at the contact, not only on the depth.

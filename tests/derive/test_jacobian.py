@@ -11,7 +11,7 @@ import pytest
 import sympy as sp
 
 from asperity.contacts.symbols import DEPTH, POSITION, K
-from asperity.derive.jacobian import derive, expand_definitions
+from asperity.derive.derivatives import derive, expand_definitions
 from asperity.laws import LAWS, Law
 
 LETTERS = "WABCDEFG"

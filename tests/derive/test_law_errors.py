@@ -13,14 +13,14 @@ import pytest
 import sympy as sp
 
 from asperity.analysis import characteristic_number
-from asperity.clamps import BACKED, NONE
 from asperity.contacts.symbols import ARGUMENT_ORDER, HXX, ContactSymbols
 from asperity.core.errors import LawError
-from asperity.derive.jacobian import derive, symbolic_force
-from asperity.derive.python_source import law_source
+from asperity.derive.derivatives import derive, symbolic_force
+from asperity.derive.generate import law_source
+from asperity.kernels import path_loop, stateful_loops
 from asperity.kernels.fuse import source_on_texture
-from asperity.kernels.loops import path_loop, stateful_loops
 from asperity.laws import LAWS, Law
+from asperity.laws.clamps import BACKED, NONE
 from asperity.surface import Surface
 from asperity.textures.kinds.sinusoid import Sinusoid
 

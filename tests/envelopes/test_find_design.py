@@ -15,12 +15,12 @@ import pytest
 import asperity as asp
 from asperity.analysis.energy.scan import scan_force
 from asperity.analysis.limits.spectrum import scan_forces
-from asperity.clamps import CLAMPS
 from asperity.core.cache import bypass_results
 from asperity.core.errors import ParameterError
 from asperity.envelopes.find_design import Design, design
 from asperity.envelopes.searches import FORCE, RANGE, Search, Target
 from asperity.envelopes.wave_borders import RenderConditions, WaveCase
+from asperity.laws.clamps import CLAMPS
 
 LAND = Path(__file__).parents[2].parent / "shared" / "data" / "sample-land.x3p"
 DEVICES = ("touch", "omega.3", "pantograph", "falcon")

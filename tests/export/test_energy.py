@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from tests.helpers.c_programs import as_exported, energies, header, library, ticks
 
-from asperity.clamps import NONE
 from asperity.laws import LAWS, Law
+from asperity.laws.clamps import NONE
 from asperity.surface import Surface
 from asperity.textures import Texture
 

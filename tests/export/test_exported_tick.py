@@ -19,7 +19,7 @@ from tests.helpers.c_programs import (
 )
 
 from asperity.core.errors import ParameterError
-from asperity.export.export_request import ExportRequest
+from asperity.export.surface_functions import ExportRequest
 from asperity.surface import Surface
 from asperity.textures import Texture
 

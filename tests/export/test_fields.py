@@ -24,7 +24,7 @@ from tests.helpers.c_programs import (
 import asperity as asp
 from asperity.core.errors import ParameterError
 from asperity.export.c99 import c99_files
-from asperity.export.export_request import ExportRequest
+from asperity.export.surface_functions import ExportRequest
 from asperity.surface import Surface
 from asperity.textures import Texture
 from asperity.textures.fields.field_file import save_field

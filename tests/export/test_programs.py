@@ -12,8 +12,8 @@ from bench.firmware import build_firmware, missing_tool
 from tests.helpers.c_programs import COMPILERS, STRICT, kernel_ticks, run_command, tool
 
 import asperity as asp
-from asperity.export.export_request import ExportRequest
-from asperity.export.targets import find_target, write_files
+from asperity.export.c99 import find_target, write_files
+from asperity.export.surface_functions import ExportRequest
 
 CPP = Path(__file__).parent / "cpp"
 EXAMPLES = Path(__file__).parents[2] / "examples" / "export"

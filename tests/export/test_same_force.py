@@ -20,8 +20,8 @@ from tests.helpers.c_programs import (
     ticks,
 )
 
-from asperity.clamps import CLAMPS
 from asperity.laws import LAWS, Law
+from asperity.laws.clamps import CLAMPS
 from asperity.surface import Surface
 from asperity.textures import HeightMap, Sinusoid, Texture
 from asperity.textures.catalogue import as_texture

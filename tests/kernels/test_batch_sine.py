@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from asperity import Sinusoid, Surface
-from asperity.clamps import NONE
 from asperity.kernels import batch_sine, fuse
-from asperity.kernels.loops import point_loops as probe_loops
+from asperity.kernels import point_loops as probe_loops
 from asperity.laws import LAWS
+from asperity.laws.clamps import NONE
 
 ERROR = 6e-16
 LARGEST = 2.0 * math.pi * 1e6  # [rad], one million turns

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from asperity.clamps import BACKED, CLAMPS, Clamp
 from asperity.core import cache as checked
 from asperity.kernels import fuse
 from asperity.kernels import numba_internals as code_store
 from asperity.laws import LAWS, Law
+from asperity.laws.clamps import BACKED, CLAMPS, Clamp
 from asperity.textures import Texture
 
 Check = Callable[..., Any]

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from llvmlite import binding  # type: ignore[import-untyped]  # it has no types
 
-from asperity.clamps import BACKED
 from asperity.kernels import fuse
 from asperity.laws import LAWS
+from asperity.laws.clamps import BACKED
 from asperity.textures import Sinusoid
 
 HEAD = fuse._module_header("A test.", "")

@@ -8,13 +8,13 @@ from types import ModuleType
 
 import pytest
 
-from asperity.clamps import CLAMPS, Clamp
 from asperity.contacts import sampler_interface as sampler
-from asperity.kernels import law_interface as law_functions
+from asperity.kernels import probe_functions as law_functions
 from asperity.kernels.fuse import kernel_source
-from asperity.kernels.law_codegen import LawCode, contact_source, probe_source
 from asperity.kernels.link import unit_from_module
+from asperity.kernels.probe_functions import LawCode, contact_source, probe_source
 from asperity.laws import LAWS
+from asperity.laws.clamps import CLAMPS, Clamp
 from asperity.simulation.kernels import axis_body as axes
 from asperity.simulation.kernels import body_interface as body_functions
 from asperity.simulation.kernels import coupled_body as dense

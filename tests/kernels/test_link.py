@@ -19,7 +19,6 @@ import numpy as np
 import pytest
 
 import asperity
-from asperity.clamps import NONE
 from asperity.core.compiled import Kernels
 from asperity.core.errors import ParameterError
 from asperity.kernels import fuse
@@ -34,6 +33,7 @@ from asperity.kernels.link import (
     unit_from_source,
 )
 from asperity.laws import LAWS
+from asperity.laws.clamps import NONE
 from asperity.textures import Sinusoid
 
 
@@ -84,7 +84,7 @@ def test_declaration_of_a_module_matches_its_source(module: ModuleType) -> None:
 def test_samplers_and_searches_declare_kernels() -> None:
     names = {module.__name__.removeprefix("asperity.") for module in MODULES}
     assert names >= {"textures.kinds.sinusoid_sampler", "contacts.split_solver"}
-    assert "kernels.loops.sampler_loops" in names
+    assert "kernels.sampler_loops" in names
     assert len(names) > 15
 
 

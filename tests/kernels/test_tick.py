@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from tests.helpers.user_modules import imported
 
-from asperity.clamps import NONE
 from asperity.contacts.warm_start import new_warm_start
 from asperity.core.checks import FloatArray
 from asperity.kernels import tick
 from asperity.kernels.fuse import fuse_on_texture
+from asperity.laws.clamps import NONE
 from asperity.simulation import Cartesian, PrescribedHand, Servo, Strokes, simulate
 from asperity.surface import Surface
 from asperity.textures import HeightMap, Sinusoid

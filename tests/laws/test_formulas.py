@@ -10,7 +10,7 @@ import pytest
 import sympy as sp
 
 from asperity.contacts.symbols import ContactSymbols
-from asperity.derive.jacobian import symbolic_force
+from asperity.derive.derivatives import symbolic_force
 from asperity.laws import LAWS
 
 # Generic values without symmetry, so that exchanged terms are detected.

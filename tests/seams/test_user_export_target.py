@@ -21,7 +21,7 @@ from tests.helpers.c_programs import (
 from tests.helpers.user_modules import imported
 
 import asperity as asp
-from asperity.export import targets
+from asperity.export import c99
 from asperity.export.program import LinkedSource
 
 Call = Callable[..., tuple[int, str, str]]
@@ -49,12 +49,12 @@ def test_documented_example_writes_its_file(
     assert (status, err) == (0, "")
     assert "Written: texture.txt" in out
     assert Path("texture.txt").read_text() == "texture"
-    assert set(targets.TARGETS) == {"c99"}  # registered until the command ends
+    assert set(c99.TARGETS) == {"c99"}  # registered until the command ends
 
 
 def test_target_of_a_plugin_writes_several_files(call: Call, tmp_path: Path) -> None:
     (tmp_path / "notes.py").write_text(
-        "from asperity.export.targets import ExportTarget\n"
+        "from asperity.export.c99 import ExportTarget\n"
         "def files(request, stem):\n"
         "    law = request.surface.law.letter\n"
         "    return {f'{stem}.txt': f'{request.name}: law {law}\\n',\n"
@@ -73,9 +73,9 @@ def test_target_of_a_plugin_writes_several_files(call: Call, tmp_path: Path) -> 
 
 
 def test_registering_an_existing_name_is_refused() -> None:
-    target = targets.ExportTarget("c99", "", ".h", lambda _request, _stem: {})
+    target = c99.ExportTarget("c99", "", ".h", lambda _request, _stem: {})
     with pytest.raises(asp.ParameterError, match="lang is registered already"):
-        targets.register(target)
+        c99.register(target)
 
 
 def test_user_defined_law_and_texture_give_the_force_of_the_kernel(tmp_path: Path) -> None:

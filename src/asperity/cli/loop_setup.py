@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.clamps import BACKED
 from asperity.cli import options
 from asperity.cli.options import Command, file_values
 from asperity.cli.output import progress_bar, step_bar
 from asperity.core.arguments import STIFFNESS, Argument
 from asperity.core.errors import ParameterError, print_message
 from asperity.laws import REGISTERED_LAWS, Law, check_parameters_apply, find_law
+from asperity.laws.clamps import BACKED
 
 if TYPE_CHECKING:
     from asperity.devices import Device

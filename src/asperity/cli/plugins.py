@@ -66,8 +66,8 @@ def plugin_registries() -> tuple[PluginRegistry, ...]:
     from asperity import laws
     from asperity.analysis.gain.theorems import THEOREMS
     from asperity.analysis.passivity.criteria import CRITERIA
-    from asperity.derive.jacobian import symbolic_force
-    from asperity.export import targets
+    from asperity.derive.derivatives import symbolic_force
+    from asperity.export import c99
     from asperity.measured.reading import Reader, readers
     from asperity.paper import claims as claim_registry
     from asperity.paper.claim import Claim
@@ -84,7 +84,7 @@ def plugin_registries() -> tuple[PluginRegistry, ...]:
         PluginRegistry(readers.USER_READERS, Reader, readers.register),
         PluginRegistry(claim_registry.CLAIMS, Claim, claim_registry.register),
         PluginRegistry(driver_registry.DRIVER_KINDS, DriverKind, driver_registry.register_driver),
-        PluginRegistry(targets.TARGETS, targets.ExportTarget, targets.register),
+        PluginRegistry(c99.TARGETS, c99.ExportTarget, c99.register),
         PluginRegistry(case_runs.RUN_KINDS, case_runs.RunKind, case_runs.register_run),
         PluginRegistry(CRITERIA),
         PluginRegistry(THEOREMS),

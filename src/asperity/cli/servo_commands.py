@@ -20,13 +20,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.clamps import BACKED
 from asperity.cli import loop_setup, options
 from asperity.cli.main import declare_command
 from asperity.cli.options import file_values, surface_values
 from asperity.cli.output import Outputs, check_outputs, output_options, progress_bar
 from asperity.cli.plugins import load_plugin_files, plugin_files
 from asperity.core.errors import ParameterError, print_message
+from asperity.laws.clamps import BACKED
 
 if TYPE_CHECKING:
     from asperity.lab.scene_state import SceneState

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.clamps import BACKED
 from asperity.cli import options
 from asperity.cli.main import declare_command
 from asperity.cli.output import Outputs, check_outputs, output_options, progress_bar, step_bar
@@ -20,6 +19,7 @@ from asperity.core.arguments import MAX_DEPTH, STIFFNESS
 from asperity.core.errors import ParameterError, escape_unprintable
 from asperity.core.files import check_output, write_bytes
 from asperity.laws import SHIPPED_LAW_ARGUMENTS
+from asperity.laws.clamps import BACKED
 
 if TYPE_CHECKING:
     from asperity.devices import Device
@@ -210,7 +210,7 @@ def export_command(
     or a scene file (TOML).
     """
     from asperity.export import targets
-    from asperity.export.export_request import ExportRequest
+    from asperity.export.surface_functions import ExportRequest
     from asperity.textures.fields.field_file import is_field
 
     request = options.provided_values(values, _REQUEST_ARGUMENTS)

@@ -29,8 +29,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from asperity.core.digests import package_digest
-from asperity.core.files import open_atomic, open_input
+from asperity.core.files import open_atomic, open_input, package_digest
 from asperity.core.units import parse_size
 
 if TYPE_CHECKING:
@@ -350,7 +349,7 @@ def get_or_compute(name: str, content: str | None, compute: Callable[[], Value])
 
     Args:
         name: name of the result.
-        content: :func:`~asperity.core.digests.content_digest` of all that the result depends on
+        content: :func:`~asperity.core.files.content_digest` of all that the result depends on
             besides the package; ``None`` if it is unknown: then nothing is stored.
         compute: computes the result.
     """

@@ -45,7 +45,7 @@ class Kernels:
         native: those of ``call_address``, ``load_acquire`` and ``store_release`` that the module
             calls; see :mod:`asperity.kernels.intrinsics`.
         for_blocks: whether its functions replace those of the same names in loops over blocks of
-            points; see :mod:`asperity.kernels.loops.block_loops`.
+            points; see :mod:`asperity.kernels.block_loops`.
         iterates: whether it holds long iterations, for which inlining only slows compilation.
     """
 

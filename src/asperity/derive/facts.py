@@ -9,8 +9,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from asperity.clamps import Clamp
 from asperity.laws import LAWS, Law
+from asperity.laws.clamps import Clamp
 
 GENERATED_DIRECTORY = Path(__file__).parent / "generated"
 
@@ -65,7 +65,7 @@ def clamped_facts(law: Law, clamp: Clamp) -> LawFacts:
 
     Example:
         >>> from asperity.laws import find_law
-        >>> from asperity.clamps import BACKED, LATERAL
+        >>> from asperity.laws.clamps import BACKED, LATERAL
         >>> law = find_law("C")
         >>> clamped_facts(law, BACKED).conservative, clamped_facts(law, LATERAL).conservative
         (True, False)
@@ -82,16 +82,17 @@ def derive_facts(law: Law) -> LawFacts:
     """Derive the facts of a law from its symbols.
 
     Raises:
-        LawError: see :func:`asperity.derive.jacobian.derive`.
+        LawError: see :func:`asperity.derive.derivatives.derive`.
     """
     from asperity.contacts.symbols import HX, HY, POSITION, H
-    from asperity.derive.curl import (
+    from asperity.derive.derivatives import (
         PIECEWISE_FUNCTIONS,
         conservative_clamps,
         curl_verdict,
+        derive,
+        expand_definitions,
         vanishes_at_contact,
     )
-    from asperity.derive.jacobian import derive, expand_definitions
 
     verdict = curl_verdict(law)
     derivation = derive(law)
@@ -114,7 +115,7 @@ def derive_facts(law: Law) -> LawFacts:
 def _is_affine(jacobian: Any) -> bool:
     """Return whether the second derivative by the depth vanishes identically."""
     from asperity.contacts.symbols import DEPTH
-    from asperity.derive.curl import is_zero
+    from asperity.derive.derivatives import is_zero
 
     second = jacobian.diff(DEPTH, 2)
     # A nonzero value at one point decides at once; a proof is tried only if the value is zero.

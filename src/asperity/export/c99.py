@@ -1,4 +1,4 @@
-"""Export target C99: a header, or a library of header, source and CMake file.
+"""Export target C99: a header, or a library of header, source and CMake file, and their output.
 
 The data of large maps are written to a source file beside the header.
 """
@@ -6,15 +6,24 @@ The data of large maps are written to a source file beside the header.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+import os
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
 
 from asperity.contacts.warm_start import BUDGET, ERROR_BOUND, UNLIMITED, WARM_START_SIZE
-from asperity.core.errors import ParameterError
-from asperity.export.export_request import ExportRequest
+from asperity.core.errors import ParameterError, escape_unprintable, find_named
+from asperity.core.files import check_not_existing, open_atomic
+from asperity.export.c_language import fill_template, load_template
 from asperity.export.expressions import real_literal
 from asperity.export.program import block_comment
-from asperity.export.surface_functions import ProgramData, SurfaceFunctions, surface_functions
-from asperity.export.template_files import fill_template, load_template
+from asperity.export.surface_functions import (
+    ExportRequest,
+    ProgramData,
+    SurfaceFunctions,
+    surface_functions,
+)
 
 MAX_POSITION = 1000.0
 """Limit of the coordinates [m]; the force is zero beyond, where cell indices would overflow."""
@@ -141,3 +150,86 @@ def _size_error(
     words = f"must be at least {size} bytes, the data of this surface; at most {points} points fit"
     words += ": crop it, or prepare it with fewer; a field may be loaded"
     return ParameterError("max_data", words, request.max_data_size)
+
+
+@dataclass(frozen=True)
+class ExportTarget:
+    """A format to export to.
+
+    Attributes:
+        name: name of the target, such as ``c99``.
+        description: short description.
+        suffix: suffix of the main file, such as ``.h``.
+        files: function of an export request and the stem of the file names that returns the texts
+            of the files by name, the main file first.
+    """
+
+    name: str
+    description: str
+    suffix: str
+    files: Callable[[ExportRequest, str], dict[str, str]]
+
+
+TARGETS = {"c99": ExportTarget("c99", "a C header, or a C library", ".h", c99_files)}
+"""Export targets by name."""
+
+
+def register(target: ExportTarget) -> ExportTarget:
+    """Register a user-defined export target.
+
+    Raises:
+        ParameterError: for a name that is taken.
+    """
+    if TARGETS.setdefault(target.name, target) is not target:
+        raise ParameterError("lang", "is registered already", target.name)
+    return target
+
+
+def find_target(name: str) -> ExportTarget:
+    """Return an export target by its name.
+
+    Raises:
+        ParameterError: for an unknown name.
+    """
+    return find_named("lang", name.lower(), TARGETS)
+
+
+def check_name(path: Path, target: ExportTarget) -> None:
+    """Check that the file name has the suffix of the target.
+
+    Raises:
+        ParameterError: for another suffix, or a name that is not printable.
+    """
+    if path.suffix != target.suffix or not path.stem.isprintable() or '"' in path.stem:
+        words = f"must be a file that ends in {target.suffix}"
+        raise ParameterError("output", words, escape_unprintable(path.name))
+
+
+def write_files(
+    path: str | os.PathLike[str], target: ExportTarget, request: ExportRequest, *, force: bool
+) -> list[Path]:
+    """Write all files of an exported program, or none, and return their paths.
+
+    Args:
+        path: the main file; further files are written to the same folder.
+        target: the export target.
+        request: the export request.
+        force: whether to replace existing files.
+
+    Raises:
+        ParameterError: for a file that exists, or cannot be written.
+    """
+    place = Path(path)
+    check_name(place, target)
+    files = target.files(request, place.stem)
+    for name in files:
+        check_not_existing("output", place.parent / name, force=force)
+    try:
+        with ExitStack() as written:
+            for name, text in files.items():
+                stream = written.enter_context(open_atomic(place.parent / name))
+                stream.write(text.encode())
+                stream.flush()
+    except OSError as error:
+        raise ParameterError("output", f"cannot be written: {error.strerror}", str(path)) from None
+    return [place.parent / name for name in files]

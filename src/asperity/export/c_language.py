@@ -7,18 +7,22 @@ an exported program holds as data.
 Operations have the semantics of Numba: ``math.floor`` and ``int`` return a 64-bit integer, ``min``
 and ``max`` compare from left to right, a remainder has the sign of the divisor, and a constant
 power is a product by repeated squaring.
+
+The templates of exported files are those of the folder ``templates``.
 """
 
 from __future__ import annotations
 
 import ast
 import math
-import tomllib
+import re
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
+from importlib import resources
 from typing import NamedTuple
 
 from asperity.core.errors import ParameterError
-from asperity.export.template_files import load_template
 
 
 class NotExportableError(ParameterError):
@@ -165,13 +169,12 @@ def c_scalar_type(value_type: ValueType, real: str) -> str:
     return known.get(value_type, real)
 
 
-def words(group: str) -> list[str]:
-    """Return the words of a group of the file ``c_words.toml``."""
-    text: str = tomllib.loads(load_template("c_words.toml"))[group]
-    return text.split()
-
-
-REAL_FUNCTIONS = {name: name for name in words("functions")}
+# Functions from real numbers to a real number, which C and Python call by the same name.
+_SAME_FUNCTIONS = """
+    acos acosh asin asinh atan atan2 atanh cbrt copysign cos cosh exp exp2 expm1 fabs hypot
+    log log10 log1p log2 pow sin sinh sqrt tan tanh
+"""
+REAL_FUNCTIONS = {name: name for name in _SAME_FUNCTIONS.split()}
 REAL_FUNCTIONS |= {f"arc{name}": f"a{name}" for name in ("cos", "sin", "tan", "tan2")}
 """C functions of the functions of ``math`` and ``numpy`` from real numbers to a real number."""
 
@@ -250,3 +253,19 @@ def power_helper(exponent: int, base: ScalarType) -> HelperFunction:
     whole = f"power{suffix}_{'minus_' if exponent < 0 else ''}{abs(exponent)}"
     body = "".join(f"    {line}\n" for line in lines)
     return HelperFunction(whole, f"static inline {kind} @{whole}({kind} a)\n{{\n{body}}}\n")
+
+
+@lru_cache(maxsize=16)
+def load_template(name: str) -> str:
+    """Return a file of the folder ``templates``."""
+    return resources.files("asperity.export").joinpath("templates", name).read_text("utf-8")
+
+
+def fill_template(text: str, values: Mapping[str, str]) -> str:
+    """Return a template with its placeholders, such as ``@name@``, replaced.
+
+    Example:
+        >>> fill_template("void @name@_reset(void);", {"name": "texture"})
+        'void texture_reset(void);'
+    """
+    return re.sub(r"@(\w+)@", lambda found: values[found[1]], text)

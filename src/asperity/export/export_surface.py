@@ -16,22 +16,22 @@ from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.results.analyze import Analysis, Progress, analyze
 from asperity.analysis.results.compare import DEFAULT_DEVICE
 from asperity.analysis.surface_sentences import depth_range_text, leak_energy_text
-from asperity.clamps import BACKED
 from asperity.core.files import check_not_existing
 from asperity.core.units import format_quantity
 from asperity.core.version import __version__
 from asperity.devices import DeviceLike
-from asperity.export import targets
-from asperity.export.export_request import ExportRequest, is_searching
-from asperity.export.template_files import fill_template, load_template
+from asperity.export import c99
+from asperity.export.c_language import fill_template, load_template
+from asperity.export.surface_functions import ExportRequest, is_searching
 from asperity.laws import Law
+from asperity.laws.clamps import BACKED
 from asperity.surface import Surface
 from asperity.textures.catalogue import TextureLike
 from asperity.textures.fields.field_file import is_field, save_field
 from asperity.textures.texture import Texture
 
 if TYPE_CHECKING:
-    from asperity.export.targets import ExportTarget
+    from asperity.export.c99 import ExportTarget
     from asperity.textures.fields.potential_field import PotentialField
 
 
@@ -66,7 +66,7 @@ def export_code(
         force: whether to replace existing files.
         progress: called with the name of each step of the analysis.
         **arguments: ``name``, ``precision``, ``max_data_size``, ``max_evaluations`` of
-            :class:`~asperity.export.export_request.ExportRequest`; those of
+            :class:`~asperity.export.surface_functions.ExportRequest`; those of
             :func:`~asperity.analysis.results.analyze.analyze` otherwise.
 
     Returns:
@@ -82,9 +82,9 @@ def export_code(
         >>> [file.name for file in files]
         ['texture.h', 'texture_data.c']
     """
-    target = targets.find_target(lang)
+    target = c99.find_target(lang)
     place = Path(path)
-    targets.check_name(place, target)
+    c99.check_name(place, target)
     names = ("name", "precision", "max_data_size", "max_evaluations")
     request = {name: arguments.pop(name) for name in names if name in arguments}
     ExportRequest.validate(**request)
@@ -115,12 +115,12 @@ def export_analysis(
         path: the main file.
         target: the export target.
         field: where to save the field of law H; ``None`` to save none.
-        request: options of :class:`~asperity.export.export_request.ExportRequest`.
+        request: options of :class:`~asperity.export.surface_functions.ExportRequest`.
         force: whether to replace existing files.
     """
     comment = header_comment_text(analysis, path.name)
     order = ExportRequest(analysis.surface, comment=comment, q_upper=analysis.q.upper, **request)
-    files = targets.write_files(path, target, order, force=force)
+    files = c99.write_files(path, target, order, force=force)
     if field is not None:
         save_field(field, cast("PotentialField", analysis.surface.texture))
         files.append(field)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from asperity.export import c_language as c
 from asperity.export.c_language import ValueType
 from asperity.export.expression_types import ProgramContext, called_name, indices_of
-from asperity.export.type_inference import FunctionTypes
+from asperity.export.function_analysis import FunctionTypes
 
 _PRIMARY = 12
 _UNARY = 11

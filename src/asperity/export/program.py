@@ -14,8 +14,8 @@ from collections.abc import Mapping
 
 from asperity.export import c_language as c
 from asperity.export.c_language import NotExportableError, ValueType
+from asperity.export.function_analysis import FunctionTypes
 from asperity.export.statements import FunctionPrinter
-from asperity.export.type_inference import FunctionTypes
 
 _SINGLE_PRECISION_ROUNDINGS = {"EPS": 2.0**-23, "SQRT_EPS": 2.0**-11.5}
 """Constants of :mod:`asperity.core.compiled` in single precision."""

@@ -6,13 +6,23 @@ import ast
 from collections.abc import Iterator, Sequence
 
 from asperity.export import c_language as c
-from asperity.export import liveness
+from asperity.export import function_analysis
 from asperity.export.c_language import ValueType
 from asperity.export.expression_types import ProgramContext, called_name
 from asperity.export.expressions import BINARY_OPERATORS, ExpressionPrinter
-from asperity.export.type_inference import FunctionTypes
+from asperity.export.function_analysis import FunctionTypes
 
-RESERVED_WORDS = frozenset(c.words("reserved"))
+_RESERVED_TEXT = """
+    auto break case char const continue default do double else enum extern float for goto if
+    inline int long register restrict return short signed sizeof static struct switch typedef
+    union unsigned void volatile while and and_eq asm bitand bitor bool catch class compl
+    const_cast constexpr delete dynamic_cast explicit export false friend mutable namespace
+    new noexcept not not_eq nullptr operator or or_eq private protected public
+    reinterpret_cast static_assert static_cast template this throw true try typeid typename
+    using virtual wchar_t xor xor_eq far near small huge interface pascal linux unix I IN OUT
+    min max
+"""
+RESERVED_WORDS = frozenset(_RESERVED_TEXT.split())
 """Keywords of C and C++, and names that system headers define as macros."""
 
 
@@ -33,9 +43,9 @@ class FunctionPrinter(ast.NodeVisitor):
         }
         self.expressions = ExpressionPrinter(types, program, self.names)
         self._temporaries = 0
-        self._live = liveness.live_names(types)
-        self._loop_variables = dict(liveness.self_declaring_loops(types.node))
-        self._declaring = liveness.declaring_statements(
+        self._live = function_analysis.live_names(types)
+        self._loop_variables = dict(function_analysis.self_declaring_loops(types.node))
+        self._declaring = function_analysis.declaring_statements(
             types, self._live, set(self._loop_variables.values())
         )
 
@@ -46,7 +56,7 @@ class FunctionPrinter(ast.NodeVisitor):
             for name in self.types.argument_names
             if name not in self._live and not c.is_constant(self.types.types[name])
         ]
-        body = liveness.without_docstring(self.types.node.body)
+        body = function_analysis.without_docstring(self.types.node.body)
         inside = [*self._argument_conversions(), *self._declarations(), *unused, *self._block(body)]
         return [signature, "{", *_indent(inside), "}"]
 
@@ -156,7 +166,7 @@ class FunctionPrinter(ast.NodeVisitor):
     def _loop_end(self, node: ast.For, end: ast.expr) -> tuple[str, list[str]]:
         """Return the end of a loop, and the line that stores it if the loop may change it."""
         text = self.expressions.as_type(end, c.INT, 8)
-        changed = set(liveness.stored_names(node))
+        changed = set(function_analysis.stored_names(node))
         read = {part.id for part in ast.walk(end) if isinstance(part, ast.Name)}
         calls = any(isinstance(part, (ast.Call, ast.Subscript)) for part in ast.walk(end))
         if self.types.constant_integer(end) is not None or not (read & changed or calls):
@@ -278,8 +288,8 @@ class FunctionPrinter(ast.NodeVisitor):
 
     def _check_evaluation_order(self, node: ast.stmt) -> None:
         """Check that the value does not depend on an evaluation order that C leaves open."""
-        for value in liveness.expressions_in(node):
-            for piece in liveness.sequenced_parts(value):
+        for value in function_analysis.expressions_in(node):
+            for piece in function_analysis.sequenced_parts(value):
                 calls = [part for part in ast.walk(piece) if isinstance(part, ast.Call)]
                 acting = [call for call in calls if self.types.written_arrays(call)]
                 written = {name for call in acting for name in self.types.written_arrays(call)}

@@ -20,7 +20,7 @@ from asperity.core.checks import FloatArray, check_positive
 from asperity.core.errors import ParameterError, suggest_names
 from asperity.core.units import format_quantity
 from asperity.core.version import __version__
-from asperity.export.template_files import fill_template, load_template
+from asperity.export.c_language import fill_template, load_template
 from asperity.textures.texture import Texture
 
 # Number of equal rows in the map of a profile.

@@ -17,12 +17,10 @@ from functools import cache, lru_cache, partial
 from threading import Lock
 from types import ModuleType
 
-from asperity.clamps import NONE, Clamp
 from asperity.contacts.sampler_interface import SAMPLER_FUNCTIONS
 from asperity.core.errors import ParameterError
 from asperity.core.processes import defer_interrupt
 from asperity.derive.facts import generated_kernel_path, law_facts
-from asperity.kernels.law_codegen import LawCode, contact_source, probe_source
 from asperity.kernels.link import (
     INTRINSIC_MODULES,
     MissingFunctionError,
@@ -33,7 +31,9 @@ from asperity.kernels.link import (
     loops_of,
     unit_from_module,
 )
+from asperity.kernels.probe_functions import LawCode, contact_source, probe_source
 from asperity.laws import LAWS, Law
+from asperity.laws.clamps import NONE, Clamp
 
 Modules = tuple[ModuleType, ...]
 # Functions to link, each with the unit that defines it.
@@ -74,7 +74,7 @@ def kernel_source(law: Law) -> str:
     if LAWS.get(law.letter) is law:
         text = generated_kernel_path(law).read_text(encoding="utf-8")
         return text[text.index("def ") :]
-    from asperity.derive.python_source import law_source
+    from asperity.derive.generate import law_source
 
     return law_source(law)
 
@@ -109,8 +109,7 @@ def fuse_surface(law: Law, sampler: Modules, clamp: Clamp) -> ModuleType:
     Raises:
         ParameterError: for a texture that lacks a function that the law requires.
     """
-    from asperity.kernels import batch_sine
-    from asperity.kernels.loops import block_loops, point_loops, stateful_loops
+    from asperity.kernels import batch_sine, block_loops, point_loops, stateful_loops
 
     blocks = tuple(m for m in sampler if unit_from_module(m).kernels.for_blocks)
     if blocks and _samples_only_at_probe(law):
@@ -132,8 +131,7 @@ def _samples_only_at_probe(law: Law) -> bool:
 @lru_cache(maxsize=256)
 def fuse_path(law: Law, sampler: Modules, clamp: Clamp) -> ModuleType:
     """Return the compiled loop of a law along a path, ``path_batch``; see :func:`fuse_surface`."""
-    from asperity.kernels import batch_sine
-    from asperity.kernels.loops import path_loop
+    from asperity.kernels import batch_sine, path_loop
 
     overrides = () if law.contact.has_warm_start else (batch_sine,)
     return fuse_on_texture(law, sampler, clamp, (path_loop,), overrides)
@@ -219,7 +217,7 @@ def _missing_function_error(
 @lru_cache(maxsize=256)
 def fuse_contact(law: Law) -> ModuleType:
     """Return the compiled loop of a law over given contacts, ``contact_batch``."""
-    from asperity.kernels.loops import contact_loop
+    from asperity.kernels import contact_loop
 
     loop = unit_from_module(contact_loop)
     code = LawCode(law, kernel_source(law), NONE)
@@ -256,8 +254,7 @@ def fuse_sampler(sampler: Modules, *further: ModuleType) -> ModuleType:
     and ``nearest_batch`` (points (n, 3), result (n, 2)), and the loops of further modules. A loop
     that calls a function that the sampler lacks raises a ParameterError when it is called.
     """
-    from asperity.kernels import batch_sine
-    from asperity.kernels.loops import sampler_loops
+    from asperity.kernels import batch_sine, sampler_loops
 
     units = tuple(map(unit_from_module, (sampler_loops, *further)))
     available = (unit_from_module(batch_sine), *map(unit_from_module, sampler), *units)

@@ -6,7 +6,7 @@ The anchor of a law with state sticks, and slips once its deflection would excee
 import math
 
 from asperity.core.compiled import EVERY_FUNCTION, FloatArray, Kernels, multiply_add
-from asperity.kernels.law_interface import Matrix3Rows, Vector3
+from asperity.kernels.probe_functions import Matrix3Rows, Vector3
 
 KERNELS = Kernels(provides=EVERY_FUNCTION)
 

@@ -9,7 +9,7 @@ import math
 from typing import NamedTuple
 
 from asperity.core.compiled import EVERY_FUNCTION, FloatArray, Kernels
-from asperity.kernels.law_interface import probe_tick
+from asperity.kernels.probe_functions import probe_tick
 
 KERNELS = Kernels(provides=EVERY_FUNCTION)
 

@@ -17,7 +17,7 @@ import math
 from typing import NamedTuple
 
 from asperity.core.compiled import FloatArray, Kernels, load_acquire
-from asperity.kernels.law_interface import probe_depth
+from asperity.kernels.probe_functions import probe_depth
 from asperity.kernels.tick import ServoSettings, ServoState
 from asperity.loop.interface import (
     DEPTH,

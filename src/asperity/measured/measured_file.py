@@ -12,10 +12,9 @@ import numpy as np
 
 from asperity.core.cache import get_or_compute
 from asperity.core.checks import FloatArray
-from asperity.core.digests import content_digest
 from asperity.core.display import Reportable
 from asperity.core.errors import ParameterError
-from asperity.core.files import open_input, to_plain_data
+from asperity.core.files import content_digest, open_input, to_plain_data
 from asperity.measured.file_arguments import READING_ARGUMENTS
 from asperity.measured.form import SurfaceDecomposition, decompose_surface
 from asperity.measured.parameters import correlation_parameters

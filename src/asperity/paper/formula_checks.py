@@ -154,7 +154,7 @@ def check_zero_outside(law: str) -> Check:
 
 def check_curl(law: str, *, is_conservative: bool) -> Check:
     """Check whether a law is conservative by its symbolic curl."""
-    from asperity.derive.curl import curl_verdict
+    from asperity.derive.derivatives import curl_verdict
 
     verdict = curl_verdict(find_law(law))
     kind = "conservative" if verdict.conservative else "not conservative"

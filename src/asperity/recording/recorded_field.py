@@ -17,13 +17,12 @@ from typing import Any
 
 import numpy as np
 
-from asperity.clamps import Clamp, find_clamp
 from asperity.core.checks import FloatArray
-from asperity.core.digests import content_digest
 from asperity.core.errors import ParameterError
-from asperity.core.files import read_toml, text_digest, to_plain_data
+from asperity.core.files import content_digest, read_toml, text_digest, to_plain_data
 from asperity.kernels.fuse import kernel_source
 from asperity.laws import Law, find_law
+from asperity.laws.clamps import Clamp, find_clamp
 from asperity.surface import Surface
 
 TEXTURE_FILE = "texture.npz"

@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import Any
 
 from asperity.analysis.results.compare import DEFAULT_DEVICE, compare
-from asperity.clamps import BACKED
 from asperity.core.errors import ParameterError
 from asperity.core.files import Serializable, check_not_existing
 from asperity.core.units import format_quantity
 from asperity.devices import Device, DeviceLike, load_device
 from asperity.laws import REGISTERED_LAWS, find_law
+from asperity.laws.clamps import BACKED
 from asperity.scene.loops import SceneLike, as_scene, make_loop
 from asperity.scene.scene_file import Scene
 from asperity.scene.sections import surface_keywords

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from asperity.clamps import CLAMPS, NONE
 from asperity.core.arguments import (
     MAX_DEPTH,
     RENDERING,
@@ -23,6 +22,7 @@ from asperity.core.arguments import (
 from asperity.core.errors import ParameterError, find_named
 from asperity.core.files import open_input, to_plain_data
 from asperity.laws import SHIPPED_LAW_ARGUMENTS, Law, registered_arguments
+from asperity.laws.clamps import CLAMPS, NONE
 from asperity.recording.recording import is_recording, open_recording
 from asperity.simulation import BandHand, PrescribedHand, SpringHand, Stationary, Strokes
 from asperity.simulation import Waypoints as PathMotion

@@ -22,10 +22,9 @@ import numpy as np
 from asperity.analysis.results.check_limits import limits
 from asperity.analysis.results.compare import DEFAULT_DEVICE, compare
 from asperity.core.checks import check_keywords
-from asperity.core.digests import content_digest, package_digest
 from asperity.core.display import Tabular
 from asperity.core.errors import AsperityError, ParameterError, find_named
-from asperity.core.files import to_plain_data
+from asperity.core.files import content_digest, package_digest, to_plain_data
 from asperity.laws import REGISTERED_LAWS, find_law, find_laws
 from asperity.rendering import is_searched, rendered_surface
 from asperity.scene.loops import onset, scan

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from asperity.core.arguments import Argument
-from asperity.core.digests import package_digest
 from asperity.core.errors import ParameterError
+from asperity.core.files import package_digest
 from asperity.core.version import __version__
 from asperity.devices import load_device
 from asperity.laws import find_law, find_laws

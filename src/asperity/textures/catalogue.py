@@ -14,8 +14,8 @@ import numpy as np
 
 from asperity.core.arguments import Argument, document_arguments, parse_arguments
 from asperity.core.checks import FloatArray
-from asperity.core.digests import content_digest
 from asperity.core.errors import ParameterError, suggest_names
+from asperity.core.files import content_digest
 from asperity.measured.file_arguments import FILE_ARGUMENTS, SYNTHETIC_ARGUMENTS
 from asperity.measured.measured_file import prepare_file
 from asperity.measured.prepared import PreparedSurface

@@ -16,9 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from asperity.contacts.contact import Contact, ExactHeight
 from asperity.core.arguments import Argument
 from asperity.core.checks import FloatArray, Points, check_points
-from asperity.core.digests import content_digest, is_shipped
 from asperity.core.display import Plottable
-from asperity.core.files import to_plain_data
+from asperity.core.files import content_digest, is_shipped, to_plain_data
 from asperity.enclosures.cells import Cells
 from asperity.measured.prepared import PreparationStage
 from asperity.textures.domain import (

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from asperity.analysis.energy.field_energy import split_state
-from asperity.clamps import NONE
 from asperity.core.checks import FloatArray
 from asperity.kernels.fuse import fuse_surface
+from asperity.laws.clamps import NONE
 from asperity.surface import Surface
 from asperity.textures.kinds import sinusoid_sampler as sinusoid
 from asperity.textures.kinds.sinusoid import Sinusoid

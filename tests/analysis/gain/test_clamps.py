@@ -15,10 +15,10 @@ from asperity.analysis.energy.continuity import continuity
 from asperity.analysis.energy.leak import worst_loop
 from asperity.analysis.gain import characteristic
 from asperity.analysis.passivity.assess_passivity import passivity
-from asperity.clamps import NONE
 from asperity.derive.facts import law_facts
 from asperity.devices import parse_device
 from asperity.laws import LAWS, Law
+from asperity.laws.clamps import NONE
 from asperity.surface import Surface
 from asperity.textures.kinds.fourier import Fourier
 from asperity.textures.kinds.sinusoid import Sinusoid

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from asperity.clamps import NONE
 from asperity.core.checks import FloatArray
 from asperity.kernels.fuse import fuse_surface
 from asperity.laws import LAWS
+from asperity.laws.clamps import NONE
 from asperity.textures.fields.field_grid import BLENDED, COARSE_STEP, FieldGrid
 from asperity.textures.fields.node_potentials import compute_potentials, split_columns
 from asperity.textures.kinds.fourier import Fourier

@@ -32,8 +32,8 @@ from asperity.analysis.gain.medial_axis import SearchOptions
 from asperity.analysis.gain.theorems import THEOREMS, Reduction, derivative_bound, theorem_on
 from asperity.core.cache import get_or_compute
 from asperity.core.checks import FloatArray, check_positive
-from asperity.core.digests import content_digest, is_shipped
 from asperity.core.errors import ParameterError
+from asperity.core.files import content_digest, is_shipped
 from asperity.kernels.fuse import kernel_source
 from asperity.laws import LAWS, Law
 from asperity.surface import Surface

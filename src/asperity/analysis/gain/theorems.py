@@ -16,10 +16,10 @@ from asperity.analysis.bounds.branch_and_bound import Problem
 from asperity.analysis.gain import medial_axis, proofs
 from asperity.analysis.gain import proofs as forms
 from asperity.analysis.gain.proofs import NormalChangeProblem, SlopeProblem
-from asperity.clamps import BACKED, LATERAL, WHOLE, Clamp
 from asperity.core.errors import ParameterError
 from asperity.enclosures.cells import Cells
 from asperity.laws import LAWS, Law
+from asperity.laws.clamps import BACKED, LATERAL, WHOLE, Clamp
 from asperity.surface import Surface
 
 

@@ -21,10 +21,9 @@ from asperity.analysis.results.comparison_assumptions import comparison_assumpti
 from asperity.analysis.results.recommendation import LawRow, recommend, recommendation_text
 from asperity.core.arguments import DEFAULT_STIFFNESS, FIELD
 from asperity.core.checks import check_keywords, check_positive
-from asperity.core.digests import content_digest
 from asperity.core.display import Plottable, Reportable, Tabular
 from asperity.core.errors import ParameterError
-from asperity.core.files import attributes_to_dict, json_text, to_plain_data
+from asperity.core.files import attributes_to_dict, content_digest, json_text, to_plain_data
 from asperity.core.processes import precompute
 from asperity.devices import Device, DeviceLike, load_device
 from asperity.laws import LAWS, Law, distribute_parameters, find_laws

@@ -241,7 +241,7 @@ def zero_curl_is_conservative() -> Check:
 
     Not if the force jumps where contact begins.
     """
-    from asperity.derive.curl import curl_verdict
+    from asperity.derive.derivatives import curl_verdict
 
     stripe = Law("T", "constant-pull", "nominal", lambda c: c.k * 1e-3 * c.tangential([1, 0]))
     verdict = curl_verdict(stripe)

@@ -98,7 +98,7 @@ def _check_conservativity(row: TableTwoRow) -> claim.Check:
 def _check_continuity(row: TableTwoRow) -> claim.Check:
     """Check the condition on h: a force that depends on h' jumps where h' jumps."""
     from asperity.contacts.symbols import HX
-    from asperity.derive.jacobian import symbolic_force
+    from asperity.derive.derivatives import symbolic_force
 
     uses_slope = HX in symbolic_force(find_law(row.law)).free_symbols
     needs_slope = "h'" in row.printed.continuous

@@ -173,7 +173,7 @@ def remark_5() -> Check:
     """The factor √(1 + h'²) is what keeps B from being conservative."""
     import sympy as sp
 
-    from asperity.derive.curl import curl_verdict
+    from asperity.derive.derivatives import curl_verdict
 
     def force(c: Any) -> Any:
         return sp.sqrt(1 + c.slope.dot(c.slope)) * find_law("B").force(c)

@@ -16,7 +16,7 @@ from operator import itemgetter
 from typing import TYPE_CHECKING
 
 from asperity.core.cache import get_or_compute
-from asperity.core.digests import content_digest
+from asperity.core.files import content_digest
 from asperity.core.processes import precompute
 from asperity.core.version import __version__
 from asperity.report.document import page as pages

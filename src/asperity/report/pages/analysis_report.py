@@ -10,9 +10,9 @@ import numpy as np
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.passivity.assess_passivity import Passivity, stability_limit_text
 from asperity.analysis.results.analyze import PASSIVITY_FIELDS, Analysis
-from asperity.clamps import NONE
 from asperity.core.units import format_quantity
 from asperity.laws import LAWS, SHIPPED_LAW_ARGUMENTS
+from asperity.laws.clamps import NONE
 from asperity.report.document import page
 from asperity.report.document.page import HEADED, Cell, Media, Row, Section, Table, TableLayout
 from asperity.report.pages.comparison_columns import texture_name

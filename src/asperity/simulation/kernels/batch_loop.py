@@ -6,7 +6,7 @@ enough to detect a limit cycle.
 """
 
 from asperity.core.compiled import FloatArray, IntArray, Kernels
-from asperity.kernels.law_interface import probe_in_contact
+from asperity.kernels.probe_functions import probe_in_contact
 from asperity.kernels.tick import ServoSettings, ServoState, servo_tick, state_before_tick
 from asperity.simulation.kernels.body_interface import (
     DIVERGED,

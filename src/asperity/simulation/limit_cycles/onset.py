@@ -13,9 +13,14 @@ from numpy.typing import ArrayLike
 from asperity.analysis.gain import characteristic
 from asperity.core.cache import get_or_compute_each
 from asperity.core.checks import FloatArray, check_array, check_positive
-from asperity.core.digests import is_shipped
 from asperity.core.errors import ParameterError
-from asperity.core.files import Serializable, attributes_to_dict, json_text, to_plain_data
+from asperity.core.files import (
+    Serializable,
+    attributes_to_dict,
+    is_shipped,
+    json_text,
+    to_plain_data,
+)
 from asperity.laws.w_smooth_wall import LAW as SMOOTH_WALL
 from asperity.simulation.batch import BatchSimulation, Trajectory
 from asperity.simulation.hands import Hand

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.clamps import NONE
 from asperity.core.checks import FloatArray, check_positive
 from asperity.core.errors import ParameterError
 from asperity.core.units import round_up
 from asperity.laws import LAWS
+from asperity.laws.clamps import NONE
 from asperity.textures.fields import node_potentials
 from asperity.textures.fields.field_certificate import Progress, cells_above, curvature_bounds
 from asperity.textures.fields.field_grid import RAMP, FieldGrid, SingleArray

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.clamps import NONE
 from asperity.core.checks import FloatArray
 from asperity.laws import LAWS
+from asperity.laws.clamps import NONE
 from asperity.textures.fields import node_loop
 from asperity.textures.fields.field_certificate import Progress, run_in_threads
 from asperity.textures.fields.field_grid import NEIGHBOUR_WEIGHT, RAMP, FieldGrid, SingleArray

@@ -12,10 +12,9 @@ import numpy as np
 
 from asperity.contacts.contact import Contact
 from asperity.core.checks import FloatArray
-from asperity.core.digests import content_digest
 from asperity.core.display import Tabular
 from asperity.core.errors import ParameterError
-from asperity.core.files import to_plain_data
+from asperity.core.files import content_digest, to_plain_data
 from asperity.measured.lengths import format_length
 from asperity.textures.fields.field_grid import FieldGrid
 from asperity.textures.fields.field_sampler import FieldArguments

@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.core.compiled import FloatArray, Kernels
-from asperity.kernels.law_interface import probe_force, probe_jacobian
 from asperity.kernels.loop_functions import sliding_derivative, store_force, store_jacobian
+from asperity.kernels.probe_functions import probe_force, probe_jacobian
 
 KERNELS = Kernels(loops=("force_batch", "jacobian_batch"))
 

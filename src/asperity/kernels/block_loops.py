@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from asperity.core.compiled import FloatArray, Kernels, local_array
-from asperity.kernels.law_interface import probe_force, probe_jacobian
 from asperity.kernels.loop_functions import load_point
+from asperity.kernels.probe_functions import probe_force, probe_jacobian
 
 KERNELS = Kernels(loops=("force_batch", "jacobian_batch"))
 

@@ -1,7 +1,8 @@
-"""Generation of the functions of one probe: contact, formula and clamp of a law.
+"""The functions of a probe that loops call: their interface, and their generation for a law.
 
-They combine the code of the contact with the functions of the law; ``law_interface`` lists them.
-Loops over points are plain modules in ``loops``.
+The linker binds the calls of the loops to the generated functions, which combine the code of the
+contact with the functions of the law and its clamp. ``texture`` is the record of a texture kind,
+``law`` the tuple :attr:`asperity.surface.Surface.law_arguments`.
 """
 
 from __future__ import annotations
@@ -12,10 +13,69 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from asperity.clamps import Clamp
 from asperity.contacts.contact import parameter_name
+from asperity.core.checks import FloatArray
 from asperity.kernels.link import parse_source
+from asperity.laws.clamps import Clamp
 from asperity.laws.law import Law
+
+Vector3 = tuple[float, float, float]
+Matrix3Rows = tuple[float, float, float, float, float, float, float, float, float]
+
+
+def probe_force(
+    x: float, y: float, z: float, dx: float, dy: float, texture: object, law: object
+) -> Vector3:
+    """Return the force [N]; (dx, dy) is the deflection of the anchor [m] for a law with state."""
+    raise NotImplementedError  # the linker binds calls to the generated function
+
+
+def probe_force_warm(
+    x: float, y: float, z: float, dx: float, dy: float, warm_start: FloatArray, texture: object,
+    law: object,
+) -> Vector3:  # fmt: skip
+    """Return the force [N] of a law whose contact has a warm-started search."""
+    raise NotImplementedError  # the linker binds calls to the generated function
+
+
+def probe_jacobian(
+    x: float, y: float, z: float, dx: float, dy: float, sxx: float, sxy: float, syy: float,
+    texture: object, law: object,
+) -> tuple[*Vector3, *Matrix3Rows]:  # fmt: skip
+    """Return force [N] and Jacobian [N/m], row by row; s.. is the derivative of the deflection."""
+    raise NotImplementedError  # the linker binds calls to the generated function
+
+
+def probe_in_contact(x: float, y: float, z: float, texture: object) -> bool:
+    """Return whether there is contact."""
+    raise NotImplementedError  # the linker binds calls to the generated function
+
+
+def probe_depth(x: float, y: float, z: float, texture: object) -> float:
+    """Return the depth [m]; 0 out of contact."""
+    raise NotImplementedError  # the linker binds calls to the generated function
+
+
+def probe_tick(
+    x: float, y: float, z: float, ax: float, ay: float, held: bool, warm_start: FloatArray,
+    texture: object, law: object,
+) -> tuple[float, float, float, float, float, bool]:  # fmt: skip
+    """Return the force [N], the new anchor position [m] and whether the anchor is held.
+
+    A law with state holds its anchor during contact; others leave it unchanged. A search stays
+    within the budget of ``warm_start`` and updates it; see :mod:`asperity.contacts.warm_start`.
+    """
+    raise NotImplementedError  # the linker binds calls to the generated function
+
+
+def contact_jacobian(
+    x: float, y: float, z: float, depth: float,
+    h: float, hx: float, hy: float, hxx: float, hxy: float, hyy: float,
+    dx: float, dy: float, sxx: float, sxy: float, syy: float, law: object,
+) -> tuple[*Vector3, *Matrix3Rows]:  # fmt: skip
+    """Return force [N] and Jacobian [N/m], row by row, at a given contact of a probe."""
+    raise NotImplementedError  # the linker binds calls to the generated function
+
 
 # Parameters that every kernel receives, before those of the law.
 SHARED_PARAMETERS = ("k", "h_mid", "h_half", "clamp_depth", "floor")
@@ -31,7 +91,7 @@ class LawCode:
 
     Attributes:
         law: the law.
-        source: its kernels; see :func:`asperity.derive.python_source.law_source`.
+        source: its kernels; see :func:`asperity.derive.generate.law_source`.
         clamp: the depth clamp.
     """
 

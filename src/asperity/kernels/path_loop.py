@@ -2,8 +2,8 @@
 
 from asperity.contacts.warm_start import ERROR_BOUND, EVALUATIONS
 from asperity.core.compiled import FloatArray, Kernels
-from asperity.kernels.law_interface import probe_tick
 from asperity.kernels.loop_functions import store_force
+from asperity.kernels.probe_functions import probe_tick
 
 KERNELS = Kernels(loops=("path_batch",))
 

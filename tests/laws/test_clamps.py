@@ -8,8 +8,17 @@ import numpy as np
 import pytest
 
 import asperity as asp
-from asperity.clamps import BACKED, CLAMPS, LATERAL, NONE, WHOLE, Clamp, find_clamp, register_clamp
 from asperity.core.errors import LawError, ParameterError
+from asperity.laws.clamps import (
+    BACKED,
+    CLAMPS,
+    LATERAL,
+    NONE,
+    WHOLE,
+    Clamp,
+    find_clamp,
+    register_clamp,
+)
 
 UPWARD = Clamp("upward", "the depth of the vertical force is held at max_depth", (2,))
 WAVE = asp.Sinusoid(0.2e-3, 1e-3, 0.4, (2.0, 1.0))

@@ -11,8 +11,8 @@ import pytest
 import sympy as sp
 
 from asperity.contacts.symbols import ARGUMENT_ORDER
-from asperity.derive.jacobian import derive, expand_definitions
-from asperity.derive.python_source import law_source
+from asperity.derive.derivatives import derive, expand_definitions
+from asperity.derive.generate import law_source
 from asperity.laws import LAWS, Law
 
 VALUES = {

@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 
 from asperity.contacts.warm_start import ERROR_BOUND, EVALUATIONS
+from asperity.kernels import block_loops, contact_loop, sampler_loops, tick
 from asperity.kernels import loop_functions as storing
-from asperity.kernels import tick
-from asperity.kernels.loops import block_loops, contact_loop, sampler_loops
-from asperity.kernels.loops import path_loop as path_loops
-from asperity.kernels.loops import point_loops as probe_loops
-from asperity.kernels.loops import stateful_loops as anchored_loops
-from asperity.kernels.loops.block_loops import BLOCK
+from asperity.kernels import path_loop as path_loops
+from asperity.kernels import point_loops as probe_loops
+from asperity.kernels import stateful_loops as anchored_loops
+from asperity.kernels.block_loops import BLOCK
 
 COUNT = 2 * BLOCK + 3
 RNG = np.random.default_rng(12)

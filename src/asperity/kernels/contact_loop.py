@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.core.compiled import FloatArray, Kernels
-from asperity.kernels.law_interface import contact_jacobian
 from asperity.kernels.loop_functions import sliding_derivative, store_jacobian
+from asperity.kernels.probe_functions import contact_jacobian
 
 KERNELS = Kernels(loops=("contact_batch",))
 

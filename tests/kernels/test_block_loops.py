@@ -12,8 +12,8 @@ from llvmlite import binding  # type: ignore[import-untyped]  # it has no types
 from asperity import HeightMap, Sinusoid, Surface
 from asperity.contacts.warm_start import new_warm_start
 from asperity.core.checks import FloatArray
-from asperity.kernels.loops import block_loops
-from asperity.kernels.loops.block_loops import BLOCK
+from asperity.kernels import block_loops
+from asperity.kernels.block_loops import BLOCK
 from asperity.laws import LAWS
 from asperity.reference import exact_force
 from asperity.textures.spline import heightmap_block_sampler as heightmap_block

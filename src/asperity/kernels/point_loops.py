@@ -1,8 +1,8 @@
 """Loops over probe points of laws without state."""
 
 from asperity.core.compiled import FloatArray, Kernels
-from asperity.kernels.law_interface import probe_force, probe_jacobian
 from asperity.kernels.loop_functions import load_point, store_force, store_jacobian
+from asperity.kernels.probe_functions import probe_force, probe_jacobian
 
 KERNELS = Kernels(loops=("force_batch", "jacobian_batch"))
 

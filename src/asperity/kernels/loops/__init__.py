@@ -1,1 +1,0 @@
-"""Compiled loops over points, paths and samples."""
