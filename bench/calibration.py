@@ -25,7 +25,7 @@ from asperity.servo.calibration.calibrator import (
     Calibration,
     Calibrator,
 )
-from asperity.servo.calibration.test_rig import UnclockedRig
+from asperity.servo.calibration.excitation import UnclockedRig
 from asperity.servo.drivers.simulated import simulated_driver
 from asperity.servo.safety import Safety
 from asperity.simulation import Cartesian, Servo, SpringHand, Stationary

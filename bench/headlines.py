@@ -26,7 +26,7 @@ from asperity.scene import load_scene
 from asperity.scene.scene_defaults import make_servo
 from asperity.simulation import Cartesian, Servo, SpringHand, Stationary
 from asperity.simulation.batch import BatchSimulation
-from asperity.simulation.limit_cycles.onset import run_starts, start_offsets
+from asperity.simulation.onset import run_starts, start_offsets
 from asperity.surface import Surface
 from bench.margins import HANDS, press_with
 

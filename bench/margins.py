@@ -32,7 +32,7 @@ from asperity.scene.sweeps import map_threads
 from asperity.simulation import Cartesian, Servo, SpringHand, Stationary
 from asperity.simulation.batch import BatchSimulation, SegmentStatistics, StopRule, Trajectory
 from asperity.simulation.kernels import batch_loop
-from asperity.simulation.limit_cycles.onset_search import limit_cycle_rule
+from asperity.simulation.onset_search import limit_cycle_rule
 from asperity.surface import Surface
 from asperity.textures import Fourier, Sinusoid
 from asperity.textures.texture import Texture

@@ -180,8 +180,8 @@ ROOMS = {
         ("simulation",),
         (
             "tests/simulation/kernels/test_simulation_loop_by_definition.py",
-            "tests/simulation/limit_cycles/test_prediction.py",
-            "tests/simulation/limit_cycles/test_onset_rules.py",
+            "tests/simulation/test_prediction.py",
+            "tests/simulation/test_onset_rules.py",
             "tests/simulation/kernels/test_bodies_by_definition.py",
             "tests/simulation/test_hands.py",
             "tests/simulation/test_discretization.py",

@@ -28,8 +28,7 @@ from asperity.servo.driver_loop import (
 )
 from asperity.servo.drivers.library import LibraryDriver
 from asperity.servo.drivers.simulated import simulated_driver
-from asperity.servo.fault import EndReason
-from asperity.servo.loop_memory import LoopMemory, LoopStatistics
+from asperity.servo.loop_memory import EndReason, LoopMemory, LoopStatistics
 from asperity.servo.process import ServoProcess
 from asperity.servo.safety import Safety
 from asperity.simulation import Cartesian, Servo, SpringHand, Stationary

@@ -26,8 +26,7 @@ from asperity.core.errors import AsperityError
 from asperity.loop.shared_trace import COLUMNS
 from asperity.recording.recording import Recording, open_recording
 from asperity.servo.driver_loop import DriverLoop, build_program, system_clock
-from asperity.servo.fault import EndReason
-from asperity.servo.loop_memory import LoopMemory
+from asperity.servo.loop_memory import EndReason, LoopMemory
 from asperity.servo.process import LoopRecorder, ServoProcess
 from asperity.servo.safety import Safety
 from asperity.simulation import Servo

@@ -14,7 +14,7 @@ from tests.cli.conftest import Call
 import asperity as asp
 from asperity.cli import simulation_commands
 from asperity.sweeps.case_runs import RUN_KINDS
-from asperity.sweeps.result_store import CASES_FILE
+from asperity.sweeps.sweep_result import CASES_FILE
 
 COMMAND = "sweep"
 ROOT = Path(__file__).parents[2]

@@ -10,7 +10,7 @@ import pytest
 from asperity.core.errors import ParameterError
 from asperity.lab.scene_state import DEFAULT_SURFACE, SceneState, make_scene_state
 from asperity.scene import load_scene
-from asperity.scene.scene_template import scene_template
+from asperity.scene.scene_keys import scene_template
 from asperity.textures import Sinusoid
 
 

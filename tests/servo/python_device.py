@@ -11,11 +11,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from asperity.loop.clock import Clock
+from asperity.loop.guards import Clock
 from asperity.servo.driver_loop import LoopProgram, build_program, function_address
+from asperity.servo.drivers import library as by_address
 from asperity.servo.drivers.driver import Driver
-from asperity.servo.kernels import library_device as by_address
-from asperity.servo.kernels.library_device import LibraryDevice
+from asperity.servo.drivers.library import LibraryDevice
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
 

@@ -13,10 +13,10 @@ from bench.servo_ends import DEVICES, End, Run, try_end
 
 from asperity.core.errors import ParameterError
 from asperity.devices import load_device
-from asperity.servo.device_lock import lock_device
 from asperity.servo.drivers.force_dimension import ForceDimensionDriver
 from asperity.servo.drivers.library import LibraryDriver
 from asperity.servo.drivers.simulated import ReplayDriver
+from asperity.servo.loop_process import lock_device
 from asperity.servo.safety import Safety, check_passivity_damping
 from asperity.simulation import Servo
 
@@ -96,7 +96,7 @@ import sys, time
 from multiprocessing import get_context
 from pathlib import Path
 
-from asperity.servo import driver_loop
+from asperity.servo import driver_loop, loop_process
 
 
 class Memory:
@@ -106,7 +106,7 @@ class Memory:
 
 def loop():
     driver_loop.end_with_parent = lambda release: None  # the pipe, which closes later
-    driver_loop._leave_to_supervisor(Memory())
+    loop_process._leave_to_supervisor(Memory())
     time.sleep(0.3)
     print("watching" if not Path(sys.argv[1]).exists() else "stopped at once", flush=True)
     time.sleep(20.0)

@@ -12,16 +12,18 @@ from tests.servo.python_device import SURFACE
 from asperity.core.checks import FloatArray
 from asperity.loop.shared_trace import COLUMNS
 from asperity.servo.driver_loop import DriverLoop, build_program, no_clock
-from asperity.servo.drivers.pointer import PointerDriver, PointerHand, pointer_driver
-from asperity.servo.kernels import pointer_anchor
-from asperity.servo.kernels.pointer_anchor import (
+from asperity.servo.drivers import pointer as pointer_driver_module
+from asperity.servo.drivers.pointer import (
     FOLLOWER_ROW,
     MAX_LAG,
     MAX_POLLS,
     NEXT_SAMPLE,
     SAMPLE_COUNT,
     STATE_ROW,
+    PointerDriver,
+    PointerHand,
     anchor_segment,
+    pointer_driver,
 )
 from asperity.servo.loop_memory import LoopMemory
 from asperity.servo.safety import Safety
@@ -76,7 +78,7 @@ def test_a_following_anchor_repeats_waits_and_leaves_out(
     pointer: PointerHand, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     waits: list[int] = []
-    monkeypatch.setattr(pointer_anchor, "call_address", lambda *_: waits.append(1))
+    monkeypatch.setattr(pointer_driver_module, "call_address", lambda *_: waits.append(1))
     leading, following = driver(pointer).open(), driver(pointer, follows=True).open()
     pointer.request_motion((2e-3, -1e-3, 0.0))
 

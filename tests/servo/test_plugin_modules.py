@@ -28,7 +28,7 @@ class Thing:
 CHILD = """
 import pickle
 import sys
-from asperity.servo.driver_loop import unpickle
+from asperity.servo.loop_process import unpickle
 before = list(sys.path)
 thing = unpickle(*pickle.load(sys.stdin.buffer))
 print(thing.times(), sys.path == before)

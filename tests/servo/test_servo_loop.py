@@ -17,8 +17,7 @@ from tests.servo.python_device import SURFACE, PythonClock, PythonDevice, progra
 from asperity.contacts.warm_start import TRUNCATED_TICKS
 from asperity.servo.driver_loop import DriverLoop, build_program, no_clock
 from asperity.servo.drivers.simulated import simulated_driver
-from asperity.servo.fault import EndReason
-from asperity.servo.loop_memory import LoopMemory, LoopStatistics
+from asperity.servo.loop_memory import EndReason, LoopMemory, LoopStatistics
 from asperity.servo.safety import Safety
 from asperity.simulation import (
     BandHand,

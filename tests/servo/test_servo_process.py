@@ -16,7 +16,7 @@ from asperity.devices import load_device
 from asperity.loop.shared_trace import COLUMNS
 from asperity.servo import driver_loop
 from asperity.servo.drivers.simulated import simulated_driver
-from asperity.servo.fault import FAULT_SAMPLES, DeviceFault, EndReason
+from asperity.servo.loop_memory import FAULT_SAMPLES, DeviceFault, EndReason
 from asperity.servo.process import PrestartedProcess, ServoProcess
 from asperity.servo.safety import Safety
 from asperity.simulation import Cartesian, Servo, SpringHand, Stationary

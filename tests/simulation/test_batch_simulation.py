@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.simulation.limit_cycles import limit_cycle_definition as definition
+from tests.simulation import limit_cycle_definition as definition
 
 from asperity.core.errors import ParameterError
 from asperity.simulation import (
@@ -23,7 +23,7 @@ from asperity.simulation import (
 )
 from asperity.simulation.batch import BatchSimulation, SegmentStatistics, StopRule, Trajectory
 from asperity.simulation.kernels.body_interface import LANES
-from asperity.simulation.limit_cycles.onset_search import limit_cycle_rule
+from asperity.simulation.onset_search import limit_cycle_rule
 from asperity.simulation.trace import Run, StopReason
 from asperity.surface import Surface
 from asperity.textures import Sinusoid

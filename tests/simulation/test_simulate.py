@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.helpers.allocations import traced_peak
-from tests.simulation.limit_cycles.limit_cycle_definition import is_cycling, velocity_spread
+from tests.simulation.limit_cycle_definition import is_cycling, velocity_spread
 
 from asperity.core.errors import ParameterError
 from asperity.recording.recording import open_recording
@@ -33,7 +33,7 @@ from asperity.simulation import (
     simulate,
     simulate_many,
 )
-from asperity.simulation.limit_cycles.onset_search import felt_speed
+from asperity.simulation.onset_search import felt_speed
 from asperity.simulation.trace import COLUMNS, DecimatedTrace
 from asperity.surface import Surface
 from asperity.textures.kinds.sinusoid import Sinusoid

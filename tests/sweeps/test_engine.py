@@ -22,9 +22,9 @@ from asperity.core.errors import ParameterError
 from asperity.rendering import rendered_surface
 from asperity.sweeps.case_runs import compute_cases
 from asperity.sweeps.engine import LOST, Place, local_place, run_cases
-from asperity.sweeps.result_store import CASES_FILE, ResultStore
 from asperity.sweeps.run_sweep import estimate_case_time, missing_cases, open_store, run_plan
 from asperity.sweeps.sweep_plan import SweepPlan
+from asperity.sweeps.sweep_result import CASES_FILE, ResultStore
 
 MakePlan = Callable[..., SweepPlan]
 CHILD = Path(__file__).with_name("sweep_child.py")

@@ -32,8 +32,7 @@ if TYPE_CHECKING:
     from asperity.lab.scene_state import SceneState
     from asperity.lab.session import Handle
     from asperity.scene.setup import Setup
-    from asperity.servo.fault import EndReason
-    from asperity.servo.loop_memory import LoopMemory
+    from asperity.servo.loop_memory import EndReason, LoopMemory
     from asperity.servo.process import PrestartedProcess, ServoProcess
 
 
@@ -191,7 +190,7 @@ def watch_loop(loop: ServoProcess, signals: list[int], write_rows: Callable[[], 
         DeviceFault: for a fault.
     """
     from asperity.scene.device_run import POLL_INTERVAL
-    from asperity.servo.fault import EndReason
+    from asperity.servo.loop_memory import EndReason
 
     for note in loop.notes:
         print_message(note)

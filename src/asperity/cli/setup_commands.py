@@ -23,7 +23,7 @@ from asperity.core.errors import AsperityError, ParameterError, escape_unprintab
 if TYPE_CHECKING:
     from asperity.devices import Device
     from asperity.laws import Law
-    from asperity.servo.calibration.test_rig import CalibrationRig
+    from asperity.servo.calibration.excitation import CalibrationRig
     from asperity.simulation.servo import Servo
     from asperity.textures import Texture
 
@@ -36,7 +36,7 @@ def init_command(scene: str, *, force: bool) -> None:
 
     It can be simulated as it is; all other settings are comments.
     """
-    from asperity.scene.scene_template import scene_template
+    from asperity.scene.scene_keys import scene_template
 
     text = scene_template(Path(scene).name)
     output.write_template("scene", scene, text, "asperity simulate {}", force=force)
@@ -265,7 +265,7 @@ def calibration_rig(
         signals: received signals, which stop the calibration.
         yes: whether to start without confirmation.
     """
-    from asperity.servo.calibration.test_rig import ClockedRig, UnclockedRig
+    from asperity.servo.calibration.excitation import ClockedRig, UnclockedRig
     from asperity.servo.drivers.driver_registry import hardware_driver
     from asperity.servo.safety import Safety
     from asperity.simulation.servo import Servo

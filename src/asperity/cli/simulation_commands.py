@@ -202,8 +202,7 @@ def sweep_command(
     SCENE is a scene file (TOML), a texture with its arguments or a measured file. With --output,
     the same command goes on where it was stopped.
     """
-    from asperity.sweeps.cluster import cluster_place
-    from asperity.sweeps.engine import local_place
+    from asperity.sweeps.engine import cluster_place, local_place
     from asperity.sweeps.run_sweep import run_plan
     from asperity.sweeps.sweep_plan import make_plan
 

@@ -20,8 +20,7 @@ from asperity.lab.scene_state import SCENE_KEY, SavedScenes, SceneState
 from asperity.scene.setup import Setup
 from asperity.servo.drivers.driver import Driver
 from asperity.servo.drivers.pointer import PointerHand, pointer_driver
-from asperity.servo.fault import DeviceFault, EndReason
-from asperity.servo.loop_memory import LoopMemory
+from asperity.servo.loop_memory import DeviceFault, EndReason, LoopMemory
 from asperity.servo.process import PrestartedProcess, ServoProcess
 from asperity.surface import Surface
 

@@ -35,13 +35,7 @@ from asperity.simulation import (
 )
 from asperity.simulation.batch import BatchSimulation, StopRule
 from asperity.simulation.hands import Hand
-from asperity.simulation.limit_cycles.onset import (
-    Onset,
-    Prediction,
-    predict,
-    run_starts,
-    start_offsets,
-)
+from asperity.simulation.onset import Onset, Prediction, predict, run_starts, start_offsets
 from asperity.surface import Surface
 from asperity.textures import named_surface
 from asperity.textures.kinds.sinusoid import Sinusoid
@@ -148,7 +142,7 @@ class CycleCount(Serializable):
         delay: loop delay [samples].
         starts: number of starts.
         cycles: number of starts that end in a steady cycle, see
-            :mod:`asperity.simulation.limit_cycles.onset`.
+            :mod:`asperity.simulation.onset`.
         slow: number of starts that still moved after 0.5 s and came to rest by 2 or 8 s.
         time: time of the first start's trace [s], shape (n,).
         x: position of the handle [m], shape (n,).

@@ -11,7 +11,7 @@ from asperity.recording.replay import Replay
 from asperity.report.document.page import Page, Row, Table, notebook_page
 from asperity.report.pages import run_report, sweep_report
 from asperity.report.pages.sweep_report import sweep_page
-from asperity.scene.sweep_results import OnsetSweep, StrokeSweep
+from asperity.scene.sweeps import OnsetSweep, StrokeSweep
 from asperity.simulation import Run
 from asperity.sweeps.sweep_result import SweepResult
 

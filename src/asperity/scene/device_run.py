@@ -21,8 +21,7 @@ from asperity.scene.scene_file import Scene
 from asperity.scene.sections import surface_keywords
 from asperity.scene.setup import SIMULATED_DRIVER, Setup
 from asperity.servo.drivers.simulated import simulated_driver
-from asperity.servo.fault import EndReason
-from asperity.servo.loop_memory import LoopStatistics
+from asperity.servo.loop_memory import EndReason, LoopStatistics
 from asperity.servo.process import LoopRecorder, PrestartedProcess, ServoProcess
 from asperity.servo.safety import excess_stiffness_reason
 from asperity.textures import Texture

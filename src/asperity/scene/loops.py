@@ -21,17 +21,18 @@ from asperity.laws import (
 from asperity.scene.scene_file import Scene, load_scene
 from asperity.scene.sections import SURFACE_FIELDS
 from asperity.scene.setup import Setup, make_setup
-from asperity.scene.sweep_results import OnsetSweep, StrokeSweep
 from asperity.scene.sweeps import (
     DEFAULT_DELAYS,
     DEFAULT_SPEEDS,
     DEFAULT_STARTS,
     DEFAULT_TOLERANCE,
+    OnsetSweep,
+    StrokeSweep,
     sweep_onsets,
     sweep_strokes,
 )
 from asperity.simulation import Run
-from asperity.simulation.limit_cycles.onset import MIN_STIFFNESS
+from asperity.simulation.onset import MIN_STIFFNESS
 
 SceneLike = Scene | str | os.PathLike[str]
 Laws = str | Sequence[str | Law]

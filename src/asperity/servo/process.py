@@ -25,10 +25,16 @@ from asperity.devices import Device
 from asperity.loop.shared_trace import COLUMNS
 from asperity.recording.recorded_field import field_attachments, field_metadata
 from asperity.recording.writer import RecordingWriter
-from asperity.servo import driver_loop
+from asperity.servo import driver_loop, loop_process
 from asperity.servo.drivers.driver import Driver
-from asperity.servo.fault import FAULT_DESCRIPTIONS, FAULT_SAMPLES, DeviceFault, EndReason
-from asperity.servo.loop_memory import LoopMemory, LoopStatistics
+from asperity.servo.loop_memory import (
+    FAULT_DESCRIPTIONS,
+    FAULT_SAMPLES,
+    DeviceFault,
+    EndReason,
+    LoopMemory,
+    LoopStatistics,
+)
 from asperity.servo.safety import Safety, check_passivity_damping
 from asperity.simulation.servo import Servo
 from asperity.surface import Surface
@@ -54,7 +60,7 @@ class PrestartedProcess:
         self.memory = memory or LoopMemory()
         self.connection, theirs = context.Pipe()
         self.process = context.Process(
-            target=driver_loop.run_loop_process, args=(theirs, self.memory), daemon=True
+            target=loop_process.run_loop_process, args=(theirs, self.memory), daemon=True
         )
         self.process.start()
         theirs.close()
@@ -124,7 +130,7 @@ class ServoProcess:
             if isinstance(surface, driver_loop.LoopProgram)
             else driver_loop.build_program(surface, driver)
         )
-        self._job = driver_loop.LoopJob(program, driver, servo, self._safety, reach, last)
+        self._job = loop_process.LoopJob(program, driver, servo, self._safety, reach, last)
         self._prestarted = prestarted
         self.memory = LoopMemory() if prestarted is None else prestarted.memory
         self.notes: tuple[str, ...] = ()
@@ -254,7 +260,7 @@ class ServoProcess:
         self._heartbeat_stop.set()
         assert self._prestarted is not None
         waits = self._end_reason in {EndReason.RUNNING, EndReason.UNRESPONSIVE}
-        self._prestarted.terminate(driver_loop.MAX_CALL_TIME if waits else _EXIT_TIMEOUT)
+        self._prestarted.terminate(loop_process.MAX_CALL_TIME if waits else _EXIT_TIMEOUT)
         if self._end_reason is EndReason.DIED and not self._was_released:
             self._was_released = True
             with suppress(AsperityError, OSError):
@@ -324,7 +330,7 @@ def require_max_force(driver: Driver, servo: Servo) -> None:
         raise ParameterError("max_force", words)
 
 
-def _pickle(value: object) -> tuple[driver_loop.ModuleFiles, bytes]:
+def _pickle(value: object) -> tuple[loop_process.ModuleFiles, bytes]:
     """Return a pickled value, and the files of the plugins that it needs."""
     try:
         data = pickle.dumps(value)

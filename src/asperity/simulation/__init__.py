@@ -1,9 +1,17 @@
 """Simulation of texture, device and hand in a closed loop, with an exact energy ledger."""
 
 from asperity.simulation.discretization import Resonance
-from asperity.simulation.hands import BandHand, Hand, PrescribedHand, SpringHand
-from asperity.simulation.limit_cycles.onset import Onset, find_onset
-from asperity.simulation.motions import Motion, Stationary, Strokes, Waypoints
+from asperity.simulation.hands import (
+    BandHand,
+    Hand,
+    Motion,
+    PrescribedHand,
+    SpringHand,
+    Stationary,
+    Strokes,
+    Waypoints,
+)
+from asperity.simulation.onset import Onset, find_onset
 from asperity.simulation.pantograph import LinkMasses, Pantograph
 from asperity.simulation.plants import Cartesian, Plant
 from asperity.simulation.scan import Stroke, scan_strokes

@@ -20,11 +20,10 @@ from asperity.core.errors import ParameterError
 from asperity.kernels import tick
 from asperity.kernels.fuse import fuse_on_texture
 from asperity.simulation import simulate
-from asperity.simulation.hands import Hand
+from asperity.simulation.hands import Hand, Motion
 from asperity.simulation.kernels import batch_loop, simulated_device
 from asperity.simulation.kernels.body_interface import LANES, SAMPLES, STOP
-from asperity.simulation.kernels.energy_ledger import FRICTION, LEDGER_SIZE, LOST, SUPPLIED
-from asperity.simulation.motions import Motion
+from asperity.simulation.kernels.body_parts import FRICTION, LEDGER_SIZE, LOST, SUPPLIED
 from asperity.simulation.plants import Plant, sampled_plant
 from asperity.simulation.servo import Servo
 from asperity.simulation.trace import StopReason

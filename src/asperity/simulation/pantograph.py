@@ -14,7 +14,7 @@ from asperity.core.checks import FloatArray, check_array
 from asperity.core.errors import ParameterError
 from asperity.devices.five_bar import FiveBar, handle_damping, joint_angles
 from asperity.simulation.hands import Hand, nonnegative
-from asperity.simulation.kernels import energy_ledger, hand_force
+from asperity.simulation.kernels import body_parts
 from asperity.simulation.kernels import pantograph_dynamics as pantograph
 from asperity.simulation.kernels.pantograph_dynamics import LinkageRecord, PantographRecord
 from asperity.simulation.plants import (
@@ -137,7 +137,7 @@ class Pantograph(Plant):
             FRICTION_SUBSTEPS if self.friction > 0.0 else 1, float(period), _MAX_STEP_FRACTION,
             bool(self.inside_only), MIN_ELBOW_SINE,
         )  # fmt: skip
-        return SampledPlant((pantograph, hand_force, energy_ledger), record, 6)
+        return SampledPlant((pantograph, body_parts), record, 6)
 
     def workspace_violation(self, position: FloatArray) -> str:
         """Return why a position [m] is outside the workspace; empty if it is inside."""

@@ -16,16 +16,14 @@ from numpy.typing import ArrayLike
 from asperity.core.checks import FloatArray, check_array
 from asperity.core.errors import ParameterError
 from asperity.simulation.discretization import Resonance, integrate, linear_body
-from asperity.simulation.hands import Hand, SpringHand, Triple, nonnegative, per_axis
+from asperity.simulation.hands import Hand, NamedPart, SpringHand, Triple, nonnegative, per_axis
 from asperity.simulation.kernels import (
     axis_body,
+    body_parts,
     coupled_body,
     elastic_band,
-    energy_ledger,
-    hand_force,
     prescribed_motion,
 )
-from asperity.simulation.motions import NamedPart
 from asperity.simulation.servo import Servo
 
 # Parts of a sample over which dry friction is held constant.
@@ -129,7 +127,7 @@ def sampled_plant(plant: Plant, hand: Hand, servo: Servo) -> SampledPlant:
     """
     if hand.is_prescribed:
         record = prescribed_motion.PrescribedMotionRecord(float(servo.period))
-        return SampledPlant((prescribed_motion, energy_ledger), record, 6)
+        return SampledPlant((prescribed_motion, body_parts), record, 6)
     try:
         with np.errstate(all="ignore"):  # an overflow is refused below
             sampled = plant.sample(hand, servo.period)
@@ -285,7 +283,7 @@ def _axis_plant(plant: Cartesian, hand: SpringHand, period: float) -> SampledPla
     table = np.hstack([changes[:, :2].reshape(3, -1), loss, np.array(numbers).T])
     stops = np.diag(span / changes[:, 1, 2]) if plant.friction > 0.0 else np.zeros((3, 3))
     record = axis_body.AxisBodyRecord(table, plant.friction, stops, parts, span)
-    return SampledPlant((axis_body, coupled_body, energy_ledger), record, 6)
+    return SampledPlant((axis_body, body_parts), record, 6)
 
 
 def coupled_plant(plant: Cartesian, hand: SpringHand, period: float) -> SampledPlant:
@@ -301,7 +299,7 @@ def coupled_plant(plant: Cartesian, hand: SpringHand, period: float) -> SampledP
         stops, parts, span,
     )  # fmt: skip
     order = 6 if plant.resonance is None else 12
-    return SampledPlant((coupled_body, energy_ledger), record, order)
+    return SampledPlant((coupled_body, body_parts), record, order)
 
 
 def _substeps(plant: Cartesian) -> int:
@@ -317,4 +315,4 @@ def _elastic_band_plant(plant: Cartesian, hand: Hand, period: float) -> SampledP
     record = elastic_band.ElasticBandRecord(
         np.diag(plant.mass), plant.damping, hand.record(), plant.friction, parts, period / parts
     )
-    return SampledPlant((elastic_band, hand_force, coupled_body, energy_ledger), record, 6)
+    return SampledPlant((elastic_band, body_parts), record, 6)

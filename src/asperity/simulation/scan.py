@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike
 from asperity.core.checks import FloatArray, check_positive
 from asperity.core.errors import ParameterError
 from asperity.core.files import attributes_to_dict
-from asperity.simulation.hands import Hand
-from asperity.simulation.motions import Strokes
+from asperity.simulation.hands import Hand, Strokes
 from asperity.simulation.plants import Plant
 from asperity.simulation.servo import Servo
 from asperity.simulation.simulate import simulate

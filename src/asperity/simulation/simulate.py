@@ -25,13 +25,12 @@ from asperity.loop import no_guards, servo_loop
 from asperity.loop.interface import LoopState
 from asperity.recording.recorded_field import field_attachments, field_metadata
 from asperity.recording.writer import RecordingWriter
-from asperity.simulation.hands import Hand
+from asperity.simulation.hands import Hand, Motion
 from asperity.simulation.kernels import energy_trace, simulated_device
 from asperity.simulation.kernels.body_interface import LEFT_WORKSPACE
-from asperity.simulation.kernels.energy_ledger import LEDGER_SIZE
+from asperity.simulation.kernels.body_parts import LEDGER_SIZE
 from asperity.simulation.kernels.energy_trace import TraceRows
 from asperity.simulation.kernels.simulated_device import SimulatedDevice
-from asperity.simulation.motions import Motion
 from asperity.simulation.plants import Plant, SampledPlant, sampled_plant
 from asperity.simulation.servo import Servo
 from asperity.simulation.trace import (
@@ -76,7 +75,7 @@ class Simulation:
 
     Attributes:
         memory: warm start of that search, see :mod:`asperity.contacts.warm_start`.
-        ledger_sums: sums of the ledger since the start, see ``kernels/energy_ledger.py``.
+        ledger_sums: sums of the ledger since the start, see ``kernels/body_parts.py``.
         samples: samples done.
 
     Raises:

@@ -190,7 +190,7 @@ class Ledger:
 
     @classmethod
     def from_sums(cls, sums: FloatArray, stored_before: float, stored_after: float) -> Ledger:
-        """Return the ledger of the sums of a run; see ``kernels/energy_ledger.py``."""
+        """Return the ledger of the sums of a run; see ``kernels/body_parts.py``."""
         x, y, z, px, py, pz, *others = map(float, sums)
         return cls((x, y, z), (px, py, pz), *(*others, stored_before, stored_after))
 

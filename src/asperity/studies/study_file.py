@@ -13,7 +13,7 @@ from asperity.scene.scene_file import SECTIONS, read_scene, read_sections
 from asperity.scene.scene_keys import find_varied_arguments
 from asperity.studies.design import StudyDesign
 from asperity.studies.methods import EXCLUSIONS, METHODS
-from asperity.sweeps.variations import parse_values
+from asperity.sweeps.sweep_plan import parse_values
 
 STUDY_ARGUMENTS = read_arguments(Path(__file__).with_suffix(".toml"))
 """Arguments of the section [study] by name."""

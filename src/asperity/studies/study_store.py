@@ -22,7 +22,7 @@ from asperity.recording.replay import file_digest
 from asperity.studies.design import Method, Presentation, TrialRecord
 from asperity.studies.methods import METHODS
 from asperity.studies.study_file import Study, build_study
-from asperity.sweeps.result_store import check_plan, lock_folder
+from asperity.sweeps.sweep_result import check_plan, lock_folder
 
 STUDY_FILE = "study.json"
 ANSWERS_FILE = "answers.jsonl"

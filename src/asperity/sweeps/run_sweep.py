@@ -13,11 +13,9 @@ from asperity.core.arguments import check_integer
 from asperity.core.errors import ParameterError
 from asperity.core.processes import available_cores
 from asperity.sweeps.case_runs import Case, Outcome, compute_cases
-from asperity.sweeps.cluster import cluster_place
-from asperity.sweeps.engine import Place, local_place, run_cases
-from asperity.sweeps.result_store import ResultStore
+from asperity.sweeps.engine import Place, cluster_place, local_place, run_cases
 from asperity.sweeps.sweep_plan import SweepPlan, make_plan
-from asperity.sweeps.sweep_result import SweepResult
+from asperity.sweeps.sweep_result import ResultStore, SweepResult
 
 Progress = Callable[[float], object]
 
@@ -54,7 +52,7 @@ def sweep(
         processes: number of worker processes; 1 for none; default: one per core. A script that
             starts some needs the usual ``if __name__ == "__main__":``.
         scheduler: address of a scheduler of Dask, whose workers compute instead; see
-            :func:`~asperity.sweeps.cluster.cluster_place`.
+            :func:`~asperity.sweeps.engine.cluster_place`.
         progress: called with the completed fraction of the cases that were left.
         **options: further arguments of :func:`asperity.compare`, :func:`asperity.limits`,
             :func:`asperity.onset` or :func:`asperity.scan`.

@@ -1,24 +1,31 @@
-"""The plan of a sweep: its scene, the values of its cases, and what is computed for each."""
+"""The plan of a sweep: its scene, the values of its cases, and what is computed for each.
+
+The values of a key are listed, on a linear or logarithmic grid, or the points of a design.
+"""
 
 from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from asperity.core.arguments import Argument
 from asperity.core.errors import ParameterError
 from asperity.core.files import package_digest
+from asperity.core.units import parse_quantity
 from asperity.core.version import __version__
 from asperity.devices import load_device
 from asperity.laws import find_law, find_laws
 from asperity.recording.replay import file_digest
 from asperity.scene.scene_file import DEVICE_ID, read_scene
 from asperity.scene.scene_keys import find_varied_arguments
-from asperity.sweeps import variations
+from asperity.scene.sections import to_scene_values
 from asperity.sweeps.case_runs import LAW_KEY, CaseTemplate, find_run
 
 SCHEMA = 1
@@ -60,7 +67,7 @@ class SweepPlan:
         """Return the values of a case by column: SI numbers, or texts."""
         values = self.values(index)
         return {
-            self.column(key): variations.table_value(argument, values[key])
+            self.column(key): table_value(argument, values[key])
             for key, argument in self.arguments.items()
         }
 
@@ -135,23 +142,148 @@ def _parse_axes(
 ) -> tuple[dict[str, Argument], list[list[dict[str, Any]]]]:
     """Return the declarations of the varied keys, and the choices that are combined."""
     found = find_varied_arguments(sections, {key: text.split(",") for key, text in vary.items()})
-    ranges: dict[str, variations.Range] = {}
+    ranges: dict[str, Range] = {}
     axes: list[list[dict[str, Any]]] = []
     for key, text in vary.items():
         argument = found[key]
         name = found[key].name
-        if design and variations.is_range(argument, text):
-            ranges[name], _ = variations.parse_range(argument, text, in_design=True)
+        if design and is_range(argument, text):
+            ranges[name], _ = parse_range(argument, text, in_design=True)
             continue
-        values = variations.parse_values(argument, text)
+        values = parse_values(argument, text)
         for value in values:
             _CHECKS.get(name, str)(value)  # an unknown law or device
         axes.append([{name: _absolute(value)} for value in values])
     arguments = {argument.name: argument for argument in found.values()}
-    return arguments, [variations.design_points(design, ranges), *axes] if design else axes
+    return arguments, [design_points(design, ranges), *axes] if design else axes
 
 
 def _absolute(value: Any) -> Any:
     """Return a device file by its full path, since workers may run in other folders."""
     is_file = isinstance(value, str) and value.lower().endswith(".toml")
     return str(Path(value).resolve()) if is_file else value
+
+
+_NUMBER_FORMS = ("quantity", "integer", "pair", "axes")
+"""Forms of arguments of which a single number is a value."""
+_STEPS = re.compile(r"(\d*)\s*(log)?")
+Range = tuple[Argument, float, float, bool]
+"""Argument, first and last value [SI], and whether the steps are equal ratios."""
+
+
+def is_range(argument: Argument, text: str) -> bool:
+    """Return whether a text is a range of numbers, START:STOP."""
+    return argument.form in _NUMBER_FORMS and ":" in text
+
+
+def parse_values(argument: Argument, text: str) -> list[Any]:
+    """Return the values of a key as they are written in a scene.
+
+    Args:
+        argument: declaration, whose name is the key.
+        text: "0.5mm:4mm:40" (40 equal steps), "0.5mm:4mm:40log" (40 equal ratios), or values
+            separated by commas.
+
+    Raises:
+        ParameterError: for an empty or reversed range, or a value that cannot be used.
+
+    Example:
+        >>> parse_values(Argument("texture.period", "", "m"), "1mm:4mm:3log")
+        ['0.001 m', '0.002 m', '0.004 m']
+        >>> parse_values(Argument("device.id", "", form="text"), "touch,omega.3")
+        ['touch', 'omega.3']
+    """
+    if is_range(argument, text):
+        (_, low, high, is_logarithmic), steps = parse_range(argument, text)
+        numbers = (np.geomspace if is_logarithmic else np.linspace)(low, high, steps)
+        values = [scene_value(argument, number) for number in numbers.tolist()]
+    else:
+        parts = [argument.parse(part.strip()) for part in text.split(",") if part.strip()]
+        values = [_canonical(argument, part) for part in parts]
+    if not values or len(set(map(str, values))) < len(values):
+        words = "names a value twice" if values else "needs values: KEY=a,b,c"
+        raise ParameterError("vary", f"{argument.name} {words}", text)
+    return values
+
+
+def parse_range(argument: Argument, text: str, *, in_design: bool = False) -> tuple[Range, int]:
+    """Return a range and its number of values; in a design it has none.
+
+    Raises:
+        ParameterError: for an empty or reversed range, or a number that cannot be used.
+    """
+    start, stop, *rest = text.split(":")
+    match = _STEPS.fullmatch(":".join(rest).strip())
+    steps = int(match[1] or 0) if match else 0
+    if match is None or (match[1] if in_design else steps < 2):
+        usual = "START:STOP or START:STOP:log in a design" if in_design else "START:STOP:COUNT"
+        words = f"range of {argument.name} must be {usual}, with log for equal ratios"
+        raise ParameterError("vary", f"{words} and two values or more", text)
+    low, high = (parse_quantity(argument.name, end, argument.unit) for end in (start, stop))
+    if not low < high or (match[2] and low <= 0.0):
+        words = "positive for equal ratios" if low < high else "less than STOP: it is empty"
+        raise ParameterError("vary", f"range of {argument.name}: START must be {words}", text)
+    for number in (low, high):
+        scene_value(argument, number)
+    return (argument, low, high, bool(match[2])), steps
+
+
+def scene_value(argument: Argument, number: float) -> Any:
+    """Return an SI number as it is written in a scene, without the rounding of its computation.
+
+    Fourteen digits are the same on machines whose logarithms differ in the last one.
+
+    Raises:
+        ParameterError: for a number out of the bounds of the argument, or a part of a whole one.
+    """
+    return _canonical(argument, float(f"{number:.14g}"))
+
+
+def _canonical(argument: Argument, value: Any) -> Any:
+    """Return a value [SI] as it is written in a scene: one text for one number."""
+    return to_scene_values({argument.name: argument.validate(value)}, [argument])[argument.name]
+
+
+def table_value(argument: Argument, value: Any) -> Any:
+    """Return a value as written in a scene as an SI number, or as a text if it is none.
+
+    Example:
+        >>> table_value(Argument("texture.period", "", "m"), "0.5 mm")
+        0.0005
+    """
+    parsed = argument.parse(value)
+    if isinstance(parsed, (list, tuple)):
+        return "; ".join(str(part) for part in parsed)
+    return parsed
+
+
+def design_points(design: str, ranges: Mapping[str, Range]) -> list[dict[str, Any]]:
+    """Return the points of a design: values by key.
+
+    Args:
+        design: "sobol:64": that many points of Sobol's sequence, a power of two.
+        ranges: by key.
+
+    Raises:
+        ParameterError: for another design or number, or no range.
+    """
+    name, _, count = design.partition(":")
+    points = int(count) if name == "sobol" and count.isdecimal() and len(count) < 10 else 0
+    if points < 2 or points & (points - 1) or not ranges:
+        near = f"sobol:{2 ** min(20, max(1, points.bit_length()))}"
+        words = "needs a range: --vary KEY=START:STOP" if not ranges and points else (
+            f"must be sobol:N, N a power of two, such as {near}")  # fmt: skip
+        raise ParameterError("design", words, design)
+    from scipy.stats import qmc
+
+    fractions = qmc.Sobol(len(ranges), scramble=False).random_base2(points.bit_length() - 1)
+    columns = {
+        key: low * (high / low) ** part if is_logarithmic else low + (high - low) * part
+        for (key, (_, low, high, is_logarithmic)), part in zip(
+            ranges.items(), fractions.T, strict=True
+        )
+    }
+    return [
+        {key: scene_value(ranges[key][0], column[i]) for key, column in columns.items()}
+        for i in range(points)
+    ]

@@ -1,17 +1,30 @@
-"""The result of a sweep: its table, as rows, CSV, Parquet, a DataFrame or an xarray Dataset."""
+"""The result of a sweep: its folder, and its table as rows, CSV, Parquet, DataFrame or Dataset.
+
+The folder has one line per case, appended when the case is done. A process that is killed at any
+moment leaves whole lines, and at most one torn line at the end, which is removed when the folder is
+opened again.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import json
+import re
+import weakref
+from array import array
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
 from typing import Any
+
+from filelock import FileLock, Timeout
 
 from asperity.core.display import Reportable
 from asperity.core.errors import ParameterError
-from asperity.core.files import to_plain_data
-from asperity.sweeps.case_runs import RunKind, find_run
-from asperity.sweeps.result_store import ResultStore
+from asperity.core.files import append_bytes, json_text, open_input, to_plain_data, write_bytes
+from asperity.core.processes import defer_interrupt
+from asperity.sweeps.case_runs import Outcome, RunKind, find_run
 from asperity.sweeps.sweep_plan import SweepPlan
 from asperity.sweeps.table_files import UNIT, TableFiles
 
@@ -98,3 +111,137 @@ class SweepResult(Reportable, TableFiles):
             if match := UNIT.fullmatch(str(name)):
                 dataset[name].attrs["units"] = match[2]
         return dataset
+
+
+PLAN_FILE = "sweep.json"
+CASES_FILE = "cases.jsonl"
+_LOCK_FILE = ".lock"
+_MISSING = -1
+_LINE = re.compile(rb'\{"case": (\d+), .*\}\n')
+
+
+class ResultStore:
+    """Outcomes of cases on disk; no other process can use the folder until it is released.
+
+    Args:
+        folder: a new or empty folder, or that of the same sweep.
+        plan: plain data that identifies the sweep.
+        n_cases: number of cases.
+
+    Attributes:
+        path: the folder.
+        n_done: number of cases that are recorded.
+
+    Raises:
+        ParameterError: for a folder that cannot be used.
+    """
+
+    def __init__(self, folder: Path, plan: Mapping[str, Any], n_cases: int) -> None:
+        self.path = folder
+        self._offsets = array("q", [_MISSING]) * n_cases
+        with ExitStack() as stack:
+            stack.enter_context(lock_folder(folder))
+            check_plan(folder / PLAN_FILE, plan, "sweep")
+            self._stream = (folder / CASES_FILE).open("ab", buffering=0)
+            self._reader = (folder / CASES_FILE).open("rb")
+            weakref.finalize(self, self._stream.close)
+            weakref.finalize(self, self._reader.close)
+            self._end = self._find_cases()
+            # Lets other processes write; outcomes can still be read.
+            self.release = stack.pop_all().close
+        self.n_done = n_cases - self._offsets.count(_MISSING)
+
+    def _find_cases(self) -> int:
+        """Note where each case begins; return the end of the last whole line."""
+        end = 0
+        for line in self._reader:
+            match = _LINE.fullmatch(line)
+            if match is not None and int(match[1]) < len(self._offsets):
+                self._offsets[int(match[1])] = end
+            end += len(line) if line.endswith(b"\n") else 0
+        self._stream.truncate(end)
+        return end
+
+    def __contains__(self, index: int) -> bool:
+        return self._offsets[index] != _MISSING
+
+    def record(self, outcomes: Sequence[Outcome]) -> None:
+        """Append outcomes.
+
+        Raises:
+            ParameterError: if they cannot be written; what was recorded before stays.
+        """
+        lines = [_case_line(one) for one in outcomes]
+        with defer_interrupt():
+            append_bytes("output", self._stream, b"".join(lines))
+            for one, line in zip(outcomes, lines, strict=True):
+                self._offsets[one.index] = self._end
+                self._end += len(line)
+            self.n_done += len(lines)
+
+    def outcomes(self) -> Iterator[Outcome]:
+        """Yield the recorded outcomes in the order of their numbers."""
+        for index in filter(self.__contains__, range(len(self._offsets))):
+            self._reader.seek(self._offsets[index])
+            data = json.loads(self._reader.readline())
+            rows = [{name: _decode(v) for name, v in row.items()} for row in data["rows"]]
+            yield Outcome(index, rows, data["error"])
+
+
+def _case_line(outcome: Outcome) -> bytes:
+    data = {"case": outcome.index, "error": outcome.error, "rows": list(outcome.rows)}
+    return json.dumps(data, allow_nan=False, ensure_ascii=False).encode() + b"\n"
+
+
+def _decode(value: Any) -> Any:
+    """Return a number for which JSON has no token."""
+    return float(value) if value in ("inf", "-inf") else value
+
+
+@contextmanager
+def lock_folder(folder: Path) -> Iterator[None]:
+    """Make a folder, and lock it until the block ends.
+
+    Raises:
+        ParameterError: for a folder that another process has locked, and in place of an error of
+            the system or of damaged content in the block.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with FileLock(folder / _LOCK_FILE, timeout=0):
+            yield
+    except Timeout:
+        raise ParameterError("output", "is in use by another process", str(folder)) from None
+    except ParameterError:
+        raise
+    except (OSError, ValueError) as error:
+        words = f"must be a folder that can be written: {getattr(error, 'strerror', error)}"
+        raise ParameterError("output", words, str(folder)) from None
+
+
+def check_plan(path: Path, plan: Mapping[str, Any], kind: str) -> None:
+    """Check that a folder is empty or holds a plan, and write the plan into an empty one.
+
+    Args:
+        path: of the plan in its folder.
+        plan: plain data.
+        kind: of what is planned, for messages.
+
+    Raises:
+        ParameterError: for a folder that holds something else; others see :func:`lock_folder`.
+    """
+    folder = path.parent
+    text = json_text(plan)
+    if not path.exists():
+        if any(one.name != _LOCK_FILE for one in folder.iterdir()):
+            words = f"is neither empty nor the folder of a {kind}"
+            raise ParameterError("output", words, str(folder))
+        write_bytes("output", path, text.encode())
+        return
+    with open_input(path) as stream:
+        recorded = json.loads(stream.read())
+        given = json.loads(text)
+    differing = [name for name, value in given.items() if recorded.get(name) != value]
+    if differing:
+        words = f"holds another {kind} (other {', '.join(differing)}): choose another folder"
+        raise ParameterError("output", words, str(folder))

@@ -9,7 +9,7 @@ import asperity as asp
 from asperity.devices import parse_device
 from asperity.simulation import Cartesian, Servo, SpringHand, Stationary, simulate
 from asperity.simulation.batch import BatchSimulation
-from asperity.simulation.limit_cycles.onset import run_starts, start_offsets
+from asperity.simulation.onset import run_starts, start_offsets
 from asperity.simulation.trace import TailStatistics
 from asperity.surface import Surface
 

@@ -22,6 +22,17 @@ from asperity.servo.calibration.calibrator import (
     CalibrationError,
     Calibrator,
 )
+from asperity.servo.calibration.excitation import (
+    EXCITATION_COLUMN,
+    PUSHING,
+    REST,
+    WALL,
+    ClockedRig,
+    Excitation,
+    UnclockedRig,
+    excitation_renderer,
+    frame_axes,
+)
 from asperity.servo.calibration.identification import (
     AxisDynamics,
     DelayEstimate,
@@ -36,18 +47,10 @@ from asperity.servo.calibration.identification import (
     rest_noise,
 )
 from asperity.servo.calibration.measured_device import measured_device
-from asperity.servo.calibration.test_rig import (
-    EXCITATION_COLUMN,
-    ClockedRig,
-    UnclockedRig,
-    excitation_renderer,
-    frame_axes,
-)
 from asperity.servo.drivers.driver import AWAY, RIGHT, TOWARDS, UP, surface_frame
 from asperity.servo.drivers.driver_registry import DRIVER_KINDS, hardware_driver
 from asperity.servo.drivers.simulated import simulated_driver
-from asperity.servo.fault import DeviceFault
-from asperity.servo.kernels.excitation import PUSHING, REST, WALL, Excitation
+from asperity.servo.loop_memory import DeviceFault
 from asperity.servo.safety import Safety
 from asperity.simulation import Cartesian, Pantograph, Servo, SpringHand, Stationary
 

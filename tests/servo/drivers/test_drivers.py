@@ -14,7 +14,7 @@ from bench.fakes import compile_library
 from tests.servo.python_device import SURFACE
 
 from asperity.core.errors import ParameterError
-from asperity.loop.clock import Clock
+from asperity.loop.guards import Clock
 from asperity.recording.recording import open_recording
 from asperity.servo.driver_loop import DriverLoop, LoopProgram, build_program, no_clock
 from asperity.servo.drivers.driver import RIGHT, TOWARDS, UP, Driver, Frame, surface_frame
@@ -22,8 +22,7 @@ from asperity.servo.drivers.driver_registry import hardware_driver
 from asperity.servo.drivers.force_dimension import LIBRARY, ForceDimensionDriver
 from asperity.servo.drivers.library import LibraryDriver
 from asperity.servo.drivers.simulated import replay_driver
-from asperity.servo.fault import EndReason
-from asperity.servo.loop_memory import LoopMemory
+from asperity.servo.loop_memory import EndReason, LoopMemory
 from asperity.servo.safety import Safety
 from asperity.simulation import Cartesian, Servo, SpringHand, Stationary, simulate
 

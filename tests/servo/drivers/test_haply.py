@@ -19,8 +19,7 @@ from asperity.servo.driver_loop import system_clock
 from asperity.servo.drivers import threaded as exchanged
 from asperity.servo.drivers.driver_registry import hardware_driver
 from asperity.servo.drivers.haply import MAX_PENDING, SERVICE, HaplyDriver
-from asperity.servo.fault import EndReason
-from asperity.servo.kernels.ring_buffer import (
+from asperity.servo.drivers.threaded import (
     FAILURE_CODE,
     FORCES,
     HEADER_WORDS,
@@ -28,8 +27,9 @@ from asperity.servo.kernels.ring_buffer import (
     RING_ROWS,
     ROW_WORDS,
     STALE,
+    ThreadedDevice,
 )
-from asperity.servo.kernels.threaded_device import ThreadedDevice
+from asperity.servo.loop_memory import EndReason
 
 ZERO = (0.0, 0.0, 0.0)
 Start = Callable[..., FakeHaply]

@@ -18,8 +18,8 @@ from asperity.servo.driver_loop import system_clock
 from asperity.servo.drivers import threaded as exchanged
 from asperity.servo.drivers.driver_registry import hardware_driver
 from asperity.servo.drivers.open_haptics import LIBRARY, OpenHapticsDriver
-from asperity.servo.fault import EndReason
-from asperity.servo.kernels.ring_buffer import FAILURE_CODE, LOOP_SILENT, STALE
+from asperity.servo.drivers.threaded import FAILURE_CODE, LOOP_SILENT, STALE
+from asperity.servo.loop_memory import EndReason
 
 NOTHING, ERROR, HANGS, NOT_A_NUMBER, FAR, NOT_CALIBRATED, NOT_OPENED = range(7)
 OPENED, ENABLED, FRAMES, RUNNING, FORCED = range(5)

@@ -27,13 +27,13 @@ from asperity.simulation import (
     SpringHand,
 )
 from asperity.simulation.kernels import axis_body as axes
+from asperity.simulation.kernels import body_parts as hands
 from asperity.simulation.kernels import coupled_body as dense
 from asperity.simulation.kernels import elastic_band as banded
-from asperity.simulation.kernels import hand_force as hands
 from asperity.simulation.kernels import pantograph_dynamics as five_bar
 from asperity.simulation.kernels import prescribed_motion as prescribed
 from asperity.simulation.kernels.body_interface import LEFT_WORKSPACE, RUNNING, SampleInput
-from asperity.simulation.kernels.energy_ledger import (
+from asperity.simulation.kernels.body_parts import (
     EXCHANGED,
     FRICTION,
     HAND,

@@ -20,7 +20,7 @@ from asperity.simulation.kernels.body_interface import (
     RUNNING,
     SampleInput,
 )
-from asperity.simulation.kernels.energy_ledger import (
+from asperity.simulation.kernels.body_parts import (
     FRICTION,
     LEDGER_SIZE,
     LOST,

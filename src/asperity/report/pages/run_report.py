@@ -22,8 +22,8 @@ from asperity.report.sentences.number_text import readable_name
 from asperity.report.sentences.texts import sentence
 from asperity.scene.setup import Setup
 from asperity.simulation import Run
-from asperity.simulation.limit_cycles.onset import is_at_rest
-from asperity.simulation.limit_cycles.onset_search import felt_speed
+from asperity.simulation.onset import is_at_rest
+from asperity.simulation.onset_search import felt_speed
 from asperity.simulation.trace import MAX_ROWS
 from asperity.surface import Surface
 

@@ -15,8 +15,7 @@ from asperity.report.sentences.texts import table_data
 from asperity.scene.setup import Setup
 from asperity.servo.calibration.calibrator import AxisCalibration, Calibration
 from asperity.servo.calibration.measured_device import effective_resolution, format_uncertainty
-from asperity.servo.fault import EndReason
-from asperity.servo.loop_memory import LoopStatistics
+from asperity.servo.loop_memory import EndReason, LoopStatistics
 from asperity.servo.process import ServoProcess
 
 _CALIBRATION_HEADINGS = ("axis", "wall held", "cycled at", "damping N·s/m", "friction mN", "mass g")

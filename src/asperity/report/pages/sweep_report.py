@@ -16,8 +16,8 @@ from asperity.report.pages.run_report import LOOP_FOOTER, loop_facts
 from asperity.report.sentences.number_text import INFINITY_SIGN, NOT_AVAILABLE
 from asperity.report.sentences.texts import table_data, table_notes
 from asperity.scene.setup import Setup
-from asperity.scene.sweep_results import OnsetSweep, StrokeSweep
-from asperity.simulation.limit_cycles.onset import Prediction
+from asperity.scene.sweeps import OnsetSweep, StrokeSweep
+from asperity.simulation.onset import Prediction
 from asperity.simulation.scan import Stroke
 from asperity.sweeps.sweep_result import CASE, SweepResult
 from asperity.sweeps.table_files import UNIT

@@ -18,7 +18,7 @@ from asperity.recording.recording import Recording
 from asperity.recording.replay import recorded_field
 from asperity.recording.row_encoding import NamedColumns
 from asperity.report.pictures import style
-from asperity.simulation.limit_cycles.onset import Prediction
+from asperity.simulation.onset import Prediction
 from asperity.simulation.scan import Stroke
 from asperity.simulation.trace import MAX_ROWS
 from asperity.sweeps.sweep_result import SweepResult

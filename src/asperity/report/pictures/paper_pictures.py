@@ -18,7 +18,7 @@ from asperity.paper.figures import ForceField, LoopEnergy, force_fields, loop_en
 from asperity.report.pictures import style
 from asperity.report.sentences.number_text import readable_name
 from asperity.report.sentences.texts import table_notes
-from asperity.simulation.limit_cycles.onset import Prediction
+from asperity.simulation.onset import Prediction
 
 _COLUMNS = 4
 _MILLI = 1e3

@@ -13,6 +13,14 @@ from asperity.core.checks import FloatArray
 from asperity.core.errors import AsperityError
 from asperity.core.files import Serializable
 from asperity.devices.device import Axis as AxisName
+from asperity.servo.calibration.excitation import (
+    EXCITATION_COLUMN,
+    PUSHING,
+    REST,
+    WALL,
+    CalibrationRig,
+    Excitation,
+)
 from asperity.servo.calibration.identification import (
     FLOOR_STEPS,
     MAX_STIFFNESS,
@@ -29,8 +37,6 @@ from asperity.servo.calibration.identification import (
     position_step,
     rest_noise,
 )
-from asperity.servo.calibration.test_rig import EXCITATION_COLUMN, CalibrationRig
-from asperity.servo.kernels.excitation import PUSHING, REST, WALL, Excitation
 
 HOLDING_STIFFNESS = 30.0
 """Stiffness of the spring that holds the handle without a wall [N/m]."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -119,9 +120,9 @@ class Driver(ABC):
         """Number of readings; ``None`` for any number."""
         return None
 
-    @abstractmethod
     def kernel_modules(self) -> tuple[ModuleType, ...]:
-        """Return the compiled modules of ``device_read`` and ``device_write``."""
+        """Return the compiled modules of ``device_read`` and ``device_write``; default: its own."""
+        return (sys.modules[type(self).__module__],)
 
     @abstractmethod
     def placeholder_record(self) -> tuple[Any, ...]:

@@ -1,21 +1,25 @@
 """Devices of Force Dimension (omega, delta, sigma, lambda) and the Falcon, by libdhd.
 
-Metres and newtons; x towards the user, y to the user's right, z up.
+Metres and newtons; x towards the user, y to the user's right, z up. The C functions that the loop
+calls return 0 or a notice: 1 for a reading too soon after the last one, 2 for a saturated motor.
+Errors are negative.
 """
+
+# ruff: noqa: ARG001 - one signature for every device
 
 from __future__ import annotations
 
 import ctypes
 from dataclasses import dataclass, field
-from types import ModuleType
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
+from asperity.core.compiled import FloatArray, Kernels, call_address, local_array
 from asperity.core.errors import ParameterError
 from asperity.servo.drivers import driver
 from asperity.servo.drivers.driver import RIGHT, TOWARDS, UP, Driver, DriverKind
 from asperity.servo.drivers.library import function_addresses, load_library
-from asperity.servo.kernels import force_dimension_device
-from asperity.servo.kernels.force_dimension_device import ForceDimensionDevice
+
+KERNELS = Kernels(provides=("device_read", "device_write"), native=("call_address",))
 
 LIBRARY = "ASPERITY_LIBDHD"
 """Environment variable of the path of the library."""
@@ -29,6 +33,39 @@ _FUNCTIONS = (
     "dhdGetDeviceCount", "dhdOpenID", "dhdEnableForce", "dhdClose", "dhdErrorGetLastStr",
     "dhdGetPosition", "dhdSetForce",
 )  # fmt: skip
+
+
+class ForceDimensionDevice(NamedTuple):
+    """An open device.
+
+    Attributes:
+        get_position: address of ``int dhdGetPosition(double *x, double *y, double *z, char id)``.
+        set_force: address of ``int dhdSetForce(double x, double y, double z, char id)``.
+        number: id of the device.
+    """
+
+    get_position: int
+    set_force: int
+    number: int
+
+
+def device_read(position: FloatArray, device: ForceDimensionDevice) -> int:
+    """Read the position by libdhd; see ``interface``."""
+    x = local_array((1,))
+    y = local_array((1,))
+    z = local_array((1,))
+    answer = call_address(device.get_position, x, y, z, device.number)
+    position[0] = x[0]
+    position[1] = y[0]
+    position[2] = z[0]
+    return min(answer, 0)
+
+
+def device_write(
+    fx: float, fy: float, fz: float, in_contact: bool, device: ForceDimensionDevice
+) -> int:
+    """Command a force by libdhd; see ``interface``."""
+    return min(call_address(device.set_force, fx, fy, fz, device.number), 0)
 
 
 @dataclass
@@ -55,10 +92,6 @@ class ForceDimensionDriver(Driver):
     def device_name(self) -> str:
         """Name of the device for its lock."""
         return str(self.number or 0)
-
-    def kernel_modules(self) -> tuple[ModuleType, ...]:
-        """Return the module that calls libdhd."""
-        return (force_dimension_device,)
 
     def placeholder_record(self) -> ForceDimensionDevice:
         """Return a record of no device."""

@@ -19,13 +19,12 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 from asperity.core.errors import ParameterError
-from asperity.loop.clock import CLOCK_BOOTTIME
-from asperity.servo.driver_loop import PRIORITY
+from asperity.loop.guards import CLOCK_BOOTTIME
 from asperity.servo.drivers import threaded
 from asperity.servo.drivers.driver import AWAY, RIGHT, UP, DriverKind
+from asperity.servo.drivers.threaded import FORCE_TIMEOUT, LOOP_SILENT, STALE, ThreadedDevice
 from asperity.servo.drivers.websocket_client import ProtocolError, WebSocketClient
-from asperity.servo.kernels.ring_buffer import FORCE_TIMEOUT, LOOP_SILENT, STALE
-from asperity.servo.kernels.threaded_device import ThreadedDevice
+from asperity.servo.loop_process import PRIORITY
 
 CONNECTION_LOST = 3
 INVALID_STATE = 4

@@ -1,6 +1,7 @@
 """Shared libraries of vendors, and the driver of a user-defined one.
 
-A user-defined device is a shared library with four C functions, see ``examples/own_device.c``.
+A user-defined device is a shared library with four C functions, see ``examples/own_device.c``. The
+loop calls two of them: ``read(double position[3])`` and ``write(force[3], contact)``.
 
 Metres and newtons; x to the right, y away from the user, z up.
 """
@@ -12,13 +13,13 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import ModuleType
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
+from asperity.core.compiled import FloatArray, Kernels, call_address, local_array
 from asperity.core.errors import ParameterError
 from asperity.servo.drivers.driver import AWAY, IDENTITY_FRAME, RIGHT, UP, Driver, DriverKind, Frame
-from asperity.servo.kernels import library_device
-from asperity.servo.kernels.library_device import LibraryDevice
+
+KERNELS = Kernels(provides=("device_read", "device_write"), native=("call_address",))
 
 _WRONG_ARCHITECTURE = (
     "wrong elf class", "invalid elf header", "incompatible architecture", "exec format",
@@ -70,6 +71,32 @@ def function_addresses(library: ctypes.CDLL, *names: str) -> list[int]:
 FUNCTIONS = ("asperity_open", "asperity_read", "asperity_write", "asperity_close")
 
 
+class LibraryDevice(NamedTuple):
+    """The addresses of a library's functions; both return 0 if there is no error.
+
+    Attributes:
+        read: address of ``int read(double position[3])``.
+        write: address of ``int write(const double force[3], int contact)``.
+    """
+
+    read: int
+    write: int
+
+
+def device_read(position: FloatArray, device: LibraryDevice) -> int:
+    """Read the position by the library; see ``interface``."""
+    return call_address(device.read, position)
+
+
+def device_write(fx: float, fy: float, fz: float, in_contact: bool, device: LibraryDevice) -> int:
+    """Command a force by the library; see ``interface``."""
+    force = local_array((3,))
+    force[0] = fx
+    force[1] = fy
+    force[2] = fz
+    return call_address(device.write, force, in_contact)
+
+
 @dataclass(frozen=True)
 class LibraryDriver(Driver):
     """A device that a shared library drives.
@@ -89,10 +116,6 @@ class LibraryDriver(Driver):
     def device_name(self) -> str:
         """Name of the device for its lock."""
         return str(Path(self.path).resolve())
-
-    def kernel_modules(self) -> tuple[ModuleType, ...]:
-        """Return the module that calls the library."""
-        return (library_device,)
 
     def placeholder_record(self) -> LibraryDevice:
         """Return a record of no device."""

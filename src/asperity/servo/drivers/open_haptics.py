@@ -1,14 +1,15 @@
 """Devices of 3D Systems (Touch, Touch X, Omni, Premium), by libHD of OpenHaptics.
 
-Millimetres and newtons; x to the right, y up, z towards the user. The scheduler of libHD, a thread
-that calls back 1000 times a second, is the only place for a frame: the compiled
-:func:`~asperity.servo.kernels.open_haptics_frame.haptic_frame` runs in it; the loop exchanges with
-it.
+Millimetres and newtons; x to the right, y up, z towards the user. libHD allows one frame per tick
+of its scheduler, in the scheduler's thread, which calls back 1000 times a second: the compiled
+:func:`~asperity.servo.drivers.open_haptics.haptic_frame` runs there, and the loop exchanges with it
+through a ring buffer.
 """
 
 from __future__ import annotations
 
 import ctypes
+import sys
 import time
 from dataclasses import dataclass, field
 from functools import cache
@@ -16,17 +17,51 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from asperity.core.compiled import (
+    FloatArray,
+    IntArray,
+    Kernels,
+    call_address,
+    local_array,
+    store_release,
+)
 from asperity.core.errors import ParameterError
 from asperity.kernels.fuse import fuse_module
 from asperity.servo.driver_loop import system_clock
+from asperity.servo.drivers import threaded
 from asperity.servo.drivers.driver import RIGHT, TOWARDS, UP, DriverKind, Frame, surface_frame
 from asperity.servo.drivers.library import function_addresses, load_library
-from asperity.servo.drivers.threaded import ThreadedDriver, new_ring_buffer, wait_for_position
-from asperity.servo.kernels import open_haptics_frame as open_haptics
-from asperity.servo.kernels import ring_buffer as slot
-from asperity.servo.kernels.open_haptics_frame import BEGIN_FRAME, BUFFER_ADDRESS, FRAMES, HANDLE
-from asperity.servo.kernels.ring_buffer import BUFFER_WORDS, FAILURE_CODE, RingBuffer
-from asperity.servo.kernels.threaded_device import ThreadedDevice
+from asperity.servo.drivers.threaded import (
+    BUFFER_WORDS,
+    DRIVER_WORDS,
+    FAILURE_CODE,
+    FORCE_TIMEOUT,
+    FORCES,
+    LOOP_SILENT,
+    POSITIONS,
+    RingBuffer,
+    ThreadedDevice,
+    ThreadedDriver,
+    latest_row,
+    new_ring_buffer,
+    push_row,
+    set_failure,
+    wait_for_position,
+)
+
+KERNELS = Kernels(loops=("haptic_frame",), native=("call_address", "store_release"))
+
+# Words of the driver: number of frames, addresses of functions, handle of the device, address of
+# the ring buffer, and the time as the system writes it.
+FRAMES, BEGIN_FRAME, END_FRAME, GET_DOUBLE, SET_DOUBLE = range(DRIVER_WORDS, DRIVER_WORDS + 5)
+GET_ERROR, GETTIME, HANDLE, BUFFER_ADDRESS = range(DRIVER_WORDS + 5, DRIVER_WORDS + 9)
+TIME = BUFFER_ADDRESS + 1
+# Constants of hdDefines.h and hdScheduler.h.
+CURRENT_POSITION = 0x2050
+CURRENT_FORCE = 0x2700
+CALLBACK_CONTINUE = 1
+_MONOTONIC = 1
+_NANOSECONDS = 1_000_000_000
 
 AXES = (RIGHT, UP, TOWARDS)
 MILLIMETRE = 1e-3
@@ -47,6 +82,44 @@ _CALIBRATED = 0x5000
 _MAX_PRIORITY = 0xFFFF  # the greatest priority of a callback
 _CLOSED = -1  # failure code of a closed device
 _RELEASE_TIMEOUT = 0.05  # [s] for the scheduler to release the force
+
+
+def haptic_frame(words: IntArray, numbers: FloatArray) -> int:
+    """Push the position of the handle, and apply the force of the loop.
+
+    The force is zero after any failure, and if the loop does not renew it.
+    ``hdGetError`` returns a record, whose first number is the error, in a register.
+
+    Args:
+        words: words of the ring buffer.
+        numbers: numbers of the ring buffer.
+
+    Returns:
+        The code for the scheduler to call again.
+    """
+    place = local_array((3,))
+    force = local_array((3,))
+    call_address(words[GETTIME], _MONOTONIC, words[BUFFER_ADDRESS] + 8 * TIME)
+    now = words[TIME] * _NANOSECONDS + words[TIME + 1]
+    wanted = latest_row(words, numbers, FORCES)
+    is_nonzero = wanted.x != 0.0 or wanted.y != 0.0 or wanted.z != 0.0
+    if is_nonzero and now - wanted.time > words[FORCE_TIMEOUT]:
+        set_failure(words, LOOP_SILENT)
+    held = words[FAILURE_CODE] == 0 and wanted.time != 0
+    force[0] = wanted.x if held else 0.0
+    force[1] = wanted.y if held else 0.0
+    force[2] = wanted.z if held else 0.0
+    call_address(words[BEGIN_FRAME], words[HANDLE])
+    call_address(words[GET_DOUBLE], CURRENT_POSITION, place)
+    call_address(words[SET_DOUBLE], CURRENT_FORCE, force)
+    call_address(words[END_FRAME], words[HANDLE])
+    wrong = call_address(words[GET_ERROR])
+    if wrong != 0:
+        set_failure(words, wrong)
+    else:
+        push_row(words, numbers, POSITIONS, place[0], place[1], place[2], now)
+    store_release(words, FRAMES, words[FRAMES] + 1)
+    return CALLBACK_CONTINUE
 
 
 class _ErrorInfo(ctypes.Structure):
@@ -129,7 +202,7 @@ class OpenHapticsDriver(ThreadedDriver):
 
     def describe_error(self, code: int) -> str:
         """Return an error of libHD in words."""
-        if code in {slot.STALE, slot.LOOP_SILENT}:
+        if code in {threaded.STALE, LOOP_SILENT}:
             return super().describe_error(code)
         return f"libHD: {_error_text(_library(), code)} (0x{code:04x})"
 
@@ -151,7 +224,7 @@ def _callback() -> Any:
     """Return the compiled callback of the scheduler: no interpreter runs in its thread."""
     from numba import carray, cfunc, types  # type: ignore[attr-defined]  # it has no stubs
 
-    frame = fuse_module(open_haptics, slot).haptic_frame
+    frame = fuse_module(sys.modules[__name__], threaded).haptic_frame
 
     @cfunc(types.uint32(types.voidptr))
     def callback(memory: Any) -> Any:

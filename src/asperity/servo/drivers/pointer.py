@@ -1,8 +1,18 @@
-"""A simulated device whose hand follows a pointer while the loop runs."""
+"""A simulated device whose hand follows a pointer while the loop runs.
+
+Requests come through shared memory, at any time and in any steps. The anchor follows them with
+critical damping and a limited speed.
+
+The anchor of a following loop repeats that of another loop, sample by sample. Such a loop has no
+clock of its own: it waits for each sample of the other one, so both get the same motion at the same
+samples, however late either is.
+"""
 
 from __future__ import annotations
 
+import math
 import os
+import sys
 import tempfile
 from contextlib import suppress
 from dataclasses import dataclass
@@ -14,18 +24,109 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from asperity.core.checks import FloatArray, check_array, check_real
+from asperity.core.compiled import Kernels, call_address
 from asperity.core.errors import ParameterError
+from asperity.loop.guards import CLOCK_BOOTTIME
 from asperity.servo.driver_loop import no_clock, system_clock
 from asperity.servo.drivers.simulated import SimulatedDriver, simulated_driver
-from asperity.servo.kernels import pointer_anchor
-from asperity.simulation.hands import Hand
+from asperity.simulation.hands import Hand, Stationary
 from asperity.simulation.kernels.simulated_device import SimulatedDevice
-from asperity.simulation.motions import Stationary
 from asperity.simulation.plants import Plant
 from asperity.simulation.servo import Servo
 
-_ROW_COUNT = pointer_anchor.HEADER_ROWS + pointer_anchor.HISTORY_SAMPLES
+KERNELS = Kernels(provides=("anchor_segment",), native=("call_address",))
+
+# Rows of the memory: the pointer writes the first four, the loop the next three, a following loop
+# the last. The request is the point TARGET + COSINE cos(angle) + SINE sin(angle) [m].
+TARGET, COSINE, SINE, REQUEST_ROW, ANCHOR, VELOCITY, STATE_ROW, FOLLOWER_ROW = range(8)
+HEADER_ROWS = 8
+# Then follow the anchors at the newest samples [m], which a following loop repeats.
+HISTORY_SAMPLES = 8_000
+# REQUEST_ROW: angular velocity [rad/s] and number of the newest request; STATE_ROW: angle [rad],
+# number of the newest acknowledged request, and number of samples whose rows are complete.
+ANGLE = 0
+REQUEST_NUMBER = 1
+SAMPLE_COUNT = 2
+# FOLLOWER_ROW: number of the next sample that is repeated, and number of samples left out.
+NEXT_SAMPLE = 0
+LEFT_OUT = 1
+
+TRACKING_BANDWIDTH = 250.0
+"""Bandwidth of the anchor [rad/s]; it lags by 2/ω, 8 ms."""
+MAX_SPEED = 0.4
+"""Largest speed of the anchor [m/s]."""
+POLL_TIME = 2_000_000
+"""Time for which a following loop waits before it looks for the next sample again [ns]."""
+MAX_POLLS = 25
+"""Waits after which its anchor rests for a sample, so that a request to stop is met."""
+MAX_LAG = 2000
+"""Samples behind the other loop, beyond which a following loop leaves samples out."""
+
+_ROW_COUNT = HEADER_ROWS + HISTORY_SAMPLES
 _MEMORY_FOLDER = "/dev/shm" if Path("/dev/shm").is_dir() else None
+
+
+def history_row(sample: int) -> int:
+    """Return the row of the anchor at a sample."""
+    return HEADER_ROWS + sample % HISTORY_SAMPLES
+
+
+def follow_anchor(device: SimulatedDevice) -> tuple[float, float, float, float, float, float]:
+    """Return the anchor of the other loop at its sample and at the next [m], and wait for them.
+
+    The sample is the own one plus ``counters[2]``. Without a further sample the anchor rests.
+    """
+    at = device.anchor
+    sample = device.counters[1] + device.counters[2]
+    polls = 0
+    while at[STATE_ROW, SAMPLE_COUNT] < sample + 2 and polls < MAX_POLLS:
+        call_address(device.clock.nanosleep, CLOCK_BOOTTIME, 0, device.clock.timespec, 0)
+        polls += 1
+    lag = int(at[STATE_ROW, SAMPLE_COUNT]) - 2 - sample
+    left_out = lag if lag > MAX_LAG else 0
+    here = history_row(sample + left_out)
+    following = sample + left_out + (1 if lag >= 0 else 0)
+    there = history_row(following)
+    device.counters[2] += following - sample - 1
+    at[FOLLOWER_ROW, NEXT_SAMPLE] = following
+    at[FOLLOWER_ROW, LEFT_OUT] += left_out
+    return at[here, 0], at[here, 1], at[here, 2], at[there, 0], at[there, 1], at[there, 2]
+
+
+def anchor_segment(device: SimulatedDevice) -> tuple[float, float, float, float, float, float]:
+    """Return the position of the hand's anchor at this sample and at the next [m].
+
+    v' = ω² (target - a) - 2 ω v, with |v| limited to ``MAX_SPEED``. With a clock that can wait, the
+    anchor is that of another loop.
+    """
+    if device.clock.nanosleep != 0:
+        return follow_anchor(device)
+    at = device.anchor
+    at[STATE_ROW, SAMPLE_COUNT] = device.counters[1]  # written in the call after that of the row
+    step = 1.0 / device.update_rate
+    number = at[REQUEST_ROW, REQUEST_NUMBER]
+    angle = (at[STATE_ROW, ANGLE] + at[REQUEST_ROW, ANGLE] * step) % (2.0 * math.pi)
+    cosine = math.cos(angle)
+    sine = math.sin(angle)
+    speed = 0.0
+    for i in range(3):
+        target = at[TARGET, i] + at[COSINE, i] * cosine + at[SINE, i] * sine
+        pull = TRACKING_BANDWIDTH * TRACKING_BANDWIDTH * (target - at[ANCHOR, i])
+        at[VELOCITY, i] += step * (pull - 2.0 * TRACKING_BANDWIDTH * at[VELOCITY, i])
+        speed += at[VELOCITY, i] * at[VELOCITY, i]
+    speed = math.sqrt(speed)
+    share = MAX_SPEED / speed if speed > MAX_SPEED else 1.0
+    ax = at[ANCHOR, 0]
+    ay = at[ANCHOR, 1]
+    az = at[ANCHOR, 2]
+    row = history_row(device.counters[1])
+    for i in range(3):
+        at[row, i] = at[ANCHOR, i]
+        at[VELOCITY, i] *= share
+        at[ANCHOR, i] += step * at[VELOCITY, i]
+    at[STATE_ROW, ANGLE] = angle
+    at[STATE_ROW, REQUEST_NUMBER] = number
+    return ax, ay, az, at[ANCHOR, 0], at[ANCHOR, 1], at[ANCHOR, 2]
 
 
 class PointerHand:
@@ -48,11 +149,11 @@ class PointerHand:
         with open(descriptor, "wb") as file:
             file.write(bytes(8 * 3 * _ROW_COUNT))
         self._table: FloatArray | None = open_pointer_table(self.name)
-        self._table[pointer_anchor.TARGET] = self._table[pointer_anchor.ANCHOR] = position
+        self._table[TARGET] = self._table[ANCHOR] = position
 
     @property
     def table(self) -> FloatArray:
-        """The memory, see ``kernels/pointer_anchor.py``."""
+        """The memory, whose rows are named above."""
         if self._table is None:
             raise ParameterError("pointer", "is closed")
         return self._table
@@ -76,42 +177,38 @@ class PointerHand:
         Raises:
             ParameterError: for a number that is not finite.
         """
-        points = {
-            pointer_anchor.TARGET: ("target", target),
-            pointer_anchor.COSINE: ("cosine", cosine),
-            pointer_anchor.SINE: ("sine", sine),
-        }
+        points = {TARGET: ("target", target), COSINE: ("cosine", cosine), SINE: ("sine", sine)}
         rows = {row: check_array(*point, (3,), "m") for row, point in points.items()}
         velocity = check_real("angular_velocity", angular_velocity, "rad/s")
         table = self.table
         for row, values in rows.items():
             table[row] = values
-        table[pointer_anchor.REQUEST_ROW, pointer_anchor.ANGLE] = velocity
+        table[REQUEST_ROW, ANGLE] = velocity
         number = self.request_count + 1
-        table[pointer_anchor.REQUEST_ROW, pointer_anchor.REQUEST_NUMBER] = number
+        table[REQUEST_ROW, REQUEST_NUMBER] = number
         return number
 
     @property
     def request_count(self) -> int:
         """Number of the newest request."""
-        return int(self.table[pointer_anchor.REQUEST_ROW, pointer_anchor.REQUEST_NUMBER])
+        return int(self.table[REQUEST_ROW, REQUEST_NUMBER])
 
     @property
     def acknowledged_count(self) -> int:
         """Number of the newest acknowledged request."""
-        return int(self.table[pointer_anchor.STATE_ROW, pointer_anchor.REQUEST_NUMBER])
+        return int(self.table[STATE_ROW, REQUEST_NUMBER])
 
     @property
     def follower_lag(self) -> tuple[int, int]:
         """Samples by which a following loop is behind, and samples that it has left out."""
-        sample, left_out, _ = self.table[pointer_anchor.FOLLOWER_ROW]
-        count = self.table[pointer_anchor.STATE_ROW, pointer_anchor.SAMPLE_COUNT]
+        sample, left_out, _ = self.table[FOLLOWER_ROW]
+        count = self.table[STATE_ROW, SAMPLE_COUNT]
         return max(int(count - sample), 0), int(left_out)
 
     @property
     def anchor(self) -> FloatArray:
         """Position of the anchor (3,) [m]."""
-        return np.array(self.table[pointer_anchor.ANCHOR])
+        return np.array(self.table[ANCHOR])
 
     def close(self) -> None:
         """Release the memory; a running loop keeps its own mapping."""
@@ -151,7 +248,7 @@ class PointerDriver(SimulatedDriver):
 
     def kernel_modules(self) -> tuple[ModuleType, ...]:
         """Return the modules of a simulated device, with the anchor of the pointer first."""
-        return pointer_anchor, *super().kernel_modules()
+        return sys.modules[__name__], *super().kernel_modules()
 
     def open(self) -> tuple[Any, ...]:
         """Return the device, held by the hand.
@@ -165,12 +262,12 @@ class PointerDriver(SimulatedDriver):
             raise ParameterError("pointer", "is closed: nothing moves the hand") from None
         device = SimulatedDevice(*super().open())._replace(anchor=table)
         if not self.follows:
-            table[pointer_anchor.STATE_ROW] = 0.0
+            table[STATE_ROW] = 0.0
             return device
-        count = table[pointer_anchor.STATE_ROW, pointer_anchor.SAMPLE_COUNT]
+        count = table[STATE_ROW, SAMPLE_COUNT]
         device.counters[2] = max(count - 1.0, 0.0)
-        table[pointer_anchor.FOLLOWER_ROW] = device.counters[2], 0.0, 0.0
-        wait = np.array([0, pointer_anchor.POLL_TIME])
+        table[FOLLOWER_ROW] = device.counters[2], 0.0, 0.0
+        wait = np.array([0, POLL_TIME])
         return device._replace(clock=system_clock()._replace(timespec=wait))
 
 

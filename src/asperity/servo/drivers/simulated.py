@@ -16,12 +16,11 @@ from asperity.loop import replayed_device
 from asperity.loop.replayed_device import ReplayedDevice
 from asperity.recording.recording import Recording, open_recording
 from asperity.servo.drivers.driver import Driver
-from asperity.simulation.hands import Hand
+from asperity.simulation.hands import Hand, Motion
 from asperity.simulation.kernels import simulated_device
 from asperity.simulation.kernels.body_interface import DIVERGED, LEFT_WORKSPACE
-from asperity.simulation.kernels.energy_ledger import LEDGER_SIZE
+from asperity.simulation.kernels.body_parts import LEDGER_SIZE
 from asperity.simulation.kernels.simulated_device import SimulatedDevice
-from asperity.simulation.motions import Motion
 from asperity.simulation.plants import Plant, sampled_plant
 from asperity.simulation.servo import Servo
 from asperity.simulation.simulate import anchor_points, initial_motion

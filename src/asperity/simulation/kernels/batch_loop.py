@@ -16,7 +16,7 @@ from asperity.simulation.kernels.body_interface import (
     SampleInput,
     advance_body,
 )
-from asperity.simulation.kernels.energy_ledger import FRICTION, LOST, SUPPLIED
+from asperity.simulation.kernels.body_parts import FRICTION, LOST, SUPPLIED
 from asperity.simulation.kernels.simulated_device import flush_subnormals
 
 KERNELS = Kernels(loops=("simulate_lanes",))

@@ -52,7 +52,7 @@ def advance_body(x: FloatArray, ledger: FloatArray, inputs: SampleInput, plant: 
 
     Args:
         x: state: position [m], velocity [m/s], more; changed.
-        ledger: sums, see ``energy_ledger``; changed.
+        ledger: sums, see ``body_parts``; changed.
         inputs: force and motion of the hand's anchor.
         plant: record of the body.
 

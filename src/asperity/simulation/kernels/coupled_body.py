@@ -7,14 +7,13 @@ quadratic form. With the anchor's motion it is larger by u · B (2 Δe + u T), a
 anchor's spring and damper is M Δw + M_r Δs - (F + g) T + B Δe.
 """
 
-import math
 from typing import NamedTuple
 
 from asperity.core.compiled import FloatArray, Kernels, local_array
 from asperity.simulation.kernels.body_interface import RUNNING, SampleInput
-from asperity.simulation.kernels.energy_ledger import add_energies
+from asperity.simulation.kernels.body_parts import add_energies, friction_force
 
-KERNELS = Kernels(provides=("advance_body", "friction_force", "stored_energy"))
+KERNELS = Kernels(provides=("advance_body", "stored_energy"))
 
 # First components of forces in z, and the number of all.
 FORCE = 12
@@ -135,23 +134,6 @@ def multiply_columns(columns: FloatArray, z: FloatArray, result: FloatArray) -> 
     for j in range(z.shape[0]):
         for i in range(result.shape[0]):
             result[i] += columns[j, i] * z[j]
-
-
-def friction_force(
-    vx: float, vy: float, vz: float, friction: float, stopping_mass: FloatArray, substep: float
-) -> tuple[float, float, float]:
-    """Return the dry friction [N] that stops the velocity within a part, or its limit against it.
-
-    ``stopping_mass`` (3, 3) is the mass that it stops in the part's duration.
-    """
-    gx = -(stopping_mass[0, 0] * vx + stopping_mass[0, 1] * vy + stopping_mass[0, 2] * vz) / substep
-    gy = -(stopping_mass[1, 0] * vx + stopping_mass[1, 1] * vy + stopping_mass[1, 2] * vz) / substep
-    gz = -(stopping_mass[2, 0] * vx + stopping_mass[2, 1] * vy + stopping_mass[2, 2] * vz) / substep
-    speed = math.sqrt(vx * vx + vy * vy + vz * vz)
-    if gx * gx + gy * gy + gz * gz <= friction * friction or speed == 0.0:
-        return gx, gy, gz
-    share = -friction / speed
-    return share * vx, share * vy, share * vz
 
 
 def stored_energy(

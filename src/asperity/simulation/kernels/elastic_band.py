@@ -4,11 +4,11 @@ from typing import NamedTuple
 
 from asperity.core.compiled import FloatArray, Kernels, local_array
 from asperity.simulation.kernels.body_interface import RUNNING, SampleInput
-from asperity.simulation.kernels.coupled_body import friction_force
-from asperity.simulation.kernels.energy_ledger import add_energies
-from asperity.simulation.kernels.hand_force import (
+from asperity.simulation.kernels.body_parts import (
     HandRecord,
+    add_energies,
     band_changes_state,
+    friction_force,
     hand_energy,
     hand_force,
 )

@@ -8,7 +8,7 @@ from asperity.core.compiled import FloatArray, IntArray, Kernels
 from asperity.kernels.tick import ServoSettings, ServoState
 from asperity.loop.interface import GuardedForce, Reading
 from asperity.simulation.kernels.body_interface import stored_energy
-from asperity.simulation.kernels.energy_ledger import SAME_SAMPLE, SAMPLING
+from asperity.simulation.kernels.body_parts import SAME_SAMPLE, SAMPLING
 from asperity.simulation.kernels.simulated_device import SimulatedDevice, anchor_segment, due_force
 
 KERNELS = Kernels(provides=("trace_sample", "trace_timing"), loops=("stored_energy_at",))

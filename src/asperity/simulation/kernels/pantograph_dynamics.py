@@ -16,9 +16,9 @@ from typing import NamedTuple
 
 from asperity.core.compiled import FloatArray, Kernels
 from asperity.simulation.kernels.body_interface import LEFT_WORKSPACE, RUNNING, SampleInput
-from asperity.simulation.kernels.energy_ledger import add_energies
-from asperity.simulation.kernels.hand_force import (
+from asperity.simulation.kernels.body_parts import (
     HandRecord,
+    add_energies,
     band_changes_state,
     hand_energy,
     hand_force,

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from asperity.core.compiled import FloatArray, Kernels
 from asperity.simulation.kernels.body_interface import RUNNING, SampleInput
-from asperity.simulation.kernels.energy_ledger import add_energies
+from asperity.simulation.kernels.body_parts import add_energies
 
 KERNELS = Kernels(provides=("advance_body", "stored_energy"))
 

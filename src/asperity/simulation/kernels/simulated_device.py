@@ -22,12 +22,12 @@ class SimulatedDevice(NamedTuple):
             anchor's first row (3,).
         anchor: positions of the hand's anchor at the samples (k, 3) [m], after which it rests; or
             the memory of another ``anchor_segment``.
-        ledger: sums of energies, see ``energy_ledger``.
+        ledger: sums of energies, see ``body_parts``.
         update_rate: 1/T [1/s].
         plant: record of the body.
         position_step: step of the device's own encoders [m]; 0 for none.
         force_step: step of the device's own force [N]; 0 for none.
-        clock: clock of an ``anchor_segment`` that waits, see :mod:`asperity.loop.clock`.
+        clock: clock of an ``anchor_segment`` that waits, see :mod:`asperity.loop.guards`.
     """
 
     x: FloatArray

@@ -27,7 +27,7 @@ from asperity.scene.sections import to_scene_values
 from asperity.scene.setup import Setup, make_setup
 from asperity.servo.drivers.driver import Driver
 from asperity.servo.drivers.simulated import simulated_driver
-from asperity.servo.fault import EndReason
+from asperity.servo.loop_memory import EndReason
 from asperity.servo.process import ServoProcess
 from asperity.servo.safety import excess_stiffness_reason
 from asperity.studies.study_file import Study

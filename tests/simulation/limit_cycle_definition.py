@@ -11,8 +11,8 @@ import numpy as np
 from asperity.core.checks import FloatArray
 from asperity.perception.grip import load_grip
 from asperity.simulation import Run
-from asperity.simulation.limit_cycles.onset_search import DURATION_FACTORS
-from asperity.simulation.motions import Motion
+from asperity.simulation.hands import Motion
+from asperity.simulation.onset_search import DURATION_FACTORS
 from asperity.simulation.trace import StopReason
 
 

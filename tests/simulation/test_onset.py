@@ -9,11 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.simulation.limit_cycles.limit_cycle_definition import (
-    is_cycling,
-    is_settling,
-    velocity_spread,
-)
+from tests.simulation.limit_cycle_definition import is_cycling, is_settling, velocity_spread
 
 from asperity.core.errors import ParameterError
 from asperity.simulation import (
@@ -28,12 +24,7 @@ from asperity.simulation import (
     find_onset,
     simulate,
 )
-from asperity.simulation.limit_cycles.onset import (
-    expected_onset,
-    predict,
-    smooth_wall_onset,
-    start_offsets,
-)
+from asperity.simulation.onset import expected_onset, predict, smooth_wall_onset, start_offsets
 from asperity.surface import Surface
 from asperity.textures.kinds.sinusoid import Sinusoid
 

@@ -1,14 +1,39 @@
-"""The hand on a body that is integrated: a spring to its anchor, or a band to a far end."""
+"""What bodies share: the ledger of energies [J], the hand that holds them, and dry friction."""
 
 import math
 from typing import NamedTuple
 
-from asperity.core.compiled import Kernels
+from asperity.core.compiled import FloatArray, Kernels
 
-KERNELS = Kernels(provides=("band_changes_state", "hand_energy", "hand_force"))
-
+KERNELS = Kernels(
+    provides=("add_energies", "band_changes_state", "friction_force", "hand_energy", "hand_force")
+)
 
 Triple = tuple[float, float, float]
+
+# Work of the held force, per axis; the paper's same-sample sum, per axis; loss; work of the hand;
+# work of dry friction; what sampling adds; all without their signs.
+SUPPLIED = 0
+SAME_SAMPLE = 3
+LOST = 6
+HAND = 7
+FRICTION = 8
+SAMPLING = 9
+EXCHANGED = 10
+LEDGER_SIZE = 11
+
+
+def add_energies(
+    ledger: FloatArray, wx: float, wy: float, wz: float, lost: float, hand: float, rubbed: float
+) -> None:
+    """Add work of the held force per axis, loss, work of the hand and of dry friction [J]."""
+    ledger[SUPPLIED] += wx
+    ledger[SUPPLIED + 1] += wy
+    ledger[SUPPLIED + 2] += wz
+    ledger[LOST] += lost
+    ledger[HAND] += hand
+    ledger[FRICTION] += rubbed
+    ledger[EXCHANGED] += abs(wx) + abs(wy) + abs(wz) + abs(lost) + abs(hand) + abs(rubbed)
 
 
 class HandRecord(NamedTuple):
@@ -78,3 +103,20 @@ def hand_energy(sx: float, sy: float, sz: float, hand: HandRecord) -> float:
         return float(0.5 * hand.stiffness[0] * over * over)
     x, y, z = hand.stiffness
     return float(0.5 * (x * sx * sx + y * sy * sy + z * sz * sz))
+
+
+def friction_force(
+    vx: float, vy: float, vz: float, friction: float, stopping_mass: FloatArray, substep: float
+) -> tuple[float, float, float]:
+    """Return the dry friction [N] that stops the velocity within a part, or its limit against it.
+
+    ``stopping_mass`` (3, 3) is the mass that it stops in the part's duration.
+    """
+    gx = -(stopping_mass[0, 0] * vx + stopping_mass[0, 1] * vy + stopping_mass[0, 2] * vz) / substep
+    gy = -(stopping_mass[1, 0] * vx + stopping_mass[1, 1] * vy + stopping_mass[1, 2] * vz) / substep
+    gz = -(stopping_mass[2, 0] * vx + stopping_mass[2, 1] * vy + stopping_mass[2, 2] * vz) / substep
+    speed = math.sqrt(vx * vx + vy * vy + vz * vz)
+    if gx * gx + gy * gy + gz * gz <= friction * friction or speed == 0.0:
+        return gx, gy, gz
+    share = -friction / speed
+    return share * vx, share * vy, share * vz

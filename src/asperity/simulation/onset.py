@@ -22,11 +22,10 @@ from asperity.core.files import (
     to_plain_data,
 )
 from asperity.laws.w_smooth_wall import LAW as SMOOTH_WALL
+from asperity.simulation import onset_search
 from asperity.simulation.batch import BatchSimulation, Trajectory
-from asperity.simulation.hands import Hand
+from asperity.simulation.hands import Hand, Motion
 from asperity.simulation.kernels.body_interface import LANES
-from asperity.simulation.limit_cycles import onset_search
-from asperity.simulation.motions import Motion
 from asperity.simulation.plants import Plant
 from asperity.simulation.servo import Servo
 from asperity.simulation.simulate import count_samples
@@ -188,7 +187,7 @@ def find_onsets(
         tolerance: width of the bracket over its lower end.
         threshold: sum over the axes of the standard deviations of the velocity above which an
             oscillation counts as a limit cycle [m/s]. By default an oscillation counts that a hand
-            feels (:func:`~asperity.simulation.limit_cycles.onset_search.felt_speed`) and that lasts
+            feels (:func:`~asperity.simulation.onset_search.felt_speed`) and that lasts
             without steps of position and force, whose chatter belongs to the encoder.
         lowest: stiffness at which the search starts [N/m]; a surface too soft for the hand's force
             lets the handle sink to depths at which the numbers of the law do not hold.

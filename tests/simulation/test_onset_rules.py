@@ -14,16 +14,11 @@ import pytest
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
 from asperity.perception.grip import load_grip
-from asperity.simulation import Cartesian, Servo, SpringHand, Stationary, Strokes, find_onset
+from asperity.simulation import Cartesian, Servo, SpringHand, Stationary, Strokes, find_onset, onset
 from asperity.simulation.batch import SegmentStatistics
 from asperity.simulation.kernels.body_interface import LANES
-from asperity.simulation.limit_cycles import onset
-from asperity.simulation.limit_cycles.onset import Onset, find_onsets, is_at_rest, start_offsets
-from asperity.simulation.limit_cycles.onset_search import (
-    bracket_onset,
-    felt_speed,
-    limit_cycle_rule,
-)
+from asperity.simulation.onset import Onset, find_onsets, is_at_rest, start_offsets
+from asperity.simulation.onset_search import bracket_onset, felt_speed, limit_cycle_rule
 from asperity.simulation.trace import StopReason
 from asperity.surface import Surface
 from asperity.textures import Sinusoid

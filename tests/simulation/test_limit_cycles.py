@@ -6,16 +6,12 @@ import math
 
 import numpy as np
 import pytest
-from tests.simulation.limit_cycles.limit_cycle_definition import (
-    ShiftedMotion,
-    ends_in_cycle,
-    velocity_spread,
-)
+from tests.simulation.limit_cycle_definition import ShiftedMotion, ends_in_cycle, velocity_spread
 
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
 from asperity.simulation import Cartesian, Resonance, Run, Servo, SpringHand, Stationary, simulate
-from asperity.simulation.limit_cycles.onset import Onset, find_onset, predict, start_offsets
+from asperity.simulation.onset import Onset, find_onset, predict, start_offsets
 from asperity.simulation.trace import COLUMNS, TailStatistics
 from asperity.surface import Surface
 from asperity.textures import Sinusoid

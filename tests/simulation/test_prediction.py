@@ -11,8 +11,8 @@ import pytest
 from asperity.analysis.bounds.bound import Bound
 from asperity.rendering import bake
 from asperity.simulation import BandHand, Cartesian, Pantograph, Resonance, Servo, SpringHand
-from asperity.simulation.limit_cycles import onset as onset_module
-from asperity.simulation.limit_cycles.onset import Onset, predict, smooth_wall_onset
+from asperity.simulation import onset as onset_module
+from asperity.simulation.onset import Onset, predict, smooth_wall_onset
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Sinusoid
 

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from asperity.core.errors import ParameterError
-from asperity.servo.drivers.pointer import PointerHand, pointer_driver
-from asperity.servo.kernels.pointer_anchor import (
+from asperity.servo.drivers.pointer import (
     ANCHOR,
     ANGLE,
     HEADER_ROWS,
@@ -18,7 +17,9 @@ from asperity.servo.kernels.pointer_anchor import (
     MAX_SPEED,
     STATE_ROW,
     TRACKING_BANDWIDTH,
+    PointerHand,
     anchor_segment,
+    pointer_driver,
 )
 from asperity.simulation import Cartesian, PrescribedHand, Servo, SpringHand
 

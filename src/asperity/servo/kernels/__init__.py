@@ -1,1 +1,0 @@
-"""The compiled loop of a device, and what it asks of clocks and devices."""

@@ -1,1 +1,0 @@
-"""Detection of limit cycles, and the stiffness at which they begin."""
