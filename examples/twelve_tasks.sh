@@ -37,8 +37,8 @@ asperity compare $SURFACE --device touch --laws WCH --html phone.html
 # 9. Printed: the same file has a style for paper
 asperity analyze $SURFACE --law C --device touch --html print.html
 
-# 10. In a lecture: slides, a claim of the paper with its evidence, then the lab, stopped with Ctrl-C
-asperity reproduce --claim fig-3 --figures lecture --format slides
+# 10. In a lecture: a figure, a claim of the paper with its evidence, then the lab, stopped with Ctrl-C
+asperity reproduce --claim fig-3 --figures lecture
 asperity reproduce --claim eq-5 --html claim.html
 timeout --preserve-status -s INT 20 asperity lab $SURFACE --law C --no-browser
 

@@ -12,9 +12,7 @@ import pytest
 from tests.report.report_pages import check_alone, check_alts
 
 import asperity as asp
-from asperity.measured.measured_file import MeasurementSummary
 from asperity.report import html_text
-from asperity.report.document.page import Paragraph, Section, add_section
 from asperity.report.pages.measured_report import measured_sections
 
 Call = Callable[..., tuple[int, str, str]]
@@ -175,15 +173,6 @@ def test_comparison_reports_of_measured_surfaces_have_the_section(source: str) -
     assert measured_sections(asp.Sinusoid(1e-4, 1e-3)) == []
     text = html_text(asp.compare(texture, laws="W"))
     assert "Surface parameters" in text
-
-
-def test_user_defined_section_is_on_the_page(call: Call, source: str, tmp_path: Path) -> None:
-    def build_section(summary: MeasurementSummary) -> Section:
-        return Section("Mine", [Paragraph(f"of {summary.source}")])
-
-    add_section(MeasurementSummary, build_section)
-    call("show", source, *PLAIN, "--html", str(tmp_path / "page.html"))
-    assert "of map.npy" in (tmp_path / "page.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("command", [["show"], ["prepare", "-o", "surface.npz"]])

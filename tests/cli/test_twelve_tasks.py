@@ -68,7 +68,7 @@ EXPECTED: dict[int, tuple[str, dict[str, str]]] = {
     9: (r"law C", {"print.html": "@media print"}),
     10: (
         r"http://(127\.0\.0\.1|localhost):\d+",
-        {"claim.html": "eq-5", "lecture/slides.html": "<h1>Around a closed path"},
+        {"claim.html": "eq-5", "lecture/fig-3.svg": "<svg"},
     ),
     11: (r"did you mean '--device'[\s\S]*^law start at texture", {}),
     12: (r"The recording was not closed", {"run.csv": "x [m]"}),

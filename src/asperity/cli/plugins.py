@@ -1,4 +1,4 @@
-"""The option ``--plugin``: Python files with user-defined laws, textures, readers, claims and more.
+"""The option ``--plugin``: Python files with user-defined laws, textures, readers and more.
 
 Only the command line names such files: the user who types the command runs the code. What a file
 defines is registered until the command ends.
@@ -69,9 +69,6 @@ def plugin_registries() -> tuple[PluginRegistry, ...]:
     from asperity.derive.derivatives import symbolic_force
     from asperity.export import c99
     from asperity.measured.reading import Reader, readers
-    from asperity.paper import claims as claim_registry
-    from asperity.paper.claim import Claim
-    from asperity.report.document import page
     from asperity.servo.drivers import driver_registry
     from asperity.servo.drivers.driver import DriverKind
     from asperity.sweeps import case_runs
@@ -82,13 +79,11 @@ def plugin_registries() -> tuple[PluginRegistry, ...]:
         PluginRegistry(laws.REGISTERED_LAWS, laws.Law, laws.register, symbolic_force),
         PluginRegistry(catalogue.CATALOGUE, TextureKind, catalogue.register),
         PluginRegistry(readers.USER_READERS, Reader, readers.register),
-        PluginRegistry(claim_registry.CLAIMS, Claim, claim_registry.register),
         PluginRegistry(driver_registry.DRIVER_KINDS, DriverKind, driver_registry.register_driver),
         PluginRegistry(c99.TARGETS, c99.ExportTarget, c99.register),
         PluginRegistry(case_runs.RUN_KINDS, case_runs.RunKind, case_runs.register_run),
         PluginRegistry(CRITERIA),
         PluginRegistry(THEOREMS),
-        PluginRegistry(page._USER_SECTIONS),
     )
 
 
@@ -134,7 +129,7 @@ def _load_plugin(file: str, registries: tuple[PluginRegistry, ...]) -> None:
     if before == [registry.entries for registry in registries]:
         types = [registry.plugin_type for registry in registries]
         names = ", ".join(one.__name__ for one in types if one is not None)
-        functions = "register_criterion, register_theorem or add_section"
+        functions = "register_criterion or register_theorem"
         words = f"{file} registers nothing: no {names} at its top level, and no call of {functions}"
         raise ParameterError(_OPTION, words)
 

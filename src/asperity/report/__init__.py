@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from asperity.report.document.page import add_section as add_section
 from asperity.report.pages.comparison_columns import comparison_table as comparison_table
 from asperity.report.views import html_text as html_text
 from asperity.report.views import notebook_html as notebook_html
@@ -13,14 +12,7 @@ from asperity.report.views import rich_renderables as rich_renderables
 if TYPE_CHECKING:
     from asperity.report.pictures.plotting import plot as plot
 
-__all__ = [
-    "add_section",
-    "comparison_table",
-    "html_text",
-    "notebook_html",
-    "plot",
-    "rich_renderables",
-]
+__all__ = ["comparison_table", "html_text", "notebook_html", "plot", "rich_renderables"]
 
 
 def __getattr__(name: str) -> Any:

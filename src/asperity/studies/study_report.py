@@ -56,7 +56,6 @@ def study_page(result: StudyResult) -> Page:
             *(functions if kind.has_function and result.included else ()),
             Section("Participants", [_participant_table(result)], notes=[score.interval]),
             Section("Exclusion", [page.pairs_table(rules), *(excluded or [nobody])], _RULES),
-            *page.user_sections(StudyResult, result),
         ],
     )  # fmt: skip
 

@@ -14,8 +14,7 @@ from tests.paper.claims.perturbations import (
 from tests.paper.claims.test_claims import CORRECTED, FAILS, HOLDS
 from tests.paper.test_experiments import EXPECTED
 
-from asperity.paper import CLAIMS, Claim, get_claim
-from asperity.paper.claims import register
+from asperity.paper import CLAIMS, get_claim
 from asperity.paper.probes import ProbePoint
 from asperity.surface import Surface
 from asperity.textures.kinds.sinusoid import Sinusoid
@@ -89,11 +88,3 @@ def test_replacement_with_owner_affects_only_that_class() -> None:
     with Perturbation("no norms", (replacement,)).apply():
         assert ProbePoint.norms is None
     assert callable(ProbePoint.norms)
-
-
-def test_user_defined_claim_needs_no_perturbation() -> None:
-    claim = register(Claim("own", (), "mine", "Mine.", get_claim("eq-6").compute))
-    try:
-        assert claim.run().flips_under == ""
-    finally:
-        del CLAIMS["own"]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import io
 import re
 from pathlib import Path
@@ -149,20 +148,3 @@ def test_path_over_the_bump_is_inside_the_axes(experiments: Experiments) -> None
     highest = max(1e3 * one.z.max() for one in experiments.bump.bumps)
     assert highest > 25.0  # A throws the handle up
     assert max(axes.get_ylim()[1] for axes in bumps_figure(experiments.bump).axes[::2]) > highest
-
-
-def test_slides_have_one_sentence_and_one_picture_each(
-    experiments: Experiments, tmp_path: Path
-) -> None:
-    (path,) = write_figures(PAPER_FIGURES, tmp_path, "slides", experiments)
-    assert [path] == list(tmp_path.iterdir())
-    assert path.name == "slides.html"
-    text = path.read_text(encoding="utf-8")
-    sentences = re.findall(r"<h1>(.*?)</h1>", text)
-    assert len(set(sentences)) == len(NAMES)
-    assert all(sentence.endswith(".") and ". " not in sentence for sentence in sentences)
-    images = re.findall(r'src="data:image/svg\+xml;base64,([^"]*)"', text)
-    svg = write_figures(find_figures(["fig-3"]), tmp_path, "svg", experiments)[0].read_bytes()
-    assert base64.b64decode(images[1]) == svg
-    assert len(images) == len(NAMES)
-    assert "http" not in re.sub(r"base64,[^\"]*", "", text)

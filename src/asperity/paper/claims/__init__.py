@@ -63,19 +63,6 @@ _ROWS = [*FORMULAS.items(), *CATALOGUE.items()]
 CLAIMS: dict[str, Claim] = {
     one.id: one for one in sorted((_catalogued_claim(*pair) for pair in _ROWS), key=_paper_order)
 }
-_PAPER_CLAIM_IDS = frozenset(CLAIMS)
-
-
-def register(new_claim: Claim) -> Claim:
-    """Register a user-defined claim.
-
-    Raises:
-        ParameterError: if the id is already in use.
-    """
-    if new_claim.id in CLAIMS:
-        raise ParameterError("claim", f"cannot be added: {new_claim.id!r} is taken")
-    CLAIMS[new_claim.id] = new_claim
-    return new_claim
 
 
 def get_claim(claim_id: str) -> Claim:
@@ -150,17 +137,18 @@ def reproduce_claims(
     """
     if isinstance(ids, str):
         raise ParameterError("ids", "must be a sequence of ids, not one text", ids)
-    wanted = None if ids is None else {found.id for given in ids for found in find_claims(given)}
-    names = [name for name in CLAIMS if wanted is None or name in wanted]
-    results = []
-    with precompute(_run_in_worker, names) as precomputed:
-        for name, found in zip(names, precomputed, strict=True):
-            results.append(CLAIMS[name].run() if found is None else found)
+    names = list(CLAIMS)
+    if ids is not None:
+        selected = {claim.id for reference in ids for claim in find_claims(reference)}
+        names = [name for name in CLAIMS if name in selected]
+    results: list[Result] = []
+    with precompute(_run_claim, names) as precomputed:
+        for name, result in zip(names, precomputed, strict=True):
+            results.append(result or _run_claim(name))  # none: no worker has computed it
             if progress is not None:
                 progress(results[-1], len(results), len(names))
     return tuple(results)
 
 
-def _run_in_worker(claim_id: str) -> Result | None:
-    """Compute a claim of the paper; user-defined claims are unknown to worker processes."""
-    return CLAIMS[claim_id].run() if claim_id in _PAPER_CLAIM_IDS else None
+def _run_claim(claim_id: str) -> Result:
+    return CLAIMS[claim_id].run()

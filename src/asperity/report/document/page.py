@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from enum import Flag, auto
 from functools import partial
@@ -366,29 +366,3 @@ def figure_bytes(result: Any, suffix: str) -> bytes:
     with default_style():
         _plot(result, None).savefig(image, format=suffix[1:], metadata=metadata)
     return image.getvalue()
-
-
-# --- user-defined sections ------------------------------------------------------------------------
-
-_USER_SECTIONS: dict[type, list[Callable[..., Section | None]]] = {}
-
-
-def add_section(result_type: type, section: Callable[..., Section | None]) -> None:
-    """Add a section to the page of every result of a type, before the assumptions.
-
-    Args:
-        result_type: the type, such as :class:`~asperity.analysis.results.compare.Comparison`.
-        section: called with the arguments of the page: a comparison, an analysis, limits; of a run
-            its setup and the run. It returns a :class:`Section`, or ``None`` for none.
-    """
-    sections = _USER_SECTIONS.setdefault(result_type, [])
-    if section not in sections:
-        sections.append(section)
-
-
-def user_sections(result_type: type, *arguments: Any) -> list[Section]:
-    """Return the user-defined sections of a type of result."""
-    functions = _USER_SECTIONS.get(result_type, ())
-    with default_style() if functions else nullcontext():
-        sections = [function(*arguments) for function in functions]
-    return [section for section in sections if section is not None]

@@ -199,7 +199,6 @@ def analysis_page(analysis: Analysis, texture_code: str = "") -> page.Page:
             _continuity_section(analysis),
             Section("On a straight scan", [page.pairs_table(merit_facts(analysis))], media=_MEDIA),
             Section("Reproduce q", [page.Paragraph(code, "code")], media=_MEDIA),
-            *page.user_sections(Analysis, analysis),
             *page.assumption_sections(
                 analysis.assumptions, device_numbers_table(analysis.device, PASSIVITY_FIELDS)
             ),

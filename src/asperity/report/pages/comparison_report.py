@@ -55,7 +55,6 @@ def comparison_page(comparison: Comparison, full: bool = False) -> Page:
             *_figure_sections(comparison),
             *thin_sections(comparison.texture),
             *measured_sections(comparison.texture),
-            *page.user_sections(Comparison, comparison),
             *page.assumption_sections(
                 comparison.assumptions,
                 device_numbers_table(comparison.device, list(comparison.device.data)),
@@ -226,7 +225,7 @@ def design_page(result: Design) -> page.Page:
         title=f"Design for {result.comparison.device.name}",
         answer=design_answer(result),
         facts=compared.facts,
-        sections=[*sections, *page.user_sections(Design, result), *compared.sections],
+        sections=[*sections, *compared.sections],
         footer=compared.footer,
     )
 

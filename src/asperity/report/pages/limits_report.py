@@ -152,7 +152,6 @@ def limits_page(result: check_limits.Limits) -> page.Page:
             Section("The six limits", limits, notes=notes, media=SCREEN | Media.NOTEBOOK),
             _figure_section(result),
             *(_waves_sections(result) if result.waves else ()),
-            *page.user_sections(check_limits.Limits, result),
             *page.assumption_sections(
                 result.assumptions, device_numbers_table(result.device, fields)
             ),
@@ -219,7 +218,6 @@ def envelope_page(result: Envelope) -> page.Page:
             Section(title, [figure], caption, media=Media.HTML | Media.NOTEBOOK),
             *tables,
             *([_points_section(result)] if result.surfaces else ()),
-            *page.user_sections(Envelope, result),
             *page.assumption_sections(result.assumptions),
             Section("How to read it", [page.DefinitionList(glossary("envelope"))]),
         ],

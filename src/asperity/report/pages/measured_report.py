@@ -233,7 +233,6 @@ def surface_summary_page(summary: MeasurementSummary) -> page.Page:
         *_parts_sections(summary),
         *_figure_sections(summary),
         *_step_sections(prepared),
-        *page.user_sections(MeasurementSummary, summary),
         *([Section("Definitions of the parameters", definitions)] if definitions else ()),
     ]
     return page.Page(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import io
 import os
 from collections.abc import Callable, Iterable, Sequence
@@ -17,7 +16,6 @@ from matplotlib.figure import Figure
 
 from asperity.core.errors import ParameterError
 from asperity.core.files import write_bytes
-from asperity.core.version import __version__
 from asperity.paper import VERDICTS, Result
 from asperity.paper.claim import Number
 from asperity.paper.claims import find_claims
@@ -36,7 +34,6 @@ from asperity.paper.experiments import (
 )
 from asperity.paper.figures import loop_energies
 from asperity.report.document import page
-from asperity.report.document.html import template_environment
 from asperity.report.document.page import (
     HEADED,
     Cell,
@@ -55,7 +52,7 @@ from asperity.report.pictures import paper_pictures
 from asperity.report.pictures import paper_pictures as pictures
 from asperity.report.pictures.loop_pictures import onset_figure
 from asperity.report.pictures.paper_pictures import loop_energy_text
-from asperity.report.sentences.texts import sentence, slide_texts, table_data, table_notes
+from asperity.report.sentences.texts import sentence, table_data, table_notes
 
 _MORE_NOTE = "The evidence of one claim: asperity reproduce --claim ID"
 
@@ -85,7 +82,6 @@ def claims_page(results: Sequence[Result], experiments: Experiments | None) -> P
         sections += experiment_sections(experiments)
         guesses += [*experiments.passivity.fitted, *experiments.scanning.guessed]
         guesses += [*experiments.bump.guessed, *experiments.devices.guessed]
-    sections += page.user_sections(Result, results, experiments)
     sections += [one for one in page.assumption_sections(guesses) if Media.HTML in one.media]
     title = "“On the Synthesis of Haptic Textures”, claim by claim"
     facts = [(one["fact"], verdict) for verdict, one in table_data("verdicts").items()]
@@ -272,7 +268,7 @@ def _device_cells(device_onset: DeviceOnset) -> Cells:
     return [*names, law, q, allowed, rule, cycling, starts, depth]
 
 
-FileFormat = Literal["svg", "png", "slides"]
+FileFormat = Literal["svg", "png"]
 _DPI = 192  # of a PNG: about 1920 pixels for the 10 inches that all figures are wide
 _MARGIN = 0.15  # around the figure [inch]
 _HASH_SALT = "asperity"  # of the identifiers in an SVG, which are random without one
@@ -384,7 +380,7 @@ def write_figures(
     experiments: Experiments | None = None,
     progress: Callable[[str], None] = lambda _name: None,
 ) -> tuple[Path, ...]:
-    """Draw figures and write each to a file, or all on slides; the same bytes for the same numbers.
+    """Draw figures and write each to a file; the same bytes for the same numbers.
 
     Args:
         figures: the figures.
@@ -396,27 +392,16 @@ def write_figures(
     Raises:
         ParameterError: if a file cannot be written.
     """
-    ending = "svg" if file_format == "slides" else file_format
     files: dict[Path, bytes] = {}
     with default_style():
         matplotlib.rcParams["svg.hashsalt"] = _HASH_SALT
         for figure in figures:
             progress(figure.name)
-            image = _draw_image(figure.draw(experiments), ending)
-            files[folder / f"{figure.name}.{ending}"] = image
-    if file_format == "slides":
-        files = {folder / "slides.html": _slides(figures, files.values()).encode()}
+            image = _draw_image(figure.draw(experiments), file_format)
+            files[folder / f"{figure.name}.{file_format}"] = image
     for path, content in files.items():
         write_bytes("figures", path, content)
     return tuple(files)
-
-
-def _slides(figures: Sequence[PaperFigure], images: Iterable[bytes]) -> str:
-    """Return a page with a slide for each figure: one sentence and the picture."""
-    pictures = [base64.b64encode(image).decode("ascii") for image in images]
-    slides = [slide_texts(figure.texts) for figure in figures]
-    template = template_environment().get_template("slides.html.j2")
-    return template.render(slides=[*zip(slides, pictures, strict=True)], version=__version__)
 
 
 def _draw_image(figure: Figure, file_format: str) -> bytes:

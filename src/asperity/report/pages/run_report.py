@@ -178,7 +178,6 @@ def run_page(setup: Setup, run: Run) -> Page:
             Section("Energy ledger", [ledger], caption),
             page.terminal_section(ledger, notes=[caption]),
             page.facts_section(run_facts(setup, run)),
-            *page.user_sections(Run, setup, run),
             *page.assumption_sections(setup.assumptions),
         ],
         footer=LOOP_FOOTER,

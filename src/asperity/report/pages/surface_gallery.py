@@ -177,7 +177,6 @@ def surfaces_page(entries: Sequence[SurfaceEntry], *, detailed: bool = False) ->
             *_list_sections(entries, detailed=detailed),
             Section("", [*map(page.Paragraph, table_notes("cards"))]),
             *sections,
-            *page.user_sections(SurfaceEntry, entries),
         ],
     )
 

@@ -104,7 +104,6 @@ def onset_page(result: OnsetSweep) -> Page:
             replace(in_numbers, title="", caption="", media=Media.TERMINAL),
             onset_figure_section("loop.onsets", predictions),
             in_numbers,
-            *page.user_sections(Prediction, setup, predictions),
             *page.assumption_sections(setup.assumptions),
         ],
         footer=LOOP_FOOTER,
@@ -193,7 +192,6 @@ def strokes_page(result: StrokeSweep) -> Page:
             page.terminal_section(table, notes=notes),
             page.figure_section("loop.strokes", partial(_draw_strokes, strokes), laws=laws),
             Section("In numbers", [table], notes=[note]),
-            *page.user_sections(Stroke, setup, strokes),
             *page.assumption_sections(setup.assumptions),
         ],
         footer=LOOP_FOOTER,
@@ -229,7 +227,6 @@ def sweep_page(result: SweepResult) -> Page:
             *(_figure_section(result, name, keys) for name in names),
             Section("Ranges", [table]),
             *([Section("Failed cases", errors)] if failed else ()),
-            *page.user_sections(SweepResult, result),
         ],
         footer=page.PAPER_CITATION,
     )

@@ -41,12 +41,6 @@ def table_notes(table: str) -> list[str]:
     return list(_load_texts()["notes"][table])
 
 
-def slide_texts(name: str) -> dict[str, str]:
-    """Return the texts of a figure, with "title" and "slide", by their name."""
-    report, figure = name.split(".")
-    return dict(_load_texts()["figures"][report][figure])
-
-
 def figure_text(name: str, **values: object) -> tuple[str, str, str]:
     """Return title, caption and description of a figure.
 
