@@ -6,8 +6,9 @@ import json
 import math
 import os
 import stat
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum, StrEnum
+from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -17,6 +18,7 @@ import pytest
 
 from asperity.core.errors import ParameterError
 from asperity.core.files import (
+    OMITTED,
     Serializable,
     attributes_to_dict,
     json_text,
@@ -25,6 +27,8 @@ from asperity.core.files import (
     read_toml,
     to_plain_data,
     write_text,
+    written,
+    written_names,
 )
 
 
@@ -120,6 +124,28 @@ def test_serialized_attributes_select_and_order_the_data() -> None:
         ("size", 0),
         ("name", "o"),
     ]
+
+
+def test_omitted_fields_are_not_written_and_marked_properties_are() -> None:
+    @dataclass(frozen=True)
+    class Marked(Outer):
+        more: tuple[Inner, ...] = field(default=(), metadata=OMITTED)
+
+        @property
+        @written
+        def size(self) -> int:
+            return 7
+
+        @cached_property
+        @written
+        def double(self) -> int:
+            return 2 * self.size
+
+    assert written_names(Outer) == ("name", "inner", "more")
+    data = Marked("o", Inner(1.0, (2.0, 3.0))).to_dict()
+    assert data == {
+        "name": "o", "inner": {"reach": 1.0, "at": [2.0, 3.0]}, "size": 7, "double": 14,
+    }  # fmt: skip
 
 
 def test_json_is_readable_and_strict() -> None:

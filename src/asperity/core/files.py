@@ -13,7 +13,7 @@ import os
 import platform
 import stat
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from enum import Enum
@@ -21,13 +21,15 @@ from functools import lru_cache
 from importlib.metadata import version
 from io import BufferedReader, FileIO
 from pathlib import Path
-from typing import IO, Any, ClassVar, overload
+from typing import IO, Any, ClassVar, TypeVar, overload
 
 from asperity.core.errors import ParameterError, escape_unprintable
 
 _MAX_DOTS = 10_000  # in a line of TOML
 
 STANDARD_OUTPUT = "-"
+
+Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def is_special_file(path: str | os.PathLike[str]) -> bool:
@@ -275,23 +277,66 @@ def attributes_to_dict(
 
     Args:
         value: the object.
-        names: names of the attributes, in order; default: all fields of a dataclass.
-        exclude: fields to omit.
+        names: names of the attributes, in order; default: those of :func:`written_names`.
+        exclude: attributes to omit.
         infinity: replacement of an unbounded number.
     """
     if not names:
-        if not is_dataclass(value):
-            raise TypeError(f"no plain data: {type(value).__name__}")
-        names = tuple(field.name for field in fields(value) if field.name not in exclude)
+        kind: type = type(value)
+        if not is_dataclass(kind):
+            raise TypeError(f"no plain data: {kind.__name__}")
+        names = tuple(name for name in written_names(kind) if name not in exclude)
     return {name: to_plain_data(getattr(value, name), infinity) for name in names}
 
 
+OMITTED = {"written": False}
+"""Metadata of a field that is not part of the plain data: ``field(metadata=OMITTED)``."""
+
+
+def written(function: Function) -> Function:
+    """Mark a property as part of the plain data of its class.
+
+    Example:
+        >>> from dataclasses import dataclass, field
+        >>> @dataclass(frozen=True)
+        ... class Span(Serializable):
+        ...     low: float
+        ...     high: float
+        ...     comment: str = field(default="", metadata=OMITTED)
+        ...
+        ...     @property
+        ...     @written
+        ...     def length(self) -> float:
+        ...         return self.high - self.low
+        >>> Span(1.0, 3.0).to_dict()
+        {'low': 1.0, 'high': 3.0, 'length': 2.0}
+    """
+    vars(function)["is_written"] = True
+    return function
+
+
+@lru_cache(maxsize=256)
+def written_names(cls: type) -> tuple[str, ...]:
+    """Return the attributes that are the plain data of a dataclass.
+
+    They are its fields except the :data:`OMITTED` ones, then the properties that are marked as
+    :func:`written`, each in the order of definition.
+    """
+    names = [item.name for item in fields(cls) if item.metadata.get("written", True)]
+    for base in reversed(cls.__mro__):
+        for name, member in vars(base).items():
+            function = getattr(member, "fget", None) or getattr(member, "func", None)
+            if hasattr(function, "is_written"):
+                names.append(name)
+    return tuple(dict.fromkeys(names))
+
+
 class Serializable:
-    """Mixin for dataclasses that are written as plain data.
+    """Mixin for dataclasses that are written as plain data; see :func:`written_names`.
 
     Attributes:
         serialized_attributes: names of the attributes to write, in order, separated by spaces;
-            empty for all fields.
+            empty for those of :func:`written_names`.
     """
 
     serialized_attributes: ClassVar[str] = ""

@@ -11,7 +11,7 @@ from typing import Any, Literal
 from asperity.core.arguments import read_arguments
 from asperity.core.display import Displayable
 from asperity.core.errors import ParameterError
-from asperity.core.files import Serializable, attributes_to_dict
+from asperity.core.files import OMITTED, Serializable
 from asperity.core.units import format_quantity
 
 FIELD_TABLE = read_arguments(Path(__file__).with_name("device_fields.toml"))
@@ -49,13 +49,14 @@ class Datum(Serializable):
     source: str
     verified: bool
     also: tuple[Datum, ...] = ()
-    origin: Origin = "read"
+    origin: Origin = field(default="read", metadata=OMITTED)
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units; ``verified`` is the origin of a number that is not read."""
-        data = attributes_to_dict(self, "value", "unit", "source", "verified", "also")
-        is_special = self.verified and self.origin != "read"
-        return data | ({"verified": self.origin} if is_special else {})
+        data = super().to_dict()
+        if self.verified and self.origin != "read":
+            data["verified"] = self.origin
+        return data
 
     @property
     def text(self) -> str:
@@ -109,8 +110,8 @@ class WallTest(Datum):
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units, with the known details of the test."""
-        test = attributes_to_dict(self, *WALL_KEYS)
-        return super().to_dict() | {name: value for name, value in test.items() if value}
+        data = super().to_dict().items()
+        return {name: value for name, value in data if value or name not in WALL_KEYS}
 
 
 @dataclass(frozen=True)
@@ -124,7 +125,6 @@ class Device(Serializable, Displayable):
         axes: directions of its own x, y and z; empty if unknown.
         driver: driver for ``--driver real``, such as ``haply``; empty if none is known.
         notes: further remarks, in sentences.
-        workspace_size: greatest known width of the workspace [m]; infinite if it is unknown.
 
     Example:
         >>> from asperity.devices import load_device
@@ -135,20 +135,12 @@ class Device(Serializable, Displayable):
         [('14500 N/m', False)]
     """
 
-    serialized_attributes = "id name axes driver notes data"
-
     id: str
     name: str
     data: Mapping[str, Datum]
     axes: str = ""
     notes: tuple[str, ...] = ()
     driver: str = ""
-    workspace_size: float = field(init=False, compare=False)
-
-    def __post_init__(self) -> None:
-        sides = [self.value("workspace_diameter"), self.value("workspace_length")]
-        widths = [2.0 * (self.value("workspace_radius") or 0.0), *filter(None, sides)]
-        object.__setattr__(self, "workspace_size", max(widths) or math.inf)
 
     def __repr__(self) -> str:
         return f"<Device {self.id}, {self.name}: {len(self.data)} numbers>"
@@ -156,6 +148,13 @@ class Device(Serializable, Displayable):
     def value(self, field: str) -> float | None:
         """Return a number in SI units, ``None`` if it is unknown."""
         return self.data[field].value if field in self.data else None
+
+    @property
+    def workspace_size(self) -> float:
+        """Greatest known width of the workspace [m]; infinite if it is unknown."""
+        sides = [self.value("workspace_diameter"), self.value("workspace_length")]
+        widths = [2.0 * (self.value("workspace_radius") or 0.0), *filter(None, sides)]
+        return max(widths) or math.inf
 
     @property
     def wall_test(self) -> WallTest | None:
