@@ -22,7 +22,7 @@ from asperity.contacts.warm_start import (
 )
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
-from asperity.report.pages.run_report import search_error_text
+from asperity.report.sentences.loop_text import search_error_text
 from asperity.simulation import Cartesian, Servo, SpringHand, Stationary, simulate
 from asperity.simulation.plants import sampled_plant
 from asperity.simulation.simulate import Simulation

@@ -25,9 +25,9 @@ from asperity.core import cache, processes
 from asperity.core.compiled import COMPILE_CALLBACKS
 from asperity.core.files import json_text
 from asperity.paper.cycle_experiments import band_setup
+from asperity.report import html_text
 from asperity.report.document.html import RenderedPicture
 from asperity.report.pages.surface_gallery import find_surfaces
-from asperity.report.views import html_text
 from asperity.scene import sweeps
 from asperity.textures import Sinusoid
 from asperity.textures.catalogue import CATALOGUE

@@ -28,8 +28,8 @@ from asperity.core.display import Displayable, Plottable, Reportable
 from asperity.devices import parse_device
 from asperity.measured.measured_file import MeasurementSummary, show
 from asperity.paper.table_two import TableTwo
+from asperity.report import find_page
 from asperity.report.document.terminal import print_page
-from asperity.report.views import find_page
 from asperity.simulation import Cartesian, Run, Servo, SpringHand, Stationary, simulate
 
 WAVE = asp.Sinusoid(2e-4, 2e-3)

@@ -28,7 +28,7 @@ from asperity.analysis.gain.proofs import CrestProblem
 from asperity.core.errors import InternalError, ParameterError
 from asperity.enclosures.cells import DERIVATIVE_NAMES
 from asperity.reference import exact_force, exact_jacobian
-from asperity.report.views import html_text
+from asperity.report import html_text
 from asperity.textures import Domain, Texture, catalogue
 from asperity.textures.texture import TextureKind
 

@@ -214,7 +214,7 @@ def show_live_state() -> Iterator[Any]:
     from rich.console import Console
     from rich.live import Live
 
-    from asperity.report.pages.servo_report import status_line
+    from asperity.report.sentences.loop_text import status_line
 
     with Live(console=Console(stderr=True), transient=True, refresh_per_second=20) as live:
         yield lambda loop: live.update(status_line(loop))

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.passivity.assess_passivity import Passivity, stability_limit_text
 from asperity.analysis.results.analyze import PASSIVITY_FIELDS, Analysis
 from asperity.core.units import format_quantity
@@ -15,10 +14,15 @@ from asperity.laws import LAWS, SHIPPED_LAW_ARGUMENTS
 from asperity.laws.clamps import NONE
 from asperity.report.document import page
 from asperity.report.document.page import HEADED, Cell, Media, Row, Section, Table, TableLayout
-from asperity.report.pages.comparison_columns import texture_name
 from asperity.report.pages.device_report import device_numbers_table
 from asperity.report.sentences import number_text
-from asperity.report.sentences.alt_text import analysis_figure_names
+from asperity.report.sentences.analysis_text import (
+    bound_notes,
+    computed_bounds,
+    critical_speed_text,
+    thrust_text,
+)
+from asperity.report.sentences.surface_text import texture_name
 from asperity.report.sentences.texts import glossary, sentence
 from asperity.surface import Surface
 
@@ -28,12 +32,6 @@ _JUMP_HEADINGS = ("at depth", "jumps by", "near (both witnesses are in the JSON)
 _MEDIA = HEADED | Media.HTML
 
 
-def _computed_bounds(analysis: Analysis) -> list[tuple[str, Bound]]:
-    """Return the numbers that were searched for, from which the others follow."""
-    curl = [] if analysis.curl is None else [("|curl f|/k", analysis.curl)]
-    return [("q", analysis.q), ("q⁺", analysis.one_sided), *curl]
-
-
 def undecided_criteria(analysis: Analysis) -> list[tuple[str, str]]:
     """Return the criteria that decide nothing, grouped by reason: names and reason."""
     names: dict[str, list[str]] = {}
@@ -41,44 +39,6 @@ def undecided_criteria(analysis: Analysis) -> list[tuple[str, str]]:
         if criterion.holds is None:
             names.setdefault(criterion.conclusion, []).append(criterion.name)
     return [("; ".join(group), reason) for reason, group in names.items()]
-
-
-def bound_notes(analysis: Analysis) -> list[str]:
-    """Return how each number was obtained, and whether and why the law is conservative."""
-    notes = [f"{name}: {bound.note}" for name, bound in _computed_bounds(analysis) if bound.note]
-    word = "yes" if analysis.conservative else "no"
-    return [*notes, f"conservative: {word}, {analysis.conservative_reason}"]
-
-
-def critical_speed_text(analysis: Analysis) -> str:
-    """Return v* as text, with its meaning or the missing data."""
-    speed = analysis.v_star
-    if speed is None:
-        if analysis.device.value("damping") is None:
-            return "not decidable: needs damping"
-        return "not known: no loop found that gains energy"
-    if speed == 0.0:
-        return "0 m/s: no energy to absorb"
-    if math.isinf(speed):
-        return "∞: a device without damping never absorbs the energy"
-    datum = analysis.device.data["damping"]
-    mark = "" if datum.verified else " (not verified)"
-    return (
-        f"{format_quantity(speed, 'm/s')}: below it, damping {datum.text}{mark} absorbs too little"
-    )
-
-
-def thrust_text(analysis: Analysis) -> str:
-    """Return the mean thrust on a straight scan as text."""
-    thrust = analysis.leak.thrust
-    surface = analysis.surface
-    if surface.law.stateful:
-        return "not defined: friction resists in any case"
-    if thrust is None:
-        return "not stated: the line is not periodic"
-    # Smaller values are rounding errors of forces up to stiffness times depth.
-    is_zero = abs(thrust) <= 1e-12 * surface.stiffness * surface.max_depth
-    return f"{'0 N' if is_zero else format_quantity(thrust, 'N')} on a straight scan"
 
 
 def leak_facts(analysis: Analysis) -> list[tuple[str, str]]:
@@ -128,7 +88,7 @@ def merit_facts(analysis: Analysis) -> list[tuple[str, str]]:
 
 def bounds_table(analysis: Analysis) -> Table:
     """Return one row per number: lower, upper, method and the point that attains lower."""
-    bounds = _computed_bounds(analysis)
+    bounds = computed_bounds(analysis)
     density = analysis.curl_density
     if density is not None and density.upper > 0.0:
         bounds.append(("|curl f| [N/m]", density))
@@ -186,13 +146,15 @@ def analysis_page(analysis: Analysis, texture_code: str = "") -> page.Page:
     code = "\n".join(reproduction_lines(analysis, texture_code))
     surface = analysis.surface
     name = analysis.device.name
+    # The map of a profile shows no more than its section.
+    gain_figures = ("gain", "depth") if surface.texture.is_profile else ("gain", "top", "depth")
     return page.Page(
         title=f"{texture_name(surface.texture)}, law {surface.law.letter}, on the {name}",
         answer=analysis.answer,
         facts=_facts(analysis),
         sections=[
             _bounds_section(analysis),
-            *_figure_sections(analysis, "gain", "top", "depth"),
+            *_figure_sections(analysis, *gain_figures),
             *_criteria_sections(analysis),
             Section("Worst loop", [page.pairs_table(leak_facts(analysis))], media=_MEDIA),
             *_figure_sections(analysis, "field"),
@@ -261,7 +223,7 @@ def _continuity_section(analysis: Analysis) -> Section:
 
 
 def _figure_sections(analysis: Analysis, *names: str) -> list[Section]:
-    """Return the figures of these names that the analysis has."""
+    """Return the figures of these names."""
     sections = []
     leak = analysis.leak
     gained = number_text.range_text(leak.energy, leak.upper_per_period, "J")
@@ -271,11 +233,10 @@ def _figure_sections(analysis: Analysis, *names: str) -> list[Section]:
         "loop": f"; the worst loop gains {gained}" if len(leak.vertices) else "",
     }
     for name in names:
-        if name in analysis_figure_names(analysis):
-            figure = page.plot_later(analysis, name)
-            media = Media.HTML | Media.NOTEBOOK if name == "gain" else Media.HTML
-            text = f"analysis.{name}"
-            sections.append(page.figure_section(text, figure, (), 3, media, **values))
+        figure = page.plot_later(analysis, name)
+        media = Media.HTML | Media.NOTEBOOK if name == "gain" else Media.HTML
+        text = f"analysis.{name}"
+        sections.append(page.figure_section(text, figure, (), 3, media, **values))
     return sections
 
 

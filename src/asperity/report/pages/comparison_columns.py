@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 from rich.table import Table as RichTable
 
@@ -13,8 +12,6 @@ from asperity.analysis.limits.perceptibility_sentences import texture_amount_tex
 from asperity.analysis.passivity.assess_passivity import stability_limit_text
 from asperity.analysis.results.compare import Comparison
 from asperity.analysis.results.recommendation import LawRow
-from asperity.core.arguments import Argument
-from asperity.core.units import format_quantity, round_down
 from asperity.report.document.page import (
     Cell,
     Media,
@@ -26,9 +23,8 @@ from asperity.report.document.page import (
 )
 from asperity.report.document.terminal import rich_table
 from asperity.report.sentences import number_text
+from asperity.report.sentences.comparison_text import recommended_stiffness_text, row_limit_text
 from asperity.report.sentences.texts import column_meanings, table_notes
-from asperity.textures.catalogue import CATALOGUE
-from asperity.textures.texture import Texture
 
 VERDICT_MIN_CONSOLE = 72
 """Console width [characters] from which the verdicts are in the table, not below it."""
@@ -54,22 +50,9 @@ class LawColumn:
 
 
 _BASIS_TEXT = {"wall gain": "no limit", "none": "–"}
-# Lengths of maps and profiles, which are not arguments of a kind.
-_LENGTH_NAMES = {"pitch", "cutoff"}
-_OMITTED_NAMES = {"kind", "preparation", "phase", "direction", "phases", "wavevectors"}
-_OMITTED_NAMES |= {"thin_regions", "gain", "one_sided", "accuracy", "grid", "source"}  # of fields
 
 
 # --- cells ----------------------------------------------------------------------------------------
-
-
-def row_limit_text(row: LawRow) -> str:
-    """Return the stability limit of the stiffness on the device: "995 N/m", or "none"."""
-    limit = row.stability_limit
-    if not limit.stiffness or not row.conservative:
-        return "none"
-    mark = number_text.SAMPLED_MARK if limit.sampled else ""
-    return f"{mark}{format_quantity(round_down(limit.stiffness), 'N/m')}"
 
 
 def has_sampled(comparison: Comparison) -> bool:
@@ -80,56 +63,7 @@ def has_sampled(comparison: Comparison) -> bool:
     return any(map(number_text.is_sampled, numbers)) or any(leaks)
 
 
-def describe_texture(description: dict[str, Any]) -> str:
-    """Return the kind of a texture and its plain arguments as text.
-
-    Example:
-        >>> describe_texture({"kind": "sinusoid", "amplitude": 8e-4, "period": 1e-3, "phase": 0.0})
-        'sinusoid: amplitude 0.8 mm, period 1 mm'
-    """
-    kind = CATALOGUE.get(description["kind"])
-    declared = {} if kind is None else {argument.name: argument for argument in kind.arguments}
-    parts = []
-    for name, value in description.items():
-        if name in _OMITTED_NAMES:
-            continue
-        values = value if isinstance(value, list) else [value]
-        if len(values) > 4:
-            parts.append(f"{len(values)} {name}")
-            continue
-        texts = [_value_text(name, one, declared.get(name)) for one in values]
-        parts.append(f"{number_text.readable_name(name)} {' × '.join(texts)}")
-    return f"{description['kind']}: {', '.join(parts)}"
-
-
-def _value_text(name: str, value: Any, argument: Argument | None) -> str:
-    if isinstance(value, bool):
-        return number_text.yes_no_text(value)
-    if argument is not None:
-        return argument.format_value(value)
-    is_length = name in _LENGTH_NAMES and isinstance(value, float)
-    return format_quantity(value, "m") if is_length else f"{value}"
-
-
-def texture_name(texture: Texture) -> str:
-    """Return the file of a texture, its kind, or that of the one that was baked, for a title.
-
-    Example:
-        >>> from asperity.textures import Sinusoid
-        >>> texture_name(Sinusoid(1e-4, 1e-3))
-        'Sinusoid'
-    """
-    description = texture.describe().get("source", texture.describe())
-    return texture.file_name or number_text.readable_name(description["kind"]).capitalize()
-
-
 # --- tables ---------------------------------------------------------------------------------------
-
-
-def recommended_stiffness_text(row: LawRow) -> str:
-    """Return the recommended stiffness: "3050 N/m", or "none"."""
-    stiffness = row.recommended_stiffness
-    return number_text.limit_text(stiffness) if stiffness else "none"
 
 
 def _recommendation_cell(row: LawRow, _comparison: Comparison) -> Cell:

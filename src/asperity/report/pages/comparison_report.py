@@ -2,37 +2,43 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from operator import attrgetter
 
 from asperity.analysis.limits import perceptibility_sentences
-from asperity.analysis.limits.perceptibility_sentences import force_magnitude_text
 from asperity.analysis.results.check_limits import percent
 from asperity.analysis.results.compare import Comparison
 from asperity.analysis.results.device_comparisons import DeviceComparisons
 from asperity.analysis.results.recommendation import LawRow
 from asperity.core.units import format_quantity
 from asperity.envelopes.find_design import Design
-from asperity.envelopes.searches import FORCE, MET
+from asperity.envelopes.searches import MET
 from asperity.report.document import page
 from asperity.report.document.page import Cell, Media, Page, Row, Section, Table, TableLayout
-from asperity.report.pages.comparison_columns import (
-    describe_texture,
-    law_rows,
-    law_sections,
-    recommended_stiffness_text,
-    terminal_sections,
-    texture_name,
-)
-from asperity.report.pages.device_report import datum_text, device_numbers_table
+from asperity.report.pages.comparison_columns import law_rows, law_sections, terminal_sections
+from asperity.report.pages.device_report import device_numbers_table
 from asperity.report.pages.measured_report import measured_sections, thin_sections
-from asperity.report.sentences.alt_text import COMPARISON_FIGURES, comparison_alt_text
+from asperity.report.sentences.comparison_text import (
+    design_answer,
+    field_alt_text,
+    force_alt_text,
+    gain_alt_text,
+    hand_alt_text,
+    merit_alt_text,
+    recommended_stiffness_text,
+    requested_stiffness_text,
+    spectrum_alt_text,
+    surface_alt_text,
+)
+from asperity.report.sentences.device_text import datum_text
 from asperity.report.sentences.number_text import (
     NOT_AVAILABLE,
     bound_text,
     limit_text,
     position_text,
 )
+from asperity.report.sentences.surface_text import describe_texture, texture_name
 from asperity.report.sentences.texts import column_meanings, figure_text, glossary
 
 _FOOTER = f"{page.PAPER_CITATION}. {page.NO_PERCEPTUAL_TEST}"
@@ -74,30 +80,55 @@ def _facts(comparison: Comparison) -> list[tuple[str, str]]:
         ("Peak to valley", format_quantity(texture.peak_to_valley, "m")),
         ("Device", device.name),
         ("K₀, stiffest smooth wall", datum_text(device.wall_test)),
-        ("Stiffness", _requested_stiffness_text(comparison)),
+        ("Stiffness", requested_stiffness_text(comparison)),
         ("Pressed to", format_quantity(comparison.max_depth, "m")),
         ("Scanned at", perceptibility_sentences.speed_text(comparison.speed)),
     ]
 
 
-def _requested_stiffness_text(comparison: Comparison) -> str:
-    stiffness = comparison.stiffness
-    recommended = "the recommended one of each law"
-    return recommended if stiffness is None else format_quantity(stiffness, "N/m", 4)
-
-
 def _figure_sections(comparison: Comparison) -> list[Section]:
     depth = format_quantity(comparison.max_depth, "m")
-    stiffness = _requested_stiffness_text(comparison)
+    stiffness = requested_stiffness_text(comparison)
     find_digest = partial(attrgetter("content_digest"), comparison)  # slow, for a page alone
     sections = []
-    for name in COMPARISON_FIGURES:
-        text = partial(comparison_alt_text, comparison, name)
+    for name, describe in _FIGURE_DESCRIPTIONS.items():
+        text = partial(describe, comparison)
         picture = page.Picture(page.plot_later(comparison, name), text, name, find_digest)
         media = Media.HTML | Media.NOTEBOOK if name == "merit" else Media.HTML
         title, caption, _ = figure_text(f"comparison.{name}", depth=depth, stiffness=stiffness)
         sections.append(Section(title, [picture], caption, media=media))
     return sections
+
+
+def _describe_surface(comparison: Comparison) -> str:
+    return surface_alt_text(comparison.texture)
+
+
+def _describe_spectrum(comparison: Comparison) -> str:
+    from asperity.report.pictures.device_pictures import device_wavelength_limits, line_spectrum
+
+    lengths, amplitudes = line_spectrum(comparison.texture)
+    strongest = amplitudes.argmax()
+    limits = [text for _length, text in device_wavelength_limits(comparison.device)]
+    return spectrum_alt_text(float(lengths[strongest]), float(amplitudes[strongest]), limits)
+
+
+def _describe_force(comparison: Comparison) -> str:
+    from asperity.report.pictures.law_pictures import force_segment
+
+    return force_alt_text(comparison, force_segment(comparison.texture).length)
+
+
+_FIGURE_DESCRIPTIONS: dict[str, Callable[[Comparison], str]] = {
+    "surface": _describe_surface,
+    "spectrum": _describe_spectrum,
+    "hand": hand_alt_text,
+    "force": _describe_force,
+    "field": field_alt_text,
+    "gain": gain_alt_text,
+    "merit": merit_alt_text,
+}
+"""Functions that describe the figures of a comparison, in the order of its page."""
 
 
 def _provenance_section(comparison: Comparison) -> Section:
@@ -237,31 +268,3 @@ def _lost_table(result: Design) -> Table:
         words, _, unit = name.rstrip("]").partition(" [")
         rows.append(Row([words, format_quantity(value, unit) if unit else percent(value)]))
     return Table(("of the texture", "not rendered"), rows, (1,))
-
-
-def design_answer(result: Design) -> str:
-    """Return the design, and whether it meets the target, in a few sentences."""
-    row = result.row
-    texture = result.comparison.texture
-    target = result.target
-    k = format_quantity(row.surface.stiffness, "N/m", 4)
-    felt = row.perceptibility
-    height = format_quantity(texture.peak_to_valley, "m")
-    way = "as high" if texture.single_wave is not None else "as large"
-    unit = f"{target.measure} at the {target.at}"
-    text = f"law {row.law.letter} at {k}, {result.factor:.4g} times {way}: {height} peak to valley"
-    if felt is not None:
-        text += f"; {force_magnitude_text(felt.texture_rms)} RMS of texture, "
-        if target.texture_force and unit != "RMS at the motor":
-            text += f"{force_magnitude_text(result.margins[FORCE] * target.texture_force)} {unit}, "
-        text += (f"support {row.support:.2g}, " if target.min_support else "") + felt.tier
-    verb = "limits" if len(result.binding) == 1 else "limit"
-    limits = f"{' and '.join(result.binding)} {verb} it"
-    if not result.is_feasible:
-        force = f"{force_magnitude_text(result.reachable)} {unit}"
-        most = force if result.reachable else "Nothing"
-        return f"Not met. {most} can be reached; {limits}. Nearest: {text}."
-    if target.texture_force is None:
-        return f"The largest is l{text[1:]}. {limits[0].upper()}{limits[1:]}."
-    least = min(result.margins.values())
-    return f"L{text[1:]}. Least margin {least:.3g}; {limits}."

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from asperity.core.units import format_quantity
-from asperity.devices import FIELD_TABLE, FIELD_UNITS, Datum, Device, WallTest
+from asperity.devices import FIELD_TABLE, Device, WallTest
 from asperity.report.document import page
 from asperity.report.document.page import (
     HEADED,
@@ -17,46 +16,17 @@ from asperity.report.document.page import (
     Table,
     TableLayout,
 )
-from asperity.report.sentences.number_text import NOT_AVAILABLE, readable_name
+from asperity.report.sentences.device_text import (
+    datum_text,
+    missing_fields,
+    verified_text,
+    wall_test_text,
+)
+from asperity.report.sentences.number_text import readable_name
 from asperity.report.sentences.texts import table_data, table_notes
 
-UNVERIFIED_MARK = "?"
 _NAME_MIN_CONSOLE = 96
 """Console width [characters] from which the full name has a column."""
-
-
-def datum_text(datum: Datum | None) -> str:
-    """Return a datum as text, with a ? if it is not verified; "–" for none.
-
-    Example:
-        >>> datum_text(Datum(5.5e-5, "m", "remembered", False)), datum_text(None)
-        ('55 µm ?', '–')
-    """
-    if datum is None:
-        return NOT_AVAILABLE
-    return datum.text if datum.verified else f"{datum.text} {UNVERIFIED_MARK}"
-
-
-def verified_text(datum: Datum) -> str:
-    """Return the pedigree of a verified datum, "measured" or "read" in a public source, or "no"."""
-    return datum.pedigree if datum.verified else "no"
-
-
-def wall_test_text(test: WallTest) -> str:
-    """Return the conditions of a wall test as text; "" without any.
-
-    Example:
-        >>> wall_test_text(WallTest(1e3, "N/m", "", True, cycled=2e3, directions=("x", "z")))
-        'tried along x, z; cycled at 2000 N/m'
-    """
-    parts = [
-        f"tried along {', '.join(test.directions)}" if test.directions else "",
-        f"cycled at {format_quantity(test.cycled, 'N/m')}" if test.cycled else "",
-        f"at {format_quantity(test.update_rate, 'Hz')}" if test.update_rate else "",
-        f"{test.positions} positions" if test.positions else "",
-        f"lightest direction {test.lightest:g} of the one tried" if test.lightest else "",
-    ]
-    return "; ".join(part for part in parts if part)
 
 
 def devices_page(devices: Sequence[Device], *, detailed: bool = False) -> Page:
@@ -120,21 +90,6 @@ def device_numbers_table(device: Device, fields: Sequence[str]) -> Table:
         test = wall_test_text(datum) if isinstance(datum, WallTest) else ""
         rows.append(Row([name, datum.text, verified, Cell(datum.source, subtext=test)]))
     return Table((device.name, "value", "verified", "source"), rows, numeric_columns=(1,))
-
-
-def missing_fields(device: Device) -> list[str]:
-    """Return the data that asperity uses and that the device lacks, with units.
-
-    Example:
-        >>> from asperity.devices import load_device
-        >>> missing_fields(load_device("touch"))[0]
-        'force_resolution [N]: smallest step of the force'
-    """
-    return [
-        f"{field} [{FIELD_UNITS[field]}]: {FIELD_TABLE[field].description}"
-        for field in table_data("used_fields")
-        if field not in device.data
-    ]
 
 
 def _device_sections(device: Device) -> list[Section]:

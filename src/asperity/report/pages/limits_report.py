@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import math
 from pathlib import Path
 
 from asperity.analysis.limits.limit_rules import LIMIT_RULES
@@ -14,7 +13,6 @@ from asperity.core.errors import ParameterError
 from asperity.core.files import write_bytes
 from asperity.core.units import format_quantity
 from asperity.envelopes.envelope import LISTED, DeviceEnvelope, Envelope
-from asperity.envelopes.wave_borders import WaveBorders
 from asperity.report.document import page
 from asperity.report.document.page import (
     SCREEN,
@@ -26,15 +24,15 @@ from asperity.report.document.page import (
     Table,
     TableLayout,
 )
-from asperity.report.pages.comparison_columns import texture_name
 from asperity.report.pages.device_report import device_numbers_table
-from asperity.report.sentences.number_text import (
-    INFINITY_SIGN,
-    NOT_AVAILABLE,
-    readable_name,
-    yes_no_text,
+from asperity.report.sentences.analysis_text import (
+    amplitude_range_text,
+    envelope_answer,
+    symbol_lines,
 )
-from asperity.report.sentences.texts import figure_text, glossary, sentence, table_data, table_notes
+from asperity.report.sentences.number_text import readable_name, side_text, yes_no_text
+from asperity.report.sentences.surface_text import texture_name
+from asperity.report.sentences.texts import figure_text, glossary, table_notes
 
 _LIMIT_HEADINGS = ("", "limit", "condition", "left", "right", "holds", "for", "at speeds")
 _NAME_COLUMN = 1
@@ -52,18 +50,6 @@ _WAVE_HEADINGS = ("wavelength", "amplitude", "share", "frequency", "force")
 MAX_WAVES = 16
 """Number of waves listed: those with the greatest share of the height variance."""
 WAVE_LIMITS = tuple(rule.number for rule in LIMIT_RULES if rule.number != 5)
-
-
-def side_text(side: float | None, unit: str) -> str:
-    """Return one side of an inequality as text; "–" if it is unknown.
-
-    Example:
-        >>> side_text(5e-5, "m"), side_text(float("inf"), "N/m"), side_text(None, "Hz")
-        ('50 µm', '∞', '–')
-    """
-    if side is None:
-        return NOT_AVAILABLE
-    return INFINITY_SIGN if side == float("inf") else format_quantity(side, unit)
 
 
 def six_limits_table(result: check_limits.Limits) -> Table:
@@ -115,26 +101,6 @@ def _waves_table(result: check_limits.Limits, *, short: bool) -> Table:
     limits = [f"{number}" if short else f"limit {number}" for number in WAVE_LIMITS]
     headings = (*_WAVE_HEADINGS, *limits, "at speeds")
     return Table(headings, rows, range(len(_WAVE_HEADINGS)))
-
-
-def symbol_lines(result: check_limits.Limits) -> list[str]:
-    """Return the symbols of the limits with their values."""
-    device = result.device
-    surface = result.surface
-    values = []
-    for symbol, field in table_data("symbols").items():
-        if field in device.data:
-            datum = device.data[field]
-            text = f"1/({datum.text})" if field == "update_rate" else datum.text
-            values.append(f"{symbol} = {text}{'' if datum.verified else ' (not verified)'}")
-    q = INFINITY_SIGN if result.gain.value == float("inf") else f"{result.gain.value:.4g}"
-    numbers = ", ".join(values) or "no data"
-    speed = speed_text(result.speed)
-    stiffness = check_limits.stiffness_text(result)
-    return [
-        sentence("symbols", speed=speed, limits=result, device=device.name, numbers=numbers),
-        sentence("gain_symbol", law=surface.law.letter, stiffness=stiffness, limits=result, q=q),
-    ]
 
 
 def limits_page(result: check_limits.Limits) -> page.Page:
@@ -212,7 +178,7 @@ def envelope_page(result: Envelope) -> page.Page:
     tables = [Section(one.device.name, [_ranges_table(one)], media=_ALL) for one in result.devices]
     return page.Page(
         title=f"Sinusoids rendered by {names}",
-        answer=" ".join(map(_answer, result.devices)),
+        answer=" ".join(map(envelope_answer, result.devices)),
         facts=[("Devices", names), ("Least stiffness", stiffness), ("Scanning speed", speed)],
         sections=[
             Section(title, [figure], caption, media=Media.HTML | Media.NOTEBOOK),
@@ -225,19 +191,6 @@ def envelope_page(result: Envelope) -> page.Page:
     )
 
 
-def _answer(one: DeviceEnvelope) -> str:
-    law = one.widest
-    largest = max(one.laws, key=lambda other: other.decades)
-    if not law.decades:
-        return f"{one.device.name} renders no sinusoid with these laws."
-    lengths = [border.wavelength for border in law.borders if border.decades]
-    span = " to ".join(format_quantity(lengths[i], "m") for i in (0, -1))
-    text = f"{one.device.name} renders most with law {law.letter}, wavelengths from {span}"
-    if largest is law:
-        return f"{text}{'' if law.conservative else '; it feels alive'}."
-    return f"{text}; law {largest.letter} renders more, but feels alive."
-
-
 def _ranges_table(one: DeviceEnvelope) -> Table:
     """Return the area and the rendered amplitudes at some wavelengths, a row per law."""
     shown = [i for i, border in enumerate(one.laws[0].borders) if border.wavelength in LISTED]
@@ -246,21 +199,11 @@ def _ranges_table(one: DeviceEnvelope) -> Table:
     rows = []
     for law in one.laws:
         curl = "no" if law.conservative else "yes"
-        ranges = [_range_text(law.borders[i]) for i in shown]
+        ranges = [amplitude_range_text(law.borders[i]) for i in shown]
         cells: page.Cells = [Cell(law.letter, "l"), f"{law.decades:.2f}", curl, *ranges]
         rows.append(Row(cells, kind="best" if law is one.widest else "", law=law.letter))
     layout = TableLayout(drop_order=[0, 1, *range(3, 3 + len(shown)), 2], gap=2)
     return Table(("law", "area", "curl", *lengths), rows, range(3, 3 + len(shown)), layout)
-
-
-def _range_text(border: WaveBorders) -> str:
-    """Return the rendered amplitudes at a wavelength for reading."""
-    if math.isnan(border.felt_from):
-        return NOT_AVAILABLE
-    low = format_quantity(border.felt_from, "m", digits=2)
-    if math.isinf(border.felt_up_to):
-        return f"from {low}"
-    return f"{low} – {format_quantity(border.felt_up_to, 'm', digits=2)}"
 
 
 def _points_section(result: Envelope) -> Section:

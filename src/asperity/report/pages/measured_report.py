@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -16,9 +15,8 @@ from asperity.core.errors import escape_unprintable
 from asperity.core.units import format_quantity
 from asperity.measured.filters import short_trace_text
 from asperity.measured.form import SurfaceDecomposition, decompose_surface
-from asperity.measured.lengths import format_counts, format_lengths
 from asperity.measured.measured_file import MeasurementSummary, decimate
-from asperity.measured.parameters import MAX_CORRELATION_POINTS, SurfaceParameter, find_parameter
+from asperity.measured.parameters import SurfaceParameter, find_parameter
 from asperity.measured.prepared import PreparationStage, PreparedSurface
 from asperity.report.document import page
 from asperity.report.document.page import (
@@ -31,8 +29,16 @@ from asperity.report.document.page import (
     Table,
     TableLayout,
 )
-from asperity.report.sentences.number_text import NOT_AVAILABLE
-from asperity.report.sentences.texts import sentence, table_data
+from asperity.report.sentences.number_text import NOT_AVAILABLE, decimal_text
+from asperity.report.sentences.surface_text import (
+    lay_text,
+    parts_text,
+    removed_text,
+    roughness_text,
+    surface_summary_text,
+    texture_text,
+)
+from asperity.report.sentences.texts import sentence_case, table_data
 from asperity.textures.fields.potential_field import PotentialField
 from asperity.textures.texture import Texture
 
@@ -102,19 +108,6 @@ def _choose_unit(values: Iterable[float | None]) -> tuple[str, float]:
     return next(fitting, _LENGTH_UNITS[-1])
 
 
-def decimal_text(value: float) -> str:
-    """Return three significant digits, without an exponent if six decimal places suffice.
-
-    Example:
-        >>> [decimal_text(value) for value in (1234.5, 12.345, -0.0012345, 1e-9, 0.0)]
-        ['1234', '12.3', '-0.00123', '1e-09', '0']
-    """
-    if value == 0.0 or not math.isfinite(value):
-        return f"{value:g}"
-    places = max(0, 2 - math.floor(math.log10(abs(value))))
-    return f"{value:.{places}f}" if places <= 6 else f"{value:.0e}"
-
-
 def _parameter_definitions(stages: Sequence[PreparationStage]) -> Table:
     """Return symbol, name, formula and standard of each parameter."""
     rows = []
@@ -156,67 +149,6 @@ def _compute_parts(texture: Texture) -> SurfaceDecomposition:
     heights, pitch, periodic = texture.samples()
     parts = decompose_surface(heights, pitch, periodic=periodic)
     return replace(parts, heights=np.zeros(0))  # the cache needs the numbers alone
-
-
-def parts_text(parts: SurfaceDecomposition) -> str:
-    """Return how form, waviness and texture are separated, in one sentence."""
-    return sentence("parts", nesting=format_quantity(parts.nesting, "m"))
-
-
-def texture_text(parts: SurfaceDecomposition) -> str:
-    """Return the RMS of texture, form and waviness, in one sentence."""
-    lengths = (parts.texture.rms, parts.nesting, parts.form.rms, parts.waviness.rms)
-    texture, nesting, form, waviness = (format_quantity(length, "m") for length in lengths)
-    return sentence("texture", texture=texture, nesting=nesting, form=form, waviness=waviness)
-
-
-def roughness_text(history: Sequence[PreparationStage]) -> str:
-    """Return the RMS of what the requested L-filter left, in one sentence; empty for none."""
-    if not history or (nesting := history[-1].nesting) is None:
-        return ""
-    symbol, rms = next(iter(history[-1].values.items()))
-    rms_text = format_quantity(rms or 0.0, "m")
-    nesting_text = format_quantity(nesting, "m")
-    return sentence("roughness", symbol=symbol, rms=rms_text, nesting=nesting_text)
-
-
-def surface_summary_text(prepared: PreparedSurface) -> str:
-    """Return a surface in one line: size, pitch, heights.
-
-    Example:
-        >>> import numpy as np
-        >>> surface_summary_text(PreparedSurface(np.array([0.0, 1e-6, 0.0, 1e-6]), (1e-5,), ()))
-        '4 points, pitch 10 µm, peak to valley 1 µm, RMS 500 nm'
-    """
-    heights = prepared.heights
-    span = float(heights.max()) - float(heights.min())
-    parts = [
-        f"{format_counts(heights.shape[::-1])} points",
-        f"pitch {format_lengths(prepared.pitch)}",
-        f"peak to valley {format_quantity(span, 'm')}",
-        f"RMS {format_quantity(float(heights.std()), 'm')}",
-    ]
-    if prepared.filled_mask is not None:
-        parts.append(f"{100.0 * float(prepared.filled_mask.mean()):.2g} % filled")
-    if prepared.periodic:
-        parts.append("periodic")
-    return ", ".join(parts)
-
-
-def lay_text(summary: MeasurementSummary) -> str:
-    """Return autocorrelation length and texture aspect ratio as text; empty for a profile."""
-    heights = summary.prepared.heights
-    (length, ratio) = summary.correlation
-    if heights.ndim == 1:
-        return ""
-    if heights.size > MAX_CORRELATION_POINTS:
-        return f"Sal and Str are computed for at most {MAX_CORRELATION_POINTS} points."
-    if length is None:
-        return "Sal: none; the correlation falls to 0.2 in no direction within half of the map."
-    text = f"Sal {format_quantity(length, 'm')} (autocorrelation length)"
-    if ratio is None:
-        return f"{text}; Str: none, the correlation stays above 0.2 in some direction (a lay)."
-    return f"{text}, Str {ratio:.2g} (texture aspect ratio: 1 isotropic, 0 a lay)."
 
 
 # --- pages ----------------------------------------------------------------------------------------
@@ -298,7 +230,7 @@ def _figure_sections(summary: MeasurementSummary) -> list[Section]:
     sections = []
     for number, change in enumerate(summary.changes):
         caption = f"Before, after, and what the step removed: {removed_text(change.stage)}"
-        title = change.stage.name[0].upper() + change.stage.name[1:]
+        title = sentence_case(change.stage.name)
         removed = change.before - change.after
         maps = {"before": change.before, "after": change.after, "removed": removed}
         figure = partial(_draw_heights, maps, change.sides)
@@ -312,15 +244,6 @@ def _draw_heights(heights_by_title: Mapping[str, FloatArray], sides: tuple[float
     from asperity.report.pictures.surface_pictures import heights_figure
 
     return heights_figure(heights_by_title, sides)
-
-
-def removed_text(stage: PreparationStage) -> str:
-    """Return what a step removed: "12.3 nm RMS, range 1.2 µm"."""
-    if stage.removed is None:
-        return "nothing"
-    rms = format_quantity(stage.removed.rms, "m")
-    span = format_quantity(stage.removed.range, "m")
-    return f"{rms} RMS, range {span}"
 
 
 def field_page(field: PotentialField, path: str) -> page.Page:

@@ -16,8 +16,7 @@ from matplotlib.figure import Figure
 
 from asperity.core.errors import ParameterError
 from asperity.core.files import write_bytes
-from asperity.paper import VERDICTS, Result
-from asperity.paper.claim import Number
+from asperity.paper import Result
 from asperity.paper.claims import find_claims
 from asperity.paper.cycle_experiments import (
     DeviceExperiment,
@@ -47,29 +46,18 @@ from asperity.report.document.page import (
     default_style,
 )
 from asperity.report.pages import sweep_report
-from asperity.report.pages.run_report import energy_text
 from asperity.report.pictures import paper_pictures
 from asperity.report.pictures import paper_pictures as pictures
 from asperity.report.pictures.loop_pictures import onset_figure
-from asperity.report.pictures.paper_pictures import loop_energy_text
-from asperity.report.sentences.texts import sentence, table_data, table_notes
+from asperity.report.sentences.number_text import energy_text, stiffness_number
+from asperity.report.sentences.paper_text import (
+    evidence_text,
+    loop_energy_text,
+    verdict_counts_text,
+)
+from asperity.report.sentences.texts import sentence, sentence_case, table_data, table_notes
 
 _MORE_NOTE = "The evidence of one claim: asperity reproduce --claim ID"
-
-
-def verdict_counts_text(results: Sequence[Result]) -> str:
-    """Return the number of claims by verdict: "Of 60 claims 55 hold, ..."."""
-    counts = {verdict: sum(r.verdict == verdict for r in results) for verdict in VERDICTS}
-    verdicts = table_data("verdicts")
-    parts = [f"{count} {verdicts[verdict]['plural']}" for verdict, count in counts.items()]
-    return f"Of {len(results)} claims {', '.join(parts)}."
-
-
-def evidence_text(value: Number) -> str:
-    """Return a number of the evidence as text."""
-    if isinstance(value, list):
-        return ", ".join(f"{item:.10g}" for item in value)
-    return value if isinstance(value, str) else f"{value:.10g}"
 
 
 def claims_page(results: Sequence[Result], experiments: Experiments | None) -> Page:
@@ -129,7 +117,7 @@ def _evidence_section(result: Result) -> Section:
         page.Paragraph(result.statement),
         Table((), [Row([_verdict_cell(result)])]),
         page.Paragraph(result.evidence.summary),
-        *[page.Paragraph(f"{name[0].upper()}{name[1:]}: {text}") for name, text in details],
+        *[page.Paragraph(f"{sentence_case(name)}: {text}") for name, text in details],
     ]
     numbers = result.evidence.numbers.items()
     notes = [f"  {name}: {evidence_text(value)}" for name, value in numbers]
@@ -263,7 +251,7 @@ def _device_cells(device_onset: DeviceOnset) -> Cells:
         device_onset.prediction
     )
     kind = "no" if device_onset.catalogue_rule_missed else ""
-    allowed = Cell(sweep_report.stiffness_number(device_onset.catalogue_rule), kind)
+    allowed = Cell(stiffness_number(device_onset.catalogue_rule), kind)
     names = [device_onset.device, device_onset.surface]
     return [*names, law, q, allowed, rule, cycling, starts, depth]
 

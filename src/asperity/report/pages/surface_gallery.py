@@ -13,6 +13,7 @@ from asperity.core.errors import find_named
 from asperity.core.units import format_quantity
 from asperity.report.document import page
 from asperity.report.document.page import Cell, Page, Row, Section, Table, TableLayout
+from asperity.report.sentences.surface_text import argument_text, arguments_text, unit_name
 from asperity.report.sentences.texts import table_notes
 from asperity.textures.catalogue import CATALOGUE
 from asperity.textures.kinds.named_surfaces import LIBRARY
@@ -106,33 +107,6 @@ def _format_quantity(argument: Argument, value: Any) -> str:
     return argument.format_value(value).replace("µ", "u").replace(" ", "")
 
 
-def arguments_text(kind: TextureKind) -> str:
-    """Return the arguments on one line: with their defaults, or with their units.
-
-    Example:
-        >>> from asperity.textures.catalogue import CATALOGUE
-        >>> arguments_text(CATALOGUE["grating"])
-        'height [m], period [m], duty=0.5, edge=ridge or groove/4'
-    """
-    parts = []
-    for argument in kind.arguments:
-        # Without spaces, so that no line breaks inside a quantity.
-        default = argument.default_text.replace(" ", "") if argument.default is not None else ""
-        value = f"={default or argument.default_description}"
-        parts.append(_unit_name(argument) if argument.required else f"{argument.name}{value}")
-    return ", ".join(parts)
-
-
-def _unit_name(argument: Argument) -> str:
-    return f"{argument.name} [{argument.unit}]" if argument.unit else argument.name
-
-
-def _argument_text(argument: Argument) -> str:
-    """Return the description of an argument with its choices."""
-    choice = f": {', '.join(argument.choices)}" if argument.choices else ""
-    return argument.description + choice
-
-
 # --- the page -------------------------------------------------------------------------------------
 
 
@@ -154,7 +128,7 @@ def _list_sections(entries: Sequence[SurfaceEntry], *, detailed: bool) -> list[S
 
 def _arguments_section(entry: SurfaceEntry) -> Section:
     rows = [
-        Row([Cell(one.name, "l"), one.unit, one.default_text, _argument_text(one)])
+        Row([Cell(one.name, "l"), one.unit, one.default_text, argument_text(one)])
         for one in entry.kind.arguments
     ]
     headings = ("argument", "unit", "default", "meaning")
@@ -190,7 +164,7 @@ def _draw_card(texture: Texture) -> Figure:
 def _card(entry: SurfaceEntry) -> Section:
     kind = entry.kind
     rows = [
-        Row([Cell(_unit_name(one), "mono"), one.default_text, _argument_text(one)])
+        Row([Cell(unit_name(one), "mono"), one.default_text, argument_text(one)])
         for one in kind.arguments
     ]
     blocks: list[page.Block] = [

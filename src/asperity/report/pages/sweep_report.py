@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -13,9 +13,9 @@ from asperity.core.units import format_quantity
 from asperity.report.document import page
 from asperity.report.document.page import Cell, Cells, Media, Page, Row, Section, Table, TableLayout
 from asperity.report.pages.run_report import LOOP_FOOTER, loop_facts
-from asperity.report.sentences.number_text import INFINITY_SIGN, NOT_AVAILABLE
+from asperity.report.sentences.loop_text import onset_answer, stroke_answer
+from asperity.report.sentences.number_text import NOT_AVAILABLE, millijoules, stiffness_number
 from asperity.report.sentences.texts import table_data, table_notes
-from asperity.scene.setup import Setup
 from asperity.scene.sweeps import OnsetSweep, StrokeSweep
 from asperity.simulation.onset import Prediction
 from asperity.simulation.scan import Stroke
@@ -56,38 +56,6 @@ def _sweep_table(headings: Sequence[str], rows: Sequence[Row], omit: Sequence[in
     columns = range(len(headings))
     layout = TableLayout(wrap=columns, omit=omit, gap=2, has_rule=False)
     return Table(headings, rows, columns[1:], layout)
-
-
-def stiffness_number(value: float) -> str:
-    """Return a stiffness [N/m] with three digits, without the unit."""
-    if math.isinf(value):
-        return INFINITY_SIGN
-    return f"{value:.3g}" if value < 1000.0 else f"{float(f'{value:.3g}'):,.0f}".replace(",", " ")
-
-
-def onset_answer(setup: Setup, predictions: Sequence[Prediction]) -> str:
-    """Return the result in two sentences."""
-    missed = [one for one in predictions if one.violates_delay_rule]
-    walls = [one for one in predictions if one.violates_wall_rule]
-    step = setup.servo.position_resolution
-    if missed:
-        shares = [f"{_case_name(one)} ({one.onset.cycling / one.delay_rule:.0%})" for one in missed]
-        answer = f"Limit cycles below the delay rule, at this share of it: {', '.join(shares)}."
-        if step:
-            resolution = format_quantity(step, "m")
-            answer += f" The rule is proved for exact positions, not for steps of {resolution}."
-    else:
-        proved = sum(one.conservative for one in predictions)
-        cases = "case" if proved == 1 else "cases"
-        answer = f"No limit cycle below the delay rule, in {proved} {cases} of conservative laws."
-    if any(one.wall_rule is not None and not one.onset.is_smooth_wall for one in predictions):
-        names = ", ".join(map(_case_name, walls))
-        answer += f" K₀/q was too much for: {names}." if walls else " K₀/q was safe in all of them."
-    return answer
-
-
-def _case_name(prediction: Prediction) -> str:
-    return f"{prediction.onset.law} at d = {prediction.onset.delay}"
 
 
 def onset_page(result: OnsetSweep) -> Page:
@@ -132,14 +100,6 @@ def onset_section(title: str, predictions: Sequence[Prediction], caption: str = 
 STROKE_HEADINGS = ("law", "speed", "depth", "x", "y", "z", "sum", "field", "±", "paper's", "lost")
 
 
-def millijoules(value: float, *, signed: bool = True) -> str:
-    """Return an energy [J] as text in mJ."""
-    size = abs(value)
-    digits = 0 if size >= 1.0 else 1 if size >= 0.1 else 2 if size >= 1e-4 else 4
-    text = f"{1e3 * value:+.{digits}f}" if signed else f"{1e3 * value:.{digits}f}"
-    return "0" if not text.strip("+-0.") else text
-
-
 def stroke_cells(stroke: Stroke) -> Cells:
     """Return the cells of a row of energies per stroke."""
     depth = format_quantity(stroke.mean_depth, "m", digits=2)
@@ -156,22 +116,6 @@ def stroke_cells(stroke: Stroke) -> Cells:
         millijoules(sum(stroke.same_sample)),
         f"{stroke.lost_contact:.3g}",
     ]
-
-
-def stroke_answer(strokes: Sequence[Stroke]) -> str:
-    """Return which laws deliver energy, and which do so by their field, in two sentences."""
-    by_all = _group_laws(strokes, lambda stroke: stroke.total > stroke.spread + stroke.error)
-    by_field = _group_laws(strokes, lambda stroke: stroke.gains_energy)
-    return f"A stroke delivers energy: {by_all}. The field of the law itself does: {by_field}."
-
-
-def _group_laws(strokes: Sequence[Stroke], gains_energy: Callable[[Stroke], bool]) -> str:
-    laws = list(dict.fromkeys(stroke.law for stroke in strokes))
-    groups: dict[str, list[str]] = {"always": [], "at times": [], "never": []}
-    for law in laws:
-        gains = [gains_energy(stroke) for stroke in strokes if stroke.law == law]
-        groups["always" if all(gains) else "at times" if any(gains) else "never"].append(law)
-    return ", ".join(f"{', '.join(laws)} {when}" for when, laws in groups.items() if laws)
 
 
 def strokes_page(result: StrokeSweep) -> Page:

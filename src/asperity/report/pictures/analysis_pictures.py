@@ -21,7 +21,6 @@ from asperity.core.checks import FloatArray
 from asperity.core.units import format_quantity
 from asperity.report.pictures import analysis_windows, law_pictures, style
 from asperity.report.pictures.scan_plane import CurlField, curl_field
-from asperity.report.sentences.alt_text import analysis_figure_names
 from asperity.report.sentences.number_text import interval_text, range_text
 
 FigureArea = Figure | SubFigure
@@ -51,8 +50,9 @@ def available_pictures(analysis: Analysis) -> dict[str, style.SizedDrawing]:
         "depth": (draw_depth, lambda: _GRAPH_HEIGHT),
     }
     pictures: dict[str, style.SizedDrawing] = {}
-    for name in analysis_figure_names(analysis):
-        draw, height = drawings[name]
+    if analysis.surface.texture.is_profile:
+        del drawings["top"]
+    for name, (draw, height) in drawings.items():
         pictures[name] = (_WIDTH, height()), partial(draw, analysis=analysis)
     return pictures
 

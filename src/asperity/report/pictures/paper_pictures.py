@@ -17,6 +17,7 @@ from asperity.paper.experiments import BumpExperiment, Experiments, ScanningExpe
 from asperity.paper.figures import ForceField, LoopEnergy, force_fields, loop_energies
 from asperity.report.pictures import style
 from asperity.report.sentences.number_text import readable_name
+from asperity.report.sentences.paper_text import loop_energy_text
 from asperity.report.sentences.texts import table_notes
 from asperity.simulation.onset import Prediction
 
@@ -175,13 +176,6 @@ def _draw_work(axes: Axes, panel: LoopEnergy) -> None:
     style.draw_zero_line(axes, _MIN_ENERGY_RANGE)
     options: dict[str, Any] = {"fontsize": style.LABEL, "color": style.MUTED}
     axes.set_title(loop_energy_text(panel), loc="left", pad=5.0, **options)
-
-
-def loop_energy_text(panel: LoopEnergy) -> str:
-    """Return the energy of the loop as text."""
-    gain = round(panel.energy * _MICRO, 1)
-    source = f", as {panel.equation}" if panel.equation else ""
-    return f"gains {gain:.1f} µJ{source}" if gain > 0.0 else f"returns all{source}"
 
 
 # Colours of the laws, in their order.

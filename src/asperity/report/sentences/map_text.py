@@ -7,8 +7,8 @@ import math
 from asperity.analysis import characteristic_number, worst_loop
 from asperity.core.units import format_quantity
 from asperity.export.surface_maps import SampledMap, height_resolution, normal_error
-from asperity.report.pages.run_report import energy_text
-from asperity.report.sentences.texts import sentence
+from asperity.report.sentences.number_text import energy_text
+from asperity.report.sentences.texts import sentence, sentence_case
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
 
@@ -19,8 +19,8 @@ def describe_map(sampled_map: SampledMap) -> str:
     """Return content and size of a map."""
     wide, high = (format_quantity(side, "m") for side in sampled_map.size)
     tiled = "it can be tiled" if sampled_map.is_periodic else "it cannot be tiled"
-    words = f"{sampled_map.description[:1].upper()}{sampled_map.description[1:]}"
-    return sentence("sampled_map", words=words, size=f"{wide} x {high}", tiled=tiled)
+    content = sentence_case(sampled_map.description)
+    return sentence("sampled_map", content=content, size=f"{wide} x {high}", tiled=tiled)
 
 
 def describe_heights(sampled_map: SampledMap, suffix: str) -> str:

@@ -5,11 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
+from typing import TYPE_CHECKING
 
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.results.compare import Comparison
 from asperity.analysis.results.recommendation import LawRow
 from asperity.core.units import format_quantity, round_down
+
+if TYPE_CHECKING:
+    pass
+
+if TYPE_CHECKING:
+    pass
+
+if TYPE_CHECKING:
+    pass
 
 INFINITY_SIGN = "∞"
 NOT_AVAILABLE = "–"
@@ -229,3 +239,53 @@ def witness_text(bound: Bound) -> str:
     x, y = (f"{1e3 * part + 0.0:.6g}" for part in bound.deflection)
     state = f"deflection ({x}, {y}) mm, {'sliding' if bound.sliding else 'sticking'}"
     return f"{onset}{position_text(bound.at)}, {state}"
+
+
+def energy_text(value: float) -> str:
+    """Return an energy with its sign: "+2.97 mJ"."""
+    if value == 0.0:
+        return "0 J"
+    if not math.isfinite(value):
+        return "not finite"
+    text = format_quantity(abs(value), "J", digits=3)
+    return f"{'+' if value > 0.0 else '-'}{text}"
+
+
+def stiffness_number(value: float) -> str:
+    """Return a stiffness [N/m] with three digits, without the unit."""
+    if math.isinf(value):
+        return INFINITY_SIGN
+    return f"{value:.3g}" if value < 1000.0 else f"{float(f'{value:.3g}'):,.0f}".replace(",", " ")
+
+
+def millijoules(value: float, *, signed: bool = True) -> str:
+    """Return an energy [J] as text in mJ."""
+    size = abs(value)
+    digits = 0 if size >= 1.0 else 1 if size >= 0.1 else 2 if size >= 1e-4 else 4
+    text = f"{1e3 * value:+.{digits}f}" if signed else f"{1e3 * value:.{digits}f}"
+    return "0" if not text.strip("+-0.") else text
+
+
+def decimal_text(value: float) -> str:
+    """Return three significant digits, without an exponent if six decimal places suffice.
+
+    Example:
+        >>> [decimal_text(value) for value in (1234.5, 12.345, -0.0012345, 1e-9, 0.0)]
+        ['1234', '12.3', '-0.00123', '1e-09', '0']
+    """
+    if value == 0.0 or not math.isfinite(value):
+        return f"{value:g}"
+    places = max(0, 2 - math.floor(math.log10(abs(value))))
+    return f"{value:.{places}f}" if places <= 6 else f"{value:.0e}"
+
+
+def side_text(side: float | None, unit: str) -> str:
+    """Return one side of an inequality as text; "–" if it is unknown.
+
+    Example:
+        >>> side_text(5e-5, "m"), side_text(float("inf"), "N/m"), side_text(None, "Hz")
+        ('50 µm', '∞', '–')
+    """
+    if side is None:
+        return NOT_AVAILABLE
+    return INFINITY_SIGN if side == float("inf") else format_quantity(side, unit)

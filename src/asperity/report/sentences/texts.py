@@ -55,3 +55,8 @@ def figure_text(name: str, **values: object) -> tuple[str, str, str]:
     text = _load_texts()["figures"][report][figure]
     description = text.get("description", "")
     return text["title"], text["caption"].format(**values), description.format(**values)
+
+
+def sentence_case(name: str) -> str:
+    """Return a name with a capital letter, for the beginning of a sentence or of a title."""
+    return f"{name[:1].upper()}{name[1:]}"

@@ -11,6 +11,7 @@ from asperity.recording.replay import Replay
 from asperity.report.document.page import Page, Row, Table, notebook_page
 from asperity.report.pages import run_report, sweep_report
 from asperity.report.pages.sweep_report import sweep_page
+from asperity.report.sentences.loop_text import work_text
 from asperity.scene.sweeps import OnsetSweep, StrokeSweep
 from asperity.simulation import Run
 from asperity.sweeps.sweep_result import SweepResult
@@ -31,7 +32,7 @@ find_loop_page.register(SweepResult, sweep_page)
 
 @find_loop_page.register
 def _run_page(result: Run) -> Page:
-    answer = f"{run_report.work_text(result.surface, result)}."
+    answer = f"{work_text(result.surface, result)}."
     page = notebook_page(answer, run_report.ledger_table(result))
     return Page("", answer, (), [*page.sections, *run_report.figure_sections(result)])
 

@@ -1,0 +1,257 @@
+"""Results of loops, simulated, recorded and on a device, as sentences."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from asperity.core.units import format_quantity
+from asperity.recording.recording import Recording
+from asperity.recording.replay import Replay
+from asperity.report.sentences.number_text import energy_text
+from asperity.report.sentences.surface_text import describe_texture
+from asperity.report.sentences.texts import sentence
+from asperity.scene.setup import Setup
+from asperity.servo.calibration.calibrator import Calibration
+from asperity.servo.calibration.measured_device import effective_resolution, format_uncertainty
+from asperity.servo.loop_memory import EndReason, LoopStatistics
+from asperity.servo.process import ServoProcess
+from asperity.simulation import Run
+from asperity.simulation.onset import Prediction, is_at_rest
+from asperity.simulation.onset_search import felt_speed
+from asperity.simulation.scan import Stroke
+from asperity.surface import Surface
+
+
+def work_text(surface: Surface, run: Run) -> str:
+    """Return the work that the texture did on the hand."""
+    total = run.ledger.total
+    energy = format_quantity(abs(total), "J", digits=3)
+    work = f"delivers {energy} to the hand" if total > 0.0 else f"takes {energy} from the hand"
+    if not (total and math.isfinite(total)):
+        work = "delivers an energy that is not finite" if total else "does no work"
+    stiffness = format_quantity(surface.stiffness, "N/m")
+    duration = format_quantity(run.duration, "s")
+    return f"Law {surface.law.letter} at {stiffness} {work} in {duration}"
+
+
+def run_answer(setup: Setup, run: Run) -> str:
+    """Return the result of a run in one or two sentences."""
+    sentences = [work_text(setup.surface, run)]
+    if run.stop_message:
+        sentences.append(f"The run stopped: it {run.stop_message}")
+    if not run.is_energy_balanced:
+        sentences.append("The energy balance does not close: do not rely on this run")
+    if run.truncated_ticks:
+        sentences.append(search_error_text(run))
+    if not run.stop_message:
+        sentences.append(rest_text(setup, run))
+    return f"{'. '.join(sentences)}."
+
+
+def search_error_text(run: Run) -> str:
+    """Return the error bound of the forces where searches were truncated."""
+    share = sentence("truncated", count=run.truncated_ticks, samples=run.samples)
+    if run.surface.law.contact.bounds_force_error:
+        error = format_quantity(run.surface.stiffness * run.search_error, "N", digits=2)
+        return f"{share}: the error of the force was at most {error}"
+    distance = format_quantity(run.search_error, "m", digits=2)
+    return f"{share}: another point was nearer by at most {distance}"
+
+
+def rest_text(setup: Setup, run: Run) -> str:
+    """Return whether the handle came to rest."""
+    if not is_at_rest(setup.motion, run.duration):
+        return "The hand was moving to the end"
+    if run.tail is None or not run.tail.is_complete:
+        return "Too few samples were traced to decide whether the handle came to rest"
+    speed = run.tail.velocity_spread
+    felt = felt_speed(speed, run.tail.position_spread)
+    verdict = "comes to rest"
+    if speed > felt and run.tail.gains_energy:
+        servo = setup.servo
+        has_steps = servo.position_resolution or servo.force_resolution
+        verdict = "keeps moving: a limit cycle"
+        verdict += ", or the chatter of steps" if has_steps else ""
+    limit, spread = (format_quantity(one, "m/s", digits=3) for one in (felt, speed))
+    return sentence("rest", verdict=verdict, spread=spread, limit=limit)
+
+
+def closure_text(run: Run) -> str:
+    """Return definitions of the energies, and the relative residual."""
+    ledger = run.ledger
+    share = abs(ledger.closure) / ledger.exchanged if ledger.exchanged > 0.0 else 0.0
+    if not math.isfinite(share):
+        return "The run diverged: its energies are not finite."
+    exchanged = format_quantity(ledger.exchanged, "J", digits=3)
+    return sentence("ledger", share=f"{share:.1g}", exchanged=exchanged)
+
+
+def recording_answer(recording: Recording) -> str:
+    """Return size, surface and completeness of a recording in one or two sentences."""
+    period = row_period(recording.metadata)
+    surface = surface_metadata(recording.metadata)
+    rate = f" at {format_quantity(1.0 / period, 'Hz')}" if period else ""
+    text = f"{recording.rows} rows, {format_quantity(recording.duration, 's')}{rate}"
+    if surface is not None:
+        stiffness = format_quantity(float(surface["stiffness"]), "N/m")
+        text += f": law {surface['law']} at {stiffness} on {describe_texture(surface['texture'])}"
+    return f"{text}. {_truncation_text(recording)}".rstrip()
+
+
+def _truncation_text(recording: Recording) -> str:
+    """Return why samples may be missing; nothing for a complete recording."""
+    if recording.is_complete:
+        return "" if recording.rows else "Nothing was recorded."
+    if not recording.rows:
+        return "The recording was not closed, and contains no complete block."
+    count = recording.unread_bytes
+    lost = f" ({count} bytes after it are an incomplete block)" if count else ""
+    return f"The recording was not closed: it ends with the last complete block{lost}."
+
+
+def surface_metadata(metadata: Mapping[str, Any]) -> Mapping[str, Any] | None:
+    """Return the surface of a recording; ``None`` if its description is incomplete."""
+    surface = metadata.get("surface")
+    names = {"texture", "law", "law_name", "stiffness", "max_depth", "content"}
+    if not isinstance(surface, Mapping) or not surface.keys() >= names:
+        return None
+    has_kind = isinstance(surface["texture"], Mapping) and "kind" in surface["texture"]
+    numbers = surface["stiffness"], surface["max_depth"]
+    return surface if has_kind and _are_positive_numbers(*numbers) else None
+
+
+def row_period(metadata: Mapping[str, Any]) -> float:
+    """Return the time from row to row [s]; 0 if it is not recorded."""
+    servo = metadata.get("servo")
+    every = metadata.get("every", 1)
+    period: Any = servo.get("period") if isinstance(servo, Mapping) else None
+    return float(period) * every if _are_positive_numbers(period, every) else 0.0
+
+
+def _are_positive_numbers(*values: Any) -> bool:
+    return all(isinstance(value, (int, float)) and value > 0 for value in values)
+
+
+def replay_answer(replay: Replay) -> str:
+    """Return the result of a replay in one or two sentences."""
+    if replay.first_difference is None:
+        return f"All {replay.rows} rows are reproduced bit for bit."
+    one = replay.first_difference
+    unit = "N" if one.column.startswith("commanded") else "m" if "anchor" in one.column else ""
+    values = f"{one.replayed_value!r} instead of {one.recorded_value!r}".replace("'", "")
+    where = f"row {one.row}, at {format_quantity(one.time, 's')}"
+    first = f"the first is {where}: {one.column} is {values} {unit}".rstrip()
+    largest = format_quantity(replay.max_force_difference, "N", digits=3)
+    count = f"{replay.differing_rows} of {replay.rows} rows differ"
+    return f"{count}; {first}. The largest difference of a force is {largest}."
+
+
+def onset_answer(setup: Setup, predictions: Sequence[Prediction]) -> str:
+    """Return the result in two sentences."""
+    missed = [one for one in predictions if one.violates_delay_rule]
+    walls = [one for one in predictions if one.violates_wall_rule]
+    step = setup.servo.position_resolution
+    if missed:
+        shares = [f"{_case_name(one)} ({one.onset.cycling / one.delay_rule:.0%})" for one in missed]
+        answer = f"Limit cycles below the delay rule, at this share of it: {', '.join(shares)}."
+        if step:
+            resolution = format_quantity(step, "m")
+            answer += f" The rule is proved for exact positions, not for steps of {resolution}."
+    else:
+        proved = sum(one.conservative for one in predictions)
+        cases = "case" if proved == 1 else "cases"
+        answer = f"No limit cycle below the delay rule, in {proved} {cases} of conservative laws."
+    if any(one.wall_rule is not None and not one.onset.is_smooth_wall for one in predictions):
+        names = ", ".join(map(_case_name, walls))
+        answer += f" K₀/q was too much for: {names}." if walls else " K₀/q was safe in all of them."
+    return answer
+
+
+def _case_name(prediction: Prediction) -> str:
+    return f"{prediction.onset.law} at d = {prediction.onset.delay}"
+
+
+def stroke_answer(strokes: Sequence[Stroke]) -> str:
+    """Return which laws deliver energy, and which do so by their field, in two sentences."""
+    by_all = _group_laws(strokes, lambda stroke: stroke.total > stroke.spread + stroke.error)
+    by_field = _group_laws(strokes, lambda stroke: stroke.gains_energy)
+    return f"A stroke delivers energy: {by_all}. The field of the law itself does: {by_field}."
+
+
+def _group_laws(strokes: Sequence[Stroke], gains_energy: Callable[[Stroke], bool]) -> str:
+    laws = list(dict.fromkeys(stroke.law for stroke in strokes))
+    groups: dict[str, list[str]] = {"always": [], "at times": [], "never": []}
+    for law in laws:
+        gains = [gains_energy(stroke) for stroke in strokes if stroke.law == law]
+        groups["always" if all(gains) else "at times" if any(gains) else "never"].append(law)
+    return ", ".join(f"{', '.join(laws)} {when}" for when, laws in groups.items() if laws)
+
+
+_QUANTILES = (0.5, 0.99, 0.999)
+
+
+CAUSE_TEXT = {EndReason.STOPPED: "stopped", EndReason.FINISHED: "done"}
+
+
+def calibration_lines(calibration: Calibration) -> list[str]:
+    """Return resolution, rate, delay and K₀, and the axes that could not be measured."""
+    step = calibration.position_step
+    delay = calibration.delay
+    weakest = calibration.weakest_axis
+    resolution = "exact" if step is None else f"step {format_uncertainty(step, 1e6)} µm"
+    noise = format_uncertainty(calibration.noise, 1e6)
+    effective = format_quantity(effective_resolution(calibration).value, "m")
+    others = ", ".join(map(str, delay.alternatives))
+    ambiguity = f", or {others}: not written" if others else ""
+    stiffness = format_quantity(weakest.wall.stable_stiffness, "N/m")
+    return [
+        f"Positions: {resolution}; noise at rest {noise} µm; effective step {effective}",
+        f"Rate: {format_uncertainty(calibration.update_rate)} Hz of new readings; delay: "
+        f"{delay.samples} samples{ambiguity}",
+        f"K₀: {stiffness}, along {weakest.name}, the weakest axis",
+        *[
+            f"- The handle does not move along {name}: nothing was measured there"
+            for name in calibration.immobile_axes
+        ],
+    ]
+
+
+def status_line(loop: ServoProcess) -> str:
+    """Return time, position, force, energy and late samples of a running loop in one line."""
+    rows, _first = loop.rows(loop.memory.row_count - 1)
+    if not len(rows):
+        return "waiting for the first sample"
+    time, x, y, z, _cx, _cy, _cz, fx, fy, fz, _share, supplied = rows[-1, :12]
+    place = ", ".join(f"{1e3 * value:+8.3f}" for value in (x, y, z))
+    force = math.sqrt(fx * fx + fy * fy + fz * fz)
+    late = loop.statistics.late
+    return f"{time:8.2f} s  ({place}) mm  {force:6.3f} N  {energy_text(supplied):>10}  late {late}"
+
+
+def timing_lines(statistics: LoopStatistics) -> list[str]:
+    """Return late samples, start delay and period error of a loop.
+
+    Example:
+        >>> counts = [0] * 9 + [900] * 1 + [99, 1] + [0] * 29
+        >>> for line in timing_lines(
+        ...     LoopStatistics(1000, 1, 2, 2e-6, 0, 0, 0, tuple(counts), tuple(counts))
+        ... ):
+        ...     print(line)
+        Late: 1 of 1000 samples finished after the next was due, 2 skipped
+        Start delay:   50 % within 512 ns, 99 % 1.02 µs, 99.9 % 1.02 µs, worst 2 µs
+        Period error:  50 % within 512 ns, 99 % 1.02 µs, 99.9 % 1.02 µs
+    """
+
+    def quantiles(quantile: Callable[[float], float]) -> str:
+        spans = [f"{100.0 * q:g} % {format_quantity(quantile(q), 's')}" for q in _QUANTILES]
+        return ", ".join(spans).replace("% ", "% within ", 1)
+
+    worst = format_quantity(statistics.max_lateness, "s")
+    return [
+        f"Late: {statistics.late} of {statistics.samples} samples finished after the next was due, "
+        f"{statistics.skipped} skipped",
+        f"Start delay:   {quantiles(statistics.lateness_quantile)}, worst {worst}",
+        f"Period error:  {quantiles(statistics.jitter_quantile)}",
+    ]

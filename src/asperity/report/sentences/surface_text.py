@@ -1,0 +1,164 @@
+"""Textures, their arguments and their measured parameters as text."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from asperity.core.arguments import Argument
+from asperity.core.units import format_quantity
+from asperity.measured.form import SurfaceDecomposition
+from asperity.measured.lengths import format_counts, format_lengths
+from asperity.measured.measured_file import MeasurementSummary
+from asperity.measured.parameters import MAX_CORRELATION_POINTS
+from asperity.measured.prepared import PreparationStage, PreparedSurface
+from asperity.report.sentences import number_text
+from asperity.report.sentences.texts import sentence
+from asperity.textures.catalogue import CATALOGUE
+from asperity.textures.texture import Texture, TextureKind
+
+# Lengths of maps and profiles, which are not arguments of a kind.
+_LENGTH_NAMES = {"pitch", "cutoff"}
+_OMITTED_NAMES = {"kind", "preparation", "phase", "direction", "phases", "wavevectors"}
+_OMITTED_NAMES |= {"thin_regions", "gain", "one_sided", "accuracy", "grid", "source"}  # of fields
+
+
+def describe_texture(description: dict[str, Any]) -> str:
+    """Return the kind of a texture and its plain arguments as text.
+
+    Example:
+        >>> describe_texture({"kind": "sinusoid", "amplitude": 8e-4, "period": 1e-3, "phase": 0.0})
+        'sinusoid: amplitude 0.8 mm, period 1 mm'
+    """
+    kind = CATALOGUE.get(description["kind"])
+    declared = {} if kind is None else {argument.name: argument for argument in kind.arguments}
+    parts = []
+    for name, value in description.items():
+        if name in _OMITTED_NAMES:
+            continue
+        values = value if isinstance(value, list) else [value]
+        if len(values) > 4:
+            parts.append(f"{len(values)} {name}")
+            continue
+        texts = [_value_text(name, one, declared.get(name)) for one in values]
+        parts.append(f"{number_text.readable_name(name)} {' × '.join(texts)}")
+    return f"{description['kind']}: {', '.join(parts)}"
+
+
+def _value_text(name: str, value: Any, argument: Argument | None) -> str:
+    if isinstance(value, bool):
+        return number_text.yes_no_text(value)
+    if argument is not None:
+        return argument.format_value(value)
+    is_length = name in _LENGTH_NAMES and isinstance(value, float)
+    return format_quantity(value, "m") if is_length else f"{value}"
+
+
+def texture_name(texture: Texture) -> str:
+    """Return the file of a texture, its kind, or that of the one that was baked, for a title.
+
+    Example:
+        >>> from asperity.textures import Sinusoid
+        >>> texture_name(Sinusoid(1e-4, 1e-3))
+        'Sinusoid'
+    """
+    description = texture.describe().get("source", texture.describe())
+    return texture.file_name or number_text.readable_name(description["kind"]).capitalize()
+
+
+def parts_text(parts: SurfaceDecomposition) -> str:
+    """Return how form, waviness and texture are separated, in one sentence."""
+    return sentence("parts", nesting=format_quantity(parts.nesting, "m"))
+
+
+def texture_text(parts: SurfaceDecomposition) -> str:
+    """Return the RMS of texture, form and waviness, in one sentence."""
+    lengths = (parts.texture.rms, parts.nesting, parts.form.rms, parts.waviness.rms)
+    texture, nesting, form, waviness = (format_quantity(length, "m") for length in lengths)
+    return sentence("texture", texture=texture, nesting=nesting, form=form, waviness=waviness)
+
+
+def roughness_text(history: Sequence[PreparationStage]) -> str:
+    """Return the RMS of what the requested L-filter left, in one sentence; empty for none."""
+    if not history or (nesting := history[-1].nesting) is None:
+        return ""
+    symbol, rms = next(iter(history[-1].values.items()))
+    rms_text = format_quantity(rms or 0.0, "m")
+    nesting_text = format_quantity(nesting, "m")
+    return sentence("roughness", symbol=symbol, rms=rms_text, nesting=nesting_text)
+
+
+def surface_summary_text(prepared: PreparedSurface) -> str:
+    """Return a surface in one line: size, pitch, heights.
+
+    Example:
+        >>> import numpy as np
+        >>> surface_summary_text(PreparedSurface(np.array([0.0, 1e-6, 0.0, 1e-6]), (1e-5,), ()))
+        '4 points, pitch 10 µm, peak to valley 1 µm, RMS 500 nm'
+    """
+    heights = prepared.heights
+    span = float(heights.max()) - float(heights.min())
+    parts = [
+        f"{format_counts(heights.shape[::-1])} points",
+        f"pitch {format_lengths(prepared.pitch)}",
+        f"peak to valley {format_quantity(span, 'm')}",
+        f"RMS {format_quantity(float(heights.std()), 'm')}",
+    ]
+    if prepared.filled_mask is not None:
+        parts.append(f"{100.0 * float(prepared.filled_mask.mean()):.2g} % filled")
+    if prepared.periodic:
+        parts.append("periodic")
+    return ", ".join(parts)
+
+
+def lay_text(summary: MeasurementSummary) -> str:
+    """Return autocorrelation length and texture aspect ratio as text; empty for a profile."""
+    heights = summary.prepared.heights
+    (length, ratio) = summary.correlation
+    if heights.ndim == 1:
+        return ""
+    if heights.size > MAX_CORRELATION_POINTS:
+        return f"Sal and Str are computed for at most {MAX_CORRELATION_POINTS} points."
+    if length is None:
+        return "Sal: none; the correlation falls to 0.2 in no direction within half of the map."
+    text = f"Sal {format_quantity(length, 'm')} (autocorrelation length)"
+    if ratio is None:
+        return f"{text}; Str: none, the correlation stays above 0.2 in some direction (a lay)."
+    return f"{text}, Str {ratio:.2g} (texture aspect ratio: 1 isotropic, 0 a lay)."
+
+
+def removed_text(stage: PreparationStage) -> str:
+    """Return what a step removed: "12.3 nm RMS, range 1.2 µm"."""
+    if stage.removed is None:
+        return "nothing"
+    rms = format_quantity(stage.removed.rms, "m")
+    span = format_quantity(stage.removed.range, "m")
+    return f"{rms} RMS, range {span}"
+
+
+def arguments_text(kind: TextureKind) -> str:
+    """Return the arguments on one line: with their defaults, or with their units.
+
+    Example:
+        >>> from asperity.textures.catalogue import CATALOGUE
+        >>> arguments_text(CATALOGUE["grating"])
+        'height [m], period [m], duty=0.5, edge=ridge or groove/4'
+    """
+    parts = []
+    for argument in kind.arguments:
+        # Without spaces, so that no line breaks inside a quantity.
+        default = argument.default_text.replace(" ", "") if argument.default is not None else ""
+        value = f"={default or argument.default_description}"
+        parts.append(unit_name(argument) if argument.required else f"{argument.name}{value}")
+    return ", ".join(parts)
+
+
+def unit_name(argument: Argument) -> str:
+    """Return the name of an argument with its unit."""
+    return f"{argument.name} [{argument.unit}]" if argument.unit else argument.name
+
+
+def argument_text(argument: Argument) -> str:
+    """Return the description of an argument with its choices."""
+    choice = f": {', '.join(argument.choices)}" if argument.choices else ""
+    return argument.description + choice
