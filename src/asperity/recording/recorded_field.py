@@ -11,7 +11,6 @@ import sys
 import zipfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -19,7 +18,7 @@ import numpy as np
 
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
-from asperity.core.files import content_digest, read_toml, text_digest, to_plain_data
+from asperity.core.files import content_digest, text_digest, to_plain_data
 from asperity.kernels.fuse import kernel_source
 from asperity.laws import Law, find_law
 from asperity.laws.clamps import Clamp, find_clamp
@@ -30,8 +29,6 @@ TEXTURE_FILE = "texture.npz"
 # Largest attachment of a recording: a map of 2400 x 2400 points.
 MAX_BYTES = 2**26
 _PACKAGE_PREFIX = "asperity."
-# Modules of samplers in recordings of earlier versions, and their modules now.
-MOVED_MODULES = read_toml("modules", Path(__file__).with_name("moved_modules.toml"))
 _DAMAGE_ERRORS = (ValueError, KeyError, EOFError, OSError, TypeError, zipfile.BadZipFile)
 
 
@@ -45,7 +42,6 @@ class RecordedField:
         sampler: modules whose functions evaluate the texture.
         texture: record of the texture.
         law_arguments: parameters of the law.
-        heights: heights of the spline that a baked field was made from [m].
     """
 
     law: Law
@@ -53,7 +49,6 @@ class RecordedField:
     sampler: tuple[ModuleType, ...]
     texture: tuple[Any, ...]
     law_arguments: tuple[float, ...]
-    heights: FloatArray | None = None
 
     def height(self, points: FloatArray) -> FloatArray:
         """Return the height of the texture [m], shape (n,), at points (n, 2) [m]."""
@@ -98,15 +93,6 @@ def arguments_digest(arguments: Iterable[Any]) -> str:
     return content_digest(*map(np.asarray, arguments))
 
 
-def has_digest(arguments: Iterable[Any], metadata: Mapping[str, Any]) -> bool:
-    """Return whether a recording holds these numbers.
-
-    Older recordings have a digest of 16 digits; the checksums of their archive protect them.
-    """
-    recorded = str(metadata.get("texture_content"))
-    return len(recorded) == 16 or recorded == arguments_digest(arguments)
-
-
 def formula_digest(law: Law) -> str:
     """Return a digest of the compiled formula of a law."""
     return text_digest(kernel_source(law))
@@ -118,8 +104,7 @@ def field_attachments(surface: Surface) -> dict[str, bytes]:
     if sum(np.asarray(value).nbytes for value in arguments) > MAX_BYTES:
         return {}
     stream = io.BytesIO()
-    heights = {"heights": surface.texture.stored_heights()} if surface.texture.baked_numbers else {}
-    np.savez(stream, *map(np.asarray, arguments), **heights)  # type: ignore[arg-type]  # typed as if one might be a flag
+    np.savez(stream, *map(np.asarray, arguments))
     return {TEXTURE_FILE: stream.getvalue()}
 
 
@@ -136,13 +121,10 @@ def read_field(metadata: Mapping[str, Any], data: bytes) -> RecordedField:
     try:
         law = find_law(str(metadata["law"]))
         clamp = find_clamp(str(metadata["clamp"]))
-        names = dict.fromkeys(MOVED_MODULES.get(name, name) for name in metadata["sampler"])
-        modules = (_sampler_module(str(name)) for name in names)
-        sampler = tuple(dict.fromkeys(modules))  # earlier recordings name modules merged since
+        sampler = tuple(_sampler_module(str(name)) for name in metadata["sampler"])
         kind = getattr(sampler[0], str(metadata["record"]))
         with np.load(io.BytesIO(data), allow_pickle=False) as archive:
-            values = [archive[name] for name in archive.files if name != "heights"]
-            heights = archive["heights"] if "heights" in archive.files else None
+            values = [archive[name] for name in archive.files]
         texture = kind(*(value if value.ndim else value.item() for value in values))
         parameters = tuple(float.fromhex(text) for text in metadata["law_arguments"])
     except ParameterError:
@@ -150,9 +132,9 @@ def read_field(metadata: Mapping[str, Any], data: bytes) -> RecordedField:
     except (*_DAMAGE_ERRORS, AttributeError, IndexError) as error:
         reason = f"its surface cannot be read ({type(error).__name__}: {error})"
         raise ParameterError("recording", reason) from None
-    if not has_digest(texture, metadata):
+    if metadata.get("texture_content") != arguments_digest(texture):
         raise ParameterError("recording", "holds another texture than its metadata: it is damaged")
-    return RecordedField(law, clamp, sampler, texture, parameters, heights)
+    return RecordedField(law, clamp, sampler, texture, parameters)
 
 
 def _sampler_module(name: str) -> ModuleType:

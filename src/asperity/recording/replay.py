@@ -29,14 +29,12 @@ from asperity.recording.recorded_field import (
     TEXTURE_FILE,
     RecordedField,
     formula_digest,
-    has_digest,
     read_field,
     surface_field,
 )
 from asperity.recording.recording import Recording, open_recording
 from asperity.recording.replay_trace import ReplayTrace
 from asperity.surface import Surface
-from asperity.textures.catalogue import rebuild_texture
 from asperity.textures.texture import Texture
 
 COMPARED_COLUMNS = (
@@ -116,8 +114,7 @@ def replay(recording: Recording | str | os.PathLike[str], surface: Surface | Non
     field = recorded_field(recording) if surface is None else surface_field(surface)
     notes = [*describe_changes(recording, field.law)]
     recorded = str(surface_data.get("content"))
-    # The digests of older recordings, of 12 digits, cannot be compared.
-    if surface is not None and len(recorded) != 12 and surface.digest != recorded:
+    if surface is not None and surface.digest != recorded:
         notes.append(f"Recorded on another surface: content {recorded}, this is {surface.digest}.")
     result = Replay(str(recording.path), 0, 0, None, 0.0, tuple(notes))
     for first, block, forces in _replay_blocks(recording, field, settings):
@@ -143,23 +140,6 @@ def recorded_surface_on(recording: Recording, texture: Texture) -> Surface:
         )
     except (KeyError, TypeError) as error:
         raise ParameterError("recording", f"names no whole surface: {error!r}") from None
-
-
-def recorded_texture(recording: Recording) -> Texture:
-    """Return the texture stored in a recording, bit for bit.
-
-    Raises:
-        ParameterError: it holds none, or one that cannot be rebuilt.
-    """
-    surface_data = _surface_metadata(recording)
-    field = recorded_field(recording)
-    described = surface_data.get("texture")
-    described = described if isinstance(described, Mapping) else {}
-    texture = rebuild_texture(field.texture, field.sampler, described, field.heights)
-    if texture is None or not has_digest(texture.arguments, surface_data):
-        words = f"has a texture of a kind of your own, {described.get('kind')}, that cannot be made"
-        raise ParameterError("recording", f"{words} again: describe() must name its arguments")
-    return texture
 
 
 def _surface_metadata(recording: Recording) -> Mapping[str, Any]:

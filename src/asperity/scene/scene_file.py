@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections import ChainMap
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,22 +11,11 @@ from asperity.core.arguments import Argument, parse_arguments
 from asperity.core.errors import ParameterError, suggest_names
 from asperity.core.files import read_toml
 from asperity.devices import Device, load_device, override_device, parse_device
-from asperity.recording.recording import open_recording
-from asperity.recording.replay import recorded_texture
 from asperity.scene.sections import surface_arguments
 from asperity.textures import catalogue
-from asperity.textures.texture import Texture, TextureKind
+from asperity.textures.texture import Texture
 
-_PATH = Argument("path", "the recording, relative to the scene", form="path", required=True)
-
-
-def _load_recorded_texture(path: str) -> Texture:
-    return recorded_texture(open_recording(path))
-
-
-_SUMMARY = "the surface of a recording"
-RECORDING_KIND = TextureKind("recording", _SUMMARY, _load_recorded_texture, (_PATH,))
-TEXTURE_KINDS = ChainMap({"recording": RECORDING_KIND}, *catalogue.KINDS.maps)
+TEXTURE_KINDS = catalogue.KINDS
 """Texture kinds of the section [texture]."""
 DEVICE_ID = Argument("device.id", "device of the catalogue", form="text")
 LOOP_SECTIONS = ("hand", "motion", "run", "servo")
@@ -46,6 +34,7 @@ class Scene:
             :func:`~asperity.scene.setup.make_setup`.
         folder: folder to which paths in these sections are relative.
         files: the scene file and a measured surface, if it was loaded from them.
+        text: the scene file as it was read, or the specification.
     """
 
     texture: Texture
@@ -54,6 +43,7 @@ class Scene:
     loop: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     folder: Path = Path()
     files: tuple[Path, ...] = ()
+    text: str = ""
 
 
 def load_scene(source: str, file_arguments: Mapping[str, Any] | None = None) -> Scene:
@@ -78,8 +68,9 @@ def load_scene(source: str, file_arguments: Mapping[str, Any] | None = None) -> 
     extra = dict(file_arguments or {})
     if catalogue.is_scene(source) and catalogue.parse_specification(source) is None:
         path = Path(source)
-        return build_scene(read_sections(path), path.parent, path, extra)
-    return Scene(catalogue.as_texture(source, extra))
+        scene = build_scene(read_sections(path), path.parent, path, extra)
+        return replace(scene, text=path.read_text(encoding="utf-8-sig"))
+    return Scene(catalogue.as_texture(source, extra), text=source)
 
 
 def read_scene(source: str) -> tuple[dict[str, dict[str, Any]], Path]:
@@ -158,7 +149,7 @@ def build_scene(
     surface = parse_arguments("surface", sections.get("surface", {}), surface_arguments())
     device = _scene_device(sections["device"]) if "device" in sections else None
     loop = {name: sections[name] for name in LOOP_SECTIONS if name in sections}
-    built = catalogue.build_texture(kind, texture, folder, extra, TEXTURE_KINDS)
+    built = catalogue.build_texture(kind, texture, folder, extra)
     files = [folder / texture["path"]] if "path" in texture else []
     return Scene(built, surface, device, loop, folder, (path, *files))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from asperity.analysis.results.compare import DEFAULT_DEVICE
 from asperity.analysis.surface_sentences import law_parameter_sentences
 from asperity.core.arguments import FIELD, parse_arguments
 from asperity.core.errors import ParameterError
-from asperity.core.files import attributes_to_dict, to_plain_data
+from asperity.core.files import OMITTED, attributes_to_dict, to_plain_data
 from asperity.core.units import format_quantity
 from asperity.devices import Device, load_device
 from asperity.devices.device_file import to_device_toml
@@ -53,6 +53,7 @@ class Setup:
         files: the files of the scene.
         safety: limits of the loop on a device.
         rendering: how law H is rendered.
+        scene_text: text of the scene, which a recording stores.
     """
 
     surface: Surface
@@ -69,6 +70,7 @@ class Setup:
     files: tuple[Path, ...] = ()
     safety: Safety = safety.DEFAULT_SAFETY
     rendering: str = FIELD
+    scene_text: str = field(default="", metadata=OMITTED)
 
     @cached_property
     def rendered(self) -> Surface:
@@ -99,6 +101,7 @@ class Setup:
         metadata["device"] = attributes_to_dict(device, "id", "name")
         metadata["device"]["file"] = to_device_toml(device)
         metadata["files"] = self.file_hashes()
+        metadata["scene"] = self.scene_text
         if driver:
             metadata["driver"] = driver
         if driver == SIMULATED_DRIVER:
@@ -205,7 +208,7 @@ def make_setup(
     return Setup(
         whole, chosen, plant, hand, servo, motion, span,
         assumptions=(*assumed, *notes, *default, *_leaving_warnings(scene.texture, motion, span)),
-        files=scene.files, safety=guards, rendering=rendering, **run,
+        files=scene.files, safety=guards, rendering=rendering, scene_text=scene.text, **run,
     )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Catalogue of texture kinds, and textures from a specification, a measured file or a recording."""
+"""Catalogue of texture kinds, and textures from a specification or a measured file."""
 
 from __future__ import annotations
 
@@ -7,20 +7,14 @@ import re
 from collections import ChainMap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import ModuleType
-from typing import Any, cast
-
-import numpy as np
+from typing import Any
 
 from asperity.core.arguments import Argument, document_arguments, parse_arguments
-from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError, suggest_names
-from asperity.core.files import content_digest
 from asperity.measured.file_arguments import FILE_ARGUMENTS, SYNTHETIC_ARGUMENTS
 from asperity.measured.measured_file import prepare_file
 from asperity.measured.prepared import PreparedSurface
-from asperity.textures.fields.field_file import assemble_field, is_field, load_field
-from asperity.textures.fields.field_sampler import FieldArguments
+from asperity.textures.fields.field_file import is_field, load_field
 from asperity.textures.kinds import KIND_EXAMPLES
 from asperity.textures.kinds.fourier import Fourier
 from asperity.textures.kinds.grating import Grating
@@ -28,8 +22,6 @@ from asperity.textures.kinds.named_surfaces import LIBRARY
 from asperity.textures.kinds.noise import Noise, NoiseProfile
 from asperity.textures.kinds.prepare_synthetic import prepare_texture
 from asperity.textures.kinds.sinusoid import Sinusoid
-from asperity.textures.spline.heightmap_sampler import HeightMapArguments
-from asperity.textures.spline.profile_sampler import ProfileArguments
 from asperity.textures.spline.spline_texture import HeightMap, Profile, fit_spline
 from asperity.textures.texture import Texture, TextureKind
 
@@ -40,7 +32,7 @@ CATALOGUE: dict[str, TextureKind] = {
 """All texture kinds and named surfaces by name, and those added by :func:`register`."""
 
 # Names that the command line and scenes use for something else.
-_RESERVED = ("file", "recording")
+_RESERVED = ("file",)
 
 
 def register(kind: TextureKind) -> TextureKind:
@@ -140,7 +132,7 @@ def load_texture(  # noqa: D417 - the others are described where they are declar
 
 
 def _build_described(description: Mapping[str, Any]) -> Texture:
-    texture = _rebuild_from_description(description)
+    texture = _build_from_description(description)
     if texture is None:
         words = f"is of a kind that is not known here: {description.get('kind')}"
         raise ParameterError("texture", f"{words}; name its file, --plugin FILE")
@@ -231,7 +223,6 @@ def build_texture(
     arguments: Mapping[str, Any],
     folder: Path | None = None,
     values: Mapping[str, Any] | None = None,
-    kinds: Mapping[str, TextureKind] = KINDS,
 ) -> Texture:
     """Return a texture of a kind from its arguments as text or lists.
 
@@ -240,14 +231,13 @@ def build_texture(
         arguments: arguments of the kind and of the preparation, by name.
         folder: folder that the path of a file is relative to.
         values: further arguments of the preparation [SI]; they take precedence.
-        kinds: texture kinds by name.
 
     Raises:
         ParameterError: for an unknown kind or argument, one that is missing, or a wrong value.
     """
-    if kind not in kinds:
-        raise ParameterError("surface", f"kind is unknown: {kind!r}; {suggest_names(kind, kinds)}")
-    entry = kinds[kind]
+    if kind not in KINDS:
+        raise ParameterError("surface", f"kind is unknown: {kind!r}; {suggest_names(kind, KINDS)}")
+    entry = KINDS[kind]
     synthetic = () if kind == "file" else SYNTHETIC_ARGUMENTS
     own = {argument.name for argument in entry.arguments}
     preparing = [argument for argument in synthetic if argument.name not in own]
@@ -274,66 +264,7 @@ def _require_all(kind: TextureKind, arguments: dict[str, Any]) -> dict[str, Any]
     return arguments
 
 
-def rebuild_texture(
-    arguments: tuple[Any, ...],
-    sampler: tuple[ModuleType, ...],
-    description: Mapping[str, Any],
-    heights: FloatArray | None = None,
-) -> Texture | None:
-    """Return the texture with this sampler record.
-
-    Splines are rebuilt from the record, other kinds from their description, which must contain the
-    arguments declared by their :class:`~asperity.textures.texture.TextureKind`.
-
-    Args:
-        arguments: the record that the sampler functions receive.
-        sampler: modules of the sampler functions.
-        description: description of the texture, see :meth:`Texture.describe`.
-        heights: of the spline that a field was baked from, see :meth:`Texture.stored_heights`.
-
-    Returns:
-        The texture; ``None`` if it cannot be rebuilt.
-
-    Example:
-        >>> from asperity.textures.kinds.sinusoid import Sinusoid
-        >>> wave = Sinusoid(amplitude=0.2e-3, period=2e-3)
-        >>> rebuilt = rebuild_texture(wave.arguments, wave.sampler, wave.describe())
-        >>> rebuilt, rebuilt.arguments == wave.arguments
-        (Sinusoid(amplitude=0.0002, period=0.002, phase=0.0, direction=(1.0, 0.0)), True)
-    """
-    if isinstance(arguments, FieldArguments):
-        nodes = np.empty(0) if heights is None else heights
-        return assemble_field(arguments, description, nodes, _build_described)
-    texture = None
-    if isinstance(arguments, (ProfileArguments, HeightMapArguments)):
-        texture = _rebuild_spline(arguments)
-    if texture is None or texture.sampler != sampler:
-        texture = _rebuild_from_description(description)
-    if texture is None or texture.sampler != sampler:
-        return None
-    # The record itself: computed again, its numbers could differ in their last bits.
-    vars(texture)["arguments"] = arguments
-    texture.preparation = tuple(map(str, description.get("preparation", ())))
-    return texture
-
-
-def _rebuild_spline(record: ProfileArguments | HeightMapArguments) -> Texture:
-    heights = record.c
-    origin = cast(Any, record.x0)
-    pitch: tuple[float, ...] = (1.0 / record.ix,)
-    if isinstance(record, HeightMapArguments):
-        pitch = (*pitch, 1.0 / record.iy)
-        origin = (record.x0, record.y0)
-    for _axis in pitch:  # the heights at the nodes along an axis are (c₋ + 4 c + c₊)/6
-        last = len(heights) - (2 if record.periodic else 1)
-        heights = (heights[: last - 1] + 4.0 * heights[1:last] + heights[2 : last + 1]).T / 6.0
-    texture = fit_spline(heights, pitch, periodic=record.periodic, origin=origin)
-    digest = content_digest("rebuilt", type(record).__name__, *record)
-    vars(texture).update(coefficients=record.c, digest=digest)
-    return texture
-
-
-def _rebuild_from_description(description: Mapping[str, Any]) -> Texture | None:
+def _build_from_description(description: Mapping[str, Any]) -> Texture | None:
     """Return a texture of a registered kind from the arguments in its description."""
     kind = CATALOGUE.get(str(description.get("kind")))
     if kind is None:
