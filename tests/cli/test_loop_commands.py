@@ -166,7 +166,9 @@ def test_recorded_run_is_replayed_bit_for_bit_and_exported(
     text = (tmp_path / "page.html").read_text(encoding="utf-8")
     check_alts(check_alone(text), text)
     code, out, _err = call("recording", "info", path, "--json", "-")
-    assert json.loads(out)["about"]["device"]["name"]
+    about = json.loads(out)["about"]
+    assert about["device"]["name"]
+    assert about["scene"] + "\n" == Path(still).read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(

@@ -67,7 +67,6 @@ def plugin_registries() -> tuple[PluginRegistry, ...]:
     from asperity.analysis.gain.theorems import THEOREMS
     from asperity.analysis.passivity.criteria import CRITERIA
     from asperity.derive.derivatives import symbolic_force
-    from asperity.export import c99
     from asperity.measured.reading import Reader, readers
     from asperity.servo.drivers import driver_registry
     from asperity.servo.drivers.driver import DriverKind
@@ -80,7 +79,6 @@ def plugin_registries() -> tuple[PluginRegistry, ...]:
         PluginRegistry(catalogue.CATALOGUE, TextureKind, catalogue.register),
         PluginRegistry(readers.USER_READERS, Reader, readers.register),
         PluginRegistry(driver_registry.DRIVER_KINDS, DriverKind, driver_registry.register_driver),
-        PluginRegistry(c99.TARGETS, c99.ExportTarget, c99.register),
         PluginRegistry(case_runs.RUN_KINDS, case_runs.RunKind, case_runs.register_run),
         PluginRegistry(CRITERIA),
         PluginRegistry(THEOREMS),

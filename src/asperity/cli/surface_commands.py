@@ -209,7 +209,7 @@ def export_command(
     SURFACE is a texture with its arguments (sinusoid:amplitude=0.8mm,period=1mm), a measured file
     or a scene file (TOML).
     """
-    from asperity.export import targets
+    from asperity.export import c99
     from asperity.export.surface_functions import ExportRequest
     from asperity.textures.fields.field_file import is_field
 
@@ -218,9 +218,9 @@ def export_command(
         if "max_evaluations" in request:
             raise ParameterError("exact", "searches without a budget: leave out --max-evaluations")
         request["max_evaluations"] = math.inf
-    target = targets.find_target(values["lang"] or "c99")
+    target = c99.find_target(values["lang"] or "c99")
     path = Path(output)
-    targets.check_name(path, target)
+    c99.check_name(path, target)
     check_output("output", output, force=force)
     field = path.with_suffix(".field") if load and not is_field(surface) else None
     check_output("output", str(field) if field else None, force=force)

@@ -174,17 +174,6 @@ TARGETS = {"c99": ExportTarget("c99", "a C header, or a C library", ".h", c99_fi
 """Export targets by name."""
 
 
-def register(target: ExportTarget) -> ExportTarget:
-    """Register a user-defined export target.
-
-    Raises:
-        ParameterError: for a name that is taken.
-    """
-    if TARGETS.setdefault(target.name, target) is not target:
-        raise ParameterError("lang", "is registered already", target.name)
-    return target
-
-
 def find_target(name: str) -> ExportTarget:
     """Return an export target by its name.
 

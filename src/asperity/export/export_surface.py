@@ -60,7 +60,7 @@ def export_code(
             that are recommended on the device.
         path: the main file ("texture.h"); further files are written beside it.
         device: device whose limits stand in the file.
-        lang: export target, "c99" or one of a plugin.
+        lang: export target, "c99".
         load: whether the program loads the field of law H from a file, which is written as well.
         shared: whether to write a library: header, source and CMakeLists.txt.
         force: whether to replace existing files.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from asperity.core.errors import LawError, ParameterError
+from asperity.core.errors import ParameterError
 
 _FORCE = ("fx", "fy", "fz")
 _JACOBIAN = tuple(f"j{row}{column}" for row in range(3) for column in range(3))
@@ -110,7 +110,7 @@ LATERAL = Clamp("lateral", "the depth of the lateral force is held at max_depth"
 BACKED = Clamp("backed", "whole, with a backing wall below it", (0, 1, 2), has_backing_wall=True)
 
 CLAMPS = {clamp.name: clamp for clamp in (NONE, WHOLE, LATERAL, BACKED)}
-"""The clamps by name: those of the package and registered ones."""
+"""The clamps by name."""
 
 
 def find_clamp(name: str) -> Clamp:
@@ -122,14 +122,3 @@ def find_clamp(name: str) -> Clamp:
     if name not in CLAMPS:
         raise ParameterError("clamp", f"must be one of {', '.join(CLAMPS)}", name)
     return CLAMPS[name]
-
-
-def register_clamp(clamp: Clamp) -> Clamp:
-    """Register a user-defined clamp, so that ``Surface(..., clamp=name)`` finds it.
-
-    Raises:
-        LawError: for a name that another clamp has.
-    """
-    if CLAMPS.setdefault(clamp.name, clamp) != clamp:
-        raise LawError(f"there is a clamp {clamp.name!r} already")
-    return clamp
