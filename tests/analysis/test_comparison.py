@@ -311,7 +311,7 @@ def test_answer_says_how_much_calibrating_gains() -> None:
     before, after = (
         asp.compare(texture, parse_device(one, "mine"), "H") for one in (rig, calibrated)
     )
-    assert "the factor is 1: up to 2 times stiffer (asperity calibrate)." in before.recommendation
+    assert "the factor is 1: up to 2 times stiffer (calibrate)." in before.recommendation
     ratio = after.row("H").recommended_stiffness / before.row("H").recommended_stiffness
     assert ratio == pytest.approx(2.0, rel=1e-2)
     assert "calibrated" not in after.recommendation

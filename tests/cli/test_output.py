@@ -88,7 +88,7 @@ def test_two_outputs_cannot_be_the_same_file(tmp_path: Path) -> None:
 def test_existing_file_is_kept_without_force(tmp_path: Path) -> None:
     target = tmp_path / "result.json"
     target.write_text("old")
-    with pytest.raises(ParameterError, match=r"json exists: .*; --force replaces it"):
+    with pytest.raises(ParameterError, match=r"json exists: .*; force=True replaces it"):
         check_outputs(force=False, json=str(target))
     check_outputs(force=False, json=os.devnull)  # nothing is lost
     check_outputs(force=False, json="-")

@@ -123,7 +123,7 @@ def test_surface_without_a_scene_uses_the_recommended_stiffness(call: Call, tmp_
         asp.compare(wave, device="touch", laws="D", clamp="backed").rows[0].recommended_stiffness
     )
     text = " ".join(out.split())
-    assert f"Law D at {format_quantity(stiffness, 'N/m')}, as asperity compare recommends" in text
+    assert f"Law D at {format_quantity(stiffness, 'N/m')}, as compare recommends" in text
     assert "A simulated hand is pulled 160 µm deep" in text
     assert open_recording(path).rows > 100
     # A given stiffness is used as it is, and checked.

@@ -18,7 +18,7 @@ HEIGHTS = 1e-7 * np.random.default_rng(4).normal(size=(12, 15))
 @pytest.mark.parametrize("pitch", [0.3125, 0.101, 0.99e-11])
 def test_absurd_pitch_of_a_file_must_be_confirmed(pitch: float) -> None:
     raw = RawSurface(HEIGHTS * pitch, (pitch, pitch), "part.nms", ())
-    with pytest.raises(ParameterError, match=r"pitch must be given: part\.nms says .*--pitch"):
+    with pytest.raises(ParameterError, match=r"pitch must be given: part\.nms says .*pitch="):
         prepare(raw)
     with pytest.raises(ParameterError, match="height_range"):  # the slope is left to confirm
         prepare(raw, pitch=pitch)

@@ -154,7 +154,7 @@ def test_participants_exist_once_and_sit_once(folder: Path, study: Study) -> Non
     with Participant(folder, study, "P01"):
         with pytest.raises(ParameterError, match=r"is in use by another process, got .*P01"):
             Participant(folder, study, "P01", resume=True)
-        with pytest.raises(ParameterError, match="P01 exists already: --resume goes on"):
+        with pytest.raises(ParameterError, match="P01 exists already: resume=True goes on"):
             Participant(folder, study, "P01")
         with pytest.raises(ParameterError, match=r"is in use by another process, got .*P01"):
             remove_participant(folder, "P01")

@@ -21,7 +21,7 @@ from asperity.laws import REGISTERED_LAWS, SHIPPED_LAW_ARGUMENTS, registered_arg
 
 if TYPE_CHECKING:
     from asperity.analysis.results.compare import Comparison
-    from asperity.analysis.results.device_comparisons import DeviceComparisons
+    from asperity.analysis.results.device_comparisons import DeviceComparisons, MissingData
     from asperity.devices import Device
     from asperity.laws import Law
     from asperity.textures import Texture
@@ -180,10 +180,16 @@ def _write_comparisons(
         )
         return
     if result.comparisons or len(result.missing_data) > 1:
-        outputs.write(result, report.comparisons_page(result))
+        remedies = [_missing_data_text(missing) for missing in result.missing_data]
+        outputs.write(result, report.comparisons_page(result), extra_line="\n".join(remedies))
     if not result.comparisons:
         reasons = "; ".join(one.sentence for one in result.missing_data)
         raise ParameterError("device", f"lacks data to compare laws: {reasons}")
+
+
+def _missing_data_text(missing: MissingData) -> str:
+    field = missing.hint.translate(str.maketrans("", "", ' "'))
+    return f"{missing.device} can be compared with --set {field}"
 
 
 _SAMPLING = options.command_arguments("limits")

@@ -22,8 +22,11 @@ from asperity.core.errors import (
     nearest_names,
     print_message,
     suggest_names,
+    write_keyword,
 )
 from asperity.core.files import read_toml
+from asperity.core.units import format_quantity
+from asperity.devices import FIELD_UNITS
 from asperity.laws import SHIPPED_LAW_ARGUMENTS
 from asperity.measured.file_arguments import FILE_ARGUMENTS
 
@@ -31,23 +34,76 @@ GROUPS = read_toml("commands", Path(__file__).with_name("commands.toml"))
 """Module, summary and example of each command, by group and name."""
 COMMANDS = {name: entry for group in GROUPS.values() for name, entry in group.items()}
 
-_FILE_OPTIONS = {argument.name for argument in FILE_ARGUMENTS}
+_FILE_OPTIONS = {argument.name: argument for argument in FILE_ARGUMENTS}
 _HEADINGS = {
     "Law": {"law", "laws", "clamp", "stiffness", "max_depth", "rendering", *SHIPPED_LAW_ARGUMENTS},
     "Device and hand": {"device", "driver", "speed", "grip", "settings"},
-    "Measured surface": _FILE_OPTIONS,
+    "Measured surface": set(_FILE_OPTIONS),
     "Output": {"output", "json_path", "html_path", "trace_path", "record", "force", "no_cache"},
 }
 _HEADING_OF = {name: title for title, names in _HEADINGS.items() for name in names}
 
 
-class HeadedCommand(click.Command):
-    """Command whose help has options under headings, and an example."""
+def write_option(name: str, value: object, ctx: click.Context) -> str:
+    """Return an argument as an option of the running command, with a value for it.
+
+    A field of a device is a value of ``--set``. What is no option is written as in Python.
+
+    Args:
+        name: name of the argument.
+        value: a text, a number [SI], ``True`` for a switch, ``None`` for the option alone.
+        ctx: context of the command.
+    """
+    options = {str(option.name): option for option in ctx.command.params}
+    if isinstance(value, float) and name in _FILE_OPTIONS:
+        value = format_quantity(value, _FILE_OPTIONS[name].unit, digits=6)
+    text = "" if value is True else str(value).replace(" ", "")
+    if name in FIELD_UNITS and name not in options and "settings" in options:
+        return f"--set {name}={text}"
+    if name not in options:
+        return write_keyword(name, value)
+    option = options[name]
+    if value is None and option.metavar != "TEXT":
+        text = option.metavar or ""
+    return f"{max(option.opts, key=len)} {text}".rstrip()
+
+
+def option_message(error: ParameterError, ctx: click.Context) -> str:
+    """Return the message of an error with options of the running command for its arguments."""
+    from asperity.textures.catalogue import CATALOGUE
+
+    message = error.write_message(lambda name, value: write_option(name, value, ctx))
+    kind = str(ctx.params.get("surface", "")).partition(":")[0]
+    if kind in CATALOGUE and any(error.argument == one.name for one in CATALOGUE[kind].arguments):
+        return f"{message}; asperity surfaces {kind} shows an example"
+    typed = ctx.meta["arguments"]
+    for option in ctx.command.params:
+        flag = max(option.opts, key=len)
+        is_typed = any(text.partition("=")[0] in option.opts for text in typed)
+        if option.name == error.argument and flag.startswith("--") and not is_typed:
+            return message if flag in message else f"{message} (option {flag})"
+    return message
+
+
+class OptionCommand(click.Command):
+    """Command whose errors name its options."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Parse the arguments, and keep them for :func:`repeat_options`."""
+        """Parse the arguments, and keep them for messages and :func:`repeat_options`."""
         ctx.meta["arguments"] = list(args)
         return super().parse_args(ctx, args)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command."""
+        try:
+            return super().invoke(ctx)
+        except ParameterError as error:
+            error.args = (option_message(error, ctx),)
+            raise
+
+
+class HeadedCommand(OptionCommand):
+    """Command whose help has options under headings, and an example."""
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the options; those of a measured file only for ``--help-surface``."""
@@ -176,6 +232,8 @@ def _options_of(command: click.Command | None) -> list[str]:
 
 class StrictGroup(click.Group):
     """Group of commands that refuses repeated options."""
+
+    command_class = OptionCommand
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]

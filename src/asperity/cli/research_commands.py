@@ -96,7 +96,12 @@ def reproduce_command(
         names_text = ", ".join(path.name for path in paths)
         written = f"Figures in {escape_unprintable(folder)}: {names_text}"
 
-    page = evidence_page(results) if names else claims_page(results, experiments)
+    command = "asperity reproduce --claim {}"
+    if names:
+        page = evidence_page(results, command)
+    else:
+        page = claims_page(results, experiments, command)
+        written = written or f"The evidence of one claim: {command.format('ID')}"
     data = {"schema": 1, "claims": results, "experiments": experiments}
     outputs.write(data, page, extra_line=written)
 
@@ -213,8 +218,18 @@ def run_command(file: str, participant: str, folder: str | None, driver: str, **
     click.echo(f"{participant}: {person.trial - before} answers in {name}; {words}")
 
 
+def _check_study_folder(_ctx: click.Context, _argument: click.Parameter, folder: str) -> str:
+    from asperity.studies.study_store import STUDY_FILE
+
+    if not (Path(folder) / STUDY_FILE).is_file():
+        raise ParameterError(
+            "folder", "is no folder of a study: asperity study run makes one", folder
+        )
+    return folder
+
+
 @study_command.command("report", short_help="Write scores, tables and a page; unblinds.")
-@click.argument("folder")
+@click.argument("folder", callback=_check_study_folder)
 @output.output_options(uses_cache=False)
 def report_command(folder: str, outputs: output.Outputs) -> None:
     """Write scores with intervals, pictures and tables into FOLDER, with the key of the codes.
@@ -247,7 +262,7 @@ def plan_command(file: str, effect: float, **values: Any) -> None:
 
 
 @study_command.command("remove", short_help="Delete all data of a participant.")
-@click.argument("folder")
+@click.argument("folder", callback=_check_study_folder)
 @click.argument("participant")
 def remove_command(folder: str, participant: str) -> None:
     """Delete all data of PARTICIPANT in FOLDER: answers, recordings, and tables made from them."""

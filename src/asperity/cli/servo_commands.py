@@ -332,4 +332,4 @@ def _device_scene(
     with progress_bar("analyzing the surface"):
         check_stiffness_limit(setup, accept_risk=accept_risk)
     scene = make_device_scene_state(setup, servo, source)
-    return scene, make_handle(driver, setup)
+    return scene, make_handle(driver, setup, "; asperity lab --accept-risk renders it")

@@ -40,7 +40,7 @@ def surfaces_command(names: tuple[str, ...], outputs: Outputs) -> None:
     from asperity.report.pages.surface_gallery import find_surfaces, surfaces_page
 
     surfaces = find_surfaces(names)
-    page = surfaces_page(surfaces, detailed=bool(names))
+    page = surfaces_page(surfaces, detailed=bool(names), command="asperity compare")
     outputs.write({"schema": 2, "surfaces": surfaces}, page, "Figures")
 
 

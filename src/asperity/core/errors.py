@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import copyreg
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from typing import ClassVar, TypeVar
 
 _Entry = TypeVar("_Entry")
+
+ArgumentWriter = Callable[[str, object], str]
+"""Writes the name of an argument with a value for it, or with ``None`` alone."""
 
 
 class AsperityError(Exception):
@@ -24,27 +27,56 @@ class AsperityError(Exception):
 class ParameterError(AsperityError, ValueError):
     """An invalid argument; the message states its name, the requirement and the value.
 
+    The message may name other arguments, as ``{force}``, with the values that help: here they are
+    written as in Python, on the command line as options.
+
     Attributes:
         argument: name of the argument.
         requirement: what the argument must be.
         value: the value passed, ``None`` if it is not part of the message.
+        suggestions: values [SI, or as text] of the arguments that the requirement names in braces;
+            ``None`` where the name alone is to be written.
 
     Example:
         >>> raise ParameterError("stiffness", "must be positive and finite [N/m]", -3.0)
         Traceback (most recent call last):
         ...
         asperity.core.errors.ParameterError: stiffness must be positive and finite [N/m], got -3.0
+        >>> print(ParameterError("output", "exists; {force} replaces it", force=True))
+        output exists; force=True replaces it
     """
 
-    def __init__(self, argument: str, requirement: str, value: object = None) -> None:
+    def __init__(
+        self, argument: str, requirement: str, value: object = None, **suggestions: object
+    ) -> None:
         self.argument = argument
-        self.requirement = requirement
         self.value = value
-        tail = "" if value is None else f", got {value!r}"
-        super().__init__(f"{argument} {requirement}{tail}")
+        self.suggestions = suggestions
+        self._template = requirement
+        self.requirement = self.write_requirement(write_keyword)
+        super().__init__(self.write_message(write_keyword))
+
+    def write_requirement(self, write_argument: ArgumentWriter) -> str:
+        """Return the requirement with the suggestions as a function writes them."""
+        text = self._template
+        for name, value in self.suggestions.items():
+            text = text.replace(f"{{{name}}}", write_argument(name, value))
+        return text
+
+    def write_message(self, write_argument: ArgumentWriter) -> str:
+        """Return the message with the suggestions as a function of name and value writes them."""
+        tail = "" if self.value is None else f", got {self.value!r}"
+        return f"{self.argument} {self.write_requirement(write_argument)}{tail}"
 
     def __reduce__(self) -> tuple[object, ...]:  # by state: subclasses have other arguments
         return copyreg.__newobj__, (type(self), *self.args), self.__dict__  # type: ignore[attr-defined]  # typeshed omits it
+
+
+def write_keyword(name: str, value: object) -> str:
+    """Return an argument as in a call of Python; its name alone if the value is ``None``."""
+    if value is None:
+        return name
+    return f"{name}={value:.6g}" if isinstance(value, float) else f"{name}={value!r}"
 
 
 class _ReasonError(ParameterError):
@@ -52,12 +84,12 @@ class _ReasonError(ParameterError):
 
     _argument: ClassVar[str]
 
-    def __init__(self, reason: str) -> None:
-        super().__init__(self._argument, reason)
-        self.args = (reason,)
+    def __init__(self, reason: str, **suggestions: object) -> None:
+        super().__init__(self._argument, reason, **suggestions)
 
-    def __str__(self) -> str:
-        return self.requirement
+    def write_message(self, write_argument: ArgumentWriter) -> str:
+        """Return the reason with the suggestions as a function writes them."""
+        return self.write_requirement(write_argument)
 
 
 class SurfaceFileError(_ReasonError):

@@ -392,6 +392,6 @@ def _assumptions(
     if peaks:
         sentences.append(
             "Points of a surface are its greatest waves, each taken alone; the waves of a surface "
-            "act together: asperity compare decides about the whole surface"
+            "act together: compare decides about the whole surface"
         )
     return tuple(sentences)

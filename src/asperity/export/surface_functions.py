@@ -315,8 +315,8 @@ class ExportRequest:
     def __post_init__(self) -> None:
         self.validate(**vars(self))
         if is_searched(self.surface):
-            words = "must be baked to export law H: asperity bake, with --extent without a period"
-            raise ParameterError("surface", words)
+            text = "must be baked to export law H; without a period, bake a part of it"
+            raise ParameterError("surface", text)
         if self.loads_field and not self.surface.texture.baked_numbers:
             raise ParameterError("load", "needs a baked field: law H without a closed form")
 

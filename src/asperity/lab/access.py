@@ -160,7 +160,7 @@ def respond(
     """
     name = access_token.authorize(request.path, request.headers.get_all("Host"))
     if name is None:
-        return _text_response(HTTPStatus.FORBIDDEN, "Open the address that asperity lab prints.")
+        return _text_response(HTTPStatus.FORBIDDEN, "Open the address that the lab prints.")
     if name == LIVE_PATH:
         if access_token.is_same_origin(request.headers.get_all("Origin")):
             return None

@@ -44,11 +44,13 @@ class Handle:
         driver: of the device.
         motion_source: what moves the handle, for the page.
         start_prompt: shown before the first start.
+        risk_advice: ends the refusal of a stiffness above the limit.
     """
 
     driver: Driver
     motion_source: str
     start_prompt: str
+    risk_advice: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """Return driver, motion source and behaviour on loss for the page."""
@@ -59,11 +61,11 @@ class Handle:
         }
 
 
-def make_handle(driver: Driver, setup: Setup) -> Handle:
-    """Return the handle of a driver on the device of a setup."""
+def make_handle(driver: Driver, setup: Setup, risk_advice: str = "") -> Handle:
+    """Return the handle of a driver on the device of a setup; see :class:`Handle`."""
     if not driver.has_moving_handle:
         source = "A recording moves the handle; the pointer has no effect"
-        return Handle(driver, source, "stopped: Start replays the recording")
+        return Handle(driver, source, "stopped: Start replays the recording", risk_advice)
     name = setup.device.name
     return Handle(
         driver,
@@ -71,6 +73,7 @@ def make_handle(driver: Driver, setup: Setup) -> Handle:
         " those of the device",
         f"stopped. Keep a hand near the switch of {name}, the handle in the air: Start ramps the"
         f" force up. If the loop dies: {driver.loss_notice}",
+        risk_advice,
     )
 
 
@@ -389,8 +392,8 @@ class Session:
         except BrokenProcessPool:
             reason = "the process that analyses it has crashed: try again"
         if reason:
-            advice = "asperity lab --accept-risk renders it"
-            raise ParameterError("stiffness", f"is refused: {reason}; {advice}")
+            advice = self.handle.risk_advice if self.handle else ""
+            raise ParameterError("stiffness", f"is refused: {reason}{advice}")
         return True
 
     def _poll(self) -> None:

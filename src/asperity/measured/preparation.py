@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,40 +62,46 @@ def check_plausible(raw: RawSurface, heights: FloatArray, pitch: Pitch) -> None:
             "height_range",
             f"is required: the values of {raw.source} have no unit; give the peak-to-valley"
             f" height [m]{raw.unit_question}",
+            unit="um",
         )
     span = float(np.nanmax(heights)) - float(np.nanmin(heights))
     slope = mean_slope(heights, pitch)
+    fixes, suggestions = _suggest_fixes(raw, span, slope)
     if slope > MAX_MEAN_SLOPE:
         raise ParameterError(
             "height_range",
             f"must be given: heights that span {format_length(span)} at a pitch of"
             f" {format_lengths(pitch)} have a mean slope of {slope:.3g}, and no instrument measures"
-            f" {MAX_MEAN_SLOPE:g}; {_suggest_fixes(raw, span, slope)}",
+            f" {MAX_MEAN_SLOPE:g}; {fixes}",
+            **suggestions,
         )
     if 0.0 < slope < MIN_MEAN_SLOPE:
         raise ParameterError(
             "height_range",
             f"must be given: heights that span {format_length(span)} at a pitch of"
             f" {format_lengths(pitch)} have a mean slope of {slope:.3g}, less than"
-            f" {MIN_MEAN_SLOPE:g}: heights or pitch may be in another unit (--pitch); if they are"
-            f" right: height_range={span:.6g} (--height-range {span:.6g}m)",
+            f" {MIN_MEAN_SLOPE:g}: heights or pitch may be in another unit; give {{pitch}}, or, if"
+            " they are right, {height_range}",
+            pitch=None,
+            height_range=span,
         )
     if span > _MAX_SPAN and not raw.has_units:
         raise ParameterError(
             "height_range",
             f"must be given: heights that span {format_length(span)} look not to be in metres, and"
-            f" {raw.source} names no unit; {_suggest_fixes(raw, span, slope)}",
+            f" {raw.source} names no unit; {fixes}",
+            **suggestions,
         )
 
 
-def _suggest_fixes(raw: RawSurface, span: float, slope: float) -> str:
-    """Return the options for another unit, and for heights that are right."""
+def _suggest_fixes(raw: RawSurface, span: float, slope: float) -> tuple[str, dict[str, Any]]:
+    """Return what to give for another unit, and for heights that are right, with the values."""
     unit = next((u for u, factor in _COMMON_UNITS.items() if slope * factor <= 1.0), "nm")
-    other = f"unit='{unit}' (--unit {unit})"
-    if raw.has_units:  # no option changes the unit of a file: give the height range
-        other = f"height_range={span * _COMMON_UNITS[unit]:.6g} (--height-range {span:.6g}{unit})"
-    as_read = f"height_range={span:.6g} (--height-range {span:.6g}m)"
-    return f"if in {unit}: {other}; if they are right: {as_read}; --outliers 6 removes spikes"
+    other = "{unit}"
+    if raw.has_units:  # no argument changes the unit of a file: give the height range
+        other = f"a height range of {format_length(span * _COMMON_UNITS[unit])}"
+    right = "if they are right: {height_range}; {outliers} removes spikes"
+    return f"if in {unit}: {other}; {right}", {"unit": unit, "height_range": span, "outliers": 6}
 
 
 def mean_slope(heights: FloatArray, pitch: Pitch) -> float:
@@ -316,7 +323,8 @@ def _check_missing(heights: FloatArray, max_missing: float) -> None:
         raise ParameterError(
             "surface",
             f"misses {missing:.1%} of its points; at most {share} can be filled, unless you allow"
-            f" more: max_missing={math.ceil(100 * missing) / 100:g} (--max-missing)",
+            " more: {max_missing}",
+            max_missing=math.ceil(100 * missing) / 100,
         )
 
 
@@ -340,7 +348,8 @@ def _resolve_pitch(raw: RawSurface, pitch: GivenPitch, steps: list[str]) -> Pitc
         raise ParameterError(
             "pitch",
             f"must be given: {raw.source} says {format_lengths(lateral)}, which no instrument has;"
-            f" if it is right: pitch={lateral[0]:g} (--pitch {lateral[0]:g}m)",
+            " if it is right: {pitch}",
+            pitch=lateral[0],
         )
     return lateral
 

@@ -147,5 +147,5 @@ def _sampler_module(name: str) -> ModuleType:
         module = importlib.import_module(name)
     if not hasattr(module, "KERNELS"):
         words = f"has a texture of an unknown kind ({name})"
-        raise ParameterError("recording", f"{words}: name its file, --plugin FILE")
+        raise ParameterError("recording", f"{words}: name its file as {{plugin}}", plugin=None)
     return module  # type: ignore[return-value]  # None has no KERNELS

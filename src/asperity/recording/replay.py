@@ -158,8 +158,8 @@ def recorded_field(recording: Recording) -> RecordedField:
     metadata = _surface_metadata(recording)
     data = recording.attachment(TEXTURE_FILE)
     if data is None:
-        words = "does not hold its surface, which was too large: name it, --surface SURFACE"
-        raise ParameterError("recording", words)
+        text = "does not hold its surface, which was too large: name it as {surface}"
+        raise ParameterError("recording", text, surface=None)
     return read_field(metadata, data)
 
 

@@ -69,13 +69,14 @@ def recommend_law_and_stiffness(
         raise ParameterError("law", f"is missing, and none is recommended: {result.recommendation}")
     chosen = {**surface, "law": row.law}
     if "stiffness" in surface:
-        return chosen, f"Law {row.law.letter}, as asperity compare recommends"
+        return chosen, f"Law {row.law.letter}, as compare recommends"
     if not row.recommended_stiffness:
         reason = f"is missing, and none is known to be stable for law {row.law.letter}"
-        raise ParameterError("stiffness", f"{reason} on {device.id}: try --stiffness 100N/m")
+        text = f"{reason} on {device.id}: try {{stiffness}}"
+        raise ParameterError("stiffness", text, stiffness="100 N/m")
     chosen["stiffness"] = row.recommended_stiffness
     stiffness = format_quantity(row.recommended_stiffness, "N/m")
-    return chosen, f"Law {row.law.letter} at {stiffness}, as asperity compare recommends"
+    return chosen, f"Law {row.law.letter} at {stiffness}, as compare recommends"
 
 
 _NO_HAND: dict[str, Any] = {
@@ -97,7 +98,8 @@ def check_stiffness_limit(setup: Setup, *, accept_risk: bool = False) -> None:
         ParameterError: otherwise, with the reason.
     """
     if not accept_risk and (reason := excess_stiffness_reason(setup.rendered, setup.device)):
-        raise ParameterError("stiffness", f"is refused: {reason}; --accept-risk accepts it")
+        text = f"is refused: {reason}; {{accept_risk}} accepts it"
+        raise ParameterError("stiffness", text, accept_risk=True)
 
 
 def simulated_process(setup: Setup, prestarted: PrestartedProcess | None = None) -> ServoProcess:

@@ -134,7 +134,7 @@ def scene_template(name: str = "scene.toml") -> str:
     sinusoid = TEXTURE_KINDS["sinusoid"].arguments
     names = {argument.name for argument in sinusoid}
     others = [argument for argument in SYNTHETIC_ARGUMENTS if argument.name not in names]
-    texture = _kind_line("sinusoid", TEXTURE_KINDS, "asperity surfaces lists their arguments")
+    texture = _kind_line("sinusoid", TEXTURE_KINDS, "surfaces lists their arguments")
     hand = _kind_line("spring", HANDS)
     motion = _kind_line("strokes", MOTIONS)
     return _TEMPLATE.read_text("utf-8").format(

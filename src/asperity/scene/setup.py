@@ -176,7 +176,7 @@ def make_setup(
     merged = {**scene.surface, **(surface or {})}
     run = parse_arguments("run", scene.loop.get("run", {}), sections.RUN_ARGUMENTS)
     if "law" not in merged:
-        raise ParameterError("law", "is missing: --law B, or a scene whose [surface] names one")
+        raise ParameterError("law", "is missing: give {law}, or name one in [surface]", law="B")
     if use_defaults and not {"hand", "motion"} & scene.loop.keys():
         return _make_default_setup(scene, merged, device, duration or run.get("duration"))
     for name in ("hand", "motion"):

@@ -326,8 +326,8 @@ def require_max_force(driver: Driver, servo: Servo) -> None:
         ParameterError: if it is not known.
     """
     if driver.has_moving_handle and not math.isfinite(servo.max_force):
-        words = "is not known: a device that moves needs it, --set max_force=3N"
-        raise ParameterError("max_force", words)
+        text = "is not known: a device that moves needs it, such as {max_force}"
+        raise ParameterError("max_force", text, max_force="3 N")
 
 
 def _pickle(value: object) -> tuple[loop_process.ModuleFiles, bytes]:

@@ -114,8 +114,8 @@ def check_passivity_damping(safety: Safety, device: Device, servo: Servo) -> Non
     if not given:
         return
     if mass is None:
-        words = f"needs the apparent_mass of {device.id}, which bounds it: --set apparent_mass=50g"
-        raise ParameterError("passivity_damping", words)
+        text = f"needs the mass of {device.id}, which bounds it, such as {{apparent_mass}}"
+        raise ParameterError("passivity_damping", text, apparent_mass="50 g")
     bound = mass / ((1 + servo.delay) * servo.period)
     if given > bound:
         words = (
@@ -153,7 +153,7 @@ def excess_stiffness_reason(surface: Surface, device: Device, *, keeps_margin: b
     allowed = recommended.stiffness if keeps_margin else allowed
     context = f"for law {surface.law.letter} on {device.id}"
     if not allowed:
-        return f"no stable stiffness is known {context}: asperity analyze says what is missing"
+        return f"no stable stiffness is known {context}: analyze says what is missing"
     if surface.stiffness <= allowed:
         return ""
     limit = f"limit of {format_quantity(allowed, 'N/m', digits=3)}"

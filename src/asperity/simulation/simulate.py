@@ -366,7 +366,7 @@ def _open_trace(
     if not isinstance(trace, (str, os.PathLike)):
         raise ParameterError("trace", "must be True, False or a path", trace)
     if Path(trace).suffix.lower() not in (".mcap", ""):
-        words = "must end in .mcap; asperity recording export writes such a recording as .csv"
+        words = "must end in .mcap; such a recording can be exported as .csv"
         raise ParameterError("trace", words, os.fspath(trace))
     return RecordingWriter(trace, COLUMNS, metadata(), field_attachments(surface), "trace")
 

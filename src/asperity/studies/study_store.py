@@ -78,7 +78,7 @@ def read_study(folder: str | Path) -> Study:
     try:
         content = dict(json.loads((Path(folder) / STUDY_FILE).read_bytes()))
     except (OSError, ValueError):
-        words = "is no folder of a study: asperity study run makes one"
+        words = "is no folder of a study, which a session of it makes"
         raise ParameterError("folder", words, str(folder)) from None
     if (schema := content.get("schema")) != SCHEMA:
         raise ParameterError("folder", f"is of another version: schema {schema!r}, not {SCHEMA}")
@@ -97,9 +97,11 @@ def _check_known(folder: str | Path, code: str, *, is_new: bool = False) -> dict
     """Check that a participant exists, or is new; return the numbers of all by code."""
     known = list_participants(folder)
     if (check_participant(code) in known) == is_new:
-        words = f"is unknown; known: {', '.join(known) or 'none'}"
-        words = "exists already: --resume goes on where it stopped" if is_new else words
-        raise ParameterError("participant", f"{code} {words}")
+        if is_new:
+            text = f"{code} exists already: {{resume}} goes on where it stopped"
+            raise ParameterError("participant", text, resume=True)
+        text = f"{code} is unknown; known: {', '.join(known) or 'none'}"
+        raise ParameterError("participant", text)
     return known
 
 

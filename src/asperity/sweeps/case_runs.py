@@ -72,8 +72,8 @@ class RunKind:
         names = inspect.signature(self.function).parameters.keys()
         check_keywords(options, names - _SCENE_ARGUMENTS, lambda: None)
         if laws is not None and not self.takes_laws:
-            words = f"do not apply to {self.name}, which takes one: --vary {LAW_KEY}=A,B"
-            raise ParameterError("laws", words)
+            text = f"do not apply to {self.name}, which takes one: {{vary}} gives several"
+            raise ParameterError("laws", text, vary=f"{LAW_KEY}=A,B")
 
 
 def _compare(scene: Scene, laws: Laws, options: Mapping[str, Any], _seed: int) -> Tabular:

@@ -271,9 +271,10 @@ def design_points(design: str, ranges: Mapping[str, Range]) -> list[dict[str, An
     points = int(count) if name == "sobol" and count.isdecimal() and len(count) < 10 else 0
     if points < 2 or points & (points - 1) or not ranges:
         near = f"sobol:{2 ** min(20, max(1, points.bit_length()))}"
-        words = "needs a range: --vary KEY=START:STOP" if not ranges and points else (
-            f"must be sobol:N, N a power of two, such as {near}")  # fmt: skip
-        raise ParameterError("design", words, design)
+        if points and not ranges:
+            text = "needs a range to vary, such as {vary}"
+            raise ParameterError("design", text, design, vary="KEY=START:STOP")
+        raise ParameterError("design", f"must be sobol:N, N a power of two, such as {near}", design)
     from scipy.stats import qmc
 
     fractions = qmc.Sobol(len(ranges), scramble=False).random_base2(points.bit_length() - 1)

@@ -135,7 +135,7 @@ def _build_described(description: Mapping[str, Any]) -> Texture:
     texture = _build_from_description(description)
     if texture is None:
         words = f"is of a kind that is not known here: {description.get('kind')}"
-        raise ParameterError("texture", f"{words}; name its file, --plugin FILE")
+        raise ParameterError("texture", f"{words}; name its file as {{plugin}}", plugin=None)
     return texture
 
 
@@ -260,7 +260,7 @@ def _require_all(kind: TextureKind, arguments: dict[str, Any]) -> dict[str, Any]
     for name in required:
         if name not in arguments:
             needs = f"is missing: a {kind.name} needs {', '.join(required)}"
-            raise ParameterError(name, f"{needs}; asperity surfaces {kind.name} shows an example")
+            raise ParameterError(name, needs)
     return arguments
 
 

@@ -68,7 +68,7 @@ class MissingData(Serializable):
         option = self.hint.replace(" = ", "=").replace('"', "").replace(" ", "")
         return (
             f"{self.device}: the stiffest smooth wall that held is unknown; measure it, and add "
-            f"{self.hint} to its file, or give --set {option}"
+            f"{self.hint} to its file, or set {option}"
         )
 
 

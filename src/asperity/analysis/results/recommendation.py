@@ -352,7 +352,7 @@ def _form_advice(texture: Perceptibility) -> str:
     """Return how to remove form and waviness, where they make up most of the force."""
     if not texture.is_mostly_form:
         return ""
-    return "Most of it is form and waviness, felt as a shape: --form 2 and --l-cutoff remove it."
+    return "Most of it is form and waviness, felt as a shape: form=2 and l_cutoff remove it."
 
 
 def _contact_loss_text(row: LawRow) -> str:
@@ -362,7 +362,7 @@ def _contact_loss_text(row: LawRow) -> str:
     full_depth = format_quantity(round_up((1.0 - 1e-9) * row.surface.texture.peak_to_valley), "m")
     return (
         f"Pressed to {depth} it loses contact on {100.0 * row.contact_lost:.0f} % of the scan; "
-        f"pressed to {full_depth} it keeps contact (--max-depth)."
+        f"pressed to {full_depth} it keeps contact (max_depth)."
     )
 
 
@@ -477,7 +477,7 @@ def _margin_text(row: LawRow) -> str:
         return text
     gain = f"{calibrated:g}: up to {calibrated / margin.factor:.2g} times stiffer"
     whose = "On a calibrated device, where a wall was tried along every axis, the factor is"
-    return f"{text} {whose} {gain} (asperity calibrate)."
+    return f"{text} {whose} {gain} (calibrate)."
 
 
 def simulated_loops_text(margin: Margin) -> str:

@@ -405,7 +405,8 @@ def reject_positions(table: TextTable) -> None:
     rows, columns = np.array(values.shape) > _MIN_POSITIONS
     if (across and (down or columns)) or (down and rows):
         fault = "the first row or column looks like positions or numbers of the others"
-        raise SurfaceFileError(f"{fault}: remove it, and give their distance as pitch (--pitch)")
+        text = f"{fault}: remove it, and give their distance as {{pitch}}"
+        raise SurfaceFileError(text, pitch=None)
 
 
 def _is_axis(values: FloatArray) -> bool:

@@ -114,7 +114,8 @@ def _find_units(
         raise ParameterError(
             "unit",
             f"is required: {name} does not state the unit of its {what}{header.question}; give it,"
-            " such as unit='um' (--unit um), or name it for each column, such as 'x [um], z [nm]'",
+            " such as {unit}, or name it for each column, such as 'x [um], z [nm]'",
+            unit="um",
         )
     return [unit or given for unit in own], notes
 
@@ -167,7 +168,7 @@ def _read_matrix(
         heights = heights[:, 0]
         pitch = tuple(set(pitch))
     known = pitch if len(pitch) == heights.ndim else None
-    question = "" if unit else f", or their unit, such as unit='um' (--unit um){header.question}"
+    question = "" if unit else f", or their unit, such as {{unit}}{header.question}"
     return reader.RawSurface(
         heights, known, name, notes, not question, bool(question), unit_question=question
     )

@@ -97,7 +97,7 @@ def _device_sections(device: Device) -> list[Section]:
     title = device.name if device.name == device.id else f"{device.name} ({device.id})"
     text = [f"Axes: {device.axes}"] if device.axes else []
     if device.driver:
-        text.append(f"Driver: {device.driver} (asperity run ... --driver real)")
+        text.append(f"Driver: {device.driver}, which 'real' names")
     parts = [text] if text else []
     parts += [[note] for note in device.notes]
     if missing := missing_fields(device):

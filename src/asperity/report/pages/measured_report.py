@@ -73,7 +73,7 @@ def stages_table(stages: Sequence[PreparationStage]) -> Table:
     layout = TableLayout(
         drop_order=sorted(range(1, len(keys)), key=lambda i: priority.index(keys[i])),
         legend={**legend, len(keys): _REMOVED_MEANING},
-        dropped_note="More in a wider terminal, and with --json.",
+        dropped_note="More in a wider terminal, and in the JSON.",
     )
     return _columns_table(columns, layout)
 
@@ -136,7 +136,7 @@ def measured_sections(texture: Texture) -> list[Section]:
     if not texture.history:
         return []
     table = stages_table(texture.history)
-    more = "More: asperity show."
+    more = "More is in the report of show."
     if text := roughness_text(texture.history):
         return [Section("Surface parameters", [table], text, [more])]
     parts = get_or_compute("parts", texture.digest, lambda: _compute_parts(texture))

@@ -57,13 +57,20 @@ from asperity.report.sentences.paper_text import (
 )
 from asperity.report.sentences.texts import sentence, sentence_case, table_data, table_notes
 
-_MORE_NOTE = "The evidence of one claim: asperity reproduce --claim ID"
 
+def claims_page(
+    results: Sequence[Result], experiments: Experiments | None, command: str = ""
+) -> Page:
+    """Return the report: counts, claims by section with their evidence, figures, experiments.
 
-def claims_page(results: Sequence[Result], experiments: Experiments | None) -> Page:
-    """Return the report: counts, claims by section with their evidence, figures, experiments."""
+    Args:
+        results: of the claims.
+        experiments: the repeated experiments, if any.
+        command: what shows the evidence of one claim, with ``{}`` for its name.
+    """
     sections = _terminal_sections(results, experiments)
-    sections += [_claims_section(name, members) for name, members in _group_by_section(results)]
+    for name, members in _group_by_section(results):
+        sections.append(_claims_section(name, members, command))
     sections += paper_sections()
     guesses: list[str] = []
     if experiments is not None:
@@ -95,16 +102,12 @@ def _terminal_sections(results: Sequence[Result], experiments: Experiments | Non
     table = Table(("claim", "verdict", "states"), rows, layout=layout)
     lines = experiments.summary_lines if experiments is not None else ()
     summary = [page.Paragraph(f"{name}: {text}") for name, text in lines]
-    return [
-        page.terminal_section(table),
-        *([page.terminal_section(*summary)] if summary else ()),
-        page.terminal_section(notes=[_MORE_NOTE]),
-    ]
+    return [page.terminal_section(table), *([page.terminal_section(*summary)] if summary else ())]
 
 
-def evidence_page(results: Sequence[Result]) -> Page:
+def evidence_page(results: Sequence[Result], command: str = "") -> Page:
     """Return the report of chosen claims; a terminal shows everything that a verdict rests on."""
-    whole = claims_page(results, None)
+    whole = claims_page(results, None, command)
     evidence = map(_evidence_section, results)
     sections = [section for section in whole.sections if Media.HTML in section.media]
     return replace(whole, answer="", sections=[*evidence, *sections])
@@ -129,9 +132,9 @@ def _group_by_section(results: Sequence[Result]) -> list[tuple[str, list[Result]
     return [(section, [*members]) for section, members in grouped]
 
 
-def _claims_section(section: str, members: Sequence[Result]) -> Section:
+def _claims_section(section: str, members: Sequence[Result], command: str) -> Section:
     headings = ("claim", "equations", "states", "verdict")
-    table = Table(headings, [_claim_row(result) for result in members])
+    table = Table(headings, [_claim_row(result, command) for result in members])
     return Section(section if section == "Abstract" else f"Section {section}", [table])
 
 
@@ -147,11 +150,12 @@ def _evidence_details(result: Result) -> list[tuple[str, str]]:
     return [(name, text) for name, text in details if text]
 
 
-def _claim_row(result: Result) -> Row:
+def _claim_row(result: Result, command: str) -> Row:
     evidence = result.evidence
     details = _evidence_details(result)
     details += [(name, evidence_text(value)) for name, value in evidence.numbers.items()]
-    details.append(("reproduce", f"asperity reproduce --claim {result.id}"))
+    if command:
+        details.append(("reproduce", command.format(result.id)))
     cells: Cells = [
         Cell(result.id, "l"),
         ", ".join(result.equations),

@@ -137,11 +137,19 @@ def _arguments_section(entry: SurfaceEntry) -> Section:
     return page.terminal_section(table, *source)
 
 
-def surfaces_page(entries: Sequence[SurfaceEntry], *, detailed: bool = False) -> Page:
-    """Return a card with a picture of every surface; in detail, a terminal lists arguments."""
+def surfaces_page(
+    entries: Sequence[SurfaceEntry], *, detailed: bool = False, command: str = ""
+) -> Page:
+    """Return a card with a picture of every surface; in detail, a terminal lists arguments.
+
+    Args:
+        entries: the surfaces.
+        detailed: whether a terminal lists the arguments.
+        command: what is written before the surface in an example of its use.
+    """
     groups = {
-        "Named surfaces": [_card(one) for one in entries if one.is_named],
-        "Kinds of textures": [_card(one) for one in entries if not one.is_named],
+        "Named surfaces": [_card(one, command) for one in entries if one.is_named],
+        "Kinds of textures": [_card(one, command) for one in entries if not one.is_named],
     }
     sections = [Section(title, [page.Cards(cards)]) for title, cards in groups.items() if cards]
     return Page(
@@ -161,7 +169,7 @@ def _draw_card(texture: Texture) -> Figure:
     return gallery_figure(texture)
 
 
-def _card(entry: SurfaceEntry) -> Section:
+def _card(entry: SurfaceEntry, command: str) -> Section:
     kind = entry.kind
     rows = [
         Row([Cell(unit_name(one), "mono"), one.default_text, argument_text(one)])
@@ -170,7 +178,7 @@ def _card(entry: SurfaceEntry) -> Section:
     blocks: list[page.Block] = [
         page.Picture(partial(_draw_card, entry.texture), f"{kind.name}: {kind.summary}.", dpi=110),
         page.Paragraph(f"{entry.size_text}, {entry.height_text} from peak to valley", "note"),
-        page.Paragraph(f"asperity compare {shlex.quote(entry.specification)}", "mono"),
+        page.Paragraph(f"{command} {shlex.quote(entry.specification)}".strip(), "mono"),
         Table(("argument", "default", "meaning"), rows),
     ]
     notes = [f"Sizes: {kind.source}."] if kind.source else []

@@ -125,7 +125,8 @@ def strokes_page(result: StrokeSweep) -> Page:
     laws = ", ".join(dict.fromkeys(stroke.law for stroke in strokes))
     stops = sorted({stroke.stop_message for stroke in strokes if stroke.stop_message})
     (note,) = table_notes("strokes")
-    notes = [f"{note} The y axis: --html, --json.", *(f"Stopped: it {one}" for one in stops)]
+    notes = [f"{note} The y axis is in the report and in the JSON."]
+    notes += [f"Stopped: it {stop}" for stop in stops]
     rows = [Row(stroke_cells(one), law=one.law) for one in strokes]
     table = _sweep_table(STROKE_HEADINGS, rows, omit=(STROKE_HEADINGS.index("y"),))
     return Page(

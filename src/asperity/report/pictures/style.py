@@ -298,8 +298,10 @@ def _theme_style(styles: str) -> str:
 
     def variable(found: re.Match[str]) -> str:
         what, colour = found.groups()
-        name = THEME_VARIABLES.get(colour)
-        return f"{what}: var(--p-{name}, {colour})" if name else found[0]
+        if colour not in THEME_VARIABLES:
+            return found[0]
+        name = f"p-{THEME_VARIABLES[colour]}"
+        return f"{what}: var(--{name}, {colour})"
 
     return re.sub(r"(fill|stroke): (#[0-9a-f]{6})", variable, styles)
 

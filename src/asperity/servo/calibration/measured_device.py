@@ -36,7 +36,7 @@ def measured_device(
         date: date of the measurement.
         simulated: whether the device was simulated.
     """
-    source = f"measured by asperity calibrate, {date}"
+    source = f"measured by the calibration of asperity, {date}"
     source += f", on a simulated {base.id}" if simulated else ""
     origin: Origin = "simulated" if simulated else "measured"
     data = {field: datum for field, datum in base.data.items() if field not in _MEASURED_FIELDS}

@@ -91,7 +91,8 @@ class Terminal(ExitStack):
             return None
         pressed = os.read(sys.stdin.fileno(), 1)
         if not pressed:
-            raise ParameterError("terminal", "is closed: --resume goes on where it stopped")
+            text = "is closed: {resume} goes on where it stopped"
+            raise ParameterError("terminal", text, resume=True)
         if pressed == b"\x1b" and select.select([sys.stdin], [], [], 0.02)[0]:
             pressed += os.read(sys.stdin.fileno(), 2)  # the rest of an arrow key
         return _SEQUENCES.get(pressed, pressed.decode("ascii", "replace").lower())

@@ -220,7 +220,7 @@ def _read_header(data: NDArray[np.uint8]) -> Any:
         raise SurfaceFileError("has another byte order, or is damaged")
     if header["version"] != VERSION:
         words = f"is a .field file of version {header['version']}, of which {VERSION} is read"
-        raise SurfaceFileError(f"{words}; repeat: asperity bake SURFACE -o FILE")
+        raise SurfaceFileError(f"{words}; bake it again")
     if header["header_checksum"] != zlib.crc32(data[: HEADER.itemsize - 4].data):
         raise SurfaceFileError("has a damaged header")
     if header["file_bytes"] != len(data):
