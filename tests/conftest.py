@@ -60,6 +60,17 @@ def pytest_configure(config: pytest.Config) -> None:
         os.environ["ASPERITY_CACHE_DIR"] = str(cache.mkdir("asperity"))
 
 
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int:
+    """Return one worker more than cores: tests of loops and pages wait most of their time."""
+    return (os.cpu_count() or 1) + 1
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Run the pages of the lab first, which one worker does while the others compute."""
+    items.sort(key=lambda item: not item.nodeid.startswith("tests/lab/"))
+
+
 def pytest_collection_finish() -> None:
     """Collect garbage less often: compilers create many objects, of which few are garbage."""
     gc.freeze()

@@ -16,9 +16,8 @@ from asperity.laws import REGISTERED_LAWS
 OWN_LAW = str(Path(__file__).parents[2] / "examples" / "own_law.py")
 
 
-@pytest.fixture(scope="module")
-def lab() -> Iterator[Started]:
-    """A lab that runs in a process of its own, as a user starts it; each module has a new one.
+def start_lab() -> Iterator[Started]:
+    """Yield a lab that runs in a process of its own, as a user starts it, and end it.
 
     The device has 1000 samples a second: with the 4000 of the default, two labs and two browsers
     are too much for two cores, and samples are late.
@@ -26,6 +25,12 @@ def lab() -> Iterator[Started]:
     started = Started("--device", "touch-x", "--law", "C", "--stiffness", "250N/m")
     yield started
     assert started.end() == (0, "")
+
+
+@pytest.fixture(scope="module")
+def lab() -> Iterator[Started]:
+    """A lab for each module, of which tests may end the processes."""
+    yield from start_lab()
 
 
 @pytest.fixture(scope="package")

@@ -16,14 +16,25 @@ _RUN = (
 )
 
 
+LOOKS = ((1280, False), (1280, True), (400, False), (400, True))  # width, and whether it is dark
+
+
 def violations(page: Browser) -> list[str]:
     """Return what axe-core finds wrong, after a check that it has found anything at all."""
     assert AXE is not None
     page.ask("new Promise(done => setTimeout(done, 300))")
-    page.ask(f"{AXE.read_text(encoding='utf-8')}; 1")
+    if not page.ask("Boolean(globalThis.axe)"):
+        page.ask(f"{AXE.read_text(encoding='utf-8')}; 1")
     passes, found = page.ask(_RUN)
     assert passes > 20
     return list(found)
+
+
+def check_looks(page: Browser) -> None:
+    """Check the page as it is in each width, by day and by night."""
+    for width, dark in LOOKS:
+        page.resize(width, 800, dark=dark)
+        assert violations(page) == [], (width, dark)
 
 
 @pytest.fixture
@@ -39,11 +50,8 @@ def everything_open(page: Browser) -> Iterator[None]:
 @needs_browser
 @needs_axe
 @pytest.mark.usefixtures("everything_open")
-@pytest.mark.parametrize("dark", [False, True])
-@pytest.mark.parametrize("width", [1280, 400])
-def test_axe_finds_nothing(page: Browser, dark: bool, width: int) -> None:
-    page.resize(width, 800, dark=dark)
-    assert violations(page) == []
+def test_axe_finds_nothing(page: Browser) -> None:
+    check_looks(page)
     # A field that feeds the hand, above the limit of a light device, with a hint; then the loops.
     former = page.ask("lab.status.settings.device")
     use_device(page, "touch-x")
@@ -55,18 +63,18 @@ def test_axe_finds_nothing(page: Browser, dark: bool, width: int) -> None:
     )
     page.until("document.getElementById('motion-note').textContent")
     page.until("document.querySelector('.above-limit') !== null")
-    assert violations(page) == []
+    check_looks(page)
     page.ask("document.querySelector('#motion [value=loop]').click()")
     page.until("lab.energyMeter.suppliesEnergy")
-    assert violations(page) == []
+    check_looks(page)
     page.ask("document.querySelector('#motion [value=pointer]').click()")
     # The tour, before and after its first step.
     page.press("t")
     page.until("lab.tour.isActive && lab.status.state === 'running'")
-    assert violations(page) == []
+    check_looks(page)
     page.press("v")
     page.until("document.querySelector('#tour.completed') !== null")
-    assert violations(page) == []
+    check_looks(page)
     page.press("t")
     page.until("lab.status.state === 'running' && !lab.tour.isActive")
     use_device(page, former)

@@ -6,7 +6,7 @@ from tests.lab.browser import Browser, needs_browser
 from tests.lab.page.monkey import Monkey
 from tests.lab.started import Started
 
-ACTIONS = 150
+ACTIONS = 60
 
 
 @needs_browser
