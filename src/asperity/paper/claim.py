@@ -184,7 +184,7 @@ class _SummaryFormatter(string.Formatter):
             parts = (f"{name} {self.format_field(one, format_spec)}" for name, one in value.items())
             return ", ".join(parts)
         if isinstance(value, list):
-            return " to ".join(self.format_field(end(value), format_spec) for end in (min, max))
+            return " to ".join([self.format_field(end(value), format_spec) for end in (min, max)])
         number_format, space, unit = format_spec.partition(" ")
         number_format, star, factor = number_format.partition("*")
         return format(value * float(factor) if star else value, number_format) + space + unit
@@ -242,11 +242,13 @@ def _format_errors(compared: Mapping[str, ArrayLike | None], target: FloatArray)
         known = {
             name: value for name, value in (shown | {"true": target}).items() if value is not None
         }
-        return ", ".join(f"{name} {float(np.asarray(value)):.6g}" for name, value in known.items())
+        return ", ".join(
+            [f"{name} {float(np.asarray(value)):.6g}" for name, value in known.items()]
+        )
     errors = {name: _format_error(relative_error(one, target)) for name, one in compared.items()}
     if len(errors) == 1:
         return errors["as printed"]
-    return ", ".join(f"{name} {error}" for name, error in errors.items())
+    return ", ".join([f"{name} {error}" for name, error in errors.items()])
 
 
 def _error_numbers(
@@ -303,9 +305,9 @@ def combine_checks(*checks: Check) -> Check:
     """Combine checks: a claim is as good as the weakest of its parts."""
     worst = max(checks, key=lambda check: _SEVERITY.index(check.verdict))
     numbers = {name: value for check in checks for name, value in check.numbers.items()}
-    summary = "; ".join(check.summary for check in checks if check.summary)
+    summary = "; ".join([check.summary for check in checks if check.summary])
     correction, fitted = (
-        "; ".join(dict.fromkeys(text for text in texts if text))
+        "; ".join(dict.fromkeys([text for text in texts if text]))
         for texts in zip(*((check.correction, check.fitted) for check in checks), strict=True)
     )
     return Check(summary, numbers, correction, fitted, worst.verdict)

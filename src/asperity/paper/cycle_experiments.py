@@ -199,8 +199,8 @@ def count_cycles(
     stiffness = setup.surface.stiffness
     shifts = start_offsets(setup.surface, starts)
     runs = run_starts(loop, stiffness, servo, shifts, duration)
-    cycling = sum(bool(run.verdict) for run in runs)
-    slow = sum(run.samples * servo.period > duration and not run.verdict for run in runs)
+    cycling = sum([bool(run.verdict) for run in runs])
+    slow = sum([run.samples * servo.period > duration and not run.verdict for run in runs])
     samples = range(0, round(duration / servo.period), TRACE_STRIDE)
     first = loop.new_trajectory(stiffness, delay, shifts[0], _observe_at(samples[1:]))
     path = [first.state[[0, 2]].copy()]

@@ -253,9 +253,11 @@ class Experiments:
         textured = [
             one for one in self.passivity.onsets if one.wall_rule and not one.onset.is_smooth_wall
         ]
-        missed = sum(one.violates_wall_rule for one in textured)
+        missed = sum([one.violates_wall_rule for one in textured])
         # A wall that cycles at the least stiffness tried may also cycle below it.
-        open_cases = sum(one.onset.quiet == 0.0 and not one.violates_wall_rule for one in textured)
+        open_cases = sum(
+            [one.onset.quiet == 0.0 and not one.violates_wall_rule for one in textured]
+        )
         unknown = f", unknown in {open_cases}" if open_cases else ""
         return f"below K0/q of the wall's own onset in {missed} of {len(textured)} cases{unknown}"
 
@@ -264,7 +266,7 @@ class Experiments:
         missed = [
             f"{one.onset.law} at d = {one.onset.delay}" for one in found if one.violates_delay_rule
         ]
-        cases = sum(one.conservative for one in found)
+        cases = sum([one.conservative for one in found])
         if not missed:
             return f"no limit cycle below the delay rule in {cases} cases of conservative laws"
         return (
@@ -287,8 +289,8 @@ class Experiments:
 
     def _summarize_devices(self) -> str:
         found = self.devices.onsets
-        missed = sum(one.catalogue_rule_missed for one in found)
-        rules = sum(one.prediction.violates_delay_rule for one in found)
+        missed = sum([one.catalogue_rule_missed for one in found])
+        rules = sum([one.prediction.violates_delay_rule for one in found])
         return (
             f"{missed} of {len(found)} cases cycle at a stiffness that the catalogue's K0/q "
             f"allows, {rules} below the delay rule"

@@ -136,7 +136,7 @@ FORMULAS = read_toml("formulas", Path(__file__).with_name("formulas.toml"))
 
 def format_by_name(values: Mapping[str, float], spec: str = ".2f", unit: str = "") -> str:
     """Return "A 1.00 unit, B 2.00 unit"."""
-    return ", ".join(f"{name} {value:{spec}}{unit}" for name, value in values.items())
+    return ", ".join([f"{name} {value:{spec}}{unit}" for name, value in values.items()])
 
 
 def check_zero_outside(law: str) -> Check:
@@ -161,7 +161,7 @@ def check_curl(law: str, *, is_conservative: bool) -> Check:
     return check_statement(
         f"{law} is {kind}: {verdict.reason}",
         printed=verdict.conservative is is_conservative,
-        numbers={f"curl of {law}": ", ".join(str(entry) for entry in verdict.curl)},
+        numbers={f"curl of {law}": ", ".join([str(entry) for entry in verdict.curl])},
     )
 
 
@@ -176,9 +176,11 @@ def check_continuity(law: str, *, is_continuous: bool) -> Check:
 def max_loop_share(law: str) -> float:
     """Return the greatest energy around the path of Fig. 3 over κ₀A², without its sign."""
     return max(
-        abs(loop_work(case.surface(law), case.groove_path(), 1e-10))
-        / (case.stiffness * case.amplitude**2)
-        for case in [SCANNING, *random_settings()]
+        [
+            abs(loop_work(case.surface(law), case.groove_path(), 1e-10))
+            / (case.stiffness * case.amplitude**2)
+            for case in [SCANNING, *random_settings()]
+        ]
     )
 
 

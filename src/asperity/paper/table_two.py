@@ -135,7 +135,9 @@ class TableTwo(Serializable, Displayable):
         return [head, *(_cells(row) for row in self.rows)]
 
     def __repr__(self) -> str:
-        return f"<TableTwo: {sum(row.agrees for row in self.rows)} of {len(self.rows)} rows stand>"
+        return (
+            f"<TableTwo: {sum([row.agrees for row in self.rows])} of {len(self.rows)} rows stand>"
+        )
 
 
 def table_two() -> TableTwo:

@@ -61,7 +61,7 @@ def _catalogued_claim(claim_id: str, row: Mapping[str, Any]) -> Claim:
 
 _ROWS = [*FORMULAS.items(), *CATALOGUE.items()]
 CLAIMS: dict[str, Claim] = {
-    one.id: one for one in sorted((_catalogued_claim(*pair) for pair in _ROWS), key=_paper_order)
+    one.id: one for one in sorted([_catalogued_claim(*pair) for pair in _ROWS], key=_paper_order)
 }
 
 

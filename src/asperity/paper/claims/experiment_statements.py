@@ -41,7 +41,7 @@ def samples_per_period() -> claim.Check:
             frequency=_SPEED / length,
         ),
         claim.check_statement(
-            "periods of sections V.A to V.C: " + ", ".join(f"{p * 1e3:g} mm" for p in periods),
+            "periods of sections V.A to V.C: " + ", ".join([f"{p * 1e3:g} mm" for p in periods]),
             printed=math.isclose(max(periods), length),
             corrected=math.isclose(min(periods), length),
             periods=periods,
@@ -134,8 +134,10 @@ def held_force_work(path: FloatArray, force: FloatArray) -> float:
     """Return the work of forces held from each point of a path to the next [J]."""
     fine = np.linspace(0.0, 1.0, 8)[:, None]
     return sum(
-        float(np.sum(np.diff(start + fine * step, axis=0) @ held))
-        for start, step, held in zip(path[:-1], np.diff(path, axis=0), force, strict=True)
+        [
+            float(np.sum(np.diff(start + fine * step, axis=0) @ held))
+            for start, step, held in zip(path[:-1], np.diff(path, axis=0), force, strict=True)
+        ]
     )
 
 
@@ -255,7 +257,7 @@ def stiffness_is_raised() -> claim.Check:
     """Texturing generally raises the effective stiffness."""
     settings = [*cases.SETTINGS.values(), *cases.random_settings(5)]
     numbers = {law: [case.q(law) for case in settings] for law in cases.PAPER_LAWS}
-    least = min(min(values) for values in numbers.values())
+    least = min([min(values) for values in numbers.values()])
     raised = [law for law, values in numbers.items() if max(values) > 1.0 + 1e-9]
     return claim.check_statement(
         printed=least >= 1.0 - 1e-6 and len(raised) >= 4,
@@ -273,7 +275,7 @@ def number_is_proportional() -> claim.Check:
     proportional = [
         law for law, (a, length) in exponents.items() if max(abs(a - 1.0), abs(length + 1.0)) < 0.3
     ]
-    summary = ", ".join(f"{law} {a:+.2f} {length:+.2f}" for law, (a, length) in exponents.items())
+    summary = ", ".join([f"{law} {a:+.2f} {length:+.2f}" for law, (a, length) in exponents.items()])
     return claim.check_statement(
         f"exponents of A and l in V.A's setting: {summary}; D has no finite number",
         printed=len(proportional) > len(cases.PAPER_LAWS) / 2,
@@ -297,7 +299,7 @@ def always_passive() -> claim.Check:
     greatest = {law: max(values) for law, values in speeds.items()}
     return claim.check_statement(
         "A gains energy below "
-        + ", ".join(f"{speed * 1e3:.3g} mm/s" for speed in speeds["A"])
+        + ", ".join([f"{speed * 1e3:.3g} mm/s" for speed in speeds["A"]])
         + f" with κ₀ = 1000, 10, 1000 N/m and 1, 1, 100 N·s/m, C below {greatest['C']:.1g} m/s, "
         "whatever the sampling",
         printed=max(greatest.values()) <= 1e-12,

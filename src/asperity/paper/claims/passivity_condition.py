@@ -115,7 +115,7 @@ def _delayed_wall_gain(delay: int = 2) -> float:
 def corollary() -> Check:
     """‖J‖ <= σ₀(B)/(2T) everywhere is sufficient for passivity (Corollary 1)."""
     net, damping, _path, _surface = _slow_loop_gain("A")
-    gain = max(_max_random_gain(delay, 31 + delay) for delay in (0, 1))
+    gain = max([_max_random_gain(delay, 31 + delay) for delay in (0, 1)])
     late = _delayed_wall_gain()
     return check_statement(
         f"A at equality in (1), σ₀ = {damping:.3f} N·s/m",
@@ -208,7 +208,7 @@ def doubling_halves_stiffness() -> Check:
         q = [ExperimentCase(1000.0, period, 0.4e-3).q(law) for period in (1e-3, 5e-4, 2e-5, 1e-5)]
         ratios[law] = [q[1] / q[0], q[3] / q[2]]
     finite = {law: ratio for law, ratio in ratios.items() if math.isfinite(ratio[0])}
-    halving = "".join(law for law, ratio in ratios.items() if abs(ratio[1] - 2.0) < 0.02)
+    halving = "".join([law for law, ratio in ratios.items() if abs(ratio[1] - 2.0) < 0.02])
     summary = format_by_name({law: ratio[0] for law, ratio in finite.items()})
     return check_statement(
         f"l from 1 to 0.5 mm multiplies q by: {summary} (D is infinite both times); "
@@ -282,7 +282,7 @@ def condition_with_conservative_law() -> Check:
 
     Computed by the work of the held force, and by the paper's own sum of section V.B.
     """
-    gain = max(_max_random_gain(delay, 51 + delay) for delay in (0, 1))
+    gain = max([_max_random_gain(delay, 51 + delay) for delay in (0, 1)])
     late = _delayed_wall_gain()
     wall = _delayed_wall_gain(delay=-1)
     return check_statement(

@@ -66,8 +66,10 @@ def textured_walls_cycle() -> claim.Check:
 
     starts = counts["W", 0].starts
     summary = "; ".join(
-        f"lag {d}: {', '.join(f'{law} {counts[law, d].cycles}' for law in 'WAF')}"
-        for d in TRIED_DELAYS
+        [
+            f"lag {d}: {', '.join([f'{law} {counts[law, d].cycles}' for law in 'WAF'])}"
+            for d in TRIED_DELAYS
+        ]
     )
     numbers: dict[str, claim.Number] = {}
     for (law, d), one in counts.items():
@@ -92,9 +94,9 @@ def divided_walls_settle() -> claim.Check:
         for d in TRIED_DELAYS
         if count_cycles(law, 1.0, d).cycles
     ]
-    cycling = sum(one.cycles for one in counts)
-    starts = sum(one.starts for one in counts)
-    lags = ", ".join(f"{one.wall} at {one.delay}" for one in counts)
+    cycling = sum([one.cycles for one in counts])
+    starts = sum([one.starts for one in counts])
+    lags = ", ".join([f"{one.wall} at {one.delay}" for one in counts])
     summary = f"where the undivided cycle (lags: {lags}), {cycling} of {starts} starts cycle"
     numbers = {f"{one.wall}, lag {one.delay}": float(one.cycles) for one in counts}
     settles = [one.cycles == 0 for one in counts]
@@ -115,8 +117,10 @@ def _stroke_numbers(strokes: tuple[Stroke, ...]) -> dict[str, float]:
 
 def _format_ranges(energies: list[tuple[float, float]]) -> str:
     return ", ".join(
-        f"{min(along):+.3g} to {max(along):+.3g} mJ along {axis}"
-        for axis, along in zip("xz", zip(*energies, strict=True), strict=True)
+        [
+            f"{min(along):+.3g} to {max(along):+.3g} mJ along {axis}"
+            for axis, along in zip("xz", zip(*energies, strict=True), strict=True)
+        ]
     )
 
 
@@ -139,12 +143,12 @@ def _check_strokes(
 
 
 def _format_gain_count(strokes: Sequence[Stroke]) -> str:
-    count = sum(one.gains_energy for one in strokes)
+    count = sum([one.gains_energy for one in strokes])
     return f"; its field supplies energy in {count} of {len(strokes)}"
 
 
 def _format_greatest_supply(strokes: Sequence[Stroke]) -> str:
-    field = max(abs(1e3 * one.field) for one in strokes)
+    field = max([abs(1e3 * one.field) for one in strokes])
     return f"; its field supplies at most {field:.2g} mJ, the rest is sampling"
 
 
@@ -154,8 +158,8 @@ def decrease_indicates_supply() -> claim.Check:
     Checked with strokes in which the balance of the whole loop shows a supply.
     """
     strokes = [one for law in "AE" for one in _simulated_strokes(law) if one.total > 0.0]
-    rising = sum(sum(one.same_sample) > 0.0 for one in strokes)
-    closure = max(one.closure for one in strokes)
+    rising = sum([sum(one.same_sample) > 0.0 for one in strokes])
+    closure = max([one.closure for one in strokes])
     return claim.check_statement(
         f"of {len(strokes)} strokes in which A and E supply energy to the hand, by a balance of "
         f"all energies that closes within {closure:.0e}",
@@ -200,9 +204,11 @@ def law_a_loses_contact() -> claim.Check:
     """On a 20 mm bump A gains in jumps and loses contact (Fig. 7)."""
     bumps = _simulated_bumps("A")
     summary = "; ".join(
-        f"{one.entry}: {1e3 * one.total:+.3g} mJ, up to {1e3 * one.jump:.3g} mJ in 20 ms, "
-        f"contact lost {one.lost} times"
-        for one in bumps
+        [
+            f"{one.entry}: {1e3 * one.total:+.3g} mJ, up to {1e3 * one.jump:.3g} mJ in 20 ms, "
+            f"contact lost {one.lost} times"
+            for one in bumps
+        ]
     )
     # The energy of a jump must not be taken back, as it is by a field with a potential.
     confirmed = [0.25 * one.total < one.jump < one.total and one.lost > 1 for one in bumps]
@@ -214,9 +220,11 @@ def law_d_is_balanced() -> claim.Check:
     bumps = _simulated_bumps("D")
     gains = [one.total for one in _simulated_bumps("A")]
     summary = "; ".join(
-        f"{one.entry}: {1e3 * one.total:+.3g} mJ against {1e3 * gain:+.3g} of A, up to "
-        f"{1e3 * one.top:.0f} mm high"
-        for one, gain in zip(bumps, gains, strict=True)
+        [
+            f"{one.entry}: {1e3 * one.total:+.3g} mJ against {1e3 * gain:+.3g} of A, up to "
+            f"{1e3 * one.top:.0f} mm high"
+            for one, gain in zip(bumps, gains, strict=True)
+        ]
     )
     balanced = [
         abs(one.total) <= MARGINAL_SHARE * gain for one, gain in zip(bumps, gains, strict=True)
@@ -247,8 +255,10 @@ def divided_walls_are_passive() -> claim.Check:
     textured = {law: one for law, one in onsets.items() if law in PAPER_LAWS}
     violating = {law: one for law, one in textured.items() if one.violates_wall_rule}
     summary = ", ".join(
-        f"{law} from {one.onset.cycling:.0f} N/m on, where κ₀/q is {one.wall_rule:.0f}"
-        for law, one in violating.items()
+        [
+            f"{law} from {one.onset.cycling:.0f} N/m on, where κ₀/q is {one.wall_rule:.0f}"
+            for law, one in violating.items()
+        ]
     )
     numbers: dict[str, claim.Number] = {"W: quiet to [N/m]": wall}
     for law, one in textured.items():

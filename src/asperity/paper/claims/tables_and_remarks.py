@@ -43,7 +43,7 @@ def figure_three_energies() -> claim.Check:
     scale = SCANNING.stiffness * SCANNING.amplitude**2
     energies = {panel.law: panel.energy for panel in loop_energies()}
     gains = {law: energy * 1e6 for law, energy in energies.items() if law not in "CD"}
-    rest = max(abs(energies[law]) for law in "CD") / scale
+    rest = max([abs(energies[law]) for law in "CD"]) / scale
     return claim.check_statement(
         f"around their paths {format_by_name(gains, '.1f', ' µJ')}; C and D around that of A "
         f"{rest:.1e} κ₀A²",
@@ -133,7 +133,7 @@ def remark_2() -> claim.Check:
     unchanged = [law for law, pair in numbers.items() if claim.relative_error(*pair) < 1e-9]
     changed = [law for law in numbers if law not in unchanged]
     margin = _least_bound_ratio()
-    growth = ", ".join(f"{law} {numbers[law][0]:.2f} to {numbers[law][1]:.2f}" for law in changed)
+    growth = ", ".join([f"{law} {numbers[law][0]:.2f} to {numbers[law][1]:.2f}" for law in changed])
     return claim.check_statement(
         f"waves 100 times finer at the same M leave q of {', '.join(unchanged)} as it is and "
         f"change {growth}; bounds with K >= |h''| are at least {margin:.3f} times q",
@@ -175,7 +175,7 @@ def remark_3() -> claim.Check:
     )
     held = [SCANNING.surface("C", clamp=clamp, max_depth=0.1e-3) for clamp in _CLAMPS[1:]]
     lateral_loop, whole_loop = (loop_work(one, SCANNING.groove_path()) for one in held)
-    bounded = "".join(law for law, ratio in lateral.items() if ratio <= 1.0 + 1e-6)
+    bounded = "".join([law for law, ratio in lateral.items() if ratio <= 1.0 + 1e-6])
     return claim.combine_checks(
         claim.check_statement(
             printed=min(growth.values()) > 1.5,
@@ -201,9 +201,9 @@ def unbounded_friction() -> claim.Check:
     )
     return claim.check_statement(
         "‖J_F‖/κ₀ at 1, 10, 1000 times the depth: "
-        + ", ".join(f"{v:.3g}" for v in free)
+        + ", ".join([f"{v:.3g}" for v in free])
         + "; with p^z clamped "
-        + ", ".join(f"{v:.3g}" for v in clamped),
+        + ", ".join([f"{v:.3g}" for v in clamped]),
         printed=free[2] > 50.0 * free[1] and clamped[2] <= free[0] * (1.0 + 1e-9),
         free=free,
         clamped=clamped,

@@ -91,10 +91,10 @@ def proportional_a() -> Check:
     """
     slopes = {name: 2.0 * math.pi * case.amplitude / case.period for name, case in SETTINGS.items()}
     ratios = {name: case.q("A") / slopes[name] for name, case in SETTINGS.items()}
-    summary = ", ".join(f"{name} {slopes[name]:.2f} ({ratios[name]:.3f})" for name in SETTINGS)
+    summary = ", ".join([f"{name} {slopes[name]:.2f} ({ratios[name]:.3f})" for name in SETTINGS])
     return check_statement(
         f"2πA/l, and q_A over it: {summary}",
-        printed=max(abs(ratio - 1.0) for ratio in ratios.values()) < 0.1,
+        printed=max([abs(ratio - 1.0) for ratio in ratios.values()]) < 0.1,
         numbers={f"q_A over 2πA/l in {name}": ratio for name, ratio in ratios.items()},
     )
 
@@ -115,8 +115,10 @@ def closed_forms() -> Check:
     errors = {}
     for law, closed_form in _CLOSED_FORMS.items():
         errors[f"greatest relative difference for {law}"] = max(
-            abs(find_max_norm(case.surface(law)) / closed_form(case.texture, case.depth) - 1.0)
-            for case in cases
+            [
+                abs(find_max_norm(case.surface(law)) / closed_form(case.texture, case.depth) - 1.0)
+                for case in cases
+            ]
         )
     is_closed = min(errors.values()) <= 1e-6
     return check_statement(printed=not is_closed, corrected=is_closed, numbers=errors)
@@ -185,7 +187,7 @@ def remark_5() -> Check:
         check_statement(
             f"B times the factor: {without.reason}",
             printed=without.conservative,
-            curl_of_B_times_the_factor=", ".join(str(entry) for entry in without.curl),
+            curl_of_B_times_the_factor=", ".join([str(entry) for entry in without.curl]),
         ),
     )
 
@@ -286,10 +288,10 @@ def _check_jumps(name: str, case: cases.ExperimentCase) -> Check:
     surface = case.surface("D")
     result = continuity(surface, characteristic_number(surface))
     offset = max(
-        (abs((j.before[0] / case.period + 0.25) % 1.0 - 0.5) for j in result.jumps),
+        [abs((j.before[0] / case.period + 0.25) % 1.0 - 0.5) for j in result.jumps],
         default=math.inf,
     )
-    size = max((jump.size for jump in result.jumps), default=0.0)
+    size = max([jump.size for jump in result.jumps], default=0.0)
     return check_statement(
         f"{name}: {len(result.jumps)} jumps located, up to {size:.2f} N, all within {offset:.1e} l "
         f"of a maximum, from {case.crest_radius * 1e3:.3f} mm down",

@@ -88,11 +88,11 @@ def _dropped_columns(table: pages.Table, width: int) -> set[int]:
     cells = [table.headings, *(row.cells for row in table.rows)]
     texts = [[cell if isinstance(cell, str) else cell.text for cell in row] for row in cells]
     widths = [
-        max(len(line) for text in column for line in text.split("\n")) + gap
+        max([len(line) for text in column for line in text.split("\n")]) + gap
         for column in zip(*texts, strict=True)
     ]
-    room = width + gap - sum(widths) + sum(widths[i] for i in order)
-    fitting = sum(total <= room for total in accumulate(widths[i] for i in order))
+    room = width + gap - sum(widths) + sum([widths[i] for i in order])
+    fitting = sum([total <= room for total in accumulate(widths[i] for i in order)])
     return set(order[fitting:])
 
 

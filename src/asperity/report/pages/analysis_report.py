@@ -47,7 +47,7 @@ def leak_facts(analysis: Analysis) -> list[tuple[str, str]]:
     density = analysis.curl_density
     line = analysis.leak.line
     x, y = (float(part) + 0.0 for part in line.direction)
-    start = ", ".join(f"{1e3 * float(part) + 0.0:.6g}" for part in line.start)
+    start = ", ".join([f"{1e3 * float(part) + 0.0:.6g}" for part in line.start])
     plane = f"vertical, along ({x:.6g}, {y:.6g}) through ({start}) mm"
     energy = number_text.range_text(leak.energy, leak.upper_per_period, "J")
     facts = [

@@ -105,7 +105,7 @@ def _waves_table(result: check_limits.Limits, *, short: bool) -> Table:
 
 def limits_page(result: check_limits.Limits) -> page.Page:
     """Return the report: answer, limits, figure, waves and assumptions."""
-    fields = [*dict.fromkeys(limit.device_field for limit in result.limits), "friction"]
+    fields = [*dict.fromkeys([limit.device_field for limit in result.limits]), "friction"]
     notes = [*symbol_lines(result), *table_notes("limits")]
     limits = [six_limits_table(result)]
     surface = result.surface
@@ -144,7 +144,7 @@ def _facts(result: check_limits.Limits) -> list[tuple[str, str]]:
 
 
 def _figure_section(result: check_limits.Limits) -> Section:
-    met = sum(all(wave.holds.values()) for wave in result.waves)
+    met = sum([all(wave.holds.values()) for wave in result.waves])
     figure = page.plot_later(result)
     media = Media.HTML | Media.NOTEBOOK
     count = len(result.waves)
@@ -168,7 +168,7 @@ SUFFIXES = (".csv", *page.FIGURE_SUFFIXES)
 
 def envelope_page(result: Envelope) -> page.Page:
     """Return the report: answer, diagram, ranges by law, points and assumptions."""
-    names = ", ".join(one.device.name for one in result.devices)
+    names = ", ".join([one.device.name for one in result.devices])
     stiffness = format_quantity(result.conditions.min_stiffness, "N/m")
     speed = speed_text(result.conditions.speed)
     title, caption, alt = figure_text(

@@ -54,7 +54,7 @@ _REMOVED_MEANING = ("removed", "deviation that the step removed: RMS about the m
 
 def stages_table(stages: Sequence[PreparationStage]) -> Table:
     """Return the parameters after each step, and what it removed; one unit per column."""
-    kinds = "/".join(dict.fromkeys(next(iter(stage.values))[0] for stage in stages))
+    kinds = "/".join(dict.fromkeys([next(iter(stage.values))[0] for stage in stages]))
     columns = [("after", [Cell(stage.name, "l") for stage in stages])]
     keys = [""]
     legend = {}
@@ -101,7 +101,7 @@ def _number_column(
 
 
 def _choose_unit(values: Iterable[float | None]) -> tuple[str, float]:
-    greatest = max((abs(value) for value in values if value is not None), default=0.0)
+    greatest = max([abs(value) for value in values if value is not None], default=0.0)
     if greatest == 0.0:
         return "", 1.0
     fitting = ((name, size) for name, size in _LENGTH_UNITS if greatest >= size)

@@ -168,7 +168,7 @@ def _claim_row(result: Result, command: str) -> Row:
 def paper_sections() -> list[Section]:
     """Return figures 2 and 3 of the paper."""
     panels = loop_energies()
-    gained = "; ".join(f"{panel.law} {loop_energy_text(panel)}" for panel in panels)
+    gained = "; ".join([f"{panel.law} {loop_energy_text(panel)}" for panel in panels])
     loops = partial(paper_pictures.figure_three, panels)
     count = len(panels)
     return [
@@ -195,7 +195,7 @@ def _cycle_section(experiment: PassivityExperiment) -> Section:
     first = experiment.counts[0]
     notes = _fitted_notes(experiment.fitted)
     figure = partial(paper_pictures.cycles_figure, experiment)
-    counts = ", ".join(f"{one.cycles} with {one.wall}" for one in experiment.counts)
+    counts = ", ".join([f"{one.cycles} with {one.wall}" for one in experiment.counts])
     values: dict[str, Any] = {"lag": first.delay, "starts": first.starts, "counts": counts}
     return page.figure_section("paper.cycles", figure, notes, **values)
 
@@ -224,8 +224,10 @@ def _stroke_section(experiment: ScanningExperiment) -> Section:
 def _bump_section(experiment: BumpExperiment) -> Section:
     figure = partial(paper_pictures.bumps_figure, experiment)
     gains = "; ".join(
-        f"{one.law} {energy_text(float(one.supplied[-1]))} ({one.entry})"
-        for one in experiment.bumps
+        [
+            f"{one.law} {energy_text(float(one.supplied[-1]))} ({one.entry})"
+            for one in experiment.bumps
+        ]
     )
     notes = _fitted_notes(experiment.guessed)
     return page.figure_section("paper.bumps", figure, notes, gains=gains)
@@ -238,7 +240,7 @@ def _device_section(experiments: Experiments) -> Section:
         notes.append(f"Few misses on the left are weak evidence: {devices.wall_summary}.")
     notes.append(f"Not simulated for lack of an apparent mass: {', '.join(devices.skipped)}.")
     count = len(devices.onsets)
-    missed = sum(one.catalogue_rule_missed for one in devices.onsets)
+    missed = sum([one.catalogue_rule_missed for one in devices.onsets])
     figure = partial(paper_pictures.devices_figure, experiments)
     return page.figure_section("paper.devices", figure, notes, missed=missed, count=count)
 
@@ -340,7 +342,7 @@ def find_figures(
         return tuple(one for one in PAPER_FIGURES if include_simulated or not one.needs_simulation)
     found = tuple(one for one in PAPER_FIGURES if one.shows_any(names))
     if not found:
-        available = ", ".join(name for one in PAPER_FIGURES for name in one.claim_names)
+        available = ", ".join([name for one in PAPER_FIGURES for name in one.claim_names])
         reason = f"are not available for {', '.join(names)}, but for {available}"
         raise ParameterError("figures", reason)
     return found

@@ -54,7 +54,7 @@ class SurfaceEntry:
     @property
     def size_text(self) -> str:
         """The period as text."""
-        return " x ".join(format_quantity(length, "m") for length in self.size)
+        return " x ".join([format_quantity(length, "m") for length in self.size])
 
     @property
     def height_text(self) -> str:
@@ -96,10 +96,10 @@ def _format_argument(kind: TextureKind, name: str, value: Any) -> str:
     """Return a value as an argument of the command line, micrometres in ASCII."""
     argument = next(argument for argument in kind.arguments if argument.name == name)
     if argument.form == "vectors":
-        rows = (" ".join(f"{part:g}" for part in row) for row in value)
-        return "; ".join(f"{row} {argument.unit}" for row in rows)
+        rows = (" ".join([f"{part:g}" for part in row]) for row in value)
+        return "; ".join([f"{row} {argument.unit}" for row in rows])
     if isinstance(value, list):
-        return "; ".join(_format_quantity(argument, part) for part in value)
+        return "; ".join([_format_quantity(argument, part) for part in value])
     return _format_quantity(argument, value)
 
 

@@ -80,7 +80,7 @@ def onset_page(result: OnsetSweep) -> Page:
 
 def onset_figure_section(name: str, predictions: Sequence[Prediction]) -> Section:
     """Return the figure of the onsets with the texts of a name."""
-    laws = ", ".join(dict.fromkeys(one.onset.law for one in predictions))
+    laws = ", ".join(dict.fromkeys([one.onset.law for one in predictions]))
     return page.figure_section(name, partial(_draw_onsets, predictions), laws=laws)
 
 
@@ -122,7 +122,7 @@ def strokes_page(result: StrokeSweep) -> Page:
     """Return the report of the strokes."""
     setup = result.setup
     strokes = result.strokes
-    laws = ", ".join(dict.fromkeys(stroke.law for stroke in strokes))
+    laws = ", ".join(dict.fromkeys([stroke.law for stroke in strokes]))
     stops = sorted({stroke.stop_message for stroke in strokes if stroke.stop_message})
     (note,) = table_notes("strokes")
     notes = [f"{note} The y axis is in the report and in the JSON."]
@@ -158,7 +158,7 @@ def sweep_page(result: SweepResult) -> Page:
     """Return the report of a sweep."""
     plan = result.plan
     failed = len(result.errors)
-    keys = ", ".join(plan.column(key) for key in plan.arguments)
+    keys = ", ".join([plan.column(key) for key in plan.arguments])
     count = "1 case fails" if failed == 1 else f"{failed or 'no'} cases fail"
     table = _range_table(result)
     errors = [_error_table(result)] if failed else []
@@ -194,7 +194,7 @@ def _range_table(result: SweepResult) -> Table:
     """Return least and greatest value of each shown number, by law or other columns of a case."""
     found: dict[tuple[str, ...], list[dict[str, Any]]] = {}
     for row in result.iterate_rows():
-        group = " ".join(str(row[name]) for name in result.run.index[:1] if name in row)
+        group = " ".join([str(row[name]) for name in result.run.index[:1] if name in row])
         for name in result.run.shown:
             if row.get(name) is not None:
                 least, greatest = found.setdefault((name, group), [row, row])
@@ -211,7 +211,10 @@ def _range_table(result: SweepResult) -> Table:
 
 def _extreme(result: SweepResult, name: str, row: dict[str, Any]) -> list[str]:
     columns = [result.plan.column(key) for key in result.plan.arguments]
-    return [_value_text(name, row[name]), ", ".join(_value_text(one, row[one]) for one in columns)]
+    return [
+        _value_text(name, row[name]),
+        ", ".join([_value_text(one, row[one]) for one in columns]),
+    ]
 
 
 def _value_text(column: str, value: Any) -> str:

@@ -73,7 +73,7 @@ class Window:
 def field_segment(surfaces: Sequence[Surface]) -> scan_plane.ScanSegment:
     """Return the part of the scan line shown in figures of the field."""
     texture = surfaces[0].texture
-    depth = max(surface.max_depth for surface in surfaces)
+    depth = max([surface.max_depth for surface in surfaces])
     length = scan_plane.feature_length(texture)
     wanted = 1.3 * (texture.peak_to_valley + depth)
     return scan_plane.choose_segment(texture, min(max(wanted, length), 3.0 * length), 3.0 * length)
@@ -248,7 +248,7 @@ def _shared_limits(forces: Sequence[scan_plane.PlaneForces]) -> tuple[float, flo
     """Return the limits of the shared axis [N], which clip a law that exceeds the others by far."""
     lows = [min(float(f.tangential.min()), float(f.normal.min()), 0.0) for f in forces]
     highs = [max(float(f.tangential.max()), float(f.normal.max()), 0.0) for f in forces]
-    spans = sorted(max(high, -low) for low, high in zip(lows, highs, strict=True))
+    spans = sorted([max(high, -low) for low, high in zip(lows, highs, strict=True)])
     usual = spans[(len(spans) - 1) // 2]
     limit = _MAX_FORCE_RATIO * usual if usual > 0.0 else (spans[-1] or 1.0)
     low = max(min(lows), -limit)
@@ -367,7 +367,7 @@ def merit_figure(comparison: Comparison) -> Figure:
     figure = style.new_figure(10.0, 4.6)
     axes = style.single_axes(figure)
     scale, unit = (1e3, " · l [mm]") if strength_has_unit(comparison) else (1.0, "")
-    widest = max(max(row.strength for row in comparison.rows) * scale, 1e-12)
+    widest = max(max([row.strength for row in comparison.rows]) * scale, 1e-12)
     for row in comparison.rows:
         sound = row.conservative and row.continuous
         x = row.strength * scale

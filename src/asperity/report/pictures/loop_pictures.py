@@ -175,7 +175,7 @@ _DASHES = ("-", "--", ":", "-.")
 
 def onset_figure(predictions: Sequence[Prediction]) -> Figure:
     """Return onset stiffness against delay, one panel per law, with the predictions."""
-    laws = list(dict.fromkeys(one.onset.law for one in predictions))
+    laws = list(dict.fromkeys([one.onset.law for one in predictions]))
     figure, panels = style.law_panels(len(laws), 2.3, 0.5, x="delay [samples]", y="stiffness [N/m]")
     for axes, law in zip(panels, laws, strict=True):
         mine = [one for one in predictions if one.onset.law == law]
@@ -210,7 +210,7 @@ def _line_style(colour: str, dashes: str, width: float = 1.1, marker: str = "") 
 
 def strokes_figure(strokes: Sequence[Stroke]) -> Figure:
     """Return energy per stroke against speed, one panel per law, one line per depth."""
-    laws = list(dict.fromkeys(stroke.law for stroke in strokes))
+    laws = list(dict.fromkeys([stroke.law for stroke in strokes]))
     figure, panels = style.law_panels(
         len(laws), 2.3, 0.5, x="speed [m/s]", y="energy per stroke [mJ]", sharey=False
     )
@@ -228,7 +228,7 @@ def strokes_figure(strokes: Sequence[Stroke]) -> Figure:
 
 def _draw_law_strokes(axes: Axes, strokes: Sequence[Stroke]) -> None:
     """Draw one line per depth: the sum, and thinner lines for x and z."""
-    depths = dict.fromkeys(stroke.depth for stroke in strokes)
+    depths = dict.fromkeys([stroke.depth for stroke in strokes])
     for depth, dashes in zip(depths, _DASHES * len(depths), strict=False):
         mine = [one for one in strokes if one.depth == depth]
         speeds = [one.speed for one in mine]
@@ -281,7 +281,7 @@ def _use_millimetres(tables: Iterable[list[list[Any]]], axis: int, column: str) 
     if not column.endswith("[m]"):
         return column
     rows = [row for table in tables for row in table]
-    unit = style.length_unit(max(abs(row[axis]) for row in rows))
+    unit = style.length_unit(max([abs(row[axis]) for row in rows]))
     for row in rows:
         row[axis] *= unit.scale
     return f"{column[:-2]}{unit.name}]"

@@ -270,11 +270,11 @@ def ranges_text(panels: Sequence[Panel]) -> str:
     if len(points) > _MAX_LISTED_POINTS:
         parts.append(f"{len(points)} points")
     elif points:
-        listed = "; ".join(f"{one.name} at {one.x[0]:.3g}, {one.y[0]:.3g}" for one in points)
+        listed = "; ".join([f"{one.name} at {one.x[0]:.3g}, {one.y[0]:.3g}" for one in points])
         parts.append(f"{panels[0].x} and {panels[0].y}: {listed}")
     # Symbols keep their case: σ is not Σ.
     firsts = [text[0].upper() if text[0].isascii() else text[0] for text in parts]
-    return "".join(f" {first}{text[1:]}." for first, text in zip(firsts, parts, strict=True))
+    return "".join([f" {first}{text[1:]}." for first, text in zip(firsts, parts, strict=True)])
 
 
 def _group_ranges(
@@ -309,7 +309,7 @@ def _add_range(
 def _members_text(members: list[tuple[str, float, float]]) -> str:
     if len(members) <= _MAX_LISTED_PANELS:
         return "; ".join(
-            f"{_range_text(low, high)}{_panel_suffix(panel)}" for panel, low, high in members
+            [f"{_range_text(low, high)}{_panel_suffix(panel)}" for panel, low, high in members]
         )
     widest = max(members, key=lambda one: one[2] - one[1])
     least = min(members, key=lambda one: one[2] - one[1])

@@ -232,8 +232,8 @@ def energies_figure(experiment: ScanningExperiment) -> Figure:
 
 def bumps_figure(experiment: BumpExperiment) -> Figure:
     """Return path and energy over the bump, one row per entry."""
-    entries = list(dict.fromkeys(one.entry for one in experiment.bumps))
-    laws = dict.fromkeys(one.law for one in experiment.bumps)
+    entries = list(dict.fromkeys([one.entry for one in experiment.bumps]))
+    laws = dict.fromkeys([one.law for one in experiment.bumps])
     colours = dict(zip(laws, _LAW_COLOURS * len(laws), strict=False))
     figure = style.new_figure(10.0, 2.8 * len(entries) + 0.4)
     grid: Any = figure.subplots(len(entries), 2, squeeze=False)
@@ -279,7 +279,7 @@ def devices_figure(experiments: Experiments) -> Figure:
     """Return onset against allowed stiffness for two rules, on logarithmic axes."""
     figure = style.new_figure(10.0, 5.2)
     left, right = figure.subplots(1, 2, sharex=True, sharey=True)
-    devices = dict.fromkeys(one.device for one in experiments.devices.onsets)
+    devices = dict.fromkeys([one.device for one in experiments.devices.onsets])
     markers = {**dict(zip(devices, "osD^vP*" * len(devices), strict=False)), _PAPER_DEVICE: "X"}
     wall_rule = [
         _OnsetPoint(one.catalogue_rule, one.prediction, one.device, one.catalogue_rule_missed)
@@ -298,7 +298,7 @@ def devices_figure(experiments: Experiments) -> Figure:
         _draw_rule(axes, points, markers)
         y = "cycles from [N/m]" if axes is left else ""
         style.label_axes(axes, f"allowed by {name} [N/m]", y)
-        missed = sum(point.is_missed for point in points)
+        missed = sum([point.is_missed for point in points])
         style.set_panel_title(axes, name, f"{missed} of {len(points)} wrong")
     for device, marker in markers.items():
         left.plot([], [], marker, mfc=style.BACKGROUND, mec=style.BLUE, label=device)
@@ -325,7 +325,7 @@ def _draw_rule(axes: Axes, points: Sequence[_OnsetPoint], markers: Mapping[str, 
         (drawn,) = axes.plot(allowed, onset.value, marker, label=label, **options)
         style.mark_law(drawn, onset.law)
     for near in named.values():
-        letters = "".join(dict.fromkeys(point.prediction.onset.law for point in near))
+        letters = "".join(dict.fromkeys([point.prediction.onset.law for point in near]))
         last = max(near, key=lambda point: point.allowed)
         note: dict[str, Any] = {"textcoords": "offset points", "color": style.MUTED}
         corner = (last.allowed, last.prediction.onset.value)

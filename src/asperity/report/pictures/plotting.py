@@ -146,7 +146,7 @@ def _conservation_remarks(comparison: Comparison) -> list[str]:
 def _stacked_figure(*drawings: style.SizedDrawing) -> Figure:
     """Return a figure with one drawing below the other."""
     heights = [height for (_, height), _ in drawings]
-    figure = style.new_figure(max(width for (width, _), _ in drawings), sum(heights))
+    figure = style.new_figure(max([width for (width, _), _ in drawings]), sum(heights))
     if len(drawings) == 1:
         drawings[0][1](figure)
         return figure

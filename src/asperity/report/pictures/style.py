@@ -96,7 +96,7 @@ def nice_length(target: float) -> float:
         (0.2, 5.0)
     """
     power: float = 10.0 ** math.floor(math.log10(target))
-    step = max(m for m in (1.0, 2.0, 5.0) if m * power <= target * (1.0 + 1e-9))
+    step = max([m for m in (1.0, 2.0, 5.0) if m * power <= target * (1.0 + 1e-9)])
     return round(step * power, 12)
 
 

@@ -86,7 +86,7 @@ def envelope_answer(one: DeviceEnvelope) -> str:
     if not law.decades:
         return f"{one.device.name} renders no sinusoid with these laws."
     lengths = [border.wavelength for border in law.borders if border.decades]
-    span = " to ".join(format_quantity(lengths[i], "m") for i in (0, -1))
+    span = " to ".join([format_quantity(lengths[i], "m") for i in (0, -1)])
     text = f"{one.device.name} renders most with law {law.letter}, wavelengths from {span}"
     if largest is law:
         return f"{text}{'' if law.conservative else '; it feels alive'}."

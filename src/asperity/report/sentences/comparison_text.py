@@ -100,7 +100,7 @@ def surface_alt_text(texture: Texture) -> str:
     if texture.is_profile:
         return f"Section of the body along its scan line, {height} from peak to valley."
     sides = " by ".join(
-        format_quantity(float((span @ span) ** 0.5), "m") for span in texture.domain.spans
+        [format_quantity(float((span @ span) ** 0.5), "m") for span in texture.domain.spans]
     )
     return sentence("map", sides=sides, height=height)
 
@@ -131,8 +131,8 @@ def force_alt_text(comparison: Comparison, length: float) -> str:
 
 def field_alt_text(comparison: Comparison) -> str:
     """Return the laws whose fields have curl, and those without."""
-    without = join_letters(row.law.letter for row in comparison.rows if row.conservative)
-    with_curl = join_letters(row.law.letter for row in comparison.rows if not row.conservative)
+    without = join_letters([row.law.letter for row in comparison.rows if row.conservative])
+    with_curl = join_letters([row.law.letter for row in comparison.rows if not row.conservative])
     panels = f"Arrows of force over curl, a panel for each of {_law_count_text(comparison)}"
     return f"{panels}. Without curl: {without}; with curl: {with_curl}."
 

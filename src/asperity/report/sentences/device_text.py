@@ -41,7 +41,7 @@ def wall_test_text(test: WallTest) -> str:
         f"{test.positions} positions" if test.positions else "",
         f"lightest direction {test.lightest:g} of the one tried" if test.lightest else "",
     ]
-    return "; ".join(part for part in parts if part)
+    return "; ".join([part for part in parts if part])
 
 
 def missing_fields(device: Device) -> list[str]:

@@ -160,7 +160,7 @@ def onset_answer(setup: Setup, predictions: Sequence[Prediction]) -> str:
             resolution = format_quantity(step, "m")
             answer += f" The rule is proved for exact positions, not for steps of {resolution}."
     else:
-        proved = sum(one.conservative for one in predictions)
+        proved = sum([one.conservative for one in predictions])
         cases = "case" if proved == 1 else "cases"
         answer = f"No limit cycle below the delay rule, in {proved} {cases} of conservative laws."
     if any(one.wall_rule is not None and not one.onset.is_smooth_wall for one in predictions):
@@ -181,12 +181,12 @@ def stroke_answer(strokes: Sequence[Stroke]) -> str:
 
 
 def _group_laws(strokes: Sequence[Stroke], gains_energy: Callable[[Stroke], bool]) -> str:
-    laws = list(dict.fromkeys(stroke.law for stroke in strokes))
+    laws = list(dict.fromkeys([stroke.law for stroke in strokes]))
     groups: dict[str, list[str]] = {"always": [], "at times": [], "never": []}
     for law in laws:
         gains = [gains_energy(stroke) for stroke in strokes if stroke.law == law]
         groups["always" if all(gains) else "at times" if any(gains) else "never"].append(law)
-    return ", ".join(f"{', '.join(laws)} {when}" for when, laws in groups.items() if laws)
+    return ", ".join([f"{', '.join(laws)} {when}" for when, laws in groups.items() if laws])
 
 
 _QUANTILES = (0.5, 0.99, 0.999)
@@ -224,7 +224,7 @@ def status_line(loop: ServoProcess) -> str:
     if not len(rows):
         return "waiting for the first sample"
     time, x, y, z, _cx, _cy, _cz, fx, fy, fz, _share, supplied = rows[-1, :12]
-    place = ", ".join(f"{1e3 * value:+8.3f}" for value in (x, y, z))
+    place = ", ".join([f"{1e3 * value:+8.3f}" for value in (x, y, z)])
     force = math.sqrt(fx * fx + fy * fy + fz * fz)
     late = loop.statistics.late
     return f"{time:8.2f} s  ({place}) mm  {force:6.3f} N  {energy_text(supplied):>10}  late {late}"

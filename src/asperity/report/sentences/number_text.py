@@ -167,7 +167,7 @@ def format_in_one_unit(values: Sequence[float], unit: str, digits: int = 3) -> l
         >>> format_in_one_unit([0.25, 1.5e-3], "m")
         ['250 mm', '1.5 mm']
     """
-    name, scale = _choose_unit(max((abs(v) for v in values), default=0.0), unit)
+    name, scale = _choose_unit(max([abs(v) for v in values], default=0.0), unit)
     return [f"{float(f'{value * scale:.{digits}g}'):.10g} {name}" for value in values]
 
 
@@ -221,9 +221,9 @@ def position_text(point: tuple[float, float, float] | None) -> str:
     """
     if point is None:
         return NOT_AVAILABLE
-    largest = max(abs(value) for value in point)
+    largest = max([abs(value) for value in point])
     unit, scale = ("mm", 1e3) if largest >= 1e-4 else ("µm", 1e6)
-    return f"({', '.join(f'{value * scale + 0.0:.6g}' for value in point)}) {unit}"
+    return f"({', '.join([f'{value * scale + 0.0:.6g}' for value in point])}) {unit}"
 
 
 def witness_text(bound: Bound) -> str:

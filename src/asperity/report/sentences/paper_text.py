@@ -12,7 +12,7 @@ from asperity.report.sentences.texts import table_data
 
 def verdict_counts_text(results: Sequence[Result]) -> str:
     """Return the number of claims by verdict: "Of 60 claims 55 hold, ..."."""
-    counts = {verdict: sum(r.verdict == verdict for r in results) for verdict in VERDICTS}
+    counts = {verdict: sum([r.verdict == verdict for r in results]) for verdict in VERDICTS}
     verdicts = table_data("verdicts")
     parts = [f"{count} {verdicts[verdict]['plural']}" for verdict, count in counts.items()]
     return f"Of {len(results)} claims {', '.join(parts)}."
@@ -21,7 +21,7 @@ def verdict_counts_text(results: Sequence[Result]) -> str:
 def evidence_text(value: Number) -> str:
     """Return a number of the evidence as text."""
     if isinstance(value, list):
-        return ", ".join(f"{item:.10g}" for item in value)
+        return ", ".join([f"{item:.10g}" for item in value])
     return value if isinstance(value, str) else f"{value:.10g}"
 
 
