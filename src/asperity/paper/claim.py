@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from asperity.core.checks import FloatArray
 from asperity.core.errors import AsperityError
-from asperity.core.files import Serializable, read_toml, to_plain_data
+from asperity.core.files import OMITTED, Serializable, read_toml, to_plain_data
 
 Verdict = Literal["holds", "holds with correction", "does not hold", "undecided"]
 VERDICTS: tuple[Verdict, ...] = ("holds", "holds with correction", "does not hold", "undecided")
@@ -81,11 +81,9 @@ class Result(Serializable):
         flips_under: a change under which the verdict would be different.
     """
 
-    serialized_attributes = "id equations statement verdict evidence flips_under"
-
     id: str
     equations: tuple[str, ...]
-    section: str
+    section: str = field(metadata=OMITTED)
     statement: str
     verdict: Verdict
     evidence: Evidence
@@ -181,13 +179,19 @@ class _SummaryFormatter(string.Formatter):
 
     def format_field(self, value: Any, format_spec: str) -> str:
         if isinstance(value, dict):
-            parts = (f"{name} {self.format_field(one, format_spec)}" for name, one in value.items())
+            parts = [
+                f"{name} {self.format_field(part, format_spec)}" for name, part in value.items()
+            ]
             return ", ".join(parts)
         if isinstance(value, list):
-            return " to ".join([self.format_field(end(value), format_spec) for end in (min, max)])
+            least = self.format_field(min(value), format_spec)
+            greatest = self.format_field(max(value), format_spec)
+            return f"{least} to {greatest}"
         number_format, space, unit = format_spec.partition(" ")
-        number_format, star, factor = number_format.partition("*")
-        return format(value * float(factor) if star else value, number_format) + space + unit
+        number_format, _star, factor = number_format.partition("*")
+        if factor:
+            value = value * float(factor)
+        return format(value, number_format) + space + unit
 
 
 CATALOGUE = read_toml("claims", Path(__file__).with_name("claims.toml"))
@@ -225,12 +229,15 @@ def check_values(
         return Check(f"{quantity}: could not be computed")
     agrees = relative_error(printed, target) <= tolerance
     compared = {"as printed": printed}
-    if corrected is not None and not agrees:
-        compared["corrected"] = corrected
+    is_right = None
+    if corrected is not None:
+        is_right = relative_error(corrected, target) <= tolerance
+        if not agrees:
+            compared["corrected"] = corrected
     return check_statement(
         f"{quantity}: {_format_errors(compared, target)}",
         printed=agrees,
-        corrected=None if corrected is None else relative_error(corrected, target) <= tolerance,
+        corrected=is_right,
         correction=correction,
         numbers=_error_numbers(quantity, compared, target),
     )
@@ -238,14 +245,18 @@ def check_values(
 
 def _format_errors(compared: Mapping[str, ArrayLike | None], target: FloatArray) -> str:
     if target.ndim == 0:
-        shown = {name.removeprefix("as "): value for name, value in compared.items()}
-        known = {
-            name: value for name, value in (shown | {"true": target}).items() if value is not None
-        }
+        values = {name.removeprefix("as "): value for name, value in compared.items()}
+        values["true"] = target
         return ", ".join(
-            [f"{name} {float(np.asarray(value)):.6g}" for name, value in known.items()]
+            [
+                f"{name} {float(np.asarray(value)):.6g}"
+                for name, value in values.items()
+                if value is not None
+            ]
         )
-    errors = {name: _format_error(relative_error(one, target)) for name, one in compared.items()}
+    errors = {
+        name: _format_error(relative_error(values, target)) for name, values in compared.items()
+    }
     if len(errors) == 1:
         return errors["as printed"]
     return ", ".join([f"{name} {error}" for name, error in errors.items()])
@@ -285,7 +296,7 @@ def check_statement(
         **named_numbers: further values; underscores in names stand for spaces.
     """
     known = {name.replace("_", " "): value for name, value in named_numbers.items()}
-    known |= {} if numbers is None else dict(numbers)
+    known |= numbers or {}
     if printed is None:
         return Check(summary, known)
     if printed:
@@ -306,11 +317,14 @@ def combine_checks(*checks: Check) -> Check:
     worst = max(checks, key=lambda check: _SEVERITY.index(check.verdict))
     numbers = {name: value for check in checks for name, value in check.numbers.items()}
     summary = "; ".join([check.summary for check in checks if check.summary])
-    correction, fitted = (
-        "; ".join(dict.fromkeys([text for text in texts if text]))
-        for texts in zip(*((check.correction, check.fitted) for check in checks), strict=True)
-    )
+    correction = _join_once([check.correction for check in checks])
+    fitted = _join_once([check.fitted for check in checks])
     return Check(summary, numbers, correction, fitted, worst.verdict)
+
+
+def _join_once(texts: Sequence[str]) -> str:
+    """Return the texts that are not empty, each once."""
+    return "; ".join(dict.fromkeys(filter(None, texts)))
 
 
 def relative_error(value: ArrayLike | None, reference: ArrayLike) -> float:
@@ -325,7 +339,9 @@ def relative_error(value: ArrayLike | None, reference: ArrayLike) -> float:
         return 0.0 if np.array_equal(values, target) else math.inf
     scale = float(np.abs(target).max())
     difference = float(np.abs(values - target).max())
-    return difference / scale if scale > 0.0 else (0.0 if difference == 0.0 else math.inf)
+    if scale > 0.0:
+        return difference / scale
+    return 0.0 if difference == 0.0 else math.inf
 
 
 def _format_error(error: float) -> str:

@@ -8,16 +8,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
-from asperity.core.files import Serializable, read_toml
+from asperity.core.files import OMITTED, Serializable, written
 from asperity.devices import device_names, load_device
 from asperity.paper.cases import BUMP, PASSIVITY, SAMPLING_PERIOD, SCANNING
 from asperity.scene.scene_defaults import make_plant
@@ -46,9 +45,27 @@ ALL_LAWS = "WABCDEFGH"
 FITTED_DELAY = 6  # samples, fitted: of 0 and 4 to 7 the one at which W settles while A and F cycle
 TRACE_STRIDE = 10  # samples
 
-_ASSUMPTIONS = read_toml("assumptions", Path(__file__).with_name("assumptions.toml"))
-FITTED_ASSUMPTIONS, GUESSED_HANDS, GUESSED_BUMP, GUESSED_DEVICES = map(tuple, _ASSUMPTIONS.values())
-"""What sections V.A, V.B, V.C and further devices require and the paper does not state."""
+# What sections V.A, V.B, V.C and further devices require and the paper does not state.
+FITTED_ASSUMPTIONS = (
+    "Link masses (about 20 g at the handle): guessed, the paper gives none",
+    "Link lengths 63, 75, 25 mm: the published device, not read in a source",
+    "Working point (37.5, 100) mm from the right motor: fitted; only there x and z couple",
+    "Loop lag of 6 samples: fitted; the paper states none",
+    "Elastic band 200 N/m, 3 N and 80 mm long at the surface, 0.02 N·s/m: guessed",
+    "Release from rest 4 mm above the surface, at 24 phases of the texture: guessed",
+)
+GUESSED_HANDS = (
+    "The hand of section V.B, 300 N/m and 3 N·s/m, 50 g, pressing with 1 N: guessed",
+    "Two more hands, softer and stiffer, and three speeds, to show their influence",
+)
+GUESSED_BUMP = (
+    "Hands, entry height and speeds of section V.C: guessed; the paper's subject moved freely",
+)
+GUESSED_DEVICES = (
+    "The hand: 300 N/m sideways, 3 N·s/m, pressing with 1 N. Most of these devices have no other "
+    "damping: none of their physical damping is published",
+    "Where the update rate is not known, 1 kHz; where the delay is not known, none",
+)
 
 
 def band_setup(
@@ -149,17 +166,15 @@ class CycleCount(Serializable):
         z: position of the handle [m], shape (n,).
     """
 
-    serialized_attributes = "law stiffness delay starts cycles slow"
-
     law: str
-    divisor: float
+    divisor: float = field(metadata=OMITTED)
     delay: int
     starts: int
     cycles: int
     slow: int
-    time: FloatArray
-    x: FloatArray
-    z: FloatArray
+    time: FloatArray = field(metadata=OMITTED)
+    x: FloatArray = field(metadata=OMITTED)
+    z: FloatArray = field(metadata=OMITTED)
 
     @property
     def wall(self) -> str:
@@ -167,6 +182,7 @@ class CycleCount(Serializable):
         return self.law if self.divisor == 1.0 else f"{self.law}/{self.divisor:g}"
 
     @property
+    @written
     def stiffness(self) -> float:
         """Stiffness [N/m]."""
         return _STIFFNESS / self.divisor
@@ -259,22 +275,20 @@ class DeviceOnset(Serializable):
         prediction: simulated onset, and the limits by the criteria with the hand's damping.
     """
 
-    serialized_attributes = (
-        "device surface catalogue_stiffness catalogue_rule catalogue_rule_missed"
-    )
-
     device: str
     surface: str
     catalogue_stiffness: float
-    prediction: Prediction
+    prediction: Prediction = field(metadata=OMITTED)
 
     @property
+    @written
     def catalogue_rule(self) -> float:
         """K₀/q with the K₀ of the catalogue and the q of the depth reached [N/m]."""
         q = self.prediction.q
         return self.catalogue_stiffness / q if q > 0.0 else math.inf
 
     @property
+    @written
     def catalogue_rule_missed(self) -> bool:
         """Whether a limit cycle occurs at a stiffness that K₀/q of the catalogue allows."""
         cycling = self.prediction.onset.cycling
@@ -303,9 +317,11 @@ class DeviceExperiment(Serializable):
     def wall_ratios(self) -> tuple[float, ...]:
         """Onset of limit cycles of the simulated smooth wall over the catalogue's K₀."""
         return tuple(
-            one.prediction.onset.cycling / one.catalogue_stiffness
-            for one in self.onsets
-            if one.prediction.onset.is_smooth_wall
+            [
+                wall.prediction.onset.cycling / wall.catalogue_stiffness
+                for wall in self.onsets
+                if wall.prediction.onset.is_smooth_wall
+            ]
         )
 
     @property
@@ -322,12 +338,10 @@ class DeviceExperiment(Serializable):
 
 def reference_textures(measured_texture: Texture | None = None) -> dict[str, Texture]:
     """Return a gentle sinusoid and a measured surface, or a synthetic one in its place."""
-    name = "yours"
-    texture = measured_texture
-    if texture is None:
-        name = "knurl"
-        texture = named_surface("knurl")
-    return {"sinusoid A/l = 0.1": Sinusoid(0.1e-3, 1e-3), name: texture}
+    sinusoid = Sinusoid(0.1e-3, 1e-3)
+    if measured_texture is None:
+        return {"sinusoid A/l = 0.1": sinusoid, "knurl": named_surface("knurl")}
+    return {"sinusoid A/l = 0.1": sinusoid, "yours": measured_texture}
 
 
 def usable_devices() -> tuple[list[str], list[str]]:
@@ -337,10 +351,13 @@ def usable_devices() -> tuple[list[str], list[str]]:
     for name in device_names():
         try:
             _wall_setup(name)
+            is_usable = catalogue_stiffness(name) is not None
         except ParameterError:
+            is_usable = False
+        if is_usable:
+            usable.append(name)
+        else:
             skipped.append(name)
-            continue
-        (skipped if catalogue_stiffness(name) is None else usable).append(name)
     return usable, skipped
 
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from asperity.core.checks import FloatArray
-from asperity.core.files import Serializable, to_plain_data
+from asperity.core.files import OMITTED, Serializable, to_plain_data
 from asperity.core.units import format_quantity
 from asperity.paper import cycle_experiments as setups
 from asperity.paper.cycle_experiments import (
@@ -41,14 +41,12 @@ class BumpRun(Serializable):
         jump: greatest energy supplied within 20 ms [J].
         top: greatest height of the handle [m].
         closure: residual of the energy balance over the energy exchanged [1].
+        stopped: reason for which the run ended early; empty if it did not.
         time: [s], shape (n,).
         x: position of the handle [m], shape (n,).
         z: position of the handle [m], shape (n,).
         supplied: energy supplied so far, all axes [J], shape (n,).
-        stopped: reason for which the run ended early; empty if it did not.
     """
-
-    serialized_attributes = "law entry energy lost jump top closure stopped"
 
     law: str
     entry: str
@@ -57,11 +55,11 @@ class BumpRun(Serializable):
     jump: float
     top: float
     closure: float
-    time: FloatArray
-    x: FloatArray
-    z: FloatArray
-    supplied: FloatArray
     stopped: str
+    time: FloatArray = field(metadata=OMITTED)
+    x: FloatArray = field(metadata=OMITTED)
+    z: FloatArray = field(metadata=OMITTED)
+    supplied: FloatArray = field(metadata=OMITTED)
 
     @property
     def total(self) -> float:
@@ -160,15 +158,13 @@ class ScanningExperiment(Serializable):
         guessed: assumptions that the paper does not state.
     """
 
-    serialized_attributes = "strokes guessed"
-
     strokes: tuple[HandStroke, ...]
-    traces: tuple[EnergyTrace, ...]
+    traces: tuple[EnergyTrace, ...] = field(metadata=OMITTED)
     guessed: tuple[str, ...] = setups.GUESSED_HANDS
 
     def strokes_of(self, law: str) -> tuple[Stroke, ...]:
         """Return the strokes of a law for all hands and speeds."""
-        return tuple(one.stroke for one in self.strokes if one.stroke.law == law)
+        return tuple([done.stroke for done in self.strokes if done.stroke.law == law])
 
 
 @lru_cache(maxsize=128)
@@ -188,7 +184,8 @@ def energy_trace(law: str) -> EnergyTrace:
     assert isinstance(setup.motion, Strokes)
     run = setup.simulate()
     traced = slice(0, round(setup.motion.period / run.period), setups.TRACE_STRIDE)
-    exact, paper = (run.energies[name][traced][:, [0, 2]] for name in ("supplied", "same_sample"))
+    exact = run.energies["supplied"][traced][:, [0, 2]]
+    paper = run.energies["same_sample"][traced][:, [0, 2]]
     return EnergyTrace(law, run.time[traced], exact, paper)
 
 
@@ -241,7 +238,7 @@ class Experiments:
         )
 
     def _summarize_cycles(self) -> str:
-        parts = [f"{one.wall} {one.cycles}" for one in self.passivity.counts]
+        parts = [f"{count.wall} {count.cycles}" for count in self.passivity.counts]
         first = self.passivity.counts[0]
         return (
             f"of {first.starts} starts cycle at 2000 N/m and a lag of {first.delay} samples: "
@@ -251,22 +248,25 @@ class Experiments:
     def _summarize_wall_rule(self) -> str:
         """Count the textures that cycle below the wall's own onset over q."""
         textured = [
-            one for one in self.passivity.onsets if one.wall_rule and not one.onset.is_smooth_wall
+            prediction
+            for prediction in self.passivity.onsets
+            if prediction.wall_rule and not prediction.onset.is_smooth_wall
         ]
-        missed = sum([one.violates_wall_rule for one in textured])
+        safe = [prediction for prediction in textured if not prediction.violates_wall_rule]
+        missed = len(textured) - len(safe)
+        text = f"below K0/q of the wall's own onset in {missed} of {len(textured)} cases"
         # A wall that cycles at the least stiffness tried may also cycle below it.
-        open_cases = sum(
-            [one.onset.quiet == 0.0 and not one.violates_wall_rule for one in textured]
-        )
-        unknown = f", unknown in {open_cases}" if open_cases else ""
-        return f"below K0/q of the wall's own onset in {missed} of {len(textured)} cases{unknown}"
+        unknown = sum([prediction.onset.quiet == 0.0 for prediction in safe])
+        return f"{text}, unknown in {unknown}" if unknown else text
 
     def _summarize_delay_rule(self) -> str:
-        found = self.passivity.onsets
+        predictions = self.passivity.onsets
         missed = [
-            f"{one.onset.law} at d = {one.onset.delay}" for one in found if one.violates_delay_rule
+            f"{prediction.onset.law} at d = {prediction.onset.delay}"
+            for prediction in predictions
+            if prediction.violates_delay_rule
         ]
-        cases = sum([one.conservative for one in found])
+        cases = sum([prediction.conservative for prediction in predictions])
         if not missed:
             return f"no limit cycle below the delay rule in {cases} cases of conservative laws"
         return (
@@ -277,24 +277,26 @@ class Experiments:
 
     def _summarize_strokes(self) -> str:
         counts: dict[str, list[bool]] = {}
-        for one in self.scanning.strokes:
-            counts.setdefault(one.stroke.law, []).append(one.stroke.gains_energy)
+        for done in self.scanning.strokes:
+            counts.setdefault(done.stroke.law, []).append(done.stroke.gains_energy)
         parts = [f"{law} {sum(gains)}" for law, gains in counts.items()]
         total = max(map(len, counts.values()))
         return f"of {total} hands and speeds the field supplies energy: {', '.join(parts)}"
 
     def _summarize_bumps(self) -> str:
-        parts = [f"{one.law} {1e3 * one.total:+.3g} mJ ({one.entry})" for one in self.bump.bumps]
-        return ", ".join(parts)
+        bumps = self.bump.bumps
+        return ", ".join([f"{run.law} {1e3 * run.total:+.3g} mJ ({run.entry})" for run in bumps])
 
     def _summarize_devices(self) -> str:
-        found = self.devices.onsets
-        missed = sum([one.catalogue_rule_missed for one in found])
-        rules = sum([one.prediction.violates_delay_rule for one in found])
-        return (
-            f"{missed} of {len(found)} cases cycle at a stiffness that the catalogue's K0/q "
+        onsets = self.devices.onsets
+        missed = sum([onset.catalogue_rule_missed for onset in onsets])
+        rules = sum([onset.prediction.violates_delay_rule for onset in onsets])
+        text = (
+            f"{missed} of {len(onsets)} cases cycle at a stiffness that the catalogue's K0/q "
             f"allows, {rules} below the delay rule"
-        ) + (f"; {self.devices.wall_summary}" if self.devices.wall_summary else "")
+        )
+        summary = self.devices.wall_summary
+        return f"{text}; {summary}" if summary else text
 
 
 def run_experiments(

@@ -129,7 +129,7 @@ def loop_energies() -> tuple[LoopEnergy, ...]:
         >>> [f"{panel.law} {panel.energy * 1e3 + 0.0:.3f} mJ" for panel in loop_energies()][:2]
         ['A 0.320 mJ', 'B 0.147 mJ']
     """
-    return tuple(_loop_energy(law) for law in PAPER_LAWS)
+    return tuple(map(_loop_energy, PAPER_LAWS))
 
 
 def _loop_energy(law: str) -> LoopEnergy:
@@ -141,7 +141,7 @@ def _loop_energy(law: str) -> LoopEnergy:
     corners = SCANNING.loop_path(law)
     legs = zip(corners, np.roll(corners, -1, axis=0), strict=True)
     share = np.linspace(0.0, 1.0, _STEPS_PER_SEGMENT, endpoint=False)[:, None]
-    path = np.concatenate([*(a + share * (b - a) for a, b in legs), corners[:1]])
+    path = np.concatenate([*[a + share * (b - a) for a, b in legs], corners[:1]])
     step = np.diff(path, axis=0)
     # By midpoints: corners of the path may lie where the force jumps.
     dense = np.empty((2 * len(path) - 1, 3))

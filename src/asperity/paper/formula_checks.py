@@ -75,15 +75,14 @@ class FormulaRow:
             points = [_probe_values(probe) for probe in probes]
             pairs = [probe.references(self.quantity) for probe in probes]
             reference = np.array(pairs).swapaxes(0, 1)
-        printed, corrected = (
-            np.broadcast_to(evaluate_formula(formula, points), reference.shape) if formula else None
-            for formula in (self.printed, self.corrected)
-        )
+        values = {}
+        for formula in filter(None, (self.printed, self.corrected)):
+            values[formula] = np.broadcast_to(evaluate_formula(formula, points), reference.shape)
         name = self.quantity.replace("jacobian", "Jacobian")
         return check_values(
             self.label or f"{name} of {law} at generic probes, by definition and kernel",
-            printed=printed,
-            corrected=corrected,
+            printed=values.get(self.printed),
+            corrected=values.get(self.corrected),
             reference=reference,
         )
 

@@ -90,12 +90,12 @@ class ProbePoint:
 
     def references(self, quantity: str) -> tuple[ArrayLike, ArrayLike]:
         """Return a "force", "jacobian" or "norm" by the definition and by the kernel."""
-        if quantity == "norm":
-            definition, kernel = self.norms()
-            return definition, kernel
+        if quantity == "force":
+            return self.force(), self.compiled_force()
         if quantity == "jacobian":
             return self.jacobian(), self.compiled_jacobian()
-        return self.force(), self.compiled_force()
+        definition, kernel = self.norms()
+        return definition, kernel
 
     def norms(self) -> FloatArray:
         """Return ‖J‖ by the definition and by the kernel [N/m], shape (2,)."""
@@ -124,7 +124,8 @@ def generic_probes(law: str, count: int = 4, seed: int = 5) -> Iterator[ProbePoi
     radius = 1.0 / texture.bounds[1]
     for _ in range(count):
         contact = draw.uniform(0.0, 3e-3)
-        h, slope = (float(profile(contact, order)) for order in (0, 1))
+        h = float(profile(contact, 0))
+        slope = float(profile(contact, 1))
         depth = radius * draw.uniform(0.2, 0.7)
         size = math.hypot(1.0, slope)
         x = contact + depth * slope / size
@@ -132,7 +133,8 @@ def generic_probes(law: str, count: int = 4, seed: int = 5) -> Iterator[ProbePoi
         if law in "FG":
             z = -depth
         at = float(find_closest_point(surface, x, z)[0]) if law in "DE" else x
-        yield ProbePoint(surface, x, z, at, *(float(profile(at, order)) for order in (0, 1, 2)))
+        derivatives = [float(profile(at, order)) for order in (0, 1, 2)]
+        yield ProbePoint(surface, x, z, at, *derivatives)
 
 
 def _profile(surface: Surface) -> Callable[[Any, int], Any]:

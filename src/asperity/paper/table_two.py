@@ -4,19 +4,101 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from pathlib import Path
 
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.continuity import continuity
 from asperity.analysis.energy.field_energy import loop_work
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
 from asperity.core.display import Displayable
-from asperity.core.files import Serializable, read_toml
+from asperity.core.files import Serializable, written
 from asperity.paper.cases import PAPER_CASE, PAPER_LAWS, PASSIVITY, SCANNING, TURNING_DEPTH
 
 _ENERGY_TOLERANCE = 1e-9  # relative to k A²
-TABLE_TWO: dict[str, dict[str, str]] = read_toml("table", Path(__file__).with_suffix(".toml"))
-"""Rows of ``table_two.toml`` by law, where the entries are explained."""
+
+
+@dataclass(frozen=True)
+class PrintedEntry:
+    """The cells of a law in Table II, and what has to be changed.
+
+    Attributes:
+        number: the cell as printed.
+        conservative: the cell as printed.
+        continuous: the cell as printed.
+        formula: closed form of the number, with G₁ = 2πA/l and y = 4π²AD/l²; empty without one.
+        change: with {y}, {radius} [mm] of the crests, {q} and {printed}, values for the parameters
+            of section V.A.
+    """
+
+    number: str
+    conservative: str
+    continuous: str
+    formula: str
+    change: str
+
+
+TABLE_TWO = {
+    "A": PrintedEntry(
+        number="√(1 + [2πA/l]²)",
+        conservative="No",
+        continuous="If h continuous",
+        formula="√(1 + G₁²)",
+        change="Nothing, but that it is attained at x = 0 modulo l/2.",
+    ),
+    "B": PrintedEntry(
+        number="No closed-form",
+        conservative="No",
+        continuous="If h' continuous",
+        formula="max(√(1 + G₁²), y)",
+        change="There is a closed form, and it grows with the depth: y = {y:.2f} here.",
+    ),
+    "C": PrintedEntry(
+        number="No closed-form",
+        conservative="Yes",
+        continuous="If h' continuous",
+        formula="greatest of 1, y and feasible roots of λ²(λ - 1 - G₁²) = E²(λ - 1)²/4",
+        change=(
+            "There is a closed form, and it grows with the depth: y = {y:.2f} here. For this "
+            "law q⁺ is the number that decides."
+        ),
+    ),
+    "D": PrintedEntry(
+        number="1",
+        conservative="Yes",
+        continuous="No. Even if h continuous",
+        formula="1 if y <= 1/2, y/(1 - y) if y < 1, else infinite",
+        change=(
+            "(18) leaves out the curvature of the surface. The crests' radius of curvature is "
+            "{radius:g} mm; from that depth on the force jumps and q is infinite. 1 is q⁺."
+        ),
+    ),
+    "E": PrintedEntry(
+        number="1",
+        conservative="No",
+        continuous="If h continuous",
+        formula="1",
+        change="Nothing; (19) and (20) have the wrong sign.",
+    ),
+    "F": PrintedEntry(
+        number="Appendix I",
+        conservative="Almost",
+        continuous="If h continuous",
+        formula="",
+        change=(
+            "The paper uses 8.3. Its own formula gives {printed:.2f}, and √2 times that "
+            "{root_two_printed:.2f}: a factor √2/2 was dropped. The formula bounds each entry "
+            "by itself, with a factor 2 that 0 <= h <= 1 rules out; the law as defined has "
+            "{q:.4f}. 'Almost' is no: the loop of (27) gains energy."
+        ),
+    ),
+    "G": PrintedEntry(
+        number="No closed-form",
+        conservative="No",
+        continuous="If h' continuous",
+        formula="max(1, y)",
+        change="There is a closed form, and it grows with the depth: y = {y:.2f} here.",
+    ),
+}
+"""Entries by law."""
 
 
 @dataclass(frozen=True)
@@ -55,11 +137,6 @@ class TableTwoRow(Serializable):
         change: explanation of the differences.
     """
 
-    serialized_attributes = (
-        "law printed q one_sided formula conservative continuous energy number_agrees "
-        "conservativity_agrees continuity_agrees energy_agrees change"
-    )
-
     law: str
     printed: PrintedRow
     q: Bound
@@ -71,6 +148,7 @@ class TableTwoRow(Serializable):
     change: str
 
     @property
+    @written
     def number_agrees(self) -> bool | None:
         """Whether the printed formula gives q; ``None`` if none is printed."""
         if self.printed.value is None:
@@ -78,16 +156,19 @@ class TableTwoRow(Serializable):
         return math.isclose(self.printed.value, self.q.value, rel_tol=1e-6)
 
     @property
+    @written
     def conservativity_agrees(self) -> bool:
         """Whether the printed entry agrees with the symbolic curl."""
         return self.printed.conservative == ("Yes" if self.conservative else "No")
 
     @property
+    @written
     def continuity_agrees(self) -> bool:
         """Whether the printed entry agrees with the force on this smooth surface."""
         return self.printed.continuous.startswith("No") is not self.continuous
 
     @property
+    @written
     def energy_agrees(self) -> bool:
         """Whether the energy around the loop agrees with the printed formula, or with its sign."""
         scale = SCANNING.stiffness * SCANNING.amplitude**2
@@ -103,8 +184,10 @@ class TableTwoRow(Serializable):
     @property
     def verdict(self) -> str:
         """``"yes"`` if the row is correct, ``"new"`` if only a number is added, else ``"no"``."""
-        others = self.conservativity_agrees and self.continuity_agrees and self.energy_agrees
-        return {True: "yes", None: "new", False: "no"}[self.number_agrees] if others else "no"
+        facts_agree = self.conservativity_agrees and self.continuity_agrees and self.energy_agrees
+        if not facts_agree or self.number_agrees is False:
+            return "no"
+        return "yes" if self.number_agrees else "new"
 
 
 @dataclass(frozen=True)
@@ -115,8 +198,6 @@ class TableTwo(Serializable, Displayable):
         rows: laws A to G.
         parameters: parameters of the numbers and of the loops, in words.
     """
-
-    serialized_attributes = "parameters rows"
 
     rows: tuple[TableTwoRow, ...]
     parameters: str
@@ -132,7 +213,7 @@ class TableTwo(Serializable, Displayable):
     def cells(self) -> list[list[str]]:
         """Return the cells as text; the first row is the heading."""
         head = ["law", "q printed", "q", "q⁺", "conservative", "continuous", "loop", "stands"]
-        return [head, *(_cells(row) for row in self.rows)]
+        return [head, *map(_cells, self.rows)]
 
     def __repr__(self) -> str:
         return (
@@ -166,7 +247,7 @@ def table_two() -> TableTwo:
         f"loops: k = {SCANNING.stiffness:g} N/m, l = {_format_mm(SCANNING.period)}, "
         f"a = {_format_mm(TURNING_DEPTH)}"
     )
-    return TableTwo(tuple(_row(letter) for letter in PAPER_LAWS), parameters)
+    return TableTwo(tuple(map(_row, PAPER_LAWS)), parameters)
 
 
 def _format_mm(length: float) -> str:
@@ -185,7 +266,7 @@ def _row(letter: str) -> TableTwoRow:
         printed=printed,
         q=q,
         one_sided=one_sided_number(surface),
-        formula=TABLE_TWO[letter].get("formula", ""),
+        formula=TABLE_TWO[letter].formula,
         conservative=surface.facts.conservative,
         continuous=continuity(surface, q).continuous,
         energy=loop_work(looped, SCANNING.loop_path(letter)),
@@ -205,10 +286,11 @@ def _printed_rows() -> dict[str, PrintedRow]:
     f_energy = 0.5 * k * case.friction * 0.5 * case.deflection * (case.depth - TURNING_DEPTH)
     values = {"A": math.hypot(1.0, slope), "D": 1.0, "E": 1.0, "F": PAPER_CASE.sticking_norm()}
     energies = {"A": half, "B": b_energy, "C": 0.0, "D": 0.0, "F": f_energy}
-    cells = {law: (row["conservative"], row["continuous"]) for law, row in TABLE_TWO.items()}
     return {
-        law: PrintedRow(row["number"], values.get(law), *cells[law], energies.get(law))
-        for law, row in TABLE_TWO.items()
+        law: PrintedRow(
+            entry.number, values.get(law), entry.conservative, entry.continuous, energies.get(law)
+        )
+        for law, entry in TABLE_TWO.items()
     }
 
 
@@ -216,7 +298,7 @@ def _explain_correction(law: str, printed: PrintedRow, q: Bound) -> str:
     """Return the explanation of the differences."""
     case = PASSIVITY
     number = printed.value or 0.0
-    return TABLE_TWO[law]["change"].format(
+    return TABLE_TWO[law].change.format(
         y=4.0 * math.pi**2 * case.amplitude * case.depth / case.period**2,
         radius=1e3 * case.crest_radius,
         printed=number,
@@ -227,10 +309,12 @@ def _explain_correction(law: str, printed: PrintedRow, q: Bound) -> str:
 
 def _cells(row: TableTwoRow) -> list[str]:
     printed = row.printed
-    number = printed.number if printed.value is None else f"{printed.number} = {printed.value:.4g}"
+    number = printed.number
+    if printed.value is not None and number != "1":
+        number += f" = {printed.value:.4g}"
     return [
         row.law,
-        "1" if printed.number == "1" else number,
+        number,
         f"{_format_number(row.q)} ({row.q.method})",
         _format_number(row.one_sided),
         _format_fact(row.conservative, printed.conservative, row.conservativity_agrees),
@@ -241,7 +325,8 @@ def _cells(row: TableTwoRow) -> list[str]:
 
 
 def _format_fact(value: bool, printed: str, agrees: bool) -> str:
-    return ("yes" if value else "no") + ("" if agrees else f" ({printed})")
+    fact = "yes" if value else "no"
+    return fact if agrees else f"{fact} ({printed})"
 
 
 def _format_number(bound: Bound) -> str:

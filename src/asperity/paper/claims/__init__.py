@@ -61,7 +61,8 @@ def _catalogued_claim(claim_id: str, row: Mapping[str, Any]) -> Claim:
 
 _ROWS = [*FORMULAS.items(), *CATALOGUE.items()]
 CLAIMS: dict[str, Claim] = {
-    one.id: one for one in sorted([_catalogued_claim(*pair) for pair in _ROWS], key=_paper_order)
+    claim.id: claim
+    for claim in sorted([_catalogued_claim(*row) for row in _ROWS], key=_paper_order)
 }
 
 
@@ -79,8 +80,8 @@ def get_claim(claim_id: str) -> Claim:
         equation = f"eq-{str(claim_id).strip('() ')}"
         hint = nearest_names(equation if equation in CLAIMS else str(claim_id), CLAIMS)
         listing = "run without it to list them; fig-3 selects the claims of a figure"
-        words = f"is unknown: {claim_id!r}; {hint}there are {len(CLAIMS)} claims: {listing}"
-        raise ParameterError("claim", words)
+        reason = f"is unknown: {claim_id!r}; {hint}there are {len(CLAIMS)} claims: {listing}"
+        raise ParameterError("claim", reason)
     return CLAIMS[claim_id]
 
 
@@ -95,14 +96,14 @@ def find_claims(reference: str) -> tuple[Claim, ...]:
         ParameterError: if there is none; the message suggests similar ids.
 
     Example:
-        >>> [found.id for found in find_claims("fig-5")]
+        >>> [claim.id for claim in find_claims("fig-5")]
         ['sentence-V.A-cycles', 'sentence-V.A-settles']
     """
     if isinstance(reference, str) and reference not in CLAIMS:
         wanted = _normalize_reference(reference)
-        found = tuple(one for one in CLAIMS.values() if wanted in _claim_references(one))
-        if wanted and found:
-            return found
+        selected = [claim for claim in CLAIMS.values() if wanted in _claim_references(claim)]
+        if wanted and selected:
+            return tuple(selected)
     return (get_claim(reference),)
 
 

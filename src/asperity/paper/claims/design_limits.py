@@ -4,21 +4,39 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 
 import numpy as np
 
 from asperity.analysis.gain.characteristic import characteristic_number
 from asperity.core.checks import FloatArray
-from asperity.core.files import read_toml
 from asperity.paper.cases import SCANNING, random_settings
 from asperity.paper.claim import Check, check_statement, combine_checks
 from asperity.paper.formula_checks import max_difference_quotient
 from asperity.surface import Surface
 from asperity.textures.kinds.sinusoid import Sinusoid
 
-# Exponents of metre, second and newton.
-_DIMENSIONS = read_toml("dimensions", Path(__file__).with_name("dimensions.toml"))
+_PER_SECOND = (0, -1, 0)
+_LENGTH = (1, 0, 0)
+_FORCE = (0, 0, 1)
+_STIFFNESS = (-1, 0, 1)
+_NUMBER = (0, 0, 0)
+_DIMENSIONS = {
+    "v": (1, -1, 0),
+    "T": (0, 1, 0),
+    "l": _LENGTH,
+    "delta": _LENGTH,
+    "b": _FORCE,
+    "force": _FORCE,
+    "A": _LENGTH,
+    "stiffest": _STIFFNESS,
+    "k": _STIFFNESS,
+    "resonance": _PER_SECOND,
+    "alpha": _NUMBER,
+    "beta": _NUMBER,
+    "gamma": _NUMBER,
+    "q": _NUMBER,
+}
+"""Exponents of metre, second and newton of the quantities in the limits."""
 Quantities = Mapping[str, float]
 Inequality = Callable[[Quantities], tuple[float, float]]
 _CASES = 400
@@ -47,14 +65,14 @@ def unit_invariant_share(inequality: Inequality, seed: int) -> float:
 def _check_dimensions(number: int) -> Check:
     """Check that both sides of a limit, or of the corrected one, have the same dimension."""
     share = unit_invariant_share(PRINTED_LIMITS[number], 1)
-    corrected = CORRECTED_LIMITS.get(number)
-    corrected_share = None if corrected is None else unit_invariant_share(corrected, 1)
-    tail = f", corrected in {corrected_share:.2f}" if corrected and share < 1.0 else ""
+    summary = f"unchanged by other units in {share:.2f} of {_CASES} cases"
+    if number not in CORRECTED_LIMITS:
+        return check_statement(summary, printed=share == 1.0, share_as_printed=share)
+    corrected_share = unit_invariant_share(CORRECTED_LIMITS[number], 1)
+    if share < 1.0:
+        summary += f", corrected in {corrected_share:.2f}"
     return check_statement(
-        f"unchanged by other units in {share:.2f} of {_CASES} cases{tail}",
-        printed=share == 1.0,
-        corrected=None if corrected is None else corrected_share == 1.0,
-        share_as_printed=share,
+        summary, printed=share == 1.0, corrected=corrected_share == 1.0, share_as_printed=share
     )
 
 

@@ -66,13 +66,13 @@ def force_w() -> claim.Check:
 
 def number_f() -> claim.Check:
     """q_F = 8.3 for the stated parameters."""
-    own = PAPER_CASE.sticking_norm()
+    printed = PAPER_CASE.sticking_norm()
     true = PAPER_CASE.max_norm_ratio()
     package = cases.PASSIVITY.q("F")
     return claim.check_statement(
-        printed=any(round(value, 1) == 8.3 for value in (own, true, package)),
-        norm_of_the_printed_matrix=own,
-        root_two_times_that=math.sqrt(2.0) * own,
+        printed=8.3 in {round(value, 1) for value in (printed, true, package)},
+        norm_of_the_printed_matrix=printed,
+        root_two_times_that=math.sqrt(2.0) * printed,
         number_of_the_papers_law=true,
         number_of_the_packages_law=package,
     )
@@ -87,11 +87,10 @@ def number_a() -> claim.Check:
 def _handle_damping(x: float) -> float:
     """Return σ₀(B) of the Pantograph at x, with unverified link lengths [N·s/m]."""
     device = load_device("pantograph")
-    lengths = [device.value(field) for field in ("proximal_link", "distal_link", "base_distance")]
-    proximal, distal, base = (math.nan if length is None else length for length in lengths)
-    matrix = handle_damping(
-        FiveBar(proximal, distal, base), cases.PASSIVITY.joint_damping, (x, 0.1)
-    )
+    lengths = [
+        device.data[name].value for name in ("proximal_link", "distal_link", "base_distance")
+    ]
+    matrix = handle_damping(FiveBar(*lengths), cases.PASSIVITY.joint_damping, (x, 0.1))
     return float(np.linalg.svd(matrix, compute_uv=False)[-1])
 
 

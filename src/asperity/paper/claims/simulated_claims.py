@@ -23,7 +23,7 @@ def _simulated_strokes(law: str) -> tuple[Stroke, ...]:
 
 
 def _simulated_bumps(law: str) -> tuple[BumpRun, ...]:
-    return tuple(one for one in bump_experiment(law).bumps if one.law == law)
+    return tuple([run for run in bump_experiment(law).bumps if run.law == law])
 
 
 def check_over_assumptions(
@@ -44,7 +44,7 @@ def check_over_assumptions(
         numbers: computed values by name.
     """
     outcomes = {*by_paper_measure, *by_exact_measure}
-    agreed = outcomes.pop() if len(outcomes) == 1 else None
+    agreed = None if len(outcomes) > 1 else all(outcomes)
     tally = (
         f"as printed in {sum(by_paper_measure)} of {len(by_paper_measure)} guesses by the paper's "
         f"measure, {sum(by_exact_measure)} by ours"
@@ -56,13 +56,13 @@ def textured_walls_cycle() -> claim.Check:
     """At 2000 N/m W settles; textured with A or F it enters a limit cycle (Fig. 5).
 
     W must settle from every start. A and F must end in a limit cycle: by the paper's measure from
-    one start, as in its figure, by ours from at least a quarter of them.
+    count start, as in its figure, by ours from at least a quarter of them.
     """
     counts = {(law, d): count_cycles(law, 1.0, d) for law in "WAF" for d in TRIED_DELAYS}
 
     def is_confirmed(delay: int, least: float) -> bool:
-        wall, a, f = (counts[law, delay] for law in "WAF")
-        return wall.cycles == 0 and min(a.cycles, f.cycles) >= least
+        textured = min(counts["A", delay].cycles, counts["F", delay].cycles)
+        return counts["W", delay].cycles == 0 and textured >= least
 
     starts = counts["W", 0].starts
     summary = "; ".join(
@@ -72,9 +72,9 @@ def textured_walls_cycle() -> claim.Check:
         ]
     )
     numbers: dict[str, claim.Number] = {}
-    for (law, d), one in counts.items():
-        numbers[f"{law}, lag {d}: cycles"] = float(one.cycles)
-        numbers[f"{law}, lag {d}: calms down slowly"] = float(one.slow)
+    for (law, d), count in counts.items():
+        numbers[f"{law}, lag {d}: cycles"] = float(count.cycles)
+        numbers[f"{law}, lag {d}: calms down slowly"] = float(count.slow)
     return check_over_assumptions(
         f"of {starts} starts cycle for good at {summary}",
         [is_confirmed(d, 1.0) for d in TRIED_DELAYS],
@@ -94,24 +94,24 @@ def divided_walls_settle() -> claim.Check:
         for d in TRIED_DELAYS
         if count_cycles(law, 1.0, d).cycles
     ]
-    cycling = sum([one.cycles for one in counts])
-    starts = sum([one.starts for one in counts])
-    lags = ", ".join([f"{one.wall} at {one.delay}" for one in counts])
+    cycling = sum([count.cycles for count in counts])
+    starts = sum([count.starts for count in counts])
+    lags = ", ".join([f"{count.wall} at {count.delay}" for count in counts])
     summary = f"where the undivided cycle (lags: {lags}), {cycling} of {starts} starts cycle"
-    numbers = {f"{one.wall}, lag {one.delay}": float(one.cycles) for one in counts}
-    settles = [one.cycles == 0 for one in counts]
+    numbers = {f"{count.wall}, lag {count.delay}": float(count.cycles) for count in counts}
+    settles = [count.cycles == 0 for count in counts]
     return check_over_assumptions(summary, settles, settles, numbers)
 
 
 def _stroke_numbers(strokes: tuple[Stroke, ...]) -> dict[str, float]:
     numbers = {}
-    for number, one in enumerate(strokes, start=1):
-        where = f"{one.law} {number}, {one.speed:g} m/s"
-        numbers[f"{where}: x [J]"] = one.energy[0]
-        numbers[f"{where}: z [J]"] = one.energy[2]
-        numbers[f"{where}: field [J]"] = one.field
-        numbers[f"{where}: the paper's sum along x [J]"] = one.same_sample[0]
-        numbers[f"{where}: the paper's sum along z [J]"] = one.same_sample[2]
+    for number, stroke in enumerate(strokes, start=1):
+        where = f"{stroke.law} {number}, {stroke.speed:g} m/s"
+        numbers[f"{where}: x [J]"] = stroke.energy[0]
+        numbers[f"{where}: z [J]"] = stroke.energy[2]
+        numbers[f"{where}: field [J]"] = stroke.field
+        numbers[f"{where}: the paper's sum along x [J]"] = stroke.same_sample[0]
+        numbers[f"{where}: the paper's sum along z [J]"] = stroke.same_sample[2]
     return numbers
 
 
@@ -131,24 +131,26 @@ def _check_strokes(
 ) -> claim.Check:
     """Check the energies along x and z of all hands and speeds by both measures."""
     strokes = _simulated_strokes(law)
-    paper = [(1e3 * one.same_sample[0], 1e3 * one.same_sample[2]) for one in strokes]  # [mJ]
-    exact = [(1e3 * one.energy[0], 1e3 * one.energy[2]) for one in strokes]
+    paper = [
+        (1e3 * stroke.same_sample[0], 1e3 * stroke.same_sample[2]) for stroke in strokes
+    ]  # [mJ]
+    exact = [(1e3 * stroke.energy[0], 1e3 * stroke.energy[2]) for stroke in strokes]
     return check_over_assumptions(
         f"the paper's sum {_format_ranges(paper)}; exact ledger {_format_ranges(exact)}"
         f"{format_field(strokes)}",
-        [predicate(*one) for one in paper],
-        [predicate(*one) for one in exact],
+        [predicate(*energies) for energies in paper],
+        [predicate(*energies) for energies in exact],
         _stroke_numbers(strokes),
     )
 
 
 def _format_gain_count(strokes: Sequence[Stroke]) -> str:
-    count = sum([one.gains_energy for one in strokes])
+    count = sum([stroke.gains_energy for stroke in strokes])
     return f"; its field supplies energy in {count} of {len(strokes)}"
 
 
 def _format_greatest_supply(strokes: Sequence[Stroke]) -> str:
-    field = max([abs(1e3 * one.field) for one in strokes])
+    field = max([abs(1e3 * stroke.field) for stroke in strokes])
     return f"; its field supplies at most {field:.2g} mJ, the rest is sampling"
 
 
@@ -157,9 +159,9 @@ def decrease_indicates_supply() -> claim.Check:
 
     Checked with strokes in which the balance of the whole loop shows a supply.
     """
-    strokes = [one for law in "AE" for one in _simulated_strokes(law) if one.total > 0.0]
-    rising = sum([sum(one.same_sample) > 0.0 for one in strokes])
-    closure = max([one.closure for one in strokes])
+    strokes = [stroke for law in "AE" for stroke in _simulated_strokes(law) if stroke.total > 0.0]
+    rising = sum([sum(stroke.same_sample) > 0.0 for stroke in strokes])
+    closure = max([stroke.closure for stroke in strokes])
     return claim.check_statement(
         f"of {len(strokes)} strokes in which A and E supply energy to the hand, by a balance of "
         f"all energies that closes within {closure:.0e}",
@@ -218,28 +220,28 @@ def law_a_loses_contact() -> claim.Check:
 def law_d_is_balanced() -> claim.Check:
     """On a 20 mm bump D keeps its energy in balance (Fig. 7)."""
     bumps = _simulated_bumps("D")
-    gains = [one.total for one in _simulated_bumps("A")]
+    gains = [run.total for run in _simulated_bumps("A")]
     summary = "; ".join(
         [
-            f"{one.entry}: {1e3 * one.total:+.3g} mJ against {1e3 * gain:+.3g} of A, up to "
-            f"{1e3 * one.top:.0f} mm high"
-            for one, gain in zip(bumps, gains, strict=True)
+            f"{run.entry}: {1e3 * run.total:+.3g} mJ against {1e3 * gain:+.3g} of A, up to "
+            f"{1e3 * run.top:.0f} mm high"
+            for run, gain in zip(bumps, gains, strict=True)
         ]
     )
     balanced = [
-        abs(one.total) <= MARGINAL_SHARE * gain for one, gain in zip(bumps, gains, strict=True)
+        abs(run.total) <= MARGINAL_SHARE * gain for run, gain in zip(bumps, gains, strict=True)
     ]
     return check_over_assumptions(f"{summary} of 20", balanced, balanced, _bump_numbers(bumps))
 
 
 def _bump_numbers(bumps: tuple[BumpRun, ...]) -> dict[str, float]:
     numbers = {}
-    for one in bumps:
-        numbers[f"{one.entry}: energy [J]"] = one.total
-        numbers[f"{one.entry}: in 20 ms [J]"] = one.jump
-        numbers[f"{one.entry}: contact lost"] = float(one.lost)
-        numbers[f"{one.entry}: highest [m]"] = one.top
-        numbers[f"{one.entry}: ledger does not close by"] = one.closure
+    for run in bumps:
+        numbers[f"{run.entry}: energy [J]"] = run.total
+        numbers[f"{run.entry}: in 20 ms [J]"] = run.jump
+        numbers[f"{run.entry}: contact lost"] = float(run.lost)
+        numbers[f"{run.entry}: highest [m]"] = run.top
+        numbers[f"{run.entry}: ledger does not close by"] = run.closure
     return numbers
 
 
@@ -249,21 +251,23 @@ def divided_walls_are_passive() -> claim.Check:
     κ₀ is the smooth wall's own onset of limit cycles in V.A's loop, q that of the depth reached.
     """
     onsets = {
-        one.onset.law: one for one in passivity_onsets(ALL_LAWS, (0,), STARTS) if one.wall_rule
+        onset.onset.law: onset
+        for onset in passivity_onsets(ALL_LAWS, (0,), STARTS)
+        if onset.wall_rule
     }
     wall = onsets["W"].onset.quiet
-    textured = {law: one for law, one in onsets.items() if law in PAPER_LAWS}
-    violating = {law: one for law, one in textured.items() if one.violates_wall_rule}
+    textured = {law: onset for law, onset in onsets.items() if law in PAPER_LAWS}
+    violating = {law: onset for law, onset in textured.items() if onset.violates_wall_rule}
     summary = ", ".join(
         [
-            f"{law} from {one.onset.cycling:.0f} N/m on, where κ₀/q is {one.wall_rule:.0f}"
-            for law, one in violating.items()
+            f"{law} from {onset.onset.cycling:.0f} N/m on, where κ₀/q is {onset.wall_rule:.0f}"
+            for law, onset in violating.items()
         ]
     )
     numbers: dict[str, claim.Number] = {"W: quiet to [N/m]": wall}
-    for law, one in textured.items():
-        numbers[f"{law}: cycles at [N/m]"] = one.onset.cycling
-        numbers[f"{law}: κ₀/q [N/m]"] = one.wall_rule or 0.0
+    for law, onset in textured.items():
+        numbers[f"{law}: cycles at [N/m]"] = onset.onset.cycling
+        numbers[f"{law}: κ₀/q [N/m]"] = onset.wall_rule or 0.0
     return claim.check_statement(
         f"without lag W is quiet to {wall:.0f} N/m; of {', '.join(textured)} cycle below κ₀/q: "
         f"{summary or 'none'}; D has no finite q there",

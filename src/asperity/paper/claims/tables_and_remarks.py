@@ -161,20 +161,13 @@ def _least_bound_ratio() -> float:
     return least
 
 
-_CLAMPS = ("none", "lateral", "whole")
-
-
 def remark_3() -> claim.Check:
     """Limiting the depth that the lateral force uses bounds the numbers of B, C, F and G."""
-    growth, lateral, whole = (
-        {
-            law: _max_norm_at_depth(law, clamp, 50.0) / _max_norm_at_depth(law, "none", 1.0)
-            for law in "BCFG"
-        }
-        for clamp in _CLAMPS
-    )
-    held = [SCANNING.surface("C", clamp=clamp, max_depth=0.1e-3) for clamp in _CLAMPS[1:]]
-    lateral_loop, whole_loop = (loop_work(one, SCANNING.groove_path()) for one in held)
+    growth = _growth_with_depth("none")
+    lateral = _growth_with_depth("lateral")
+    whole = _growth_with_depth("whole")
+    lateral_loop = _clamped_loop_work("lateral")
+    whole_loop = _clamped_loop_work("whole")
     bounded = "".join([law for law, ratio in lateral.items() if ratio <= 1.0 + 1e-6])
     return claim.combine_checks(
         claim.check_statement(
@@ -193,12 +186,24 @@ def remark_3() -> claim.Check:
     )
 
 
+def _growth_with_depth(clamp: str) -> dict[str, float]:
+    """Return by which factor the norms of laws grow at 50 times the depth."""
+    return {
+        law: _max_norm_at_depth(law, clamp, 50.0) / _max_norm_at_depth(law, "none", 1.0)
+        for law in "BCFG"
+    }
+
+
+def _clamped_loop_work(clamp: str) -> float:
+    surface = SCANNING.surface("C", clamp=clamp, max_depth=0.1e-3)
+    return loop_work(surface, SCANNING.groove_path())
+
+
 def unbounded_friction() -> claim.Check:
     """The gain of F grows with the depth without bound; clamping p^z bounds it."""
-    free, clamped = (
-        [_max_norm_at_depth("F", clamp, factor) / 1000.0 for factor in (1.0, 10.0, 1000.0)]
-        for clamp in _CLAMPS[:2]
-    )
+    factors = (1.0, 10.0, 1000.0)
+    free = [_max_norm_at_depth("F", "none", factor) / 1000.0 for factor in factors]
+    clamped = [_max_norm_at_depth("F", "lateral", factor) / 1000.0 for factor in factors]
     return claim.check_statement(
         "‖J_F‖/κ₀ at 1, 10, 1000 times the depth: "
         + ", ".join([f"{v:.3g}" for v in free])
