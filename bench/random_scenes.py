@@ -23,7 +23,7 @@ from rich.progress import track
 
 from asperity.analysis import characteristic_number, one_sided_number
 from asperity.analysis.energy.leak import worst_loop
-from asperity.analysis.passivity.assess_passivity import passivity
+from asperity.analysis.passivity.verdict import passivity
 from asperity.core.checks import FloatArray
 from asperity.devices import parse_device
 from asperity.simulation import Cartesian, Run, Servo, SpringHand, Stationary, simulate_many

@@ -19,8 +19,8 @@ from rich.progress import track
 
 from asperity.analysis import characteristic_number, one_sided_number
 from asperity.analysis.energy.leak import worst_loop
-from asperity.analysis.passivity.assess_passivity import passivity
 from asperity.analysis.passivity.criteria import DELAY, QUANTIZATION
+from asperity.analysis.passivity.verdict import passivity
 from asperity.devices import parse_device
 from asperity.simulation import Cartesian, Run, Servo, SpringHand, Stationary, simulate_many
 from asperity.surface import Surface

@@ -22,8 +22,8 @@ from rich.table import Table
 
 from asperity.analysis import characteristic_number, one_sided_number
 from asperity.analysis.energy.leak import worst_loop
-from asperity.analysis.passivity.assess_passivity import passivity
-from asperity.analysis.passivity.verdict import recommend_stiffness
+from asperity.analysis.passivity.recommended_stiffness import recommend_stiffness
+from asperity.analysis.passivity.verdict import passivity
 from asperity.devices import Device, parse_device
 from asperity.scene.sweeps import map_threads
 from bench.margins import RandomLoop, admissible_loops, has_start, lasting_motion

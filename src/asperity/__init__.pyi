@@ -11,7 +11,7 @@ from asperity.analysis import one_sided_number as one_sided_number
 from asperity.analysis import worst_loop as worst_loop
 from asperity.analysis.energy.field_energy import SplitState as SplitState
 from asperity.analysis.energy.field_energy import split_state as split_state
-from asperity.analysis.passivity.assess_passivity import passivity as passivity
+from asperity.analysis.passivity.verdict import passivity as passivity
 from asperity.analysis.results.analyze import Analysis as Analysis
 from asperity.analysis.results.analyze import analyze as analyze
 from asperity.analysis.results.check_limits import Limits as Limits

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 import asperity as asp
-from asperity.analysis.limits.perceptibility_sentences import texture_amount_text
-from asperity.analysis.passivity.assess_passivity import stiffness_limit_text
 from asperity.core.errors import ParameterError
 from asperity.core.units import format_quantity
 from asperity.devices import parse_device
 from asperity.laws import Law
 from asperity.report.pages.comparison_columns import FULL_COLUMNS, SUMMARY_COLUMNS, comparison_table
+from asperity.report.sentences.limit_sentences import texture_amount_text
 from asperity.report.sentences.number_text import limit_text
+from asperity.report.sentences.passivity_sentences import stiffness_limit_text
 
 PAPER = asp.Sinusoid(amplitude=0.8e-3, period=1e-3)
 

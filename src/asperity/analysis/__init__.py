@@ -9,8 +9,8 @@ from asperity.analysis.gain.characteristic import (
     curl_number,
     one_sided_number,
 )
-from asperity.analysis.passivity.assess_passivity import Passivity
 from asperity.analysis.passivity.criteria import Criterion
+from asperity.analysis.passivity.verdict import Passivity
 from asperity.analysis.results.compare import Comparison, compare
 from asperity.analysis.results.recommendation import LawRow
 

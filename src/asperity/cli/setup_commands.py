@@ -198,7 +198,7 @@ def calibrate_command(
     not touch the handle. Keep a hand near the power or force switch. Ctrl-C releases the force, and
     nothing is written. Read docs/howto/safety.md before using a real device.
     """
-    from asperity.analysis.passivity.verdict import unit_starts
+    from asperity.analysis.passivity.recommended_stiffness import unit_starts
     from asperity.devices import load_device
     from asperity.devices.device_file import to_device_toml
     from asperity.servo.calibration.calibrator import Calibrator

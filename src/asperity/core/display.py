@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, overload
 
 from asperity.core.errors import ParameterError
 from asperity.core.files import write_bytes
@@ -24,6 +24,45 @@ def set_renderer(load: Callable[[], Any]) -> None:
     """Set the function that loads the renderer of results; see :mod:`asperity.report`."""
     global _load_renderer  # noqa: PLW0603  # set once, when the package is imported
     _load_renderer = load
+
+
+def describe(value: object, name: str) -> Any:
+    """Return a text about a result, which the report makes (:mod:`asperity.report.sentences`).
+
+    Args:
+        value: the result.
+        name: name of the text.
+    """
+    return _load_renderer().describe(value, name)
+
+
+T = TypeVar("T")
+
+
+class Text(Generic[T]):
+    """An attribute of a result that is text: the report makes it of the result at the first use.
+
+    Args:
+        doc: what the text says.
+    """
+
+    def __init__(self, doc: str) -> None:
+        self.__doc__ = doc
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    @overload
+    def __get__(self, instance: None, owner: type) -> Text[T]: ...
+    @overload
+    def __get__(self, instance: object, owner: type) -> T: ...
+    def __get__(self, instance: object | None, owner: type) -> Text[T] | T:
+        if instance is None:
+            return self
+        text: T = describe(instance, self._name)
+        # Not a field: it is found before this descriptor from now on.
+        instance.__dict__[self._name] = text
+        return text
 
 
 class Displayable:

@@ -12,16 +12,13 @@ import numpy as np
 
 from asperity.analysis.gain.characteristic import is_shipped_law
 from asperity.analysis.limits.limit_rules import LIMIT_RULES, shortest_wavelengths
-from asperity.analysis.limits.perceptibility_sentences import speed_text
 from asperity.analysis.limits.spectrum import MIN_SHARE, Wave, compute_spectrum
-from asperity.analysis.results.compare import DEFAULT_DEVICE, Progress, missing_data_hint
-from asperity.analysis.surface_sentences import law_parameter_sentences, unverified_sentences
+from asperity.analysis.results.compare import DEFAULT_DEVICE, Progress, lacks_data
 from asperity.core.checks import check_array, check_items
-from asperity.core.display import Plottable, Reportable, Tabular
+from asperity.core.display import Plottable, Reportable, Tabular, Text
 from asperity.core.errors import ParameterError
 from asperity.core.files import Serializable, to_plain_data
 from asperity.core.processes import precompute
-from asperity.core.units import format_quantity
 from asperity.devices import Device, DeviceLike, load_device
 from asperity.devices.device import USER_SOURCE
 from asperity.envelopes.wave_borders import (
@@ -32,7 +29,6 @@ from asperity.envelopes.wave_borders import (
     make_conditions,
 )
 from asperity.laws import REGISTERED_LAWS, Law, distribute_parameters, find_laws
-from asperity.perception.grip import grip_text
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
 from asperity.textures.catalogue import TextureLike, as_texture
@@ -42,7 +38,7 @@ LISTED = (0.5e-3, 1e-3, 2e-3, 5e-3, 10e-3)
 """Wavelengths of the tables [m]."""
 WAVELENGTHS = tuple(sorted({*np.geomspace(0.05e-3, 20e-3, 54).tolist(), *LISTED}))
 """Wavelengths of an envelope by default [m]."""
-_GENTLE_WAVE = Sinusoid(1e-5, 1e-3)
+GENTLE_WAVE = Sinusoid(1e-5, 1e-3)
 _MAX_PEAKS = 8
 _EDGE = 1.0 + 1e-6
 """A wave is resolved if it is longer than a limit of the device, not if it is as long."""
@@ -142,13 +138,12 @@ class Envelope(Plottable, Reportable, Tabular):
         devices: one envelope per device.
         conditions: what rendering means: speed, least stiffness, hand.
         surfaces: peaks of measured surfaces.
-        assumptions: assumptions, in sentences.
     """
 
     devices: tuple[DeviceEnvelope, ...]
     conditions: RenderConditions
     surfaces: tuple[SurfacePeaks, ...]
-    assumptions: tuple[str, ...]
+    assumptions = Text[tuple[str, ...]]("Assumptions, in sentences.")
 
     def __getitem__(self, device: str) -> DeviceEnvelope:
         """Return the envelope of a device by its id."""
@@ -244,7 +239,7 @@ def envelope(
     peaks = tuple(
         _locate_peaks(name, compute_spectrum(texture).waves, regions) for name, texture in textures
     )
-    return Envelope(regions, checked, peaks, _assumptions(regions, checked, peaks))
+    return Envelope(regions, checked, peaks)
 
 
 def _device_envelope(laws: Sequence[LawEnvelope]) -> DeviceEnvelope:
@@ -266,7 +261,7 @@ def _check_wavelengths(wavelengths: Sequence[float]) -> tuple[float, ...]:
 def textured_laws() -> tuple[Law, ...]:
     """Return the registered laws whose force depends on the texture."""
     return tuple(
-        law for law in REGISTERED_LAWS.values() if Surface(_GENTLE_WAVE, law).depends_on_texture
+        law for law in REGISTERED_LAWS.values() if Surface(GENTLE_WAVE, law).depends_on_texture
     )
 
 
@@ -284,8 +279,10 @@ def make_cases(
     """
     devices = [load_device(one) for one in check_items("device", device)]
     for one in devices:
-        if hint := missing_data_hint(one):
-            raise ParameterError("device", f"{one.id} needs max_stiffness: add {hint} to its file")
+        if lacks_data(one):
+            raise ParameterError(
+                "device", f'{one.id} needs max_stiffness: add max_stiffness = "... N/m" to its file'
+            )
     if len({one.id for one in devices}) < len(devices):
         raise ParameterError("device", "names one device twice", [one.id for one in devices])
     chosen = textured_laws() if laws is None else find_laws(laws)
@@ -327,7 +324,7 @@ def _compute(
     results = []
     with precompute(compute_task, shared) as precomputed:
         for (case, wavelengths), computed in zip(tasks, precomputed, strict=True):
-            surface = Surface(_GENTLE_WAVE, case.law)
+            surface = Surface(GENTLE_WAVE, case.law)
             letter = surface.law.letter
             is_conservative = surface.facts.conservative
             if progress is not None:
@@ -362,36 +359,3 @@ def _locate_peaks(
         for one in regions
     )
     return SurfacePeaks(name, tuple(peaks), rendered)
-
-
-_USED_FIELDS = tuple(rule.device_field for rule in LIMIT_RULES[:2] + LIMIT_RULES[3:])
-_USED_FIELDS += ("apparent_mass", "damping", "friction")
-
-
-def _assumptions(
-    regions: Sequence[DeviceEnvelope], conditions: RenderConditions, peaks: Sequence[SurfacePeaks]
-) -> tuple[str, ...]:
-    depth = conditions.max_depth and format_quantity(conditions.max_depth, "m")
-    sentences = [
-        f"Sinusoids, pressed to {depth or 'their peak-to-valley height, at most 1 mm'}, scanned at "
-        f"{speed_text(conditions.speed)} at constant height",
-        f"Hand: {grip_text(conditions.grip)}",
-    ]
-    for one in regions:
-        name = one.device.name
-        words = unverified_sentences(one.device, _USED_FIELDS)
-        sentences += [text if name in text else f"{name}: {text}" for text in words]
-    for law in regions[0].laws:
-        parts = law_parameter_sentences(law.case.surface(_GENTLE_WAVE))
-        sentences += [f"{text} for law {law.letter}" for text in parts]
-    if any(not law.conservative for one in regions for law in one.laws):
-        sentences.append(
-            "A law with curl has the wall's gain K₀/q as its limit: it delivers energy below a "
-            "speed v* at any stiffness, and feels alive"
-        )
-    if peaks:
-        sentences.append(
-            "Points of a surface are its greatest waves, each taken alone; the waves of a surface "
-            "act together: compare decides about the whole surface"
-        )
-    return tuple(sentences)

@@ -25,7 +25,10 @@ from asperity.analysis.limits.limit_rules import (
     LEAST_SAMPLES,
     check_sample_count,
 )
-from asperity.analysis.passivity.verdict import StiffnessRecommendation, recommend_stiffness
+from asperity.analysis.passivity.recommended_stiffness import (
+    StiffnessRecommendation,
+    recommend_stiffness,
+)
 from asperity.core.arguments import FIELD, SEARCH
 from asperity.core.cache import bypass_results
 from asperity.core.checks import check_keywords, check_positive

@@ -15,7 +15,7 @@ import numpy as np
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.results.analyze import Analysis, Progress, analyze
 from asperity.analysis.results.compare import DEFAULT_DEVICE
-from asperity.analysis.surface_sentences import depth_range_text, leak_energy_text
+from asperity.core.display import describe
 from asperity.core.files import check_not_existing
 from asperity.core.units import format_quantity
 from asperity.core.version import __version__
@@ -170,11 +170,11 @@ def _facts(analysis: Analysis) -> list[str]:
         "place": _format_extent(surface.texture),
         "device": analysis.device.name,
         "stiffness": f"k = {format_quantity(surface.stiffness, 'N/m')}{parameters}",
-        "region": f"{surface.texture.domain.description}, {depth_range_text(surface)}",
+        "region": f"{surface.texture.domain.description}, {describe(surface, 'depth_range')}",
         "clamp": _format_clamp(analysis),
         "q": _format_bound(analysis.q),
         "q+": _format_bound(analysis.one_sided),
-        "leak": f"{leak_energy_text(analysis.leak)} ({analysis.leak.method})",
+        "leak": f"{analysis.leak.energy_text} ({analysis.leak.method})",
     }
     lines = []
     for name, value in rows.items():

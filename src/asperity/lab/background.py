@@ -15,7 +15,7 @@ from typing import Any, Self
 import numpy as np
 
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
-from asperity.analysis.passivity.verdict import recommend_stiffness
+from asperity.analysis.passivity.recommended_stiffness import recommend_stiffness
 from asperity.core.checks import FloatArray
 from asperity.core.errors import AsperityError
 from asperity.core.processes import make_pool
@@ -93,8 +93,7 @@ def compute_limit(surface: Surface, device: Device) -> dict[str, Any]:
     """Return the stability limit of the stiffness of a surface on a device, with its criterion.
 
     ``stiffness`` is in N/m, or ``None`` if no limit is known; ``criterion`` and ``basis`` are those
-    of :class:`~asperity.analysis.passivity.verdict.StabilityLimit`; ``q`` is the characteristic
-    number, ``one_sided`` the one-sided number.
+    of the stability limit; ``q`` is the characteristic number, ``one_sided`` the one-sided number.
     """
     try:
         q = characteristic_number(surface)
@@ -122,9 +121,8 @@ def compute_recommendation(
     amount of texture, and ``grip`` the assumed hand.
     """
     # Imported by the worker process alone: the server starts sooner.
-    from asperity.analysis.limits.perceptibility_sentences import texture_amount_text
     from asperity.analysis.results.compare import compare
-    from asperity.perception.grip import grip_text
+    from asperity.report.sentences.limit_sentences import grip_text, texture_amount_text
 
     laws = tuple(REGISTERED_LAWS.values())
     is_default = max_depth == default_max_depth(texture)

@@ -16,7 +16,7 @@ import numpy as np
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError, suggest_names
 from asperity.core.files import Serializable, read_toml
-from asperity.core.units import format_quantity, parse_quantity
+from asperity.core.units import parse_quantity
 
 DEFAULT_GRIP = "pen-grip"
 _FOLDER = Path(__file__).parent / "grips"
@@ -181,14 +181,3 @@ def _parse_points(points: Sequence[Mapping[str, Any]], source: str) -> dict[str,
     except (KeyError, TypeError):
         needs = ", ".join(_POINT_UNITS)
         raise ParameterError("grip", f"{source}: each threshold needs {needs}") from None
-
-
-def grip_text(grip: Grip) -> str:
-    """Return the impedance of a grip for reading.
-
-    Example:
-        >>> grip_text(load_grip("pen-grip"))
-        'tool held like a pen (200 N/m, 2 N·s/m)'
-    """
-    numbers = f"{format_quantity(grip.stiffness, 'N/m')}, {grip.damping:g} N·s/m"
-    return f"{grip.name} ({numbers})"

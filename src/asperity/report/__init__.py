@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from rich.console import RenderableType
 
 from asperity.analysis.bounds.bound import Bound
-from asperity.analysis.passivity.assess_passivity import Passivity
+from asperity.analysis.passivity.verdict import Passivity
 from asperity.analysis.results.analyze import Analysis
 from asperity.analysis.results.check_limits import Limits
 from asperity.analysis.results.compare import Comparison
@@ -31,6 +31,7 @@ from asperity.report.pages.comparison_report import comparison_page, comparisons
 from asperity.report.pages.device_report import device_page
 from asperity.report.pages.limits_report import envelope_page, limits_page
 from asperity.report.pages.measured_report import surface_summary_page
+from asperity.report.sentences.catalogue import describe as describe
 from asperity.report.sentences.number_text import interval_text, readable_name, witness_text
 from asperity.report.sentences.surface_text import describe_texture
 from asperity.surface import Surface
@@ -39,7 +40,7 @@ from asperity.textures.texture import Texture
 if TYPE_CHECKING:
     from asperity.report.pictures.plotting import plot as plot
 
-__all__ = ["comparison_table", "html_text", "notebook_html", "plot", "rich_renderables"]
+__all__ = ["comparison_table", "describe", "html_text", "notebook_html", "plot", "rich_renderables"]
 
 
 def __getattr__(name: str) -> Any:

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from asperity.analysis.results.compare import DEFAULT_DEVICE
-from asperity.analysis.surface_sentences import law_parameter_sentences
 from asperity.core.arguments import FIELD, parse_arguments
+from asperity.core.display import describe
 from asperity.core.errors import ParameterError
 from asperity.core.files import OMITTED, attributes_to_dict, to_plain_data
 from asperity.core.units import format_quantity
@@ -201,9 +201,9 @@ def make_setup(
         servo = replace(servo, velocity_share=share)
     span, default = _resolve_duration(duration, run.pop("duration", None), motion)
     whole = _make_surface(scene.texture, merged, laws)
-    notes += [] if laws else law_parameter_sentences(whole)
+    notes += [] if laws else describe(whole, "law_parameters")
     for law in laws:
-        parameters = law_parameter_sentences(whole.to_law(law))
+        parameters = describe(whole.to_law(law), "law_parameters")
         notes += [f"{parameter} for law {law.letter}" for parameter in parameters]
     return Setup(
         whole, chosen, plant, hand, servo, motion, span,

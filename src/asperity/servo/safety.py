@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
-from asperity.analysis.passivity.verdict import recommend_stiffness
+from asperity.analysis.passivity.recommended_stiffness import recommend_stiffness
 from asperity.core.arguments import read_arguments
 from asperity.core.errors import ParameterError
 from asperity.core.files import Serializable

@@ -14,7 +14,7 @@ from asperity.analysis.bounds.bound import CURL, NORM, ONE_SIDED
 from asperity.analysis.energy.continuity import continuity
 from asperity.analysis.energy.leak import worst_loop
 from asperity.analysis.gain import characteristic
-from asperity.analysis.passivity.assess_passivity import passivity
+from asperity.analysis.passivity.verdict import passivity
 from asperity.derive.facts import law_facts
 from asperity.devices import parse_device
 from asperity.laws import LAWS, Law

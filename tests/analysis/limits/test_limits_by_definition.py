@@ -25,13 +25,13 @@ from asperity.analysis.limits.perceptibility import (
     classify_perceptibility,
     respond,
 )
-from asperity.analysis.limits.perceptibility_sentences import unverified_text
 from asperity.analysis.limits.spectrum import Spectrum, Wave
-from asperity.analysis.passivity.verdict import StabilityLimit
+from asperity.analysis.passivity.recommended_stiffness import StabilityLimit
 from asperity.analysis.results import check_limits
 from asperity.core.errors import ParameterError
 from asperity.devices import parse_device
 from asperity.perception.grip import Grip
+from asperity.report.sentences.limit_sentences import unverified_text
 from asperity.surface import Surface
 from asperity.textures import Fourier, Profile, Sinusoid
 from asperity.textures.texture import TexturePart
@@ -146,7 +146,7 @@ def test_waves_with_significant_height_or_force_are_reported() -> None:
     """The threshold is 0.1 % of either; exact sums keep all waves; each wave has each limit."""
     low = 0.9e-3
     waves = tuple(Wave(float(n), 0.1 * n, share) for n, share in ((3, low), (2, 1e-3), (1, low)))
-    bands, exact = Spectrum(waves, False, ""), Spectrum(waves, True, "")
+    bands, exact = Spectrum(waves, exact=False), Spectrum(waves, exact=True)
     forces = np.array([1.0, 0.0, math.sqrt(1e-3)])
     assert check_limits._significant_waves(bands, forces).tolist() == [True, True, False]
     assert (

@@ -12,12 +12,6 @@ import pytest
 
 from asperity.analysis.energy.scan import merit
 from asperity.analysis.limits.perceptibility import Perceptibility, Remedy, assess_perceptibility
-from asperity.analysis.limits.perceptibility_sentences import (
-    form_removal_sentences,
-    masking_text,
-    remedies_text,
-    texture_amount_text,
-)
 from asperity.analysis.results.check_limits import limits
 from asperity.analysis.results.compare import compare
 from asperity.core.checks import FloatArray
@@ -25,6 +19,12 @@ from asperity.core.errors import ParameterError
 from asperity.devices import Device, device_names, load_device, parse_device
 from asperity.devices.device import Datum
 from asperity.perception.grip import Grip, load_grip
+from asperity.report.sentences.limit_sentences import (
+    form_removal_sentences,
+    masking_text,
+    remedies_text,
+    texture_amount_text,
+)
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Sinusoid
 from asperity.textures.catalogue import as_texture

@@ -136,7 +136,7 @@ def test_each_band_has_its_own_force_ratio(periodic: bool) -> None:
     surface = Surface(texture, "C", stiffness=500.0, max_depth=1e-4)
     assert scan_height(surface) == pytest.approx(height, rel=1e-2)
     lengths = np.array([256, 128, 50, 38, 16, 11]) * 5e-6
-    bands = Spectrum(tuple(Wave(float(length), 1.0, 0.1) for length in lengths), False, "given")
+    bands = Spectrum(tuple(Wave(float(length), 1.0, 0.1) for length in lengths), exact=False)
     resolved_lengths = lengths[[1, 1, 1, 4, 4, 4]]
     expected = 500.0 * np.hypot(1.0, height * 2 * np.pi / resolved_lengths)
     np.testing.assert_allclose(wave_forces(surface, bands), expected, rtol=0.05)

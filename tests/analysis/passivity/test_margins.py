@@ -20,14 +20,14 @@ from bench.margins import (
 )
 
 from asperity.analysis import characteristic_number, one_sided_number, worst_loop
-from asperity.analysis.passivity.assess_passivity import passivity
-from asperity.analysis.passivity.verdict import (
+from asperity.analysis.passivity.recommended_stiffness import (
     NO_MARGIN,
     StabilityLimit,
     load_margins,
     safety_margin,
     unit_starts,
 )
+from asperity.analysis.passivity.verdict import passivity
 from asperity.devices import parse_device
 from asperity.laws import LAWS, Law, find_law
 from asperity.surface import Surface

@@ -15,11 +15,11 @@ from hypothesis import strategies as st
 
 from asperity.analysis import characteristic_number, loop_work, one_sided_number
 from asperity.analysis.bounds.bound import Bound
-from asperity.analysis.energy.leak import Leak, worst_loop
+from asperity.analysis.energy.leak import Leak, LoopKind, LoopOrigin, worst_loop
 from asperity.analysis.passivity import criteria
-from asperity.analysis.passivity.assess_passivity import Passivity, passivity
 from asperity.analysis.passivity.criteria import Criterion
 from asperity.analysis.passivity.device_loop import make_device_loop
+from asperity.analysis.passivity.verdict import Passivity, passivity
 from asperity.core.errors import ParameterError
 from asperity.derive.facts import law_facts
 from asperity.devices import Datum, Device, parse_device
@@ -48,8 +48,9 @@ def rectangle(surface: Surface) -> Leak:
     heights = -0.6 * surface.max_depth + 0.3 * surface.max_depth * np.array([-1.0, 1.0])
     corners = np.array([[*ends[i], heights[j]] for i, j in ((0, 0), (0, 1), (1, 1), (1, 0))])
     energy = loop_work(surface, corners)
+    origin = LoopOrigin(LoopKind.CURL_BY_DEPTH)
     vertices = corners if energy > 0.0 else np.ascontiguousarray(corners[::-1])
-    return Leak(abs(energy), math.inf, along, "sampled", "a rectangle", vertices, None)
+    return Leak(abs(energy), math.inf, along, "sampled", origin, vertices, None)
 
 
 def exact_bound(value: float) -> Bound:

@@ -34,7 +34,8 @@ from asperity.analysis.passivity.device_loop import (
     is_contradictory,
     max_proved_delay,
 )
-from asperity.analysis.passivity.verdict import Ground, StabilityLimit
+from asperity.analysis.passivity.recommended_stiffness import StabilityLimit
+from asperity.analysis.passivity.verdict import Ground
 from asperity.devices import Datum, Device, WallTest
 
 INF, HALF = math.inf, Fraction(1, 2)
@@ -55,7 +56,7 @@ def make_loop(stiffness: float = 1.0, **more: Any) -> DeviceLoop:
         "leak": None,
         "conservative": True,
         "obstacle": None,
-        "reason": "",
+        "continuity": None,
         "rate": Fraction(1),
         "damping": None,
         "virtual_damping": None,

@@ -17,7 +17,7 @@ from asperity.analysis import characteristic_number, loop_work, one_sided_number
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.field_energy import split_state
 from asperity.analysis.energy.leak import worst_loop
-from asperity.analysis.passivity.assess_passivity import Passivity, passivity
+from asperity.analysis.passivity.verdict import Passivity, passivity
 from asperity.devices import parse_device
 from asperity.surface import Surface
 from asperity.textures.kinds.fourier import Fourier

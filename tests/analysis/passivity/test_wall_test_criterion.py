@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.leak import worst_loop
-from asperity.analysis.passivity.assess_passivity import Passivity, passivity
+from asperity.analysis.passivity.verdict import Passivity, passivity
 from asperity.analysis.results.analyze import analyze
 from asperity.analysis.results.check_limits import limits
 from asperity.analysis.results.compare import compare

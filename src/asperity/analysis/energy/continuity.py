@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from enum import Enum, auto
 from functools import cached_property
 
 import numpy as np
@@ -14,12 +15,32 @@ from asperity.analysis.gain.characteristic import cached_result
 from asperity.analysis.gain.medial_axis import Crest, sharpest_crest
 from asperity.analysis.gain.theorems import theorem_on
 from asperity.core.checks import FloatArray
+from asperity.core.display import Text
 from asperity.core.files import Serializable
-from asperity.core.units import format_quantity, round_down, round_up
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
 
 Point = tuple[float, float, float]
+
+
+class ContinuityCause(Enum):
+    """Why the force is continuous, or not."""
+
+    JUMP_AT_CONTACT = auto()
+    """The formula does not vanish with the depth."""
+    SINGLE_VALUED = auto()
+    """Force and contact point change without jumps."""
+    DISTANCE = auto()
+    """The force depends on the distance to the surface alone."""
+    CURVATURE = auto()
+    """The bound of the second derivatives makes the nearest point unique."""
+    CRESTS = auto()
+    """The contact point jumps below crests."""
+    NOT_FOUND = auto()
+    """No medial axis was found down to max_depth."""
+    BLUNT_CRESTS = auto()
+    """It is proved that no crest is so sharp."""
+
 
 # Depths between the onset and max_depth at which a jump is located.
 JUMP_LEVELS = 8
@@ -58,31 +79,27 @@ class Continuity(Serializable):
 
     Attributes:
         continuous: whether the force is continuous.
-        cause: the reason, without the Lipschitz constant.
+        cause: the reason.
+        surface: the surface.
         lipschitz: Lipschitz constant k q [N/m] of a continuous force along straight paths inside
             the working region; ``None`` if the force jumps.
-        surface: the surface.
+        onset: depth [m] from which the contact point jumps below crests; 0 where that is not the
+            cause.
     """
 
     serialized_attributes = "continuous reason lipschitz jumps"
 
     continuous: bool
-    cause: str
+    cause: ContinuityCause
+    surface: Surface = field(repr=False, compare=False)
     lipschitz: Bound | None = None
-    surface: Surface | None = field(default=None, repr=False, compare=False)
-
-    @property
-    def reason(self) -> str:
-        """The reason, in one sentence."""
-        upper = math.inf if self.lipschitz is None else self.lipschitz.upper
-        if math.isinf(upper):
-            return self.cause
-        return f"{self.cause}; Lipschitz constant at most {round_up(upper):.10g} N/m"
+    onset: float = 0.0
+    reason = Text[str]("The reason, in one sentence.")
 
     @cached_property
     def jumps(self) -> tuple[Jump, ...]:
         """Jumps of the force, see :func:`find_jumps`; located on first access."""
-        if self.continuous or self.surface is None:
+        if self.continuous:
             return ()
         return find_jumps(self.surface)
 
@@ -110,12 +127,11 @@ def continuity(surface: Surface, q: Bound) -> Continuity:
     """
     facts = surface.facts
     if not facts.vanishes_at_contact:
-        text = "the force jumps where contact begins: its formula does not vanish with the depth"
-        return Continuity(False, text, surface=surface)
+        return Continuity(False, ContinuityCause.JUMP_AT_CONTACT, surface)
     if surface.law.contact.single_valued:
-        return _continuous_force(surface, q, "force and contact point change without jumps")
+        return _continuous_force(surface, q, ContinuityCause.SINGLE_VALUED)
     if not facts.depends_on_surface:
-        return _continuous_force(surface, q, "the distance to the surface never jumps")
+        return _continuous_force(surface, q, ContinuityCause.DISTANCE)
     return _nearest_continuity(surface, q)
 
 
@@ -126,19 +142,13 @@ def _nearest_continuity(surface: Surface, q: Bound) -> Continuity:
     """
     depth = surface.max_depth
     if depth * surface.texture.bounds[1] < 1.0:
-        reason = "the nearest point is unique down to 1/K, K >= ‖Hess h‖"
-        return _continuous_force(surface, q, reason)
+        return _continuous_force(surface, q, ContinuityCause.CURVATURE)
     key = repr((q.lower, q.upper, q.at))
     onset, proved = cached_result("onset of jumps", surface, lambda unit: _jump_onset(unit, q), key)
     if onset <= depth:
-        start = format_quantity(round_down(onset), "m")
-        reason = f"the contact point jumps below crests, at depths from {start}"
-        return Continuity(False, reason, surface=surface)
-    deepest = format_quantity(depth, "m")
-    reason = f"no medial axis found down to {deepest}; the force jumps below it"
-    if proved:
-        reason = f"no crest is so sharp that the nearest point jumps at {deepest}"
-    return _continuous_force(surface, q, reason)
+        return Continuity(False, ContinuityCause.CRESTS, surface, onset=onset)
+    cause = ContinuityCause.BLUNT_CRESTS if proved else ContinuityCause.NOT_FOUND
+    return _continuous_force(surface, q, cause)
 
 
 def _jump_onset(surface: Surface, q: Bound) -> tuple[float, bool]:
@@ -157,12 +167,12 @@ def _jump_onset(surface: Surface, q: Bound) -> tuple[float, bool]:
     return onset, proved
 
 
-def _continuous_force(surface: Surface, q: Bound, reason: str) -> Continuity:
+def _continuous_force(surface: Surface, q: Bound, cause: ContinuityCause) -> Continuity:
     k = surface.stiffness
     # One unit in the last place covers the rounding of the product.
     upper = math.nextafter(k * q.upper, math.inf)
     slope = replace(q, lower=k * q.lower, upper=upper, note=f"k q [N/m]; q: {q.note}")
-    return Continuity(True, reason, slope, surface)
+    return Continuity(True, cause, surface, slope)
 
 
 # --- jumps ----------------------------------------------------------------------------------------

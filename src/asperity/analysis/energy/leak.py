@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from enum import Enum, auto
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from asperity.analysis.energy.field_energy import initial_panels, integrate, loo
 from asperity.analysis.energy.scan import parallel_scan_lines, scan_height, scan_line_along
 from asperity.analysis.gain.characteristic import cached_result, is_shipped_law
 from asperity.core.checks import FloatArray, check_positive
+from asperity.core.display import Text
 from asperity.core.errors import InternalError
 from asperity.core.files import Serializable
 from asperity.surface import Surface
@@ -31,6 +33,42 @@ _DEPTH_BISECTIONS = 16
 _THRUST_STEPS = 512
 
 
+class LoopKind(Enum):
+    """What the worst loop is."""
+
+    EVERY_LOOP = auto()
+    """Every closed loop: a conservative law."""
+    NO_GAIN = auto()
+    """No evaluated loop gains energy."""
+    CURL_BY_DEPTH = auto()
+    """Around the region of one sign of the curl, down to a depth."""
+    CURL_BY_DISTANCE = auto()
+    """Around the region of one sign of the curl within a distance of the surface."""
+    FRICTION_PATH = auto()
+    """The paper's path of (27): along in light contact, back at depth."""
+    IN_PLANE = auto()
+    """In the plane at a depth, about an anchor that sticks."""
+
+
+@dataclass(frozen=True)
+class LoopOrigin:
+    """How the worst loop was found.
+
+    Attributes:
+        kind: what it is.
+        depth: depth or distance that bounds it [m].
+        starts: number of starting points of which it is the worst.
+        deflection: distance along in light contact [m].
+        lines: number of lines of which it is the worst.
+    """
+
+    kind: LoopKind
+    depth: float = 0.0
+    starts: int = 1
+    deflection: float = 0.0
+    lines: int = 1
+
+
 @dataclass(frozen=True)
 class Leak(Serializable):
     """The worst simple loop, traversed once, in a vertical plane along a scan line.
@@ -46,7 +84,7 @@ class Leak(Serializable):
             gain n times as much. Infinite without proof.
         line: the scan line of the plane.
         method: ``"theorem"`` (zero by proof), ``"certified"`` or ``"sampled"``.
-        description: the loop in words.
+        origin: how the loop was found.
         vertices: the loop as a closed polygon (n, 3) [m], empty if no loop gains energy;
             ``loop_work(surface, vertices)`` is ``energy``.
         thrust: mean tangential force on a straight scan along the line at the scan height [N],
@@ -62,9 +100,13 @@ class Leak(Serializable):
     upper_per_period: float
     line: ScanLine
     method: str
-    description: str
+    origin: LoopOrigin
     vertices: FloatArray
     thrust: float | None
+    description = Text[str]("The loop in words.")
+    energy_text = Text[str](
+        "The energy that it gains, per period or line length if that is proved."
+    )
 
     def __repr__(self) -> str:
         upper = f"at most {self.upper_per_period:.4g} J per period"
@@ -146,15 +188,13 @@ def _find_worst_loop(surface: Surface, line: ScanLine) -> Leak:
     if surface.law.stateful:
         return _stateful_leak(surface, line)
     if surface.facts.conservative:
-        text = "every closed loop: zero by the symbolic curl"
         thrust = 0.0 if line.periodic else None
-        return Leak(0.0, 0.0, line, "theorem", text, np.zeros((0, 3)), thrust)
+        origin = LoopOrigin(LoopKind.EVERY_LOOP)
+        return Leak(0.0, 0.0, line, "theorem", origin, np.zeros((0, 3)), thrust)
     lines = parallel_scan_lines(surface, line)
-    find = _column_leak if surface.law.contact.is_above_probe else _nearest_leak
-    leak = find(surface, lines)
-    if len(lines) > 1:
-        return replace(leak, description=f"{leak.description}, the worst of {len(lines)} lines")
-    return leak
+    if surface.law.contact.is_above_probe:
+        return _column_leak(surface, lines)
+    return _nearest_leak(surface, lines)
 
 
 def _column_leak(surface: Surface, lines: list[ScanLine]) -> Leak:
@@ -169,9 +209,9 @@ def _column_leak(surface: Surface, lines: list[ScanLine]) -> Leak:
     if energy > upper:
         _check_against_bound(surface, line, vertices, energy)
     method = "sampled" if bounds is None else "certified"
-    text = f"around the region of one sign of the curl, depth to {surface.clamped_depth * 1e3:g} mm"
+    origin = LoopOrigin(LoopKind.CURL_BY_DEPTH, surface.clamped_depth, lines=len(lines))
     thrust = _mean_thrust(surface, line)
-    return Leak(energy, max(upper, energy), line, method, text, vertices, thrust)
+    return Leak(energy, max(upper, energy), line, method, origin, vertices, thrust)
 
 
 def _check_against_bound(
@@ -219,12 +259,9 @@ def _nearest_leak(surface: Surface, lines: list[ScanLine]) -> Leak:
     outlines = [outline for line in lines for outline in _nearest_outlines(surface, line)]
     _estimate, polygon, line = max(outlines, key=lambda outline: outline[0])
     vertices, energy = orient_loop(surface, polygon, _NEAREST_TOLERANCE)
-    text = (
-        "around the region of one sign of the curl where the surface is nearer than "
-        f"{surface.max_depth * 1e3:g} mm"
-    )
+    origin = LoopOrigin(LoopKind.CURL_BY_DISTANCE, surface.max_depth, lines=len(lines))
     thrust = _mean_thrust(surface, line)
-    return Leak(energy, math.inf, line, "sampled", text, vertices, thrust)
+    return Leak(energy, math.inf, line, "sampled", origin, vertices, thrust)
 
 
 def _nearest_outlines(
@@ -312,12 +349,12 @@ def _stateful_leak(surface: Surface, line: ScanLine) -> Leak:
     worst = max(found, key=lambda loop: loop.energy)
     pressing = 0.5 * surface.stiffness * surface.max_depth**2
     if worst.energy <= _TOLERANCE * pressing:  # error of the quadrature
-        return _sampled_leak(0.0, line, "no evaluated loop gains energy", np.zeros((0, 3)))
+        return _sampled_leak(0.0, line, LoopOrigin(LoopKind.NO_GAIN), np.zeros((0, 3)))
     return worst
 
 
-def _sampled_leak(energy: float, line: ScanLine, description: str, vertices: FloatArray) -> Leak:
-    return Leak(energy, math.inf, line, "sampled", description, vertices, None)
+def _sampled_leak(energy: float, line: ScanLine, origin: LoopOrigin, vertices: FloatArray) -> Leak:
+    return Leak(energy, math.inf, line, "sampled", origin, vertices, None)
 
 
 def friction_path(surface: Surface, start: FloatArray, along: FloatArray) -> FloatArray:
@@ -343,12 +380,9 @@ def light_then_deep_loop(surface: Surface, line: ScanLine) -> Leak:
     ]
     energies = [loop_work(surface, path) for path in paths]
     best = int(np.argmax(energies))
-    text = (
-        f"the paper's path of (27), worst of {len(paths)} starts: "
-        f"{surface.parameter('max_deflection') * 1e3:g} mm along in light contact, "
-        f"back at {surface.max_depth * 1e3:g} mm"
-    )
-    return _sampled_leak(float(energies[best]), line, text, paths[best])
+    deflection = surface.parameter("max_deflection")
+    origin = LoopOrigin(LoopKind.FRICTION_PATH, surface.max_depth, len(paths), deflection)
+    return _sampled_leak(float(energies[best]), line, origin, paths[best])
 
 
 def in_plane_loop(surface: Surface, line: ScanLine) -> Leak:
@@ -364,9 +398,9 @@ def in_plane_loop(surface: Surface, line: ScanLine) -> Leak:
         for sign in (1.0, -1.0)
     ]
     outlines.sort(key=lambda outline: -outline[0])
-    text = f"in the plane at {surface.max_depth * 1e3:g} mm about an anchor that sticks"
-    best = [path for _estimate, path in outlines[:_EVALUATED_LOOPS]]
-    loops = [_sampled_leak(loop_work(surface, path), line, text, path) for path in best]
+    origin = LoopOrigin(LoopKind.IN_PLANE, surface.max_depth)
+    paths = [path for _estimate, path in outlines[:_EVALUATED_LOOPS]]
+    loops = [_sampled_leak(loop_work(surface, path), line, origin, path) for path in paths]
     return max(loops, key=lambda loop: loop.energy)
 
 

@@ -29,7 +29,7 @@ from asperity.devices.device import USER_SOURCE
 from asperity.perception.grip import Grip, load_grip
 from asperity.surface import Surface, default_max_depth
 from asperity.textures.kinds.prepare_synthetic import prepare_texture
-from asperity.textures.texture import TexturePart
+from asperity.textures.texture import Texture, TexturePart
 
 MIN_SAMPLES = 2.0
 """Least samples of a wave by the sampling theorem; with more, but fewer than α and β, the wave is
@@ -199,7 +199,7 @@ def _is_felt_magnified(
 ) -> bool:
     """Return whether the surface, magnified by a factor, is felt, touched and within reach."""
     texture = prepare_texture(surface.texture, magnify=factor)
-    size = np.hypot(*texture.domain.spans.T).max()
+    size = texture_length(texture)
     scaled = factor * surface.max_depth
     if texture.is_mirrored and size > device.workspace_size:
         return False
@@ -210,6 +210,11 @@ def _is_felt_magnified(
     rms = scanned.ripple * larger.stiffness
     assessed = assess_perceptibility(larger, device, part, rms=rms, find_remedies=False, **options)
     return assessed.tier == "felt" and scanned.contact_lost <= MAX_CONTACT_LOST
+
+
+def texture_length(texture: Texture) -> float:
+    """Return the longer side of a texture, or its period [m]."""
+    return float(np.hypot(*texture.domain.spans.T).max())
 
 
 def classify_perceptibility(

@@ -16,6 +16,7 @@ from asperity.analysis.energy.scan import scan_height
 from asperity.analysis.gain.characteristic import cached_result, is_shipped_law
 from asperity.core.cache import get_or_compute
 from asperity.core.checks import FloatArray
+from asperity.core.display import Text
 from asperity.core.files import Serializable
 from asperity.surface import Surface
 from asperity.textures.plane_waves import PlaneWaves
@@ -59,14 +60,17 @@ class Spectrum(Serializable):
     Attributes:
         waves: the waves.
         exact: whether they are the waves of a sum, not bands of a periodogram.
-        description: the method, in words.
+        is_radial: whether bands are those of a map.
+        is_windowed: whether the heights do not repeat, and were windowed (Hann).
     """
 
     serialized_attributes = "exact description wavelengths amplitudes"
 
     waves: tuple[Wave, ...]
     exact: bool
-    description: str
+    is_radial: bool = False
+    is_windowed: bool = False
+    description = Text[str]("The method, in words.")
 
     def __repr__(self) -> str:
         return f"<Spectrum of {len(self.waves)} waves: {self.description}>"
@@ -119,27 +123,21 @@ def compute_spectrum(texture: Texture) -> Spectrum:
 
 
 def _compute_spectrum(texture: Texture) -> Spectrum:
-    waves = _plane_waves(texture)
-    if waves is not None and len(waves) <= _MAX_WAVES:
-        return Spectrum(waves, True, "the waves of the sum")
+    plane_waves = _plane_waves(texture)
+    if plane_waves is not None and len(plane_waves) <= _MAX_WAVES:
+        return Spectrum(plane_waves, exact=True)
     heights, spacing, repeats = texture.samples()
-    found = band_variances(heights[None], spacing, repeats)
-    total = float(found.variance.sum())
+    bands = band_variances(heights[None], spacing, repeats)
+    total = float(bands.variance.sum())
     # The variance of a constant height is rounding.
     if total <= 1e-24 * float(np.max(np.abs(heights)) ** 2):
-        return Spectrum((), False, "flat")
-    words = "third-octave bands of the periodogram" + ("" if texture.is_profile else ", radially")
-    words += "" if repeats else ", Hann window"
-    bands = zip(found.wavelength, found.variance, strict=True)
-    return Spectrum(
-        tuple(
-            Wave(float(length), math.sqrt(2.0 * variance), float(variance) / total)
-            for length, variance in bands
-            if variance > _TRANSFORM_ROUNDING * total
-        ),
-        False,
-        words,
-    )
+        return Spectrum((), exact=False)
+    waves = []
+    for length, variance in zip(bands.wavelength, bands.variance, strict=True):
+        if variance > _TRANSFORM_ROUNDING * total:
+            amplitude = math.sqrt(2.0 * variance)
+            waves.append(Wave(float(length), amplitude, float(variance) / total))
+    return Spectrum(tuple(waves), False, not texture.is_profile, not repeats)
 
 
 def _plane_waves(texture: Texture) -> tuple[Wave, ...] | None:

@@ -24,7 +24,7 @@ from asperity.analysis.passivity.device_loop import (
 )
 from asperity.core.errors import ParameterError
 from asperity.core.files import attributes_to_dict
-from asperity.devices import Device, WallTest
+from asperity.devices import Device
 
 PAPER = "paper (1)"
 ONE_SIDED = "one-sided"
@@ -46,9 +46,10 @@ class Criterion:
         holds: whether the surface's stiffness fulfils it; ``None`` if that cannot be decided.
         limit: greatest stiffness that it allows [N/m], never overstated; ``None`` if unknown.
         margin: limit over the surface's stiffness [1]; ``None`` if the limit is unknown.
-        assumptions: its assumptions in one line, with the device's numbers that it uses.
+        assumptions: assumptions of a user-defined criterion, in one line.
         missing: fields of the device that it requires and that are unknown.
-        conclusion: the conclusion in words; derived from the other fields where it is empty.
+        conclusion: the conclusion of a user-defined criterion in words; by default derived from
+            the other fields.
         upper_limit: stiffness above which it does not hold for certain [N/m]; ``None`` if unknown.
         obstacle: why it does not apply to the law; ``None`` if it does.
         used_fields: fields of the device that it uses.
@@ -84,7 +85,7 @@ class StiffnessRule:
     norm_weight: Fraction
     budget: Fraction | None
     required_fields: tuple[str, ...]
-    assumptions: str
+    assumptions: str = ""
     obstacle: Obstacle | None = None
     used_fields: tuple[str, ...] = ()
 
@@ -128,34 +129,38 @@ def _round_down(value: Number) -> float:
     return near if Fraction(near) <= value else math.nextafter(near, -math.inf)
 
 
-_COMMON_ASSUMPTIONS = (
-    "conservative law, zero-order hold, symmetric damping >= σ₀ wherever the force acts"
-)
 _ZERO = Fraction(0)
 _ONE = Fraction(1)
 _DAMPING_FIELDS = ("update_rate", "damping")
 
 
 def _paper_rule(loop: DeviceLoop) -> StiffnessRule:
-    note = "zero-order hold; no certificate for a field with curl, nor from 2 samples of delay on"
-    formula = "k q <= σ₀/(2T)"
-    twice = Fraction(2)
-    return StiffnessRule(PAPER, formula, _ZERO, twice, loop.damping_gain, _DAMPING_FIELDS, note)
+    budget = loop.damping_gain
+    return StiffnessRule(PAPER, "k q <= σ₀/(2T)", _ZERO, Fraction(2), budget, _DAMPING_FIELDS)
 
 
 def _one_sided_rule(loop: DeviceLoop) -> StiffnessRule:
-    note = f"{_COMMON_ASSUMPTIONS}, no delay, no virtual damping"
-    rule = (ONE_SIDED, "k q⁺ <= 2σ₀/T", HALF, _ZERO, loop.damping_gain, _DAMPING_FIELDS, note)
-    return StiffnessRule(*rule, loop.obstacle)
+    return StiffnessRule(
+        ONE_SIDED,
+        "k q⁺ <= 2σ₀/T",
+        HALF,
+        _ZERO,
+        loop.damping_gain,
+        _DAMPING_FIELDS,
+        obstacle=loop.obstacle,
+    )
 
 
 def _delay_rule(loop: DeviceLoop) -> StiffnessRule:
-    note = f"{_COMMON_ASSUMPTIONS}, d whole samples of delay, no virtual damping, no quantisation"
-    fields = (*_DAMPING_FIELDS, "delay_samples")
-    delay = loop.known_delay
-    formula = "k (q⁺/2 + d q) <= σ₀/T"
-    budget = loop.damping_gain
-    return StiffnessRule(DELAY, formula, HALF, delay, budget, fields, note, loop.obstacle)
+    return StiffnessRule(
+        DELAY,
+        "k (q⁺/2 + d q) <= σ₀/T",
+        HALF,
+        loop.known_delay,
+        loop.damping_gain,
+        (*_DAMPING_FIELDS, "delay_samples"),
+        obstacle=loop.obstacle,
+    )
 
 
 def _virtual_damping_rule(loop: DeviceLoop) -> StiffnessRule:
@@ -163,64 +168,58 @@ def _virtual_damping_rule(loop: DeviceLoop) -> StiffnessRule:
     budget = loop.damping_gain
     if budget is not None:
         budget -= abs(loop.virtual_damping_gain)
-    delay = "no delay" if loop.delay is None else "d whole samples of delay"
-    note = f"{_COMMON_ASSUMPTIONS}, {delay}, b_v on the last step's mean velocity"
-    fields = (*_DAMPING_FIELDS, "virtual_damping")
-    formula = "k (q⁺/2 + d q) T + |b_v| <= σ₀" if loop.delay else "k q⁺ T/2 + |b_v| <= σ₀"
-    weights = (HALF, loop.known_delay)
-    more = ("delay_samples",)
-    return StiffnessRule(VIRTUAL, formula, *weights, budget, fields, note, loop.obstacle, more)
+    formula = "k q⁺ T/2 + |b_v| <= σ₀"
+    if loop.delay:
+        formula = "k (q⁺/2 + d q) T + |b_v| <= σ₀"
+    return StiffnessRule(
+        VIRTUAL,
+        formula,
+        HALF,
+        loop.known_delay,
+        budget,
+        (*_DAMPING_FIELDS, "virtual_damping"),
+        obstacle=loop.obstacle,
+        used_fields=("delay_samples",),
+    )
 
 
 def _wall_rule(loop: DeviceLoop) -> StiffnessRule:
-    note = (
-        "the paper's III.B as printed, for every law; a rule of thumb: that a wall did not cycle "
-        "proves no damping, and no norm bounds what a field with curl gains"
-    )
     budget = loop.wall_stiffness
-    return StiffnessRule(WALL, "k q <= K₀", _ZERO, _ONE, budget, ("max_stiffness",), note)
+    return StiffnessRule(WALL, "k q <= K₀", _ZERO, _ONE, budget, ("max_stiffness",))
 
 
 def _wall_test_rule(loop: DeviceLoop) -> StiffnessRule:
     """The least limit over all pairs of damping and delay that the wall test admits.
 
     For a delay d the test admits σ₀/T >= K₀ (1/2 + d), so the delay rule allows
-    K₀ (1/2 + d)/(q⁺/2 + d q). That falls with d, since q⁺ <= q: to K₀/q for unbounded d.
+    K₀ (1/2 + d)/(q⁺/2 + d q). That falls with d, since q⁺ <= q: to K₀/q for unbounded d. With
+    delay, the test does not show the effect of virtual damping: there is no limit.
     """
     longest = loop.longest_delay
-    budget = loop.wall_stiffness
-    note = (
-        "plausible, not proved: the wall of stiffness K₀ was close to its stability limit (heavy "
-        f"handle, loose grip); {damping_assumption(loop.wall_test)}; conservative law"
-    )
-    if longest is None:
-        note = "no delay fits: a wall of K₀ needs more damping than the data of the device"
     if loop.virtual_damping and loop.delay != 0:
         longest = None
-        note = "no limit: with delay, the wall test does not show the effect of virtual damping"
-    if longest is None:
-        budget = None
+    budget = None if longest is None else loop.wall_stiffness
     formula = "k q <= K₀"
-    weights = (_ZERO, _ONE)
+    one_sided_weight = _ZERO
+    norm_weight = _ONE
     if longest is not None and longest != math.inf:
         formula = "k (q⁺/2 + d q) <= K₀ (1/2 + d)"
-        weights = (HALF, Fraction(longest))
+        one_sided_weight = HALF
+        norm_weight = Fraction(longest)
         if budget is not None:
-            budget *= HALF + Fraction(longest)
+            budget *= HALF + norm_weight
             if loop.damping_gain is not None:
                 budget = min(budget, loop.damping_gain)  # the one admissible pair is known
-    needed = ("max_stiffness",)
-    more = ("delay_samples", "damping", "update_rate")
-    return StiffnessRule(WALL_TEST, formula, *weights, budget, needed, note, loop.obstacle, more)
-
-
-def damping_assumption(wall_test: WallTest | None) -> str:
-    """Return the assumption about the damping along directions in which no wall was tested."""
-    if wall_test is not None and wall_test.lightest is not None:
-        return f"damping is at least {wall_test.lightest:g} of the tested in all directions"
-    tested = ", ".join(wall_test.directions) if wall_test is not None else ""
-    direction = f"tested along {tested}" if tested else "the direction of the test is not stated"
-    return f"damping is equal in all directions, {direction}"
+    return StiffnessRule(
+        WALL_TEST,
+        formula,
+        one_sided_weight,
+        norm_weight,
+        budget,
+        ("max_stiffness",),
+        obstacle=loop.obstacle,
+        used_fields=("delay_samples", "damping", "update_rate"),
+    )
 
 
 # --- quantisation of positions and forces ---------------------------------------------------------
@@ -233,29 +232,36 @@ def _quantization_criterion(loop: DeviceLoop) -> Criterion:
     and by |b_v| |δ|/T more with virtual damping; friction dissipates f_c per metre.
     """
     formula = "k q |δ|/2 + |b|/2 <= f_c"
-    fields = ("position_resolution", "force_resolution")
-    note = f"{_COMMON_ASSUMPTIONS}; |δ|, |b|: a step along three axes at once; f_c: least_friction"
-    result = Criterion(QUANTIZATION, formula, assumptions=note, used_fields=fields)
+    fields: tuple[str, ...] = ("position_resolution", "force_resolution")
+    result = Criterion(QUANTIZATION, formula, used_fields=fields)
     test = loop.wall_test
     step = loop.position_step
     if test is not None and test.positions == "stepped" and not step:
         return replace(result, missing=("position_resolution",))
     if not (step or loop.force_step):
-        note = "positions and forces are assumed to be exact: their resolution is unknown"
-        return replace(result, holds=True, limit=math.inf, margin=math.inf, assumptions=note)
-    rest = loop.friction - loop.force_step / 2 - abs(loop.virtual_damping_gain) * step
-    all_fields = (*fields, "least_friction", "virtual_damping")
+        return replace(result, holds=True, limit=math.inf, margin=math.inf)
+    friction = loop.friction - loop.force_step / 2 - abs(loop.virtual_damping_gain) * step
+    fields = (*fields, "least_friction", "virtual_damping")
     if step or loop.obstacle:
-        rule = (QUANTIZATION, formula, _ZERO, step / 2, rest, (), note, loop.obstacle, all_fields)
-        return evaluate_rule(loop, StiffnessRule(*rule))
-    limit = math.inf if rest >= 0 else 0.0
+        rule = StiffnessRule(
+            QUANTIZATION,
+            formula,
+            _ZERO,
+            step / 2,
+            friction,
+            (),
+            obstacle=loop.obstacle,
+            used_fields=fields,
+        )
+        return evaluate_rule(loop, rule)
+    limit = math.inf if friction >= 0 else 0.0
     return replace(
         result,
-        holds=rest >= 0,
+        holds=friction >= 0,
         limit=limit,
         margin=limit,
         upper_limit=limit,
-        used_fields=all_fields,
+        used_fields=fields,
     )
 
 
@@ -353,17 +359,15 @@ def _round_up(value: Fraction) -> float:
 
 def _leak_criterion(loop: DeviceLoop) -> Criterion:
     """A field that gains energy on a loop gains it at any speed: no k is safe."""
-    formula = "W <= 0 for every loop"
+    result = Criterion(LEAK, "W <= 0 for every loop")
     fields = ("damping",)
     if loop.conservative:
-        note = "the law's curl is identically zero; no data of the device are needed"
-        return Criterion(LEAK, formula, True, math.inf, math.inf, note)
-    method = "" if loop.leak is None else f" ({loop.leak.method})"
-    note = f"one slow traversal of the loop{method}; dry friction is not counted"
+        return replace(result, holds=True, limit=math.inf, margin=math.inf)
+    result = replace(result, used_fields=fields)
     if not has_known_leak(loop):
-        return Criterion(LEAK, formula, assumptions=note, used_fields=fields)
+        return result
     missing = () if loop.damping is not None else fields
-    return Criterion(LEAK, formula, False, 0.0, 0.0, note, missing, used_fields=fields)
+    return replace(result, holds=False, limit=0.0, margin=0.0, missing=missing)
 
 
 # --- all of them ----------------------------------------------------------------------------------
@@ -415,3 +419,12 @@ def evaluate_criteria(loop: DeviceLoop) -> dict[str, Criterion]:
             result = evaluate_rule(loop, result)
         criteria[name] = replace(result, name=name)
     return criteria
+
+
+def main_rule(loop: DeviceLoop) -> str:
+    """Return the name of the criterion for the known data of the device."""
+    if loop.virtual_damping is not None:
+        return VIRTUAL
+    if loop.delay == 0:
+        return ONE_SIDED
+    return DELAY

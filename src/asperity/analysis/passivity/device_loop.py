@@ -8,7 +8,7 @@ from enum import Enum, auto
 from fractions import Fraction
 
 from asperity.analysis.bounds.bound import Bound
-from asperity.analysis.energy.continuity import continuity
+from asperity.analysis.energy.continuity import Continuity, continuity
 from asperity.analysis.energy.leak import Leak
 from asperity.analysis.gain.theorems import theorem_on
 from asperity.core.checks import check_positive, check_real
@@ -41,7 +41,7 @@ class DeviceLoop:
         leak: the worst loop; ``None`` where only stiffness limits are needed.
         conservative: whether the law is conservative.
         obstacle: why the rules for conservative laws do not apply; ``None`` if they do.
-        reason: reason of the obstacle, from the curl or the continuity of the force.
+        continuity: jumps of the force, where they are the obstacle; else ``None``.
         stiffness: k of the surface [N/m].
         rate: update rate 1/T [Hz].
         damping: σ₀ [N s/m].
@@ -64,7 +64,7 @@ class DeviceLoop:
     leak: Leak | None
     conservative: bool
     obstacle: Obstacle | None
-    reason: str
+    continuity: Continuity | None
     stiffness: Fraction
     rate: Fraction | None
     damping: Fraction | None
@@ -133,7 +133,7 @@ def make_device_loop(
     Raises:
         ParameterError: for device data out of range.
     """
-    obstacle, reason = _find_obstacle(surface, q)
+    obstacle, jumps = _find_obstacle(surface, q)
     delay = _exact_value(device, "delay_samples", _NOT_NEGATIVE)
     if delay is not None and delay.denominator != 1:
         raise ParameterError("device.delay_samples", "must be a whole number", float(delay))
@@ -153,7 +153,7 @@ def make_device_loop(
         leak=leak,
         conservative=surface.facts.conservative,
         obstacle=obstacle,
-        reason=reason,
+        continuity=jumps,
         stiffness=Fraction(surface.stiffness),
         rate=rate,
         damping=damping,
@@ -190,18 +190,20 @@ def _exact_value(device: Device, field: str, requirement: tuple[str, float]) -> 
     return Fraction(check_real(f"device.{field}", value, unit))
 
 
-def _find_obstacle(surface: Surface, q: Bound) -> tuple[Obstacle | None, str]:
-    """Return why the law's potential gives no bound, if so, and the reason in words.
+def _find_obstacle(surface: Surface, q: Bound) -> tuple[Obstacle | None, Continuity | None]:
+    """Return why the law's potential gives no bound, if so, and the jumps of the force.
 
     The rules need U(p + Δ) <= U(p) + ∇U · Δ + q⁺|Δ|²/2. The Jacobian proves that where the force
     is continuous. A jump can violate it, except where U is an infimum by theorem.
     """
     if not surface.facts.conservative:
-        return Obstacle.CURL, surface.facts.reason
+        return Obstacle.CURL, None
     if theorem_on(surface).is_infimum:
-        return None, ""
-    smooth = continuity(surface, q)
-    return (None, "") if smooth.continuous else (Obstacle.JUMPS, smooth.reason)
+        return None, None
+    force = continuity(surface, q)
+    if force.continuous:
+        return None, None
+    return Obstacle.JUMPS, force
 
 
 def is_contradictory(loop: DeviceLoop) -> bool:

@@ -1,29 +1,38 @@
-"""The verdict on passivity, the stability limit, and the recommended stiffness."""
+"""The verdict on passivity of a surface on a device, with every criterion."""
 
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 from enum import Enum, auto
 from fractions import Fraction
-from functools import cache
-from pathlib import Path
 from typing import Literal
 
 from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.energy.leak import Leak
 from asperity.analysis.passivity import criteria, device_loop
-from asperity.core.arguments import DEFAULT_STIFFNESS
+from asperity.analysis.passivity.criteria import (
+    BuzzBound,
+    Criterion,
+    buzz_bound,
+    evaluate_criteria,
+    main_rule,
+)
+from asperity.analysis.passivity.device_loop import (
+    DeviceLoop,
+    critical_speed,
+    make_device_loop,
+    max_proved_delay,
+)
+from asperity.analysis.passivity.recommended_stiffness import StabilityLimit, stability_limit
+from asperity.core.display import Displayable, Text
+from asperity.core.errors import ParameterError
 from asperity.core.files import Serializable
-from asperity.core.units import round_down
-from asperity.devices import Device
-from asperity.laws import LAWS, Law
+from asperity.devices import DeviceLike, load_device
 from asperity.surface import Surface
-from asperity.textures import Sinusoid
 
 Verdict = Literal["passive", "bounded", "plausible", "not passive", "undecided"]
-Basis = Literal["proved", "plausible", "bounded", "wall gain", "none"]
 
 
 class Ground(Enum):
@@ -51,43 +60,14 @@ class Ground(Enum):
     """The wall test decides nothing, and damping or rate of the device are unknown."""
 
 
-@dataclass(frozen=True)
-class StabilityLimit(Serializable):
-    """Stability limit of the stiffness of a law on a device, and its basis.
-
-    Attributes:
-        stiffness: the limit [N/m]; 0 if no stable stiffness is known, ``None`` if undecidable.
-        basis: ``"proved"``: passive up to the limit, under the assumptions of the criterion.
-            ``"plausible"``: a smooth wall of that gain did not cycle. ``"bounded"``:
-            passive but for quantisation, whose buzz moves at ``buzz_goal`` at most, or at twice
-            what steps of force cause at any stiffness.
-            ``"wall gain"``: a wall of that gain did not cycle; no stability limit, since the law
-            has curl and delivers energy below v* at any stiffness. ``"none"``.
-        criterion: name of the criterion that gives the limit; empty for none.
-        delay: delay of the binding pair of damping and delay, in samples; infinity where any delay
-            is admissible, ``None`` where the limit has no such pair.
-        sampled: whether the limit uses a number that was only sampled, so that it may be too high.
-        proved_stiffness: stiffness up to which passivity is proved [N/m]; 0 for none.
-    """
-
-    stiffness: float | None
-    basis: Basis
-    criterion: str = ""
-    delay: float | None = None
-    sampled: bool = False
-    proved_stiffness: float = 0.0
-
-
 def decide_verdict(
-    loop: device_loop.DeviceLoop,
-    by_name: Mapping[str, criteria.Criterion],
-    buzz: criteria.BuzzBound | None,
+    loop: DeviceLoop, by_name: Mapping[str, Criterion], buzz: BuzzBound | None
 ) -> tuple[Verdict, str, Ground]:
     """Return the verdict, the name of the deciding criterion, and the ground.
 
     For a law that is not conservative the leak decides, never a norm.
     """
-    main = _main_rule(loop)
+    main = main_rule(loop)
     if not loop.conservative:
         unknown = by_name[criteria.LEAK].holds is None
         return "undecided" if unknown else "not passive", criteria.LEAK, Ground.CRITERION
@@ -102,7 +82,7 @@ def decide_verdict(
 
 
 def _assess_quantization(
-    by_name: Mapping[str, criteria.Criterion], main: str, buzz: criteria.BuzzBound | None
+    by_name: Mapping[str, Criterion], main: str, buzz: BuzzBound | None
 ) -> tuple[Verdict, str, Ground]:
     """Return the verdict on a loop that is passive but for quantisation."""
     steps = by_name[criteria.QUANTIZATION]
@@ -113,70 +93,7 @@ def _assess_quantization(
     return "undecided", criteria.QUANTIZATION, Ground.UNBOUNDED
 
 
-def stability_limit(
-    loop: device_loop.DeviceLoop, by_name: Mapping[str, criteria.Criterion]
-) -> StabilityLimit:
-    """Return the stability limit of the stiffness, and its basis.
-
-    Comparison, analysis and the six limits of the device share this limit.
-    """
-    main = by_name[_main_rule(loop)]
-    steps = by_name[criteria.QUANTIZATION]
-    if not loop.conservative:
-        return _limit_from_criterion("wall gain", by_name[criteria.WALL])
-    plausible = _limit_from_criterion("plausible", by_name[criteria.WALL_TEST], loop.longest_delay)
-    if loop.obstacle is not None or loop.delay is None or device_loop.is_contradictory(loop):
-        return plausible
-    proved = _proved_limit(main, steps)
-    silent = proved.stiffness or 0.0
-    if (
-        main.limit
-        and not steps.missing
-        and (calm := criteria.buzz_limited_stiffness(loop)) is not None
-    ):
-        bounded = min(calm, main.limit)
-        if bounded > silent:
-            return StabilityLimit(
-                bounded, "bounded", criteria.QUANTIZATION, proved_stiffness=silent
-            )
-    if (plausible.stiffness or 0.0) > (proved.stiffness or 0.0):
-        return replace(plausible, proved_stiffness=proved.proved_stiffness)
-    if proved.stiffness is None:
-        return plausible
-    return proved
-
-
-def _proved_limit(main: criteria.Criterion, steps: criteria.Criterion) -> StabilityLimit:
-    """Return the stiffness up to which the rule and the quantisation criterion are proved."""
-    if main.limit is None or steps.limit is None:
-        sampled = _limit_from_criterion("proved", main)
-        return sampled if sampled.sampled else StabilityLimit(None, "none")
-    stiffness = min(main.limit, steps.limit)
-    basis: Basis = "proved" if stiffness else "none"
-    return StabilityLimit(
-        stiffness, basis, main.name if stiffness else "", proved_stiffness=stiffness
-    )
-
-
-def _limit_from_criterion(
-    basis: Basis, criterion: criteria.Criterion, delay: device_loop.Number | None = None
-) -> StabilityLimit:
-    sampled = criterion.limit is None and criterion.upper_limit is not None
-    stiffness = criterion.upper_limit if sampled else criterion.limit
-    if not stiffness:
-        return StabilityLimit(stiffness, "none")
-    pair = None if delay is None else float(delay)
-    return StabilityLimit(stiffness, basis, criterion.name, pair, sampled)
-
-
-def _main_rule(loop: device_loop.DeviceLoop) -> str:
-    """Return the name of the criterion for the known data of the device."""
-    if loop.virtual_damping is not None:
-        return criteria.VIRTUAL
-    return criteria.ONE_SIDED if loop.delay == 0 else criteria.DELAY
-
-
-def _find_unstable_motion(loop: device_loop.DeviceLoop) -> Ground | None:
+def _find_unstable_motion(loop: DeviceLoop) -> Ground | None:
     """Return why a small motion at a witness point gains energy without limit, if one does.
 
     A straight oscillation along the witness direction, p + u ε cos(θ i), where -uᵀJu = K, gains
@@ -206,7 +123,7 @@ def _find_unstable_motion(loop: device_loop.DeviceLoop) -> Ground | None:
 
 
 def _assess_wall_test(
-    loop: device_loop.DeviceLoop, by_name: Mapping[str, criteria.Criterion], main: str
+    loop: DeviceLoop, by_name: Mapping[str, Criterion], main: str
 ) -> tuple[Verdict, str, Ground]:
     """Return the verdict of the wall test, or the criterion that would decide."""
     if by_name[criteria.WALL_TEST].holds:
@@ -220,135 +137,134 @@ def _assess_wall_test(
     return "undecided", main, Ground.CRITERION
 
 
-_MARGINS_FILE = Path(__file__).with_name("margins.toml")
-# Limits that need no margin: they are proved, or bound the buzz.
-_BASES_WITHOUT_MARGIN = ("proved", "bounded")
-
-
 @dataclass(frozen=True)
-class Margin(Serializable):
-    """Safety margin: the recommended stiffness over K₀/q, from random admissible loops.
+class Passivity(Serializable, Displayable):
+    """Passivity of a surface on a device: whether the hand can gain energy without limit.
 
     Attributes:
-        factor: recommended stiffness over stability limit, at most 1.
-        law: letter of the simulated law; for a user-defined law the shipped law with the least
-            factor.
-        loops: number of random loops simulated at that factor of K₀/q; 0 without simulation.
-        cycles: in how many of them a motion lasts, without steps, that a hand feels.
-        speed: RMS speed of the fastest of these motions, summed over the axes [m/s].
-        extent: its RMS displacement [m].
+        loop: the surface on the device.
+        evaluated: all criteria by name, without sentences.
+        decided_by: name of the deciding criterion; for ``"undecided"``, of the one that would
+            decide.
+        verdict: ``"passive"`` (proved, under the assumptions of that criterion), ``"bounded"``
+            (proved but for quantisation, whose buzz stays below ``buzz``), ``"plausible"`` (no
+            proof: a smooth wall did not cycle), ``"not passive"`` (a motion of the hand that gains
+            energy without limit is known) or ``"undecided"``.
+        ground: ground of the verdict.
+        stability_limit: stability limit of the stiffness, and its basis.
+        buzz: bound of the motion that quantisation may cause; ``None`` if there is no bound.
     """
 
-    factor: float
-    law: str = ""
-    loops: int = 0
-    cycles: int = 0
-    speed: float = 0.0
-    extent: float = 0.0
+    serialized_attributes = (
+        "verdict decided_by reason stiffness stability_limit critical_speed greatest_delay buzz "
+        "criteria"
+    )
+
+    loop: DeviceLoop = field(compare=False)
+    evaluated: Mapping[str, Criterion]
+    decided_by: str
+    verdict: Verdict
+    ground: Ground
+    stability_limit: StabilityLimit
+    buzz: BuzzBound | None
+    reason = Text[str]("The reason of the verdict in one sentence.")
+    criteria = Text[tuple[Criterion, ...]](
+        "All criteria with their sentences, also those that do not decide."
+    )
 
     @property
-    def frequency(self) -> float:
-        """Frequency of a sinusoid of that speed and displacement [Hz]."""
-        return self.speed / (2.0 * math.pi * self.extent) if self.extent else 0.0
+    def stiffness(self) -> float:
+        """Stiffness of the surface [N/m]."""
+        return self.loop.surface.stiffness
+
+    @property
+    def critical_speed(self) -> float | None:
+        """v* [m/s], the speed on the worst loop below which damping does not absorb its energy.
+
+        0 for a conservative law, ``None`` if unknown.
+        """
+        return critical_speed(self.loop)
+
+    @property
+    def greatest_delay(self) -> int | None:
+        """Greatest number of whole samples of delay for which the delay rule is proved.
+
+        At this stiffness; ``None`` if not even 0 is proved, or if it is unknown.
+        """
+        return max_proved_delay(self.loop)
+
+    def criterion(self, name: str) -> Criterion:
+        """Return a criterion by its name, with its sentences.
+
+        Raises:
+            KeyError: if there is none of that name.
+        """
+        return {criterion.name: criterion for criterion in self.criteria}[name]
+
+    def __repr__(self) -> str:
+        limit = self.stability_limit
+        stiffness = "unknown" if limit.stiffness is None else f"{limit.stiffness:g} N/m"
+        return (
+            f"<Passivity: {self.verdict}, decided by {self.decided_by}; "
+            f"limit {stiffness}, {limit.basis}>"
+        )
 
 
-NO_MARGIN = Margin(1.0)
+def passivity(
+    surface: Surface, device: DeviceLike, q: Bound, one_sided: Bound, leak: Leak
+) -> Passivity:
+    """Return whether the loop of hand, device and texture is passive, with every criterion.
 
+    With T the period of the update rate, σ₀ the device's damping, b_v its virtual damping, d its
+    whole samples of delay and K₀ the stiffest smooth wall that it renders, the criteria are:
 
-@cache
-def load_margins(along_lightest: bool = False) -> dict[Law, Margin]:
-    """Return the simulated margin of each law.
+    * paper (1): k q <= σ₀/(2T), as printed;
+    * one-sided: k q⁺ <= 2σ₀/T, for a conservative law without delay;
+    * delay: k (q⁺/2 + d q) <= σ₀/T, for a conservative law;
+    * virtual damping: k (q⁺/2 + d q) T + |b_v| <= σ₀, for a conservative law;
+    * steps and friction: k q |δ|/2 + |b|/2 <= f_c, for a conservative law, beside one of these;
+    * smooth-wall rule: k q <= K₀, as printed in the paper's III.B: a rule of thumb;
+    * wall test: k (q⁺/2 + d q) <= K₀ (1/2 + d), k q <= K₀ for any delay, for a conservative law:
+      plausible, not proved;
+    * leak: no loop of the field gains energy.
 
-    Args:
-        along_lightest: whether K₀ is that of the lightest direction, or of the weakest axis.
-    """
-    table = tomllib.loads(_MARGINS_FILE.read_text(encoding="utf-8"))
-    entries = table["lightest" if along_lightest else "normal"]
-    return {LAWS[law]: Margin(law=law, **entry) for law, entry in entries.items()}
-
-
-def safety_margin(surface: Surface, device: Device, limit: StabilityLimit) -> Margin:
-    """Return the safety margin below a stability limit.
-
-    A proved limit needs no margin. Where K₀ is known along the device's lightest direction, the
-    margin is smaller.
-
-    Args:
-        surface: the surface, of which the law counts.
-        device: the device.
-        limit: the stability limit.
-    """
-    if limit.basis in _BASES_WITHOUT_MARGIN or not surface.depends_on_texture:
-        return NO_MARGIN
-    test = device.wall_test
-    margins = load_margins(along_lightest=test is not None and test.lightest is not None)
-    return margins.get(surface.law) or min(margins.values(), key=lambda margin: margin.factor)
-
-
-@dataclass(frozen=True)
-class StiffnessRecommendation:
-    """Recommended stiffness of a law on a device.
-
-    Attributes:
-        stability_limit: stability limit of the stiffness, and its basis.
-        margin: safety margin below it.
-        stiffness: recommended stiffness [N/m], rounded down to three digits; 0 if no stable
-            stiffness is known, or if there is no limit.
-        wall_stiffness: K₀ for this law [N/m]: in the lightest direction, at the device's rate;
-            ``None`` if it is unknown.
-    """
-
-    stability_limit: StabilityLimit
-    margin: Margin
-    stiffness: float
-    wall_stiffness: float | None
-
-
-def recommend_stiffness(
-    surface: Surface, device: Device, q: Bound, one_sided: Bound
-) -> StiffnessRecommendation:
-    """Return the recommended stiffness of a surface's law on a device.
+    Missing data of the device are never guessed: an unknown delay, damping or rate decides
+    nothing. Virtual damping, quantisation and dry friction that are not given count as none.
 
     Args:
-        surface: the surface; its stiffness does not count.
-        device: the device.
+        surface: the surface.
+        device: id of the catalogue, TOML file, or a :class:`~asperity.devices.Device`.
         q: its characteristic number.
         one_sided: its one-sided number.
+        leak: its worst loop.
+
+    Raises:
+        ParameterError: for another type, or device data out of range.
+
+    Reference:
+        The paper's (1) and III.B; Colgate and Schenkel (the paper's [25]);
+        docs/theory/passivity.md.
+
+    Example:
+        >>> from asperity.analysis import characteristic_number, one_sided_number
+        >>> from asperity.analysis.energy.leak import worst_loop
+        >>> from asperity.devices import parse_device
+        >>> from asperity.textures.kinds.sinusoid import Sinusoid
+        >>> rig = {"damping": "2 N*s/m", "update_rate": "4 kHz", "delay_samples": 1}
+        >>> surface = Surface(Sinusoid(amplitude=0.1e-3, period=1e-3), "H")
+        >>> numbers = characteristic_number(surface), one_sided_number(surface)
+        >>> leak = worst_loop(surface)
+        >>> result = passivity(surface, parse_device(rig, "mine"), *numbers, leak)
+        >>> result.verdict, result.decided_by, round(result.stability_limit.stiffness, 3)
+        ('passive', 'delay', 5333.333)
     """
-    loop = device_loop.make_device_loop(surface, device, q, one_sided, None)
-    limit = stability_limit(loop, criteria.evaluate_criteria(loop))
-    margin = safety_margin(surface, device, limit)
-    known = limit.stiffness or 0.0
-    start = round_down(margin.factor * known) if math.isfinite(known) else 0.0
-    wall = None if loop.wall_stiffness is None else float(loop.wall_stiffness)
-    return StiffnessRecommendation(limit, margin, start, wall)
-
-
-_GENTLE_TEXTURE = Sinusoid(1e-6, 1e-2)
-_UNIT_GAIN = Bound(1.0, 1.0, "theorem")
-
-
-def unit_starts(device: Device) -> dict[str, float]:
-    """Return the recommended stiffness [N/m] of each law on a surface with q = q⁺ = 1, by letter.
-
-    On other surfaces it is smaller by the factor q; 0 if no stable stiffness is known.
-    """
-    return {
-        letter: recommend_stiffness(
-            Surface(_GENTLE_TEXTURE, letter), device, _UNIT_GAIN, _UNIT_GAIN
-        ).stiffness
-        for letter in LAWS
-    }
-
-
-def at_recommended_stiffness(
-    surface: Surface, device: Device, recommendation: StiffnessRecommendation
-) -> Surface:
-    """Return the surface at the recommended stiffness.
-
-    Without one it is at the smooth wall's K₀, or at 1000 N/m where that is unknown too.
-    """
-    if recommendation.stiffness:
-        return surface.to_stiffness(recommendation.stiffness)
-    test = device.wall_test
-    return surface.to_stiffness(DEFAULT_STIFFNESS if test is None else test.value)
+    types = (("surface", surface, Surface), ("q", q, Bound), ("one_sided", one_sided, Bound))
+    for name, value, kind in (*types, ("leak", leak, Leak)):
+        if not isinstance(value, kind):
+            raise ParameterError(name, f"must be a {kind.__name__}", value)
+    loop = make_device_loop(surface, load_device(device), q, one_sided, leak)
+    criteria = evaluate_criteria(loop)
+    buzz = buzz_bound(loop)
+    verdict, decided_by, ground = decide_verdict(loop, criteria, buzz)
+    limit = stability_limit(loop, criteria)
+    return Passivity(loop, criteria, decided_by, verdict, ground, limit, buzz)

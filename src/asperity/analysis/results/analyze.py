@@ -16,26 +16,15 @@ from asperity.analysis.energy.continuity import Continuity, continuity
 from asperity.analysis.energy.leak import Leak, worst_loop
 from asperity.analysis.energy.scan import Merit, merit
 from asperity.analysis.gain.characteristic import cached_number, curl_number, make_options
-from asperity.analysis.passivity.assess_passivity import (
-    Passivity,
-    buzz_text,
-    energy_gained_text,
-    passivity,
-    stiffness_limit_text,
+from asperity.analysis.passivity.recommended_stiffness import (
+    at_recommended_stiffness,
+    recommend_stiffness,
 )
-from asperity.analysis.passivity.criteria import LEAK
-from asperity.analysis.passivity.verdict import at_recommended_stiffness, recommend_stiffness
+from asperity.analysis.passivity.verdict import Passivity, passivity
 from asperity.analysis.results.compare import DEFAULT_DEVICE, recommended_law
-from asperity.analysis.surface_sentences import (
-    SCOPE_SENTENCE,
-    default_depth_text,
-    depth_range_text,
-    law_parameter_sentences,
-    unverified_sentences,
-)
-from asperity.core.arguments import DEFAULT_STIFFNESS, FIELD
+from asperity.core.arguments import FIELD
 from asperity.core.checks import check_keywords
-from asperity.core.display import Plottable, Reportable
+from asperity.core.display import Plottable, Reportable, Text
 from asperity.core.errors import ParameterError
 from asperity.core.files import attributes_to_dict, to_plain_data
 from asperity.core.units import format_quantity
@@ -82,6 +71,10 @@ class Analysis(Plottable, Reportable):
     passivity: Passivity
     merit: Merit
     extent: tuple[float, float] | None = None
+    answer = Text[str]("The verdict in one sentence.")
+    assumptions = Text[tuple[str, ...]](
+        "Used defaults, unverified device data and preparation of the surface, in sentences."
+    )
 
     @property
     def curl_density(self) -> Bound | None:
@@ -108,64 +101,10 @@ class Analysis(Plottable, Reportable):
         rate = self.device.value("update_rate")
         return assess_rendering(self.surface, update_rate=rate)
 
-    @cached_property
-    def answer(self) -> str:
-        """The verdict in one sentence."""
-        surface = self.surface
-        passivity = self.passivity
-        depth = format_quantity(surface.max_depth, "m")
-        subject = f"law {surface.law.letter} at {surface.stiffness:g} N/m, pressed to {depth}, "
-        subject += f"on the {self.device.name}"
-        title = subject[:1].upper() + subject[1:]
-        rule = passivity.criterion(passivity.decided_by)
-        limit = stiffness_limit_text(rule.limit or 0.0)
-        if passivity.verdict == "passive":
-            text = f"{title} is passive by {rule.formula}, whose limit is {limit}"
-        elif passivity.verdict == "plausible":
-            proof = f"plausible, not proved: {rule.formula}, limit {limit}"
-            text = f"That {subject} is passive is {proof}"
-        elif passivity.verdict == "bounded" and passivity.buzz is not None:
-            text = f"{title} is passive but for steps: {buzz_text(passivity.buzz)}"
-        elif passivity.verdict == "not passive":
-            reason = passivity.reason
-            if rule.name == LEAK:
-                reason = energy_gained_text(passivity.loop)
-            text = f"{title} is not passive: {reason}"
-        else:
-            text = f"Whether {subject} is passive is undecided: {passivity.reason}"
-        return f"{text}; {_jumps_clause(self)}."
-
-    @cached_property
-    def assumptions(self) -> tuple[str, ...]:
-        """Used defaults, unverified device data and preparation of the surface, in sentences."""
-        surface = self.surface
-        leak = self.leak
-        texture = surface.texture
-        depth = format_quantity(surface.max_depth, "m")
-        searched = self.rendering.sentence(surface.law)
-        sentences = [*texture.preparation, *filter(None, [searched]), *_default_sentences(surface)]
-        region = texture.domain.description
-        if self.extent is not None:
-            sides = " x ".join(format_quantity(side, "m") for side in self.extent)
-            region = f"{sides} from the origin"
-        sentences.append(f"The numbers are suprema over {region} and {depth_range_text(surface)}")
-        if surface.effective_clamp.changes_force:
-            clamp = f"The {surface.effective_clamp} clamp holds the depth from {depth} down"
-            lowest = format_quantity(surface.clamped_depth, "m")
-            sentences.append(f"{clamp}; loops are compared down to depths of {lowest}")
-        x, y = (float(part) for part in leak.line.direction)
-        sentences.append(f"Loops in the vertical plane along ({x:g}, {y:g}) are compared")
-        bounds = (self.q, self.one_sided, self.curl)
-        if any(bound is not None and math.isinf(bound.upper - bound.lower) for bound in bounds):
-            sentences.append(
-                "A number without an upper bound is the greatest one found, not a proof"
-            )
-        if not self.continuity.continuous:
-            sentences.append(
-                "Jumps are located where contact begins and below the sharpest crest only"
-            )
-        sentences += unverified_sentences(self.device, PASSIVITY_FIELDS)
-        return (*sentences, SCOPE_SENTENCE)
+    @property
+    def bounds(self) -> tuple[Bound, ...]:
+        """q, q⁺ and, for a law without state, sup |curl f|/k."""
+        return tuple([bound for bound in (self.q, self.one_sided, self.curl) if bound is not None])
 
     def __repr__(self) -> str:
         law = self.surface.law.letter
@@ -330,27 +269,3 @@ def surface_width(texture: Texture) -> float:
     if not texture.is_mirrored:
         return math.inf
     return float(np.hypot(*texture.domain.spans.T).min())
-
-
-def _jumps_clause(result: Analysis) -> str:
-    force = result.continuity
-    if force.continuous:
-        return "its force is continuous"
-    if not force.jumps:
-        return f"its force is not continuous ({force.reason})"
-    largest = format_quantity(max(jump.size for jump in force.jumps), "N")
-    return f"its force jumps, by up to {largest} where that was located"
-
-
-def _default_sentences(surface: Surface) -> list[str]:
-    sentences = []
-    if surface.stiffness == DEFAULT_STIFFNESS:
-        sentences.append(f"Default stiffness {surface.stiffness:g} N/m")
-    if surface.max_depth == default_max_depth(surface.texture):
-        sentences.append(default_depth_text(surface))
-    if surface.max_depth > surface_width(surface.texture):
-        width = format_quantity(surface_width(surface.texture), "m")
-        sentences.append(
-            f"Below {width}, the surface's width, only its mirror images are in contact"
-        )
-    return sentences + law_parameter_sentences(surface)

@@ -6,36 +6,30 @@ import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.analysis import surface_sentences
 from asperity.analysis.bounds.bound import NORM, ONE_SIDED, Bound
 from asperity.analysis.energy.scan import scan_force
 from asperity.analysis.gain.characteristic import cached_number
 from asperity.analysis.limits import limit_rules
 from asperity.analysis.limits.limit_rules import Limit
 from asperity.analysis.limits.perceptibility import Perceptibility, assess_perceptibility
-from asperity.analysis.limits.perceptibility_sentences import (
-    masking_text,
-    perceptibility_assumptions,
-    remedies_text,
-    speed_text,
-    texture_amount_text,
-)
 from asperity.analysis.limits.spectrum import MIN_SHARE, Spectrum, compute_spectrum, wave_forces
-from asperity.analysis.passivity import verdict
-from asperity.analysis.passivity.assess_passivity import stability_limit_text
-from asperity.analysis.passivity.verdict import Margin, StabilityLimit
+from asperity.analysis.passivity.recommended_stiffness import (
+    Margin,
+    StabilityLimit,
+    StiffnessRecommendation,
+    at_recommended_stiffness,
+    recommend_stiffness,
+)
 from asperity.analysis.results.compare import DEFAULT_DEVICE, recommended_law
 from asperity.core.arguments import DEFAULT_STIFFNESS, FIELD
 from asperity.core.checks import FloatArray, check_keywords, check_positive
-from asperity.core.display import Plottable, Reportable, Tabular
+from asperity.core.display import Plottable, Reportable, Tabular, Text
 from asperity.core.files import Serializable, attributes_to_dict
-from asperity.core.units import format_quantity, round_down
 from asperity.devices import Device, DeviceLike, load_device
 from asperity.laws import Law
 from asperity.perception.grip import DEFAULT_GRIP, Grip, load_grip
@@ -93,7 +87,8 @@ class Limits(Plottable, Reportable, Tabular):
         grip: the hand that holds the device.
         speeds: scanning speeds [m/s] at which all decidable limits hold, from the first up to but
             excluding the second.
-        assumptions: the assumptions, in sentences.
+        contact_lost: fraction of the scan without contact.
+        defaults: names of the arguments that were not given; "samples" for any of the three.
     """
 
     surface: Surface
@@ -112,7 +107,10 @@ class Limits(Plottable, Reportable, Tabular):
     perceptibility: Perceptibility
     grip: Grip
     speeds: tuple[float, float]
-    assumptions: tuple[str, ...] = ()
+    contact_lost: float
+    defaults: tuple[str, ...]
+    answer = Text[str]("Which limits hold and whether the texture is felt, in a few sentences.")
+    assumptions = Text[tuple[str, ...]]("The assumptions, in sentences.")
 
     @property
     def texture(self) -> Texture:
@@ -125,33 +123,6 @@ class Limits(Plottable, Reportable, Tabular):
         total = sum(wave.share for wave in self.waves)
         met = sum(wave.share for wave in self.waves if all(wave.holds.values()))
         return met / total if total > 0.0 else 0.0
-
-    @cached_property
-    def answer(self) -> str:
-        """Which limits hold and whether the texture is felt, in a few sentences."""
-        if not self.waves:
-            return "The surface is flat: there is no texture to feel."
-        speed = speed_text(self.speed)
-        failing = [limit for limit in self.limits if limit.holds is False]
-        undecided = [limit for limit in self.limits if limit.holds is None]
-        if failing:
-            failures = "; ".join(_failure_text(limit) for limit in failing)
-            advice = _speed_advice(self, failing)
-            text = f"{_met_share_text(self, failing)} at {speed}: {failures}.{advice}"
-        elif len(undecided) == len(self.limits):
-            text = "No limit can be decided."
-        elif undecided:
-            holding = [limit for limit in self.limits if limit.holds]
-            verb = "hold" if len(holding) > 1 else "holds"
-            text = f"As far as can be decided: {_limit_numbers(holding)} {verb} at {speed}."
-        else:
-            text = f"Yes: all six limits hold at {speed}."
-        if undecided:
-            missing = dict.fromkeys(one for limit in undecided for one in limit.missing_data)
-            numbers = _limit_numbers(undecided)
-            data = _join_words([*missing])
-            text += f" Not decidable: {numbers}; missing: {data}."
-        return f"{text} {texture_force_text(self)}"
 
     def limit(self, number: int) -> Limit:
         """Return a limit by the paper's number.
@@ -200,139 +171,6 @@ class Limits(Plottable, Reportable, Tabular):
             "gain": {"symbol": self.gain_symbol} | self.gain.to_dict(),
             **attributes_to_dict(self, *after_gain.split()),
         }
-
-
-def speeds_text(speeds: tuple[float, float] | None) -> str:
-    """Return an interval of speeds for reading, its end rounded down.
-
-    Example:
-        >>> speeds_text((0.0, 0.4)), speeds_text((0.0, math.inf)), speeds_text((0.0, 0.0))
-        ('below 0.4 m/s', 'all', 'none')
-    """
-    if speeds is None:
-        return "–"
-    if math.isinf(speeds[1]):
-        return "all"
-    if speeds[1] == 0.0:
-        return "none"
-    return f"below {speed_text(round_down(speeds[1]))}"
-
-
-def _met_share_text(result: Limits, failing: Sequence[Limit]) -> str:
-    """Return the share of the texture that meets the limits that can be decided."""
-    if any(limit.share is None for limit in failing) or result.resolved_share == 0.0:
-        return "Not as it is"
-    share = percent(result.resolved_share)
-    return f"Not all of it, only waves with {share} of the height variance,"
-
-
-def _failure_text(limit: Limit) -> str:
-    """Return both sides of a limit that fails, for the wave that violates it most."""
-    left, right = (
-        format_quantity(side, limit.unit) if side is not None else "–"
-        for side in (limit.left, limit.right)
-    )
-    return f"limit {limit.number} ({limit.name}) fails, {left} against {right}"
-
-
-def _speed_advice(result: Limits, failing: Sequence[Limit]) -> str:
-    """Return the speeds at which all limits hold, or the limits that hold at no speed."""
-    top = result.speeds[1]
-    if top == 0.0:
-        at_none = [limit for limit in failing if limit.speeds and limit.speeds[1] == 0.0]
-        return f" No speed satisfies {_limit_numbers(at_none)}."
-    return f" {speeds_text(result.speeds).capitalize()} they hold."
-
-
-def texture_force_text(result: Limits) -> str:
-    """Return the texture force, its perceptibility, and remedies."""
-    texture = result.perceptibility
-    law = result.surface.law.letter
-    text = f"At {stiffness_text(result)} law {law} gives {texture_amount_text(texture)}: "
-    if texture.tier == "felt":
-        return f"{text}felt."
-    return f"{text}{texture.tier}; {masking_text(texture)}. {remedies_text(texture)}".rstrip()
-
-
-def stiffness_text(result: Limits) -> str:
-    """Return the stiffness of the force for reading, rounded down."""
-    return format_quantity(round_down(result.surface.stiffness), "N/m")
-
-
-def percent(share: float) -> str:
-    """Return a share for reading, never rounded to none or to all.
-
-    Example:
-        >>> percent(0.5), percent(1e-5), percent(0.9999), percent(1.0)
-        ('50 %', '< 0.1 %', '> 99.9 %', '100 %')
-    """
-    if 0.0 < share < 1e-3:
-        return "< 0.1 %"
-    if 0.999 < share < 1.0 - 1e-12:
-        return "> 99.9 %"
-    return f"{100.0 * share:.3g} %"
-
-
-def _limit_numbers(limits: Sequence[Limit]) -> str:
-    word = "limit" if len(limits) == 1 else "limits"
-    return f"{word} {_join_words([str(limit.number) for limit in limits])}"
-
-
-def _join_words(words: Sequence[str]) -> str:
-    return " and ".join(filter(None, [", ".join(words[:-1]), words[-1]])) if words else "none"
-
-
-def limits_assumptions(
-    result: Limits, defaults: Mapping[str, bool], contact_lost: float
-) -> tuple[str, ...]:
-    """Return the assumptions of the limits, in sentences.
-
-    Args:
-        result: the limits.
-        defaults: whether speed, stiffness, max_depth and samples are defaults.
-        contact_lost: fraction of the scan without contact.
-    """
-    surface = result.surface
-    sentences = [*surface.texture.preparation, *_default_sentences(result, defaults)]
-    sentences.append(f"Waves: {result.spectrum.description}")
-    left_out = len(result.spectrum.waves) - len(result.waves)
-    if left_out:
-        sentences.append(
-            f"{left_out} bands with less than 0.1 % of the variance of height and of force are "
-            "left out of the limits"
-        )
-    depth = format_quantity(surface.max_depth, "m")
-    sentences.append(f"Forces are those of a scan at constant height, pressed to {depth}")
-    if contact_lost > 0.0:
-        sentences.append(f"No contact on {percent(contact_lost)} of that scan")
-    if result.gain.method == "sampled":
-        sentences.append(f"{result.gain_symbol} = {result.gain.value:.4g} is sampled, not proved")
-    used = [*dict.fromkeys(limit.device_field for limit in result.limits), "friction"]
-    sentences += perceptibility_assumptions(result.perceptibility, result.device, result.grip)
-    sentences += surface_sentences.unverified_sentences(result.device, used)
-    sentences.append("The limits are necessary, not sufficient; they were not tested with people")
-    return tuple(sentences)
-
-
-def _default_sentences(result: Limits, defaults: Mapping[str, bool]) -> list[str]:
-    sentences = []
-    if defaults["speed"]:
-        sentences.append(f"Default speed {speed_text(result.speed)}")
-    if defaults["samples"]:
-        counts = (result.time_samples, result.position_samples, result.force_steps)
-        shown = ", ".join(f"{name} = {n:g}" for name, n in zip("αβγ", counts, strict=True))
-        sentences.append(f"Samples in a wave: {shown}; the paper recommends 5 to 10")
-    if defaults["stiffness"]:
-        share = result.margin.factor
-        limit = result.stability_limit
-        default = "" if limit.stiffness else ", a default"
-        part = f"{share:g} of what is " if limit.stiffness and share < 1.0 else ""
-        sentences.append(
-            f"Stiffness {stiffness_text(result)}{default}: {part}{stability_limit_text(limit)}"
-        )
-    if defaults["max_depth"]:
-        sentences.append(surface_sentences.default_depth_text(result.surface))
-    return sentences + surface_sentences.law_parameter_sentences(result.surface)
 
 
 def limits(
@@ -406,9 +244,9 @@ def limits(
     surface = rendered_surface(surface, rendering)
     q = cached_number(surface, NORM)
     one_sided = cached_number(surface, ONE_SIDED)
-    recommended = verdict.recommend_stiffness(surface, device, q, one_sided)
+    recommended = recommend_stiffness(surface, device, q, one_sided)
     if stiffness is None:
-        surface = verdict.at_recommended_stiffness(surface, device, recommended)
+        surface = at_recommended_stiffness(surface, device, recommended)
     scan = scan_force(surface)
     hand = load_grip(grip)
     perceptibility = assess_perceptibility(
@@ -420,26 +258,37 @@ def limits(
         grip=hand,
         **settings,
     )
-    gain = _limiting_number(q, one_sided, recommended.stability_limit)
-    result = _evaluate_limits(surface, device, recommended, *gain, perceptibility, hand, settings)
-    given = {"speed": speed, "stiffness": stiffness, "max_depth": max_depth}
-    defaults = {name: value is None for name, value in given.items()}
-    defaults["samples"] = None in {time_samples, position_samples, force_steps}
-    assumptions = limits_assumptions(result, defaults, scan.contact_lost)
-    return replace(result, assumptions=assumptions)
+    arguments = {
+        "speed": speed,
+        "stiffness": stiffness,
+        "max_depth": max_depth,
+        "samples": None if None in (time_samples, position_samples, force_steps) else 1.0,
+    }
+    return _evaluate_limits(
+        surface,
+        device,
+        recommended,
+        q,
+        one_sided,
+        settings,
+        perceptibility=perceptibility,
+        grip=hand,
+        contact_lost=scan.contact_lost,
+        defaults=tuple([name for name, value in arguments.items() if value is None]),
+    )
 
 
 def _evaluate_limits(
     surface: Surface,
     device: Device,
-    recommended: verdict.StiffnessRecommendation,
-    gain: Bound,
-    gain_symbol: str,
-    perceptibility: Perceptibility,
-    grip: Grip,
-    settings: dict[str, float],
+    recommended: StiffnessRecommendation,
+    q: Bound,
+    one_sided: Bound,
+    settings: Mapping[str, Any],
+    **others: Any,
 ) -> Limits:
-    """Return the six limits, without sentences."""
+    """Return the six limits; ``others`` are further attributes of the result."""
+    gain, gain_symbol = _limiting_number(q, one_sided, recommended.stability_limit)
     spectrum = compute_spectrum(surface.texture)
     forces = wave_forces(surface, spectrum)
     is_significant = _significant_waves(spectrum, forces)
@@ -473,16 +322,14 @@ def _evaluate_limits(
         limits=six,
         waves=_rendered_waves(spectrum, is_significant, case, decisions),
         spectrum=spectrum,
-        perceptibility=perceptibility,
-        grip=grip,
         speeds=(0.0, top),
-        assumptions=(),
         **settings,
+        **others,
     )
 
 
 def _limiting_number(
-    q: Bound, one_sided: Bound, stability_limit: verdict.StabilityLimit
+    q: Bound, one_sided: Bound, stability_limit: StabilityLimit
 ) -> tuple[Bound, str]:
     """Return the number that limits the stiffness on this device, and its symbol.
 

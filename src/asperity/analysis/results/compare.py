@@ -14,14 +14,21 @@ from asperity.analysis.energy.leak import worst_loop
 from asperity.analysis.energy.scan import merit as compute_merit
 from asperity.analysis.gain.characteristic import cached_number, is_shipped_law, surface_content
 from asperity.analysis.limits.limit_rules import DEFAULT_SPEED
-from asperity.analysis.limits.perceptibility import assess_perceptibility
-from asperity.analysis.passivity.assess_passivity import passivity
-from asperity.analysis.passivity.verdict import at_recommended_stiffness, recommend_stiffness
-from asperity.analysis.results.comparison_assumptions import comparison_assumptions
-from asperity.analysis.results.recommendation import LawRow, recommend, recommendation_text
+from asperity.analysis.limits.perceptibility import Tier, assess_perceptibility
+from asperity.analysis.passivity.recommended_stiffness import (
+    at_recommended_stiffness,
+    recommend_stiffness,
+)
+from asperity.analysis.passivity.verdict import passivity
+from asperity.analysis.results.recommendation import (
+    LawRow,
+    nearest_to_felt,
+    recommend,
+    textured_rows,
+)
 from asperity.core.arguments import DEFAULT_STIFFNESS, FIELD
 from asperity.core.checks import check_keywords, check_positive
-from asperity.core.display import Plottable, Reportable, Tabular
+from asperity.core.display import Plottable, Reportable, Tabular, Text
 from asperity.core.errors import ParameterError
 from asperity.core.files import attributes_to_dict, content_digest, json_text, to_plain_data
 from asperity.core.processes import precompute
@@ -55,9 +62,7 @@ class Comparison(Plottable, Reportable, Tabular):
         rows: one per law, in the given order.
         recommended_row: row of the recommended law; ``None`` if none can be recommended.
         nearest_row: where no texture is felt, row of the law that comes nearest; else ``None``.
-        recommendation: the recommendation with its reason, in words.
-        assumptions: assumptions, in sentences: defaults, unverified device data, the preparation
-            steps of the surface, regions and resolutions of sampling.
+        defaults: names of the arguments that were not given.
     """
 
     texture: Texture
@@ -69,8 +74,17 @@ class Comparison(Plottable, Reportable, Tabular):
     rows: tuple[LawRow, ...]
     recommended_row: LawRow | None
     nearest_row: LawRow | None
-    recommendation: str
-    assumptions: tuple[str, ...]
+    defaults: tuple[str, ...]
+    recommendation = Text[str]("The recommendation with its reason, in words.")
+    assumptions = Text[tuple[str, ...]](
+        "Assumptions, in sentences: defaults, unverified device data, the preparation steps of the "
+        "surface, regions and resolutions of sampling."
+    )
+
+    @property
+    def textured_rows(self) -> list[LawRow]:
+        """Rows of the laws with a texture and a known stable stiffness."""
+        return textured_rows(self.rows)
 
     @property
     def recommended(self) -> str:
@@ -84,6 +98,12 @@ class Comparison(Plottable, Reportable, Tabular):
         if None in contents:
             return None
         return content_digest(json_text(self), self.texture.filled_mask, tuple(contents))
+
+    @property
+    def tier(self) -> Tier | None:
+        """Tier of the recommended law, or of the one that comes nearest to it."""
+        row = self.recommended_row or self.nearest_row
+        return None if row is None else row.tier
 
     def row(self, letter: str) -> LawRow:
         """Return the row of a law by its letter.
@@ -135,7 +155,7 @@ def compare(
     For every law: the perceptibility of its texture
     (:func:`~asperity.analysis.limits.perceptibility.assess_perceptibility`); q and q⁺; the
     stability limit and its basis
-    (:func:`~asperity.analysis.passivity.assess_passivity.passivity`); whether the field is
+    (:func:`~asperity.analysis.passivity.verdict.passivity`); whether the field is
     conservative, and the energy gained on its worst loop; whether the force is continuous;
     strength and support; and a verdict. All numbers of a law are those of one stiffness.
 
@@ -177,10 +197,13 @@ def compare(
     device = load_device(device)
     stiffness = None if stiffness is None else check_positive("stiffness", stiffness, "N/m")
     scan_speed = DEFAULT_SPEED if speed is None else check_positive("speed", speed, "m/s")
-    if hint := missing_data_hint(device):
-        others = "damping, update_rate and delay_samples"
-        needs = f"needs max_stiffness to compare laws: add {hint}, the stiffest smooth wall"
-        raise ParameterError("device", f"{device.id} {needs} that held, to its file; or {others}")
+    if lacks_data(device):
+        raise ParameterError(
+            "device",
+            f'{device.id} needs max_stiffness to compare laws: add max_stiffness = "... N/m", the '
+            "stiffest smooth wall that held, to its file; or damping, update_rate and "
+            "delay_samples",
+        )
     parameters = distribute_parameters(law_parameters or {}, laws)
     surface_arguments |= {"stiffness": stiffness or DEFAULT_STIFFNESS, "max_depth": max_depth}
     surfaces = [
@@ -198,8 +221,9 @@ def compare(
             if progress is not None:
                 progress(surface.law.letter)
             rows.append(_compute_row(surface, query))
-    recommended = recommend(rows, stiffness)
-    defaults = {"max_depth": not explicit_depth, "speed": speed is None}
+    recommended = recommend(rows)
+    nearest = nearest_to_felt(rows) if recommended is None else None
+    arguments = {"max_depth": max_depth, "speed": speed}
     return Comparison(
         texture=texture,
         device=device,
@@ -208,23 +232,25 @@ def compare(
         speed=scan_speed,
         grip=query.grip,
         rows=tuple(rows),
-        recommended_row=recommended.row,
-        nearest_row=recommended.nearest,
-        recommendation=recommendation_text(recommended, device),
-        assumptions=comparison_assumptions(rows, part, device, query.grip, defaults),
+        recommended_row=recommended,
+        nearest_row=nearest,
+        defaults=tuple([name for name, value in arguments.items() if value is None]),
     )
 
 
-def missing_data_hint(device: Device) -> str:
-    """Return the line missing from a device file to compare laws on it; empty if none is missing.
+def lacks_data(device: Device) -> bool:
+    """Return whether a device has too little data to compare laws on it.
+
+    A comparison needs the stiffest smooth wall that held, max_stiffness, or damping, update rate
+    and delay, which prove a limit.
 
     Example:
-        >>> missing_data_hint(load_device("touch")), missing_data_hint(load_device("2diy"))
-        ('', 'max_stiffness = "... N/m"')
+        >>> lacks_data(load_device("touch")), lacks_data(load_device("2diy"))
+        (False, True)
     """
     fields = ("damping", "update_rate", "delay_samples")
     is_provable = all(device.value(field) is not None for field in fields)
-    return "" if device.wall_test is not None or is_provable else 'max_stiffness = "... N/m"'
+    return device.wall_test is None and not is_provable
 
 
 def recommended_law(

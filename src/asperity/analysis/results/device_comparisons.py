@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from asperity.analysis.limits.perceptibility_sentences import texture_amount_text
-from asperity.analysis.results.compare import SCHEMA, Comparison, compare, missing_data_hint
+from asperity.analysis.results.compare import SCHEMA, Comparison, compare, lacks_data
+from asperity.analysis.results.recommendation import LawRow
 from asperity.core.checks import check_items
-from asperity.core.display import Reportable, Tabular
+from asperity.core.display import Reportable, Tabular, Text
 from asperity.core.errors import ParameterError
 from asperity.core.files import Serializable, to_plain_data
-from asperity.core.units import format_quantity
 from asperity.devices import Device, DeviceLike, load_device
 from asperity.laws import REGISTERED_LAWS, Law
 from asperity.textures.catalogue import TextureLike, as_texture
@@ -24,52 +22,27 @@ from asperity.textures.texture import Texture
 DeviceProgress = Callable[[Device, float | None, str], None]
 
 
-_NO_LAW = "no law"
-
-
-def _best_tier(result: Comparison) -> str:
-    """Return the tier of the recommended law, or of the one that comes nearest to it."""
-    row = result.recommended_row or result.nearest_row
-    return _NO_LAW if row is None or row.tier is None else row.tier
-
-
-def _best_case_text(comparisons: Sequence[Comparison]) -> str:
-    """Return the device, depth and law of the strongest texture, in a sentence."""
-    cases = [(one.recommended_row, one) for one in comparisons if one.recommended_row is not None]
-    row, best = max(cases, key=lambda case: (case[0].tier == "felt", case[0].resolved_force))
-    law = f"law {row.law.letter}"
-    if best.stiffness is not None:
-        law += f" at {format_quantity(best.stiffness, 'N/m')}"
-    elif row.recommended_stiffness:
-        law += f" from {format_quantity(row.recommended_stiffness, 'N/m')}"
-    if row.perceptibility is not None:
-        law += f", {row.tier}, {texture_amount_text(row.perceptibility)}"
-    depth = format_quantity(best.max_depth, "m")
-    return f"Best on the {best.device.name}, pressed to {depth}: {law}."
-
-
 @dataclass(frozen=True)
 class MissingData(Serializable):
     """A device with too little data to compare laws on it.
 
     Attributes:
         device: its id.
-        hint: the missing line of its device file.
+        field: the missing field of its device file.
+        unit: its unit.
     """
 
     serialized_attributes = "device hint"
 
     device: str
-    hint: str
+    field: str = "max_stiffness"
+    unit: str = "N/m"
+    sentence = Text[str]("The missing data and how to supply them.")
 
     @property
-    def sentence(self) -> str:
-        """The missing data and how to supply them."""
-        option = self.hint.replace(" = ", "=").replace('"', "").replace(" ", "")
-        return (
-            f"{self.device}: the stiffest smooth wall that held is unknown; measure it, and add "
-            f"{self.hint} to its file, or set {option}"
-        )
+    def hint(self) -> str:
+        """The missing line of the device file."""
+        return f'{self.field} = "... {self.unit}"'
 
 
 @dataclass(frozen=True)
@@ -85,23 +58,21 @@ class DeviceComparisons(Reportable, Tabular):
     texture: Texture
     comparisons: tuple[Comparison, ...]
     missing_data: tuple[MissingData, ...] = ()
+    recommendation = Text[str](
+        "The best device and law for the texture, and the number of cases by tier."
+    )
 
     @property
-    def recommendation(self) -> str:
-        """The best device and law for the texture, and the number of cases by tier."""
-        sentences = []
-        if any(one.recommended_row for one in self.comparisons):
-            sentences.append(_best_case_text(self.comparisons))
-        count = len(self.comparisons)
-        tiers = Counter(map(_best_tier, self.comparisons))
-        if count:
-            order = ("felt", "borderline", "not felt", _NO_LAW)
-            counts = ", ".join(f"{tier} in {tiers[tier]}" for tier in order if tiers[tier])
-            sentences.append(f"Of {count} case{'s' * (count > 1)}: {counts}.")
-        if self.missing_data:
-            names = ", ".join(one.device for one in self.missing_data)
-            sentences.append(f"No smooth wall is known to have held on {names}.")
-        return " ".join(sentences)
+    def best_case(self) -> tuple[Comparison, LawRow] | None:
+        """The comparison and law of the strongest texture; ``None`` if none is recommended."""
+        cases = [
+            (comparison, comparison.recommended_row)
+            for comparison in self.comparisons
+            if comparison.recommended_row is not None
+        ]
+        return max(
+            cases, key=lambda case: (case[1].tier == "felt", case[1].resolved_force), default=None
+        )
 
     def __repr__(self) -> str:
         counts = f"{len(self.comparisons)} compared, {len(self.missing_data)} without data"
@@ -164,8 +135,8 @@ def compare_devices(
     comparisons = []
     missing_data = []
     for device in loaded:
-        if hint := missing_data_hint(device):
-            missing_data.append(MissingData(device.id, hint))
+        if lacks_data(device):
+            missing_data.append(MissingData(device.id))
             continue
         for depth in depths:
             on_law = progress and partial(progress, device, depth)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from asperity.analysis.passivity.assess_passivity import Passivity, stability_limit_text
+from asperity.analysis.passivity.verdict import Passivity
 from asperity.analysis.results.analyze import PASSIVITY_FIELDS, Analysis
 from asperity.core.units import format_quantity
 from asperity.laws import LAWS, SHIPPED_LAW_ARGUMENTS
@@ -22,6 +22,7 @@ from asperity.report.sentences.analysis_text import (
     critical_speed_text,
     thrust_text,
 )
+from asperity.report.sentences.passivity_sentences import stability_limit_text
 from asperity.report.sentences.surface_text import texture_name
 from asperity.report.sentences.texts import glossary, sentence
 from asperity.surface import Surface

@@ -8,8 +8,6 @@ from dataclasses import dataclass, replace
 from rich.table import Table as RichTable
 
 from asperity.analysis.bounds.bound import Bound
-from asperity.analysis.limits.perceptibility_sentences import texture_amount_text, tier_text
-from asperity.analysis.passivity.assess_passivity import stability_limit_text
 from asperity.analysis.results.compare import Comparison
 from asperity.analysis.results.recommendation import LawRow
 from asperity.report.document.page import (
@@ -24,6 +22,8 @@ from asperity.report.document.page import (
 from asperity.report.document.terminal import rich_table
 from asperity.report.sentences import number_text
 from asperity.report.sentences.comparison_text import recommended_stiffness_text, row_limit_text
+from asperity.report.sentences.limit_sentences import texture_amount_text, tier_text
+from asperity.report.sentences.passivity_sentences import stability_limit_text
 from asperity.report.sentences.texts import column_meanings, table_notes
 
 VERDICT_MIN_CONSOLE = 72

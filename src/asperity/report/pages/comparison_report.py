@@ -6,8 +6,6 @@ from collections.abc import Callable
 from functools import partial
 from operator import attrgetter
 
-from asperity.analysis.limits import perceptibility_sentences
-from asperity.analysis.results.check_limits import percent
 from asperity.analysis.results.compare import Comparison
 from asperity.analysis.results.device_comparisons import DeviceComparisons
 from asperity.analysis.results.recommendation import LawRow
@@ -19,6 +17,7 @@ from asperity.report.document.page import Cell, Media, Page, Row, Section, Table
 from asperity.report.pages.comparison_columns import law_rows, law_sections, terminal_sections
 from asperity.report.pages.device_report import device_numbers_table
 from asperity.report.pages.measured_report import measured_sections, thin_sections
+from asperity.report.sentences import limit_sentences
 from asperity.report.sentences.comparison_text import (
     design_answer,
     field_alt_text,
@@ -32,6 +31,7 @@ from asperity.report.sentences.comparison_text import (
     surface_alt_text,
 )
 from asperity.report.sentences.device_text import datum_text
+from asperity.report.sentences.limit_sentences import percent
 from asperity.report.sentences.number_text import (
     NOT_AVAILABLE,
     bound_text,
@@ -82,7 +82,7 @@ def _facts(comparison: Comparison) -> list[tuple[str, str]]:
         ("K₀, stiffest smooth wall", datum_text(device.wall_test)),
         ("Stiffness", requested_stiffness_text(comparison)),
         ("Pressed to", format_quantity(comparison.max_depth, "m")),
-        ("Scanned at", perceptibility_sentences.speed_text(comparison.speed)),
+        ("Scanned at", limit_sentences.speed_text(comparison.speed)),
     ]
 
 
@@ -169,8 +169,8 @@ def _case_row(comparison: Comparison) -> Row:
             depth,
             Cell(text, "l", note=comparison.recommendation),
             limit_text(comparison.stiffness or best.recommended_stiffness),
-            perceptibility_sentences.force_magnitude_text(best.resolved_force),
-            perceptibility_sentences.tier_text(best.perceptibility),
+            limit_sentences.force_magnitude_text(best.resolved_force),
+            limit_sentences.tier_text(best.perceptibility),
         ]
     )
 
@@ -227,7 +227,7 @@ def _case_section(comparison: Comparison) -> Section:
     """Return answer, laws and assumptions of one device and depth."""
 
     def cells(row: LawRow) -> list[str | Cell]:
-        felt = perceptibility_sentences.tier_text(row.perceptibility)
+        felt = limit_sentences.tier_text(row.perceptibility)
         return [Cell(row.law.letter, "l"), recommended_stiffness_text(row), felt, row.verdict]
 
     rows = law_rows(comparison, cells)

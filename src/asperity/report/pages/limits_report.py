@@ -7,7 +7,6 @@ import io
 from pathlib import Path
 
 from asperity.analysis.limits.limit_rules import LIMIT_RULES
-from asperity.analysis.limits.perceptibility_sentences import speed_text, texture_amount_text
 from asperity.analysis.results import check_limits
 from asperity.core.errors import ParameterError
 from asperity.core.files import write_bytes
@@ -25,11 +24,13 @@ from asperity.report.document.page import (
     TableLayout,
 )
 from asperity.report.pages.device_report import device_numbers_table
+from asperity.report.sentences import limit_sentences
 from asperity.report.sentences.analysis_text import (
     amplitude_range_text,
     envelope_answer,
     symbol_lines,
 )
+from asperity.report.sentences.limit_sentences import speed_text, texture_amount_text
 from asperity.report.sentences.number_text import readable_name, side_text, yes_no_text
 from asperity.report.sentences.surface_text import texture_name
 from asperity.report.sentences.texts import figure_text, glossary, table_notes
@@ -64,8 +65,8 @@ def six_limits_table(result: check_limits.Limits) -> Table:
             side_text(limit.left, limit.unit),
             side_text(limit.right, limit.unit),
             page.holds_cell(limit.holds),
-            "" if limit.share is None else check_limits.percent(limit.share),
-            missing or check_limits.speeds_text(limit.speeds),
+            "" if limit.share is None else limit_sentences.percent(limit.share),
+            missing or limit_sentences.speeds_text(limit.speeds),
         ]
         style = "bold red" if limit.holds is False else "dim" if limit.holds is None else ""
         rows.append(Row(cells, style=style))
@@ -89,11 +90,11 @@ def _waves_table(result: check_limits.Limits, *, short: bool) -> Table:
             [
                 format_quantity(wave.wavelength, "m"),
                 format_quantity(wave.amplitude, "m"),
-                check_limits.percent(wave.share),
+                limit_sentences.percent(wave.share),
                 format_quantity(wave.frequency, "Hz"),
                 format_quantity(wave.force, "N", digits=2),
                 *[cell(wave.holds.get(number)) for number in WAVE_LIMITS],
-                check_limits.speeds_text((0.0, wave.top_speed)),
+                limit_sentences.speeds_text((0.0, wave.top_speed)),
             ]
         )
         for wave in listed_waves(result)
@@ -137,8 +138,8 @@ def _facts(result: check_limits.Limits) -> list[tuple[str, str]]:
         ("Law", f"{law.letter}, {readable_name(law.name)}"),
         ("Device", result.device.name),
         ("Scanning speed", speed_text(result.speed)),
-        ("Stiffness", check_limits.stiffness_text(result)),
-        ("Speeds at which all decided limits hold", check_limits.speeds_text(result.speeds)),
+        ("Stiffness", limit_sentences.stiffness_text(result)),
+        ("Speeds at which all decided limits hold", limit_sentences.speeds_text(result.speeds)),
         ("Texture force", f"{texture_amount_text(perceptibility)}: {perceptibility.tier}"),
     ]
 

@@ -32,7 +32,7 @@ def calibration_page(
         calibration: its calibration.
         path: the device file.
         starts: recommended stiffness [N/m] of each law before and after the calibration, see
-            :func:`~asperity.analysis.passivity.verdict.unit_starts`.
+            :func:`~asperity.analysis.passivity.recommended_stiffness.unit_starts`.
     """
     force = format_quantity(calibration.max_force, "N")
     rows = [Row(_calibration_cells(axis)) for axis in calibration.axes]

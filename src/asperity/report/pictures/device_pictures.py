@@ -15,16 +15,15 @@ from numpy.typing import NDArray
 
 from asperity.analysis.energy.scan import parallel_line_points
 from asperity.analysis.limits.limit_rules import shortest_wavelengths
-from asperity.analysis.limits.perceptibility_sentences import speed_text
-from asperity.analysis.results.check_limits import Limits, stiffness_text
+from asperity.analysis.results.check_limits import Limits
 from asperity.analysis.results.compare import Comparison
 from asperity.core.checks import FloatArray
 from asperity.core.units import format_quantity
 from asperity.devices import Device
 from asperity.envelopes.envelope import DeviceEnvelope, Envelope, LawEnvelope, SurfacePeaks
 from asperity.envelopes.wave_borders import AMPLITUDE_RANGE
-from asperity.perception.grip import grip_text
 from asperity.report.pictures import style
+from asperity.report.sentences.limit_sentences import grip_text, speed_text, stiffness_text
 from asperity.textures.texture import Texture
 
 _LINE_POINTS = 4096

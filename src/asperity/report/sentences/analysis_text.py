@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 
 from asperity.analysis.bounds.bound import Bound
-from asperity.analysis.limits.perceptibility_sentences import speed_text
 from asperity.analysis.results import check_limits
 from asperity.analysis.results.analyze import Analysis
 from asperity.core.units import format_quantity
 from asperity.envelopes.envelope import DeviceEnvelope
 from asperity.envelopes.wave_borders import WaveBorders
+from asperity.report.sentences import limit_sentences
+from asperity.report.sentences.limit_sentences import speed_text
 from asperity.report.sentences.number_text import INFINITY_SIGN, NOT_AVAILABLE
 from asperity.report.sentences.texts import sentence, table_data
 
@@ -72,7 +73,7 @@ def symbol_lines(result: check_limits.Limits) -> list[str]:
     q = INFINITY_SIGN if result.gain.value == float("inf") else f"{result.gain.value:.4g}"
     numbers = ", ".join(values) or "no data"
     speed = speed_text(result.speed)
-    stiffness = check_limits.stiffness_text(result)
+    stiffness = limit_sentences.stiffness_text(result)
     return [
         sentence("symbols", speed=speed, limits=result, device=device.name, numbers=numbers),
         sentence("gain_symbol", law=surface.law.letter, stiffness=stiffness, limits=result, q=q),

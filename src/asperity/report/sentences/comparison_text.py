@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from asperity.analysis.limits.perceptibility_sentences import force_magnitude_text
 from asperity.analysis.results.compare import Comparison
 from asperity.analysis.results.recommendation import LawRow
 from asperity.core.units import format_quantity, round_down
 from asperity.envelopes.find_design import Design
 from asperity.envelopes.searches import FORCE
 from asperity.report.sentences import number_text
+from asperity.report.sentences.limit_sentences import force_magnitude_text
 from asperity.report.sentences.number_text import bound_text
 from asperity.report.sentences.texts import sentence, sentence_case
 from asperity.textures.texture import Texture

@@ -1,0 +1,244 @@
+"""The stability limit, the safety margin below it, and the recommended stiffness."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Literal
+
+from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.passivity import criteria, device_loop
+from asperity.core.arguments import DEFAULT_STIFFNESS
+from asperity.core.files import Serializable
+from asperity.core.units import round_down
+from asperity.devices import Device
+from asperity.laws import LAWS, Law
+from asperity.surface import Surface
+from asperity.textures import Sinusoid
+
+Basis = Literal["proved", "plausible", "bounded", "wall gain", "none"]
+
+
+@dataclass(frozen=True)
+class StabilityLimit(Serializable):
+    """Stability limit of the stiffness of a law on a device, and its basis.
+
+    Attributes:
+        stiffness: the limit [N/m]; 0 if no stable stiffness is known, ``None`` if undecidable.
+        basis: ``"proved"``: passive up to the limit, under the assumptions of the criterion.
+            ``"plausible"``: a smooth wall of that gain did not cycle. ``"bounded"``:
+            passive but for quantisation, whose buzz moves at ``buzz_goal`` at most, or at twice
+            what steps of force cause at any stiffness.
+            ``"wall gain"``: a wall of that gain did not cycle; no stability limit, since the law
+            has curl and delivers energy below v* at any stiffness. ``"none"``.
+        criterion: name of the criterion that gives the limit; empty for none.
+        delay: delay of the binding pair of damping and delay, in samples; infinity where any delay
+            is admissible, ``None`` where the limit has no such pair.
+        sampled: whether the limit uses a number that was only sampled, so that it may be too high.
+        proved_stiffness: stiffness up to which passivity is proved [N/m]; 0 for none.
+    """
+
+    stiffness: float | None
+    basis: Basis
+    criterion: str = ""
+    delay: float | None = None
+    sampled: bool = False
+    proved_stiffness: float = 0.0
+
+
+def stability_limit(
+    loop: device_loop.DeviceLoop, by_name: Mapping[str, criteria.Criterion]
+) -> StabilityLimit:
+    """Return the stability limit of the stiffness, and its basis.
+
+    Comparison, analysis and the six limits of the device share this limit.
+    """
+    main = by_name[criteria.main_rule(loop)]
+    steps = by_name[criteria.QUANTIZATION]
+    if not loop.conservative:
+        return _limit_from_criterion("wall gain", by_name[criteria.WALL])
+    plausible = _limit_from_criterion("plausible", by_name[criteria.WALL_TEST], loop.longest_delay)
+    if loop.obstacle is not None or loop.delay is None or device_loop.is_contradictory(loop):
+        return plausible
+    proved = _proved_limit(main, steps)
+    silent = proved.stiffness or 0.0
+    if (
+        main.limit
+        and not steps.missing
+        and (calm := criteria.buzz_limited_stiffness(loop)) is not None
+    ):
+        bounded = min(calm, main.limit)
+        if bounded > silent:
+            return StabilityLimit(
+                bounded, "bounded", criteria.QUANTIZATION, proved_stiffness=silent
+            )
+    if (plausible.stiffness or 0.0) > (proved.stiffness or 0.0):
+        return replace(plausible, proved_stiffness=proved.proved_stiffness)
+    if proved.stiffness is None:
+        return plausible
+    return proved
+
+
+def _proved_limit(main: criteria.Criterion, steps: criteria.Criterion) -> StabilityLimit:
+    """Return the stiffness up to which the rule and the quantisation criterion are proved."""
+    if main.limit is None or steps.limit is None:
+        sampled = _limit_from_criterion("proved", main)
+        return sampled if sampled.sampled else StabilityLimit(None, "none")
+    stiffness = min(main.limit, steps.limit)
+    basis: Basis = "proved" if stiffness else "none"
+    return StabilityLimit(
+        stiffness, basis, main.name if stiffness else "", proved_stiffness=stiffness
+    )
+
+
+def _limit_from_criterion(
+    basis: Basis, criterion: criteria.Criterion, delay: device_loop.Number | None = None
+) -> StabilityLimit:
+    sampled = criterion.limit is None and criterion.upper_limit is not None
+    stiffness = criterion.upper_limit if sampled else criterion.limit
+    if not stiffness:
+        return StabilityLimit(stiffness, "none")
+    pair = None if delay is None else float(delay)
+    return StabilityLimit(stiffness, basis, criterion.name, pair, sampled)
+
+
+_MARGINS_FILE = Path(__file__).with_name("margins.toml")
+
+
+# Limits that need no margin: they are proved, or bound the buzz.
+_BASES_WITHOUT_MARGIN = ("proved", "bounded")
+
+
+@dataclass(frozen=True)
+class Margin(Serializable):
+    """Safety margin: the recommended stiffness over K₀/q, from random admissible loops.
+
+    Attributes:
+        factor: recommended stiffness over stability limit, at most 1.
+        law: letter of the simulated law; for a user-defined law the shipped law with the least
+            factor.
+        loops: number of random loops simulated at that factor of K₀/q; 0 without simulation.
+        cycles: in how many of them a motion lasts, without steps, that a hand feels.
+        speed: RMS speed of the fastest of these motions, summed over the axes [m/s].
+        extent: its RMS displacement [m].
+    """
+
+    factor: float
+    law: str = ""
+    loops: int = 0
+    cycles: int = 0
+    speed: float = 0.0
+    extent: float = 0.0
+
+    @property
+    def frequency(self) -> float:
+        """Frequency of a sinusoid of that speed and displacement [Hz]."""
+        return self.speed / (2.0 * math.pi * self.extent) if self.extent else 0.0
+
+
+NO_MARGIN = Margin(1.0)
+
+
+@cache
+def load_margins(along_lightest: bool = False) -> dict[Law, Margin]:
+    """Return the simulated margin of each law.
+
+    Args:
+        along_lightest: whether K₀ is that of the lightest direction, or of the weakest axis.
+    """
+    table = tomllib.loads(_MARGINS_FILE.read_text(encoding="utf-8"))
+    entries = table["lightest" if along_lightest else "normal"]
+    return {LAWS[law]: Margin(law=law, **entry) for law, entry in entries.items()}
+
+
+def safety_margin(surface: Surface, device: Device, limit: StabilityLimit) -> Margin:
+    """Return the safety margin below a stability limit.
+
+    A proved limit needs no margin. Where K₀ is known along the device's lightest direction, the
+    margin is smaller.
+
+    Args:
+        surface: the surface, of which the law counts.
+        device: the device.
+        limit: the stability limit.
+    """
+    if limit.basis in _BASES_WITHOUT_MARGIN or not surface.depends_on_texture:
+        return NO_MARGIN
+    test = device.wall_test
+    margins = load_margins(along_lightest=test is not None and test.lightest is not None)
+    return margins.get(surface.law) or min(margins.values(), key=lambda margin: margin.factor)
+
+
+@dataclass(frozen=True)
+class StiffnessRecommendation:
+    """Recommended stiffness of a law on a device.
+
+    Attributes:
+        stability_limit: stability limit of the stiffness, and its basis.
+        margin: safety margin below it.
+        stiffness: recommended stiffness [N/m], rounded down to three digits; 0 if no stable
+            stiffness is known, or if there is no limit.
+        wall_stiffness: K₀ for this law [N/m]: in the lightest direction, at the device's rate;
+            ``None`` if it is unknown.
+    """
+
+    stability_limit: StabilityLimit
+    margin: Margin
+    stiffness: float
+    wall_stiffness: float | None
+
+
+def recommend_stiffness(
+    surface: Surface, device: Device, q: Bound, one_sided: Bound
+) -> StiffnessRecommendation:
+    """Return the recommended stiffness of a surface's law on a device.
+
+    Args:
+        surface: the surface; its stiffness does not count.
+        device: the device.
+        q: its characteristic number.
+        one_sided: its one-sided number.
+    """
+    loop = device_loop.make_device_loop(surface, device, q, one_sided, None)
+    limit = stability_limit(loop, criteria.evaluate_criteria(loop))
+    margin = safety_margin(surface, device, limit)
+    known = limit.stiffness or 0.0
+    start = round_down(margin.factor * known) if math.isfinite(known) else 0.0
+    wall = None if loop.wall_stiffness is None else float(loop.wall_stiffness)
+    return StiffnessRecommendation(limit, margin, start, wall)
+
+
+_GENTLE_TEXTURE = Sinusoid(1e-6, 1e-2)
+
+
+_UNIT_GAIN = Bound(1.0, 1.0, "theorem")
+
+
+def unit_starts(device: Device) -> dict[str, float]:
+    """Return the recommended stiffness [N/m] of each law on a surface with q = q⁺ = 1, by letter.
+
+    On other surfaces it is smaller by the factor q; 0 if no stable stiffness is known.
+    """
+    return {
+        letter: recommend_stiffness(
+            Surface(_GENTLE_TEXTURE, letter), device, _UNIT_GAIN, _UNIT_GAIN
+        ).stiffness
+        for letter in LAWS
+    }
+
+
+def at_recommended_stiffness(
+    surface: Surface, device: Device, recommendation: StiffnessRecommendation
+) -> Surface:
+    """Return the surface at the recommended stiffness.
+
+    Without one it is at the smooth wall's K₀, or at 1000 N/m where that is unknown too.
+    """
+    if recommendation.stiffness:
+        return surface.to_stiffness(recommendation.stiffness)
+    test = device.wall_test
+    return surface.to_stiffness(DEFAULT_STIFFNESS if test is None else test.value)

@@ -1,0 +1,301 @@
+"""Sentences about passivity: the verdict with its reason, limits of the stiffness, criteria."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+from asperity.analysis.passivity import criteria
+from asperity.analysis.passivity.criteria import BuzzBound, Criterion
+from asperity.analysis.passivity.device_loop import (
+    DeviceLoop,
+    Obstacle,
+    critical_speed,
+    has_known_leak,
+    max_proved_delay,
+)
+from asperity.analysis.passivity.recommended_stiffness import StabilityLimit
+from asperity.analysis.passivity.verdict import Ground, Passivity
+from asperity.core.units import format_quantity, round_down
+from asperity.devices import WallTest
+from asperity.report.sentences.energy_sentences import continuity_reason
+from asperity.surface import Surface
+
+_GAINS_ENERGY = "a small oscillation where q⁺ or q is attained gains energy"
+_IF_DAMPED = "if damping there is σ₀"
+
+
+def verdict_reason(passivity: Passivity) -> str:
+    """Return the reason of the verdict, in one sentence."""
+    loop = passivity.loop
+    criterion = passivity.criterion(passivity.decided_by)
+    formula = criterion.formula
+    conclusion = criterion.conclusion
+    stiffness = f"{formula} at {loop.surface.stiffness:g} N/m"
+    wall = f"a smooth wall of {float(loop.cycling_stiffness or 0.0):g} N/m cycled"
+    reasons = {
+        Ground.PROVED: f"{stiffness}; {conclusion}",
+        Ground.CRITERION: conclusion,
+        Ground.BOUNDED: _quantization_reason(criterion, passivity.buzz),
+        Ground.UNBOUNDED: _quantization_reason(criterion, passivity.buzz),
+        Ground.WALL_HELD: f"{stiffness}; {conclusion}; {criterion.assumptions}",
+        Ground.WALL_CYCLED: f"{wall}, so {_GAINS_ENERGY}, {_IF_DAMPED}",
+        Ground.CONTRADICTION: f"{wall}, which damping and delay prove passive: one is wrong",
+        Ground.GAINS_ENERGY: f"{_GAINS_ENERGY}, {_IF_DAMPED}",
+        Ground.GAINS_ENERGY_REGARDLESS: f"{_GAINS_ENERGY}, whatever the damping",
+        Ground.DEVICE_UNKNOWN: f"{formula} {conclusion}; to decide: {_unknown_data(loop)}",
+    }
+    return reasons[passivity.ground]
+
+
+def _quantization_reason(criterion: Criterion, buzz: BuzzBound | None) -> str:
+    bound = "no bound of the buzz is known" if buzz is None else buzz_text(buzz)
+    return f"silence is not proved, {criterion.formula} {criterion.conclusion}; {bound}"
+
+
+def _unknown_data(loop: DeviceLoop) -> str:
+    fields = ("update_rate", "damping", "delay_samples")
+    return ", ".join([field for field in fields if loop.device.value(field) is None])
+
+
+def buzz_text(buzz: BuzzBound) -> str:
+    """Return the bound of the motion that steps of positions and forces may cause."""
+    speed = format_quantity(buzz.speed, "m/s")
+    power = format_quantity(buzz.power, "W")
+    return f"a sustained buzz moves at {speed} RMS and draws {power} at most"
+
+
+def delivery_text(loop: DeviceLoop) -> str:
+    """Return below which speed the field of a law with curl delivers energy, and at which power.
+
+    On its worst loop the field does the work W over the length ℓ, a mean force W/ℓ; at the speed v
+    damping absorbs σ₀ v of it. So it delivers energy below v* = W/(σ₀ ℓ), at most σ₀ v*²/4 at v*/2.
+    """
+    speed = critical_speed(loop)
+    if loop.leak is None or (speed is None and not has_known_leak(loop)):
+        return "may deliver energy at any stiffness: the law has curl"
+    if speed is None or loop.damping is None:
+        mean = format_quantity(loop.leak.energy / loop.leak.length, "N")
+        return f"delivers energy below v* = {mean} / damping (missing)"
+    if math.isinf(speed):
+        return "delivers energy at any speed: the device has no damping"
+    power = format_quantity(float(loop.damping) * speed**2 / 4.0, "W")
+    return f"delivers energy below v* = {format_quantity(speed, 'm/s')}, at most {power}"
+
+
+def energy_gained_text(loop: DeviceLoop) -> str:
+    """Return the energy gained on the worst loop, and the speed below which it is delivered."""
+    energy = 0.0 if loop.leak is None else loop.leak.energy
+    return f"a loop gains {format_quantity(energy, 'J')}; it {delivery_text(loop)}"
+
+
+# --- limits of the stiffness ----------------------------------------------------------------------
+
+
+def stability_limit_text(limit: StabilityLimit, loop: DeviceLoop | None = None) -> str:
+    """Return the stability limit and its basis.
+
+    Args:
+        limit: the limit.
+        loop: the surface on the device, for v* and power of a law with curl.
+
+    Example:
+        >>> stability_limit_text(StabilityLimit(1999.9, "plausible", "wall test", math.inf))
+        'plausible up to 1990 N/m at the delay of the wall test'
+        >>> stability_limit_text(StabilityLimit(1999.9, "wall gain"))
+        'no stable stiffness: below a speed v* the field delivers energy at any stiffness'
+        >>> stability_limit_text(StabilityLimit(None, "none"))
+        'no stable stiffness is known: the device data are insufficient'
+        >>> stability_limit_text(StabilityLimit(0.0, "none"))
+        'no stable stiffness is known'
+    """
+    if limit.stiffness is None:
+        return "no stable stiffness is known: the device data are insufficient"
+    if limit.basis == "none":
+        return "no stable stiffness is known"
+    if limit.basis == "wall gain" and loop is not None:
+        return delivery_text(loop)
+    if limit.basis == "wall gain":
+        return "no stable stiffness: below a speed v* the field delivers energy at any stiffness"
+    at_most = "at most " if limit.sampled else ""
+    stiffness = stiffness_limit_text(limit.stiffness)
+    return f"{limit.basis} up to {at_most}{stiffness}{delay_clause(limit.delay)}"
+
+
+def delay_clause(delay: float | None) -> str:
+    """Return the admissible delay [samples], to be appended to a limit; empty for ``None``.
+
+    Infinity: the limit holds whatever the delay of the wall test was; it is not a limit for a loop
+    with a longer delay than that of the test.
+    """
+    if delay is None:
+        return ""
+    if math.isinf(delay):
+        return " at the delay of the wall test"
+    return f", for a delay up to {delay:.3g} samples"
+
+
+def stiffness_limit_text(stiffness: float) -> str:
+    """Return a stiffness limit for reading: rounded down, never overstated.
+
+    Example:
+        >>> stiffness_limit_text(1234.5), stiffness_limit_text(math.inf)
+        ('1230 N/m', 'infinite')
+    """
+    if stiffness == math.inf:
+        return "infinite"
+    return f"{round_down(stiffness):.10g} N/m"
+
+
+# --- criteria -------------------------------------------------------------------------------------
+
+
+def described_criteria(passivity: Passivity) -> tuple[Criterion, ...]:
+    """Return all criteria with their conclusions in words and their complete assumptions."""
+    loop = passivity.loop
+    return tuple(
+        [
+            replace(
+                criterion,
+                conclusion=criterion.conclusion or _conclusion(loop, criterion),
+                assumptions=_criterion_assumptions(loop, criterion),
+            )
+            for criterion in passivity.evaluated.values()
+        ]
+    )
+
+
+_HOLDS_TEXT = {True: "holds", False: "does not hold", None: "not decidable"}
+
+
+def _conclusion(loop: DeviceLoop, criterion: Criterion) -> str:
+    """Return the conclusion of a criterion in words."""
+    if criterion.name == criteria.LEAK:
+        return _leak_conclusion(loop, criterion)
+    if criterion.obstacle is Obstacle.CURL:
+        return f"not applicable: the law is not conservative ({loop.surface.facts.reason})"
+    if criterion.obstacle is Obstacle.JUMPS and loop.continuity is not None:
+        return f"not applicable: the force is not continuous: {continuity_reason(loop.continuity)}"
+    answer = _HOLDS_TEXT[criterion.holds]
+    if criterion.holds is None and criterion.missing:
+        missing = ", ".join(criterion.missing)
+        return f"{answer}: needs {missing}{_proved_delays_text(loop, criterion)}"
+    return f"{answer}{_limit_clause(criterion)}"
+
+
+def _limit_clause(criterion: Criterion) -> str:
+    """Return the limit of a criterion, to be appended to whether it holds."""
+    upper = criterion.upper_limit
+    if criterion.limit is None and upper is None:
+        return ""
+    if criterion.limit is None:
+        at_most = stiffness_limit_text(upper or 0.0)
+        return f": the number was only sampled; the limit is at most {at_most}"
+    limit = stiffness_limit_text(criterion.limit)
+    if criterion.holds is None and upper is not None:
+        return f": the limit is between {limit} and {stiffness_limit_text(upper)}"
+    return f": the limit is {limit}"
+
+
+def _proved_delays_text(loop: DeviceLoop, criterion: Criterion) -> str:
+    """Return the proved delays, if the delay is all that is missing."""
+    if criterion.missing != ("delay_samples",):
+        return ""
+    delay = max_proved_delay(loop)
+    if delay is None:
+        return "; at this stiffness not even d = 0 is proved"
+    return f"; at this stiffness d <= {delay} is proved"
+
+
+def _leak_conclusion(loop: DeviceLoop, criterion: Criterion) -> str:
+    if criterion.holds is None:
+        return "not decidable: no loop found that gains energy, and no proof that none does"
+    if criterion.holds:
+        return "holds: no loop gains"
+    return f"does not hold: {energy_gained_text(loop)}"
+
+
+def _criterion_assumptions(loop: DeviceLoop, criterion: Criterion) -> str:
+    """Return the assumptions with the region and the numbers used, unverified ones marked."""
+    describe = _ASSUMPTIONS.get(criterion.name)
+    assumptions = criterion.assumptions if describe is None else describe(loop)
+    if criterion.name == criteria.LEAK and criterion.holds:
+        return assumptions
+    data = loop.device.data
+    numbers = []
+    for field in criterion.used_fields:
+        if field in data:
+            mark = "" if data[field].verified else " (not verified)"
+            numbers.append(f"{field} {data[field].text}{mark}")
+    parts = (assumptions, _depth_text(loop.surface), ", ".join(numbers))
+    return "; ".join(filter(None, parts))
+
+
+def _depth_text(surface: Surface) -> str:
+    if surface.effective_clamp.holds_whole_force:
+        return "at every depth"
+    return f"no deeper than {format_quantity(surface.clamped_depth, 'm')}"
+
+
+_COMMON = "conservative law, zero-order hold, symmetric damping >= σ₀ wherever the force acts"
+
+
+def _virtual_damping_assumptions(loop: DeviceLoop) -> str:
+    delay = "no delay" if loop.delay is None else "d whole samples of delay"
+    return f"{_COMMON}, {delay}, b_v on the last step's mean velocity"
+
+
+def _quantization_assumptions(loop: DeviceLoop) -> str:
+    is_missing = loop.wall_test is not None and loop.wall_test.positions == "stepped"
+    if not (loop.position_step or loop.force_step or is_missing):
+        return "positions and forces are assumed to be exact: their resolution is unknown"
+    return f"{_COMMON}; |δ|, |b|: a step along three axes at once; f_c: least_friction"
+
+
+def _wall_test_assumptions(loop: DeviceLoop) -> str:
+    if loop.virtual_damping and loop.delay != 0:
+        return "no limit: with delay, the wall test does not show the effect of virtual damping"
+    if loop.longest_delay is None:
+        return "no delay fits: a wall of K₀ needs more damping than the data of the device"
+    return (
+        "plausible, not proved: the wall of stiffness K₀ was close to its stability limit (heavy "
+        f"handle, loose grip); {damping_assumption(loop.wall_test)}; conservative law"
+    )
+
+
+def damping_assumption(wall_test: WallTest | None) -> str:
+    """Return the assumption about the damping along directions in which no wall was tested."""
+    if wall_test is not None and wall_test.lightest is not None:
+        return f"damping is at least {wall_test.lightest:g} of the tested in all directions"
+    if wall_test is not None and wall_test.directions:
+        tested = f"tested along {', '.join(wall_test.directions)}"
+        return f"damping is equal in all directions, {tested}"
+    return "damping is equal in all directions, the direction of the test is not stated"
+
+
+def _leak_assumptions(loop: DeviceLoop) -> str:
+    if loop.conservative:
+        return "the law's curl is identically zero; no data of the device are needed"
+    method = "" if loop.leak is None else f" ({loop.leak.method})"
+    return f"one slow traversal of the loop{method}; dry friction is not counted"
+
+
+_ASSUMPTIONS: dict[str, Callable[[DeviceLoop], str]] = {
+    criteria.PAPER: lambda _loop: (
+        "zero-order hold; no certificate for a field with curl, nor from 2 samples of delay on"
+    ),
+    criteria.ONE_SIDED: lambda _loop: f"{_COMMON}, no delay, no virtual damping",
+    criteria.DELAY: lambda _loop: (
+        f"{_COMMON}, d whole samples of delay, no virtual damping, no quantisation"
+    ),
+    criteria.VIRTUAL: _virtual_damping_assumptions,
+    criteria.QUANTIZATION: _quantization_assumptions,
+    criteria.WALL: lambda _loop: (
+        "the paper's III.B as printed, for every law; a rule of thumb: that a wall did not cycle "
+        "proves no damping, and no norm bounds what a field with curl gains"
+    ),
+    criteria.WALL_TEST: _wall_test_assumptions,
+    criteria.LEAK: _leak_assumptions,
+}
+"""The assumptions of the shipped criteria; a user-defined one has its own."""
