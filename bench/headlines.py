@@ -25,7 +25,7 @@ from asperity.devices import Device, device_names, load_device
 from asperity.scene import load_scene
 from asperity.scene.scene_defaults import make_servo
 from asperity.simulation import Cartesian, Servo, SpringHand, Stationary
-from asperity.simulation.batch import BatchSimulation
+from asperity.simulation.lanes import BatchSimulation
 from asperity.simulation.onset import run_starts, start_offsets
 from asperity.surface import Surface
 from bench.margins import HANDS, press_with

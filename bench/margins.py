@@ -28,10 +28,10 @@ from rich.console import Console
 from rich.table import Table
 
 from asperity.analysis import characteristic_number
+from asperity.loop import lane_loop
 from asperity.scene.sweeps import map_threads
 from asperity.simulation import Cartesian, Servo, SpringHand, Stationary
-from asperity.simulation.batch import BatchSimulation, SegmentStatistics, StopRule, Trajectory
-from asperity.simulation.kernels import batch_loop
+from asperity.simulation.lanes import BatchSimulation, SegmentStatistics, StopRule, Trajectory
 from asperity.simulation.onset_search import limit_cycle_rule
 from asperity.surface import Surface
 from asperity.textures import Fourier, Sinusoid
@@ -278,7 +278,7 @@ def _speed_norm(run: Trajectory, seen: list[SegmentStatistics]) -> float:
     count = seen[-1].samples - (seen[-2].samples if len(seen) > 1 else 0)
     sums, squares = (
         run.statistics[first : first + 3]
-        for first in (batch_loop.VELOCITY_SUM, batch_loop.VELOCITY_SQUARES)
+        for first in (lane_loop.VELOCITY_SUM, lane_loop.VELOCITY_SQUARES)
     )
     return math.sqrt(float(np.sum(squares / count - (sums / count) ** 2)))
 

@@ -179,10 +179,10 @@ ROOMS = {
     "simulation": Room(
         ("simulation",),
         (
-            "tests/simulation/kernels/test_simulation_loop_by_definition.py",
+            "tests/loop/test_simulation_loop_by_definition.py",
             "tests/simulation/test_prediction.py",
             "tests/simulation/test_onset_rules.py",
-            "tests/simulation/kernels/test_bodies_by_definition.py",
+            "tests/loop/test_bodies_by_definition.py",
             "tests/simulation/test_hands.py",
             "tests/simulation/test_discretization.py",
             "tests/simulation",

@@ -14,8 +14,8 @@ from unittest.mock import patch
 
 import numpy as np
 
+from asperity.servo.driver import Driver
 from asperity.servo.drivers import force_dimension, haply, open_haptics
-from asperity.servo.drivers.driver import Driver
 from asperity.servo.drivers.force_dimension import ForceDimensionDriver
 from asperity.servo.drivers.haply import HaplyDriver
 from asperity.servo.drivers.library import LibraryDriver

@@ -15,12 +15,12 @@ from asperity.kernels.link import unit_from_module
 from asperity.kernels.probe_functions import LawCode, contact_source, probe_source
 from asperity.laws import LAWS
 from asperity.laws.clamps import CLAMPS, Clamp
-from asperity.simulation.kernels import axis_body as axes
-from asperity.simulation.kernels import body_interface as body_functions
-from asperity.simulation.kernels import coupled_body as dense
-from asperity.simulation.kernels import elastic_band as banded
-from asperity.simulation.kernels import pantograph_dynamics as five_bar
-from asperity.simulation.kernels import prescribed_motion as prescribed
+from asperity.loop import body_interface as body_functions
+from asperity.loop.bodies import axis_body as axes
+from asperity.loop.bodies import coupled_body as dense
+from asperity.loop.bodies import elastic_band as banded
+from asperity.loop.bodies import pantograph_dynamics as five_bar
+from asperity.loop.bodies import prescribed_motion as prescribed
 from asperity.textures.kinds import fourier_line_sampler as fourier_line
 from asperity.textures.kinds import fourier_sampler as fourier
 from asperity.textures.kinds import sinusoid_sampler as sinusoid

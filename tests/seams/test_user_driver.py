@@ -17,8 +17,8 @@ from tests.helpers.pages import page_example
 from asperity.core.errors import ParameterError
 from asperity.devices import load_device
 from asperity.recording.recording import open_recording
+from asperity.servo.driver import Frame
 from asperity.servo.drivers import driver_registry
-from asperity.servo.drivers.driver import Frame
 from asperity.servo.drivers.driver_registry import hardware_driver, register_driver
 from asperity.servo.drivers.force_dimension import ForceDimensionDriver
 from asperity.servo.drivers.haply import HaplyDriver

@@ -21,8 +21,13 @@ from asperity.simulation import (
     Strokes,
     simulate,
 )
-from asperity.simulation.batch import BatchSimulation, SegmentStatistics, StopRule, Trajectory
-from asperity.simulation.kernels.body_interface import LANES
+from asperity.simulation.lanes import (
+    MAX_LANES,
+    BatchSimulation,
+    SegmentStatistics,
+    StopRule,
+    Trajectory,
+)
 from asperity.simulation.onset_search import limit_cycle_rule
 from asperity.simulation.trace import Run, StopReason
 from asperity.surface import Surface
@@ -191,9 +196,9 @@ def test_incompatible_parts_and_excess_sizes_are_errors() -> None:
         loop.new_trajectory(900.0, 1_000_001, np.zeros(3), SegmentRecorder(1).judge())
     starts = [
         loop.new_trajectory(900.0, 0, np.zeros(3), SegmentRecorder(1).judge())
-        for _ in range(LANES + 1)
+        for _ in range(MAX_LANES + 1)
     ]
-    with pytest.raises(ParameterError, match=f"at most {LANES}"):
+    with pytest.raises(ParameterError, match=f"at most {MAX_LANES}"):
         loop.run(starts)
 
 
@@ -202,7 +207,7 @@ def test_incompatible_parts_and_excess_sizes_are_errors() -> None:
 
 BAND = BandHand(200.0, 3.0, 0.08, 0.02)
 STILL = Stationary((0.0, 0.0, 0.0))
-OFFSETS = np.array([(1e-4 * i, 0.0, 4e-3 - 1e-3 * i) for i in range(LANES)])
+OFFSETS = np.array([(1e-4 * i, 0.0, 4e-3 - 1e-3 * i) for i in range(MAX_LANES)])
 PUSHED_OUT = SpringHand(0.0, 0.1, 0.0, (0.0, 0.0, 1.0))
 
 
@@ -234,7 +239,7 @@ def test_pantographs_equal_single_runs(
     loop = BatchSimulation(*parts, STILL, start_position, velocity)
     goals = [
         (round(0.05 / period), round((0.12 if i in {1, 2, 7} else 0.06) / period))
-        for i in range(LANES)
+        for i in range(MAX_LANES)
     ]
     watchers = [SegmentRecorder(*goal) for goal in goals]
     starts = [

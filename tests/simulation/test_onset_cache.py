@@ -14,7 +14,7 @@ from asperity.core import cache
 from asperity.core import cache as kept
 from asperity.laws import Law
 from asperity.simulation import Cartesian, Servo, SpringHand, Stationary, find_onset
-from asperity.simulation.batch import BatchSimulation
+from asperity.simulation.lanes import BatchSimulation
 from asperity.simulation.onset import Onset
 from asperity.surface import Surface
 from asperity.textures import Sinusoid

@@ -15,8 +15,7 @@ from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
 from asperity.perception.grip import load_grip
 from asperity.simulation import Cartesian, Servo, SpringHand, Stationary, Strokes, find_onset, onset
-from asperity.simulation.batch import SegmentStatistics
-from asperity.simulation.kernels.body_interface import LANES
+from asperity.simulation.lanes import MAX_LANES, SegmentStatistics
 from asperity.simulation.onset import Onset, find_onsets, is_at_rest, start_offsets
 from asperity.simulation.onset_search import bracket_onset, felt_speed, limit_cycle_rule
 from asperity.simulation.trace import StopReason
@@ -289,7 +288,7 @@ class StandInLoop:
         return StandInTrajectory(stiffness, delay, float(shift[0]), self.times)
 
     def run(self, starts: list[StandInTrajectory]) -> None:
-        assert 1 <= len(starts) <= LANES
+        assert 1 <= len(starts) <= MAX_LANES
         assert len(set(map(id, starts))) == len(starts)
         self.together.append(starts)
         for start in starts:

@@ -15,6 +15,14 @@ import pytest
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
 from asperity.devices.five_bar import handle_damping, joint_angles, joint_rates
+from asperity.loop.bodies.pantograph_dynamics import (
+    PantographRecord,
+    StepInput,
+    linkage_dynamics,
+    linkage_friction,
+    linkage_rates,
+    linkage_reaches,
+)
 from asperity.simulation import (
     BandHand,
     Hand,
@@ -29,14 +37,6 @@ from asperity.simulation import (
     Waypoints,
     plants,
     simulate,
-)
-from asperity.simulation.kernels.pantograph_dynamics import (
-    PantographRecord,
-    StepInput,
-    linkage_dynamics,
-    linkage_friction,
-    linkage_rates,
-    linkage_reaches,
 )
 from asperity.simulation.pantograph import linkage_record
 from asperity.surface import Surface

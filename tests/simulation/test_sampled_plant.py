@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from asperity.core.errors import ParameterError
+from asperity.loop.bodies import pantograph_dynamics as five_bar
+from asperity.loop.bodies.coupled_body import multiply_columns
 from asperity.simulation import (
     BandHand,
     Cartesian,
@@ -19,8 +21,6 @@ from asperity.simulation import (
     Stationary,
     simulate,
 )
-from asperity.simulation.kernels import pantograph_dynamics as five_bar
-from asperity.simulation.kernels.coupled_body import multiply_columns
 from asperity.simulation.pantograph import linkage_record
 from asperity.simulation.plants import sampled_plant
 from asperity.surface import Surface

@@ -19,7 +19,7 @@ from asperity.laws.clamps import BACKED
 if TYPE_CHECKING:
     from asperity.devices import Device
     from asperity.scene.setup import Setup
-    from asperity.servo.drivers.driver import Driver
+    from asperity.servo.driver import Driver
     from asperity.servo.process import PrestartedProcess
     from asperity.simulation.servo import Servo
     from asperity.textures.texture import Texture
@@ -133,7 +133,7 @@ def recommend(
 
 def _check_driver(name: str, device: Device) -> None:
     """Check a driver and its files before the laws are compared, which takes long."""
-    from asperity.servo.drivers.driver import IDENTITY_FRAME
+    from asperity.servo.driver import IDENTITY_FRAME
     from asperity.servo.drivers.driver_registry import find_driver
     from asperity.servo.drivers.simulated import open_replay
 

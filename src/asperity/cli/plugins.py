@@ -68,8 +68,8 @@ def plugin_registries() -> tuple[PluginRegistry, ...]:
     from asperity.analysis.passivity.criteria import CRITERIA
     from asperity.derive.derivatives import symbolic_force
     from asperity.measured.reading import Reader, readers
+    from asperity.servo.driver import DriverKind
     from asperity.servo.drivers import driver_registry
-    from asperity.servo.drivers.driver import DriverKind
     from asperity.sweeps import case_runs
     from asperity.textures import catalogue
     from asperity.textures.texture import TextureKind

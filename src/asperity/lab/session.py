@@ -18,7 +18,7 @@ from asperity.devices import Device
 from asperity.lab.messages import SteerRequest
 from asperity.lab.scene_state import SCENE_KEY, SavedScenes, SceneState
 from asperity.scene.setup import Setup
-from asperity.servo.drivers.driver import Driver
+from asperity.servo.driver import Driver
 from asperity.servo.drivers.pointer import PointerHand, pointer_driver
 from asperity.servo.loop_memory import DeviceFault, EndReason, LoopMemory
 from asperity.servo.process import PrestartedProcess, ServoProcess

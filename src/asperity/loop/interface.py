@@ -17,6 +17,8 @@ LATE_SAMPLE, NO_HEARTBEAT = range(8, 10)
 # Requests to stop: with a ramp, or with the next sample.
 STOP_RAMPED = 1
 STOP_NOW = 2
+# End sample of a loop that does not end by itself.
+NO_END = 2**62
 
 
 class Reading(NamedTuple):

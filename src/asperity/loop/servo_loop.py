@@ -32,15 +32,7 @@ from asperity.loop.interface import (
     trace_timing,
 )
 
-KERNELS = Kernels(loops=("servo_loop",))
-
-
-def start_timing(timing: LoopTiming, clock: Clock) -> LoopTiming:
-    """Return the timing with the first sample due now, if none is due yet."""
-    if timing.due != 0:
-        return timing
-    now = clock_now(0, clock)
-    return LoopTiming(timing.sample, now, 0, timing.heartbeat, now)
+KERNELS = Kernels(provides=("run_sample",), loops=("servo_loop",))
 
 
 def servo_loop(
@@ -65,47 +57,68 @@ def servo_loop(
     Returns:
         End cause, error code of the driver, and the state, whose force is zero.
     """
-    position = local_array((3,))
-    servo, force, timing = state
     cause = RUNNING
     code = OK
     if end_sample < 0:
         return cause, code, state
-    timing = start_timing(timing, clock)
+    state = LoopState(state.servo, state.force, start_timing(state.timing, clock))
     while cause == RUNNING:
-        end, is_released = requested_end(timing.sample, end_sample, force, guards)
-        if is_released:
-            cause = end
-            break
-        start = clock_wait_until(timing.due, clock)
-        reading = read_position(position, start - timing.due, guards, device)
-        cause = reading.cause
-        code = reading.code
-        in_contact = False
-        before = servo
-        if cause == RUNNING:
-            x = reading.x
-            y = reading.y
-            z = reading.z
-            before = state_before_tick(servo, timing.sample, x, y, z, settings)
-            servo = servo_tick(before, settings, x, y, z, memory, texture, law)
-            force = guard_force(force, before, servo, end != RUNNING, settings, guards)
-            in_contact = probe_in_contact(servo.x, servo.y, servo.z, texture)
-            cause = check_sample(servo, force, guards, texture)
-        if cause != RUNNING:
-            force = release_force(force)
-        trace_sample(
-            trace, timing.sample, reading, before, servo, force, in_contact, settings, device
+        cause, code, state = run_sample(
+            state, end_sample, settings, clock, guards, device, trace, memory, texture, law
         )
-        answer = write_force(force.fx, force.fy, force.fz, in_contact, guards, device)
-        if cause == RUNNING and answer != OK:
-            cause = DEVICE
-            code = answer
-        now = clock_now(timing.due, clock)
-        trace_timing(trace, start - timing.due, now - start)
-        timing_fault, timing = finish_timing(timing, start, now, guards)
-        if cause == RUNNING:
-            cause = timing_fault
     # Release the force once more, even after a failed write.
-    force = release_device(force, guards, device)
+    force = release_device(state.force, guards, device)
+    return cause, code, LoopState(state.servo, force, state.timing)
+
+
+def start_timing(timing: LoopTiming, clock: Clock) -> LoopTiming:
+    """Return the timing with the first sample due now, if none is due yet."""
+    if timing.due != 0:
+        return timing
+    now = clock_now(0, clock)
+    return LoopTiming(timing.sample, now, 0, timing.heartbeat, now)
+
+
+def run_sample(
+    state: LoopState, end_sample: int, settings: ServoSettings, clock: Clock, guards: Guards,
+    device: object, trace: object, memory: FloatArray, texture: object, law: object,
+) -> tuple[int, int, LoopState]:  # fmt: skip
+    """Run a sample, unless the loop ends before it; see :func:`servo_loop`.
+
+    Returns:
+        End cause, or ``RUNNING``; error code of the driver; state, whose force is zero after a
+        fault.
+    """
+    position = local_array((3,))
+    servo, force, timing = state
+    end, is_released = requested_end(timing.sample, end_sample, force, guards)
+    if is_released:
+        return end, OK, state
+    start = clock_wait_until(timing.due, clock)
+    reading = read_position(position, start - timing.due, guards, device)
+    cause = reading.cause
+    code = reading.code
+    in_contact = False
+    before = servo
+    if cause == RUNNING:
+        x = reading.x
+        y = reading.y
+        z = reading.z
+        before = state_before_tick(servo, timing.sample, x, y, z, settings)
+        servo = servo_tick(before, settings, x, y, z, memory, texture, law)
+        force = guard_force(force, before, servo, end != RUNNING, settings, guards)
+        in_contact = probe_in_contact(servo.x, servo.y, servo.z, texture)
+        cause = check_sample(servo, force, guards, texture)
+    if cause != RUNNING:
+        force = release_force(force)
+    trace_sample(trace, timing.sample, reading, before, servo, force, in_contact, settings, device)
+    answer = write_force(force.fx, force.fy, force.fz, in_contact, guards, device)
+    if cause == RUNNING and answer != OK:
+        cause = DEVICE
+        code = answer
+    now = clock_now(timing.due, clock)
+    trace_timing(trace, start - timing.due, now - start)
+    timing_fault, timing = finish_timing(timing, start, now, guards)
+    if cause == RUNNING:
+        cause = timing_fault
     return cause, code, LoopState(servo, force, timing)

@@ -32,8 +32,8 @@ from asperity.simulation import (
     Strokes,
     find_onset,
 )
-from asperity.simulation.batch import BatchSimulation, StopRule
 from asperity.simulation.hands import Hand
+from asperity.simulation.lanes import BatchSimulation, StopRule
 from asperity.simulation.onset import Onset, Prediction, predict, run_starts, start_offsets
 from asperity.surface import Surface
 from asperity.textures import named_surface

@@ -15,16 +15,13 @@ from asperity.kernels.fuse import load_fused, source_on_texture
 from asperity.kernels.tick import ServoState
 from asperity.loop import guards, servo_loop, shared_trace
 from asperity.loop.guards import Clock, Guards, LoopLimits
-from asperity.loop.interface import LoopState
+from asperity.loop.interface import NO_END, LoopState
 from asperity.loop.shared_trace import SharedBlock
-from asperity.servo.drivers.driver import Driver
+from asperity.servo.driver import Driver
 from asperity.servo.loop_memory import EndReason
 from asperity.servo.safety import Safety
 from asperity.simulation.servo import Servo
 from asperity.surface import Surface
-
-NO_END = 2**62
-"""End sample of a loop that does not end by itself."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,8 +23,8 @@ from typing import Any
 
 from asperity.core.errors import AsperityError, ParameterError
 from asperity.core.processes import end_with_parent
+from asperity.servo.driver import Driver
 from asperity.servo.driver_loop import DriverLoop, LoopProgram, no_clock, system_clock
-from asperity.servo.drivers.driver import Driver
 from asperity.servo.loop_memory import EndReason, LoopMemory
 from asperity.servo.safety import Safety
 from asperity.simulation.servo import Servo

@@ -22,11 +22,12 @@ from asperity.core.checks import FloatArray
 from asperity.core.errors import AsperityError, ParameterError, print_message
 from asperity.core.files import to_plain_data
 from asperity.devices import Device
+from asperity.loop.interface import NO_END
 from asperity.loop.shared_trace import COLUMNS
 from asperity.recording.recorded_field import field_attachments, field_metadata
 from asperity.recording.writer import RecordingWriter
 from asperity.servo import driver_loop, loop_process
-from asperity.servo.drivers.driver import Driver
+from asperity.servo.driver import Driver
 from asperity.servo.loop_memory import (
     FAULT_DESCRIPTIONS,
     FAULT_SAMPLES,
@@ -124,7 +125,7 @@ class ServoProcess:
         self._device = device
         if device is not None:
             check_passivity_damping(self._safety, device, servo)
-        last = driver_loop.NO_END if duration is None else round(duration / servo.period)
+        last = NO_END if duration is None else round(duration / servo.period)
         program = (
             surface
             if isinstance(surface, driver_loop.LoopProgram)

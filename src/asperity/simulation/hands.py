@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from asperity.core.checks import FloatArray, check_array, check_positive, check_real
 from asperity.core.errors import ParameterError
 from asperity.core.files import attributes_to_dict
-from asperity.simulation.kernels.body_parts import HandRecord
+from asperity.loop.bodies.body_parts import HandRecord
 
 # ruff: noqa: ARG002 - one signature for all hands
 

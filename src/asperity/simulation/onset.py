@@ -23,9 +23,8 @@ from asperity.core.files import (
 )
 from asperity.laws.w_smooth_wall import LAW as SMOOTH_WALL
 from asperity.simulation import onset_search
-from asperity.simulation.batch import BatchSimulation, Trajectory
 from asperity.simulation.hands import Hand, Motion
-from asperity.simulation.kernels.body_interface import LANES
+from asperity.simulation.lanes import MAX_LANES, BatchSimulation, Trajectory
 from asperity.simulation.plants import Plant
 from asperity.simulation.servo import Servo
 from asperity.simulation.simulate import count_samples
@@ -95,7 +94,7 @@ def run_starts(
         batch.new_trajectory(stiffness, servo.delay, shift, onset_search.limit_cycle_rule(samples))
         for shift in offsets
     ]
-    while active := [run for run in runs if run.verdict is None][:LANES]:
+    while active := [run for run in runs if run.verdict is None][:MAX_LANES]:
         batch.run(active)
     return runs
 

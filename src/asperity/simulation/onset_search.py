@@ -15,8 +15,13 @@ import numpy as np
 
 from asperity.core.checks import FloatArray
 from asperity.perception.grip import Grip, load_grip
-from asperity.simulation.batch import BatchSimulation, SegmentStatistics, StopRule, Trajectory
-from asperity.simulation.kernels.body_interface import LANES
+from asperity.simulation.lanes import (
+    MAX_LANES,
+    BatchSimulation,
+    SegmentStatistics,
+    StopRule,
+    Trajectory,
+)
 from asperity.simulation.trace import SUPPLY_SHARE, StopReason
 
 # A run that still oscillates is extended by these factors, up to the last one.
@@ -152,7 +157,7 @@ def run_searches(batch: BatchSimulation, searches: Mapping[int, OnsetSearch]) ->
             for place, (priority, run) in enumerate(search.next_trajectories())
         ]
         queue.sort(key=lambda entry: entry[:2])
-        batch.run([run for _priority, _place, run in queue[:LANES]])
+        batch.run([run for _priority, _place, run in queue[:MAX_LANES]])
         for number, search in list(active.items()):
             if search.is_finished():
                 del active[number]
@@ -197,7 +202,7 @@ class OnsetSearch:
 
     def _select_trajectories(self) -> list[tuple[int, Trajectory]]:
         keys = self._keys()
-        new = list(islice((key for key in keys if key not in self._results), LANES))
+        new = list(islice((key for key in keys if key not in self._results), MAX_LANES))
         # The first one runs alone: if it cycles, the others are not needed.
         alone = self._bracket is None and new[0] == keys[0]
         for key in new[: 1 if alone else None]:

@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike
 from asperity.core.checks import FloatArray, check_array
 from asperity.core.errors import ParameterError
 from asperity.devices.five_bar import FiveBar, handle_damping, joint_angles
+from asperity.loop.bodies import body_parts
+from asperity.loop.bodies import pantograph_dynamics as pantograph
+from asperity.loop.bodies.pantograph_dynamics import LinkageRecord, PantographRecord
 from asperity.simulation.hands import Hand, nonnegative
-from asperity.simulation.kernels import body_parts
-from asperity.simulation.kernels import pantograph_dynamics as pantograph
-from asperity.simulation.kernels.pantograph_dynamics import LinkageRecord, PantographRecord
 from asperity.simulation.plants import (
     FRICTION_SUBSTEPS,
     Plant,

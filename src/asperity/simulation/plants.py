@@ -15,15 +15,15 @@ from numpy.typing import ArrayLike
 
 from asperity.core.checks import FloatArray, check_array
 from asperity.core.errors import ParameterError
-from asperity.simulation.discretization import Resonance, integrate, linear_body
-from asperity.simulation.hands import Hand, NamedPart, SpringHand, Triple, nonnegative, per_axis
-from asperity.simulation.kernels import (
+from asperity.loop.bodies import (
     axis_body,
     body_parts,
     coupled_body,
     elastic_band,
     prescribed_motion,
 )
+from asperity.simulation.discretization import Resonance, integrate, linear_body
+from asperity.simulation.hands import Hand, NamedPart, SpringHand, Triple, nonnegative, per_axis
 from asperity.simulation.servo import Servo
 
 # Parts of a sample over which dry friction is held constant.
@@ -127,7 +127,7 @@ def sampled_plant(plant: Plant, hand: Hand, servo: Servo) -> SampledPlant:
     """
     if hand.is_prescribed:
         record = prescribed_motion.PrescribedMotionRecord(float(servo.period))
-        return SampledPlant((prescribed_motion, body_parts), record, 6)
+        return SampledPlant((prescribed_motion,), record, 6)
     try:
         with np.errstate(all="ignore"):  # an overflow is refused below
             sampled = plant.sample(hand, servo.period)

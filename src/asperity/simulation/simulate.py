@@ -5,32 +5,30 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from functools import cached_property
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from asperity.contacts.warm_start import MAX_ERROR_BOUND, TRUNCATED_TICKS, new_warm_start
+from asperity.contacts.warm_start import MAX_ERROR_BOUND, TRUNCATED_TICKS
 from asperity.core.arguments import check_integer
-from asperity.core.checks import FloatArray, check_array, check_positive
+from asperity.core.checks import FloatArray, check_positive
 from asperity.core.errors import ParameterError
 from asperity.core.files import to_plain_data
 from asperity.core.processes import available_cores
-from asperity.kernels import tick
-from asperity.kernels.fuse import fuse_on_texture
-from asperity.loop import no_guards, servo_loop
-from asperity.loop.interface import LoopState
+from asperity.loop.simulated_device import FIRST_SAMPLE
 from asperity.recording.recorded_field import field_attachments, field_metadata
 from asperity.recording.writer import RecordingWriter
 from asperity.simulation.hands import Hand, Motion
-from asperity.simulation.kernels import energy_trace, simulated_device
-from asperity.simulation.kernels.body_interface import LEFT_WORKSPACE
-from asperity.simulation.kernels.body_parts import LEDGER_SIZE
-from asperity.simulation.kernels.energy_trace import TraceRows
-from asperity.simulation.kernels.simulated_device import SimulatedDevice
+from asperity.simulation.lanes import (
+    CHUNK_SAMPLES,
+    Lane,
+    LaneLoop,
+    anchor_points,
+    check_parts,
+    initial_motion,
+)
 from asperity.simulation.plants import Plant, SampledPlant, sampled_plant
 from asperity.simulation.servo import Servo
 from asperity.simulation.trace import (
@@ -44,25 +42,9 @@ from asperity.simulation.trace import (
 )
 from asperity.surface import Surface
 
-# Why the compiled loop stops, by its error code.
-STOP_REASONS = tuple(StopReason)
-# Largest delay [samples]: a second at a megahertz.
-MAX_DELAY = 1_000_000
 
-
-def check_delay(delay: int) -> int:
-    """Return a delay [samples].
-
-    Raises:
-        ParameterError: for a delay of more than ``MAX_DELAY``.
-    """
-    if delay > MAX_DELAY:
-        raise ParameterError("delay", f"must be at most {MAX_DELAY} samples", delay)
-    return delay
-
-
-class Simulation:
-    """A surface on a body with a servo, run chunk by chunk.
+class Simulation(Lane):
+    """A surface on a body with a servo, run chunk by chunk: a single lane, with its ledger.
 
     Args:
         surface: the surface, rendered at its stiffness.
@@ -73,11 +55,6 @@ class Simulation:
         max_evaluations: evaluation budget of a tick in its search for closest points; default: that
             of the law's contact. A larger budget takes longer, and truncates fewer searches.
 
-    Attributes:
-        memory: warm start of that search, see :mod:`asperity.contacts.warm_start`.
-        ledger_sums: sums of the ledger since the start, see ``kernels/body_parts.py``.
-        samples: samples done.
-
     Raises:
         ParameterError: for a delay of more than ``MAX_DELAY`` samples.
     """
@@ -86,31 +63,12 @@ class Simulation:
         self, surface: Surface, plant: SampledPlant, servo: Servo, start: FloatArray,
         velocity: FloatArray | None = None, max_evaluations: float | None = None,
     ) -> None:  # fmt: skip
-        self._plant = plant
-        self._servo = servo
-        self._surface = surface
-        self.state = plant.initial_state(start, np.zeros(3) if velocity is None else velocity)
-        self.queue = np.zeros((check_delay(servo.delay) + 1, 3))
-        budget = surface.law.contact.max_evaluations
-        self.memory = new_warm_start(budget if max_evaluations is None else max_evaluations)
-        self.samples = 0
-        self._counters = np.zeros(3, np.int64)
-        self._loop_state = LoopState()
-        self.ledger_sums = np.zeros(LEDGER_SIZE)
+        state = plant.initial_state(start, np.zeros(3) if velocity is None else velocity)
+        if max_evaluations is None:
+            max_evaluations = surface.law.contact.max_evaluations
+        super().__init__(state, servo.delay, surface.law_arguments[0], max_evaluations)
+        self._loop = LaneLoop(surface, plant, servo)
         self._energy_at_start = 0.0
-
-    @cached_property
-    def _kernels(self) -> ModuleType:
-        surface = self._surface
-        parts = servo_loop, energy_trace, no_guards, simulated_device
-        return fuse_on_texture(
-            surface.law, surface.texture.sampler, surface.effective_clamp,
-            (*parts, *self._plant.modules, tick),
-        )  # fmt: skip
-
-    def stored_energy(self, anchor: FloatArray) -> float:
-        """Return the stored energy [J] with the hand's anchor at a position [m]."""
-        return float(self._kernels.stored_energy_at(self.state, anchor, self._plant.record))
 
     def run(
         self, anchor: FloatArray, trace: FloatArray | None = None, every: int = 1
@@ -129,29 +87,17 @@ class Simulation:
         Raises:
             ParameterError: for a trace whose rows have another length.
         """
-        if self.samples == 0:
-            self._energy_at_start = self.stored_energy(anchor[0])
+        first = self.samples
+        if first == 0:
+            self._energy_at_start = self._loop.stored_energy(self.state, anchor[0])
         table = np.empty((0, len(COLUMNS))) if trace is None else trace
         if table.ndim != 2 or table.shape[1] != len(COLUMNS):
             words = f"must have rows of {len(COLUMNS)} numbers, got shape {table.shape}"
             raise ParameterError("trace", words)
-        first = self.samples
-        surface = self._surface
-        self._counters[2] = first
-        device = SimulatedDevice(
-            self.state, self.queue, self._counters, anchor, self.ledger_sums,
-            1.0 / self._servo.period, self._plant.record,
-        )  # fmt: skip
-        rows = TraceRows(table, np.array([0, -first % every]), every)
-        _cause, stop, self._loop_state = self._kernels.servo_loop(
-            self._loop_state, first + len(anchor) - 1, self._servo.settings, (), (), device, rows,
-            self.memory, surface.texture.arguments, surface.law_arguments,
-        )  # fmt: skip
-        self.rows_written = int(rows.counters[0])
-        # The sample in which a body leaves its workspace is not done.
-        self.samples = self._loop_state.timing.sample - (stop == LEFT_WORKSPACE)
+        self.counters[FIRST_SAMPLE] = first
+        self.rows_written = self._loop.run([self], len(anchor) - 1, anchor, table, every)
         self._anchor = anchor[self.samples - first].copy()
-        return STOP_REASONS[int(stop)]
+        return self.stop
 
     @property
     def search_truncation(self) -> tuple[int, float]:
@@ -160,12 +106,10 @@ class Simulation:
 
     def ledger(self) -> Ledger:
         """Return the energies since the start."""
-        end = self.stored_energy(self._anchor)
+        end = self._loop.stored_energy(self.state, self._anchor)
         return Ledger.from_sums(self.ledger_sums, self._energy_at_start, end)
 
 
-# Samples per chunk: memory does not depend on the duration, and progress is reported in between.
-CHUNK_SAMPLES = 16_384
 # Largest number of samples of a run: a day of computing and more.
 MAX_SAMPLES = 10**12
 
@@ -292,23 +236,6 @@ def simulate_many(jobs: Sequence[Mapping[str, Any]], workers: int | None = None)
         return list(pool.map(lambda job: simulate(**job), jobs))
 
 
-def check_parts(surface: Surface, plant: Plant, hand: Hand, servo: Servo, motion: Motion) -> None:
-    """Check the types of the parts of a closed loop.
-
-    Raises:
-        ParameterError: for the first part of another type.
-    """
-    for name, value, kind, words in (
-        ("surface", surface, Surface, "a Surface"),
-        ("plant", plant, Plant, "a plant such as Cartesian or Pantograph"),
-        ("hand", hand, Hand, "a hand such as SpringHand, BandHand or PrescribedHand"),
-        ("servo", servo, Servo, "a Servo"),
-        ("motion", motion, Motion, "a motion such as Stationary, Strokes or Waypoints"),
-    ):
-        if not isinstance(value, kind):
-            raise ParameterError(name, f"must be {words}", value)
-
-
 def count_samples(duration: float, period: float) -> int:
     """Return the number of samples of a duration [s].
 
@@ -322,38 +249,6 @@ def count_samples(duration: float, period: float) -> int:
     if samples < 1:
         raise ParameterError("duration", f"must be at least one period, {period} s", duration)
     return samples
-
-
-def initial_motion(
-    plant: Plant, hand: Hand, servo: Servo, motion: Motion,
-    start: ArrayLike | None, velocity: ArrayLike | None,
-) -> tuple[FloatArray, FloatArray]:  # fmt: skip
-    """Return the initial position [m] and velocity [m/s] of a handle; see :func:`simulate`.
-
-    Raises:
-        ParameterError: for an initial state that the hand or the plant does not allow.
-    """
-    position = None if start is None else check_array("start", start, (3,), "m")
-    speed = None if velocity is None else check_array("velocity", velocity, (3,), "m/s")
-    position, speed = hand.initial_motion(motion, position, speed, servo.period)
-    plant.check_points("start", position)
-    plant.check_points("velocity", speed)
-    reason = "" if hand.is_prescribed else plant.workspace_violation(position)
-    if reason:
-        raise ParameterError("start", f"must be in the workspace: {reason}", position.tolist())
-    return position, speed
-
-
-def anchor_points(motion: Motion, period: float, plant: Plant, first: int, last: int) -> FloatArray:
-    """Return the positions of the anchor [m] at the samples from ``first`` to ``last``, included.
-
-    Raises:
-        ParameterError: for a motion that is not finite, or that the plant does not allow.
-    """
-    times = np.arange(first, last + 1, dtype=np.float64) * float(period)
-    points = check_array("motion", motion.at(times), (last + 1 - first, 3), "m")
-    plant.check_points("motion", points)
-    return points
 
 
 def _open_trace(

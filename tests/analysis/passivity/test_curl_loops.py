@@ -8,7 +8,7 @@ import pytest
 import asperity as asp
 from asperity.devices import parse_device
 from asperity.simulation import Cartesian, Servo, SpringHand, Stationary, simulate
-from asperity.simulation.batch import BatchSimulation
+from asperity.simulation.lanes import BatchSimulation
 from asperity.simulation.onset import run_starts, start_offsets
 from asperity.simulation.trace import TailStatistics
 from asperity.surface import Surface

@@ -47,7 +47,7 @@ from asperity.servo.calibration.identification import (
     rest_noise,
 )
 from asperity.servo.calibration.measured_device import measured_device
-from asperity.servo.drivers.driver import AWAY, RIGHT, TOWARDS, UP, surface_frame
+from asperity.servo.driver import AWAY, RIGHT, TOWARDS, UP, surface_frame
 from asperity.servo.drivers.driver_registry import DRIVER_KINDS, hardware_driver
 from asperity.servo.drivers.simulated import simulated_driver
 from asperity.servo.loop_memory import DeviceFault

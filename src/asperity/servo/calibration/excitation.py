@@ -24,8 +24,8 @@ from asperity.devices.device import Axis
 from asperity.kernels.fuse import module_source
 from asperity.loop import servo_loop
 from asperity.loop.shared_trace import COLUMNS
+from asperity.servo.driver import Driver, Frame
 from asperity.servo.driver_loop import DriverLoop, LoopProgram, loop_parts, no_clock
-from asperity.servo.drivers.driver import Driver, Frame
 from asperity.servo.loop_memory import (
     FAULT_DESCRIPTIONS,
     FAULT_SAMPLES,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from asperity.core.errors import ParameterError, suggest_names
 from asperity.devices import Device
+from asperity.servo.driver import Driver, DriverKind, Vector, surface_frame
 from asperity.servo.drivers import force_dimension, haply, library, open_haptics
-from asperity.servo.drivers.driver import Driver, DriverKind, Vector, surface_frame
 
 DEVICE_DRIVER = "real"
 """Name of the driver in the device's entry."""

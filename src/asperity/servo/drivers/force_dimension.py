@@ -15,8 +15,8 @@ from typing import ClassVar, NamedTuple
 
 from asperity.core.compiled import FloatArray, Kernels, call_address, local_array
 from asperity.core.errors import ParameterError
-from asperity.servo.drivers import driver
-from asperity.servo.drivers.driver import RIGHT, TOWARDS, UP, Driver, DriverKind
+from asperity.servo import driver
+from asperity.servo.driver import RIGHT, TOWARDS, UP, Driver, DriverKind
 from asperity.servo.drivers.library import function_addresses, load_library
 
 KERNELS = Kernels(provides=("device_read", "device_write"), native=("call_address",))

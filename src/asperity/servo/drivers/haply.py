@@ -20,8 +20,8 @@ from typing import Any, ClassVar
 
 from asperity.core.errors import ParameterError
 from asperity.loop.guards import CLOCK_BOOTTIME
+from asperity.servo.driver import AWAY, RIGHT, UP, DriverKind
 from asperity.servo.drivers import threaded
-from asperity.servo.drivers.driver import AWAY, RIGHT, UP, DriverKind
 from asperity.servo.drivers.threaded import FORCE_TIMEOUT, LOOP_SILENT, STALE, ThreadedDevice
 from asperity.servo.drivers.websocket_client import ProtocolError, WebSocketClient
 from asperity.servo.loop_process import PRIORITY

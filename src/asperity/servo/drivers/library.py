@@ -17,7 +17,7 @@ from typing import ClassVar, NamedTuple
 
 from asperity.core.compiled import FloatArray, Kernels, call_address, local_array
 from asperity.core.errors import ParameterError
-from asperity.servo.drivers.driver import AWAY, IDENTITY_FRAME, RIGHT, UP, Driver, DriverKind, Frame
+from asperity.servo.driver import AWAY, IDENTITY_FRAME, RIGHT, UP, Driver, DriverKind, Frame
 
 KERNELS = Kernels(provides=("device_read", "device_write"), native=("call_address",))
 

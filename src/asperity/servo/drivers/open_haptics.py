@@ -27,9 +27,9 @@ from asperity.core.compiled import (
 )
 from asperity.core.errors import ParameterError
 from asperity.kernels.fuse import fuse_module
+from asperity.servo.driver import RIGHT, TOWARDS, UP, DriverKind, Frame, surface_frame
 from asperity.servo.driver_loop import system_clock
 from asperity.servo.drivers import threaded
-from asperity.servo.drivers.driver import RIGHT, TOWARDS, UP, DriverKind, Frame, surface_frame
 from asperity.servo.drivers.library import function_addresses, load_library
 from asperity.servo.drivers.threaded import (
     BUFFER_WORDS,

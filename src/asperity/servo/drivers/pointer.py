@@ -27,10 +27,10 @@ from asperity.core.checks import FloatArray, check_array, check_real
 from asperity.core.compiled import Kernels, call_address
 from asperity.core.errors import ParameterError
 from asperity.loop.guards import CLOCK_BOOTTIME
+from asperity.loop.simulated_device import FIRST_SAMPLE, SAMPLES, SimulatedDevice
 from asperity.servo.driver_loop import no_clock, system_clock
 from asperity.servo.drivers.simulated import SimulatedDriver, simulated_driver
 from asperity.simulation.hands import Hand, Stationary
-from asperity.simulation.kernels.simulated_device import SimulatedDevice
 from asperity.simulation.plants import Plant
 from asperity.simulation.servo import Servo
 
@@ -74,10 +74,11 @@ def history_row(sample: int) -> int:
 def follow_anchor(device: SimulatedDevice) -> tuple[float, float, float, float, float, float]:
     """Return the anchor of the other loop at its sample and at the next [m], and wait for them.
 
-    The sample is the own one plus ``counters[2]``. Without a further sample the anchor rests.
+    The sample is that of this loop plus ``counters[FIRST_SAMPLE]``. Without a further sample the
+    anchor rests.
     """
     at = device.anchor
-    sample = device.counters[1] + device.counters[2]
+    sample = device.counters[SAMPLES] + device.counters[FIRST_SAMPLE]
     polls = 0
     while at[STATE_ROW, SAMPLE_COUNT] < sample + 2 and polls < MAX_POLLS:
         call_address(device.clock.nanosleep, CLOCK_BOOTTIME, 0, device.clock.timespec, 0)
@@ -87,7 +88,7 @@ def follow_anchor(device: SimulatedDevice) -> tuple[float, float, float, float, 
     here = history_row(sample + left_out)
     following = sample + left_out + (1 if lag >= 0 else 0)
     there = history_row(following)
-    device.counters[2] += following - sample - 1
+    device.counters[FIRST_SAMPLE] += following - sample - 1
     at[FOLLOWER_ROW, NEXT_SAMPLE] = following
     at[FOLLOWER_ROW, LEFT_OUT] += left_out
     return at[here, 0], at[here, 1], at[here, 2], at[there, 0], at[there, 1], at[there, 2]
@@ -102,7 +103,8 @@ def anchor_segment(device: SimulatedDevice) -> tuple[float, float, float, float,
     if device.clock.nanosleep != 0:
         return follow_anchor(device)
     at = device.anchor
-    at[STATE_ROW, SAMPLE_COUNT] = device.counters[1]  # written in the call after that of the row
+    # Written in the call after that of the row.
+    at[STATE_ROW, SAMPLE_COUNT] = device.counters[SAMPLES]
     step = 1.0 / device.update_rate
     number = at[REQUEST_ROW, REQUEST_NUMBER]
     angle = (at[STATE_ROW, ANGLE] + at[REQUEST_ROW, ANGLE] * step) % (2.0 * math.pi)
@@ -119,7 +121,7 @@ def anchor_segment(device: SimulatedDevice) -> tuple[float, float, float, float,
     ax = at[ANCHOR, 0]
     ay = at[ANCHOR, 1]
     az = at[ANCHOR, 2]
-    row = history_row(device.counters[1])
+    row = history_row(device.counters[SAMPLES])
     for i in range(3):
         at[row, i] = at[ANCHOR, i]
         at[VELOCITY, i] *= share
@@ -265,8 +267,8 @@ class PointerDriver(SimulatedDriver):
             table[STATE_ROW] = 0.0
             return device
         count = table[STATE_ROW, SAMPLE_COUNT]
-        device.counters[2] = max(count - 1.0, 0.0)
-        table[FOLLOWER_ROW] = device.counters[2], 0.0, 0.0
+        device.counters[FIRST_SAMPLE] = max(count - 1.0, 0.0)
+        table[FOLLOWER_ROW] = device.counters[FIRST_SAMPLE], 0.0, 0.0
         wait = np.array([0, POLL_TIME])
         return device._replace(clock=system_clock()._replace(timespec=wait))
 

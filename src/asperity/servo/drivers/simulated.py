@@ -12,18 +12,16 @@ import numpy as np
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
 from asperity.core.units import format_quantity
-from asperity.loop import replayed_device
+from asperity.loop import replayed_device, simulated_device
+from asperity.loop.body_interface import DIVERGED, LEFT_WORKSPACE
 from asperity.loop.replayed_device import ReplayedDevice
+from asperity.loop.simulated_device import COUNTERS_SIZE, DELAY, LEDGER_SIZE, SimulatedDevice
 from asperity.recording.recording import Recording, open_recording
-from asperity.servo.drivers.driver import Driver
+from asperity.servo.driver import Driver
 from asperity.simulation.hands import Hand, Motion
-from asperity.simulation.kernels import simulated_device
-from asperity.simulation.kernels.body_interface import DIVERGED, LEFT_WORKSPACE
-from asperity.simulation.kernels.body_parts import LEDGER_SIZE
-from asperity.simulation.kernels.simulated_device import SimulatedDevice
+from asperity.simulation.lanes import anchor_points, initial_motion
 from asperity.simulation.plants import Plant, sampled_plant
 from asperity.simulation.servo import Servo
-from asperity.simulation.simulate import anchor_points, initial_motion
 
 MAX_SAMPLES = 40_000_000
 """Samples of the hand's motion, which is computed before the start: about a gigabyte."""
@@ -61,7 +59,7 @@ class SimulatedDriver(Driver):
         """Return a copy, so that every start is equal."""
         device = self.device
         return device._replace(
-            x=device.x.copy(), queue=np.zeros_like(device.queue), counters=np.zeros(3, np.int64),
+            x=device.x.copy(), queue=np.zeros_like(device.queue), counters=device.counters.copy(),
             ledger=np.zeros(LEDGER_SIZE),
         )  # fmt: skip
 
@@ -99,9 +97,12 @@ def simulated_driver(
     position, speed = initial_motion(plant, hand, servo, motion, start, velocity)
     anchor = anchor_points(motion, servo.period, plant, 0, samples)
     body = sampled_plant(plant, hand, servo)
+    counters = np.zeros(COUNTERS_SIZE, np.int64)
+    counters[DELAY] = servo.delay
     device = SimulatedDevice(
-        body.initial_state(position, speed), np.zeros((servo.delay + 1, 3)), np.zeros(3, np.int64),
-        np.ascontiguousarray(anchor), np.zeros(LEDGER_SIZE), 1.0 / servo.period, body.record,
+        body.initial_state(position, speed), np.zeros((servo.delay + 1, 3)), counters,
+        np.ascontiguousarray(anchor), np.zeros(3), np.zeros(LEDGER_SIZE), 1.0 / servo.period,
+        body.record,
         float(servo.position_resolution) if device_resolution else 0.0,
         float(servo.force_resolution) if device_resolution else 0.0,
     )  # fmt: skip

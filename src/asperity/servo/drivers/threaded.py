@@ -36,8 +36,8 @@ from asperity.core.errors import ParameterError
 from asperity.kernels.fuse import fuse_module
 from asperity.loop.guards import Clock, clock_now
 from asperity.loop.interface import OK
+from asperity.servo.driver import IDENTITY_FRAME, Driver, Frame
 from asperity.servo.driver_loop import function_address, no_clock, system_clock
-from asperity.servo.drivers.driver import IDENTITY_FRAME, Driver, Frame
 
 KERNELS = Kernels(
     provides=(

@@ -25,7 +25,7 @@ from asperity.scene.scene_file import build_scene
 from asperity.scene.scene_keys import with_values
 from asperity.scene.sections import to_scene_values
 from asperity.scene.setup import Setup, make_setup
-from asperity.servo.drivers.driver import Driver
+from asperity.servo.driver import Driver
 from asperity.servo.drivers.simulated import simulated_driver
 from asperity.servo.loop_memory import EndReason
 from asperity.servo.process import ServoProcess

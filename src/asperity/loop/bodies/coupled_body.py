@@ -10,8 +10,9 @@ anchor's spring and damper is M Δw + M_r Δs - (F + g) T + B Δe.
 from typing import NamedTuple
 
 from asperity.core.compiled import FloatArray, Kernels, local_array
-from asperity.simulation.kernels.body_interface import RUNNING, SampleInput
-from asperity.simulation.kernels.body_parts import add_energies, friction_force
+from asperity.loop.bodies.body_parts import friction_force
+from asperity.loop.body_interface import RUNNING, SampleInput
+from asperity.loop.simulated_device import add_energies
 
 KERNELS = Kernels(provides=("advance_body", "stored_energy"))
 

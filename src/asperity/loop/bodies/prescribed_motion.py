@@ -1,12 +1,13 @@
 """A handle whose motion is prescribed: that of the hand's anchor."""
 
-# ruff: noqa: ARG001 - one signature for every body
-
 from typing import NamedTuple
 
 from asperity.core.compiled import FloatArray, Kernels
-from asperity.simulation.kernels.body_interface import RUNNING, SampleInput
-from asperity.simulation.kernels.body_parts import add_energies
+from asperity.loop.body_interface import RUNNING, SampleInput
+from asperity.loop.simulated_device import add_energies
+
+# ruff: noqa: ARG001 - one signature for every body
+
 
 KERNELS = Kernels(provides=("advance_body", "stored_energy"))
 

@@ -12,11 +12,6 @@ from asperity.core.checks import FloatArray
 RUNNING = 0
 DIVERGED = 1
 LEFT_WORKSPACE = 2
-# Columns of the progress of several runs: stop reason and samples done.
-STOP = 0
-SAMPLES = 1
-# Largest number of runs that advance together.
-LANES = 8
 
 
 class SampleInput(NamedTuple):
@@ -52,7 +47,7 @@ def advance_body(x: FloatArray, ledger: FloatArray, inputs: SampleInput, plant: 
 
     Args:
         x: state: position [m], velocity [m/s], more; changed.
-        ledger: sums, see ``body_parts``; changed.
+        ledger: sums, see ``simulated_device``; changed.
         inputs: force and motion of the hand's anchor.
         plant: record of the body.
 

@@ -3,15 +3,15 @@
 from typing import NamedTuple
 
 from asperity.core.compiled import FloatArray, Kernels, local_array
-from asperity.simulation.kernels.body_interface import RUNNING, SampleInput
-from asperity.simulation.kernels.body_parts import (
+from asperity.loop.bodies.body_parts import (
     HandRecord,
-    add_energies,
     band_changes_state,
     friction_force,
     hand_energy,
     hand_force,
 )
+from asperity.loop.body_interface import RUNNING, SampleInput
+from asperity.loop.simulated_device import add_energies
 
 KERNELS = Kernels(provides=("advance_body", "stored_energy"))
 

@@ -15,6 +15,14 @@ from scipy.integrate import solve_ivp
 
 from asperity.core.checks import FloatArray
 from asperity.devices.five_bar import handle_damping
+from asperity.loop.bodies import axis_body as axes
+from asperity.loop.bodies import body_parts as hands
+from asperity.loop.bodies import coupled_body as dense
+from asperity.loop.bodies import elastic_band as banded
+from asperity.loop.bodies import pantograph_dynamics as five_bar
+from asperity.loop.bodies import prescribed_motion as prescribed
+from asperity.loop.body_interface import LEFT_WORKSPACE, RUNNING, SampleInput
+from asperity.loop.simulated_device import EXCHANGED, FRICTION, HAND, LEDGER_SIZE, LOST, SUPPLIED
 from asperity.simulation import (
     BandHand,
     Cartesian,
@@ -25,21 +33,6 @@ from asperity.simulation import (
     Resonance,
     Servo,
     SpringHand,
-)
-from asperity.simulation.kernels import axis_body as axes
-from asperity.simulation.kernels import body_parts as hands
-from asperity.simulation.kernels import coupled_body as dense
-from asperity.simulation.kernels import elastic_band as banded
-from asperity.simulation.kernels import pantograph_dynamics as five_bar
-from asperity.simulation.kernels import prescribed_motion as prescribed
-from asperity.simulation.kernels.body_interface import LEFT_WORKSPACE, RUNNING, SampleInput
-from asperity.simulation.kernels.body_parts import (
-    EXCHANGED,
-    FRICTION,
-    HAND,
-    LEDGER_SIZE,
-    LOST,
-    SUPPLIED,
 )
 from asperity.simulation.pantograph import linkage_record
 from asperity.simulation.plants import coupled_plant, sampled_plant, substep_count
@@ -285,13 +278,13 @@ def test_friction_force_for_a_mass_matrix() -> None:
     stopping_force = -mass @ v / 0.01
     size = float(np.linalg.norm(stopping_force))
     for limit in (size * (1.0 + 1e-12), 2.0 * size):
-        force = dense.friction_force(*v, limit, mass, 0.01)
+        force = hands.friction_force(*v, limit, mass, 0.01)
         np.testing.assert_allclose(force, stopping_force, rtol=1e-14)
     for limit in (size * (1.0 - 1e-6), 0.1 * size):
-        force = np.array(dense.friction_force(*v, limit, mass, 0.01))
+        force = np.array(hands.friction_force(*v, limit, mass, 0.01))
         np.testing.assert_allclose(force, -limit * v / np.linalg.norm(v), rtol=1e-14)
-    assert dense.friction_force(0.0, 0.0, 0.0, 1.0, mass, 0.01) == (0.0, 0.0, 0.0)
-    assert dense.friction_force(0.0, 0.0, 0.0, 0.0, mass, 0.01) == (0.0, 0.0, 0.0)
+    assert hands.friction_force(0.0, 0.0, 0.0, 1.0, mass, 0.01) == (0.0, 0.0, 0.0)
+    assert hands.friction_force(0.0, 0.0, 0.0, 0.0, mass, 0.01) == (0.0, 0.0, 0.0)
 
 
 # --- bands ----------------------------------------------------------------------------------------

@@ -11,24 +11,28 @@ import pytest
 from asperity.core.checks import FloatArray
 from asperity.kernels import tick
 from asperity.kernels.tick import ServoState
-from asperity.loop import no_guards, servo_loop
-from asperity.loop.interface import LoopState, LoopTiming
-from asperity.simulation.kernels import batch_loop, energy_trace, simulated_device
-from asperity.simulation.kernels.body_interface import (
-    DIVERGED,
-    LEFT_WORKSPACE,
-    RUNNING,
-    SampleInput,
+from asperity.loop import lane_loop, no_guards, servo_loop, simulated_device
+from asperity.loop.body_interface import DIVERGED, LEFT_WORKSPACE, RUNNING, SampleInput
+from asperity.loop.lane_loop import (
+    LANE_COUNTERS_SIZE,
+    LOW,
+    SAMPLE_COUNT,
+    STATISTICS_SIZE,
+    STOP,
+    Lanes,
 )
-from asperity.simulation.kernels.body_parts import (
+from asperity.loop.simulated_device import (
+    COUNTERS_SIZE,
+    DELAY,
     FRICTION,
     LEDGER_SIZE,
     LOST,
+    QUEUE_HEAD,
     SAME_SAMPLE,
+    SAMPLES,
     SAMPLING,
+    SimulatedDevice,
 )
-from asperity.simulation.kernels.energy_trace import TraceRows
-from asperity.simulation.kernels.simulated_device import SimulatedDevice
 from asperity.simulation.trace import COLUMNS
 
 RNG = np.random.default_rng(61)
@@ -41,7 +45,7 @@ def test_force_is_delayed_by_its_number_of_samples() -> None:
     for delay in (0, 1, 3):
         queue, head, applied = np.zeros((delay + 1, 3)), 0, []
         for i in range(1, 9):
-            head, *due = simulated_device.delay_force(queue, head, i, 10.0 * i, 100.0 * i)
+            head, *due = simulated_device.delay_force(queue, head, delay, i, 10.0 * i, 100.0 * i)
             applied.append(due)
             assert 0 <= head <= delay
         expected = [[max(i - delay, 0) * part for part in (1.0, 10.0, 100.0)] for i in range(1, 9)]
@@ -53,7 +57,7 @@ def test_command_energies_are_added_to_the_ledger() -> None:
     ledger = np.arange(float(LEDGER_SIZE))
     before = ServoState(1.0, 2.0, 3.0, fx=5.0, fy=7.0, fz=11.0)
     after = ServoState(1.5, 2.25, 2.0, fx=-1.0, fy=4.0, fz=2.0)
-    energy_trace.add_command_energies(ledger, before, after)
+    lane_loop.add_command_energies(ledger, before, after)
     displacement, force = np.array([0.5, 0.25, -1.0]), np.array([-1.0, 4.0, 2.0])
     expected = np.arange(float(LEDGER_SIZE))
     expected[SAME_SAMPLE : SAME_SAMPLE + 3] += force * displacement
@@ -63,9 +67,10 @@ def test_command_energies_are_added_to_the_ledger() -> None:
 
 def device(x: FloatArray, delay: int = 1, **values: Any) -> SimulatedDevice:
     """Return a simulated device at 2 Hz with an anchor row per sample."""
-    counters, ledger = np.zeros(3, np.int64), np.zeros(LEDGER_SIZE)
+    counters, ledger = np.zeros(COUNTERS_SIZE, np.int64), np.zeros(LEDGER_SIZE)
+    counters[DELAY] = delay
     queue, anchor = np.zeros((delay + 1, 3)), RNG.normal(size=(9, 3))
-    result = SimulatedDevice(x, queue, counters, anchor, ledger, 2.0, "plant")
+    result = SimulatedDevice(x, queue, counters, anchor, np.zeros(3), ledger, 2.0, "plant")
     return result._replace(**values)
 
 
@@ -74,11 +79,12 @@ def test_row_values_match_their_column_names(monkeypatch: pytest.MonkeyPatch) ->
         assert plant == "plant"
         return float(x[0] + 2.0 * ax + 3.0 * ay + 4.0 * az)
 
-    monkeypatch.setattr(energy_trace, "stored_energy", stored_energy)
+    monkeypatch.setattr(lane_loop, "stored_energy", stored_energy)
     x, ledger = RNG.normal(size=8), RNG.normal(size=LEDGER_SIZE)
     body = device(x, 2, ledger=ledger, queue=RNG.normal(size=(3, 3)))
-    body.counters[:] = 2, 6, 4
-    (ax, ay, az), due = body.anchor[2], body.queue[0]
+    body.counters[:DELAY] = 2, 6, 4
+    body.offset[:] = 0.5, -0.25, 0.125
+    (ax, ay, az), due = body.anchor[2] + body.offset, body.queue[0]
     expected: dict[str, Any] = {
         "time": 0.25,
         **dict(zip(["x", "y", "z", "vx", "vy", "vz"], x, strict=False)),
@@ -91,7 +97,7 @@ def test_row_values_match_their_column_names(monkeypatch: pytest.MonkeyPatch) ->
     for held in (True, False):
         trace = np.full((3, len(COLUMNS)), np.nan)
         servo = SERVO._replace(held=held)
-        energy_trace.write_row(1, 0.25, servo, trace, body)
+        lane_loop.write_row(1, 0.25, servo, trace, body)
         assert np.isnan(trace[[0, 2]]).all()
         row = trace[1]
         for name, value in expected.items():
@@ -100,27 +106,22 @@ def test_row_values_match_their_column_names(monkeypatch: pytest.MonkeyPatch) ->
         np.testing.assert_array_equal(row[16:26], ledger[:10])
         assert row[26] == stored_energy(x, ax, ay, az, "plant")
         assert tuple(row[27:]) == (servo.anchor_x, servo.anchor_y, float(held))
-    undelayed = energy_trace.due_force(1.0, 2.0, 3.0, device(x, 0))
+    undelayed = lane_loop.due_force(1.0, 2.0, 3.0, device(x, 0))
     assert undelayed == (1.0, 2.0, 3.0)
 
 
 def test_lane_statistics_are_bounds_and_sums() -> None:
     """Bounds since the start; sums of velocity and position since the last segment."""
     rows, ledgers = RNG.normal(size=(12, 6)), RNG.normal(size=(12, LEDGER_SIZE))
-    statistics = np.full((2, batch_loop.STATISTICS_SIZE), np.nan)
-    statistics[1, batch_loop.LOW : batch_loop.SAMPLE_COUNT] = [np.inf] * 3 + [-np.inf] * 3
+    statistics = np.zeros(STATISTICS_SIZE)
+    statistics[LOW:SAMPLE_COUNT] = [np.inf] * 3 + [-np.inf] * 3
     for x, ledger in zip(rows[:5], ledgers, strict=False):
-        batch_loop.update_lane_statistics(
-            statistics, 1, np.stack([-x, x]), np.stack([-ledger, ledger])
-        )
-    statistics[1, batch_loop.SAMPLE_COUNT] = 0.0
+        lane_loop.update_statistics(statistics, x, ledger)
+    statistics[SAMPLE_COUNT] = 0.0
     for x, ledger in zip(rows[5:], ledgers[5:], strict=True):
-        batch_loop.update_lane_statistics(
-            statistics, 1, np.stack([-x, x]), np.stack([-ledger, ledger])
-        )
-    assert np.isnan(statistics[0]).all()
+        lane_loop.update_statistics(statistics, x, ledger)
     low, high, (count,), base, total, squares, last, *positions = np.split(
-        statistics[1], [3, 6, 7, 10, 13, 16, 18, 21, 24]
+        statistics, [3, 6, 7, 10, 13, 16, 18, 21, 24]
     )
     np.testing.assert_array_equal(low, rows[:, :3].min(axis=0))
     np.testing.assert_array_equal(high, rows[:, :3].max(axis=0))
@@ -153,8 +154,8 @@ class Recorder:
         patches = {
             "servo_tick": self.servo_tick,
             "probe_in_contact": lambda x, y, z, _t: x > y + z,
-            "trace_sample": energy_trace.trace_sample,
-            "trace_timing": energy_trace.trace_timing,
+            "trace_sample": lane_loop.trace_sample,
+            "trace_timing": lane_loop.trace_timing,
         }
         for name in no_guards.KERNELS.provides:
             patches[name] = getattr(no_guards, name)
@@ -164,7 +165,7 @@ class Recorder:
             monkeypatch.setattr(no_guards, name, getattr(simulated_device, name))
         monkeypatch.setattr(simulated_device, "flush_subnormal", lambda value: value + 0.25)
         monkeypatch.setattr(simulated_device, "advance_body", self.advance_body)
-        monkeypatch.setattr(energy_trace, "write_row", self.write_row)
+        monkeypatch.setattr(lane_loop, "write_row", self.write_row)
 
     def flush(self, state: ServoState) -> ServoState:
         self.flushed.append(len(self.ticks))
@@ -188,40 +189,60 @@ class Recorder:
 
 
 def run(samples: int, *, every: int = 1, done: int = 1, rows: int = 99, x: Any = None) -> Any:
-    """Return stop, rows, state, samples, head of the queue and the anchor positions."""
+    """Return stop, rows, state of the servo, samples, head of the queue and the anchor positions.
+
+    A second lane, which has stopped before, is left alone.
+    """
     anchor = np.arange(3.0 * (samples + 1)).reshape(-1, 3) ** 2
-    body = device(np.zeros(8) if x is None else x, anchor=anchor)
-    body.counters[1:] = done
-    trace = TraceRows(np.zeros((rows, 9)), np.array([0, -done % every]), every)
-    settings: Any = SimpleNamespace(period=0.5)
-    none: Any = ()
-    _cause, stop, state = servo_loop.servo_loop(
-        LoopState(SERVO, timing=LoopTiming(sample=done)),
-        done + samples,
-        settings,
-        none,
-        none,
-        body,
-        trace,
-        np.zeros(3),
-        "texture",
-        "law",
+    counters = np.zeros((2, LANE_COUNTERS_SIZE), np.int64)
+    counters[:, 1 : DELAY + 1] = done, done, 1
+    counters[1, STOP] = DIVERGED
+    states = np.zeros((2, 8))
+    states[0] = 0.0 if x is None else np.resize(x, 8)
+    servo_states = np.tile([float(value) for value in SERVO], (2, 1))
+    empty = np.zeros((2, 0))
+    lanes = Lanes(
+        states,
+        np.zeros((2, 2, 3)),
+        counters,
+        servo_states,
+        np.zeros((2, LEDGER_SIZE)),
+        np.zeros((2, 3)),
+        empty,
+        np.zeros((2, 3)),
+        np.array([7.0, 8.0]),
     )
-    finished = state.timing.sample - (stop == LEFT_WORKSPACE)
-    return stop, trace.counters[0], state, finished, body.counters[0], anchor
+    row_counters = np.array([0, -done % every])
+    settings: Any = SimpleNamespace(period=0.5)
+    stopped = [table[1].copy() for table in lanes]
+    lane_loop.run_lanes(
+        lanes,
+        samples,
+        anchor,
+        "plant",
+        settings,
+        np.zeros((rows, 9)),
+        row_counters,
+        every,
+        "texture",
+        (0.5, 9.0),
+    )
+    assert all((table[1] == before).all() for table, before in zip(lanes, stopped, strict=True))
+    servo = lane_loop.load_state(lanes, 0).servo
+    return counters[0, STOP], row_counters[0], servo, *counters[0, [SAMPLES, QUEUE_HEAD]], anchor
 
 
 def test_sample_passes_reading_to_servo_and_force_to_body(monkeypatch: pytest.MonkeyPatch) -> None:
     """The servo gets the reading; the body the force of one sample ago and the anchor's motion."""
     recorder, x = Recorder(monkeypatch), np.array([0.0, -1.0, -2.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-    stop, rows, state, samples, head, anchor = run(4, x=x)
+    stop, rows, servo, samples, head, anchor = run(4, x=x)
     assert (stop, rows, samples, head) == (RUNNING, 4, 5, 0)
     assert recorder.ticks[0][0] == SERVO
     for i, (previous, *arguments) in enumerate(recorder.ticks):
         np.testing.assert_array_equal(arguments[:3], [i, i - 1.0, i - 2.0])
-        assert arguments[4:] == ["texture", "law"]
+        assert arguments[4:] == ["texture", (7.0, 9.0)]
         assert i == 0 or previous == ServoState(i - 1, i - 2, i - 3, fx=i, fy=2 * i, fz=3 * i)
-    assert state.servo == ServoState(3.0, 2.0, 1.0, fx=4.0, fy=8.0, fz=12.0)
+    assert servo == ServoState(3.0, 2.0, 1.0, fx=4.0, fy=8.0, fz=12.0)
     for i, inputs in enumerate(recorder.inputs):
         assert inputs[:3] == (i, 2.0 * i, 3.0 * i)
         assert inputs[3:6] == tuple(anchor[i])
@@ -294,7 +315,7 @@ def test_run_stops_at_workspace_limit_or_divergence(monkeypatch: pytest.MonkeyPa
 
 
 def test_stored_energy_is_computed_with_the_anchor(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(energy_trace, "stored_energy", lambda *arguments: arguments)
+    monkeypatch.setattr(lane_loop, "stored_energy", lambda *arguments: arguments)
     point: Any = np.array([1.0, 2.0, 3.0])
-    stored: Any = energy_trace.stored_energy_at(point, 2.0 * point, "plant")
+    stored: Any = lane_loop.stored_energy_at(point, 2.0 * point, "plant")
     assert stored == (point, 2.0, 4.0, 6.0, "plant")

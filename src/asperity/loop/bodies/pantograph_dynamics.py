@@ -9,20 +9,16 @@ rods the kinetic energy is ½ p'ᵀ M p' with, per arm, I₁ = rotor + m₁ l₁
 and c(p, p') is what the masses need to stay on their way while p'' = 0.
 """
 
-# ruff: noqa: ARG001 - one signature for every body
-
 import math
 from typing import NamedTuple
 
 from asperity.core.compiled import FloatArray, Kernels
-from asperity.simulation.kernels.body_interface import LEFT_WORKSPACE, RUNNING, SampleInput
-from asperity.simulation.kernels.body_parts import (
-    HandRecord,
-    add_energies,
-    band_changes_state,
-    hand_energy,
-    hand_force,
-)
+from asperity.loop.bodies.body_parts import HandRecord, band_changes_state, hand_energy, hand_force
+from asperity.loop.body_interface import LEFT_WORKSPACE, RUNNING, SampleInput
+from asperity.loop.simulated_device import add_energies
+
+# ruff: noqa: ARG001 - one signature for every body
+
 
 KERNELS = Kernels(
     provides=(
