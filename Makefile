@@ -67,7 +67,7 @@ $(VENV)/mutants/ready: mutants.lock | $(VENV)/installer
 
 MUTANTS := --count 10
 mutants: $(VENV)/mutants/ready $(VENV)/development  ## Do the tests notice when the code is wrong? Takes hours
-	$(VENV)/mutants/bin/python bench/mutants.py --python $(abspath $(BIN))/python $(MUTANTS)
+	$(VENV)/mutants/bin/python bench/stress/mutants.py --python $(abspath $(BIN))/python $(MUTANTS)
 
 kernels: $(VENV)/runtime  ## Derive the shipped laws again
 	$(BIN)/python -m asperity.derive.generate

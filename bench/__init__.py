@@ -1,4 +1,4 @@
-"""The benchmark: ``python -m bench [kernels] [cache] [nearest] [waiting]``, all by default.
+"""The benchmark: ``python -m bench [PART ...]``, all by default; parts are listed in ``__main__``.
 
 Speed is stated as a ratio against the same computation in C on the same machine, measured in turns.
 """

@@ -12,10 +12,9 @@ from pathlib import Path
 
 from rich.console import Console
 
-from bench import (
+from bench.speed import (
     batches,
     cache,
-    calibration,
     certificates,
     export,
     fields,
@@ -29,6 +28,7 @@ from bench import (
     ticks,
     waiting,
 )
+from bench.stress import calibration
 
 PARTS: dict[str, Callable[[Console], None]] = {
     "kernels": kernels.run,

@@ -100,7 +100,7 @@ def reading_worker() -> Iterator[Callable[..., int]]:
     Third-party readers take two seconds to import, which each file would cost. The limits are those
     of a process for each file. The process starts with the first file.
     """
-    from bench.fuzz_child import ReadingWorker
+    from bench.stress.fuzz_child import ReadingWorker
 
     with ExitStack() as stack:
         workers: list[ReadingWorker] = []

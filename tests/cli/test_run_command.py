@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bench.cases import HELD_HANDLE
-from bench.fakes import compile_library
+from bench.speed.cases import HELD_HANDLE
+from bench.stand_ins.fakes import compile_library
 from tests.servo.drivers.test_drivers import EXAMPLE
 
 import asperity as asp

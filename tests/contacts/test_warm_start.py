@@ -9,8 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bench.nearest_exhaustive import Case, search_exhaustively
-from bench.ticks import adversarial_textures
+from bench.speed.ticks import adversarial_textures
+from bench.stress.nearest_exhaustive import Case, search_exhaustively
 
 from asperity.contacts.warm_start import (
     BUDGET,

@@ -24,7 +24,7 @@ from asperity.envelopes.wave_borders import (
 
 DEVICES = ("touch", "omega.3", "pantograph", "falcon")
 LAWS = "ABCDEFGH"
-COUNT = 16  # python -m bench.envelopes checks 200
+COUNT = 16  # python -m bench.stress.envelopes checks 200
 Border = tuple[WaveCase, WaveBorders, float, bool]
 """Case, borders at a wavelength, an amplitude on the border, whether it is rendered above."""
 

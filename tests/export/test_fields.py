@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bench.firmware import build_firmware, missing_tool
+from bench.speed.firmware import build_firmware, missing_tool
 from tests.helpers.c_programs import (
     COMPILERS,
     STRICT,

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bench.firmware import build_firmware, missing_tool
+from bench.speed.firmware import build_firmware, missing_tool
 from tests.helpers.c_programs import COMPILERS, STRICT, kernel_ticks, run_command, tool
 
 import asperity as asp

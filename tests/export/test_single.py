@@ -7,8 +7,8 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from bench import single as bench_single
-from bench.single import measure_single_precision
+from bench.stress import single as bench_single
+from bench.stress.single import measure_single_precision
 from tests.helpers.c_programs import header
 
 from asperity.laws import LAWS

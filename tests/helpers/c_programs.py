@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
-from bench import c_programs
-from bench.c_programs import (
+from bench.speed import c_programs
+from bench.speed.c_programs import (
     STRICT,
     as_exported,
     compile_library,
@@ -54,5 +54,5 @@ def tool(name: str) -> str:
 def library(
     folder: Path, compiler: str, headers: Mapping[str, str], *flags: str, single: bool = False
 ) -> ctypes.CDLL:
-    """Return exported headers, by name, compiled into one library; see ``bench.c_programs``."""
+    """Return exported headers compiled into one library; see ``bench.speed.c_programs``."""
     return c_programs.library(folder, tool(compiler), headers, *flags, single=single)

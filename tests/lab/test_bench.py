@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 import pytest
-from bench.lab import _cpu_time, chance_lag
+from bench.speed.lab import _cpu_time, chance_lag
 
 
 def test_a_difference_is_told_from_chance() -> None:

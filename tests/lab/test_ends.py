@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 
 import pytest
-from bench.servo_ends import descendants, is_alive
+from bench.stress.servo_ends import descendants, is_alive
 from tests.lab.client import heard, joined, news
 from tests.lab.started import Started
 

@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
-from bench.servo_ends import DEVICES, End, Run, try_end
+from bench.stress.servo_ends import DEVICES, End, Run, try_end
 
 from asperity.core.errors import ParameterError
 from asperity.devices import load_device
@@ -20,7 +20,7 @@ from asperity.servo.loop_process import lock_device
 from asperity.servo.safety import Safety, check_passivity_damping
 from asperity.simulation import Servo
 
-# Each starts a command and a loop; bench/servo_ends.py tries all of them on all drivers.
+# Each starts a command and a loop; bench/stress/servo_ends.py tries all of them on all drivers.
 ENDS = ["terminal closed", "TERM to the group", "Ctrl-Z (TSTP)", "KILL of the group", "USR1"]
 
 

@@ -1,10 +1,10 @@
-"""Sessions that are killed at random moments; python -m bench.study_kills does it 500 times."""
+"""Sessions that are killed at random moments; ``bench.stress.study_kills`` does it 500 times."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from bench.study_kills import LONGEST, STIFFNESSES, run_kills
+from bench.stress.study_kills import LONGEST, STIFFNESSES, run_kills
 
 
 def test_kills_lose_nothing_and_unblind_nothing(tmp_path: Path) -> None:

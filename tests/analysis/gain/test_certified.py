@@ -1,6 +1,7 @@
 """Certified numbers: no sample exceeds ``upper``, ``lower`` is attained, and the gap is exact.
 
-The random surfaces are those of the long benchmark ``python -m bench.certificates --random 10000``.
+The random surfaces are those of the long benchmark ``python -m bench.speed.certificates --random
+10000``.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ from asperity.reference import exact_jacobian
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Profile, Sinusoid, Texture
 
-_PATH = Path(__file__).parents[3] / "bench" / "random_surfaces.py"
+_PATH = Path(__file__).parents[3] / "bench" / "stress" / "random_surfaces.py"
 WAVE = Sinusoid(0.3e-3, 1e-3, 0.4, (1.0, 2.0))
 
 

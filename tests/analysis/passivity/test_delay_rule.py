@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bench.random_scenes import ROUNDING, outcomes, scenes
+from bench.stress.random_scenes import ROUNDING, outcomes, scenes
 
 
 def test_passive_scenes_never_gain_energy() -> None:

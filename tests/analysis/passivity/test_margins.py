@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from bench.margins import (
+from bench.stress.margins import (
     CEILINGS,
     FACTORS,
     LOOPS,
@@ -38,7 +38,7 @@ PLAUSIBLE = StabilityLimit(1000.0, "plausible", "wall test")
 
 @pytest.mark.parametrize(("letter", "along_lightest"), [("C", False), ("G", True)])
 def test_random_loops_reproduce_the_margin(letter: str, along_lightest: bool) -> None:
-    """``python -m bench.margins`` writes the table; this test repeats the loops at the factor."""
+    """``bench.stress.margins`` writes the table; this test repeats the loops at the factor."""
     margin = load_margins(along_lightest)[find_law(letter)]
     found = count_cycles(letter, margin.factor, LOOPS, SEED + 1, along_lightest)
     assert (found.loops, found.cycles) == (margin.loops, margin.cycles)

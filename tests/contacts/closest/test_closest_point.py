@@ -20,7 +20,7 @@ from asperity.textures import Fourier, HeightMap, Profile, Sinusoid, Texture
 
 ROOT = Path(__file__).parents[3]
 sys.path.insert(0, str(ROOT))
-search = importlib.import_module("bench.nearest_exhaustive")
+search = importlib.import_module("bench.stress.nearest_exhaustive")
 
 Check = Callable[..., Any]
 
@@ -101,7 +101,7 @@ def test_no_surface_point_is_closer(texture: Texture, scatter: Check):
 
 @pytest.mark.parametrize("kind", search.CASES)
 def test_closest_point_agrees_with_exhaustive_search(kind: str):
-    """On random probes (``python -m bench.nearest_exhaustive`` tries 1e5 of each kind).
+    """On random probes (``python -m bench.stress.nearest_exhaustive`` tries 1e5 of each kind).
 
     Negative control: a local search from the probe's x, y misses some of them.
     """
@@ -242,7 +242,7 @@ import numpy as np
 from numba import njit
 from numba.core.runtime import rtsys
 from asperity.surface import Surface
-from bench.nearest_exhaustive import CASES, probes
+from bench.stress.nearest_exhaustive import CASES, probes
 
 @njit
 def allocating_batch(points, out, texture):

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bench.fakes import compile_library
+from bench.stand_ins.fakes import compile_library
 from tests.lab.browser import Browser, needs_browser, until
 from tests.lab.client import STILL, column, frames, head, heard, joined, news, refused, say
 from tests.lab.started import Started
@@ -23,7 +23,7 @@ from asperity.scene import load_scene
 from asperity.scene.setup import make_setup
 from asperity.servo.drivers.library import LibraryDriver
 
-SOURCE = Path(__file__).parents[3] / "bench" / "c" / "mapped_device.c"
+SOURCE = Path(__file__).parents[3] / "bench" / "stand_ins" / "c" / "mapped_device.c"
 # A busy machine is late, and that is not what is tested here.
 SCENE = """
 [texture]

@@ -1,4 +1,4 @@
-"""Whatever is done to the page, nothing breaks; ``python -m bench.lab_monkey`` does more of it."""
+"""Whatever is done to the page, nothing breaks; ``bench.stress.lab_monkey`` does more of it."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bench.fuzz_child import ReadingWorker
+from bench.stress.fuzz_child import ReadingWorker
 
 from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.measured.reading import RawSurface, ReadingOptions, SurfaceFile, isolation

@@ -1,4 +1,4 @@
-"""A bounded fuzz run of every reader; ``python -m bench.fuzz`` is the long one."""
+"""A bounded fuzz run of every reader; ``python -m bench.stress.fuzz`` is the long one."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ import pytest
 
 ROOT = Path(__file__).parents[3]
 sys.path.insert(0, str(ROOT))
-fuzz = importlib.import_module("bench.fuzz")
-seeds = importlib.import_module("bench.fuzz_seeds")
+fuzz = importlib.import_module("bench.stress.fuzz")
+seeds = importlib.import_module("bench.stress.fuzz_seeds")
 
 COUNT = 200
 
@@ -31,7 +31,7 @@ def results() -> dict[str, dict[str, Any]]:
 @pytest.fixture(scope="module")
 def worker() -> Iterator[Any]:
     """One process for many files, as in the long run."""
-    with importlib.import_module("bench.fuzz_child").ReadingWorker() as started:
+    with importlib.import_module("bench.stress.fuzz_child").ReadingWorker() as started:
         yield started
 
 

@@ -1,4 +1,4 @@
-"""Random text files in the styles of instruments; ``python -m bench.text_headers`` reads 10 000."""
+"""Random text files in the styles of instruments; ``bench.stress.text_headers`` reads 10 000."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from bench import text_headers
+from bench.stress import text_headers
 
 from asperity.measured.reading import RawSurface, text_header
 

@@ -9,7 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bench.calibration import RandomDevice, calibrate_device, list_misses, random_device, wall_limit
+from bench.stress.calibration import (
+    RandomDevice,
+    calibrate_device,
+    list_misses,
+    random_device,
+    wall_limit,
+)
 from tests.servo.python_device import PythonDevice
 
 import asperity as asp

@@ -1,10 +1,10 @@
-"""A few random faults of ``python -m bench.servo_faults`` for every driver."""
+"""A few random faults of ``python -m bench.stress.servo_faults`` for every driver."""
 
 from __future__ import annotations
 
 import pytest
-from bench import servo_faults
-from bench.servo_rigs import RIGS
+from bench.stand_ins.servo_rigs import RIGS
+from bench.stress import servo_faults
 
 from asperity.servo.drivers.driver_registry import DRIVER_KINDS
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bench.fakes import compile_library
+from bench.stand_ins.fakes import compile_library
 from tests.servo.python_device import SURFACE
 
 from asperity.core.errors import ParameterError
@@ -28,7 +28,7 @@ from asperity.simulation import Cartesian, Servo, SpringHand, Stationary, simula
 
 ROOT = Path(__file__).parents[3]
 EXAMPLE = ROOT / "examples" / "own_device.c"
-FAKES = ROOT / "bench" / "c"
+FAKES = ROOT / "bench" / "stand_ins" / "c"
 NOTHING, READ_ONCE, _READ_EVER, WRITE_ONCE = range(4)
 # Generous limits: lateness on a busy machine is not under test here.
 NO_RAMP = Safety(ramp=0.0, max_slew=1e9, silence=60.0, lateness=60.0)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bench.fake_haply import FAULTS, FakeHaply
+from bench.stand_ins.fake_haply import FAULTS, FakeHaply
 from tests.servo.drivers.test_drivers import run
 from tests.servo.python_device import SURFACE
 

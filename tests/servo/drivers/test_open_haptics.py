@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bench.fakes import compile_library
+from bench.stand_ins.fakes import compile_library
 from tests.servo.drivers.test_drivers import FAKES, run
 from tests.servo.drivers.test_haply import wait_until, write_force
 from tests.servo.python_device import SURFACE

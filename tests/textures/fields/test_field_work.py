@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from bench.field_loops import (
+from bench.stress.field_loops import (
     DEPTH,
     K,
     edge_work,

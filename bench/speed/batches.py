@@ -1,0 +1,48 @@
+"""Time of forces at many points, against C that is written for vector registers by hand."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from bench.speed import cases, reference
+from bench.speed.timing import median_ratio, take_turns
+
+LAWS = "ABCG"
+GOAL = 1.2
+POINTS = 16_384  # a multiple of eight
+ROUNDS = 301
+# C may fuse products and sums, as asperity does in batches.
+FLAGS = ("-std=gnu11", "-march=native", "-fno-math-errno", "-ffp-contract=fast")
+
+
+def run(console: Console) -> None:
+    """Print one row for each law on a sinusoid and on a map, and the verdict."""
+    if shutil.which("gcc") is None:
+        console.print("not run: comparison with C (no gcc)")
+        return
+    console.print(f"ns per point, medians of {ROUNDS} batches of {POINTS} points, run in turns")
+    table = Table("texture", "law", "asperity ns", "C by hand ns", "asp./C", box=None)
+    ratios = []
+    with tempfile.TemporaryDirectory() as folder:
+        library = reference.build(Path(folder), FLAGS, "batches.c")
+        known = cases.textures()
+        for kind in reference.KINDS:
+            for law in LAWS:
+                kernel = cases.kernel(known[kind], law, cases.probes(known[kind], POINTS))
+                other = reference.reference(library, kernel)
+                reference.check_agreement(kernel, other, ("run_force",))
+                times = take_turns([kernel.run_force, other.run_force], ROUNDS)
+                ns = [f"{t:.1f}" for t in np.median(times, axis=0) / POINTS * 1e9]
+                ratio = median_ratio(times, 0, 1)
+                ratios.append((ratio, f"law {law} on {kind}"))
+                table.add_row(kind, law, *ns, f"{ratio:.2f}")
+    console.print(table)
+    over = [f"{where} {ratio:.2f}" for ratio, where in ratios if ratio > GOAL]
+    answer = "met" if not over else f"MISSED by {len(over)} of {len(ratios)}: {', '.join(over)}"
+    console.print(f"goal {GOAL} -> {answer}", style="bold")

@@ -1,0 +1,252 @@
+"""Cost of a globally nearest surface point, the contact of the god-object laws, against peers.
+
+The peers: a k-d tree (SciPy) of points of the surface, the nearest of them polished by Newton's
+method, and the downhill simplex of 35 steps that HAPI uses. Each is timed in turns with asperity on
+the same probes, and counted wrong where it ends farther away by more than 1e-6 of the extent.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from asperity.core.checks import FloatArray
+from asperity.textures import Fourier, HeightMap, Noise, Profile
+from asperity.textures.texture import Texture
+from bench.speed import cases, peers
+from bench.speed.timing import Batch, median_ratio, seconds, take_turns
+from bench.stress.nearest_exhaustive import texture_extent
+
+ROUNDS = 7
+BATCH_SECONDS = 0.1
+LEAST, MOST = 100, 5_000
+WRONG = 1e-6  # of the extent
+TREE_STEP = 0.5  # of the pitch
+# Pixels of a map; elsewhere shares of the peak-to-valley height.
+PIXELS = (1.0, 10.0, 100.0)
+SHARES = (0.01, 1.0)
+SIDE = 1024
+# What nearest points must reach [µs]: of a profile at any depth, of a map at most so many pixels.
+PROFILE_LIMIT = 1.0
+MAP_LIMITS = {1.0: 10.0, 10.0: 10.0, 100.0: 60.0}
+FORCE_LIMIT = 1.2  # times the nearest point
+GOALS = "profile 1 µs; 1024 x 1024 map 10 µs to 10 pixels, 60 µs at 100; D 1.2 x nearest"
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A texture with what a row of the table needs.
+
+    Attributes:
+        name: in the table.
+        texture: the texture.
+        pitch: distance of its nodes, or a fine fraction of its shortest wave [m].
+        depths: vertical depths of the probes, by their names [m].
+        limits: what the nearest point may take [µs], by the names of the depths.
+    """
+
+    name: str
+    texture: Texture
+    pitch: float
+    depths: dict[str, float]
+    limits: dict[str, float]
+
+
+def run(console: Console) -> None:
+    """Print a table of µs per query, the memory of asperity and tree, and the verdict."""
+    table = Table(box=None, pad_edge=False)
+    table.add_column("texture")
+    headings = ("depth", "nearest\nµs", "slowest\nof 300", "force D\n/nearest", "k-d tree\nµs")
+    for heading in (*headings, "\nratio", "\nwrong", "simplex\nµs", "\nratio", "\nwrong"):
+        table.add_column(heading, justify="right")
+    missed: list[str] = []
+    memory = []
+    for subject in _subjects():
+        tree = _build_tree(subject)
+        size = sum(getattr(argument, "nbytes", 0) for argument in subject.texture.arguments)
+        memory.append(f"{subject.name}: asperity {size / 1e6:.3g} MB; tree {tree.describe()}")
+        for depth in subject.depths:
+            cells, faults = _row(subject, depth, tree)
+            table.add_row(subject.name, depth, *cells)
+            missed += faults
+    console.print(
+        "nearest point, medians of batches over random probes in turns; slowest of 300 on its own;"
+        f"\nwrong: farther than the nearest point by more than {WRONG:g} of the extent (asperity:"
+        "\nnone in 1e5, python -m bench.stress.nearest_exhaustive). Tree and simplex: see"
+        " bench/speed/peers.py."
+    )
+    console.print(table)
+    console.print("\n".join(memory), style="dim")
+    answer = "met" if not missed else f"MISSED: {'; '.join(missed)}"
+    console.print(f"goals: {GOALS} -> {answer}", style="bold")
+
+
+def _subjects() -> list[Subject]:
+    known = cases.textures()
+    rng = np.random.default_rng(cases.SEED)
+    rough = HeightMap(cases._rough((SIDE, SIDE), rng), pitch=50e-6)
+    noise = Noise(rms=0.1e-3, size=SIDE * 50e-6, pitch=50e-6, seed=1)
+    subjects = []
+    for name, texture in {**known, f"map {SIDE}": rough, f"noise {SIDE}": noise}.items():
+        if name == "heightmap":
+            continue
+        if isinstance(texture, HeightMap):
+            depths = {f"{count:g} px": count * texture.pitch[0] for count in PIXELS}
+            limits = {f"{count:g} px": limit for count, limit in MAP_LIMITS.items()}
+            subjects.append(Subject(name, texture, texture.pitch[0], depths, limits))
+            continue
+        depths = {f"{share:.0%}": share * texture.peak_to_valley for share in SHARES}
+        limits = dict.fromkeys(depths, PROFILE_LIMIT) if texture.is_profile else {}
+        subjects.append(Subject(name, texture, _grid_spacing(texture), depths, limits))
+    return subjects
+
+
+def _grid_spacing(texture: Texture) -> float:
+    """Return the pitch of a profile, or a 40th of the shortest wave [m]."""
+    if isinstance(texture, Profile):
+        return texture.pitch
+    if isinstance(texture, Fourier):
+        return float(2.0 * np.pi / np.hypot(*texture.wavevectors.T).max() / 40.0)
+    return texture.scan_line().length / 40.0
+
+
+@dataclass(frozen=True)
+class Tree:
+    """A k-d tree of points of a surface.
+
+    Attributes:
+        axes: unit vectors (d, 2) of the coordinates along which the height varies.
+        points: the points [m], shape (n, d + 1), the height last.
+        tree: of SciPy.
+        memory: that points and tree take [bytes], from the growth of the process.
+        build: time that the tree took [s].
+    """
+
+    axes: FloatArray
+    points: FloatArray
+    tree: Any
+    memory: float
+    build: float
+
+    def nearest(self, probes: FloatArray) -> FloatArray:
+        """Return the points (n, 2) nearest to the probes; across a profile a probe stays."""
+        along = probes[:, :2] @ self.axes.T
+        _distance, index = self.tree.query(np.column_stack([along, probes[:, 2]]))
+        feet = probes[:, :2] + (self.points[index, :-1] - along) @ self.axes
+        return np.ascontiguousarray(feet)
+
+    def describe(self) -> str:
+        """Return size, memory and build time in words."""
+        size = f"{len(self.points):,} points, {self.memory / 1e6:.0f} MB"
+        return f"{size}, built in {self.build:.1f} s"
+
+
+def _build_tree(subject: Subject) -> Tree:
+    """Return the tree of a surface: its domain, and as far beyond as the deepest probe reaches."""
+    from scipy.spatial import cKDTree
+
+    before = _resident_memory()
+    texture, step = subject.texture, TREE_STEP * subject.pitch
+    reach = max(subject.depths.values())
+    domain, axes = texture.domain, np.eye(2)
+    if texture.is_profile:
+        axes = domain.spans / np.hypot(*domain.spans[0])
+    along = np.array([domain.origin, domain.origin + domain.spans.sum(axis=0)]) @ axes.T
+    ticks = [
+        np.arange(low, high, step)
+        for low, high in zip(along.min(axis=0) - reach, along.max(axis=0) + reach, strict=True)
+    ]
+    flat = np.stack(np.meshgrid(*ticks), axis=-1).reshape(-1, len(axes))
+    points = np.column_stack([flat, texture.height(flat @ axes)])
+    del flat
+    start = perf_counter()
+    tree = cKDTree(points)
+    return Tree(axes, points, tree, _resident_memory() - before, perf_counter() - start)
+
+
+def _resident_memory() -> float:
+    """Return the resident memory of this process [bytes]; 0 where it cannot be told."""
+    status = Path("/proc/self/statm")
+    return float(status.read_text().split()[1]) * 4096.0 if status.exists() else 0.0
+
+
+def _row(subject: Subject, depth_name: str, tree: Tree) -> tuple[list[str], list[str]]:
+    """Return the cells of a row after its names, and the goals that it misses."""
+    texture = subject.texture
+    points = _limit_points(texture, cases.probes(texture, MOST, subject.depths[depth_name]))
+    loop, arguments = texture._loops.nearest_batch, texture.arguments
+    feet, out = np.empty((len(points), 2)), np.empty((len(points), 2))
+    god = cases.kernel(texture, "D", points)
+    compiled = _peers(texture)
+    last = _last_proxies(texture, points, subject.pitch)
+
+    def by_tree() -> None:
+        compiled.peer_polish_batch(points, tree.nearest(points), out, arguments)
+
+    def by_simplex() -> None:
+        compiled.peer_simplex_batch(points, last, out, arguments)
+
+    methods: list[Batch] = [by_tree, by_simplex]
+    times = take_turns([lambda: loop(points, feet, arguments), god.run_force, *methods], ROUNDS)
+    medians = np.median(times, axis=0) / len(points) * 1e6
+    ratio = median_ratio(times, 1, 0)
+    cells = [f"{medians[0]:.2f}", f"{_slowest(texture, points):.1f}", f"{ratio:.2f}"]
+    best = _distances(texture, points, feet)
+    for n, method in enumerate(methods, start=2):
+        method()
+        wrong = _distances(texture, points, out) - best > WRONG * texture_extent(texture)
+        share = f"{100 * wrong.mean():.2g} %"
+        cells += [f"{medians[n]:.2f}", f"{median_ratio(times, n, 0):.1f}", share]
+    faults = []
+    if medians[0] > subject.limits.get(depth_name, np.inf):
+        faults.append(f"{subject.name} {depth_name} {medians[0]:.2f} µs")
+    if ratio > FORCE_LIMIT:
+        faults.append(f"D on {subject.name} {depth_name} {ratio:.2f}")
+    return cells, faults
+
+
+def _limit_points(texture: Texture, points: FloatArray) -> FloatArray:
+    """Return as many of the probes as take a batch's time."""
+    loop, arguments = texture._loops.nearest_batch, texture.arguments
+    feet = np.empty((LEAST, 2))
+    loop(points[:LEAST], feet, arguments)  # compiled, or loaded
+    each = seconds(lambda: loop(points[:LEAST], feet, arguments)) / LEAST
+    return points[: int(np.clip(BATCH_SECONDS / each, LEAST, MOST))]
+
+
+def _peers(texture: Texture) -> ModuleType:
+    from asperity.kernels.fuse import fuse_sampler
+
+    return fuse_sampler(texture.sampler, peers)
+
+
+def _last_proxies(texture: Texture, points: FloatArray, pitch: float) -> FloatArray:
+    """Return where a proxy was one sample before: the feet of probes a pitch away."""
+    rng = np.random.default_rng(cases.SEED + 3)
+    angle = rng.uniform(0.0, 2.0 * np.pi, len(points))
+    aside = pitch * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(len(points))])
+    return np.ascontiguousarray(texture.nearest(points + aside)[:, :2])
+
+
+def _distances(texture: Texture, points: FloatArray, closest_points: FloatArray) -> FloatArray:
+    away = np.column_stack([closest_points, texture.height(closest_points)]) - points
+    return np.asarray(np.linalg.norm(away, axis=1))
+
+
+def _slowest(texture: Texture, points: FloatArray) -> float:
+    """Return the time of the slowest of 300 queries [µs], its call overhead taken off."""
+    loop, arguments = texture._loops.nearest_batch, texture.arguments
+    feet = np.empty((1, 2))
+    singles = [points[i : i + 1] for i in range(min(300, len(points)))]
+    calls = [lambda point=point: loop(point, feet, arguments) for point in singles]
+    empty = points[:0]
+    overhead = np.median(take_turns([lambda: loop(empty, feet, arguments)], 101))
+    each = np.median(take_turns(calls, 3), axis=0)
+    return float(each.max() - overhead) * 1e6

@@ -1,0 +1,252 @@
+"""The longest tick of laws D and H on surfaces made to be slow, and what a stroke costs per tick.
+
+Each tick of an adversary begins with nothing remembered; its time is the least of a few turns, so
+that an interruption by something else does not count.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from time import perf_counter
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from asperity.contacts.warm_start import new_warm_start
+from asperity.core.checks import FloatArray
+from asperity.surface import Surface
+from asperity.textures import Fourier, HeightMap, Texture
+from asperity.textures.catalogue import as_texture
+from bench.speed import cases
+from bench.speed.timing import seconds, take_turns
+
+SIDE = 512
+PITCH = 50e-6
+SPEED, RATE = 0.1, 4000.0
+TICKS = 800
+# Goals, in µs.
+LONGEST = {"D": 50.0, "H": 150.0}
+PER_TICK = {"D": 0.5, "H": 2.5}
+PROBES = 40
+TURNS = 5
+WAVES = 32
+# Goal, share of ticks.
+TRUNCATED = 1e-3
+Adversaries = dict[str, tuple[HeightMap, FloatArray]]
+
+
+def adversarial_textures(side: int = SIDE) -> Adversaries:
+    """Return maps of so many nodes a side, each with a probe (1, 3) [m] that is hardest for it.
+
+    The probe is the centre of curvature of dome and grooves, and is deep below the others.
+    """
+    from scipy.ndimage import gaussian_filter
+
+    rng = np.random.default_rng(cases.SEED)
+    centre = 0.5 * (side - 1) * PITCH
+    y, x = np.mgrid[:side, :side] * PITCH - centre
+    away = np.hypot(x, y)
+    noise = gaussian_filter(rng.standard_normal((side, side)), 6.0, mode="reflect")
+    steps = gaussian_filter(rng.standard_normal((side, side)), 12.0, mode="reflect")
+    needles = np.where(rng.random((side, side)) < 0.01, 1e-3, 0.0)
+    radius = 0.8 * side * PITCH
+    ring = 1e-3 / (2.0 * np.pi)
+    heights: dict[str, tuple[FloatArray, float]] = {
+        "noise": (0.1e-3 * noise / noise.std(), -1.5e-3),
+        "needles": (needles, -2e-3),
+        "plateaus": (0.3e-3 * np.round(steps / steps.std()), -2e-3),
+        "concentric grooves": (0.2e-3 * np.cos(away / ring), 0.2e-3 - ring**2 / 0.2e-3),
+        "dome": (np.sqrt(radius**2 - away**2) - radius, -radius),
+    }
+    return {
+        name: (HeightMap(values, PITCH), np.array([[centre, centre, z]]))
+        for name, (values, z) in heights.items()
+    }
+
+
+def many_waves() -> tuple[Fourier, FloatArray]:
+    """Return a sum of waves of all directions, and a probe (1, 3) [m] far below it."""
+    rng = np.random.default_rng(cases.SEED)
+    length, turn = 2.0 * np.pi / 1e-3 * rng.uniform(0.3, 1.5, WAVES), rng.uniform(0.0, 7.0, WAVES)
+    vectors = length[:, None] * np.column_stack([np.cos(turn), np.sin(turn)])
+    return Fourier(np.full(WAVES, 4e-5), vectors, turn), np.array([[0.0, 0.0, -1e-2]])
+
+
+def wave_sum(count: int) -> Fourier:
+    """Return a sum of waves of random directions with the RMS height of ``many_waves``."""
+    rng = np.random.default_rng(5)
+    length, turn = 2.0 * np.pi / 1e-3 * rng.uniform(0.3, 1.5, count), rng.uniform(0.0, 7.0, count)
+    vectors = length[:, None] * np.column_stack([np.cos(turn), np.sin(turn)])
+    return Fourier(np.full(count, 4e-5 * np.sqrt(WAVES / count)), vectors, turn)
+
+
+def strokes(surface: Surface) -> list[FloatArray]:
+    """Return eight straight strokes (n, 3) [m] of 5 to 100 mm/s, half and fully pressed.
+
+    Every other one keeps its height, the others their depth.
+    """
+    rng, texture = np.random.default_rng(3), surface.texture
+    paths = []
+    for n in range(8):
+        depth, speed = (1.0, 0.5)[n // 4] * surface.max_depth, (0.005, 0.02, 0.05, 0.1)[n % 4]
+        turn, start = rng.uniform(0.0, 2.0 * np.pi), rng.uniform(2e-3, 20e-3, 2)
+        way = speed / RATE * np.arange(TICKS)[:, None] * np.array([np.cos(turn), np.sin(turn)])
+        top = texture.height(start + way) if n % 2 else np.full(TICKS, texture.extremes[1])
+        paths.append(np.ascontiguousarray(np.column_stack([start + way, top - depth])))
+    return paths
+
+
+def strokes_table() -> tuple[Table, list[str]]:
+    """Return what ticks along strokes cost and how many are truncated, and the goals missed."""
+    table = Table(box=None, pad_edge=False)
+    headings = ("truncated", "evaluations\nmean", "99.9 %", "most", "µs\na tick")
+    for heading in ("law", "surface", *headings):
+        table.add_column(heading, justify="left" if heading in {"law", "surface"} else "right")
+    maps = adversarial_textures()
+    textures: dict[str, Texture] = {name: maps[name][0] for name in ("needles", "plateaus")}
+    textures |= {f"{count} waves": wave_sum(count) for count in (3, 6, 8)}
+    textures |= {"cloth": as_texture("cloth"), f"{WAVES} waves": many_waves()[0]}
+    missed = []
+    for name, texture in textures.items():
+        for law in "DEH":
+            surface = Surface(texture, law, cases.STIFFNESS)
+            budget = surface.law.contact.max_evaluations
+            loop, arguments = surface._path_loops.path_batch, _arguments(surface)
+            counts, times = [], []
+            for path in strokes(surface):
+                out, told = np.empty_like(path), np.empty((TICKS, 2))
+                turn = partial(loop, path, out, told, new_warm_start(budget), *arguments)
+                turn()
+                times.append(min(seconds(turn) for _turn in range(TURNS)))
+                loop(path, out, told, new_warm_start(budget), *arguments)
+                counts.append(told.copy())
+            bounds, evaluations = np.concatenate(counts).T
+            share = float(np.mean(bounds > 0.0))
+            cells = [f"{share:.2%}", f"{evaluations.mean():.0f}"]
+            cells += [f"{np.quantile(evaluations, 0.999):.0f}", f"{evaluations.max():.0f}"]
+            table.add_row(law, name, *cells, f"{np.mean(times) / TICKS * 1e6:.1f}")
+            if share > TRUNCATED and name != f"{WAVES} waves":
+                missed.append(f"{law} on {name}: {share:.2%}")
+    return table, missed
+
+
+def run(console: Console) -> None:
+    """Print a row for each surface and law, and whether the goals are met."""
+    table, missed = strokes_table()
+    console.print("strokes of 5 to 100 mm/s at 4 kHz, half and fully pressed, with the budgets")
+    console.print(table)
+    answer = "met" if not missed else f"MISSED: {'; '.join(missed)}"
+    console.print(f"goal: at most {TRUNCATED:.1%} truncated -> {answer}", style="bold")
+    console.print()
+    _run_longest(console)
+
+
+def _run_longest(console: Console) -> None:
+    table = Table(box=None, pad_edge=False)
+    headings = (
+        "longest\ntick µs",
+        "evaluations",
+        "truncated",
+        "error\nbound µm",
+        "without a\nbudget µs",
+    )
+    for heading in (
+        "law",
+        "surface",
+        *headings,
+        "stroke\nµs a tick",
+        "evaluations",
+        "each alone\nµs",
+    ):
+        table.add_column(heading, justify="left" if heading in {"law", "surface"} else "right")
+    missed: list[str] = []
+    surfaces: dict[str, tuple[Texture, FloatArray]] = {**adversarial_textures()}
+    surfaces[f"{WAVES} waves"] = many_waves()
+    for name, (texture, centre) in surfaces.items():
+        for law in "DH":
+            surface = Surface(texture, law, cases.STIFFNESS)
+            longest, cells = _longest(surface, _probes(texture, centre))
+            each, more = _stroke(surface)
+            table.add_row(law, name, *cells, *more)
+            if longest > LONGEST[law]:
+                missed.append(f"{law} on {name}: {longest:.0f} µs")
+            if name == "noise" and each > PER_TICK[law]:
+                missed.append(f"{law} along a stroke: {each:.1f} µs")
+    console.print(
+        f"maps of {SIDE} x {SIDE} and a sum of {WAVES} waves;"
+        "\nticks at 0.3 to 3 times max_depth and at centres of curvature;"
+        f"\nstrokes of {SPEED:g} m/s at {RATE:g} Hz at half of max_depth;"
+        "\nerror bound of D: a point may be nearer by so much; of H: of force over stiffness"
+    )
+    console.print(table)
+    answer = "met" if not missed else f"MISSED: {'; '.join(missed)}"
+    goals = "longest tick D 50, H 150 µs; stroke on noise D 0.5, H 2.5 µs"
+    console.print(f"goals: {goals} -> {answer}", style="bold")
+
+
+def _probes(texture: Texture, centre: FloatArray) -> FloatArray:
+    rng = np.random.default_rng(cases.SEED + 5)
+    xy = rng.uniform(0.1, 0.9, (PROBES, 2)) * SIDE * PITCH
+    deep = Surface(texture).max_depth * rng.choice([0.3, 1.0, 1.0, 3.0], PROBES)
+    random = np.column_stack([xy, texture.height(xy) - deep])
+    near = centre + np.array([[0, 0, 0], [1e-7, 0, 0], [1e-4, 1e-5, 0], [0, 0, 0.5 * centre[0, 2]]])
+    return np.ascontiguousarray(np.concatenate([random, near]))
+
+
+def _longest(surface: Surface, probes: FloatArray) -> tuple[float, list[str]]:
+    """Return the longest tick [µs], and the cells that tell of it."""
+    loop, arguments = surface._path_loops.path_batch, _arguments(surface)
+    out, told = np.empty((1, 3)), np.empty((1, 2))
+    budget = surface.law.contact.max_evaluations
+    rows = []
+    for probe in probes:
+        point = probe[None].copy()
+
+        times = []
+        for _turn in range(TURNS):
+            times.append(
+                seconds(partial(loop, point, out, told, new_warm_start(budget), *arguments))
+            )
+        rows.append((min(times) * 1e6, told[0, 1], told[0, 0]))
+    times_, looks, gaps = np.array(rows).T
+    # Without a budget a tick at a centre of curvature may take seconds: of random probes only.
+    exact = []
+    surface._loops.force_batch(probes[:1], out, *arguments)  # compiled, or loaded
+    for probe in probes[:PROBES]:
+        start = perf_counter()
+        surface._loops.force_batch(probe[None], out, *arguments)
+        exact.append((perf_counter() - start) * 1e6)
+    cells = [
+        f"{times_.max():.1f}",
+        f"{looks.max():.0f}",
+        f"{np.mean(gaps > 0.0):.0%}",
+        f"{gaps.max() * 1e6:.3g}",
+        f"{max(exact):.0f}",
+    ]
+    return float(times_.max()), cells
+
+
+def _stroke(surface: Surface) -> tuple[float, list[str]]:
+    """Return what a tick of a stroke costs [µs], and the cells that tell of it."""
+    loop, arguments = surface._path_loops.path_batch, _arguments(surface)
+    way = SPEED / RATE * np.arange(TICKS)[:, None] * np.array([np.cos(0.3), np.sin(0.3)])
+    xy = np.array([0.1, 0.2]) * SIDE * PITCH + way
+    depth = 0.5 * surface.max_depth
+    path = np.ascontiguousarray(np.column_stack([xy, surface.texture.height(xy) - depth]))
+    out, told = np.empty_like(path), np.empty((TICKS, 2))
+    budget = surface.law.contact.max_evaluations
+
+    def ticks() -> None:
+        loop(path, out, told, new_warm_start(budget), *arguments)
+
+    def alone() -> None:
+        surface._loops.force_batch(path, out, *arguments)
+
+    times = np.median(take_turns([ticks, alone], TURNS), axis=0) / TICKS * 1e6
+    ticks()
+    return float(times[0]), [f"{times[0]:.2f}", f"{told[:, 1].mean():.1f}", f"{times[1]:.2f}"]
+
+
+def _arguments(surface: Surface) -> tuple[object, object]:
+    return surface.texture.arguments, surface.law_arguments

@@ -1,0 +1,29 @@
+"""Do designs meet their targets with the greatest margin, and does what they name bind?
+
+``python -m bench.stress.designs [COUNT]`` runs the checks of ``tests/envelopes`` on that many
+feasible and infeasible random targets, 200 by default, each against a random search of 1000 points.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+
+from tests.envelopes import test_find_design as designs
+
+
+def main() -> None:
+    designs.COUNT = int(sys.argv[1]) if len(sys.argv) > 1 else 200
+    for check in (
+        designs.test_feasible_targets_are_met_with_the_greatest_margin,
+        designs.test_targets_beyond_reach_get_the_nearest_one,
+        designs.test_a_requirement_binds_if_and_only_if_relaxing_it_extends_the_reach,
+    ):
+        start = time.perf_counter()
+        check()
+        seconds = time.perf_counter() - start
+        print(f"{check.__name__}: holds on {designs.COUNT}, {seconds:.0f} s", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,207 @@
+"""Work of baked fields along closed paths, in the compiled tick.
+
+``python -m bench.stress.field_loops [LOOPS]`` prints the greatest work of random triangles in and
+around cloth over k l², l the longest edge, and the work along an ellipse and 300 random loops
+beside that of the law by search.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.table import Table
+
+from asperity.contacts.warm_start import new_warm_start
+from asperity.core.checks import FloatArray
+from asperity.rendering import bake
+from asperity.surface import Surface
+from asperity.textures.fields.field_sampler import FieldArguments
+from asperity.textures.fields.potential_field import PotentialField
+
+K = 1000.0
+DEPTH = 0.15e-3
+LOOPS = 1_000_000
+PART = 2500
+ELLIPSE_SIDES = 1334
+RANDOM_LOOPS = 300
+# K / (2 RATE) is the damping that takes the work of held forces.
+RATE, DAMPING = 4000.0, 0.125
+SEARCHED = 50  # evaluations of a search that is truncated often
+MAX_CROSSINGS = 4
+# Exact to degree 11, that of the force along a segment between knots.
+GAUSS, WEIGHTS = np.polynomial.legendre.leggauss(6)
+BISECTIONS, SAMPLES = 50, 40
+
+Force = Callable[[FloatArray], FloatArray]
+
+
+def node_coordinates(points: FloatArray, field: FieldArguments) -> FloatArray:
+    rates = np.diag([0.0, 0.0, field.iz])
+    rates[:2, :2] = [[field.m00, field.m01], [field.m10, field.m11]]
+    return np.asarray((points - [field.x0, field.y0, field.z0]) @ rates.T)
+
+
+def edge_work(
+    force: Force, start: FloatArray, end: FloatArray, field: FieldArguments
+) -> FloatArray:
+    """Return the work along edges (n, 3), each split where it crosses knots or the surface."""
+    a, b = node_coordinates(start, field), node_coordinates(end, field)
+    knots = np.floor(np.minimum(a, b) + 0.5)[..., None] + 0.5 + np.arange(MAX_CROSSINGS)
+    assert (np.maximum(a, b) < knots[..., -1]).all()  # no more crossings than are looked for
+    with np.errstate(divide="ignore", invalid="ignore"):
+        shares = np.nan_to_num((knots - a[..., None]) / (b - a)[..., None], posinf=1.0, neginf=0.0)
+    shares = np.sort(np.clip(shares.reshape(len(a), -1), 0.0, 1.0), axis=1)
+    shares = np.pad(shares, [(0, 0), (1, 1)], constant_values=(0.0, 1.0))
+    shares = np.sort(np.hstack([shares, surface_crossings(force, start, end, shares)]), axis=1)
+    lengths = np.diff(shares, axis=1)
+    at = shares[:, :-1, None] + 0.5 * (1.0 + GAUSS) * lengths[..., None]
+    points = start[:, None, None] + at[..., None] * (end - start)[:, None, None]
+    along = np.einsum(
+        "...d,...d->...",
+        force(points.reshape(-1, 3)).reshape(points.shape),
+        np.broadcast_to((end - start)[:, None, None], points.shape),
+    )
+    return np.asarray(0.5 * np.einsum("nsg,ns,g->n", along, lengths, WEIGHTS))
+
+
+def surface_crossings(
+    force: Force, start: FloatArray, end: FloatArray, shares: FloatArray
+) -> FloatArray:
+    """Return the shares (n, segments) of edges at which a force begins or ends, else 0."""
+    points = start[:, None] + shares[..., None] * (end - start)[:, None]
+    pressed = np.any(force(points.reshape(-1, 3)), axis=1).reshape(shares.shape)
+    row, segment = np.nonzero(np.diff(pressed, axis=1))
+    low, high, first = shares[row, segment], shares[row, segment + 1], pressed[row, segment]
+    for _ in range(BISECTIONS if len(row) > 0 else 0):
+        middle = 0.5 * (low + high)
+        same = force(start[row] + middle[:, None] * (end - start)[row]).any(axis=1) == first
+        low, high = np.where(same, middle, low), np.where(same, high, middle)
+    crossings = np.zeros((len(start), shares.shape[1] - 1))
+    crossings[row, segment] = low
+    return crossings
+
+
+def random_triangles(surface: Surface, count: int, seed: int) -> FloatArray:
+    """Return closed paths (n, 3, 3) of up to three nodes a side, in and around the surface."""
+    texture, rng = surface.texture, np.random.default_rng(seed)
+    assert isinstance(texture, PotentialField)
+    centre = rng.uniform(-4e-3, 8e-3, (count, 1, 3))
+    low, top = texture.grid.floor + 6e-5, texture.extremes[1] + 2e-5
+    centre[..., 2] = rng.uniform(low, top, (count, 1))
+    return np.asarray(centre + rng.uniform(-5e-5, 5e-5, (count, 3, 3)))
+
+
+def triangle_work(
+    force: Force, loops: FloatArray, field: FieldArguments, stiffness: float = K
+) -> tuple[FloatArray, FloatArray]:
+    """Return the work of each edge of triangles (n, 3, 3), and k l² of each triangle [J]."""
+    ends = np.roll(loops, -1, axis=1)
+    scale = stiffness * np.square(np.linalg.norm(ends - loops, axis=-1).max(axis=1))
+    work = edge_work(force, loops.reshape(-1, 3), ends.reshape(-1, 3), field)
+    return work.reshape(-1, 3), scale
+
+
+def may_leave_twice(
+    force: Force, loops: FloatArray, field: FieldArguments, stiffness: float = K
+) -> NDArray[np.bool_]:
+    """Return which triangles (n, 3, 3) may leave the surface twice between two knots.
+
+    Their work is not summed exactly. Others are at least a tenth of a spacing deep at closely
+    spaced samples, or outside.
+    """
+    share = np.arange(SAMPLES)[:, None] / SAMPLES
+    points = loops[:, :, None] + share * (np.roll(loops, -1, axis=1) - loops)[:, :, None]
+    size = np.linalg.norm(force(points.reshape(-1, 3)), axis=1).reshape(len(loops), -1) / stiffness
+    return np.asarray(((size > 0.0) & (size < 0.1 / field.iz)).any(axis=1))
+
+
+def ellipse(surface: Surface, vertices: int) -> FloatArray:
+    """Return the ellipse of 87 x 81 µm at (1.223, 1.288) mm on which a search once gained."""
+    angle = 2.0 * np.pi * np.arange(vertices) / vertices
+    depth = np.full(vertices, surface.texture.extremes[1] - 0.14e-3)
+    return np.column_stack(
+        [1.223e-3 + 43.5e-6 * np.cos(angle), 1.288e-3 + 40.5e-6 * np.sin(angle), depth]
+    )
+
+
+def random_loop(surface: Surface, rng: np.random.Generator, vertices: int) -> FloatArray:
+    """Return a closed path (n, 3) [m]: a random ellipse with a second harmonic, in contact."""
+    angle = 2.0 * np.pi * np.arange(vertices)[:, None] / vertices
+    frame = rng.uniform(-1.0, 1.0, (4, 3)) * [6e-5, 6e-5, 2e-5]
+    waves = np.cos(angle) * frame[0] + np.sin(angle) * frame[1]
+    waves += 0.3 * (np.cos(2.0 * angle) * frame[2] + np.sin(2.0 * angle) * frame[3])
+    top = surface.texture.extremes[1]
+    centre = [*rng.uniform(0.0, 3.36e-3, 2), top - rng.uniform(0.05e-3, 0.14e-3)]
+    return np.asarray(centre + waves)
+
+
+def add_rows(
+    table: Table, paths: dict[str, list[FloatArray]], baked: Surface, field: FieldArguments
+) -> None:
+    """Add the greatest work on each group of paths: exact, over k l², and held from tick to tick.
+
+    Held forces do work although the field does none; the damping takes it where it is at least
+    half of stiffness times sample period, and the gain is 1.
+    """
+    exact = Surface("cloth", "H", K, max_depth=DEPTH)
+    budgets = {"search": exact.law.contact.max_evaluations, f"search of {SEARCHED}": SEARCHED}
+    forces = {"baked": baked.trace} | {
+        name: partial(lambda budget, points: exact.trace(points, new_warm_start(budget)), budget)
+        for name, budget in budgets.items()
+    }
+    for group, members in paths.items():
+        for name, force in forces.items():
+            work, held = [], []
+            for path in members:
+                scale, end = K * float(np.square(np.ptp(path, axis=0)).sum()), np.roll(path, -1, 0)
+                work.append(edge_work(force, path, end, field).sum() / scale)
+                moves = end - path
+                held.append((force(path) * moves).sum() - DAMPING * RATE * np.square(moves).sum())
+            table.add_row(group, name, f"{np.max(work):+.1e}", f"{1e6 * np.max(held):+.2g}")
+
+
+def main(arguments: Sequence[str]) -> None:
+    count = int(arguments[0]) if arguments else LOOPS
+    exact = Surface("cloth", "H", K, max_depth=DEPTH)
+    for gain in (None, 1.15):
+        baked = bake(exact, 40e-6, max_gain=gain)
+        texture, worst, largest, brushing = baked.texture, 0.0, 0.0, list[FloatArray]()
+        assert isinstance(texture, PotentialField)
+        field = texture.arguments
+        for part in range(-(-count // PART)):
+            size = min(PART, count - part * PART)
+            loops = random_triangles(baked, size, part)
+            work, scale = triangle_work(baked.trace, loops, field)
+            total = np.abs(work.sum(axis=1)) / scale
+            rough = may_leave_twice(baked.trace, loops, field)
+            worst = max(worst, float(total[~rough].max()))
+            brushing.append(total[rough])
+            largest = max(largest, float((np.abs(work) / scale[:, None]).max()))
+        control, scale = triangle_work(
+            Surface("cloth", "A", K, max_depth=DEPTH).force, loops, field
+        )
+        of_a = float((np.abs(control.sum(axis=1)) / scale).max())
+        met = "met" if worst <= 1e-12 else "MISSED"
+        rest = np.concatenate(brushing)
+        print(
+            f"cloth, smoothed {texture.passes} times, {count:,} triangles: |work| / (k l²) <="
+            f" {worst:.1e} (goal 1e-12: {met}); of one edge {largest:.2f}; law A {of_a:.2f};"
+            f" {len(rest):,} of them brush the surface: {np.mean(rest <= 1e-12):.3%} as exact, the"
+            f" others <= {rest.max():.1e}, summed over kinks"
+        )
+        headings = "work over k l²", f"held at 4 kHz less {DAMPING} N·s/m [µJ]"
+        table = Table("paths", "law H", *headings, box=None)
+        rng = np.random.default_rng(0)
+        loops_of_law = [random_loop(baked, rng, 400) for _loop in range(RANDOM_LOOPS)]
+        paths = {"ellipse": [ellipse(baked, ELLIPSE_SIDES)], f"{RANDOM_LOOPS} loops": loops_of_law}
+        add_rows(table, paths, baked, field)
+        Console(width=100, highlight=False).print(table)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
