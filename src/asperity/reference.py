@@ -59,10 +59,8 @@ def exact_jacobian(
             if sliding and square > 0:
                 along = (d[0] * move[0] + d[1] * move[1]) / square
                 follow = [move[0] - along * d[0], move[1] - along * d[1]]
-            ahead, behind = (
-                _force(surface, _offset(p, sign, move), _offset(d, sign, follow))
-                for sign in (1, -1)
-            )
+            ahead = _force(surface, _offset(p, 1, move), _offset(d, 1, follow))
+            behind = _force(surface, _offset(p, -1, move), _offset(d, -1, follow))
             columns.append((ahead - behind) / (2 * step))
         return mpmath.matrix([[columns[c][r] for c in range(3)] for r in range(3)])
 

@@ -76,17 +76,21 @@ def bake(
     """
     if not surface.law.contact.has_potential_field:
         raise ParameterError("surface", f"must have law H to be baked, not {surface.law}")
-    wanted = _goal(**goal)
+    bake_goal = _bake_goal(**goal)
+    texture = surface.texture
+    if extent is not None:
+        texture = _finite_part(texture, extent)
     field = bake_texture(
-        surface.texture if extent is None else _finite_part(surface.texture, extent),
+        texture,
         surface.max_depth,
         surface.parameter("continuity"),
         resolution=resolution,
-        goal=wanted,
+        goal=bake_goal,
         progress=progress,
     )
-    if resolution is not None and (least := min(field.accuracy.shares)) > _MAX_SHARE:
-        lost = f"would differ from law H by {least:.0%} of the texture's force at every depth"
+    share = min(field.accuracy.shares)
+    if resolution is not None and share > _MAX_SHARE:
+        lost = f"would differ from law H by {share:.0%} of the texture's force at every depth"
         raise ParameterError("resolution", f"is coarser than the texture: {lost}", resolution)
     return surface.to_texture(field)
 
@@ -136,16 +140,16 @@ def bake_mesh(
         docs/theory/split.md.
     """
     body = load_mesh(path, unit, repair=repair)
-    wanted = _goal(**goal)
+    bake_goal = _bake_goal(**goal)
     if texture is not None:
         body = lay_texture(body, as_texture(texture), texture_side)
     field = bake_body(
-        body, max_depth, continuity, resolution=resolution, goal=wanted, progress=progress
+        body, max_depth, continuity, resolution=resolution, goal=bake_goal, progress=progress
     )
     return Surface(field, "H", stiffness, field.max_depth, continuity=continuity)
 
 
-def _goal(
+def _bake_goal(
     share: float = BakeGoal.share,
     max_gain: float | None = BakeGoal.max_gain,
     max_bytes: int = BakeGoal.max_bytes,
@@ -293,7 +297,8 @@ def _finite_part(texture: Texture, extent: Extent) -> Texture:
     slope, hessian = texture.bounds
     wave = 2.0 * math.pi * slope / hessian if hessian > 0.0 else min(sides)
     counts = [max(math.ceil(side / wave * _NODES_PER_WAVE), 8) for side in sides]
-    x, y = (np.linspace(0.0, side, count + 1) for side, count in zip(sides, counts, strict=True))
+    x = np.linspace(0.0, sides[0], counts[0] + 1)
+    y = np.linspace(0.0, sides[1], counts[1] + 1)
     points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     heights = texture.height(points).reshape(len(y), len(x))
     pitch = (sides[0] / counts[0], sides[1] / counts[1])

@@ -31,9 +31,8 @@ _Optional = ArrayLike | None
 
 def default_max_depth(texture: Texture) -> float:
     """Return the peak-to-valley height of the texture, at most 1 mm [m]."""
-    height = texture.peak_to_valley
-    depth = min(height, MAX_DEFAULT_DEPTH) if height > 0.0 else MAX_DEFAULT_DEPTH
-    return min(depth, texture.depth_limit)
+    depth = min(texture.peak_to_valley, MAX_DEFAULT_DEPTH, texture.depth_limit)
+    return depth or min(MAX_DEFAULT_DEPTH, texture.depth_limit)
 
 
 def _law_parameter(name: str, text: str) -> property:
@@ -107,6 +106,8 @@ class Surface(Plottable):
     ) -> None:
         law = find_law(law)
         texture = as_texture(texture)
+        if max_depth is None:
+            max_depth = default_max_depth(texture)
         names = ("friction", "max_deflection", "modulation_depth", "continuity")
         values = (friction, max_deflection, modulation_depth, continuity)
         keywords = {
@@ -123,9 +124,7 @@ class Surface(Plottable):
                 "texture": texture,
                 "law": law,
                 "stiffness": STIFFNESS.validate(stiffness),
-                "max_depth": MAX_DEPTH.validate(
-                    default_max_depth(texture) if max_depth is None else max_depth
-                ),
+                "max_depth": MAX_DEPTH.validate(max_depth),
                 "clamp": find_clamp(clamp).name,
                 "_explicit_parameters": keywords | named,
             }
@@ -138,17 +137,17 @@ class Surface(Plottable):
         """
         names = ("texture", "law", "stiffness", "max_depth", "clamp", "_explicit_parameters")
         state = {name: getattr(self, name) for name in names}
-        registered = REGISTERED_LAWS.get(self.law.letter) is self.law
-        return state | ({"law": self.law.letter} if registered else {})
+        if REGISTERED_LAWS.get(self.law.letter) is self.law:
+            state["law"] = self.law.letter
+        return state
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Set all attributes; parameters that are not given get the defaults of the law."""
         law = find_law(state["law"])
-        given = state["_explicit_parameters"]
-        parameters = {
-            name: argument.validate(given[name]) if name in given else float(law.parameters[name])
-            for name, argument in law.arguments.items()
-        }
+        parameters = {name: float(value) for name, value in law.parameters.items()}
+        for name, value in state["_explicit_parameters"].items():
+            if name in parameters:
+                parameters[name] = law.arguments[name].validate(value)
         if law.stateful and "max_deflection" in parameters:  # the derivation requires it
             check_positive("max_deflection", parameters["max_deflection"], "m")
         texture = state["texture"]
@@ -221,8 +220,8 @@ class Surface(Plottable):
             ParameterError: for an unknown law, or a value that cannot be used.
         """
         other = find_law(law)
-        given = other.check_parameters(law_parameters or {})
-        return self._replace(law=other, _explicit_parameters={**self._explicit_parameters, **given})
+        parameters = {**self._explicit_parameters, **other.check_parameters(law_parameters or {})}
+        return self._replace(law=other, _explicit_parameters=parameters)
 
     def parameter(self, name: str) -> float:
         """Return the value of a parameter of the law.
@@ -282,15 +281,19 @@ class Surface(Plottable):
         from asperity.kernels.fuse import kernel_source
 
         # The extremes of a map take time to compute: only for laws that use the relative height.
-        relative = "h_mid" in kernel_source(self.law)
-        low, high = self.texture.extremes if relative else (-1.0, 1.0)
-        half = 0.5 * (high - low)
+        low = -1.0
+        high = 1.0
+        if "h_mid" in kernel_source(self.law):
+            low, high = self.texture.extremes
+        floor = 0.0
+        if CLAMPS[self.clamp].has_backing_wall:
+            floor = self.floor
         return (
             self.stiffness,
             0.5 * (low + high),
-            half if half > 0.0 else 1.0,  # a flat texture modulates nothing
+            0.5 * (high - low) or 1.0,  # a flat texture modulates nothing
             self.max_depth,
-            self.floor if CLAMPS[self.clamp].has_backing_wall else 0.0,
+            floor,
             *self.law_parameters.values(),
         )
 
@@ -341,7 +344,7 @@ class Surface(Plottable):
         self._loops.force_batch(
             probes.rows, *state, out, self.texture.arguments, self.law_arguments
         )
-        return out[0] if probes.is_single else out
+        return probes.restore_shape(out)
 
     def jacobian(
         self, points: ArrayLike, deflection: _Optional = None, sliding: _Optional = None
@@ -426,13 +429,13 @@ class Surface(Plottable):
             return ()
         if deflection is None:
             return (np.zeros((probes.count, 2)),)
-        given = probes.check_array_per_point("deflection", deflection, 2, "m")
-        longest = float(np.hypot(given[:, 0], given[:, 1]).max(initial=0.0))
+        deflections = probes.check_array_per_point("deflection", deflection, 2, "m")
+        longest = float(np.hypot(*deflections.T).max(initial=0.0))
         # Tolerate the rounding of a deflection of exactly that length.
         if longest > self.max_deflection * (1.0 + 1e-12):
             limit = f"must not be longer than max_deflection = {self.max_deflection} m"
             raise ParameterError("deflection", limit, longest)
-        return (given,)
+        return (deflections,)
 
 
 SURFACE_KEYWORDS = frozenset(inspect.signature(Surface).parameters) - {"texture"}

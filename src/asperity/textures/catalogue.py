@@ -124,18 +124,19 @@ def load_texture(  # noqa: D417 - the others are described where they are declar
     """
     values = dict(locals())  # every argument under its own name
     defaults = load_texture.__kwdefaults__ or {}
-    given = {name: x for name, x in values.items() if x is not defaults.get(name, ...)}
-    if {"cutoff", "s_cutoff"} <= given.keys():
+    arguments = {name: x for name, x in values.items() if x is not defaults.get(name, ...)}
+    if {"cutoff", "s_cutoff"} <= arguments.keys():
         raise ParameterError("cutoff", "is the former name of s_cutoff: give one of them")
-    given = {"s_cutoff" if name == "cutoff" else name: x for name, x in given.items()}
-    return _load_file(**given)
+    if "cutoff" in arguments:
+        arguments["s_cutoff"] = arguments.pop("cutoff")
+    return _load_file(**arguments)
 
 
 def _build_described(description: Mapping[str, Any]) -> Texture:
     texture = _build_from_description(description)
     if texture is None:
-        words = f"is of a kind that is not known here: {description.get('kind')}"
-        raise ParameterError("texture", f"{words}; name its file as {{plugin}}", plugin=None)
+        fault = f"is of a kind that is not known here: {description.get('kind')}"
+        raise ParameterError("texture", f"{fault}; name its file as {{plugin}}", plugin=None)
     return texture
 
 
@@ -171,14 +172,14 @@ def as_texture(
     if isinstance(texture, Texture):
         return texture
     if not isinstance(texture, (str, os.PathLike)):
-        words = "must be a texture, a text such as 'sandpaper:grit=P60', or the path of a file"
-        raise ParameterError(name, words, texture)
+        requirement = "must be a texture, a text such as 'sandpaper:grit=P60', or a file's path"
+        raise ParameterError(name, requirement, texture)
     extra = dict(values or {})
     if isinstance(texture, str) and (named := parse_specification(texture)) is not None:
         return build_texture(*named, values=extra)
     if is_scene(texture):
-        words = "is a scene, which defines more than a texture; use asperity.scene.load_scene"
-        raise ParameterError(name, words, os.fspath(texture))
+        reason = "is a scene, which defines more than a texture; use asperity.scene.load_scene"
+        raise ParameterError(name, reason, os.fspath(texture))
     return _load_file(texture, **extra)
 
 
@@ -199,15 +200,16 @@ def parse_specification(source: str) -> tuple[str, dict[str, str]] | None:
     if is_path or not re.fullmatch(r"[A-Za-z][\w-]+", kind):
         return None
     if not colon and (named == _FILE.name or named not in KINDS):
-        hint = suggest_names(kind, KINDS)
-        words = f"is neither a file nor a named surface: {source!r}; {hint}"
-        raise ParameterError("surface", words)
+        reason = f"is neither a file nor a named surface: {source!r}"
+        raise ParameterError("surface", f"{reason}; {suggest_names(kind, KINDS)}")
     return named, _parse_arguments(arguments)
 
 
 def _parse_arguments(text: str) -> dict[str, str]:
     arguments: dict[str, str] = {}
-    for part in text.split(",") if text.strip() else ():
+    if not text.strip():
+        return arguments
+    for part in text.split(","):
         name, equals, value = part.partition("=")
         name = name.strip().replace("-", "_")
         if not equals or not name:
@@ -239,10 +241,10 @@ def build_texture(
         raise ParameterError("surface", f"kind is unknown: {kind!r}; {suggest_names(kind, KINDS)}")
     entry = KINDS[kind]
     synthetic = () if kind == "file" else SYNTHETIC_ARGUMENTS
-    own = {argument.name for argument in entry.arguments}
-    preparing = [argument for argument in synthetic if argument.name not in own]
+    constructing = {argument.name for argument in entry.arguments}
+    preparing = [argument for argument in synthetic if argument.name not in constructing]
     read = parse_arguments(kind, arguments, (*entry.arguments, *preparing), folder)
-    preparation = {name: read.pop(name) for name in read.keys() - own} | dict(values or {})
+    preparation = {name: read.pop(name) for name in read.keys() - constructing} | dict(values or {})
     if kind == "file":
         return entry.factory(**_require_all(entry, read | preparation))
     names = [argument.name for argument in synthetic]

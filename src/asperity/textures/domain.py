@@ -79,7 +79,7 @@ class Domain:
         sides = np.hypot(*spans.T)
         number = np.array(counts, dtype=np.intp)
         # A finite map has nodes at both ends; a periodic one does not repeat its first node.
-        steps = sides / (number if self.periodic else number - 1)
+        steps = sides / (number - (not self.periodic))
         first = np.zeros_like(number)
         if max_count is not None and number.max() > max_count:
             repeats = False
@@ -90,7 +90,8 @@ class Domain:
             for start, count, step, side in zip(first, number, steps, sides, strict=True)
         ]
         points = self.origin + np.stack(np.meshgrid(*ticks), axis=-1) @ spans
-        points = points[None] if len(ticks) == 1 else points
+        if len(ticks) == 1:
+            points = points[None]
         return points, (float(steps[0]), float(steps[-1])), repeats
 
 
@@ -201,7 +202,7 @@ class BoundedCells(Cells):
         """See :class:`Cells`."""
         values = self.derivatives(centres)
         steps = half[:, None] * self._region.spans
-        corners = [steps[0] + sign * steps[-1] for sign in (-1.0, 1.0)] if len(steps) > 1 else steps
+        corners = [steps.sum(axis=0), steps[0] - steps[1:].sum(axis=0)]
         reach = max(float(np.hypot(*corner)) for corner in corners)
         return {name: self._model(name, values, steps, reach) for name in names}
 
@@ -251,8 +252,8 @@ class BoundedCells(Cells):
             change = _spectral_norms(np.diff(second, axis=0))
             limit = b.third_derivative_bound * np.hypot(*np.diff(points, axis=0).T)
             checks.append(("third-derivative bound", 2, change, limit))
-        for name, order, found, most in checks:
-            above = ~(found <= most * _INFLATION + 2.0 * self._rounding_errors[order])
+        for name, order, value, bound in checks:
+            above = ~(value <= bound * _INFLATION + 2.0 * self._rounding_errors[order])
             if above.any():
                 x, y = points[int(np.argmax(above))]
                 raise InternalError(f"the texture exceeds its {name} at ({x:g}, {y:g}) m")
@@ -290,11 +291,11 @@ class LineSegments:
 
     def models(self, names: Sequence[str]) -> dict[str, TaylorNumber]:
         """Return enclosures of height derivatives, whose one coordinate is along the line."""
-        found = self.cells.enclosures(self.centres, self.half, names)
-        for name, model in found.items():
+        models = self.cells.enclosures(self.centres, self.half, names)
+        for name, model in models.items():
             if isinstance(model, TaylorModel):
-                found[name] = TaylorModel(model.c, model.g.sum(axis=0, keepdims=True), model.e)
-        return found
+                models[name] = TaylorModel(model.c, model.g.sum(axis=0, keepdims=True), model.e)
+        return models
 
 
 def equal_segments(cells: Cells, line: ScanLine, min_count: int, length: float) -> LineSegments:

@@ -10,6 +10,7 @@ from itertools import product
 from typing import Any
 
 import mpmath
+import numpy as np
 
 from asperity.contacts.contact import ExactHeight
 from asperity.core.checks import FloatArray
@@ -35,13 +36,15 @@ def taylor_continuation(derivatives: Callable[[FloatArray], FloatArray]) -> Exac
 
     def height(x: Any, y: Any, m: int, n: int) -> Any:
         near = [float(x), float(y)]
-        h, hx, hy, hxx, hxy, hyy = (mpmath.mpf(float(v)) for v in derivatives([near])[0])  # type: ignore[arg-type]  # a list is accepted
+        h, hx, hy, hxx, hxy, hyy = map(mpmath.mpf, derivatives(np.array([near]))[0].tolist())
         dx = x - mpmath.mpf(near[0])
         dy = y - mpmath.mpf(near[1])
         if m + n == 2:
             return (hyy, hxy, hxx)[m]
-        if m + n == 1:
-            return hx + hxx * dx + hxy * dy if m else hy + hxy * dx + hyy * dy
+        if m == 1:
+            return hx + hxx * dx + hxy * dy
+        if n == 1:
+            return hy + hxy * dx + hyy * dy
         return h + dx * (hx + hxx * dx / 2 + hxy * dy) + dy * (hy + hyy * dy / 2)
 
     return height
@@ -78,8 +81,7 @@ def _weights(u: Any, count: int, periodic: bool, order: int) -> dict[int, Any]:
     weights: dict[int, Any] = {}
     first = int(mpmath.floor(u)) - 1
     for j in range(first, first + 4):
-        node = j % count if periodic else j % (2 * (count - 1))
-        node = node if node < count else 2 * (count - 1) - node
+        node = j % count if periodic else abs((j + count - 1) % (2 * (count - 1)) - (count - 1))
         weights[node] = weights.get(node, 0) + _basis(u - j, order)
     return weights
 

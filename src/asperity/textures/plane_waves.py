@@ -157,7 +157,7 @@ def _is_exact(q: int, row: list[int], basis: FloatArray, wave: FloatArray) -> bo
     size = q * float(np.hypot(*wave)) + float(np.abs(row) @ np.hypot(*basis.T))
     across = np.abs(basis[:, 0] * wave[1] - basis[:, 1] * wave[0])
     rotated = across > _NEARLY_PARALLEL * np.hypot(*basis.T) * np.hypot(*wave)
-    allowed = Fraction((2.0 if rotated.any() else 1.0) * _ROUNDING * size)
+    allowed = Fraction((1.0 + rotated.any()) * _ROUNDING * size)
     for axis in (0, 1):
         terms = (n * Fraction(b) for n, b in zip(row, basis[:, axis].tolist(), strict=True))
         if abs(sum(terms, -q * Fraction(float(wave[axis])))) > allowed:
@@ -248,7 +248,7 @@ class WaveCells(cells.Cells):
     def __init__(
         self, waves: PlaneWaves, extent: tuple[float, ...] | None = None, margin: float = 0.0
     ) -> None:
-        self._extent = None if extent is None else tuple(side + 2.0 * margin for side in extent)
+        self._extent: tuple[float, ...] | None = None
         self._margin = margin
         self._amplitudes = waves.amplitudes
         self._phases = waves.phases
@@ -256,6 +256,7 @@ class WaveCells(cells.Cells):
         if extent is None:
             self._basis, self._multiples = waves.lattice
         else:
+            self._extent = tuple(side + 2.0 * margin for side in extent)
             self._basis = np.eye(2)
             self._multiples = self._waves
             self._phases = self._phases - self._waves.sum(axis=1) * margin
@@ -272,24 +273,29 @@ class WaveCells(cells.Cells):
 
     def initial_cells(self) -> tuple[Iterator[FloatArray], FloatArray]:
         """See :class:`Cells`."""
-        sizes = np.full(self.dimensions, 2.0 * math.pi) if self._extent is None else self._extent
+        sizes = self._sizes()
         # Cells on which the phase of the fastest wave changes by about 0.7 rad, but not fewer than
         # can be evaluated at the cost of one.
-        least = 64 if self.dimensions == 1 else 16
-        turns = np.abs(self._multiples).max(axis=0) * np.asarray(sizes)
+        fewest = 64 if self.dimensions == 1 else 16
+        turns = np.abs(self._multiples).max(axis=0) * sizes
         limit = 4_000_000 ** (1.0 / self.dimensions)
-        counts = [int(min(max(math.ceil(turn / 0.7), least), limit)) for turn in turns]
-        half = 0.5 * np.asarray(sizes) / counts
+        counts = [int(min(max(math.ceil(turn / 0.7), fewest), limit)) for turn in turns]
+        half = 0.5 * sizes / counts
         chunks = cells.grid_index_chunks(counts, self.chunk_size())
         return (half * (2.0 * index + 1.0) for index in chunks), half
 
+    def _sizes(self) -> FloatArray:
+        """Return the sizes of the torus, or of the rectangle."""
+        if self._extent is None:
+            return np.full(self.dimensions, 2.0 * math.pi)
+        return np.array(self._extent)
+
     def sample_coordinates(self, count: int = cells.SAMPLE_COUNT) -> FloatArray:
         """See :class:`Cells`."""
-        sizes = np.full(self.dimensions, 2.0 * math.pi) if self._extent is None else self._extent
         count = min(count, max(64, _SINES_PER_CHUNK // len(self._amplitudes)))
         if self.dimensions == 1 and self._extent is None:
             count = min(count, _SAMPLES_PER_WAVE * (1 + int(np.abs(self._multiples).max())))
-        return np.asarray(cells.low_discrepancy_points(count, self.dimensions) * np.asarray(sizes))
+        return np.asarray(cells.low_discrepancy_points(count, self.dimensions) * self._sizes())
 
     def chunk_size(self) -> int:
         """See :class:`Cells`."""
@@ -309,14 +315,18 @@ class WaveCells(cells.Cells):
         second = 0.5 * reach * reach
         rest = [second * np.minimum(1.0, np.abs(part) + reach) for part in (sine, cosine)]
         # Rounding errors of the phases.
-        most = np.abs(centres).max(axis=0, initial=0.0) @ np.abs(self._multiples).T
-        largest = float((most + np.abs(self._phases)).max())
+        phases = np.abs(centres).max(axis=0, initial=0.0) @ np.abs(self._multiples).T
+        largest = float((phases + np.abs(self._phases)).max())
         slack = 16.0 * cells.EPS * (1.0 + largest + len(sine[0]))
         result: dict[str, TaylorNumber] = {}
         for name in names:
             weight = self._weights[name]
             odd = sum(cells.DERIVATIVE_ORDERS[name]) % 2
-            values, slopes = (cosine, -sine) if odd else (sine, cosine)
+            values = sine
+            slopes = cosine
+            if odd:
+                values = cosine
+                slopes = -sine
             if not weight.any():
                 result[name] = 0.0
                 continue
@@ -329,7 +339,8 @@ class WaveCells(cells.Cells):
     def _weight(self, nx: int, ny: int) -> FloatArray:
         """Return the weights of the waves of a derivative: cosines for slopes, otherwise sines."""
         weight = self._amplitudes * self._waves[:, 0] ** nx * self._waves[:, 1] ** ny
-        return np.asarray(-weight if nx + ny == 2 else weight)
+        sign = (1.0, 1.0, -1.0)[nx + ny]
+        return np.asarray(sign * weight)
 
     def derivatives(self, coordinates: FloatArray) -> FloatArray:
         """See :class:`Cells`."""
@@ -367,8 +378,8 @@ def nearest_phases(basis: FloatArray, target: FloatArray, max_turns: int = 400) 
     rank = int(np.linalg.matrix_rank(basis))
     rows = _independent_rows(basis, rank)
     others = [row for row in range(len(basis)) if row not in rows]
-    most = max_turns if rank == 2 else max_turns**2
-    span = np.arange(-most, most + 1)
+    turns_each = max_turns ** (3 - rank)
+    span = np.arange(-turns_each, turns_each + 1)
     turns = np.stack(np.meshgrid(*[span] * rank, indexing="ij"), axis=-1).reshape(-1, rank)
     phases = target[rows] + 2.0 * math.pi * turns
     points = phases @ np.linalg.pinv(basis[rows]).T

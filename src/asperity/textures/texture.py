@@ -153,7 +153,8 @@ class Texture(Plottable, ABC):
 
     def constructor_values(self) -> dict[str, Any]:
         """Return the arguments of the constructor by name, SI units."""
-        return {one.name: getattr(self, one.name) for one in self.constructor_arguments}
+        names = [argument.name for argument in self.constructor_arguments]
+        return {name: getattr(self, name) for name in names}
 
     def __repr__(self) -> str:
         values = ", ".join(f"{name}={value!r}" for name, value in self.constructor_values().items())
@@ -244,7 +245,9 @@ class Texture(Plottable, ABC):
         region = self.domain
         if extent is not None:
             region = Domain(np.zeros(2), np.diag(extent), periodic=False, description="extent")
-        return self._bounded_cells(region if region.periodic else region.expand(margin))
+        if not region.periodic:
+            region = region.expand(margin)
+        return self._bounded_cells(region)
 
     def sampling_cells(self) -> Cells:
         """Return the cells over which suprema are sampled where they cannot be certified."""
@@ -268,19 +271,21 @@ class Texture(Plottable, ABC):
 
     def sample_counts(self) -> list[int]:
         """Return the numbers of initial samples of a dense search along each span of the domain."""
-        if self.is_profile or self.waves is None:
-            return [_PROFILE_SAMPLES] if self.is_profile else [_SIDE_SAMPLES] * 2
+        if self.is_profile:
+            return [_PROFILE_SAMPLES]
+        if self.waves is None:
+            return [_SIDE_SAMPLES] * 2
         counts = _SAMPLES_PER_WAVE * np.hypot(*self.domain.spans.T) / self.waves.shortest_wavelength
         return [int(count) for count in np.clip(counts, _MIN_SAMPLES, _MAX_SAMPLES)]
 
     def grid_counts(self) -> list[int]:
         """Return the numbers of points along each span of the domain that resolve every wave."""
         sides = np.hypot(*self.domain.orthogonal_spans()[0].T)
-        most = _LINE_POINTS if self.is_profile else _SIDE_POINTS
+        limit = _LINE_POINTS if self.is_profile else _SIDE_POINTS
         if self.waves is None:
-            return [most] * len(sides)
+            return [limit] * len(sides)
         counts = np.ceil(_POINTS_PER_WAVE * sides / self.waves.shortest_wavelength)
-        return [int(count) for count in np.clip(counts, 16, most)]
+        return [int(count) for count in np.clip(counts, 16, limit)]
 
     def texture_part(self) -> TexturePart:
         """Return the texture without form and waviness: by default all of it.

@@ -151,7 +151,8 @@ class BakePlan:
         used = felt[rows]
         self.probes = points[used]
         self.rows = (np.cumsum(felt) - 1)[rows[used]]
-        self.force, count = force[used], len(self.depths)
+        self.force = force[used]
+        count = len(self.depths)
         mean = np.column_stack([_mean_of_rows(part, self.rows, count) for part in self.force.T])
         around = np.square(self.force - mean[self.rows]).sum(axis=1)
         self.row_rms = np.sqrt(_mean_of_rows(around, self.rows, count))
@@ -159,7 +160,8 @@ class BakePlan:
 
     def set_shallow(self, points: FloatArray) -> None:
         """Set the points [m], (n, 3), just below the surface at which its place is measured."""
-        self.shallow, self.shallow_depth = points, self.exact(points)[1]
+        self.shallow = points
+        self.shallow_depth = self.exact(points)[1]
 
     def exact(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the exact force over the stiffness [m], (n, 3), and depth √(2U) [m], (n,)."""
@@ -212,10 +214,14 @@ class BakePlan:
             done = 1.0 - 0.5**trial
             field = self.bake(resolution, scale_progress(progress, done, 0.5 * (1.0 - done)))
             share = max(field.accuracy.share, goal * field.accuracy.onset / self.onset_limit)
-            if resolution == (coarsest if share <= goal else finest) or 0.5 * goal <= share <= goal:
+            is_reached = share <= goal
+            if resolution == (coarsest if is_reached else finest) or 0.5 * goal <= share <= goal:
                 break
             tried.add(resolution)
-            lower, upper = (lower, resolution) if share > goal else (resolution, upper)
+            if is_reached:
+                lower = resolution
+            else:
+                upper = resolution
             ratio = max(share, 0.01 * goal) / max(self.predict_share(resolution), 0.01 * goal)
             resolution = self.predict_resolution(lower, upper, _AIM ** (trial + 1) * goal / ratio)
             if resolution in tried:
@@ -234,9 +240,10 @@ class BakePlan:
             return math.log(max(self.predict_share(math.exp(exponent)), 1e-9) / share)
 
         limits = math.log(finest), math.log(coarsest)
-        for limit, sign in zip(limits, (1.0, -1.0), strict=True):
-            if sign * excess(limit) >= 0.0:
-                return finest if limit == limits[0] else coarsest
+        if excess(limits[0]) >= 0.0:
+            return finest
+        if excess(limits[1]) <= 0.0:
+            return coarsest
         return math.exp(brentq(excess, *limits, xtol=_PREDICTION_STEP))
 
     def predict_share(self, resolution: float) -> float:
@@ -252,13 +259,15 @@ class BakePlan:
 
     def finest_resolution(self, max_bytes: float = math.inf) -> float:
         """Return the finest resolution [m] of a field within the size allowed, to three digits."""
-        most = min(max_bytes, self.goal.max_bytes)
+        limit = min(max_bytes, self.goal.max_bytes)
         coarse = max(self.grid(math.inf).spacing)
         fine = 1e-5 * coarse
         while coarse > 1.001 * fine:
             middle = math.sqrt(fine * coarse)
-            fits = self._bytes(middle) <= most
-            fine, coarse = (fine, middle) if fits else (middle, coarse)
+            if self._bytes(middle) <= limit:
+                coarse = middle
+            else:
+                fine = middle
         return coarse
 
     def _bytes(self, resolution: float) -> int:
@@ -274,13 +283,13 @@ class BakePlan:
         limit = self.goal.max_bytes
         if size > limit:
             nodes = " x ".join(map(str, grid.node_counts))
-            least = self._bytes(math.inf)
-            fits = f"even the coarsest one takes {least} byte"
-            if least <= limit:  # rounded up, so that the resolution in the message fits
+            smallest = self._bytes(math.inf)
+            fits = f"even the coarsest one takes {smallest} byte"
+            if smallest <= limit:  # rounded up, so that the resolution in the message fits
                 fits = f"{round_up(self.finest_resolution()):.3g} m fits"
-            words = f"would need a field of {nodes} nodes, {size / 1e6:,.1f} MB, more than"
-            words += f" max_bytes = {limit / 1e6:,.1f} MB; {fits}"
-            raise ParameterError("resolution", words, max(grid.spacing))
+            excess = f"would need a field of {nodes} nodes, {size / 1e6:,.1f} MB, more than"
+            excess += f" max_bytes = {limit / 1e6:,.1f} MB; {fits}"
+            raise ParameterError("resolution", excess, max(grid.spacing))
 
     def certify(
         self, potentials: SingleArray, grid: FieldGrid, progress: Progress | None
@@ -304,21 +313,29 @@ class BakePlan:
             if passes == self.goal.passes or count == 0:
                 break
             # What is left is due to the borders of smoothed parts: they are widened.
-            ramp = 2 * ramp + 1 if count > _STALLED * before else ramp
+            if count > _STALLED * before:
+                ramp = 2 * ramp + 1
             before = count
             weights, cells = node_potentials.spread_marks(cells, grid.border, ramp)
             node_potentials.smooth(potentials, weights, grid)
             passes += 1
         upper, attained = curvature_bounds(grid, arguments, progress)
-        one_sided, other = (certified_number(float(upper[i]), attained[i]) for i in range(2))
+        one_sided = certified_number(float(upper[0]), attained[0])
+        other = certified_number(float(upper[1]), attained[1])
         larger = max(one_sided, other, key=lambda number: number.lower)
         largest = float(arguments.c.max(initial=0.0))
         force, energy = grid.error_bounds(self.lipschitz, passes, largest)
         field = PotentialField(
-            self.texture, grid, arguments, max_depth=self.max_depth, continuity=self.continuity,
-            passes=passes, gain=replace(larger, upper=max(one_sided.upper, other.upper)),
-            one_sided=one_sided, accuracy=FieldAccuracy(force, energy),
-        )  # fmt: skip
+            self.texture,
+            grid,
+            arguments,
+            max_depth=self.max_depth,
+            continuity=self.continuity,
+            passes=passes,
+            gain=replace(larger, upper=max(one_sided.upper, other.upper)),
+            one_sided=one_sided,
+            accuracy=FieldAccuracy(force, energy),
+        )
         difference = self._render(field, self.probes)[0] - self.force
         shift = np.abs(self._render(field, self.shallow)[1] - self.shallow_depth)
         field.accuracy = replace(

@@ -46,13 +46,13 @@ def curvature_bounds(
     bounds = np.zeros((2, 5))
     if grid.border != ZERO:
         bounds[0, :2] = 1.0  # of the flat wall far below
-    found = _search(bounds, np.zeros((0, 0, 0), np.uint8), field, progress)
+    numbers = _search(bounds, np.zeros((0, 0, 0), np.uint8), field, progress)
     largest = float(field.c.max(initial=0.0))
     rounding = _DIFFERENCE_ROUNDING * (largest / min(grid.spacing)) ** 2
-    best = found[np.argmax(found[:, :, 1], axis=0), [0, 1]]
+    best = numbers[np.argmax(numbers[:, :, 1], axis=0), [0, 1]]
     at = grid.positions(best[:, 2 : 2 + len(grid.cells)])
     attained = np.column_stack([best[:, 1], at, grid.height(best[:, 4])])
-    return found[:, :, 0].max(axis=0) + rounding, attained
+    return numbers[:, :, 0].max(axis=0) + rounding, attained
 
 
 def cells_above(field: FieldArguments, limit: float, cells: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -69,22 +69,22 @@ def cells_above(field: FieldArguments, limit: float, cells: NDArray[np.uint8]) -
 def _search(
     bounds: FloatArray, marks: NDArray[np.uint8], field: FieldArguments, progress: Progress | None
 ) -> FloatArray:
-    """Return the bounds found by each part of the search, (n, 2, 5)."""
+    """Return the bounds of each part of the search, (n, 2, 5)."""
     from asperity.kernels.fuse import fuse_module
 
     loops = fuse_module(field_curvature, field_sampler)
     weights = *hull_weights(field), *product_weights(field)
     width = field.columns.shape[1] - 3 + (field.border != PERIODIC)
     parts = [(k, min(k + _COLUMNS_PER_PART, width)) for k in range(0, width, _COLUMNS_PER_PART)]
-    found = np.repeat(bounds[None], len(parts), axis=0)
+    numbers = np.repeat(bounds[None], len(parts), axis=0)
 
     def search(part: int) -> None:
         # Starting from the bounds of the first part, the others evaluate few cells.
-        found[part] = found[0]
-        loops.hull_batch(*parts[part], *weights, found[part], marks, field)
+        numbers[part] = numbers[0]
+        loops.hull_batch(*parts[part], *weights, numbers[part], marks, field)
 
     run_in_threads(search, range(len(parts)), progress)
-    return found
+    return numbers
 
 
 def hull_weights(field: FieldArguments) -> tuple[FloatArray, FloatArray]:

@@ -85,9 +85,14 @@ def mix_nodes(nodes: FloatArray, count: int, n: int, plane: FloatArray, mixed: F
 
 
 def expand_run(
-    count: int, nodes: FloatArray, plane: FloatArray, upward: FloatArray, mixed: FloatArray,
-    margin: float, hull: FloatArray,
-) -> None:  # fmt: skip
+    count: int,
+    nodes: FloatArray,
+    plane: FloatArray,
+    upward: FloatArray,
+    mixed: FloatArray,
+    margin: float,
+    hull: FloatArray,
+) -> None:
     """Write the Bernstein coefficients of S, ∇S and Hess S of a run of cells.
 
     ``hull`` (27, 10, count) holds S, x, y, z, xx, xy, xz, yy, yz, zz.
@@ -137,9 +142,15 @@ def measure_hulls(count: int, hull: FloatArray, work: FloatArray, size: int) -> 
 
 
 def exclude_cells(
-    m: int, count: int, rate: float, hull: FloatArray, bounds: FloatArray, work: FloatArray,
-    size: int, field: FieldArguments,
-) -> None:  # fmt: skip
+    m: int,
+    count: int,
+    rate: float,
+    hull: FloatArray,
+    bounds: FloatArray,
+    work: FloatArray,
+    size: int,
+    field: FieldArguments,
+) -> None:
     """Write to row 3 of ``work`` what is positive for cells whose bounds are not raised.
 
     It is the least leading minor, of linearized matrices, or 1 where S is nowhere positive.
@@ -169,14 +180,23 @@ def exclude_cells(
             drop = rate * (s0 * c - s0 * z - hull[q, 0, k] * c - depth)
             sag = rate * work[0, k] * work[4, k]
             upper = least_minor(
-                above, xx + x * x, xy + x * y, xz + x * z, yy + y * y, yz + y * z,
+                above,
+                xx + x * x,
+                xy + x * y,
+                xz + x * z,
+                yy + y * y,
+                yz + y * z,
                 zz + z * z - drop + sag,
-            )  # fmt: skip
+            )
             lower = least_minor(
-                below, a * (a - 2.0 * x) - xx, a * b - a * y - b * x - xy,
-                a * c - a * z - c * x - xz, b * (b - 2.0 * y) - yy,
-                b * c - b * z - c * y - yz, c * (c - 2.0 * z) - zz + drop + sag,
-            )  # fmt: skip
+                below,
+                a * (a - 2.0 * x) - xx,
+                a * b - a * y - b * x - xy,
+                a * c - a * z - c * x - xz,
+                b * (b - 2.0 * y) - yy,
+                b * c - b * z - c * y - yz,
+                c * (c - 2.0 * z) - zz + drop + sag,
+            )
             if rate > 0.0:
                 upper = min(upper, above - 1.0 + drop - sag)
             work[3, k] = min(work[3, k], upper, lower)
@@ -208,9 +228,15 @@ def multiply_hull(
 
 
 def raise_bound(
-    row: int, place: tuple[int, int, int], k: int, rate: float, hull: FloatArray,
-    product: FloatArray, bounds: FloatArray, field: FieldArguments,
-) -> None:  # fmt: skip
+    row: int,
+    place: tuple[int, int, int],
+    k: int,
+    rate: float,
+    hull: FloatArray,
+    product: FloatArray,
+    bounds: FloatArray,
+    field: FieldArguments,
+) -> None:
     """Raise the bounds of Hess T, or of its negative, by cell k of a run from a place on.
 
     ``bounds[row]`` holds the upper bound, the greatest value attained, and where. Below the floor
@@ -232,9 +258,13 @@ def raise_bound(
             bounds[0, 0] = max(bounds[0, 0], 1.0 - drop)
         zz = sign * (product[n, 5] - drop)
         matrix = (
-            sign * product[n, 0], sign * product[n, 1], sign * product[n, 2],
-            sign * product[n, 3], sign * product[n, 4], zz,
-        )  # fmt: skip
+            sign * product[n, 0],
+            sign * product[n, 1],
+            sign * product[n, 2],
+            sign * product[n, 3],
+            sign * product[n, 4],
+            zz,
+        )
         bound = bounds[row, 0] * (1.0 - SLACK)
         if corner:
             bound = min(bound, bounds[row, 1])
@@ -250,10 +280,18 @@ def raise_bound(
 
 
 def search_run(
-    place: tuple[int, int, int], count: int, rate: float, hull: FloatArray, work: FloatArray,
-    pairs: IntArray, weights: FloatArray, product: FloatArray, bounds: FloatArray,
-    marks: NDArray[np.uint8], field: FieldArguments,
-) -> None:  # fmt: skip
+    place: tuple[int, int, int],
+    count: int,
+    rate: float,
+    hull: FloatArray,
+    work: FloatArray,
+    pairs: IntArray,
+    weights: FloatArray,
+    product: FloatArray,
+    bounds: FloatArray,
+    marks: NDArray[np.uint8],
+    field: FieldArguments,
+) -> None:
     """Raise the bounds by the cells of a run that are not excluded, or test these cells."""
     upper = bounds[0, 0]
     lower = bounds[1, 0]
@@ -273,9 +311,16 @@ def search_run(
 
 
 def hull_batch(
-    first: int, last: int, plane: FloatArray, upward: FloatArray, pairs: IntArray,
-    weights: FloatArray, bounds: FloatArray, marks: NDArray[np.uint8], field: FieldArguments,
-) -> None:  # fmt: skip
+    first: int,
+    last: int,
+    plane: FloatArray,
+    upward: FloatArray,
+    pairs: IntArray,
+    weights: FloatArray,
+    bounds: FloatArray,
+    marks: NDArray[np.uint8],
+    field: FieldArguments,
+) -> None:
     """Raise bounds of the eigenvalues of Hess T by the cells of nodes first to last along x.
 
     Args:
@@ -318,7 +363,16 @@ def hull_batch(
                 expand_run(count, nodes, plane, upward, mixed, field.margin, hull)
                 exclude_cells(m, count, rate, hull, bounds, work, size, field)
                 search_run(
-                    (j, i, m), count, rate, hull, work, pairs, weights, product, bounds, marks,
+                    (j, i, m),
+                    count,
+                    rate,
+                    hull,
+                    work,
+                    pairs,
+                    weights,
+                    product,
+                    bounds,
+                    marks,
                     field,
-                )  # fmt: skip
+                )
                 m += count

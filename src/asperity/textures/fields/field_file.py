@@ -10,7 +10,6 @@ from __future__ import annotations
 import json
 import math
 import os
-import tomllib
 import zlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -36,7 +35,30 @@ _ALIGNMENT = 4096
 _COUNTS = ("levels", "below", "border")
 _SCALARS = ("x0", "y0", "z0", "m00", "m01", "m10", "m11", "iz", "margin", "lift")
 
-HEADER = np.dtype([*tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8")).items()])
+HEADER = np.dtype(
+    [
+        ("magic", "S8"),
+        ("version", "<u4"),
+        ("byte_order", "<u4"),  # 0x01020304
+        ("file_bytes", "<u8"),
+        ("rows", "<u4"),
+        ("columns", "<u4"),
+        ("columns_offset", "<u8"),  # int32 (rows, columns, 4)
+        ("count", "<u8"),
+        ("values_offset", "<u8"),  # float32 (count,)
+        ("heights_offset", "<u8"),  # float64, to the description
+        ("json_offset", "<u8"),  # UTF-8, to the end of the file
+        *((name, "<f8") for name in _SCALARS),
+        ("levels", "<i4"),
+        ("border", "<i4"),
+        ("q", "<f8"),  # certified characteristic number
+        ("floor", "<f8"),  # z down to which it is that of the spline [m]
+        ("below", "<i4"),
+        ("reserved", "V68"),
+        ("checksum", "<u4"),  # CRC-32 of all that follows the header
+        ("header_checksum", "<u4"),  # CRC-32 of the header before this entry
+    ]
+)
 
 # Builds the texture of a description; see :meth:`Texture.describe`.
 BuildTexture = Callable[[Mapping[str, Any]], Texture]
@@ -153,14 +175,13 @@ def load_field(path: str | os.PathLike[str], build_texture: BuildTexture) -> Pot
 
 def _decode(data: NDArray[np.uint8], build_texture: BuildTexture) -> PotentialField:
     header = _read_header(data)
-    rows, width, count = (int(header[name]) for name in ("rows", "columns", "count"))
-    columns = _section(data, header["columns_offset"], rows * width * 4, "<i4")
-    values = _section(data, header["values_offset"], count, "<f4")
-    text = bytes(data[int(header["json_offset"]) :])
+    shape = (int(header["rows"]), int(header["columns"]), 4)
+    columns = _section(data, header["columns_offset"], math.prod(shape), "<i4")
+    values = _section(data, header["values_offset"], int(header["count"]), "<f4")
+    described = json.loads(bytes(data[int(header["json_offset"]) :]))
     numbers: dict[str, Any] = {name: header[name].item() for name in (*_SCALARS, *_COUNTS)}
-    record = FieldArguments(values, columns.reshape(rows, width, 4), **numbers)
-    described = json.loads(text)
-    count = math.prod(described["shape"]) if described["shape"] else 0
+    record = FieldArguments(values, columns.reshape(shape), **numbers)
+    count = math.prod(described["shape"]) * bool(described["shape"])
     heights = _section(data, header["heights_offset"], count, "<f8")
     return assemble_field(record, described, heights, build_texture)
 
@@ -185,26 +206,37 @@ def assemble_field(
     """
     numbers = described["grid"]
     grid = FieldGrid(
-        steps=np.array(numbers["steps"]), cells=tuple(numbers["cells"]),
-        start=np.array(numbers["start"]), levels=record.levels,
-        level_spacing=numbers["level_spacing"], floor=numbers["floor"], below=record.below,
+        steps=np.array(numbers["steps"]),
+        cells=tuple(numbers["cells"]),
+        start=np.array(numbers["start"]),
+        levels=record.levels,
+        level_spacing=numbers["level_spacing"],
+        floor=numbers["floor"],
+        below=record.below,
         border=record.border,
-    )  # fmt: skip
-    _check_record(record, grid)
-    gain, one_sided = (
-        CertifiedNumber(**(described[name] | {"at": tuple(described[name]["at"])}))
-        for name in ("gain", "one_sided")
     )
-    names = ("max_depth", "continuity", "passes")
-    regions = described.get("thin_regions", ())
+    _check_record(record, grid)
     thin_map = described.get("thin_map")
     return PotentialField(
-        _source(described, heights, build_texture), grid, record, gain=gain, one_sided=one_sided,
+        _source(described, heights, build_texture),
+        grid,
+        record,
+        max_depth=described["max_depth"],
+        continuity=described["continuity"],
+        passes=described["passes"],
+        gain=CertifiedNumber(**_with_place(described["gain"])),
+        one_sided=CertifiedNumber(**_with_place(described["one_sided"])),
         accuracy=FieldAccuracy(**described["accuracy"]),
-        thin_regions=tuple(ThinRegion(**row | {"at": tuple(row["at"])}) for row in regions),
+        thin_regions=tuple(
+            ThinRegion(**_with_place(region)) for region in described.get("thin_regions", ())
+        ),
         thin_map=None if thin_map is None else np.array(thin_map, float),
-        **{name: described[name] for name in names},
-    )  # fmt: skip
+    )
+
+
+def _with_place(number: dict[str, Any]) -> dict[str, Any]:
+    """Return the fields of a number with its place as a tuple, which JSON knows as a list."""
+    return number | {"at": tuple(number["at"])}
 
 
 def _read_header(data: NDArray[np.uint8]) -> Any:
@@ -219,8 +251,8 @@ def _read_header(data: NDArray[np.uint8]) -> Any:
     if header["byte_order"] != _BYTE_ORDER:
         raise SurfaceFileError("has another byte order, or is damaged")
     if header["version"] != VERSION:
-        words = f"is a .field file of version {header['version']}, of which {VERSION} is read"
-        raise SurfaceFileError(f"{words}; bake it again")
+        found = f"is a .field file of version {header['version']}, of which {VERSION} is read"
+        raise SurfaceFileError(f"{found}; bake it again")
     if header["header_checksum"] != zlib.crc32(data[: HEADER.itemsize - 4].data):
         raise SurfaceFileError("has a damaged header")
     if header["file_bytes"] != len(data):
@@ -268,10 +300,13 @@ def _source(described: Mapping[str, Any], heights: FloatArray, build: BuildTextu
         return build(source)
     origin = described["origin"] if len(described["shape"]) == 2 else described["origin"][0]
     return fit_spline(
-        heights.reshape(described["shape"]), described["pitch"], periodic=described["periodic"],
-        origin=origin, preparation=described["preparation"],
+        heights.reshape(described["shape"]),
+        described["pitch"],
+        periodic=described["periodic"],
+        origin=origin,
+        preparation=described["preparation"],
         filled_mask=_mask_from_changes(described.get("filled"), described["shape"]),
-    )  # fmt: skip
+    )
 
 
 def _mask_changes(mask: NDArray[np.bool_] | None) -> list[int] | None:

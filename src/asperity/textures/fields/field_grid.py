@@ -119,7 +119,7 @@ class FieldGrid:
     @property
     def node_counts(self) -> tuple[int, ...]:
         """Number of distinct nodes along each axis of the plane, and of levels."""
-        extra = 0 if self.border == PERIODIC else 1
+        extra = int(self.border != PERIODIC)
         return (*(count + extra for count in self.cells), self.levels)
 
     @property
@@ -183,9 +183,11 @@ class FieldGrid:
         A quadratic B-spline has the variance 1/4 of a squared step along each axis, and a smoothing
         pass adds at most 1/4; the spline by which depths are interpolated has that of its steps.
         """
-        coarse = 0.25 * (COARSE_STEP * self.level_spacing) ** 2 if self.deep else 0.0
-        own = 0.25 + 2.0 * NEIGHBOUR_WEIGHT * passes
-        return own * float(np.square(self.spacing).sum()) + coarse
+        variance = 0.25 + 2.0 * NEIGHBOUR_WEIGHT * passes
+        variance *= float(np.square(self.spacing).sum())
+        if self.deep:
+            variance += 0.25 * (COARSE_STEP * self.level_spacing) ** 2
+        return variance
 
     def error_bounds(
         self, gain: float, passes: int = 0, largest: float = 0.0
@@ -223,7 +225,7 @@ class FieldGrid:
         rates = np.linalg.pinv(self.steps).T * np.hypot(*self.steps.T)[:, None]
         # Derivatives along non-orthogonal steps amplify an error of the gradient.
         skew = max(1.0, float(np.linalg.norm(rates, 2)))
-        width = 1.5 * (1 + COARSE_STEP) if self.deep else 1.5
+        width = 1.5 * (1 + COARSE_STEP * bool(self.deep))
         reach = (width + passes) * math.sqrt(float(square.sum()))
         potential = max(0.5 * (gain + 1.0) * spread, reach * math.sqrt(spread))
         return skew * float(np.linalg.norm(components)), potential + largest * rounding
@@ -249,15 +251,28 @@ class FieldGrid:
             values[start : start + len(part)] = np.maximum(part + self.margin, 0.0)
         table = np.stack([starts - first, first, end, reach], axis=-1).astype(np.int32)
         table = self._with_borders(table)
-        x0, y0 = (float(value) for value in self.start)
+        x0, y0 = self.start.tolist()
         rates = np.zeros((2, 2))
         # Rows of the pseudo-inverse's transpose: nodes per metre along each axis.
         rates[: len(self.cells)] = np.linalg.pinv(self.steps).T
         (m00, m01), (m10, m11) = rates.tolist()
         return FieldArguments(
-            values, table, x0, y0, float(self.height(0)), m00, m01, m10, m11,
-            1.0 / self.level_spacing, self.margin, lift, self.levels, self.below, self.border,
-        )  # fmt: skip
+            values,
+            table,
+            x0,
+            y0,
+            float(self.height(0)),
+            m00,
+            m01,
+            m10,
+            m11,
+            1.0 / self.level_spacing,
+            self.margin,
+            lift,
+            self.levels,
+            self.below,
+            self.border,
+        )
 
     def _with_borders(self, table: NDArray[np.int32]) -> NDArray[np.int32]:
         """Return the columns (rows, columns, 4) with those beyond the borders, and their reach."""

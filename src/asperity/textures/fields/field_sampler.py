@@ -257,9 +257,14 @@ def field_expansion(
     if s <= 0.0:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     xx, xy, xz, yy, yz, zz = field_hessian(
-        du * du + s * uu, (du * dv + s * uv) * u_sign * v_sign, (du * dw + s * uw) * u_sign,
-        dv * dv + s * vv, (dv * dw + s * vw) * v_sign, dw * dw + s * ww, field,
-    )  # fmt: skip
+        du * du + s * uu,
+        (du * dv + s * uv) * u_sign * v_sign,
+        (du * dw + s * uw) * u_sign,
+        dv * dv + s * vv,
+        (dv * dw + s * vw) * v_sign,
+        dw * dw + s * ww,
+        field,
+    )
     rate, _slope, added = field_descent(below, field)
     curvature = 1.0 - rate * rate
     if 0.0 < below < 1.0:
@@ -279,9 +284,14 @@ def sample_height(x: float, y: float, field: FieldArguments) -> float:
 
 
 def closest_point_within_budget(
-    x: float, y: float, z: float, _start_x: float, _start_y: float, _budget: float,
+    x: float,
+    y: float,
+    z: float,
+    _start_x: float,
+    _start_y: float,
+    _budget: float,
     field: FieldArguments,
-) -> tuple[float, float, float, float, float, float, float]:  # fmt: skip
+) -> tuple[float, float, float, float, float, float, float]:
     """Return the point to which the probe is pulled: X, Y, Z, two slopes of 0, exactly, at once."""
     gx, gy, gz = field_gradient(x, y, z, field)
     return x - gx, y - gy, z - gz, 0.0, 0.0, 0.0, 1.0

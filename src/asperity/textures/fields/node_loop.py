@@ -27,9 +27,13 @@ def outside_distance(x: float, y: float, z: float, start: FloatArray, texture: o
 
 
 def column_batch(
-    xy: FloatArray, z: FloatArray, out: NDArray[np.float32], continuity: float, margin: float,
+    xy: FloatArray,
+    z: FloatArray,
+    out: NDArray[np.float32],
+    continuity: float,
+    margin: float,
     texture: object,
-) -> None:  # fmt: skip
+) -> None:
     """Write √(2U) [m] inside and the negative distance of the surface outside, at least -margin.
 
     A search that starts from the atoms of the node above mostly takes one query, which proves that
@@ -61,8 +65,16 @@ def column_batch(
         for m in range(z.shape[0] - 1, -1, -1):
             if z[m] < height:
                 count, _gap, _evaluations, _truncated = split_compute_atoms(
-                    xy[i, 0], xy[i, 1], z[m], continuity, count, UNLIMITED, p, atoms, offset,
+                    xy[i, 0],
+                    xy[i, 1],
+                    z[m],
+                    continuity,
+                    count,
+                    UNLIMITED,
+                    p,
+                    atoms,
+                    offset,
                     texture,
-                )  # fmt: skip
+                )
                 energy = split_evaluate_energy(atoms, count, p, mu, offset)
                 out[i, m] = math.sqrt(max(2.0 * energy, 0.0))

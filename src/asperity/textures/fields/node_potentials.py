@@ -51,7 +51,10 @@ def compute_potentials(
         xy = grid.positions(np.stack(np.unravel_index(part, plane), axis=-1))
         depths = np.empty((len(part), len(z)), np.float32)
         columns(xy, z, grid.margin, depths)
-        result[first : first + at_once] = depths @ weights if grid.deep else depths
+        if grid.deep:
+            result[first : first + at_once] = depths @ weights
+        else:
+            result[first : first + at_once] = depths
 
     run_in_threads(fill, range(0, len(result), at_once), progress)
     return result.reshape(grid.node_counts)

@@ -270,8 +270,8 @@ class PotentialField(Texture, Tabular):
         if not contact.has_potential_field:
             raise ParameterError("law", "must be H on a baked field: no other law was baked")
         if parameters["continuity"] != self.continuity:
-            words = f"must be {self.continuity:.6g}, as baked"
-            raise ParameterError("continuity", words, parameters["continuity"])
+            requirement = f"must be {self.continuity:.6g}, as baked"
+            raise ParameterError("continuity", requirement, parameters["continuity"])
 
     @cached_property
     def digest(self) -> str | None:
@@ -282,5 +282,5 @@ class PotentialField(Texture, Tabular):
 
 def certified_number(upper: float, attained: FloatArray) -> CertifiedNumber:
     """Return a number of a field from a row of :func:`curvature_bounds`."""
-    value, x, y, z = (float(number) for number in attained)
+    value, x, y, z = attained.tolist()
     return CertifiedNumber(value, upper, (x, y, z))

@@ -65,8 +65,9 @@ class Fourier(Texture):
         with np.errstate(over="ignore"):
             curvature = float(np.abs(self.amplitudes) @ np.hypot(*self.wavevectors.T) ** 2)
         check_curvature("amplitudes", curvature, "wavevectors")
-        given = np.zeros(count) if phases is None else phases
-        self.phases = check_array("phases", given, (count,), "rad").copy()
+        if phases is None:
+            phases = np.zeros(count)
+        self.phases = check_array("phases", phases, (count,), "rad").copy()
 
     def __repr__(self) -> str:
         if len(self.amplitudes) > _MAX_REPR_WAVES:
@@ -97,13 +98,24 @@ class Fourier(Texture):
         inflate = 1.0 + 1e-14 * len(length)
         third = inflate * float(np.abs(self.amplitudes) @ length**3)
         fourth = inflate * float(np.abs(self.amplitudes) @ length**4)
-        kx, ky = (np.ascontiguousarray(column) for column in self.wavevectors.T)
+        kx = np.ascontiguousarray(self.wavevectors[:, 0])
+        ky = np.ascontiguousarray(self.wavevectors[:, 1])
         low, high = self.extremes
         ux, uy = self._directions[0].tolist()
         return FourierArguments(
-            self.amplitudes, kx, ky, self.phases,
-            self.bounds[1], third, low, high, float(length.max()), ux, uy, fourth,
-        )  # fmt: skip
+            self.amplitudes,
+            kx,
+            ky,
+            self.phases,
+            self.bounds[1],
+            third,
+            low,
+            high,
+            float(length.max()),
+            ux,
+            uy,
+            fourth,
+        )
 
     @cached_property
     def _directions(self) -> FloatArray:
@@ -161,10 +173,9 @@ class Fourier(Texture):
         """One period; for an aperiodic sum 16 of its longest waves in each direction."""
         if self._periods is not None:
             return Domain(np.zeros(2), self._periods, periodic=True, description="one period")
-        side = self._aperiodic_side
-        spans = side * (self._directions[:1] if self._is_parallel else np.eye(2))
+        spans = self._directions[:1] if self._is_parallel else np.eye(2)
         text = f"never repeats; {_APERIODIC_EXTENT_WAVES} of its longest waves"
-        return Domain(np.zeros(2), spans, periodic=False, description=text)
+        return Domain(np.zeros(2), self._aperiodic_side * spans, periodic=False, description=text)
 
     @property
     def _aperiodic_side(self) -> float:
@@ -189,8 +200,9 @@ class Fourier(Texture):
         vectors = multiples @ periods
         lengths = np.hypot(*vectors.T)
         along_x = (np.abs(vectors[:, 1]) < 1e-9 * lengths) & (vectors[:, 0] > 0.0)
-        candidates = vectors[along_x] if along_x.any() else vectors
-        return np.asarray(candidates[np.argmin(np.hypot(*candidates.T))])
+        if along_x.any():
+            vectors = vectors[along_x]
+        return np.asarray(vectors[np.argmin(np.hypot(*vectors.T))])
 
     def _supremum(self, amplitudes: FloatArray) -> float:
         """Return sup Σ a_i sin(θ_i + phase_i) by branch and bound on the torus of phases."""

@@ -72,7 +72,8 @@ class _SelfAffine(Spline):
         if pitch > cutoff / MIN_NODES_PER_WAVE * (1.0 + 1e-9):
             limit = f"must be at most a quarter of the cut-off {cutoff:g} m"
             raise ParameterError("pitch", f"{limit}, or the spline cannot follow", pitch)
-        rolloff = max(shortest / _ROLLOFF_PER_SIDE, cutoff) if rolloff is None else rolloff
+        if rolloff is None:
+            rolloff = max(shortest / _ROLLOFF_PER_SIDE, cutoff)
         if check_positive("rolloff", rolloff, "m") < cutoff:
             raise ParameterError("rolloff", f"must be at least the cut-off, {cutoff:g} m", rolloff)
         # The tolerance allows for the rounding of a side that is a whole number of pitches.
@@ -222,7 +223,8 @@ def random_field(
         seed: seed of the phases.
     """
     ny, nx = shape
-    columns, rows = (math.floor(side / band.cutoff) for side in size)
+    columns = math.floor(size[0] / band.cutoff)
+    rows = math.floor(size[1] / band.cutoff)
     spectrum = np.zeros(shape, dtype=np.complex128)
     rng = np.random.default_rng(seed)
     for shell in range(1, max(columns, rows) + 1):

@@ -98,16 +98,18 @@ def _filter_amplitudes(
         if length is not None:
             short = filters.ALPHA * check_positive(name, length, "m") * numbers / (2.0 * math.pi)
             transfer = np.exp(-math.pi * short**2)
-            amplitudes = amplitudes * (transfer if name == "s_cutoff" else 1.0 - transfer)
+            if name == "l_cutoff":
+                transfer = 1.0 - transfer
+            amplitudes = amplitudes * transfer
     return amplitudes
 
 
 def _scaled_waves(
     texture: Texture, waves: PlaneWaves, amplitudes: FloatArray, lateral: float
 ) -> Texture:
-    one = texture.single_wave
-    if one is not None:
-        return Sinusoid(float(amplitudes[0]), one.period * lateral, one.phase, one.direction)
+    wave = texture.single_wave
+    if wave is not None:
+        return Sinusoid(float(amplitudes[0]), wave.period * lateral, wave.phase, wave.direction)
     return Fourier(amplitudes, waves.wavevectors / lateral, waves.phases)
 
 

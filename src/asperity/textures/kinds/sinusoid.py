@@ -115,8 +115,8 @@ class Sinusoid(Texture):
 
         def height(x: Any, y: Any, m: int, n: int) -> Any:
             k = 2 * mpmath.pi / mpmath.mpf(self.period)
-            kx, ky = (k * part for part in self.direction)
-            return exact_waves([(self.amplitude, kx, ky, self.phase)])(x, y, m, n)
+            ux, uy = self.direction
+            return exact_waves([(self.amplitude, k * ux, k * uy, self.phase)])(x, y, m, n)
 
         return height
 

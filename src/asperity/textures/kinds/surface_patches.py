@@ -113,12 +113,12 @@ def _add_grain(heights: FloatArray, random_numbers: FloatArray) -> None:
     """Add a convex polyhedron, bounded above by its lowest facet; lengths in grain sizes."""
     pitch = 1.0 / _NODES_PER_GRAIN
     radius = 0.5 * (0.75 + 0.5 * random_numbers[2])
-    columns, rows = (
-        _nodes_around(d * _PAPER_NODES * pitch, 1.3 * radius, _PAPER_NODES, pitch)
-        for d in random_numbers[:2]
-    )
-    x = (columns * pitch - random_numbers[0] * _PAPER_NODES * pitch)[None, :]
-    y = (rows * pitch - random_numbers[1] * _PAPER_NODES * pitch)[:, None]
+    x0 = random_numbers[0] * _PAPER_NODES * pitch
+    y0 = random_numbers[1] * _PAPER_NODES * pitch
+    columns = _nodes_around(x0, 1.3 * radius, _PAPER_NODES, pitch)
+    rows = _nodes_around(y0, 1.3 * radius, _PAPER_NODES, pitch)
+    x = (columns * pitch - x0)[None, :]
+    y = (rows * pitch - y0)[:, None]
     turn, lean, reach = random_numbers[3:].reshape(3, _FACETS)
     upper = np.full((len(rows), len(columns)), np.inf)
     for i in range(_FACETS):
@@ -191,9 +191,14 @@ def _add_pore(
     row = int(random_numbers[1] * ny)
     # Large vessels are in the early wood; small ones are spread over the rest.
     number, share = divmod(random_numbers[0] * _RINGS, 1.0)
-    early = random_numbers[2] < 0.8
-    wide = width * (0.7 + 0.5 * random_numbers[3]) if early else 0.45 * width
-    place = number + (_EARLY * share if early else share)
+    depth = 1.0
+    if random_numbers[2] < 0.8:
+        wide = width * (0.7 + 0.5 * random_numbers[3])
+        share *= _EARLY
+    else:
+        wide = 0.45 * width
+        depth = 0.7
+    place = number + share
     ring = nx * pitch[0] / _RINGS
     x0 = (place - sway[row, round(place * nx / _RINGS) % nx]) * ring
     half = 0.5 * _PORE_LENGTH * wide * (0.4 + random_numbers[4])
@@ -203,7 +208,7 @@ def _add_pore(
     u = (columns * pitch[0] - x0)[None, :] / (0.5 * wide)
     trough = np.clip(1.0 - u**2, 0.0, 1.0) ** 0.5 * np.clip(1.0 - along**4, 0.0, 1.0)
     where = np.ix_(rows % ny, columns % nx)
-    pores[where] = np.maximum(pores[where], trough * wide / width / (1.0 if early else 0.7))
+    pores[where] = np.maximum(pores[where], trough * wide / width / depth)
 
 
 # --- woven cloth: plain weave of twisted yarns ----------------------------------------------------
@@ -230,19 +235,23 @@ def weave_cloth(
 
 
 def _yarns(
-    count: int, half_width: float, thickness: float, irregularity: float, seed: int,
-    *, over_first: bool,
-) -> FloatArray:  # fmt: skip
+    count: int,
+    half_width: float,
+    thickness: float,
+    irregularity: float,
+    seed: int,
+    *,
+    over_first: bool,
+) -> FloatArray:
     """Return the upper side of yarns along y; lengths are in spacings."""
     period = float(_YARNS)
     # The border and the scan line, half a patch away, run along the middle of a yarn.
     along = (np.arange(count)[:, None] + 0.5) / _NODES_PER_YARN + 0.5
     across = (np.arange(count)[None, :] + 0.5) / _NODES_PER_YARN + 0.5
     slow = SelfAffineSpectrum(1.5, 4.0, 0.5)
-    sway, swell = (
-        rough_field((count, count), (period, period), slow, irregularity, 2 * seed + i)
-        for i in (0, 1)
-    )
+    shape = (count, count)
+    sway = rough_field(shape, (period, period), slow, irregularity, 2 * seed)
+    swell = rough_field(shape, (period, period), slow, irregularity, 2 * seed + 1)
     across = across + sway
     number = np.floor(across)
     offset = across - number - 0.5

@@ -15,7 +15,16 @@ from asperity.textures.fields.node_potentials import ColumnFunction, compute_pot
 from asperity.textures.fields.potential_field import PotentialField, ThinRegion
 from asperity.textures.meshes import mesh_potential, triangle_tree
 from asperity.textures.meshes.mesh_body import INTERSECTING, MeshBody, make_fault
-from asperity.textures.meshes.mesh_potential import BodyLaw
+from asperity.textures.meshes.mesh_potential import (
+    DEEPEST,
+    FAULT_Z,
+    GREATEST_WINDING,
+    HEIGHT,
+    LEAST_WINDING,
+    THIN,
+    THIN_Z,
+    BodyLaw,
+)
 from asperity.textures.spline.spline_texture import HeightMap
 
 # Greatest default of the depth to which the field of a body is exact [m].
@@ -93,9 +102,16 @@ class _BodyLoops:
         summary = np.zeros((len(xy), 7))
         crossings = np.empty((_MOST_CROSSINGS, 2))
         self._loops.column_batch(
-            np.ascontiguousarray(xy), np.ascontiguousarray(z), self.law, self._tolerance, margin,
-            out, summary, crossings, self.body.tree,
-        )  # fmt: skip
+            np.ascontiguousarray(xy),
+            np.ascontiguousarray(z),
+            self.law,
+            self._tolerance,
+            margin,
+            out,
+            summary,
+            crossings,
+            self.body.tree,
+        )
         return summary
 
     def sample_depth(self) -> float:
@@ -133,10 +149,8 @@ class _BodyLoops:
         self._xy = grid.positions(index)
         empty = np.zeros((len(self._xy), 0), np.float32)
         self._summary = self.columns(self._xy, np.empty(0), grid.margin, empty)
-        least = self._summary[:, 4]
-        greatest = self._summary[:, 5]
-        wrong = (least < 0.0) | (greatest > 1.0)
-        places = np.column_stack([self._xy, self._summary[:, 6]])[wrong]
+        wrong = (self._summary[:, LEAST_WINDING] < 0.0) | (self._summary[:, GREATEST_WINDING] > 1.0)
+        places = np.column_stack([self._xy, self._summary[:, FAULT_Z]])[wrong]
         if fault := make_fault(INTERSECTING, places):
             raise SurfaceFileError(f"{self.body.name} has no defined inside: {fault[0]}")
 
@@ -152,8 +166,8 @@ class _BodyLoops:
         self, body: MeshBody, thin: tuple[ThinRegion, ...]
     ) -> tuple[HeightMap, float]:
         """Return the body seen from above, its least height around it, and its greatest depth."""
-        deepest = float(self._summary[:, 1].max())
-        heights = self._summary[:, 0].reshape(self.grid.node_counts[:2]).T
+        deepest = float(self._summary[:, DEEPEST].max())
+        heights = self._summary[:, HEIGHT].reshape(self.grid.node_counts[:2]).T
         missing = ~np.isfinite(heights)
         if missing.all() or deepest == 0.0:
             raise ParameterError("resolution", "is coarser than the body", self.grid.spacing[0])
@@ -170,14 +184,17 @@ class _BodyLoops:
                 f" pressed deeper than {half} there, the probe is pulled to the other side"
             )
         envelope = HeightMap(
-            filled, self.grid.spacing[:2], origin=self.grid.start.tolist(),
-            preparation=(text, *notes), filled_mask=missing if missing.any() else None,
-        )  # fmt: skip
+            filled,
+            self.grid.spacing[:2],
+            origin=self.grid.start.tolist(),
+            preparation=(text, *notes),
+            filled_mask=missing if missing.any() else None,
+        )
         return envelope, deepest
 
     def thin_map(self, max_depth: float) -> FloatArray:
         """Return half thickness [m] below the depth, but for rounding; NaN elsewhere."""
-        half = self._summary[:, 2].reshape(self.grid.node_counts[:2]).T
+        half = self._summary[:, THIN].reshape(self.grid.node_counts[:2]).T
         return np.where(half < (1.0 - 1e-9) * max_depth, np.round(half, _DIGITS), np.nan)
 
     def thin_regions(self, thin_map: FloatArray) -> tuple[ThinRegion, ...]:
@@ -185,13 +202,14 @@ class _BodyLoops:
         from scipy import ndimage
 
         labels, count = ndimage.label(np.isfinite(thin_map.T), structure=np.ones((3, 3)))
-        found = []
+        regions = []
         for label in range(1, count + 1):
             rows = np.flatnonzero(labels.ravel() == label)
-            best = rows[np.argmin(self._summary[rows, 2])]
-            x, y, thin, z = np.round([*self._xy[best], *self._summary[best, 2:4]], _DIGITS).tolist()
-            found.append(ThinRegion((x, y, z), thin, len(rows)))
-        return tuple(sorted(found, key=lambda region: region.half_thickness))
+            thinnest = rows[np.argmin(self._summary[rows, THIN])]
+            numbers = [*self._xy[thinnest], *self._summary[thinnest, [THIN, THIN_Z]]]
+            x, y, half, z = np.round(numbers, _DIGITS).tolist()
+            regions.append(ThinRegion((x, y, z), half, len(rows)))
+        return tuple(sorted(regions, key=lambda region: region.half_thickness))
 
 
 class _BodyPlan(bake.BakePlan):
@@ -224,8 +242,8 @@ class _BodyPlan(bake.BakePlan):
 
     def exact(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         """See :class:`BakePlan`."""
-        found = self.loops.evaluate(points)
-        return np.ascontiguousarray(found[:, 1:4]), np.sqrt(np.maximum(2.0 * found[:, 0], 0.0))
+        potential, *force, _depth = self.loops.evaluate(points).T
+        return np.stack(force, axis=1), np.sqrt(np.maximum(2.0 * potential, 0.0))
 
     def bake(self, resolution: float, progress: Progress | None) -> PotentialField:
         """See :class:`BakePlan`."""
@@ -237,7 +255,8 @@ class _BodyPlan(bake.BakePlan):
         thin_map = loops.thin_map(self.max_depth)
         thin = loops.thin_regions(thin_map)
         self.texture, deepest = loops.upper_envelope(loops.body, thin)
-        if self.max_depth > (deepest := max(self.deepest, deepest)):
+        deepest = max(self.deepest, deepest)
+        if self.max_depth > deepest:
             reason = f"must be at most {format_length(deepest)}, the greatest depth of the body"
             raise ParameterError("max_depth", reason, self.max_depth)
         field = self.certify(depths, grid, bake.scale_progress(progress, 0.9, 0.1))

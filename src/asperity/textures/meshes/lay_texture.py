@@ -64,7 +64,8 @@ def lay_texture(body: MeshBody, texture: Texture, side: str = "+z") -> MeshBody:
     heights = texture.height(points[:, plane]) - texture.extremes[0]
     moved = points + (shares * heights)[:, None] * _unit(_sums(faces, normals))
     triangles = moved[faces.reshape(-1, 3)]
-    before, after = (trimesh.triangles.cross(part) for part in (corners[..., :3], triangles))
+    before = trimesh.triangles.cross(corners[..., :3])
+    after = trimesh.triangles.cross(triangles)
     folded = (before * after).sum(axis=1) < 0.0
     if folded.any():
         place = ", ".join(map(format_length, corners[folded][0, 0, :3].tolist()))
@@ -111,7 +112,9 @@ def _corner_normals(triangles: FloatArray) -> FloatArray:
     vertices = _merge(triangles)[1].reshape(-1, 3)
     pairs, edges = library.graph.face_adjacency(vertices, return_edges=True)
     flat = _unit(trimesh.triangles.cross(triangles))
-    pairs, edges = (part[(flat[pairs].prod(axis=1).sum(axis=1) > _EDGE)] for part in (pairs, edges))
+    is_smooth = flat[pairs].prod(axis=1).sum(axis=1) > _EDGE
+    pairs = pairs[is_smooth]
+    edges = edges[is_smooth]
     # Corners of both triangles at each end of their edge.
     ends = (vertices[pairs][:, None] == edges[:, :, None, None]).argmax(axis=-1)
     links = (3 * pairs[:, None] + ends).reshape(-1, 2).T
@@ -164,7 +167,9 @@ def _refine(corners: FloatArray, longest: float) -> FloatArray:
             reason = f"is too fine for this body: it takes more than {_MAX_TRIANGLES:,} triangles"
             raise ParameterError("texture", reason)
         start = squares[rows].argmax(axis=1)
-        a, b, c = (corners[rows, (start + k) % 3] for k in range(3))
+        a = corners[rows, start]
+        b = corners[rows, (start + 1) % 3]
+        c = corners[rows, (start + 2) % 3]
         middle = 0.5 * (a + b)
         corners[rows] = np.stack([a, middle, c], axis=1)
         corners = np.concatenate([corners, np.stack([middle, b, c], axis=1)])

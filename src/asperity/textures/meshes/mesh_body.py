@@ -64,9 +64,12 @@ class MeshBody:
 
     @classmethod
     def from_arrays(
-        cls, vertices: FloatArray, faces: NDArray[np.integer[Any]], name: str = "mesh",
+        cls,
+        vertices: FloatArray,
+        faces: NDArray[np.integer[Any]],
+        name: str = "mesh",
         repair: bool = False,
-    ) -> MeshBody:  # fmt: skip
+    ) -> MeshBody:
         """Return the body with the given vertices (m, 3) [m] and faces (n, 3), if it is sound.
 
         Raises:
@@ -147,8 +150,8 @@ def _check_count(path: Path, suffix: str) -> None:
     stated = _stated_count(head, suffix)
     if stated is not None:
         if suffix == "stl" and size != _STL_HEADER + 50 * stated:
-            found = f"it states {stated:,} triangles and holds {(size - _STL_HEADER) // 50:,}"
-            raise SurfaceFileError(f"{path.name} is damaged: {found}")
+            fault = f"it states {stated:,} triangles and holds {(size - _STL_HEADER) // 50:,}"
+            raise SurfaceFileError(f"{path.name} is damaged: {fault}")
         count = stated
     if count > MAX_TRIANGLES:
         excess = f"{count:,} triangles, more than {MAX_TRIANGLES:,}"
@@ -245,7 +248,7 @@ def make_fault(kind: str, places: FloatArray) -> list[MeshFault]:
     """Return the fault that occurs at places (n, 3) [m]; nothing if there are none."""
     if len(places) == 0:
         return []
-    x, y, z = (float(value) for value in places[0])
+    x, y, z = places[0].tolist()
     return [MeshFault(kind, len(places), (x, y, z))]
 
 
@@ -280,7 +283,8 @@ def _edges(
     starts = faces.ravel()
     keys = np.minimum(starts, ends).astype(np.int64) * vertex_count + np.maximum(starts, ends)
     keys = np.sort(2 * keys + (starts < ends))  # the sign is the last digit: one array is sorted
-    keys, signs = keys >> 1, 2 * (keys & 1) - 1
+    signs = 2 * (keys & 1) - 1
+    keys >>= 1
     first = np.flatnonzero(np.r_[True, keys[1:] != keys[:-1]]) if len(keys) else np.empty(0, int)
     counts = np.diff(np.r_[first, len(keys)])
     return keys, first, counts, np.add.reduceat(signs, first) if len(first) else signs
@@ -288,7 +292,9 @@ def _edges(
 
 def signed_volume(vertices: FloatArray, faces: NDArray[np.int32]) -> float:
     """Return the enclosed volume [m³]; negative where the triangles point inwards."""
-    a, b, c = (vertices[faces[:, k]] - vertices[0] for k in range(3))
+    a = vertices[faces[:, 0]] - vertices[0]
+    b = vertices[faces[:, 1]] - vertices[0]
+    c = vertices[faces[:, 2]] - vertices[0]
     return float(np.einsum("ni,ni->", a, np.cross(b, c))) / 6.0
 
 

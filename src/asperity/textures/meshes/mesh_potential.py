@@ -81,9 +81,14 @@ def limited_potential(energy: float, max_depth: float) -> tuple[float, float]:
 
 
 def split_in_mesh(
-    p: FloatArray, near: int, law: BodyLaw, y: FloatArray, atoms: FloatArray, offset: FloatArray,
+    p: FloatArray,
+    near: int,
+    law: BodyLaw,
+    y: FloatArray,
+    atoms: FloatArray,
+    offset: FloatArray,
     tree: TriangleTree,
-) -> tuple[float, int, int, float]:  # fmt: skip
+) -> tuple[float, int, int, float]:
     """Write y, the atoms of law H (5, 4) and z̄ - p, ``offset``, at a point inside a closed mesh.
 
     Returns:
@@ -155,9 +160,14 @@ def note_thin_part(atoms: FloatArray, count: int, y: FloatArray, row: int, out: 
 
 
 def note_thin_spans(
-    p: FloatArray, count: int, crossings: FloatArray, lengths: tuple[float, float], row: int,
-    out: FloatArray, tree: TriangleTree,
-) -> None:  # fmt: skip
+    p: FloatArray,
+    count: int,
+    crossings: FloatArray,
+    lengths: tuple[float, float],
+    row: int,
+    out: FloatArray,
+    tree: TriangleTree,
+) -> None:
     """Write the least half thickness of spans between opposite walls, if between two lengths.
 
     It is the distance of the middle of a span from the mesh. Parts that lie between two nodes are
@@ -176,9 +186,16 @@ def note_thin_spans(
 
 
 def column_batch(
-    columns: FloatArray, z: FloatArray, law: BodyLaw, tolerance: float, margin: float,
-    out: NDArray[np.float32], summary: FloatArray, crossings: FloatArray, tree: TriangleTree,
-) -> None:  # fmt: skip
+    columns: FloatArray,
+    z: FloatArray,
+    law: BodyLaw,
+    tolerance: float,
+    margin: float,
+    out: NDArray[np.float32],
+    summary: FloatArray,
+    crossings: FloatArray,
+    tree: TriangleTree,
+) -> None:
     """Write the depths of columns of nodes.
 
     Args:

@@ -60,7 +60,7 @@ def max_height(coefficients: FloatArray) -> float:
             [rows @ patches @ columns.T for rows in (_LEFT, _RIGHT) for columns in (_LEFT, _RIGHT)]
         )
         best = max(best, float(patches[:, ::3, ::3].max()))
-    return max(best, float(patches.max())) if len(patches) else best
+    return max(best, float(patches.max(initial=-np.inf)))
 
 
 def _max_node_height(coefficients: FloatArray) -> float:
@@ -252,7 +252,9 @@ def _fit_block(part: FloatArray, side: int, scale: float, slack: FloatArray) -> 
         scale: factor of the derivative.
         slack: rounding error of the coefficients.
     """
-    y, x = ((2.0 * np.arange(count) - (count - side - 1) - side) / side for count in part.shape[:2])
+    rows, columns, _ = part.shape
+    x = (2.0 * np.arange(columns) - (columns - side - 1) - side) / side
+    y = (2.0 * np.arange(rows) - (rows - side - 1) - side) / side
     gx = x @ part.mean(axis=0) / (x @ x)
     gy = y @ part.mean(axis=1) / (y @ y)
     rest = part - gx * x[:, None]

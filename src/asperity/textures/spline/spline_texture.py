@@ -109,8 +109,8 @@ class Spline(Texture):
 
     def texture_part(self) -> TexturePart:
         """See :class:`Texture` and :func:`~asperity.measured.form.decompose_surface`."""
-        found = get_or_compute("texture part", self.digest, self._separate_texture)
-        heights, nesting, form, waviness = found
+        parts = get_or_compute("texture part", self.digest, self._separate_texture)
+        heights, nesting, form, waviness = parts
         rest = fit_spline(heights, self._pitches, periodic=self.periodic, origin=self.origin)
         return TexturePart(rest, nesting, form, waviness)
 
@@ -192,11 +192,10 @@ class Spline(Texture):
 
     def describe(self) -> dict[str, Any]:
         """See :class:`Texture`."""
-        both = list(self.heights.shape[::-1]), list(self._pitches)
-        points, pitch = both if self.axes > 1 else (along_x[0] for along_x in both)
+        points = list(self.heights.shape[::-1])
         return super().describe() | {
-            "points": points,
-            "pitch": pitch,
+            "points": points if self.axes > 1 else points[0],
+            "pitch": np.asarray(self.pitch).tolist(),
             "periodic": self.periodic,
             "preparation": list(self.preparation),
         }
@@ -211,8 +210,9 @@ def node_heights(heights: ArrayLike, axes: int) -> FloatArray:
     require_memory(*np.shape(heights)[::-1])
     result = check_array("heights", heights, (None,) * axes, "m").copy()
     if min(result.shape) < MIN_NODES:
-        least, given = (" x ".join(map(str, n)) for n in ((MIN_NODES,) * axes, result.shape))
-        raise ParameterError("heights", f"must be at least {least} points, got {given}")
+        smallest = " x ".join([str(MIN_NODES)] * axes)
+        size = " x ".join(map(str, result.shape))
+        raise ParameterError("heights", f"must be at least {smallest} points, got {size}")
     return result
 
 
@@ -228,9 +228,9 @@ def _check_mask(mask: ArrayLike | None, shape: tuple[int, ...]) -> NDArray[np.bo
 
 def _flush_small_values(values: FloatArray) -> None:
     """Set values whose square would be subnormal to zero, in place, row by row."""
-    least = _FLUSH_THRESHOLD * max(float(values.max()), -float(values.min()))
+    smallest = _FLUSH_THRESHOLD * max(float(values.max()), -float(values.min()))
     for row in np.atleast_2d(values):
-        row[np.abs(row) < least] = 0.0
+        row[np.abs(row) < smallest] = 0.0
 
 
 # Least number of samples of a dense search.
@@ -366,7 +366,7 @@ class HeightMap(Spline):
     @cached_property
     def arguments(self) -> HeightMapArguments:
         """See :class:`Texture`."""
-        x0, y0 = (float(value) for value in self.origin)
+        x0, y0 = self.origin.tolist()
         c = self.coefficients
         (px, py) = self.pitch
         pyramid = plane_pyramid(c, self.pitch)
