@@ -14,7 +14,6 @@ from rich.console import Console
 
 from bench.speed import (
     batches,
-    cache,
     certificates,
     export,
     fields,
@@ -24,7 +23,6 @@ from bench.speed import (
     recording,
     servo,
     simulation,
-    split,
     ticks,
     waiting,
 )
@@ -33,9 +31,7 @@ from bench.stress import calibration
 PARTS: dict[str, Callable[[Console], None]] = {
     "kernels": kernels.run,
     "batches": batches.run,
-    "cache": cache.run,
     "nearest": nearest.run,
-    "split": split.run,
     "ticks": ticks.run,
     "fields": fields.run,
     "simulation": simulation.run,

@@ -12,7 +12,7 @@ from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Profile, Sinusoid
 from asperity.textures.texture import Texture
 
-LAWS = "WABCDEFG"
+LAWS = "WABCDEFGH"
 STIFFNESS = 1000.0
 SEED = 20240607
 HELD_HANDLE = """

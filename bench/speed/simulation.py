@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import argparse
 import ctypes
 import math
 import os
 import shutil
 import subprocess
-import sys
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -36,8 +34,6 @@ from asperity.surface import Surface
 from asperity.textures import Sinusoid
 from bench.speed.reference import FLAGS, DisagreementError
 from bench.speed.timing import median_ratio, seconds, take_turns
-from bench.stress.random_scenes import delay_rule
-from bench.stress.random_steps import steps_rule
 
 GOALS = {"Cartesian": 1.5, "Pantograph": 2.0}
 GOAL_REAL_TIME = 100.0
@@ -261,23 +257,3 @@ def _two_cores(console: Console) -> None:
     console.print(
         f"{len(jobs)} scenes on two threads: {gain:.2f} x (goal {GOAL_CORES}) -> {answer}"
     )
-
-
-def main() -> int:
-    """Run the benchmark, or the delay rule on many random scenes."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--random", type=int, metavar="N", help="random scenes for the delay rule")
-    parser.add_argument("--steps", type=int, metavar="N", help="the same with encoders, friction")
-    parser.add_argument("--seed", type=int, default=1)
-    given = parser.parse_args()
-    console = Console(width=100, highlight=False)
-    if given.random:
-        return delay_rule(given.random, given.seed, console)
-    if given.steps:
-        return steps_rule(given.steps, given.seed, console)
-    run(console)
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

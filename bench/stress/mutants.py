@@ -45,149 +45,37 @@ _OPERATORS = re.compile(
 )
 
 
-@dataclass(frozen=True)
-class Room:
-    """A part of the code and its tests.
-
-    Attributes:
-        code: files or folders below ``src/asperity``.
-        tests: arguments of pytest.
-    """
-
-    code: tuple[str, ...]
-    tests: tuple[str, ...]
-
-
+# The folder below src/asperity, and the tests that are run against its mutants.
 ROOMS = {
-    "derive": Room(("derive",), ("tests/laws", "tests/derive")),
-    "contacts": Room(
-        (
-            "contacts/contact.py",
-            "contacts/closest",
-            "contacts/height_contacts.py",
-            "contacts/proxy_contacts.py",
-            "contacts/sampler_interface.py",
-            "contacts/symbols.py",
-            "contacts/warm_start.py",
-        ),
-        (
-            "tests/contacts",
-            "tests/test_reference.py",
-            "tests/derive",
-            "tests/laws",
-            "tests/seams/test_user_contact.py",
-        ),
+    "derive": ("derive", "tests/derive", "tests/laws"),
+    "contacts": (
+        "contacts",
+        "tests/contacts",
+        "tests/test_reference.py",
+        "tests/derive",
+        "tests/laws",
     ),
-    "kernels": Room(
-        ("kernels",),
-        (
-            "tests/kernels/test_loops_by_definition.py",
-            "tests/kernels/test_link.py",
-            "tests/kernels/test_fuse.py",
-            "tests/kernels/test_tick.py",
-            "tests/kernels/test_interfaces.py",
-            "tests/kernels/test_native.py",
-            "tests/textures/kinds/test_sinusoid.py",
-            "tests/test_surface.py",
-            "tests/test_reference.py",
-            "tests/core/test_cache.py",
-            "tests/kernels/test_batch_sine.py",
-            "tests/kernels/test_block_loops.py",
-            "tests/enclosures/test_taylor.py",
-        ),
+    "kernels": (
+        "kernels",
+        "tests/kernels",
+        "tests/test_surface.py",
+        "tests/enclosures/test_taylor.py",
     ),
-    "passivity": Room(
-        ("analysis/passivity",),
-        (
-            "tests/analysis/passivity/test_passivity_by_definition.py",
-            "tests/analysis/passivity/test_passivity.py",
-            "tests/analysis/passivity/test_wall_test_criterion.py",
-            "tests/analysis/passivity/test_passivity_theorems.py",
-            "tests/seams/test_user_criterion.py",
-            "tests/analysis/passivity/test_margins.py",
-        ),
+    "passivity": (
+        "analysis/passivity",
+        "tests/analysis/passivity",
+        "tests/seams/test_user_criterion.py",
     ),
-    "limits": Room(
-        ("analysis/limits", "analysis/results/check_limits.py"),
-        (
-            "tests/analysis/limits/test_limits_by_definition.py",
-            "tests/analysis/limits/test_limits.py",
-            "tests/analysis/limits/test_spectrum.py",
-            "tests/analysis/limits/test_wave_force.py",
-            "tests/analysis/limits/test_perceptibility.py",
-            "tests/analysis/limits/test_limit_sentences.py",
-        ),
+    "limits": ("analysis/limits", "tests/analysis/limits"),
+    "bounds": (
+        "analysis/bounds",
+        "tests/analysis/bounds",
+        "tests/analysis/gain",
+        "tests/enclosures/test_taylor.py",
     ),
-    "bounds": Room(
-        ("analysis/bounds",),
-        (
-            "tests/analysis/bounds/test_branch_and_bound.py",
-            "tests/analysis/bounds/test_bounds_by_definition.py",
-            "tests/analysis/gain/test_gain_by_definition.py",
-            "tests/analysis/bounds/test_contradictions.py",
-            "tests/analysis/energy/test_merit.py",
-            "tests/analysis/gain/test_clamps.py",
-            "tests/enclosures/test_taylor.py",
-            "tests/analysis/gain/test_certified.py",
-            "tests/analysis/gain/test_certified_laws.py",
-        ),
-    ),
-    "gain": Room(
-        ("analysis/gain",),
-        (
-            "tests/analysis/gain/test_gain_by_definition.py",
-            "tests/analysis/gain/test_theorems.py",
-            "tests/analysis/bounds/test_bounds_by_definition.py",
-            "tests/analysis/bounds/test_branch_and_bound.py",
-            "tests/analysis/gain/test_closed_forms.py",
-            "tests/analysis/gain/test_surface_cache.py",
-            "tests/analysis/gain/test_clamps.py",
-            "tests/analysis/gain/test_certified.py",
-            "tests/analysis/gain/test_certified_laws.py",
-        ),
-    ),
-    "energy": Room(
-        ("analysis/energy",),
-        (
-            "tests/analysis/energy/test_anchor.py",
-            "tests/analysis/energy/test_curl_integral.py",
-            "tests/analysis/energy/test_thrust.py",
-            "tests/analysis/energy/test_loops.py",
-            "tests/analysis/energy/test_energy_by_definition.py",
-            "tests/analysis/energy/test_merit.py",
-            "tests/analysis/energy/test_leak.py",
-            "tests/analysis/energy/test_continuity.py",
-            "tests/analysis/energy/test_ridges.py",
-            "tests/analysis/bounds/test_contradictions.py",
-        ),
-    ),
-    "split": Room(
-        (
-            "contacts/split_evaluation.py",
-            "contacts/split_optimality.py",
-            "contacts/split_solver.py",
-        ),
-        (
-            "tests/contacts/test_split_kernels.py",
-            "tests/contacts/test_split_solver.py",
-            "tests/analysis/energy/test_split.py",
-            "tests/analysis/energy/test_split_map.py",
-            "tests/analysis/energy/test_split_definition.py",
-            "tests/analysis/energy/test_split_closed_form.py",
-        ),
-    ),
-    "simulation": Room(
-        ("simulation",),
-        (
-            "tests/loop/test_simulation_loop_by_definition.py",
-            "tests/simulation/test_prediction.py",
-            "tests/simulation/test_onset_rules.py",
-            "tests/loop/test_bodies_by_definition.py",
-            "tests/simulation/test_hands.py",
-            "tests/simulation/test_discretization.py",
-            "tests/simulation",
-        ),
-    ),
+    "gain": ("analysis/gain", "tests/analysis/gain", "tests/analysis/bounds"),
+    "energy": ("analysis/energy", "tests/analysis/energy", "tests/analysis/bounds"),
+    "simulation": ("simulation", "tests/simulation"),
 }
 
 
@@ -224,16 +112,16 @@ def copy_tree(folder: Path) -> Path:
     return tree
 
 
-def plan_mutants(tree: Path, name: str, room: Room, python: str) -> tuple[Path, Path]:
+def plan_mutants(tree: Path, name: str, python: str) -> tuple[Path, Path]:
     """Plan the mutants of a room; return the paths of configuration and session."""
-    modules = [f"src/asperity/{part}" for part in room.code]
-    tests = f"{python} -m pytest -x -q -n 0 -p no:cacheprovider {' '.join(room.tests)}"
+    folder, *tests = ROOMS[name]
+    command = f"{python} -m pytest -x -q -n 0 -p no:cacheprovider {' '.join(tests)}"
     lines = [
         "[cosmic-ray]",
-        f"module-path = {modules}",
+        f"module-path = 'src/asperity/{folder}'",
         f"timeout = {TIMEOUT}",
         'excluded-modules = ["src/asperity/derive/generated/*"]',
-        f'test-command = "{tests}"',
+        f'test-command = "{command}"',
         "[cosmic-ray.distributor]",
         'name = "local"',
     ]
@@ -320,7 +208,7 @@ def main(arguments: Sequence[str]) -> int:
     try:
         tree = copy_tree(folder)
         for name in given.rooms or ROOMS:
-            config, session = plan_mutants(tree, name, ROOMS[name], given.python)
+            config, session = plan_mutants(tree, name, given.python)
             _cosmic_ray(tree, "baseline", config.name)
             choice = select_mutants(session, given.count, given.seed)
             _cosmic_ray(tree, "exec", config.name, session.name)

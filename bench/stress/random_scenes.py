@@ -1,5 +1,7 @@
 """Random scenes with conservative laws: does one cycle that the program calls passive?
 
+``python -m bench.stress.random_scenes COUNT [SEED]`` counts them.
+
 k (q⁺/2 + d q) <= σ₀/T says that a conservative field with d samples of delay never gives more than
 the damping of the device takes. Each scene starts out of contact, where the field's energy is zero
 and no force waits, with an undamped hand; then at every sample the work that the texture has done
@@ -13,6 +15,7 @@ used before: K₀/q⁺, with K₀ where a heavy handle's wall cycles along its n
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
@@ -212,3 +215,8 @@ def delay_rule(count: int, seed: int, console: Console) -> int:
             f"{sum(scene.passive for scene in drawn)} are called passive"
         )
     return int(bool(broken))
+
+
+if __name__ == "__main__":
+    number, seed = (*map(int, sys.argv[1:]), 1)[:2]
+    sys.exit(delay_rule(number, seed, Console(width=100, highlight=False)))

@@ -1,6 +1,6 @@
 """Random scenes with encoders, dry friction and delay: is a buzz ever above its bound?
 
-``python -m bench.speed.simulation --steps 10000 --seed 1``: the rule "steps and friction" says that
+``python -m bench.stress.random_steps COUNT [SEED]``: the rule "steps and friction" says that
 a held force is off by at most φ = k q |δ|/2 + |b|/2, that friction of at least φ keeps everything
 still in the end, and that otherwise no motion that lasts is faster than (φ - f_c)/(m T) RMS. Each
 scene is asked of the program itself, then simulated. The control tells the program steps half as
@@ -9,6 +9,7 @@ long as they are: the rule, with half of ε, must break.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -192,3 +193,8 @@ def steps_rule(count: int, seed: int, console: Console) -> int:
     broken = sum(share > 1.0 for share in control)
     console.print(f"control, half of ε: {broken} of {len(control)} are above the bound")
     return int(above > 0 or broken == 0)
+
+
+if __name__ == "__main__":
+    number, seed = (*map(int, sys.argv[1:]), 1)[:2]
+    sys.exit(steps_rule(number, seed, Console(width=100, highlight=False)))

@@ -7,7 +7,7 @@ from bench.stress.random_steps import scenes, shares
 
 
 def test_buzz_of_random_scenes_does_not_exceed_its_bound() -> None:
-    """``python -m bench.speed.simulation --steps 10000`` runs the same test with more scenes."""
+    """``python -m bench.stress.random_steps 10000`` runs the same test with more scenes."""
     sampled_scenes = list(scenes(40, 1))
     assert sum(scene.silent for scene in sampled_scenes) >= 5
     ratios = shares(sampled_scenes)
