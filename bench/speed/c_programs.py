@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import subprocess
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -154,14 +154,6 @@ def ticks(program: ctypes.CDLL, name: str, points: Any) -> Any:
     return program_ticks(program, name, points).result()
 
 
-def energies(program: ctypes.CDLL, name: str, points: Any) -> Any:
-    """Return the potential energies at probe positions."""
-    out = np.empty(len(points), points.dtype)
-    given = [array.ctypes.data_as(ctypes.c_void_p) for array in (points, out)]
-    getattr(program, f"{name}_energies")(*given, ctypes.c_int64(len(points)))
-    return out
-
-
 def surface_ticks(surface: Surface, points: Any, max_evaluations: float | None = None) -> Ticks:
     """Return ticks of the kernel of loops and simulations along a path.
 
@@ -174,16 +166,6 @@ def surface_ticks(surface: Surface, points: Any, max_evaluations: float | None =
     )
     arguments = memory, surface.texture.arguments, surface.law_arguments
     return Ticks(partial(loops.path_batch, points, out, told, *arguments), out, told[:, 0])
-
-
-def kernel_ticks(surface: Surface, points: Any, max_evaluations: float | None = None) -> Any:
-    """Return the same of the kernel."""
-    return surface_ticks(surface, points, max_evaluations).result()
-
-
-def same_bits(first: Any, second: Any) -> Any:
-    """Return which rows are the same bit by bit."""
-    return (first.view(np.int64) == second.view(np.int64)).all(axis=1)
 
 
 def probes(texture: Texture, depth: float, count: int, seed: int) -> Any:
@@ -218,9 +200,3 @@ def _move_uphill(texture: Texture, xy: Any) -> Any:
     for _ in range(60):
         xy = np.ascontiguousarray(xy + texture.gradient(xy) / bend)
     return xy
-
-
-def list_differing(names: Iterable[str], equal: Sequence[Any]) -> str:
-    """Return how many points differ, by name, of those of which any do."""
-    counts = {name: int((~one).sum()) for name, one in zip(names, equal, strict=True)}
-    return ", ".join(f"{name}: {count}" for name, count in counts.items() if count)

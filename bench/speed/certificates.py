@@ -2,15 +2,12 @@
 
 ``python -m bench certificates`` compares a certified q with what SciPy's global optimisers need for
 the same number uncertified, and times maps. ``python -m bench.speed.certificates --random 10000``
-tries random surfaces, laws and points; ``--large`` certifies a map of 8192 x 8192 points.
+tries random surfaces, laws and points.
 """
 
 from __future__ import annotations
 
-import json
 import math
-import os
-import subprocess
 import sys
 import time
 from collections import Counter
@@ -26,7 +23,7 @@ from asperity.analysis.gain.characteristic import certify, characteristic_number
 from asperity.analysis.gain.medial_axis import SearchOptions
 from asperity.core.checks import FloatArray
 from asperity.surface import Surface
-from asperity.textures import Fourier, HeightMap, Sinusoid
+from asperity.textures import HeightMap, Sinusoid
 from bench.speed.timing import Batch, median_ratio, seconds, take_turns
 from bench.stress.random_surfaces import Trial, run_trial
 
@@ -38,9 +35,6 @@ LAWS = "ABCDFG"
 MAP_LAWS = "ABCG"
 SIDES = (256, 512, 1024)
 MAP_SECONDS = 20.0
-LARGE, LARGE_GB, LARGE_SECONDS = 8192, 4.0, 60.0
-WAVES, SIDE_OF_WAVES = (4, 8, 40), 20e-3
-WAVE_GAP, WAVE_SECONDS = 1e-3, 10.0
 Objective = Callable[[FloatArray], float]
 
 
@@ -48,12 +42,6 @@ def run(console: Console) -> None:
     """Print the comparison with SciPy and the times of maps."""
     _against_scipy(console)
     _maps(console)
-    _waves(console)
-    console.print(
-        f"not run here: {LARGE} x {LARGE} (python -m bench.speed.certificates --large),"
-        " random surfaces (--random 10000)",
-        style="dim",
-    )
 
 
 # --- a sinusoid, against global optimisers --------------------------------------------------------
@@ -206,84 +194,12 @@ def _maps(console: Console) -> None:
     console.print(f"{SIDES[-1]} x {SIDES[-1]}: {total:.1f} s; goal {MAP_SECONDS:g} s: {verdict}")
 
 
-def independent_waves(count: int) -> Fourier:
-    """Return a sum of waves of 0.6 mm to 2 mm that never repeats."""
-    rng = np.random.default_rng(count)
-    turn = rng.uniform(0.0, 2.0 * math.pi, count)
-    size = 2.0 * math.pi / rng.uniform(0.6e-3, 2e-3, count)
-    waves = np.column_stack([size * np.cos(turn), size * np.sin(turn)])
-    amplitudes = 4.0 / count * rng.uniform(1e-5, 4e-5, count)
-    return Fourier(amplitudes, waves, rng.uniform(0.0, 6.0, count))
-
-
-def _waves(console: Console) -> None:
-    """Print the time of sums that never repeat: four on the whole plane, more on an extent."""
-    side = SIDE_OF_WAVES
-    places: list[tuple[int, str, tuple[float, float] | None]] = [(4, "the whole plane", None)]
-    places += [(count, f"{side * 1e3:g} mm x {side * 1e3:g} mm", (side, side)) for count in WAVES]
-    table = Table(title=f"seconds to q of independent waves to {WAVE_GAP:g}; the gap that is left")
-    for heading in ("waves", "on", *MAP_LAWS):
-        table.add_column(heading)
-    slowest = widest = 0.0
-    for count, where, extent in places:
-        cells = []
-        for letter in MAP_LAWS:
-            surface = Surface(independent_waves(count), letter, max_depth=0.1e-3)
-            search = SearchOptions(WAVE_GAP, extent=extent)
-            start = time.perf_counter()
-            bound = certify(surface, NORM, search)
-            slowest = max(slowest, taken := time.perf_counter() - start)
-            widest = max(widest, bound.gap)
-            cells.append(f"{taken:.2f}: {bound.gap:.1e}")
-        table.add_row(str(count), where, *cells)
-    console.print(table)
-    verdict = "reached" if slowest <= WAVE_SECONDS and widest <= 1.01 * WAVE_GAP else "missed"
-    goal = f"goal {WAVE_SECONDS:g} s and {WAVE_GAP:g}"
-    console.print(f"slowest {slowest:.1f} s, widest gap {widest:.1e}; {goal}: {verdict}")
-
-
 def nodes(texture: HeightMap) -> FloatArray:
     """Return a probe below every node of a map, (n, 3)."""
     ny, nx = texture.heights.shape
     x, y = (np.arange(n) * p for n, p in zip((nx, ny), texture.pitch, strict=True))
     z = texture.heights - 0.1e-3
     return np.column_stack([np.tile(x, ny), np.repeat(y, nx), z.ravel()])
-
-
-_LARGE = """
-import json, resource, sys, time
-from asperity.surface import Surface
-from bench.speed.certificates import _certify, rough_map
-texture = rough_map(int(sys.argv[2]))
-start, busy = time.perf_counter(), time.process_time()
-bound = _certify(Surface(texture, sys.argv[1], max_depth=0.2e-3))
-peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
-taken = [time.perf_counter() - start, time.process_time() - busy]
-print(json.dumps([*taken, peak, bound.lower, bound.upper, bound.note]))
-"""
-
-
-def large(console: Console, laws: Sequence[str] = ("A", "C"), side: int = LARGE) -> None:
-    """Certify a large map, each law in a process of its own, and print its peak memory."""
-    for letter in laws:
-        done = subprocess.run(
-            [sys.executable, "-c", _LARGE, letter, str(side)],
-            capture_output=True,
-            text=True,
-            check=False,
-            env=os.environ,
-        )
-        if done.returncode != 0:
-            console.print(f"{letter}: failed: {done.stderr.strip().splitlines()[-1:]}")
-            continue
-        taken, busy, peak, lower, upper, note = json.loads(done.stdout)
-        gigabytes = peak / 1e9
-        verdict = "reached" if gigabytes < LARGE_GB and taken < LARGE_SECONDS else "missed"
-        console.print(
-            f"{letter}, {side} x {side}: {taken:.0f} s ({busy:.0f} s of processor), peak "
-            f"{gigabytes:.2f} GB, goal {LARGE_SECONDS:g} s and {LARGE_GB:g} GB: {verdict}; "
-            f"q from {lower:.6g} to {upper:.6g} ({note})"
-        )
 
 
 # --- random surfaces ------------------------------------------------------------------------------
@@ -315,20 +231,12 @@ def random_trials(console: Console, count: int, first: int = 0) -> int:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run with ``--random N [first seed]``, ``--large [side]``, or nothing."""
+    """Run with ``--random N [first seed]``, or nothing."""
     console = Console(width=110, highlight=False)
-    words = list(arguments)
-    if not words:
-        run(console)
-        return 0
-    numbers = [int(word) for word in words[1:]]
-    if words[0] == "--random" and numbers:
-        return min(random_trials(console, *numbers), 1)
-    if words[0] == "--large":
-        large(console, side=numbers[0] if numbers else LARGE)
-        return 0
-    print(main.__doc__, file=sys.stderr)
-    return 2
+    if arguments[:1] == ["--random"]:
+        return min(random_trials(console, *map(int, arguments[1:])), 1)
+    run(console)
+    return 0
 
 
 if __name__ == "__main__":

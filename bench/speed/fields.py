@@ -1,14 +1,12 @@
-"""What a tick of a baked field costs, along strokes and with cold caches, beside other laws."""
+"""What a tick of a baked field costs along strokes, beside other laws."""
 
 from __future__ import annotations
 
-import ctypes
 from functools import partial
 from typing import Any
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 from asperity.contacts.warm_start import new_warm_start
 from asperity.core.checks import FloatArray
@@ -16,18 +14,15 @@ from asperity.rendering import bake
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Texture
 from asperity.textures.catalogue import as_texture
-from asperity.textures.fields.field_sampler import field_gradient
 from asperity.textures.fields.potential_field import PotentialField
 from bench.speed import cases, ticks
-from bench.speed.timing import take_turns
+from bench.speed.timing import number_table, take_turns
 
 SPEED = 0.1
 RATES = (4000.0, 1000.0)
 TICKS, SEARCHED_TICKS = 1_000_000, 2_000
-COLD_TICKS = 20_000
 TURNS = 3
 GOALS_NS = (60.0, 90.0)
-COLD_GOALS_NS = (1000.0, 3000.0)
 PITCH = 50e-6
 DEPTH = 0.15e-3
 
@@ -75,57 +70,10 @@ def _arguments(surface: Surface) -> tuple[Any, Any]:
     return surface.texture.arguments, surface.law_arguments
 
 
-def cold_times(field: PotentialField) -> FloatArray:
-    """Return ns of single forces at random places, without the time of reading the clock."""
-    import numba
-
-    rng, count = np.random.default_rng(cases.SEED), COLD_TICKS
-    xy = field.domain.points(rng.uniform(size=(count, len(field.domain.spans))))
-    points = np.column_stack([xy, field.height(xy) - rng.uniform(0.0, DEPTH, count)])
-    gettime = ctypes.CDLL(None).clock_gettime
-    gettime.argtypes, gettime.restype = (ctypes.c_int, ctypes.c_void_p), ctypes.c_int
-    gradient = _compiled(field_gradient)
-
-    @numba.njit
-    def measure(points: Any, arguments: Any, clock: Any, out: Any, with_force: Any) -> Any:
-        total = 0.0
-        for n in range(len(points)):
-            gettime(1, clock.ctypes)
-            before = clock[0] * 1_000_000_000 + clock[1]
-            if with_force:
-                x, y, z = gradient(points[n, 0], points[n, 1], points[n, 2], arguments)
-                total += x + y + z
-            gettime(1, clock.ctypes)
-            out[n] = clock[0] * 1_000_000_000 + clock[1] - before
-        return total
-
-    out, clock = np.zeros(count), np.zeros(2, np.int64)
-    measure(points[:10], field.arguments, clock, out[:10], True)
-    empty = np.zeros(count)
-    measure(points, field.arguments, clock, empty, False)
-    measure(points, field.arguments, clock, out, True)
-    return np.asarray(out - np.median(empty))
-
-
-def _compiled(function: Any) -> Any:
-    """Return a plain function compiled with the plain functions that it calls, of any module."""
-    import types
-
-    import numba
-
-    scope = dict(function.__globals__)
-    for name in function.__code__.co_names:
-        if isinstance(scope.get(name), types.FunctionType):
-            scope[name] = _compiled(scope[name])
-    return numba.njit(types.FunctionType(function.__code__, scope))
-
-
 def run(console: Console) -> None:
     """Print a row for each surface, and whether the goals are met."""
-    table = Table(box=None, pad_edge=False)
-    headings = ("MB", "baked H\n4 kHz ns", "1 kHz\nns", "cold\nmedian ns", "99 %\nns")
-    for heading in ("surface", *headings, "C\nns", "G\nns", "D\nns", "H search\nns"):
-        table.add_column(heading, justify="left" if heading == "surface" else "right")
+    headings = ("surface", "MB", "baked H\n4 kHz ns", "1 kHz\nns")
+    table = number_table(*headings, "C\nns", "G\nns", "D\nns", "H search\nns")
     missed: list[str] = []
     for name, (texture, resolution) in surfaces().items():
         exact = Surface(texture, "H", cases.STIFFNESS, max_depth=DEPTH)
@@ -133,15 +81,13 @@ def run(console: Console) -> None:
         field = baked.texture
         assert isinstance(field, PotentialField)
         times = stroke_times(baked, [stroke(texture, rate, TICKS) for rate in RATES])
-        cold = np.quantile(cold_times(field), [0.5, 0.99])
         short = [stroke(texture, RATES[0], SEARCHED_TICKS)]
         others = [stroke_times(exact.to_law(law), short)[0] for law in "CGDH"]
-        cells = [field.bytes / 1e6, *times, *cold, *others]
+        cells = [field.bytes / 1e6, *times, *others]
         table.add_row(name, *(f"{value:.0f}" for value in cells))
-        found, goals = (*times, *cold), (*GOALS_NS, *COLD_GOALS_NS)
-        if any(value > goal for value, goal in zip(found, goals, strict=True)):
+        if any(value > goal for value, goal in zip(times, GOALS_NS, strict=True)):
             missed.append(name)
     console.print(f"strokes of {SPEED:g} m/s of {TICKS} ticks; of others {SEARCHED_TICKS}")
     console.print(table)
     answer = "met" if not missed else f"MISSED on {', '.join(missed)}"
-    console.print(f"goals: 60 and 90 ns, cold 1 and 3 µs -> {answer}", style="bold")
+    console.print(f"goals: 60 and 90 ns -> {answer}", style="bold")

@@ -18,7 +18,7 @@ from asperity.core.checks import FloatArray
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
 from bench.speed import cases, reference
-from bench.speed.timing import Batch, median_ratio, seconds, take_turns
+from bench.speed.timing import Batch, median_ratio, number_table, seconds, take_turns
 
 GOAL = 1.3
 PUBLIC_GOAL = 1.0  # [µs]
@@ -111,12 +111,10 @@ def _time_alone(texture: Texture, law: str, points: FloatArray, name: str) -> Ti
 
 
 def _table(rows: Sequence[Row]) -> Table:
-    table = Table(box=None, pad_edge=False)
-    for heading in ("texture", "law"):
-        table.add_column(heading)
+    headings = []
     for what in RUNS:
-        for heading in (f"{what}\nasperity ns", "\nC ns", "asp./C\n-O3", "asp./C\nnative"):
-            table.add_column(heading, justify="right")
+        headings += [f"{what}\nasperity ns", "\nC ns", "asp./C\n-O3", "asp./C\nnative"]
+    table = number_table("texture", "law", *headings, left=2)
     for kind, law, timings in rows:
         cells = [text for timing in timings for text in _cells(timing)]
         table.add_row(kind, law, *cells, end_section=law == cases.LAWS[-1])

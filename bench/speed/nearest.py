@@ -1,8 +1,8 @@
-"""Cost of a globally nearest surface point, the contact of the god-object laws, against peers.
+"""Cost of a globally nearest surface point, the contact of the god-object laws, against a peer.
 
-The peers: a k-d tree (SciPy) of points of the surface, the nearest of them polished by Newton's
-method, and the downhill simplex of 35 steps that HAPI uses. Each is timed in turns with asperity on
-the same probes, and counted wrong where it ends farther away by more than 1e-6 of the extent.
+The peer is a k-d tree (SciPy) of points of the surface, the nearest of them polished by Newton's
+method. It is timed in turns with asperity on the same probes, and counted wrong where it ends
+farther away by more than 1e-6 of the extent.
 """
 
 from __future__ import annotations
@@ -15,13 +15,12 @@ from typing import Any
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 from asperity.core.checks import FloatArray
 from asperity.textures import Fourier, HeightMap, Noise, Profile
 from asperity.textures.texture import Texture
 from bench.speed import cases, peers
-from bench.speed.timing import Batch, median_ratio, seconds, take_turns
+from bench.speed.timing import Batch, median_ratio, number_table, seconds, take_turns
 from bench.stress.nearest_exhaustive import texture_extent
 
 ROUNDS = 7
@@ -61,11 +60,8 @@ class Subject:
 
 def run(console: Console) -> None:
     """Print a table of µs per query, the memory of asperity and tree, and the verdict."""
-    table = Table(box=None, pad_edge=False)
-    table.add_column("texture")
     headings = ("depth", "nearest\nµs", "slowest\nof 300", "force D\n/nearest", "k-d tree\nµs")
-    for heading in (*headings, "\nratio", "\nwrong", "simplex\nµs", "\nratio", "\nwrong"):
-        table.add_column(heading, justify="right")
+    table = number_table("texture", *headings, "\nratio", "\nwrong")
     missed: list[str] = []
     memory = []
     for subject in _subjects():
@@ -79,8 +75,7 @@ def run(console: Console) -> None:
     console.print(
         "nearest point, medians of batches over random probes in turns; slowest of 300 on its own;"
         f"\nwrong: farther than the nearest point by more than {WRONG:g} of the extent (asperity:"
-        "\nnone in 1e5, python -m bench.stress.nearest_exhaustive). Tree and simplex: see"
-        " bench/speed/peers.py."
+        "\nnone in 1e5, python -m bench.stress.nearest_exhaustive)."
     )
     console.print(table)
     console.print("\n".join(memory), style="dim")
@@ -185,25 +180,20 @@ def _row(subject: Subject, depth_name: str, tree: Tree) -> tuple[list[str], list
     feet, out = np.empty((len(points), 2)), np.empty((len(points), 2))
     god = cases.kernel(texture, "D", points)
     compiled = _peers(texture)
-    last = _last_proxies(texture, points, subject.pitch)
 
     def by_tree() -> None:
         compiled.peer_polish_batch(points, tree.nearest(points), out, arguments)
 
-    def by_simplex() -> None:
-        compiled.peer_simplex_batch(points, last, out, arguments)
-
-    methods: list[Batch] = [by_tree, by_simplex]
-    times = take_turns([lambda: loop(points, feet, arguments), god.run_force, *methods], ROUNDS)
+    batches: list[Batch] = [lambda: loop(points, feet, arguments), god.run_force, by_tree]
+    times = take_turns(batches, ROUNDS)
     medians = np.median(times, axis=0) / len(points) * 1e6
     ratio = median_ratio(times, 1, 0)
     cells = [f"{medians[0]:.2f}", f"{_slowest(texture, points):.1f}", f"{ratio:.2f}"]
     best = _distances(texture, points, feet)
-    for n, method in enumerate(methods, start=2):
-        method()
-        wrong = _distances(texture, points, out) - best > WRONG * texture_extent(texture)
-        share = f"{100 * wrong.mean():.2g} %"
-        cells += [f"{medians[n]:.2f}", f"{median_ratio(times, n, 0):.1f}", share]
+    by_tree()
+    wrong = _distances(texture, points, out) - best > WRONG * texture_extent(texture)
+    share = f"{100 * wrong.mean():.2g} %"
+    cells += [f"{medians[2]:.2f}", f"{median_ratio(times, 2, 0):.1f}", share]
     faults = []
     if medians[0] > subject.limits.get(depth_name, np.inf):
         faults.append(f"{subject.name} {depth_name} {medians[0]:.2f} µs")
@@ -225,14 +215,6 @@ def _peers(texture: Texture) -> ModuleType:
     from asperity.kernels.fuse import fuse_sampler
 
     return fuse_sampler(texture.sampler, peers)
-
-
-def _last_proxies(texture: Texture, points: FloatArray, pitch: float) -> FloatArray:
-    """Return where a proxy was one sample before: the feet of probes a pitch away."""
-    rng = np.random.default_rng(cases.SEED + 3)
-    angle = rng.uniform(0.0, 2.0 * np.pi, len(points))
-    aside = pitch * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(len(points))])
-    return np.ascontiguousarray(texture.nearest(points + aside)[:, :2])
 
 
 def _distances(texture: Texture, points: FloatArray, closest_points: FloatArray) -> FloatArray:

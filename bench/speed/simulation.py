@@ -1,14 +1,12 @@
-"""A servo step with its energy ledger against hand-written C; real time; two cores."""
+"""A servo step with its energy ledger against hand-written C, and real time."""
 
 from __future__ import annotations
 
 import ctypes
 import math
-import os
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -18,26 +16,16 @@ from rich.console import Console
 from rich.table import Table
 
 from asperity.core.checks import FloatArray
-from asperity.simulation import (
-    BandHand,
-    Cartesian,
-    Pantograph,
-    Servo,
-    SpringHand,
-    Strokes,
-    simulate,
-    simulate_many,
-)
+from asperity.simulation import Cartesian, Pantograph, Servo, SpringHand, Strokes, simulate
 from asperity.simulation.plants import Plant, sampled_plant
 from asperity.simulation.simulate import Simulation
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
 from bench.speed.reference import FLAGS, DisagreementError
-from bench.speed.timing import median_ratio, seconds, take_turns
+from bench.speed.timing import median_ratio, number_table, seconds, take_turns
 
 GOALS = {"Cartesian": 1.5, "Pantograph": 2.0}
 GOAL_REAL_TIME = 100.0
-GOAL_CORES = 1.8
 SAMPLES = 20_000
 ROUNDS = 151
 PERIOD = 1e-4
@@ -152,10 +140,9 @@ class _CLoop:
 
 
 def run(console: Console) -> None:
-    """Print the ratios to C, the factors of real time and the gain of two cores."""
+    """Print the ratios to C, and the factors of real time."""
     _against_c(console)
     _real_time(console)
-    _two_cores(console)
 
 
 def _against_c(console: Console) -> None:
@@ -202,9 +189,7 @@ def _check(own: _AsperityLoop, other: _CLoop, name: str, law: str) -> None:
 
 def _real_time(console: Console) -> None:
     """Print how much faster than real time each law runs at 10 kHz, trace in memory."""
-    table = Table("law", box=None, pad_edge=False)
-    for name in _PLANTS:
-        table.add_column(f"{name}\nx real time", justify="right")
+    table = number_table("law", *(f"{name}\nx real time" for name in _PLANTS))
     worst = math.inf
     for law in "WABCDEFGH":
         cells = []
@@ -226,34 +211,3 @@ def _factor(law: str, plant: Plant, duration: float = 5.0) -> float:
 
     once(0.1)
     return duration / float(np.median([seconds(once) for _ in range(5)]))
-
-
-def _two_cores(console: Console) -> None:
-    """Print how much faster many scenes run on two threads than on one."""
-    if (os.cpu_count() or 1) < 2:
-        console.print("not run: many scenes on two cores (one processor)")
-        return
-    jobs = [
-        {
-            "surface": Surface(_TEXTURE, law, 1000.0),
-            "plant": plant,
-            "hand": hand,
-            "servo": _SERVO,
-            "motion": _STROKES,
-            "duration": 10.0,
-            "trace": False,
-        }
-        for law in "WACF"
-        for plant in _PLANTS.values()
-        for hand in (_HAND, BandHand())
-    ]
-    batches: list[Callable[[], object]] = [
-        lambda: simulate_many(jobs, workers=1),
-        lambda: simulate_many(jobs, workers=2),
-    ]
-    times = take_turns(batches, 9)
-    gain = median_ratio(times, 0, 1)
-    answer = "met" if gain >= GOAL_CORES else "MISSED"
-    console.print(
-        f"{len(jobs)} scenes on two threads: {gain:.2f} x (goal {GOAL_CORES}) -> {answer}"
-    )

@@ -19,15 +19,14 @@ from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Texture
 from asperity.textures.catalogue import as_texture
 from bench.speed import cases
-from bench.speed.timing import seconds, take_turns
+from bench.speed.timing import number_table, seconds
 
 SIDE = 512
 PITCH = 50e-6
-SPEED, RATE = 0.1, 4000.0
+RATE = 4000.0
 TICKS = 800
 # Goals, in µs.
 LONGEST = {"D": 50.0, "H": 150.0}
-PER_TICK = {"D": 0.5, "H": 2.5}
 PROBES = 40
 TURNS = 5
 WAVES = 32
@@ -99,10 +98,8 @@ def strokes(surface: Surface) -> list[FloatArray]:
 
 def strokes_table() -> tuple[Table, list[str]]:
     """Return what ticks along strokes cost and how many are truncated, and the goals missed."""
-    table = Table(box=None, pad_edge=False)
     headings = ("truncated", "evaluations\nmean", "99.9 %", "most", "µs\na tick")
-    for heading in ("law", "surface", *headings):
-        table.add_column(heading, justify="left" if heading in {"law", "surface"} else "right")
+    table = number_table("law", "surface", *headings, left=2)
     maps = adversarial_textures()
     textures: dict[str, Texture] = {name: maps[name][0] for name in ("needles", "plateaus")}
     textures |= {f"{count} waves": wave_sum(count) for count in (3, 6, 8)}
@@ -143,23 +140,8 @@ def run(console: Console) -> None:
 
 
 def _run_longest(console: Console) -> None:
-    table = Table(box=None, pad_edge=False)
-    headings = (
-        "longest\ntick µs",
-        "evaluations",
-        "truncated",
-        "error\nbound µm",
-        "without a\nbudget µs",
-    )
-    for heading in (
-        "law",
-        "surface",
-        *headings,
-        "stroke\nµs a tick",
-        "evaluations",
-        "each alone\nµs",
-    ):
-        table.add_column(heading, justify="left" if heading in {"law", "surface"} else "right")
+    headings = ("longest\ntick µs", "evaluations", "truncated", "error\nbound µm", "no budget\nµs")
+    table = number_table("law", "surface", *headings, left=2)
     missed: list[str] = []
     surfaces: dict[str, tuple[Texture, FloatArray]] = {**adversarial_textures()}
     surfaces[f"{WAVES} waves"] = many_waves()
@@ -167,21 +149,17 @@ def _run_longest(console: Console) -> None:
         for law in "DH":
             surface = Surface(texture, law, cases.STIFFNESS)
             longest, cells = _longest(surface, _probes(texture, centre))
-            each, more = _stroke(surface)
-            table.add_row(law, name, *cells, *more)
+            table.add_row(law, name, *cells)
             if longest > LONGEST[law]:
                 missed.append(f"{law} on {name}: {longest:.0f} µs")
-            if name == "noise" and each > PER_TICK[law]:
-                missed.append(f"{law} along a stroke: {each:.1f} µs")
     console.print(
         f"maps of {SIDE} x {SIDE} and a sum of {WAVES} waves;"
         "\nticks at 0.3 to 3 times max_depth and at centres of curvature;"
-        f"\nstrokes of {SPEED:g} m/s at {RATE:g} Hz at half of max_depth;"
         "\nerror bound of D: a point may be nearer by so much; of H: of force over stiffness"
     )
     console.print(table)
     answer = "met" if not missed else f"MISSED: {'; '.join(missed)}"
-    goals = "longest tick D 50, H 150 µs; stroke on noise D 0.5, H 2.5 µs"
+    goals = "longest tick D 50, H 150 µs"
     console.print(f"goals: {goals} -> {answer}", style="bold")
 
 
@@ -225,27 +203,6 @@ def _longest(surface: Surface, probes: FloatArray) -> tuple[float, list[str]]:
         f"{max(exact):.0f}",
     ]
     return float(times_.max()), cells
-
-
-def _stroke(surface: Surface) -> tuple[float, list[str]]:
-    """Return what a tick of a stroke costs [µs], and the cells that tell of it."""
-    loop, arguments = surface._path_loops.path_batch, _arguments(surface)
-    way = SPEED / RATE * np.arange(TICKS)[:, None] * np.array([np.cos(0.3), np.sin(0.3)])
-    xy = np.array([0.1, 0.2]) * SIDE * PITCH + way
-    depth = 0.5 * surface.max_depth
-    path = np.ascontiguousarray(np.column_stack([xy, surface.texture.height(xy) - depth]))
-    out, told = np.empty_like(path), np.empty((TICKS, 2))
-    budget = surface.law.contact.max_evaluations
-
-    def ticks() -> None:
-        loop(path, out, told, new_warm_start(budget), *arguments)
-
-    def alone() -> None:
-        surface._loops.force_batch(path, out, *arguments)
-
-    times = np.median(take_turns([ticks, alone], TURNS), axis=0) / TICKS * 1e6
-    ticks()
-    return float(times[0]), [f"{times[0]:.2f}", f"{told[:, 1].mean():.1f}", f"{times[1]:.2f}"]
 
 
 def _arguments(surface: Surface) -> tuple[object, object]:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from time import perf_counter
 
 import numpy as np
+from rich.table import Table
 
 from asperity.core.checks import FloatArray
 
@@ -37,3 +38,11 @@ def take_turns(batches: Sequence[Batch], rounds: int) -> FloatArray:
 def median_ratio(times: FloatArray, index: int, reference: int) -> float:
     """Return the median over the rounds of the ratio of two batches of the same round."""
     return float(np.median(times[:, index] / times[:, reference]))
+
+
+def number_table(*headings: str, left: int = 1) -> Table:
+    """Return an empty table of numbers, aligned right but for so many columns of names."""
+    table = Table(box=None, pad_edge=False)
+    for place, heading in enumerate(headings):
+        table.add_column(heading, justify="left" if place < left else "right")
+    return table

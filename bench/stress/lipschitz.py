@@ -16,13 +16,13 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 from rich.progress import track
-from rich.table import Table
 
 from asperity.core.checks import FloatArray
 from asperity.surface import Surface
 from asperity.textures import Profile, Sinusoid, load_texture
 from asperity.textures.texture import Texture
 from bench.speed import cases
+from bench.speed.timing import number_table
 
 DATA = Path(__file__).parents[3] / "shared" / "data" / "sample-land.x3p"
 PAIRS_AT_ONCE = 20_000
@@ -100,9 +100,8 @@ def _search_part(
 
 def search(console: Console, pairs: int) -> bool:
     """Print the worst pairs of H, D and C on every texture; return whether H holds on all."""
-    table = Table(box=None, pad_edge=False)
-    for heading in ("texture", "c", "H: |Δf|/(kc|Δp|)", "H: excess", "D: excess", "C: excess"):
-        table.add_column(heading, justify="left" if heading == "texture" else "right")
+    headings = ("texture", "c", "H: |Δf|/(kc|Δp|)", "H: excess", "D: excess", "C: excess")
+    table = number_table(*headings)
     sound = True
     for name, texture in search_textures().items():
         for c in (1.0, 4.0):

@@ -26,7 +26,6 @@ from pathlib import Path
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 from asperity.analysis import characteristic_number
 from asperity.loop import lane_loop
@@ -50,16 +49,6 @@ DURATION = 1.0  # [s] of the first run; one that still moves is extended to 16 t
 LASTING_SHARE = 0.9  # of the loss that the texture supplies in a motion that lasts
 DELAYS = (0, 0, 1, 2, 6)
 MAX_GAIN = 50.0  # a law whose q is greater has no start to speak of
-
-HANDS = {
-    "held": SpringHand((200.0, 200.0, 0.0), 1.0, 0.03),
-    "held loosely": SpringHand((20.0, 20.0, 0.0), 0.02),
-}
-
-
-def press_with(hand: SpringHand, force: float) -> SpringHand:
-    """Return the hand with a force [N] into the surface."""
-    return SpringHand(hand.stiffness, hand.damping, hand.mass, (0.0, 0.0, -force))
 
 
 @dataclass(frozen=True)
@@ -140,11 +129,6 @@ class Motion:
     speed: float
     extent: float
     norm: float
-
-    @property
-    def frequency(self) -> float:
-        """Frequency of a sinusoid of that speed and displacement [Hz]."""
-        return self.speed / (2.0 * math.pi * self.extent) if self.extent > 0.0 else 0.0
 
 
 AT_REST = Motion(0, 0.0, 0.0, 0.0)
@@ -358,23 +342,6 @@ def measure(
             return result
 
 
-def table(found: dict[tuple[str, bool], MarginResult]) -> Table:
-    """Return what was found, one row per law."""
-    shown = Table("law", "K₀ along", "factor", "cycle", "of", "fastest", "at")
-    for (law, along), one in found.items():
-        worst = max(one.motions, key=lambda motion: motion.speed, default=AT_REST)
-        shown.add_row(
-            law,
-            "lightest" if along else "normal",
-            f"{one.factor:g}",
-            str(one.cycles),
-            str(one.loops),
-            f"{worst.speed * 1e3:.3g} mm/s",
-            f"{worst.frequency:.3g} Hz",
-        )
-    return shown
-
-
 def write_margins(found: dict[tuple[str, bool], MarginResult], path: Path = TARGET) -> None:
     """Write the margins: factor, loops, cycles and the fastest motion of each law."""
     lines = [
@@ -412,7 +379,6 @@ def main(arguments: list[str]) -> int:
         for law in options.laws
         for along in (False, True)
     }
-    console.print(table(found))
     if options.laws == LAWS:
         write_margins(found)
     return 0

@@ -19,13 +19,13 @@ from typing import Any
 import numpy as np
 from numba import njit
 from rich.console import Console
-from rich.table import Table
 
 from asperity.core.checks import FloatArray
 from asperity.textures import Fourier, HeightMap, Profile, Sinusoid
 from asperity.textures.catalogue import load_texture
 from asperity.textures.kinds.noise import Noise, NoiseProfile
 from asperity.textures.texture import Texture
+from bench.speed.timing import number_table
 
 COUNT = 100_000
 REAL = Path(__file__).parents[3] / "shared" / "data" / "sample-land.x3p"
@@ -238,17 +238,9 @@ def texture_extent(texture: Texture) -> float:
 
 def run(console: Console, count: int = COUNT, kinds: list[str] | None = None) -> int:
     """Print a table; return how many probes were farther from their foot than need be."""
-    table = Table(box=None, pad_edge=False, title=f"{count} random probes of each kind")
-    headings = (
-        "texture",
-        "extent\nmm",
-        "farther\nat most",
-        "nearer\nat most",
-        "wrong",
-        "local\nwrong",
-    )
-    for heading in (*headings, "s"):
-        table.add_column(heading, justify="left" if heading == "texture" else "right")
+    names = ("farther\nat most", "nearer\nat most", "wrong", "local\nwrong", "s")
+    table = number_table("texture", "extent\nmm", *names)
+    table.title = f"{count} random probes of each kind"
     failed = 0
     for kind in kinds or list(CASES):
         if kind.startswith("bullet") and not REAL.exists():

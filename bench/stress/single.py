@@ -20,13 +20,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 from asperity.export.surface_functions import is_searching
 from asperity.laws import LAWS
 from asperity.surface import Surface
 from bench.speed import cases
 from bench.speed.c_programs import as_exported, header, library, probes, ticks
+from bench.speed.timing import number_table
 
 NEAR = 1e-5
 PROBES = 2000
@@ -99,9 +99,7 @@ def _position_rounding_error(at: Any, h: Any, double: Any, exact: Any) -> Any:
 
 def run(console: Console) -> None:
     """Print a row for each law and texture kind."""
-    table = Table(box=None, pad_edge=False)
-    for heading in ("law, texture", "within 1e-5", "position", "tie", "not", "worst"):
-        table.add_column(heading, justify="left" if heading[0] == "l" else "right")
+    table = number_table("law, texture", "within 1e-5", "position", "tie", "not", "worst")
     for kind, texture in cases.textures().items():
         for law in LAWS:
             one = measure_single_precision(Surface(texture, law, clamp="backed"))

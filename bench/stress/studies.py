@@ -1,23 +1,17 @@
-"""Do the intervals of studies hold the truth, and how many trials does the adaptive method need?
+"""Do the intervals of studies hold the truth?
 
 ``python -m bench.stress.studies [COUNT]`` simulates that many studies (1000) of each method by
 observers whose thresholds and scores are known, and prints the share of 95 % intervals that hold
 them, apart for a participant and for the pooled value of twelve. A control whose intervals are half
-as wide shows what the shares would be if the intervals were too narrow. Then it prints how many
-trials the Bayesian method needs until the threshold is known as well as in the demonstration of its
-library after its 50 trials, with the same observer, and whether a study of the same seed is the
-same.
+as wide shows what the shares would be if the intervals were too narrow.
 """
 
 from __future__ import annotations
 
-import io
 import math
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import redirect_stdout
-from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -25,9 +19,8 @@ from rich.table import Table
 
 from asperity.studies.design import StudyDesign, Values
 from asperity.studies.methods import METHODS
-from asperity.studies.psychometric import SLOPE_SPREAD, USUAL_SLOPE, LogLevels
+from asperity.studies.psychometric import SLOPE_SPREAD, USUAL_SLOPE
 from asperity.studies.simulated_participants import Observer, simulate_run
-from asperity.studies.thresholds import BayesianTrack
 
 COUNT, PARTICIPANTS, RESAMPLES, SPREAD = 1000, 12, 400, 0.3
 LAWS = {"surface.law": ("A", "C", "D", "H")}
@@ -129,53 +122,6 @@ def coverage(study: Callable[[int], Iterator[Interval]], count: int) -> tuple[fl
     return float(held.mean()), float(halved.mean()), len(found)
 
 
-def trials_needed(count: int, most: int = 100) -> tuple[float, float]:
-    """Return the median trials, and deviation, at which ours equals the demonstration of 50.
-
-    The demonstration is SweetSpot's ``Simulate()``: threshold −2.5 and slope 1 in a range of ±5,
-    two intervals, lapses of 1 %, and its own priors.
-    """
-    import SweetSpot as Library
-
-    truth, needed, reached = -2.5, [], []
-    for seed in range(count):
-        np.random.seed(seed)  # noqa: NPY002  # the library draws from the global generator
-        with redirect_stdout(io.StringIO()):  # it prints its estimates
-            demonstration = Library.Simulate()[0]
-        goal = _deviation(demonstration.pf)
-        levels = LogLevels(math.exp(-5.0), math.exp(5.0), 1e-9, 0.0, guess=0.5, lapse=0.02)
-        track, rng = BayesianTrack(levels), np.random.default_rng(seed)
-        trial = 0
-        while trial < most and _deviation(track.procedure.pf) > goal:
-            trial += 1
-            chance = 0.5 + 0.49 / (1.0 + math.exp(-4.0 * (track.level() - truth)))
-            track.record(bool(rng.random() < chance))
-        needed.append(trial)
-        reached.append(goal)
-    return float(np.median(needed)), float(np.median(reached))
-
-
-def _deviation(function: Any) -> float:  # SweetSpot states no types
-    """Return the deviation of the posterior of the threshold."""
-    values = np.ravel(function.alpha)
-    share = np.ravel(function.Posterior("alpha"))
-    share = share / share.sum()
-    return float(np.sqrt(share @ np.square(values - share @ values)))
-
-
-def _any_strength(values: Values) -> float:
-    return level_strength(values) if KEY in values else score_strength(values)
-
-
-def replays(kind_name: str, **options: object) -> bool:
-    """Return whether a study with the same seed is the same, and with another one is not."""
-    design = StudyDesign(kind_name, LAWS, options, seed=3)
-    first, same, other = (
-        repr(simulate_run(design, 2, Observer(), _any_strength, seed)) for seed in (5, 5, 6)
-    )
-    return first == same and first != other
-
-
 def run(console: Console, count: int = COUNT) -> None:
     headings = ("method", "in 95 % intervals", "halved", "intervals", "s")
     table = Table(*headings, title=f"{count} studies")
@@ -186,15 +132,6 @@ def run(console: Console, count: int = COUNT) -> None:
         table.add_row(name, f"{100 * held:.1f} %", f"{100 * halved:.1f} %", str(total), seconds)
         console.print(name, f"{100 * held:.1f} %")
     console.print(table)
-    kinds = {"detection": LEVELS, "comparison": {}, "rating": {}, "axb": {}, "onset": LEVELS}
-    same = [replays(name, **options) for name, options in kinds.items()]
-    same.append(replays("detection", **LEVELS, procedure="bayesian"))
-    console.print(f"{sum(same)} of {len(same)} seeded studies replay bit for bit")
-    trials, deviation = trials_needed(max(count // 50, 1))
-    console.print(
-        f"Bayesian: {trials:.0f} trials reach the demonstration's deviation {deviation:.3f} "
-        f"after 50: ratio {trials / 50.0:.2f}"
-    )
 
 
 def main() -> None:

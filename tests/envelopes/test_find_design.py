@@ -24,7 +24,7 @@ from asperity.laws.clamps import CLAMPS
 
 LAND = Path(__file__).parents[2].parent / "shared" / "data" / "sample-land.x3p"
 DEVICES = ("touch", "omega.3", "pantograph", "falcon")
-COUNT = 2  # python -m bench.stress.designs checks 200
+COUNT = 2  # python -m bench.stress.envelopes checks 200
 POINTS = 1000
 FORCE_NAMES = {"RMS": "texture_force", "peak": "peak_force"}
 Case = tuple[Search, Design, float, float]

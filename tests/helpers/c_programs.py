@@ -4,24 +4,25 @@ from __future__ import annotations
 
 import ctypes
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 from bench.speed import c_programs
 from bench.speed.c_programs import (
     STRICT,
     as_exported,
     compile_library,
-    energies,
     header,
-    kernel_ticks,
-    list_differing,
     probes,
     run_command,
-    same_bits,
+    surface_ticks,
     ticks,
 )
+
+from asperity.surface import Surface
 
 __all__ = [
     "COMPILERS",
@@ -56,3 +57,27 @@ def library(
 ) -> ctypes.CDLL:
     """Return exported headers compiled into one library; see ``bench.speed.c_programs``."""
     return c_programs.library(folder, tool(compiler), headers, *flags, single=single)
+
+
+def energies(program: ctypes.CDLL, name: str, points: Any) -> Any:
+    """Return the potential energies at probe positions."""
+    out = np.empty(len(points), points.dtype)
+    given = [array.ctypes.data_as(ctypes.c_void_p) for array in (points, out)]
+    getattr(program, f"{name}_energies")(*given, ctypes.c_int64(len(points)))
+    return out
+
+
+def kernel_ticks(surface: Surface, points: Any, max_evaluations: float | None = None) -> Any:
+    """Return the same of the kernel."""
+    return surface_ticks(surface, points, max_evaluations).result()
+
+
+def same_bits(first: Any, second: Any) -> Any:
+    """Return which rows are the same bit by bit."""
+    return (first.view(np.int64) == second.view(np.int64)).all(axis=1)
+
+
+def list_differing(names: Iterable[str], equal: Sequence[Any]) -> str:
+    """Return how many points differ, by name, of those of which any do."""
+    counts = {name: int((~one).sum()) for name, one in zip(names, equal, strict=True)}
+    return ", ".join(f"{name}: {count}" for name, count in counts.items() if count)
