@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import codecs
 import os
 import signal
 import sys
-from contextlib import suppress
-from types import FrameType
 from typing import NoReturn
 
 from asperity.core.errors import InternalError, print_message
@@ -17,26 +14,17 @@ INTERRUPTED = 130  # 128 + SIGINT, as in shells
 IO_ERROR = 74  # as in sysexits.h
 BROKEN_PIPE = 141  # 128 + SIGPIPE
 _TRACEBACK = "ASPERITY_TRACEBACK"
-_REPEAT_INTERVAL = 1.0  # [s] after which an interrupt is raised again
-
-_received_signals: list[int] = []
 
 
 def main() -> NoReturn:
     """Run the command line; every error is an exit code and one line on standard error."""
-    status = INTERRUPTED
-    with suppress(KeyboardInterrupt):
-        signal.signal(signal.SIGINT, _handle_interrupt)
-        status = _run()
-    if hasattr(signal, "setitimer"):
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if _received_signals:
+    try:
+        status = _flush_output(_run())
+    except KeyboardInterrupt:
         print_message("interrupted")
-    # Run with -m, Python ends by the signal instead of the exit code after an interrupt inside an
-    # exec() of source text, such as that of a plugin. A later exec() clears that state.
-    exec("")
-    sys.exit(INTERRUPTED if _received_signals else _flush_output(status))
+        status = INTERRUPTED
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    sys.exit(status)
 
 
 def _run() -> int:
@@ -53,22 +41,6 @@ def _run() -> int:
     return 0
 
 
-def _handle_interrupt(number: int, _frame: FrameType | None) -> None:
-    """Raise KeyboardInterrupt; a second interrupt ends the program at once.
-
-    The exception is raised repeatedly until it arrives in :func:`main`, since code that is called
-    back from C may swallow it.
-    """
-    if number == signal.SIGINT:
-        _received_signals.append(number)
-        if len(_received_signals) > 1:
-            os._exit(INTERRUPTED)
-        if hasattr(signal, "setitimer"):  # not on Windows
-            signal.signal(signal.SIGALRM, _handle_interrupt)
-            signal.setitimer(signal.ITIMER_REAL, _REPEAT_INTERVAL, _REPEAT_INTERVAL)
-    raise KeyboardInterrupt
-
-
 def _prepare_streams() -> None:
     """Make the standard streams accept any output, including closed streams."""
     for descriptor in range(3):
@@ -78,29 +50,9 @@ def _prepare_streams() -> None:
             os.open(os.devnull, os.O_RDWR)
     sys.stdout = sys.stdout or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - to the end
     sys.stderr = sys.stderr or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - likewise
-    codecs.register_error("asperity", _replace_unencodable)
     for stream in (sys.stdout, sys.stderr):
-        stream.reconfigure(errors="asperity")  # type: ignore[union-attr]  # both are text files
+        stream.reconfigure(errors="replace")  # type: ignore[union-attr]  # both are text files
     os.environ |= {"MPLBACKEND": "agg"} | SINGLE_THREADED  # figures go to files
-    # The exit code reports an interrupt in a finalizer.
-    sys.unraisablehook = lambda _error: None
-
-
-# Characters of the output without an ASCII equivalent in NFKD.
-_ASCII_REPLACEMENTS = str.maketrans({
-    "µ": "u", "×": "x", "−": "-", "–": "-", "≤": "<=", "≥": ">=", "∞": "inf", "°": " deg",
-    "·": ".", "→": "->", "σ": "sigma", "⁺": "+",
-})  # fmt: skip
-
-
-def _replace_unencodable(error: UnicodeError) -> tuple[str, int]:
-    """Replace characters that the encoding of a stream does not have."""
-    from unicodedata import normalize
-
-    if not isinstance(error, UnicodeEncodeError):
-        raise error
-    text = error.object[error.start : error.end].translate(_ASCII_REPLACEMENTS)
-    return normalize("NFKD", text).encode("ascii", "ignore").decode() or "?", error.end
 
 
 def _report_error(error: BaseException) -> int:

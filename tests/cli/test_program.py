@@ -54,14 +54,11 @@ def test_closed_standard_streams_are_accepted(closed: str, tmp_path: Path) -> No
     assert path.read_text().rstrip().endswith("}") or path.read_text().rstrip().endswith("]")
 
 
-def test_characters_outside_the_encoding_are_transliterated() -> None:
+def test_characters_outside_the_encoding_are_replaced() -> None:
     process = run("PYTHONIOENCODING=ascii asperity devices")
     assert process.returncode == 0
     assert process.stdout.isascii()
-    assert "sigma0(B)" in process.stdout
-    assert "30 um" in process.stdout
-    assert "10 um ?" in process.stdout  # "not verified", not a replaced character
-    assert "???" not in process.stdout
+    assert "30 ?m" in process.stdout
 
 
 def test_error_messages_are_ascii_in_an_ascii_encoding() -> None:
@@ -120,43 +117,6 @@ def test_internal_error_shows_its_traceback_on_request() -> None:
     assert "Traceback" in process.stderr
 
 
-_SWALLOWS = """
-import os, signal, time
-import asperity.cli.main as command_line
-class Finalized:
-    def __del__(self):
-        os.kill(os.getpid(), signal.SIGINT)
-        time.sleep(0.01)
-def main():
-    try:
-        os.kill(os.getpid(), signal.SIGINT)
-    except BaseException:
-        print("went on", flush=True)
-    {work}
-command_line.main = main
-from asperity.__main__ import main
-main()
-"""
-
-
-@pytest.mark.parametrize(
-    "work", ["return", "time.sleep(30); print('to the end')"], ids=["no longer", "and works on"]
-)
-@pytest.mark.parametrize("swallowed_by", ["try", "finalizer"])
-def test_swallowed_interrupt_is_reported_and_ends_the_program(work: str, swallowed_by: str) -> None:
-    script = _SWALLOWS.replace("{work}", work)
-    if swallowed_by == "finalizer":
-        script = script.replace(
-            "        os.kill(os.getpid(), signal.SIGINT)\n    except",
-            ("        Finalized()\n        print('went on', flush=True)\n    except"),
-        )
-    process = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, check=False, timeout=60
-    )
-    assert (process.returncode, process.stdout) == (130, "went on\n")
-    assert process.stderr == "asperity: interrupted\n"
-
-
 def test_interrupt_during_interpreter_shutdown_is_ignored() -> None:
     """Python restores the default handlers while it exits, so it ignores interrupts before."""
     script = (
@@ -171,23 +131,6 @@ def test_interrupt_during_interpreter_shutdown_is_ignored() -> None:
         [sys.executable, "-c", script], capture_output=True, text=True, check=False
     )
     assert (process.returncode, process.stdout, process.stderr) == (0, "done\n", "")
-
-
-def test_interrupt_inside_exec_ends_with_exit_code_130(tmp_path: Path) -> None:
-    """With ``-m`` Python would end by the signal; dataclasses, for one, are created by exec()."""
-    interrupted = "exec('import os, signal; os.kill(os.getpid(), signal.SIGINT)')"
-    (tmp_path / "own.py").write_text(
-        "import sys, types\n"
-        "fake = types.ModuleType('fake')\n"
-        f"fake.main = lambda: {interrupted}\n"
-        "sys.modules['asperity.cli.main'] = fake\n"
-        "from asperity.__main__ import main\n"
-        "main()\n"
-    )
-    process = subprocess.run(
-        [sys.executable, "-m", "own"], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
-    assert (process.returncode, process.stderr) == (130, "asperity: interrupted\n")
 
 
 @pytest.mark.parametrize("module", ["click", "asperity.cli.analysis_commands", "numba", "numpy"])
