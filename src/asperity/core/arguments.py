@@ -96,7 +96,7 @@ class Argument:
         if self.form == "integer":
             return check_integer(self.name, value, int(self.minimum))
         if self.form != "quantity" and isinstance(value, (list, tuple)):
-            return type(value)(self.validate(part) for part in value)
+            return type(value)([self.validate(part) for part in value])
         return self._validate_number(value)
 
     def _validate_number(self, value: Any) -> float:
@@ -109,10 +109,11 @@ class Argument:
         if self.minimum <= number <= self.maximum:
             return number
         low = self.format_value(self.minimum)
+        requirement = f"must be at least {low}"
         if self.maximum < math.inf:
             requirement = f"must be {low} to {self.format_value(self.maximum)}"
-        else:
-            requirement = f"must be at least {low}" if self.minimum else "must not be negative"
+        elif not self.minimum:
+            requirement = "must not be negative"
         raise ParameterError(self.name, requirement, value)
 
     def _validate_choice(self, value: Any) -> str:
@@ -207,8 +208,9 @@ def parse_arguments(
             raise ParameterError(f"{section}.{name}", f"is unknown; {suggest_names(name, known)}")
     values = {}
     for name, value in entries.items():
-        read = known[name].parse(value)
-        values[name] = str(folder / read) if folder and known[name].form == "path" else read
+        values[name] = known[name].parse(value)
+        if folder and known[name].form == "path":
+            values[name] = str(folder / values[name])
     return values
 
 
@@ -259,7 +261,9 @@ def _parse_vector(name: str, value: Any, unit: str) -> list[float]:
 
 def _parse_vectors(name: str, value: Any, unit: str) -> list[Any]:
     rows = [_parse_vector(name, row, unit) for row in _split(value)]
-    return [row[0] for row in rows] if all(len(row) == 1 for row in rows) else rows
+    if max(map(len, rows), default=1) > 1:
+        return rows
+    return [row[0] for row in rows]
 
 
 def _parse_fixed(name: str, value: Any, unit: str, *counts: int) -> tuple[float, ...]:
@@ -282,7 +286,7 @@ def _parse_direction(name: str, value: Any, _unit: str) -> tuple[float, ...]:
     parts = _split(value, r"[;,\s]")
     if len(parts) != 2:
         raise ParameterError(name, "must be x, y, or two numbers '1,0.5'", value)
-    vector = tuple(parse_quantity(name, part, "") for part in parts)
+    vector = tuple([parse_quantity(name, part, "") for part in parts])
     if not any(vector):
         raise ParameterError(name, "must have a length", value)
     return vector
@@ -296,11 +300,11 @@ def _parse_integer(name: str, value: Any, _unit: str) -> int:
 
 
 def _parse_switch(name: str, value: Any, _unit: str) -> bool:
-    words = {"yes": True, "true": True, "no": False, "false": False}
+    switches = {"yes": True, "true": True, "no": False, "false": False}
     word = str(value).strip().lower()
-    if word not in words:
+    if word not in switches:
         raise ParameterError(name, "must be true or false", value)
-    return words[word]
+    return switches[word]
 
 
 def _parse_channel(name: str, value: Any, _unit: str) -> str | int:

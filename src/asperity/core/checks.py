@@ -35,8 +35,8 @@ def check_keywords(
     """
     for name in keywords:
         if name not in accepted:
-            own = inspect.signature(function).parameters.values()
-            names = {one.name for one in own if one.kind is not one.VAR_KEYWORD}
+            parameters = inspect.signature(function).parameters.values()
+            names = {item.name for item in parameters if item.kind is not item.VAR_KEYWORD}
             raise ParameterError(name, f"is unknown; {suggest_names(name, names.union(accepted))}")
 
 
@@ -46,7 +46,9 @@ def check_items(name: str, values: Any) -> list[Any]:
     Raises:
         ParameterError: for none.
     """
-    items = [values] if isinstance(values, str) or not isinstance(values, Iterable) else [*values]
+    if isinstance(values, str) or not isinstance(values, Iterable):
+        return [values]
+    items = list(values)
     if not items:
         raise ParameterError(name, "must be one or several")
     return items
@@ -66,25 +68,27 @@ def check_real(name: str, value: object, unit: str = "") -> float:
     """
     if isinstance(value, str) and unit:
         value = parse_quantity(name, value, unit)
-    unit = f" [{unit}]" if unit else ""
     if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
-        raise ParameterError(name, f"must be a number{unit}", value)
+        raise ParameterError(name, f"must be a number{_unit_text(unit)}", value)
     number = float(value)
     if not math.isfinite(number):
-        raise ParameterError(name, f"must be finite{unit}", value)
+        raise ParameterError(name, f"must be finite{_unit_text(unit)}", value)
     if abs(number) > _LARGEST:
-        raise ParameterError(name, f"must be at most {_LARGEST:g}{unit}", value)
+        raise ParameterError(name, f"must be at most {_LARGEST:g}{_unit_text(unit)}", value)
     return number
+
+
+def _unit_text(unit: str) -> str:
+    return f" [{unit}]" if unit else ""
 
 
 def check_positive(name: str, value: object, unit: str = "") -> float:
     """Return a positive number, at least 1e-30; see :func:`check_real`."""
     number = check_real(name, value, unit)
-    unit = f" [{unit}]" if unit else ""
     if number <= 0.0:
-        raise ParameterError(name, f"must be positive{unit}", value)
+        raise ParameterError(name, f"must be positive{_unit_text(unit)}", value)
     if number < _SMALLEST:
-        raise ParameterError(name, f"must be at least {_SMALLEST:g}{unit}", value)
+        raise ParameterError(name, f"must be at least {_SMALLEST:g}{_unit_text(unit)}", value)
     return number
 
 
@@ -155,11 +159,15 @@ class Points:
         """Return flags per point, shape (n,); all False for ``None``."""
         if value is None:
             return np.zeros(self.count, dtype=bool)
-        given = np.asarray(value)
-        if given.shape != (() if self.is_single else (self.count,)) or given.dtype != bool:
-            wanted = "one truth value" if self.is_single else f"{self.count} truth values"
-            raise ParameterError(name, f"must be {wanted}", value)
-        return np.ascontiguousarray(given).reshape(self.count)
+        flags = np.asarray(value)
+        shape: tuple[int, ...] = (self.count,)
+        requirement = f"must be {self.count} truth values"
+        if self.is_single:
+            shape = ()
+            requirement = "must be one truth value"
+        if flags.shape != shape or flags.dtype != bool:
+            raise ParameterError(name, requirement, value)
+        return np.ascontiguousarray(flags).reshape(self.count)
 
 
 def check_points(name: str, value: ArrayLike, width: int, unit: str) -> Points:
@@ -219,11 +227,9 @@ def _check_shape_and_values(
 
 
 def _shape_text(shape: tuple[int | None, ...]) -> str:
-    lengths = ["n" if length is None else str(length) for length in shape]
-    return f"({lengths[0]},)" if len(lengths) == 1 else f"({', '.join(lengths)})"
+    return str(shape).replace("None", "n")
 
 
 def _describe_first_nonfinite(values: FloatArray) -> str:
     index: Any = np.argwhere(~np.isfinite(values))[0]
-    place = ", ".join(str(int(i)) for i in index)
-    return f"the value at [{place}] is {float(values[tuple(index)])}"
+    return f"the value at {index.tolist()} is {float(values[tuple(index)])}"

@@ -120,7 +120,11 @@ def escape_unprintable(text: object) -> str:
         >>> escape_unprintable("a\x1b[31m.x3p")
         'a\\x1b[31m.x3p'
     """
-    return "".join(sign if sign.isprintable() else repr(sign)[1:-1] for sign in str(text))
+    characters = list(str(text))
+    for index, character in enumerate(characters):
+        if not character.isprintable():
+            characters[index] = repr(character)[1:-1]
+    return "".join(characters)
 
 
 def print_message(text: str) -> None:
@@ -148,8 +152,8 @@ def suggest_names(name: str, choices: Iterable[str]) -> str:
         >>> suggest_names("omega3", ["omega.3", "touch"])
         "did you mean 'omega.3'? known: omega.3, touch"
     """
-    choice = sorted(choices)
-    return f"{nearest_names(name, choice)}known: {', '.join(choice)}"
+    known = sorted(choices)
+    return f"{nearest_names(name, known)}known: {', '.join(known)}"
 
 
 def nearest_names(name: str, choices: Iterable[str]) -> str:
@@ -163,4 +167,6 @@ def nearest_names(name: str, choices: Iterable[str]) -> str:
 
     lowered = {choice.lower().lstrip("-"): choice for choice in choices}
     near = difflib.get_close_matches(name.lower().lstrip("-"), lowered, n=2, cutoff=0.65)
-    return f"did you mean {' or '.join(repr(lowered[one]) for one in near)}? " if near else ""
+    if not near:
+        return ""
+    return f"did you mean {' or '.join([repr(lowered[match]) for match in near])}? "

@@ -197,8 +197,8 @@ def append_bytes(name: str, stream: FileIO, content: bytes, *, durable: bool = F
             os.fsync(stream.fileno())
     except OSError as error:
         stream.truncate(end)
-        words = f"cannot be written: {error.strerror}; what was recorded stays"
-        raise ParameterError(name, words, str(stream.name)) from None
+        requirement = f"cannot be written: {error.strerror}; what was recorded stays"
+        raise ParameterError(name, requirement, str(stream.name)) from None
 
 
 def json_text(value: Any) -> str:
@@ -254,7 +254,7 @@ def to_plain_data(value: Any, infinity: str | None = "inf") -> Any:
     if value is None or isinstance(value, (str, int)):
         return value
     if isinstance(value, float):
-        return value if math.isfinite(value) else _nonfinite_to_plain(value, infinity)
+        return _float_to_plain(value, infinity)
     if isinstance(value, Mapping):
         return {str(name): to_plain_data(item, infinity) for name, item in value.items()}
     if isinstance(value, (list, tuple)):
@@ -264,7 +264,9 @@ def to_plain_data(value: Any, infinity: str | None = "inf") -> Any:
     return attributes_to_dict(value, infinity=infinity)
 
 
-def _nonfinite_to_plain(value: float, infinity: str | None) -> str | None:
+def _float_to_plain(value: float, infinity: str | None) -> float | str | None:
+    if math.isfinite(value):
+        return value
     if infinity is None or math.isnan(value):
         return None
     return infinity if value > 0.0 else f"-{infinity}"
@@ -285,7 +287,7 @@ def attributes_to_dict(
         kind: type = type(value)
         if not is_dataclass(kind):
             raise TypeError(f"no plain data: {kind.__name__}")
-        names = tuple(name for name in written_names(kind) if name not in exclude)
+        names = tuple([name for name in written_names(kind) if name not in exclude])
     return {name: to_plain_data(getattr(value, name), infinity) for name in names}
 
 

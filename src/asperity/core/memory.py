@@ -58,10 +58,16 @@ def limit_memory(command: str, limit: int | None) -> Iterator[None]:
     """
     base = estimate_memory(command, 0)
     if limit is not None and limit < base:
-        words = f"must be at least {_format_size(base)} for {command}, got {_format_size(limit)}"
-        raise ParameterError("memory", words)
-    allowed, words = (limit, "given") if limit is not None else (free_memory(), "free")
-    token = _BUDGET.set(None if allowed is None else MemoryBudget(allowed, base, words))
+        needed = f"must be at least {_format_size(base)} for {command}"
+        raise ParameterError("memory", f"{needed}, got {_format_size(limit)}")
+    source = "given"
+    if limit is None:
+        limit = free_memory()
+        source = "free"
+    budget = None
+    if limit is not None:
+        budget = MemoryBudget(limit, base, source)
+    token = _BUDGET.set(budget)
     try:
         yield
     finally:
@@ -105,20 +111,23 @@ def _suggest_size(points: int, budget: MemoryBudget, axes: int) -> str:
 def _format_size(count: int) -> str:
     if count < 10**6:
         return f"{count} bytes"
-    return f"{count / 1e9:.3g} GB" if count >= 10**9 else f"{count / 1e6:.0f} MB"
+    if count < 10**9:
+        return f"{count / 1e6:.0f} MB"
+    return f"{count / 1e9:.3g} GB"
 
 
 def free_memory() -> int | None:
     """Return the free memory of the machine or of the control group [bytes], if it is known."""
-    known = []
+    limits = [math.inf]
     with suppress(OSError, ValueError, IndexError):  # another system
         text = Path("/proc/meminfo").read_text(encoding="ascii")  # includes reclaimable caches
-        known.append(int(text.split("MemAvailable:")[1].split()[0]) * 1024)
+        limits.append(int(text.split("MemAvailable:")[1].split()[0]) * 1024)
     group = Path("/sys/fs/cgroup")
-    for most, used in (
+    for limit, used in (
         (group / "memory.max", group / "memory.current"),
         (group / "memory/memory.limit_in_bytes", group / "memory/memory.usage_in_bytes"),
     ):
         with suppress(OSError, ValueError):  # another version, or no limit: "max"
-            known.append(int(most.read_text()) - int(used.read_text()))
-    return max(0, min(known)) if known else None
+            limits.append(int(limit.read_text()) - int(used.read_text()))
+    free = max(0, min(limits))
+    return None if math.isinf(free) else int(free)

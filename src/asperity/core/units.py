@@ -85,16 +85,19 @@ def parse_size(name: str, value: object) -> int:
     number, prefix, binary, byte = match.groups()
     if not prefix + byte:
         parse_quantity(name, number, "B")
-    return int(float(number) * (1024.0 if binary else 1000.0) ** " kMGT".index(prefix or " "))
+    base = 1024.0 if binary else 1000.0
+    return int(float(number) * base ** " kMGT".index(prefix or " "))
 
 
 def _with_common_units(number: str | float, unit: str) -> str:
-    written = number.strip() if isinstance(number, str) else f"{number:g}"
-    return " or ".join(f"{written}{usual}" for usual in _COMMON_UNITS.get(unit, (unit,)))
+    written = str(number).strip()
+    return " or ".join([f"{written}{usual}" for usual in _COMMON_UNITS.get(unit, (unit,))])
 
 
 def _requirement(unit: str) -> str:
-    return f"must be a quantity such as '1.5 {unit}'" if unit else "must be a number"
+    if not unit:
+        return "must be a number"
+    return f"must be a quantity such as '1.5 {unit}'"
 
 
 def _parse_number(text: str | float) -> float | None:
@@ -110,9 +113,9 @@ def _parse_with_unit(name: str, text: str, unit: str) -> float:
     match = _NUMBER.match(text.strip())
     if match is None or not unit:
         raise ParameterError(name, f"{_requirement(unit)}{_correction(text[:80], unit)}", text)
-    words = text.strip()[match.end() :].strip()
+    unit_text = text.strip()[match.end() :].strip()
     try:
-        return _scale(match.group(), _find_unit_factor(words, unit))
+        return _scale(match.group(), _find_unit_factor(unit_text, unit))
     except ValueError as error:
         reason = f"the unit {error}{_correction(text[:80], unit)}"
         raise ParameterError(name, f"{_requirement(unit)}; {reason}", text) from None
@@ -125,8 +128,10 @@ def _correction(text: str, unit: str) -> str:
     if re.fullmatch(r"\s*\d+,\d+[^\d,]*", text):
         return f"; with a decimal point {text.replace(',', '.')}"
     written = _NUMBER.sub("", text.strip(), count=1).strip()
-    known = {one.lower(): one for one in _SI_FACTORS.get(unit, ())}.get(written.lower())
-    return f"; write {text.replace(written, known)}" if known else ""
+    spellings = {name.lower(): name for name in _SI_FACTORS.get(unit, ())}
+    if written.lower() not in spellings:
+        return ""
+    return f"; write {text.replace(written, spellings[written.lower()])}"
 
 
 @lru_cache(maxsize=1024)
@@ -150,8 +155,10 @@ def _find_unit_factor(unit_text: str, unit: str) -> float:
 
 def _scale(number: str, factor: float) -> float:
     """Return number · factor, correctly rounded if the factor is a power of ten."""
-    exponent = round(math.log10(factor)) if factor > 0.0 else 0
-    if factor > 0.0 and abs(factor / 10.0**exponent - 1.0) < 1e-15:
+    if factor <= 0.0:
+        return float(number) * factor
+    exponent = round(math.log10(factor))
+    if abs(factor / 10.0**exponent - 1.0) < 1e-15:
         mantissa, _, power = number.lower().partition("e")
         if len(power) < 20:  # longer exponents give zero or infinity for any factor
             return float(f"{mantissa}e{int(power or 0) + exponent}")

@@ -137,7 +137,7 @@ def _check_symbols(law: Law, force: Any) -> None:
     state = (sym.DX, sym.DY) if law.stateful else ()
     allowed = {*sym.POSITION, sym.K, sym.H_MID, sym.H_HALF, *own, *state}
     allowed |= {*law.contact.formula_symbols()}
-    unknown = sorted(str(symbol) for symbol in force.free_symbols - allowed)
+    unknown = sorted(map(str, force.free_symbols - allowed))
     if unknown:
         raise LawError(
             f"law {law.letter}: force uses {', '.join(unknown)}, which the contact does not offer; "
@@ -197,7 +197,7 @@ def curl_verdict(law: Law) -> CurlVerdict:
     if law.stateful:
         reason = "the force depends on the deflection of the anchor: it is no field of position"
         return CurlVerdict(False, curl, reason)
-    if any(entry != 0 for entry in curl):
+    if curl != sp.zeros(3, 1):
         return CurlVerdict(False, curl, "the curl is not zero")
     if derivation.force.has(*PIECEWISE_FUNCTIONS):
         return CurlVerdict(False, curl, "not proved: the formula is piecewise")
@@ -220,13 +220,14 @@ def conservative_clamps(law: Law) -> tuple[str, ...]:
     derivation = derive(law)
     full = expand_definitions(derivation, derivation.jacobian)
     held = expand_definitions(derivation, derivation.jacobian_saturated).subs(DEPTH, _CLAMPED_DEPTH)
-    curl_free = {
-        components
-        for components in {clamp.held_components for clamp in CLAMPS.values()} - {()}
-        if _curl(sp.Matrix.vstack(*((held if i in components else full)[i, :] for i in range(3))))
-        == sp.zeros(3, 1)
-    }
-    return tuple(c.name for c in CLAMPS.values() if c.held_components in curl_free)
+    names = []
+    for clamp in CLAMPS.values():
+        mixed = sp.Matrix(full)
+        for component in clamp.held_components:
+            mixed[component, :] = held[component, :]
+        if clamp.held_components and _curl(mixed) == sp.zeros(3, 1):
+            names.append(clamp.name)
+    return tuple(names)
 
 
 def _curl(jacobian: Any) -> Any:

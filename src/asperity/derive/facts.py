@@ -97,8 +97,11 @@ def derive_facts(law: Law) -> LawFacts:
     verdict = curl_verdict(law)
     derivation = derive(law)
     force = derivation.force
+    clamps: tuple[str, ...] = ()
+    if verdict.conservative:
+        clamps = conservative_clamps(law)
     moves = bool(derivation.jacobian.free_symbols & set(POSITION))
-    x, y, z = (str(component) for component in verdict.curl)
+    x, y, z = map(str, verdict.curl)
     return LawFacts(
         conservative=verdict.conservative,
         reason=verdict.reason,
@@ -108,7 +111,7 @@ def derive_facts(law: Law) -> LawFacts:
         affine_in_depth=not moves
         and not force.has(*PIECEWISE_FUNCTIONS)
         and _is_affine(expand_definitions(derivation, derivation.jacobian)),
-        conservative_clamps=conservative_clamps(law) if verdict.conservative else (),
+        conservative_clamps=clamps,
     )
 
 
@@ -123,9 +126,9 @@ def _is_affine(jacobian: Any) -> bool:
         symbol: Fraction(2 * index + 3, 7 + index)
         for index, symbol in enumerate(sorted(second.free_symbols, key=str))
     }
-    if any(abs(entry.evalf(30, subs=point)) > 1e-20 for entry in second):
+    if max([abs(entry.evalf(30, subs=point)) for entry in second]) > 1e-20:
         return False
-    return all(is_zero(entry) for entry in second)
+    return all(map(is_zero, second))
 
 
 def facts_source(law: Law) -> str:

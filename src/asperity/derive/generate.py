@@ -81,25 +81,27 @@ def law_source(law: Law) -> str:
 def function_source(derivation: Derivation, name: str, values: list[Any], summary: str) -> str:
     """Return the source of one scalar function, with common subexpressions eliminated."""
     values = [sp.sympify(value) for value in values]
-    named = {symbol for symbol, _ in derivation.definitions}
-    needed = derivation.definitions if named & sp.Matrix(values).free_symbols else ()
-    every = [substitute_root(value) for value in [*(v for _, v in needed), *values]]
-    used = sp.Matrix([*values, *(v for _, v in needed)]).free_symbols
-    arguments = [symbol for symbol in ARGUMENT_ORDER if symbol in used]
-    own = [sp.Symbol(parameter, real=True) for parameter in derivation.law.parameters]
-    arguments += [symbol for symbol in own if symbol in used]
+    definitions = dict(derivation.definitions)
+    if definitions.keys().isdisjoint(sp.Matrix(values).free_symbols):
+        definitions = {}
+    used = sp.Matrix([*values, *definitions.values()]).free_symbols
+    parameters = [sp.Symbol(parameter, real=True) for parameter in derivation.law.parameters]
+    arguments = [symbol for symbol in (*ARGUMENT_ORDER, *parameters) if symbol in used]
+    values = [substitute_root(value) for value in values]
+    definitions = {symbol: substitute_root(value) for symbol, value in definitions.items()}
     lines = []
-    if any(ROOT in value.free_symbols for value in every):
+    if ROOT in sp.Matrix([*values, *definitions.values()]).free_symbols:
         lines.append("s = math.sqrt(1.0 + hx*hx + hy*hy)")
-    printer = _ScalarPrinter(own)
-    lines += [f"{symbol} = {printer.doprint(substitute_root(value))}" for symbol, value in needed]
-    shared, results = sp.cse(
-        every[len(needed) :], symbols=sp.numbered_symbols("t"), order="canonical"
-    )
+    printer = _ScalarPrinter(parameters)
+    lines += [f"{symbol} = {printer.doprint(value)}" for symbol, value in definitions.items()]
+    shared, results = sp.cse(values, symbols=sp.numbered_symbols("t"), order="canonical")
     lines += [f"{symbol} = {printer.doprint(value)}" for symbol, value in shared]
     lines.append("return (")
-    texts = [printer.doprint(value) for value in results]
-    lines += [f"    {text}.0," if text.lstrip("-").isdigit() else f"    {text}," for text in texts]
+    for value in results:
+        text = printer.doprint(value)
+        if text.lstrip("-").isdigit():
+            text = f"{text}.0"
+        lines.append(f"    {text},")
     lines.append(")")
     body = textwrap.indent("\n".join(lines), "    ")
     header = f"def {name}({', '.join(map(printer.doprint, arguments))}):"

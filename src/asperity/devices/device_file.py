@@ -105,21 +105,22 @@ def parse_device(content: Table, default_id: str, *, from_file: bool = False) ->
         raise ParameterError("device", f"has an unknown field {unknown[0]!r}; {hint}")
     device_id = _check_text("device.id", content.get("id", default_id))
     name = _check_text("device.name", content.get("name", device_id))
-    axes, driver = (
-        _check_text(f"device.{key}", content[key]) if key in content else ""
+    texts = {
+        key: _check_text(f"device.{key}", content[key])
         for key in ("axes", "driver")
-    )
+        if key in content
+    }
     notes = content.get("notes", [])
     if not isinstance(notes, (list, tuple)):
         raise ParameterError("device.notes", "must be a list of sentences", notes)
-    sentences = tuple(_check_text("device.notes", note) for note in notes)
+    sentences = tuple([_check_text("device.notes", note) for note in notes])
     data = {
         field: _parse_datum(field, value, from_file)
         for field, value in content.items()
         if field in FIELD_TABLE
     }
     _check_forces(data)
-    return Device(device_id, name, data, axes, sentences, driver)
+    return Device(device_id, name, data, notes=sentences, **texts)
 
 
 def override_device(device: Device, content: Table) -> Device:
@@ -160,14 +161,20 @@ def _check_forces(data: Mapping[str, Datum]) -> None:
 
 def _parse_datum(field: str, value: Any, from_file: bool, is_nested: bool = False) -> Datum:
     """Return a number of a device, with the values of other sources."""
-    name = f"device.{field}.also" if is_nested else f"device.{field}"
-    table = value if isinstance(value, dict) else {"value": value}
+    name = f"device.{field}"
+    keys: tuple[str, ...] = _DATUM_KEYS
     is_wall = field == "max_stiffness" and not is_nested
-    keys = (*(_DATUM_KEYS[:-1] if is_nested else _DATUM_KEYS), *(WALL_KEYS if is_wall else ()))
+    if is_nested:
+        name = f"{name}.also"
+        keys = _DATUM_KEYS[:-1]
+    if is_wall:
+        keys = (*_DATUM_KEYS, *WALL_KEYS)
+    table = value if isinstance(value, dict) else {"value": value}
     unknown = [key for key in table if key not in keys]
-    if unknown or "value" not in table:
-        problem = f"unknown key {unknown[0]!r}" if unknown else "no value"
-        raise ParameterError(name, f"has {problem}; known: {', '.join(keys)}")
+    if unknown:
+        raise ParameterError(name, f"has unknown key {unknown[0]!r}; known: {', '.join(keys)}")
+    if "value" not in table:
+        raise ParameterError(name, f"has no value; known: {', '.join(keys)}")
     argument = replace(FIELD_TABLE[field], name=name)
     quantity = table["value"]
     if "unit" in table:
@@ -178,7 +185,7 @@ def _parse_datum(field: str, value: Any, from_file: bool, is_nested: bool = Fals
     others = table.get("also", [])
     if not isinstance(others, list) or not all(isinstance(other, dict) for other in others):
         raise ParameterError(f"{name}.also", "must be a list of tables with value and unit", others)
-    also = tuple(_parse_datum(field, other, from_file, is_nested=True) for other in others)
+    also = tuple([_parse_datum(field, other, from_file, is_nested=True) for other in others])
     datum = (float(value), argument.unit or "1", source, verified, also, origin)
     if is_wall:
         return WallTest(*datum, **_parse_wall_test(name, value, table, from_file))
@@ -190,8 +197,8 @@ def _parse_verified(name: str, value: Any) -> tuple[bool, Origin]:
     if value in get_args(Origin):
         return True, value
     if not isinstance(value, bool):
-        words = "verified must be true or false, 'read', 'measured' or 'simulated'"
-        raise ParameterError(name, words, value)
+        requirement = "verified must be true or false, 'read', 'measured' or 'simulated'"
+        raise ParameterError(name, requirement, value)
     return value, "read"
 
 
@@ -214,15 +221,16 @@ def _parse_wall_test(name: str, stiffness: float, table: Table, from_file: bool)
         requirement = "must be 'exact' or 'stepped'"
         raise ParameterError(f"{name}.positions", requirement, details["positions"])
     axes = table.get("directions", [])
-    if not isinstance(axes, list) or not all(axis in ("x", "y", "z") for axis in axes):
+    if not isinstance(axes, list) or not {"x", "y", "z"}.issuperset(map(str, axes)):
         raise ParameterError(f"{name}.directions", "must be a list of 'x', 'y' and 'z'", axes)
     return {**details, "directions": tuple(dict.fromkeys(axes))}
 
 
 def _parse_quantity(name: str, value: Any, unit: str, from_file: bool) -> float:
     """Return a finite quantity [SI]; numbers are in SI units, except in a file."""
-    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    return parse_quantity(name, value, "" if is_number and not from_file else unit)
+    if isinstance(value, (int, float)) and not isinstance(value, bool) and not from_file:
+        unit = ""
+    return parse_quantity(name, value, unit)
 
 
 def _append_unit(name: str, value: Any, unit_name: Any, unit: str) -> Any:
@@ -278,8 +286,8 @@ def device_template() -> str:
     """
     lines = []
     for name, field in FIELD_TABLE.items():
-        unit = f" [{field.unit}]" if field.unit else ""
-        lines.append(f"# {name} = {_example_value(field)}  # {field.description}{unit}")
+        line = f"# {name} = {_example_value(field)}  # {field.description}"
+        lines.append(f"{line} [{field.unit}]" if field.unit else line)
     template = (_FOLDER / "device_template.toml").read_text("utf-8")
     return template.replace("# {fields}", "\n".join(lines))
 

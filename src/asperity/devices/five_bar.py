@@ -64,7 +64,7 @@ def joint_angles(linkage: FiveBar, point: ArrayLike) -> FloatArray:
         reach = math.hypot(x, y)
         if not abs(first - second) < reach < first + second:
             limit = f"must be reached by both arms, {first:g} m and {second:g} m long"
-            raise ParameterError("point", limit, tuple(float(value) for value in position))
+            raise ParameterError("point", limit, tuple(position.tolist()))
         opening = math.acos((first**2 + reach**2 - second**2) / (2.0 * first * reach))
         angles[arm] = math.atan2(y, x) + side * opening
     return angles

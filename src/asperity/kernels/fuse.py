@@ -111,10 +111,13 @@ def fuse_surface(law: Law, sampler: Modules, clamp: Clamp) -> ModuleType:
     """
     from asperity.kernels import batch_sine, block_loops, point_loops, stateful_loops
 
-    blocks = tuple(m for m in sampler if unit_from_module(m).kernels.for_blocks)
+    blocks = [module for module in sampler if unit_from_module(module).kernels.for_blocks]
     if blocks and _samples_only_at_probe(law):
         return fuse_on_texture(law, sampler, clamp, (block_loops,), (batch_sine, *blocks))
-    modules = (stateful_loops if law.stateful else point_loops, *law.contact.kernels())
+    loops: ModuleType = point_loops
+    if law.stateful:
+        loops = stateful_loops
+    modules = (loops, *law.contact.kernels())
     return fuse_on_texture(law, sampler, clamp, modules, (batch_sine,))
 
 
@@ -162,8 +165,9 @@ def source_on_texture(
     Raises:
         ParameterError: for a texture that lacks a function that the law requires.
     """
-    units, first = (tuple(map(unit_from_module, group)) for group in (modules, overrides))
-    extra = (*units, *map(unit_from_module, law.contact.kernels()))
+    units = [unit_from_module(module) for module in modules]
+    extra = [*units, *map(unit_from_module, law.contact.kernels())]
+    first = [unit_from_module(module) for module in overrides]
     available = _available_units(law, sampler, clamp, extra, first)
     with _texture_error_context(law, sampler):
         return _assemble(f"Law {law} on {sampler[0].__name__}.", loops_of(*units), available)
@@ -210,8 +214,8 @@ def _missing_function_error(
     provided = {name for m in sampler for name in unit_from_module(m).kernels.provides}
     names = ", ".join(sorted(provided & SAMPLER_FUNCTIONS.keys())) or "nothing"
     meaning = SAMPLER_FUNCTIONS.get(missing.name, "no standard function")
-    words = f"lacks the sampler function {missing.name!r} ({meaning}), {requirement}"
-    return ParameterError("texture", f"{words}; {sampler[0].__name__} provides {names}")
+    lack = f"lacks the sampler function {missing.name!r} ({meaning}), {requirement}"
+    return ParameterError("texture", f"{lack}; {sampler[0].__name__} provides {names}")
 
 
 @lru_cache(maxsize=256)
@@ -283,7 +287,7 @@ def _assemble(title: str, loops: Roots, available: Sequence[SourceUnit]) -> str:
     texts: list[str] = []
     homes: dict[str, str] = {}
     for part in link_modules(loops, available):
-        imports = "".join(f"from {homes[name]} import {name}\n" for name in part.imports)
+        imports = "".join([f"from {homes[name]} import {name}\n" for name in part.imports])
         texts.append(_module_header(part.title or title, part.source) + imports + part.source)
         homes[part.name] = _module_name(texts[-1])
     return _MODULE_SEPARATOR.join(texts)
@@ -295,7 +299,9 @@ def _module_header(title: str, source: str) -> str:
         for name, home in INTRINSIC_MODULES.items()
         if f"{name}(" in source
     ]
-    return _HEADER.format(title=title) + "".join([*used, "\n"] if used else [])
+    if used:
+        used.append("\n")
+    return _HEADER.format(title=title) + "".join(used)
 
 
 def _module_name(text: str) -> str:

@@ -26,9 +26,10 @@ _intrinsic: Any = intrinsic
 
 
 def _call_address(_typing: Any, address: Any, *arguments: Any) -> Any:
-    is_tuple = len(arguments) == 1 and isinstance(arguments[0], types.BaseTuple)
-    given = arguments[0] if is_tuple else arguments
-    kinds = [_c_type(kind) for kind in given]
+    passed_types: Any = arguments
+    if len(arguments) == 1 and isinstance(arguments[0], types.BaseTuple):
+        passed_types = arguments[0]
+    kinds = [_c_type(kind) for kind in passed_types]
     if not isinstance(address, types.Integer) or None in kinds:
         return None
 
@@ -42,7 +43,7 @@ def _call_address(_typing: Any, address: Any, *arguments: Any) -> Any:
         answer = builder.call(builder.inttoptr(word, pointer), passed)
         return builder.sext(answer, ir.IntType(64))
 
-    return types.int64(address, _StarArgTuple.from_types(given)), generate
+    return types.int64(address, _StarArgTuple.from_types(passed_types)), generate
 
 
 def _c_argument(context: Any, builder: Any, numba_type: Any, value: Any) -> Any:
@@ -61,7 +62,9 @@ def _c_type(numba_type: Any) -> Any:
         return ir.IntType(8).as_pointer()
     if numba_type == types.float64:
         return ir.DoubleType()
-    return ir.IntType(64) if isinstance(numba_type, (types.Integer, types.Boolean)) else None
+    if isinstance(numba_type, (types.Integer, types.Boolean)):
+        return ir.IntType(64)
+    return None
 
 
 def _element_address(context: Any, builder: Any, signature: Any, values: Any) -> Any:
@@ -80,7 +83,9 @@ def _load_acquire(_typing: Any, array: Any, index: Any) -> Any:
             _element_address(context, builder, signature, values), "acquire", _WORD_BYTES
         )
 
-    return (types.int64(array, types.intp), generate) if _is_int64_array(array) and index else None
+    if not _is_int64_array(array) or not index:
+        return None
+    return types.int64(array, types.intp), generate
 
 
 def _store_release(_typing: Any, array: Any, index: Any, value: Any) -> Any:

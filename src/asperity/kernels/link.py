@@ -92,8 +92,8 @@ def unit_from_source(
     """Return the unit of a source text; the namespace holds its records and numbers."""
     functions = [node for node in parse_source(source).body if isinstance(node, ast.FunctionDef)]
     if kernels.provides == EVERY_FUNCTION:
-        every = tuple(node.name for node in functions if node.name not in kernels.loops)
-        kernels = replace(kernels, provides=every)
+        names = [node.name for node in functions if node.name not in kernels.loops]
+        kernels = replace(kernels, provides=tuple(names))
     unit = SourceUnit(name, kernels, {}, {}, {})
     rows = source.split("\n")  # once; ast.get_source_segment would split it for every function
     for node in functions:
@@ -109,15 +109,16 @@ def unit_from_source(
 def _called_functions(function: ast.FunctionDef) -> frozenset[str]:
     nodes = ast.walk(function)
     calls = [node.func for node in nodes if isinstance(node, ast.Call)]
-    return frozenset(call.id for call in calls if isinstance(call, ast.Name)) - _UNDECLARED_CALLS
+    names = [call.id for call in calls if isinstance(call, ast.Name)]
+    return frozenset(names) - _UNDECLARED_CALLS
 
 
 def _used_definitions(
     function: ast.FunctionDef, namespace: Mapping[str, object], native: tuple[str, ...]
 ) -> dict[str, str]:
     """Return the lines that define records, numbers and native functions that a body uses."""
-    body = (node for part in function.body for node in ast.walk(part))
-    names = {node.id for node in body if isinstance(node, ast.Name)}
+    body = ast.Module(function.body, [])
+    names = {node.id for node in ast.walk(body) if isinstance(node, ast.Name)}
     lines = {}
     for name in sorted(names & namespace.keys()):
         value = namespace[name]
@@ -211,8 +212,8 @@ def link_modules(
             elif owners[callee] is not unit:
                 raise _duplicate_error(callee, owners[callee], unit)
             elif callee not in parts:  # its part is not complete yet
-                words = f"{unit.name}: the shared function {callee!r} calls itself"
-                raise ParameterError("sampler", words)
+                reason = f"{unit.name}: the shared function {callee!r} calls itself"
+                raise ParameterError("sampler", reason)
         parts[name] = LinkedModule(
             title, name, _render_functions(taken, available), tuple(sorted(borrowed))
         )
@@ -243,9 +244,9 @@ def _resolve_calls(
     return taken, borrowed
 
 
-def _duplicate_error(name: str, one: SourceUnit, other: SourceUnit) -> ParameterError:
-    words = f"function {name!r} is defined by both {one.name} and {other.name}"
-    return ParameterError("sampler", words)
+def _duplicate_error(name: str, first: SourceUnit, second: SourceUnit) -> ParameterError:
+    reason = f"function {name!r} is defined by both {first.name} and {second.name}"
+    return ParameterError("sampler", reason)
 
 
 def _render_functions(functions: Mapping[str, SourceUnit], available: Sequence[SourceUnit]) -> str:
@@ -266,6 +267,6 @@ def _definition_lines(functions: Mapping[str, SourceUnit]) -> str:
     for name, unit in functions.items():
         for used, line in unit.definitions[name].items():
             if lines.setdefault(used, line) != line:
-                words = f"defines {used!r} in two ways: {line!r} and {lines[used]!r}"
-                raise ParameterError("sampler", words)
+                reason = f"defines {used!r} in two ways: {line!r} and {lines[used]!r}"
+                raise ParameterError("sampler", reason)
     return "\n".join(sorted(lines.values()))

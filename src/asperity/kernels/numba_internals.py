@@ -133,7 +133,7 @@ class SharedLowering(WideVectorLowering):
     def run_pass(self, state: Any) -> bool:
         """Lower a function."""
         # Instead of a counter; Numba's symbols contain the names of records, but not their fields.
-        fields = repr([_record_fields(one) for one in state.args])
+        fields = repr([_record_fields(argument) for argument in state.args])
         state.func_ir.func_id.unique_id = hashlib.sha256(fields.encode()).hexdigest()[:16]
         return super().run_pass(state)
 
@@ -146,9 +146,9 @@ class _CustomLoweringCompiler(_Compiler):  # type: ignore[misc]  # see above
     def define_pipelines(self) -> list[Any]:
         """Return Numba's pipeline with its lowering replaced."""
         (manager,) = super().define_pipelines()
+        replaced = {typed_passes.NativeLowering: self.lowering}
         manager.passes = [
-            (self.lowering if step is typed_passes.NativeLowering else step, description)
-            for step, description in manager.passes
+            (replaced.get(step, step), description) for step, description in manager.passes
         ]
         manager.finalize()
         return [manager]
@@ -203,7 +203,7 @@ def _function_id(dispatcher: Any, known_ids: dict[FunctionType, int]) -> int:
         names = function.__globals__
         content = (code.co_code, repr(code.co_consts), code.co_names, code.co_varnames)
         options = repr(sorted(dispatcher.targetoptions.items()))
-        used = tuple(_global_key(names.get(name), known_ids) for name in code.co_names)
+        used = tuple([_global_key(names.get(name), known_ids) for name in code.co_names])
         whole = (function.__name__, *content, repr(function.__defaults__), options, used)
         known_ids[function] = _FUNCTION_IDS.setdefault(whole, len(_FUNCTION_IDS))
     return known_ids[function]
@@ -240,15 +240,15 @@ class MachineCodeCache:
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the compiled overload of a signature, or ``None`` to compile it."""
         key = self._key(sig, target_context.codegen())
-        found = self._load_cached(key, target_context)
-        if found is None and cache.wait_and_lock(CODE_NAMESPACE, key):
-            found = self._load_cached(key, target_context)
-            if found is not None:
+        overload = self._load_cached(key, target_context)
+        if overload is None and cache.wait_and_lock(CODE_NAMESPACE, key):
+            overload = self._load_cached(key, target_context)
+            if overload is not None:
                 cache.unlock(CODE_NAMESPACE, key)
-        if found is None:
+        if overload is None:
             for callback in COMPILE_CALLBACKS:
                 callback(self._function.__name__)
-        return found
+        return overload
 
     def _load_cached(self, key: str, target_context: Any) -> Any:
         target_context.refresh()
@@ -269,10 +269,10 @@ class MachineCodeCache:
         *parts, environments = self._mark(data)._reduce()
         # A link-only function may be of a module that does not exist where this code is loaded; no
         # compiled function uses its environment.
-        own = self._function.__module__
-        mine = tuple(one for one in environments if one.globals["__name__"] == own)
+        module = self._function.__module__
+        own = tuple([env for env in environments if env.globals["__name__"] == module])
         key = self._key(sig, data.codegen)
-        content = (*parts, mine, _shared_callees(data.library))
+        content = (*parts, own, _shared_callees(data.library))
         cache.put_entry(CODE_NAMESPACE, key, _serialize(content))
         cache.unlock(CODE_NAMESPACE, key)
 
@@ -292,16 +292,16 @@ class MachineCodeCache:
 
 def _shared_callees(library: Any) -> tuple[Any, ...]:
     """Return module, name and argument types of the shared functions that code calls."""
-    found = dict[Any, None]()
+    callees = dict[Any, None]()
     waiting = [library]
-    for one in waiting:
-        for linked in one._linking_libraries:
+    for caller in waiting:
+        for linked in caller._linking_libraries:
             origin = getattr(linked, "origin", None)
             if origin is not None:
-                found[origin] = None
+                callees[origin] = None
             elif linked not in waiting:
                 waiting.append(linked)
-    return tuple(found)
+    return tuple(callees)
 
 
 def _record_fields(numba_type: Any) -> tuple[Any, ...]:

@@ -103,7 +103,7 @@ class LawCode:
     def signatures(self) -> dict[str, tuple[str, ...]]:
         """The argument names of each of the law's functions."""
         return {
-            node.name: tuple(argument.arg for argument in node.args.args)
+            node.name: tuple([argument.arg for argument in node.args.args])
             for node in parse_source(self.source).body
             if isinstance(node, ast.FunctionDef)
         }
@@ -114,13 +114,13 @@ class LawCode:
 
     def argument_names(self, *functions: str) -> frozenset[str]:
         """Return the names of all arguments of some of the law's functions."""
-        return frozenset(name for function in functions for name in self.signatures[function])
+        return frozenset().union(*[self.signatures[function] for function in functions])
 
     @property
     def unpack_line(self) -> str:
         """The line that unpacks the parameters."""
-        own = map(parameter_name, self.law.parameters)
-        return f"{', '.join((*SHARED_PARAMETERS, *own))} = law"
+        names = (*SHARED_PARAMETERS, *map(parameter_name, self.law.parameters))
+        return f"{', '.join(names)} = law"
 
 
 def probe_source(code: LawCode) -> str:
@@ -156,8 +156,9 @@ def _probe_force(code: LawCode, warm: bool = False) -> str:
 
 def _probe_jacobian(code: LawCode) -> str:
     every = (*_FORCE, *_JACOBIAN)
-    held = ("law_force", "law_jacobian_saturated") if code.clamp.changes_force else ()
-    called = ("law_jacobian", *held)
+    called = ["law_jacobian"]
+    if code.clamp.changes_force:
+        called += ["law_force", "law_jacobian_saturated"]
     lines = _contact_prologue(code, code.argument_names(*called), every)
     lines += code.clamp.jacobian_code(*map(code.call, called))
     head = f"probe_jacobian(x, y, z, {', '.join(_STATE)}, texture, law)"
@@ -174,16 +175,13 @@ def _probe_depth(code: LawCode) -> str:
 
 
 def _probe_tick(code: LawCode) -> str:
-    state = (
-        [code.unpack_line, *_STICK_SLIP.splitlines()] if code.law.stateful else ["dx = dy = 0.0"]
-    )
-    warm = "_warm" if code.law.contact.has_warm_start else ""
-    arguments = f"x, y, z, dx, dy{', warm_start' if warm else ''}, texture, law"
-    lines = [
-        *state,
-        f"fx, fy, fz = probe_force{warm}({arguments})",
-        "return fx, fy, fz, ax, ay, held",
-    ]
+    lines = ["dx = dy = 0.0"]
+    if code.law.stateful:
+        lines = [code.unpack_line, *_STICK_SLIP.splitlines()]
+    call = "probe_force(x, y, z, dx, dy, texture, law)"
+    if code.law.contact.has_warm_start:
+        call = "probe_force_warm(x, y, z, dx, dy, warm_start, texture, law)"
+    lines += [f"fx, fy, fz = {call}", "return fx, fy, fz, ax, ay, held"]
     return _function_source("probe_tick(x, y, z, ax, ay, held, warm_start, texture, law)", lines)
 
 
@@ -210,6 +208,6 @@ def energy_source(code: LawCode) -> str:
 
 def contact_source(code: LawCode) -> str:
     """Return ``contact_jacobian``, whose arguments are contact and height derivatives there."""
-    given = ("x", "y", "z", "depth", "h", "hx", "hy", "hxx", "hxy", "hyy", *_STATE)
+    arguments = ("x", "y", "z", "depth", "h", "hx", "hy", "hxx", "hxy", "hyy", *_STATE)
     lines = [code.unpack_line, f"return {code.call('law_jacobian')}"]
-    return _function_source(f"contact_jacobian({', '.join(given)}, law)", lines)
+    return _function_source(f"contact_jacobian({', '.join(arguments)}, law)", lines)

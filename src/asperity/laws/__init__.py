@@ -58,10 +58,9 @@ def register(law: Law) -> Law:
     return law
 
 
-def registered_arguments(laws: Iterable[Law] | None = None) -> dict[str, Argument]:
+def registered_arguments(laws: Iterable[Law] = REGISTERED_LAWS.values()) -> dict[str, Argument]:
     """Return the parameters of laws by name; of all registered laws by default."""
-    chosen = REGISTERED_LAWS.values() if laws is None else laws
-    return {name: argument for law in chosen for name, argument in law.arguments.items()}
+    return {name: argument for law in laws for name, argument in law.arguments.items()}
 
 
 def check_parameters_apply(requested: Iterable[str], laws: Sequence[Law]) -> None:
@@ -74,9 +73,9 @@ def check_parameters_apply(requested: Iterable[str], laws: Sequence[Law]) -> Non
     for name in requested:
         takers = [law.letter for law in REGISTERED_LAWS.values() if name in law.arguments]
         if takers and name not in taken:
-            letters, others = (", ".join(part) for part in ((law.letter for law in laws), takers))
-            words = f"has no effect: law {letters} does not take it; law {others} does"
-            raise ParameterError(name, words)
+            letters = ", ".join([law.letter for law in laws])
+            reason = f"law {letters} does not take it; law {', '.join(takers)} does"
+            raise ParameterError(name, f"has no effect: {reason}")
 
 
 def distribute_parameters(
@@ -90,10 +89,12 @@ def distribute_parameters(
     declared = registered_arguments(laws)
     for name in values:
         if name not in declared:
-            hint = suggest_names(name, declared) if declared else "those laws have no parameters"
-            letters = ", ".join(law.letter for law in laws)
-            words = f"contains {name!r}, which is no parameter of the laws {letters}; {hint}"
-            raise ParameterError("law_parameters", words)
+            hint = "those laws have no parameters"
+            if declared:
+                hint = suggest_names(name, declared)
+            letters = ", ".join([law.letter for law in laws])
+            reason = f"contains {name!r}, which is no parameter of the laws {letters}"
+            raise ParameterError("law_parameters", f"{reason}; {hint}")
     return [{name: values[name] for name in law.arguments if name in values} for law in laws]
 
 
@@ -126,7 +127,7 @@ def find_law(law: str | Law) -> Law:
     registered = _find_registered(law)
     if registered is not None:
         return registered
-    names = [name for one in REGISTERED_LAWS.values() for name in (one.letter, one.name)]
+    names = [name for known in REGISTERED_LAWS.values() for name in (known.letter, known.name)]
     raise ParameterError("law", f"is unknown: {law!r}; {suggest_names(law, names)}")
 
 
@@ -150,11 +151,10 @@ def find_laws(laws: str | Sequence[str | Law]) -> tuple[Law, ...]:
             parts = list("".join(laws.split()).strip(",;"))
     else:
         parts = list(laws)
-    found = tuple(find_law(part) for part in parts)
-    if not found:
+    named = tuple(map(find_law, parts))
+    if not named:
         raise ParameterError("laws", "must name at least one law", laws)
-    letters = sorted(law.letter for law in found)
-    for letter, following in pairwise(letters):
+    for letter, following in pairwise(sorted([law.letter for law in named])):
         if letter == following:
             raise ParameterError("laws", f"names law {letter} twice", laws)
-    return found
+    return named

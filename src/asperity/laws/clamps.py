@@ -93,15 +93,19 @@ class Clamp:
         return [*lines, *self._wall_branch("energy += 0.5 * k * (floor - z) * (floor - z)")]
 
     def _held(self, names: tuple[str, ...], components: list[int] | tuple[int, ...]) -> str:
-        pairs = zip(names, components, strict=True)
-        return ", ".join(n if c in self.held_components else "_unclamped" for n, c in pairs)
+        targets = ["_unclamped"] * len(names)
+        for index, component in enumerate(components):
+            if component in self.held_components:
+                targets[index] = names[index]
+        return ", ".join(targets)
 
     def _clamped_branch(self, *assignments: str) -> list[str]:
         return ["if depth > clamp_depth:", "    depth = clamp_depth", *assignments]
 
     def _wall_branch(self, *statements: str) -> list[str]:
-        lines = ["if z < floor:", *(f"    {statement}" for statement in statements)]
-        return lines if self.has_backing_wall else []
+        if not self.has_backing_wall:
+            return []
+        return ["if z < floor:", *[f"    {statement}" for statement in statements]]
 
 
 NONE = Clamp("none", "the law as it is")

@@ -97,7 +97,7 @@ class Law:
         if self.clampable and not self.contact.clampable:
             raise LawError(f"law {self.letter}: a law on the {self.contact} contact is not clamped")
         if self.stateful and not self.contact.supports_state:
-            names = ", ".join(c.name for c in CONTACTS.values() if c.supports_state)
+            names = ", ".join([c.name for c in CONTACTS.values() if c.supports_state])
             raise LawError(f"law {self.letter}: a law with state must be on the {names} contact")
         missing = [name for name in self.contact.parameters if name not in self.arguments]
         if missing:
@@ -119,7 +119,9 @@ class Law:
         """
         for name in values:
             if name not in self.arguments:
-                hint = suggest_names(name, self.arguments) if self.arguments else "it has none"
+                hint = "it has none"
+                if self.arguments:
+                    hint = suggest_names(name, self.arguments)
                 raise ParameterError("law_parameters", f"names {name!r}; law {self}: {hint}")
         return {name: self.arguments[name].validate(value) for name, value in values.items()}
 
