@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
+import json
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -55,10 +56,13 @@ class Shot:
 
 
 _PICTURES = """[...document.querySelectorAll("figure")].map((figure) => {
+  const title = figure.closest("section").querySelector("h2, h3").textContent;
   const view = figure.querySelector(".view"), svg = view.querySelector("svg");
+  if (%(title)s && title !== %(title)s) return null;
+  if (%(end)s && view.scrollWidth <= view.clientWidth + 1) return null;
   if (%(end)s) view.scrollLeft = view.scrollWidth;
   const frame = view.getBoundingClientRect(), to = svg.getScreenCTM();
-  return { title: figure.closest("section").querySelector("h2, h3").textContent,
+  return { title,
     frame: [frame.left + scrollX, frame.top + scrollY, frame.width, frame.height],
     ground: getComputedStyle(figure).backgroundColor,
     panels: JSON.parse(figure.querySelector("script").textContent).map((panel) => {
@@ -67,13 +71,19 @@ _PICTURES = """[...document.querySelectorAll("figure")].map((figure) => {
       const [a, b] = corners.map((corner) => corner.matrixTransform(to));
       return [[a.x - frame.left, a.y - frame.top, b.x - frame.left, b.y - frame.top], panel];
     }) };
-})"""
+}).filter((one) => one)"""
 
 
-def pictures(browser: Browser, *, end: bool = False) -> list[Shot]:
-    """Return all pictures of the open page, scrolled to their right end if ``end``."""
+def pictures(browser: Browser, *, title: str = "", end: bool = False) -> list[Shot]:
+    """Return the pictures of the open page.
+
+    Args:
+        browser: shows the page.
+        title: heading of the section of the one that is returned.
+        end: whether only those that scroll are returned, scrolled to their right end.
+    """
     shots = []
-    for one in browser.ask(_PICTURES % {"end": "true" if end else "false"}):
+    for one in browser.ask(_PICTURES % {"title": json.dumps(title), "end": json.dumps(end)}):
         image = shoot(browser, *one["frame"])
         ground = np.array([int(part) for part in re.findall(r"\d+", one["ground"])[:3]]) / 255.0
         panels = [(tuple(round(side) for side in box), panel) for box, panel in one["panels"]]

@@ -7,6 +7,9 @@ has a control: a page that is broken on purpose, in which it finds the fault.
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import deepcopy
+from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +32,7 @@ import asperity as asp
 from asperity.report import html_text
 
 pytestmark = needs_browser
-DATA = Path(__file__).parents[3] / "shared" / "data"
+DATA = Path(__file__).parents[4] / "shared" / "data"
 WIDTHS = (1280, 400)
 
 
@@ -50,6 +53,21 @@ def land_page(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def cloth_page(report_pages: dict[str, Path]) -> Path:
     return report_pages["comparison"]
+
+
+ShootPage = Callable[..., list[Shot]]
+
+
+@pytest.fixture(scope="module")
+def shoot_page(browser: Browser) -> ShootPage:
+    """Return a function that returns the pictures of a page, taken once for each look."""
+
+    @cache
+    def shoot(path: Path, width: int = 1280, dark: bool = False, end: bool = False) -> list[Shot]:
+        open_page(browser, path, width, dark=dark)
+        return pictures(browser, end=end)
+
+    return shoot
 
 
 @pytest.fixture(params=["cloth_page", "land_page"])
@@ -104,25 +122,23 @@ def outside_frame(shots: list[Shot]) -> list[str]:
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("dark", [False, True])
 def test_every_picture_shows_its_content(
-    browser: Browser, page: Path, width: int, dark: bool
+    shoot_page: ShootPage, page: Path, width: int, dark: bool
 ) -> None:
-    open_page(browser, page, width, dark=dark)
-    for end in (False, True):
-        shots = pictures(browser, end=end)
-        assert len(shots) == 7
-        assert empty_panels(shots) == []
-        assert outside_frame(shots) == []
-        if not end:
-            assert blank_pictures(shots) == []
+    shots = shoot_page(page, width, dark)
+    assert len(shots) == 7
+    assert blank_pictures(shots) == []
+    for some in (shots, shoot_page(page, width, dark, end=True)):
+        assert empty_panels(some) == []
+        assert outside_frame(some) == []
 
 
-def test_surface_has_no_blank_half(browser: Browser, page: Path) -> None:
+def test_surface_has_no_blank_half(browser: Browser, shoot_page: ShootPage, page: Path) -> None:
     """Map and section together fill nine tenths of the frame's width and height."""
-    open_page(browser, page, 1280)
-    shot = next(one for one in pictures(browser) if one.title == "The surface")
+    shot = next(one for one in shoot_page(page) if one.title == "The surface")
     assert filled_sides(shot) > (0.9, 0.85)
+    open_page(browser, page, 1280)
     browser.ask("document.querySelector('figure svg').style.clipPath = 'inset(0 50% 0 0)'")
-    shot = next(one for one in pictures(browser) if one.title == "The surface")
+    (shot,) = pictures(browser, title="The surface")
     assert filled_sides(shot)[0] < 0.65
 
 
@@ -151,9 +167,8 @@ def test_blank_picture_is_detected(
     assert len(check(pictures(browser))) >= 4
 
 
-def test_data_outside_the_frame_are_detected(browser: Browser, cloth_page: Path) -> None:
-    open_page(browser, cloth_page, 1280)
-    shots = pictures(browser)
+def test_data_outside_the_frame_are_detected(shoot_page: ShootPage, cloth_page: Path) -> None:
+    shots = [replace(shot, panels=deepcopy(shot.panels)) for shot in shoot_page(cloth_page)]
     for shot in shots:
         for _box, panel in shot.panels:
             panel["y"]["high"] = panel["y"]["low"]
@@ -185,17 +200,9 @@ def structure_differences(light: list[Shot], dark: list[Shot]) -> list[str]:
     return different
 
 
-def shoot_both(browser: Browser, path: Path, fault: str = "") -> tuple[list[Shot], list[Shot]]:
-    """Return the pictures in light and in dark, there with a further style."""
-    open_page(browser, path, 1280)
-    light = pictures(browser)
-    open_page(browser, path, 1280, dark=True)
-    add_style(browser, fault)
-    return light, pictures(browser)
-
-
-def test_light_and_dark_differ_in_colour_alone(browser: Browser, page: Path) -> None:
-    light, dark = shoot_both(browser, page)
+def test_light_and_dark_differ_in_colour_alone(shoot_page: ShootPage, page: Path) -> None:
+    light = shoot_page(page)
+    dark = shoot_page(page, dark=True)
     assert structure_differences(light, dark) == []
     for one, other in zip(light, dark, strict=True):
         assert brightness(one.image) > brightness(other.image) + 0.1
@@ -216,9 +223,12 @@ def brightness(image: Image) -> float:
     ],
 )
 def test_other_structure_in_dark_is_detected(
-    browser: Browser, cloth_page: Path, fault: str
+    browser: Browser, shoot_page: ShootPage, cloth_page: Path, fault: str
 ) -> None:
-    assert structure_differences(*shoot_both(browser, cloth_page, fault))
+    light = shoot_page(cloth_page)
+    open_page(browser, cloth_page, 1280, dark=True)
+    add_style(browser, fault)
+    assert structure_differences(light, pictures(browser))
 
 
 # --- width ----------------------------------------------------------------------------------------
