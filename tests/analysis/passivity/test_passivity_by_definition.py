@@ -69,7 +69,6 @@ def make_loop(stiffness: float = 1.0, **more: Any) -> DeviceLoop:
     rate, damping, virtual = plain["rate"] or 0, plain["damping"], plain["virtual_damping"] or 0
     return DeviceLoop(
         **plain,
-        stiffness=Fraction(stiffness),
         damping_gain=damping * rate if damping is not None and rate else None,
         virtual_damping_gain=Fraction(virtual * rate),
         known_delay=Fraction(plain["delay"] or 0),

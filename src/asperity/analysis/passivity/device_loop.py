@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum, auto
 from fractions import Fraction
 
@@ -42,7 +42,6 @@ class DeviceLoop:
         conservative: whether the law is conservative.
         obstacle: why the rules for conservative laws do not apply; ``None`` if they do.
         continuity: jumps of the force, where they are the obstacle; else ``None``.
-        stiffness: k of the surface [N/m].
         rate: update rate 1/T [Hz].
         damping: σ₀ [N s/m].
         damping_gain: σ₀/T [N/m].
@@ -65,7 +64,6 @@ class DeviceLoop:
     conservative: bool
     obstacle: Obstacle | None
     continuity: Continuity | None
-    stiffness: Fraction
     rate: Fraction | None
     damping: Fraction | None
     damping_gain: Fraction | None
@@ -77,6 +75,15 @@ class DeviceLoop:
     friction: Fraction
     position_step: Fraction
     force_step: Fraction
+
+    @property
+    def stiffness(self) -> Fraction:
+        """K of the surface [N/m]."""
+        return Fraction(self.surface.stiffness)
+
+    def with_leak(self, surface: Surface, leak: Leak) -> DeviceLoop:
+        """Return the loop of the same surface at another stiffness, with its worst loop."""
+        return replace(self, surface=surface, leak=leak)
 
     @property
     def wall_stiffness(self) -> Fraction | None:
@@ -126,7 +133,7 @@ class DeviceLoop:
 
 
 def make_device_loop(
-    surface: Surface, device: Device, q: Bound, one_sided: Bound, leak: Leak | None
+    surface: Surface, device: Device, q: Bound, one_sided: Bound, leak: Leak | None = None
 ) -> DeviceLoop:
     """Return the loop of a surface and a device.
 
@@ -154,7 +161,6 @@ def make_device_loop(
         conservative=surface.facts.conservative,
         obstacle=obstacle,
         continuity=jumps,
-        stiffness=Fraction(surface.stiffness),
         rate=rate,
         damping=damping,
         damping_gain=None if damping is None or rate is None else damping * rate,

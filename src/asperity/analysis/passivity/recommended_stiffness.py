@@ -182,6 +182,7 @@ class StiffnessRecommendation:
         margin: safety margin below it.
         stiffness: recommended stiffness [N/m], rounded down to three digits; 0 if no stable
             stiffness is known, or if there is no limit.
+        start: the same; without one the smooth wall's K₀, or 1000 N/m where that is unknown too.
         wall_stiffness: K₀ for this law [N/m]: in the lightest direction, at the device's rate;
             ``None`` if it is unknown.
     """
@@ -189,6 +190,7 @@ class StiffnessRecommendation:
     stability_limit: StabilityLimit
     margin: Margin
     stiffness: float
+    start: float
     wall_stiffness: float | None
 
 
@@ -203,13 +205,21 @@ def recommend_stiffness(
         q: its characteristic number.
         one_sided: its one-sided number.
     """
-    loop = device_loop.make_device_loop(surface, device, q, one_sided, None)
+    return recommend_on_loop(device_loop.make_device_loop(surface, device, q, one_sided))
+
+
+def recommend_on_loop(loop: device_loop.DeviceLoop) -> StiffnessRecommendation:
+    """Return the recommended stiffness of a surface's law on a device; its own does not count."""
     limit = stability_limit(loop, criteria.evaluate_criteria(loop))
-    margin = safety_margin(surface, device, limit)
-    known = limit.stiffness or 0.0
-    start = round_down(margin.factor * known) if math.isfinite(known) else 0.0
+    margin = safety_margin(loop.surface, loop.device, limit)
+    stiffness = 0.0
+    if limit.stiffness is not None and math.isfinite(limit.stiffness):
+        stiffness = round_down(margin.factor * limit.stiffness)
+    start = stiffness
+    if not stiffness:
+        start = DEFAULT_STIFFNESS if loop.wall_test is None else loop.wall_test.value
     wall = None if loop.wall_stiffness is None else float(loop.wall_stiffness)
-    return StiffnessRecommendation(limit, margin, start, wall)
+    return StiffnessRecommendation(limit, margin, stiffness, start, wall)
 
 
 _GENTLE_TEXTURE = Sinusoid(1e-6, 1e-2)
@@ -229,16 +239,3 @@ def unit_starts(device: Device) -> dict[str, float]:
         ).stiffness
         for letter in LAWS
     }
-
-
-def at_recommended_stiffness(
-    surface: Surface, device: Device, recommendation: StiffnessRecommendation
-) -> Surface:
-    """Return the surface at the recommended stiffness.
-
-    Without one it is at the smooth wall's K₀, or at 1000 N/m where that is unknown too.
-    """
-    if recommendation.stiffness:
-        return surface.to_stiffness(recommendation.stiffness)
-    test = device.wall_test
-    return surface.to_stiffness(DEFAULT_STIFFNESS if test is None else test.value)

@@ -262,7 +262,11 @@ def passivity(
     for name, value, kind in (*types, ("leak", leak, Leak)):
         if not isinstance(value, kind):
             raise ParameterError(name, f"must be a {kind.__name__}", value)
-    loop = make_device_loop(surface, load_device(device), q, one_sided, leak)
+    return assess_loop(make_device_loop(surface, load_device(device), q, one_sided, leak))
+
+
+def assess_loop(loop: DeviceLoop) -> Passivity:
+    """Return whether a surface on a device is passive; see :func:`passivity`."""
     criteria = evaluate_criteria(loop)
     buzz = buzz_bound(loop)
     verdict, decided_by, ground = decide_verdict(loop, criteria, buzz)

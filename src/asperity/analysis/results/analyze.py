@@ -16,10 +16,7 @@ from asperity.analysis.energy.continuity import Continuity, continuity
 from asperity.analysis.energy.leak import Leak, worst_loop
 from asperity.analysis.energy.scan import Merit, merit
 from asperity.analysis.gain.characteristic import cached_number, curl_number, make_options
-from asperity.analysis.passivity.recommended_stiffness import (
-    at_recommended_stiffness,
-    recommend_stiffness,
-)
+from asperity.analysis.passivity.recommended_stiffness import recommend_stiffness
 from asperity.analysis.passivity.verdict import Passivity, passivity
 from asperity.analysis.results.compare import DEFAULT_DEVICE, recommended_law
 from asperity.core.arguments import FIELD
@@ -241,8 +238,7 @@ def _resolve_surface(
     if "stiffness" in given:
         return surface
     numbers = cached_number(surface, NORM), cached_number(surface, ONE_SIDED)
-    recommended = recommend_stiffness(surface, device, *numbers)
-    return at_recommended_stiffness(surface, device, recommended)
+    return surface.to_stiffness(recommend_stiffness(surface, device, *numbers).start)
 
 
 def _check_depth(surface: Surface) -> None:

@@ -22,7 +22,6 @@ from asperity.analysis.passivity.recommended_stiffness import (
     Margin,
     StabilityLimit,
     StiffnessRecommendation,
-    at_recommended_stiffness,
     recommend_stiffness,
 )
 from asperity.analysis.results.compare import DEFAULT_DEVICE, recommended_law
@@ -246,7 +245,7 @@ def limits(
     one_sided = cached_number(surface, ONE_SIDED)
     recommended = recommend_stiffness(surface, device, q, one_sided)
     if stiffness is None:
-        surface = at_recommended_stiffness(surface, device, recommended)
+        surface = surface.to_stiffness(recommended.start)
     scan = scan_force(surface)
     hand = load_grip(grip)
     perceptibility = assess_perceptibility(

@@ -15,11 +15,9 @@ from asperity.analysis.energy.scan import merit as compute_merit
 from asperity.analysis.gain.characteristic import cached_number, is_shipped_law, surface_content
 from asperity.analysis.limits.limit_rules import DEFAULT_SPEED
 from asperity.analysis.limits.perceptibility import Tier, assess_perceptibility
-from asperity.analysis.passivity.recommended_stiffness import (
-    at_recommended_stiffness,
-    recommend_stiffness,
-)
-from asperity.analysis.passivity.verdict import passivity
+from asperity.analysis.passivity.device_loop import make_device_loop
+from asperity.analysis.passivity.recommended_stiffness import recommend_on_loop
+from asperity.analysis.passivity.verdict import assess_loop
 from asperity.analysis.results.recommendation import (
     LawRow,
     nearest_to_felt,
@@ -191,51 +189,43 @@ def compare(
         raise ParameterError("device", "must be one: asp.compare_devices compares several")
     check_keywords(surface_arguments, SURFACE_KEYWORDS - {"law"}, compare)
     texture = as_texture(texture)
-    laws = find_laws(laws)
-    if texture.baked_numbers and len(laws) >= len(ALL_LAWS):  # the one that was baked
-        laws = tuple(law for law in laws if law.contact.has_potential_field)
-    device = load_device(device)
-    stiffness = None if stiffness is None else check_positive("stiffness", stiffness, "N/m")
-    scan_speed = DEFAULT_SPEED if speed is None else check_positive("speed", speed, "m/s")
-    if lacks_data(device):
-        raise ParameterError(
-            "device",
-            f'{device.id} needs max_stiffness to compare laws: add max_stiffness = "... N/m", the '
-            "stiffest smooth wall that held, to its file; or damping, update_rate and "
-            "delay_samples",
-        )
-    parameters = distribute_parameters(law_parameters or {}, laws)
-    surface_arguments |= {"stiffness": stiffness or DEFAULT_STIFFNESS, "max_depth": max_depth}
+    query = _make_query(texture, device, stiffness, max_depth, speed, rendering, grip)
+    surface_arguments |= {"stiffness": query.stiffness or DEFAULT_STIFFNESS, "max_depth": max_depth}
+    compared = _compared_laws(texture, laws)
+    parameters = distribute_parameters(law_parameters or {}, compared)
     surfaces = [
         Surface(texture, law, law_parameters=own, **surface_arguments)
-        for law, own in zip(laws, parameters, strict=True)
+        for law, own in zip(compared, parameters, strict=True)
     ]
-    part = texture.texture_part()
-    explicit_depth = max_depth is not None
-    query = _ComparisonQuery(
-        device, stiffness, scan_speed, part, explicit_depth, rendering, load_grip(grip)
-    )
     rows = []
     with precompute(precompute_row, _precompute_tasks(surfaces, query)) as precomputed:
         for surface, _ in zip(surfaces, precomputed, strict=True):
             if progress is not None:
                 progress(surface.law.letter)
-            rows.append(_compute_row(surface, query))
+            rows.append(_render_row(surface, query))
     recommended = recommend(rows)
     nearest = nearest_to_felt(rows) if recommended is None else None
     arguments = {"max_depth": max_depth, "speed": speed}
     return Comparison(
         texture=texture,
-        device=device,
-        stiffness=stiffness,
+        device=query.device,
+        stiffness=query.stiffness,
         max_depth=surfaces[0].max_depth,
-        speed=scan_speed,
+        speed=query.speed,
         grip=query.grip,
         rows=tuple(rows),
         recommended_row=recommended,
         nearest_row=nearest,
         defaults=tuple([name for name, value in arguments.items() if value is None]),
     )
+
+
+def _compared_laws(texture: Texture, laws: str | Sequence[str | Law]) -> tuple[Law, ...]:
+    """Return the laws; where all are compared on a baked field, those that have one."""
+    found = find_laws(laws)
+    if texture.baked_numbers and len(found) >= len(ALL_LAWS):
+        return tuple([law for law in found if law.contact.has_potential_field])
+    return found
 
 
 def lacks_data(device: Device) -> bool:
@@ -291,6 +281,39 @@ class _ComparisonQuery:
     grip: Grip
 
 
+def _make_query(
+    texture: Texture,
+    device: DeviceLike,
+    stiffness: float | None,
+    max_depth: float | None,
+    speed: float | None,
+    rendering: str,
+    grip: str | os.PathLike[str] | Grip,
+) -> _ComparisonQuery:
+    """Return the conditions from arguments of :func:`compare`, checked."""
+    loaded = load_device(device)
+    if stiffness is not None:
+        stiffness = check_positive("stiffness", stiffness, "N/m")
+    if speed is not None:
+        speed = check_positive("speed", speed, "m/s")
+    if lacks_data(loaded):
+        raise ParameterError(
+            "device",
+            f'{loaded.id} needs max_stiffness to compare laws: add max_stiffness = "... N/m", the '
+            "stiffest smooth wall that held, to its file; or damping, update_rate and "
+            "delay_samples",
+        )
+    return _ComparisonQuery(
+        device=loaded,
+        stiffness=stiffness,
+        speed=DEFAULT_SPEED if speed is None else speed,
+        part=texture.texture_part(),
+        explicit_depth=max_depth is not None,
+        rendering=rendering,
+        grip=load_grip(grip),
+    )
+
+
 Task = tuple[Surface, _ComparisonQuery]
 
 
@@ -307,17 +330,22 @@ def _precompute_tasks(surfaces: Sequence[Surface], query: _ComparisonQuery) -> l
 def precompute_row(task: Task | None) -> None:
     """Compute a row in a worker process, which leaves its numbers in the cache."""
     if task is not None:
-        _compute_row(*task)
+        _render_row(*task)
+
+
+def _render_row(surface: Surface, query: _ComparisonQuery) -> LawRow:
+    """Return the row of a law as a loop renders it."""
+    return _compute_row(rendered_surface(surface, query.rendering), query)
 
 
 def _compute_row(surface: Surface, query: _ComparisonQuery) -> LawRow:
     device = query.device
-    surface = rendered_surface(surface, query.rendering)
     q = cached_number(surface, NORM)
     one_sided = cached_number(surface, ONE_SIDED)
-    recommended = recommend_stiffness(surface, device, q, one_sided)
+    loop = make_device_loop(surface, device, q, one_sided)
+    recommended = recommend_on_loop(loop)
     if query.stiffness is None:
-        surface = at_recommended_stiffness(surface, device, recommended)
+        surface = surface.to_stiffness(recommended.start)
     leak = worst_loop(surface)
     merit = compute_merit(surface)
     perceptibility = None
@@ -335,7 +363,7 @@ def _compute_row(surface: Surface, query: _ComparisonQuery) -> LawRow:
         surface=surface,
         q=q,
         one_sided=one_sided,
-        passivity=passivity(surface, device, q, one_sided, leak),
+        passivity=assess_loop(loop.with_leak(surface, leak)),
         margin=recommended.margin,
         recommended_stiffness=recommended.stiffness,
         perceptibility=perceptibility,
