@@ -127,7 +127,7 @@ def _load_plugin(file: str, registries: tuple[PluginRegistry, ...]) -> None:
     if before == [registry.entries for registry in registries]:
         types = [registry.plugin_type for registry in registries]
         names = ", ".join(one.__name__ for one in types if one is not None)
-        functions = "register_criterion or register_theorem"
+        functions = "register_criterion"
         words = f"{file} registers nothing: no {names} at its top level, and no call of {functions}"
         raise ParameterError(_OPTION, words)
 

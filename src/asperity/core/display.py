@@ -44,10 +44,13 @@ class Text(Generic[T]):
 
     Args:
         doc: what the text says.
+        is_written: whether it is part of the plain data.
     """
 
-    def __init__(self, doc: str) -> None:
+    def __init__(self, doc: str, *, is_written: bool = True) -> None:
         self.__doc__ = doc
+        if is_written:
+            self.is_written = True
 
     def __set_name__(self, owner: type, name: str) -> None:
         self._name = name

@@ -322,13 +322,14 @@ def written_names(cls: type) -> tuple[str, ...]:
     """Return the attributes that are the plain data of a dataclass.
 
     They are its fields except the :data:`OMITTED` ones, then the properties that are marked as
-    :func:`written`, each in the order of definition.
+    :func:`written` and the texts (:class:`~asperity.core.display.Text`) that are, each in the order
+    of definition.
     """
     names = [item.name for item in fields(cls) if item.metadata.get("written", True)]
     for base in reversed(cls.__mro__):
         for name, member in vars(base).items():
             function = getattr(member, "fget", None) or getattr(member, "func", None)
-            if hasattr(function, "is_written"):
+            if hasattr(function or member, "is_written"):
                 names.append(name)
     return tuple(dict.fromkeys(names))
 

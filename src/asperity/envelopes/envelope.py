@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from asperity.analysis.results.compare import DEFAULT_DEVICE, Progress, lacks_da
 from asperity.core.checks import check_array, check_items
 from asperity.core.display import Plottable, Reportable, Tabular, Text
 from asperity.core.errors import ParameterError
-from asperity.core.files import Serializable, to_plain_data
+from asperity.core.files import OMITTED, Serializable, to_plain_data, written
 from asperity.core.processes import precompute
 from asperity.devices import Device, DeviceLike, load_device
 from asperity.devices.device import USER_SOURCE
@@ -56,14 +56,13 @@ class LawEnvelope(Serializable):
         borders: at each wavelength, ascending.
     """
 
-    serialized_attributes = "letter conservative decades borders"
-
-    case: WaveCase
+    case: WaveCase = field(metadata=OMITTED)
     letter: str
     conservative: bool
     borders: tuple[WaveBorders, ...]
 
     @property
+    @written
     def decades(self) -> float:
         """Area of the region in decades of amplitude times decades of wavelength."""
         along = np.log10([one.wavelength for one in self.borders])

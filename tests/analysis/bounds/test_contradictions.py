@@ -14,7 +14,7 @@ from asperity.analysis.energy import leak as leaks
 from asperity.analysis.energy.leak import worst_loop
 from asperity.analysis.gain import medial_axis as search
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
-from asperity.analysis.gain.theorems import ClosedForm, Constant, Theorem, register_theorem
+from asperity.analysis.gain.theorems import THEOREMS, ClosedForm, Constant, Theorem
 from asperity.core.errors import AsperityError, InternalError
 from asperity.laws import LAWS, Law
 from asperity.surface import Surface
@@ -70,11 +70,11 @@ def test_wrong_jacobian_kernel_is_detected(monkeypatch: pytest.MonkeyPatch) -> N
         one_sided_number(Surface(WAVE, "D"))
 
 
-def test_wrong_theorem_is_detected() -> None:
+def test_wrong_theorem_is_detected(monkeypatch: pytest.MonkeyPatch) -> None:
     constant, closed = copy_of("W"), copy_of("A")
-    register_theorem(constant, Theorem({NORM: Constant(0.999, "wrong")}))
+    monkeypatch.setitem(THEOREMS, constant, Theorem({NORM: Constant(0.999, "wrong")}))
     form = ClosedForm(lambda _wave, _depth: 1.1, lambda _wave, _depth: 0.0)
-    register_theorem(closed, Theorem(closed_forms={NORM: form}))
+    monkeypatch.setitem(THEOREMS, closed, Theorem(closed_forms={NORM: form}))
     for law in (constant, closed):
         with pytest.raises(InternalError):
             characteristic_number(Surface(WAVE, law))

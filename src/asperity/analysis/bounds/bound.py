@@ -14,7 +14,7 @@ from asperity.analysis.bounds.branch_and_bound import DIFFERENCE_AMPLIFICATION, 
 from asperity.core.checks import FloatArray
 from asperity.core.display import Displayable
 from asperity.core.errors import InternalError
-from asperity.core.files import Serializable
+from asperity.core.files import Serializable, written
 from asperity.surface import Surface
 
 Method = Literal["theorem", "closed form", "certified", "sampled"]
@@ -40,8 +40,6 @@ class Bound(Serializable, Displayable):
         2.0
     """
 
-    serialized_attributes = "value lower upper method at note deflection sliding"
-
     lower: float
     upper: float
     method: Method
@@ -51,6 +49,7 @@ class Bound(Serializable, Displayable):
     sliding: bool = False
 
     @property
+    @written
     def value(self) -> float:
         """``upper`` where one is proved, else ``lower``."""
         return self.upper if math.isfinite(self.upper) else self.lower

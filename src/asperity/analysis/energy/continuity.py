@@ -16,7 +16,7 @@ from asperity.analysis.gain.medial_axis import Crest, sharpest_crest
 from asperity.analysis.gain.theorems import theorem_on
 from asperity.core.checks import FloatArray
 from asperity.core.display import Text
-from asperity.core.files import Serializable
+from asperity.core.files import OMITTED, Serializable, written
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
 
@@ -87,16 +87,15 @@ class Continuity(Serializable):
             cause.
     """
 
-    serialized_attributes = "continuous reason lipschitz jumps"
-
     continuous: bool
-    cause: ContinuityCause
-    surface: Surface = field(repr=False, compare=False)
+    cause: ContinuityCause = field(metadata=OMITTED)
+    surface: Surface = field(repr=False, compare=False, metadata=OMITTED)
     lipschitz: Bound | None = None
-    onset: float = 0.0
+    onset: float = field(default=0.0, metadata=OMITTED)
     reason = Text[str]("The reason, in one sentence.")
 
     @cached_property
+    @written
     def jumps(self) -> tuple[Jump, ...]:
         """Jumps of the force, see :func:`find_jumps`; located on first access."""
         if self.continuous:

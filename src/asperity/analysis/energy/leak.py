@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum, auto
 
 import numpy as np
@@ -17,7 +17,7 @@ from asperity.analysis.gain.characteristic import cached_result, is_shipped_law
 from asperity.core.checks import FloatArray, check_positive
 from asperity.core.display import Text
 from asperity.core.errors import InternalError
-from asperity.core.files import Serializable
+from asperity.core.files import OMITTED, Serializable, written
 from asperity.surface import Surface
 from asperity.textures.texture import ScanLine
 
@@ -92,15 +92,11 @@ class Leak(Serializable):
             a conservative law on a line that does not repeat.
     """
 
-    serialized_attributes = (
-        "energy upper_per_period per_length length thrust line method description vertices"
-    )
-
     energy: float
     upper_per_period: float
     line: ScanLine
     method: str
-    origin: LoopOrigin
+    origin: LoopOrigin = field(metadata=OMITTED)
     vertices: FloatArray
     thrust: float | None
     description = Text[str]("The loop in words.")
@@ -118,12 +114,14 @@ class Leak(Serializable):
         return self.upper_per_period if math.isfinite(self.upper_per_period) else self.energy
 
     @property
+    @written
     def length(self) -> float:
         """Length of the loop [m]."""
         edges = self.vertices - np.roll(self.vertices, 1, axis=0)
         return float(np.linalg.norm(edges, axis=1).sum())
 
     @property
+    @written
     def per_length(self) -> float:
         """Energy over the length of the line [J/m]: a mean thrust [N]."""
         return self.energy / self.line.length

@@ -29,7 +29,7 @@ from asperity.analysis.bounds.branch_and_bound import DEFAULT_WORK_LIMIT, Proble
 from asperity.analysis.bounds.problems import ClampProblem, LawProblem
 from asperity.analysis.bounds.sampling import highest_point, require_depth_contact, sample_supremum
 from asperity.analysis.gain.medial_axis import SearchOptions
-from asperity.analysis.gain.theorems import THEOREMS, Reduction, derivative_bound, theorem_on
+from asperity.analysis.gain.theorems import Reduction, derivative_bound, theorem_on
 from asperity.core.cache import get_or_compute
 from asperity.core.checks import FloatArray, check_positive
 from asperity.core.errors import ParameterError
@@ -224,7 +224,7 @@ def _bound_without_search(
 # Every shipped law is k times a function of position: its numbers are computed at 1 N/m, cached
 # without the stiffness, and scaled, so a cached result equals a fresh one to the last bit. A
 # user-defined law need not be proportional to k: its results hold at its own stiffness only.
-# Results that rest on code of the user, in a texture kind, a contact or a theorem, are not cached:
+# Results that rest on code of the user, in a texture kind or a contact, are not cached:
 # what that code reads is unknown.
 
 Result = TypeVar("Result")
@@ -264,7 +264,7 @@ def surface_content(surface: Surface, *extra: str) -> str | None:
     texture = surface.texture.digest
     formula: tuple[str | float, ...] = (law.letter,)
     if not is_shipped_law(law):
-        if law in THEOREMS or not is_shipped(type(law.contact)):
+        if not is_shipped(type(law.contact)):
             return None
         formula = (kernel_source(law), law.contact.name, surface.stiffness)
     if texture is None:

@@ -1,8 +1,6 @@
 """Theorems about laws beyond their formula: one table, keyed by the law object.
 
-A law that reuses a letter does not inherit its theorem. An entry for a user-defined law:
-
-    register_theorem(MY_LAW, Theorem(constants={ONE_SIDED: Constant(1.0, "the reason")}))
+A law that reuses a letter does not inherit its theorem.
 """
 
 from __future__ import annotations
@@ -16,7 +14,6 @@ from asperity.analysis.bounds.branch_and_bound import Problem
 from asperity.analysis.gain import medial_axis, proofs
 from asperity.analysis.gain import proofs as forms
 from asperity.analysis.gain.proofs import NormalChangeProblem, SlopeProblem
-from asperity.core.errors import ParameterError
 from asperity.enclosures.cells import Cells
 from asperity.laws import LAWS, Law
 from asperity.laws.clamps import BACKED, LATERAL, WHOLE, Clamp
@@ -245,19 +242,6 @@ def theorem_on(surface: Surface) -> Theorem:
     It is empty for a law without an entry.
     """
     return _BAKED if surface.texture.baked_numbers else THEOREMS.get(surface.law, _NO_THEOREM)
-
-
-def register_theorem(law: Law, theorem: Theorem) -> None:
-    """Add the theorem of a user-defined law.
-
-    Raises:
-        ParameterError: if this is not a :class:`~asperity.laws.Law`, or has an entry.
-    """
-    if not isinstance(law, Law):
-        raise ParameterError("law", "must be a Law: theorems belong to laws, not to letters", law)
-    if law in THEOREMS:
-        raise ParameterError("law", f"already has a theorem: {law}")
-    THEOREMS[law] = theorem
 
 
 def derivative_bound(surface: Surface, measure: JacobianMeasure) -> float:

@@ -8,7 +8,7 @@ third of an octave form one wave, with the amplitude of the sinusoid of the same
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from asperity.analysis.gain.characteristic import cached_result, is_shipped_law
 from asperity.core.cache import get_or_compute
 from asperity.core.checks import FloatArray
 from asperity.core.display import Text
-from asperity.core.files import Serializable
+from asperity.core.files import OMITTED, Serializable, written
 from asperity.surface import Surface
 from asperity.textures.plane_waves import PlaneWaves
 from asperity.textures.texture import Texture
@@ -64,23 +64,23 @@ class Spectrum(Serializable):
         is_windowed: whether the heights do not repeat, and were windowed (Hann).
     """
 
-    serialized_attributes = "exact description wavelengths amplitudes"
-
-    waves: tuple[Wave, ...]
+    waves: tuple[Wave, ...] = field(metadata=OMITTED)
     exact: bool
-    is_radial: bool = False
-    is_windowed: bool = False
+    is_radial: bool = field(default=False, metadata=OMITTED)
+    is_windowed: bool = field(default=False, metadata=OMITTED)
     description = Text[str]("The method, in words.")
 
     def __repr__(self) -> str:
         return f"<Spectrum of {len(self.waves)} waves: {self.description}>"
 
     @property
+    @written
     def wavelengths(self) -> FloatArray:
         """Wavelengths l [m], shape (n,)."""
         return np.array([wave.wavelength for wave in self.waves])
 
     @property
+    @written
     def amplitudes(self) -> FloatArray:
         """Amplitudes a [m], shape (n,)."""
         return np.array([wave.amplitude for wave in self.waves])

@@ -28,7 +28,7 @@ from asperity.analysis.passivity.device_loop import (
 from asperity.analysis.passivity.recommended_stiffness import StabilityLimit, stability_limit
 from asperity.core.display import Displayable, Text
 from asperity.core.errors import ParameterError
-from asperity.core.files import Serializable
+from asperity.core.files import OMITTED, Serializable, written
 from asperity.devices import DeviceLike, load_device
 from asperity.surface import Surface
 
@@ -155,16 +155,11 @@ class Passivity(Serializable, Displayable):
         buzz: bound of the motion that quantisation may cause; ``None`` if there is no bound.
     """
 
-    serialized_attributes = (
-        "verdict decided_by reason stiffness stability_limit critical_speed greatest_delay buzz "
-        "criteria"
-    )
-
-    loop: DeviceLoop = field(compare=False)
-    evaluated: Mapping[str, Criterion]
+    loop: DeviceLoop = field(compare=False, metadata=OMITTED)
+    evaluated: Mapping[str, Criterion] = field(metadata=OMITTED)
     decided_by: str
     verdict: Verdict
-    ground: Ground
+    ground: Ground = field(metadata=OMITTED)
     stability_limit: StabilityLimit
     buzz: BuzzBound | None
     reason = Text[str]("The reason of the verdict in one sentence.")
@@ -173,11 +168,13 @@ class Passivity(Serializable, Displayable):
     )
 
     @property
+    @written
     def stiffness(self) -> float:
         """Stiffness of the surface [N/m]."""
         return self.loop.surface.stiffness
 
     @property
+    @written
     def critical_speed(self) -> float | None:
         """v* [m/s], the speed on the worst loop below which damping does not absorb its energy.
 
@@ -186,6 +183,7 @@ class Passivity(Serializable, Displayable):
         return critical_speed(self.loop)
 
     @property
+    @written
     def greatest_delay(self) -> int | None:
         """Greatest number of whole samples of delay for which the delay rule is proved.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -12,7 +13,7 @@ from asperity.analysis.results.recommendation import LawRow
 from asperity.core.checks import check_items
 from asperity.core.display import Reportable, Tabular, Text
 from asperity.core.errors import ParameterError
-from asperity.core.files import Serializable, to_plain_data
+from asperity.core.files import OMITTED, Serializable, to_plain_data, written
 from asperity.devices import Device, DeviceLike, load_device
 from asperity.laws import REGISTERED_LAWS, Law
 from asperity.textures.catalogue import TextureLike, as_texture
@@ -32,14 +33,13 @@ class MissingData(Serializable):
         unit: its unit.
     """
 
-    serialized_attributes = "device hint"
-
     device: str
-    field: str = "max_stiffness"
-    unit: str = "N/m"
-    sentence = Text[str]("The missing data and how to supply them.")
+    field: str = dataclasses.field(default="max_stiffness", metadata=OMITTED)
+    unit: str = dataclasses.field(default="N/m", metadata=OMITTED)
+    sentence = Text[str]("The missing data and how to supply them.", is_written=False)
 
     @property
+    @written
     def hint(self) -> str:
         """The missing line of the device file."""
         return f'{self.field} = "... {self.unit}"'
