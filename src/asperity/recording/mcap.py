@@ -11,7 +11,6 @@ Reference:
 
 from __future__ import annotations
 
-import io
 import struct
 import zlib
 from collections.abc import Iterator, Mapping
@@ -25,6 +24,7 @@ CHANNEL = 1
 # Before the rows of a chunk: first and last time, size, checksum, no compression, size again.
 _CHUNK = struct.Struct("<QQQIIQ")
 _RECORD = struct.Struct("<BQ")
+_MEDIA_TYPE = "application/octet-stream"
 
 
 class Opcode(IntEnum):
@@ -64,13 +64,30 @@ def _encode_part(part: bytes | str | Mapping[str, str]) -> bytes:
     if isinstance(part, str):
         data = part.encode()
     else:
-        data = b"".join(_encode_part(text) for item in part.items() for text in item)
+        data = b"".join([_encode_part(text) for item in part.items() for text in item])
     return struct.pack("<I", len(data)) + data
+
+
+@dataclass(frozen=True)
+class Head:
+    """The records before the rows, and what the summary repeats of them.
+
+    Attributes:
+        content: the records.
+        schema_and_channel: two of them.
+        index: positions of the metadata and of the attachments.
+        attachments: number of attachments.
+    """
+
+    content: bytes
+    schema_and_channel: bytes
+    index: bytes
+    attachments: int
 
 
 def encode_head(
     name: str, library: str, schema: str, texts: Mapping[str, str], attachments: Mapping[str, bytes]
-) -> bytes:
+) -> Head:
     """Return the records before the rows.
 
     Args:
@@ -81,19 +98,24 @@ def encode_head(
         attachments: files inside the file, by name.
     """
     channel = struct.pack("<H", CHANNEL)
-    records = [
-        encode_record(Opcode.HEADER, "", library),
-        encode_record(Opcode.SCHEMA, channel, f"{name}/Row", "ros2msg", schema),
-        encode_record(Opcode.CHANNEL, channel, channel, f"/{name}", "cdr", {}),
-        encode_record(Opcode.METADATA, name, texts),
-        *(_encode_attachment(file, data) for file, data in attachments.items()),
-    ]
-    return MAGIC + b"".join(records)
+    repeated = encode_record(Opcode.SCHEMA, channel, f"{name}/Row", "ros2msg", schema)
+    repeated += encode_record(Opcode.CHANNEL, channel, channel, f"/{name}", "cdr", {})
+    content = MAGIC + encode_record(Opcode.HEADER, "", library) + repeated
+    metadata = encode_record(Opcode.METADATA, name, texts)
+    place = struct.pack("<QQ", len(content), len(metadata))
+    index = encode_record(Opcode.METADATA_INDEX, place, name)
+    content += metadata
+    for file, data in attachments.items():
+        record = _encode_attachment(file, data)
+        place = struct.pack("<QQQQQ", len(content), len(record), 0, 0, len(data))
+        index += encode_record(Opcode.ATTACHMENT_INDEX, place, file, _MEDIA_TYPE)
+        content += record
+    return Head(content, repeated, index, len(attachments))
 
 
 def _encode_attachment(name: str, data: bytes) -> bytes:
     times = bytes(16)  # unused
-    content = times + _encode_part(name) + _encode_part("application/octet-stream")
+    content = times + _encode_part(name) + _encode_part(_MEDIA_TYPE)
     content += struct.pack("<Q", len(data)) + data
     return encode_record(Opcode.ATTACHMENT, content, struct.pack("<I", zlib.crc32(content)))
 
@@ -144,7 +166,7 @@ def encode_chunk(
     return place, (front, rows, listed)
 
 
-def encode_summary(head: bytes, chunks: list[Chunk], rows: int, offset: int) -> bytes:
+def encode_summary(head: Head, chunks: list[Chunk], rows: int, offset: int) -> bytes:
     """Return the end of a complete file: an index of its records.
 
     Args:
@@ -154,43 +176,27 @@ def encode_summary(head: bytes, chunks: list[Chunk], rows: int, offset: int) -> 
         offset: position of the result in the file.
     """
     data_end = encode_record(Opcode.DATA_END, bytes(4))
-    records = [(op, at, head[at - _RECORD.size : at + length])
-               for op, at, length in iterate_records(io.BytesIO(head), len(head))]  # fmt: skip
-    summary = b"".join(record for op, _, record in records if op in (Opcode.SCHEMA, Opcode.CHANNEL))
-    summary += _statistics([op for op, _, _ in records], chunks, rows)
-    summary += b"".join(map(_chunk_index, chunks))
-    summary += b"".join(_index_entry(op, at - _RECORD.size, record) for op, at, record in records)
+    parts = [head.schema_and_channel, _encode_statistics(head, chunks, rows)]
+    parts += [*map(_encode_chunk_index, chunks), head.index]
+    summary = b"".join(parts)
     footer = _RECORD.pack(Opcode.FOOTER, 20) + struct.pack("<QQ", offset + len(data_end), 0)
     checksum = zlib.crc32(footer, zlib.crc32(summary))
     return data_end + summary + footer + struct.pack("<I", checksum) + MAGIC
 
 
-def _statistics(ops: list[int], chunks: list[Chunk], rows: int) -> bytes:
-    first, last = (chunks[0].times[0], chunks[-1].times[1]) if chunks else (0, 0)
-    counts = rows, 1, 1, ops.count(Opcode.ATTACHMENT), ops.count(Opcode.METADATA), len(chunks)
-    each = struct.pack("<IHQ", 10, CHANNEL, rows)
-    return encode_record(Opcode.STATISTICS, struct.pack("<QHIIIIQQ", *counts, first, last), each)
+def _encode_statistics(head: Head, chunks: list[Chunk], rows: int) -> bytes:
+    times = (0, 0)
+    if chunks:
+        times = (chunks[0].times[0], chunks[-1].times[1])
+    counts = struct.pack("<QHIIII", rows, 1, 1, head.attachments, 1, len(chunks))
+    rows_of_channel = struct.pack("<IHQ", 10, CHANNEL, rows)
+    return encode_record(Opcode.STATISTICS, counts, struct.pack("<QQ", *times), rows_of_channel)
 
 
-def _chunk_index(chunk: Chunk) -> bytes:
-    begin = chunk.start
-    end = chunk.end
-    data = struct.pack("<QQQQ", *chunk.times, begin, end - begin)
-    data += struct.pack("<IHQQ", 10, CHANNEL, end, chunk.index_size)
+def _encode_chunk_index(chunk: Chunk) -> bytes:
+    data = struct.pack("<QQQQ", *chunk.times, chunk.start, chunk.end - chunk.start)
+    data += struct.pack("<IHQQ", 10, CHANNEL, chunk.end, chunk.index_size)
     return encode_record(Opcode.CHUNK_INDEX, data, struct.pack("<IQQ", 0, chunk.size, chunk.size))
-
-
-def _index_entry(op: int, at: int, record: bytes) -> bytes:
-    """Return the entry of a metadata record or of an attachment in the index; else nothing."""
-    content = memoryview(record)[_RECORD.size :]
-    place = struct.pack("<QQ", at, len(record))
-    if op == Opcode.METADATA:
-        return encode_record(Opcode.METADATA_INDEX, place, ContentReader(content).text())
-    if op == Opcode.ATTACHMENT:
-        name, kind, data = read_attachment(content)
-        sizes = struct.pack("<QQQ", 0, 0, len(data))
-        return encode_record(Opcode.ATTACHMENT_INDEX, place, sizes, name, kind)
-    return b""
 
 
 # --- reading --------------------------------------------------------------------------------------
@@ -228,15 +234,15 @@ class ContentReader:
     def texts(self) -> dict[str, str]:
         """Return texts by name."""
         inner = ContentReader(self.read(self.number(4)))
-        found = {}
+        texts = {}
         while inner._remaining:
             name = inner.text()
-            found[name] = inner.text()
-        return found
+            texts[name] = inner.text()
+        return texts
 
 
-def read_attachment(content: bytes | memoryview) -> tuple[str, str, bytes]:
-    """Return name, kind and data of a file inside the file.
+def read_attachment(content: bytes) -> bytes:
+    """Return the data of a file inside the file.
 
     Raises:
         DamagedError: its checksum differs.
@@ -244,12 +250,12 @@ def read_attachment(content: bytes | memoryview) -> tuple[str, str, bytes]:
     reader = ContentReader(content)
     reader.read(16)  # times: unused
     name = reader.text()
-    kind = reader.text()
+    reader.text()  # media type
     data = bytes(reader.read(reader.number(8)))
     checksum = reader.number(4)
     if checksum not in {0, zlib.crc32(content[: len(content) - 4])}:
         raise DamagedError(f"the attachment {name} is damaged")
-    return name, kind, data
+    return data
 
 
 def iterate_records(stream: IO[bytes], size: int) -> Iterator[tuple[int, int, int]]:

@@ -15,6 +15,7 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
@@ -101,7 +102,7 @@ def formula_digest(law: Law) -> str:
 def field_attachments(surface: Surface) -> dict[str, bytes]:
     """Return the attachment with the arguments of the sampler; none if it would be large."""
     arguments = surface.texture.arguments
-    if sum(np.asarray(value).nbytes for value in arguments) > MAX_BYTES:
+    if sum([np.asarray(value).nbytes for value in arguments]) > MAX_BYTES:
         return {}
     stream = io.BytesIO()
     np.savez(stream, *map(np.asarray, arguments))
@@ -121,12 +122,12 @@ def read_field(metadata: Mapping[str, Any], data: bytes) -> RecordedField:
     try:
         law = find_law(str(metadata["law"]))
         clamp = find_clamp(str(metadata["clamp"]))
-        sampler = tuple(_sampler_module(str(name)) for name in metadata["sampler"])
+        sampler = tuple([_sampler_module(str(name)) for name in metadata["sampler"]])
         kind = getattr(sampler[0], str(metadata["record"]))
         with np.load(io.BytesIO(data), allow_pickle=False) as archive:
-            values = [archive[name] for name in archive.files]
-        texture = kind(*(value if value.ndim else value.item() for value in values))
-        parameters = tuple(float.fromhex(text) for text in metadata["law_arguments"])
+            values = [_to_scalar(archive[name]) for name in archive.files]
+        texture = kind(*values)
+        parameters = tuple(map(float.fromhex, metadata["law_arguments"]))
     except ParameterError:
         raise
     except (*_DAMAGE_ERRORS, AttributeError, IndexError) as error:
@@ -135,6 +136,11 @@ def read_field(metadata: Mapping[str, Any], data: bytes) -> RecordedField:
     if metadata.get("texture_content") != arguments_digest(texture):
         raise ParameterError("recording", "holds another texture than its metadata: it is damaged")
     return RecordedField(law, clamp, sampler, texture, parameters)
+
+
+def _to_scalar(value: NDArray[Any]) -> Any:
+    """Return the number in an array without axes; other arrays as they are."""
+    return value if value.ndim else value.item()
 
 
 def _sampler_module(name: str) -> ModuleType:

@@ -53,13 +53,15 @@ class Recording(Plottable):
     _attachments: Mapping[str, tuple[int, int]] = field(repr=False, default_factory=dict)
 
     def __repr__(self) -> str:
-        ends = "" if self.is_complete else ", not closed"
-        return f"<Recording {self.path.name}, {self.rows} rows, {self.duration:g} s{ends}>"
+        text = f"Recording {self.path.name}, {self.rows} rows, {self.duration:g} s"
+        if not self.is_complete:
+            text += ", not closed"
+        return f"<{text}>"
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the columns."""
-        return tuple(name for name, _unit in self.columns)
+        return tuple([name for name, _unit in self.columns])
 
     @property
     def duration(self) -> float:
@@ -91,9 +93,9 @@ class Recording(Plottable):
         end = min(end, self.rows)
         if start >= end:
             return np.empty((0, len(self.columns)))
-        least, most = self._chunk_starts.searchsorted([start, end - 1], "right")
-        begin = int(self._chunk_starts[least - 1])
-        table = np.concatenate([*self._read_blocks(int(least) - 1, int(most))])
+        first, last = self._chunk_starts.searchsorted([start, end - 1], "right")
+        begin = int(self._chunk_starts[first - 1])
+        table = np.concatenate([*self._read_blocks(int(first) - 1, int(last))])
         return table[start - begin : end - begin]
 
     @cached_property
@@ -125,7 +127,7 @@ class Recording(Plottable):
         Raises:
             ParameterError: see :meth:`blocks`.
         """
-        step = 1 if max_rows is None else max(1, -(-self.rows // max_rows))
+        step = max(1, -(-self.rows // (max_rows or self.rows or 1)))
         parts = [np.empty((0, len(self.columns)))]
         seen = 0
         for block in self.blocks():
@@ -143,8 +145,8 @@ class Recording(Plottable):
         Raises:
             ParameterError: for a name that there is not; the nearest are offered.
         """
-        at = row_encoding.find_column(self.columns, name)
-        return np.concatenate([np.empty(0), *(block[:, at] for block in self.blocks())])
+        column = row_encoding.find_column(self.columns, name)
+        return np.concatenate([np.empty(0), *[block[:, column] for block in self.blocks()]])
 
     def ranges(self) -> tuple[FloatArray, FloatArray]:
         """Return the least and the greatest value of each column; NaN if there are no rows."""
@@ -166,7 +168,7 @@ class Recording(Plottable):
         with _open_file(self.path) as stream:
             stream.seek(at)
             try:
-                return mcap.read_attachment(stream.read(length))[2]
+                return mcap.read_attachment(stream.read(length))
             except mcap.DamagedError as error:
                 raise _unreadable_error(self.path, str(error)) from None
 
@@ -234,13 +236,13 @@ def _read(path: Path, stream: IO[bytes], size: int) -> Recording:
     columns: row_encoding.Columns = ()
     texts: dict[str, str] = {}
     chunks: list[mcap.Chunk] = []
-    attached: dict[str, tuple[int, int]] = {}
-    whole = False
+    attachments: dict[str, tuple[int, int]] = {}
+    is_complete = False
     foreign = False
     end = len(mcap.MAGIC)
     for op, at, length in mcap.iterate_records(stream, size):
         if op == mcap.Opcode.DATA_END:
-            whole = True
+            is_complete = True
             break
         if op == mcap.Opcode.CHUNK and not texts:
             foreign = True
@@ -251,21 +253,31 @@ def _read(path: Path, stream: IO[bytes], size: int) -> Recording:
             columns = _columns(_record_content(stream, at, length))
         elif op == mcap.Opcode.METADATA:
             content = _record_content(stream, at, length)
-            texts = content.texts() if content.text() == SCHEMA_NAME else texts
+            if content.text() == SCHEMA_NAME:
+                texts = content.texts()
         elif op == mcap.Opcode.ATTACHMENT:
             content = _record_content(stream, at, min(length, _MAX_NAME))
             content.read(16)  # times: unused
-            attached[content.text()] = at, length
+            attachments[content.text()] = at, length
         end = at + length
-    about = _parse_metadata(texts, whole or foreign)
+    metadata = _parse_metadata(texts, is_complete or foreign)
     if not columns:
         raise mcap.DamagedError("it does not say what its rows are")
-    if not whole and chunks and not _is_intact(stream, chunks[-1]):
+    if not is_complete and chunks and not _is_intact(stream, chunks[-1]):
         end = chunks.pop().start  # the remains of a loss of power
-    rows = sum(chunk.size for chunk in chunks) // row_encoding.row_type(len(columns)).itemsize
-    unread = 0 if whole else size - end
+    if is_complete:
+        end = size
+    rows = sum([chunk.size for chunk in chunks]) // row_encoding.row_type(len(columns)).itemsize
     return Recording(
-        path, columns, rows, about, texts["version"], whole, unread, tuple(chunks), attached
+        path,
+        columns,
+        rows,
+        metadata,
+        texts["version"],
+        is_complete,
+        size - end,
+        tuple(chunks),
+        attachments,
     )
 
 
@@ -293,18 +305,19 @@ def _is_intact(stream: IO[bytes], chunk: mcap.Chunk) -> bool:
 def _parse_metadata(texts: Mapping[str, str], foreign: bool) -> dict[str, Any]:
     """Return the metadata of a recording, if this version of asperity reads it."""
     if not {"format", "version", "about"} <= texts.keys():
-        whose = "it was not written by asperity" if foreign else "it ends before its first row"
-        raise mcap.DamagedError(whose)
+        if foreign:
+            raise mcap.DamagedError("it was not written by asperity")
+        raise mcap.DamagedError("it ends before its first row")
     if texts["format"] != str(FORMAT):
-        words = f"it is of format {texts['format']}, of asperity {texts['version']}"
-        raise mcap.DamagedError(f"{words}; this asperity reads format {FORMAT}")
+        origin = f"it is of format {texts['format']}, of asperity {texts['version']}"
+        raise mcap.DamagedError(f"{origin}; this asperity reads format {FORMAT}")
     try:
-        about = json.loads(texts["about"])
+        metadata = json.loads(texts["about"])
     except ValueError as error:
         raise mcap.DamagedError(f"its metadata is not valid JSON: {error}") from None
-    if not isinstance(about, dict):
+    if not isinstance(metadata, dict):
         raise mcap.DamagedError("its metadata is not a table")
-    return about
+    return metadata
 
 
 def _open_file(path: Path) -> IO[bytes]:

@@ -83,8 +83,9 @@ class Replay(Serializable, Displayable):
     notes: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
-        same = f"{self.differing_rows} differ" if self.differing_rows else "the same bit for bit"
-        return f"<Replay of {self.rows} rows, {same}>"
+        if self.is_identical:
+            return f"<Replay of {self.rows} rows, the same bit for bit>"
+        return f"<Replay of {self.rows} rows, {self.differing_rows} differ>"
 
     @property
     def is_identical(self) -> bool:
@@ -111,11 +112,16 @@ def replay(recording: Recording | str | os.PathLike[str], surface: Surface | Non
     if not recording.rows:
         raise ParameterError("recording", "has no rows to replay")
     settings = _servo_settings(recording.metadata)
-    field = recorded_field(recording) if surface is None else surface_field(surface)
-    notes = [*describe_changes(recording, field.law)]
-    recorded = str(surface_data.get("content"))
-    if surface is not None and surface.digest != recorded:
-        notes.append(f"Recorded on another surface: content {recorded}, this is {surface.digest}.")
+    notes = []
+    if surface is None:
+        field = recorded_field(recording)
+    else:
+        field = surface_field(surface)
+        content = surface_data.get("content")
+        if surface.digest != content:
+            note = f"Recorded on another surface: content {content}, this is {surface.digest}."
+            notes.append(note)
+    notes = [*describe_changes(recording, field.law), *notes]
     result = Replay(str(recording.path), 0, 0, None, 0.0, tuple(notes))
     for first, block, forces in _replay_blocks(recording, field, settings):
         result = _compare(result, first, block, forces)
@@ -168,12 +174,17 @@ def _servo_settings(metadata: Mapping[str, Any]) -> ServoSettings:
     every = metadata.get("every", 1)
     servo = metadata.get("servo")
     if every != 1:
-        words = f"holds each {every}th sample only; the state of the loop goes from one to the next"
-        raise ParameterError("recording", f"cannot be replayed: it {words}")
-    names = ("position_resolution", "force_resolution", "max_force", "virtual_damping",
-             "velocity_share", "period")  # fmt: skip
+        reason = f"it holds each {every}th sample only; the state goes from one to the next"
+        raise ParameterError("recording", f"cannot be replayed: {reason}")
     try:
-        return ServoSettings(*(float(servo[name]) for name in names))  # type: ignore[index]  # else a TypeError
+        return ServoSettings(
+            position_step=float(servo["position_resolution"]),  # type: ignore[index]  # else a TypeError
+            force_step=float(servo["force_resolution"]),  # type: ignore[index]  # likewise
+            max_force=float(servo["max_force"]),  # type: ignore[index]  # likewise
+            virtual_damping=float(servo["virtual_damping"]),  # type: ignore[index]  # likewise
+            velocity_share=float(servo["velocity_share"]),  # type: ignore[index]  # likewise
+            period=float(servo["period"]),  # type: ignore[index]  # likewise
+        )
     except (KeyError, TypeError, ValueError):
         raise ParameterError("recording", "does not say the settings of its servo") from None
 
@@ -187,7 +198,7 @@ def _replay_blocks(
         if name not in names:
             raise ParameterError("recording", f"cannot be replayed: it has no column {name!r}")
     point = [names.index(axis) for axis in "xyz"]
-    compared = [0, *(names.index(name) for name in COMPARED_COLUMNS)]
+    compared = [0, *map(names.index, COMPARED_COLUMNS)]
     parts = servo_loop, no_guards, replayed_device, replay_trace, tick
     loops = fuse_on_texture(field.law, field.sampler, field.clamp, parts)
     state = LoopState()
@@ -211,8 +222,8 @@ def _check_times(times: FloatArray, first: int, period: float) -> None:
     wrong = np.flatnonzero(np.abs(times / period - np.arange(first, first + len(times))) > 0.5)
     if len(wrong):
         row = first + int(wrong[0])
-        words = f"samples are missing before row {row}, at {times[wrong[0]]:g} s"
-        raise ParameterError("recording", f"cannot be replayed: {words}")
+        reason = f"samples are missing before row {row}, at {times[wrong[0]]:g} s"
+        raise ParameterError("recording", f"cannot be replayed: {reason}")
 
 
 def _compare(result: Replay, first: int, block: FloatArray, replayed: FloatArray) -> Replay:
@@ -246,9 +257,10 @@ def describe_changes(recording: Recording, law: Law) -> Iterator[str]:
     if surface_data.get("formula") != formula_digest(law):
         yield f"The formula of law {surface_data.get('law')} is another one than it was."
     files = recording.metadata.get("files")
-    for name, content in files.items() if isinstance(files, Mapping) else ():
-        now = file_digest(name)
-        if now is not None and now != content:
+    if not isinstance(files, Mapping):
+        return
+    for name, content in files.items():
+        if file_digest(name) not in (None, content):
             yield f"The file {name} has changed since; the recording holds its own copy."
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,11 +50,15 @@ def schema_columns(text: str) -> Columns:
     Raises:
         DamagedError: any other definition.
     """
-    found = [_FIELD_LINE.fullmatch(line) for line in text.splitlines()]
-    columns = tuple((one[1].replace("_", " "), one[2]) for one in found if one is not None)
-    if len(columns) < len(found) or columns[:1] != (("time", "s"),):
+    columns = []
+    for line in text.splitlines():
+        match = _FIELD_LINE.fullmatch(line)
+        if match is None:
+            raise DamagedError("its rows are no table with a time")
+        columns.append((match[1].replace("_", " "), match[2]))
+    if columns[:1] != [("time", "s")]:
         raise DamagedError("its rows are no table with a time")
-    return columns
+    return tuple(columns)
 
 
 def row_type(column_count: int) -> np.dtype[np.void]:
@@ -112,8 +116,8 @@ def message_values(data: bytes, column_count: int) -> FloatArray:
     if len(data) % kind.itemsize:
         raise DamagedError("a block holds part of a row")
     rows = np.frombuffer(data, kind)
-    ours = (rows["op"] == _MESSAGE) & (rows["length"] == kind.itemsize - 9)
-    if not (ours & (rows["channel"] == CHANNEL)).all():
+    is_row = (rows["op"] == _MESSAGE) & (rows["length"] == kind.itemsize - 9)
+    if not (is_row & (rows["channel"] == CHANNEL)).all():
         raise DamagedError("a block holds something else than rows")
     return np.ascontiguousarray(rows["values"])
 
@@ -126,8 +130,8 @@ def check_table(table: FloatArray, columns: Sequence[object]) -> FloatArray:
     """
     values = np.asarray(table, dtype=np.float64)
     if values.ndim != 2 or values.shape[1] != len(columns):
-        words = f"must have the shape (rows, {len(columns)}), one column for each name"
-        raise ParameterError("block", words, values.shape)
+        requirement = f"must have the shape (rows, {len(columns)}), one column for each name"
+        raise ParameterError("block", requirement, values.shape)
     return values
 
 
@@ -210,7 +214,7 @@ class NamedColumns:
         }
 
     def _axes(self, head: str) -> FloatArray:
-        return self.select(*(f"{head} {axis}" for axis in "xyz"))
+        return self.select(f"{head} x", f"{head} y", f"{head} z")
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,7 +222,4 @@ class TraceTable(NamedColumns):
     """Rows of a recording: see :class:`NamedColumns`."""
 
     columns: Columns
-    table: FloatArray
-
-    def __repr__(self) -> str:
-        return f"<Traced {len(self.table)} rows of {len(self.columns)} columns>"
+    table: FloatArray = field(repr=False)

@@ -47,7 +47,7 @@ def export_recording(
 
 
 def _write_csv(recording: Recording, stream: IO[bytes], progress: Progress) -> None:
-    head = ",".join(f"{name} [{unit}]" for name, unit in recording.columns)
+    head = ",".join([f"{name} [{unit}]" for name, unit in recording.columns])
     stream.write(f"{head}\n".encode())
     row = ",".join(["%.17g"] * len(recording.columns)) + "\n"
     done = 0

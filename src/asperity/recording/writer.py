@@ -85,11 +85,11 @@ class RecordingWriter:
         """Rows that are written."""
         try:
             with open_atomic(path) as stream:
-                stream.write(self._head)
+                stream.write(self._head.content)
             self._file = open(path, "ab", buffering=0)  # noqa: SIM115 - closed by close()
         except OSError as error:
             raise ParameterError(argument, f"cannot be written: {error}") from None
-        self._size = len(self._head)
+        self._size = len(self._head.content)
 
     def __repr__(self) -> str:
         return f"<RecordingWriter of {self._path.name}, {self.rows} rows written>"
@@ -152,16 +152,16 @@ class RecordingWriter:
         """Write all parts, or none."""
         try:
             for part in parts:
-                left = memoryview(part)
-                while left:
-                    left = left[self._file.write(left) or 0 :]
+                remaining = memoryview(part)
+                while remaining:
+                    remaining = remaining[self._file.write(remaining) or 0 :]
         except OSError as error:
             with suppress(OSError):  # a device such as /dev/full has no length
                 self._file.truncate(self._size)
             self._file.close()
-            words = f"cannot be written any further ({error.strerror})"
-            rows_text = f"{self.rows} rows are in {self._path}"
-            raise ParameterError(self._argument, f"{words}: {rows_text}") from None
+            reason = f"cannot be written any further ({error.strerror})"
+            requirement = f"{reason}: {self.rows} rows are in {self._path}"
+            raise ParameterError(self._argument, requirement) from None
         self._size += sum(map(len, parts))
 
     def __enter__(self) -> Self:
