@@ -58,12 +58,10 @@ def check_plausible(raw: RawSurface, heights: FloatArray, pitch: Pitch) -> None:
         ParameterError: the user must give the unit or the height range, with the options for it.
     """
     if raw.relative:
-        raise ParameterError(
-            "height_range",
-            f"is required: the values of {raw.source} have no unit; give the peak-to-valley"
-            f" height [m]{raw.unit_question}",
-            unit="um",
-        )
+        text = f"is required: the values of {raw.source} have no unit; give their range [m]"
+        if raw.lacks_unit:
+            text += ", or their unit, such as {unit}"
+        raise ParameterError("height_range", text, unit="um")
     span = float(np.nanmax(heights)) - float(np.nanmin(heights))
     slope = mean_slope(heights, pitch)
     fixes, suggestions = _suggest_fixes(raw, span, slope)
@@ -190,7 +188,7 @@ def prepare(  # noqa: D417 - the others are described by their declarations
     record = StageRecorder(on_stage)
     steps = list(raw.notes)
     _check_shape(raw.heights, max_missing)
-    lateral = _resolve_pitch(raw, pitch, steps)
+    lateral = _resolve_pitch(raw, pitch, height_range, steps)
     check_degree(form)
     magnification_factors(magnify, magnify_height)
     cutoffs = find_cutoffs(raw.heights.shape, lateral, s_cutoff, l_cutoff)
@@ -328,12 +326,18 @@ def _check_missing(heights: FloatArray, max_missing: float) -> None:
         )
 
 
-def _resolve_pitch(raw: RawSurface, pitch: GivenPitch, steps: list[str]) -> Pitch:
+def _resolve_pitch(
+    raw: RawSurface, pitch: GivenPitch, height_range: float | None, steps: list[str]
+) -> Pitch:
     """Return the given pitch or that of the file [m], one value for each axis."""
     axes = raw.heights.ndim
     chosen = raw.pitch if pitch is None else pitch
     if chosen is None:
-        raise ParameterError("pitch", f"must be given [m]: {raw.source} has none")
+        missing = "{pitch}"
+        if raw.relative and height_range is None:
+            missing = "{pitch} and {unit}" if raw.lacks_unit else "{pitch} and {height_range}"
+        text = f"must be given [m]: {raw.source} has none; give {missing}"
+        raise ParameterError("pitch", text, pitch=1e-6, unit="um", height_range=1e-6)
     values = np.atleast_1d(np.asarray(chosen, dtype=np.float64))
     if values.ndim != 1 or len(values) not in (1, axes):
         wanted = "one number [m]" if axes == 1 else "one number or (px, py) [m]"

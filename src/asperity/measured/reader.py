@@ -46,7 +46,7 @@ class RawSurface:
             ``read_surface`` notes.
         relative: whether the heights are not lengths (pixel values of an image): a height range
             converts them to lengths.
-        unit_question: how to state the unit of relative heights, to end a sentence.
+        lacks_unit: whether relative heights are lengths, whose unit ``read_surface`` accepts.
 
     Example:
         >>> flat = RawSurface(np.zeros((4, 5)), (1e-6, 1e-6), "flat.npy", ())
@@ -60,7 +60,7 @@ class RawSurface:
     notes: tuple[str, ...]
     has_units: bool = True
     relative: bool = False
-    unit_question: str = ""
+    lacks_unit: bool = False
 
     @property
     def is_profile(self) -> bool:

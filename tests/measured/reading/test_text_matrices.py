@@ -157,7 +157,6 @@ def test_unusable_units_are_refused(tmp_path: Path, header: str, match: str) -> 
         ("x [um],height", "heights"),
         ("x,height [um]", "positions"),
         ("x z [nm]", "positions"),
-        ("Z unit: nm\nx,z", "positions"),
     ],
 )
 def test_each_column_needs_a_unit(tmp_path: Path, header: str, what: str) -> None:

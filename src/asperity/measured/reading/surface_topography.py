@@ -23,7 +23,7 @@ from asperity.measured.reader import (
     SurfaceFile,
 )
 from asperity.measured.reading.isolation import reject_on_error
-from asperity.measured.reading.text_header import WORDS, split_words
+from asperity.measured.reading.text_header import names_other_quantity
 
 LIBRARY = "SurfaceTopography"
 """Name of the library that reads the files of instruments."""
@@ -152,7 +152,7 @@ def _to_surface(
 def _select_channel(reader: Any, name: str, channel: str | int | None) -> Any | None:
     """Return the named height channel, or the only one; None if there is none."""
     heights = [c for c in reader.channels if c.data_kind.value == "height" and c.dim in (1, 2)]
-    heights = [c for c in heights if not split_words(str(c.name)) & WORDS["quantities"]]
+    heights = [c for c in heights if not names_other_quantity(str(c.name))]
     if not heights:
         return None
     if channel is None and len(heights) == 1:

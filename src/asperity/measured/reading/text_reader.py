@@ -23,7 +23,8 @@ def read_text(file: reader.SurfaceFile, options: reader.ReadingOptions) -> reade
     Cells are separated by tabs, semicolons, commas or white space. Empty cells and "nan"
     are missing points. A decimal comma is accepted unless commas separate the cells. Two
     columns are a profile if the first increases (or decreases) throughout; three are points
-    of a regular grid, in any order, unless the header is that of a map.
+    of a regular grid, in any order, unless the header is that of a map. Units and sizes are those
+    of column headings and of the headers in ``text_layouts.toml``.
 
     Returns:
         Heights [m]; the pitch [m] of a profile or of points, else None.
@@ -35,25 +36,22 @@ def read_text(file: reader.SurfaceFile, options: reader.ReadingOptions) -> reade
     table = find_table(_decode(file.content))
     _check_table(table)
     header = text_header.parse_map_header(table.header, table.values.shape)
-    if text_header.parse_map_header(table.comments).describes_map:
+    if text_header.parse_map_header(table.comments).pitch is not None:
         raise SurfaceFileError("several maps in one file: save each in a file of its own")
-    table, names, found = text_header.select_columns(table)
-    rows, columns = table.values.shape
-    is_list = (columns == 2 and _is_monotonic(table)) or (columns == 3 and rows > 3)
-    is_list = is_list and not header.describes_map
+    headings = text_header.find_headings(table)
+    is_list = header.pitch is None and _is_list(table)
     heights = table.values[:, -1:] if is_list else table.values
-    heights[:], marked = text_header.mask_codes(heights, header.missing_code)
+    heights[:], notes = text_header.mask_codes(heights, header.missing_code)
     if is_list:
-        units, assumed = _find_units(names, header, file.name, options)
-        read = _read_profile if columns == 2 else _read_points
-        raw = read(table, units, file.name)
-        marked = (*marked, *assumed)
+        raw = _read_list(table, headings, header, file.name, options)
     else:
-        raw = _read_matrix(table, header, file.name, options)
-    found += ["a comma is read as the decimal sign"] * (table.dialect.decimal == ",")
+        raw = _read_matrix(table, headings, header, file.name, options)
+    notes = (*header.notes, *notes, *raw.notes)
+    if table.dialect.decimal == ",":
+        notes += ("a comma is read as the decimal sign",)
     if table.n_footer_lines:
-        found.append(f"{table.n_footer_lines} lines of text after the numbers ignored")
-    return replace(raw, notes=(*header.notes, *marked, *raw.notes, *found))
+        notes += (f"{table.n_footer_lines} lines of text after the numbers ignored",)
+    return replace(raw, notes=notes)
 
 
 def _decode(content: bytes) -> str:
@@ -78,11 +76,20 @@ def _check_table(table: TextTable) -> None:
         raise SurfaceFileError(f"line {line} has an infinite number")
 
 
+def _is_list(table: TextTable) -> bool:
+    """Whether rows are points of a profile or of a map rather than rows of a matrix."""
+    rows, columns = table.values.shape
+    if columns == 2:
+        return _is_monotonic(table)
+    return bool(columns == 3 and rows > 3)
+
+
 def _is_monotonic(table: TextTable) -> bool:
     """Whether two columns are a profile rather than a matrix; a damaged profile is refused."""
     positions = table.values[:, 0]
     steps = np.diff(positions)
-    rising = float(np.median(steps[~np.isnan(steps)])) if (~np.isnan(steps)).any() else 0.0
+    known = steps[~np.isnan(steps)]
+    rising = float(np.median(known)) if known.size else 0.0
     wrong = np.flatnonzero(~(steps * np.sign(rising) > 0))
     if len(wrong) == 0:
         return True
@@ -92,32 +99,38 @@ def _is_monotonic(table: TextTable) -> bool:
     raise SurfaceFileError(f"line {table.line_numbers[int(wrong[0]) + 1]}: {fault}")
 
 
-def _find_units(
-    names: list[str], header: text_header.MapHeader, name: str, options: reader.ReadingOptions
-) -> tuple[list[float], tuple[str, ...]]:
-    """Return the units of the columns [m], the given one for each without, and the note.
+def _read_list(
+    table: TextTable,
+    headings: list[str],
+    header: text_header.MapHeader,
+    name: str,
+    options: reader.ReadingOptions,
+) -> reader.RawSurface:
+    """Read a profile, or the points of a map, with the given unit for each column without.
 
     Raises:
         ParameterError: a unit is missing, or given although the file names all.
-        SurfaceFileError: the column of heights and the rest of the header name different units.
     """
-    own = [text_header.find_single_unit(column) for column in names] or [None] * 3
-    if own[-1] is not None and header.unit not in (None, own[-1]):
-        raise SurfaceFileError(
-            f"the column {names[-1]!r} and {header.notes[0]!r} differ: correct the header"
-        )
-    height = None if header.question else own[-1] or header.unit
-    own = [*(unit or header.lateral_unit for unit in own[:-1]), height]
-    given, notes = options.resolve_unit(name, None if None in own else own[0])
+    units = [text_header.find_single_unit(heading) for heading in headings]
+    if not units:
+        units = [header.lateral_unit] * (table.values.shape[1] - 1) + [header.unit]
+    given, notes = options.resolve_unit(name, None if None in units else units[0])
     if given is None:
-        what = "positions" if height else "heights" if any(own) else "positions and heights"
+        what = "positions and heights"
+        if units[-1] is not None:
+            what = "positions"
+        elif any(units):
+            what = "heights"
         raise ParameterError(
             "unit",
-            f"is required: {name} does not state the unit of its {what}{header.question}; give it,"
-            " such as {unit}, or name it for each column, such as 'x [um], z [nm]'",
+            f"is required: {name} does not state the unit of its {what}; give it, such as {{unit}},"
+            " or name it for each column, such as 'x [um], z [nm]'",
             unit="um",
         )
-    return [unit or given for unit in own], notes
+    known = [unit or given for unit in units]
+    read = _read_profile if len(known) == 2 else _read_points
+    raw = read(table, known, name)
+    return replace(raw, notes=(*raw.notes, *notes))
 
 
 def _read_profile(table: TextTable, units: list[float], name: str) -> reader.RawSurface:
@@ -157,20 +170,34 @@ def _read_points(table: TextTable, units: list[float], name: str) -> reader.RawS
 
 
 def _read_matrix(
-    table: TextTable, header: text_header.MapHeader, name: str, options: reader.ReadingOptions
+    table: TextTable,
+    headings: list[str],
+    header: text_header.MapHeader,
+    name: str,
+    options: reader.ReadingOptions,
 ) -> reader.RawSurface:
     """Return the map, or the profile of one column; heights without a unit are relative."""
     text_header.reject_positions(table)
-    unit, notes = options.resolve_unit(name, header.unit)
+    stated = header.unit
+    heading_note: tuple[str, ...] = ()
+    if stated is None and len(headings) == 1:
+        stated = text_header.find_single_unit(headings[0])
+        if stated is not None:
+            heading_note = (f"heights in units of {stated:g} m: header {headings[0]!r}",)
+    unit, notes = options.resolve_unit(name, stated)
     heights = np.ascontiguousarray(table.values * (unit or 1.0))
-    pitch = tuple(p for p in header.pitch if p is not None)
+    pitch: tuple[float, ...] | None = header.pitch
     if heights.shape[1] == 1:
         heights = heights[:, 0]
-        pitch = tuple(set(pitch))
-    known = pitch if len(pitch) == heights.ndim else None
-    question = "" if unit else f", or their unit, such as {{unit}}{header.question}"
+        pitch = pitch[1:] if pitch else None
     return reader.RawSurface(
-        heights, known, name, notes, not question, bool(question), unit_question=question
+        heights,
+        pitch,
+        name,
+        (*heading_note, *notes),
+        has_units=bool(unit),
+        relative=not unit,
+        lacks_unit=not unit,
     )
 
 
