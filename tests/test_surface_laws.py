@@ -12,11 +12,11 @@ import pytest
 import sympy as sp
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from tests.helpers.reference import exact_force
 
 from asperity.contacts.symbols import ContactSymbols
 from asperity.core.errors import LawError, ParameterError
 from asperity.laws import LAWS, REGISTERED_LAWS, Law
-from asperity.reference import exact_force
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Profile, Sinusoid, Texture
 

@@ -51,7 +51,7 @@ ROOMS = {
     "contacts": (
         "contacts",
         "tests/contacts",
-        "tests/test_reference.py",
+        "tests/paper/test_reference.py",
         "tests/derive",
         "tests/laws",
     ),

@@ -216,8 +216,6 @@ class Rendering(Serializable):
         update_rate: of the loop [Hz].
     """
 
-    serialized_attributes = "method samples truncated error_bound speed update_rate"
-
     method: str
     samples: int = 0
     truncated: int = 0

@@ -178,11 +178,7 @@ class Surface(Plottable):
         )
 
     def to_depth(self, max_depth: float) -> Surface:
-        """Return a copy with another max_depth [m].
-
-        Raises:
-            ParameterError: for a depth that is not positive.
-        """
+        """Return a copy with another max_depth [m], which must be positive."""
         return self._replace(max_depth=MAX_DEPTH.validate(max_depth))
 
     def to_texture(self, texture: TextureLike, max_depth: float | None = None) -> Surface:
@@ -190,20 +186,13 @@ class Surface(Plottable):
 
         Args:
             texture: the texture, or a text or path that names it.
-            max_depth: [m]; unchanged by default.
-
-        Raises:
-            ParameterError: for a depth that is not positive.
+            max_depth: [m], positive; unchanged by default.
         """
         depth = self.max_depth if max_depth is None else MAX_DEPTH.validate(max_depth)
         return self._replace(texture=as_texture(texture), max_depth=depth)
 
     def to_stiffness(self, stiffness: float) -> Surface:
-        """Return a copy with another stiffness [N/m].
-
-        Raises:
-            ParameterError: for a stiffness that is not positive.
-        """
+        """Return a copy with another stiffness [N/m], which must be positive."""
         return self._replace(stiffness=STIFFNESS.validate(stiffness))
 
     def to_law(self, law: str | Law, law_parameters: Mapping[str, float] | None = None) -> Surface:
@@ -281,32 +270,20 @@ class Surface(Plottable):
         from asperity.kernels.fuse import kernel_source
 
         # The extremes of a map take time to compute: only for laws that use the relative height.
-        low = -1.0
-        high = 1.0
-        if "h_mid" in kernel_source(self.law):
-            low, high = self.texture.extremes
-        floor = 0.0
-        if CLAMPS[self.clamp].has_backing_wall:
-            floor = self.floor
+        relative = "h_mid" in kernel_source(self.law)
+        low, high = self.texture.extremes if relative else (-1.0, 1.0)
         return (
             self.stiffness,
             0.5 * (low + high),
             0.5 * (high - low) or 1.0,  # a flat texture modulates nothing
             self.max_depth,
-            floor,
+            self.floor if CLAMPS[self.clamp].has_backing_wall else 0.0,
             *self.law_parameters.values(),
         )
 
     @property
     def digest(self) -> str:
-        """Digest of everything that the force depends on: texture, law, parameters and clamp.
-
-        Example:
-            >>> from asperity.textures.kinds.sinusoid import Sinusoid
-            >>> surface = Surface(Sinusoid(amplitude=0.2e-3, period=2e-3), "B")
-            >>> surface.digest == surface.to_stiffness(1001.0).digest
-            False
-        """
+        """Digest of everything that the force depends on: texture, law, parameters and clamp."""
         from asperity.kernels.fuse import kernel_source
 
         texture = type(self.texture.arguments).__name__, *map(np.asarray, self.texture.arguments)

@@ -7,6 +7,7 @@ from itertools import pairwise
 import mpmath
 import numpy as np
 import pytest
+from tests.helpers.exact_heights import exact_height
 
 from asperity.contacts import Contact
 from asperity.contacts.closest import closest_warm as again
@@ -105,7 +106,7 @@ def test_depth_code_uses_half_the_budget_of_a_tick() -> None:
 def test_exact_closest_point_satisfies_its_equations() -> None:
     """∇φ = 0 holds to far more digits than those of the compiled search, where it starts."""
     with mpmath.workdps(60):
-        h, contact = WAVES.exact_height(), LAWS["D"].contact
+        h, contact = exact_height(WAVES), LAWS["D"].contact
         for point in POINTS[:8]:
             p = [mpmath.mpf(float(value)) for value in point]
             result = contact.exact_contact(WAVES, h, p)

@@ -10,6 +10,7 @@ from typing import Any
 import mpmath
 import numpy as np
 import pytest
+from tests.helpers.exact_heights import exact_height
 
 from asperity.analysis.bounds.branch_and_bound import _subdivide, _subdivision_count
 from asperity.enclosures.cells import (
@@ -136,7 +137,7 @@ def exact_derivatives(
         where = [mpmath.mpf(texture.origin) + c[0] * mpmath.mpf(texture.pitch), mpmath.mpf(0)]
     else:
         where = [value - mpmath.mpf(margin) for value in c]
-    h = texture.exact_height()
+    h = exact_height(texture)
     return [h(*where, *DERIVATIVE_ORDERS[name]) for name in DERIVATIVE_NAMES]
 
 

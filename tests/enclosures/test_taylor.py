@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.helpers.reference import exact_jacobian
 
 from asperity.analysis.bounds.bound import NORM
 from asperity.analysis.bounds.problems import law_constants, law_kernel, stack_entries
@@ -17,7 +18,6 @@ from asperity.enclosures.cells import DERIVATIVE_NAMES, cells_with_depth
 from asperity.enclosures.taylor import TaylorMath, TaylorModel, reciprocal
 from asperity.kernels.fuse import kernel_source
 from asperity.laws import Law, find_law
-from asperity.reference import exact_jacobian
 from asperity.surface import Surface
 from asperity.textures import Fourier
 

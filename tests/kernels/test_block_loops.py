@@ -8,6 +8,7 @@ import mpmath
 import numpy as np
 import pytest
 from llvmlite import binding  # type: ignore[import-untyped]  # it has no types
+from tests.helpers.reference import exact_force
 
 from asperity import HeightMap, Sinusoid, Surface
 from asperity.contacts.warm_start import new_warm_start
@@ -15,7 +16,6 @@ from asperity.core.checks import FloatArray
 from asperity.kernels import block_loops
 from asperity.kernels.block_loops import BLOCK
 from asperity.laws import LAWS
-from asperity.reference import exact_force
 from asperity.textures.spline import heightmap_block_sampler as heightmap_block
 from asperity.textures.spline import heightmap_sampler as heightmap
 from asperity.textures.texture import Texture

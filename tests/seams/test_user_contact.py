@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.helpers.pages import page_example
+from tests.helpers.reference import exact_force, exact_jacobian
 from tests.helpers.user_modules import imported
 
 import asperity as asp
 from asperity.contacts import VERTICAL
 from asperity.core.errors import LawError, ParameterError
 from asperity.laws import Law
-from asperity.reference import exact_force, exact_jacobian
 from asperity.simulation import Cartesian, PrescribedHand, Servo, Strokes, simulate
 
 MODULE = page_example("howto/extend.md", "A contact")

@@ -18,6 +18,7 @@ from typing import Any
 import mpmath
 import numpy as np
 import pytest
+from tests.helpers.reference import exact_force, exact_jacobian
 from tests.helpers.user_modules import imported
 
 import asperity as asp
@@ -27,7 +28,6 @@ from asperity.analysis.gain.characteristic import surface_content
 from asperity.analysis.gain.proofs import CrestProblem
 from asperity.core.errors import InternalError, ParameterError
 from asperity.enclosures.cells import DERIVATIVE_NAMES
-from asperity.reference import exact_force, exact_jacobian
 from asperity.report import html_text
 from asperity.textures import Domain, Texture, catalogue
 from asperity.textures.texture import TextureKind

@@ -67,14 +67,14 @@ class ProbePoint:
 
     def force(self) -> FloatArray:
         """Return (f_x, f_z) by the definition in 25 digits [N]."""
-        from asperity.reference import exact_force
+        from asperity.paper.reference import exact_force
 
         exact = exact_force(self.surface, [self.x, 0.0, self.z], digits=_DIGITS)
         return np.array([float(exact[0]), float(exact[2])])
 
     def jacobian(self) -> FloatArray:
         """Return the Jacobian in x and z by central differences of the definition [N/m]."""
-        from asperity.reference import exact_jacobian
+        from asperity.paper.reference import exact_jacobian
 
         exact = exact_jacobian(self.surface, [self.x, 0.0, self.z], digits=_DIGITS)
         return np.array([[float(exact[i, j]) for j in (0, 2)] for i in (0, 2)])

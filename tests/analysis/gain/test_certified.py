@@ -25,6 +25,7 @@ from tests.analysis.gain.bound_checks import (
     check_bound,
     deterministic_settings,
 )
+from tests.helpers.reference import exact_jacobian
 
 from asperity.analysis import characteristic_number, one_sided_number
 from asperity.analysis.bounds.bound import CURL, NORM, ONE_SIDED, Bound, precise_norm
@@ -34,7 +35,6 @@ from asperity.analysis.gain.characteristic import certify, curl_number
 from asperity.analysis.gain.medial_axis import SearchOptions
 from asperity.analysis.gain.proofs import largest_singular_value
 from asperity.analysis.gain.theorems import derivative_bound
-from asperity.reference import exact_jacobian
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Profile, Sinusoid, Texture
 

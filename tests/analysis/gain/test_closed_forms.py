@@ -7,11 +7,11 @@ import math
 import mpmath
 import numpy as np
 import pytest
+from tests.helpers.reference import exact_jacobian
 
 from asperity.analysis import characteristic_number, one_sided_number
 from asperity.analysis.bounds.bound import one_sided, spectral_norm
 from asperity.analysis.gain.proofs import largest_singular_value, q_c, q_d
-from asperity.reference import exact_jacobian
 from asperity.surface import Surface
 from asperity.textures.kinds.fourier import Fourier
 from asperity.textures.kinds.sinusoid import Sinusoid

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from tests.paper.claims.perturbations import replace_name
 
-import asperity.reference
+import asperity.paper.reference
 from asperity.analysis.energy.field_energy import loop_work
 from asperity.analysis.gain.characteristic import characteristic_number
 from asperity.laws import find_law
@@ -40,7 +40,7 @@ _SCALED_LAWS = replace_name(
     "definitions of laws times 1 + 1e-6",
     "symbolic_force",
     lambda original: lambda law: _FACTOR * original(law),
-    asperity.reference,
+    asperity.paper.reference,
 )
 
 

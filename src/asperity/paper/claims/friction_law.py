@@ -50,7 +50,7 @@ def _check_force(seed: int, printed: Callable[[float, float], float]) -> claim.C
 
     Its arguments are μκ₀(1 - m) p^z d/d_max and d/d_max.
     """
-    from asperity.reference import exact_force
+    from asperity.paper.reference import exact_force
 
     rng = np.random.default_rng(seed)
     printed_forces = []

@@ -156,12 +156,10 @@ def exclude_cells(
     It is the least leading minor, of linearized matrices, or 1 where S is nowhere positive.
     """
     middle = size // 2
-    measure_hulls(count, hull, work, size)
     for q in range(size):
         for k in range(count):
             slack = work[0, k] * math.sqrt(work[1, k])
             above = bounds[0, 0] * (1.0 - SLACK) - slack
-            below = bounds[1, 0] * (1.0 - SLACK) - slack
             s0 = hull[middle, 0, k]
             ds = hull[q, 0, k] - s0
             xx = s0 * hull[q, 4, k] + ds * hull[middle, 4, k]
@@ -189,7 +187,7 @@ def exclude_cells(
                 zz + z * z - drop + sag,
             )
             lower = least_minor(
-                below,
+                bounds[1, 0] * (1.0 - SLACK) - slack,
                 a * (a - 2.0 * x) - xx,
                 a * b - a * y - b * x - xy,
                 a * c - a * z - c * x - xz,
@@ -200,6 +198,11 @@ def exclude_cells(
             if rate > 0.0:
                 upper = min(upper, above - 1.0 + drop - sag)
             work[3, k] = min(work[3, k], upper, lower)
+    exclude_outside(count, work)
+
+
+def exclude_outside(count: int, work: FloatArray) -> None:
+    """Write 1 to row 3 of ``work`` for cells where S is nowhere positive."""
     for k in range(count):
         if work[2, k] <= 0.0:
             work[3, k] = 1.0
@@ -361,18 +364,10 @@ def hull_batch(
                     continue
                 load_nodes(i, j, m - 1, count + 2, rows, nodes, field)
                 expand_run(count, nodes, plane, upward, mixed, field.margin, hull)
+                measure_hulls(count, hull, work, size)
                 exclude_cells(m, count, rate, hull, bounds, work, size, field)
+                place = (j, i, m)
                 search_run(
-                    (j, i, m),
-                    count,
-                    rate,
-                    hull,
-                    work,
-                    pairs,
-                    weights,
-                    product,
-                    bounds,
-                    marks,
-                    field,
+                    place, count, rate, hull, work, pairs, weights, product, bounds, marks, field
                 )
                 m += count

@@ -238,7 +238,6 @@ class PotentialField(Texture, Tabular):
     waves: Any = _of_source("waves")
     is_mirrored: Any = _of_source("is_mirrored")
     scan_line: Any = _of_source("scan_line")
-    exact_height: Any = _of_source("exact_height")
     cells: Any = _of_source("cells")
     line_segments: Any = _of_source("line_segments")
     sample_counts: Any = _of_source("sample_counts")

@@ -21,7 +21,7 @@ from asperity.textures.spline.heightmap_sampler import HeightMapArguments
 from asperity.textures.spline.profile_sampler import ProfileArguments
 from asperity.textures.spline.pyramid import line_pyramid, plane_pyramid
 from asperity.textures.spline.spline_bounds import SplineCells, max_height, spline_segments
-from asperity.textures.texture import ExactHeight, Texture, TexturePart
+from asperity.textures.texture import Texture, TexturePart
 
 MIN_NODES = 4
 # Coefficients decay by 0.27 per node next to a flat part. Below this share of the greatest they
@@ -154,13 +154,6 @@ class Spline(Texture):
     def is_mirrored(self) -> bool:
         """See :class:`Texture`."""
         return not self.periodic
-
-    def exact_height(self) -> ExactHeight:
-        """See :class:`Texture`."""
-        from asperity.textures.exact_heights import exact_spline
-
-        inner = self.coefficients[tuple(slice(1, n + 1) for n in self.heights.shape)]
-        return exact_spline(inner, self._pitches, np.atleast_1d(self.origin), self.periodic)
 
     def cells(
         self,

@@ -13,6 +13,7 @@ from typing import Any
 import mpmath
 import sympy as sp
 
+from asperity.contacts.contact import ExactHeight
 from asperity.contacts.symbols import DEPTH, DX, DY, H_HALF, H_MID, HX, HY, POSITION, H, K
 from asperity.core.errors import ParameterError
 from asperity.derive.derivatives import symbolic_force
@@ -20,7 +21,11 @@ from asperity.surface import Surface
 
 
 def exact_force(
-    surface: Surface, point: Sequence[Any], deflection: Sequence[Any] = (0, 0), digits: int = 30
+    surface: Surface,
+    point: Sequence[Any],
+    deflection: Sequence[Any] = (0, 0),
+    digits: int = 30,
+    height: ExactHeight | None = None,
 ) -> Any:
     """Return the unclamped force of a surface at one point, (3, 1) mpmath matrix [N].
 
@@ -29,9 +34,13 @@ def exact_force(
         point: probe position [m].
         deflection: deflection of the anchor [m], for a law with state.
         digits: decimal digits of the arithmetic.
+        height: function of the height; by default :meth:`Texture.exact_height`.
     """
+    height = height or surface.texture.exact_height()
     with mpmath.workdps(digits):
-        return _force(surface, [mpmath.mpf(c) for c in point], [mpmath.mpf(c) for c in deflection])
+        p = [mpmath.mpf(c) for c in point]
+        d = [mpmath.mpf(c) for c in deflection]
+        return _force(surface, height, p, d)
 
 
 def exact_jacobian(
@@ -40,6 +49,7 @@ def exact_jacobian(
     deflection: Sequence[Any] = (0, 0),
     sliding: bool = False,
     digits: int = 30,
+    height: ExactHeight | None = None,
 ) -> Any:
     """Return the Jacobian at one point, (3, 3) mpmath matrix [N/m].
 
@@ -47,6 +57,7 @@ def exact_jacobian(
     scale of the depth, so the error of the difference is far below the requested digits. While the
     anchor sticks, the deflection follows the probe; while it slides, only the part across d does.
     """
+    height = height or surface.texture.exact_height()
     with mpmath.workdps(3 * digits):
         p = [mpmath.mpf(c) for c in point]
         d = [mpmath.mpf(c) for c in deflection]
@@ -59,8 +70,8 @@ def exact_jacobian(
             if sliding and square > 0:
                 along = (d[0] * move[0] + d[1] * move[1]) / square
                 follow = [move[0] - along * d[0], move[1] - along * d[1]]
-            ahead = _force(surface, _offset(p, 1, move), _offset(d, 1, follow))
-            behind = _force(surface, _offset(p, -1, move), _offset(d, -1, follow))
+            ahead = _force(surface, height, _offset(p, 1, move), _offset(d, 1, follow))
+            behind = _force(surface, height, _offset(p, -1, move), _offset(d, -1, follow))
             columns.append((ahead - behind) / (2 * step))
         return mpmath.matrix([[columns[c][r] for c in range(3)] for r in range(3)])
 
@@ -69,9 +80,8 @@ def _offset(point: list[Any], sign: int, step: list[Any]) -> list[Any]:
     return [a + sign * b for a, b in zip(point, step, strict=True)]
 
 
-def _force(surface: Surface, p: list[Any], d: list[Any]) -> Any:
+def _force(surface: Surface, h: ExactHeight, p: list[Any], d: list[Any]) -> Any:
     law = surface.law
-    h = surface.texture.exact_height()
     contact = law.contact.exact_contact(surface.texture, h, p)
     if contact is None:
         raise ParameterError("surface", f"with law {law} has no reference implementation")
