@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from asperity.measured import measured_file as loading
+from asperity.measured.reading import measured_file as loading
 from asperity.scene import load_scene
 from asperity.textures import HeightMap, load_texture
 

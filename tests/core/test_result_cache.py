@@ -22,7 +22,7 @@ from asperity.analysis.results import compare
 from asperity.core import cache, files
 from asperity.core.files import json_text
 from asperity.laws import LAWS, Law
-from asperity.measured.measured_file import prepare_file
+from asperity.measured.reading.measured_file import prepare_file
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Profile, Sinusoid, Texture
 

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from asperity.core.errors import ParameterError, SurfaceFileError
-from asperity.measured.measured_file import prepare_file
 from asperity.measured.prepared import PreparedSurface, is_prepared, load_prepared, save_prepared
+from asperity.measured.reading.measured_file import prepare_file
 from asperity.textures import HeightMap, Profile, load_texture
 from asperity.textures.catalogue import texture_from_prepared
 

@@ -10,7 +10,7 @@ import pytest
 from tests.lab.browser import Browser
 
 import asperity as asp
-from asperity.measured.measured_file import show
+from asperity.measured.reading.measured_file import show
 from asperity.paper.cycle_experiments import DeviceExperiment, device_onset, passivity_experiment
 from asperity.paper.experiments import Experiments, bump_experiment, scanning_experiment
 from asperity.report import html_text

@@ -26,7 +26,7 @@ from asperity import report
 from asperity.analysis.results.device_comparisons import compare_devices
 from asperity.core.display import Displayable, Plottable, Reportable
 from asperity.devices import parse_device
-from asperity.measured.measured_file import MeasurementSummary, show
+from asperity.measured.reading.measured_file import MeasurementSummary, show
 from asperity.paper.table_two import TableTwo
 from asperity.report import find_page
 from asperity.report.document.terminal import print_page

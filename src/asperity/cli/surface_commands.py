@@ -94,8 +94,8 @@ def prepare_command(file: str, output: str, outputs: Outputs, **values: Any) -> 
     before magnification. The parameters of the surface (ISO 25178-2, ISO 21920-2) are printed after
     each step; asperity show prints more of them.
     """
-    from asperity.measured.measured_file import prepare_file
     from asperity.measured.prepared import check_output_path, save_prepared
+    from asperity.measured.reading.measured_file import prepare_file
 
     check_output_path(Path(output), Path(file))
     check_outputs(force=outputs.force, output=output, json=outputs.json)
@@ -165,7 +165,7 @@ def show_command(file: str, outputs: Outputs, **values: Any) -> None:
     ISO 21920-2 (Rq, Ra, Rz ...). The report also shows what each step removed and separates form,
     waviness and texture. FILE may also be an output of asperity prepare.
     """
-    from asperity.measured.measured_file import show
+    from asperity.measured.reading.measured_file import show
 
     with preparation_progress() as start_stage:
         summary = show(file, progress=start_stage, **options.file_values(values))

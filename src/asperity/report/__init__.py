@@ -21,7 +21,7 @@ from asperity.core.units import format_quantity
 from asperity.devices import Device
 from asperity.envelopes.envelope import Envelope
 from asperity.envelopes.find_design import Design
-from asperity.measured.measured_file import MeasurementSummary
+from asperity.measured.reading.measured_file import MeasurementSummary
 from asperity.report.document.html import Origin, render_notebook, render_page
 from asperity.report.document.page import Page, Picture, notebook_page, plot_later
 from asperity.report.document.terminal import page_renderables

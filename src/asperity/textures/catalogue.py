@@ -12,8 +12,8 @@ from typing import Any
 from asperity.core.arguments import Argument, document_arguments, parse_arguments
 from asperity.core.errors import ParameterError, suggest_names
 from asperity.measured.file_arguments import FILE_ARGUMENTS, SYNTHETIC_ARGUMENTS
-from asperity.measured.measured_file import prepare_file
 from asperity.measured.prepared import PreparedSurface
+from asperity.measured.reading.measured_file import prepare_file
 from asperity.textures.fields.field_file import is_field, load_field
 from asperity.textures.kinds import KIND_EXAMPLES
 from asperity.textures.kinds.fourier import Fourier

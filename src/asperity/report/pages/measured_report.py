@@ -15,9 +15,9 @@ from asperity.core.errors import escape_unprintable
 from asperity.core.units import format_quantity
 from asperity.measured.filters import short_trace_text
 from asperity.measured.form import SurfaceDecomposition, decompose_surface
-from asperity.measured.measured_file import MeasurementSummary, decimate
 from asperity.measured.parameters import SurfaceParameter, find_parameter
 from asperity.measured.prepared import PreparationStage, PreparedSurface
+from asperity.measured.reading.measured_file import MeasurementSummary, decimate
 from asperity.report.document import page
 from asperity.report.document.page import (
     HEADED,

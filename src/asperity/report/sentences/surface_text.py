@@ -9,9 +9,9 @@ from asperity.core.arguments import Argument
 from asperity.core.units import format_quantity
 from asperity.measured.form import SurfaceDecomposition
 from asperity.measured.lengths import format_counts, format_lengths
-from asperity.measured.measured_file import MeasurementSummary
 from asperity.measured.parameters import MAX_CORRELATION_POINTS
 from asperity.measured.prepared import PreparationStage, PreparedSurface
+from asperity.measured.reading.measured_file import MeasurementSummary
 from asperity.report.sentences import number_text
 from asperity.report.sentences.texts import sentence
 from asperity.textures.catalogue import CATALOGUE
