@@ -47,50 +47,51 @@ def c99_files(request: ExportRequest, stem: str) -> dict[str, str]:
     size = sum(map(store.size_in_bytes, places))
     if size > request.max_data_size:
         raise _size_error(request, store, places, size)
-    words = _substitutions(request, functions, stem)
-    words["parts"] = "".join(f"{{{place}, sizeof {place}}}, " for place in places)
+    values = _substitutions(request, functions, stem)
+    values["parts"] = "".join([f"{{{place}, sizeof {place}}}, " for place in places])
     if request.loads_field:
-        words["parts"] = f"{{{request.name}_surface.file, {request.name}_surface.used}}, "
-        records.insert(0, _render("field_data.c", words))
-        return _program_files(request, functions, words, "\n".join(records))
+        values["parts"] = f"{{{request.name}_surface.file, {request.name}_surface.used}}, "
+        records.insert(0, _render("field_data.c", values))
+        return _program_files(request, functions, values, "\n".join(records))
     arrays = [store.definition(place) for place in places]
     if request.as_library or size <= MAX_HEADER_DATA:
-        data = "\n".join(f"static {array}" for array in arrays)
-        return _program_files(request, functions, words, "\n".join([data, *records]))
-    declared = "".join(f"extern {store.declaration(place)};\n" for place in places)
-    data = _render("extern.h", words | {"declared": declared})
-    files = _program_files(request, functions, words, "\n".join([data, *records]))
-    head = f"{words['note']}#include <stdint.h>\n\n{declared}\n"
+        data = "\n".join([f"static {array}" for array in arrays])
+        return _program_files(request, functions, values, "\n".join([data, *records]))
+    declared = "".join([f"extern {store.declaration(place)};\n" for place in places])
+    data = _render("extern.h", values | {"declared": declared})
+    files = _program_files(request, functions, values, "\n".join([data, *records]))
+    head = f"{values['note']}#include <stdint.h>\n\n{declared}\n"
     return {**files, f"{stem}_data.c": head + "\n".join(arrays)}
 
 
-def _render(name: str, words: Mapping[str, str]) -> str:
-    return fill_template(load_template(name), words)
+def _render(name: str, values: Mapping[str, str]) -> str:
+    return fill_template(load_template(name), values)
 
 
 def _program_files(
-    request: ExportRequest, functions: SurfaceFunctions, words: Mapping[str, str], data: str
+    request: ExportRequest, functions: SurfaceFunctions, values: Mapping[str, str], data: str
 ) -> dict[str, str]:
     """Return the header, or header, source and CMake file of a library.
 
     Args:
         request: the export request.
         functions: the private functions.
-        words: values of the placeholders of the templates.
+        values: values of the placeholders of the templates.
         data: definitions or declarations of the data.
     """
-    link = f"{words['NAME']}_API" if request.as_library else "static inline"
-    words = {**words, "link": link}
-    contract = _render("contract.h", words)
-    public = _render("public.c", words)
+    values = {**values, "link": "static inline"}
+    if request.as_library:
+        values["link"] = f"{values['NAME']}_API"
+    contract = _render("contract.h", values)
+    public = _render("public.c", values)
     if request.loads_field:
-        contract += _render("field.h", words)
-        public += _render("field.c", words)
+        contract += _render("field.h", values)
+        public += _render("field.c", values)
     if functions.energy_name:
-        contract += _render("energy.h", words)
-        public += _render("energy.c", words)
-    words |= {"contract": contract, "inside": "\n".join([data, functions.code, public])}
-    words["guards"] = _render("guards.h", words)
+        contract += _render("energy.h", values)
+        public += _render("energy.c", values)
+    values |= {"contract": contract, "inside": "\n".join([data, functions.code, public])}
+    values["guards"] = _render("guards.h", values)
     files = {"@stem@.h": "header.h"}
     if request.as_library:
         files = {
@@ -98,7 +99,7 @@ def _program_files(
             "@stem@.c": "library.c",
             "CMakeLists.txt": "CMakeLists.txt",
         }
-    return {fill_template(file, words): _render(name, words) for file, name in files.items()}
+    return {fill_template(file, values): _render(name, values) for file, name in files.items()}
 
 
 def _substitutions(
@@ -106,13 +107,18 @@ def _substitutions(
 ) -> dict[str, str]:
     surface = request.surface
     single = request.is_single_precision
-    q_upper = f"{request.name}_q()" if request.loads_field else _bound_literal(request.q_upper)
+    q_upper = _bound_literal(request.q_upper)
+    if request.loads_field:
+        q_upper = f"{request.name}_q()"
+    absolute = "fabs"
+    if single:
+        absolute = "fabsf"
     return {
         "name": request.name,
         "NAME": request.name.upper(),
         "stem": stem,
-        "real": "float" if single else "double",
-        "abs": "fabsf" if single else "fabs",
+        "real": request.precision,
+        "abs": absolute,
         "far": real_literal(MAX_POSITION, single),
         "tick": functions.tick_name,
         "tick_type": functions.tick_type,
@@ -143,13 +149,14 @@ def _size_error(
     arrays = [store.values[place] for place in names]
     doubles = [array for array in arrays if array.dtype.name == "float64"]
     shape = max(doubles or arrays, key=lambda array: array.size).shape
-    flat = len(shape) > 1 and min(shape) > 4
     share = request.max_data_size / size
-    fits = [int(n * (math.sqrt(share) if flat else share)) for n in shape]
-    points = " x ".join(str(max(n, 1)) for n in fits[: 2 if flat else 1])
-    words = f"must be at least {size} bytes, the data of this surface; at most {points} points fit"
-    words += ": crop it, or prepare it with fewer; a field may be loaded"
-    return ParameterError("max_data", words, request.max_data_size)
+    points = str(max(int(share * shape[0]), 1))
+    if len(shape) > 1 and min(shape) > 4:
+        side = math.sqrt(share)
+        points = " x ".join([str(max(int(side * count), 1)) for count in shape[:2]])
+    needed = f"must be at least {size} bytes, the data of this surface; at most {points} points fit"
+    advice = "crop it, or prepare it with fewer; a field may be loaded"
+    return ParameterError("max_data", f"{needed}: {advice}", request.max_data_size)
 
 
 @dataclass(frozen=True)
@@ -190,8 +197,8 @@ def check_name(path: Path, target: ExportTarget) -> None:
         ParameterError: for another suffix, or a name that is not printable.
     """
     if path.suffix != target.suffix or not path.stem.isprintable() or '"' in path.stem:
-        words = f"must be a file that ends in {target.suffix}"
-        raise ParameterError("output", words, escape_unprintable(path.name))
+        requirement = f"must be a file that ends in {target.suffix}"
+        raise ParameterError("output", requirement, escape_unprintable(path.name))
 
 
 def write_files(

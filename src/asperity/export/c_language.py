@@ -97,7 +97,9 @@ class ConstantRecord(TupleType):
     def item_expression(self, value: str, index: int) -> str:
         """Return the C expression of an item of the record."""
         place = f"{value}.{self.names[index]}"
-        return f"{self.read_macro}({place})" if self.read_macro else place
+        if self.read_macro:
+            return f"{self.read_macro}({place})"
+        return place
 
 
 @dataclass(frozen=True)
@@ -151,11 +153,11 @@ def common_type(first: ValueType, second: ValueType) -> ValueType | None:
         return max(first, second)
     if not (isinstance(first, TupleType) and isinstance(second, TupleType)):
         return None
-    common = map(common_type, first.items, second.items)
-    items = tuple(item for item in common if item is not None)
-    same_names = first.names == second.names
-    complete = len(items) == len(first.items) == len(second.items)
-    return TupleType(items, first.names) if complete and same_names else None
+    if first.names != second.names or len(first.items) != len(second.items):
+        return None
+    common = list(map(common_type, first.items, second.items))
+    items = tuple([item for item in common if item is not None])
+    return TupleType(items, first.names) if len(items) == len(common) else None
 
 
 def c_scalar_type(value_type: ValueType, real: str) -> str:
@@ -217,8 +219,8 @@ def find_helper(name: str) -> HelperFunction:
         }
     """
     definitions = load_template("helpers.c").split("\n\n")
-    found = next(text for text in definitions if f"@{name}(" in text)
-    return HelperFunction(name, found.rstrip() + "\n")
+    (definition,) = [text for text in definitions if f" @{name}(" in text.split("{")[0]]
+    return HelperFunction(name, definition.rstrip() + "\n")
 
 
 def power_helper(exponent: int, base: ScalarType) -> HelperFunction:
@@ -233,26 +235,31 @@ def power_helper(exponent: int, base: ScalarType) -> HelperFunction:
         }
         <BLANKLINE>
     """
-    kind = "real" if base == FLOAT else "int64_t"
+    kind = "int64_t"
+    name = "power_int"
+    if base == FLOAT:
+        kind = "real"
+        name = "power"
     lines = []
     factors = []
-    left = abs(exponent)
-    name = "a"
+    remaining = abs(exponent)
+    square = "a"
     step = 1
-    while left:
-        if left & 1:
-            factors.append(name)
-        left >>= 1
-        if left:
+    while remaining:
+        if remaining & 1:
+            factors.append(square)
+        remaining >>= 1
+        if remaining:
             step *= 2
-            lines.append(f"const {kind} a{step} = {name} * {name};")
-            name = f"a{step}"
+            lines.append(f"    const {kind} a{step} = {square} * {square};\n")
+            square = f"a{step}"
     product = " * ".join(factors) or "1"
-    lines.append(f"return 1 / ({product});" if exponent < 0 else f"return {product};")
-    suffix = "" if base == FLOAT else "_int"
-    whole = f"power{suffix}_{'minus_' if exponent < 0 else ''}{abs(exponent)}"
-    body = "".join(f"    {line}\n" for line in lines)
-    return HelperFunction(whole, f"static inline {kind} @{whole}({kind} a)\n{{\n{body}}}\n")
+    if exponent < 0:
+        name = f"{name}_minus"
+        product = f"1 / ({product})"
+    name = f"{name}_{abs(exponent)}"
+    body = "".join([*lines, f"    return {product};\n"])
+    return HelperFunction(name, f"static inline {kind} @{name}({kind} a)\n{{\n{body}}}\n")
 
 
 @lru_cache(maxsize=16)

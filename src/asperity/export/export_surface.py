@@ -89,7 +89,9 @@ def export_code(
     request = {name: arguments.pop(name) for name in names if name in arguments}
     ExportRequest.validate(**request)
     is_file = isinstance(surface, (str, os.PathLike)) and is_field(surface)
-    field = place.with_suffix(".field") if load and not is_file else None
+    field = None
+    if load and not is_file:
+        field = place.with_suffix(".field")
     for file in filter(None, [place, field]):
         check_not_existing("path", file, force=force)
     if not isinstance(surface, Surface):
@@ -139,11 +141,12 @@ def header_comment_text(analysis: Analysis, file_name: str) -> str:
     """
     law = analysis.surface.law
     doc = (sys.modules[law.force.__module__].__doc__ or "").strip()
-    description = doc if doc.startswith(law.letter) else law.summary
+    if not doc.startswith(law.letter):
+        doc = law.summary
     paragraphs = [
         [f"{file_name}: law {law}, by asperity {__version__}. Generated, do not edit."],
         _usage(law),
-        [description],
+        [doc],
         _facts(analysis),
         _wrap([analysis.answer, *analysis.assumptions]),
     ]
@@ -162,14 +165,13 @@ def _usage(law: Law) -> list[str]:
 
 def _facts(analysis: Analysis) -> list[str]:
     surface = analysis.surface
-    parameters = "".join(f", {name} = {value:g}" for name, value in surface.law_parameters.items())
+    parameters = [f"{name} = {value:g}" for name, value in surface.law_parameters.items()]
+    described = surface.texture.describe().items()
     rows = {
-        "surface": ", ".join(
-            f"{k} = {_format_value(v)}" for k, v in surface.texture.describe().items()
-        ),
+        "surface": ", ".join([f"{name} = {_format_value(value)}" for name, value in described]),
         "place": _format_extent(surface.texture),
         "device": analysis.device.name,
-        "stiffness": f"k = {format_quantity(surface.stiffness, 'N/m')}{parameters}",
+        "stiffness": ", ".join([f"k = {format_quantity(surface.stiffness, 'N/m')}", *parameters]),
         "region": f"{surface.texture.domain.description}, {describe(surface, 'depth_range')}",
         "clamp": _format_clamp(analysis),
         "q": _format_bound(analysis.q),
@@ -184,24 +186,26 @@ def _facts(analysis: Analysis) -> list[str]:
 
 def _format_extent(texture: Texture) -> str:
     """Return the extent of the surface: its heights, and one period in the plane."""
-    low, high = (format_quantity(height, "m") for height in texture.extremes)
-    parts = [f"heights {low} to {high}"]
+    parts = [f"heights {_format_range(texture.extremes)}"]
     if len(texture.domain.spans) > 1:
         corners = texture.domain.points(np.array([[0.0, 0.0], [0.0, 1.0], [1.0, 0.0], [1.0, 1.0]]))
         for axis, values in zip("xy", corners.T, strict=True):
-            ends = (format_quantity(float(end), "m") for end in (values.min(), values.max()))
-            parts.append(f"{axis} {' to '.join(ends)}")
+            parts.append(f"{axis} {_format_range((float(values.min()), float(values.max())))}")
     return ", ".join(parts)
+
+
+def _format_range(ends: tuple[float, float]) -> str:
+    return f"{format_quantity(ends[0], 'm')} to {format_quantity(ends[1], 'm')}"
 
 
 def _format_value(value: object) -> str:
     """Return a value of a description as text, truncated if it is long."""
     if isinstance(value, list):
-        return _truncate(f"[{', '.join(map(_format_value, value))}]")
-    return _truncate(f"{value:g}" if isinstance(value, float) else str(value))
-
-
-def _truncate(text: str) -> str:
+        text = f"[{', '.join(map(_format_value, value))}]"
+    elif isinstance(value, float):
+        text = f"{value:g}"
+    else:
+        text = str(value)
     return text if len(text) <= _WIDTH else f"{text[:40]} ..."
 
 
@@ -222,4 +226,4 @@ def _format_bound(bound: Bound) -> str:
 
 
 def _wrap(sentences: list[str]) -> list[str]:
-    return [line for one in sentences for line in textwrap.wrap(one, _WIDTH)]
+    return [line for sentence in sentences for line in textwrap.wrap(sentence, _WIDTH)]

@@ -76,8 +76,9 @@ class ExpressionTypes(ast.NodeVisitor):
 
     def not_exportable(self, construct: str, node: ast.AST | None = None) -> NotExportableError:
         """Return the error for a construct of this function that cannot be exported."""
-        text = "" if node is None else f" ({ast.unparse(node).splitlines()[0]})"
-        return NotExportableError(self.node.name, construct + text)
+        if node is not None:
+            construct += f" ({ast.unparse(node).splitlines()[0]})"
+        return NotExportableError(self.node.name, construct)
 
     def infer(self, node: ast.expr) -> ValueType:
         """Return the type of an expression.
@@ -123,15 +124,22 @@ class ExpressionTypes(ast.NodeVisitor):
             value = self.constant_integer(node.operand)
             return None if value is None else -value
         if isinstance(node, ast.Attribute) and node.attr in {"size", "ndim"}:
-            kind = self.infer(node.value)
-            if isinstance(kind, c.ArrayType) and not kind.lengths:
-                return math.prod(kind.shape) if node.attr == "size" else len(kind.shape)
+            shape = self._constant_shape(node.value)
+            if shape is not None:
+                return {"size": math.prod(shape), "ndim": len(shape)}[node.attr]
         if isinstance(node, ast.Subscript) and getattr(node.value, "attr", "") == "shape":
             assert isinstance(node.value, ast.Attribute)  # only that has an attribute
             index = self.constant_integer(node.slice)
-            kind = self.infer(node.value.value)
-            if index is not None and isinstance(kind, c.ArrayType) and not kind.lengths:
-                return kind.shape[index] if -len(kind.shape) <= index < len(kind.shape) else None
+            shape = self._constant_shape(node.value.value)
+            if index is not None and shape is not None and -len(shape) <= index < len(shape):
+                return shape[index]
+        return None
+
+    def _constant_shape(self, node: ast.expr) -> tuple[int, ...] | None:
+        """Return the shape of an array unless it is loaded at run time."""
+        kind = self.infer(node)
+        if isinstance(kind, c.ArrayType) and not kind.lengths:
+            return kind.shape
         return None
 
     def visit_Name(self, node: ast.Name) -> ValueType:
@@ -204,19 +212,22 @@ class ExpressionTypes(ast.NodeVisitor):
         right = self.infer_scalar(node.right)
         both = max(left, right)
         if left == right == c.SINGLE:
-            words = "computes with two numbers of single precision: use float()"
-            raise self.not_exportable(words, node)
+            construct = "computes with two numbers of single precision: use float()"
+            raise self.not_exportable(construct, node)
         if isinstance(node.op, ast.Div):
             return c.FLOAT
         if isinstance(node.op, ast.Pow):
             return self._power(node, left)
         if isinstance(node.op, (ast.MatMult, *c.BIT_OPERATORS)):
             if isinstance(node.op, ast.MatMult) or both not in {c.BOOL, c.INT}:
-                words = "has an operator that is not defined for its operands"
-                raise self.not_exportable(words, node)
-            shifts = isinstance(node.op, (ast.LShift, ast.RShift))
-            return c.INT if shifts else both
-        return c.FLOAT if both == c.SINGLE else max(both, c.INT)
+                construct = "has an operator that is not defined for its operands"
+                raise self.not_exportable(construct, node)
+            if isinstance(node.op, (ast.LShift, ast.RShift)):
+                return c.INT
+            return both
+        if both == c.SINGLE:
+            return c.FLOAT
+        return max(both, c.INT)
 
     def _power(self, node: ast.BinOp, base: c.ScalarType) -> ValueType:
         exponent = self.constant_integer(node.right)
@@ -233,15 +244,17 @@ class ExpressionTypes(ast.NodeVisitor):
             return c.BOOL
         if isinstance(node.op, ast.Invert) and kind != c.INT:
             raise self.not_exportable("has an operator that is not defined for its operand", node)
-        return c.INT if kind == c.BOOL else kind
+        return max(kind, c.INT)
 
     def visit_Compare(self, node: ast.Compare) -> ValueType:
         """Return the type of a comparison."""
-        if any(isinstance(op, (ast.Is, ast.IsNot, ast.In, ast.NotIn)) for op in node.ops):
-            raise self.not_exportable("compares by 'is' or 'in'", node)
-        if not all(isinstance(one, (ast.Name, ast.Constant)) for one in node.comparators[:-1]):
-            words = "chains comparisons of an expression that is not a name"
-            raise self.not_exportable(words, node)
+        for operator in node.ops:
+            if isinstance(operator, (ast.Is, ast.IsNot, ast.In, ast.NotIn)):
+                raise self.not_exportable("compares by 'is' or 'in'", node)
+        for side in node.comparators[:-1]:
+            if not isinstance(side, (ast.Name, ast.Constant)):
+                construct = "chains comparisons of an expression that is not a name"
+                raise self.not_exportable(construct, node)
         for side in (node.left, *node.comparators):
             self.infer_scalar(side)
         return c.BOOL
@@ -279,12 +292,12 @@ class ExpressionTypes(ast.NodeVisitor):
         Raises:
             NotExportableError: unless each argument is given once, in order.
         """
-        by_name = {key.arg: key.value for key in node.keywords}
-        given = dict(zip(names, node.args, strict=False)) | by_name
-        stars = any(isinstance(argument, ast.Starred) for argument in node.args)
-        if stars or list(given) != [n for n in names if n in given] or len(given) != len(names):
+        arguments: dict[str | None, ast.expr] = dict(zip(names, node.args, strict=False))
+        arguments |= {keyword.arg: keyword.value for keyword in node.keywords}
+        stars = [argument for argument in node.args if isinstance(argument, ast.Starred)]
+        if stars or tuple(arguments) != tuple(names):
             raise self.not_exportable("does not pass every argument once, in order", node)
-        return [given[name] for name in names]
+        return list(arguments.values())
 
     def call_arguments(self, node: ast.Call) -> list[ast.expr]:
         """Return the arguments of a call of a compiled function, in order.
@@ -316,10 +329,10 @@ class ExpressionTypes(ast.NodeVisitor):
 
     def _work_array_shape(self, node: ast.Call) -> tuple[int, ...]:
         if len(node.args) == 1 and isinstance(node.args[0], ast.Tuple):
-            lengths = [self.constant_integer(one) for one in node.args[0].elts]
-            known = tuple(one for one in lengths if one is not None)
-            if known and len(known) == len(lengths):
-                return known
+            lengths = [self.constant_integer(length) for length in node.args[0].elts]
+            shape = tuple([length for length in lengths if length is not None])
+            if shape and len(shape) == len(lengths):
+                return shape
         raise self.not_exportable("makes a work array without a constant shape", node)
 
 
@@ -329,24 +342,30 @@ _CONVERSIONS |= dict.fromkeys(("int", "int64"), c.INT)
 
 def called_name(node: ast.Call) -> str:
     """Return the name of the called function, without its module."""
-    return node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+    if isinstance(node.func, ast.Attribute):
+        return node.func.attr
+    return str(getattr(node.func, "id", ""))
 
 
 def indices_of(node: ast.Subscript) -> list[ast.expr]:
     """Return the indices of an array element."""
-    return list(node.slice.elts) if isinstance(node.slice, ast.Tuple) else [node.slice]
+    if isinstance(node.slice, ast.Tuple):
+        return list(node.slice.elts)
+    return [node.slice]
 
 
 def _iterate_conditions(function: ast.FunctionDef) -> Iterator[ast.expr]:
     """Yield the expressions that are used as conditions only."""
     for node in ast.walk(function):
-        pending = [node.test] if isinstance(node, (ast.If, ast.While, ast.IfExp)) else []
-        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
-            pending = [node.operand]
+        pending = []
+        if isinstance(node, (ast.If, ast.While, ast.IfExp)):
+            pending.append(node.test)
+        elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
+            pending.append(node.operand)
         while pending:
             test = pending.pop()
             yield test
-            pending += test.values if isinstance(test, ast.BoolOp) else []
+            pending += getattr(test, "values", ())
 
 
 def _type_of_value(value: float) -> c.ScalarType:

@@ -67,14 +67,13 @@ class ExpressionPrinter(ast.NodeVisitor):
 
     def text(self, node: ast.expr, min_precedence: int = 0) -> str:
         """Return an expression, in parentheses if its precedence is below a minimum."""
-        value = self.to_c(node)
-        return value.text if value.precedence >= min_precedence else f"({value.text})"
+        return _enclose(*self.to_c(node), min_precedence)
 
     def to_c(self, node: ast.expr) -> CExpression:
         """Return an expression with its precedence."""
         length = self.types.constant_integer(node)
         if length is not None:
-            return CExpression(str(length), _PRIMARY if length >= 0 else _UNARY)
+            return _literal(str(length))
         value: CExpression = self.visit(node)
         return value
 
@@ -90,7 +89,7 @@ class ExpressionPrinter(ast.NodeVisitor):
             if length is not None:
                 return real_literal(float(length), self.program.single)
             cast = f"({self.program.c_type(c.FLOAT)}){self.text(node, _UNARY)}"
-            return cast if min_precedence <= _UNARY else f"({cast})"
+            return _enclose(cast, _UNARY, min_precedence)
         if value_type == c.BOOL and isinstance(own, c.ScalarType):
             return f"{self.text(node, _EQUAL + 1)} != 0"
         raise self.types.not_exportable("converts a value to another type", node)
@@ -98,8 +97,9 @@ class ExpressionPrinter(ast.NodeVisitor):
     def condition(self, node: ast.expr, min_precedence: int = 0) -> str:
         """Return a condition."""
         text = self.as_type(node, c.BOOL)
-        rank = self.to_c(node).precedence if self.types.infer(node) == c.BOOL else _EQUAL
-        return text if rank >= min_precedence else f"({text})"
+        if self.types.infer(node) == c.BOOL:
+            return _enclose(text, self.to_c(node).precedence, min_precedence)
+        return _enclose(text, _EQUAL, min_precedence)
 
     # --- names and literals ----------------------------------------------------------------------
 
@@ -113,10 +113,9 @@ class ExpressionPrinter(ast.NodeVisitor):
     def visit_Constant(self, node: ast.Constant) -> CExpression:
         """Return the C expression of a literal."""
         if isinstance(node.value, float):
-            text = real_literal(node.value, self.program.single)
-        elif isinstance(node.value, int):
-            text = str(int(node.value))
-        return CExpression(text, _UNARY if text.startswith("-") else _PRIMARY)
+            return _literal(real_literal(node.value, self.program.single))
+        assert isinstance(node.value, int)  # checked by the type inference
+        return _literal(str(int(node.value)))
 
     def visit_Attribute(self, node: ast.Attribute) -> CExpression:
         """Return the C expression of a field, a constant of a module, or the shape of an array."""
@@ -169,7 +168,10 @@ class ExpressionPrinter(ast.NodeVisitor):
             return CExpression(f"{text}[{place}]")
         for index_node, length in zip(indices_of(node), kind.shape, strict=True):
             fixed = self.types.constant_integer(index_node)
-            text += f"[{self.text(index_node) if fixed is None else fixed % max(length, 1)}]"
+            if fixed is None:
+                text += f"[{self.text(index_node)}]"
+            else:
+                text += f"[{fixed % max(length, 1)}]"
         return CExpression(text)
 
     # --- operators -------------------------------------------------------------------------------
@@ -194,8 +196,10 @@ class ExpressionPrinter(ast.NodeVisitor):
         return CExpression(f"{left} {sign} {right}", rank)
 
     def _floor_division(self, node: ast.BinOp, value_type: ValueType) -> CExpression:
-        name = "quotient" if isinstance(node.op, ast.FloorDiv) else "rest"
-        helper = c.find_helper(name if value_type == c.FLOAT else f"{name}_int")
+        name = "rest"
+        if isinstance(node.op, ast.FloorDiv):
+            name = "quotient"
+        helper = _find_typed_helper(name, value_type)
         return self._helper_call(helper, [node.left, node.right], value_type)
 
     def _power(self, node: ast.BinOp, value_type: ValueType) -> CExpression:
@@ -214,35 +218,40 @@ class ExpressionPrinter(ast.NodeVisitor):
             return CExpression(f"!{self.condition(node.operand, _UNARY)}", _UNARY)
         sign = {ast.USub: "-", ast.UAdd: "", ast.Invert: "~"}[type(node.op)]
         text = self.text(node.operand, _UNARY)
-        # Two minus signs would be a decrement.
-        return CExpression(f"{sign}({text})" if text.startswith("-") else f"{sign}{text}", _UNARY)
+        if text.startswith("-"):  # two minus signs would be a decrement
+            text = f"({text})"
+        return CExpression(f"{sign}{text}", _UNARY)
 
     def visit_Compare(self, node: ast.Compare) -> CExpression:
         """Return the C expression of a comparison."""
         sides = [node.left, *node.comparators]
         parts = []
         for left, op, right in zip(sides[:-1], node.ops, sides[1:], strict=True):
-            first = self.types.infer_scalar(left)
-            second = self.types.infer_scalar(right)
-            real = c.FLOAT in {first, second} or c.SINGLE in {first, second}
-            kind = c.FLOAT if real else c.INT
-            sign, rank = _COMPARE[type(op)]
+            kind = c.INT
+            if {self.types.infer(left), self.types.infer(right)} & {c.FLOAT, c.SINGLE}:
+                kind = c.FLOAT
+            sign, precedence = _COMPARE[type(op)]
             parts.append(
                 f"{self.as_type(left, kind, _SHIFT)} {sign} {self.as_type(right, kind, _SHIFT)}"
             )
-        return CExpression(" && ".join(parts), rank if len(parts) == 1 else _AND)
+        if len(parts) > 1:
+            precedence = _AND
+        return CExpression(" && ".join(parts), precedence)
 
     def visit_BoolOp(self, node: ast.BoolOp) -> CExpression:
         """Return the C expression of a conjunction or a disjunction."""
-        sign, rank = ("&&", _AND) if isinstance(node.op, ast.And) else ("||", _OR)
+        if isinstance(node.op, ast.And):
+            parts = [self.condition(part, _AND) for part in node.values]
+            return CExpression(" && ".join(parts), _AND)
         # Compilers warn about mixed && and || without parentheses.
-        parts = [self.condition(part, rank if sign == "&&" else _AND + 1) for part in node.values]
-        return CExpression(f" {sign} ".join(parts), rank)
+        parts = [self.condition(part, _AND + 1) for part in node.values]
+        return CExpression(" || ".join(parts), _OR)
 
     def visit_IfExp(self, node: ast.IfExp) -> CExpression:
         """Return the C expression of a conditional expression."""
         kind = self.types.infer(node)
-        first, second = (self.as_type(one, kind, _OR) for one in (node.body, node.orelse))
+        first = self.as_type(node.body, kind, _OR)
+        second = self.as_type(node.orelse, kind, _OR)
         return CExpression(f"{self.condition(node.test, _OR)} ? {first} : {second}", _CHOICE)
 
     # --- calls -----------------------------------------------------------------------------------
@@ -260,19 +269,18 @@ class ExpressionPrinter(ast.NodeVisitor):
 
     def _compiled_call(self, node: ast.Call, name: str) -> CExpression:
         arguments = self.types.call_arguments(node)
-        kinds = tuple(self.types.infer(argument) for argument in arguments)
+        kinds = tuple(map(self.types.infer, arguments))
         callee = self.program.function_name(name, kinds)
-        given = [
+        passed = [
             self.text(argument)
             for argument, kind in zip(arguments, kinds, strict=True)
             if not c.is_constant(kind)
         ]
-        return CExpression(f"{callee}({', '.join(given)})")
+        return CExpression(f"{callee}({', '.join(passed)})")
 
     def _minimum_or_maximum(self, node: ast.Call) -> CExpression:
-        name = called_name(node)
         kind = self.types.infer(node)
-        helper = self.program.helper_name(c.find_helper(name if kind == c.FLOAT else f"{name}_int"))
+        helper = self.program.helper_name(_find_typed_helper(called_name(node), kind))
         text = self.as_type(node.args[0], kind)
         for argument in node.args[1:]:
             text = f"{helper}({text}, {self.as_type(argument, kind)})"
@@ -297,13 +305,28 @@ class ExpressionPrinter(ast.NodeVisitor):
     def _helper_call(
         self, helper: c.HelperFunction, arguments: list[ast.expr], value_type: ValueType
     ) -> CExpression:
-        given = ", ".join(self.as_type(argument, value_type) for argument in arguments)
-        return CExpression(f"{self.program.helper_name(helper)}({given})")
+        passed = [self.as_type(argument, value_type) for argument in arguments]
+        return CExpression(f"{self.program.helper_name(helper)}({', '.join(passed)})")
 
     def _library_call(self, name: str, arguments: list[ast.expr]) -> CExpression:
-        given = ", ".join(self.as_type(argument, c.FLOAT) for argument in arguments)
-        suffix = "f" if self.program.single else ""
-        return CExpression(f"{name}{suffix}({given})")
+        passed = [self.as_type(argument, c.FLOAT) for argument in arguments]
+        if self.program.single:
+            name += "f"
+        return CExpression(f"{name}({', '.join(passed)})")
+
+
+def _enclose(text: str, precedence: int, min_precedence: int) -> str:
+    """Return an expression, in parentheses if its precedence is below a minimum."""
+    return text if precedence >= min_precedence else f"({text})"
+
+
+def _literal(text: str) -> CExpression:
+    return CExpression(text, _UNARY if text.startswith("-") else _PRIMARY)
+
+
+def _find_typed_helper(name: str, value_type: ValueType) -> c.HelperFunction:
+    """Return the helper function of real numbers, or its like for integers."""
+    return c.find_helper(name if value_type == c.FLOAT else f"{name}_int")
 
 
 _BUILTINS: dict[str, Callable[[ExpressionPrinter, ast.Call], CExpression]] = {
@@ -332,7 +355,8 @@ def real_literal(value: float, single: bool) -> str:
     if single and 0.0 < abs(value) < float(np.finfo(np.float32).tiny):
         value = math.copysign(float(np.finfo(np.float32).tiny), value)
     if math.isinf(value) or (single and abs(value) > float(np.finfo(np.float32).max)):
-        sign = "-" if value < 0 else ""
         size = "INFINITY" if single else "HUGE_VAL"
-        return f"{sign}{size}"
-    return f"{np.float32(value)!s}f" if single else repr(float(value))
+        return f"-{size}" if value < 0 else size
+    if single:
+        return f"{np.float32(value)!s}f"
+    return repr(float(value))

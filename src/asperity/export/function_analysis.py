@@ -41,7 +41,7 @@ class FunctionTypes(ExpressionTypes):
         self, node: ast.FunctionDef, argument_types: tuple[ValueType, ...], program: ProgramContext
     ) -> None:
         super().__init__(node, {}, program)
-        self.argument_names = tuple(argument.arg for argument in node.args.args)
+        self.argument_names = tuple([argument.arg for argument in node.args.args])
         self.argument_types = dict(zip(self.argument_names, argument_types, strict=True))
         self.types |= self.argument_types
         self._check_arguments()
@@ -65,8 +65,8 @@ class FunctionTypes(ExpressionTypes):
             raise unknown
 
     def _check_arguments(self) -> None:
-        given = self.node.args
-        if given.vararg or given.kwarg or given.kwonlyargs or given.posonlyargs:
+        signature = self.node.args
+        if signature.vararg or signature.kwarg or signature.kwonlyargs or signature.posonlyargs:
             raise self.not_exportable("has starred, keyword-only or positional-only arguments")
 
     # --- statements ------------------------------------------------------------------------------
@@ -123,8 +123,8 @@ class FunctionTypes(ExpressionTypes):
         if not isinstance(value_type, c.TupleType):
             raise self.not_exportable("unpacks a value that is not a tuple", value)
         if len(value_type.items) != len(target.elts):
-            words = f"unpacks {len(value_type.items)} values into {len(target.elts)} names"
-            raise self.not_exportable(words, target)
+            construct = f"unpacks {len(value_type.items)} values into {len(target.elts)} names"
+            raise self.not_exportable(construct, target)
         for part, item in zip(target.elts, value_type.items, strict=True):
             self._assign_type(part, item, value)
 
@@ -149,15 +149,16 @@ class FunctionTypes(ExpressionTypes):
         names = set()
         for node in ast.walk(self.node):
             if isinstance(node, ast.Subscript) and isinstance(node.ctx, ast.Store):
-                names |= {node.value.id} if isinstance(node.value, ast.Name) else set()
+                if isinstance(node.value, ast.Name):
+                    names.add(node.value.id)
             elif isinstance(node, ast.Call):
                 names |= self.written_arrays(node)
         return frozenset(names)
 
     def writes_arrays(self, node: ast.AST) -> bool:
         """Return whether a part of the code writes to a work array."""
-        calls = (part for part in ast.walk(node) if isinstance(part, ast.Call))
-        return any(self.written_arrays(call) for call in calls)
+        calls = [part for part in ast.walk(node) if isinstance(part, ast.Call)]
+        return any(map(self.written_arrays, calls))
 
     def written_arrays(self, node: ast.Call) -> set[str]:
         """Return the names of the work arrays that a call writes to."""
@@ -185,10 +186,9 @@ def _iterate_statements(body: Sequence[ast.stmt]) -> Iterator[ast.stmt]:
 
 def expressions_in(node: ast.stmt) -> Iterator[ast.expr]:
     """Yield the expressions of a statement, without those of nested statements."""
-    for _name, value in ast.iter_fields(node):
-        for part in value if isinstance(value, list) else [value]:
-            if isinstance(part, ast.expr):
-                yield part
+    for part in ast.iter_child_nodes(node):
+        if isinstance(part, ast.expr):
+            yield part
 
 
 def sequenced_parts(node: ast.expr) -> Iterator[ast.expr]:
@@ -207,8 +207,9 @@ def sequenced_parts(node: ast.expr) -> Iterator[ast.expr]:
 
 def without_docstring(body: Sequence[ast.stmt]) -> Sequence[ast.stmt]:
     """Return the statements of a function without its docstring."""
-    documented = isinstance(body[0], ast.Expr) and isinstance(body[0].value, ast.Constant)
-    return body[1:] if documented else body
+    if isinstance(body[0], ast.Expr) and isinstance(body[0].value, ast.Constant):
+        return body[1:]
+    return body
 
 
 def names_in(target: ast.AST) -> Iterator[str]:
@@ -230,21 +231,23 @@ def live_names(types: FunctionTypes) -> set[str]:
     unused: set[int] = set()
     while True:
         live = set(_loaded_names(types.node, unused))
-        found = {
+        newly_unused = {
             id(node)
             for node in ast.walk(types.node)
             if isinstance(node, (ast.Assign, ast.AugAssign, ast.AnnAssign))
-            and not any(name in live for name in stored_names(node))
+            and live.isdisjoint(stored_names(node))
             and all(map(_is_names_only, _targets(node)))
             and not types.writes_arrays(node)
         }
-        if found <= unused:
+        if newly_unused <= unused:
             return live
-        unused |= found
+        unused |= newly_unused
 
 
 def _targets(node: ast.Assign | ast.AugAssign | ast.AnnAssign) -> Sequence[ast.expr]:
-    return node.targets if isinstance(node, ast.Assign) else [node.target]
+    if isinstance(node, ast.Assign):
+        return node.targets
+    return [node.target]
 
 
 def _is_names_only(target: ast.expr) -> bool:
@@ -267,18 +270,25 @@ def self_declaring_loops(function: ast.FunctionDef) -> Iterator[tuple[ast.For, s
     """Yield the loops whose variable is used in them only, and its name."""
     loops = [node for node in ast.walk(function) if isinstance(node, ast.For)]
     for name in {loop.target.id for loop in loops if isinstance(loop.target, ast.Name)}:
-        own = [loop for loop in loops if getattr(loop.target, "id", "") == name]
-        inside = {id(part) for loop in own for inner in loop.body for part in ast.walk(inner)}
-        targets = {id(loop.target) for loop in own}
-        # Each use is the variable of such a loop that is not nested in another, or a read in one.
-        free = all(
-            (id(part) in targets) != (id(part) in inside)
-            and (id(part) in targets or isinstance(part.ctx, ast.Load))
-            for part in ast.walk(function)
-            if isinstance(part, ast.Name) and part.id == name
-        )
-        if free and name not in {argument.arg for argument in function.args.args}:
-            yield from ((loop, name) for loop in own)
+        named = [loop for loop in loops if getattr(loop.target, "id", "") == name]
+        arguments = {argument.arg for argument in function.args.args}
+        if name not in arguments and _is_used_inside_only(function, name, named):
+            for loop in named:
+                yield loop, name
+
+
+def _is_used_inside_only(function: ast.FunctionDef, name: str, loops: list[ast.For]) -> bool:
+    """Return whether a name is the variable of these loops, not nested, and read inside only."""
+    inside = {id(part) for loop in loops for inner in loop.body for part in ast.walk(inner)}
+    targets = {id(loop.target) for loop in loops}
+    for part in ast.walk(function):
+        if isinstance(part, ast.Name) and part.id == name:
+            is_target = id(part) in targets
+            if is_target == (id(part) in inside):
+                return False
+            if not is_target and not isinstance(part.ctx, ast.Load):
+                return False
+    return True
 
 
 def declaring_statements(
@@ -302,14 +312,19 @@ def declaring_statements(
 
 
 def _first_statement_with(body: Sequence[ast.stmt], name: str) -> ast.stmt | None:
-    return next((statement for statement in body if name in names_in(statement)), None)
+    for statement in body:
+        if name in names_in(statement):
+            return statement
+    return None
 
 
 def _innermost_block(body: Sequence[ast.stmt], name: str) -> Sequence[ast.stmt]:
     """Return the innermost block that holds all uses of a name."""
     while True:
         using = [statement for statement in body if name in names_in(statement)]
-        if len(using) != 1 or any(name in names_in(part) for part in expressions_in(using[0])):
+        if len(using) != 1:
+            return body
+        if [part for part in expressions_in(using[0]) if name in names_in(part)]:
             return body
         blocks = [getattr(using[0], field, ()) for field in ("body", "orelse")]
         inner = [block for block in blocks if _first_statement_with(block, name) is not None]

@@ -74,11 +74,12 @@ class Program:
         self.linked = linked
         self.prefix = prefix
         self.single = single
-        own = _SINGLE_PRECISION_ROUNDINGS if single else {}
-        self.numbers: Mapping[str, float] = linked.numbers | own
+        self.numbers: Mapping[str, float] = linked.numbers
+        if single:
+            self.numbers = linked.numbers | _SINGLE_PRECISION_ROUNDINGS
         self.records: Mapping[str, tuple[str, ...]] = linked.records
         self.signatures: Mapping[str, tuple[str, ...]] = {
-            name: tuple(argument.arg for argument in node.args.args)
+            name: tuple([argument.arg for argument in node.args.args])
             for name, node in linked.functions.items()
         }
         self.types: list[str] = []
@@ -122,8 +123,8 @@ class Program:
             self._names[helper] = self._unique_name(helper.name)
             text = helper.definition.replace(f"@{helper.name}", self._names[helper])
             text = re.sub(r"\breal\b", self.real_type, text)
-            text = text.replace("!(", "f(" if self.single else "(")
-            self.helpers.append(text)
+            suffix = "f" if self.single else ""
+            self.helpers.append(text.replace("!(", f"{suffix}("))
         return self._names[helper]
 
     def function_name(self, name: str, argument_types: tuple[ValueType, ...]) -> str:
@@ -136,11 +137,14 @@ class Program:
 
     def _print_function(self, types: FunctionTypes, name: str) -> str:
         statements = FunctionPrinter(types, self)
-        given = ", ".join(statements.parameter_declarations()) or "void"
-        result = "void" if types.result_type == c.VOID else self.c_type(types.result_type)
-        inlined = any(getattr(word, "id", "") == "inlined" for word in types.node.decorator_list)
-        inline = f"{self.prefix.upper()}_INLINE" if inlined else "static inline"
-        lines = statements.lines(f"{inline} {result} {name}({given})")
+        parameters = ", ".join(statements.parameter_declarations()) or "void"
+        result = "void"
+        if types.result_type != c.VOID:
+            result = self.c_type(types.result_type)
+        inline = "static inline"
+        if "inlined" in map(ast.unparse, types.node.decorator_list):
+            inline = f"{self.prefix.upper()}_INLINE"
+        lines = statements.lines(f"{inline} {result} {name}({parameters})")
         return comment(ast.get_docstring(types.node) or "") + "\n".join(lines) + "\n"
 
     def _unique_name(self, name: str) -> str:
@@ -164,9 +168,11 @@ class Program:
     def _tuple_type(self, tuple_type: c.TupleType) -> str:
         if tuple_type not in self._names:
             codes = [self._type_code(item) for item in tuple_type.items]
-            name = f"{codes[0]}{len(codes)}" if tuple_type.is_uniform else "_".join(codes)
-            self._names[tuple_type] = name = self._unique_name(name)
-            self.types.append(self._tuple_definition(tuple_type, name))
+            name = "_".join(codes)
+            if tuple_type.is_uniform:
+                name = f"{codes[0]}{len(codes)}"
+            self._names[tuple_type] = self._unique_name(name)
+            self.types.append(self._tuple_definition(tuple_type, self._names[tuple_type]))
         return self._names[tuple_type]
 
     def _type_code(self, value_type: ValueType) -> str:
@@ -176,18 +182,15 @@ class Program:
 
     def _tuple_definition(self, tuple_type: c.TupleType, name: str) -> str:
         types = [self.c_type(item) for item in tuple_type.items]
-        fields = [f"f{i}" for i in range(len(types))]
-        given = ", ".join(f"{one} {letter}" for one, letter in zip(types, fields, strict=True))
+        parameters = [f"{item_type} f{index}" for index, item_type in enumerate(types)]
+        members = [f"    {parameter};" for parameter in parameters]
         if tuple_type.is_uniform:
-            inside = [f"    {types[0]} v[{len(types)}];"]
-            places = [f"v[{i}]" for i in range(len(types))]
-        else:
-            inside = [f"    {one} {letter};" for one, letter in zip(types, fields, strict=True)]
-            places = fields
-        lines = ["typedef struct {", *inside, f"}} {name};", ""]
-        head = f"static inline {name} {self.constructor_name(tuple_type)}({given})"
+            members = [f"    {types[0]} v[{len(types)}];"]
+        lines = ["typedef struct {", *members, f"}} {name};", ""]
+        head = f"static inline {name} {self.constructor_name(tuple_type)}({', '.join(parameters)})"
         lines += [head, "{", f"    {name} made;"]
-        lines += [f"    made.{at} = {one};" for at, one in zip(places, fields, strict=True)]
+        for index in range(len(types)):
+            lines.append(f"    {tuple_type.item_expression('made', index)} = f{index};")
         return "\n".join([*lines, "    return made;", "}", ""])
 
     def constructor_name(self, value_type: c.TupleType) -> str:
@@ -202,8 +205,10 @@ def comment(text: str) -> str:
         >>> print(comment("Return h [m]."), end="")
         /* Return h [m]. */
     """
+    if not text.strip():
+        return ""
     first = " ".join(text.split("\n\n", maxsplit=1)[0].split())
-    return f"/* {_escape_comment(first)} */\n" if first else ""
+    return f"/* {_escape_comment(first)} */\n"
 
 
 def _escape_comment(text: str) -> str:
@@ -222,5 +227,5 @@ def block_comment(text: str) -> str:
     safe = _escape_comment(text.strip())
     if not safe:
         return ""
-    lines = "".join(f" * {line}".rstrip() + "\n" for line in safe.splitlines())
-    return f"/*\n{lines} */\n"
+    lines = [f" * {line}".rstrip() for line in safe.splitlines()]
+    return "\n".join(["/*", *lines, " */", ""])

@@ -37,10 +37,7 @@ class FunctionPrinter(ast.NodeVisitor):
     def __init__(self, types: FunctionTypes, program: ProgramContext) -> None:
         self.types = types
         self.program = program
-        self.names = {
-            name: c.constant_name(kind) or (f"{name}_" if name in RESERVED_WORDS else name)
-            for name, kind in types.types.items()
-        }
+        self.names = {name: _c_name(name, kind) for name, kind in types.types.items()}
         self.expressions = ExpressionPrinter(types, program, self.names)
         self._temporaries = 0
         self._live = function_analysis.live_names(types)
@@ -65,23 +62,25 @@ class FunctionPrinter(ast.NodeVisitor):
         result = []
         for name in self.types.argument_names:
             kind = self.types.argument_types[name]
-            if not c.is_constant(kind):
-                suffix = "_given" if kind != self.types.types[name] else ""
-                result.append(self._declaration(kind, self.names[name] + suffix))
+            if c.is_constant(kind):
+                continue
+            parameter = self.names[name]
+            if kind != self.types.types[name]:
+                parameter += "_given"
+            result.append(self._declaration(kind, parameter))
         return result
 
     def _declaration(self, value_type: ValueType, name: str) -> str:
         if isinstance(value_type, c.ArrayType):
-            lengths = "".join(f"[{length}]" for length in value_type.shape)
+            lengths = "".join([f"[{length}]" for length in value_type.shape])
             return f"{self.program.c_type(c.FLOAT)} {name}{lengths}"
         return f"{self.program.c_type(value_type)} {name}"
 
     def _argument_conversions(self) -> Iterator[str]:
         """Yield the conversions of arguments to variables of another type."""
         for name in self.types.argument_names:
-            given = self.types.argument_types[name]
             kind = self.types.types[name]
-            if given != kind and isinstance(kind, c.ScalarType):
+            if self.types.argument_types[name] != kind and isinstance(kind, c.ScalarType):
                 cname = self.names[name]
                 kind_name = self.program.c_type(kind)
                 yield f"{kind_name} {cname} = ({kind_name}){cname}_given;"
@@ -94,8 +93,10 @@ class FunctionPrinter(ast.NodeVisitor):
             )
             if elsewhere or name not in self._live or c.is_constant(kind):
                 continue
-            value = " = 0" if isinstance(kind, c.ScalarType) else ""
-            yield f"{self._declaration(kind, self.names[name])}{value};"
+            declaration = self._declaration(kind, self.names[name])
+            if isinstance(kind, c.ScalarType):
+                declaration += " = 0"
+            yield f"{declaration};"
 
     # --- statements ------------------------------------------------------------------------------
 
@@ -115,8 +116,10 @@ class FunctionPrinter(ast.NodeVisitor):
 
     def generic_visit(self, node: ast.AST) -> list[str]:
         """Return the line of ``break`` or ``continue``; ``pass`` has none."""
-        if isinstance(node, (ast.Break, ast.Continue)):
-            return ["break;" if isinstance(node, ast.Break) else "continue;"]
+        if isinstance(node, ast.Break):
+            return ["break;"]
+        if isinstance(node, ast.Continue):
+            return ["continue;"]
         return []
 
     def visit_While(self, node: ast.While) -> list[str]:
@@ -147,28 +150,29 @@ class FunctionPrinter(ast.NodeVisitor):
         """Return the lines of a loop over a range."""
         assert isinstance(node.iter, ast.Call)  # checked by the type inference
         assert isinstance(node.target, ast.Name)
-        given = node.iter.args
-        start = self.expressions.as_type(given[0], c.INT) if len(given) > 1 else "0"
-        step = self.types.constant_integer(given[2]) if len(given) > 2 else 1
+        start_node, end_node, step_node = _range_arguments(node.iter)
+        start = self.expressions.as_type(start_node, c.INT)
+        step = self.types.constant_integer(step_node)
         if not step:
             raise self.types.not_exportable("loops with a step that is not a literal", node.iter)
-        end, before = self._loop_end(node, given[1] if len(given) > 1 else given[0])
+        end, before = self._loop_end(node, end_node)
+        variable = self.names[node.target.id]
         owned = node in self._loop_variables
-        named = owned and not node.target.id.startswith("_")
-        name = self.names[node.target.id] if named else self._temporary("turn")
-        sign, change = ("<", f"{name} += {step}") if step > 0 else (">", f"{name} -= {-step}")
-        change = {1: f"{name}++", -1: f"{name}--"}.get(step, change)
-        copied = not owned and node.target.id in self._live
-        inside = [f"{self.names[node.target.id]} = {name};"] if copied else []
-        head = f"for (int64_t {name} = {start}; {name} {sign} {end}; {change}) {{"
-        return [*before, head, *_indent([*inside, *self._block(node.body)]), "}"]
+        name = variable
+        if not owned or node.target.id.startswith("_"):
+            name = self._temporary("turn")
+        body = self._block(node.body)
+        if not owned and node.target.id in self._live:
+            body.insert(0, f"{variable} = {name};")
+        head = f"for (int64_t {name} = {start}; {_loop_control(name, end, step)}) {{"
+        return [*before, head, *_indent(body), "}"]
 
     def _loop_end(self, node: ast.For, end: ast.expr) -> tuple[str, list[str]]:
         """Return the end of a loop, and the line that stores it if the loop may change it."""
         text = self.expressions.as_type(end, c.INT, 8)
         changed = set(function_analysis.stored_names(node))
         read = {part.id for part in ast.walk(end) if isinstance(part, ast.Name)}
-        calls = any(isinstance(part, (ast.Call, ast.Subscript)) for part in ast.walk(end))
+        calls = [part for part in ast.walk(end) if isinstance(part, (ast.Call, ast.Subscript))]
         if self.types.constant_integer(end) is not None or not (read & changed or calls):
             return text, []
         name = self._temporary("end")
@@ -194,7 +198,9 @@ class FunctionPrinter(ast.NodeVisitor):
 
     def visit_AnnAssign(self, node: ast.AnnAssign) -> list[str]:
         """Return the lines of an annotated assignment."""
-        return [] if node.value is None else self._assign(node, [node.target], node.value)
+        if node.value is None:
+            return []
+        return self._assign(node, [node.target], node.value)
 
     def _assign(self, node: ast.stmt, targets: Sequence[ast.expr], value: ast.expr) -> list[str]:
         if isinstance(value, ast.Call) and called_name(value) == "local_array":
@@ -231,8 +237,10 @@ class FunctionPrinter(ast.NodeVisitor):
 
     def _discard(self, value: ast.expr) -> list[str]:
         """Return the line that evaluates an unused value, if it has side effects."""
-        unused = f"(void){self.expressions.text(value)};"
-        return [unused] if self.types.writes_arrays(value) else []
+        text = self.expressions.text(value)
+        if self.types.writes_arrays(value):
+            return [f"(void){text};"]
+        return []
 
     def _assignment_line(self, node: ast.stmt, target: ast.expr, text: str) -> str:
         """Return the line that assigns to a variable or an array element."""
@@ -282,7 +290,9 @@ class FunctionPrinter(ast.NodeVisitor):
     def _temporary(self, prefix: str) -> str:
         self._temporaries += 1
         name = f"{prefix}_{self._temporaries}"
-        return name if name not in self.names.values() else self._temporary(prefix)
+        if name in self.names.values():
+            return self._temporary(prefix)
+        return name
 
     # --- order of evaluation ---------------------------------------------------------------------
 
@@ -309,10 +319,38 @@ class FunctionPrinter(ast.NodeVisitor):
 
 def _returns_zeros(node: ast.stmt) -> bool:
     """Return whether a statement returns zeros, as outside of contact."""
-    given = node.value if isinstance(node, ast.Return) else None
-    return isinstance(given, ast.Tuple) and all(
-        isinstance(item, ast.Constant) and item.value == 0.0 for item in given.elts
-    )
+    if not isinstance(node, ast.Return) or not isinstance(node.value, ast.Tuple):
+        return False
+    return {getattr(item, "value", None) for item in node.value.elts} == {0.0}
+
+
+def _range_arguments(call: ast.Call) -> tuple[ast.expr, ast.expr, ast.expr]:
+    """Return start, end and step of ``range(...)``."""
+    start: ast.expr = ast.Constant(0)
+    step: ast.expr = ast.Constant(1)
+    if len(call.args) == 1:
+        return start, call.args[0], step
+    start, end, *rest = call.args
+    return start, end, [*rest, step][0]
+
+
+def _loop_control(name: str, end: str, step: int) -> str:
+    """Return the condition and the step of a loop over integers in C."""
+    if step > 0:
+        condition = f"{name} < {end}"
+        change = f"{name} += {step}"
+    else:
+        condition = f"{name} > {end}"
+        change = f"{name} -= {-step}"
+    change = {1: f"{name}++", -1: f"{name}--"}.get(step, change)
+    return f"{condition}; {change}"
+
+
+def _c_name(name: str, kind: ValueType) -> str:
+    """Return the name of a variable in C."""
+    if name in RESERVED_WORDS:
+        name = f"{name}_"
+    return c.constant_name(kind) or name
 
 
 def _indent(lines: Sequence[str]) -> list[str]:

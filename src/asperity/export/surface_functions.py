@@ -59,8 +59,8 @@ class ProgramData:
 
     def used_by(self, code: str) -> tuple[list[str], list[str]]:
         """Return the arrays and the definitions of the records that C code uses."""
-        words = set(re.findall(r"\w+(?:\.\w+)?", code))
-        used = [place for place in self.values if place in words]
+        names = set(re.findall(r"\w+(?:\.\w+)?", code))
+        used = [place for place in self.values if place in names]
         definitions = [self._record_definition(record, used) for record in (self.texture, self.law)]
         return [place for place in used if "." not in place], list(filter(None, definitions))
 
@@ -73,16 +73,19 @@ class ProgramData:
             if place in places and isinstance(kind, c.ScalarType):
                 fields += f"    {self._c_type(kind)} {name};\n"
                 values.append(self._literal(self.values[place], kind))
+        if not values:
+            return ""
         initializer = f"{record.c_name} = {{{', '.join(values)}}};\n"
-        return f"static const struct {{\n{fields}}} {initializer}" if values else ""
+        return f"static const struct {{\n{fields}}} {initializer}"
 
     def declaration(self, name: str) -> str:
         """Return the declaration of an array, without storage class and semicolon."""
         values = self.values[name]
-        kind = _element_type(values)
-        whole = "int32_t" if _fits_32_bits(values) else "int64_t"
-        c_type = whole if kind == c.INT else self._c_type(kind)
-        return f"const {c_type} {name}" + "".join(f"[{max(n, 1)}]" for n in values.shape)
+        c_type = self._c_type(_element_type(values))
+        if c_type == "int64_t" and _fits_32_bits(values):
+            c_type = "int32_t"
+        lengths = "".join([f"[{max(length, 1)}]" for length in values.shape])
+        return f"const {c_type} {name}{lengths}"
 
     def definition(self, name: str) -> str:
         """Return the definition of an array, without storage class."""
@@ -92,13 +95,14 @@ class ProgramData:
         """Return the size of an array in the program [bytes]."""
         values = self.values[name]
         narrow = {c.FLOAT: self.single, c.INT: _fits_32_bits(values)}
-        return int(values.size) * (4 if narrow.get(_element_type(values), True) else 8)
+        item_size = 4 if narrow.get(_element_type(values), True) else 8
+        return int(values.size) * item_size
 
     def _initializer(self, values: NDArray[Any]) -> str:
         if values.size == 0:
             return "{" * values.ndim + "0" + "}" * values.ndim
         if values.ndim > 1:
-            return "{\n" + ",\n".join(self._initializer(row) for row in values) + "\n}"
+            return "{\n" + ",\n".join(map(self._initializer, values)) + "\n}"
         kind = _element_type(values)
         texts = [self._literal(value, kind) for value in values.tolist()]
         return "{" + _wrap_lines(texts) + "}"
@@ -126,10 +130,13 @@ def make_program_data(
     """
     arguments: Any = surface.texture.arguments
     values: dict[str, Any] = {}
-    lengths, stored = (_LOADED_LENGTHS, {}) if loads_field else ({}, values)
-    texture = _constant_record(
-        f"{prefix}_surface", arguments._fields, arguments, prefix, stored, lengths
-    )
+    record_name = f"{prefix}_surface"
+    if loads_field:
+        texture = _constant_record(
+            record_name, arguments._fields, arguments, prefix, {}, _LOADED_LENGTHS
+        )
+    else:
+        texture = _constant_record(record_name, arguments._fields, arguments, prefix, values)
     names = (*SHARED_PARAMETERS, *map(parameter_name, surface.law.parameters))
     numbers = [float(value) for value in surface.law_arguments]
     law = _constant_record(f"{prefix}_law", names, numbers, prefix, values)
@@ -149,13 +156,15 @@ def _constant_record(
     for name, item in zip(names, items, strict=True):
         kind = _SCALAR_TYPES.get(np.asarray(item).dtype.name)
         if kind is None:
-            words = f"cannot be exported: its record holds {name!r}, a {type(item).__name__}"
-            raise ParameterError("texture", words)
+            reason = f"its record holds {name!r}, a {type(item).__name__}"
+            raise ParameterError("texture", f"cannot be exported: {reason}")
         if isinstance(item, np.ndarray):
-            array = f"{c_name}.{name}" if lengths else f"{prefix}_data_{name}"
+            array = f"{prefix}_data_{name}"
+            if lengths:
+                array = f"{c_name}.{name}"
             values[array] = item
-            expressions = tuple(text.format(c_name) for text in lengths.get(name, ()))
-            kinds.append(c.ArrayType(item.shape, kind, array, expressions))
+            expressions = [text.format(c_name) for text in lengths.get(name, ())]
+            kinds.append(c.ArrayType(item.shape, kind, array, tuple(expressions)))
         else:
             values[f"{c_name}.{name}"] = item
             kinds.append(kind)
@@ -252,11 +261,11 @@ def surface_functions(request: ExportRequest) -> SurfaceFunctions:
     single = request.is_single_precision
     law = surface.law
     clamp = surface.effective_clamp
-    probe = next(unit for unit in law_units(law, clamp) if "probe_tick" in unit.sources)
+    (probe,) = [unit for unit in law_units(law, clamp) if "probe_tick" in unit.sources]
     energy = energy_units(law, clamp)
     roots = [("probe_tick", probe), *[("probe_energy", unit) for unit in energy[:1]]]
-    brought = [*map(unit_from_module, law.contact.kernels()), *energy]
-    text = link_on_texture(law, surface.texture.sampler, clamp, roots, brought)
+    units = [*map(unit_from_module, law.contact.kernels()), *energy]
+    text = link_on_texture(law, surface.texture.sampler, clamp, roots, units)
     program = Program(LinkedSource(text), prefix, single=single, reserved=_RESERVED_NAMES)
     store = make_program_data(surface, prefix, single=single, loads_field=request.loads_field)
     constants: tuple[ValueType, ValueType] = (store.texture, store.law)
@@ -264,9 +273,11 @@ def surface_functions(request: ExportRequest) -> SurfaceFunctions:
     kinds = (*place, c.FLOAT, c.FLOAT, c.BOOL, c.ArrayType((WARM_START_SIZE,)), *constants)
     tick = program.function_name("probe_tick", kinds)
     tick_type = program.c_type(program.infer_types("probe_tick", kinds).result_type)
-    stored = program.function_name("probe_energy", (*place, *constants)) if energy else ""
+    energy_name = ""
+    if energy:
+        energy_name = program.function_name("probe_energy", (*place, *constants))
     code = "\n".join([*program.types, *program.helpers, *program.functions])
-    return SurfaceFunctions(code, tick, tick_type, stored, store)
+    return SurfaceFunctions(code, tick, tick_type, energy_name, store)
 
 
 PRECISIONS = ("double", "float")
@@ -333,13 +344,13 @@ class ExportRequest:
             ParameterError: see the class.
         """
         if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name) or "__" in name:
-            words = "must be a C identifier: letters, digits and single _, a letter first"
-            raise ParameterError("name", words, name)
+            requirement = "must be a C identifier: letters, digits and single _, a letter first"
+            raise ParameterError("name", requirement, name)
         if name in RESERVED_WORDS:
             raise ParameterError("name", "must not be a reserved word of C or C++", name)
         if precision not in PRECISIONS:
-            words = f"must be one of {', '.join(PRECISIONS)}"
-            raise ParameterError("precision", words, precision)
+            requirement = f"must be one of {', '.join(PRECISIONS)}"
+            raise ParameterError("precision", requirement, precision)
         if max_evaluations is not None and max_evaluations != math.inf:
             check_positive("max_evaluations", max_evaluations)
 

@@ -61,9 +61,8 @@ class SampledMap:
     def description(self) -> str:
         """Description of the map."""
         ny, nx = self.heights.shape
-        px, py = (format_quantity(step, "m") for step in self.spacing)
-        apart = px if px == py else f"{px} x {py}"
-        return f"{self.region}, {nx} x {ny} points, {apart} apart"
+        steps = dict.fromkeys([format_quantity(step, "m") for step in self.spacing])
+        return f"{self.region}, {nx} x {ny} points, {' x '.join(steps)} apart"
 
 
 def sample_map(
@@ -98,17 +97,19 @@ def sample_map(
         return _evaluate_map(texture, points, steps, along, repeats, domain.description)
     sides = np.hypot(*domain.orthogonal_spans()[0].T)
     own = domain.grid(texture.grid_counts())[1]
-    steps = _check_pair("spacing", spacing) or (own if len(sides) > 1 else (own[0], own[0]))
+    if len(sides) == 1:
+        own = (own[0], own[0])
+    steps = _check_pair("spacing", spacing) or own
     size = _check_pair("extent", extent) or (float(sides[0]), float(sides[-1]))
     counts = [_point_count(side, step) for side, step in zip(size, steps, strict=True)]
     ticks = [step * np.arange(count) for step, count in zip(steps, counts, strict=True)]
     points = domain.origin + np.stack(np.meshgrid(*ticks), axis=-1)
-    what = " x ".join(format_quantity(side, "m") for side in size)
-    return _evaluate_map(texture, points, steps, np.array([1.0, 0.0]), False, what)
+    region = " x ".join([format_quantity(side, "m") for side in size])
+    return _evaluate_map(texture, points, steps, np.array([1.0, 0.0]), False, region)
 
 
 def _point_count(side: float, step: float) -> int:
-    count = round(side / step) if side / step < 1e9 else _MAX_POINTS + 1
+    count = round(min(side / step, _MAX_POINTS + 1))
     if not _MIN_POINTS <= count <= _MAX_POINTS:
         points = f"gives {count} points on {format_quantity(side, 'm')}"
         requirement = f"{points}; {_MIN_POINTS} to {_MAX_POINTS} are allowed"
@@ -119,10 +120,11 @@ def _point_count(side: float, step: float) -> int:
 def _check_pair(name: str, value: Pair | None) -> tuple[float, float] | None:
     if value is None:
         return None
-    both = [value] * 2 if isinstance(value, (int, float)) else list(value)
-    if len(both) != 2:
+    if isinstance(value, (int, float)):
+        value = (value, value)
+    if len(value) != 2:
         raise ParameterError(name, "must be one length, or two for x and y [m]", value)
-    return check_positive(name, both[0], "m"), check_positive(name, both[1], "m")
+    return check_positive(name, value[0], "m"), check_positive(name, value[1], "m")
 
 
 def _evaluate_map(
@@ -239,8 +241,8 @@ def normal_png(surface_map: SampledMap, convention: str = "gltf") -> bytes:
     """
     rule = find_convention(convention)
     pixels = rule.encode(surface_map.normals)
-    words = f"Normals, {rule.description}; {_LAYOUT}, green up"
-    return _encode_png(surface_map, pixels, b"", b"", words)
+    description = f"Normals, {rule.description}; {_LAYOUT}, green up"
+    return _encode_png(surface_map, pixels, b"", b"", description)
 
 
 def find_convention(name: str) -> NormalConvention:
@@ -286,8 +288,7 @@ def normal_error(surface_map: SampledMap, convention: str) -> float:
 def _height_range(heights: FloatArray) -> tuple[float, float]:
     """Return the minimum height and the range [m]; the range of a flat map is 1 nm."""
     low = float(heights.min())
-    high = float(heights.max())
-    return low, high - low if high > low else 1e-9
+    return low, float(heights.max()) - low or 1e-9
 
 
 def _encode_png(
@@ -297,11 +298,11 @@ def _encode_png(
     from PIL import Image, PngImagePlugin
 
     text = PngImagePlugin.PngInfo()
-    words = f"{description}; {surface_map.description}; asperity {__version__}"
-    text.add_text("Description", words.encode("latin-1", "replace").decode("latin-1"))
+    description = f"{description}; {surface_map.description}; asperity {__version__}"
+    text.add_text("Description", description.encode("latin-1", "replace").decode("latin-1"))
     stream = io.BytesIO()
     Image.fromarray(pixels).save(stream, "png", pnginfo=text)
-    size = "\0".join(repr(step) for step in surface_map.spacing)
+    size = "\0".join(map(repr, surface_map.spacing))
     chunks = io.BytesIO()
     PngImagePlugin.putchunk(chunks, b"sCAL", b"\x01" + size.encode())
     if kind:
