@@ -36,7 +36,7 @@ def random_search(search: Search, draw: random.Random) -> tuple[float, float]:
     force, margin, reach = search.target.texture_force or 1.0, 0.0, 0.0
     for _ in range(POINTS // 10):
         x = draw.uniform(*search.bounds)
-        top = search.top(x)
+        top = search.max_stiffness(x)
         for share in [1.0, *(10.0 ** draw.uniform(-2.0, 0.0) for _ in range(9))] if top else ():
             ratios = search.ratios(x, share * top)
             margin = max(margin, min(ratios.values()))
@@ -51,7 +51,7 @@ def dense_reach(search: Search, x: float, stiffness: float) -> float:
     near = [x + 1e-3 * step for step in range(-150, 151)]
     reach, force = 0.0, search.target.texture_force or 1.0
     for y in (x for x in [*near, high] if low <= x <= high):
-        if not (top := search.top(y)):
+        if not (top := search.max_stiffness(y)):
             continue
         top *= min(1.0, search.ratios(y, top)["leak"])
         for k in {top, *(min(top, stiffness * share) for share in (0.97, 0.99, 1.0, 1.01, 1.03))}:
@@ -252,7 +252,7 @@ def test_a_peak_excludes_form_and_waviness() -> None:
     assert part.nesting is not None
     case = WaveCase("C", {}, asp.load_device("omega.3"), RenderConditions())
     search = Search(case, texture, Target(1e-3, measure="peak"))
-    ratios = search.certified(1.0).ratios(search.target, 500.0)
+    ratios = search.compute_sample(1.0).ratios(search.target, 500.0)
     own = asp.Surface(part.texture, "C", stiffness=500.0)
     scan = scan_force(own)
     assert scan.peak > 2.0 * scan.ripple
@@ -309,15 +309,15 @@ def test_numbers_of_a_magnified_texture_are_those_of_the_original(
 ) -> None:
     case = WaveCase(letter, {}, asp.load_device("omega.3"), RenderConditions(), "search")
     search = Search(case, base, Target(1e-3))
-    scaled = case.trial(search.scaled(factor))
-    sample = search.certified(factor, "search")
+    scaled = case.trial(search.scaled_texture(factor))
+    sample = search.compute_sample(factor, "search")
     assert sample.trial.recommended.stiffness == scaled.recommended.stiffness
     assert scaled.waves is not None
     assert sample.trial.waves is not None
     components = sample.trial.waves.components
     np.testing.assert_allclose(components, scaled.waves.components, rtol=1e-6, atol=1e-12)
     lost = scan_force(scaled.surface).contact_lost
-    assert sample.lost == pytest.approx(lost, abs=1e-3)
+    assert sample.contact_lost == pytest.approx(lost, abs=1e-3)
 
 
 def test_largest_measured_texture_states_what_is_lost() -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
@@ -20,7 +19,16 @@ from asperity.core.processes import precompute
 from asperity.core.units import round_down
 from asperity.devices import DeviceLike
 from asperity.envelopes.envelope import make_cases
-from asperity.envelopes.searches import FORCE, MET, MOTOR, RMS, Answer, Search, Target, agree
+from asperity.envelopes.searches import (
+    FORCE,
+    MET,
+    MOTOR,
+    RMS,
+    Answer,
+    Search,
+    Target,
+    are_consistent,
+)
 from asperity.laws import Law
 from asperity.textures.catalogue import TextureLike, as_texture
 
@@ -74,14 +82,14 @@ class Design(Reportable, Tabular):
             return {}
         waves = felt.speed / felt.spectrum.frequencies[~felt.spectrum.is_resolved]
         is_long = waves > self.comparison.device.workspace_size
-        found = {
+        losses = {
             "texture force [N]": math.sqrt(1.0 - min(felt.resolved, 1.0)) * felt.texture_rms,
             "waves up to [m]": waves[~is_long].max(initial=0.0),
             "waves from [m]": waves[is_long].min(initial=math.inf),
             "height": 1.0 - surface.max_depth / surface.texture.peak_to_valley,
             "contact": self.row.contact_lost,
         }
-        return {name: float(value) for name, value in found.items() if 1e-6 < value < math.inf}
+        return {name: float(value) for name, value in losses.items() if 1e-6 < value < math.inf}
 
     def __repr__(self) -> str:
         state = "meets" if self.is_feasible else f"is kept by {self.binding[0]} from"
@@ -154,26 +162,43 @@ def design(
     if at not in (MOTOR, "hand"):
         raise ParameterError("at", "must be motor or hand", at)
     check_keywords(conditions, {"speed", "min_stiffness", "max_depth", "grip"}, design)
-    forces = {"texture_force": texture_force, "peak_force": peak_force}
-    given = [check_positive(name, x, "N") for name, x in forces.items() if x is not None]
-    if peak_force is not None and (len(given) > 1 or at != MOTOR):
-        reason = "replaces texture_force" if len(given) > 1 else "is at the motor, at='hand' is not"
-        raise ParameterError("peak_force", f"{reason}: leave one out")
-    leak = math.inf if max_leak is None else check_positive("max_leak", max_leak, "J")
-    support = 0.0 if min_support is None else check_fraction("min_support", min_support)
-    measure = RMS if peak_force is None else "peak"
-    target = Target(given[0] if given else None, at, leak, support, measure)
+    target = _make_target(texture_force, peak_force, at, max_leak, min_support)
     base = as_texture(texture)
     if base.peak_to_valley == 0.0:
         raise ParameterError("texture", "must have a height: this one is flat")
-    values = {name: check_items(name, one) for name, one in (law_parameters or {}).items()}
+    values = {name: check_items(name, items) for name, items in (law_parameters or {}).items()}
     searches = {}
-    for chosen in product(*values.values()):
-        own = dict(zip(values, chosen, strict=True))
-        for case in make_cases(device, laws, own, design, conditions):
+    for combination in product(*values.values()):
+        parameters = dict(zip(values, combination, strict=True))
+        for case in make_cases(device, laws, parameters, design, conditions):
             searches[case.letter, str(case.law_parameters)] = Search(case, base, target)
     report = progress or (lambda _step: None)
     return _confirm(*_best_law([*searches.values()], report), report)
+
+
+def _make_target(
+    texture_force: float | None,
+    peak_force: float | None,
+    at: str,
+    max_leak: float | None,
+    min_support: float | None,
+) -> Target:
+    """Return the target from arguments of :func:`design`, checked."""
+    if texture_force is not None:
+        texture_force = check_positive("texture_force", texture_force, "N")
+    if peak_force is not None:
+        peak_force = check_positive("peak_force", peak_force, "N")
+        if texture_force is not None:
+            raise ParameterError("peak_force", "replaces texture_force: leave one out")
+        if at != MOTOR:
+            raise ParameterError("peak_force", "is at the motor, at='hand' is not: leave one out")
+    return Target(
+        texture_force=texture_force if peak_force is None else peak_force,
+        at=at,
+        max_leak=math.inf if max_leak is None else check_positive("max_leak", max_leak, "J"),
+        min_support=0.0 if min_support is None else check_fraction("min_support", min_support),
+        measure=RMS if peak_force is None else "peak",
+    )
 
 
 Found = tuple[Search, Answer]
@@ -183,31 +208,35 @@ def search_law(search: Search | None) -> Found | None:
     """Return a search and its answer, also in a worker process."""
     if search is None:
         return None
+    if search.texture.single_wave is None:
+        return search, search.find_answer()
     # Many waves are tried, and each takes less time than the cache.
-    with nullcontext() if search.texture.single_wave is None else bypass_results():
-        return search, search.answer()
+    with bypass_results():
+        return search, search.find_answer()
 
 
 def _best_law(searches: Sequence[Search], report: Progress) -> Found:
     """Return the search of the best law; those with curl only if no other meets the target."""
-    found: list[Found] = []
+    results: list[Found] = []
     for is_conservative in (True, False):
-        group = [one for one in searches if one.is_conservative is is_conservative]
+        group = [search for search in searches if search.is_conservative is is_conservative]
         # A user-defined law cannot be sent to another process.
-        shared = [one if isinstance(one.case.law, str) else None for one in group]
+        shared = [search if isinstance(search.case.law, str) else None for search in group]
         with precompute(search_law, shared) as precomputed:
             for search, computed in zip(group, precomputed, strict=True):
                 report(f"law {search.case.letter}")
-                found += filter(None, [computed or search_law(search)])
-        if any(answer.is_met for _search, answer in found):
+                result = computed or search_law(search)
+                if result is not None:
+                    results.append(result)
+        if any(answer.is_met for _search, answer in results):
             break
-    return max(found, key=_preference)
+    return max(results, key=_preference)
 
 
-def _preference(found: Found) -> tuple[Any, ...]:
+def _preference(result: Found) -> tuple[Any, ...]:
     """Return what is preferred: to meet the target, or nearly; no curl; the margin or the size."""
-    search, answer = found
-    return answer.is_met, answer.reach > 0.0, search.is_conservative, answer.found.score
+    search, answer = result
+    return answer.is_met, answer.reachable > 0.0, search.is_conservative, answer.candidate.score
 
 
 def _confirm(search: Search, answer: Answer, report: Progress) -> Design:
@@ -217,32 +246,47 @@ def _confirm(search: Search, answer: Answer, report: Progress) -> Design:
     """
     designs: list[Design] = []
     for _ in range(_COMPARISONS):
-        factor = float(f"{math.exp(answer.found.x):.5g}")
-        k = round_down(min(answer.found.stiffness, search.top(math.log(factor))), 4)
+        factor = float(f"{math.exp(answer.candidate.log_factor):.5g}")
+        log_factor = math.log(factor)
+        greatest = search.max_stiffness(log_factor)
+        stiffness = round_down(min(answer.candidate.stiffness, greatest), 4)
         report(f"comparison of law {search.case.letter}, factor {factor:g}")
-        designs.append(one := _make_design(search, answer, factor, k))
-        expected = search.ratios(math.log(factor), one.row.surface.stiffness)
-        if agree(expected, one.margins):
+        compared = _make_design(search, answer, factor, stiffness)
+        designs.append(compared)
+        expected = search.ratios(log_factor, compared.row.surface.stiffness)
+        if are_consistent(expected, compared.margins):
             break
-        scale = {name: value / expected[name] for name, value in one.margins.items()}
-        relaxed = {name: search.relaxed.get(name, 1.0) * scale[name] for name in scale}
+        relaxed = {
+            name: search.relaxed.get(name, 1.0) * margin / expected[name]
+            for name, margin in compared.margins.items()
+        }
         search = replace(search, relaxed=relaxed)
-        answer = search.answer()
-    return max(designs, key=lambda one: (one.is_feasible, one.reachable))
+        answer = search.find_answer()
+    return max(designs, key=lambda compared: (compared.is_feasible, compared.reachable))
 
 
 def _make_design(search: Search, answer: Answer, factor: float, stiffness: float) -> Design:
     case = search.case
     target = search.target
-    own = {name: getattr(case.conditions, name) for name in ("max_depth", "speed", "grip")}
-    own |= {"law_parameters": case.law_parameters}
-    result = compare(search.scaled(factor), case.device, [case.law], stiffness or None, **own)
-    sample = search.certified(factor)
-    ratios = sample.ratios(target, result.rows[0].surface.stiffness)
+    conditions = case.conditions
+    comparison = compare(
+        search.scaled_texture(factor),
+        case.device,
+        [case.law],
+        stiffness or None,
+        max_depth=conditions.max_depth,
+        speed=conditions.speed,
+        grip=conditions.grip,
+        law_parameters=case.law_parameters,
+    )
+    sample = search.compute_sample(factor)
+    ratios = sample.ratios(target, comparison.rows[0].surface.stiffness)
     margins = {name: ratio for name, ratio in ratios.items() if ratio < 1e20}
-    reach = factor
+    reachable = factor
     if target.texture_force is not None:
-        reach = target.texture_force * min(1.0, margins[FORCE])
-    if min(ratio for name, ratio in margins.items() if name != FORCE) < MET:
-        reach = 0.0
-    return Design(target, factor, result, margins, reach, search.binding(answer, ratios))
+        reachable = target.texture_force * min(1.0, margins[FORCE])
+    others = [ratio for name, ratio in margins.items() if name != FORCE]
+    if min(others) < MET:
+        reachable = 0.0
+    binding = search.limiting_requirements(answer, ratios)
+    return Design(target, factor, comparison, margins, reachable, binding)

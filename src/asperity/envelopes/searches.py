@@ -1,7 +1,7 @@
 """Textures of one law on a device that differ by a factor: which one meets a target best.
 
-Each requirement is a ratio that has to be at least 1 (docs/theory/envelopes.md). SciPy's optimisers
-search the factor and the stiffness.
+Each requirement is a ratio that has to be at least 1 (docs/theory/envelopes.md). Factor and
+stiffness are searched on grids, between whose points SciPy refines the best.
 """
 
 from __future__ import annotations
@@ -25,24 +25,35 @@ from asperity.surface import Surface
 from asperity.textures.kinds.prepare_synthetic import prepare_texture
 from asperity.textures.texture import Texture
 
-RANGE = "range of factors"
+STABILITY = "stability"
+LEAST_STIFFNESS = "least stiffness"
+PERCEPTIBILITY = "perceptibility"
+WORKSPACE = "workspace"
+CONTACT = "contact"
+LEAK = "leak"
+SUPPORT = "support"
 FORCE = "texture force"
+"""The requirements."""
+RANGE = "range of factors"
+"""What limits a design at the least or the greatest factor."""
+MET_WITH_LESS_STIFFNESS = {STABILITY, LEAK}
+MET_WITH_MORE_STIFFNESS = {LEAST_STIFFNESS, PERCEPTIBILITY, FORCE}
+"""Requirements that a greater stiffness exceeds by less, and by more."""
+
 MOTOR = "motor"
 RMS = "RMS"
 MET = 0.995
 """Ratio from which a requirement counts as met: factor and stiffness are rounded."""
-NEAR = 1.01
+EQUAL = 1.01
 """Factor within which ratios count as equal."""
-_FALLING = {"stability", "leak"}
-_RISING = {"least stiffness", "perceptibility", FORCE}
-"""Requirements that a greater stiffness exceeds by less, and by more."""
-_LEAST = 1e-30
+
+_LEAST_RATIO = 1e-30
 _PENALTY = 100.0
 """Weight of the logarithm by which a requirement is missed, against force and size."""
 _TOLERANCE = 1e-3
 _MAX_FACTOR = 100.0
-_SAMPLES_PER_DECADE = 4
-_REFINED = 3
+_FACTORS_PER_DECADE = 4
+_REFINED_FACTORS = 3
 _STIFFNESSES = 48
 """Stiffnesses tried at a factor: the force on the hand has resonances."""
 
@@ -67,17 +78,72 @@ class Target(Serializable):
     measure: str = RMS
 
 
+class Sample(NamedTuple):
+    """A texture at its recommended stiffness.
+
+    Attributes:
+        trial: the trial of :class:`~asperity.envelopes.wave_borders.WaveCase`.
+        leak: energy gained on the worst loop per period and per stiffness [m²].
+        contact_lost: fraction of the scan without contact.
+        support: S [1], computed if there is a least one.
+        crest_factor: peak of the texture's force on the scan over its RMS if the target is a peak,
+            else 1.
+    """
+
+    trial: Trial
+    leak: float
+    contact_lost: float
+    support: float
+    crest_factor: float
+
+    def ratios(self, target: Target, stiffness: float) -> dict[str, float]:
+        """Return by which factor each requirement is exceeded; all are met from 1 on."""
+        if self.trial.waves is None:
+            return {STABILITY: _LEAST_RATIO, FORCE: _LEAST_RATIO}
+        waves = self.trial.waves.at_stiffness(stiffness)
+        response = perceptibility.respond(waves)
+        texture = self.trial.surface.texture
+        ratios = {
+            STABILITY: self.trial.recommended.stiffness / stiffness,
+            LEAST_STIFFNESS: stiffness / self.trial.min_stiffness,
+            PERCEPTIBILITY: perceptibility.felt_ratio(waves, response),
+            WORKSPACE: _workspace_ratio(texture, waves.reach),
+            CONTACT: perceptibility.MAX_CONTACT_LOST / max(self.contact_lost, _LEAST_RATIO),
+            LEAK: target.max_leak / max(self.leak * stiffness, _LEAST_RATIO),
+            SUPPORT: self.support / max(target.min_support, _LEAST_RATIO),
+            FORCE: self._force(waves, target) / (target.texture_force or _LEAST_RATIO),
+        }
+        return {
+            name: min(max(ratio, _LEAST_RATIO), 1.0 / _LEAST_RATIO)
+            for name, ratio in ratios.items()
+        }
+
+    def _force(self, waves: perceptibility.WaveScan, target: Target) -> float:
+        """Return the texture's force [N] where and as the target measures it."""
+        if target.at == MOTOR:
+            return self.crest_factor * float(np.linalg.norm(waves.case.forces)) / math.sqrt(2.0)
+        felt = perceptibility.classify_perceptibility(waves, self.trial.doubtful, 0, 0, None)
+        return felt.hand_force / math.sqrt(2.0)
+
+
+def _workspace_ratio(texture: Texture, workspace_size: float) -> float:
+    """Return the width of the workspace over the size of a texture with a border."""
+    if not texture.is_mirrored:
+        return 1.0 / _LEAST_RATIO
+    return workspace_size / perceptibility.texture_length(texture)
+
+
 class Candidate(NamedTuple):
     """A factor of the texture with a stiffness.
 
     Attributes:
         score: what is maximized.
-        x: natural logarithm of the factor.
+        log_factor: natural logarithm of the factor.
         stiffness: [N/m].
     """
 
     score: float
-    x: float
+    log_factor: float
     stiffness: float
 
 
@@ -86,63 +152,17 @@ class Answer(NamedTuple):
 
     Attributes:
         is_met: whether it meets the target.
-        reach: texture force [N], at most the target's, or factor of the largest texture that meets
-            all other requirements; 0 for none.
-        found: the candidate.
+        reachable: texture force [N], at most the target's, or factor of the largest texture that
+            meets all other requirements; 0 for none.
+        candidate: the candidate.
     """
 
     is_met: bool
-    reach: float
-    found: Candidate
+    reachable: float
+    candidate: Candidate
 
 
 Score = Callable[[Mapping[str, float]], float]
-Scored = TypeVar("Scored", bound=tuple[float, ...])
-
-
-class Sample(NamedTuple):
-    """A texture at its recommended stiffness.
-
-    Attributes:
-        trial: the trial of :class:`~asperity.envelopes.wave_borders.WaveCase`.
-        leak: energy gained on the worst loop per period and per stiffness [m²].
-        lost: fraction of the scan without contact.
-        support: S [1], computed if there is a least one.
-        crest: peak of the texture's force on the scan over its RMS if the target is a peak, else 1.
-    """
-
-    trial: Trial
-    leak: float
-    lost: float
-    support: float
-    crest: float
-
-    def ratios(self, target: Target, stiffness: float) -> dict[str, float]:
-        """Return by which factor each requirement is exceeded; all are met from 1 on."""
-        if self.trial.waves is None:
-            return {"stability": _LEAST, FORCE: _LEAST}
-        waves = self.trial.waves.at_stiffness(stiffness)
-        response = perceptibility.respond(waves)
-        force = self.crest * float(np.linalg.norm(waves.case.forces)) / math.sqrt(2.0)
-        if target.at != MOTOR:
-            felt = perceptibility.classify_perceptibility(waves, self.trial.doubtful, 0, 0, None)
-            force = felt.hand_force / math.sqrt(2.0)
-        found = {
-            "stability": self.trial.recommended.stiffness / stiffness,
-            "least stiffness": stiffness / self.trial.min_stiffness,
-            "perceptibility": perceptibility.felt_ratio(waves, response),
-            "workspace": _workspace_ratio(self.trial.surface.texture, waves.reach),
-            "contact": perceptibility.MAX_CONTACT_LOST / max(self.lost, _LEAST),
-            "leak": target.max_leak / max(self.leak * stiffness, _LEAST),
-            "support": self.support / max(target.min_support, _LEAST),
-            FORCE: force / (target.texture_force or _LEAST),
-        }
-        return {name: min(max(x, _LEAST), 1.0 / _LEAST) for name, x in found.items()}
-
-
-def _workspace_ratio(texture: Texture, reach: float) -> float:
-    """Return the width of the workspace over the size of a texture with a border."""
-    return reach / float(np.hypot(*texture.domain.spans.T).max()) if texture.is_mirrored else 1e30
 
 
 @dataclass(frozen=True)
@@ -175,130 +195,169 @@ class Search:
             greatest = 2.0 * AMPLITUDE_RANGE[1] / self.texture.peak_to_valley
             decades = 6
         else:
-            fits = _workspace_ratio(self.texture, self.case.device.workspace_size)
-            greatest = min(_MAX_FACTOR, 1.5 * fits)
+            fitting = _workspace_ratio(self.texture, self.case.device.workspace_size)
+            greatest = min(_MAX_FACTOR, 1.5 * fitting)
             decades = 4
         return math.log(greatest / 10**decades), math.log(greatest)
 
-    def scaled(self, factor: float) -> Texture:
-        """Return the texture of a factor."""
-        name = "magnify" if self.texture.single_wave is None else "magnify_height"
-        return prepare_texture(self.texture, **{name: factor})
+    # --- one factor -------------------------------------------------------------------------------
 
-    def certified(self, factor: float, rendering: str = FIELD) -> Sample:
-        """Return the sample of a factor, with the numbers of a comparison."""
+    def scaled_texture(self, factor: float) -> Texture:
+        """Return the texture of a factor."""
+        if self.texture.single_wave is None:
+            return prepare_texture(self.texture, magnify=factor)
+        return prepare_texture(self.texture, magnify_height=factor)
+
+    def compute_sample(self, factor: float, rendering: str = FIELD) -> Sample:
+        """Return the sample of a factor, by default with the numbers of a comparison."""
         case = replace(self.case, rendering=rendering)
         is_magnified = rendering == SEARCH and self.texture.single_wave is None
         original = (self.texture, factor) if is_magnified else None
-        trial = case.trial(self.scaled(factor), original)
+        trial = case.trial(self.scaled_texture(factor), original)
         surface = trial.surface
         leak = 0.0
         if math.isfinite(self.target.max_leak) and not surface.facts.conservative:
             leak = worst_loop(surface).worst_per_period / surface.stiffness
-        support = merit(trial.numbered).support if self.target.min_support else 1.0
+        support = 1.0
+        if self.target.min_support:
+            support = merit(trial.numbered).support
         scan = scan_force(trial.numbered)
-        part = scan if trial.scanned is trial.numbered else scan_force(trial.scanned)
-        crest = part.peak / part.ripple if self.target.measure != RMS and part.ripple else 1.0
-        return Sample(trial, leak, scan.contact_lost, support, crest)
+        crest_factor = 1.0
+        if self.target.measure != RMS:
+            texture_scan = scan_force(trial.scanned)
+            if texture_scan.ripple:
+                crest_factor = texture_scan.peak / texture_scan.ripple
+        return Sample(trial, leak, scan.contact_lost, support, crest_factor)
 
-    def sample(self, x: float) -> Sample:
+    def sample(self, log_factor: float) -> Sample:
         """Return the sample of a factor, from its logarithm; law H is searched, not baked."""
-        if x not in self.samples:
-            self.samples[x] = self.certified(math.exp(x), SEARCH)
-        return self.samples[x]
+        if log_factor not in self.samples:
+            self.samples[log_factor] = self.compute_sample(math.exp(log_factor), SEARCH)
+        return self.samples[log_factor]
 
-    def top(self, x: float) -> float:
-        """Return the recommended stiffness [N/m], relaxed."""
-        return self.sample(x).trial.recommended.stiffness * self.relaxed.get("stability", 1.0)
+    def max_stiffness(self, log_factor: float) -> float:
+        """Return the recommended stiffness at a factor [N/m], relaxed; 0 if none is known."""
+        stiffness = self.sample(log_factor).trial.recommended.stiffness
+        return stiffness * self.relaxed.get(STABILITY, 1.0)
 
-    def ratios(self, x: float, stiffness: float) -> dict[str, float]:
-        """Return by which factor each requirement is exceeded; all are met from 1 on."""
-        found = self.sample(x).ratios(self.target, stiffness)
-        return {name: ratio * self.relaxed.get(name, 1.0) for name, ratio in found.items()}
+    def ratios(self, log_factor: float, stiffness: float) -> dict[str, float]:
+        """Return by which factor each requirement is exceeded, relaxed; all are met from 1 on."""
+        ratios = self.sample(log_factor).ratios(self.target, stiffness)
+        return {name: ratio * self.relaxed.get(name, 1.0) for name, ratio in ratios.items()}
 
-    def margin(self, ratios: Mapping[str, float]) -> float:
+    # --- scores -----------------------------------------------------------------------------------
+
+    def score_margin(self, ratios: Mapping[str, float]) -> float:
         """Return the logarithm of the least ratio."""
         return math.log(min(ratios.values()))
 
-    def reach(self, ratios: Mapping[str, float]) -> float:
+    def score_reach(self, ratios: Mapping[str, float]) -> float:
         """Return the logarithm of the ratio of the force, or 0 for the largest texture.
 
         What the other requirements miss is subtracted, with a weight by which the best candidate
         meets them where any does.
         """
         others = dict(ratios)
-        force = math.log(others.pop(FORCE)) if self.target.texture_force else 0.0
-        return force + _PENALTY * min(0.0, self.margin(others))
+        force = others.pop(FORCE)
+        missed = _PENALTY * min(0.0, self.score_margin(others))
+        if self.target.texture_force is None:
+            return missed
+        return math.log(force) + missed
 
-    def candidate(self, x: float, score: Score) -> Candidate:
-        """Return the stiffness with the greatest score at a factor."""
-        if not (top := self.top(x)):
-            return Candidate(_PENALTY * math.log(_LEAST), x, 0.0)
-        if self.target.texture_force is None:  # as stiff as it may be
-            k = top * min(1.0, self.ratios(x, top)["leak"])
-            return Candidate(x + score(self.ratios(x, k)), x, k)
-        least = 0.1 * min(top, self.case.conditions.min_stiffness)
-        grid = np.linspace(math.log(least), math.log(top), _STIFFNESSES)
-        found = _maximize(lambda y: (score(self.ratios(x, math.exp(y))), y), grid, 1)
-        return Candidate(found[0], x, math.exp(found[1]))
+    # --- the search -------------------------------------------------------------------------------
 
-    def best(self, score: Score) -> Candidate:
-        """Return the candidate with the greatest score of all factors."""
-        decades = (self.bounds[1] - self.bounds[0]) / math.log(10.0)
-        grid = np.linspace(*self.bounds, round(decades * _SAMPLES_PER_DECADE) + 1)
-        return _maximize(lambda x: self.candidate(x, score), grid, _REFINED)
-
-    def answer(self) -> Answer:
+    def find_answer(self) -> Answer:
         """Return the candidate that meets the target with the greatest margin, or the nearest."""
         force = self.target.texture_force
-        if force is not None and (found := self.best(self.margin)).score >= 0.0:
-            return Answer(True, force, found)
-        found = self.best(self.reach)
-        ratios = self.ratios(found.x, found.stiffness or 1.0)
-        reach = math.exp(found.x) if force is None else force * min(1.0, ratios.pop(FORCE))
-        ratios.pop(FORCE, None)
-        is_reached = min(ratios.values()) >= MET
-        return Answer(force is None and is_reached, reach if is_reached else 0.0, found)
+        if force is not None:
+            candidate = self._best_candidate(self.score_margin)
+            if candidate.score >= 0.0:
+                return Answer(True, force, candidate)
+        candidate = self._best_candidate(self.score_reach)
+        ratios = self.ratios(candidate.log_factor, candidate.stiffness or 1.0)
+        force_ratio = ratios.pop(FORCE)
+        if min(ratios.values()) < MET:
+            return Answer(False, 0.0, candidate)
+        if force is None:
+            return Answer(True, math.exp(candidate.log_factor), candidate)
+        return Answer(False, force * min(1.0, force_ratio), candidate)
 
-    def binding(self, answer: Answer, ratios: Mapping[str, float]) -> tuple[str, ...]:
+    def _best_candidate(self, score: Score) -> Candidate:
+        """Return the candidate with the greatest score of all factors."""
+        decades = (self.bounds[1] - self.bounds[0]) / math.log(10.0)
+        grid = np.linspace(*self.bounds, round(decades * _FACTORS_PER_DECADE) + 1)
+        return _maximize(lambda x: self._candidate_at(x, score), grid, _REFINED_FACTORS)
+
+    def _candidate_at(self, log_factor: float, score: Score) -> Candidate:
+        """Return the candidate with the greatest score at a factor."""
+        greatest = self.max_stiffness(log_factor)
+        if not greatest:
+            return Candidate(_PENALTY * math.log(_LEAST_RATIO), log_factor, 0.0)
+        if self.target.texture_force is None:  # as stiff as it may be
+            stiffness = greatest * min(1.0, self.ratios(log_factor, greatest)[LEAK])
+            size = log_factor + score(self.ratios(log_factor, stiffness))
+            return Candidate(size, log_factor, stiffness)
+        least = 0.1 * min(greatest, self.case.conditions.min_stiffness)
+        grid = np.linspace(math.log(least), math.log(greatest), _STIFFNESSES)
+        best_score, log_stiffness = _maximize(
+            lambda y: (score(self.ratios(log_factor, math.exp(y))), y), grid, 1
+        )
+        return Candidate(best_score, log_factor, math.exp(log_stiffness))
+
+    def limiting_requirements(self, answer: Answer, ratios: Mapping[str, float]) -> tuple[str, ...]:
         """Return the requirements that limit an answer, of its ratios."""
-        others = dict(ratios)
+        compared = dict(ratios)
         force = self.target.texture_force
-        if force is None or not answer.reach:
-            del others[FORCE]
+        if force is None or not answer.reachable:
+            del compared[FORCE]
         else:
-            others[FORCE] *= force / answer.reach
-        least = NEAR * min(others.values())
-        names = {name for name, ratio in others.items() if ratio < least}
-        if not names & _RISING:  # a greater stiffness would not help
-            names -= _FALLING
-        if min(abs(answer.found.x - end) for end in self.bounds) < NEAR - 1.0:
-            others[RANGE] = 1.0
+            compared[FORCE] *= force / answer.reachable
+        least = min(compared.values())
+        names = {name for name, ratio in compared.items() if ratio < EQUAL * least}
+        if not names & MET_WITH_MORE_STIFFNESS:  # less stiffness would help
+            names -= MET_WITH_LESS_STIFFNESS
+        distances = [abs(answer.candidate.log_factor - end) for end in self.bounds]
+        if min(distances) < EQUAL - 1.0:
+            compared[RANGE] = 1.0
             names.add(RANGE)
-        return tuple(name for name in others if name in names - {FORCE}) or (FORCE,)
+        limiting = [name for name in compared if name in names and name != FORCE]
+        return tuple(limiting) or (FORCE,)
+
+
+Scored = TypeVar("Scored", bound=tuple[float, ...])
 
 
 def _maximize(function: Callable[[float], Scored], grid: FloatArray, refined: int) -> Scored:
-    """Return the greatest tuple, by its first item, at a grid or between its best neighbours."""
+    """Return the greatest tuple, by its first item, at a grid or between its best neighbours.
+
+    Args:
+        function: the tuple at a point.
+        grid: the points tried, ascending.
+        refined: number of the best local maxima between whose neighbours SciPy searches.
+    """
     from scipy.optimize import minimize_scalar
 
-    found = [function(float(x)) for x in grid]
-    scores = [-math.inf, *(one[0] for one in found), -math.inf]
+    tried = [function(float(x)) for x in grid]
+    scores = [-math.inf, *[scored[0] for scored in tried], -math.inf]
     last = len(grid) - 1
     peaks = [i for i in range(last + 1) if scores[i + 1] > max(scores[i], scores[i + 2])]
-    for at in sorted(peaks, key=lambda i: scores[i + 1])[-refined:]:
-        one = minimize_scalar(
+    peaks.sort(key=lambda i: scores[i + 1])
+    for peak in peaks[-refined:]:
+        refinement = minimize_scalar(
             lambda x: -function(x)[0],
-            bounds=(grid[max(at - 1, 0)], grid[min(at + 1, last)]),
+            bounds=(grid[max(peak - 1, 0)], grid[min(peak + 1, last)]),
             method="bounded",
             options={"xatol": _TOLERANCE},
         )
-        found.append(function(float(one.x)))
-    return max(found, key=lambda one: one[0])
+        tried.append(function(float(refinement.x)))
+    return max(tried, key=lambda scored: scored[0])
 
 
-def agree(first: Mapping[str, float], second: Mapping[str, float]) -> bool:
+def are_consistent(first: Mapping[str, float], second: Mapping[str, float]) -> bool:
     """Return whether two sets of ratios agree where they may decide."""
-    least = 2.0 * max(1.0, *(min(values.values()) for values in (first, second)))
-    pairs = [(first[name], second[name]) for name in first.keys() & second.keys()]
-    return all(abs(math.log(a / b)) < NEAR - 1.0 for a, b in pairs if min(a, b) < least)
+    deciding = 2.0 * max(1.0, min(first.values()), min(second.values()))
+    for name in first.keys() & second.keys():
+        ratios = first[name], second[name]
+        if min(ratios) < deciding and abs(math.log(ratios[0] / ratios[1])) >= EQUAL - 1.0:
+            return False
+    return True
