@@ -14,7 +14,7 @@ import pytest
 
 import asperity as asp
 from asperity.analysis.energy.scan import scan_force
-from asperity.analysis.limits.spectrum import scan_forces
+from asperity.analysis.limits.wave_scan import scan_forces
 from asperity.core.cache import bypass_results
 from asperity.core.errors import ParameterError
 from asperity.envelopes.find_design import Design, design

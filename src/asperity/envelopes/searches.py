@@ -16,7 +16,7 @@ import numpy as np
 
 from asperity.analysis.energy.leak import worst_loop
 from asperity.analysis.energy.scan import merit, scan_force
-from asperity.analysis.limits import perceptibility
+from asperity.analysis.limits import perceptibility, wave_scan
 from asperity.core.arguments import FIELD, SEARCH
 from asperity.core.checks import FloatArray
 from asperity.core.files import Serializable
@@ -118,7 +118,7 @@ class Sample(NamedTuple):
             for name, ratio in ratios.items()
         }
 
-    def _force(self, waves: perceptibility.WaveScan, target: Target) -> float:
+    def _force(self, waves: wave_scan.WaveScan, target: Target) -> float:
         """Return the texture's force [N] where and as the target measures it."""
         if target.at == MOTOR:
             return self.crest_factor * float(np.linalg.norm(waves.case.forces)) / math.sqrt(2.0)

@@ -18,7 +18,7 @@ import numpy as np
 from asperity.analysis.bounds.bound import NORM, ONE_SIDED, Bound, JacobianMeasure
 from asperity.analysis.energy.scan import scan_force
 from asperity.analysis.gain.characteristic import cached_number, is_shipped_law
-from asperity.analysis.limits import perceptibility
+from asperity.analysis.limits import perceptibility, wave_scan
 from asperity.analysis.limits.limit_rules import (
     DEFAULT_SAMPLES,
     DEFAULT_SPEED,
@@ -119,7 +119,7 @@ class Trial:
     surface: Surface
     recommended: StiffnessRecommendation
     q: Bound
-    waves: perceptibility.WaveScan | None
+    waves: wave_scan.WaveScan | None
     min_stiffness: float
     numbered: Surface
     factor: float
@@ -241,7 +241,7 @@ class WaveCase:
         surface = trial.surface
         points = _SCAN_POINTS if texture.single_wave else None
         ripple = trial.factor * scan_force(trial.numbered, points).ripple
-        waves, doubtful, _rms, scanned = perceptibility.scan_waves(
+        waves, doubtful, _rms, scanned = wave_scan.scan_waves(
             surface,
             self.device,
             texture.texture_part(),

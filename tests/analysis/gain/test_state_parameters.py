@@ -12,7 +12,8 @@ from asperity.analysis.energy.leak import worst_loop
 from asperity.analysis.energy.scan import merit
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
 from asperity.analysis.gain.theorems import derivative_bound
-from asperity.analysis.limits.spectrum import compute_spectrum, wave_forces
+from asperity.analysis.limits.spectrum import compute_spectrum
+from asperity.analysis.limits.wave_scan import wave_forces
 from asperity.core.checks import FloatArray
 from asperity.laws import Law
 from asperity.surface import Surface

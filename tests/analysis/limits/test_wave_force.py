@@ -10,13 +10,8 @@ from scipy.integrate import quad
 
 from asperity.analysis.energy.scan import scan_height
 from asperity.analysis.limits import spectrum as module
-from asperity.analysis.limits.spectrum import (
-    Spectrum,
-    Wave,
-    compute_spectrum,
-    scan_forces,
-    wave_forces,
-)
+from asperity.analysis.limits.spectrum import Spectrum, Wave, compute_spectrum
+from asperity.analysis.limits.wave_scan import scan_forces, wave_forces
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Profile, Sinusoid, Texture
 

@@ -6,7 +6,7 @@ import pytest
 
 import asperity as asp
 from asperity.analysis import characteristic_number, one_sided_number, worst_loop
-from asperity.analysis.passivity.criteria import BUZZ_SPEED, buzz_limited_stiffness
+from asperity.analysis.passivity.device_loop import BUZZ_SPEED, buzz_limited_stiffness
 from asperity.analysis.passivity.verdict import Passivity, passivity
 from asperity.devices import load_device, parse_device
 from asperity.devices.device_file import override_device

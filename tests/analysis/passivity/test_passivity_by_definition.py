@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from asperity.analysis.bounds.bound import Bound
-from asperity.analysis.passivity import criteria
+from asperity.analysis.passivity import criteria, device_loop
 from asperity.analysis.passivity import verdict as judgement
 from asperity.analysis.passivity.criteria import (
     DELAY,
@@ -22,11 +22,11 @@ from asperity.analysis.passivity.criteria import (
     VIRTUAL,
     WALL,
     WALL_TEST,
-    BuzzBound,
     Criterion,
     StiffnessRule,
 )
 from asperity.analysis.passivity.device_loop import (
+    BuzzBound,
     DeviceLoop,
     Obstacle,
     critical_speed,
@@ -224,7 +224,7 @@ def test_buzz_bound_equals_its_formula() -> None:
             position_step=Fraction(3),
             force_step=Fraction(5),
         )
-        result, b = criteria.buzz_bound(loop), abs(virtual or 0.0)
+        result, b = device_loop.buzz_bound(loop), abs(virtual or 0.0)
         if loss is None or delay is None or INF in (q, plus):
             assert result is None
             continue
@@ -240,9 +240,9 @@ def test_buzz_bound_equals_its_formula() -> None:
     assert min(margins) < 0.0 < max(margins)
     assert 0.0 in margins
     whole: dict[str, Any] = {"damping": Fraction(6), "delay": 0, "position_step": Fraction(1)}
-    assert criteria.buzz_bound(make_loop(**whole)) is not None
-    assert criteria.buzz_bound(make_loop(**whole, rate=None)) is None
-    assert criteria.buzz_bound(make_loop(**whole, obstacle=Obstacle.JUMPS)) is None
+    assert device_loop.buzz_bound(make_loop(**whole)) is not None
+    assert device_loop.buzz_bound(make_loop(**whole, rate=None)) is None
+    assert device_loop.buzz_bound(make_loop(**whole, obstacle=Obstacle.JUMPS)) is None
 
 
 # --- stability limit ------------------------------------------------------------------------------
@@ -259,7 +259,7 @@ def test_stability_limit_is_the_larger_of_plausible_and_proved() -> None:
     unbounded = make_loop(damping=Fraction(1), delay=2, rate=None)
     bounded = make_loop(damping=Fraction(1), delay=2, force_step=Fraction(1, 1000))
     check_stability_limits(unbounded, None)
-    check_stability_limits(bounded, criteria.buzz_limited_stiffness(bounded))
+    check_stability_limits(bounded, device_loop.buzz_limited_stiffness(bounded))
 
 
 def check_stability_limits(loop: DeviceLoop, calm: float | None) -> None:

@@ -101,7 +101,7 @@ class Leak(Serializable):
     thrust: float | None
     description = Text[str]("The loop in words.")
     energy_text = Text[str](
-        "The energy that it gains, per period or line length if that is proved."
+        "The energy that it gains, per period or line length if that is proved.", is_written=False
     )
 
     def __repr__(self) -> str:

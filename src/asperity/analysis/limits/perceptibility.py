@@ -20,30 +20,29 @@ from numpy.typing import NDArray
 
 from asperity.analysis.energy.scan import scan_force
 from asperity.analysis.limits.limit_rules import LIMIT_RULES, LimitCase, evaluate_limit
-from asperity.analysis.limits.spectrum import compute_spectrum, wave_force_components
+from asperity.analysis.limits.wave_scan import MASKING_FIELDS, WaveScan, scan_waves
 from asperity.core.checks import FloatArray
 from asperity.core.files import Serializable
 from asperity.core.units import round_down, round_up
 from asperity.devices import Device
-from asperity.devices.device import USER_SOURCE
 from asperity.perception.grip import Grip, load_grip
 from asperity.surface import Surface, default_max_depth
 from asperity.textures.kinds.prepare_synthetic import prepare_texture
 from asperity.textures.texture import Texture, TexturePart
 
+DEFAULT_APPARENT_MASS = 0.1
+"""Apparent mass [kg] assumed for a device that does not state it."""
+
 MIN_SAMPLES = 2.0
 """Least samples of a wave by the sampling theorem; with more, but fewer than α and β, the wave is
 distorted and borderline at best."""
 
-DEFAULT_APPARENT_MASS = 0.1
-"""Apparent mass [kg] assumed for a device that does not state it."""
 
 MAX_SPEED = 0.5
 """Greatest scanning speed [m/s] that a remedy asks for."""
 
 # The limits that decide whether a wave is resolved: all limits on waves but that on its force.
 _SAMPLING_RULES = tuple(rule for rule in LIMIT_RULES if rule.number in {1, 2, 3, 6})
-_MASKING_FIELDS = "force_resolution", "friction", "bandwidth", "update_rate", "position_resolution"
 _HAND_FIELDS = "apparent_mass", "damping"
 # Factors by which a quantity is changed in the search for a remedy.
 _FACTORS = 1.05 ** np.arange(1, 189)
@@ -52,46 +51,6 @@ _FACTORS = 1.05 ** np.arange(1, 189)
 _MAGNIFICATION_TRIES = 1.0, 1.5, 2.5
 MAX_CONTACT_LOST = 0.5
 """Greatest share of the scan without contact of a magnified texture that counts as a remedy."""
-
-
-@dataclass(frozen=True)
-class WaveScan:
-    """The waves of a texture on a scan, with the device and the hand that they move.
-
-    Attributes:
-        case: device, speed, samples, and the waves.
-        components: amplitudes of the force along the wall and along its normal [N], shape (n, 2).
-        grip: the hand.
-        contact_stiffness: stiffness of the wall along its normal [N/m].
-        reach: width of the workspace [m]; longer waves are not felt as such.
-    """
-
-    case: LimitCase
-    components: FloatArray
-    grip: Grip
-    contact_stiffness: float
-    reach: float = math.inf
-
-    def magnified(self, factor: float) -> WaveScan:
-        """Return the scan of the texture magnified in all directions, as deep in proportion."""
-        wavelengths = factor * self.case.wavelengths
-        case = replace(self.case, wavelengths=wavelengths, forces=factor * self.case.forces)
-        return replace(self, case=case, components=factor * self.components)
-
-    def at_stiffness(self, stiffness: float) -> WaveScan:
-        """Return the scan at another stiffness [N/m], to which the force is proportional."""
-        factor = stiffness / self.contact_stiffness
-        case = replace(self.case, forces=factor * self.case.forces)
-        components = factor * self.components
-        return replace(self, case=case, components=components, contact_stiffness=stiffness)
-
-    def at_speed(self, speed: float) -> WaveScan:
-        """Return the scan at another speed [m/s]."""
-        return replace(self, case=replace(self.case, speed=speed))
-
-    def with_device(self, field: str, value: float) -> WaveScan:
-        """Return the scan on a device with another value of a field."""
-        return replace(self, case=replace(self.case, device={**self.case.device, field: value}))
 
 
 def assess_perceptibility(
@@ -142,56 +101,6 @@ def assess_perceptibility(
     options = {"explicit_depth": explicit_depth, "grip": grip, **scan}
     is_felt = partial(_is_felt_magnified, surface, device, options)
     return replace(result, remedies=tuple(_find_remedies(waves, is_felt)))
-
-
-def scan_waves(
-    surface: Surface,
-    device: Device,
-    part: TexturePart,
-    grip: Grip,
-    *,
-    rms: float,
-    explicit_depth: bool,
-    points: int | None = None,
-    **scan: float,
-) -> tuple[WaveScan, dict[str, float], float, Surface]:
-    """Return the waves of a surface on a scan with the trusted numbers of a device.
-
-    Args:
-        surface: texture, law and stiffness.
-        device: see :func:`assess_perceptibility`.
-        part: see :func:`assess_perceptibility`.
-        grip: the hand.
-        rms: RMS of the oscillating force of the surface [N].
-        explicit_depth: see :func:`assess_perceptibility`.
-        points: see :func:`~asperity.analysis.limits.spectrum.wave_force_components`.
-        **scan: see :func:`assess_perceptibility`.
-
-    Returns:
-        The waves; the numbers of the device that are not trusted; RMS of the force of the texture;
-        the surface without form and waviness, whose scan has that force.
-    """
-    texture_rms = rms
-    scanned = surface
-    if part.nesting is not None:
-        depth = surface.max_depth if explicit_depth else default_max_depth(part.texture)
-        scanned = surface.to_texture(part.texture, depth)
-        texture_rms = scan_force(scanned).ripple * surface.stiffness
-    spectrum = compute_spectrum(part.texture)
-    components = wave_force_components(scanned, spectrum, points)
-    forces = np.hypot(*components.T)
-    # The waves share the RMS of the scan; their sum differs by what is not periodic in the scan.
-    total = math.sqrt(float(forces @ forces))
-    scale = math.sqrt(2.0) * texture_rms / total if total > 0.0 else 0.0
-    data = {name: datum.value for name, datum in device.data.items()}
-    doubtful = {
-        name: data.pop(name)
-        for name in _MASKING_FIELDS
-        if (datum := device.data.get(name)) and not datum.verified and datum.source != USER_SOURCE
-    }
-    case = LimitCase(data, spectrum.wavelengths, scale * forces, spectrum.shares, **scan)
-    waves = WaveScan(case, scale * components, grip, surface.stiffness, device.workspace_size)
-    return waves, doubtful, texture_rms, scanned
 
 
 def _is_felt_magnified(
@@ -270,7 +179,7 @@ def classify_perceptibility(
         speed=waves.case.speed,
         apparent_mass=response.apparent_mass,
         extrapolated=bool(np.any((rendered < ends[0]) | (rendered > ends[1]))),
-        missing_data=tuple(one for one in (*_MASKING_FIELDS, *_HAND_FIELDS) if one not in data),
+        missing_data=tuple(one for one in (*MASKING_FIELDS, *_HAND_FIELDS) if one not in data),
         unverified=tuple(masking),
         remedies=(),
         spectrum=response,

@@ -1,4 +1,4 @@
-"""The spectrum of a texture, and the force of each of its waves on a scan at constant height.
+"""The spectrum of a texture: its waves, or third-octave bands of its heights.
 
 A sum of plane waves is decomposed exactly, wave by wave. A profile or a map is decomposed by its
 periodogram, a map radially: every bin counts by its wavelength in any direction. The bins of a
@@ -12,13 +12,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from asperity.analysis.energy.scan import scan_height
-from asperity.analysis.gain.characteristic import cached_result, is_shipped_law
 from asperity.core.cache import get_or_compute
 from asperity.core.checks import FloatArray
 from asperity.core.display import Text
 from asperity.core.files import OMITTED, Serializable, written
-from asperity.surface import Surface
 from asperity.textures.plane_waves import PlaneWaves
 from asperity.textures.texture import Texture
 
@@ -241,128 +238,3 @@ def _hann_window(count: int, is_periodic: bool) -> FloatArray:
     if is_periodic or count == 1:
         return np.ones(count)
     return np.asarray(0.5 - 0.5 * np.cos(2.0 * math.pi * (np.arange(count) + 0.5) / count))
-
-
-# Points of the fit to a sum of waves, and of a side of the patch of a map; fewer where every
-# force requires a closest-point search.
-_FIT_POINTS = {False: 16384, True: 4096}
-_LINE_POINTS = {False: 2**15, True: 4096}
-_SIDE_POINTS = {False: 1024, True: 96}
-# An aperiodic sum is fitted over this many of its longest waves.
-_APERIODIC_FIT_LENGTH = 64.0
-_GOLDEN_RATIO = 0.5 * (math.sqrt(5.0) - 1.0)
-
-
-def wave_forces(surface: Surface, spectrum: Spectrum) -> FloatArray:
-    """Return the force amplitude of every wave of a texture.
-
-    The squares of the components of :func:`wave_force_components` are added.
-
-    Args:
-        surface: texture, law and stiffness.
-        spectrum: the spectrum of its texture.
-
-    Returns:
-        A_F [N], shape (n,).
-
-    Example:
-        >>> from asperity.analysis.limits.spectrum import compute_spectrum
-        >>> from asperity.textures.kinds.sinusoid import Sinusoid
-        >>> texture = Sinusoid(amplitude=1e-4, period=1e-3)
-        >>> wave_forces(Surface(texture, "A", stiffness=500.0), compute_spectrum(texture)).round(9)
-        array([0.05])
-    """
-    return np.asarray(np.hypot(*wave_force_components(surface, spectrum).T))
-
-
-def wave_force_components(
-    surface: Surface, spectrum: Spectrum, points: int | None = None
-) -> FloatArray:
-    """Return the force amplitude of every wave of a texture, along the wall and along its normal.
-
-    The probe moves at constant height, as deep as
-    :func:`~asperity.analysis.energy.scan.merit` scans; a law with state slides at full
-    deflection. For a sum of waves the force is fitted by the same waves (least squares). For bands
-    it is the amplitude of the band times the square root of the ratio of force variance to height
-    variance on the same patch.
-
-    Returns:
-        Amplitudes [N], shape (n, 2): of the components along x and y, their squares added; and of
-        the component along z.
-    """
-    if not spectrum.waves:
-        return np.zeros((0, 2))
-    if points is not None and spectrum.exact:
-        return _fit_waves(surface, spectrum, points)
-    compute = _fit_waves if spectrum.exact else _band_force_amplitudes
-    key = repr((spectrum.exact, spectrum.waves))
-    forces = cached_result("wave forces", surface, lambda unit: compute(unit, spectrum), key)
-    return np.asarray(forces) * (surface.stiffness if is_shipped_law(surface.law) else 1.0)
-
-
-def scan_forces(surface: Surface, xy: FloatArray) -> FloatArray:
-    """Return the forces [N], shape (n, 3), at points (n, 2) [m] of the scan's height."""
-    probes = np.column_stack([xy, np.full(len(xy), scan_height(surface))])
-    if not surface.law.stateful:
-        return surface.force(probes)
-    direction = surface.texture.scan_line().direction
-    return surface.force(
-        probes, np.tile(surface.parameter("max_deflection") * direction, (len(xy), 1))
-    )
-
-
-def _fit_waves(surface: Surface, spectrum: Spectrum, points: int | None = None) -> FloatArray:
-    """Return the amplitudes of the least-squares fit of waves to the force."""
-    count = points or _FIT_POINTS[surface.law.contact.requires_search]
-    xy = _fit_points(surface.texture, spectrum, count)
-    vectors = np.array([wave.vector for wave in spectrum.waves])
-    angles = xy @ vectors.T + np.array([wave.phase for wave in spectrum.waves])
-    columns = np.hstack([np.ones((len(xy), 1)), np.sin(angles), np.cos(angles)])
-    fit = np.linalg.lstsq(columns, scan_forces(surface, xy), rcond=None)[0][1:]
-    squares = fit[: len(vectors)] ** 2 + fit[len(vectors) :] ** 2
-    pairs = np.column_stack([squares[:, 0] + squares[:, 1], squares[:, 2]])
-    return np.asarray(np.sqrt(pairs))
-
-
-def _fit_points(texture: Texture, spectrum: Spectrum, count: int) -> FloatArray:
-    """Return points (n, 2) [m] spread evenly over one period, or over many wavelengths."""
-    domain = texture.domain
-    steps = np.arange(count)
-    spans = domain.spans
-    if not domain.periodic:
-        side = _APERIODIC_FIT_LENGTH * float(spectrum.wavelengths.max())
-        spans = side * spans / np.hypot(*spans.T)[:, None]
-    # Equal steps along the first span, the golden ratio across: a low-discrepancy lattice.
-    fractions = [(steps + 0.5) / count, (steps * _GOLDEN_RATIO) % 1.0][: len(spans)]
-    return np.asarray(domain.origin + np.stack(fractions, axis=-1) @ spans)
-
-
-def _band_force_amplitudes(surface: Surface, spectrum: Spectrum) -> FloatArray:
-    """Return the amplitude of each band, from the ratio of force to height on a patch."""
-    texture = surface.texture
-    costly = surface.law.contact.requires_search
-    max_count = (_LINE_POINTS if texture.is_profile else _SIDE_POINTS)[costly]
-    points, spacing, repeats = texture.domain.grid(texture.grid_counts(), max_count)
-    flat = points.reshape(-1, 2)
-    shape = points.shape[:2]
-    pushed = scan_forces(surface, flat)
-    if not pushed.any():  # nothing is touched here: take the patch around the highest point
-        flat = flat + _highest_point(texture) - flat.mean(axis=0)
-        pushed = scan_forces(surface, flat)
-    heights = band_variances(texture.height(flat).reshape(1, *shape), spacing, repeats)
-    forces = np.ascontiguousarray(pushed.T).reshape(3, *shape)
-    along, normal = (band_variances(part, spacing, repeats) for part in (forces[:2], forces[2:]))
-    known = heights.variance > 1e-12 * heights.variance.max()
-    variances = np.column_stack([along.variance, normal.variance])
-    ratio = np.sqrt(variances[known] / heights.variance[known, None])
-    wanted = np.floor(BANDS_PER_OCTAVE * np.log2(1.0 / spectrum.wavelengths))
-    # A wave longer than the patch has the force ratio of the longest wave in it.
-    nearest = np.abs(heights.number[known] - wanted[:, None]).argmin(axis=1)
-    return np.asarray(spectrum.amplitudes[:, None] * ratio[nearest])
-
-
-def _highest_point(texture: Texture) -> FloatArray:
-    """Return the highest sample (x, y) [m] of a texture."""
-    counts = texture.grid_counts()
-    points = texture.domain.grid(counts, max(counts))[0].reshape(-1, 2)
-    return np.asarray(points[np.argmax(texture.height(points))])

@@ -9,7 +9,6 @@ user-defined criterion.
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -21,10 +20,10 @@ from asperity.analysis.passivity.device_loop import (
     Number,
     Obstacle,
     has_known_leak,
+    round_down_exactly,
 )
 from asperity.core.errors import ParameterError
 from asperity.core.files import attributes_to_dict
-from asperity.devices import Device
 
 PAPER = "paper (1)"
 ONE_SIDED = "one-sided"
@@ -108,9 +107,9 @@ def evaluate_rule(loop: DeviceLoop, rule: StiffnessRule) -> Criterion:
     return replace(
         result,
         holds=True if loop.stiffness <= proved else False if loop.stiffness > possible else None,
-        limit=_round_down(proved) if is_proved else None,
-        margin=_round_down(proved / loop.stiffness) if is_proved else None,
-        upper_limit=_round_down(possible),
+        limit=round_down_exactly(proved) if is_proved else None,
+        margin=round_down_exactly(proved / loop.stiffness) if is_proved else None,
+        upper_limit=round_down_exactly(possible),
     )
 
 
@@ -119,14 +118,6 @@ def _max_stiffness(budget: Fraction, gain: Number) -> Number:
     if budget <= 0 or gain == math.inf:
         return Fraction(0)
     return budget / gain if gain > 0 else math.inf
-
-
-def _round_down(value: Number) -> float:
-    """Return the greatest float that is not above the value."""
-    if value == math.inf:
-        return math.inf
-    near = float(min(value, Fraction(sys.float_info.max)))
-    return near if Fraction(near) <= value else math.nextafter(near, -math.inf)
 
 
 _ZERO = Fraction(0)
@@ -263,95 +254,6 @@ def _quantization_criterion(loop: DeviceLoop) -> Criterion:
         upper_limit=limit,
         used_fields=fields,
     )
-
-
-@dataclass(frozen=True)
-class BuzzBound:
-    """Upper bound of a periodic motion that quantisation may sustain.
-
-    Attributes:
-        speed: RMS of the distance per sample period over the motion's period [m/s].
-        power: power gained by the hand [W].
-    """
-
-    speed: float
-    power: float
-
-
-def buzz_bound(loop: DeviceLoop) -> BuzzBound | None:
-    """Return the bound of the buzz that quantisation may cause; ``None`` if there is none.
-
-    Each step Δ gains at most (φ - f_c)|Δ| - m|Δ|², m = σ₀/T - |b_v|/T - k (q⁺/2 + d q), so a
-    periodic motion has RMS speed (φ - f_c)/(m T) and draws (φ - f_c)²/(4 m T) at most.
-
-    Reference:
-        docs/theory/passivity.md.
-    """
-    terms = None if loop.damping_gain is None else _buzz_terms(loop)
-    if terms is None or loop.rate is None:
-        return None
-    per_stiffness, fixed, gain, budget = terms
-    margin = budget - loop.stiffness * gain
-    if margin <= 0:
-        return None
-    excess = max(loop.stiffness * per_stiffness + fixed, _ZERO)
-    speed = excess * loop.rate / margin
-    power = excess**2 * loop.rate / (4 * margin)
-    return BuzzBound(_round_up(speed), _round_up(power))
-
-
-BUZZ_SPEED = 0.010
-"""Bound of the buzz [m/s] for which a start is chosen where damping and delay are known.
-
-The field ``max_buzz`` of a device replaces it.
-"""
-
-
-def buzz_goal(device: Device) -> float:
-    """Return the bound of the buzz for which starts are chosen on a device [m/s]."""
-    return device.value("max_buzz") or BUZZ_SPEED
-
-
-def buzz_limited_stiffness(loop: DeviceLoop, speed: float | None = None) -> float | None:
-    """Return the greatest stiffness [N/m] at which :func:`buzz_bound` is at most a speed.
-
-    With φ - f_c = a k + c and m = (G - g k)/T it is (v G - c/T)/(a/T + v g). Errors of force that
-    do not scale with k let it be c/(T G) at any stiffness: v is at least twice that.
-
-    Args:
-        loop: the surface on the device; its stiffness does not count.
-        speed: v [m/s]; :func:`buzz_goal` by default.
-
-    Returns:
-        The stiffness; ``None`` if there is no bound at any.
-    """
-    terms = _buzz_terms(loop)
-    if terms is None or loop.rate is None or terms[-1] <= 0:
-        return None
-    per_stiffness, fixed, gain, budget = terms
-    v = max(Fraction(speed or buzz_goal(loop.device)), 2 * fixed * loop.rate / budget)
-    slope = per_stiffness * loop.rate + v * gain
-    return math.inf if slope == 0 else _round_down((v * budget - fixed * loop.rate) / slope)
-
-
-def _buzz_terms(loop: DeviceLoop) -> tuple[Fraction, Fraction, Fraction, Fraction] | None:
-    """Return (φ - f_c per stiffness, its fixed part, q⁺/2 + d q, the budget [N/m]), if known."""
-    if loop.obstacle or loop.damping_gain is None or loop.delay is None:
-        return None
-    q = loop.weighted_gain(_ZERO, _ONE, "upper")
-    gain = loop.weighted_gain(HALF, loop.known_delay, "upper")
-    if math.inf in (q, gain):
-        return None
-    virtual = abs(loop.virtual_damping_gain)
-    fixed = loop.force_step / 2 + virtual * loop.position_step - loop.friction
-    per_stiffness = Fraction(q) * loop.position_step / 2
-    return per_stiffness, fixed, Fraction(gain), loop.damping_gain - virtual
-
-
-def _round_up(value: Fraction) -> float:
-    """Return the least float that is not below the value."""
-    near = float(value)
-    return near if Fraction(near) >= value else math.nextafter(near, math.inf)
 
 
 # --- the leak -------------------------------------------------------------------------------------

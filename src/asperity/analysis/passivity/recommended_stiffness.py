@@ -69,7 +69,7 @@ def stability_limit(
     if (
         main.limit
         and not steps.missing
-        and (calm := criteria.buzz_limited_stiffness(loop)) is not None
+        and (calm := device_loop.buzz_limited_stiffness(loop)) is not None
     ):
         bounded = min(calm, main.limit)
         if bounded > silent:

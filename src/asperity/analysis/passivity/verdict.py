@@ -12,15 +12,11 @@ from typing import Literal
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.leak import Leak
 from asperity.analysis.passivity import criteria, device_loop
-from asperity.analysis.passivity.criteria import (
-    BuzzBound,
-    Criterion,
-    buzz_bound,
-    evaluate_criteria,
-    main_rule,
-)
+from asperity.analysis.passivity.criteria import Criterion, evaluate_criteria, main_rule
 from asperity.analysis.passivity.device_loop import (
+    BuzzBound,
     DeviceLoop,
+    buzz_bound,
     critical_speed,
     make_device_loop,
     max_proved_delay,

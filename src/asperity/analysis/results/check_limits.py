@@ -17,7 +17,8 @@ from asperity.analysis.gain.characteristic import cached_number
 from asperity.analysis.limits import limit_rules
 from asperity.analysis.limits.limit_rules import Limit
 from asperity.analysis.limits.perceptibility import Perceptibility, assess_perceptibility
-from asperity.analysis.limits.spectrum import MIN_SHARE, Spectrum, compute_spectrum, wave_forces
+from asperity.analysis.limits.spectrum import MIN_SHARE, Spectrum, compute_spectrum
+from asperity.analysis.limits.wave_scan import wave_forces
 from asperity.analysis.passivity.recommended_stiffness import (
     Margin,
     StabilityLimit,

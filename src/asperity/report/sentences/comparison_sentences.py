@@ -6,7 +6,7 @@ import math
 from collections import Counter
 
 from asperity.analysis.limits.perceptibility import Perceptibility, texture_length
-from asperity.analysis.passivity.criteria import buzz_goal
+from asperity.analysis.passivity.device_loop import buzz_goal
 from asperity.analysis.passivity.recommended_stiffness import Margin, load_margins
 from asperity.analysis.results.compare import Comparison
 from asperity.analysis.results.device_comparisons import DeviceComparisons, MissingData

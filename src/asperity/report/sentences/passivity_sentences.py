@@ -7,8 +7,9 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from asperity.analysis.passivity import criteria
-from asperity.analysis.passivity.criteria import BuzzBound, Criterion
+from asperity.analysis.passivity.criteria import Criterion
 from asperity.analysis.passivity.device_loop import (
+    BuzzBound,
     DeviceLoop,
     Obstacle,
     critical_speed,
