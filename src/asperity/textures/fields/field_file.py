@@ -251,8 +251,8 @@ def _read_header(data: NDArray[np.uint8]) -> Any:
     if header["byte_order"] != _BYTE_ORDER:
         raise SurfaceFileError("has another byte order, or is damaged")
     if header["version"] != VERSION:
-        found = f"is a .field file of version {header['version']}, of which {VERSION} is read"
-        raise SurfaceFileError(f"{found}; bake it again")
+        fault = f"is a .field file of version {header['version']}, of which {VERSION} is read"
+        raise SurfaceFileError(f"{fault}; bake it again")
     if header["header_checksum"] != zlib.crc32(data[: HEADER.itemsize - 4].data):
         raise SurfaceFileError("has a damaged header")
     if header["file_bytes"] != len(data):

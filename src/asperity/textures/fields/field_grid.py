@@ -240,8 +240,8 @@ class FieldGrid:
         """
         rows = np.swapaxes(depths if len(self.cells) == 2 else depths[:, None], 0, 1)
         # One row after the other, since masks of a large field would take more memory than it does.
-        least = (_CUT - 1.0) * self.margin
-        first, end = np.stack([_column_limits(row, least) for row in rows], axis=1)
+        cut = (_CUT - 1.0) * self.margin
+        first, end = np.stack([_column_limits(row, cut) for row in rows], axis=1)
         reach = np.stack([_column_limits(row, 0.0)[1] for row in rows])
         starts = (np.cumsum(end - first) - (end - first).ravel()).reshape(first.shape)
         values = np.empty(int((end - first).sum()), np.float32)

@@ -60,13 +60,13 @@ class NamedSurface(HeightMap):
         return MIN_NODES_PER_WAVE * self.pitch[0], MIN_NODES_PER_WAVE * self.pitch[1]
 
     def __repr__(self) -> str:
-        given = "".join(f", {name}={value!r}" for name, value in self.parameters.items())
-        return f"named_surface({self.name!r}{given})"
+        arguments = "".join(f", {name}={value!r}" for name, value in self.parameters.items())
+        return f"named_surface({self.name!r}{arguments})"
 
     def describe(self) -> dict[str, Any]:
         """See :class:`Texture`; the kind is the name."""
-        own = {"kind": self.name, "cutoff": list(self.cutoff)}
-        return super().describe() | own | self.parameters
+        names = {"kind": self.name, "cutoff": list(self.cutoff)}
+        return super().describe() | names | self.parameters
 
 
 def named_surface(name: str, **parameters: Any) -> NamedSurface:

@@ -99,15 +99,15 @@ def split_in_mesh(
     mu = 1.0 / (1.0 + c)
     # U >= (1 - μ) d²/2: beyond this distance d nothing but the constant is left.
     limit = (law.max_depth * CORE) ** 2 / (1.0 - mu)
-    square, atoms[0, 0], atoms[0, 1], atoms[0, 2], found = tree_closest(
+    square, atoms[0, 0], atoms[0, 1], atoms[0, 2], triangle = tree_closest(
         p[0], p[1], p[2], limit, near, tree
     )
-    if found < 0:
+    if triangle < 0:
         return 0.5 * limit, 0, near, math.sqrt(limit)
     a = local_array((7, 10))
     atoms[0, 3] = 1.0
     count = 1
-    last = found
+    last = triangle
     scale = abs(p[0]) + abs(p[1]) + abs(p[2])
     energy = split_evaluate_energy(atoms, count, p, mu, offset)
     for _ in range(_MAX_QUERIES):
@@ -119,13 +119,13 @@ def split_in_mesh(
         atoms[count, 3] = 0.0
         gap, rounding = split_duality_gap(atoms, count, y, mu, scale)
         if gap <= max(_GAP * square, law.tolerance, rounding):
-            return energy - 0.5 * gap, count, found, math.sqrt(square)
+            return energy - 0.5 * gap, count, triangle, math.sqrt(square)
         left = split_solve_weights(atoms, count + 1, p, mu, a)
         if left == 0:  # by rounding: there are no better weights
             break
         count = left
         energy = split_evaluate_energy(atoms, count, p, mu, offset)
-    return energy, count, found, math.sqrt(square)
+    return energy, count, triangle, math.sqrt(square)
 
 
 def summarize_column(
@@ -230,10 +230,10 @@ def column_batch(
         for m in range(out.shape[1]):
             p[2] = z[m]
             if winding_above(p[2], total, crossings) <= 0:
-                square, _x, _y, _z, found = tree_closest(
+                square, _x, _y, _z, triangle = tree_closest(
                     p[0], p[1], p[2], margin * margin, near, tree
                 )
-                out[i, m] = -math.sqrt(square) if found >= 0 else -margin
+                out[i, m] = -math.sqrt(square) if triangle >= 0 else -margin
                 continue
             energy, count, near, distance = split_in_mesh(p, near, law, y, atoms, offset, tree)
             energy, _slope = limited_potential(energy, law.max_depth)

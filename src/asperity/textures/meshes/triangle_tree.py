@@ -125,33 +125,33 @@ def tree_closest(
     Returns:
         The limit, the point itself and -1 if nothing is closer than the limit.
     """
-    least, cx, cy, cz = closest_on_triangle(x, y, z, near, tree)
-    found = near
-    if least >= limit:
-        least = limit
+    square_bound, cx, cy, cz = closest_on_triangle(x, y, z, near, tree)
+    triangle = near
+    if square_bound >= limit:
+        square_bound = limit
         cx = x
         cy = y
         cz = z
-        found = -1
+        triangle = -1
     stack = local_array((64, 2))
     stack[0, 0] = 0.0
     stack[0, 1] = box_distance(x, y, z, 0, tree)
     size = 1
     while size > 0:
         size -= 1
-        if stack[size, 1] >= least:
+        if stack[size, 1] >= square_bound:
             continue
         node = int(stack[size, 0])
         if node >= tree.leaves - 1:
             first = (node - tree.leaves + 1) * LEAF_SIZE
             for t in range(first, min(first + LEAF_SIZE, tree.corners.shape[0])):
                 square, px, py, pz = closest_on_triangle(x, y, z, t, tree)
-                if square < least:
-                    least = square
+                if square < square_bound:
+                    square_bound = square
                     cx = px
                     cy = py
                     cz = pz
-                    found = t
+                    triangle = t
             continue
         left = box_distance(x, y, z, 2 * node + 1, tree)
         right = box_distance(x, y, z, 2 * node + 2, tree)
@@ -161,7 +161,7 @@ def tree_closest(
         stack[size + 1 - swap, 0] = 2 * node + 2
         stack[size + 1 - swap, 1] = right
         size += 2
-    return least, cx, cy, cz, found
+    return square_bound, cx, cy, cz, triangle
 
 
 def side_crossing(x: float, y: float, t: int, start: int, end: int, tree: TriangleTree) -> int:
@@ -255,7 +255,7 @@ def winding_above(z: float, count: int, crossings: FloatArray) -> int:
 
 def opposite_walls(atoms: FloatArray, count: int, y: FloatArray) -> float:
     """Return the least cosine of the directions from y to two of the atoms."""
-    least = 1.0
+    cosine = 1.0
     for i in range(count):
         for j in range(i):
             dot = ii = jj = 0.0
@@ -265,5 +265,5 @@ def opposite_walls(atoms: FloatArray, count: int, y: FloatArray) -> float:
                 dot += a * b
                 ii += a * a
                 jj += b * b
-            least = min(least, dot / math.sqrt(max(ii * jj, 1e-300)))
-    return least
+            cosine = min(cosine, dot / math.sqrt(max(ii * jj, 1e-300)))
+    return cosine
