@@ -233,9 +233,34 @@ def document_arguments(arguments: Iterable[Argument]) -> Callable[[Function], Fu
     return describe
 
 
-STIFFNESS, SEED, MAX_DEPTH, RENDERING = read_arguments(Path(__file__).with_suffix(".toml")).values()
+STIFFNESS = Argument(
+    "stiffness",
+    "stiffness of the surface",
+    "N/m",
+    default=1000.0,
+    must_be_positive=True,
+    example="500N/m",
+)
 DEFAULT_STIFFNESS: Any = STIFFNESS.default
-FIELD, SEARCH = RENDERING.choices
+SEED = Argument("seed", "of the random numbers", default=0, form="integer")
+MAX_DEPTH = Argument(
+    "max_depth",
+    "maximum penetration depth",
+    "m",
+    default_description="peak-to-valley height, at most 1 mm",
+    must_be_positive=True,
+    example="0.5mm",
+)
+FIELD = "field"
+SEARCH = "search"
+RENDERING = Argument(
+    "rendering",
+    "rendering of law H where it has no closed form: field (a baked potential field) or search "
+    "(with an evaluation budget)",
+    default=FIELD,
+    form="text",
+    choices=(FIELD, SEARCH),
+)
 
 
 # --- parsers of the forms: name of the argument, value, unit --------------------------------------

@@ -9,11 +9,9 @@ import math
 import re
 from collections.abc import Callable
 from functools import lru_cache
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from asperity.core.errors import ParameterError
-from asperity.core.files import read_toml
 
 if TYPE_CHECKING:
     import pint
@@ -25,7 +23,32 @@ _UNIT_PATTERN = re.compile(
     rf"(?:1\s*/\s*)?(?:{_UNIT_FACTOR_PATTERN})(?:\s*[*/·\s]\s*(?:{_UNIT_FACTOR_PATTERN}))*"
 )
 _MAX_UNIT_LENGTH = 64
-_COMMON_UNITS, _SI_FACTORS = read_toml("units", Path(__file__).with_suffix(".toml")).values()
+# Units suggested in messages, by SI unit, most common first; default: the SI unit.
+_COMMON_UNITS = {
+    "m": ("mm", "um", "m"),
+    "rad": ("deg", "rad"),
+    "rad/m": ("rad/mm", "rad/m"),
+    "s": ("s", "ms"),
+    "kg": ("g", "kg"),
+    "N": ("N", "mN"),
+    "B": ("MB", "GB"),
+}
+# SI values of common units, by SI unit, so that pint is imported for other units only.
+_SI_FACTORS = {
+    "m": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "nm": 1e-9, "cm": 1e-2},
+    "rad": {"rad": 1.0},
+    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6},
+    "kg": {"kg": 1.0, "g": 1e-3},
+    "N": {"N": 1.0, "mN": 1e-3},
+    "Hz": {"Hz": 1.0, "kHz": 1e3},
+    "N/m": {"N/m": 1.0, "N/mm": 1e3, "kN/m": 1e3},
+    "N*s/m": {"N*s/m": 1.0, "N s/m": 1.0},
+    "N s/m": {"N*s/m": 1.0, "N s/m": 1.0},
+    "N*m*s": {"N*m*s": 1.0, "mN*m*s": 1e-3},
+    "m/s": {"m/s": 1.0, "mm/s": 1e-3, "cm/s": 1e-2},
+    "rad/m": {"rad/m": 1.0, "rad/mm": 1e3},
+    "B": {"B": 1.0, "kB": 1e3, "MB": 1e6, "GB": 1e9},
+}
 
 
 @lru_cache(maxsize=1)

@@ -34,8 +34,12 @@ from asperity.rendering import is_searched
 from asperity.surface import Surface
 
 _SCALAR_TYPES = {
-    "float64": c.FLOAT, "float32": c.SINGLE, "int64": c.INT, "int32": c.INT, "bool": c.BOOL,
-}  # fmt: skip
+    "float64": c.FLOAT,
+    "float32": c.SINGLE,
+    "int64": c.INT,
+    "int32": c.INT,
+    "bool": c.BOOL,
+}
 _WIDTH = 100
 
 

@@ -109,7 +109,9 @@ def sample_map(
 
 
 def _point_count(side: float, step: float) -> int:
-    count = round(min(side / step, _MAX_POINTS + 1))
+    count = _MAX_POINTS + 1
+    if side / step < 1e9:
+        count = round(side / step)
     if not _MIN_POINTS <= count <= _MAX_POINTS:
         points = f"gives {count} points on {format_quantity(side, 'm')}"
         requirement = f"{points}; {_MIN_POINTS} to {_MAX_POINTS} are allowed"
@@ -128,9 +130,13 @@ def _check_pair(name: str, value: Pair | None) -> tuple[float, float] | None:
 
 
 def _evaluate_map(
-    texture: Texture, points: FloatArray, steps: tuple[float, float], along: FloatArray,
-    is_periodic: bool, region: str,
-) -> SampledMap:  # fmt: skip
+    texture: Texture,
+    points: FloatArray,
+    steps: tuple[float, float],
+    along: FloatArray,
+    is_periodic: bool,
+    region: str,
+) -> SampledMap:
     shape = points.shape[:2]
     flat = np.ascontiguousarray(points.reshape(-1, 2))
     heights = texture.height(flat)
@@ -139,9 +145,12 @@ def _evaluate_map(
     normals = np.column_stack([-slopes @ along, -slopes @ across, np.ones(len(flat))])
     normals /= np.sqrt((normals**2).sum(axis=1))[:, None]
     return SampledMap(
-        heights.reshape(shape), normals.reshape(*shape, 3), (float(steps[0]), float(steps[1])),
-        is_periodic, region,
-    )  # fmt: skip
+        heights.reshape(shape),
+        normals.reshape(*shape, 3),
+        (float(steps[0]), float(steps[1])),
+        is_periodic,
+        region,
+    )
 
 
 _LAYOUT = "x to the right, y down"

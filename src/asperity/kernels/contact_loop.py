@@ -11,9 +11,15 @@ KERNELS = Kernels(loops=("contact_batch",))
 
 
 def contact_batch(
-    points: FloatArray, depths: FloatArray, derivatives: FloatArray, deflection: FloatArray,
-    sliding: NDArray[np.bool_], force: FloatArray, jacobian: FloatArray, law: object,
-) -> None:  # fmt: skip
+    points: FloatArray,
+    depths: FloatArray,
+    derivatives: FloatArray,
+    deflection: FloatArray,
+    sliding: NDArray[np.bool_],
+    force: FloatArray,
+    jacobian: FloatArray,
+    law: object,
+) -> None:
     """Write forces (n, 3) [N] and Jacobians (n, 3, 3) [N/m] of contacts.
 
     Args:
@@ -31,9 +37,21 @@ def contact_batch(
         dy = deflection[i, 1]
         sxx, sxy, syy = sliding_derivative(dx, dy, sliding[i])
         values = contact_jacobian(
-            points[i, 0], points[i, 1], points[i, 2], depths[i],
-            derivatives[i, 0], derivatives[i, 1], derivatives[i, 2],
-            derivatives[i, 3], derivatives[i, 4], derivatives[i, 5],
-            dx, dy, sxx, sxy, syy, law,
-        )  # fmt: skip
+            points[i, 0],
+            points[i, 1],
+            points[i, 2],
+            depths[i],
+            derivatives[i, 0],
+            derivatives[i, 1],
+            derivatives[i, 2],
+            derivatives[i, 3],
+            derivatives[i, 4],
+            derivatives[i, 5],
+            dx,
+            dy,
+            sxx,
+            sxy,
+            syy,
+            law,
+        )
         store_jacobian(force, jacobian, i, values)

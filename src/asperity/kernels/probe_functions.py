@@ -31,17 +31,31 @@ def probe_force(
 
 
 def probe_force_warm(
-    x: float, y: float, z: float, dx: float, dy: float, warm_start: FloatArray, texture: object,
+    x: float,
+    y: float,
+    z: float,
+    dx: float,
+    dy: float,
+    warm_start: FloatArray,
+    texture: object,
     law: object,
-) -> Vector3:  # fmt: skip
+) -> Vector3:
     """Return the force [N] of a law whose contact has a warm-started search."""
     raise NotImplementedError  # the linker binds calls to the generated function
 
 
 def probe_jacobian(
-    x: float, y: float, z: float, dx: float, dy: float, sxx: float, sxy: float, syy: float,
-    texture: object, law: object,
-) -> tuple[*Vector3, *Matrix3Rows]:  # fmt: skip
+    x: float,
+    y: float,
+    z: float,
+    dx: float,
+    dy: float,
+    sxx: float,
+    sxy: float,
+    syy: float,
+    texture: object,
+    law: object,
+) -> tuple[*Vector3, *Matrix3Rows]:
     """Return force [N] and Jacobian [N/m], row by row; s.. is the derivative of the deflection."""
     raise NotImplementedError  # the linker binds calls to the generated function
 
@@ -57,9 +71,16 @@ def probe_depth(x: float, y: float, z: float, texture: object) -> float:
 
 
 def probe_tick(
-    x: float, y: float, z: float, ax: float, ay: float, held: bool, warm_start: FloatArray,
-    texture: object, law: object,
-) -> tuple[float, float, float, float, float, bool]:  # fmt: skip
+    x: float,
+    y: float,
+    z: float,
+    ax: float,
+    ay: float,
+    held: bool,
+    warm_start: FloatArray,
+    texture: object,
+    law: object,
+) -> tuple[float, float, float, float, float, bool]:
     """Return the force [N], the new anchor position [m] and whether the anchor is held.
 
     A law with state holds its anchor during contact; others leave it unchanged. A search stays
@@ -69,10 +90,23 @@ def probe_tick(
 
 
 def contact_jacobian(
-    x: float, y: float, z: float, depth: float,
-    h: float, hx: float, hy: float, hxx: float, hxy: float, hyy: float,
-    dx: float, dy: float, sxx: float, sxy: float, syy: float, law: object,
-) -> tuple[*Vector3, *Matrix3Rows]:  # fmt: skip
+    x: float,
+    y: float,
+    z: float,
+    depth: float,
+    h: float,
+    hx: float,
+    hy: float,
+    hxx: float,
+    hxy: float,
+    hyy: float,
+    dx: float,
+    dy: float,
+    sxx: float,
+    sxy: float,
+    syy: float,
+    law: object,
+) -> tuple[*Vector3, *Matrix3Rows]:
     """Return force [N] and Jacobian [N/m], row by row, at a given contact of a probe."""
     raise NotImplementedError  # the linker binds calls to the generated function
 

@@ -22,9 +22,14 @@ def force_batch(
 
 
 def jacobian_batch(
-    points: FloatArray, deflection: FloatArray, sliding: NDArray[np.bool_], force: FloatArray,
-    jacobian: FloatArray, texture: object, law: object,
-) -> None:  # fmt: skip
+    points: FloatArray,
+    deflection: FloatArray,
+    sliding: NDArray[np.bool_],
+    force: FloatArray,
+    jacobian: FloatArray,
+    texture: object,
+    law: object,
+) -> None:
     """Write forces (n, 3) [N] and Jacobians (n, 3, 3) [N/m]; ``sliding`` anchors are dragged."""
     for i in range(points.shape[0]):
         dx = deflection[i, 0]

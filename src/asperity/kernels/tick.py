@@ -106,11 +106,19 @@ def flush_subnormal(value: float) -> float:
 def flush_subnormal_state(state: ServoState) -> ServoState:
     """Return the state without subnormal numbers."""
     return ServoState(
-        flush_subnormal(state.x), flush_subnormal(state.y), flush_subnormal(state.z),
-        flush_subnormal(state.vx), flush_subnormal(state.vy), flush_subnormal(state.vz),
-        flush_subnormal(state.anchor_x), flush_subnormal(state.anchor_y), state.held,
-        flush_subnormal(state.fx), flush_subnormal(state.fy), flush_subnormal(state.fz),
-    )  # fmt: skip
+        flush_subnormal(state.x),
+        flush_subnormal(state.y),
+        flush_subnormal(state.z),
+        flush_subnormal(state.vx),
+        flush_subnormal(state.vy),
+        flush_subnormal(state.vz),
+        flush_subnormal(state.anchor_x),
+        flush_subnormal(state.anchor_y),
+        state.held,
+        flush_subnormal(state.fx),
+        flush_subnormal(state.fy),
+        flush_subnormal(state.fz),
+    )
 
 
 def state_before_tick(
@@ -123,9 +131,15 @@ def state_before_tick(
 
 
 def servo_tick(
-    state: ServoState, settings: ServoSettings, x: float, y: float, z: float,
-    warm_start: FloatArray, texture: object, law: object,
-) -> ServoState:  # fmt: skip
+    state: ServoState,
+    settings: ServoSettings,
+    x: float,
+    y: float,
+    z: float,
+    warm_start: FloatArray,
+    texture: object,
+    law: object,
+) -> ServoState:
     """Return the state after a tick, with the commanded force.
 
     The position is quantised, the law is evaluated, virtual damping is added, and the force is

@@ -64,9 +64,12 @@ class RecordedField:
 def surface_field(surface: Surface) -> RecordedField:
     """Return the field of a surface."""
     return RecordedField(
-        surface.law, surface.effective_clamp, surface.texture.sampler, surface.texture.arguments,
+        surface.law,
+        surface.effective_clamp,
+        surface.texture.sampler,
+        surface.texture.arguments,
         surface.law_arguments,
-    )  # fmt: skip
+    )
 
 
 def field_metadata(surface: Surface) -> dict[str, Any]:

@@ -38,8 +38,13 @@ from asperity.surface import Surface
 from asperity.textures.texture import Texture
 
 COMPARED_COLUMNS = (
-    "commanded x", "commanded y", "commanded z", "law anchor x", "law anchor y", "law held",
-)  # fmt: skip
+    "commanded x",
+    "commanded y",
+    "commanded z",
+    "law anchor x",
+    "law anchor y",
+    "law held",
+)
 """The columns that are computed and compared."""
 
 
@@ -210,9 +215,17 @@ def _replay_blocks(
         out = np.empty((len(block), len(COMPARED_COLUMNS)))
         device = ReplayedDevice(points, np.zeros(1, np.int64))
         _cause, _code, state = loops.servo_loop(
-            state, first + len(block), settings, (), (), device, ReplayTrace(out, first), memory,
-            field.texture, field.law_arguments,
-        )  # fmt: skip
+            state,
+            first + len(block),
+            settings,
+            (),
+            (),
+            device,
+            ReplayTrace(out, first),
+            memory,
+            field.texture,
+            field.law_arguments,
+        )
         yield first, block[:, compared], out
         first += len(block)
 

@@ -24,9 +24,16 @@ class ReplayTrace(NamedTuple):
 
 
 def trace_sample(
-    trace: ReplayTrace, sample: int, reading: Reading, before: ServoState, servo: ServoState,
-    force: GuardedForce, in_contact: bool, settings: ServoSettings, device: object,
-) -> None:  # fmt: skip
+    trace: ReplayTrace,
+    sample: int,
+    reading: Reading,
+    before: ServoState,
+    servo: ServoState,
+    force: GuardedForce,
+    in_contact: bool,
+    settings: ServoSettings,
+    device: object,
+) -> None:
     """Write a row; see ``interface``."""
     row = sample - trace.first_sample
     trace.rows[row, 0] = servo.fx
