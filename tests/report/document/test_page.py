@@ -32,7 +32,7 @@ def page(*sections: Section) -> Reader:
 def all_blocks(text: str) -> list[Section]:
     """Return sections with one block of each type, with the text in every field."""
     cell = Cell(text, "no", note=text, subtext=text, summary=text, details=[(text, text)])
-    table = Table((text, "n"), [Row([text, cell], "best", id="row")], numeric_columns=(1,))
+    table = Table((text, "n"), [Row([text, cell], True, id="row")], numeric_columns=(1,))
     blocks = [
         Paragraph(text),
         Paragraph(text, "code"),

@@ -83,7 +83,7 @@ def _render_pictures(sections: Sequence[pages.Section]) -> dict[int, RenderedPic
 
 
 def _result_or_render(result: RenderedPicture | None, picture: pages.Picture) -> RenderedPicture:
-    return render_picture(picture) if result is None else result
+    return result or render_picture(picture)
 
 
 def _pictures_in(sections: Sequence[pages.Section]) -> Iterator[pages.Picture]:
@@ -129,14 +129,13 @@ def render_notebook(page: pages.Page) -> str:
         if pages.Media.NOTEBOOK in section.media
         for block in section.blocks
     ]
-    picture = next((block for block in blocks if isinstance(block, pages.Picture)), None)
+    pictures = [block for block in blocks if isinstance(block, pages.Picture)]
     template = template_environment().get_template("notebook.html.j2")
     return template.render(
         page=page,
         paragraphs=[block.text for block in blocks if isinstance(block, pages.Paragraph)],
         tables=[block for block in blocks if isinstance(block, pages.Table)],
-        picture=picture,
-        png="" if picture is None else _encode_png(picture),
+        pictures=[(picture, _encode_png(picture)) for picture in pictures[:1]],
     )
 
 
@@ -158,8 +157,10 @@ def _build_date() -> str:
     Reference:
         https://reproducible-builds.org/specs/source-date-epoch
     """
+    seconds = time.time()
     epoch = os.environ.get("SOURCE_DATE_EPOCH", "")
-    seconds = int(epoch) if epoch.isdecimal() and len(epoch) < 12 else time.time()
+    if epoch.isdecimal() and len(epoch) < 12:
+        seconds = int(epoch)
     return time.strftime("%Y-%m-%d", time.gmtime(seconds))
 
 

@@ -131,14 +131,14 @@ class Row:
 
     Attributes:
         cells: one per column.
-        kind: "best" is tinted, and bold in a terminal.
+        is_best: whether it is tinted, and bold in a terminal.
         id: anchor for links to the row; may be empty.
         style: Rich style in a terminal.
         law: letter of the law that the row belongs to; the row is hidden with that law.
     """
 
     cells: Sequence[str | Cell]
-    kind: str = ""
+    is_best: bool = False
     id: str = ""
     style: str = ""
     law: str = ""
@@ -341,7 +341,14 @@ def assumption_sections(sentences: Sequence[str], *blocks: Block) -> list[Sectio
 
 def holds_cell(holds: bool | None) -> Cell:
     """Return yes, no, or ? for a condition that cannot be decided."""
-    return Cell(yes_no_text(holds), "open" if holds is None else "" if holds else "no")
+    if holds is None:
+        return Cell(yes_no_text(holds), "open")
+    return flagged_cell(yes_no_text(holds), not holds)
+
+
+def flagged_cell(text: str, is_wrong: bool) -> Cell:
+    """Return a cell that is coloured if something is wrong."""
+    return Cell(text, "no") if is_wrong else Cell(text)
 
 
 @contextmanager

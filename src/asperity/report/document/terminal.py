@@ -32,8 +32,9 @@ def page_renderables(page: pages.Page, width: int) -> Iterator[RenderableType]:
         yield Text(page.answer, "bold")
     is_first = not page.answer
     for section in page.sections:
-        is_shown = pages.Media.TERMINAL in section.media
-        parts = list(_section_parts(section, width)) if is_shown else []
+        if pages.Media.TERMINAL not in section.media:
+            continue
+        parts = list(_section_parts(section, width))
         if parts and not is_first:
             yield Text()
         is_first = is_first and not parts
@@ -86,14 +87,17 @@ def _dropped_columns(table: pages.Table, width: int) -> set[int]:
     if not order:
         return set()
     cells = [table.headings, *(row.cells for row in table.rows)]
-    texts = [[cell if isinstance(cell, str) else cell.text for cell in row] for row in cells]
     widths = [
-        max([len(line) for text in column for line in text.split("\n")]) + gap
-        for column in zip(*texts, strict=True)
+        max([len(line) for cell in column for line in _plain_text(cell).split("\n")]) + gap
+        for column in zip(*cells, strict=True)
     ]
     room = width + gap - sum(widths) + sum([widths[i] for i in order])
     fitting = sum([total <= room for total in accumulate(widths[i] for i in order)])
     return set(order[fitting:])
+
+
+def _plain_text(cell: str | pages.Cell) -> str:
+    return cell if isinstance(cell, str) else cell.text
 
 
 def rich_table(table: pages.Table, width: int) -> RichTable:
@@ -102,24 +106,22 @@ def rich_table(table: pages.Table, width: int) -> RichTable:
     headings = table.headings or [""] * len(table.rows[0].cells)
     columns = sorted(set(range(len(headings))) - _hidden_columns(table, width))
     is_limited = layout.max_widths_below is None or width < layout.max_widths_below
-    max_widths = layout.max_widths if is_limited else {}
-    result = RichTable(
-        box=box.SIMPLE_HEAD if layout.has_rule and table.headings else None,
-        padding=(0, layout.gap if width >= layout.tight_below else 0, 0, 0),
-        show_edge=False,
-        pad_edge=False,
-        show_header=bool(table.headings),
-    )
+    result = RichTable(box=None, show_edge=False, pad_edge=False, show_header=bool(table.headings))
+    if layout.has_rule and table.headings:
+        result.box = box.SIMPLE_HEAD
+    result.padding = (0, 0, 0, 0)
+    if width >= layout.tight_below:
+        result.padding = (0, layout.gap, 0, 0)
     for i in columns:
         result.add_column(
             Text(headings[i]),
             justify="right" if i in table.numeric_columns else "left",
             no_wrap=i not in layout.wrap,
             overflow="fold" if i in layout.wrap else "ellipsis",
-            max_width=max_widths.get(i),
+            max_width=layout.max_widths.get(i) if is_limited else None,
         )
     for row in table.rows:
-        style = row.style or ("bold" if row.kind == "best" else "")
+        style = "bold" if row.is_best else row.style
         result.add_row(*[_cell_text(row.cells[i]) for i in columns], style=style)
     return result
 
@@ -128,7 +130,9 @@ def _cell_text(cell: str | pages.Cell) -> Text:
     if isinstance(cell, str):
         return Text(cell)
     text = Text(cell.text, _KIND_STYLES.get(cell.kind, ""))
-    return text.append(f"\n{cell.subtext}", "dim") if cell.subtext else text
+    if cell.subtext:
+        text.append(f"\n{cell.subtext}", "dim")
+    return text
 
 
 def rich_pairs(rows: Iterable[tuple[str, str]], style: str = "") -> RichTable:

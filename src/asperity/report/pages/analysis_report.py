@@ -47,9 +47,9 @@ def leak_facts(analysis: Analysis) -> list[tuple[str, str]]:
     leak = analysis.leak
     density = analysis.curl_density
     line = analysis.leak.line
-    x, y = (float(part) + 0.0 for part in line.direction)
+    direction = ", ".join([f"{float(part) + 0.0:.6g}" for part in line.direction])
     start = ", ".join([f"{1e3 * float(part) + 0.0:.6g}" for part in line.start])
-    plane = f"vertical, along ({x:.6g}, {y:.6g}) through ({start}) mm"
+    plane = f"vertical, along ({direction}) through ({start}) mm"
     energy = number_text.range_text(leak.energy, leak.upper_per_period, "J")
     facts = [
         ("energy", f"{energy} per traversal ({leak.method})"),
@@ -72,9 +72,11 @@ def merit_facts(analysis: Analysis) -> list[tuple[str, str]]:
     """Return strength, support and force on the scan that compares laws."""
     scan = analysis.merit
     surface = analysis.surface
-    unit = "" if surface.texture.scan_line().periodic else " m"
+    strength = number_text.merit_text(scan.strength)
+    if not surface.texture.scan_line().periodic:
+        strength += " m"
     facts = [
-        ("strength T", f"{number_text.merit_text(scan.strength)}{unit}"),
+        ("strength T", strength),
         ("support S", number_text.merit_text(scan.support)),
         ("RMS force", f"{format_quantity(scan.ripple * surface.stiffness, 'N')} RMS at this k"),
         ("height", f"z = {format_quantity(scan.height, 'm')}"),
@@ -113,13 +115,11 @@ def criteria_table(passivity: Passivity) -> Table:
             Cell(criterion.formula, "line"),
             page.holds_cell(criterion.holds),
             number_text.limit_text(criterion.limit),
-            number_text.NOT_AVAILABLE
-            if criterion.margin is None
-            else number_text.lower_bound_text(criterion.margin, 3),
+            number_text.margin_text(criterion.margin),
             Cell(criterion.conclusion, subtext=criterion.assumptions),
         ]
-        style = "dim" if criterion.holds is None and not decides else ""
-        rows.append(Row(cells, "best" if decides else "", style=style))
+        style = "dim" if criterion.holds is None else ""
+        rows.append(Row(cells, decides, style=style))
     return Table(_CRITERIA_HEADINGS, rows, (3, 4))
 
 
@@ -201,7 +201,7 @@ def _criteria_sections(analysis: Analysis) -> list[Section]:
     passivity = analysis.passivity
     table = criteria_table(analysis.passivity)
     title = f"Passive on the {analysis.device.name}?"
-    marked = [replace(one, cells=["→" if one.kind else "", *one.cells]) for one in table.rows]
+    marked = [replace(row, cells=["→" * row.is_best, *row.cells]) for row in table.rows]
     layout = TableLayout(wrap=(1,), max_widths={1: 18}, omit=(6,))
     short = Table(("", *table.headings), marked, (4, 5), layout)
     limit = stability_limit_text(passivity.stability_limit, passivity.loop)
@@ -231,8 +231,10 @@ def _figure_sections(analysis: Analysis, *names: str) -> list[Section]:
     values: dict[str, object] = {
         "letter": analysis.surface.law.letter,
         "q": number_text.interval_text(analysis.q),
-        "loop": f"; the worst loop gains {gained}" if len(leak.vertices) else "",
+        "loop": "",
     }
+    if len(leak.vertices):
+        values["loop"] = f"; the worst loop gains {gained}"
     for name in names:
         figure = page.plot_later(analysis, name)
         media = Media.HTML | Media.NOTEBOOK if name == "gain" else Media.HTML
@@ -302,14 +304,19 @@ def _texture_expression(surface: Surface, texture_code: str) -> str:
 
 def _surface_arguments(surface: Surface) -> str:
     law = surface.law
-    shipped = LAWS.get(law.letter) is law
-    parts = [repr(law.letter) if shipped else "law"]
+    is_shipped = LAWS.get(law.letter) is law
+    parts = [repr(law.letter) if is_shipped else "law"]
     parts += [f"stiffness={surface.stiffness!r}", f"max_depth={surface.max_depth!r}"]
-    own = {name: v for name, v in surface.law_parameters.items() if v != law.parameters[name]}
-    parts += [f"{name}={v!r}" for name, v in own.items() if name in SHIPPED_LAW_ARGUMENTS]
-    rest = {name: v for name, v in own.items() if name not in SHIPPED_LAW_ARGUMENTS}
-    if rest:
-        parts.append(f"law_parameters={rest!r}")
+    others = {}
+    for name, value in surface.law_parameters.items():
+        if value == law.parameters[name]:
+            continue
+        if name in SHIPPED_LAW_ARGUMENTS:
+            parts.append(f"{name}={value!r}")
+        else:
+            others[name] = value
+    if others:
+        parts.append(f"law_parameters={others!r}")
     if surface.clamp != NONE.name:
         parts.append(f"clamp={surface.clamp!r}")
     return ", ".join(parts)

@@ -159,7 +159,7 @@ def law_rows(comparison: Comparison, cells: Callable[[LawRow], Sequence[str | Ce
     """Return a row per law, the recommended one first and marked."""
     best = comparison.recommended_row
     return [
-        Row(cells(row), "best" if row is best else "", law=row.law.letter)
+        Row(cells(row), row is best, law=row.law.letter)
         for row in sorted(comparison.rows, key=lambda row: row is not best)
     ]
 
@@ -167,22 +167,24 @@ def law_rows(comparison: Comparison, cells: Callable[[LawRow], Sequence[str | Ce
 def laws_table(comparison: Comparison, columns: Sequence[LawColumn]) -> Table:
     """Return one row per law with these columns."""
     if comparison.stiffness is not None:
-        columns = [_GIVEN_COLUMN if one is _START_COLUMN else one for one in columns]
-    rows = law_rows(comparison, lambda row: [one.cell(row, comparison) for one in columns])
-    names = [single_line(one.heading) for one in columns]
+        given = {id(_START_COLUMN): _GIVEN_COLUMN}
+        columns = [given.get(id(column), column) for column in columns]
+    rows = law_rows(comparison, lambda row: [column.cell(row, comparison) for column in columns])
+    names = [single_line(column.heading) for column in columns]
     meanings = dict(column_meanings("laws"))
     if not any("v*" in row.verdict for row in comparison.rows):
         del meanings["verdict"]
     layout = TableLayout(
-        wrap=[i for i, one in enumerate(columns) if one in (NAME_COLUMN, VERDICT_COLUMN)],
-        max_widths={i: 24 for i, one in enumerate(columns) if one is NAME_COLUMN},
-        min_console={i: one.min_console for i, one in enumerate(columns)},
+        wrap=[i for i, column in enumerate(columns) if column in (NAME_COLUMN, VERDICT_COLUMN)],
+        max_widths={i: 24 for i, column in enumerate(columns) if column is NAME_COLUMN},
+        min_console={i: column.min_console for i, column in enumerate(columns)},
         legend={i: (name, meanings[name]) for i, name in enumerate(names) if name in meanings},
         tight_below=_WIDE_GAP_CONSOLE,
     )
-    numeric = [i for i, one in enumerate(columns) if one.is_numeric]
-    units = {"T": " [m]"} if number_text.strength_has_unit(comparison) else {}
-    headings = [f"{one.heading}{units.get(one.heading, '')}" for one in columns]
+    numeric = [i for i, column in enumerate(columns) if column.is_numeric]
+    headings = [column.heading for column in columns]
+    if number_text.strength_has_unit(comparison):
+        headings = ["T [m]" if heading == "T" else heading for heading in headings]
     return Table(headings, rows, numeric, layout)
 
 

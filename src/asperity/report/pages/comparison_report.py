@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from operator import attrgetter
 
@@ -177,7 +177,7 @@ def _case_row(comparison: Comparison) -> Row:
 
 def cases_table(comparisons: DeviceComparisons) -> Table:
     """Return a row for each device and depth."""
-    rows = [_case_row(one) for one in comparisons.comparisons]
+    rows = list(map(_case_row, comparisons.comparisons))
     for missing in comparisons.missing_data:
         rows.append(Row([missing.device, NOT_AVAILABLE, "K₀ missing", *[NOT_AVAILABLE] * 3]))
     legend = dict(enumerate(column_meanings("cases"), start=1))
@@ -188,16 +188,11 @@ def cases_table(comparisons: DeviceComparisons) -> Table:
 def comparisons_page(comparisons: DeviceComparisons) -> Page:
     """Return the report: the table, then each device and depth with its laws and assumptions."""
     texture = comparisons.texture
-    missing = [one.sentence for one in comparisons.missing_data]
+    missing = [device.sentence for device in comparisons.missing_data]
     cases = comparisons.comparisons
     table = cases_table(comparisons)
-    answers = [f"{_case_title(one)}: {one.recommendation}" for one in cases]
-    common = [
-        sentence
-        for sentence in (cases[0].assumptions if cases else ())
-        if all(sentence in one.assumptions for one in cases)
-    ]
-    assumed = [one for one in page.assumption_sections(common) if Media.TERMINAL in one.media]
+    answers = [f"{_case_title(case)}: {case.recommendation}" for case in cases]
+    assumed = page.assumption_sections(_common_assumptions(cases))
     return Page(
         title=f"{texture_name(texture)} on several devices",
         answer=comparisons.recommendation,
@@ -208,15 +203,31 @@ def comparisons_page(comparisons: DeviceComparisons) -> Page:
         sections=[
             page.terminal_section(table),
             *[page.terminal_section(page.Paragraph(text)) for text in (*answers, *missing)],
-            *assumed,
+            *[section for section in assumed if Media.TERMINAL in section.media],
             Section("", [table, *map(page.Paragraph, missing)], media=Media.NOTEBOOK),
             Section("Summary", [table, page.DefinitionList(column_meanings("cases"))]),
-            *[_case_section(one) for one in cases],
-            *([Section("Missing", [page.BulletList(missing)])] if missing else ()),
+            *map(_case_section, cases),
+            *_missing_sections(missing),
             *measured_sections(texture),
         ],
         footer=_FOOTER,
     )
+
+
+def _common_assumptions(cases: Sequence[Comparison]) -> list[str]:
+    """Return the assumptions that all comparisons share."""
+    return [
+        assumption
+        for comparison in cases[:1]
+        for assumption in comparison.assumptions
+        if all(assumption in other.assumptions for other in cases)
+    ]
+
+
+def _missing_sections(sentences: Sequence[str]) -> list[Section]:
+    if not sentences:
+        return []
+    return [Section("Missing", [page.BulletList(sentences)])]
 
 
 def _case_title(comparison: Comparison) -> str:
@@ -244,9 +255,12 @@ def design_page(result: Design) -> page.Page:
     compared = comparison_page(result.comparison)
     rows = []
     for name, ratio in result.margins.items():
-        note = "limits the answer" if name in result.binding else ""
-        cell = Cell("not met", "no") if ratio < MET else note
-        rows.append(Row([name, f"{ratio:.3g}", cell]))
+        remark = Cell("")
+        if ratio < MET:
+            remark = Cell("not met", "no")
+        elif name in result.binding:
+            remark = Cell("limits the answer")
+        rows.append(Row([name, f"{ratio:.3g}", remark]))
     media = page.SCREEN | Media.HEADING
     title = "Margins: by which factor each requirement is exceeded"
     sections = [Section(title, [Table(("requirement", "margin", ""), rows, (1,))], media=media)]
@@ -265,6 +279,7 @@ def _lost_table(result: Design) -> Table:
     """Return what the device takes away from the texture."""
     rows = []
     for name, value in result.lost.items():
-        words, _, unit = name.rstrip("]").partition(" [")
-        rows.append(Row([words, format_quantity(value, unit) if unit else percent(value)]))
+        quantity, _, unit = name.rstrip("]").partition(" [")
+        text = format_quantity(value, unit) if unit else percent(value)
+        rows.append(Row([quantity, text]))
     return Table(("of the texture", "not rendered"), rows, (1,))

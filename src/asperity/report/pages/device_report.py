@@ -33,9 +33,10 @@ def devices_page(devices: Sequence[Device], *, detailed: bool = False) -> Page:
     """Return one row per device for a terminal; in detail, all data of each device."""
     if detailed:
         return Page("", "", (), [part for device in devices for part in _device_sections(device)])
-    has_unverified = any(not datum.verified for device in devices for datum in device.data.values())
-    unverified, more = table_notes("devices")
-    last = page.terminal_section(notes=[unverified, more] if has_unverified else [more])
+    notes = table_notes("devices")
+    if all(datum.verified for device in devices for datum in device.data.values()):
+        notes = notes[1:]  # the first explains the mark of unverified data
+    last = page.terminal_section(notes=notes)
     return Page("", "", (), [page.terminal_section(_devices_table(devices)), last])
 
 
@@ -55,10 +56,11 @@ def _device_table(device: Device) -> Table:
     """Return all data of a device with their sources, alternative values in rows below."""
     rows = []
     for field, datum in device.data.items():
-        named = [(readable_name(field), datum), *(("  also", other) for other in datum.also)]
-        for name, one in named:
-            style = "" if one.verified else "yellow"
-            rows.append(Row([name, one.text, verified_text(one), one.source], style=style))
+        named = [(readable_name(field), datum), *[("  also", other) for other in datum.also]]
+        for name, value in named:
+            style = "" if value.verified else "yellow"
+            cells = [name, value.text, verified_text(value), value.source]
+            rows.append(Row(cells, style=style))
         if isinstance(datum, WallTest) and wall_test_text(datum):
             rows.append(Row(["  the test", "", "", wall_test_text(datum)]))
     headings = ("datum", "value", "verified", "source")
@@ -94,17 +96,20 @@ def device_numbers_table(device: Device, fields: Sequence[str]) -> Table:
 
 def _device_sections(device: Device) -> list[Section]:
     """Return the data of a device, and what is missing, for a terminal."""
-    title = device.name if device.name == device.id else f"{device.name} ({device.id})"
-    text = [f"Axes: {device.axes}"] if device.axes else []
+    title = device.name
+    if device.name != device.id:
+        title += f" ({device.id})"
+    access = []
+    if device.axes:
+        access.append(f"Axes: {device.axes}")
     if device.driver:
-        text.append(f"Driver: {device.driver}, which 'real' names")
-    parts = [text] if text else []
-    parts += [[note] for note in device.notes]
-    if missing := missing_fields(device):
-        heading = "Missing data, without which some results are undecided:"
-        parts.append([heading, *(f"  {one}" for one in missing)])
+        access.append(f"Driver: {device.driver}, which 'real' names")
+    missing = [f"  {field}" for field in missing_fields(device)]
+    if missing:
+        missing.insert(0, "Missing data, without which some results are undecided:")
+    parts = [access, *[[note] for note in device.notes], missing]
     return [
         Section(title, (), media=HEADED),
         page.terminal_section(_device_table(device)),
-        *[page.terminal_section(*map(page.Paragraph, lines)) for lines in parts],
+        *[page.terminal_section(*map(page.Paragraph, lines)) for lines in parts if lines],
     ]

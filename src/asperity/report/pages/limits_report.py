@@ -47,6 +47,7 @@ _LIMITS_LAYOUT = TableLayout(
     max_widths_below=_WIDE_CONSOLE,
     min_console={_SHARE_COLUMN: _WIDE_CONSOLE},
 )
+_STYLES = {True: "", False: "bold red", None: "dim"}
 _WAVE_HEADINGS = ("wavelength", "amplitude", "share", "frequency", "force")
 MAX_WAVES = 16
 """Number of waves listed: those with the greatest share of the height variance."""
@@ -57,7 +58,9 @@ def six_limits_table(result: check_limits.Limits) -> Table:
     """Return one row per limit: number, name, condition, both sides, result, share and speeds."""
     rows = []
     for limit in result.limits:
-        missing = f"needs {', '.join(limit.missing_data)}" if limit.missing_data else ""
+        speeds = limit_sentences.speeds_text(limit.speeds)
+        if limit.missing_data:
+            speeds = f"needs {', '.join(limit.missing_data)}"
         cells: page.Cells = [
             Cell(str(limit.number), "l"),
             limit.name,
@@ -66,10 +69,9 @@ def six_limits_table(result: check_limits.Limits) -> Table:
             side_text(limit.right, limit.unit),
             page.holds_cell(limit.holds),
             "" if limit.share is None else limit_sentences.percent(limit.share),
-            missing or limit_sentences.speeds_text(limit.speeds),
+            speeds,
         ]
-        style = "bold red" if limit.holds is False else "dim" if limit.holds is None else ""
-        rows.append(Row(cells, style=style))
+        rows.append(Row(cells, style=_STYLES[limit.holds]))
     return Table(_LIMIT_HEADINGS, rows, (3, 4, _SHARE_COLUMN), _LIMITS_LAYOUT)
 
 
@@ -118,7 +120,7 @@ def limits_page(result: check_limits.Limits) -> page.Page:
         sections=[
             Section("The six limits", limits, notes=notes, media=SCREEN | Media.NOTEBOOK),
             _figure_section(result),
-            *(_waves_sections(result) if result.waves else ()),
+            *_waves_sections(result),
             *page.assumption_sections(
                 result.assumptions, device_numbers_table(result.device, fields)
             ),
@@ -154,8 +156,12 @@ def _figure_section(result: check_limits.Limits) -> Section:
 
 def _waves_sections(result: check_limits.Limits) -> list[Section]:
     """Return the waves in numbers, for a page and for a terminal."""
+    if not result.waves:
+        return []
+    notes = []
     more = len(result.waves) - MAX_WAVES
-    notes = [f"And {more} more with less of the height variance."] if more > 0 else []
+    if more > 0:
+        notes.append(f"And {more} more with less of the height variance.")
     return [
         Section("Wave by wave", [_waves_table(result, short=False)], notes=notes),
         Section("", [_waves_table(result, short=True)], notes=notes, media=Media.TERMINAL),
@@ -184,7 +190,7 @@ def envelope_page(result: Envelope) -> page.Page:
         sections=[
             Section(title, [figure], caption, media=Media.HTML | Media.NOTEBOOK),
             *tables,
-            *([_points_section(result)] if result.surfaces else ()),
+            *_points_sections(result),
             *page.assumption_sections(result.assumptions),
             Section("How to read it", [page.DefinitionList(glossary("envelope"))]),
         ],
@@ -192,23 +198,27 @@ def envelope_page(result: Envelope) -> page.Page:
     )
 
 
-def _ranges_table(one: DeviceEnvelope) -> Table:
+def _ranges_table(envelope: DeviceEnvelope) -> Table:
     """Return the area and the rendered amplitudes at some wavelengths, a row per law."""
-    shown = [i for i, border in enumerate(one.laws[0].borders) if border.wavelength in LISTED]
-    shown = shown or list(range(0, len(one.laws[0].borders), 1 + len(one.laws[0].borders) // 6))
-    lengths = [format_quantity(one.laws[0].borders[i].wavelength, "m") for i in shown]
+    borders = envelope.laws[0].borders
+    shown = [i for i, border in enumerate(borders) if border.wavelength in LISTED]
+    if not shown:
+        shown = list(range(0, len(borders), 1 + len(borders) // 6))
+    lengths = [format_quantity(borders[i].wavelength, "m") for i in shown]
     rows = []
-    for law in one.laws:
-        curl = "no" if law.conservative else "yes"
+    for law in envelope.laws:
+        curl = yes_no_text(not law.conservative)
         ranges = [amplitude_range_text(law.borders[i]) for i in shown]
         cells: page.Cells = [Cell(law.letter, "l"), f"{law.decades:.2f}", curl, *ranges]
-        rows.append(Row(cells, kind="best" if law is one.widest else "", law=law.letter))
+        rows.append(Row(cells, law is envelope.widest, law=law.letter))
     layout = TableLayout(drop_order=[0, 1, *range(3, 3 + len(shown)), 2], gap=2)
     return Table(("law", "area", "curl", *lengths), rows, range(3, 3 + len(shown)), layout)
 
 
-def _points_section(result: Envelope) -> Section:
-    """Return the greatest waves of the surfaces, and the laws that render each."""
+def _points_sections(result: Envelope) -> list[Section]:
+    """Return the greatest waves of the surfaces, if any, and the laws that render each."""
+    if not result.surfaces:
+        return []
     headings = ("surface", "wavelength", "amplitude", *[one.device.id for one in result.devices])
     rows = []
     for surface in result.surfaces:
@@ -217,7 +227,7 @@ def _points_section(result: Envelope) -> Section:
             laws = [letters[index] or "none" for letters in surface.rendered_by]
             rows.append(Row([surface.name, *sizes, *laws]))
     title = "Waves of the surfaces, and the laws that render each alone"
-    return Section(title, [Table(headings, rows, (1, 2))], media=_ALL)
+    return [Section(title, [Table(headings, rows, (1, 2))], media=_ALL)]
 
 
 def write_envelope(result: Envelope, path: str) -> None:

@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _RMS = find_parameter("Sq")
-_REMOVED = ("removed, RMS", "removed, range")
+_REMOVED = {"removed, RMS": "rms", "removed, range": "range"}
 _LENGTH_UNITS = (("m", 1.0), ("mm", 1e-3), ("µm", 1e-6), ("nm", 1e-9))
 _Column = tuple[str, list[Cell]]  # heading and cells
 _REMOVED_MEANING = ("removed", "deviation that the step removed: RMS about the mean, and range")
@@ -65,8 +65,8 @@ def stages_table(stages: Sequence[PreparationStage]) -> Table:
         legend[len(columns)] = (name, parameter.description)
         columns.append(_number_column(name, parameter, numbers))
         keys.append(parameter.symbol)
-    removed = [(s.removed.rms, s.removed.range) if s.removed else (None, None) for s in stages]
-    for name, values in zip(_REMOVED, zip(*removed, strict=True), strict=True):
+    for name, attribute in _REMOVED.items():
+        values = [getattr(stage.removed, attribute, None) for stage in stages]
         columns.append(_number_column(name, _RMS, values))
     keys += _REMOVED
     priority = table_data("parameters")
@@ -104,17 +104,21 @@ def _choose_unit(values: Iterable[float | None]) -> tuple[str, float]:
     greatest = max([abs(value) for value in values if value is not None], default=0.0)
     if greatest == 0.0:
         return "", 1.0
-    fitting = ((name, size) for name, size in _LENGTH_UNITS if greatest >= size)
-    return next(fitting, _LENGTH_UNITS[-1])
+    fitting = [unit for unit in _LENGTH_UNITS if greatest >= unit[1]]
+    return fitting[0] if fitting else _LENGTH_UNITS[-1]
 
 
-def _parameter_definitions(stages: Sequence[PreparationStage]) -> Table:
-    """Return symbol, name, formula and standard of each parameter."""
+def _definition_sections(prepared: PreparedSurface) -> list[Section]:
+    """Return symbol, name, formula and standard of each parameter, if there are any."""
+    if not prepared.history:
+        return []
     rows = []
-    for symbol in stages[-1].values:
-        one = find_parameter(symbol)
-        rows.append(Row([Cell(symbol, "l"), one.description, one.formula, one.reference]))
-    return Table(("symbol", "parameter", "formula", "standard"), rows)
+    for symbol in prepared.history[-1].values:
+        parameter = find_parameter(symbol)
+        cells = [parameter.description, parameter.formula, parameter.reference]
+        rows.append(Row([Cell(symbol, "l"), *cells]))
+    table = Table(("symbol", "parameter", "formula", "standard"), rows)
+    return [Section("Definitions of the parameters", [table])]
 
 
 # --- form, waviness, texture ----------------------------------------------------------------------
@@ -158,14 +162,13 @@ def surface_summary_page(summary: MeasurementSummary) -> page.Page:
     """Return the report: parameters, parts, and the surface before and after each step."""
     prepared = summary.prepared
     title = "After each step"
-    definitions = [_parameter_definitions(prepared.history)] if prepared.history else []
     sections = [
         page.terminal_section(page.Paragraph(surface_summary_text(prepared))),
         *_stage_sections(prepared, title),
         *_parts_sections(summary),
         *_figure_sections(summary),
         *_step_sections(prepared),
-        *([Section("Definitions of the parameters", definitions)] if definitions else ()),
+        *_definition_sections(prepared),
     ]
     return page.Page(
         title=f"Parameters of the surface {summary.source}",
@@ -179,10 +182,10 @@ def _answer(summary: MeasurementSummary) -> str:
     if summary.parts is not None:
         return texture_text(summary.parts)
     prepared = summary.prepared
-    nesting = summary.prepared.history[-1].nesting
+    roughness = roughness_text(prepared.history)
+    nesting = prepared.history[-1].nesting
     warning = short_trace_text(prepared.heights.shape, prepared.pitch, nesting or 0.0)
-    warning = f" {warning[:1].upper()}{warning[1:]}." if warning else ""
-    return f"{roughness_text(prepared.history)}{warning}"
+    return f"{roughness} {sentence_case(warning)}." if warning else roughness
 
 
 def preparation_page(prepared: PreparedSurface, path: str) -> page.Page:
@@ -211,7 +214,7 @@ def _step_sections(prepared: PreparedSurface) -> list[Section]:
 
 
 def _parts_sections(summary: MeasurementSummary) -> list[Section]:
-    lay = [text for text in [lay_text(summary)] if text]
+    lay = list(filter(None, [lay_text(summary)]))
     media = SCREEN | Media.NOTEBOOK
     if summary.parts is None:
         return [Section("Lay", [], notes=lay, media=media)] if lay else []
@@ -249,10 +252,11 @@ def _draw_heights(heights_by_title: Mapping[str, FloatArray], sides: tuple[float
 def field_page(field: PotentialField, path: str) -> page.Page:
     """Return the numbers of a baked field, for a terminal, and the path of its file."""
     lowest = round(max(field.grid.floor, field.extremes[0] - field.max_depth), 12)
-    floor, bound = (format_quantity(x, "m") for x in (lowest, field.accuracy.bound))
+    floor = format_quantity(lowest, "m")
+    bound = format_quantity(field.accuracy.bound, "m")
     *others, baked = field.preparation
     texts = (
-        *(f"{text}." for text in others),
+        *[f"{text}." for text in others],
         f"{baked}; at most {bound} times the stiffness from it, proved.",
         f"q⁺ at most {field.one_sided.upper:.4g}. Valid down to z = {floor}. {field.bytes} bytes.",
         f"Saved: {escape_unprintable(path)}",

@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 
 from asperity.core.errors import ParameterError
 from asperity.core.files import write_bytes
+from asperity.core.units import format_quantity
 from asperity.paper import Result
 from asperity.paper.claims import find_claims
 from asperity.paper.cycle_experiments import (
@@ -94,7 +95,9 @@ def _terminal_sections(results: Sequence[Result], experiments: Experiments | Non
         rows.append(Row([f"§ {section}", "", ""], style="bold"))
         for result in members:
             numbers = ", ".join(result.equations)
-            statement = f"{numbers}: {result.statement}" if numbers else result.statement
+            statement = result.statement
+            if numbers:
+                statement = f"{numbers}: {statement}"
             if result.evidence.fitted:
                 statement += f" ({result.evidence.fitted})"
             rows.append(Row([result.id, _verdict_cell(result), statement]))
@@ -213,10 +216,16 @@ def _energy_section(experiment: ScanningExperiment) -> Section:
 def _stroke_section(experiment: ScanningExperiment) -> Section:
     headings = ("law", "hand", "speed", "x", "z", "sum", "field", "±", "paper's", "lost")
     rows = []
-    for one in experiment.strokes:
-        law, speed, _depth, x, _y, *rest, _lost = sweep_report.stroke_cells(one.stroke)
-        lost = f"{one.stroke.lost_contact:.1f}"
-        rows.append(Row([law, one.hand, speed, x, *rest, lost], law=one.stroke.law))
+    for done in experiment.strokes:
+        stroke = done.stroke
+        cells: Cells = [
+            Cell(stroke.law, "l"),
+            done.hand,
+            format_quantity(stroke.speed, "m/s"),
+            *sweep_report.energy_cells(stroke, "xz"),
+            f"{stroke.lost_contact:.1f}",
+        ]
+        rows.append(Row(cells, law=stroke.law))
     table = Table(headings, rows, numeric_columns=range(2, len(headings)))
     return Section("V.B, every hand and speed", [table], notes=table_notes("paper_strokes"))
 
@@ -253,13 +262,17 @@ def _device_table_section(experiment: DeviceExperiment) -> Section:
 
 
 def _device_cells(device_onset: DeviceOnset) -> Cells:
-    law, _delay, _quiet, cycling, starts, depth, q, _paper, rule, _wall = sweep_report.onset_cells(
-        device_onset.prediction
-    )
-    kind = "no" if device_onset.catalogue_rule_missed else ""
-    allowed = Cell(stiffness_number(device_onset.catalogue_rule), kind)
-    names = [device_onset.device, device_onset.surface]
-    return [*names, law, q, allowed, rule, cycling, starts, depth]
+    prediction = device_onset.prediction
+    allowed = stiffness_number(device_onset.catalogue_rule)
+    return [
+        device_onset.device,
+        device_onset.surface,
+        Cell(prediction.onset.law, "l"),
+        stiffness_number(prediction.q),
+        page.flagged_cell(allowed, device_onset.catalogue_rule_missed),
+        sweep_report.delay_rule_cell(prediction),
+        *sweep_report.bracket_cells(prediction),
+    ]
 
 
 FileFormat = Literal["svg", "png"]

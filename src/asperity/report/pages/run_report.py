@@ -24,7 +24,7 @@ from asperity.report.sentences.loop_text import (
     run_answer,
     surface_metadata,
 )
-from asperity.report.sentences.number_text import energy_text, readable_name
+from asperity.report.sentences.number_text import count_text, energy_text, readable_name
 from asperity.report.sentences.surface_text import describe_texture, texture_name
 from asperity.scene.setup import Setup
 from asperity.simulation import Run
@@ -40,12 +40,14 @@ _LEDGER_HEADINGS = ("energy", "x", "y", "z", "sum")
 def loop_facts(setup: Setup) -> list[tuple[str, str]]:
     """Return names and values of surface, device, servo, hand and motion."""
     servo = setup.servo
-    step = servo.position_resolution
+    resolution = "not limited"
+    if servo.position_resolution:
+        resolution = format_quantity(servo.position_resolution, "m")
     return [
         ("Surface", str(setup.surface.texture.describe()["kind"])),
         ("Device", setup.device.name),
         ("Update period", format_quantity(servo.period, "s")),
-        ("Position resolution", format_quantity(step, "m") if step else "not limited"),
+        ("Position resolution", resolution),
         ("Hand", str(setup.hand.to_dict()["kind"])),
         ("Motion", str(setup.motion.to_dict()["kind"])),
     ]
@@ -58,7 +60,7 @@ def run_facts(setup: Setup, run: Run) -> list[tuple[str, str]]:
         ("Law", f"{surface.law.letter}, {readable_name(surface.law.name)}"),
         ("Stiffness", format_quantity(surface.stiffness, "N/m")),
         *loop_facts(setup),
-        ("Delay", f"{setup.servo.delay} sample{'' if setup.servo.delay == 1 else 's'}"),
+        ("Delay", count_text(setup.servo.delay, "sample")),
         ("Simulated", f"{format_quantity(run.duration, 's')}, {run.samples} samples"),
     ]
 
@@ -154,19 +156,22 @@ def recording_facts(recording: Recording) -> list[tuple[str, str]]:
         rows += [("Content", str(surface["content"]))]
     if isinstance(device, Mapping):
         rows += [("Device", str(device.get("name")))]
-    kinds = [(name.capitalize(), about.get(name)) for name in ("hand", "motion")]
-    rows += [(name, str(one.get("kind"))) for name, one in kinds if isinstance(one, Mapping)]
-    if period := row_period(about):
+    for name in ("hand", "motion"):
+        part = about.get(name)
+        if isinstance(part, Mapping):
+            rows += [(name.capitalize(), str(part.get("kind")))]
+    period = row_period(about)
+    if period:
         rows += [("From row to row", format_quantity(period, "s"))]
     return rows
 
 
 def columns_table(recording: Recording, ranges: tuple[FloatArray, FloatArray]) -> Table:
     """Return the columns with their least and greatest values, empty without rows."""
-    rows = [
-        Row([name, *(f"{one:.6g}" if recording.rows else "" for one in (low, high)), unit])
-        for (name, unit), low, high in zip(recording.columns, *ranges, strict=True)
-    ]
+    rows = []
+    for (name, unit), low, high in zip(recording.columns, *ranges, strict=True):
+        ends = [f"{low:.6g}", f"{high:.6g}"] if recording.rows else ["", ""]
+        rows.append(Row([name, *ends, unit]))
     headings = ("column", "least", "greatest", "unit")
     return Table(headings, rows, (1, 2), TableLayout(gap=2))
 
@@ -185,13 +190,16 @@ def recording_page(
     columns = columns_table(recording, ranges or recording.ranges())
     facts = recording_facts(recording)
     media = Media.HTML | Media.NOTEBOOK
-    figure = _motion_section(page.plot_later(recording), recording.duration, "", media)
+    figures = []
+    if recording.rows > 1:
+        draw = page.plot_later(recording)
+        figures.append(_motion_section(draw, recording.duration, "", media))
     return Page(
         title=f"Recording {recording.path.name}",
         answer=recording_answer(recording),
         facts=facts,
         sections=[
-            *([figure] if recording.rows > 1 else ()),
+            *figures,
             Section("Columns", [columns], media=SCREEN | Media.NOTEBOOK),
             page.facts_section(facts),
             *page.assumption_sections(recording.metadata.get("assumptions", ())),

@@ -9,7 +9,7 @@ from asperity.core.units import format_quantity
 from asperity.devices import Device
 from asperity.report.document.page import Page, Paragraph, Row, Table, terminal_page
 from asperity.report.sentences.loop_text import CAUSE_TEXT, calibration_lines, timing_lines
-from asperity.report.sentences.number_text import energy_text, readable_name
+from asperity.report.sentences.number_text import NOT_AVAILABLE, energy_text, readable_name
 from asperity.report.sentences.texts import table_data
 from asperity.scene.setup import Setup
 from asperity.servo.calibration.calibrator import AxisCalibration, Calibration
@@ -49,18 +49,23 @@ def calibration_page(
 
 
 def _start_cells(law: str, before: float, after: float) -> tuple[str, ...]:
-    cells = (format_quantity(one, "N/m") if one else "none" for one in (before, after))
-    return law, *cells, f"{after / before:.2g} times" if before and after else "–"
+    change = NOT_AVAILABLE
+    if before and after:
+        change = f"{after / before:.2g} times"
+    return law, _start_text(before), _start_text(after), change
+
+
+def _start_text(stiffness: float) -> str:
+    return format_quantity(stiffness, "N/m") if stiffness else "none"
 
 
 def _calibration_cells(axis: AxisCalibration) -> tuple[str, ...]:
     wall = axis.wall
     motion = axis.dynamics
-    cycling = wall.cycling_stiffness
     return (
         axis.name,
         format_quantity(wall.stable_stiffness, "N/m"),
-        "none" if cycling is None else format_quantity(cycling, "N/m"),
+        _start_text(wall.cycling_stiffness or 0.0),
         format_uncertainty(motion.damping),
         format_uncertainty(motion.friction, 1e3),
         format_uncertainty(motion.mass, 1e3),
@@ -73,17 +78,19 @@ def device_run_page(setup: Setup, loop: ServoProcess, cause: EndReason, path: st
     rows = loop.rows(loop.memory.row_count - 1)[0]
     surface = setup.surface
     period = setup.servo.period
-    driver = "" if loop.driver.has_moving_handle else f", {loop.driver.name}"
+    device = setup.device.name
+    if not loop.driver.has_moving_handle:
+        device += f", {loop.driver.name}"
     span = format_quantity(period * statistics.samples, "s", digits=3)
     limited = [(getattr(statistics, name), text) for name, text in table_data("limited").items()]
     lines = [
         f"Law {surface.law.letter}, {readable_name(surface.law.name)}, at "
-        f"{format_quantity(surface.stiffness, 'N/m')} on {setup.device.name}{driver}: "
+        f"{format_quantity(surface.stiffness, 'N/m')} on {device}: "
         f"{CAUSE_TEXT[cause]}",
         f"{statistics.samples} samples in {span}, at {format_quantity(1.0 / period, 'Hz')}",
         *timing_lines(statistics),
         *[text.format(count) for count, text in limited if count],
-        *([f"Energy to the hand: {energy_text(float(rows[-1, 11]))}"] if len(rows) else ()),
+        *[f"Energy to the hand: {energy_text(float(row[11]))}" for row in rows[-1:]],
         *[f"- {assumption}" for assumption in (*setup.assumptions, *loop.notes)],
     ]
     blocks = [Paragraph(line) for line in lines]

@@ -111,30 +111,41 @@ def _format_quantity(argument: Argument, value: Any) -> str:
 
 
 def _list_sections(entries: Sequence[SurfaceEntry], *, detailed: bool) -> list[Section]:
-    """Return one row per surface for a terminal; in detail, also its arguments."""
+    """Return entry row per surface for a terminal; in detail, also its arguments."""
     rows = []
-    for one in entries:
-        summary = Cell(one.kind.summary, subtext=arguments_text(one.kind))
-        size = one.size_text.replace(" x ", " x\n")
-        rows.append(Row([Cell(one.kind.name, "l"), summary, size, one.height_text]))
-        if one.kind.example:
-            rows.append(Row(["", one.specification, "", ""]))
+    for entry in entries:
+        summary = Cell(entry.kind.summary, subtext=arguments_text(entry.kind))
+        size = entry.size_text.replace(" x ", " x\n")
+        rows.append(Row([Cell(entry.kind.name, "l"), summary, size, entry.height_text]))
+        if entry.kind.example:
+            rows.append(Row(["", entry.specification, "", ""]))
     headings = ("name", "summary and arguments", "size", "height")
     table = Table(headings, rows, (2, 3), TableLayout(wrap=(1,), gap=2))
-    details = [_arguments_section(one) for one in entries] if detailed else []
-    last = details or [page.terminal_section(*map(page.Paragraph, table_notes("surfaces")))]
-    return [page.terminal_section(table), *last]
+    if detailed:
+        return [page.terminal_section(table), *map(_arguments_section, entries)]
+    notes = map(page.Paragraph, table_notes("surfaces"))
+    return [page.terminal_section(table), page.terminal_section(*notes)]
 
 
 def _arguments_section(entry: SurfaceEntry) -> Section:
     rows = [
-        Row([Cell(one.name, "l"), one.unit, one.default_text, argument_text(one)])
-        for one in entry.kind.arguments
+        Row(
+            [
+                Cell(argument.name, "l"),
+                argument.unit,
+                argument.default_text,
+                argument_text(argument),
+            ]
+        )
+        for argument in entry.kind.arguments
     ]
     headings = ("argument", "unit", "default", "meaning")
     table = Table(headings, rows, layout=TableLayout(wrap=(2, 3), gap=2))
-    source = [page.Paragraph(f"Sizes: {entry.kind.source}.")] if entry.kind.source else []
-    return page.terminal_section(table, *source)
+    return page.terminal_section(table, *map(page.Paragraph, _source_notes(entry.kind)))
+
+
+def _source_notes(kind: TextureKind) -> list[str]:
+    return [f"Sizes: {kind.source}."] if kind.source else []
 
 
 def surfaces_page(
@@ -148,8 +159,8 @@ def surfaces_page(
         command: what is written before the surface in an example of its use.
     """
     groups = {
-        "Named surfaces": [_card(one, command) for one in entries if one.is_named],
-        "Kinds of textures": [_card(one, command) for one in entries if not one.is_named],
+        "Named surfaces": [_card(entry, command) for entry in entries if entry.is_named],
+        "Kinds of textures": [_card(entry, command) for entry in entries if not entry.is_named],
     }
     sections = [Section(title, [page.Cards(cards)]) for title, cards in groups.items() if cards]
     return Page(
@@ -172,8 +183,8 @@ def _draw_card(texture: Texture) -> Figure:
 def _card(entry: SurfaceEntry, command: str) -> Section:
     kind = entry.kind
     rows = [
-        Row([Cell(unit_name(one), "mono"), one.default_text, argument_text(one)])
-        for one in kind.arguments
+        Row([Cell(unit_name(argument), "mono"), argument.default_text, argument_text(argument)])
+        for argument in kind.arguments
     ]
     blocks: list[page.Block] = [
         page.Picture(partial(_draw_card, entry.texture), f"{kind.name}: {kind.summary}.", dpi=110),
@@ -181,5 +192,5 @@ def _card(entry: SurfaceEntry, command: str) -> Section:
         page.Paragraph(f"{command} {shlex.quote(entry.specification)}".strip(), "mono"),
         Table(("argument", "default", "meaning"), rows),
     ]
-    notes = [f"Sizes: {kind.source}."] if kind.source else []
+    notes = _source_notes(kind)
     return Section(kind.name, blocks, kind.summary, notes, level=3, id=kind.name)

@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import partial
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 from asperity.core.units import format_quantity
@@ -26,29 +27,38 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def onset_cells(prediction: Prediction) -> list[Cell]:
+def onset_cells(prediction: Prediction) -> Cells:
     """Return the cells of a row; rules that allowed a stiffness that cycled are coloured."""
     onset = prediction.onset
-    rule = stiffness_number(prediction.delay_rule)
-    cycling = "none" if math.isinf(onset.cycling) else stiffness_number(onset.cycling)
-    wall = prediction.wall_rule
-    wall_text = NOT_AVAILABLE if wall is None else stiffness_number(wall)
-    texts = [
-        str(onset.delay),
-        stiffness_number(onset.quiet),
-        cycling,
-        f"{onset.cycles}/{onset.starts}",
-        format_quantity(prediction.depth, "m", digits=2),
-        stiffness_number(prediction.q),
-        stiffness_number(prediction.paper_limit),
-    ]
-    proved = rule if prediction.conservative else f"({rule})"
+    wall_rule = NOT_AVAILABLE
+    if prediction.wall_rule is not None:
+        wall_rule = stiffness_number(prediction.wall_rule)
     return [
         Cell(onset.law, "l"),
-        *map(Cell, texts),
-        Cell(proved, "no" if prediction.violates_delay_rule else ""),
-        Cell(wall_text, "no" if prediction.violates_wall_rule else ""),
+        str(onset.delay),
+        stiffness_number(onset.quiet),
+        *bracket_cells(prediction),
+        stiffness_number(prediction.q),
+        stiffness_number(prediction.paper_limit),
+        delay_rule_cell(prediction),
+        page.flagged_cell(wall_rule, prediction.violates_wall_rule),
     ]
+
+
+def bracket_cells(prediction: Prediction) -> Cells:
+    """Return the stiffness that cycles, the starts that do, and the depth of the handle."""
+    onset = prediction.onset
+    cycling = "none" if math.isinf(onset.cycling) else stiffness_number(onset.cycling)
+    depth = format_quantity(prediction.depth, "m", digits=2)
+    return [cycling, f"{onset.cycles}/{onset.starts}", depth]
+
+
+def delay_rule_cell(prediction: Prediction) -> Cell:
+    """Return the stiffness that the delay rule allows, in brackets where it proves nothing."""
+    rule = stiffness_number(prediction.delay_rule)
+    if not prediction.conservative:
+        rule = f"({rule})"
+    return page.flagged_cell(rule, prediction.violates_delay_rule)
 
 
 def _sweep_table(headings: Sequence[str], rows: Sequence[Row], omit: Sequence[int] = ()) -> Table:
@@ -103,18 +113,22 @@ STROKE_HEADINGS = ("law", "speed", "depth", "x", "y", "z", "sum", "field", "±",
 def stroke_cells(stroke: Stroke) -> Cells:
     """Return the cells of a row of energies per stroke."""
     depth = format_quantity(stroke.mean_depth, "m", digits=2)
-    prefix: Cells = [Cell(stroke.law, "l"), format_quantity(stroke.speed, "m/s"), depth]
+    lost = "" if stroke.stop_message else f"{stroke.lost_contact:.3g}"
+    speed = format_quantity(stroke.speed, "m/s")
+    return [Cell(stroke.law, "l"), speed, depth, *energy_cells(stroke, "xyz"), lost]
+
+
+def energy_cells(stroke: Stroke, axes: str) -> Cells:
+    """Return energies along axes, their sum, that of the field, variation and the paper's sum."""
     if stroke.stop_message:
         stopped = Cell("stopped", summary="Why", details=[("stopped", stroke.stop_message)])
-        return [*prefix, "", "", "", stopped, "", "", "", ""]
+        return [*[""] * len(axes), stopped, "", "", ""]
     return [
-        *prefix,
-        *[millijoules(value) for value in stroke.energy],
+        *[millijoules(stroke.energy["xyz".index(axis)]) for axis in axes],
         millijoules(stroke.total),
-        Cell(millijoules(stroke.field), "no" if stroke.gains_energy else ""),
+        page.flagged_cell(millijoules(stroke.field), stroke.gains_energy),
         millijoules(stroke.spread + stroke.error, signed=False),
         millijoules(sum(stroke.same_sample)),
-        f"{stroke.lost_contact:.3g}",
     ]
 
 
@@ -157,21 +171,22 @@ _LEFT_OUT = "Failed cases and unbounded values are left out."
 def sweep_page(result: SweepResult) -> Page:
     """Return the report of a sweep."""
     plan = result.plan
-    failed = len(result.errors)
     keys = ", ".join([plan.column(key) for key in plan.arguments])
-    count = "1 case fails" if failed == 1 else f"{failed or 'no'} cases fail"
+    failures = "1 case fails"
+    if len(result.errors) != 1:
+        failures = f"{len(result.errors) or 'no'} cases fail"
     table = _range_table(result)
-    errors = [_error_table(result)] if failed else []
+    errors = _error_tables(result)
     names = [name for name in result.run.shown if name in result.columns]
     return Page(
         title=f"Sweep of {plan.source}: {plan.template.run}",
-        answer=f"{len(plan)} cases of {plan.template.run} over {keys}: {count}.",
+        answer=f"{len(plan)} cases of {plan.template.run} over {keys}: {failures}.",
         facts=[(key, text) for key, text in plan.vary.items()],
         sections=[
             page.terminal_section(table, *errors),
-            *(_figure_section(result, name, keys) for name in names),
+            *[_figure_section(result, name, keys) for name in names],
             Section("Ranges", [table]),
-            *([Section("Failed cases", errors)] if failed else ()),
+            *[Section("Failed cases", [table]) for table in errors],
         ],
         footer=page.PAPER_CITATION,
     )
@@ -192,20 +207,19 @@ def _draw(result: SweepResult, name: str) -> Figure:
 
 def _range_table(result: SweepResult) -> Table:
     """Return least and greatest value of each shown number, by law or other columns of a case."""
-    found: dict[tuple[str, ...], list[dict[str, Any]]] = {}
-    for row in result.iterate_rows():
-        group = " ".join([str(row[name]) for name in result.run.index[:1] if name in row])
+    extremes: dict[tuple[str, str], tuple[dict[str, Any], dict[str, Any]]] = {}
+    for case in result.iterate_rows():
+        group = " ".join([str(case[name]) for name in result.run.index[:1] if name in case])
         for name in result.run.shown:
-            if row.get(name) is not None:
-                least, greatest = found.setdefault((name, group), [row, row])
-                least = row if row[name] < least[name] else least
-                greatest = row if row[name] > greatest[name] else greatest
-                found[name, group] = [least, greatest]
-    rows = [
-        Row([Cell(UNIT.sub(r"\1", name), "l"), group, *_extreme(result, name, least),
-             *_extreme(result, name, greatest)])
-        for (name, group), (least, greatest) in found.items()
-    ]  # fmt: skip
+            if case.get(name) is not None:
+                least, greatest = extremes.get((name, group), (case, case))
+                least = min(least, case, key=itemgetter(name))
+                greatest = max(greatest, case, key=itemgetter(name))
+                extremes[name, group] = (least, greatest)
+    rows = []
+    for (name, group), (least, greatest) in extremes.items():
+        ends = [*_extreme(result, name, least), *_extreme(result, name, greatest)]
+        rows.append(Row([Cell(UNIT.sub(r"\1", name), "l"), group, *ends]))
     return Table(_HEADINGS, rows, (2, 4), TableLayout(wrap=(0, 3, 5), gap=2, has_rule=False))
 
 
@@ -213,20 +227,23 @@ def _extreme(result: SweepResult, name: str, row: dict[str, Any]) -> list[str]:
     columns = [result.plan.column(key) for key in result.plan.arguments]
     return [
         _value_text(name, row[name]),
-        ", ".join([_value_text(one, row[one]) for one in columns]),
+        ", ".join([_value_text(column, row[column]) for column in columns]),
     ]
 
 
 def _value_text(column: str, value: Any) -> str:
+    if isinstance(value, str):
+        return value
     match = UNIT.fullmatch(column)
-    return (
-        str(value) if isinstance(value, str) else format_quantity(value, match[2] if match else "")
-    )
+    return format_quantity(value, match[2] if match else "")
 
 
-def _error_table(result: SweepResult) -> Table:
-    """Return the errors, how often each occurred, and its first case."""
+def _error_tables(result: SweepResult) -> list[Table]:
+    """Return the errors, if any, how often each occurred, and its first case."""
+    if not result.errors:
+        return []
     firsts = {error: index for index, error in reversed(result.errors.items())}
     counts: Iterable[tuple[str, int]] = Counter(result.errors.values()).most_common(_MAX_ERRORS)
     rows = [Row([str(count), str(firsts[error]), error]) for error, count in counts]
-    return Table(("cases", f"first {CASE}", "error"), rows, (0, 1), TableLayout(wrap=(2,)))
+    headings = ("cases", f"first {CASE}", "error")
+    return [Table(headings, rows, (0, 1), TableLayout(wrap=(2,)))]

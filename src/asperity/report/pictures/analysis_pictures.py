@@ -141,9 +141,9 @@ def _fade_beyond_depth(
 
 def _horizontal_axis_text(window: law_pictures.Window) -> str:
     """Return start and direction of the horizontal axis."""
-    x, y = (format_quantity(float(v) + 0.0, "m") for v in window.segment.xy(np.zeros(1))[0])
-    u, v = (float(part) for part in window.segment.line.direction)
-    return f"from x = {x}, y = {y} along ({u:.4g}, {v:.4g})"
+    start = [format_quantity(float(part) + 0.0, "m") for part in window.segment.xy(np.zeros(1))[0]]
+    direction = ", ".join([f"{float(part):.4g}" for part in window.segment.line.direction])
+    return f"from x = {start[0]}, y = {start[1]} along ({direction})"
 
 
 # --- the loop gain --------------------------------------------------------------------------------
@@ -155,7 +155,9 @@ def _gain_scale(analysis: Analysis, values: FloatArray) -> LogNorm:
     top = max(analysis.q.lower, 2.0)
     if math.isinf(top):
         top = min(_MAX_GAIN, max(float(np.quantile(known, 0.995)), 10.0))
-    low = min(0.5, 0.5 * top, float(np.quantile(known, 0.02)) if known.size else 0.5)
+    low = min(0.5, 0.5 * top)
+    if known.size:
+        low = min(low, float(np.quantile(known, 0.02)))
     return LogNorm(max(low, 1e-3 * top), top)
 
 
@@ -180,8 +182,10 @@ def draw_gain(figure: FigureArea, analysis: Analysis) -> None:
 def _gain_remark(analysis: Analysis) -> str:
     if math.isinf(analysis.q.lower):
         return "q = ∞; the cross is the onset"
-    cross = "; the cross attains the lower end" if analysis.q.at is not None else ""
-    return f"q = {interval_text(analysis.q)} ({analysis.q.method}){cross}"
+    remark = f"q = {interval_text(analysis.q)} ({analysis.q.method})"
+    if analysis.q.at is None:
+        return remark
+    return f"{remark}; the cross attains the lower end"
 
 
 def _draw_cross(axes: Axes, x: float, y: float) -> None:
@@ -220,8 +224,10 @@ def _wrap_into_domain(
     point: FloatArray, low: FloatArray, size: FloatArray, *, periodic: bool
 ) -> FloatArray:
     """Return a point wrapped into the rectangle of a periodic texture."""
-    inside = np.all((point >= low) & (point <= low + size))
-    return point if inside or not periodic else low + (point - low) % size
+    is_inside = np.all((point >= low) & (point <= low + size))
+    if is_inside or not periodic:
+        return point
+    return low + (point - low) % size
 
 
 # --- depth ----------------------------------------------------------------------------------------
@@ -239,16 +245,21 @@ def draw_depth(figure: FigureArea, analysis: Analysis) -> None:
         axes.plot(column.depth * unit.scale, values, label=f"σ{'₁₂₃'[index]}", **options)
     _draw_bounds(axes, analysis.q)
     if analysis.q.at is not None:
-        infinite = math.isinf(analysis.q.lower)
-        text = "onset: the force jumps from here down" if infinite else "witness"
+        text = "witness"
+        if math.isinf(analysis.q.lower):
+            text = "onset: the force jumps from here down"
         axes.axvline(column.witness_depth * unit.scale, color=style.FAINT, lw=1.2, zorder=0)
         _annotate_line(axes, column.witness_depth / surface.max_depth, text)
     top = float(np.quantile(column.values[:, 0], 0.98))
-    _set_value_scale(axes, max(top, analysis.q.lower) if math.isfinite(analysis.q.lower) else top)
+    if math.isfinite(analysis.q.lower):
+        top = max(top, analysis.q.lower)
+    _set_value_scale(axes, top)
     axes.set_xlim(0.0, surface.max_depth * unit.scale)
-    along = "along the normal" if abs(column.direction[2]) < 1.0 else "below the surface"
+    along = "below the surface"
     if not surface.law.contact.begins_on_texture:
         along = "below the smooth wall"
+    elif abs(column.direction[2]) < 1.0:
+        along = "along the normal"
     style.label_axes(axes, f"depth {along} [{unit.name}]", "singular values of J/k [1]")
     remark = f"q = {interval_text(analysis.q)} ({analysis.q.method})"
     style.set_panel_title(axes, surface.law.letter, "down to the witness", remark)
@@ -265,17 +276,18 @@ def _draw_bounds(axes: Axes, q: Bound) -> None:
 
 def _set_value_scale(axes: Axes, max_value: float) -> None:
     """Scale the vertical axis up to a value, logarithmically above 1 for a large value."""
-    great = max_value > 30.0
-    if great:
+    highest = 1.12 * min(max_value, _MAX_GAIN)
+    axes.set_ylim(-0.03 * highest, highest)
+    if max_value > 30.0:
+        axes.set_ylim(-0.1, highest)
         axes.set_yscale("symlog", linthresh=1.0)
         axes.yaxis.set_major_locator(SymmetricalLogLocator(base=10, linthresh=1, subs=[1, 2, 5]))
         axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _place: f"{value:g}"))
-    highest = 1.12 * min(max_value, _MAX_GAIN)
-    axes.set_ylim(-0.1 if great else -0.03 * highest, highest)
 
 
 def _annotate_line(axes: Axes, fraction: float, text: str) -> None:
     """Add text beside a vertical line at a fraction of the width, on the wider side."""
-    left = fraction > 0.5
-    side, away = ("right", -4) if left else ("left", 4)
-    style.add_note(axes, text, (min(fraction, 1.0), 0.5), xytext=(away, 0), ha=side, va="center")
+    place: dict[str, Any] = {"xytext": (4, 0), "ha": "left"}
+    if fraction > 0.5:
+        place = {"xytext": (-4, 0), "ha": "right"}
+    style.add_note(axes, text, (min(fraction, 1.0), 0.5), va="center", **place)

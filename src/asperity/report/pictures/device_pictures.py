@@ -41,7 +41,9 @@ def line_spectrum(texture: Texture) -> tuple[FloatArray, FloatArray]:
     heights = texture.height(parallel_line_points(texture, line, _LINE_POINTS).reshape(-1, 2))
     rows = heights.reshape(-1, _LINE_POINTS)
     rows = rows - rows.mean(axis=1, keepdims=True)
-    window = np.ones(_LINE_POINTS) if line.periodic else np.hanning(_LINE_POINTS)
+    window = np.ones(_LINE_POINTS)
+    if not line.periodic:
+        window = np.hanning(_LINE_POINTS)
     spectrum = 2.0 * np.abs(np.fft.rfft(rows * window, axis=1)) / window.sum()
     amplitude = np.sqrt(np.mean(spectrum**2, axis=0))[1:]
     wavelength = line.length / np.arange(1, len(amplitude) + 1)
@@ -50,12 +52,15 @@ def line_spectrum(texture: Texture) -> tuple[FloatArray, FloatArray]:
 
 def device_wavelength_limits(device: Device) -> list[tuple[float, str]]:
     """Return the wavelengths [m] below which a device renders no texture, and why."""
-    found = shortest_wavelengths(device, _SCAN_SPEED, _SAMPLES_PER_PERIOD, _SAMPLES_PER_PERIOD)
-    speed = f" at {_SCAN_SPEED:g} m/s"
-    return [
-        (least, f"{words}{'' if number == 2 else speed}: {format_quantity(least, 'm')}")
-        for least, number, words in found
-    ]
+    limits = []
+    for least, number, reason in shortest_wavelengths(
+        device, _SCAN_SPEED, _SAMPLES_PER_PERIOD, _SAMPLES_PER_PERIOD
+    ):
+        text = reason
+        if number != 2:  # the only limit that does not depend on the speed
+            text += f" at {_SCAN_SPEED:g} m/s"
+        limits.append((least, f"{text}: {format_quantity(least, 'm')}"))
+    return limits
 
 
 def spectrum_figure(texture: Texture, device: Device) -> Figure:
@@ -70,12 +75,13 @@ def spectrum_figure(texture: Texture, device: Device) -> Figure:
     y = amplitude[shown] * unit.scale
     if shown.sum() <= 40:
         axes.vlines(x, 0.0, y, color=style.BLUE)
-    marker = {"lw": 1.0} if shown.sum() > 40 else {"marker": "o", "ls": ""}
-    axes.plot(x, y, color=style.BLUE, label="amplitude", **marker)
+        axes.plot(x, y, "o", color=style.BLUE, label="amplitude")
+    else:
+        axes.plot(x, y, color=style.BLUE, label="amplitude", lw=1.0)
     axes.set(xscale="log", yscale="log")
     for level, (least, text) in enumerate(limits):
         _draw_wavelength_limit([axes], least, text, 0.96 - 0.1 * level)
-    edges = [*wavelength[shown], *(least for least, _text in limits)]
+    edges = [*wavelength[shown], *[least for least, _text in limits]]
     axes.set_xlim(min(edges) * _MILLI / 1.5, max(edges) * _MILLI * 2.5)
     top = float(amplitude.max()) * unit.scale
     axes.set_ylim(min(top / 300.0, float(y.min()) / 2.0), top * 4.0)
@@ -95,15 +101,15 @@ def hand_figure(comparison: Comparison) -> Figure:
     if row is None or row.perceptibility is None or not len(row.perceptibility.spectrum.motions):
         style.add_note(axes, "no texture at a known stiffness", (0.5, 0.5), ha="center")
         return figure
-    found = row.perceptibility
-    waves = row.perceptibility.spectrum
+    perceptibility = row.perceptibility
+    waves = perceptibility.spectrum
     frequencies = waves.frequencies
     motions = waves.motions * _MICRO
     span = np.geomspace(min(5.0, frequencies.min() / 1.5), max(600.0, frequencies.max() * 1.5), 300)
-    unnoticed, felt = (level * _MICRO for level in comparison.grip.threshold(span))
+    unnoticed, felt = np.array(comparison.grip.threshold(span)) * _MICRO
     axes.plot(span, felt, color=style.GREEN, lw=1.2, ls="--", label="felt above")
     axes.plot(span, unnoticed, color=style.GREEN, lw=1.2, ls=":", label="nobody notices below")
-    title = f"law {row.law.letter}, {found.tier}"
+    title = f"law {row.law.letter}, {perceptibility.tier}"
     drawn = motions > 1e-3 * unnoticed.min()
     parts = {title: drawn & waves.is_resolved, "beyond the device": drawn & ~waves.is_resolved}
     _draw_marks(axes, frequencies, motions, parts)
@@ -111,7 +117,7 @@ def hand_figure(comparison: Comparison) -> Figure:
     plain = FuncFormatter(lambda value, _place: f"{value:g}")
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_formatter(plain)
-    mass = format_quantity(1e3 * found.apparent_mass, "g")
+    mass = format_quantity(1e3 * perceptibility.apparent_mass, "g")
     held = f"{comparison.device.name}, {mass}, {grip_text(comparison.grip)}"
     style.set_panel_title(axes, "Motion of the held tool", held)
     style.label_axes(axes, "frequency [Hz]", "amplitude [µm]")
@@ -169,7 +175,9 @@ def limits_figure(result: Limits) -> Figure:
     edges = [*lengths.tolist(), *least]
     span = max(max(edges) / min(edges), 4.0)
     # The text of the last line needs a third of the width.
-    room = span**0.45 if least and least[-1] > 0.5 * max(edges) else 1.6
+    room = 1.6
+    if least and least[-1] > 0.5 * max(edges):
+        room = span**0.45
     lower.set_xlim(min(edges) * _MILLI / 1.6, max(edges) * _MILLI * room)
     plain = FuncFormatter(lambda value, _place: f"{value:g}")
     for axis in (lower.xaxis, upper.yaxis, lower.yaxis):
@@ -207,13 +215,13 @@ def _draw_wavelength_limits(result: Limits, panels: Sequence[Axes]) -> list[floa
     found = shortest_wavelengths(
         result.device, result.speed, result.time_samples, result.position_samples
     )
-    for level, (least, number, words) in enumerate(found):
-        text = f"{number}: {words}, {format_quantity(least, 'm')}"
+    for level, (least, number, reason) in enumerate(found):
+        text = f"{number}: {reason}, {format_quantity(least, 'm')}"
         _draw_wavelength_limit(panels, least, text, 0.97 - 0.11 * level)
     if found:
         for axes in panels:
             axes.axvspan(1e-12, found[-1][0] * _MILLI, color=style.ORANGE, alpha=0.06, lw=0.0)
-    return [least for least, _number, _words in found]
+    return [least for least, _number, _reason in found]
 
 
 def _draw_force_limits(result: Limits, axes: Axes, scale: float) -> None:
@@ -229,9 +237,9 @@ def _draw_force_limits(result: Limits, axes: Axes, scale: float) -> None:
         frequencies, texture.apparent_mass, damping, result.surface.stiffness
     )
     names = "unnoticed below, along the normal", "felt above, along the normal"
-    for level, words, line in zip(result.grip.threshold(frequencies), names, ":-", strict=True):
+    for level, name, line in zip(result.grip.threshold(frequencies), names, ":-", strict=True):
         needed = level / compliance * scale
-        axes.plot(lengths * _MILLI, needed, color=style.GREEN, lw=1.0, ls=line, label=words)
+        axes.plot(lengths * _MILLI, needed, color=style.GREEN, lw=1.0, ls=line, label=name)
     lines = [line for line in axes.lines if line.get_label() in names]
     style.add_legend(axes, handles=lines, loc="upper left")
     if step is not None:
@@ -252,12 +260,13 @@ _MARKERS = "osD^vP"
 def envelope_figure(result: Envelope) -> Figure:
     """Return the diagram of an envelope, with devices side by side on the same scales."""
     count = len(result.devices)
-    height = (5.6 if count == 1 else 4.8) * math.ceil(count / 3)
-    figure = style.new_figure(10.0 if count < 3 else 13.0, height + 0.6)
+    width = 10.0 if count < 3 else 13.0
+    height = 5.6 if count == 1 else 4.8
+    figure = style.new_figure(width, height * math.ceil(count / 3) + 0.6)
     panels = style.axes_grid(figure, count, 3, x="wavelength [mm]", y="amplitude [µm]")
     handles: dict[str, Any] = {}
-    for index, (axes, one) in enumerate(zip(panels, result.devices, strict=True)):
-        _draw_device(axes, one)
+    for index, (axes, envelope) in enumerate(zip(panels, result.devices, strict=True)):
+        _draw_device(axes, envelope)
         for marker, surface in zip(_MARKERS, result.surfaces, strict=False):
             _draw_peaks(axes, surface, index, marker)
         shown = zip(*axes.get_legend_handles_labels(), strict=True)
@@ -277,30 +286,32 @@ def envelope_figure(result: Envelope) -> Figure:
     return figure
 
 
-def _draw_device(axes: Axes, one: DeviceEnvelope) -> None:
-    lengths = [border.wavelength * _MILLI for border in one.laws[0].borders]
-    widest = one.widest
+def _draw_device(axes: Axes, envelope: DeviceEnvelope) -> None:
+    lengths = [border.wavelength * _MILLI for border in envelope.laws[0].borders]
+    widest = envelope.widest
     axes.set(xscale="log", yscale="log", xlim=(lengths[0], lengths[-1]))
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_formatter(FuncFormatter(lambda value, _place: f"{value:g}"))
-    for colour, law in zip(_COLOURS * len(one.laws), one.laws, strict=False):
+    for colour, law in zip(_COLOURS * len(envelope.laws), envelope.laws, strict=False):
         _draw_region(axes, law, colour, is_filled=law is widest)
-    for level, limit in enumerate(one.limits):
+    for level, limit in enumerate(envelope.limits):
         x = limit.wavelength * _MILLI
         axes.axvline(x, color=style.ORANGE, lw=1.0, ls="--", zorder=1.0)
         text = f"{limit.number}" if limit.trusted else f"({limit.number})"
         place = {"xycoords": ("data", "axes fraction"), "xytext": (2, 0), "color": style.ORANGE}
         style.add_note(axes, text, (x, 0.02 + 0.05 * level), **place)
     for name, number, dots in (("force_limit", 4, ":"), ("gain_limit", 5, "-.")):
-        _draw_amplitude_limit(axes, one, name, f"limit {number}", dots)
+        _draw_amplitude_limit(axes, envelope, name, f"limit {number}", dots)
     remark = f"filled: law {widest.letter}, {widest.decades:.2g} decades²"
-    style.set_panel_title(axes, one.device.name, "", remark)
+    style.set_panel_title(axes, envelope.device.name, "", remark)
 
 
 def _draw_region(axes: Axes, law: LawEnvelope, colour: str, *, is_filled: bool) -> None:
     """Draw the outline of each connected part of the region of a law, open to longer waves."""
     for has_region, group in groupby(law.borders, key=lambda border: border.decades > 0.0):
-        part = list(group) if has_region else []
+        if not has_region:
+            continue
+        part = list(group)
         x = [border.wavelength * _MILLI for border in part]
         low = [border.felt_from * _MICRO for border in part]
         # Above the panel where there is no upper end.
@@ -308,7 +319,7 @@ def _draw_region(axes: Axes, law: LawEnvelope, colour: str, *, is_filled: bool) 
         dashes: Any = "-" if law.conservative else (0, (4, 2))
         (line,) = axes.plot([*x[::-1], *x], [*high[::-1], *low], color=colour, lw=1.3, ls=dashes)
         style.mark_law(line, law.letter)
-        if part and f"law {law.letter}" not in axes.get_legend_handles_labels()[1]:
+        if f"law {law.letter}" not in axes.get_legend_handles_labels()[1]:
             line.set_label(f"law {law.letter}")
         if is_filled:
             axes.fill_between(x, low, high, color=colour, alpha=0.08, lw=0.0)
@@ -319,10 +330,10 @@ def _draw_amplitude_limit(
 ) -> None:
     """Draw a limit on the amplitude of the first law that has it."""
     for law in one.laws:
-        found = [border for border in law.borders if math.isfinite(getattr(border, name))]
-        if found:
-            x = [border.wavelength * _MILLI for border in found]
-            y = [getattr(border, name) * _MICRO for border in found]
+        borders = [border for border in law.borders if math.isfinite(getattr(border, name))]
+        if borders:
+            x = [border.wavelength * _MILLI for border in borders]
+            y = [getattr(border, name) * _MICRO for border in borders]
             text = f"{label} (law {law.letter})"
             axes.plot(x, y, color=style.ORANGE, lw=1.0, ls=dots, label=text, zorder=1.0)
             return

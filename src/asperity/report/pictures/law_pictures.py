@@ -6,7 +6,7 @@ Scales are shared by all laws of a figure. Strength and support have a point per
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -120,7 +120,7 @@ def draw_fields(
     segment = window.segment
     bottom = window.bottom
     top = window.top
-    surfaces, over, per = _to_one_stiffness(surfaces)
+    surfaces, scaling = _to_one_stiffness(surfaces)
     curls = [scan_plane.curl_field(surface, segment, bottom) for surface in surfaces]
     arrows = [scan_plane.arrow_field(surface, segment, bottom, top) for surface in surfaces]
     curl_limit, force_per_inch = _choose_scales(surfaces, curls, arrows)
@@ -138,25 +138,47 @@ def draw_fields(
         places = window.scale(field.along, field.z)
         quiver = axes.quiver(*places, field.tangential, field.normal, zorder=4, **options)
         _draw_outline(axes, surface, window)
-        style.title_law(axes, surface.law, remarks[index] if index < len(remarks) else "")
+        style.title_law(axes, surface.law, "".join(remarks[index : index + 1]))
         axes.set_aspect("equal" if is_true_to_scale else "auto")
-    label = f"curl{over} [{'1' if over else 'N/m'}]: uncoloured is conservative"
+    label = f"{scaling.curl_label}: uncoloured is conservative"
     bar = style.add_colorbar(figure, image, panels, label, **style.WIDE_COLORBAR)
     key = style.nice_length(0.35 * force_per_inch)
-    unit = per(key)
-    _draw_force_key(bar, quiver, key, f"{'k · ' if over else ''}{key * unit.scale:g} {unit.name}")
+    unit = scaling.choose_unit(key)
+    text = f"{scaling.factor}{key * unit.scale:g} {unit.name}"
+    _draw_force_key(bar, quiver, key, text)
     return panels
 
 
-def _to_one_stiffness(surfaces: Sequence[Surface]) -> tuple[list[Surface], str, Any]:
-    """Return surfaces of one stiffness, words for their force, and the choice of its unit.
+@dataclass(frozen=True)
+class _ForceScaling:
+    """How forces are shown: as they are, or over the stiffness.
+
+    Attributes:
+        force_label: name of the force.
+        curl_label: name of the curl with its unit.
+        factor: in front of a force.
+        choose_unit: returns the unit of an axis for forces up to a size.
+    """
+
+    force_label: str
+    curl_label: str
+    factor: str
+    choose_unit: Callable[[float], style.AxisUnit]
+
+
+_FORCES = _ForceScaling("force", "curl [N/m]", "", style.force_unit)
+_OVER_STIFFNESS = _ForceScaling("force / k", "curl / k [1]", "k · ", style.length_unit)
+
+
+def _to_one_stiffness(surfaces: Sequence[Surface]) -> tuple[list[Surface], _ForceScaling]:
+    """Return surfaces of one stiffness, and how their forces are shown.
 
     Where the stiffness differs between laws, forces are over it: those of weak laws would be
     invisible beside those of stiff ones.
     """
     if len({surface.stiffness for surface in surfaces}) == 1:
-        return list(surfaces), "", style.force_unit
-    return [surface.to_stiffness(1.0) for surface in surfaces], " / k", style.length_unit
+        return list(surfaces), _FORCES
+    return [surface.to_stiffness(1.0) for surface in surfaces], _OVER_STIFFNESS
 
 
 def _choose_scales(
@@ -166,10 +188,16 @@ def _choose_scales(
 ) -> tuple[float, float]:
     """Return the greatest curl of the colours [N/m] and the force of an inch of arrow [N]."""
     strong = [np.abs(c.curl).ravel() for c in curls if np.abs(c.curl).max() > 1e-9 * c.max_norm]
-    limit = float(np.quantile(np.concatenate(strong), 0.97)) if strong else surfaces[0].stiffness
+    limit = surfaces[0].stiffness
+    if strong:
+        limit = float(np.quantile(np.concatenate(strong), 0.97))
     sizes = np.concatenate([np.hypot(a.tangential, a.normal) for a in arrows])
-    usual = float(np.quantile(sizes, 0.9)) if sizes.size else 1.0
-    rounded = 2.0 * style.nice_length(0.5 * limit) if limit > 0.0 else 1.0
+    usual = 1.0
+    if sizes.size:
+        usual = float(np.quantile(sizes, 0.9))
+    rounded = 1.0
+    if limit > 0.0:
+        rounded = 2.0 * style.nice_length(0.5 * limit)
     return rounded, usual / 0.32
 
 
@@ -228,19 +256,19 @@ def force_size(count: int) -> tuple[float, float]:
 def draw_forces(figure: Figure | SubFigure, surfaces: Sequence[Surface]) -> None:
     """Draw tangential and normal force along the scan for every law, on shared axes."""
     segment = force_segment(surfaces[0].texture)
-    surfaces, over, choose_unit = _to_one_stiffness(surfaces)
+    surfaces, scaling = _to_one_stiffness(surfaces)
     forces = [scan_plane.scan_forces(surface, segment) for surface in surfaces]
     limits = _shared_limits(forces)
-    unit = choose_unit(max(map(abs, limits)))
+    unit = scaling.choose_unit(max(map(abs, limits)))
     wide = style.length_unit(segment.length)
     x = f"along the scan line [{wide.name}]"
-    y = f"force{over} [{unit.name}]"
+    y = f"{scaling.force_label} [{unit.name}]"
     panels = style.axes_grid(figure, len(surfaces), _FORCE_COLUMNS, x=x, y=y)
     for axes, surface, force in zip(panels, surfaces, forces, strict=True):
         _draw_force_panel(axes, surface, force, (wide, unit))
         _annotate_clipping(axes, force, limits, unit)
-    low, high = (limit * unit.scale for limit in limits)
-    panels[0].set(xlim=(0.0, segment.length * wide.scale), ylim=(low, high))
+    heights = (limits[0] * unit.scale, limits[1] * unit.scale)
+    panels[0].set(xlim=(0.0, segment.length * wide.scale), ylim=heights)
     _draw_force_legend(figure, panels[0])
 
 
@@ -250,7 +278,7 @@ def _shared_limits(forces: Sequence[scan_plane.PlaneForces]) -> tuple[float, flo
     highs = [max(float(f.tangential.max()), float(f.normal.max()), 0.0) for f in forces]
     spans = sorted([max(high, -low) for low, high in zip(lows, highs, strict=True)])
     usual = spans[(len(spans) - 1) // 2]
-    limit = _MAX_FORCE_RATIO * usual if usual > 0.0 else (spans[-1] or 1.0)
+    limit = _MAX_FORCE_RATIO * usual or spans[-1] or 1.0
     low = max(min(lows), -limit)
     high = min(max(highs), limit)
     margin = 0.08 * ((high - low) or 1.0)
@@ -280,14 +308,14 @@ def _annotate_clipping(
     both = np.concatenate([force.tangential, force.normal])
     low = float(both.min())
     high = float(both.max())
-    words = []
+    extremes = []
     if high > limits[1]:
-        words.append(f"up to {high * unit.scale:.2g} {unit.name}")
+        extremes.append(f"up to {high * unit.scale:.2g} {unit.name}")
     if low < limits[0]:
-        words.append(f"down to {low * unit.scale:.2g} {unit.name}")
-    if words:
-        left = f"clipped: {', '.join(words)}"
-        style.add_note(axes, left, (0.99, 0.95), ha="right", va="top", color=style.INK)
+        extremes.append(f"down to {low * unit.scale:.2g} {unit.name}")
+    if extremes:
+        text = f"clipped: {', '.join(extremes)}"
+        style.add_note(axes, text, (0.99, 0.95), ha="right", va="top", color=style.INK)
 
 
 def _draw_force_legend(figure: Figure | SubFigure, axes: Axes) -> None:
@@ -366,13 +394,16 @@ def merit_figure(comparison: Comparison) -> Figure:
     """
     figure = style.new_figure(10.0, 4.6)
     axes = style.single_axes(figure)
-    scale, unit = (1e3, " · l [mm]") if strength_has_unit(comparison) else (1.0, "")
+    scale = 1.0
+    label = "strength T"
+    if strength_has_unit(comparison):
+        scale = 1e3
+        label = "strength T · l [mm]"
     widest = max(max([row.strength for row in comparison.rows]) * scale, 1e-12)
     for row in comparison.rows:
-        sound = row.conservative and row.continuous
         x = row.strength * scale
         y = row.support
-        colour = style.GREEN if sound else style.ORANGE
+        colour = style.GREEN if row.conservative and row.continuous else style.ORANGE
         name = f"_{row.law.letter}"
         (point,) = axes.plot(x, y, "o", ms=8, color=colour, clip_on=False, label=name)
         weight = "bold" if row is comparison.recommended_row else "normal"
@@ -383,7 +414,7 @@ def merit_figure(comparison: Comparison) -> Figure:
             style.mark_law(artist, row.law.letter)
     axes.set(xlim=(0.0, 1.15 * widest), ylim=(0.0, 1.15))
     axes.grid(color=style.FAINT, lw=0.5)
-    style.label_axes(axes, f"strength T{unit}", "support S")
+    style.label_axes(axes, label, "support S")
     axes.plot([], [], "o", color=style.GREEN, label="conservative and continuous")
     axes.plot([], [], "o", color=style.ORANGE, label="leaks or jumps")
     style.add_legend(axes, loc="upper right")

@@ -46,7 +46,9 @@ def run_figure(run: NamedColumns, height: HeightFunction) -> Figure:
     motion = figure.add_subplot(grid[0, :2])
     force = figure.add_subplot(grid[1, :2], sharex=motion)
     energy = figure.add_subplot(grid[2, :2], sharex=motion)
-    path, phase_z, phase_x = (figure.add_subplot(grid[i, 2]) for i in range(3))
+    path = figure.add_subplot(grid[0, 2])
+    phase_z = figure.add_subplot(grid[1, 2])
+    phase_x = figure.add_subplot(grid[2, 2])
     for axes in (motion, force, energy, path, phase_z, phase_x):
         style.style_axes(axes)
     _draw_motion(motion, run, height, shown)
@@ -138,7 +140,7 @@ def _draw_path(axes: Axes, run: NamedColumns, height_at: HeightFunction, selecti
     low = float(place[:, i].min())
     top = float(place[:, i].max())
     line = np.repeat(np.median(run.position, axis=0)[None, :2], 600, axis=0)
-    line[:, i] = np.linspace(low, top, 600) if top > low else low
+    line[:, i] = np.linspace(low, top, 600)
     height = height_at(line)
     floor = min(float(place[:, 2].min()), float(height.min()))
     style.fill_below(axes, line[:, i] * wide.scale, height * high.scale, floor * high.scale)
@@ -191,8 +193,8 @@ def onset_figure(predictions: Sequence[Prediction]) -> Figure:
             ("K₀/q", [one.wall_rule or math.nan for one in mine], _line_style(style.ORANGE, "-.")),
         ]
         for name, values, options in lines:
-            # A logarithmic axis cannot show other values.
-            shown = [v if math.isfinite(v) and v > 0.0 else math.nan for v in values]
+            shown = np.array(values)
+            shown[~(np.isfinite(shown) & (shown > 0.0))] = np.nan  # not on a logarithmic axis
             axes.plot(delays, shown, label=name, **options)
         if any(one.onset.quiet == 0.0 for one in predictions):
             below = [math.nan if one.onset.quiet else one.onset.cycling for one in mine]
@@ -218,7 +220,7 @@ def strokes_figure(strokes: Sequence[Stroke]) -> Figure:
     least = 1e3 * 0.01 * max(totals, default=1e-3)
     for axes, law in zip(panels, laws, strict=True):
         _draw_law_strokes(axes, [stroke for stroke in strokes if stroke.law == law])
-        style.draw_zero_line(axes, least)  # so that small values options small
+        style.draw_zero_line(axes, least)  # so that small values stay small
         axes.xaxis.set_major_locator(MaxNLocator(5))
         style.set_panel_title(axes, law, "")
         style.mark_law(axes, law)
@@ -227,17 +229,17 @@ def strokes_figure(strokes: Sequence[Stroke]) -> Figure:
 
 
 def _draw_law_strokes(axes: Axes, strokes: Sequence[Stroke]) -> None:
-    """Draw one line per depth: the sum, and thinner lines for x and z."""
+    """Draw stroke line per depth: the sum, and thinner lines for x and z."""
     depths = dict.fromkeys([stroke.depth for stroke in strokes])
     for depth, dashes in zip(depths, _DASHES * len(depths), strict=False):
-        mine = [one for one in strokes if one.depth == depth]
-        speeds = [one.speed for one in mine]
+        mine = [stroke for stroke in strokes if stroke.depth == depth]
+        speeds = [stroke.speed for stroke in mine]
         name = f"{format_quantity(depth, 'm', digits=3)} deep"
         for i, colour in ((0, style.ORANGE), (2, style.BLUE)):
-            values = [1e3 * one.energy[i] for one in mine]
+            values = [1e3 * stroke.energy[i] for stroke in mine]
             along = f"_{'xyz'[i]}, {name}"
             axes.plot(speeds, values, dashes, color=colour, lw=0.9, label=along)
-        values = [1e3 * one.total for one in mine]
+        values = [1e3 * stroke.total for stroke in mine]
         axes.plot(speeds, values, dashes, color=style.INK, lw=1.5, marker="o", ms=3.0, label=name)
 
 
@@ -260,12 +262,12 @@ def sweep_figure(result: SweepResult, name: str) -> Figure:
     columns = result.columns
     keys = [plan.column(key) for key in plan.arguments]
     axes_names = [key for key in keys if columns[key] in (int, float)][:2] or keys[:1]
-    others = [*(key for key in keys if key not in axes_names), *result.run.index]
+    others = [*[key for key in keys if key not in axes_names], *result.run.index]
     groups: dict[Group, list[list[Any]]] = {}
     for row in result.iterate_rows():
         if row.get(name) is not None:
-            group = tuple(_text(row[key]) for key in others if key in columns)
-            groups.setdefault(group, []).append([*(row[key] for key in axes_names), row[name]])
+            group = tuple([_text(row[key]) for key in others if key in columns])
+            groups.setdefault(group, []).append([row[key] for key in (*axes_names, name)])
     labels = [_use_millimetres(groups.values(), i, one) for i, one in enumerate(axes_names)]
     if len(axes_names) == 1:
         return _line_figure(groups, labels[0], name)
@@ -273,7 +275,9 @@ def sweep_figure(result: SweepResult, name: str) -> Figure:
 
 
 def _text(value: Any) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    return str(value)
 
 
 def _use_millimetres(tables: Iterable[list[list[Any]]], axis: int, column: str) -> str:
@@ -296,7 +300,8 @@ def _line_figure(groups: dict[Group, list[list[Any]]], x: str, y: str) -> Figure
     for panel, (title, lines) in zip(axes, panels.items(), strict=False):
         for label, rows in lines.items():
             places, values = zip(*rows, strict=True)
-            shown = [value if math.isfinite(value) else math.nan for value in values]
+            shown = np.array(values, dtype=float)
+            shown[~np.isfinite(shown)] = np.nan
             panel.plot(places, shown, "o-", ms=2.5, lw=1.0, label=", ".join(label))
         _scale(panel, [row for rows in lines.values() for row in rows])
         style.set_panel_title(panel, ", ".join(title), "")
@@ -330,7 +335,9 @@ def _map_figure(
     figure, axes = style.law_panels(len(shown), 2.8, 1.0, x=names[0], y=names[1])
     tables = [np.array(rows, dtype=np.float64) for rows in shown.values()]
     finite = np.concatenate([table[np.isfinite(table[:, 2]), 2] for table in tables])
-    limits = {"vmin": finite.min(), "vmax": finite.max()} if len(finite) else {}
+    limits = {}
+    if len(finite):
+        limits = {"vmin": finite.min(), "vmax": finite.max()}
     for panel, title, table in zip(axes, shown, tables, strict=True):
         artist = _draw_map(panel, table, is_grid, {**limits, "cmap": style.HEIGHTS})
         _scale(panel, table[:, :2].tolist())

@@ -21,6 +21,7 @@ from matplotlib.lines import Line2D
 
 from asperity.core.checks import FloatArray
 from asperity.report.pictures import style
+from asperity.report.sentences.texts import sentence_case
 
 _COLORBAR_LABEL = "<colorbar>"  # what matplotlib calls the axes of a colour bar
 _MAX_POINTS = 2000  # of a line
@@ -100,22 +101,23 @@ def _extract_panel(figure: Figure, axes: Axes) -> Panel:
 
 
 def _find_law(artist: Any) -> str:
-    gid = artist.get_gid() or ""
-    return gid.removeprefix(style.LAW_PREFIX) if gid.startswith(style.LAW_PREFIX) else ""
+    before, prefix, letter = (artist.get_gid() or "").partition(style.LAW_PREFIX)
+    return letter if prefix and not before else ""
 
 
 def _neighbour_label(figure: Figure, axes: Axes, axis_name: str) -> str:
     """Return the label of another panel in the same column, or row."""
 
-    def place(one: Axes) -> int | None:
-        spec = one.get_subplotspec()
+    def place(panel: Axes) -> int | None:
+        spec = panel.get_subplotspec()
         if spec is None:
             return None
-        return spec.colspan.start if axis_name == "x" else spec.rowspan.start
+        span = {"x": spec.colspan, "y": spec.rowspan}[axis_name]
+        return span.start
 
-    panels = [one for one in figure.axes if one.get_label() != _COLORBAR_LABEL]
-    neighbours = [one for one in panels if place(one) == place(axes)]
-    labels = [getattr(one, f"get_{axis_name}label")() for one in neighbours]
+    panels = [panel for panel in figure.axes if panel.get_label() != _COLORBAR_LABEL]
+    neighbours = [panel for panel in panels if place(panel) == place(axes)]
+    labels = [getattr(panel, f"get_{axis_name}label")() for panel in neighbours]
     return next(filter(None, labels), "")
 
 
@@ -124,12 +126,13 @@ def _neighbour_label(figure: Figure, axes: Axes, axis_name: str) -> str:
 
 def _is_data_line(axes: Axes, line: Line2D) -> bool:
     name = str(line.get_label())
-    own = all(line.get_transform().contains_branch_seperately(axes.transData))
-    return own and not name.startswith("_child") and np.size(line.get_xdata()) > 0
+    is_in_data = all(line.get_transform().contains_branch_seperately(axes.transData))
+    return is_in_data and not name.startswith("_child") and np.size(line.get_xdata()) > 0
 
 
 def _extract_series(line: Line2D, law: str) -> Series:
-    x, y = (np.asarray(v, dtype=float) for v in (line.get_xdata(), line.get_ydata()))
+    x = np.asarray(line.get_xdata(), dtype=float)
+    y = np.asarray(line.get_ydata(), dtype=float)
     every = slice(None, None, -(-len(x) // _MAX_POINTS))
     name = str(line.get_label()).removeprefix("_")
     return Series(name, _find_law(line) or law, x[every], y[every])
@@ -140,22 +143,32 @@ def _extract_series(line: Line2D, law: str) -> Series:
 
 def _extract_field(figure: Figure, axes: Axes) -> FieldData | None:
     """Return the values in colours with a bar, at the centres of cells over the panel."""
-    meshes = [one for one in axes.collections if isinstance(one, QuadMesh)]
-    images = [one for one in axes.images if np.asarray(one.get_array()).ndim == 2]
-    if not (meshes or images):
-        return None
-    (x0, x1) = axes.get_xlim()
-    (y0, y1) = axes.get_ylim()
-    x, y = (
-        low + (np.arange(count) + 0.5) * (high - low) / count
-        for low, high, count in ((x0, x1, _MAX_CELLS[0]), (y0, y1, _MAX_CELLS[1]))
-    )
-    values = _resample_mesh(meshes[0], x, y) if meshes else _resample_image(images[0], x, y)
-    drawn = (meshes or images)[0]
-    shared = (one for one in figure.axes if one.get_label() == _COLORBAR_LABEL)
-    bar = drawn.colorbar.ax if drawn.colorbar else next(shared, None)
-    words = "" if bar is None else bar.get_xlabel() or bar.get_ylabel()
-    return FieldData(f"{words.split(']')[0]}]" if "]" in words else words, values)
+    meshes = [mesh for mesh in axes.collections if isinstance(mesh, QuadMesh)]
+    images = [image for image in axes.images if np.asarray(image.get_array()).ndim == 2]
+    x = _cell_centres(axes.get_xlim(), _MAX_CELLS[0])
+    y = _cell_centres(axes.get_ylim(), _MAX_CELLS[1])
+    if meshes:
+        return FieldData(_field_name(figure, meshes[0]), _resample_mesh(meshes[0], x, y))
+    if images:
+        return FieldData(_field_name(figure, images[0]), _resample_image(images[0], x, y))
+    return None
+
+
+def _cell_centres(limits: tuple[float, float], count: int) -> FloatArray:
+    low, high = limits
+    return low + (np.arange(count) + 0.5) * (high - low) / count
+
+
+def _field_name(figure: Figure, artist: QuadMesh | AxesImage) -> str:
+    """Return the label up to the unit of the colour bar, its own or that of the figure."""
+    bars = [axes for axes in figure.axes if axes.get_label() == _COLORBAR_LABEL]
+    if artist.colorbar:
+        bars = [artist.colorbar.ax]
+    if not bars:
+        return ""
+    label: str = bars[0].get_xlabel() or bars[0].get_ylabel()
+    name, bracket, _rest = label.partition("]")
+    return f"{name}{bracket}"
 
 
 def _resample_mesh(mesh: QuadMesh, x: FloatArray, y: FloatArray) -> FloatArray:
@@ -193,7 +206,6 @@ def panels_to_json(panels: Sequence[Panel]) -> str:
 
 
 def _panel_dict(panel: Panel) -> dict[str, Any]:
-    field = panel.field
     return {
         "name": panel.name,
         "law": panel.law,
@@ -202,27 +214,31 @@ def _panel_dict(panel: Panel) -> dict[str, Any]:
         "y": _axis_dict(panel.y, panel.axes.get_ylim(), panel.axes.yaxis),
         "series": [
             {
-                "name": one.name,
-                "law": one.law,
-                "x": _compress_steps(one.x),
-                "y": _round_values(one.y, _DIGITS),
+                "name": series.name,
+                "law": series.law,
+                "x": _compress_steps(series.x),
+                "y": _round_values(series.y, _DIGITS),
             }
-            for one in panel.series
+            for series in panel.series
         ],
-        "field": None
-        if field is None
-        else {
-            "name": field.name,
-            "columns": field.values.shape[1],
-            "values": _round_values(field.values.ravel(), _FIELD_DIGITS),
-        },
+        "field": _field_dict(panel.field),
+    }
+
+
+def _field_dict(field: FieldData | None) -> dict[str, Any] | None:
+    if field is None:
+        return None
+    return {
+        "name": field.name,
+        "columns": field.values.shape[1],
+        "values": _round_values(field.values.ravel(), _FIELD_DIGITS),
     }
 
 
 def _axis_dict(name: str, limits: tuple[float, float], axis: Any) -> dict[str, Any]:
     """Return name, limits and scale; for a symmetric logarithm also its linear threshold."""
-    low, high = (float(f"{value:.8g}") for value in limits)
-    data = {"name": name, "low": low, "high": high, "scale": axis.get_scale()}
+    ends = [float(f"{value:.8g}") for value in limits]
+    data = {"name": name, "low": ends[0], "high": ends[1], "scale": axis.get_scale()}
     if data["scale"] == "symlog":
         data["linear"] = axis.get_transform().linthresh
     return data
@@ -240,11 +256,14 @@ def _compress_steps(x: FloatArray) -> Any:
 
 def _round_values(values: FloatArray, digits: int) -> list[float | int | None]:
     """Return values with a number of digits, ``None`` for one that is not finite."""
-    found: list[float | int | None] = []
-    for value in values.tolist():
-        short = float(f"{value:.{digits}g}") if math.isfinite(value) else None
-        found.append(int(short) if short is not None and short == int(short) else short)
-    return found
+    return [_round_value(value, digits) for value in values.tolist()]
+
+
+def _round_value(value: float, digits: int) -> float | int | None:
+    if not math.isfinite(value):
+        return None
+    rounded = float(f"{value:.{digits}g}")
+    return int(rounded) if rounded.is_integer() else rounded
 
 
 # --- as text --------------------------------------------------------------------------------------
@@ -266,15 +285,18 @@ def ranges_text(panels: Sequence[Panel]) -> str:
     if len(groups) > _MAX_QUANTITIES:
         groups = _group_ranges(panels, by_line=False)
     parts = [f"{quantity}: {_members_text(members)}" for quantity, members in groups.items()]
-    points = [one for panel in panels for one in panel.series if len(one.x) == 1]
+    points = [series for panel in panels for series in panel.series if len(series.x) == 1]
     if len(points) > _MAX_LISTED_POINTS:
         parts.append(f"{len(points)} points")
     elif points:
         listed = "; ".join([f"{one.name} at {one.x[0]:.3g}, {one.y[0]:.3g}" for one in points])
         parts.append(f"{panels[0].x} and {panels[0].y}: {listed}")
-    # Symbols keep their case: σ is not Σ.
-    firsts = [text[0].upper() if text[0].isascii() else text[0] for text in parts]
-    return "".join([f" {first}{text[1:]}." for first, text in zip(firsts, parts, strict=True)])
+    return "".join([f" {_start_sentence(part)}." for part in parts])
+
+
+def _start_sentence(text: str) -> str:
+    """Return a text with a capital letter; symbols keep their case: σ is not Σ."""
+    return sentence_case(text) if text[0].isascii() else text
 
 
 def _group_ranges(
@@ -283,10 +305,10 @@ def _group_ranges(
     """Return panel, least and greatest value by quantity: of each line, or of each axis."""
     groups: dict[str, list[tuple[str, float, float]]] = {}
     for panel in panels:
-        for one in panel.series:
-            if len(one.x) > 1:
-                name = _quantity_name(one.name, panel.y) if by_line else panel.y
-                _add_range(groups, name, panel.name, one.y)
+        for series in panel.series:
+            if len(series.x) > 1:
+                name = _quantity_name(series.name, panel.y) if by_line else panel.y
+                _add_range(groups, name, panel.name, series.y)
         if panel.field is not None:
             _add_range(groups, panel.field.name, panel.name, panel.field.values)
     return groups
@@ -294,7 +316,9 @@ def _group_ranges(
 
 def _quantity_name(series: str, axis: str) -> str:
     """Return a quantity with its unit: "normal force [N]"."""
-    return axis if series in ("", axis.split(" [", maxsplit=1)[0]) else f"{series}, {axis}"
+    if series in ("", axis.split(" [", maxsplit=1)[0]):
+        return axis
+    return f"{series}, {axis}"
 
 
 def _add_range(
@@ -311,8 +335,8 @@ def _members_text(members: list[tuple[str, float, float]]) -> str:
         return "; ".join(
             [f"{_range_text(low, high)}{_panel_suffix(panel)}" for panel, low, high in members]
         )
-    widest = max(members, key=lambda one: one[2] - one[1])
-    least = min(members, key=lambda one: one[2] - one[1])
+    widest = max(members, key=lambda member: member[2] - member[1])
+    least = min(members, key=lambda member: member[2] - member[1])
     return (
         f"varies most{_panel_suffix(widest[0])}, {_range_text(*widest[1:])}, "
         f"and least{_panel_suffix(least[0])}, {_range_text(*least[1:])}"

@@ -51,8 +51,7 @@ def figure_two() -> Figure:
         style.set_panel_title(axes, panel.law, readable_name(panel.name), remark)
         lowest = number + _COLUMNS >= len(panels)
         first = number % _COLUMNS == 0
-        style.label_axes(axes, "x [mm]" if lowest else "", "z [mm]" if first else "")
-        axes.tick_params(labelbottom=lowest)
+        style.label_outer_axes(axes, "x [mm]", "z [mm]", lowest=lowest, first=first)
         axes.set_aspect("equal")
     _draw_key(places[len(panels) :])
     for axes in places:
@@ -128,7 +127,8 @@ def figure_three(panels: Sequence[LoopEnergy] | None = None) -> Figure:
     Reference:
         The paper's Fig. 3.
     """
-    panels = loop_energies() if panels is None else panels
+    if panels is None:
+        panels = loop_energies()
     rows = -(-len(panels) // 2)
     figure = style.new_figure(10.0, 2.15 * rows)
     grid: Any = figure.subplots(rows, _COLUMNS)
@@ -144,9 +144,10 @@ def figure_three(panels: Sequence[LoopEnergy] | None = None) -> Figure:
         lowest = number + 2 >= len(panels)
         _draw_path(path, panel)
         _draw_work(work, panel)
-        path.tick_params(labelbottom=lowest)
-        style.label_axes(path, "x [mm]" if lowest else "", "z [mm]")
-        style.label_axes(work, "arc length [mm]" if lowest else "", "energy [µJ]")
+        style.label_outer_axes(path, "x [mm]", "z [mm]", lowest=lowest)
+        style.label_axes(work, "", "energy [µJ]")
+        if lowest:
+            style.label_axes(work, "arc length [mm]", "energy [µJ]")
     return figure
 
 
@@ -244,15 +245,15 @@ def bumps_figure(experiment: BumpExperiment) -> Figure:
             style.style_axes(axes)
         style.fill_below(left, 1e3 * x, 1e3 * height, -25.0)
         runs = [bump for bump in experiment.bumps if bump.entry == entry]
-        for one in runs:
-            options: dict[str, Any] = {"color": colours[one.law], "label": one.law}
-            drawn = left.plot(1e3 * one.x, 1e3 * one.z, lw=0.9, **options)
-            drawn += right.plot(one.time, 1e3 * one.supplied, lw=1.2, **options)
-            for line in drawn:
-                style.mark_law(line, one.law)
+        for run in runs:
+            options: dict[str, Any] = {"color": colours[run.law], "label": run.law}
+            lines = left.plot(1e3 * run.x, 1e3 * run.z, lw=0.9, **options)
+            lines += right.plot(run.time, 1e3 * run.supplied, lw=1.2, **options)
+            for line in lines:
+                style.mark_law(line, run.law)
         style.draw_zero_line(right)
         style.add_legend(right)
-        left.set_ylim(-25.0, max(25.0, *(1e3 * one.z.max() + 2.0 for one in runs)))
+        left.set_ylim(-25.0, max(25.0, *[1e3 * run.z.max() + 2.0 for run in runs]))
         style.set_panel_title(left, "Path", entry)
         style.set_panel_title(right, "Energy", "supplied to the hand")
         style.label_axes(left, "x [mm]", "z [mm]")
@@ -296,10 +297,10 @@ def devices_figure(experiments: Experiments) -> Figure:
     ]
     for axes, points, name in ((left, wall_rule, "K₀/q"), (right, delay_rule, "delay rule")):
         _draw_rule(axes, points, markers)
-        y = "cycles from [N/m]" if axes is left else ""
-        style.label_axes(axes, f"allowed by {name} [N/m]", y)
+        style.label_axes(axes, f"allowed by {name} [N/m]")
         missed = sum([point.is_missed for point in points])
         style.set_panel_title(axes, name, f"{missed} of {len(points)} wrong")
+    left.set_ylabel("cycles from [N/m]", fontsize=style.LABEL, color=style.MUTED)
     for device, marker in markers.items():
         left.plot([], [], marker, mfc=style.BACKGROUND, mec=style.BLUE, label=device)
     style.add_legend(left)
@@ -317,12 +318,12 @@ def _draw_rule(axes: Axes, points: Sequence[_OnsetPoint], markers: Mapping[str, 
             continue
         place = round(3.0 * math.log10(allowed)), round(8.0 * math.log10(onset.value))
         named.setdefault(place, []).append(point)
-        edge = style.ORANGE if point.is_missed else style.BLUE
-        face = edge if point.is_missed else style.BACKGROUND
-        options: dict[str, Any] = {"mec": edge, "mfc": face, "mew": 0.9, "ms": 5.5}
+        options: dict[str, Any] = {"mec": style.BLUE, "mfc": style.BACKGROUND}
+        if point.is_missed:
+            options = {"color": style.ORANGE}
         label = f"_{onset.law}, {point.device}"
         marker = markers[point.device]
-        (drawn,) = axes.plot(allowed, onset.value, marker, label=label, **options)
+        (drawn,) = axes.plot(allowed, onset.value, marker, label=label, mew=0.9, ms=5.5, **options)
         style.mark_law(drawn, onset.law)
     for near in named.values():
         letters = "".join(dict.fromkeys([point.prediction.onset.law for point in near]))

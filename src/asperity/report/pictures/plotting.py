@@ -90,8 +90,9 @@ def _plot_comparison(result: Comparison, picture: str | None = None) -> Figure:
 def _plot_analysis(result: Analysis, picture: str | None = None) -> Figure:
     drawings = available_pictures(result)
     _check_picture_name(picture, *drawings)
-    names = list(drawings) if picture is None else [picture]
-    return _stacked_figure(*[drawings[name] for name in names])
+    if picture is not None:
+        return _stacked_figure(drawings[picture])
+    return _stacked_figure(*drawings.values())
 
 
 @plot.register

@@ -86,7 +86,8 @@ def choose_segment(texture: Texture, target_length: float, max_length: float) ->
     line = texture.scan_line()
     if line.length <= max_length * (1.0 + 1e-9):
         fitting = round(min(target_length, max_length) / line.length)
-        return ScanSegment(line, 0.0, (max(1, fitting) if line.periodic else 1) * line.length)
+        periods = max(1, fitting) if line.periodic else 1
+        return ScanSegment(line, 0.0, periods * line.length)
     length = min(max(target_length, 0.0) or max_length, max_length)
     highest = int(np.argmax(texture.height(line.points(_SURVEY_POINTS))))
     centre = (highest + 0.5) * line.length / _SURVEY_POINTS
@@ -141,7 +142,7 @@ def field_range(surfaces: Iterable[Surface], segment: ScanSegment) -> tuple[floa
     """Return bottom and top [m] of the figures of the field, the same for all laws."""
     surfaces = list(surfaces)
     heights = surfaces[0].texture.height(segment.xy(segment.distances(1000)))
-    low = min([float(heights.min()), *(scan_height(surface) for surface in surfaces)])
+    low = min([float(heights.min()), *map(scan_height, surfaces)])
     high = max(float(heights.max()), 0.0)
     margin = 0.06 * (high - low)
     return low - margin, high + margin
@@ -181,7 +182,8 @@ def curl_field(
         rows: number of cells upwards; likewise.
     """
     coarser = math.sqrt(min(1.0, _BUDGET / (surface.law.contact.relative_cost * columns * rows)))
-    columns, rows = (max(1, round(coarser * count)) for count in (columns, rows))
+    columns = max(1, round(coarser * columns))
+    rows = max(1, round(coarser * rows))
     edges = segment.distances(columns + 1)
     middles = 0.5 * (edges[1:] + edges[:-1])
     xy = segment.xy(middles)
@@ -206,7 +208,8 @@ def arrow_field(surface: Surface, segment: ScanSegment, bottom: float, top: floa
     """Return forces on a regular grid between bottom and top [m], in contact only."""
     steps = (np.arange(_ARROW_COLUMNS) + 0.5) * (segment.length / _ARROW_COLUMNS)
     levels = bottom + (np.arange(_ARROW_ROWS) + 0.5) * ((top - bottom) / _ARROW_ROWS)
-    along, z = (grid.ravel() for grid in np.meshgrid(steps, levels, indexing="ij"))
+    along = np.repeat(steps, len(levels))
+    z = np.tile(levels, len(steps))
     xy = segment.xy(along)
     inside = surface.law.contact.is_in_contact(surface.texture, np.column_stack([xy, z]))
     return _compute_plane_forces(surface, segment, along[inside], xy[inside], z[inside])

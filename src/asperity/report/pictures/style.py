@@ -80,12 +80,16 @@ def length_unit(extent: float) -> AxisUnit:
     """
     if extent < 2e-7:
         return AxisUnit("nm", 1e9)
-    return AxisUnit("µm", 1e6) if extent < 1e-4 else AxisUnit("mm", 1e3)
+    if extent < 1e-4:
+        return AxisUnit("µm", 1e6)
+    return AxisUnit("mm", 1e3)
 
 
 def force_unit(extent: float) -> AxisUnit:
     """Return the best unit of an axis for forces up to the extent [N]."""
-    return AxisUnit("mN", 1e3) if extent < 0.1 else AxisUnit("N", 1.0)
+    if extent < 0.1:
+        return AxisUnit("mN", 1e3)
+    return AxisUnit("N", 1.0)
 
 
 def nice_length(target: float) -> float:
@@ -187,10 +191,8 @@ def axes_grid(
     grid: Any = figure.subplots(rows, columns, sharex=True, sharey=sharey, squeeze=False)
     for index, axes in enumerate(grid.ravel()):
         axes.set_visible(index < count)
-        lowest = index + columns >= count
         style_axes(axes)
-        axes.tick_params(labelbottom=lowest)
-        label_axes(axes, x if lowest else "", y if index % columns == 0 else "")
+        label_outer_axes(axes, x, y, lowest=index + columns >= count, first=index % columns == 0)
     return list(grid.ravel()[:count])
 
 
@@ -219,8 +221,9 @@ def mark_law(artist: Artist, letter: str) -> None:
 def set_panel_title(axes: Axes, letter: str, name: str, remark: str = "") -> None:
     """Add a title: the letter in bold, the name, and a remark below them."""
     axes.set_label(f"{letter}, {name}" if name else letter)
-    above = TICK + 6.0 if remark else 0.0
+    above = 0.0
     if remark:
+        above = TICK + 6.0
         axes.set_title(remark, loc="left", fontsize=TICK, color=MUTED, pad=5.0)
     text_style: dict[str, Any] = {"fontsize": TITLE, "color": INK, "va": "bottom"}
     text_style |= {"textcoords": "offset points", "parse_math": False, "annotation_clip": False}
@@ -244,6 +247,15 @@ def label_axes(axes: Axes, x: str = "", y: str = "") -> None:
     """Label the axes, with units."""
     axes.set_xlabel(x, fontsize=LABEL, color=MUTED)
     axes.set_ylabel(y, fontsize=LABEL, color=MUTED)
+
+
+def label_outer_axes(axes: Axes, x: str, y: str, *, lowest: bool, first: bool = True) -> None:
+    """Label axes of a grid: below the lowest of a column, and beside the first of a row."""
+    axes.tick_params(labelbottom=lowest)
+    if lowest:
+        axes.set_xlabel(x, fontsize=LABEL, color=MUTED)
+    if first:
+        axes.set_ylabel(y, fontsize=LABEL, color=MUTED)
 
 
 def add_colorbar(
@@ -318,7 +330,9 @@ def _renumber_ids(text: str) -> str:
 
     def plain(found: re.Match[str]) -> str:
         before, name, after = found.groups()
-        return f"{before}@{numbers[name]}{after}" if name in numbers else ""
+        if name not in numbers:
+            return ""
+        return f"{before}@{numbers[name]}{after}"
 
     text = re.sub(r'((?:url\(|href=")#)([^")]+)([")])', plain, text)
     text = re.sub(r'( id=")([^"]+)(")', plain, text)

@@ -48,12 +48,10 @@ def map_grid(texture: Texture, count: int) -> MapGrid:
     corners = texture.domain.points(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]))
     low = corners.min(axis=0)
     size = corners.max(axis=0) - low
-    columns, rows = (max(2, round(float(side / size.max()) * count)) for side in size)
-    x, y = (
-        low[axis] + (np.arange(n) + 0.5) * size[axis] / n for axis, n in enumerate((columns, rows))
-    )
-    xy = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    return MapGrid(low, size, (rows, columns), xy)
+    counts = [max(2, round(float(side / size.max()) * count)) for side in size]
+    centres = [low[i] + (np.arange(n) + 0.5) * size[i] / n for i, n in enumerate(counts)]
+    xy = np.stack(np.meshgrid(*centres), axis=-1).reshape(-1, 2)
+    return MapGrid(low, size, (counts[1], counts[0]), xy)
 
 
 _MAP_POINTS = 320
@@ -122,7 +120,8 @@ def _draw_body(
     z = texture.height(segment.xy(along)) * high.scale
     low = float(z.min())
     top = float(z.max())
-    below, above = (margin * max(top - low, 1e-9) for margin in margins)
+    below = margins[0] * max(top - low, 1e-9)
+    above = margins[1] * max(top - low, 1e-9)
     style.fill_below(axes, x, z, low - below)
     axes.plot(x, z, color=style.INK, linewidth=width, label="height")
     axes.set(xlim=(x[0], x[-1]), ylim=(low - below, top + above))
@@ -165,7 +164,8 @@ def _shade_relief(
         steepest_slope: slope to which the 90 % quantile of the slopes is scaled.
         altitude: of the light above the horizon [degrees].
     """
-    dx, dy = (float(step) for step in size / np.array(heights.shape[::-1]))
+    dx = float(size[0] / heights.shape[1])
+    dy = float(size[1] / heights.shape[0])
     slopes = np.hypot(*np.gradient(heights, dy, dx))
     exaggeration = steepest_slope / max(float(np.quantile(slopes, 0.9)), 1e-300)
     return LightSource(azdeg=315, altdeg=altitude).shade(
@@ -178,11 +178,11 @@ def _grey_filled(shaded: FloatArray, texture: Texture) -> FloatArray:
     filled = texture.filled_mask
     if filled is None or not filled.any():
         return shaded
-    rows, columns = (
+    indices = [
         np.minimum((np.arange(count) + 0.5) * extent / count, extent - 1).astype(int)
         for count, extent in zip(shaded.shape[:2], filled.shape, strict=True)
-    )
-    there = filled[np.ix_(rows, columns)]
+    ]
+    there = filled[np.ix_(*indices)]
     result = shaded.copy()
     result[there, :3] = 0.25 * result[there, :3] + 0.75 * np.array([0.80, 0.82, 0.85])
     return result
@@ -244,10 +244,11 @@ _MATERIAL_COLOURS = ("#5f5547", "#b9ab92", "#ddd1ba")
 
 def gallery_figure(texture: Texture) -> Figure:
     """Return the map of a texture, lit from the side, and a section below it."""
-    figure = style.new_figure(4.4, 2.0 if texture.is_profile else 5.0)
     if texture.is_profile:
+        figure = style.new_figure(4.4, 2.0)
         _draw_card_section(figure.subplots(), texture)
         return figure
+    figure = style.new_figure(4.4, 5.0)
     upper, lower = figure.subplots(2, 1, height_ratios=[4.0, 1.0])
     _draw_card_map(upper, texture)
     _draw_card_section(lower, texture)
@@ -293,8 +294,11 @@ def heights_figure(heights_by_title: Mapping[str, FloatArray], sides: tuple[floa
         label = f"along the profile [{unit.name}]"
         panels[-1, 0].set_xlabel(label, fontsize=style.LABEL, color=style.MUTED)
         return figure
-    wide = sides[0] >= 2.0 * sides[1]
-    rows, columns = (count, 1) if wide else (1, count)
+    rows = 1
+    columns = count
+    if sides[0] >= 2.0 * sides[1]:
+        rows = count
+        columns = 1
     width = 10.0 / columns - 0.9
     height = min(width * sides[1] / sides[0], _MAX_MAP_HEIGHT) + 0.75
     figure = style.new_figure(10.0, rows * height)
@@ -325,8 +329,8 @@ def _draw_height_map(
     high = style.length_unit(float(np.ptp(known)))
     frame = (0.0, sides[0] * wide.scale, 0.0, sides[1] * wide.scale)
     # The colours span the middle 99 % of the heights, so that spikes do not dominate them.
-    low, top = (float(value) * high.scale for value in np.quantile(known, [0.005, 0.995]))
-    colours: dict[str, Any] = {"cmap": style.HEIGHTS, "vmin": low, "vmax": top}
+    span = np.quantile(known, [0.005, 0.995]) * high.scale
+    colours: dict[str, Any] = {"cmap": style.HEIGHTS, "vmin": span[0], "vmax": span[1]}
     options: dict[str, Any] = {"origin": "lower", "extent": frame, "interpolation": "nearest"}
     image = axes.imshow(heights * high.scale, **colours, **options)
     style.style_axes(axes)

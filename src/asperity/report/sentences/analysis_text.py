@@ -8,25 +8,28 @@ from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.results import check_limits
 from asperity.analysis.results.analyze import Analysis
 from asperity.core.units import format_quantity
+from asperity.devices import Datum
 from asperity.envelopes.envelope import DeviceEnvelope
 from asperity.envelopes.wave_borders import WaveBorders
 from asperity.report.sentences import limit_sentences
 from asperity.report.sentences.limit_sentences import speed_text
-from asperity.report.sentences.number_text import INFINITY_SIGN, NOT_AVAILABLE
+from asperity.report.sentences.number_text import INFINITY_SIGN, NOT_AVAILABLE, yes_no_text
 from asperity.report.sentences.texts import sentence, table_data
 
 
 def computed_bounds(analysis: Analysis) -> list[tuple[str, Bound]]:
     """Return the numbers that were searched for, from which the others follow."""
-    curl = [] if analysis.curl is None else [("|curl f|/k", analysis.curl)]
-    return [("q", analysis.q), ("q⁺", analysis.one_sided), *curl]
+    bounds = [("q", analysis.q), ("q⁺", analysis.one_sided)]
+    if analysis.curl is not None:
+        bounds.append(("|curl f|/k", analysis.curl))
+    return bounds
 
 
 def bound_notes(analysis: Analysis) -> list[str]:
     """Return how each number was obtained, and whether and why the law is conservative."""
     notes = [f"{name}: {bound.note}" for name, bound in computed_bounds(analysis) if bound.note]
-    word = "yes" if analysis.conservative else "no"
-    return [*notes, f"conservative: {word}, {analysis.conservative_reason}"]
+    answer = yes_no_text(analysis.conservative)
+    return [*notes, f"conservative: {answer}, {analysis.conservative_reason}"]
 
 
 def critical_speed_text(analysis: Analysis) -> str:
@@ -41,10 +44,12 @@ def critical_speed_text(analysis: Analysis) -> str:
     if math.isinf(speed):
         return "∞: a device without damping never absorbs the energy"
     datum = analysis.device.data["damping"]
-    mark = "" if datum.verified else " (not verified)"
-    return (
-        f"{format_quantity(speed, 'm/s')}: below it, damping {datum.text}{mark} absorbs too little"
-    )
+    damping = _marked_text(datum, datum.text)
+    return f"{format_quantity(speed, 'm/s')}: below it, damping {damping} absorbs too little"
+
+
+def _marked_text(datum: Datum, text: str) -> str:
+    return text if datum.verified else f"{text} (not verified)"
 
 
 def thrust_text(analysis: Analysis) -> str:
@@ -56,8 +61,9 @@ def thrust_text(analysis: Analysis) -> str:
     if thrust is None:
         return "not stated: the line is not periodic"
     # Smaller values are rounding errors of forces up to stiffness times depth.
-    is_zero = abs(thrust) <= 1e-12 * surface.stiffness * surface.max_depth
-    return f"{'0 N' if is_zero else format_quantity(thrust, 'N')} on a straight scan"
+    if abs(thrust) <= 1e-12 * surface.stiffness * surface.max_depth:
+        thrust = 0.0
+    return f"{format_quantity(thrust, 'N')} on a straight scan"
 
 
 def symbol_lines(result: check_limits.Limits) -> list[str]:
@@ -68,9 +74,12 @@ def symbol_lines(result: check_limits.Limits) -> list[str]:
     for symbol, field in table_data("symbols").items():
         if field in device.data:
             datum = device.data[field]
+            # The symbol of the update rate is the period.
             text = f"1/({datum.text})" if field == "update_rate" else datum.text
-            values.append(f"{symbol} = {text}{'' if datum.verified else ' (not verified)'}")
-    q = INFINITY_SIGN if result.gain.value == float("inf") else f"{result.gain.value:.4g}"
+            values.append(f"{symbol} = {_marked_text(datum, text)}")
+    q = INFINITY_SIGN
+    if math.isfinite(result.gain.value):
+        q = f"{result.gain.value:.4g}"
     numbers = ", ".join(values) or "no data"
     speed = speed_text(result.speed)
     stiffness = limit_sentences.stiffness_text(result)
@@ -80,18 +89,19 @@ def symbol_lines(result: check_limits.Limits) -> list[str]:
     ]
 
 
-def envelope_answer(one: DeviceEnvelope) -> str:
+def envelope_answer(envelope: DeviceEnvelope) -> str:
     """Return the law that renders most on a device, and whether it feels alive."""
-    law = one.widest
-    largest = max(one.laws, key=lambda other: other.decades)
+    name = envelope.device.name
+    law = envelope.widest
+    largest = max(envelope.laws, key=lambda other: other.decades)
     if not law.decades:
-        return f"{one.device.name} renders no sinusoid with these laws."
+        return f"{name} renders no sinusoid with these laws."
     lengths = [border.wavelength for border in law.borders if border.decades]
-    span = " to ".join([format_quantity(lengths[i], "m") for i in (0, -1)])
-    text = f"{one.device.name} renders most with law {law.letter}, wavelengths from {span}"
-    if largest is law:
-        return f"{text}{'' if law.conservative else '; it feels alive'}."
-    return f"{text}; law {largest.letter} renders more, but feels alive."
+    span = f"{format_quantity(lengths[0], 'm')} to {format_quantity(lengths[-1], 'm')}"
+    best = f"{name} renders most with law {law.letter}, wavelengths from {span}"
+    if largest is not law:
+        return f"{best}; law {largest.letter} renders more, but feels alive."
+    return f"{best}." if law.conservative else f"{best}; it feels alive."
 
 
 def amplitude_range_text(border: WaveBorders) -> str:

@@ -14,7 +14,7 @@ from asperity.envelopes.find_design import Design
 from asperity.envelopes.searches import FORCE
 from asperity.report.sentences import number_text
 from asperity.report.sentences.limit_sentences import force_magnitude_text
-from asperity.report.sentences.number_text import bound_text
+from asperity.report.sentences.number_text import bound_text, count_text
 from asperity.report.sentences.texts import sentence, sentence_case
 from asperity.textures.texture import Texture
 
@@ -37,8 +37,9 @@ def recommended_stiffness_text(row: LawRow) -> str:
 def requested_stiffness_text(comparison: Comparison) -> str:
     """Return the stiffness of a comparison, or that each law has its own."""
     stiffness = comparison.stiffness
-    recommended = "the recommended one of each law"
-    return recommended if stiffness is None else format_quantity(stiffness, "N/m", 4)
+    if stiffness is None:
+        return "the recommended one of each law"
+    return format_quantity(stiffness, "N/m", 4)
 
 
 def design_answer(result: Design) -> str:
@@ -47,8 +48,9 @@ def design_answer(result: Design) -> str:
     names = " and ".join(result.binding)
     verb = "limits" if len(result.binding) == 1 else "limit"
     if not result.is_feasible:
-        reached = f"{force_magnitude_text(result.reachable)} {_force_unit(result)}"
-        reached = reached if result.reachable else "Nothing"
+        reached = "Nothing"
+        if result.reachable:
+            reached = f"{force_magnitude_text(result.reachable)} {_force_unit(result)}"
         return f"Not met. {reached} can be reached; {names} {verb} it. Nearest: law {design}."
     if result.target.texture_force is None:
         return f"The largest is law {design}. {sentence_case(names)} {verb} it."
@@ -120,7 +122,7 @@ def hand_alt_text(comparison: Comparison) -> str:
     row = comparison.recommended_row or comparison.nearest_row
     if row is None or row.perceptibility is None:
         return "Thresholds of the hand; no law has a known stiffness."
-    return sentence("hand", law=row.law.letter, found=row.perceptibility)
+    return sentence("hand", law=row.law.letter, felt=row.perceptibility)
 
 
 def force_alt_text(comparison: Comparison, length: float) -> str:
@@ -140,8 +142,8 @@ def field_alt_text(comparison: Comparison) -> str:
 def gain_alt_text(comparison: Comparison) -> str:
     """Return the laws with the greatest and the least loop gain."""
     rows = sorted(comparison.rows, key=lambda row: row.q.value)
-    least, most = (f"{row.law.letter} ({bound_text(row.q)})" for row in (rows[0], rows[-1]))
-    return sentence("gain", laws=_law_count_text(comparison), least=least, most=most)
+    ends = [f"{row.law.letter} ({bound_text(row.q)})" for row in (rows[0], rows[-1])]
+    return sentence("gain", laws=_law_count_text(comparison), least=ends[0], greatest=ends[1])
 
 
 def merit_alt_text(comparison: Comparison) -> str:
@@ -152,5 +154,4 @@ def merit_alt_text(comparison: Comparison) -> str:
 
 
 def _law_count_text(comparison: Comparison) -> str:
-    count = len(comparison.rows)
-    return f"{count} law{'' if count == 1 else 's'}"
+    return count_text(len(comparison.rows), "law")

@@ -34,14 +34,18 @@ def wall_test_text(test: WallTest) -> str:
         >>> wall_test_text(WallTest(1e3, "N/m", "", True, cycled=2e3, directions=("x", "z")))
         'tried along x, z; cycled at 2000 N/m'
     """
-    parts = [
-        f"tried along {', '.join(test.directions)}" if test.directions else "",
-        f"cycled at {format_quantity(test.cycled, 'N/m')}" if test.cycled else "",
-        f"at {format_quantity(test.update_rate, 'Hz')}" if test.update_rate else "",
-        f"{test.positions} positions" if test.positions else "",
-        f"lightest direction {test.lightest:g} of the one tried" if test.lightest else "",
-    ]
-    return "; ".join([part for part in parts if part])
+    parts = []
+    if test.directions:
+        parts.append(f"tried along {', '.join(test.directions)}")
+    if test.cycled:
+        parts.append(f"cycled at {format_quantity(test.cycled, 'N/m')}")
+    if test.update_rate:
+        parts.append(f"at {format_quantity(test.update_rate, 'Hz')}")
+    if test.positions:
+        parts.append(f"{test.positions} positions")
+    if test.lightest:
+        parts.append(f"lightest direction {test.lightest:g} of the one tried")
+    return "; ".join(parts)
 
 
 def missing_fields(device: Device) -> list[str]:

@@ -9,7 +9,7 @@ from typing import Any
 from asperity.core.units import format_quantity
 from asperity.recording.recording import Recording
 from asperity.recording.replay import Replay
-from asperity.report.sentences.number_text import energy_text
+from asperity.report.sentences.number_text import count_text, energy_text
 from asperity.report.sentences.surface_text import describe_texture
 from asperity.report.sentences.texts import sentence
 from asperity.scene.setup import Setup
@@ -28,9 +28,14 @@ def work_text(surface: Surface, run: Run) -> str:
     """Return the work that the texture did on the hand."""
     total = run.ledger.total
     energy = format_quantity(abs(total), "J", digits=3)
-    work = f"delivers {energy} to the hand" if total > 0.0 else f"takes {energy} from the hand"
-    if not (total and math.isfinite(total)):
-        work = "delivers an energy that is not finite" if total else "does no work"
+    if total == 0.0:
+        work = "does no work"
+    elif not math.isfinite(total):
+        work = "delivers an energy that is not finite"
+    elif total > 0.0:
+        work = f"delivers {energy} to the hand"
+    else:
+        work = f"takes {energy} from the hand"
     stiffness = format_quantity(surface.stiffness, "N/m")
     duration = format_quantity(run.duration, "s")
     return f"Law {surface.law.letter} at {stiffness} {work} in {duration}"
@@ -70,18 +75,20 @@ def rest_text(setup: Setup, run: Run) -> str:
     felt = felt_speed(speed, run.tail.position_spread)
     verdict = "comes to rest"
     if speed > felt and run.tail.gains_energy:
-        servo = setup.servo
-        has_steps = servo.position_resolution or servo.force_resolution
         verdict = "keeps moving: a limit cycle"
-        verdict += ", or the chatter of steps" if has_steps else ""
-    limit, spread = (format_quantity(one, "m/s", digits=3) for one in (felt, speed))
+        if setup.servo.position_resolution or setup.servo.force_resolution:
+            verdict = "keeps moving: a limit cycle, or the chatter of steps"
+    limit = format_quantity(felt, "m/s", digits=3)
+    spread = format_quantity(speed, "m/s", digits=3)
     return sentence("rest", verdict=verdict, spread=spread, limit=limit)
 
 
 def closure_text(run: Run) -> str:
     """Return definitions of the energies, and the relative residual."""
     ledger = run.ledger
-    share = abs(ledger.closure) / ledger.exchanged if ledger.exchanged > 0.0 else 0.0
+    share = 0.0
+    if ledger.exchanged > 0.0:
+        share = abs(ledger.closure) / ledger.exchanged
     if not math.isfinite(share):
         return "The run diverged: its energies are not finite."
     exchanged = format_quantity(ledger.exchanged, "J", digits=3)
@@ -92,8 +99,9 @@ def recording_answer(recording: Recording) -> str:
     """Return size, surface and completeness of a recording in one or two sentences."""
     period = row_period(recording.metadata)
     surface = surface_metadata(recording.metadata)
-    rate = f" at {format_quantity(1.0 / period, 'Hz')}" if period else ""
-    text = f"{recording.rows} rows, {format_quantity(recording.duration, 's')}{rate}"
+    text = f"{recording.rows} rows, {format_quantity(recording.duration, 's')}"
+    if period:
+        text += f" at {format_quantity(1.0 / period, 'Hz')}"
     if surface is not None:
         stiffness = format_quantity(float(surface["stiffness"]), "N/m")
         text += f": law {surface['law']} at {stiffness} on {describe_texture(surface['texture'])}"
@@ -106,9 +114,9 @@ def _truncation_text(recording: Recording) -> str:
         return "" if recording.rows else "Nothing was recorded."
     if not recording.rows:
         return "The recording was not closed, and contains no complete block."
-    count = recording.unread_bytes
-    lost = f" ({count} bytes after it are an incomplete block)" if count else ""
-    return f"The recording was not closed: it ends with the last complete block{lost}."
+    if not recording.unread_bytes:
+        return "The recording was not closed: it ends with the last complete block."
+    return sentence("unread_block", count=recording.unread_bytes)
 
 
 def surface_metadata(metadata: Mapping[str, Any]) -> Mapping[str, Any] | None:
@@ -118,16 +126,18 @@ def surface_metadata(metadata: Mapping[str, Any]) -> Mapping[str, Any] | None:
     if not isinstance(surface, Mapping) or not surface.keys() >= names:
         return None
     has_kind = isinstance(surface["texture"], Mapping) and "kind" in surface["texture"]
-    numbers = surface["stiffness"], surface["max_depth"]
-    return surface if has_kind and _are_positive_numbers(*numbers) else None
+    if not has_kind or not _are_positive_numbers(surface["stiffness"], surface["max_depth"]):
+        return None
+    return surface
 
 
 def row_period(metadata: Mapping[str, Any]) -> float:
     """Return the time from row to row [s]; 0 if it is not recorded."""
     servo = metadata.get("servo")
-    every = metadata.get("every", 1)
-    period: Any = servo.get("period") if isinstance(servo, Mapping) else None
-    return float(period) * every if _are_positive_numbers(period, every) else 0.0
+    every: Any = metadata.get("every", 1)
+    if not isinstance(servo, Mapping) or not _are_positive_numbers(servo.get("period"), every):
+        return 0.0
+    return float(servo["period"] * every)
 
 
 def _are_positive_numbers(*values: Any) -> bool:
@@ -138,35 +148,52 @@ def replay_answer(replay: Replay) -> str:
     """Return the result of a replay in one or two sentences."""
     if replay.first_difference is None:
         return f"All {replay.rows} rows are reproduced bit for bit."
-    one = replay.first_difference
-    unit = "N" if one.column.startswith("commanded") else "m" if "anchor" in one.column else ""
-    values = f"{one.replayed_value!r} instead of {one.recorded_value!r}".replace("'", "")
-    where = f"row {one.row}, at {format_quantity(one.time, 's')}"
-    first = f"the first is {where}: {one.column} is {values} {unit}".rstrip()
+    first = replay.first_difference
+    unit = ""
+    if first.column.startswith("commanded"):
+        unit = " N"
+    elif "anchor" in first.column:
+        unit = " m"
+    values = f"{first.replayed_value!r} instead of {first.recorded_value!r}".replace("'", "")
+    where = f"row {first.row}, at {format_quantity(first.time, 's')}"
+    difference = f"the first is {where}: {first.column} is {values}{unit}"
     largest = format_quantity(replay.max_force_difference, "N", digits=3)
     count = f"{replay.differing_rows} of {replay.rows} rows differ"
-    return f"{count}; {first}. The largest difference of a force is {largest}."
+    return f"{count}; {difference}. The largest difference of a force is {largest}."
 
 
 def onset_answer(setup: Setup, predictions: Sequence[Prediction]) -> str:
     """Return the result in two sentences."""
-    missed = [one for one in predictions if one.violates_delay_rule]
-    walls = [one for one in predictions if one.violates_wall_rule]
+    sentences = [_delay_rule_text(predictions)]
     step = setup.servo.position_resolution
-    if missed:
-        shares = [f"{_case_name(one)} ({one.onset.cycling / one.delay_rule:.0%})" for one in missed]
-        answer = f"Limit cycles below the delay rule, at this share of it: {', '.join(shares)}."
-        if step:
-            resolution = format_quantity(step, "m")
-            answer += f" The rule is proved for exact positions, not for steps of {resolution}."
-    else:
-        proved = sum([one.conservative for one in predictions])
-        cases = "case" if proved == 1 else "cases"
-        answer = f"No limit cycle below the delay rule, in {proved} {cases} of conservative laws."
-    if any(one.wall_rule is not None and not one.onset.is_smooth_wall for one in predictions):
-        names = ", ".join(map(_case_name, walls))
-        answer += f" K₀/q was too much for: {names}." if walls else " K₀/q was safe in all of them."
-    return answer
+    if step and any(one.violates_delay_rule for one in predictions):
+        resolution = format_quantity(step, "m")
+        sentences.append(f"The rule is proved for exact positions, not for steps of {resolution}.")
+    textured = [one for one in predictions if not one.onset.is_smooth_wall]
+    if any(one.wall_rule is not None for one in textured):
+        sentences.append(_wall_rule_text(predictions))
+    return " ".join(sentences)
+
+
+def _delay_rule_text(predictions: Sequence[Prediction]) -> str:
+    """Return the cases that cycle below the delay rule, or how many it holds for."""
+    shares = [
+        f"{_case_name(prediction)} ({prediction.onset.cycling / prediction.delay_rule:.0%})"
+        for prediction in predictions
+        if prediction.violates_delay_rule
+    ]
+    if shares:
+        return f"Limit cycles below the delay rule, at this share of it: {', '.join(shares)}."
+    cases = count_text(sum([prediction.conservative for prediction in predictions]), "case")
+    return f"No limit cycle below the delay rule, in {cases} of conservative laws."
+
+
+def _wall_rule_text(predictions: Sequence[Prediction]) -> str:
+    """Return the cases that cycle below K₀/q."""
+    violating = [_case_name(one) for one in predictions if one.violates_wall_rule]
+    if violating:
+        return f"K₀/q was too much for: {', '.join(violating)}."
+    return "K₀/q was safe in all of them."
 
 
 def _case_name(prediction: Prediction) -> str:
@@ -185,7 +212,12 @@ def _group_laws(strokes: Sequence[Stroke], gains_energy: Callable[[Stroke], bool
     groups: dict[str, list[str]] = {"always": [], "at times": [], "never": []}
     for law in laws:
         gains = [gains_energy(stroke) for stroke in strokes if stroke.law == law]
-        groups["always" if all(gains) else "at times" if any(gains) else "never"].append(law)
+        frequency = "at times"
+        if all(gains):
+            frequency = "always"
+        elif not any(gains):
+            frequency = "never"
+        groups[frequency].append(law)
     return ", ".join([f"{', '.join(laws)} {when}" for when, laws in groups.items() if laws])
 
 
@@ -200,11 +232,14 @@ def calibration_lines(calibration: Calibration) -> list[str]:
     step = calibration.position_step
     delay = calibration.delay
     weakest = calibration.weakest_axis
-    resolution = "exact" if step is None else f"step {format_uncertainty(step, 1e6)} µm"
+    resolution = "exact"
+    if step is not None:
+        resolution = f"step {format_uncertainty(step, 1e6)} µm"
     noise = format_uncertainty(calibration.noise, 1e6)
     effective = format_quantity(effective_resolution(calibration).value, "m")
-    others = ", ".join(map(str, delay.alternatives))
-    ambiguity = f", or {others}: not written" if others else ""
+    ambiguity = ""
+    if delay.alternatives:
+        ambiguity = f", or {', '.join(map(str, delay.alternatives))}: not written"
     stiffness = format_quantity(weakest.wall.stable_stiffness, "N/m")
     return [
         f"Positions: {resolution}; noise at rest {noise} µm; effective step {effective}",

@@ -17,18 +17,20 @@ _SHADING_LAW = "G"
 
 def describe_map(sampled_map: SampledMap) -> str:
     """Return content and size of a map."""
-    wide, high = (format_quantity(side, "m") for side in sampled_map.size)
+    size = " x ".join([format_quantity(side, "m") for side in sampled_map.size])
     tiled = "it can be tiled" if sampled_map.is_periodic else "it cannot be tiled"
     content = sentence_case(sampled_map.description)
-    return sentence("sampled_map", content=content, size=f"{wide} x {high}", tiled=tiled)
+    return sentence("sampled_map", content=content, size=size, tiled=tiled)
 
 
 def describe_heights(sampled_map: SampledMap, suffix: str) -> str:
     """Return the range of the heights in a file, and their rounding error."""
-    ends = sampled_map.heights.min(), sampled_map.heights.max()
-    low, high = (format_quantity(float(end), "m", digits=6) for end in ends)
+    low = format_quantity(float(sampled_map.heights.min()), "m", digits=6)
+    high = format_quantity(float(sampled_map.heights.max()), "m", digits=6)
     error = height_resolution(sampled_map, suffix)
-    accuracy = f"with errors up to {format_quantity(error, 'm', digits=3)}" if error else "exact"
+    accuracy = "exact"
+    if error:
+        accuracy = f"with errors up to {format_quantity(error, 'm', digits=3)}"
     return f"Heights from {low} to {high}, {accuracy}; the interpolation depends on the tool."
 
 
@@ -47,11 +49,13 @@ def describe_shading(texture: Texture, stiffness: float | None) -> str:
         stiffness: [N/m]; default: that of a surface.
     """
     surface = Surface(texture, _SHADING_LAW)
-    surface = surface if stiffness is None else surface.to_stiffness(stiffness)
+    if stiffness is not None:
+        surface = surface.to_stiffness(stiffness)
     q = characteristic_number(surface)
     leak = worst_loop(surface)
-    has_gain = leak.energy > 0.0
-    energy = f"a loop gains {energy_text(leak.energy)}" if has_gain else "no loop gains energy"
+    energy = "no loop gains energy"
+    if leak.energy > 0.0:
+        energy = f"a loop gains {energy_text(leak.energy)}"
     at = format_quantity(surface.stiffness, "N/m")
     depth = format_quantity(surface.max_depth, "m")
     return sentence("shading", law=_SHADING_LAW, at=at, depth=depth, energy=energy, q=q)

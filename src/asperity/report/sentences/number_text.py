@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 INFINITY_SIGN = "∞"
 NOT_AVAILABLE = "–"
 SAMPLED_MARK = "~"
+_ENERGY_DIGITS = ((0, 1.0), (1, 0.1), (2, 1e-4))  # decimal places [mJ], and from which energy [J]
 _PREFIXES = {"": 1.0, "m": 1e3, "µ": 1e6, "n": 1e9, "p": 1e12, "k": 1e-3, "M": 1e-6}
 
 
@@ -59,7 +60,19 @@ def force_text(value: float) -> str:
 
 def yes_no_text(holds: bool | None) -> str:
     """Return yes, no, or ? for an undecidable condition."""
-    return "?" if holds is None else "yes" if holds else "no"
+    if holds is None:
+        return "?"
+    return "yes" if holds else "no"
+
+
+def count_text(count: int, noun: str) -> str:
+    """Return a number of things.
+
+    Example:
+        >>> count_text(1, "law"), count_text(3, "law")
+        ('1 law', '3 laws')
+    """
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def readable_name(name: str) -> str:
@@ -112,13 +125,17 @@ def upper_bound_text(value: float, digits: int = 6) -> str:
 
 
 def _round_outward(value: float, digits: int, rounding: str) -> str:
-    if math.isinf(value):
-        return INFINITY_SIGN if value > 0.0 else f"−{INFINITY_SIGN}"
+    if value == math.inf:
+        return INFINITY_SIGN
+    if value == -math.inf:
+        return f"−{INFINITY_SIGN}"
     # Thirteen digits first, so that the rounding of a double does not change a digit.
     plain = Decimal(f"{value:.12e}")
     rounded = Context(prec=digits, rounding=rounding).create_decimal(plain)
-    text = f"{rounded:f}" if 1e-5 <= abs(value) < 1e7 or value == 0.0 else f"{rounded:e}"
-    return text.rstrip("0").rstrip(".") if "." in text and "e" not in text.lower() else text
+    if value != 0.0 and not 1e-5 <= abs(value) < 1e7:
+        return f"{rounded:e}"
+    text = f"{rounded:f}"
+    return text.rstrip("0").rstrip(".") if "." in text else text
 
 
 def limit_text(stiffness: float | None) -> str:
@@ -130,7 +147,16 @@ def limit_text(stiffness: float | None) -> str:
     """
     if stiffness is None:
         return NOT_AVAILABLE
-    return INFINITY_SIGN if math.isinf(stiffness) else f"{round_down(stiffness):.10g} N/m"
+    if math.isinf(stiffness):
+        return INFINITY_SIGN
+    return f"{round_down(stiffness):.10g} N/m"
+
+
+def margin_text(margin: float | None) -> str:
+    """Return a margin rounded down; "–" for none."""
+    if margin is None:
+        return NOT_AVAILABLE
+    return lower_bound_text(margin, 3)
 
 
 def interval_text(bound: Bound) -> str:
@@ -221,8 +247,11 @@ def position_text(point: tuple[float, float, float] | None) -> str:
     """
     if point is None:
         return NOT_AVAILABLE
-    largest = max([abs(value) for value in point])
-    unit, scale = ("mm", 1e3) if largest >= 1e-4 else ("µm", 1e6)
+    unit = "µm"
+    scale = 1e6
+    if max(map(abs, point)) >= 1e-4:
+        unit = "mm"
+        scale = 1e3
     return f"({', '.join([f'{value * scale + 0.0:.6g}' for value in point])}) {unit}"
 
 
@@ -233,12 +262,14 @@ def witness_text(bound: Bound) -> str:
         >>> witness_text(Bound(math.inf, math.inf, "certified", (0.0, 0.0, 1e-3)))
         'onset (0, 0, 1) mm'
     """
-    onset = "onset " if math.isinf(bound.lower) and bound.at is not None else ""
+    place = position_text(bound.at)
+    if math.isinf(bound.lower) and bound.at is not None:
+        place = f"onset {place}"
     if bound.deflection is None:
-        return f"{onset}{position_text(bound.at)}"
-    x, y = (f"{1e3 * part + 0.0:.6g}" for part in bound.deflection)
-    state = f"deflection ({x}, {y}) mm, {'sliding' if bound.sliding else 'sticking'}"
-    return f"{onset}{position_text(bound.at)}, {state}"
+        return place
+    deflection = ", ".join([f"{1e3 * part + 0.0:.6g}" for part in bound.deflection])
+    phase = "sliding" if bound.sliding else "sticking"
+    return f"{place}, deflection ({deflection}) mm, {phase}"
 
 
 def energy_text(value: float) -> str:
@@ -255,15 +286,18 @@ def stiffness_number(value: float) -> str:
     """Return a stiffness [N/m] with three digits, without the unit."""
     if math.isinf(value):
         return INFINITY_SIGN
-    return f"{value:.3g}" if value < 1000.0 else f"{float(f'{value:.3g}'):,.0f}".replace(",", " ")
+    if value < 1000.0:
+        return f"{value:.3g}"
+    return f"{float(f'{value:.3g}'):,.0f}".replace(",", " ")
 
 
 def millijoules(value: float, *, signed: bool = True) -> str:
     """Return an energy [J] as text in mJ."""
-    size = abs(value)
-    digits = 0 if size >= 1.0 else 1 if size >= 0.1 else 2 if size >= 1e-4 else 4
-    text = f"{1e3 * value:+.{digits}f}" if signed else f"{1e3 * value:.{digits}f}"
-    return "0" if not text.strip("+-0.") else text
+    # Fewer decimal places for greater energies.
+    digits = next((places for places, least in _ENERGY_DIGITS if abs(value) >= least), 4)
+    sign = "+" if signed else ""
+    text = f"{1e3 * value:{sign}.{digits}f}"
+    return text if text.strip("+-0.") else "0"
 
 
 def decimal_text(value: float) -> str:
@@ -288,4 +322,6 @@ def side_text(side: float | None, unit: str) -> str:
     """
     if side is None:
         return NOT_AVAILABLE
-    return INFINITY_SIGN if side == float("inf") else format_quantity(side, unit)
+    if math.isinf(side):
+        return INFINITY_SIGN
+    return format_quantity(side, unit)

@@ -22,11 +22,13 @@ def evidence_text(value: Number) -> str:
     """Return a number of the evidence as text."""
     if isinstance(value, list):
         return ", ".join([f"{item:.10g}" for item in value])
-    return value if isinstance(value, str) else f"{value:.10g}"
+    if isinstance(value, str):
+        return value
+    return f"{value:.10g}"
 
 
 def loop_energy_text(panel: LoopEnergy) -> str:
     """Return the energy of the loop as text."""
     gain = round(1e6 * panel.energy, 1)
-    source = f", as {panel.equation}" if panel.equation else ""
-    return f"gains {gain:.1f} µJ{source}" if gain > 0.0 else f"returns all{source}"
+    energy = f"gains {gain:.1f} µJ" if gain > 0.0 else "returns all"
+    return f"{energy}, as {panel.equation}" if panel.equation else energy

@@ -30,8 +30,10 @@ def describe_texture(description: dict[str, Any]) -> str:
         >>> describe_texture({"kind": "sinusoid", "amplitude": 8e-4, "period": 1e-3, "phase": 0.0})
         'sinusoid: amplitude 0.8 mm, period 1 mm'
     """
-    kind = CATALOGUE.get(description["kind"])
-    declared = {} if kind is None else {argument.name: argument for argument in kind.arguments}
+    declared = {}
+    if description["kind"] in CATALOGUE:
+        arguments = CATALOGUE[description["kind"]].arguments
+        declared = {argument.name: argument for argument in arguments}
     parts = []
     for name, value in description.items():
         if name in _OMITTED_NAMES:
@@ -40,7 +42,7 @@ def describe_texture(description: dict[str, Any]) -> str:
         if len(values) > 4:
             parts.append(f"{len(values)} {name}")
             continue
-        texts = [_value_text(name, one, declared.get(name)) for one in values]
+        texts = [_value_text(name, number, declared.get(name)) for number in values]
         parts.append(f"{number_text.readable_name(name)} {' × '.join(texts)}")
     return f"{description['kind']}: {', '.join(parts)}"
 
@@ -50,8 +52,9 @@ def _value_text(name: str, value: Any, argument: Argument | None) -> str:
         return number_text.yes_no_text(value)
     if argument is not None:
         return argument.format_value(value)
-    is_length = name in _LENGTH_NAMES and isinstance(value, float)
-    return format_quantity(value, "m") if is_length else f"{value}"
+    if name in _LENGTH_NAMES and isinstance(value, float):
+        return format_quantity(value, "m")
+    return f"{value}"
 
 
 def texture_name(texture: Texture) -> str:
@@ -73,14 +76,19 @@ def parts_text(parts: SurfaceDecomposition) -> str:
 
 def texture_text(parts: SurfaceDecomposition) -> str:
     """Return the RMS of texture, form and waviness, in one sentence."""
-    lengths = (parts.texture.rms, parts.nesting, parts.form.rms, parts.waviness.rms)
-    texture, nesting, form, waviness = (format_quantity(length, "m") for length in lengths)
-    return sentence("texture", texture=texture, nesting=nesting, form=form, waviness=waviness)
+    return sentence(
+        "texture",
+        texture=format_quantity(parts.texture.rms, "m"),
+        nesting=format_quantity(parts.nesting, "m"),
+        form=format_quantity(parts.form.rms, "m"),
+        waviness=format_quantity(parts.waviness.rms, "m"),
+    )
 
 
 def roughness_text(history: Sequence[PreparationStage]) -> str:
     """Return the RMS of what the requested L-filter left, in one sentence; empty for none."""
-    if not history or (nesting := history[-1].nesting) is None:
+    nesting = history[-1].nesting if history else None
+    if nesting is None:
         return ""
     symbol, rms = next(iter(history[-1].values.items()))
     rms_text = format_quantity(rms or 0.0, "m")
@@ -144,13 +152,16 @@ def arguments_text(kind: TextureKind) -> str:
         >>> arguments_text(CATALOGUE["grating"])
         'height [m], period [m], duty=0.5, edge=ridge or groove/4'
     """
-    parts = []
-    for argument in kind.arguments:
-        # Without spaces, so that no line breaks inside a quantity.
-        default = argument.default_text.replace(" ", "") if argument.default is not None else ""
-        value = f"={default or argument.default_description}"
-        parts.append(unit_name(argument) if argument.required else f"{argument.name}{value}")
-    return ", ".join(parts)
+    return ", ".join(map(_default_or_unit, kind.arguments))
+
+
+def _default_or_unit(argument: Argument) -> str:
+    if argument.required:
+        return unit_name(argument)
+    if argument.default is None:
+        return f"{argument.name}={argument.default_description}"
+    # Without spaces, so that no line breaks inside a quantity.
+    return f"{argument.name}={argument.default_text.replace(' ', '')}"
 
 
 def unit_name(argument: Argument) -> str:
@@ -160,5 +171,6 @@ def unit_name(argument: Argument) -> str:
 
 def argument_text(argument: Argument) -> str:
     """Return the description of an argument with its choices."""
-    choice = f": {', '.join(argument.choices)}" if argument.choices else ""
-    return argument.description + choice
+    if not argument.choices:
+        return argument.description
+    return f"{argument.description}: {', '.join(argument.choices)}"
