@@ -30,6 +30,7 @@ from asperity.paper.experiments import (
     scanning_experiment,
     simulate_bump,
 )
+from asperity.report.sentences.paper_text import experiment_summaries
 from asperity.simulation import simulate
 from asperity.surface import Surface
 from asperity.textures.kinds.sinusoid import Sinusoid
@@ -125,7 +126,7 @@ def test_onset_below_the_lowest_stiffness_is_unknown(experiments: Experiments) -
         onset = replace(first.onset, quiet=quiet, cycling=50.0)
         changed = (replace(first, onset=onset, wall_rule=rule),)
         modified = replace(experiments, passivity=replace(experiments.passivity, onsets=changed))
-        return dict(modified.summary_lines)["V.A onsets"].rpartition("; ")[2]
+        return dict(experiment_summaries(modified))["V.A onsets"].rpartition("; ")[2]
 
     prefix = "below K0/q of the wall's own onset in"
     assert summary(0.0, 14.0) == f"{prefix} 0 of 1 cases, unknown in 1"
@@ -140,14 +141,14 @@ def test_experiments_are_serializable_with_summaries(experiments: Experiments) -
     assert len(data["V.B"]["strokes"]) == 2 * len(cycle_experiments.HANDS) * len(
         cycle_experiments.SPEEDS
     )
-    assert [name for name, _text in experiments.summary_lines] == [
+    assert [name for name, _text in experiment_summaries(experiments)] == [
         "V.A",
         "V.A onsets",
         "V.B",
         "V.C",
         "devices",
     ]
-    summaries = dict(experiments.summary_lines)
+    summaries = dict(experiment_summaries(experiments))
     assert "the field supplies energy: A 9, H 0" in summaries["V.B"]
     assert summaries["devices"].startswith("0 of 1 cases")
 
@@ -174,7 +175,7 @@ def test_summary_compares_simulated_walls_with_the_catalogue(experiments: Experi
     """It states the simulated wall's onset relative to the catalogue's stiffness."""
     (texture,) = experiments.devices.onsets
     assert experiments.devices.wall_ratios == ()
-    assert "wall" not in dict(experiments.summary_lines)["devices"]
+    assert "wall" not in dict(experiment_summaries(experiments))["devices"]
     wall_prediction = replace(
         texture.prediction, onset=replace(texture.prediction.onset, is_smooth_wall=True)
     )
@@ -184,7 +185,7 @@ def test_summary_compares_simulated_walls_with_the_catalogue(experiments: Experi
     assert modified.devices.wall_ratios == pytest.approx([greatest_ratio, greatest_ratio / 2.5])
     assert (
         f"only at {greatest_ratio / 2.5:.0f} to {greatest_ratio:.0f} times"
-        in dict(modified.summary_lines)["devices"]
+        in dict(experiment_summaries(modified))["devices"]
     )
 
 

@@ -75,7 +75,7 @@ def run_command(
     hashes = setup.file_hashes()
     with progress_bar("analyzing the surface"):
         check_stiffness_limit(setup, accept_risk=accept_risk)
-    from asperity.report.pages.servo_report import device_run_page
+    from asperity.report.pages.run_report import device_run_page
 
     loop = make_loop(setup, driver, duration, process)
     with stop_on_signals(loop.memory) as signals:

@@ -225,7 +225,7 @@ def calibrate_command(
     stem = Path(output).stem
     calibrated = measured_device(base, result, stem, date, simulated=simulated)
     write_output("output", output, to_device_toml(calibrated))
-    from asperity.report.pages.servo_report import calibration_page
+    from asperity.report.pages.run_report import calibration_page
 
     before = unit_starts(base)
     after = unit_starts(calibrated)

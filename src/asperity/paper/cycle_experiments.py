@@ -324,17 +324,6 @@ class DeviceExperiment(Serializable):
             ]
         )
 
-    @property
-    def wall_summary(self) -> str:
-        """The range of ``wall_ratios`` in words; empty if no wall was simulated.
-
-        It qualifies the number of cases that cycle below the catalogue's K₀/q.
-        """
-        if not self.wall_ratios:
-            return ""
-        span = f"{min(self.wall_ratios):.0f} to {max(self.wall_ratios):.0f}"
-        return f"the simulated wall itself cycles only at {span} times the catalogue's K0"
-
 
 def reference_textures(measured_texture: Texture | None = None) -> dict[str, Texture]:
     """Return a gentle sinusoid and a measured surface, or a synthetic one in its place."""

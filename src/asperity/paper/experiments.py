@@ -11,10 +11,8 @@ import numpy as np
 
 from asperity.core.checks import FloatArray
 from asperity.core.files import OMITTED, Serializable, to_plain_data
-from asperity.core.units import format_quantity
 from asperity.paper import cycle_experiments as setups
 from asperity.paper.cycle_experiments import (
-    RESOLUTION,
     DeviceExperiment,
     PassivityExperiment,
     device_experiment,
@@ -225,78 +223,6 @@ class Experiments:
         return to_plain_data(
             {"V.A": self.passivity, "V.B": self.scanning, "V.C": self.bump, "beyond": self.devices}
         )
-
-    @property
-    def summary_lines(self) -> tuple[tuple[str, str], ...]:
-        """Name and result of each experiment, in words."""
-        return (
-            ("V.A", self._summarize_cycles()),
-            ("V.A onsets", f"{self._summarize_delay_rule()}; {self._summarize_wall_rule()}"),
-            ("V.B", self._summarize_strokes()),
-            ("V.C", self._summarize_bumps()),
-            ("devices", self._summarize_devices()),
-        )
-
-    def _summarize_cycles(self) -> str:
-        parts = [f"{count.wall} {count.cycles}" for count in self.passivity.counts]
-        first = self.passivity.counts[0]
-        return (
-            f"of {first.starts} starts cycle at 2000 N/m and a lag of {first.delay} samples: "
-            f"{', '.join(parts)}"
-        )
-
-    def _summarize_wall_rule(self) -> str:
-        """Count the textures that cycle below the wall's own onset over q."""
-        textured = [
-            prediction
-            for prediction in self.passivity.onsets
-            if prediction.wall_rule and not prediction.onset.is_smooth_wall
-        ]
-        safe = [prediction for prediction in textured if not prediction.violates_wall_rule]
-        missed = len(textured) - len(safe)
-        text = f"below K0/q of the wall's own onset in {missed} of {len(textured)} cases"
-        # A wall that cycles at the least stiffness tried may also cycle below it.
-        unknown = sum([prediction.onset.quiet == 0.0 for prediction in safe])
-        return f"{text}, unknown in {unknown}" if unknown else text
-
-    def _summarize_delay_rule(self) -> str:
-        predictions = self.passivity.onsets
-        missed = [
-            f"{prediction.onset.law} at d = {prediction.onset.delay}"
-            for prediction in predictions
-            if prediction.violates_delay_rule
-        ]
-        cases = sum([prediction.conservative for prediction in predictions])
-        if not missed:
-            return f"no limit cycle below the delay rule in {cases} cases of conservative laws"
-        return (
-            f"limit cycles below the delay rule in {len(missed)} of {cases} cases of conservative "
-            f"laws, with steps of the encoder of {format_quantity(RESOLUTION, 'm')}; it is proved "
-            f"for exact positions: {', '.join(missed)}"
-        )
-
-    def _summarize_strokes(self) -> str:
-        counts: dict[str, list[bool]] = {}
-        for done in self.scanning.strokes:
-            counts.setdefault(done.stroke.law, []).append(done.stroke.gains_energy)
-        parts = [f"{law} {sum(gains)}" for law, gains in counts.items()]
-        total = max(map(len, counts.values()))
-        return f"of {total} hands and speeds the field supplies energy: {', '.join(parts)}"
-
-    def _summarize_bumps(self) -> str:
-        bumps = self.bump.bumps
-        return ", ".join([f"{run.law} {1e3 * run.total:+.3g} mJ ({run.entry})" for run in bumps])
-
-    def _summarize_devices(self) -> str:
-        onsets = self.devices.onsets
-        missed = sum([onset.catalogue_rule_missed for onset in onsets])
-        rules = sum([onset.prediction.violates_delay_rule for onset in onsets])
-        text = (
-            f"{missed} of {len(onsets)} cases cycle at a stiffness that the catalogue's K0/q "
-            f"allows, {rules} below the delay rule"
-        )
-        summary = self.devices.wall_summary
-        return f"{text}; {summary}" if summary else text
 
 
 def run_experiments(

@@ -23,10 +23,19 @@ from asperity.report.sentences.device_text import (
     wall_test_text,
 )
 from asperity.report.sentences.number_text import readable_name
-from asperity.report.sentences.texts import table_data, table_notes
+from asperity.report.sentences.texts import table_notes
 
 _NAME_MIN_CONSOLE = 96
 """Console width [characters] from which the full name has a column."""
+_COLUMNS = {
+    "max\nforce": "max_force",
+    "stiffest\nwall": "max_stiffness",
+    "position\nstep": "position_resolution",
+    "force\nstep": "force_resolution",
+    "update\nrate": "update_rate",
+    "damping\nσ₀(B)": "damping",
+}
+"""The data that distinguish devices, by heading; all data are listed for one device."""
 
 
 def devices_page(devices: Sequence[Device], *, detailed: bool = False) -> Page:
@@ -43,11 +52,10 @@ def devices_page(devices: Sequence[Device], *, detailed: bool = False) -> Page:
 def _devices_table(devices: Sequence[Device]) -> Table:
     """Return one row per device, the first column its id alone."""
     rows = []
-    columns = table_data("devices")
     for device in devices:
-        texts = [datum_text(device.data.get(field)) for field in columns.values()]
+        texts = [datum_text(device.data.get(field)) for field in _COLUMNS.values()]
         rows.append(Row([Cell(device.id, "l"), device.name, *texts]))
-    headings = ("id", "device", *columns)
+    headings = ("id", "device", *_COLUMNS)
     layout = TableLayout(wrap=(1,), min_console={1: _NAME_MIN_CONSOLE})
     return Table(headings, rows, range(2, len(headings)), layout)
 

@@ -38,7 +38,7 @@ from asperity.report.sentences.surface_text import (
     surface_summary_text,
     texture_text,
 )
-from asperity.report.sentences.texts import sentence_case, table_data
+from asperity.report.sentences.texts import sentence_case
 from asperity.textures.fields.potential_field import PotentialField
 from asperity.textures.texture import Texture
 
@@ -47,6 +47,11 @@ if TYPE_CHECKING:
 
 _RMS = find_parameter("Sq")
 _REMOVED = {"removed, RMS": "rms", "removed, range": "range"}
+# Columns of maps and profiles by importance, for narrow consoles.
+_PRIORITY = (
+    *("Sq", "q", "Sz", "z", "removed, RMS", "Sa", "a", "Sdq", "Sm", "dq", "Sdr", "Ssk", "sk"),
+    *("Sku", "ku", "removed, range", "t", "Sp", "p", "Sv", "v"),
+)
 _LENGTH_UNITS = (("m", 1.0), ("mm", 1e-3), ("µm", 1e-6), ("nm", 1e-9))
 _Column = tuple[str, list[Cell]]  # heading and cells
 _REMOVED_MEANING = ("removed", "deviation that the step removed: RMS about the mean, and range")
@@ -69,9 +74,8 @@ def stages_table(stages: Sequence[PreparationStage]) -> Table:
         values = [getattr(stage.removed, attribute, None) for stage in stages]
         columns.append(_number_column(name, _RMS, values))
     keys += _REMOVED
-    priority = table_data("parameters")
     layout = TableLayout(
-        drop_order=sorted(range(1, len(keys)), key=lambda i: priority.index(keys[i])),
+        drop_order=sorted(range(1, len(keys)), key=lambda i: _PRIORITY.index(keys[i])),
         legend={**legend, len(keys): _REMOVED_MEANING},
         dropped_note="More in a wider terminal, and in the JSON.",
     )

@@ -48,15 +48,17 @@ from asperity.report.document.page import (
 )
 from asperity.report.pages import sweep_report
 from asperity.report.pictures import paper_pictures
-from asperity.report.pictures import paper_pictures as pictures
 from asperity.report.pictures.loop_pictures import onset_figure
 from asperity.report.sentences.number_text import energy_text, stiffness_number
 from asperity.report.sentences.paper_text import (
+    VERDICT_TEXTS,
     evidence_text,
+    experiment_summaries,
     loop_energy_text,
     verdict_counts_text,
+    wall_summary_text,
 )
-from asperity.report.sentences.texts import sentence, sentence_case, table_data, table_notes
+from asperity.report.sentences.texts import sentence, sentence_case, table_notes
 
 
 def claims_page(
@@ -80,12 +82,12 @@ def claims_page(
         guesses += [*experiments.bump.guessed, *experiments.devices.guessed]
     sections += [one for one in page.assumption_sections(guesses) if Media.HTML in one.media]
     title = "“On the Synthesis of Haptic Textures”, claim by claim"
-    facts = [(one["fact"], verdict) for verdict, one in table_data("verdicts").items()]
+    facts = [(text.meaning, verdict) for verdict, text in VERDICT_TEXTS.items()]
     return Page(title, verdict_counts_text(results), facts, sections, sentence("claims"))
 
 
 def _verdict_cell(result: Result) -> Cell:
-    return Cell(result.verdict, table_data("verdicts")[result.verdict]["kind"])
+    return Cell(result.verdict, VERDICT_TEXTS[result.verdict].cell_kind)
 
 
 def _terminal_sections(results: Sequence[Result], experiments: Experiments | None) -> list[Section]:
@@ -103,8 +105,10 @@ def _terminal_sections(results: Sequence[Result], experiments: Experiments | Non
             rows.append(Row([result.id, _verdict_cell(result), statement]))
     layout = TableLayout(wrap=(2,), gap=2, has_rule=False)
     table = Table(("claim", "verdict", "states"), rows, layout=layout)
-    lines = experiments.summary_lines if experiments is not None else ()
-    summary = [page.Paragraph(f"{name}: {text}") for name, text in lines]
+    summary = []
+    if experiments is not None:
+        lines = experiment_summaries(experiments)
+        summary = [page.Paragraph(f"{name}: {text}") for name, text in lines]
     return [page.terminal_section(table), *([page.terminal_section(*summary)] if summary else ())]
 
 
@@ -245,8 +249,9 @@ def _bump_section(experiment: BumpExperiment) -> Section:
 def _device_section(experiments: Experiments) -> Section:
     devices = experiments.devices
     notes = _fitted_notes(devices.guessed)
-    if devices.wall_summary:
-        notes.append(f"Few misses on the left are weak evidence: {devices.wall_summary}.")
+    summary = wall_summary_text(devices)
+    if summary:
+        notes.append(f"Few misses on the left are weak evidence: {summary}.")
     notes.append(f"Not simulated for lack of an apparent mass: {', '.join(devices.skipped)}.")
     count = len(devices.onsets)
     missed = sum([one.catalogue_rule_missed for one in devices.onsets])
@@ -287,7 +292,6 @@ class PaperFigure:
 
     Attributes:
         name: of the file, without its suffix.
-        texts: name of its texts.
         claim_names: claims that it shows, as names for
             :func:`~asperity.paper.claims.find_claims`.
         draw: returns the figure, from all experiments or from the one that it needs.
@@ -295,7 +299,6 @@ class PaperFigure:
     """
 
     name: str
-    texts: str
     claim_names: Sequence[str]
     draw: Callable[[Experiments | None], Figure]
     needs_simulation: bool = True
@@ -306,31 +309,51 @@ class PaperFigure:
         return any(claim.id in ours for name in names for claim in find_claims(name))
 
 
-def _devices_figure(experiments: Experiments | None) -> Figure:
+def _draw_devices(experiments: Experiments | None) -> Figure:
     assert experiments is not None, "no claim needs this figure alone"
-    return pictures.devices_figure(experiments)
+    return paper_pictures.devices_figure(experiments)
 
 
 def _drawing(
     draw: Callable[[Any], Figure], experiment: str, simulate: Callable[[], Any]
 ) -> Callable[[Experiments | None], Figure]:
     """Return a drawing of one experiment, which is simulated if none have been."""
-    return lambda found: draw(getattr(found, experiment) if found else simulate())
+
+    def draw_experiment(experiments: Experiments | None) -> Figure:
+        if experiments is None:
+            return draw(simulate())
+        return draw(getattr(experiments, experiment))
+
+    return draw_experiment
 
 
-_DRAWINGS: dict[str, Callable[[Experiments | None], Figure]] = {
-    "fig-2": lambda _found: pictures.figure_two(),
-    "fig-3": lambda _found: pictures.figure_three(),
-    # Figure 5 needs no onsets, which take minutes.
-    "fig-5": _drawing(pictures.cycles_figure, "passivity", lambda: passivity_experiment(delays=())),
-    "onsets": _drawing(lambda one: onset_figure(one.onsets), "passivity", passivity_experiment),
-    "fig-6": _drawing(pictures.energies_figure, "scanning", scanning_experiment),
-    "fig-7": _drawing(pictures.bumps_figure, "bump", bump_experiment),
-    "devices": _devices_figure,
-}
-PAPER_FIGURES = tuple(
-    PaperFigure(name, draw=_DRAWINGS[name], **values)
-    for name, values in table_data("paper_figures").items()
+def _simulate_cycles() -> PassivityExperiment:
+    """Simulate figure 5 without onsets, which take minutes."""
+    return passivity_experiment(delays=())
+
+
+def _draw_onset_figure(experiment: PassivityExperiment) -> Figure:
+    return onset_figure(experiment.onsets)
+
+
+PAPER_FIGURES = (
+    PaperFigure("fig-2", ["fig-2"], lambda _experiments: paper_pictures.figure_two(), False),
+    PaperFigure("fig-3", ["fig-3"], lambda _experiments: paper_pictures.figure_three(), False),
+    PaperFigure(
+        "fig-5", ["fig-5"], _drawing(paper_pictures.cycles_figure, "passivity", _simulate_cycles)
+    ),
+    PaperFigure(
+        "onsets",
+        ["sentence-III.B-reduced"],
+        _drawing(_draw_onset_figure, "passivity", passivity_experiment),
+    ),
+    PaperFigure(
+        "fig-6",
+        ["fig-6"],
+        _drawing(paper_pictures.energies_figure, "scanning", scanning_experiment),
+    ),
+    PaperFigure("fig-7", ["fig-7"], _drawing(paper_pictures.bumps_figure, "bump", bump_experiment)),
+    PaperFigure("devices", [], _draw_devices),
 )
 """In the order of the paper; additional figures follow those that they belong to."""
 
@@ -352,13 +375,15 @@ def find_figures(
         ['fig-3', 'fig-5']
     """
     if not names:
-        return tuple(one for one in PAPER_FIGURES if include_simulated or not one.needs_simulation)
-    found = tuple(one for one in PAPER_FIGURES if one.shows_any(names))
-    if not found:
-        available = ", ".join([name for one in PAPER_FIGURES for name in one.claim_names])
+        return tuple(
+            [figure for figure in PAPER_FIGURES if include_simulated or not figure.needs_simulation]
+        )
+    selected = tuple([figure for figure in PAPER_FIGURES if figure.shows_any(names)])
+    if not selected:
+        available = ", ".join([name for figure in PAPER_FIGURES for name in figure.claim_names])
         reason = f"are not available for {', '.join(names)}, but for {available}"
         raise ParameterError("figures", reason)
-    return found
+    return selected
 
 
 def create_folder(path: str) -> Path:

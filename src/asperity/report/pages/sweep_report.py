@@ -16,7 +16,7 @@ from asperity.report.document.page import Cell, Cells, Media, Page, Row, Section
 from asperity.report.pages.run_report import LOOP_FOOTER, loop_facts
 from asperity.report.sentences.loop_text import onset_answer, stroke_answer
 from asperity.report.sentences.number_text import NOT_AVAILABLE, millijoules, stiffness_number
-from asperity.report.sentences.texts import table_data, table_notes
+from asperity.report.sentences.texts import table_notes
 from asperity.scene.sweeps import OnsetSweep, StrokeSweep
 from asperity.simulation.onset import Prediction
 from asperity.simulation.scan import Stroke
@@ -25,6 +25,19 @@ from asperity.sweeps.table_files import UNIT
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+_ONSET_HEADINGS = (
+    "law",
+    "d",
+    "quiet to",
+    "cycles",
+    "starts",
+    "depth",
+    "q",
+    "paper (1)",
+    "delay rule",
+    "K₀/q",
+)
 
 
 def onset_cells(prediction: Prediction) -> Cells:
@@ -103,7 +116,7 @@ def _draw_onsets(predictions: Sequence[Prediction]) -> Figure:
 def onset_section(title: str, predictions: Sequence[Prediction], caption: str = "") -> Section:
     """Return onsets and limits in numbers."""
     rows = [Row(onset_cells(one), law=one.onset.law) for one in predictions]
-    table = _sweep_table(table_data("onsets"), rows)
+    table = _sweep_table(_ONSET_HEADINGS, rows)
     return Section(title, [table], caption, table_notes("onsets"))
 
 

@@ -14,7 +14,16 @@ from asperity.envelopes.wave_borders import WaveBorders
 from asperity.report.sentences import limit_sentences
 from asperity.report.sentences.limit_sentences import speed_text
 from asperity.report.sentences.number_text import INFINITY_SIGN, NOT_AVAILABLE, yes_no_text
-from asperity.report.sentences.texts import sentence, table_data
+from asperity.report.sentences.texts import sentence
+
+_SYMBOLS = {
+    "T": "update_rate",
+    "δ": "position_resolution",
+    "b": "force_resolution",
+    "K₀": "max_stiffness",
+    "F₀": "bandwidth",
+}
+"""Data of a device by their symbols in the limits."""
 
 
 def computed_bounds(analysis: Analysis) -> list[tuple[str, Bound]]:
@@ -71,7 +80,7 @@ def symbol_lines(result: check_limits.Limits) -> list[str]:
     device = result.device
     surface = result.surface
     values = []
-    for symbol, field in table_data("symbols").items():
+    for symbol, field in _SYMBOLS.items():
         if field in device.data:
             datum = device.data[field]
             # The symbol of the update rate is the period.

@@ -5,9 +5,18 @@ from __future__ import annotations
 from asperity.core.units import format_quantity
 from asperity.devices import FIELD_TABLE, FIELD_UNITS, Datum, Device, WallTest
 from asperity.report.sentences.number_text import NOT_AVAILABLE
-from asperity.report.sentences.texts import table_data
 
 UNVERIFIED_MARK = "?"
+_USED_FIELDS = (
+    "max_stiffness",
+    "position_resolution",
+    "force_resolution",
+    "update_rate",
+    "bandwidth",
+    "damping",
+    "friction",
+)
+"""The data without which some results are undecided."""
 
 
 def datum_text(datum: Datum | None) -> str:
@@ -58,6 +67,6 @@ def missing_fields(device: Device) -> list[str]:
     """
     return [
         f"{field} [{FIELD_UNITS[field]}]: {FIELD_TABLE[field].description}"
-        for field in table_data("used_fields")
+        for field in _USED_FIELDS
         if field not in device.data
     ]

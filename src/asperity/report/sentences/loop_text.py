@@ -290,3 +290,13 @@ def timing_lines(statistics: LoopStatistics) -> list[str]:
         f"Start delay:   {quantiles(statistics.lateness_quantile)}, worst {worst}",
         f"Period error:  {quantiles(statistics.jitter_quantile)}",
     ]
+
+
+def limited_lines(statistics: LoopStatistics) -> list[str]:
+    """Return in how many samples a limit was active, and why that matters."""
+    texts = {
+        "Force limit active in {} samples: not the force of the law": statistics.force_limited,
+        "Slew limit active in {} samples: not the force of the law": statistics.slew_limited,
+        "{} samples below max_depth, outside the analysed region": statistics.too_deep,
+    }
+    return [text.format(count) for text, count in texts.items() if count]

@@ -21,11 +21,6 @@ def sentence(name: str, **values: object) -> str:
     return text.format(**values)
 
 
-def table_data(name: str) -> Any:
-    """Return headings, fields or kinds of rows of a table, by its name in ``texts.toml``."""
-    return _load_texts()["tables"][name]
-
-
 def glossary(result: str) -> list[tuple[str, str]]:
     """Return terms and definitions for a kind of result: "comparison", "analysis" or "limits"."""
     return list(_load_texts()["glossary"][result].items())
