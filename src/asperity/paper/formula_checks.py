@@ -121,8 +121,13 @@ def _probe_values(probe: ProbePoint) -> list[float]:
 def _closest_point_values() -> list[list[float]]:
     """Return the values of all symbols at the closest points of generic probes."""
     return [
-        [*_probe_values(one.probe), *one.force, *one.jacobian.ravel(), *one.derivatives.ravel()]
-        for one in closest_point_derivatives()
+        [
+            *_probe_values(derivatives.probe),
+            *derivatives.force,
+            *derivatives.jacobian.ravel(),
+            *derivatives.derivatives.ravel(),
+        ]
+        for derivatives in closest_point_derivatives()
     ]
 
 

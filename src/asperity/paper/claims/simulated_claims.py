@@ -207,13 +207,13 @@ def law_a_loses_contact() -> claim.Check:
     bumps = _simulated_bumps("A")
     summary = "; ".join(
         [
-            f"{one.entry}: {1e3 * one.total:+.3g} mJ, up to {1e3 * one.jump:.3g} mJ in 20 ms, "
-            f"contact lost {one.lost} times"
-            for one in bumps
+            f"{run.entry}: {1e3 * run.total:+.3g} mJ, up to {1e3 * run.jump:.3g} mJ in 20 ms, "
+            f"contact lost {run.lost} times"
+            for run in bumps
         ]
     )
     # The energy of a jump must not be taken back, as it is by a field with a potential.
-    confirmed = [0.25 * one.total < one.jump < one.total and one.lost > 1 for one in bumps]
+    confirmed = [0.25 * run.total < run.jump < run.total and run.lost > 1 for run in bumps]
     return check_over_assumptions(summary, confirmed, confirmed, _bump_numbers(bumps))
 
 

@@ -71,7 +71,10 @@ def _render_pictures(sections: Sequence[pages.Section]) -> dict[int, RenderedPic
 
     Those with a digest are shared out among helper processes, and cached.
     """
-    digests = [(one, one.find_digest and one.find_digest()) for one in _pictures_in(sections)]
+    digests = [
+        (picture, picture.find_digest and picture.find_digest())
+        for picture in _pictures_in(sections)
+    ]
     shared = [picture for picture, digest in digests if digest is not None]
     rendered = {id(one): render_picture(one) for one, digest in digests if digest is None}
     with precompute(render_picture, shared) as results:
@@ -105,7 +108,7 @@ def render_page(page: pages.Page, origin: Origin | None = None) -> str:
     # Insignificant white space only makes pages larger.
     style = re.sub(r"\s*([{};])\s*", r"\1", _read_template("style.css"))
     script = _read_template("page.js")
-    sections = [one for one in page.sections if pages.Media.HTML in one.media]
+    sections = [section for section in page.sections if pages.Media.HTML in section.media]
     pictures = _render_pictures(sections)
     template = template_environment().get_template("page.html.j2")
     return template.render(

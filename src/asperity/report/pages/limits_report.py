@@ -175,14 +175,17 @@ SUFFIXES = (".csv", *page.FIGURE_SUFFIXES)
 
 def envelope_page(result: Envelope) -> page.Page:
     """Return the report: answer, diagram, ranges by law, points and assumptions."""
-    names = ", ".join([one.device.name for one in result.devices])
+    names = ", ".join([envelope.device.name for envelope in result.devices])
     stiffness = format_quantity(result.conditions.min_stiffness, "N/m")
     speed = speed_text(result.conditions.speed)
     title, caption, alt = figure_text(
         "envelope.regions", stiffness=stiffness, speed=speed, count=len(result.devices)
     )
     figure = Picture(page.plot_later(result), alt)
-    tables = [Section(one.device.name, [_ranges_table(one)], media=_ALL) for one in result.devices]
+    tables = [
+        Section(envelope.device.name, [_ranges_table(envelope)], media=_ALL)
+        for envelope in result.devices
+    ]
     return page.Page(
         title=f"Sinusoids rendered by {names}",
         answer=" ".join(map(envelope_answer, result.devices)),
@@ -219,7 +222,12 @@ def _points_sections(result: Envelope) -> list[Section]:
     """Return the greatest waves of the surfaces, if any, and the laws that render each."""
     if not result.surfaces:
         return []
-    headings = ("surface", "wavelength", "amplitude", *[one.device.id for one in result.devices])
+    headings = (
+        "surface",
+        "wavelength",
+        "amplitude",
+        *[envelope.device.id for envelope in result.devices],
+    )
     rows = []
     for surface in result.surfaces:
         for index, wave in enumerate(surface.waves):

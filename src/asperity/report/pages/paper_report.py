@@ -80,7 +80,9 @@ def claims_page(
         sections += experiment_sections(experiments)
         guesses += [*experiments.passivity.fitted, *experiments.scanning.guessed]
         guesses += [*experiments.bump.guessed, *experiments.devices.guessed]
-    sections += [one for one in page.assumption_sections(guesses) if Media.HTML in one.media]
+    sections += [
+        section for section in page.assumption_sections(guesses) if Media.HTML in section.media
+    ]
     title = "“On the Synthesis of Haptic Textures”, claim by claim"
     facts = [(text.meaning, verdict) for verdict, text in VERDICT_TEXTS.items()]
     return Page(title, verdict_counts_text(results), facts, sections, sentence("claims"))
@@ -202,7 +204,7 @@ def _cycle_section(experiment: PassivityExperiment) -> Section:
     first = experiment.counts[0]
     notes = _fitted_notes(experiment.fitted)
     figure = partial(paper_pictures.cycles_figure, experiment)
-    counts = ", ".join([f"{one.cycles} with {one.wall}" for one in experiment.counts])
+    counts = ", ".join([f"{count.cycles} with {count.wall}" for count in experiment.counts])
     values: dict[str, Any] = {"lag": first.delay, "starts": first.starts, "counts": counts}
     return page.figure_section("paper.cycles", figure, notes, **values)
 
@@ -238,8 +240,8 @@ def _bump_section(experiment: BumpExperiment) -> Section:
     figure = partial(paper_pictures.bumps_figure, experiment)
     gains = "; ".join(
         [
-            f"{one.law} {energy_text(float(one.supplied[-1]))} ({one.entry})"
-            for one in experiment.bumps
+            f"{run.law} {energy_text(float(run.supplied[-1]))} ({run.entry})"
+            for run in experiment.bumps
         ]
     )
     notes = _fitted_notes(experiment.guessed)
@@ -254,14 +256,16 @@ def _device_section(experiments: Experiments) -> Section:
         notes.append(f"Few misses on the left are weak evidence: {summary}.")
     notes.append(f"Not simulated for lack of an apparent mass: {', '.join(devices.skipped)}.")
     count = len(devices.onsets)
-    missed = sum([one.catalogue_rule_missed for one in devices.onsets])
+    missed = sum([onset.catalogue_rule_missed for onset in devices.onsets])
     figure = partial(paper_pictures.devices_figure, experiments)
     return page.figure_section("paper.devices", figure, notes, missed=missed, count=count)
 
 
 def _device_table_section(experiment: DeviceExperiment) -> Section:
     headings = ("device", "surface", "law", "q", "K₀/q", "delay rule", "cycles", "starts", "depth")
-    rows = [Row(_device_cells(one), law=one.prediction.onset.law) for one in experiment.onsets]
+    rows = [
+        Row(_device_cells(onset), law=onset.prediction.onset.law) for onset in experiment.onsets
+    ]
     table = Table(headings, rows, numeric_columns=range(3, len(headings)))
     return Section("Devices in numbers", [table], notes=table_notes("paper_devices"))
 

@@ -103,7 +103,7 @@ def onset_page(result: OnsetSweep) -> Page:
 
 def onset_figure_section(name: str, predictions: Sequence[Prediction]) -> Section:
     """Return the figure of the onsets with the texts of a name."""
-    laws = ", ".join(dict.fromkeys([one.onset.law for one in predictions]))
+    laws = ", ".join(dict.fromkeys([prediction.onset.law for prediction in predictions]))
     return page.figure_section(name, partial(_draw_onsets, predictions), laws=laws)
 
 
@@ -115,7 +115,7 @@ def _draw_onsets(predictions: Sequence[Prediction]) -> Figure:
 
 def onset_section(title: str, predictions: Sequence[Prediction], caption: str = "") -> Section:
     """Return onsets and limits in numbers."""
-    rows = [Row(onset_cells(one), law=one.onset.law) for one in predictions]
+    rows = [Row(onset_cells(prediction), law=prediction.onset.law) for prediction in predictions]
     table = _sweep_table(_ONSET_HEADINGS, rows)
     return Section(title, [table], caption, table_notes("onsets"))
 
@@ -154,7 +154,7 @@ def strokes_page(result: StrokeSweep) -> Page:
     (note,) = table_notes("strokes")
     notes = [f"{note} The y axis is in the report and in the JSON."]
     notes += [f"Stopped: it {stop}" for stop in stops]
-    rows = [Row(stroke_cells(one), law=one.law) for one in strokes]
+    rows = [Row(stroke_cells(stroke), law=stroke.law) for stroke in strokes]
     table = _sweep_table(STROKE_HEADINGS, rows, omit=(STROKE_HEADINGS.index("y"),))
     return Page(
         title=f"Energy per stroke, {setup.device.name}",

@@ -271,7 +271,9 @@ def envelope_figure(result: Envelope) -> Figure:
             _draw_peaks(axes, surface, index, marker)
         shown = zip(*axes.get_legend_handles_labels(), strict=True)
         handles |= {label: handle for handle, label in shown}
-    ends = [x for one in result.devices for law in one.laws for x in law.borders if x.decades]
+    ends = [
+        x for envelope in result.devices for law in envelope.laws for x in law.borders if x.decades
+    ]
     least = min([border.felt_from for border in ends], default=1e-6) / 3.0
     panels[0].set_ylim(least * _MICRO, AMPLITUDE_RANGE[1] * _MICRO)
     labels = sorted(handles)

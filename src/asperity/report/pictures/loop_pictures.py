@@ -177,27 +177,31 @@ _DASHES = ("-", "--", ":", "-.")
 
 def onset_figure(predictions: Sequence[Prediction]) -> Figure:
     """Return onset stiffness against delay, one panel per law, with the predictions."""
-    laws = list(dict.fromkeys([one.onset.law for one in predictions]))
+    laws = list(dict.fromkeys([case.onset.law for case in predictions]))
     figure, panels = style.law_panels(len(laws), 2.3, 0.5, x="delay [samples]", y="stiffness [N/m]")
     for axes, law in zip(panels, laws, strict=True):
-        mine = [one for one in predictions if one.onset.law == law]
+        mine = [case for case in predictions if case.onset.law == law]
         proved = mine[0].conservative
         axes.set_yscale("log")
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-        delays = [one.onset.delay for one in mine]
+        delays = [case.onset.delay for case in mine]
         dashes = "-" if proved else ":"
         lines: list[tuple[str, list[float], dict[str, Any]]] = [
-            ("onset", [one.onset.value for one in mine], _line_style(style.BLUE, "-", 1.2, "o")),
-            ("delay rule", [one.delay_rule for one in mine], _line_style(style.GREEN, dashes)),
-            ("paper (1)", [one.paper_limit for one in mine], _line_style(style.MUTED, "--")),
-            ("K₀/q", [one.wall_rule or math.nan for one in mine], _line_style(style.ORANGE, "-.")),
+            ("onset", [case.onset.value for case in mine], _line_style(style.BLUE, "-", 1.2, "o")),
+            ("delay rule", [case.delay_rule for case in mine], _line_style(style.GREEN, dashes)),
+            ("paper (1)", [case.paper_limit for case in mine], _line_style(style.MUTED, "--")),
+            (
+                "K₀/q",
+                [case.wall_rule or math.nan for case in mine],
+                _line_style(style.ORANGE, "-."),
+            ),
         ]
         for name, values, options in lines:
             shown = np.array(values)
             shown[~(np.isfinite(shown) & (shown > 0.0))] = np.nan  # not on a logarithmic axis
             axes.plot(delays, shown, label=name, **options)
-        if any(one.onset.quiet == 0.0 for one in predictions):
-            below = [math.nan if one.onset.quiet else one.onset.cycling for one in mine]
+        if any(case.onset.quiet == 0.0 for case in predictions):
+            below = [math.nan if case.onset.quiet else case.onset.cycling for case in mine]
             options = _line_style(style.BLUE, "", marker="v") | {"ms": 8.0, "mfc": style.BACKGROUND}
             axes.plot(delays, below, label="the least tried", **options)
         style.set_panel_title(axes, law, "conservative" if proved else "not conservative: no proof")
@@ -216,7 +220,7 @@ def strokes_figure(strokes: Sequence[Stroke]) -> Figure:
     figure, panels = style.law_panels(
         len(laws), 2.3, 0.5, x="speed [m/s]", y="energy per stroke [mJ]", sharey=False
     )
-    totals = [abs(one.total) for one in strokes if math.isfinite(one.total)]
+    totals = [abs(stroke.total) for stroke in strokes if math.isfinite(stroke.total)]
     least = 1e3 * 0.01 * max(totals, default=1e-3)
     for axes, law in zip(panels, laws, strict=True):
         _draw_law_strokes(axes, [stroke for stroke in strokes if stroke.law == law])

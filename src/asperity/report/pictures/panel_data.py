@@ -201,7 +201,9 @@ def _resample_image(image: AxesImage, x: FloatArray, y: FloatArray) -> FloatArra
 
 def panels_to_json(panels: Sequence[Panel]) -> str:
     """Return panels as JSON without angle brackets, as it is embedded in a page."""
-    text = json.dumps([_panel_dict(one) for one in panels], allow_nan=False, separators=(",", ":"))
+    text = json.dumps(
+        [_panel_dict(panel) for panel in panels], allow_nan=False, separators=(",", ":")
+    )
     return text.replace("<", "\\u003c")
 
 
@@ -289,7 +291,9 @@ def ranges_text(panels: Sequence[Panel]) -> str:
     if len(points) > _MAX_LISTED_POINTS:
         parts.append(f"{len(points)} points")
     elif points:
-        listed = "; ".join([f"{one.name} at {one.x[0]:.3g}, {one.y[0]:.3g}" for one in points])
+        listed = "; ".join(
+            [f"{series.name} at {series.x[0]:.3g}, {series.y[0]:.3g}" for series in points]
+        )
         parts.append(f"{panels[0].x} and {panels[0].y}: {listed}")
     return "".join([f" {_start_sentence(part)}." for part in parts])
 

@@ -233,8 +233,8 @@ def energies_figure(experiment: ScanningExperiment) -> Figure:
 
 def bumps_figure(experiment: BumpExperiment) -> Figure:
     """Return path and energy over the bump, one row per entry."""
-    entries = list(dict.fromkeys([one.entry for one in experiment.bumps]))
-    laws = dict.fromkeys([one.law for one in experiment.bumps])
+    entries = list(dict.fromkeys([run.entry for run in experiment.bumps]))
+    laws = dict.fromkeys([run.law for run in experiment.bumps])
     colours = dict(zip(laws, _LAW_COLOURS * len(laws), strict=False))
     figure = style.new_figure(10.0, 2.8 * len(entries) + 0.4)
     grid: Any = figure.subplots(len(entries), 2, squeeze=False)
@@ -280,20 +280,27 @@ def devices_figure(experiments: Experiments) -> Figure:
     """Return onset against allowed stiffness for two rules, on logarithmic axes."""
     figure = style.new_figure(10.0, 5.2)
     left, right = figure.subplots(1, 2, sharex=True, sharey=True)
-    devices = dict.fromkeys([one.device for one in experiments.devices.onsets])
+    devices = dict.fromkeys([onset.device for onset in experiments.devices.onsets])
     markers = {**dict(zip(devices, "osD^vP*" * len(devices), strict=False)), _PAPER_DEVICE: "X"}
     wall_rule = [
-        _OnsetPoint(one.catalogue_rule, one.prediction, one.device, one.catalogue_rule_missed)
-        for one in experiments.devices.onsets
+        _OnsetPoint(
+            onset.catalogue_rule, onset.prediction, onset.device, onset.catalogue_rule_missed
+        )
+        for onset in experiments.devices.onsets
     ]
     wall_rule += [
-        _OnsetPoint(one.wall_rule or math.nan, one, _PAPER_DEVICE, one.violates_wall_rule)
-        for one in experiments.passivity.onsets
+        _OnsetPoint(
+            prediction.wall_rule or math.nan,
+            prediction,
+            _PAPER_DEVICE,
+            prediction.violates_wall_rule,
+        )
+        for prediction in experiments.passivity.onsets
     ]
     delay_rule = [
-        _OnsetPoint(one.delay_rule, one, device, one.violates_delay_rule)
-        for _allowed, one, device, _missed in wall_rule
-        if one.conservative
+        _OnsetPoint(prediction.delay_rule, prediction, device, prediction.violates_delay_rule)
+        for _allowed, prediction, device, _missed in wall_rule
+        if prediction.conservative
     ]
     for axes, points, name in ((left, wall_rule, "K₀/q"), (right, delay_rule, "delay rule")):
         _draw_rule(axes, points, markers)

@@ -166,11 +166,11 @@ def onset_answer(setup: Setup, predictions: Sequence[Prediction]) -> str:
     """Return the result in two sentences."""
     sentences = [_delay_rule_text(predictions)]
     step = setup.servo.position_resolution
-    if step and any(one.violates_delay_rule for one in predictions):
+    if step and any(prediction.violates_delay_rule for prediction in predictions):
         resolution = format_quantity(step, "m")
         sentences.append(f"The rule is proved for exact positions, not for steps of {resolution}.")
-    textured = [one for one in predictions if not one.onset.is_smooth_wall]
-    if any(one.wall_rule is not None for one in textured):
+    textured = [prediction for prediction in predictions if not prediction.onset.is_smooth_wall]
+    if any(prediction.wall_rule is not None for prediction in textured):
         sentences.append(_wall_rule_text(predictions))
     return " ".join(sentences)
 
@@ -190,7 +190,9 @@ def _delay_rule_text(predictions: Sequence[Prediction]) -> str:
 
 def _wall_rule_text(predictions: Sequence[Prediction]) -> str:
     """Return the cases that cycle below K₀/q."""
-    violating = [_case_name(one) for one in predictions if one.violates_wall_rule]
+    violating = [
+        _case_name(prediction) for prediction in predictions if prediction.violates_wall_rule
+    ]
     if violating:
         return f"K₀/q was too much for: {', '.join(violating)}."
     return "K₀/q was safe in all of them."
