@@ -133,11 +133,14 @@ def load_texture(  # noqa: D417 - the others are described where they are declar
 
 
 def _build_described(description: Mapping[str, Any]) -> Texture:
-    texture = _build_from_description(description)
-    if texture is None:
-        fault = f"is of a kind that is not known here: {description.get('kind')}"
+    """Return the texture of a registered kind from the arguments in its description."""
+    name = str(description.get("kind"))
+    if name not in CATALOGUE:
+        fault = f"is of a kind that is not known here: {name}"
         raise ParameterError("texture", f"{fault}; name its file as {{plugin}}", plugin=None)
-    return texture
+    kind = CATALOGUE[name]
+    names = [argument.name for argument in kind.arguments if argument.name in description]
+    return kind.factory(**{name: description[name] for name in names})
 
 
 _PATH = Argument("path", "the file, relative to the scene", form="path", required=True)
@@ -264,15 +267,3 @@ def _require_all(kind: TextureKind, arguments: dict[str, Any]) -> dict[str, Any]
             needs = f"is missing: a {kind.name} needs {', '.join(required)}"
             raise ParameterError(name, needs)
     return arguments
-
-
-def _build_from_description(description: Mapping[str, Any]) -> Texture | None:
-    """Return a texture of a registered kind from the arguments in its description."""
-    kind = CATALOGUE.get(str(description.get("kind")))
-    if kind is None:
-        return None
-    names = [argument.name for argument in kind.arguments if argument.name in description]
-    try:
-        return kind.factory(**{name: description[name] for name in names})
-    except (TypeError, ValueError, ParameterError):
-        return None

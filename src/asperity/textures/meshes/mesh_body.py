@@ -81,21 +81,20 @@ class MeshBody:
         if not np.isfinite(vertices).all():
             raise SurfaceFileError(f"{name} has corners that are not finite numbers")
         vertices, faces = merge_vertices(vertices, faces)
-        before = find_faults(vertices, faces)
-        after = before
-        repaired = False
-        if repair and _unsound(before):
+        faults = find_faults(vertices, faces)
+        repaired: list[MeshFault] = []
+        if repair and _unsound(faults):
+            repaired = faults
             vertices, faces = _repair(vertices, faces)
-            after = find_faults(vertices, faces)
-            repaired = True
-        if wrong := _unsound(after):
+            faults = find_faults(vertices, faces)
+        if _unsound(faults):
             tried = " after the repair" if repaired else "; the repair option may close and turn it"
-            faults = "; ".join(map(str, wrong))
-            raise SurfaceFileError(f"{name} has no defined inside{tried}: {faults}")
+            reasons = "; ".join(map(str, _unsound(faults)))
+            raise SurfaceFileError(f"{name} has no defined inside{tried}: {reasons}")
         triangles = vertices[faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]]
         if not np.ptp(triangles.reshape(-1, 3), axis=0).all():
             raise SurfaceFileError(f"{name} is flat: it encloses no volume")
-        return cls(triangles, name, tuple(after), tuple(before if repaired else ()))
+        return cls(triangles, name, tuple(faults), tuple(repaired))
 
 
 def _unsound(faults: Sequence[MeshFault]) -> list[MeshFault]:
