@@ -116,16 +116,6 @@ def test_record_is_converted_by_its_fields_or_by_named_attributes() -> None:
     assert list(attributes_to_dict(outer, "size", "name").items()) == [("size", 1), ("name", "o")]
 
 
-def test_serialized_attributes_select_and_order_the_data() -> None:
-    class Short(Outer):
-        serialized_attributes = "size name"
-
-    assert list(Short("o", Inner(1.0, (2.0, 3.0))).to_dict().items()) == [
-        ("size", 0),
-        ("name", "o"),
-    ]
-
-
 def test_omitted_fields_are_not_written_and_marked_properties_are() -> None:
     @dataclass(frozen=True)
     class Marked(Outer):

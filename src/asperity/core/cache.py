@@ -60,8 +60,9 @@ class CacheWarning(UserWarning):
 
 def cache_folder() -> Path:
     """Return the cache folder, whether or not it exists."""
-    if chosen := os.environ.get(_FOLDER_VARIABLE):
-        return Path(chosen)
+    folder = os.environ.get(_FOLDER_VARIABLE)
+    if folder:
+        return Path(folder)
     from platformdirs import user_cache_path
 
     try:
@@ -77,7 +78,9 @@ def size_limit() -> int:
         ParameterError: for a value that is not a size.
     """
     value = os.environ.get(_SIZE_VARIABLE)
-    return parse_size(_SIZE_VARIABLE, value) if value else DEFAULT_SIZE_LIMIT
+    if not value:
+        return DEFAULT_SIZE_LIMIT
+    return parse_size(_SIZE_VARIABLE, value)
 
 
 @contextmanager
@@ -125,8 +128,9 @@ def list_entries() -> list[CacheEntry]:
     for path in paths:
         if _ENTRY_NAME.fullmatch(path.name):
             with suppress(OSError):  # another process may have deleted it
-                found = path.stat()
-                entries.append(CacheEntry(path.parent.name, path, found.st_size, found.st_mtime_ns))
+                status = path.stat()
+                namespace = path.parent.name
+                entries.append(CacheEntry(namespace, path, status.st_size, status.st_mtime_ns))
     return entries
 
 

@@ -182,17 +182,18 @@ def check_points(name: str, value: ArrayLike, width: int, unit: str) -> Points:
         >>> check_points("xy", [[0, 1]], 2, "m").is_single
         False
     """
-    plain = type(value) is np.ndarray and value.dtype is _FLOAT and value.flags.c_contiguous
-    given: Any = value if plain else _to_float_array(name, value, _point_shape_text(width), unit)
-    shape = given.shape
-    item = given.item
-    single = shape == (width,)
+    rows: Any = value
+    if not (type(value) is np.ndarray and value.dtype is _FLOAT and value.flags.c_contiguous):
+        rows = _to_float_array(name, value, _point_shape_text(width), unit)
+    single = rows.shape == (width,)
+    if single:
+        rows = rows[None]
     # Single points are checked inside loops: their two or three values are finite if the sum is.
-    if single or shape == (1, width):
+    if rows.shape == (1, width):
+        item = rows.item
         total: float = item(0) + item(1) + item(-1)
         if total - total == 0.0:
-            return Points(given[None] if single else given, single)
-    rows = given[None] if single else given
+            return Points(rows, single)
     return Points(
         _check_shape_and_values(name, rows, (None, width), _point_shape_text(width), unit), single
     )
@@ -204,12 +205,12 @@ def _point_shape_text(width: int) -> str:
 
 def _to_float_array(name: str, value: ArrayLike, shape_text: str, unit: str) -> FloatArray:
     try:
-        given = np.asarray(value)
+        array = np.asarray(value)
     except (TypeError, ValueError):  # rows of different length
-        given = np.array(None)
-    if given.dtype.kind not in "fiu" and given.size:
+        array = np.array(None)
+    if array.dtype.kind not in "fiu" and array.size:
         raise ParameterError(name, f"must be numbers of shape {shape_text} [{unit}]")
-    return np.ascontiguousarray(given, dtype=np.float64)
+    return np.ascontiguousarray(array, dtype=np.float64)
 
 
 def _check_shape_and_values(
@@ -217,8 +218,8 @@ def _check_shape_and_values(
 ) -> FloatArray:
     """Return the values if they are finite and of the shape."""
     fits = values.ndim == len(shape)
-    for wanted, length in zip(shape, values.shape, strict=False):
-        fits = fits and wanted in (None, length)
+    for required, length in zip(shape, values.shape, strict=False):
+        fits = fits and required in (None, length)
     if not fits:
         raise ParameterError(name, f"must have shape {shape_text} [{unit}]", values.shape)
     if not np.isfinite(values).all():

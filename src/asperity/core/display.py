@@ -165,6 +165,6 @@ class Tabular(ABC):
         try:
             import pandas
         except ImportError:
-            words = "needs pandas: pip install pandas; or use table_rows()"
-            raise ParameterError("to_dataframe", words) from None
+            requirement = "needs pandas: pip install pandas; or use table_rows()"
+            raise ParameterError("to_dataframe", requirement) from None
         return pandas.DataFrame(self.table_rows())

@@ -21,7 +21,7 @@ from functools import lru_cache
 from importlib.metadata import version
 from io import BufferedReader, FileIO
 from pathlib import Path
-from typing import IO, Any, ClassVar, TypeVar, overload
+from typing import IO, Any, TypeVar, overload
 
 from asperity.core.errors import ParameterError, escape_unprintable
 
@@ -189,10 +189,10 @@ def append_bytes(name: str, stream: FileIO, content: bytes, *, durable: bool = F
         ParameterError: if it cannot be written; what was in the file before stays.
     """
     end = os.fstat(stream.fileno()).st_size
-    left = memoryview(content)
+    remaining = memoryview(content)
     try:
-        while left:  # the disk may have room for a part
-            left = left[stream.write(left) :]
+        while remaining:  # the disk may have room for a part
+            remaining = remaining[stream.write(remaining) :]
         if durable:
             os.fsync(stream.fileno())
     except OSError as error:
@@ -335,18 +335,11 @@ def written_names(cls: type) -> tuple[str, ...]:
 
 
 class Serializable:
-    """Mixin for dataclasses that are written as plain data; see :func:`written_names`.
-
-    Attributes:
-        serialized_attributes: names of the attributes to write, in order, separated by spaces;
-            empty for those of :func:`written_names`.
-    """
-
-    serialized_attributes: ClassVar[str] = ""
+    """Mixin for dataclasses that are written as plain data; see :func:`written_names`."""
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data in SI units; infinity is the string "inf", an unknown value None."""
-        return attributes_to_dict(self, *self.serialized_attributes.split())
+        return attributes_to_dict(self)
 
 
 def check_not_existing(name: str, path: str | os.PathLike[str], *, force: bool) -> None:

@@ -93,11 +93,11 @@ def require_memory(*counts: int) -> None:
     points = math.prod(counts)
     if budget is None or points <= budget.max_points:
         return
-    wanted = f"must be about {_format_size(budget.base + _BYTES_PER_POINT * points)}"
-    given = f"{_format_size(budget.limit)} are {budget.source}"
+    needed = f"must be about {_format_size(budget.base + _BYTES_PER_POINT * points)}"
+    available = f"{_format_size(budget.limit)} are {budget.source}"
     count = " x ".join(map(str, counts))
     advice = _suggest_size(points, budget, len(counts))
-    raise ParameterError("memory", f"{wanted} for {count} points, {given}; {advice}")
+    raise ParameterError("memory", f"{needed} for {count} points, {available}; {advice}")
 
 
 def _suggest_size(points: int, budget: MemoryBudget, axes: int) -> str:

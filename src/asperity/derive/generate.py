@@ -67,14 +67,14 @@ def law_source(law: Law) -> str:
     force = list(d.force)
     jacobian = list(d.jacobian)
     saturated = list(d.jacobian_saturated)
-    both = "Force [N] and Jacobian [N/m]: fx, fy, fz, then J row by row."
-    fixed = "Jacobian [N/m], row by row, where a clamp holds the depth constant."
+    both_text = "Force [N] and Jacobian [N/m]: fx, fy, fz, then J row by row."
+    fixed_text = "Jacobian [N/m], row by row, where a clamp holds the depth constant."
     parts = [
         function_source(d, "law_force", force, "Force on the probe: fx, fy, fz [N]."),
-        function_source(d, "law_jacobian", force + jacobian, both),
+        function_source(d, "law_jacobian", force + jacobian, both_text),
     ]
     if law.clampable:
-        parts.append(function_source(d, "law_jacobian_saturated", saturated, fixed))
+        parts.append(function_source(d, "law_jacobian_saturated", saturated, fixed_text))
     return "\n\n".join(parts)
 
 

@@ -152,11 +152,11 @@ def _check_text(name: str, value: Any) -> str:
 
 
 def _check_forces(data: Mapping[str, Datum]) -> None:
-    most = data.get("max_force")
-    lasting = data.get("continuous_force")
-    if most is not None and lasting is not None and lasting.value > most.value:
-        limit = f"must not be greater than max_force, {most.text}"
-        raise ParameterError("device.continuous_force", limit, lasting.text)
+    peak = data.get("max_force")
+    continuous = data.get("continuous_force")
+    if peak is not None and continuous is not None and continuous.value > peak.value:
+        limit = f"must not be greater than max_force, {peak.text}"
+        raise ParameterError("device.continuous_force", limit, continuous.text)
 
 
 def _parse_datum(field: str, value: Any, from_file: bool, is_nested: bool = False) -> Datum:

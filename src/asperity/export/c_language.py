@@ -275,4 +275,4 @@ def fill_template(text: str, values: Mapping[str, str]) -> str:
         >>> fill_template("void @name@_reset(void);", {"name": "texture"})
         'void texture_reset(void);'
     """
-    return re.sub(r"@(\w+)@", lambda found: values[found[1]], text)
+    return re.sub(r"@(\w+)@", lambda match: values[match[1]], text)

@@ -149,13 +149,13 @@ class Program:
 
     def _unique_name(self, name: str) -> str:
         """Return a unique name with the prefix."""
-        whole = name
+        unique = name
         number = 1
-        while whole in self._used_names:
+        while unique in self._used_names:
             number += 1
-            whole = f"{name}_{number}"
-        self._used_names.add(whole)
-        return f"{self.prefix}_{whole}"
+            unique = f"{name}_{number}"
+        self._used_names.add(unique)
+        return f"{self.prefix}_{unique}"
 
     # --- tuples -------------------------------------------------------------------------------
 

@@ -99,9 +99,9 @@ def distribute_parameters(
 
 
 def _find_registered(name: str) -> Law | None:
-    wanted = _normalized_name(name)
+    normalized = _normalized_name(name)
     for law in REGISTERED_LAWS.values():
-        if wanted in {_normalized_name(law.letter), _normalized_name(law.name)}:
+        if normalized in {_normalized_name(law.letter), _normalized_name(law.name)}:
             return law
     return None
 

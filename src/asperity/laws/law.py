@@ -101,8 +101,8 @@ class Law:
             raise LawError(f"law {self.letter}: a law with state must be on the {names} contact")
         missing = [name for name in self.contact.parameters if name not in self.arguments]
         if missing:
-            words = f"a law on the {self.contact} contact must have the parameter {missing[0]}"
-            raise LawError(f"law {self.letter}: {words}")
+            reason = f"a law on the {self.contact} contact must have the parameter {missing[0]}"
+            raise LawError(f"law {self.letter}: {reason}")
         if not callable(self.force):
             raise LawError(f"law {self.letter}: force must be a function of the contact symbols")
 
@@ -134,8 +134,8 @@ def _find_contact(letter: str, contact: str | Contact) -> Contact:
         return contact
     if not isinstance(contact, str) or contact not in CONTACTS:
         hint = suggest_names(str(contact), CONTACTS)
-        words = f"contact must be one of {', '.join(CONTACTS)} or a Contact, got {contact!r}"
-        raise LawError(f"law {letter}: {words}; {hint}")
+        reason = f"contact must be one of {', '.join(CONTACTS)} or a Contact, got {contact!r}"
+        raise LawError(f"law {letter}: {reason}; {hint}")
     return CONTACTS[contact]
 
 

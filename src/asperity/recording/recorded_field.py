@@ -155,6 +155,6 @@ def _sampler_module(name: str) -> ModuleType:
     if module is None and name.startswith(_PACKAGE_PREFIX):
         module = importlib.import_module(name)
     if not hasattr(module, "KERNELS"):
-        words = f"has a texture of an unknown kind ({name})"
-        raise ParameterError("recording", f"{words}: name its file as {{plugin}}", plugin=None)
+        reason = f"has a texture of an unknown kind ({name})"
+        raise ParameterError("recording", f"{reason}: name its file as {{plugin}}", plugin=None)
     return module  # type: ignore[return-value]  # None has no KERNELS

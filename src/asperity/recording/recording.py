@@ -7,12 +7,10 @@ import os
 import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from asperity.core.checks import FloatArray
 from asperity.core.display import Plottable
@@ -76,47 +74,19 @@ class Recording(Plottable):
         Raises:
             ParameterError: if the file is gone, or a block is damaged.
         """
-        return self._read_blocks(0, len(self._chunks))
-
-    def _read_blocks(self, start: int, end: int) -> Iterator[FloatArray]:
+        rows = 0
         with _open_file(self.path) as stream:
-            for number in range(start, end):
-                yield self._read_block(stream, number)
-
-    def row_range(self, start: int, end: int) -> FloatArray:
-        """Return the rows from one to another, which is not among them; no others are read.
-
-        Raises:
-            ParameterError: see :meth:`blocks`.
-        """
-        start = max(start, 0)
-        end = min(end, self.rows)
-        if start >= end:
-            return np.empty((0, len(self.columns)))
-        first, last = self._chunk_starts.searchsorted([start, end - 1], "right")
-        begin = int(self._chunk_starts[first - 1])
-        table = np.concatenate([*self._read_blocks(int(first) - 1, int(last))])
-        return table[start - begin : end - begin]
-
-    @cached_property
-    def _chunk_starts(self) -> NDArray[np.int64]:
-        """Number of the first row of each block."""
-        size = row_encoding.row_type(len(self.columns)).itemsize
-        ends = np.cumsum([chunk.size // size for chunk in self._chunks], dtype=np.int64)
-        return np.concatenate([np.zeros(1, np.int64), ends])[:-1]
-
-    def _read_block(self, stream: IO[bytes], number: int) -> FloatArray:
-        """Return the rows of a block."""
-        chunk = self._chunks[number]
-        first_row = self._chunk_starts[number]
-        stream.seek(chunk.rows_start)
-        data = stream.read(chunk.size)
-        if zlib.crc32(data) != chunk.checksum:
-            raise _unreadable_error(self.path, f"the block after row {first_row} is damaged")
-        try:
-            return row_encoding.message_values(data, len(self.columns))
-        except mcap.DamagedError as error:
-            raise _unreadable_error(self.path, str(error)) from None
+            for chunk in self._chunks:
+                stream.seek(chunk.rows_start)
+                data = stream.read(chunk.size)
+                if zlib.crc32(data) != chunk.checksum:
+                    raise _unreadable_error(self.path, f"the block after row {rows} is damaged")
+                try:
+                    block = row_encoding.message_values(data, len(self.columns))
+                except mcap.DamagedError as error:
+                    raise _unreadable_error(self.path, str(error)) from None
+                yield block
+                rows += len(block)
 
     def table(self, max_rows: int | None = None) -> FloatArray:
         """Return the rows, shape (rows, columns).

@@ -61,8 +61,9 @@ def _write_mat(recording: Recording, stream: IO[bytes], progress: Progress) -> N
     from scipy.io import savemat
 
     if recording.rows * 8 > _MAX_MAT_BYTES:
-        most = _MAX_MAT_BYTES // 8
-        raise ParameterError("output", f"has room for {most} rows in .mat, not {recording.rows}")
+        max_rows = _MAX_MAT_BYTES // 8
+        requirement = f"has room for {max_rows} rows in .mat, not {recording.rows}"
+        raise ParameterError("output", requirement)
     table = recording.table()
     progress(0.5)
     columns = {_variable_name(name): table[:, [i]] for i, name in enumerate(recording.names)}
@@ -99,8 +100,8 @@ def import_pyarrow() -> Any:
     try:
         import pyarrow
     except ImportError:
-        words = "needs pyarrow for .parquet: pip install 'asperity[parquet]'"
-        raise ParameterError("output", words) from None
+        requirement = "needs pyarrow for .parquet: pip install 'asperity[parquet]'"
+        raise ParameterError("output", requirement) from None
     return pyarrow
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from asperity.core.cache import get_or_compute_each
 from asperity.core.checks import FloatArray, check_array, check_positive
 from asperity.core.errors import ParameterError
 from asperity.core.files import (
+    OMITTED,
     Serializable,
     attributes_to_dict,
     is_shipped,
@@ -58,8 +59,6 @@ class Onset(Serializable):
         is_smooth_wall: whether the law is the smooth wall.
     """
 
-    serialized_attributes = "law delay quiet cycling starts cycles low high"
-
     law: str
     delay: int
     quiet: float
@@ -68,7 +67,7 @@ class Onset(Serializable):
     cycles: int
     low: tuple[float, float, float]
     high: tuple[float, float, float]
-    is_smooth_wall: bool = False
+    is_smooth_wall: bool = field(default=False, metadata=OMITTED)
 
     @property
     def value(self) -> float:
