@@ -15,7 +15,7 @@ from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
 from asperity.devices import FIELD_TABLE, Device, load_device
-from asperity.report.sentences.device_text import missing_fields, verified_text
+from asperity.report.sentences.analysis_text import missing_fields, verified_text
 from asperity.servo.driver import AWAY, RIGHT, TOWARDS, UP, WALL_AXES, Driver, Vector
 from asperity.servo.drivers.driver_registry import DRIVER_KINDS
 

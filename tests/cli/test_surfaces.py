@@ -18,7 +18,7 @@ from asperity.cli.surface_commands import surfaces_command
 from asperity.core.errors import ParameterError
 from asperity.core.units import parse_quantity
 from asperity.report.document.html import render_page
-from asperity.report.pages.surface_gallery import find_surfaces, surfaces_page
+from asperity.report.pages.catalogue_report import find_surfaces, surfaces_page
 from asperity.report.pictures.style import svg_text
 from asperity.report.pictures.surface_pictures import gallery_figure
 from asperity.scene import TEXTURE_KINDS, load_scene

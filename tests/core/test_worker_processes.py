@@ -27,7 +27,7 @@ from asperity.core.files import json_text
 from asperity.paper.cycle_experiments import band_setup
 from asperity.report import html_text
 from asperity.report.document.html import RenderedPicture
-from asperity.report.pages.surface_gallery import find_surfaces
+from asperity.report.pages.catalogue_report import find_surfaces
 from asperity.scene import sweeps
 from asperity.textures import Sinusoid
 from asperity.textures.catalogue import CATALOGUE

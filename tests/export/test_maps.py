@@ -23,7 +23,7 @@ from asperity.export.surface_maps import (
     sample_map,
 )
 from asperity.measured.reading import read_surface
-from asperity.report.sentences.map_text import describe_shading
+from asperity.report.sentences.surface_text import describe_shading
 
 RNG = np.random.default_rng(4)
 ROUGH = asp.HeightMap(2e-5 * RNG.normal(size=(24, 37)) + 3e-3, (1.3e-5, 2.9e-5), origin=(1e-3, 0.0))

@@ -16,9 +16,9 @@ from asperity.paper.experiments import Experiments, bump_experiment, scanning_ex
 from asperity.report import html_text
 from asperity.report.document.html import render_page
 from asperity.report.document.page import Page
+from asperity.report.pages.catalogue_report import find_surfaces, surfaces_page
 from asperity.report.pages.paper_report import experiment_sections
 from asperity.report.pages.run_report import run_page
-from asperity.report.pages.surface_gallery import find_surfaces, surfaces_page
 from asperity.scene import load_scene
 from asperity.scene.setup import make_setup
 from asperity.surface import Surface

@@ -154,7 +154,7 @@ def devices_command(names: tuple[str, ...], outputs: Outputs, *, template: bool)
     """
     from asperity.devices import device_names, load_device
     from asperity.devices.device_file import device_template
-    from asperity.report.pages.device_report import devices_page
+    from asperity.report.pages.catalogue_report import devices_page
 
     if template:
         if names or outputs.json:

@@ -37,7 +37,7 @@ def surfaces_command(names: tuple[str, ...], outputs: Outputs) -> None:
     With NAMEs, show details. Other commands accept these names as SURFACE, with arguments after a
     colon: cloth, sandpaper:grit=P60, noise:rms=20um,size=10mm.
     """
-    from asperity.report.pages.surface_gallery import find_surfaces, surfaces_page
+    from asperity.report.pages.catalogue_report import find_surfaces, surfaces_page
 
     surfaces = find_surfaces(names)
     page = surfaces_page(surfaces, detailed=bool(names), command="asperity compare")
@@ -296,10 +296,14 @@ def maps_command(
 def _describe_map(
     texture: Texture, sampled: SampledMap, suffix: str, normals: str | None, stiffness: float | None
 ) -> list[str]:
-    from asperity.report.sentences import map_text
+    from asperity.report.sentences import surface_text
 
     if normals is None:
-        return [map_text.describe_map(sampled), map_text.describe_heights(sampled, suffix)]
+        return [surface_text.describe_map(sampled), surface_text.describe_heights(sampled, suffix)]
     with progress_bar("analyzing law G"):
-        shading = map_text.describe_shading(texture, stiffness)
-    return [map_text.describe_map(sampled), map_text.describe_normals(sampled, normals), shading]
+        shading = surface_text.describe_shading(texture, stiffness)
+    return [
+        surface_text.describe_map(sampled),
+        surface_text.describe_normals(sampled, normals),
+        shading,
+    ]

@@ -26,9 +26,9 @@ from asperity.report.document.html import Origin, render_notebook, render_page
 from asperity.report.document.page import Page, Picture, notebook_page, plot_later
 from asperity.report.document.terminal import page_renderables
 from asperity.report.pages.analysis_report import analysis_page, criteria_table
+from asperity.report.pages.catalogue_report import device_page
 from asperity.report.pages.comparison_columns import comparison_table as comparison_table
 from asperity.report.pages.comparison_report import comparison_page, comparisons_page, design_page
-from asperity.report.pages.device_report import device_page
 from asperity.report.pages.limits_report import envelope_page, limits_page
 from asperity.report.pages.measured_report import surface_summary_page
 from asperity.report.sentences.catalogue import describe as describe

@@ -14,7 +14,7 @@ from asperity.laws import LAWS, SHIPPED_LAW_ARGUMENTS
 from asperity.laws.clamps import NONE
 from asperity.report.document import page
 from asperity.report.document.page import HEADED, Cell, Media, Row, Section, Table, TableLayout
-from asperity.report.pages.device_report import device_numbers_table
+from asperity.report.pages.catalogue_report import device_numbers_table
 from asperity.report.sentences import number_text
 from asperity.report.sentences.analysis_text import (
     bound_notes,

@@ -14,10 +14,11 @@ from asperity.envelopes.find_design import Design
 from asperity.envelopes.searches import MET
 from asperity.report.document import page
 from asperity.report.document.page import Cell, Media, Page, Row, Section, Table, TableLayout
+from asperity.report.pages.catalogue_report import device_numbers_table
 from asperity.report.pages.comparison_columns import law_rows, law_sections, terminal_sections
-from asperity.report.pages.device_report import device_numbers_table
 from asperity.report.pages.measured_report import measured_sections, thin_sections
 from asperity.report.sentences import limit_sentences
+from asperity.report.sentences.analysis_text import datum_text
 from asperity.report.sentences.comparison_text import (
     design_answer,
     field_alt_text,
@@ -30,7 +31,6 @@ from asperity.report.sentences.comparison_text import (
     spectrum_alt_text,
     surface_alt_text,
 )
-from asperity.report.sentences.device_text import datum_text
 from asperity.report.sentences.limit_sentences import percent
 from asperity.report.sentences.number_text import (
     NOT_AVAILABLE,

@@ -23,7 +23,7 @@ from asperity.report.document.page import (
     Table,
     TableLayout,
 )
-from asperity.report.pages.device_report import device_numbers_table
+from asperity.report.pages.catalogue_report import device_numbers_table
 from asperity.report.sentences import limit_sentences
 from asperity.report.sentences.analysis_text import (
     amplitude_range_text,
