@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import runpy
 import shutil
 from pathlib import Path
 from typing import Any
@@ -84,15 +85,15 @@ def test_onsets_and_strokes_of_a_scene(call: Call, tmp_path: Path) -> None:
     assert rows[0]["energy per stroke [J]"] != rows[1]["energy per stroke [J]"]
 
 
-def test_a_run_of_a_plugin_and_errors_as_rows(
+def test_errors_are_rows_of_the_table(
     call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.delitem(RUN_KINDS, "counting", raising=False)  # of tests in this process
+    monkeypatch.setitem(RUN_KINDS, "counting", runpy.run_path(COUNTING)["COUNTING"])
     scene = tmp_path / "scene.toml"
     scene.write_text('[texture]\nkind = "sinusoid"\namplitude = "0.1 mm"\nperiod = "1 mm"\n')
     vary = ("--vary", "texture.kind=sinusoid,cloth")
     code, out, err = call(
-        str(scene), *vary, "--run", "counting", "--plugin", COUNTING, "-o", str(tmp_path / "run"),
+        str(scene), *vary, "--run", "counting", "-o", str(tmp_path / "run"),
         "--jobs", "1", width=150,
     )  # fmt: skip
     assert (code, err) == (0, "")
@@ -100,8 +101,8 @@ def test_a_run_of_a_plugin_and_errors_as_rows(
     assert "cloth.amplitude is unknown" in out
     rows = read_csv(tmp_path / "run" / "table.csv")
     assert [bool(row["error"]) for row in rows] == [False, True]
-    code, _, err = call(str(scene), *vary, "--run", "counting")
-    assert (code, "run is unknown: 'counting'" in err) == (2, True)
+    code, _, err = call(str(scene), *vary, "--run", "counted")
+    assert (code, "run is unknown: 'counted'" in err) == (2, True)
 
 
 @pytest.mark.parametrize(

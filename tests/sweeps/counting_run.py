@@ -1,4 +1,4 @@
-"""A run for tests, registered with runpy or as a plugin: cheap, counted, and it fails when told to.
+"""A run for tests, added with runpy: cheap, counted, and it fails when told to.
 
 Environment: SWEEP_LOG, a file to which each computed case appends the number of its texture's
 period; SWEEP_PAUSE, the time of a case [s].

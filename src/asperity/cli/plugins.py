@@ -70,7 +70,6 @@ def plugin_registries() -> tuple[PluginRegistry, ...]:
     from asperity.measured.reading import Reader, readers
     from asperity.servo.driver import DriverKind
     from asperity.servo.drivers import driver_registry
-    from asperity.sweeps import case_runs
     from asperity.textures import catalogue
     from asperity.textures.texture import TextureKind
 
@@ -79,7 +78,6 @@ def plugin_registries() -> tuple[PluginRegistry, ...]:
         PluginRegistry(catalogue.CATALOGUE, TextureKind, catalogue.register),
         PluginRegistry(readers.USER_READERS, Reader, readers.register),
         PluginRegistry(driver_registry.DRIVER_KINDS, DriverKind, driver_registry.register_driver),
-        PluginRegistry(case_runs.RUN_KINDS, case_runs.RunKind, case_runs.register_run),
         PluginRegistry(CRITERIA),
         PluginRegistry(THEOREMS),
     )

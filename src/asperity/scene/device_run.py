@@ -60,11 +60,15 @@ def recommend_law_and_stiffness(
     Raises:
         ParameterError: if nothing can be recommended.
     """
-    laws = [find_law(surface["law"])] if "law" in surface else list(REGISTERED_LAWS.values())
+    laws = list(REGISTERED_LAWS.values())
+    if "law" in surface:
+        laws = [find_law(surface["law"])]
     keywords = surface_keywords(surface, *laws)
     keywords.pop("law", None)
     result = compare(texture, device, laws, progress=progress, **keywords)
-    row = result.rows[0] if "law" in surface else result.recommended_row or result.nearest_row
+    row = result.recommended_row or result.nearest_row
+    if "law" in surface:
+        row = result.rows[0]
     if row is None:
         raise ParameterError("law", f"is missing, and none is recommended: {result.recommendation}")
     chosen = {**surface, "law": row.law}

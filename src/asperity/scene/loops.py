@@ -42,7 +42,9 @@ def as_scene(scene: SceneLike) -> Scene:
     """Return the scene of a path, or the scene itself."""
     if not isinstance(scene, (Scene, str, os.PathLike)):
         raise ParameterError("scene", "must be the path of a scene file, or a Scene", scene)
-    return scene if isinstance(scene, Scene) else load_scene(os.fspath(scene))
+    if isinstance(scene, Scene):
+        return scene
+    return load_scene(os.fspath(scene))
 
 
 def make_loop(
@@ -64,20 +66,28 @@ def make_loop(
         options: further arguments of :func:`~asperity.scene.setup.make_setup`.
     """
     loaded = as_scene(scene)
-    # The law of the surface is replaced by each of a sweep.
-    surface = {**loaded.surface, **({"law": "W"} if laws else {}), **arguments}
-    used = laws or ([find_law(surface["law"])] if "law" in surface else [])
-    accepted = {argument.name for argument in SURFACE_FIELDS} - ({"law"} if laws else set())
+    surface = {**loaded.surface, **arguments}
+    accepted = {argument.name for argument in SURFACE_FIELDS}
+    used = list(laws)
+    if laws:
+        # The law of the surface is replaced by each of a sweep.
+        surface = {**loaded.surface, "law": "W", **arguments}
+        accepted.remove("law")
+    elif "law" in surface:
+        used = [find_law(surface["law"])]
     known = registered_arguments([*REGISTERED_LAWS.values(), *used])
     check_keywords(arguments, accepted.union(known), function)
     check_parameters_apply(arguments, used)
-    chosen = None if device is None else load_device(device)
-    return make_setup(loaded, surface=surface, device=chosen, laws=laws, **options)
+    if device is not None:
+        device = load_device(device)
+    return make_setup(loaded, surface=surface, device=device, laws=laws, **options)
 
 
 def _find_laws(laws: Laws | None) -> tuple[Law, ...]:
     """Return the laws of a sweep; all registered ones by default."""
-    return tuple(REGISTERED_LAWS.values()) if laws is None else find_laws(laws)
+    if laws is None:
+        return tuple(REGISTERED_LAWS.values())
+    return find_laws(laws)
 
 
 def simulate(

@@ -41,12 +41,13 @@ def scene_arguments(
         "servo": safety.ARGUMENTS,
     }
     for section, known in _KINDS.items():
-        given = sections.get(section, {}).get("kind", "")
-        names = {str(given), *(kinds or {}).get(section, ())}
-        kind = Argument("kind", f"kind of {section}", form="text", choices=tuple(known))
-        own = [one for name in names if name in known for one in known[name].arguments]
-        shared = SYNTHETIC_ARGUMENTS if section == "texture" and names - {"file"} else ()
-        arguments[section] = (kind, *shared, *own)
+        names = {str(sections.get(section, {}).get("kind", "")), *(kinds or {}).get(section, ())}
+        declared = [Argument("kind", f"kind of {section}", form="text", choices=tuple(known))]
+        if section == "texture" and names - {"file"}:
+            declared += SYNTHETIC_ARGUMENTS
+        for name in names & known.keys():
+            declared += known[name].arguments
+        arguments[section] = declared
     return {
         f"{section}.{argument.name}": replace(argument, name=f"{section}.{argument.name}")
         for section, declared in arguments.items()
@@ -61,13 +62,15 @@ def find_scene_argument(key: str, arguments: Mapping[str, Argument]) -> Argument
         ParameterError: for an unknown key, with the nearest ones.
     """
     name = key.strip().replace("-", "_")
-    name = DEVICE_ID.name if name == "device" else name
-    if name not in arguments:
-        mine = [one for one in arguments if one.startswith(f"{name.partition('.')[0]}.")]
-        near, _, names = suggest_names(name, arguments).partition("known: ")
-        listed = ", ".join(mine) if mine else f"the keys of a scene, such as {names[:60]} ..."
-        raise ParameterError("vary", f"names no key of the scene: {name}; {near}known: {listed}")
-    return arguments[name]
+    if name == "device":
+        name = DEVICE_ID.name
+    if name in arguments:
+        return arguments[name]
+    section = name.partition(".")[0]
+    of_section = [key for key in arguments if key.startswith(f"{section}.")]
+    near, _, names = suggest_names(name, arguments).partition("known: ")
+    listed = ", ".join(of_section) or f"the keys of a scene, such as {names[:60]} ..."
+    raise ParameterError("vary", f"names no key of the scene: {name}; {near}known: {listed}")
 
 
 def find_varied_arguments(
@@ -85,13 +88,13 @@ def find_varied_arguments(
     """
     kinds = {key.removesuffix(".kind"): values for key, values in vary.items()}
     known = scene_arguments(sections, kinds)
-    found: dict[str, Argument] = {}
+    varied: dict[str, Argument] = {}
     for key in (*vary, *others):
         argument = find_scene_argument(key, known)
-        if argument in found.values():
+        if argument in varied.values():
             raise ParameterError("vary", f"names a key twice: {argument.name}")
-        found[key] = argument
-    return found
+        varied[key] = argument
+    return varied
 
 
 def with_values(
@@ -119,6 +122,7 @@ _HAND = {"stiffness": '["300 N/m", "300 N/m", "0 N/m"]', "damping": '"3 N*s/m"',
 _MOTION = {"start": '["-10 mm", "0 mm", "0 mm"]', "end": '["10 mm", "0 mm", "0 mm"]',
            "speed": '"0.05 m/s"', "count": "2"}  # fmt: skip
 _AXIS_COUNTS = {"space": 3, "plane": 2}
+_FIXED_EXAMPLES = {"switch": "true", "vector": "[1, 0]"}
 
 
 def scene_template(name: str = "scene.toml") -> str:
@@ -134,7 +138,7 @@ def scene_template(name: str = "scene.toml") -> str:
     sinusoid = TEXTURE_KINDS["sinusoid"].arguments
     names = {argument.name for argument in sinusoid}
     others = [argument for argument in SYNTHETIC_ARGUMENTS if argument.name not in names]
-    texture = _kind_line("sinusoid", TEXTURE_KINDS, "surfaces lists their arguments")
+    texture = _kind_line("sinusoid", TEXTURE_KINDS, "; surfaces lists their arguments")
     hand = _kind_line("spring", HANDS)
     motion = _kind_line("strokes", MOTIONS)
     return _TEMPLATE.read_text("utf-8").format(
@@ -152,37 +156,42 @@ def scene_template(name: str = "scene.toml") -> str:
 def _kind_line(
     name: str, kinds: Mapping[str, TextureKind] | Mapping[str, SectionKind], more: str = ""
 ) -> str:
-    others = ", ".join(other for other in sorted(kinds) if other != name)
-    return f'kind = "{name}"  # or {others}' + (f"; {more}" if more else "") + "\n"
+    others = ", ".join(sorted(kinds.keys() - {name}))
+    return f'kind = "{name}"  # or {others}{more}\n'
 
 
 def _argument_lines(arguments: Iterable[Argument], values: Mapping[str, str]) -> str:
     """Return a line for each argument, as a comment if it has no value."""
     lines = []
     for argument in arguments:
-        unit = f" [{argument.unit}]" if argument.unit else ""
-        words = f"{argument.description}{unit}"
+        comment = argument.description
+        if argument.unit:
+            comment += f" [{argument.unit}]"
         if argument.name in values:
-            lines.append(f"{argument.name} = {values[argument.name]}  # {words}")
-        else:
-            default = f"; default {argument.default_text}" if argument.default_text else ""
-            lines.append(f"# {argument.name} = {_example_value(argument)}  # {words}{default}")
+            lines.append(f"{argument.name} = {values[argument.name]}  # {comment}")
+            continue
+        if argument.default_text:
+            comment += f"; default {argument.default_text}"
+        lines.append(f"# {argument.name} = {_example_value(argument)}  # {comment}")
     return "\n".join(lines) + "\n"
 
 
 def _example_value(argument: Argument) -> str:
     """Return a value in TOML: the example, the default, or one of this form."""
     quoted = '"{}"'.format
-    if argument.form == "switch":
-        return "true"
+    if argument.form in _FIXED_EXAMPLES:
+        return _FIXED_EXAMPLES[argument.form]
     if argument.form in _AXIS_COUNTS:
         zeros = [quoted(f"0 {argument.unit}")] * _AXIS_COUNTS[argument.form]
         return f"[{', '.join(zeros)}]"
-    if argument.form == "vector":
-        return "[1, 0]"
+    value = argument.default
+    if value is None:
+        value = 1
+    if argument.unit:
+        text = argument.format_value(value).replace("°", " deg").replace("µ", "u")
+        return quoted(argument.example or text)
     if argument.example:
-        return quoted(argument.example) if argument.unit else argument.example
-    value = 1 if argument.default is None else argument.default
-    if not argument.unit:
-        return quoted(value) if argument.form == "text" else f"{value}"
-    return quoted(argument.format_value(value).replace("°", " deg").replace("µ", "u"))
+        return argument.example
+    if argument.form == "text":
+        return quoted(value)
+    return str(value)

@@ -92,7 +92,9 @@ def surface_keywords(values: Mapping[str, Any], *laws: Law) -> dict[str, Any]:
     names |= {argument.name for argument in SURFACE_FIELDS}
     keywords = {name: value for name, value in values.items() if name in names}
     rest = {name: value for name, value in values.items() if name not in names}
-    return keywords | ({"law_parameters": rest} if rest else {})
+    if rest:
+        keywords["law_parameters"] = rest
+    return keywords
 
 
 @dataclass(frozen=True)
@@ -110,28 +112,29 @@ class SectionKind:
     arguments: tuple[Argument, ...] = ()
 
 
-def _kind(description: str, make: Callable[..., Any], table: str = "") -> SectionKind:
-    arguments = _read(table, make if isinstance(make, type) else None) if table else ()
-    return SectionKind(description, make, arguments)
-
-
 def _read(table: str, defaults: type | None = None) -> tuple[Argument, ...]:
     return tuple(read_arguments(Path(__file__).with_suffix(".toml"), table, defaults).values())
 
 
 HANDS: dict[str, SectionKind] = {
-    "spring": _kind(
-        "a spring and a damper from the handle to the moving anchor", SpringHand, "spring"
+    "spring": SectionKind(
+        "a spring and a damper from the handle to the moving anchor",
+        SpringHand,
+        _read("spring", SpringHand),
     ),
-    "band": _kind("an elastic band that pulls the handle into the wall", BandHand, "band"),
-    "moved": _kind("the handle follows the motion, whatever the force", PrescribedHand),
+    "band": SectionKind(
+        "an elastic band that pulls the handle into the wall", BandHand, _read("band", BandHand)
+    ),
+    "moved": SectionKind("the handle follows the motion, whatever the force", PrescribedHand),
 }
 """Kinds of [hand]."""
 
 MOTIONS: dict[str, SectionKind] = {
-    "still": _kind("the anchor does not move", Stationary, "still"),
-    "strokes": _kind("the anchor moves to and fro at constant speed", Strokes, "strokes"),
-    "path": _kind("the anchor follows the positions in a file", read_path, "path"),
+    "still": SectionKind("the anchor does not move", Stationary, _read("still", Stationary)),
+    "strokes": SectionKind(
+        "the anchor moves to and fro at constant speed", Strokes, _read("strokes", Strokes)
+    ),
+    "path": SectionKind("the anchor follows the positions in a file", read_path, _read("path")),
 }
 """Kinds of [motion]."""
 
@@ -165,9 +168,10 @@ def build_section(
     values = parse_arguments(section, arguments, part.arguments, folder)
     for argument in part.arguments:
         if argument.required and argument.name not in values:
-            file = argument.form == "path"
-            needs = f"a {kind} needs a file of positions" if file else f"{kind} needs it"
-            raise ParameterError(f"{section}.{argument.name}", f"is missing: {needs}")
+            name = f"{section}.{argument.name}"
+            if argument.form == "path":
+                raise ParameterError(name, f"is missing: a {kind} needs a file of positions")
+            raise ParameterError(name, f"is missing: {kind} needs it")
     return part.make(**values)
 
 
@@ -189,6 +193,6 @@ def to_scene_values(values: Mapping[str, Any], arguments: Iterable[Argument]) ->
 def _to_scene_value(value: Any, unit: str) -> Any:
     if isinstance(value, (list, tuple)):
         return [_to_scene_value(part, unit) for part in value]
-    if isinstance(value, (bool, str)):
+    if isinstance(value, (bool, str)) or not unit:
         return value
-    return f"{value!r} {unit}" if unit else value
+    return f"{value!r} {unit}"

@@ -201,7 +201,8 @@ def make_setup(
         servo = replace(servo, velocity_share=share)
     span, default = _resolve_duration(duration, run.pop("duration", None), motion)
     whole = _make_surface(scene.texture, merged, laws)
-    notes += [] if laws else describe(whole, "law_parameters")
+    if not laws:
+        notes += describe(whole, "law_parameters")
     for law in laws:
         parameters = describe(whole.to_law(law), "law_parameters")
         notes += [f"{parameter} for law {law.letter}" for parameter in parameters]
@@ -218,7 +219,7 @@ def _make_default_setup(
     """Return the closed loop of a scene with the default hand and motion."""
     chosen = device or scene.device or load_device(DEFAULT_DEVICE)
     chosen, assumed = scene_defaults.with_assumed_mass(chosen)
-    span = scene_defaults.DEFAULT_STROKE_DURATION if duration is None else duration
+    span = duration or scene_defaults.DEFAULT_STROKE_DURATION
     built = _make_surface(scene.texture, surface, ())
     hand, words = scene_defaults.default_hand_sections(built, chosen, span)
     whole = replace(scene, loop={**scene.loop, **hand})
@@ -228,24 +229,23 @@ def _make_default_setup(
 
 def _make_surface(texture: Texture, values: Mapping[str, Any], laws: Sequence[Law]) -> Surface:
     """Return the surface of a loop, with the parameters of all its laws."""
-    law = find_law(values["law"])
-    all_laws = [*laws, law]
+    all_laws = [*laws, find_law(values["law"])]
     keywords = sections.surface_keywords(values, *all_laws)
     keywords.pop("rendering", None)
     parameters = keywords.pop("law_parameters", {})
     surface = Surface(texture, **keywords)
     distributed = distribute_parameters(parameters, all_laws)
-    for one, its_parameters in zip(all_laws, distributed, strict=True):
-        surface = surface.to_law(one, its_parameters)
+    for law, law_parameters in zip(all_laws, distributed, strict=True):
+        surface = surface.to_law(law, law_parameters)
     return surface
 
 
 def _resolve_duration(
     argument: float | None, from_scene: float | None, motion: Motion
 ) -> tuple[float, list[str]]:
-    span = from_scene if argument is None else argument
-    if span is not None:
-        return sections.DURATION.validate(span), []
+    for duration in (argument, from_scene):
+        if duration is not None:
+            return sections.DURATION.validate(duration), []
     ends = getattr(motion, "duration", 0.0)
     if ends > 0.0:
         return float(ends), []

@@ -42,6 +42,8 @@ from asperity.surface import Surface
 
 START_TIMEOUT = 120.0
 """Time until the loop must run [s]: compiling for the first time takes most of it."""
+# The argument that a message of the loop's process refuses.
+_REFUSALS = {"failed": "device", "refused": "surface"}
 _ENDED_MESSAGE = "comes too late: the loop has ended"
 _EXIT_TIMEOUT = 2.0  # [s] for a process to report its end
 _HEARTBEAT_PERIOD = 0.01  # [s] at most
@@ -125,15 +127,17 @@ class ServoProcess:
         self._device = device
         if device is not None:
             check_passivity_damping(self._safety, device, servo)
-        last = NO_END if duration is None else round(duration / servo.period)
-        program = (
-            surface
-            if isinstance(surface, driver_loop.LoopProgram)
-            else driver_loop.build_program(surface, driver)
-        )
-        self._job = loop_process.LoopJob(program, driver, servo, self._safety, reach, last)
+        end_sample = NO_END
+        if duration is not None:
+            end_sample = round(duration / servo.period)
+        if isinstance(surface, Surface):
+            surface = driver_loop.build_program(surface, driver)
+        self._job = loop_process.LoopJob(surface, driver, servo, self._safety, reach, end_sample)
         self._prestarted = prestarted
-        self.memory = LoopMemory() if prestarted is None else prestarted.memory
+        if prestarted is None:
+            self.memory = LoopMemory()
+        else:
+            self.memory = prestarted.memory
         self.notes: tuple[str, ...] = ()
         self._end_reason = EndReason.RUNNING
         self._driver_message = ""
@@ -188,14 +192,13 @@ class ServoProcess:
     def fault(self) -> DeviceFault:
         """Return the fault that ended the loop."""
         reason = self._end_reason
-        by_driver = reason is EndReason.DEVICE
-        words = self._driver_message if by_driver else FAULT_DESCRIPTIONS[reason]
+        text = FAULT_DESCRIPTIONS.get(reason, self._driver_message)
         rows, _first = self.memory.rows(self.memory.row_count - FAULT_SAMPLES)
-        at = f" at {rows[-1, 0]:.4g} s" if len(rows) else ""
-        end = f"{words}{at}; the force was made zero"
+        if len(rows):
+            text += f" at {rows[-1, 0]:.4g} s"
         if reason in {EndReason.UNRESPONSIVE, EndReason.DIED}:
-            end = f"{words}{at}. {self.driver.loss_notice}"
-        return DeviceFault(reason, end, rows)
+            return DeviceFault(reason, f"{text}. {self.driver.loss_notice}", rows)
+        return DeviceFault(reason, f"{text}; the force was made zero", rows)
 
     def change_surface(self, surface: Surface, *, accept_risk: bool = False) -> None:
         """Render another surface: the force ramps down, the surface is replaced, it ramps up.
@@ -260,21 +263,25 @@ class ServoProcess:
         """End the process, which has closed the device unless it hangs."""
         self._heartbeat_stop.set()
         assert self._prestarted is not None
-        waits = self._end_reason in {EndReason.RUNNING, EndReason.UNRESPONSIVE}
-        self._prestarted.terminate(loop_process.MAX_CALL_TIME if waits else _EXIT_TIMEOUT)
+        timeout = _EXIT_TIMEOUT
+        if self._end_reason in {EndReason.RUNNING, EndReason.UNRESPONSIVE}:
+            timeout = loop_process.MAX_CALL_TIME
+        self._prestarted.terminate(timeout)
         if self._end_reason is EndReason.DIED and not self._was_released:
             self._was_released = True
             with suppress(AsperityError, OSError):
                 self.driver.release_lost_device()
 
     def _send_heartbeats(self) -> None:
-        count = -1
+        previous_count = -1
         while not self._heartbeat_stop.wait(min(0.1 * self._safety.silence, _HEARTBEAT_PERIOD)):
             self.memory.send_heartbeat()
-            if count == (count := self.memory.row_count):
+            count = self.memory.row_count
+            if count == previous_count:
                 # If it is suspended: its next sample is late, and releases the force.
                 with suppress(OSError):
                     os.kill(self.process.pid or os.getpid(), signal.SIGCONT)
+            previous_count = count
 
     def _receive(self, timeout: float = 0.0) -> None:
         """Receive messages, and check that the loop makes progress."""
@@ -308,8 +315,8 @@ class ServoProcess:
                 kind, content = self._connection.recv()
                 if kind == expected:
                     return content
-                if kind in {"failed", "refused"}:
-                    raise ParameterError("device" if kind == "failed" else "surface", content)
+                if kind in _REFUSALS:
+                    raise ParameterError(_REFUSALS[kind], content)
                 self._handle_message(kind, content)
                 if self.poll() is not EndReason.RUNNING:
                     raise ParameterError("surface", _ENDED_MESSAGE)

@@ -69,11 +69,13 @@ class Safety(Serializable):
         """Return the largest change of the force [N/s]; infinite if neither number is known."""
         if self.max_slew is not None:
             return self.max_slew
-        return max_force / DEFAULT_RISE_TIME if math.isfinite(max_force) else math.inf
+        return max_force / DEFAULT_RISE_TIME
 
     def lateness_limit(self, period: float) -> float:
         """Return the longest time for which a loop of a period [s] may be late [s]."""
-        return max(LATE_PERIODS * period, MIN_LATENESS) if self.lateness is None else self.lateness
+        if self.lateness is not None:
+            return self.lateness
+        return max(LATE_PERIODS * period, MIN_LATENESS)
 
     def reach_limit(self, device: Device) -> float:
         """Return the largest distance of a reading from the middle of the workspace [m].
@@ -84,10 +86,13 @@ class Safety(Serializable):
         if self.reach is not None:
             return self.reach
         radius = device.value("workspace_radius")
-        sides = device.value("workspace_diameter"), device.value("workspace_length")
-        if radius is None and None not in sides:
-            radius = 0.5 * math.hypot(*(side or 0.0 for side in sides))
-        return math.inf if radius is None else REACH_FACTOR * radius
+        diameter = device.value("workspace_diameter")
+        length = device.value("workspace_length")
+        if radius is None and diameter is not None and length is not None:
+            radius = 0.5 * math.hypot(diameter, length)
+        if radius is None:
+            return math.inf
+        return REACH_FACTOR * radius
 
 
 ARGUMENTS = tuple(read_arguments(Path(__file__).with_suffix(".toml"), defaults=Safety).values())
@@ -148,15 +153,17 @@ def excess_stiffness_reason(surface: Surface, device: Device, *, keeps_margin: b
     """
     q = characteristic_number(surface)
     recommended = recommend_stiffness(surface, device, q, one_sided_number(surface))
-    basis = recommended.stability_limit.basis
     allowed = recommended.stability_limit.stiffness
-    allowed = recommended.stiffness if keeps_margin else allowed
+    limit = "limit"
+    if keeps_margin:
+        allowed = recommended.stiffness
+        limit = "recommended limit"
     context = f"for law {surface.law.letter} on {device.id}"
     if not allowed:
         return f"no stable stiffness is known {context}: analyze says what is missing"
     if surface.stiffness <= allowed:
         return ""
-    limit = f"limit of {format_quantity(allowed, 'N/m', digits=3)}"
-    limit = f"recommended {limit}" if keeps_margin else limit
-    given = format_quantity(surface.stiffness, "N/m")
-    return f"{given} is above the {limit} {context} ({basis}; q = {q.value:.3g})"
+    stiffness = format_quantity(surface.stiffness, "N/m")
+    limit += f" of {format_quantity(allowed, 'N/m', digits=3)}"
+    reason = f"{recommended.stability_limit.basis}; q = {q.value:.3g}"
+    return f"{stiffness} is above the {limit} {context} ({reason})"

@@ -36,7 +36,7 @@ CHUNK_SAMPLES = 16_384
 MAX_DELAY = 1_000_000
 # Why the compiled loop stops, by its error code.
 _STOP_REASONS = tuple(StopReason)
-_NO_ROWS = np.empty((0, len(COLUMNS)))
+NO_ROWS = np.empty((0, len(COLUMNS)))
 # Adds nothing to the positions of an anchor, not even to the sign of a zero.
 _NO_SHIFT = np.full(3, -0.0)
 # Attributes of a lane that the compiled loop changes, by the fields of its record.
@@ -135,7 +135,7 @@ class LaneLoop:
 
     def run(
         self, lanes: Sequence[Lane], samples: int, anchor: FloatArray,
-        rows: FloatArray = _NO_ROWS, every: int = 1,
+        rows: FloatArray = NO_ROWS, every: int = 1,
     ) -> int:  # fmt: skip
         """Run lanes over a number of samples.
 
@@ -293,8 +293,9 @@ class BatchSimulation:
     ) -> None:  # fmt: skip
         check_parts(surface, plant, hand, servo, motion)
         self._parts = plant, hand, servo, motion
-        origin = motion.at(np.zeros(1))[0]
-        self._origin = origin if start is None else check_array("start", start, (3,), "m")
+        if start is None:
+            start = motion.at(np.zeros(1))[0]
+        self._origin = check_array("start", start, (3,), "m")
         self._velocity = velocity
         self._max_evaluations = surface.law.contact.max_evaluations
         self._body = sampled_plant(plant, hand, servo)
@@ -381,13 +382,17 @@ def initial_motion(
     Raises:
         ParameterError: for an initial state that the hand or the plant does not allow.
     """
-    position = None if start is None else check_array("start", start, (3,), "m")
-    speed = None if velocity is None else check_array("velocity", velocity, (3,), "m/s")
+    position = None
+    speed = None
+    if start is not None:
+        position = check_array("start", start, (3,), "m")
+    if velocity is not None:
+        speed = check_array("velocity", velocity, (3,), "m/s")
     position, speed = hand.initial_motion(motion, position, speed, servo.period)
     plant.check_points("start", position)
     plant.check_points("velocity", speed)
-    reason = "" if hand.is_prescribed else plant.workspace_violation(position)
-    if reason:
+    reason = plant.workspace_violation(position)
+    if reason and not hand.is_prescribed:
         raise ParameterError("start", f"must be in the workspace: {reason}", position.tolist())
     return position, speed
 

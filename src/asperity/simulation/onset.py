@@ -75,7 +75,9 @@ class Onset(Serializable):
 
         It is the upper end if the lowest stiffness cycled, infinite if nothing did.
         """
-        return math.sqrt(self.quiet * self.cycling) if self.quiet else self.cycling
+        if self.quiet == 0.0:
+            return self.cycling
+        return math.sqrt(self.quiet * self.cycling)
 
 
 def is_at_rest(motion: Motion, duration: float) -> bool:
@@ -202,9 +204,13 @@ def find_onsets(
         raise ParameterError("tolerance", f"must be at least {_MIN_TOLERANCE:g}", tolerance)
     if not check_positive("lowest", lowest, "N/m") < check_positive("highest", highest, "N/m"):
         raise ParameterError("lowest", f"must be below the highest, {highest:g} N/m", lowest)
-    limit = None if threshold is None else check_positive("threshold", threshold, "m/s")
-    servo = servo if limit else servo.without_steps()
-    origin = motion.at(np.zeros(1))[0] if start is None else check_array("start", start, (3,), "m")
+    if threshold is None:
+        servo = servo.without_steps()
+    else:
+        threshold = check_positive("threshold", threshold, "m/s")
+    if start is None:
+        start = motion.at(np.zeros(1))[0]
+    origin = check_array("start", start, (3,), "m")
     samples = _samples_for(duration, servo)
 
     def search_all(numbers: Sequence[int]) -> Iterator[tuple[int, Onset]]:
@@ -213,7 +219,7 @@ def find_onsets(
 
         def search(number: int) -> onset_search.OnsetSearch:
             def trajectory(stiffness: float, start: int) -> Trajectory:
-                rule = onset_search.limit_cycle_rule(samples, limit)
+                rule = onset_search.limit_cycle_rule(samples, threshold)
                 return batch.new_trajectory(stiffness, delays[number], offsets[start], rule)
 
             bracketing = onset_search.bracket_onset(lowest, highest, width, nears[number])
@@ -230,7 +236,7 @@ def find_onsets(
 
     contents = []
     for delay, near in zip(delays, nears, strict=True):
-        numbers = tuple(origin), velocity, duration, starts, width, limit, lowest, highest, near
+        numbers = tuple(origin), velocity, duration, starts, width, threshold, lowest, highest, near
         parts = plant, hand, replace(servo, delay=delay), motion
         contents.append(_cache_key(surface, parts, numbers))
     return get_or_compute_each("onset", contents, search_all)
@@ -240,7 +246,7 @@ def _cache_key(surface: Surface, parts: Sequence[Any], numbers: Sequence[Any]) -
     """Return the content that an onset depends on; ``None`` for user-defined parts."""
     if not all(is_shipped(type(part)) for part in parts):
         return None
-    values = [None if number is None else np.asarray(number).tolist() for number in numbers]
+    values = [np.asarray(number).tolist() for number in numbers]
     return characteristic.surface_content(surface, json_text([*parts, values]))
 
 
@@ -337,9 +343,12 @@ def expected_onset(
     plus = characteristic.one_sided_number(surface, TOLERANCE).value
     q = characteristic.characteristic_number(surface, TOLERANCE).value
     # Below a medial axis q is unbounded; most trajectories never reach it.
-    weight = 0.5 * plus + servo.delay * (q if math.isfinite(q) else plus)
-    onset = damping / servo.period / weight if weight > 0.0 else math.inf
-    return onset if 0.0 < onset < math.inf else None
+    if not math.isfinite(q):
+        q = plus
+    weight = 0.5 * plus + servo.delay * q
+    if damping <= 0.0 or not 0.0 < weight < math.inf:
+        return None
+    return damping / servo.period / weight
 
 
 def predict(
@@ -363,17 +372,24 @@ def predict(
     depth = max(top - onset.low[2], 0.0)
     limit = surface.texture.depth_limit
     damping = plant.min_damping(onset.low, onset.high, hand, top)
-    q = plus = 0.0
+    q = 0.0
+    plus = 0.0
     if onset.low[2] < bottom - limit:  # below a baked field nothing is certified
-        q = plus = math.inf
+        q = math.inf
+        plus = math.inf
     elif depth > 0.0:
         # Below the depth of a clamp the numbers are those of the clamped force.
-        clamped = surface.effective_clamp.changes_force and depth > surface.max_depth
-        pressed = surface if clamped else surface.to_depth(min(depth, limit))
-        q = characteristic.characteristic_number(pressed, TOLERANCE).value
-        plus = characteristic.one_sided_number(pressed, TOLERANCE).value
+        if depth <= surface.max_depth or not surface.effective_clamp.changes_force:
+            surface = surface.to_depth(min(depth, limit))
+        q = characteristic.characteristic_number(surface, TOLERANCE).value
+        plus = characteristic.one_sided_number(surface, TOLERANCE).value
     budget = damping / servo.period
-    weight = 0.5 * plus + (servo.delay * q if servo.delay else 0.0)
+    weight = 0.5 * plus
+    if servo.delay:  # q may be infinite
+        weight += servo.delay * q
+    wall_rule = None
+    if wall is not None and q != 0.0:
+        wall_rule = wall.quiet / q
     return Prediction(
         onset=onset,
         depth=depth,
@@ -381,10 +397,17 @@ def predict(
         q=q,
         one_sided=plus,
         conservative=surface.facts.conservative,
-        paper_limit=0.5 * budget / q if q > 0.0 else math.inf,
-        delay_rule=budget / weight if weight > 0.0 else math.inf,
-        wall_rule=None if wall is None or q == 0.0 else wall.quiet / q,
+        paper_limit=_limit(0.5 * budget, q),
+        delay_rule=_limit(budget, weight),
+        wall_rule=wall_rule,
     )
+
+
+def _limit(budget: float, weight: float) -> float:
+    """Return the stiffness whose weight uses up a budget [N/m]; infinite without a weight."""
+    if weight > 0.0:
+        return budget / weight
+    return math.inf
 
 
 def smooth_wall_onset(onsets: Sequence[Onset], delay: int) -> Onset | None:

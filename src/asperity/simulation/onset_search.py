@@ -49,12 +49,13 @@ def felt_speed(speed: float, extent: float, grip: Grip | None = None) -> float:
         >>> round(felt_speed(0.1, 0.1 / (2 * math.pi * 24)) * 1e3, 3)  # 24 Hz, in mm/s
         0.267
     """
-    held = _default_grip() if grip is None else grip
-    lowest = held.frequency[0]
-    highest = held.frequency[-1]
-    frequency = speed / (2.0 * math.pi * extent) if extent > 0.0 else highest
-    frequency = min(max(frequency, lowest), highest)
-    return math.sqrt(2.0) * math.pi * frequency * float(held.threshold(frequency)[1])
+    if grip is None:
+        grip = _default_grip()
+    frequency = grip.frequency[-1]
+    if extent > 0.0:
+        frequency = speed / (2.0 * math.pi * extent)
+        frequency = min(max(frequency, grip.frequency[0]), grip.frequency[-1])
+    return math.sqrt(2.0) * math.pi * frequency * float(grip.threshold(frequency)[1])
 
 
 @cache
@@ -115,8 +116,9 @@ def _judge_stopped_run(
 
 def _oscillates(segment: SegmentStatistics, threshold: float | None) -> bool:
     speed = segment.velocity_spread
-    limit = felt_speed(speed, segment.position_spread) if threshold is None else threshold
-    return speed > limit
+    if threshold is None:
+        threshold = felt_speed(speed, segment.position_spread)
+    return speed > threshold
 
 
 def _gains_energy(first: SegmentStatistics, last: SegmentStatistics) -> bool:
@@ -151,11 +153,10 @@ def run_searches(batch: BatchSimulation, searches: Mapping[int, OnsetSearch]) ->
     """Run the most urgent trajectories of all searches; yield the number of each finished one."""
     active = dict(searches)
     while active:
-        queue = [
-            (priority, place, run)
-            for search in active.values()
-            for place, (priority, run) in enumerate(search.next_trajectories())
-        ]
+        queue: list[tuple[int, int, Trajectory]] = []
+        for search in active.values():
+            for place, (priority, run) in enumerate(search.next_trajectories()):
+                queue.append((priority, place, run))
         queue.sort(key=lambda entry: entry[:2])
         batch.run([run for _priority, _place, run in queue[:MAX_LANES]])
         for number, search in list(active.items()):
@@ -205,7 +206,8 @@ class OnsetSearch:
         new = list(islice((key for key in keys if key not in self._results), MAX_LANES))
         # The first one runs alone: if it cycles, the others are not needed.
         alone = self._bracket is None and new[0] == keys[0]
-        for key in new[: 1 if alone else None]:
+        startable = new[:1] if alone else new
+        for key in startable:
             if key not in self._running:
                 self._running[key] = self._start(*key)
         running = [key for key in new if key in self._running]
@@ -235,8 +237,10 @@ class OnsetSearch:
                 self._stiffness = self._bracketing.send(bool(cycling))
             except StopIteration as end:
                 self._bracket = end.value
-                quiet, least = end.value
-                self._stiffness = quiet if math.isinf(least) else least
+                quiet, cycling_stiffness = end.value
+                self._stiffness = cycling_stiffness
+                if math.isinf(cycling_stiffness):
+                    self._stiffness = quiet
         if len(self._results_at_stiffness()) < self._count:
             return False
         self._report_progress()
@@ -248,7 +252,7 @@ class OnsetSearch:
         ends = self._results_at_stiffness().values()
         low = np.fmin.reduce([bounds[0] for _, bounds in ends]).tolist()
         high = np.fmax.reduce([bounds[1] for _, bounds in ends]).tolist()
-        count = sum(cycles for cycles, _ in ends)
+        count = [cycles for cycles, _ in ends].count(True)
         return OnsetBracket(*self._bracket, count, tuple(low), tuple(high))
 
     def _results_at_stiffness(self) -> dict[tuple[float, int], tuple[bool, FloatArray]]:
@@ -282,8 +286,10 @@ def bracket_onset(
             index += 1
         if index == len(steps):
             return steps[-1], math.inf
-    quiet = steps[index - 1] if index else 0.0
+    quiet = 0.0
     cycling = steps[index]
+    if index:
+        quiet = steps[index - 1]
     while quiet > 0.0 and cycling > quiet * (1.0 + width):
         middle = math.sqrt(quiet * cycling)
         if (yield middle):

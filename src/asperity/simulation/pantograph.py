@@ -18,9 +18,9 @@ from asperity.loop.bodies import pantograph_dynamics as pantograph
 from asperity.loop.bodies.pantograph_dynamics import LinkageRecord, PantographRecord
 from asperity.simulation.hands import Hand, nonnegative
 from asperity.simulation.plants import (
-    FRICTION_SUBSTEPS,
     Plant,
     SampledPlant,
+    friction_substeps,
     max_rate,
     substep_count,
 )
@@ -134,7 +134,7 @@ class Pantograph(Plant):
         substep_count(self.friction, rate, period)  # refuses too many; the number depends on speed
         record = PantographRecord(
             linkage, hand.record(), float(self.friction), rate,
-            FRICTION_SUBSTEPS if self.friction > 0.0 else 1, float(period), _MAX_STEP_FRACTION,
+            friction_substeps(self.friction), float(period), _MAX_STEP_FRACTION,
             bool(self.inside_only), MIN_ELBOW_SINE,
         )  # fmt: skip
         return SampledPlant((pantograph, body_parts), record, 6)

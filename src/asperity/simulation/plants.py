@@ -27,7 +27,7 @@ from asperity.simulation.hands import Hand, NamedPart, SpringHand, Triple, nonne
 from asperity.simulation.servo import Servo
 
 # Parts of a sample over which dry friction is held constant.
-FRICTION_SUBSTEPS = 4
+_FRICTION_SUBSTEPS = 4
 # Largest share of a time constant that one Runge-Kutta step covers: energy then closes to 1e-10.
 _MAX_STEP_FRACTION = 0.01
 # Largest number of substeps: a body that needs more is too fast for its period.
@@ -164,8 +164,14 @@ def substep_count(friction: float, max_rate: float, period: float) -> int:
     """
     if not max_rate * period / _MAX_STEP_FRACTION <= _MAX_SUBSTEPS:
         raise OverflowError
-    count = math.ceil(max_rate * period / _MAX_STEP_FRACTION)
-    return max(count, FRICTION_SUBSTEPS if friction > 0.0 else 1)
+    return max(math.ceil(max_rate * period / _MAX_STEP_FRACTION), friction_substeps(friction))
+
+
+def friction_substeps(friction: float) -> int:
+    """Return the number of parts of a sample over which dry friction [N] is held constant."""
+    if friction > 0.0:
+        return _FRICTION_SUBSTEPS
+    return 1
 
 
 def max_rate(mass: float, damping: float, hand: Hand) -> float:
@@ -249,15 +255,19 @@ class Cartesian(Plant):
             return _elastic_band_plant(self, hand, period)
         is_diagonal = not np.any(self.damping - np.diag(np.diag(self.damping)))
         separate = is_diagonal and self.resonance is None
-        return (_axis_plant if separate else coupled_plant)(self, hand, period)
+        if separate:
+            return _axis_plant(self, hand, period)
+        return coupled_plant(self, hand, period)
 
     def min_damping(
         self, low: ArrayLike, high: ArrayLike, hand: Hand | None = None, top: float = 0.0
     ) -> float:
         """Return the smallest damping of the handle [N s/m], the same everywhere."""
-        # Behind a resonance the hand does not damp the handle.
-        held = 0.0 if hand is None or self.resonance is not None else hand.damping_matrix
-        return float(np.linalg.eigvalsh(self.damping + held)[0])
+        damping = self.damping
+        if hand is not None and self.resonance is None:
+            # Behind a resonance the hand does not damp the handle.
+            damping = damping + hand.damping_matrix
+        return float(np.linalg.eigvalsh(damping)[0])
 
     def rates(self) -> list[tuple[str, float]]:
         """Return the numbers that make the body fast."""
@@ -270,7 +280,7 @@ class Cartesian(Plant):
 
 def _axis_plant(plant: Cartesian, hand: SpringHand, period: float) -> SampledPlant:
     """Return a rigid body without coupling between its axes."""
-    parts = _substeps(plant)
+    parts = friction_substeps(plant.friction)
     body = linear_body(plant.mass, plant.damping, hand)
     span = period / parts
     used = np.arange(18).reshape(6, 3).T[:, [0, 1, 4]]  # e, w and F of each axis
@@ -281,14 +291,16 @@ def _axis_plant(plant: Cartesian, hand: SpringHand, period: float) -> SampledPla
     force = np.array(hand.force)
     numbers = [np.diag(plant.damping), body.mass, body.stiffness, force, np.full(3, span)]
     table = np.hstack([changes[:, :2].reshape(3, -1), loss, np.array(numbers).T])
-    stops = np.diag(span / changes[:, 1, 2]) if plant.friction > 0.0 else np.zeros((3, 3))
+    stops = np.zeros((3, 3))
+    if plant.friction > 0.0:
+        stops = np.diag(span / changes[:, 1, 2])
     record = axis_body.AxisBodyRecord(table, plant.friction, stops, parts, span)
     return SampledPlant((axis_body, body_parts), record, 6)
 
 
 def coupled_plant(plant: Cartesian, hand: SpringHand, period: float) -> SampledPlant:
     """Return a linear body with any coupling, moved by whole matrices."""
-    parts = _substeps(plant)
+    parts = friction_substeps(plant.friction)
     body = linear_body(plant.mass, plant.damping, hand, plant.resonance)
     span = period / parts
     change, loss = integrate(body.dynamics, body.loss, span)
@@ -300,10 +312,6 @@ def coupled_plant(plant: Cartesian, hand: SpringHand, period: float) -> SampledP
     )  # fmt: skip
     order = 6 if plant.resonance is None else 12
     return SampledPlant((coupled_body, body_parts), record, order)
-
-
-def _substeps(plant: Cartesian) -> int:
-    return FRICTION_SUBSTEPS if plant.friction > 0.0 else 1
 
 
 def _elastic_band_plant(plant: Cartesian, hand: Hand, period: float) -> SampledPlant:

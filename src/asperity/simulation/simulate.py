@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -23,6 +24,7 @@ from asperity.recording.writer import RecordingWriter
 from asperity.simulation.hands import Hand, Motion
 from asperity.simulation.lanes import (
     CHUNK_SAMPLES,
+    NO_ROWS,
     Lane,
     LaneLoop,
     anchor_points,
@@ -63,22 +65,22 @@ class Simulation(Lane):
         self, surface: Surface, plant: SampledPlant, servo: Servo, start: FloatArray,
         velocity: FloatArray | None = None, max_evaluations: float | None = None,
     ) -> None:  # fmt: skip
-        state = plant.initial_state(start, np.zeros(3) if velocity is None else velocity)
+        if velocity is None:
+            velocity = np.zeros(3)
+        state = plant.initial_state(start, velocity)
         if max_evaluations is None:
             max_evaluations = surface.law.contact.max_evaluations
         super().__init__(state, servo.delay, surface.law_arguments[0], max_evaluations)
         self._loop = LaneLoop(surface, plant, servo)
         self._energy_at_start = 0.0
 
-    def run(
-        self, anchor: FloatArray, trace: FloatArray | None = None, every: int = 1
-    ) -> StopReason:
+    def run(self, anchor: FloatArray, trace: FloatArray = NO_ROWS, every: int = 1) -> StopReason:
         """Run one sample for each row of the anchor's motion but the last.
 
         Args:
             anchor: positions of the hand's anchor at the samples [m], shape (k + 1, 3), contiguous;
                 it moves at constant velocity in between. The first row is its current position.
-            trace: rows to write, shape (at least k/every + 1, columns); none for no trace.
+            trace: rows to write, shape (at least k/every + 1, columns); none by default.
             every: samples per row.
 
         Returns:
@@ -90,12 +92,11 @@ class Simulation(Lane):
         first = self.samples
         if first == 0:
             self._energy_at_start = self._loop.stored_energy(self.state, anchor[0])
-        table = np.empty((0, len(COLUMNS))) if trace is None else trace
-        if table.ndim != 2 or table.shape[1] != len(COLUMNS):
-            words = f"must have rows of {len(COLUMNS)} numbers, got shape {table.shape}"
+        if trace.ndim != 2 or trace.shape[1] != len(COLUMNS):
+            words = f"must have rows of {len(COLUMNS)} numbers, got shape {trace.shape}"
             raise ParameterError("trace", words)
         self.counters[FIRST_SAMPLE] = first
-        self.rows_written = self._loop.run([self], len(anchor) - 1, anchor, table, every)
+        self.rows_written = self._loop.run([self], len(anchor) - 1, anchor, trace, every)
         self._anchor = anchor[self.samples - first].copy()
         return self.stop
 
@@ -189,21 +190,28 @@ def simulate(
         origin = {"made_by": "simulate", "surface": field_metadata(surface)}
         return {**origin, **data, "every": every, **(metadata or {})}
 
-    rows = -(-samples // every)
+    rows = math.ceil(samples / every)
     writer = _open_trace(trace, rows, max_rows, recording_metadata, surface)
-    tail = None if trace is False else TailStatistics(rows)
+    tail = None
+    if trace is not False:
+        tail = TailStatistics(rows)
     try:
         stop = _run_chunks(simulation, anchor_chunk, samples, writer, tail, every, progress)
     finally:
         writer.close()
+    stop_location = ""
+    if stop is StopReason.LEFT_WORKSPACE:
+        stop_location = plant.describe_exit(simulation.state)
+    table = NO_ROWS
+    path = ""
+    if isinstance(writer, DecimatedTrace):
+        table = writer.table
+    elif not isinstance(trace, bool):
+        path = os.fspath(trace)
     truncated, error = simulation.search_truncation
-    left = stop is StopReason.LEFT_WORKSPACE
-    table = writer.table if isinstance(writer, DecimatedTrace) else np.empty((0, len(COLUMNS)))
     return Run(
-        table, simulation.state, simulation.samples, float(servo.period),
-        simulation.ledger(), surface, stop, plant.describe_exit(simulation.state) if left else "",
-        path="" if isinstance(trace, bool) else os.fspath(trace),
-        tail=tail, notes=plant.notes, truncated_ticks=truncated, search_error=error,
+        table, simulation.state, simulation.samples, float(servo.period), simulation.ledger(),
+        surface, stop, stop_location, path, tail, plant.notes, truncated, error,
     )  # fmt: skip
 
 
@@ -231,8 +239,9 @@ def simulate_many(jobs: Sequence[Mapping[str, Any]], workers: int | None = None)
         >>> [run.samples for run in simulate_many([job, job])]
         [1000, 1000]
     """
-    count = available_cores() if workers is None else check_integer("workers", workers, 1)
-    with ThreadPoolExecutor(count) as pool:
+    if workers is None:
+        workers = available_cores()
+    with ThreadPoolExecutor(check_integer("workers", workers, 1)) as pool:
         return list(pool.map(lambda job: simulate(**job), jobs))
 
 
@@ -256,8 +265,11 @@ def _open_trace(
     metadata: Callable[[], dict[str, Any]], surface: Surface,
 ) -> TraceWriter:  # fmt: skip
     if isinstance(trace, bool):
-        most = None if max_rows is None or not trace else check_integer("max_rows", max_rows)
-        return DecimatedTrace(rows if trace else 0, most)
+        if max_rows is not None:
+            max_rows = check_integer("max_rows", max_rows)
+        if not trace or max_rows == 0:
+            rows = 0
+        return DecimatedTrace(rows, max_rows)
     if not isinstance(trace, (str, os.PathLike)):
         raise ParameterError("trace", "must be True, False or a path", trace)
     if Path(trace).suffix.lower() not in (".mcap", ""):
@@ -271,10 +283,12 @@ def _run_chunks(
     trace: TraceWriter, tail: TailStatistics | None, every: int,
     progress: Callable[[float], None] | None,
 ) -> StopReason:  # fmt: skip
-    buffer = None if tail is None else np.empty((CHUNK_SAMPLES // every + 1, len(COLUMNS)))
+    buffer = NO_ROWS
+    if tail is not None:
+        buffer = np.empty((CHUNK_SAMPLES // every + 1, len(COLUMNS)))
     while simulation.samples < samples:
         stop = simulation.run(anchor_chunk(simulation.samples), buffer, every)
-        if tail is not None and buffer is not None:
+        if tail is not None:
             rows = buffer[: simulation.rows_written]
             trace.append(rows)
             tail.update(rows)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
@@ -18,17 +19,16 @@ from asperity.surface import Surface
 
 COLUMNS = (
     ("time", "s"),
-    *((axis, "m") for axis in "xyz"),
-    *((f"v{axis}", "m/s") for axis in "xyz"),
-    *((f"commanded {axis}", "N") for axis in "xyz"),
-    *((f"applied {axis}", "N") for axis in "xyz"),
-    *((f"anchor {axis}", "m") for axis in "xyz"),
-    *((f"supplied {axis}", "J") for axis in "xyz"),
-    *((f"same sample {axis}", "J") for axis in "xyz"),
-    *((name, "J") for name in ("lost", "hand", "friction", "sampling", "stored")),
-    *((f"law anchor {axis}", "m") for axis in "xy"),
-    ("law held", "1"),
-)
+    ("x", "m"), ("y", "m"), ("z", "m"),
+    ("vx", "m/s"), ("vy", "m/s"), ("vz", "m/s"),
+    ("commanded x", "N"), ("commanded y", "N"), ("commanded z", "N"),
+    ("applied x", "N"), ("applied y", "N"), ("applied z", "N"),
+    ("anchor x", "m"), ("anchor y", "m"), ("anchor z", "m"),
+    ("supplied x", "J"), ("supplied y", "J"), ("supplied z", "J"),
+    ("same sample x", "J"), ("same sample y", "J"), ("same sample z", "J"),
+    ("lost", "J"), ("hand", "J"), ("friction", "J"), ("sampling", "J"), ("stored", "J"),
+    ("law anchor x", "m"), ("law anchor y", "m"), ("law held", "1"),
+)  # fmt: skip
 """Columns of the trace with their units."""
 
 
@@ -44,14 +44,16 @@ class DecimatedTrace:
     """
 
     def __init__(self, rows: int, max_rows: int | None) -> None:
-        most = rows if max_rows is None else max_rows
-        self._step = max(1, -(-rows // most)) if most else rows + 1
+        self._step = 1
+        if max_rows is not None:
+            self._step = max(1, math.ceil(rows / max(max_rows, 1)))
         try:
-            self._table = np.empty((-(-rows // self._step) if most else 0, len(COLUMNS)))
+            self._table = np.empty((math.ceil(rows / self._step), len(COLUMNS)))
         except (MemoryError, ValueError):  # more than the address space
             limit = f"needs memory for {rows} rows: give a path, or a larger 'every'"
             raise ParameterError("trace", limit) from None
-        self._rows_seen = self._row_count = 0
+        self._rows_seen = 0
+        self._row_count = 0
 
     def append(self, rows: FloatArray) -> None:
         """Store every n-th row."""
@@ -99,7 +101,8 @@ class TailStatistics:
         self._count_in_tail = 0
         self._mean = np.zeros((2, 3))
         self._squares = np.zeros((2, 3))
-        self._first_row = self._last_row = np.zeros(len(COLUMNS))
+        self._first_row = np.zeros(len(COLUMNS))
+        self._last_row = np.zeros(len(COLUMNS))
 
     @property
     def is_complete(self) -> bool:
@@ -190,7 +193,7 @@ class Ledger:
 
     @classmethod
     def from_sums(cls, sums: FloatArray, stored_before: float, stored_after: float) -> Ledger:
-        """Return the ledger of the sums of a run; see ``kernels/body_parts.py``."""
+        """Return the ledger of the sums of a run; see :mod:`asperity.loop.simulated_device`."""
         x, y, z, px, py, pz, *others = map(float, sums)
         return cls((x, y, z), (px, py, pz), *(*others, stored_before, stored_after))
 
@@ -268,7 +271,9 @@ class Run(NamedColumns, Plottable):
     @property
     def stop_message(self) -> str:
         """Why the run stopped early, in words; empty if it did not."""
-        return f"{self.stop}: {self.stop_location}" if self.stop_location else str(self.stop)
+        if not self.stop_location:
+            return str(self.stop)
+        return f"{self.stop}: {self.stop_location}"
 
     @property
     def duration(self) -> float:
@@ -289,5 +294,5 @@ class Run(NamedColumns, Plottable):
     def to_dict(self) -> dict[str, Any]:
         """Return plain data without the trace, SI units; None for an overflow."""
         names = "duration samples period stop_message state ledger truncated_ticks search_error"
-        own = attributes_to_dict(self, *names.split(), infinity=None)
-        return own | {"trace": self.path or None, "notes": list(self.notes)}
+        data = attributes_to_dict(self, *names.split(), infinity=None)
+        return data | {"trace": self.path or None, "notes": list(self.notes)}

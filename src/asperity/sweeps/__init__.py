@@ -1,7 +1,6 @@
 """Sweeps: many cases of one scene, in this process, on all cores or on a cluster."""
 
-from asperity.sweeps.case_runs import RunKind, register_run
 from asperity.sweeps.run_sweep import sweep
 from asperity.sweeps.sweep_result import SweepResult
 
-__all__ = ["RunKind", "SweepResult", "register_run", "sweep"]
+__all__ = ["SweepResult", "sweep"]

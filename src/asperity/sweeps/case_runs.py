@@ -77,15 +77,15 @@ class RunKind:
 
 
 def _compare(scene: Scene, laws: Laws, options: Mapping[str, Any], _seed: int) -> Tabular:
-    found = tuple(REGISTERED_LAWS.values()) if laws is None else find_laws(laws)
-    arguments = {**surface_keywords(scene.surface, *found), **options}
+    compared = find_laws(laws or tuple(REGISTERED_LAWS))
+    arguments = {**surface_keywords(scene.surface, *compared), **options}
     arguments.pop("law", None)
-    return compare(scene.texture, scene.device or DEFAULT_DEVICE, found, **arguments)
+    return compare(scene.texture, scene.device or DEFAULT_DEVICE, compared, **arguments)
 
 
 def _limits(scene: Scene, _laws: Laws, options: Mapping[str, Any], _seed: int) -> Tabular:
-    laws = find_laws([scene.surface["law"]]) if "law" in scene.surface else ()
-    arguments = surface_keywords(scene.surface, *(laws or REGISTERED_LAWS.values()))
+    laws = [scene.surface["law"]] if "law" in scene.surface else tuple(REGISTERED_LAWS)
+    arguments = surface_keywords(scene.surface, *find_laws(laws))
     return limits(scene.texture, scene.device or DEFAULT_DEVICE, **{**arguments, **options})
 
 
@@ -101,26 +101,28 @@ def _bake(scene: Scene, _laws: Laws, options: Mapping[str, Any], _seed: int) -> 
     return cast("Tabular", rendered.texture)  # a potential field
 
 
+def _onset(scene: Scene, laws: Laws, options: Mapping[str, Any], _seed: int) -> Tabular:
+    return onset(scene, laws, **options)
+
+
+def _scan(scene: Scene, laws: Laws, options: Mapping[str, Any], _seed: int) -> Tabular:
+    return scan(scene, laws, **options)
+
+
 _FORCE = "resolved force RMS [N]"
+_FIELD_ENERGY = "energy of the field [J]"
 _STIFFNESS = "recommended stiffness [N/m]"
 RUN_KINDS = {
     kind.name: kind
     for kind in (
         RunKind("compare", compare, _compare, ("law",), (_STIFFNESS, _FORCE)),
         RunKind("limits", limits, _limits, (), ("top speed [m/s]", _FORCE), takes_laws=False),
-        RunKind("onset", onset, lambda scene, laws, options, _: onset(scene, laws, **options),
-                ("law", "delay [samples]"), ("cycling [N/m]",)),
-        RunKind("scan", scan, lambda scene, laws, options, _: scan(scene, laws, **options),
-                ("law", "speed [m/s]", "depth [m]"), ("energy of the field [J]",)),
+        RunKind("onset", onset, _onset, ("law", "delay [samples]"), ("cycling [N/m]",)),
+        RunKind("scan", scan, _scan, ("law", "speed [m/s]", "depth [m]"), (_FIELD_ENERGY,)),
         RunKind("bake", rendered_surface, _bake, (), ("size [B]", "q"), takes_laws=False),
     )
 }  # fmt: skip
-"""Runs by name; a plugin may define one."""
-
-
-def register_run(kind: RunKind) -> None:
-    """Register a user-defined run by its name."""
-    RUN_KINDS[kind.name] = kind
+"""Runs by name."""
 
 
 def find_run(name: str) -> RunKind:
@@ -221,5 +223,7 @@ def _compute_case(template: CaseTemplate, index: int, values: Mapping[str, Any])
         result = run.compute(scene, laws, template.options, seed)
         return Outcome(index, to_plain_data(result.table_rows()))
     except Exception as error:  # one case must not end the others
-        kind = "" if isinstance(error, AsperityError) else f"{type(error).__name__}: "
-        return Outcome(index, error=" ".join(f"{kind}{error}".split()))
+        text = str(error)
+        if not isinstance(error, AsperityError):
+            text = f"{type(error).__name__}: {error}"
+        return Outcome(index, error=" ".join(text.split()))

@@ -67,10 +67,13 @@ def sweep(
         >>> [(row["texture.period [m]"], row["law"]) for row in result.table_rows()]
         [(0.001, 'W'), (0.001, 'A'), (0.002, 'W'), (0.002, 'A')]
     """
-    count = available_cores() if processes is None else check_integer("processes", processes, 1)
+    if processes is None:
+        processes = available_cores()
+    check_integer("processes", processes, 1)
     plan = make_plan(os.fspath(scene), vary, run, design=design, laws=laws, options=options)
-    place = local_place(count) if scheduler is None else cluster_place(scheduler)
-    return run_plan(plan, place, folder, progress)
+    if scheduler is not None:
+        return run_plan(plan, cluster_place(scheduler), folder, progress)
+    return run_plan(plan, local_place(processes), folder, progress)
 
 
 def run_plan(

@@ -10,12 +10,14 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from asperity.core.arguments import Argument
+from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
 from asperity.core.files import package_digest
 from asperity.core.units import parse_quantity
@@ -74,13 +76,15 @@ class SweepPlan:
     def column(self, key: str) -> str:
         """Return the column of a key, "texture.period [m]"."""
         unit = self.arguments[key].unit
-        return f"{key} [{unit}]" if unit else key
+        if not unit:
+            return key
+        return f"{key} [{unit}]"
 
     def describe(self) -> dict[str, Any]:
         """Return plain data that identifies the sweep, with its files and versions."""
         template = self.template
         texts = set[str]()
-        for choices in (*template.sections.values(), *(one for axis in self.axes for one in axis)):
+        for choices in chain(template.sections.values(), *self.axes):
             texts.update(value for value in choices.values() if isinstance(value, str))
         digests = {text: file_digest(template.folder / text) for text in sorted(texts)}
         return {
@@ -122,12 +126,13 @@ def make_plan(
     sections, folder = read_scene(scene)
     letters = None
     if laws is not None:
-        letters = tuple(one.letter for one in find_laws(laws if isinstance(laws, str) else [*laws]))
+        letters = tuple(law.letter for law in find_laws(laws))
     find_run(run).check_options(options or {}, letters)
     arguments, axes = _parse_axes(sections, vary, design)
-    if not axes or (letters and LAW_KEY in arguments):
-        words = f"cannot be given while {LAW_KEY} is varied" if axes else "is missing: KEY=a,b,c"
-        raise ParameterError("laws" if axes else "vary", words)
+    if not axes:
+        raise ParameterError("vary", "is missing: KEY=a,b,c")
+    if letters and LAW_KEY in arguments:
+        raise ParameterError("laws", f"cannot be given while {LAW_KEY} is varied")
     device = sections.get("device", {})
     if "id" in device:
         device["id"] = _absolute(device["id"])
@@ -141,34 +146,58 @@ def _parse_axes(
     sections: Mapping[str, Mapping[str, Any]], vary: Mapping[str, str], design: str
 ) -> tuple[dict[str, Argument], list[list[dict[str, Any]]]]:
     """Return the declarations of the varied keys, and the choices that are combined."""
-    found = find_varied_arguments(sections, {key: text.split(",") for key, text in vary.items()})
+    declared = find_varied_arguments(sections, {key: text.split(",") for key, text in vary.items()})
     ranges: dict[str, Range] = {}
     axes: list[list[dict[str, Any]]] = []
     for key, text in vary.items():
-        argument = found[key]
-        name = found[key].name
+        argument = declared[key]
+        name = argument.name
         if design and is_range(argument, text):
-            ranges[name], _ = parse_range(argument, text, in_design=True)
+            ranges[name] = parse_range(argument, text, in_design=True)
             continue
         values = parse_values(argument, text)
         for value in values:
             _CHECKS.get(name, str)(value)  # an unknown law or device
         axes.append([{name: _absolute(value)} for value in values])
-    arguments = {argument.name: argument for argument in found.values()}
-    return arguments, [design_points(design, ranges), *axes] if design else axes
+    if design:
+        axes.insert(0, design_points(design, ranges))
+    return {argument.name: argument for argument in declared.values()}, axes
 
 
 def _absolute(value: Any) -> Any:
     """Return a device file by its full path, since workers may run in other folders."""
-    is_file = isinstance(value, str) and value.lower().endswith(".toml")
-    return str(Path(value).resolve()) if is_file else value
+    if isinstance(value, str) and value.lower().endswith(".toml"):
+        return str(Path(value).resolve())
+    return value
 
 
 _NUMBER_FORMS = ("quantity", "integer", "pair", "axes")
 """Forms of arguments of which a single number is a value."""
 _STEPS = re.compile(r"(\d*)\s*(log)?")
-Range = tuple[Argument, float, float, bool]
-"""Argument, first and last value [SI], and whether the steps are equal ratios."""
+
+
+class Range(NamedTuple):
+    """A range of values.
+
+    Attributes:
+        argument: declaration of the key.
+        low: first value [SI].
+        high: last value [SI].
+        is_logarithmic: whether the steps are equal ratios.
+        steps: number of values; 0 in a design.
+    """
+
+    argument: Argument
+    low: float
+    high: float
+    is_logarithmic: bool
+    steps: int
+
+    def at(self, fractions: FloatArray) -> FloatArray:
+        """Return the values at fractions of the range, 0 to 1."""
+        if self.is_logarithmic:
+            return self.low * (self.high / self.low) ** fractions
+        return self.low + (self.high - self.low) * fractions
 
 
 def is_range(argument: Argument, text: str) -> bool:
@@ -194,38 +223,48 @@ def parse_values(argument: Argument, text: str) -> list[Any]:
         ['touch', 'omega.3']
     """
     if is_range(argument, text):
-        (_, low, high, is_logarithmic), steps = parse_range(argument, text)
-        numbers = (np.geomspace if is_logarithmic else np.linspace)(low, high, steps)
-        values = [scene_value(argument, number) for number in numbers.tolist()]
+        _, low, high, is_logarithmic, steps = parse_range(argument, text)
+        grid = np.geomspace if is_logarithmic else np.linspace
+        values = [scene_value(argument, number) for number in grid(low, high, steps).tolist()]
     else:
         parts = [argument.parse(part.strip()) for part in text.split(",") if part.strip()]
         values = [_canonical(argument, part) for part in parts]
-    if not values or len(set(map(str, values))) < len(values):
-        words = "names a value twice" if values else "needs values: KEY=a,b,c"
-        raise ParameterError("vary", f"{argument.name} {words}", text)
+    if not values:
+        raise ParameterError("vary", f"{argument.name} needs values: KEY=a,b,c", text)
+    if len(set(map(str, values))) < len(values):
+        raise ParameterError("vary", f"{argument.name} names a value twice", text)
     return values
 
 
-def parse_range(argument: Argument, text: str, *, in_design: bool = False) -> tuple[Range, int]:
-    """Return a range and its number of values; in a design it has none.
+def parse_range(argument: Argument, text: str, *, in_design: bool = False) -> Range:
+    """Return a range with its number of values; in a design it has none.
 
     Raises:
         ParameterError: for an empty or reversed range, or a number that cannot be used.
     """
     start, stop, *rest = text.split(":")
     match = _STEPS.fullmatch(":".join(rest).strip())
-    steps = int(match[1] or 0) if match else 0
-    if match is None or (match[1] if in_design else steps < 2):
-        usual = "START:STOP or START:STOP:log in a design" if in_design else "START:STOP:COUNT"
-        words = f"range of {argument.name} must be {usual}, with log for equal ratios"
-        raise ParameterError("vary", f"{words} and two values or more", text)
-    low, high = (parse_quantity(argument.name, end, argument.unit) for end in (start, stop))
-    if not low < high or (match[2] and low <= 0.0):
-        words = "positive for equal ratios" if low < high else "less than STOP: it is empty"
-        raise ParameterError("vary", f"range of {argument.name}: START must be {words}", text)
+    usual = "START:STOP or START:STOP:log in a design" if in_design else "START:STOP:COUNT"
+    words = f"range of {argument.name} must be {usual}, with log for equal ratios"
+    error = ParameterError("vary", f"{words} and two values or more", text)
+    if match is None:
+        raise error
+    steps = int(match[1] or 0)
+    if in_design and match[1]:
+        raise error
+    if not in_design and steps < 2:
+        raise error
+    low = parse_quantity(argument.name, start, argument.unit)
+    high = parse_quantity(argument.name, stop, argument.unit)
+    is_logarithmic = match[2] is not None
+    words = f"range of {argument.name}: START must be"
+    if not low < high:
+        raise ParameterError("vary", f"{words} less than STOP: it is empty", text)
+    if is_logarithmic and low <= 0.0:
+        raise ParameterError("vary", f"{words} positive for equal ratios", text)
     for number in (low, high):
         scene_value(argument, number)
-    return (argument, low, high, bool(match[2])), steps
+    return Range(argument, low, high, is_logarithmic, steps)
 
 
 def scene_value(argument: Argument, number: float) -> Any:
@@ -253,7 +292,7 @@ def table_value(argument: Argument, value: Any) -> Any:
     """
     parsed = argument.parse(value)
     if isinstance(parsed, (list, tuple)):
-        return "; ".join(str(part) for part in parsed)
+        return "; ".join(map(str, parsed))
     return parsed
 
 
@@ -278,13 +317,8 @@ def design_points(design: str, ranges: Mapping[str, Range]) -> list[dict[str, An
     from scipy.stats import qmc
 
     fractions = qmc.Sobol(len(ranges), scramble=False).random_base2(points.bit_length() - 1)
-    columns = {
-        key: low * (high / low) ** part if is_logarithmic else low + (high - low) * part
-        for (key, (_, low, high, is_logarithmic)), part in zip(
-            ranges.items(), fractions.T, strict=True
-        )
-    }
-    return [
-        {key: scene_value(ranges[key][0], column[i]) for key, column in columns.items()}
-        for i in range(points)
-    ]
+    columns = {}
+    for (key, bounds), column in zip(ranges.items(), fractions.T, strict=True):
+        columns[key] = [scene_value(bounds.argument, number) for number in bounds.at(column)]
+    rows = zip(*columns.values(), strict=True)
+    return [dict(zip(columns, row, strict=True)) for row in rows]

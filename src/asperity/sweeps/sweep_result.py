@@ -58,7 +58,8 @@ class SweepResult(Reportable, TableFiles):
     @cached_property
     def errors(self) -> dict[int, str]:
         """Why cases failed, by their number."""
-        return {one.index: one.error for one in self.store.outcomes() if one.error}
+        outcomes = self.store.outcomes()
+        return {outcome.index: outcome.error for outcome in outcomes if outcome.error}
 
     @cached_property
     def columns(self) -> dict[str, type]:
@@ -77,9 +78,9 @@ class SweepResult(Reportable, TableFiles):
 
         A row has the number and the values of its case, and results or an error.
         """
-        for one in self.store.outcomes():
-            case = {CASE: one.index, **self.plan.numbers(one.index)}
-            for row in one.rows or ({ERROR: one.error},):
+        for outcome in self.store.outcomes():
+            case = {CASE: outcome.index, **self.plan.numbers(outcome.index)}
+            for row in outcome.rows or ({ERROR: outcome.error},):
                 yield {**case, **row}
 
     def to_dict(self) -> dict[str, Any]:
@@ -99,11 +100,13 @@ class SweepResult(Reportable, TableFiles):
         """
         frame = self.to_dataframe()
         plan = self.plan
-        keys = [CASE] if plan.design else [plan.column(key) for key in plan.arguments]
+        keys = [plan.column(key) for key in plan.arguments]
+        if plan.design:
+            keys = [CASE]
         index = [name for name in self.run.index if name in frame]
-        found = frame[frame[ERROR].isna()].drop(columns=[ERROR])
+        complete = frame[frame[ERROR].isna()].drop(columns=[ERROR])
         try:
-            dataset = found.set_index(keys + index).to_xarray()
+            dataset = complete.set_index(keys + index).to_xarray()
         except ImportError:
             words = "needs xarray: pip install xarray; or use table_rows()"
             raise ParameterError("to_xarray", words) from None
@@ -158,7 +161,8 @@ class ResultStore:
             match = _LINE.fullmatch(line)
             if match is not None and int(match[1]) < len(self._offsets):
                 self._offsets[int(match[1])] = end
-            end += len(line) if line.endswith(b"\n") else 0
+            if line.endswith(b"\n"):
+                end += len(line)
         self._stream.truncate(end)
         return end
 
@@ -171,11 +175,11 @@ class ResultStore:
         Raises:
             ParameterError: if they cannot be written; what was recorded before stays.
         """
-        lines = [_case_line(one) for one in outcomes]
+        lines = [_case_line(outcome) for outcome in outcomes]
         with defer_interrupt():
             append_bytes("output", self._stream, b"".join(lines))
-            for one, line in zip(outcomes, lines, strict=True):
-                self._offsets[one.index] = self._end
+            for outcome, line in zip(outcomes, lines, strict=True):
+                self._offsets[outcome.index] = self._end
                 self._end += len(line)
             self.n_done += len(lines)
 
@@ -195,7 +199,9 @@ def _case_line(outcome: Outcome) -> bytes:
 
 def _decode(value: Any) -> Any:
     """Return a number for which JSON has no token."""
-    return float(value) if value in ("inf", "-inf") else value
+    if value in ("inf", "-inf"):
+        return float(value)
+    return value
 
 
 @contextmanager
@@ -233,15 +239,15 @@ def check_plan(path: Path, plan: Mapping[str, Any], kind: str) -> None:
     folder = path.parent
     text = json_text(plan)
     if not path.exists():
-        if any(one.name != _LOCK_FILE for one in folder.iterdir()):
+        if any(file.name != _LOCK_FILE for file in folder.iterdir()):
             words = f"is neither empty nor the folder of a {kind}"
             raise ParameterError("output", words, str(folder))
         write_bytes("output", path, text.encode())
         return
     with open_input(path) as stream:
         recorded = json.loads(stream.read())
-        given = json.loads(text)
-    differing = [name for name, value in given.items() if recorded.get(name) != value]
+    expected = json.loads(text)
+    differing = [name for name, value in expected.items() if recorded.get(name) != value]
     if differing:
         words = f"holds another {kind} (other {', '.join(differing)}): choose another folder"
         raise ParameterError("output", words, str(folder))

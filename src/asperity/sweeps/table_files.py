@@ -82,19 +82,19 @@ class TableFiles(Tabular):
         types = {bool: arrow.bool_(), int: arrow.int64(), float: arrow.float64()}
         fields = []
         for name, kind in self.columns.items():
-            match = UNIT.fullmatch(name)
-            unit = {"unit": match[2]} if match else None
-            fields.append(arrow.field(name, types.get(kind, arrow.string()), metadata=unit))
+            metadata = None
+            if match := UNIT.fullmatch(name):
+                metadata = {"unit": match[2]}
+            fields.append(arrow.field(name, types.get(kind, arrow.string()), metadata=metadata))
         metadata = {"asperity": json_text(self.metadata)}
         schema = arrow.schema(fields, metadata=metadata)
         rows = self.iterate_rows()
         with parquet.ParquetWriter(stream, schema) as writer:
             while block := list(islice(rows, _BLOCK)):
-                columns = [
-                    [None if (value := row.get(name)) is None else kind(value) for row in block]
-                    for name, kind in self.columns.items()
-                ]
-                arrays = [arrow.array(*one) for one in zip(columns, schema.types, strict=True)]
+                arrays = []
+                for name, kind in self.columns.items():
+                    values = [_cast(row.get(name), kind) for row in block]
+                    arrays.append(arrow.array(values, schema.field(name).type))
                 writer.write_table(arrow.Table.from_arrays(arrays, schema=schema))
 
 
@@ -102,12 +102,23 @@ def _common_type(types: set[type]) -> type:
     """Return the type of a column from those of its values."""
     if types == {int, float}:
         return float
-    return next(iter(types)) if len(types) == 1 else str
+    if len(types) == 1:
+        return types.pop()
+    return str
+
+
+def _cast(value: Any, kind: type) -> Any:
+    """Return a value as a type; an unknown one stays ``None``."""
+    if value is None:
+        return None
+    return kind(value)
 
 
 def _csv_value(value: Any) -> Any:
     """Return a value of CSV: true and false as in JSON."""
-    return str(value).lower() if isinstance(value, bool) else value
+    if isinstance(value, bool):
+        return str(value).lower()
+    return value
 
 
 def _write_file(path: str | os.PathLike[str], write: Callable[[IO[bytes]], None]) -> None:

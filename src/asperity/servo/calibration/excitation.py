@@ -19,7 +19,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from asperity.contacts.warm_start import FIRST_POINT, POINT_COUNT
-from asperity.core.compiled import FloatArray, Kernels
+from asperity.core.compiled import FloatArray, Kernels, local_array
 from asperity.devices.device import Axis
 from asperity.kernels.fuse import module_source
 from asperity.loop import servo_loop
@@ -99,10 +99,13 @@ def initialize_excitation(
     x: float, y: float, z: float, memory: FloatArray, law: Excitation
 ) -> None:
     """Initialize the memory with the position of the handle."""
-    given = not math.isnan(law.x)
-    memory[CENTRE] = law.x if given else x
-    memory[CENTRE + 1] = law.y if given else y
-    memory[CENTRE + 2] = law.z if given else z
+    memory[CENTRE] = law.x
+    memory[CENTRE + 1] = law.y
+    memory[CENTRE + 2] = law.z
+    if math.isnan(law.x):
+        memory[CENTRE] = x
+        memory[CENTRE + 1] = y
+        memory[CENTRE + 2] = z
     memory[LAST_POSITION] = x
     memory[LAST_POSITION + 1] = y
     memory[LAST_POSITION + 2] = z
@@ -146,30 +149,31 @@ def probe_tick(
         initialize_excitation(x, y, z, memory, law)
     count = memory[SAMPLE_INDEX]
     memory[SAMPLE_INDEX] = count + 1.0
-    ex = x - memory[CENTRE]
-    ey = y - memory[CENTRE + 1]
-    ez = z - memory[CENTRE + 2]
+    axis = int(law.axis)
+    offset = local_array((3,))
+    offset[0] = x - memory[CENTRE]
+    offset[1] = y - memory[CENTRE + 1]
+    offset[2] = z - memory[CENTRE + 2]
     if law.kind == WALL and count >= law.wait_samples:
-        ex -= law.wall_step if law.axis == 0.0 else 0.0
-        ey -= law.wall_step if law.axis == 1.0 else 0.0
-        ez -= law.wall_step if law.axis == 2.0 else 0.0
-    along = ex if law.axis == 0.0 else ey if law.axis == 1.0 else ez
+        offset[axis] -= law.wall_step
+    along = offset[axis]
     # The trip is inactive before the step: the handle may be pulled from further away.
     if law.kind != REST and count >= law.wait_samples and abs(along) > law.trip_distance:
         memory[TRIPPED] = 1.0
     over = memory[TRIPPED] != 0.0
     if over or count >= law.samples:
         return 0.0, 0.0, 0.0, law.number, count, over
-    push = push_force(memory, law) if law.kind == PUSHING else 0.0
-    bx = brake_force(x, 0, memory, law)
-    by = brake_force(y, 1, memory, law)
-    bz = brake_force(z, 2, memory, law)
-    stiff = law.stiffness if law.kind == WALL else law.holding_stiffness
-    along_it = push - stiff * along
-    fx = along_it if law.axis == 0.0 else -law.holding_stiffness * ex
-    fy = along_it if law.axis == 1.0 else -law.holding_stiffness * ey
-    fz = along_it if law.axis == 2.0 else -law.holding_stiffness * ez
-    return fx + bx, fy + by, fz + bz, law.number, count, over
+    force = local_array((3,))
+    for i in range(3):
+        force[i] = -law.holding_stiffness * offset[i]
+    if law.kind == WALL:
+        force[axis] = -law.stiffness * along
+    if law.kind == PUSHING:
+        force[axis] += push_force(memory, law)
+    fx = force[0] + brake_force(x, 0, memory, law)
+    fy = force[1] + brake_force(y, 1, memory, law)
+    fz = force[2] + brake_force(z, 2, memory, law)
+    return fx, fy, fz, law.number, count, over
 
 
 def probe_in_contact(x: float, y: float, z: float, texture: object) -> bool:
@@ -227,10 +231,9 @@ def excitation_renderer(driver: Driver) -> Callable[[Excitation], LoopProgram]:
 
 def excitation_rows(rows: FloatArray, excitation: Excitation) -> FloatArray:
     """Return the rows of an excitation."""
-    own = (rows[:, EXCITATION_COLUMN] == excitation.number) & (
-        rows[:, EXCITATION_COLUMN + 1] < excitation.samples
-    )
-    return np.asarray(rows[own])
+    is_of_number = rows[:, EXCITATION_COLUMN] == excitation.number
+    is_before_end = rows[:, EXCITATION_COLUMN + 1] < excitation.samples
+    return np.asarray(rows[is_of_number & is_before_end])
 
 
 class UnclockedRig:
@@ -269,9 +272,8 @@ class UnclockedRig:
         self._loop.reset_contact()
         rows, _first = self._loop_memory.rows(first)
         if cause.is_fault:
-            by_driver = cause is EndReason.DEVICE
-            words = self._driver.describe_error(code) if by_driver else FAULT_DESCRIPTIONS[cause]
-            raise DeviceFault(cause, f"{words}; the force was made zero", rows[-FAULT_SAMPLES:])
+            text = FAULT_DESCRIPTIONS.get(cause) or self._driver.describe_error(code)
+            raise DeviceFault(cause, f"{text}; the force was made zero", rows[-FAULT_SAMPLES:])
         return excitation_rows(rows, excitation)
 
 
@@ -316,9 +318,8 @@ class ClockedRig:
             rows, at = self.loop.rows(first)
             first = at + len(rows)
             parts.append(excitation_rows(rows, excitation))
-            if len(rows) and rows[-1, EXCITATION_COLUMN] == excitation.number and (
-                rows[-1, EXCITATION_COLUMN + 1] >= excitation.samples
-            ):  # fmt: skip
+            newest = rows[-1:, EXCITATION_COLUMN : EXCITATION_COLUMN + 2]
+            if (newest[:, 0] == excitation.number).any() and newest[0, 1] >= excitation.samples:
                 return np.concatenate(parts)
             time.sleep(_POLL_INTERVAL)
         raise DeviceFault(EndReason.UNRESPONSIVE, "the loop did not run the excitation")

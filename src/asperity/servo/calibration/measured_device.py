@@ -21,7 +21,9 @@ def effective_resolution(calibration: Calibration) -> Estimate:
     noise = _STEP_PER_SIGMA * calibration.noise.value
     value = math.hypot(step.value, noise)
     parts = step.value * step.uncertainty, noise * _STEP_PER_SIGMA * calibration.noise.uncertainty
-    return Estimate(value, math.hypot(*parts) / value if value else 0.0)
+    if value == 0.0:
+        return Estimate(0.0, 0.0)
+    return Estimate(value, math.hypot(*parts) / value)
 
 
 def measured_device(
@@ -37,8 +39,12 @@ def measured_device(
         simulated: whether the device was simulated.
     """
     source = f"measured by the calibration of asperity, {date}"
-    source += f", on a simulated {base.id}" if simulated else ""
-    origin: Origin = "simulated" if simulated else "measured"
+    origin: Origin = "measured"
+    suffix = ", measured"
+    if simulated:
+        source += f", on a simulated {base.id}"
+        origin = "simulated"
+        suffix = ", simulated and measured"
     data = {field: datum for field, datum in base.data.items() if field not in _MEASURED_FIELDS}
 
     def add(field: str, value: float, words: str) -> None:
@@ -67,7 +73,6 @@ def measured_device(
     mass = min(axis.mass.value for axis in dynamics)
     if mass > 0.0:
         add("apparent_mass", mass, f"{_describe_axes(calibration, 'mass', 'kg')}; the least")
-    suffix = ", simulated and measured" if simulated else ", measured"
     return replace(base, id=identity, name=base.name.removesuffix(suffix) + suffix, data=data)
 
 
@@ -81,19 +86,18 @@ def _wall_test(calibration: Calibration, source: str, origin: Origin) -> WallTes
     """Return the test of the smooth wall on the weakest axis, with the others beside it."""
     if any(not axis.wall.stable_stiffness for axis in calibration.axes):
         return None
-    words = {axis.name: f"{source}: along {axis.name}, {describe_wall(axis)}"
-             for axis in calibration.axes}  # fmt: skip
-    weakest = calibration.weakest_axis
-    others = tuple(
-        _datum(axis.wall.stable_stiffness, "N/m", words[axis.name], origin)
-        for axis in calibration.axes
-        if axis is not weakest
-    )
-    cycled = weakest.wall.cycling_stiffness
+    data = {}
+    for axis in calibration.axes:
+        axis_source = f"{source}: along {axis.name}, {describe_wall(axis)}"
+        data[axis.name] = _datum(axis.wall.stable_stiffness, "N/m", axis_source, origin)
+    directions = tuple(data)
+    weakest = data.pop(calibration.weakest_axis.name)
+    cycled = calibration.weakest_axis.wall.cycling_stiffness
+    if cycled is not None:
+        cycled = _round_to_four_digits(cycled)
     return WallTest(
-        _round_to_four_digits(weakest.wall.stable_stiffness), "N/m", words[weakest.name], True,
-        others, origin, directions=tuple(axis.name for axis in calibration.axes), lightest=1.0,
-        cycled=None if cycled is None else _round_to_four_digits(cycled),
+        weakest.value, "N/m", weakest.source, True, tuple(data.values()), origin,
+        directions=directions, lightest=1.0, cycled=cycled,
         update_rate=_round_to_four_digits(calibration.update_rate.value),
         positions="stepped" if calibration.position_step else "exact",
     )  # fmt: skip

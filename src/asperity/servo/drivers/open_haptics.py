@@ -105,10 +105,13 @@ def haptic_frame(words: IntArray, numbers: FloatArray) -> int:
     is_nonzero = wanted.x != 0.0 or wanted.y != 0.0 or wanted.z != 0.0
     if is_nonzero and now - wanted.time > words[FORCE_TIMEOUT]:
         set_failure(words, LOOP_SILENT)
-    held = words[FAILURE_CODE] == 0 and wanted.time != 0
-    force[0] = wanted.x if held else 0.0
-    force[1] = wanted.y if held else 0.0
-    force[2] = wanted.z if held else 0.0
+    force[0] = 0.0
+    force[1] = 0.0
+    force[2] = 0.0
+    if words[FAILURE_CODE] == 0 and wanted.time != 0:
+        force[0] = wanted.x
+        force[1] = wanted.y
+        force[2] = wanted.z
     call_address(words[BEGIN_FRAME], words[HANDLE])
     call_address(words[GET_DOUBLE], CURRENT_POSITION, place)
     call_address(words[SET_DOUBLE], CURRENT_FORCE, force)
