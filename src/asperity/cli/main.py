@@ -26,7 +26,6 @@ from asperity.core.errors import (
 )
 from asperity.core.files import read_toml
 from asperity.core.units import format_quantity
-from asperity.devices import FIELD_UNITS
 from asperity.laws import SHIPPED_LAW_ARGUMENTS
 from asperity.measured.file_arguments import FILE_ARGUMENTS
 
@@ -54,6 +53,8 @@ def write_option(name: str, value: object, ctx: click.Context) -> str:
         value: a text, a number [SI], ``True`` for a switch, ``None`` for the option alone.
         ctx: context of the command.
     """
+    from asperity.devices import FIELD_UNITS
+
     options = {str(option.name): option for option in ctx.command.params}
     if isinstance(value, float) and name in _FILE_OPTIONS:
         value = format_quantity(value, _FILE_OPTIONS[name].unit, digits=6)

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import asyncio
 import os
 import select
 import signal
 import stat
 import sys
 import time
-import webbrowser
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
@@ -253,6 +251,8 @@ def lab_command(
     """
     # Started first, since it takes long in another process.
     process = loop_setup.prestart_process()
+    import asyncio
+
     from asperity.lab.access import bind_socket
     from asperity.lab.scene_state import DEFAULT_SURFACE
     from asperity.lab.server import LabOptions, serve_lab
@@ -291,6 +291,8 @@ def _simulated_scene(source: str, values: dict[str, Any]) -> SceneState:
 
 def announce_page(name: str, address: str, *, no_browser: bool) -> None:
     """Print the address of a page, and open it in a browser."""
+    import webbrowser
+
     print_message(f"the {name} is at {address}")
     if not no_browser and not webbrowser.open(_write_redirect(address, _temporary_folder())):
         print_message("no browser was found: open the address in a browser of this machine")

@@ -77,11 +77,13 @@ def remove_outliers(heights: FloatArray, threshold: float) -> str:
         spikes = residual[block] > threshold * spread
         heights[tuple(index[spikes] for index in block)] = np.nan
         count += int(spikes.sum())
-    side = WINDOW_SIZES[heights.ndim]
-    around = f"{side} points" if heights.ndim == 1 else f"{side} x {side} points"
+    points = "points"
+    if count == 1:
+        points = "point"
+    neighbourhood = format_counts([WINDOW_SIZES[heights.ndim]] * heights.ndim)
     return (
-        f"outliers: {count} point{'' if count == 1 else 's'} beyond {threshold:g} robust standard"
-        f" deviations, of {around} around and of all"
+        f"outliers: {count} {points} beyond {threshold:g} robust standard"
+        f" deviations, of {neighbourhood} points around and of all"
         f" ({format_length(sigma)}, from the {origin} absolute deviation), made missing"
     )
 
@@ -263,21 +265,21 @@ def to_blend_samples(shape: Shape, pitch: Pitch, width: float | None) -> tuple[i
         ParameterError: the width is not positive, below four samples, or above half of the
             shorter side.
     """
-    counts = shape[::-1]
+    counts = np.array(shape[::-1])
     if width is None:
         samples = [max(_MIN_SAMPLES, round(DEFAULT_FRACTION * n)) for n in counts]
-        if any(2 * w > n for w, n in zip(samples, counts, strict=True)):
-            least = f"needs at least {2 * _MIN_SAMPLES} points along each side to blend"
-            raise ParameterError("periodic", least, counts)
+        if np.any(2 * np.array(samples) > counts):
+            limit = f"needs at least {2 * _MIN_SAMPLES} points along each side to blend"
+            raise ParameterError("periodic", limit, shape[::-1])
         return tuple(samples)
     check_positive("blend", width, "m")
     if width < (_MIN_SAMPLES - 0.5) * max(pitch):
-        least = f"{_MIN_SAMPLES} samples, {format_length(_MIN_SAMPLES * max(pitch))} [m]"
-        raise ParameterError("blend", f"must be at least {least}", width)
-    samples = [round(min(width / p, n)) for p, n in zip(pitch, counts, strict=True)]
-    if any(2 * w > n for w, n in zip(samples, counts, strict=True)):
-        most = format_length(min(n // 2 * p for p, n in zip(pitch, counts, strict=True)))
-        raise ParameterError("blend", f"must be at most half the shorter side, {most} [m]", width)
+        limit = f"{_MIN_SAMPLES} samples, {format_length(_MIN_SAMPLES * max(pitch))} [m]"
+        raise ParameterError("blend", f"must be at least {limit}", width)
+    samples = [round(min(width / p, n)) for p, n in zip(pitch, shape[::-1], strict=True)]
+    if np.any(2 * np.array(samples) > counts):
+        limit = format_length(float(min(counts // 2 * pitch)))
+        raise ParameterError("blend", f"must be at most half the shorter side, {limit} [m]", width)
     return tuple(samples)
 
 
@@ -337,9 +339,10 @@ def make_periodic(
         mask[:band] |= every[-band:]
         filled_mask = _move_axis_first(mask, axis)
     widths = format_lengths([w * p for w, p in zip(samples, pitch, strict=True)])
-    chosen = " (a tenth of each side)" if width is None else ""
+    if width is None:
+        widths += " (a tenth of each side)"
     sentence = (
-        f"made periodic: opposite borders blended over {widths}{chosen}, which leaves"
+        f"made periodic: opposite borders blended over {widths}, which leaves"
         f" {format_counts(periodic.shape[::-1])} points; a jump of up to {format_length(jump)}"
         " removed"
     )
@@ -348,7 +351,9 @@ def make_periodic(
 
 def _move_axis_first(values: ArrayT, axis: int) -> ArrayT:
     """Return a view with the given axis first; for one or two axes it is its own inverse."""
-    return values if axis == 0 else values.T
+    if axis == 0:
+        return values
+    return values.T
 
 
 def _blend_axis(heights: FloatArray, band: int, axis: int) -> FloatArray:

@@ -25,11 +25,11 @@ PREPARATION_ARGUMENTS = (*read_arguments(_TABLES, "preparation").values(), *MAGN
 FILE_ARGUMENTS = (*READING_ARGUMENTS, *PREPARATION_ARGUMENTS)
 """All arguments of a measured file."""
 
-_SYNTHETIC_NAMES = {"height_range", "s_cutoff", "l_cutoff"}
-_SYNTHETIC_NAMES |= {argument.name for argument in MAGNIFICATION_ARGUMENTS}
-SYNTHETIC_ARGUMENTS = tuple(
-    replace(argument, default_description="none") if argument.name == "s_cutoff" else argument
-    for argument in PREPARATION_ARGUMENTS
-    if argument.name in _SYNTHETIC_NAMES
+_BY_NAME = {argument.name: argument for argument in PREPARATION_ARGUMENTS}
+SYNTHETIC_ARGUMENTS = (
+    _BY_NAME["height_range"],
+    replace(_BY_NAME["s_cutoff"], default_description="none"),
+    _BY_NAME["l_cutoff"],
+    *MAGNIFICATION_ARGUMENTS,
 )
 """Arguments for any texture: a synthetic one has no missing points, no spikes and no form."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from asperity.core.checks import FloatArray, check_positive
 from asperity.core.errors import ParameterError
-from asperity.measured.lengths import Pitch, Shape, format_length
+from asperity.measured.lengths import Pitch, Shape, format_length, side_lengths
 
 ALPHA = math.sqrt(math.log(2.0) / math.pi)
 """Constant of ISO 16610-21 and -61 for a transmission of 50 % at the cut-off."""
@@ -67,10 +67,13 @@ def lowpass_in_place(
 
     for axis, step in zip(range(heights.ndim - 1, -1, -1), pitch, strict=True):
         n = heights.shape[axis]
-        frequency = rfftfreq(n, step) if periodic else np.arange(n) / (2.0 * (n - 1) * step)
+        frequency = np.arange(n) / (2.0 * (n - 1) * step)
+        if periodic:
+            frequency = rfftfreq(n, step)
         transmission = np.exp(-np.pi * (ALPHA * cutoff * frequency) ** 2)
-        other = tuple(k for k in range(heights.ndim) if k != axis)
-        response = np.expand_dims(transmission, other)
+        response = transmission
+        if axis < heights.ndim - 1:
+            response = transmission[:, None]
         if periodic:
             heights[...] = irfft(response * rfft(heights, axis=axis), n, axis=axis)
         else:
@@ -111,7 +114,7 @@ def find_cutoffs(
     Raises:
         ParameterError: a cut-off conflicts with the sampling, the extent or the other cut-off.
     """
-    longest = max((n - 1) * p for n, p in zip(shape[::-1], pitch, strict=True))
+    longest = max(side_lengths(shape, pitch))
     short, note = _s_cutoff(max(pitch), longest, s_cutoff)
     if l_cutoff is None:
         return Cutoffs(short, None, note)
@@ -168,16 +171,21 @@ def short_trace_text(shape: Shape, pitch: Pitch, l_cutoff: float) -> str:
         >>> short_trace_text((5001,), (1e-6,), 0.8e-3)
         ''
     """
-    shortest = min((n - 1) * p for n, p in zip(shape[::-1], pitch, strict=True))
-    count = SECTION_COUNT if len(shape) == 1 else 1
-    if shortest * (1 + 1e-9) >= count * l_cutoff:
+    shortest = min(side_lengths(shape, pitch))
+    sections = required_sections(shape)
+    if shortest * (1 + 1e-9) >= sections * l_cutoff:
         return ""
     side = format_length(shortest)
     length = format_length(l_cutoff)
     if len(shape) > 1:
         return f"too small for this L-filter: {side} wide, ISO 25178-3 takes at least {length}"
-    sections = f"{shortest / l_cutoff:.3g} section lengths of {length}"
-    return f"too short for this L-filter: {side} are {sections}, ISO 21920-3 takes {SECTION_COUNT}"
+    found = f"{side} are {shortest / l_cutoff:.3g} section lengths of {length}"
+    return f"too short for this L-filter: {found}, ISO 21920-3 takes {SECTION_COUNT}"
+
+
+def required_sections(shape: Shape) -> int:
+    """Return how many nesting indices long a profile, or how wide a map, is at least."""
+    return SECTION_COUNT if len(shape) == 1 else 1
 
 
 def _s_cutoff(max_pitch: float, max_length: float, s_cutoff: float | None) -> tuple[float, str]:
@@ -256,7 +264,7 @@ def check_tip_radius(shape: Shape, pitch: Pitch, radius: float) -> None:
         ParameterError: the radius is not positive, or exceeds the shorter side.
     """
     check_positive("tip_radius", radius, "m")
-    extent = min((n - 1) * p for n, p in zip(shape[::-1], pitch, strict=True))
+    extent = min(side_lengths(shape, pitch))
     if radius > extent * (1 + 5e-7):
         limit = f"must be at most the surface's shorter side, {format_length(extent)} [m]"
         raise ParameterError("tip_radius", limit, radius)
@@ -287,7 +295,9 @@ def _ball(
 ) -> tuple[FloatArray, NDArray[np.bool_]]:
     """Return how far a ball rises [m] around its lowest point, and where that is compared."""
     # Where the ball has risen by more than the height range, the point below its centre is higher.
-    reach = math.sqrt(max(span * (2.0 * radius - span), 0.0)) if span < radius else radius
+    reach = radius
+    if span < radius:
+        reach = math.sqrt(max(span * (2.0 * radius - span), 0.0))
     limits = [math.floor(reach / p * (1 + 1e-12)) for p in pitch[::-1]]
     counts = np.minimum(limits, np.array(shape) - 1)
     sides = [p * np.arange(-n, n + 1) for n, p in zip(counts, pitch[::-1], strict=True)]

@@ -11,8 +11,8 @@ from numpy.polynomial.legendre import legder, legval, legvander
 from asperity.core.checks import FloatArray, check_positive
 from asperity.core.errors import ParameterError
 from asperity.measured.defects import fill_in_place
-from asperity.measured.filters import SECTION_COUNT, gaussian_filter
-from asperity.measured.lengths import Pitch, Shape, format_length
+from asperity.measured.filters import gaussian_filter, required_sections
+from asperity.measured.lengths import Pitch, Shape, format_length, side_lengths
 
 MAX_DEGREE = 10
 """Greatest degree; the L-filter removes shorter waves."""
@@ -43,7 +43,9 @@ class FormPolynomial:
         """Return the heights [m] at all points of the grid."""
         bases = _legendre_bases(self.shape, self.degree)
         values = bases[0] @ self.coefficients
-        return np.asarray(values if len(self.shape) == 1 else values @ bases[1].T)
+        if len(self.shape) == 2:
+            values = values @ bases[1].T
+        return np.asarray(values)
 
 
 def check_degree(degree: int) -> int:
@@ -89,10 +91,10 @@ def fit_form(heights: FloatArray, degree: int = 1) -> FormPolynomial:
         True
     """
     degree = check_degree(degree)
-    most = max_degree(heights)
-    if degree > most:
+    limit = max_degree(heights)
+    if degree > limit:
         points = f"{_count_valid_coordinates(heights)} points along the shorter side"
-        raise ParameterError("form", f"must be at most {most} for {points}", degree)
+        raise ParameterError("form", f"must be at most {limit} for {points}", degree)
     orders = np.indices((degree + 1,) * heights.ndim).sum(axis=0)
     terms = np.flatnonzero(orders <= degree)
     gram, right = _normal_equations(heights, degree, None)
@@ -124,15 +126,18 @@ def subtract_form(heights: FloatArray, form: FormPolynomial, pitch: Pitch) -> st
     if form.degree == 0:
         mean = format_length(float(form.coefficients.flat[0]))
         return f"mean height {mean} subtracted; not levelled"
-    slopes = " and ".join(f"{slope:.2g}" for slope in _central_slopes(form, pitch))
-    is_profile = heights.ndim == 1
+    slopes = " and ".join([f"{slope:.2g}" for slope in _central_slopes(form, pitch)])
+    shape = "plane"
+    word = "slopes"
+    if heights.ndim == 1:
+        shape = "line"
+        word = "slope"
     if form.degree == 1:
-        kind = "line, slope" if is_profile else "plane, slopes"
-        return f"levelled: subtracted the least-squares {kind} {slopes}"
+        return f"levelled: subtracted the least-squares {shape}, {word} {slopes}"
     return (
         f"form removed: subtracted the least-squares polynomial of degree {form.degree}, its RMS"
         f" {format_length(measured.rms)}, peak to valley {format_length(measured.range)},"
-        f" {'slope' if is_profile else 'slopes'} in the middle {slopes}"
+        f" {word} in the middle {slopes}"
     )
 
 
@@ -148,7 +153,9 @@ def _normal_equations(
     bases = _legendre_bases(heights.shape, degree)
     k = degree + 1
     pairs = [(b[:, :, None] * b[:, None, :]).reshape(-1, k * k) for b in bases]
-    rest = heights if previous is None else heights - previous.evaluate()
+    rest = heights
+    if previous is not None:
+        rest = heights - previous.evaluate()
     weight = (~np.isnan(rest)).astype(np.float64)
     rest = np.nan_to_num(rest)
     if heights.ndim == 1:
@@ -162,7 +169,8 @@ def _normal_equations(
 def _count_valid_coordinates(heights: FloatArray) -> int:
     """Return the number of coordinates with a valid point, along the axis with the fewest."""
     valid = np.atleast_2d(~np.isnan(heights))
-    return min(int(valid.any(axis=axis).sum()) for axis in range(heights.ndim))
+    counts = [int(valid.any(axis=axis).sum()) for axis in range(heights.ndim)]
+    return min(counts)
 
 
 def _central_slopes(form: FormPolynomial, pitch: Pitch) -> list[float]:
@@ -248,12 +256,11 @@ def default_nesting_index(shape: Shape, pitch: Pitch, periodic: bool) -> float:
     """
     if periodic:
         return MAX_TEXTURE_WAVELENGTH
-    shortest = min((n - 1) * p for n, p in zip(shape[::-1], pitch, strict=True))
-    limit = shortest / (SECTION_COUNT if len(shape) == 1 else 1)
+    limit = min(side_lengths(shape, pitch)) / required_sections(shape)
     limit *= 1 + 1e-9  # rounding must not exclude a map as long as a nesting index
     exponent = math.floor(math.log10(limit))
-    fitting = (float(f"{digits}e{exponent}") for digits in (8, 2.5, 0.8))
-    return min(MAX_TEXTURE_WAVELENGTH, next(length for length in fitting if length <= limit))
+    lengths = [float(f"{digits}e{exponent}") for digits in (8, 2.5, 0.8)]
+    return min(MAX_TEXTURE_WAVELENGTH, max(length for length in lengths if length <= limit))
 
 
 def decompose_surface(
@@ -297,7 +304,7 @@ def decompose_surface(
         nesting = default_nesting_index(heights.shape, pitch, periodic)
     else:
         nesting = check_positive("nesting", nesting, "m")
-        longest = max((n - 1) * p for n, p in zip(heights.shape[::-1], pitch, strict=True))
+        longest = max(side_lengths(heights.shape, pitch))
         if not periodic and nesting > longest * (1 + 5e-7):
             raise ParameterError("nesting", f"must be at most the length {longest:g} m", nesting)
     missing = np.isnan(heights)
@@ -308,5 +315,10 @@ def decompose_surface(
     waviness = gaussian_filter(rest, pitch, nesting, periodic=periodic)
     rest -= waviness
     rest[missing] = np.nan
-    bow, wave, texture = (HeightStatistics.of(part[~missing]) for part in (form, waviness, rest))
-    return SurfaceDecomposition(bow, wave, texture, nesting, rest.reshape(whole))
+    return SurfaceDecomposition(
+        HeightStatistics.of(form[~missing]),
+        HeightStatistics.of(waviness[~missing]),
+        HeightStatistics.of(rest[~missing]),
+        nesting,
+        rest.reshape(whole),
+    )

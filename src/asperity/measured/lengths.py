@@ -39,12 +39,29 @@ def format_lengths(values: Sequence[float]) -> str:
         ('1 µm', '1 µm x 2 µm')
     """
     texts = [format_length(value) for value in values]
-    return texts[0] if len(set(texts)) == 1 else " x ".join(texts)
+    if len(set(texts)) == 1:
+        return texts[0]
+    return " x ".join(texts)
 
 
 def format_counts(values: Sequence[int]) -> str:
     """Return counts along the axes as text: "30 x 40"."""
-    return " x ".join(str(value) for value in values)
+    return " x ".join(map(str, values))
+
+
+def side_lengths(shape: Shape, pitch: Pitch) -> tuple[float, ...]:
+    """Return the lengths of a grid along x and y, or of a profile [m].
+
+    Example:
+        >>> side_lengths((3, 5), (1e-3, 2e-3))
+        (0.004, 0.004)
+    """
+    return tuple((n - 1) * p for n, p in zip(shape[::-1], pitch, strict=True))
+
+
+def is_pitch(pitch: Pitch) -> bool:
+    """Whether all distances are positive and finite."""
+    return all(math.isfinite(p) and p > 0.0 for p in pitch)
 
 
 METRES_PER_UNIT = {
@@ -87,11 +104,16 @@ def unit_to_metres(unit: str) -> float:
         >>> unit_to_metres("um")
         1e-06
     """
-    given = unit.strip() if isinstance(unit, str) else ""
-    multiple = _MULTIPLE.fullmatch(given)
-    factor, name = (float(multiple.group(1)), multiple.group(2)) if multiple else (1.0, given)
-    plural = name[:-1] if len(name) > 3 and name.endswith("s") else name
-    for key in (name, plural):
+    name = str(unit).strip()
+    factor = 1.0
+    multiple = _MULTIPLE.fullmatch(name)
+    if multiple:
+        factor = float(multiple.group(1))
+        name = multiple.group(2)
+    singular = name
+    if len(name) > 3:
+        singular = name.removesuffix("s")
+    for key in (name, singular):
         if key in METRES_PER_UNIT or key in _EXPLICIT_UNITS:
             return factor * (METRES_PER_UNIT.get(key) or _EXPLICIT_UNITS[key])
     raise ParameterError("unit", "must be a unit of length: m, cm, mm, um, nm, angstrom, in", unit)
@@ -114,10 +136,9 @@ def parse_number(text: str, what: str) -> float:
         >>> parse_number("-2.5e-3", "offset")
         -0.0025
     """
-    value = float(text) if _NUMBER.fullmatch(text) else math.nan
-    if not math.isfinite(value):
+    if not _NUMBER.fullmatch(text) or not math.isfinite(float(text)):
         raise SurfaceFileError(f"{what} is {text[:40]!r}; a finite number is expected")
-    return value
+    return float(text)
 
 
 def parse_heights(text: str) -> FloatArray:

@@ -51,20 +51,24 @@ class SurfaceParameter:
 
 
 _TABLES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
-AREAL_PARAMETERS = tuple(SurfaceParameter(key, **entry) for key, entry in _TABLES["areal"].items())
+
+
+def _read_definitions(table: str) -> tuple[SurfaceParameter, ...]:
+    return tuple(SurfaceParameter(symbol, **entry) for symbol, entry in _TABLES[table].items())
+
+
+AREAL_PARAMETERS = _read_definitions("areal")
 """Parameters of maps, in the order in which they are listed."""
 
-PROFILE_PARAMETERS = tuple(
-    SurfaceParameter(key, **entry) for key, entry in _TABLES["profile"].items()
-)
+PROFILE_PARAMETERS = _read_definitions("profile")
 """Parameters of profiles; their symbols begin with P, after an L-filter with R."""
 
 # Relative to Rz: smaller peaks and pits are no profile elements (ISO 4287, 4.3.1).
 _MIN_PEAK_FRACTION = 0.1
 _BLOCK = 2**15  # points processed at once, which fit into the cache
 
-_PARAMETERS_BY_SYMBOL = {one.symbol: one for one in AREAL_PARAMETERS} | {
-    f"{kind}{one.symbol}": one for kind in "PR" for one in PROFILE_PARAMETERS
+_PARAMETERS_BY_SYMBOL = {parameter.symbol: parameter for parameter in AREAL_PARAMETERS} | {
+    f"{kind}{parameter.symbol}": parameter for kind in "PR" for parameter in PROFILE_PARAMETERS
 }
 
 
@@ -107,12 +111,14 @@ def compute_parameters(
     rows = np.atleast_2d(heights)
     steps = (pitch[0], pitch[-1])
     measured = rows[~np.isnan(rows)]
-    mean, low, high = (float(x) for x in (measured.mean(), measured.min(), measured.max()))
+    mean = float(measured.mean())
+    low = float(measured.min())
+    high = float(measured.max())
     a, q, skewness, kurtosis = _height_moments(measured, mean, high - low)
     gradient, ratio = _facet_parameters(rows, steps)
     if heights.ndim > 1:
         values = (q, a, high - low, high - mean, mean - low, skewness, kurtosis, gradient, ratio)
-        return dict(zip((one.symbol for one in AREAL_PARAMETERS), values, strict=True))
+        return {p.symbol: value for p, value in zip(AREAL_PARAMETERS, values, strict=True)}
     kind = "P"
     sections = 1
     if nesting is not None:
@@ -121,7 +127,7 @@ def compute_parameters(
     peak, pit = _mean_peak_and_pit(heights - mean, sections)
     spacing = _element_spacing(heights - mean, pitch[0], _MIN_PEAK_FRACTION * (peak + pit))
     line = (q, a, peak + pit, peak, pit, high - low, skewness, kurtosis, spacing, gradient)
-    return {f"{kind}{one.symbol}": v for one, v in zip(PROFILE_PARAMETERS, line, strict=True)}
+    return {f"{kind}{p.symbol}": value for p, value in zip(PROFILE_PARAMETERS, line, strict=True)}
 
 
 def _row_blocks(rows: FloatArray, overlap: int = 0) -> Iterator[FloatArray]:
@@ -163,10 +169,12 @@ def _facet_parameters(rows: FloatArray, pitch: Pitch) -> tuple[float | None, flo
         known = ~np.isnan(lower + upper)
         if not known.all():
             corners = [part[known] for part in corners]
-        squares += 0.5 * float(sum(part.sum() for part in corners))
-        excess += 0.25 * sum(_sum_area_excess(x + y) for x in corners[:2] for y in corners[2:])
+        squares += 0.5 * float(sum([part.sum() for part in corners]))
+        excess += 0.25 * sum([_sum_area_excess(x + y) for x in corners[:2] for y in corners[2:]])
         cells += corners[0].size
-    return (math.sqrt(squares / cells), excess / cells) if cells else (None, None)
+    if not cells:
+        return None, None
+    return math.sqrt(squares / cells), excess / cells
 
 
 def _sum_area_excess(square: FloatArray) -> float:
@@ -244,11 +252,11 @@ def correlation_parameters(heights: FloatArray, pitch: Pitch) -> tuple[float | N
     if heights.size > MAX_CORRELATION_POINTS or np.nanmax(heights) == np.nanmin(heights):
         return None, None
     distances = _decay_distances(_autocorrelation(heights), heights.shape, pitch)
-    found = [distance for distance in distances if distance is not None]
-    shortest = min(found, default=None)
-    if shortest is None or len(found) < len(distances):
+    known = [distance for distance in distances if distance is not None]
+    shortest = min(known, default=None)
+    if shortest is None or len(known) < len(distances):
         return shortest, None
-    return shortest, shortest / max(found)
+    return shortest, shortest / max(known)
 
 
 def _autocorrelation(heights: FloatArray) -> FloatArray:
@@ -258,9 +266,9 @@ def _autocorrelation(heights: FloatArray) -> FloatArray:
     known = ~np.isnan(heights)
     z = np.where(known, heights - np.nanmean(heights), 0.0)
     # Zero padding prevents wrap-around at offsets up to half of the map.
-    shape = tuple(next_fast_len(n + n // 2 + 1, real=True) for n in heights.shape)
-    ones = known.astype(np.float64)
-    products, pairs = (irfft2(np.abs(rfft2(part, shape)) ** 2, shape) for part in (z, ones))
+    shape = [next_fast_len(n + n // 2 + 1, real=True) for n in heights.shape]
+    products = irfft2(np.abs(rfft2(z, shape)) ** 2, shape)
+    pairs = irfft2(np.abs(rfft2(known.astype(np.float64), shape)) ** 2, shape)
     products /= np.maximum(pairs, 0.5)  # 0 except for rounding if no two points have the offset
     return np.asarray(products / products[0, 0])
 
@@ -273,17 +281,17 @@ def _decay_distances(
 
     half = [(n // 2) * p for n, p in zip(shape[::-1], pitch, strict=True)]
     step = 0.5 * min(pitch)
-    found: list[float | None] = []
+    distances: list[float | None] = []
     for angle in np.arange(_N_DIRECTIONS) * math.pi / _N_DIRECTIONS:
         direction = math.cos(angle), math.sin(angle)
-        reach = min(side / max(abs(c), 1e-12) for side, c in zip(half, direction, strict=True))
+        reach = min([side / max(abs(c), 1e-12) for side, c in zip(half, direction, strict=True)])
         along = np.arange(0.0, reach + 0.5 * step, step)
         indices = [along * direction[1] / pitch[1], along * direction[0] / pitch[0]]
         values = map_coordinates(autocorrelation, indices, order=1, mode="grid-wrap")
         low = int(np.argmax(values < CORRELATION_LEVEL))
         if values[low] >= CORRELATION_LEVEL:
-            found.append(None)
+            distances.append(None)
             continue
         share = (values[low - 1] - CORRELATION_LEVEL) / (values[low - 1] - values[low])
-        found.append(float(along[low - 1] + share * step))
-    return found
+        distances.append(float(along[low - 1] + share * step))
+    return distances

@@ -23,8 +23,21 @@ from asperity.measured.defects import (
 from asperity.measured.file_arguments import PREPARATION_ARGUMENTS
 from asperity.measured.filters import apply_filters, apply_tip, check_tip_radius, find_cutoffs
 from asperity.measured.form import check_degree, fit_form, subtract_form
-from asperity.measured.lengths import Pitch, Shape, format_counts, format_length, format_lengths
-from asperity.measured.prepared import PreparedSurface, StageCallback, StageRecorder, resized_stage
+from asperity.measured.lengths import (
+    Pitch,
+    Shape,
+    format_counts,
+    format_length,
+    format_lengths,
+    is_pitch,
+)
+from asperity.measured.prepared import (
+    PreparedSurface,
+    StageCallback,
+    StageRecorder,
+    resized_stage,
+    some_or_none,
+)
 from asperity.measured.reader import RawSurface
 
 MAX_MEAN_SLOPE = 10.0
@@ -121,7 +134,8 @@ def mean_slope(heights: FloatArray, pitch: Pitch) -> float:
         with np.errstate(over="ignore"):  # heights near the largest float
             rises = np.abs(np.diff(lines, axis=-1))
             rises = rises[~np.isnan(rises)]
-            slopes.append(float(rises.mean()) / step if rises.size else 0.0)
+            if rises.size:
+                slopes.append(float(rises.mean()) / step)
     return max(slopes)
 
 
@@ -202,8 +216,10 @@ def prepare(  # noqa: D417 - the others are described by their declarations
         steps.append(remove_outliers(heights, outliers))
         _check_missing(heights, max_missing)
     _scale_heights(heights, raw, lateral, height_range, steps)
-    if outliers is not None or height_range is not None:
-        record("as read" if outliers is None else "without outliers", heights, lateral)
+    if outliers is not None:
+        record("without outliers", heights, lateral)
+    elif height_range is not None:
+        record("as read", heights, lateral)
     start("form")
     sentence = subtract_form(heights, fit_form(heights, form), lateral)
     record(_FORM_STAGE_NAMES.get(form, "form removed"), heights, lateral, removes=True)
@@ -226,9 +242,9 @@ def prepare(  # noqa: D417 - the others are described by their declarations
         record("periodic", heights, lateral)
         steps.append(sentence)
     start("magnify")
-    mask = filled if filled.any() else None
-    stages = tuple(record.stages)
-    ready = PreparedSurface(heights, lateral, tuple(steps), mask, bool(periodic), stages)
+    ready = PreparedSurface(
+        heights, lateral, tuple(steps), some_or_none(filled), bool(periodic), tuple(record.stages)
+    )
     return magnify_surface(ready, magnify, magnify_height)
 
 
@@ -250,9 +266,9 @@ def magnify_surface(
     pitch = prepared.pitch
     greatest = max(float(heights.max()), -float(heights.min()))
     with np.errstate(over="ignore"):
-        wider = tuple(p * lateral for p in pitch)
+        wider = tuple([p * lateral for p in pitch])
         too_far = not math.isfinite(greatest * upward) or (greatest > 0 and greatest * upward == 0)
-    if too_far or not all(0 < p < math.inf for p in wider):
+    if too_far or not is_pitch(wider):
         raise ParameterError("magnify", "makes the surface too large or small to compute", magnify)
     if lateral == upward == 1.0:
         return prepared
@@ -267,7 +283,9 @@ def magnify_surface(
 def describe_magnification(lateral: float, vertical: float) -> str:
     """Return the magnification of a surface in words."""
     size = f"magnified {lateral:g} times laterally and"
-    return f"{size} in height" if lateral == vertical else f"{size} {vertical:g} times in height"
+    if lateral == vertical:
+        return f"{size} in height"
+    return f"{size} {vertical:g} times in height"
 
 
 def _check_arguments(
@@ -290,8 +308,10 @@ def magnification_factors(magnify: float, magnify_height: float | None) -> tuple
     Raises:
         ParameterError: a factor is not positive.
     """
-    vertical = magnify if magnify_height is None else magnify_height
-    return check_positive("magnify", magnify), check_positive("magnify_height", vertical)
+    lateral = check_positive("magnify", magnify)
+    if magnify_height is None:
+        return lateral, lateral
+    return lateral, check_positive("magnify_height", magnify_height)
 
 
 def _check_shape(heights: FloatArray, max_missing: float) -> None:
@@ -299,10 +319,8 @@ def _check_shape(heights: FloatArray, max_missing: float) -> None:
     if heights.ndim == 1 and shape[0] < _MIN_POINTS:
         raise ParameterError("surface", f"must have at least {_MIN_POINTS} points", shape[0])
     if heights.ndim == 2 and min(shape) < _MIN_POINTS:
-        given = f"got {format_counts(shape)} points"
-        raise ParameterError(
-            "surface", f"is too small: the smallest accepted map is 4 x 4, {given}"
-        )
+        size = f"got {format_counts(shape)} points"
+        raise ParameterError("surface", f"is too small: the smallest accepted map is 4 x 4, {size}")
     if heights.ndim not in (1, 2):
         raise ParameterError("surface", "must be a profile (n,) or a map (ny, nx)", shape)
     if np.isinf(heights).any():
@@ -317,13 +335,11 @@ def _check_missing(heights: FloatArray, max_missing: float) -> None:
     if missing == 1.0:
         raise ParameterError("surface", "has no valid point: all heights are missing")
     if missing > max_missing:
-        share = "a quarter" if max_missing == MAX_MISSING else f"{max_missing:.1%}"
-        raise ParameterError(
-            "surface",
-            f"misses {missing:.1%} of its points; at most {share} can be filled, unless you allow"
-            " more: {max_missing}",
-            max_missing=math.ceil(100 * missing) / 100,
+        text = (
+            f"misses {missing:.1%} of its points; at most {max_missing:.0%} can be filled, unless"
+            " you allow more: {max_missing}"
         )
+        raise ParameterError("surface", text, max_missing=math.ceil(100 * missing) / 100)
 
 
 def _resolve_pitch(
@@ -331,22 +347,27 @@ def _resolve_pitch(
 ) -> Pitch:
     """Return the given pitch or that of the file [m], one value for each axis."""
     axes = raw.heights.ndim
-    chosen = raw.pitch if pitch is None else pitch
+    chosen: GivenPitch = raw.pitch
+    if pitch is not None:
+        chosen = pitch
     if chosen is None:
-        missing = "{pitch}"
-        if raw.relative and height_range is None:
-            missing = "{pitch} and {unit}" if raw.lacks_unit else "{pitch} and {height_range}"
-        text = f"must be given [m]: {raw.source} has none; give {missing}"
+        text = f"must be given [m]: {raw.source} has none; give {{pitch}}"
+        if raw.lacks_unit and height_range is None:
+            text += " and {unit}"
+        elif raw.relative and height_range is None:
+            text += " and {height_range}"
         raise ParameterError("pitch", text, pitch=1e-6, unit="um", height_range=1e-6)
     values = np.atleast_1d(np.asarray(chosen, dtype=np.float64))
     if values.ndim != 1 or len(values) not in (1, axes):
-        wanted = "one number [m]" if axes == 1 else "one number or (px, py) [m]"
+        wanted = ("one number [m]", "one number or (px, py) [m]")[axes - 1]
         raise ParameterError("pitch", f"must be {wanted}", chosen)
     for value in values:
         check_positive("pitch", value, "m")
-    lateral = tuple(float(v) for v in np.broadcast_to(values, (axes,)))
+    lateral = tuple(np.broadcast_to(values, (axes,)).tolist())
     if pitch is not None:
-        before = "" if raw.pitch is None else f" instead of the file's {format_lengths(raw.pitch)}"
+        before = ""
+        if raw.pitch is not None:
+            before = f" instead of the file's {format_lengths(raw.pitch)}"
         steps.append(f"pitch {format_lengths(lateral)} as given{before}")
     elif not PITCH_LIMITS[0] <= min(lateral) <= max(lateral) <= PITCH_LIMITS[1]:
         raise ParameterError(
@@ -372,8 +393,10 @@ def _scale_heights(
     wanted = check_positive("height_range", height_range, "m")
     if span == 0.0:
         raise ParameterError("height_range", "cannot be reached: the surface is flat")
-    given = f"{span:.4g}" if raw.relative else format_length(span)
-    steps.append(f"heights scaled from {given} to {format_length(wanted)} peak to valley")
+    before = f"{span:.4g}"
+    if not raw.relative:
+        before = format_length(span)
+    steps.append(f"heights scaled from {before} to {format_length(wanted)} peak to valley")
     heights -= low
     heights *= wanted / span
 
@@ -388,7 +411,7 @@ def _fill_missing(
         steps.append("no missing points")
         return filled
     share = 100.0 * missing / heights.size
-    base = (" about the mean", " on the fitted tilt")[form] if form < 2 else " on the fitted form"
+    base = (" about the mean", " on the fitted tilt", " on the fitted form")[min(form, 2)]
     count = f"{missing} of {heights.size} missing points ({share:.2g} %)"
     steps.append(f"filled {count} by harmonic interpolation{base}")
     fill_in_place(heights, pitch)

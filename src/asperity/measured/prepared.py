@@ -20,7 +20,7 @@ from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.core.files import Serializable, json_text, open_atomic, open_input, to_plain_data
 from asperity.measured.form import HeightStatistics
-from asperity.measured.lengths import Pitch
+from asperity.measured.lengths import Pitch, is_pitch
 from asperity.measured.parameters import ParameterValues, compute_parameters, find_parameter
 from asperity.measured.reader import ARCHIVE_ERRORS, MAX_POINTS, ZIP_MAGIC
 
@@ -80,13 +80,17 @@ class StageRecorder:
             nesting: L of an L-filter [m], if the step is one.
         """
         self._nesting = nesting or self._nesting
-        before = self._previous_heights
-        removed = _removed_statistics(before, heights) if removes and before is not None else None
+        before = None
+        removed = None
+        if removes:
+            before = self._previous_heights
+        if before is not None:
+            removed = _removed_statistics(before, heights)
         values = compute_parameters(heights, pitch, self._nesting)
         stage = PreparationStage(name, values, removed, self._nesting)
         self.stages.append(stage)
         if self._on_stage is not None:
-            self._on_stage(stage, pitch, heights, before if removes else None)
+            self._on_stage(stage, pitch, heights, before)
         self._previous_heights = heights.copy()
 
 
@@ -97,7 +101,7 @@ def parse_stages(data: Any) -> tuple[PreparationStage, ...]:
         ValueError: the data are no stages.
     """
     try:
-        return tuple(_parse_stage(one) for one in data)
+        return tuple(map(_parse_stage, data))
     except (AttributeError, KeyError, TypeError) as error:
         raise ValueError(f"no stages of a preparation: {error}") from None
 
@@ -124,7 +128,9 @@ def resized_stage(
         previous: the stage before.
         factor: factor of the lengths along x and y.
     """
-    nesting = None if previous.nesting is None else factor * previous.nesting
+    nesting = previous.nesting
+    if nesting is not None:
+        nesting *= factor
     return PreparationStage(name, compute_parameters(heights, pitch, nesting), None, nesting)
 
 
@@ -132,7 +138,9 @@ def _removed_statistics(before: FloatArray, after: FloatArray) -> HeightStatisti
     """Return RMS about the mean and range of the difference; None if all its points are missing."""
     difference = before - after
     known = difference[~np.isnan(difference)]
-    return HeightStatistics.of(known) if known.size else None
+    if not known.size:
+        return None
+    return HeightStatistics.of(known)
 
 
 FilePath = str | os.PathLike[str]
@@ -245,7 +253,7 @@ def load_prepared(path: FilePath) -> PreparedSurface:
     name = Path(path).name
     try:
         with open_input(path) as stream, zipfile.ZipFile(stream) as archive:
-            size = sum(member.file_size for member in archive.infolist())
+            size = sum([member.file_size for member in archive.infolist()])
             if size > _MAX_BYTES:
                 raise SurfaceFileError(f"unpacks to {size} bytes; at most {_MAX_BYTES} are read")
             return _read_archive(archive)
@@ -262,23 +270,29 @@ def _read_archive(archive: zipfile.ZipFile) -> PreparedSurface:
     if schema != SCHEMA:
         raise SurfaceFileError(f"has version {schema}; this asperity reads version {SCHEMA}")
     heights = _read_member(archive, "heights", "f")
-    pitch = tuple(float(p) for p in _read_member(archive, "pitch", "f", 1))
+    pitch = tuple(_read_member(archive, "pitch", "f", 1).tolist())
     filled = _read_member(archive, "filled", "b")
-    steps = tuple(str(step) for step in _read_member(archive, "steps", "U", 1))
+    steps = tuple(_read_member(archive, "steps", "U", 1).tolist())
     periodic = bool(_read_member(archive, "periodic", "b", 0))
     if heights.dtype != np.float64 or heights.ndim not in (1, 2) or min(heights.shape) < 4:
         raise SurfaceFileError("heights must be float64 of shape (ny, nx) or (n,), at least 4")
-    if len(pitch) != heights.ndim or not all(np.isfinite(p) and p > 0 for p in pitch):
+    if len(pitch) != heights.ndim or not is_pitch(pitch):
         raise SurfaceFileError(f"pitch must be {heights.ndim} positive lengths, got {pitch}")
     if filled.shape != heights.shape:
         raise SurfaceFileError(f"the mask has shape {filled.shape}, the heights {heights.shape}")
     if not np.isfinite(heights).all():
         raise SurfaceFileError("has heights that are not finite")
-    mask = filled if filled.any() else None
     history: tuple[PreparationStage, ...] = ()
     if "history.npy" in archive.namelist():  # early files have none
         history = parse_stages(json.loads(str(_read_member(archive, "history", "U", 0))))
-    return PreparedSurface(np.ascontiguousarray(heights), pitch, steps, mask, periodic, history)
+    return PreparedSurface(
+        np.ascontiguousarray(heights), pitch, steps, some_or_none(filled), periodic, history
+    )
+
+
+def some_or_none(mask: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
+    """Return a mask, or None if it is False everywhere."""
+    return mask if mask.any() else None
 
 
 def _read_member(archive: zipfile.ZipFile, name: str, kinds: str, n_axes: int | None = None) -> Any:

@@ -151,7 +151,9 @@ class ReadingOptions:
     @property
     def metres_per_unit(self) -> float | None:
         """Length of the unit [m]; None if no unit was given."""
-        return None if self.unit is None else unit_to_metres(self.unit)
+        if self.unit is None:
+            return None
+        return unit_to_metres(self.unit)
 
     def resolve_unit(
         self, name: str, own: float | None = None

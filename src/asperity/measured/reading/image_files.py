@@ -68,10 +68,12 @@ def _read_png(chunks: list[tuple[bytes, bytes]]) -> tuple[NDArray[Any], pixels.I
     packed = b"".join(data for kind, data in chunks if kind == b"IDAT")
     channels, mode = _COLOUR_TYPES[colour]
     needed = 0  # bytes of all rows, each with its filter
-    for x, y, step_x, step_y in _ADAM7 if interlaced else _PASSES:
+    passes = _ADAM7 if interlaced else _PASSES
+    for x, y, step_x, step_y in passes:
         width = len(range(x, columns, step_x))
         height = len(range(y, rows, step_y))
-        needed += height * (width * channels * depth // 8 + 1) if width else 0
+        if width:
+            needed += height * (width * channels * depth // 8 + 1)
     if _MAX_DEFLATE_RATIO * len(packed) < needed:  # before any memory is allocated
         size = f"{columns} x {rows} pixels"
         raise SurfaceFileError(f"truncated: {len(packed)} bytes cannot hold {size}")
@@ -162,18 +164,23 @@ def read_tiff(file: SurfaceFile, options: ReadingOptions) -> RawSurface | None:
         _check_page(page, len(content))
         values, notes = _to_heights(page, _decode_page(page, content))
         scale = _read_scale(tiff, page)
-    colours = 3 if int(page.photometric) == _RGB else 1
-    has_alpha = values.shape[-1] == colours + 1
+    has_alpha = values.shape[-1] == _count_colours(page) + 1
     return pixels.pixels_to_surface(
         values, scale, file.name, options, has_alpha=has_alpha, notes=notes
     )
+
+
+def _count_colours(page: Any) -> int:
+    return 3 if int(page.photometric) == _RGB else 1
 
 
 def _read_scale(file: Any, page: Any) -> pixels.ImageScale:
     """Return the lengths in ImageJ's or OME's metadata; resolution tags alone describe printing."""
     if file.is_imagej:
         return pixels.imagej_scale(file.imagej_metadata or {}, _resolution(page))
-    return pixels.ome_scale(str(page.description)) if file.is_ome else pixels.ImageScale()
+    if file.is_ome:
+        return pixels.ome_scale(str(page.description))
+    return pixels.ImageScale()
 
 
 def _resolution(page: Any) -> tuple[float, float] | None:
@@ -190,8 +197,9 @@ def _resolution(page: Any) -> tuple[float, float] | None:
 def _single_page(file: Any, pages: list[Any]) -> Any:
     """Return the only page that is neither a thumbnail nor a mask."""
     pages = [page for page in pages if not int(page.subfiletype) & (_REDUCED | _MASK)]
-    stack = int((file.imagej_metadata or {}).get("images", 1)) if file.is_imagej else 1
-    count = max(len(pages), stack)
+    count = len(pages)
+    if file.is_imagej:
+        count = max(count, int((file.imagej_metadata or {}).get("images", 1)))
     if count != 1:
         raise SurfaceFileError(f"has {count} pages; one is expected: save the one with heights")
     return pages[0]
@@ -214,12 +222,15 @@ def _check_page(page: Any, size: int) -> None:
     if int(page.bitspersample) not in (8, 16, 32, 64):
         raise SurfaceFileError(f"has {page.bitspersample} bit per pixel; 8, 16 and float are read")
     channels = int(page.samplesperpixel)
-    colours = 3 if int(page.photometric) == _RGB else 1
+    colours = _count_colours(page)
     if channels not in (colours, colours + 1):
         raise SurfaceFileError(f"has {channels} channels; one channel of heights is expected")
     bytes_needed = page.imagelength * page.imagewidth * channels * page.dtype.itemsize
-    packed = min(sum(int(n) for n in page.databytecounts), size)
-    if bytes_needed > packed * (1 if int(page.compression) == 1 else _MAX_TIFF_RATIO):
+    packed = min(sum(map(int, page.databytecounts)), size)
+    ratio = _MAX_TIFF_RATIO
+    if int(page.compression) == 1:
+        ratio = 1
+    if bytes_needed > packed * ratio:
         pixel_count = f"{page.imagewidth} x {page.imagelength} pixels"
         raise SurfaceFileError(f"truncated: {packed} bytes cannot hold {pixel_count}")
 

@@ -55,7 +55,9 @@ def read_isolated(
         if code is None or -code == getattr(signal, "SIGXCPU", None):
             raise _limit_error(file, f"{seconds:.0f} s")
         if code or not output.tell():
-            end = f"signal {signal.Signals(-code).name}" if code < 0 else f"code {code}"
+            end = f"code {code}"
+            if code < 0:
+                end = f"signal {signal.Signals(-code).name}"
             fault = f"ends its reader with {end}: damaged, or not what it seems"
             raise SurfaceFileError(f"{file.name} {fault}")
         output.seek(0)
@@ -139,10 +141,13 @@ def set_limits(seconds: float, memory: int) -> None:
     except ModuleNotFoundError:  # the parent's clock is the only limit
         return
     # RLIMIT_DATA rather than RLIMIT_AS: mapped libraries do not count.
-    for name, limit in {"DATA": memory, "CPU": math.ceil(seconds), "CORE": 0}.items():
+    for name, wanted in {"DATA": memory, "CPU": math.ceil(seconds), "CORE": 0}.items():
+        limit = wanted
         kind = getattr(resource, f"RLIMIT_{name}")
         hard = resource.getrlimit(kind)[1]
-        resource.setrlimit(kind, (limit if hard < 0 else min(limit, hard), hard))
+        if hard >= 0:
+            limit = min(limit, hard)
+        resource.setrlimit(kind, (limit, hard))
 
 
 def write_result(
@@ -186,4 +191,6 @@ def reject_on_error(fault: str) -> Iterator[None]:
 def describe_exception(error: Exception) -> str:
     """Return the text of an exception on one line, or its class name if it has none."""
     text = " ".join(str(error).split())
-    return text if 0 < len(text) <= 120 else f"{text[:117]}..." if text else type(error).__name__
+    if len(text) > 120:
+        return f"{text[:117]}..."
+    return text or type(error).__name__

@@ -17,6 +17,7 @@ from asperity.core.errors import ParameterError
 from asperity.core.files import content_digest, open_input, to_plain_data
 from asperity.measured.file_arguments import READING_ARGUMENTS
 from asperity.measured.form import SurfaceDecomposition, decompose_surface
+from asperity.measured.lengths import Pitch, side_lengths
 from asperity.measured.parameters import correlation_parameters
 from asperity.measured.prepared import (
     PreparationStage,
@@ -86,14 +87,13 @@ def _source_digest(path: str | os.PathLike[str], options: Mapping[str, Any]) -> 
             whole = hashlib.file_digest(stream, "sha256").hexdigest()
     except (OSError, ValueError):  # the reader reports the error
         return None
-    values = tuple(
-        (name, tuple(np.ravel(value).tolist()) if name == "pitch" else value)
-        for name, value in sorted(options.items())
-    )
-    return content_digest(whole, os.path.basename(os.fspath(path)), library, values)
+    values = dict(options)
+    if "pitch" in values:
+        values["pitch"] = tuple(np.ravel(values["pitch"]).tolist())
+    named = tuple(sorted(values.items()))
+    return content_digest(whole, os.path.basename(os.fspath(path)), library, named)
 
 
-Pitch = tuple[float, ...]
 _MAX_SIDE_POINTS = 360
 """Greatest number of points along each side of a map in pictures."""
 _MAX_LINE_POINTS = 4096
@@ -141,7 +141,7 @@ class MeasurementSummary(Reportable):
     @property
     def sides(self) -> tuple[float, ...]:
         """Width and depth of the prepared surface, or its length [m]."""
-        return _sides(self.prepared.heights, self.prepared.pitch)
+        return side_lengths(self.prepared.heights.shape, self.prepared.pitch)
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""
@@ -176,7 +176,7 @@ def show(
         stage: PreparationStage, pitch: Pitch, after: FloatArray, before: FloatArray | None
     ) -> None:
         if before is not None:
-            sides = _sides(after, pitch)
+            sides = side_lengths(after.shape, pitch)
             changes.append(StepChange(stage, decimate(before), decimate(after), sides))
 
     prepared = prepare_file(path, progress=progress, watch=watch, **arguments)
@@ -187,18 +187,15 @@ def show(
     parts = None
     if not prepared.history or prepared.history[-1].nesting is None:
         parts = decompose_surface(heights, pitch, periodic=prepared.periodic)
-    found: tuple[float | None, float | None] = (None, None)
+    correlation: tuple[float | None, float | None] = (None, None)
     if len(pitch) == 2:
-        found = correlation_parameters(heights, (pitch[0], pitch[1]))
-    return MeasurementSummary(os.path.basename(path), prepared, parts, found, tuple(changes))
+        correlation = correlation_parameters(heights, pitch)
+    return MeasurementSummary(os.path.basename(path), prepared, parts, correlation, tuple(changes))
 
 
 def decimate(heights: FloatArray) -> FloatArray:
     """Return every n-th point, as many as a picture can show."""
-    most = _MAX_LINE_POINTS if heights.ndim == 1 else _MAX_SIDE_POINTS
-    every = tuple(slice(None, None, -(-n // most)) for n in heights.shape)
-    return heights[every].copy()
-
-
-def _sides(heights: FloatArray, pitch: Pitch) -> tuple[float, ...]:
-    return tuple((n - 1) * p for n, p in zip(heights.shape[::-1], pitch, strict=True))
+    if heights.ndim == 1:
+        return heights[:: -(-len(heights) // _MAX_LINE_POINTS)].copy()
+    rows, columns = [-(-n // _MAX_SIDE_POINTS) for n in heights.shape]
+    return heights[::rows, ::columns].copy()

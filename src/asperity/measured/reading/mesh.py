@@ -44,9 +44,9 @@ def is_text_stl(file: SurfaceFile) -> bool:
 def is_obj(file: SurfaceFile) -> bool:
     """Whether a file starts as an OBJ, and has vertices and faces."""
     content = file.content
-    lines = (line.strip() for line in content[:65536].splitlines())
-    first = next((line for line in lines if line and not line.startswith(b"#")), b"")
-    is_start = _OBJ_LINE.match(first) is not None
+    lines = [line.strip() for line in content[:65536].splitlines()]
+    lines = [line for line in lines if line and not line.startswith(b"#")]
+    is_start = bool(lines) and _OBJ_LINE.match(lines[0]) is not None
     return is_start and bool(_OBJ_VERTEX.search(content) and _OBJ_FACE.search(content))
 
 
@@ -90,7 +90,7 @@ def _parse_text_mesh(content: bytes, mesh_format: str) -> FloatArray:
         loaded: Any = trimesh.load(io.BytesIO(content), **options)
         meshes = [loaded] if isinstance(loaded, trimesh.Trimesh) else loaded.dump()
         parts = [np.asarray(part.triangles, dtype=np.float64) for part in meshes]
-        triangles = np.concatenate(parts) if parts else np.empty((0, 3, 3))
+        triangles = np.concatenate([np.empty((0, 3, 3)), *parts])
     if triangles.shape[1:] != (3, 3):  # a vertex has two coordinates
         raise SurfaceFileError(f"damaged {mesh_format} mesh (its faces are no triangles)")
     if mesh_format == "OBJ":
@@ -134,7 +134,7 @@ def _to_surface(corners: FloatArray, name: str) -> RawSurface:
     _check_overhangs(areas, cross @ axes[2] < 0.0)
     heights, pitch, found = rasterise((corners - centre) @ axes.T)
     notes.extend((note, *found))
-    longest = max(n * p for n, p in zip(heights.shape[::-1], pitch, strict=True))
+    longest = max(np.array(heights.shape[::-1]) * pitch)
     if longest > _MAX_EXPECTED_LENGTH:
         notes.append(f"the patch is {longest:.3g} m long: check the unit")
     return RawSurface(heights, pitch, name, tuple(notes))
@@ -145,11 +145,9 @@ def _check_overhangs(areas: FloatArray, overhanging: NDArray[np.bool_]) -> None:
         return
     area = float(areas[overhanging].sum())
     total = float(areas.sum())
-    advice = (
-        "it looks like a whole body: cut off the textured side"
-        if area > _CLOSED_BODY_FRACTION * total
-        else "a height field has one height at each point: cut them off"
-    )
+    advice = "a height field has one height at each point: cut them off"
+    if area > _CLOSED_BODY_FRACTION * total:
+        advice = "it looks like a whole body: cut off the textured side"
     part = f"{1e6 * area:.4g} mm² or {area / total:.2%} of the surface"
     raise SurfaceFileError(f"{int(overhanging.sum())} triangles overhang, {part}; {advice}")
 
@@ -194,14 +192,16 @@ def fit_plane(
     angle = _min_rectangle_angle(moved.reshape(-1, 3) @ axes[:2].T)
     turn = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
     axes[:2] = turn @ axes[:2]
-    text = ", ".join(f"{value:.4g}" for value in normal + 0.0)
-    turned = f", axes turned by {math.degrees(angle):.3g}° in it" if angle else ""
-    return centre, axes, f"heights are over the mesh's best plane, normal ({text}){turned}"
+    numbers = ", ".join([f"{value:.4g}" for value in normal + 0.0])
+    note = f"heights are over the mesh's best plane, normal ({numbers})"
+    if angle:
+        note += f", axes turned by {math.degrees(angle):.3g}° in it"
+    return centre, axes, note
 
 
 def _plane_axes(normal: FloatArray) -> FloatArray:
     """Return axes with this normal; x is the projected x of the file, or y if x is the normal."""
-    first = np.eye(3)[0 if abs(normal[0]) < 0.9 else 1]
+    first = np.eye(3)[int(abs(normal[0]) >= 0.9)]
     x = first - (first @ normal) * normal
     x /= np.linalg.norm(x)
     return np.stack((x, np.cross(normal, x), normal))
@@ -226,7 +226,9 @@ def _min_rectangle_angle(points: FloatArray) -> float:
         for c, s in zip(np.cos([0.0, *angles]), np.sin([0.0, *angles]), strict=True)
     ]
     best = int(np.argmin(areas[1:]))
-    return float(angles[best]) if areas[best + 1] < areas[0] * (1 - _MIN_AREA_SAVING) else 0.0
+    if areas[best + 1] >= areas[0] * (1 - _MIN_AREA_SAVING):
+        return 0.0
+    return float(angles[best])
 
 
 _MAX_POINTS = 2**25
@@ -344,7 +346,9 @@ def _sample_triangles(
     row, column = np.divmod(index, width[which, 0])
     column = column + first[which, 0]
     row = row + first[which, 1]
-    a, b, c = (corners[which, k] for k in range(3))
+    a = corners[which, 0]
+    b = corners[which, 1]
+    c = corners[which, 2]
     # Barycentric coordinates from areas; a vertical triangle has none.
     area = _cross(b - a, c - a)
     upright = np.abs(area) > 1e-12

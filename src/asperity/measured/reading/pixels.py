@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.core.errors import ParameterError, SurfaceFileError
-from asperity.measured.lengths import format_lengths, unit_to_metres
+from asperity.measured.lengths import format_lengths, is_pitch, unit_to_metres
 from asperity.measured.reader import RawSurface, ReadingOptions, check_point_count
 
 _MAX_DESCRIPTION = 10**6
@@ -60,7 +60,8 @@ def imagej_scale(metadata: Mapping[str, Any], resolution: tuple[float, float] | 
         >>> found.pitch, found.metres_per_value
         ((5e-07, 5e-07), 1e-09)
     """
-    lateral, unit = (_find_metres_per_unit(metadata.get(key)) for key in ("unit", "vunit"))
+    lateral = _find_metres_per_unit(metadata.get("unit"))
+    unit = _find_metres_per_unit(metadata.get("vunit"))
     across = _find_metres_per_unit(metadata.get("yunit")) or lateral
     pitch = None
     if lateral and across and resolution is not None and all(resolution):
@@ -96,8 +97,10 @@ def ome_scale(description: str) -> ImageScale:
         >>> [f"{step:g} m" for step in pitch]
         ['5e-07 m', '2.5e-07 m']
     """
-    found = _OME_PIXELS.search(description[:_MAX_DESCRIPTION])
-    attributes = dict(_XML_ATTRIBUTE.findall(found.group(1) if found else ""))
+    match = _OME_PIXELS.search(description[:_MAX_DESCRIPTION])
+    if match is None:
+        return ImageScale()
+    attributes = dict(_XML_ATTRIBUTE.findall(match.group(1)))
     sides = []
     for axis in "XY":
         unit = _find_metres_per_unit(attributes.get(f"PhysicalSize{axis}Unit", "µm"))
@@ -121,7 +124,7 @@ def _find_metres_per_unit(unit: Any) -> float | None:
 
 
 def _valid_pitch(pitch: tuple[float, float]) -> tuple[float, float] | None:
-    return pitch if all(math.isfinite(p) and p > 0.0 for p in pitch) else None
+    return pitch if is_pitch(pitch) else None
 
 
 _SCAL_METRE = 1
@@ -157,7 +160,9 @@ def _parse_scal(data: bytes) -> tuple[float, float] | None:
     if data[:1] != bytes([_SCAL_METRE]):
         return None
     sides = [_parse_float(text.decode("latin-1")) for text in data[1:].split(b"\0")]
-    return _valid_pitch((sides[0], sides[1])) if len(sides) == 2 else None
+    if len(sides) != 2:
+        return None
+    return _valid_pitch((sides[0], sides[1]))
 
 
 def _parse_pcal(data: bytes, max_value: int) -> tuple[float | None, float, float]:
@@ -187,7 +192,9 @@ def _parse_float(text: str) -> float:
         value = float(text)
     except ValueError:
         return math.nan
-    return value if math.isfinite(value) else math.nan
+    if not math.isfinite(value):
+        return math.nan
+    return value
 
 
 def check_image_size(rows: int, columns: int) -> None:
@@ -249,7 +256,9 @@ def pixels_to_surface(
 
 
 def _check_opaque(alpha: NDArray[Any]) -> None:
-    opaque = np.iinfo(alpha.dtype).max if alpha.dtype.kind in "iu" else 1.0
+    opaque = 1.0
+    if alpha.dtype.kind in "iu":
+        opaque = np.iinfo(alpha.dtype).max
     transparent = int(np.count_nonzero(alpha != opaque))
     if transparent:
         raise SurfaceFileError(

@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from asperity.core.errors import AsperityError, ParameterError, SurfaceFileError, nearest_names
+from asperity.measured.lengths import is_pitch
 from asperity.measured.reader import (
     ARCHIVE_ERRORS,
     ZIP_MAGIC,
@@ -56,11 +57,13 @@ def classify_archive(path: Path) -> str:
     names = [member.filename.replace("\\", "/").lower() for member in members]
     if any(name.rpartition("/")[2] == "main.xml" for name in names):
         return "X3P"  # its reader checks the size of each member against main.xml
-    size = sum(member.file_size for member in members)
+    size = sum([member.file_size for member in members])
     if size > _MAX_UNPACKED_BYTES:
         limit = f"at most {_MAX_UNPACKED_BYTES / 1e9:.0f} GB are read"
         raise SurfaceFileError(f"{path.name} unpacks to {size / 1e9:.1f} GB; {limit}")
-    return "NPZ" if any(name.endswith(".npy") for name in names) else "other"
+    if any(name.endswith(".npy") for name in names):
+        return "NPZ"
+    return "other"
 
 
 SUPPORTED_FORMATS = "X3P, SDF, NPY, text matrix, two-column profile, PNG, TIFF, STL, OBJ"
@@ -93,17 +96,22 @@ def unrecognised_error(file: SurfaceFile) -> SurfaceFileError:
     """Return the error for a file that no reader recognises."""
     if file.head.startswith(TIFF_MAGIC):
         return _unsupported_error(file, "an instrument's TIFF file", _EXTRA_HINT)
-    advice = "" if has_library() else _EXTRA_HINT
+    advice = ""
+    if not has_library():
+        advice = _EXTRA_HINT
     if file.head.startswith(ZIP_MAGIC):
-        tail = f"; {advice}" if advice else ""
-        return SurfaceFileError(f"{file.name}: a zip archive without a main.xml is no X3P{tail}")
+        fault = "a zip archive without a main.xml is no X3P"
+        return SurfaceFileError(f"{file.name}: {_with_advice(fault, advice)}")
     return _unsupported_error(file, "a binary file", advice)
 
 
 def _unsupported_error(file: SurfaceFile, kind: str, advice: str) -> SurfaceFileError:
-    tail = f"; {advice}" if advice else ""
-    fault = f"not a surface format that asperity reads: {SUPPORTED_FORMATS}{tail}"
-    return SurfaceFileError(f"{file.name} looks like {kind}: {fault}")
+    fault = f"not a surface format that asperity reads: {SUPPORTED_FORMATS}"
+    return SurfaceFileError(f"{file.name} looks like {kind}: {_with_advice(fault, advice)}")
+
+
+def _with_advice(fault: str, advice: str) -> str:
+    return f"{fault}; {advice}" if advice else fault
 
 
 def too_large_error(name: str, size: int, limit: int, what: str = "") -> SurfaceFileError:
@@ -195,7 +203,9 @@ def external_reader_version() -> str | None:
     """
     if USER_READERS:
         return None
-    return version(surface_topography.LIBRARY) if surface_topography.has_library() else ""
+    if not has_library():
+        return ""
+    return version(surface_topography.LIBRARY)
 
 
 def _guard_reader(reader: Reader) -> Reader:
@@ -231,10 +241,10 @@ def _check_result(raw: RawSurface | None) -> RawSurface | None:
     heights = np.ascontiguousarray(raw.heights, dtype=np.float64)
     if heights.ndim not in (1, 2) or heights.size == 0:
         raise ValueError(f"heights of shape {heights.shape}")
-    pitch = None if raw.pitch is None else tuple(float(p) for p in raw.pitch)
-    if pitch is not None and not (
-        len(pitch) == heights.ndim and all(np.isfinite(p) and p > 0.0 for p in pitch)
-    ):
+    if raw.pitch is None:
+        return replace(raw, heights=heights)
+    pitch = tuple(map(float, raw.pitch))
+    if len(pitch) != heights.ndim or not is_pitch(pitch):
         raise ValueError(f"pitch {pitch} for heights of shape {heights.shape}")
     return replace(raw, heights=heights, pitch=pitch)
 
@@ -345,7 +355,7 @@ def _check_file(path: Path, name: str) -> None:
 def _check_finite(raw: RawSurface) -> RawSurface:
     infinite = np.isinf(raw.heights)
     if infinite.any():
-        index = tuple(int(k) for k in np.argwhere(infinite)[0])
+        index = tuple(np.argwhere(infinite)[0].tolist())
         fault = f"infinite height at index {index}; a missing point is written as NaN"
         raise SurfaceFileError(f"{raw.source}: {fault}")
     return raw

@@ -14,7 +14,7 @@ import numpy as np
 
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError, SurfaceFileError
-from asperity.measured.lengths import unit_to_metres
+from asperity.measured.lengths import is_pitch, unit_to_metres
 from asperity.measured.reader import (
     INTERPOLATE,
     MAX_POINTS,
@@ -88,7 +88,9 @@ class _BoundedFile(io.BufferedReader):
 
     def read(self, size: int | None = -1, /) -> bytes:
         left = max(os.fstat(self.fileno()).st_size - self.tell(), 0)
-        return super().read(left if size is None or size < 0 else min(size, left))
+        if size is None or size < 0:
+            return super().read(left)
+        return super().read(min(size, left))
 
 
 def has_library() -> bool:
@@ -127,26 +129,29 @@ def _open_recognised(library: Any, stream: _BoundedFile, *, definite_only: bool)
 def _to_surface(
     reader: Any, channel: Any, file: SurfaceFile, options: ReadingOptions
 ) -> RawSurface:
-    size = channel.nb_grid_pts
-    points = int(np.prod([int(n) for n in size])) if size is not None else 0
+    points = int(np.prod([int(n) for n in channel.nb_grid_pts or (0,)]))
     if points > MAX_POINTS or points > _MAX_COMPRESSION_RATIO * file.path.stat().st_size:
         raise SurfaceFileError(f"{points} points, more than are read or the file can hold")
-    own = None if channel.unit is None else unit_to_metres(str(channel.unit))
-    unit, assumed = options.resolve_unit(file.name, own)
+    stated = None
+    if channel.unit is not None:
+        stated = unit_to_metres(str(channel.unit))
+    unit, assumed = options.resolve_unit(file.name, stated)
     if unit is None:
         requirement = f"is required: {file.name} has no unit; give one, such as 'um'"
         raise ParameterError("unit", requirement)
     heights, pitch = _read_channel(channel)
     notes = [f"{reader.name()} file, read by SurfaceTopography"]
-    notes += [] if reader.format() in WITNESSED_FORMATS else [NO_WITNESS]
+    if reader.format() not in WITNESSED_FORMATS:
+        notes.append(NO_WITNESS)
     if len(reader.channels) > 1:
         notes.append(f"channel {channel.name!r} of {len(reader.channels)}")
     with np.errstate(over="ignore"):
         scaled = heights * unit
-    lateral = None if pitch is None else tuple(float(p) * unit for p in pitch)
-    if lateral is not None and not all(np.isfinite(lateral) & (np.array(lateral) > 0)):
-        raise SurfaceFileError(f"the file's pitch {lateral} is not positive")
-    return RawSurface(scaled, lateral, file.name, (*notes, *assumed))
+    if pitch is not None:
+        pitch = tuple([float(p) * unit for p in pitch])
+        if not is_pitch(pitch):
+            raise SurfaceFileError(f"the file's pitch {pitch} is not positive")
+    return RawSurface(scaled, pitch, file.name, (*notes, *assumed))
 
 
 def _select_channel(reader: Any, name: str, channel: str | int | None) -> Any | None:
@@ -157,7 +162,7 @@ def _select_channel(reader: Any, name: str, channel: str | int | None) -> Any | 
         return None
     if channel is None and len(heights) == 1:
         return heights[0]
-    names = ", ".join(f"{c.index}: {c.name!r}" for c in heights)
+    names = ", ".join([f"{c.index}: {c.name!r}" for c in heights])
     if channel is None:
         channels = f"{len(heights)} height channels: {names}"
         raise ParameterError("channel", f"must be given: {name} has {channels}")
@@ -174,7 +179,7 @@ def _read_channel(channel: Any) -> tuple[FloatArray, tuple[float, ...] | None]:
     options: dict[str, Any] = {}
     # The library requires a size, unless the points are uneven; the pitch is dropped below.
     if channel.physical_sizes is None and channel.is_uniform is not False:
-        options["physical_sizes"] = tuple(1.0 for _ in channel.nb_grid_pts)
+        options["physical_sizes"] = (1.0,) * len(channel.nb_grid_pts)
     if channel.unit is None:
         options["unit"] = "m"
     topography = channel.topography(**options)

@@ -49,7 +49,7 @@ def names_other_quantity(text: str) -> bool:
         >>> names_other_quantity("Z (Deflection)"), names_other_quantity("Topography")
         (True, False)
     """
-    return any(_ROLE_OF.get(word) == "other" for word in _WORD.findall(text.lower()))
+    return "other" in [_ROLE_OF.get(word) for word in _WORD.findall(text.lower())]
 
 
 def find_single_unit(name: str) -> float | None:
@@ -74,7 +74,9 @@ def find_single_unit(name: str) -> float | None:
         units = {parse_unit(last, is_bracketed=False)}
     if len(units) > 1:
         raise SurfaceFileError(f"the header {shorten(name, 60)!r} names several units")
-    return units.pop() if units else None
+    if not units:
+        return None
+    return units.pop()
 
 
 def parse_unit(name: str, *, is_bracketed: bool) -> float | None:
@@ -157,7 +159,7 @@ def _parse_entries(lines: Sequence[str]) -> dict[str, str]:
     for line in lines:
         if len(line) > _MAX_LINE:
             continue
-        sign = min((sign for sign in ":=" if sign in line), key=line.index, default=" ")
+        sign = min([sign for sign in ":=" if sign in line], key=line.index, default=" ")
         name, _, value = line.strip(' "\t,;').partition(sign)
         entry = _ENTRY_OF.get(name.strip().lower())
         if entry is not None:
@@ -184,7 +186,9 @@ def _parse_length(text: str) -> float | None:
     if match is None:
         return None
     unit = parse_unit(match.group(2), is_bracketed=True)
-    return None if unit is None else unit * float(match.group(1).replace(",", "."))
+    if unit is None:
+        return None
+    return unit * float(match.group(1).replace(",", "."))
 
 
 def _parse_code(text: str) -> float | None:
@@ -217,7 +221,9 @@ def find_headings(table: TextTable) -> list[str]:
         _check_roles(headings)
         return headings
     heading = lines[-1].strip(" \t,;")
-    return [heading] if _find_role(heading) == "z" else []
+    if _find_role(heading) != "z":
+        return []
+    return [heading]
 
 
 def _split_headings(line: str, table: TextTable) -> list[str]:
@@ -239,8 +245,9 @@ def _find_role(heading: str) -> str:
     """Return what a column holds: x, y, z, other, or "" if the heading does not say it."""
     if names_other_quantity(heading):
         return "other"
-    word = _WORD.search(heading.lower())
-    return _ROLE_OF.get(word.group(), "") if word else ""
+    for word in _WORD.findall(heading.lower())[:1]:
+        return _ROLE_OF.get(word, "")
+    return ""
 
 
 def _check_roles(headings: Sequence[str]) -> None:

@@ -40,7 +40,9 @@ def read_text(file: reader.SurfaceFile, options: reader.ReadingOptions) -> reade
         raise SurfaceFileError("several maps in one file: save each in a file of its own")
     headings = text_header.find_headings(table)
     is_list = header.pitch is None and _is_list(table)
-    heights = table.values[:, -1:] if is_list else table.values
+    heights = table.values
+    if is_list:
+        heights = heights[:, -1:]
     heights[:], notes = text_header.mask_codes(heights, header.missing_code)
     if is_list:
         raw = _read_list(table, headings, header, file.name, options)
@@ -89,7 +91,9 @@ def _is_monotonic(table: TextTable) -> bool:
     positions = table.values[:, 0]
     steps = np.diff(positions)
     known = steps[~np.isnan(steps)]
-    rising = float(np.median(known)) if known.size else 0.0
+    rising = 0.0
+    if known.size:
+        rising = float(np.median(known))
     wrong = np.flatnonzero(~(steps * np.sign(rising) > 0))
     if len(wrong) == 0:
         return True
@@ -114,8 +118,11 @@ def _read_list(
     units = [text_header.find_single_unit(heading) for heading in headings]
     if not units:
         units = [header.lateral_unit] * (table.values.shape[1] - 1) + [header.unit]
-    given, notes = options.resolve_unit(name, None if None in units else units[0])
-    if given is None:
+    stated = units[0]
+    if None in units:
+        stated = None
+    assumed, notes = options.resolve_unit(name, stated)
+    if assumed is None:
         what = "positions and heights"
         if units[-1] is not None:
             what = "positions"
@@ -127,9 +134,8 @@ def _read_list(
             " or name it for each column, such as 'x [um], z [nm]'",
             unit="um",
         )
-    known = [unit or given for unit in units]
-    read = _read_profile if len(known) == 2 else _read_points
-    raw = read(table, known, name)
+    known = [unit or assumed for unit in units]
+    raw = _read_profile(table, known, name) if len(known) == 2 else _read_points(table, known, name)
     return replace(raw, notes=(*raw.notes, *notes))
 
 
@@ -189,7 +195,8 @@ def _read_matrix(
     pitch: tuple[float, ...] | None = header.pitch
     if heights.shape[1] == 1:
         heights = heights[:, 0]
-        pitch = pitch[1:] if pitch else None
+        if pitch is not None:
+            pitch = pitch[1:]
     return reader.RawSurface(
         heights,
         pitch,
@@ -210,7 +217,7 @@ def _printed_resolution(table: TextTable, column: int) -> FloatArray:
     sign = table.dialect.decimal
     cells = [table.dialect.cells(text)[column].replace(sign, ".") for text in table.row_texts]
     decimals = {len(cell.partition(".")[2]) for cell in cells}
-    if len(decimals) == 1 and not any("e" in cell.lower() for cell in cells):
+    if len(decimals) == 1 and "e" not in "".join(cells).lower():
         return np.full(len(cells), 10.0 ** -min(decimals.pop(), 300))
     parts = [_to_decimal(cell).as_tuple() for cell in cells]
     exponents = np.array([int(part.exponent) for part in parts], dtype=np.float64)

@@ -34,8 +34,13 @@ class Dialect:
 
 # In order of preference: a comma is a decimal sign only if it cannot be a separator.
 _DIALECTS = (
-    *(Dialect(separator, ".") for separator in ("\t", ";", ",", None)),
-    *(Dialect(separator, ",") for separator in (";", "\t", None)),
+    Dialect("\t", "."),
+    Dialect(";", "."),
+    Dialect(",", "."),
+    Dialect(None, "."),
+    Dialect(";", ","),
+    Dialect("\t", ","),
+    Dialect(None, ","),
 )
 
 
@@ -84,7 +89,7 @@ def find_table(text: str) -> TextTable:
         row_texts=block.row_texts,
         header=[lines[k].lstrip("#% \t") for k in range(block.line_numbers[0] - 1)],
         comments=[line.lstrip("#% \t") for line in between if line.lstrip().startswith(("#", "%"))],
-        n_footer_lines=sum(len(after.line_numbers) for after in blocks[chosen + 1 :]),
+        n_footer_lines=sum([len(after.line_numbers) for after in blocks[chosen + 1 :]]),
         dialect=dialect,
     )
 
@@ -108,7 +113,7 @@ class _Block:
     @property
     def row_count(self) -> int:
         """Number of rows of numbers; 0 for text."""
-        return len(self.line_numbers) if self.width else 0
+        return len(self.line_numbers) * (self.width > 0)
 
 
 def _strip_comment(line: str) -> str:
@@ -156,14 +161,14 @@ def _detect_dialect(lines: list[str]) -> Dialect:
     sample = [_strip_comment(line) for line in lines[::step]]
     sample = [line for line in sample if line.strip(" \t,;")]
     best = _DIALECTS[0]
-    most = 0
+    best_count = 0
     for dialect in _DIALECTS:
-        rows = (_parse_row(line, dialect) for line in sample)
-        widths = Counter(len(row) for row in rows if row)
+        widths = Counter([len(_parse_row(line, dialect)) for line in sample])
+        del widths[0]  # lines of text
         count = max(widths.values(), default=0)
-        if count > most:
+        if count > best_count:
             best = dialect
-            most = count
+            best_count = count
     return best
 
 
@@ -176,7 +181,8 @@ def _check_other_blocks(blocks: list[_Block], index: int, dialect: Dialect) -> N
         raise _ragged_error(before[-1], -1, table)
     for k, block in enumerate(before):
         if block.width == table.width > 1:
-            raise _interrupted_error(next(b for b in before[k:] if not b.width), 0)
+            texts = [later for later in before[k:] if not later.width]
+            raise _interrupted_error(texts[0], 0)
     if after and after[0].width:
         raise _ragged_error(after[0], 0, table)
     if any(block.width for block in after):
@@ -214,4 +220,6 @@ def _interrupted_error(block: _Block, line: int) -> SurfaceFileError:
 def _drop_empty_columns(values: FloatArray) -> FloatArray:
     """Return the values without empty columns at the right, from separators at the line's end."""
     used = np.flatnonzero(~np.isnan(values).all(axis=0))
-    return values[:, : int(used[-1]) + 1] if len(used) else values
+    if not len(used):
+        return values
+    return values[:, : int(used[-1]) + 1]
