@@ -158,13 +158,12 @@ def _tiff_lengths(folder: Path) -> Seeds:
 
 
 def _columns(_: Path) -> Seeds:
-    """Profiles and points with a column of validity or of numbering."""
-    line = [f"{0.5 * k:g};{z:g};{k % 3 > 0:d}" for k, z in enumerate(_heights()[0])]
+    """Profiles and points with names and units of columns on two lines and on one."""
+    line = [f"{0.5 * k:g};{z:g}" for k, z in enumerate(_heights()[0])]
     points = [
-        f"{n},{x},{y},{z:g}"
-        for n, ((y, x), z) in enumerate(zip(np.ndindex(9, 12), _heights().ravel(), strict=True))
+        f"{x},{y},{z:g}" for (y, x), z in zip(np.ndindex(9, 12), _heights().ravel(), strict=True)
     ]
-    tables = (["X;Y;valid", "[mm];[mm];[1/0]", *line], ["index,x in um,y in um,z in um", *points])
+    tables = (["X;Y", "[mm];[mm]", *line], ["x in um,y in um,z in um", *points])
     return ["\n".join(table).encode() for table in tables]
 
 

@@ -108,8 +108,8 @@ def _parse(command: str) -> None:
     parsed_command = cli.get_command(group, words[0])
     assert parsed_command is not None, words[0]
     context = click.Context(parsed_command, parent=group)
-    parsed_command.make_parser(context).parse_args(words[1:])
-    check_not_repeated(parsed_command, words[1:], group)
+    _values, _rest, parsed = parsed_command.make_parser(context).parse_args(words[1:])
+    check_not_repeated(parsed)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)

@@ -281,7 +281,7 @@ def test_a_quarter_missing_is_accepted() -> None:
 def test_more_than_a_quarter_missing_needs_max_missing() -> None:
     heights = bumpy(20, 20)
     heights.ravel()[:109] = np.nan
-    with pytest.raises(ParameterError, match=r"misses 27.3% .* a quarter .* max_missing=0.28 "):
+    with pytest.raises(ParameterError, match=r"misses 27.3% .* a quarter .* max_missing=0.28"):
         prepare(surface(heights))
     with pytest.raises(ParameterError, match=r"misses 27.3% .* at most 27.0% can be filled"):
         prepare(surface(heights), max_missing=0.27)

@@ -174,16 +174,18 @@ def _write_comparisons(
     from asperity.report.pages import comparison_report as report
 
     if len(result.comparisons) == 1 and not result.missing_data:
-        one = result.comparisons[0]
+        comparison = result.comparisons[0]
         outputs.write(
-            one, report.comparison_page(one, full), extra_line=_next_commands(surface, one)
+            comparison,
+            report.comparison_page(comparison, full),
+            extra_line=_next_commands(surface, comparison),
         )
         return
     if result.comparisons or len(result.missing_data) > 1:
         remedies = [_missing_data_text(missing) for missing in result.missing_data]
         outputs.write(result, report.comparisons_page(result), extra_line="\n".join(remedies))
     if not result.comparisons:
-        reasons = "; ".join(one.sentence for one in result.missing_data)
+        reasons = "; ".join(comparison.sentence for comparison in result.missing_data)
         raise ParameterError("device", f"lacks data to compare laws: {reasons}")
 
 
@@ -267,7 +269,7 @@ def envelope_command(
         check_suffix(path)
     check_outputs(force=outputs.force, **{f"output {i}": path for i, path in enumerate(output, 1)})
     devices = [
-        values["settings"].apply_to(one) for one in device or options.parse_devices("omega.3")
+        values["settings"].apply_to(entry) for entry in device or options.parse_devices("omega.3")
     ]
     chosen = laws or textured_laws()
     with step_bar("reading the surfaces", len(devices) * len(chosen)) as step:

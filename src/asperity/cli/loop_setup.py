@@ -45,8 +45,8 @@ def loop_options(
     def decorate(command: Command) -> Command:
         hidden = () if stiffness else arguments[:1]
         command = options.law_options(arguments, hidden)(options.file_options(command))
-        words = "Device, in place of the scene's.  [default: the scene's, else omega.3]"
-        command = options.device_option(words)(command)
+        help_text = "Device, in place of the scene's.  [default: the scene's, else omega.3]"
+        command = options.device_option(help_text)(command)
         law = options.law_option("Law, in place of the scene's.", hidden=several_laws)
         return click.argument("scene")(law(command))
 
@@ -83,8 +83,8 @@ def load_setup(
     from asperity.scene.setup import make_setup
 
     if driver is None and not source.lower().endswith(".toml"):
-        words = "must be a scene file (.toml) with [texture], [hand] and [motion]"
-        raise ParameterError("scene", words, source)
+        fault = "must be a scene file (.toml) with [texture], [hand] and [motion]"
+        raise ParameterError("scene", fault, source)
     requested = options.surface_values(values)
     if laws:
         requested.setdefault("law", find_law("W"))
@@ -146,7 +146,11 @@ def _check_driver(name: str, device: Device) -> None:
 
 def select_laws(laws: tuple[Law, ...] | None, law: Law | None) -> tuple[Law, ...]:
     """Return the laws of ``--laws``, else the one of ``--law``, else all."""
-    return laws or (() if law is None else (law,)) or tuple(REGISTERED_LAWS.values())
+    if laws:
+        return laws
+    if law is not None:
+        return (law,)
+    return tuple(REGISTERED_LAWS.values())
 
 
 SIMULATED = "simulated"
@@ -165,8 +169,8 @@ driver_option = click.option(
 
 def driver_options(command: Command) -> Command:
     """Add ``--driver`` and ``--accept-risk``."""
-    words = "Allow a stiffness above the stability limit."
-    return driver_option(click.option("--accept-risk", is_flag=True, help=words)(command))
+    help_text = "Allow a stiffness above the stability limit."
+    return driver_option(click.option("--accept-risk", is_flag=True, help=help_text)(command))
 
 
 def driver_setup(

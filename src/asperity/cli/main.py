@@ -43,6 +43,11 @@ _HEADINGS = {
 _HEADING_OF = {name: title for title, names in _HEADINGS.items() for name in names}
 
 
+def option_flag(option: click.Parameter) -> str:
+    """Return the long form of an option."""
+    return max(option.opts, key=len)
+
+
 def write_option(name: str, value: object, ctx: click.Context) -> str:
     """Return an argument as an option of the running command, with a value for it.
 
@@ -56,42 +61,73 @@ def write_option(name: str, value: object, ctx: click.Context) -> str:
     from asperity.devices import FIELD_UNITS
 
     options = {str(option.name): option for option in ctx.command.params}
+    text = str(value)
     if isinstance(value, float) and name in _FILE_OPTIONS:
-        value = format_quantity(value, _FILE_OPTIONS[name].unit, digits=6)
-    text = "" if value is True else str(value).replace(" ", "")
+        text = format_quantity(value, _FILE_OPTIONS[name].unit, digits=6)
+    text = text.replace(" ", "").replace("µ", "u")
     if name in FIELD_UNITS and name not in options and "settings" in options:
         return f"--set {name}={text}"
     if name not in options:
         return write_keyword(name, value)
     option = options[name]
-    if value is None and option.metavar != "TEXT":
-        text = option.metavar or ""
-    return f"{max(option.opts, key=len)} {text}".rstrip()
+    if value is True or (value is None and option.metavar in (None, "TEXT")):
+        return option_flag(option)
+    if value is None:
+        text = str(option.metavar)
+    return f"{option_flag(option)} {text}"
 
 
 def option_message(error: ParameterError, ctx: click.Context) -> str:
     """Return the message of an error with options of the running command for its arguments."""
-    from asperity.textures.catalogue import CATALOGUE
-
     message = error.write_message(lambda name, value: write_option(name, value, ctx))
-    kind = str(ctx.params.get("surface", "")).partition(":")[0]
-    if kind in CATALOGUE and any(error.argument == one.name for one in CATALOGUE[kind].arguments):
+    if error.argument in _arguments_of_surface(ctx):
+        kind = ctx.params["surface"].partition(":")[0]
         return f"{message}; asperity surfaces {kind} shows an example"
-    typed = ctx.meta["arguments"]
+    typed = {text.partition("=")[0] for text in ctx.meta["arguments"]}
     for option in ctx.command.params:
-        flag = max(option.opts, key=len)
-        is_typed = any(text.partition("=")[0] in option.opts for text in typed)
-        if option.name == error.argument and flag.startswith("--") and not is_typed:
-            return message if flag in message else f"{message} (option {flag})"
+        flag = option_flag(option)
+        is_absent = typed.isdisjoint(option.opts) and flag not in message
+        if option.name == error.argument and flag.startswith("--") and is_absent:
+            return f"{message} (option {flag})"
     return message
 
 
+def _arguments_of_surface(ctx: click.Context) -> set[str]:
+    """Return the names of the arguments of a texture kind that the command line names."""
+    if not isinstance(ctx.params.get("surface"), str):
+        return set()
+    from asperity.textures.catalogue import CATALOGUE
+
+    kind = CATALOGUE.get(ctx.params["surface"].partition(":")[0])
+    return set() if kind is None else {argument.name for argument in kind.arguments}
+
+
+def check_not_repeated(parsed: Sequence[click.Parameter]) -> None:
+    """Check that no option is given twice, which click accepts silently.
+
+    Args:
+        parsed: the parameters in the order in which they were given.
+
+    Raises:
+        ParameterError: for an option that is given twice and may not be repeated.
+    """
+    for option in parsed:
+        if isinstance(option, click.Option) and not option.multiple and parsed.count(option) > 1:
+            flag = option_flag(option)
+            fault = f"is given twice: give {flag} once"
+            if option.metavar == "LIST":
+                fault += "; several values are one text, 'a; b'"
+            raise ParameterError(flag.lstrip("-"), fault)
+
+
 class OptionCommand(click.Command):
-    """Command whose errors name its options."""
+    """Command that refuses repeated options, and whose errors name its options."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Parse the arguments, and keep them for messages and :func:`repeat_options`."""
         ctx.meta["arguments"] = list(args)
+        ctx.meta["values"], _rest, parsed = self.make_parser(ctx).parse_args(list(args))
+        check_not_repeated(parsed)
         return super().parse_args(ctx, args)
 
     def invoke(self, ctx: click.Context) -> Any:
@@ -108,9 +144,9 @@ class HeadedCommand(OptionCommand):
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the options; those of a measured file only for ``--help-surface``."""
-        rows: dict[str, list[tuple[str, str]]] = {"Options": [], **{one: [] for one in _HEADINGS}}
+        rows: dict[str, list[tuple[str, str]]] = {title: [] for title in ("Options", *_HEADINGS)}
         for option in self.get_params(ctx):
-            record = option.get_help_record(ctx) if isinstance(option, click.Option) else None
+            record = option.get_help_record(ctx)
             if record is not None:
                 rows[_HEADING_OF.get(str(option.name), "Options")].append(record)
         for title, records in rows.items():
@@ -142,9 +178,13 @@ def _show_file_options(ctx: click.Context, _option: click.Parameter, requested: 
 
 
 help_surface_option = click.option(
-    "--help-surface", is_flag=True, is_eager=True, expose_value=False, callback=_show_file_options,
+    "--help-surface",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_show_file_options,
     help="Show the options of a measured surface, too: unit, filters, magnification ...",
-)  # fmt: skip
+)
 """Adds ``--help-surface``."""
 
 
@@ -156,40 +196,19 @@ def repeat_options(names: Collection[str], unused: Collection[str]) -> list[str]
         unused: names of values of ``--set`` to leave out.
     """
     ctx = click.get_current_context()
-    typed: Sequence[str] = ctx.meta["arguments"]
-    values, _rest, _order = ctx.command.make_parser(ctx).parse_args(list(typed))
     parts = []
     for option in ctx.command.params:
-        if option.name in values and option.name in {*names, *_FILE_OPTIONS}:
-            value = values[option.name]
-            for text in value if isinstance(value, list) else [value]:
-                if str(text).partition("=")[0].strip().replace("-", "_") not in unused:
-                    parts += [max(option.opts, key=len), *([text] if isinstance(text, str) else ())]
+        if option.name not in ctx.meta["values"] or option.name not in {*names, *_FILE_OPTIONS}:
+            continue
+        value = ctx.meta["values"][option.name]
+        if isinstance(value, bool):
+            parts.append(option_flag(option))
+            continue
+        texts = value if isinstance(value, list) else [value]
+        for text in texts:
+            if text.partition("=")[0].strip().replace("-", "_") not in unused:
+                parts += [option_flag(option), text]
     return parts
-
-
-def check_not_repeated(
-    command: click.Command, arguments: list[str], group: click.Context | None = None
-) -> None:
-    """Check that no option is given twice, which click accepts silently.
-
-    Args:
-        command: the command.
-        arguments: its arguments.
-        group: context of the group, whose settings the command inherits.
-
-    Raises:
-        ParameterError: for an option that is given twice and may not be repeated.
-    """
-    # With resilient parsing other errors are left to the parsing of the command itself.
-    settings = command.context_settings
-    with click.Context(command, parent=group, resilient_parsing=True, **settings) as trial:
-        _, _, parsed = command.make_parser(trial).parse_args(list(arguments))
-    for option in parsed:
-        if isinstance(option, click.Option) and not option.multiple and parsed.count(option) > 1:
-            several = "; several values are one text, 'a; b'" if option.metavar == "LIST" else ""
-            flag = max(option.opts, key=len)
-            raise ParameterError(flag.lstrip("-"), f"is given twice: give {flag} once{several}")
 
 
 _SYNONYMS = Path(__file__).with_name("synonyms.toml")
@@ -198,7 +217,9 @@ _SYNONYMS = Path(__file__).with_name("synonyms.toml")
 def unknown_command_error(name: str, group: click.Group, ctx: click.Context) -> ParameterError:
     """Return the error for a name that is no command of a group."""
     usual = read_toml("synonyms", _SYNONYMS).get(str(group.name), {}).get(name.lower())
-    hint = f"did you mean {usual!r}?" if usual else suggest_names(name, group.list_commands(ctx))
+    hint = f"did you mean {usual!r}?"
+    if usual is None:
+        hint = suggest_names(name, group.list_commands(ctx))
     return ParameterError("command", f"is unknown: {name!r}; {hint}")
 
 
@@ -207,45 +228,48 @@ def usage_error_text(error: click.ClickException) -> str:
     ctx: click.Context | None = getattr(error, "ctx", None)
     if ctx is not None and isinstance(error, click.NoSuchOption):
         return _unknown_option_text(error.option_name, ctx)
-    usage = f"; {ctx.get_usage().replace('Usage', 'usage')}" if ctx is not None else ""
-    return f"{error.format_message().rstrip('.')}{usage}"
+    message = error.format_message().rstrip(".")
+    if ctx is None:
+        return message
+    return f"{message}; {ctx.get_usage().replace('Usage', 'usage')}"
 
 
 def _unknown_option_text(option: str, ctx: click.Context) -> str:
     """Return the message for an unknown option; it names the commands that have it."""
-    pattern = re.compile(rf"-[a-z]*{re.escape(option[1:])}.*")  # -device is parsed as -d
-    name = next(filter(pattern.fullmatch, sys.argv), option) if len(option) == 2 else option
+    name = option
+    if len(option) == 2:  # -device is parsed as -d
+        pattern = re.compile(rf"-[a-z]*{re.escape(option[1:])}.*")
+        name = next(filter(pattern.fullmatch, sys.argv), option)
     options = _options_of(ctx.command)
     group = cast("click.Group", ctx.find_root().command)
     usual = read_toml("synonyms", _SYNONYMS)["options"].get(name.lower())
-    near = f"did you mean {usual!r}? " if usual in options else nearest_names(name, options)
-    known = {one: group.get_command(ctx, one) for one in group.list_commands(ctx)}
-    having = ", ".join(one for one in known if name in _options_of(known[one]))
-    taken = f"option of {having}; " if having else ""
+    hint = f"did you mean {usual!r}? " if usual in options else nearest_names(name, options)
+    commands = {command: group.get_command(ctx, command) for command in group.list_commands(ctx)}
+    having = [command for command in commands if name in _options_of(commands[command])]
+    if having:
+        hint += f"option of {', '.join(having)}; "
     path = ctx.command_path
-    return f"{path.split()[-1]} has no option {name}; {near}{taken}see {path} --help"
+    return f"{path.split()[-1]} has no option {name}; {hint}see {path} --help"
 
 
 def _options_of(command: click.Command | None) -> list[str]:
-    parameters = command.params if command else []
-    return [flag for one in parameters for flag in one.opts if flag.startswith("--")]
+    if command is None:
+        return []
+    return [flag for option in command.params for flag in option.opts if flag.startswith("--")]
 
 
 class StrictGroup(click.Group):
-    """Group of commands that refuses repeated options."""
+    """Group of commands that suggests the command for another name."""
 
     command_class = OptionCommand
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Return the command after a check for repeated options."""
+        """Return the command."""
         if args[0][:1] != "-" and self.get_command(ctx, args[0]) is None:
             raise unknown_command_error(args[0], self, ctx)
-        name, command, rest = super().resolve_command(ctx, args)
-        if command is not None:
-            check_not_repeated(command, rest, ctx)
-        return name, command, rest
+        return super().resolve_command(ctx, args)
 
 
 BAD_INPUT = AsperityError.exit_code

@@ -50,7 +50,7 @@ class Overrides:
 
     def apply_to(self, device: Device) -> Device:
         """Return the device with the overridden fields."""
-        return override_device(device, self.device) if self.device else device
+        return device if not self.device else override_device(device, self.device)
 
 
 def parse_settings(
@@ -77,11 +77,14 @@ def parse_settings(
             name not in parameters and name in FIELD_UNITS
         )
         name = name.removeprefix(_DEVICE_PREFIX)
-        if name not in (FIELD_UNITS if of_device else parameters):
-            words = f"names {name!r}, which is a parameter of no law and no field of a device"
-            shared = {f"{_DEVICE_PREFIX}{one}" for one in FIELD_UNITS.keys() & parameters.keys()}
+        known: Collection[str] = FIELD_UNITS if of_device else parameters
+        if name not in known:
+            fault = f"names {name!r}, which is a parameter of no law and no field of a device"
+            shared = {
+                f"{_DEVICE_PREFIX}{field}" for field in FIELD_UNITS.keys() & parameters.keys()
+            }
             hint = suggest_names(name, {*parameters, *FIELD_UNITS, *shared})
-            raise ParameterError("set", f"{words}; {hint}")
+            raise ParameterError("set", f"{fault}; {hint}")
         first = earlier.setdefault((of_device, name), text)
         if first is not text:
             raise ParameterError("set", f"is given twice for {name}: {first!r} and {text!r}")
@@ -91,8 +94,10 @@ def parse_settings(
             try:
                 law[name] = parameters[name].parse(value)
             except ParameterError as error:
-                field = f"; the device's is {_DEVICE_PREFIX}{text}" if name in FIELD_UNITS else ""
-                raise ParameterError(name, f"{error.requirement}{field}", error.value) from None
+                if name not in FIELD_UNITS:
+                    raise
+                fault = f"{error.requirement}; the device's is {_DEVICE_PREFIX}{text}"
+                raise ParameterError(name, fault, error.value) from None
     return Overrides(law, device)
 
 
@@ -126,7 +131,11 @@ Parser = Callable[[str], Any]
 
 def parser_callback(parse: Parser) -> Callable[[click.Context, click.Parameter, str | None], Any]:
     """Return a callback that parses the text of an option."""
-    return lambda _ctx, _option, text: None if text is None else parse(text)
+
+    def parse_given(_ctx: click.Context, _option: click.Parameter, text: str | None) -> Any:
+        return None if text is None else parse(text)
+
+    return parse_given
 
 
 def option_help(argument: Argument) -> str:
@@ -136,13 +145,14 @@ def option_help(argument: Argument) -> str:
         >>> option_help(Argument("length", "of the scan", "m", 0.1, example="5mm"))
         "Of the scan, such as '5mm'.  [default: 100 mm]"
     """
-    first = argument.description[:1]
-    rest = argument.description[1:]
-    # A leading symbol keeps its case: "c of law H".
-    words = f"{first.upper()}{rest}" if rest[:1].isalpha() else f"{first}{rest}"
-    example = f", such as '{argument.example}'" if argument.example else ""
-    default = f"  [default: {argument.default_text}]" if argument.default_text else ""
-    return f"{words}{example}.{default}"
+    text = argument.description
+    if text[1:2].isalpha():  # a leading symbol keeps its case: "c of law H"
+        text = f"{text[0].upper()}{text[1:]}"
+    if argument.example:
+        text += f", such as '{argument.example}'"
+    if argument.default_text:
+        return f"{text}.  [default: {argument.default_text}]"
+    return f"{text}."
 
 
 def argument_options(
@@ -162,24 +172,30 @@ def argument_options(
     def decorate(command: Command) -> Command:
         for argument in reversed(list(arguments)):
             flag = f"--{argument.name.replace('_', '-')}"
-            words = option_help(argument)
+            help_text = option_help(argument)
             if argument.form == "switch":
-                command = click.option(flag, is_flag=True, default=None, help=words)(command)
+                command = click.option(flag, is_flag=True, default=None, help=help_text)(command)
                 continue
             parse = argument.parse if make_parser is None else make_parser(argument)
-            is_list = make_parser is list_parser or argument.form == "items"
-            metavar = "|".join(argument.choices) or ("N" if argument.form == "integer" else "TEXT")
             command = click.option(
                 flag,
                 argument.name,
-                metavar="LIST" if is_list else metavar,
+                metavar=_metavar(argument, is_list=make_parser is list_parser),
                 callback=parser_callback(parse),
-                help=words,
+                help=help_text,
                 hidden=argument in hidden,
             )(command)
         return command
 
     return decorate
+
+
+def _metavar(argument: Argument, *, is_list: bool) -> str:
+    if is_list or argument.form == "items":
+        return "LIST"
+    if argument.form == "integer":
+        return "N"
+    return "|".join(argument.choices) or "TEXT"
 
 
 def single_value_parser(argument: Argument) -> Parser:
@@ -209,9 +225,9 @@ def list_parser(argument: Argument) -> Parser:
 def provided_values(values: Mapping[str, Any], arguments: Iterable[Argument]) -> dict[str, Any]:
     """Return the values of the given options, by the keyword of each argument."""
     return {
-        one.keyword or one.name: values[one.name]
-        for one in arguments
-        if values[one.name] is not None
+        argument.keyword or argument.name: values[argument.name]
+        for argument in arguments
+        if values[argument.name] is not None
     }
 
 
@@ -221,7 +237,8 @@ def parse_device(text: str) -> Device:
     Raises:
         ParameterError: for an unknown device, or several.
     """
-    if len(devices := parse_devices(text)) > 1:
+    devices = parse_devices(text)
+    if len(devices) > 1:
         raise ParameterError("device", "must be a single device: only compare takes several", text)
     return devices[0]
 
@@ -245,7 +262,7 @@ def parse_devices(text: str) -> tuple[Device, ...]:
     if os.path.exists(text):  # the name of a file may contain separators
         return (load_device(text),)
     parts = [part.strip() for part in text.replace(";", ",").split(",") if part.strip()]
-    devices = tuple(load_device(part) for part in parts or [text])
+    devices = tuple(map(load_device, parts or [text]))
     if len({device.id for device in devices}) < len(devices):
         raise ParameterError("device", "names one device twice", text)
     return devices
@@ -302,7 +319,7 @@ def surface_options(
 
 def _apply_memory_limit(context: click.Context, _option: click.Parameter, text: str | None) -> None:
     """Limit the memory of surfaces until the command ends."""
-    size = None if text is None else MEMORY.parse(text)
+    size = MEMORY.parse(text) if text is not None else None
     context.with_resource(limit_memory(str(context.command.name), size))
 
 
@@ -317,7 +334,7 @@ _memory_option = click.option(
 
 def _apply_job_limit(context: click.Context, _option: click.Parameter, text: str | None) -> None:
     """Limit the number of processes until the command ends."""
-    count = available_cores() if text is None else JOBS.validate(JOBS.parse(text))
+    count = JOBS.validate(JOBS.parse(text)) if text is not None else available_cores()
     context.with_resource(limit_processes(count))
 
 
@@ -388,8 +405,10 @@ def load_surface(
     requested = surface_values(values)
     scene = load_scene(source, file_values(values))
     merged = {**defaults, **scene.surface, **requested}
-    if not laws:
-        laws = [find_law(merged["law"])] if "law" in merged else tuple(REGISTERED_LAWS.values())
+    if not laws and "law" in merged:
+        laws = [find_law(merged["law"])]
+    elif not laws:
+        laws = tuple(REGISTERED_LAWS.values())
     check_parameters_apply(requested, laws)
     arguments = surface_keywords(merged, *laws)
     return scene.texture, select_device(device, scene, values), arguments

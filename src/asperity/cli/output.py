@@ -128,9 +128,9 @@ class Outputs:
         print_page(page, console)
         if extra_line:
             console.print(extra_line, soft_wrap=True, markup=False)
-        for words, path in ((page_label, self.html), ("Trace", self.trace)):
+        for label, path in ((page_label, self.html), ("Trace", self.trace)):
             if path is not None:
-                console.print(f"{words}: {escape_unprintable(path)}", soft_wrap=True, markup=False)
+                console.print(f"{label}: {escape_unprintable(path)}", soft_wrap=True, markup=False)
 
 
 def output_options(
@@ -156,8 +156,8 @@ def output_options(
             command(outputs=Outputs(**paths, force=force), **values)
 
         if html:
-            words = "Write a report with figures (HTML); - writes to standard output."
-            run = click.option("--html", "html_path", metavar="PATH", help=words)(run)
+            text = "Write a report with figures (HTML); - writes to standard output."
+            run = click.option("--html", "html_path", metavar="PATH", help=text)(run)
         if uses_cache:
             run = click.option(
                 "--no-cache",
@@ -167,8 +167,8 @@ def output_options(
                 help="Compute everything without the cache, and store nothing.",
             )(run)
         run = force_option(run) if keeps else run
-        words = "Write the result as JSON; - writes to standard output."
-        return click.option("--json", "json_path", metavar="PATH", help=words)(run)
+        text = "Write the result as JSON; - writes to standard output."
+        return click.option("--json", "json_path", metavar="PATH", help=text)(run)
 
     return decorate
 
@@ -203,6 +203,11 @@ def check_outputs(*, force: bool, **paths: str | None) -> None:
             raise ParameterError(taken[target], f"and {name} cannot both {place}")
         taken[target] = name
         check_output(name, path, force=force)
+
+
+def is_confirmed(question: str) -> bool:
+    """Whether the user confirms on a terminal; without one, nobody does."""
+    return sys.stdin.isatty() and click.confirm(question, err=True)
 
 
 def write_template(name: str, path: str, text: str, command: str, *, force: bool) -> None:

@@ -124,10 +124,10 @@ def _load_plugin(file: str, registries: tuple[PluginRegistry, ...]) -> None:
                     registry.check(value)
     if before == [registry.entries for registry in registries]:
         types = [registry.plugin_type for registry in registries]
-        names = ", ".join(one.__name__ for one in types if one is not None)
+        names = ", ".join(kind.__name__ for kind in types if kind is not None)
         functions = "register_criterion"
-        words = f"{file} registers nothing: no {names} at its top level, and no call of {functions}"
-        raise ParameterError(_OPTION, words)
+        fault = f"{file} registers nothing: no {names} at its top level, and no call of {functions}"
+        raise ParameterError(_OPTION, fault)
 
 
 def _read_source(file: str) -> bytes:

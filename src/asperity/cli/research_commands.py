@@ -49,7 +49,9 @@ _CLAIMS_FRACTION = 0.35
     metavar="DIR",
     help="Write the figures, or those of the given claims, to this folder.",
 )
-@options.argument_options([_FORMAT], lambda one: lambda text: one.validate(one.parse(text)))
+@options.argument_options(
+    [_FORMAT], lambda argument: lambda text: argument.validate(argument.parse(text))
+)
 @options.plugin_option
 @options.file_options
 @options.jobs_option
@@ -173,7 +175,9 @@ def init_command(kind: str, file: str, *, force: bool) -> None:
 @options.argument_options(_RUN)
 @loop_setup.driver_option
 @options.plugin_option
-def run_command(file: str, participant: str, folder: str | None, driver: str, **own: Any) -> None:
+def run_command(
+    file: str, participant: str, folder: str | None, driver: str, **values: Any
+) -> None:
     """Run a session of a participant, as the study FILE describes.
 
     Each stimulus is analysed before the first trial, and the study is refused if one is above its
@@ -192,7 +196,7 @@ def run_command(file: str, participant: str, folder: str | None, driver: str, **
         raise ParameterError("driver", "must be a device that a participant holds", driver)
     study = load_study(file)
     path = Path(folder or Path(file).stem)
-    observer = find_observer(own["simulate"] or "typical")
+    observer = find_observer(values["simulate"] or "typical")
     is_real = driver != loop_setup.SIMULATED
     stimuli = Stimuli(study, is_real=is_real)
     with output.progress_bar("analyzing the stimuli") as update:
@@ -200,22 +204,22 @@ def run_command(file: str, participant: str, folder: str | None, driver: str, **
     player = LoopPlayer(stimuli, first, loop_setup.make_driver(driver, first) if is_real else None)
     write_study(path, study)
     opened: Terminal | PageScreen | nullcontext[None] = nullcontext()
-    if not own["simulate"]:
+    if not values["simulate"]:
         noise = study.settings["masking_noise"]
-        opened = Terminal() if own["terminal"] else PageScreen(masking_noise=noise)
-    is_resumed = bool(own["resume"])
+        opened = Terminal() if values["terminal"] else PageScreen(masking_noise=noise)
+    is_resumed = bool(values["resume"])
     with opened as screen, Participant(path, study, participant, resume=is_resumed) as person:
         before = person.trial
         if screen is None:
             simulate_session(person, stimuli, observer)
         else:
             if screen.url:
-                announce_page("study", screen.url, no_browser=bool(own["no_browser"]))
+                announce_page("study", screen.url, no_browser=bool(values["no_browser"]))
             with suppress(SessionStopped):
                 StudySession(person, player, screen).run()
-    words = "done" if person.method.next() is None else "stopped; --resume goes on"
+    state = "done" if person.method.next() is None else "stopped; --resume goes on"
     name = escape_unprintable(path)
-    click.echo(f"{participant}: {person.trial - before} answers in {name}; {words}")
+    click.echo(f"{participant}: {person.trial - before} answers in {name}; {state}")
 
 
 def _check_study_folder(_ctx: click.Context, _argument: click.Parameter, folder: str) -> str:
@@ -257,8 +261,8 @@ def plan_command(file: str, effect: float, **values: Any) -> None:
     from asperity.studies.study_report import plan_study
 
     with output.progress_bar("simulating studies"):
-        found = plan_study(file, effect, **options.provided_values(values, _PLAN))
-    click.echo(found.text)
+        plan = plan_study(file, effect, **options.provided_values(values, _PLAN))
+    click.echo(plan.text)
 
 
 @study_command.command("remove", short_help="Delete all data of a participant.")

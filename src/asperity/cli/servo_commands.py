@@ -90,9 +90,13 @@ def run_command(
         if hashes.get(path, current) != current:
             print_message(f"{path} was changed during the run, which used the earlier content")
     data = {
-        "schema": 1, "scene": setup, "driver": driver, "ended": reason.name.lower(),
-        "notes": loop.notes, "statistics": loop.statistics,
-    }  # fmt: skip
+        "schema": 1,
+        "scene": setup,
+        "driver": driver,
+        "ended": reason.name.lower(),
+        "notes": loop.notes,
+        "statistics": loop.statistics,
+    }
     outputs.write(data, device_run_page(setup, loop, reason, record))
 
 
@@ -133,7 +137,7 @@ def stop_on_signals(memory: LoopMemory | None = None) -> Iterator[list[int]]:
             memory.request_stop(now=number in _STOP_NOW_SIGNALS)
         received.append(number)
 
-    handlers = {one: signal.signal(one, collect) for one in STOP_SIGNALS}
+    handlers = {number: signal.signal(number, collect) for number in STOP_SIGNALS}
     try:
         yield received
     finally:
@@ -239,9 +243,14 @@ _LAB_ARGUMENTS = options.command_arguments("lab")
 @loop_setup.driver_options
 @options.argument_options(_LAB_ARGUMENTS)
 def lab_command(
-    surface: str | None, port: int | None, driver: str, *, accept_risk: bool, no_browser: bool,
+    surface: str | None,
+    port: int | None,
+    driver: str,
+    *,
+    accept_risk: bool,
+    no_browser: bool,
     **values: Any,
-) -> None:  # fmt: skip
+) -> None:
     """Run SURFACE interactively in a browser, with the loop of asperity run.
 
     On the simulated device the mouse pointer acts as the hand. With --driver the loop runs on a
@@ -275,18 +284,22 @@ def _simulated_scene(source: str, values: dict[str, Any]) -> SceneState:
     from asperity.lab.scene_state import make_scene_state
     from asperity.scene import load_scene
 
-    own = surface_values(values)
+    requested_surface = surface_values(values)
     file_options = file_values(values)
     with progress_bar("reading the surface"):
         scene = load_scene(source, file_options)
     device = options.select_device(values["device"], scene, values)
-    if not {"law", "stiffness"} <= scene.surface.keys() | own.keys():
+    if not {"law", "stiffness"} <= scene.surface.keys() | requested_surface.keys():
         # Without a recommendation, and for wrong parameters, the defaults of the lab apply.
         with suppress(ParameterError):
-            requested = {"clamp": BACKED.name, **scene.surface, **own}  # as the lab renders it
-            own, note = loop_setup.recommend(scene.texture, device, requested)
+            requested = {
+                "clamp": BACKED.name,
+                **scene.surface,
+                **requested_surface,
+            }  # as the lab renders it
+            requested_surface, note = loop_setup.recommend(scene.texture, device, requested)
             print_message(note)
-    return make_scene_state(scene, source, own, device)
+    return make_scene_state(scene, source, requested_surface, device)
 
 
 def announce_page(name: str, address: str, *, no_browser: bool) -> None:

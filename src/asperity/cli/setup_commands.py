@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -63,7 +62,7 @@ def cache_command(outputs: output.Outputs, *, clear: bool) -> None:
     folder = cache.cache_folder()
     limit = cache.size_limit()
     names = sorted({*_NAMESPACE_LABELS, *(entry.namespace for entry in entries)})
-    sizes = {name: [one.size for one in entries if one.namespace == name] for name in names}
+    sizes = {name: [entry.size for entry in entries if entry.namespace == name] for name in names}
     total = _format_megabytes(entry.size for entry in entries)
     lines = [f"{escape_unprintable(str(folder))}: {total} of at most {_format_megabytes([limit])}"]
     for name, parts in sizes.items():
@@ -177,10 +176,12 @@ _CALIBRATE = options.command_arguments("calibrate")
 @declare_command("calibrate")
 @options.device_option("The device with its known values: ID of the catalogue, or a TOML file.")
 @click.option(
-    "--driver", metavar="NAME", default=SIMULATED,
+    "--driver",
+    metavar="NAME",
+    default=SIMULATED,
     help="'simulated', 'real' (the driver named in the device entry), or another driver of asperity"
     " run.  [default: simulated, without a real device]",
-)  # fmt: skip
+)
 @options.argument_options(_CALIBRATE)
 @options.set_option
 @options.plugin_option
@@ -188,9 +189,15 @@ _CALIBRATE = options.command_arguments("calibrate")
 @click.option("--yes", is_flag=True, help="Start without confirmation: the handle will move.")
 @output_options(html=False, keeps=False)
 def calibrate_command(
-    outputs: Outputs, device: Device | None, driver: str, force: float | None,
-    settings: options.Overrides, output: str, *, yes: bool,
-) -> None:  # fmt: skip
+    outputs: Outputs,
+    device: Device | None,
+    driver: str,
+    force: float | None,
+    settings: options.Overrides,
+    output: str,
+    *,
+    yes: bool,
+) -> None:
     """Calibrate a device: noise, resolution, rate, delay, mass, damping, friction, stiffest wall.
 
     The device moves the handle back and forth along each axis and then holds it with a smooth wall
@@ -302,12 +309,14 @@ def simulated_bench_driver(device: Device, servo: Servo) -> Any:
 
     whole, assumed = with_assumed_mass(device)
     plant, plant_notes = make_plant(whole)
-    own, servo_notes = make_servo(device)
+    device_servo, servo_notes = make_servo(device)
     for note in (*assumed, *plant_notes, *servo_notes):
         print_message(note)
-    own = replace(own, period=servo.period)
+    device_servo = replace(device_servo, period=servo.period)
     motion = Stationary((0.0, 0.0, 0.0))
-    return simulated_driver(plant, SpringHand(), own, motion, servo.period, device_resolution=True)
+    return simulated_driver(
+        plant, SpringHand(), device_servo, motion, servo.period, device_resolution=True
+    )
 
 
 def confirm_motion(device: Device, when_lost: str, force: float, *, yes: bool) -> None:
@@ -320,5 +329,5 @@ def confirm_motion(device: Device, when_lost: str, force: float, *, yes: bool) -
         f"{device.name} is a real device: do not touch the handle, and keep a hand near the"
         f" switch. The handle moves with up to {force:g} N. If the loop dies: {when_lost}"
     )
-    if not yes and not (sys.stdin.isatty() and click.confirm("Start?", err=True)):
+    if not yes and not output.is_confirmed("Start?"):
         raise ParameterError("yes", "is missing: the handle moves by itself; --yes starts it")

@@ -6,7 +6,6 @@ import functools
 import importlib.util
 import os
 import pickle
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import timedelta
@@ -21,7 +20,7 @@ from asperity.cli import options
 from asperity.cli.loop_setup import load_setup, loop_options, select_laws, stiffness_option
 from asperity.cli.main import StrictGroup, declare_command
 from asperity.cli.options import plugin_option
-from asperity.cli.output import Outputs, force_option, output_options, progress_bar
+from asperity.cli.output import Outputs, force_option, is_confirmed, output_options, progress_bar
 from asperity.cli.plugins import load_plugin_files, plugin_files
 from asperity.core.errors import ParameterError, escape_unprintable
 from asperity.core.files import check_output
@@ -46,9 +45,14 @@ _SIMULATE_ARGUMENTS = options.command_arguments("simulate")
 @click.option("--yes", is_flag=True, help="Simulate a long duration without confirmation.")
 @output_options()
 def simulate_command(
-    scene: str, outputs: Outputs, duration: float | None, every: int | None, *, yes: bool,
+    scene: str,
+    outputs: Outputs,
+    duration: float | None,
+    every: int | None,
+    *,
+    yes: bool,
     **values: Any,
-) -> None:  # fmt: skip
+) -> None:
     """Simulate the closed loop of SCENE (TOML) and report its energy balance.
 
     A scene has the sections [texture], [surface], [device], [hand], [motion] and [run];
@@ -56,22 +60,23 @@ def simulate_command(
     energies, with units.
     """
     setup = load_setup(scene, values, duration)
-    setup = setup if every is None else replace(setup, every=every)
+    if every is not None:
+        setup = replace(setup, every=every)
     if not yes:
         _confirm_long_run(setup, has_trace=outputs.trace is not None)
     from asperity.report.pages.run_report import run_page
     from asperity.simulation.trace import MAX_ROWS
 
     # Rows are needed for figures only.
-    max_rows = 0 if outputs.html is None else MAX_ROWS
+    max_rows = MAX_ROWS if outputs.html is not None else 0
     with progress_bar("simulating") as update:
         run = setup.simulate(trace=outputs.trace or True, progress=update, max_rows=max_rows)
 
     outputs.write({"schema": 2, "scene": setup, "run": run}, run_page(setup, run))
 
 
-_SAMPLE_TIME = 2e-7  # [s], [s], [bytes], about
-_ROW_TIME = 5e-7
+_SAMPLE_TIME = 2e-7  # [s], about
+_ROW_TIME = 5e-7  # [s]
 _ROW_BYTES = 300
 _MAX_UNASKED_TIME = 600.0
 _MAX_UNASKED_SIZE = 1e10
@@ -90,11 +95,12 @@ def _confirm_long_run(setup: Setup, *, has_trace: bool) -> None:
     size = rows * _ROW_BYTES
     if seconds <= _MAX_UNASKED_TIME and size <= _MAX_UNASKED_SIZE:
         return
-    words = f"{samples:.3g} samples, which take about {timedelta(seconds=round(seconds))} here"
-    words += f" and a trace of {1e-9 * size:.3g} GB" if has_trace else ""
-    if not (sys.stdin.isatty() and click.confirm(f"{words}. Simulate?", err=True)):
-        words = f"of {setup.duration:g} s is {words}; --yes simulates it"
-        raise ParameterError("duration", words)
+    size_text = f"{samples:.3g} samples, which take about {timedelta(seconds=round(seconds))} here"
+    if has_trace:
+        size_text += f" and a trace of {1e-9 * size:.3g} GB"
+    if not is_confirmed(f"{size_text}. Simulate?"):
+        fault = f"of {setup.duration:g} s is {size_text}; --yes simulates it"
+        raise ParameterError("duration", fault)
 
 
 _DELAYS, *_ONSET_SEARCH, _DURATION = options.command_arguments("onset")
@@ -194,9 +200,15 @@ _MAX_UNASKED_CASES = 10_000
 @options.plugin_option
 @_report_options
 def sweep_command(
-    scene: str, vary: tuple[str, ...], laws: tuple[Law, ...] | None, outputs: Outputs, *,
-    output: str | None, yes: bool, **values: Any,
-) -> None:  # fmt: skip
+    scene: str,
+    vary: tuple[str, ...],
+    laws: tuple[Law, ...] | None,
+    outputs: Outputs,
+    *,
+    output: str | None,
+    yes: bool,
+    **values: Any,
+) -> None:
     """Compute SCENE for many values of its keys, on all cores or on a cluster.
 
     SCENE is a scene file (TOML), a texture with its arguments or a measured file. With --output,
@@ -206,18 +218,24 @@ def sweep_command(
     from asperity.sweeps.run_sweep import run_plan
     from asperity.sweeps.sweep_plan import make_plan
 
-    processes = available_cores() if values["jobs"] is None else values["jobs"]
+    processes = values["jobs"]
+    if processes is None:
+        processes = available_cores()
     options.JOBS.validate(processes)
+    scheduler = values["scheduler"]
+    place = cluster_place(scheduler) if scheduler is not None else local_place(processes)
+    prepare = _prepare_worker() if processes > 1 or scheduler is not None else b""
     plan = make_plan(
-        scene, _parse_vary(vary), values["run"] or str(_RUN.default),
-        design=values["design"] or "", laws=[law.letter for law in laws] if laws else None,
+        scene,
+        _parse_vary(vary),
+        values["run"] or str(_RUN.default),
+        design=values["design"] or "",
+        laws=[law.letter for law in laws or ()] or None,
         options=options.provided_values(
             values, [options.SPEED, options.GRIP, _DURATION, _DELAYS, *_SCAN_LISTS, *_SINGLE]
         ),
-        prepare=_prepare_worker() if processes > 1 or values["scheduler"] else b"",
-    )  # fmt: skip
-    scheduler = values["scheduler"]
-    place = local_place(processes) if scheduler is None else cluster_place(scheduler)
+        prepare=prepare,
+    )
     if not yes and len(plan) > _MAX_UNASKED_CASES:
         _confirm_many_cases(plan, processes)
     with progress_bar(f"computing {len(plan)} cases") as update:
@@ -225,7 +243,7 @@ def sweep_command(
 
     from asperity.report.pages.sweep_report import sweep_page
 
-    extra = "" if output is None else _write_tables(result, Path(output))
+    extra = _write_tables(result, Path(output)) if output is not None else ""
     outputs.write(result, sweep_page(result), extra_line=extra)
 
 
@@ -234,17 +252,18 @@ def _parse_vary(texts: tuple[str, ...]) -> dict[str, str]:
     vary: dict[str, str] = {}
     for text in texts:
         key, equals, values = text.partition("=")
-        if not equals or key.strip() in vary:
-            words = "names a key twice" if equals else "must be KEY=VALUES"
-            raise ParameterError("vary", words, text)
+        if not equals:
+            raise ParameterError("vary", "must be KEY=VALUES", text)
+        if key.strip() in vary:
+            raise ParameterError("vary", "names a key twice", text)
         vary[key.strip()] = values
     return vary
 
 
 def _prepare_worker() -> bytes:
     """Return the pickled function that loads the plugins; empty without any."""
-    files = tuple(str(Path(file).resolve()) for file in plugin_files())
-    return pickle.dumps(partial(load_plugin_files, files)) if files else b""
+    files = tuple([str(Path(file).resolve()) for file in plugin_files()])
+    return b"" if not files else pickle.dumps(partial(load_plugin_files, files))
 
 
 def _confirm_many_cases(plan: SweepPlan, processes: int) -> None:
@@ -257,9 +276,9 @@ def _confirm_many_cases(plan: SweepPlan, processes: int) -> None:
 
     seconds = estimate_case_time(plan) * len(plan)
     time = timedelta(seconds=round(seconds / processes))
-    words = f"{len(plan)} cases, which take about {time} on {processes} processes here"
-    if not (sys.stdin.isatty() and click.confirm(f"{words}. Compute?", err=True)):
-        raise ParameterError("vary", f"makes {words}; --yes computes them")
+    size_text = f"{len(plan)} cases, which take about {time} on {processes} processes here"
+    if not is_confirmed(f"{size_text}. Compute?"):
+        raise ParameterError("vary", f"makes {size_text}; --yes computes them")
 
 
 def _write_tables(result: SweepResult, folder: Path) -> str:

@@ -73,8 +73,8 @@ def _check_file(_ctx: click.Context, _argument: click.Parameter, name: str) -> s
 
     kind = name.partition(":")[0].lower()
     if kind in CATALOGUE and not os.path.isfile(name):
-        words = "must be a measured file; this is a surface of the catalogue: asperity surfaces"
-        raise ParameterError("file", f"{words} {kind}", name)
+        fault = "must be a measured file; this is a surface of the catalogue: asperity surfaces"
+        raise ParameterError("file", f"{fault} {kind}", name)
     return name
 
 
@@ -139,14 +139,16 @@ def bake_command(surface: str, output: str, *, body: bool, outputs: Outputs, **v
         raise ParameterError("texture", "requires --body: it is laid on a mesh")
     check_outputs(force=outputs.force, output=output, json=outputs.json)
     with progress_bar("baking the field") as update:
-        given = options.provided_values(values, (MAX_DEPTH, SHIPPED_LAW_ARGUMENTS["continuity"]))
-        chosen = options.provided_values(values, _BAKE)
+        law_values = options.provided_values(
+            values, (MAX_DEPTH, SHIPPED_LAW_ARGUMENTS["continuity"])
+        )
+        bake_values = options.provided_values(values, _BAKE)
         if body:
-            chosen |= {"repair": repair, **options.file_values(values)}
-            baked = bake_mesh(surface, progress=update, **given, **chosen)
+            bake_values |= {"repair": repair, **options.file_values(values)}
+            baked = bake_mesh(surface, progress=update, **law_values, **bake_values)
         else:
             texture = load_scene(surface, options.file_values(values)).texture
-            baked = bake(Surface(texture, "H", **given), progress=update, **chosen)
+            baked = bake(Surface(texture, "H", **law_values), progress=update, **bake_values)
         field = save_field(output, baked.texture)
     from asperity.report.pages.measured_report import field_page
 
@@ -222,14 +224,16 @@ def export_command(
     path = Path(output)
     c99.check_name(path, target)
     check_output("output", output, force=force)
-    field = path.with_suffix(".field") if load and not is_field(surface) else None
-    check_output("output", str(field) if field else None, force=force)
+    field = None
+    if load and not is_field(surface):
+        field = path.with_suffix(".field")
+        check_output("output", str(field), force=force)
     ExportRequest.validate(**request)
 
     from asperity.analysis.results.analyze import STEPS, analyze
     from asperity.export.export_surface import export_analysis
 
-    clamp = {"clamp": values["clamp"]} if values["clamp"] is not None else {}
+    clamp = options.provided_values(values, [_CLAMP])
     with step_bar("reading the surface", len(STEPS)) as step:
         texture, device, arguments = options.load_surface(
             surface, device, values, clamp=BACKED.name

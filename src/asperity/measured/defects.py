@@ -68,8 +68,8 @@ def remove_outliers(heights: FloatArray, threshold: float) -> str:
     np.abs(residual, out=residual)
     sigma, origin = _robust_deviation(residual)
     # Rounding must not produce outliers on a surface that equals its medians.
-    least = max(threshold * sigma, 1e-12 * float(np.nanmax(np.abs(heights))))
-    suspects = np.nonzero(residual > least)
+    limit = max(threshold * sigma, 1e-12 * float(np.nanmax(np.abs(heights))))
+    suspects = np.nonzero(residual > limit)
     count = 0
     for block, windows in _iter_windows(padded, heights.shape, suspects):
         middle = np.nanmedian(windows, axis=1, keepdims=True)
@@ -77,9 +77,7 @@ def remove_outliers(heights: FloatArray, threshold: float) -> str:
         spikes = residual[block] > threshold * spread
         heights[tuple(index[spikes] for index in block)] = np.nan
         count += int(spikes.sum())
-    points = "points"
-    if count == 1:
-        points = "point"
+    points = "point" if count == 1 else "points"
     neighbourhood = format_counts([WINDOW_SIZES[heights.ndim]] * heights.ndim)
     return (
         f"outliers: {count} {points} beyond {threshold:g} robust standard"
@@ -190,8 +188,8 @@ def fill_in_place(heights: FloatArray, pitch: Pitch) -> None:
     weights = (1.0, (pitch[0] / pitch[1]) ** 2)
     for points in _hole_groups(missing):
         if len(points) > _MAX_HOLE:
-            words = f"has a hole of {len(points)} points; at most {_MAX_HOLE} are filled: crop it"
-            raise ParameterError("surface", words)
+            fault = f"has a hole of {len(points)} points; at most {_MAX_HOLE} are filled: crop it"
+            raise ParameterError("surface", fault)
         matrix, right = _laplace_system(heights, points, weights, mean)
         solution = spsolve(matrix.tocsc(), right, permc_spec="MMD_AT_PLUS_A")
         heights.reshape(-1)[points] = solution + mean
@@ -351,9 +349,7 @@ def make_periodic(
 
 def _move_axis_first(values: ArrayT, axis: int) -> ArrayT:
     """Return a view with the given axis first; for one or two axes it is its own inverse."""
-    if axis == 0:
-        return values
-    return values.T
+    return values if axis == 0 else values.T
 
 
 def _blend_axis(heights: FloatArray, band: int, axis: int) -> FloatArray:

@@ -67,13 +67,9 @@ def lowpass_in_place(
 
     for axis, step in zip(range(heights.ndim - 1, -1, -1), pitch, strict=True):
         n = heights.shape[axis]
-        frequency = np.arange(n) / (2.0 * (n - 1) * step)
-        if periodic:
-            frequency = rfftfreq(n, step)
+        frequency = rfftfreq(n, step) if periodic else np.arange(n) / (2.0 * (n - 1) * step)
         transmission = np.exp(-np.pi * (ALPHA * cutoff * frequency) ** 2)
-        response = transmission
-        if axis < heights.ndim - 1:
-            response = transmission[:, None]
+        response = transmission[:, None] if axis < heights.ndim - 1 else transmission
         if periodic:
             heights[...] = irfft(response * rfft(heights, axis=axis), n, axis=axis)
         else:
@@ -179,8 +175,8 @@ def short_trace_text(shape: Shape, pitch: Pitch, l_cutoff: float) -> str:
     length = format_length(l_cutoff)
     if len(shape) > 1:
         return f"too small for this L-filter: {side} wide, ISO 25178-3 takes at least {length}"
-    found = f"{side} are {shortest / l_cutoff:.3g} section lengths of {length}"
-    return f"too short for this L-filter: {found}, ISO 21920-3 takes {SECTION_COUNT}"
+    extent = f"{side} are {shortest / l_cutoff:.3g} section lengths of {length}"
+    return f"too short for this L-filter: {extent}, ISO 21920-3 takes {SECTION_COUNT}"
 
 
 def required_sections(shape: Shape) -> int:
@@ -295,9 +291,7 @@ def _ball(
 ) -> tuple[FloatArray, NDArray[np.bool_]]:
     """Return how far a ball rises [m] around its lowest point, and where that is compared."""
     # Where the ball has risen by more than the height range, the point below its centre is higher.
-    reach = radius
-    if span < radius:
-        reach = math.sqrt(max(span * (2.0 * radius - span), 0.0))
+    reach = math.sqrt(max(span * (2.0 * radius - span), 0.0)) if span < radius else radius
     limits = [math.floor(reach / p * (1 + 1e-12)) for p in pitch[::-1]]
     counts = np.minimum(limits, np.array(shape) - 1)
     sides = [p * np.arange(-n, n + 1) for n, p in zip(counts, pitch[::-1], strict=True)]

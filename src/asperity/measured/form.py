@@ -153,9 +153,7 @@ def _normal_equations(
     bases = _legendre_bases(heights.shape, degree)
     k = degree + 1
     pairs = [(b[:, :, None] * b[:, None, :]).reshape(-1, k * k) for b in bases]
-    rest = heights
-    if previous is not None:
-        rest = heights - previous.evaluate()
+    rest = heights - previous.evaluate() if previous is not None else heights
     weight = (~np.isnan(rest)).astype(np.float64)
     rest = np.nan_to_num(rest)
     if heights.ndim == 1:

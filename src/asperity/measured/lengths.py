@@ -39,9 +39,7 @@ def format_lengths(values: Sequence[float]) -> str:
         ('1 µm', '1 µm x 2 µm')
     """
     texts = [format_length(value) for value in values]
-    if len(set(texts)) == 1:
-        return texts[0]
-    return " x ".join(texts)
+    return texts[0] if len(set(texts)) == 1 else " x ".join(texts)
 
 
 def format_counts(values: Sequence[int]) -> str:
@@ -110,9 +108,7 @@ def unit_to_metres(unit: str) -> float:
     if multiple:
         factor = float(multiple.group(1))
         name = multiple.group(2)
-    singular = name
-    if len(name) > 3:
-        singular = name.removesuffix("s")
+    singular = name.removesuffix("s") if len(name) > 3 else name
     for key in (name, singular):
         if key in METRES_PER_UNIT or key in _EXPLICIT_UNITS:
             return factor * (METRES_PER_UNIT.get(key) or _EXPLICIT_UNITS[key])

@@ -335,9 +335,10 @@ def _check_missing(heights: FloatArray, max_missing: float) -> None:
     if missing == 1.0:
         raise ParameterError("surface", "has no valid point: all heights are missing")
     if missing > max_missing:
+        share = "a quarter" if max_missing == MAX_MISSING else f"{max_missing:.1%}"
         text = (
-            f"misses {missing:.1%} of its points; at most {max_missing:.0%} can be filled, unless"
-            " you allow more: {max_missing}"
+            f"misses {missing:.1%} of its points; at most {share} can be filled, unless you allow"
+            " more: {max_missing}"
         )
         raise ParameterError("surface", text, max_missing=math.ceil(100 * missing) / 100)
 
@@ -351,7 +352,7 @@ def _resolve_pitch(
     if pitch is not None:
         chosen = pitch
     if chosen is None:
-        text = f"must be given [m]: {raw.source} has none; give {{pitch}}"
+        text = f"must be given [m]: {raw.source} has none; give it, such as {{pitch}}"
         if raw.lacks_unit and height_range is None:
             text += " and {unit}"
         elif raw.relative and height_range is None:
@@ -393,9 +394,7 @@ def _scale_heights(
     wanted = check_positive("height_range", height_range, "m")
     if span == 0.0:
         raise ParameterError("height_range", "cannot be reached: the surface is flat")
-    before = f"{span:.4g}"
-    if not raw.relative:
-        before = format_length(span)
+    before = format_length(span) if not raw.relative else f"{span:.4g}"
     steps.append(f"heights scaled from {before} to {format_length(wanted)} peak to valley")
     heights -= low
     heights *= wanted / span

@@ -138,9 +138,7 @@ def _removed_statistics(before: FloatArray, after: FloatArray) -> HeightStatisti
     """Return RMS about the mean and range of the difference; None if all its points are missing."""
     difference = before - after
     known = difference[~np.isnan(difference)]
-    if not known.size:
-        return None
-    return HeightStatistics.of(known)
+    return None if not known.size else HeightStatistics.of(known)
 
 
 FilePath = str | os.PathLike[str]

@@ -151,28 +151,26 @@ class ReadingOptions:
     @property
     def metres_per_unit(self) -> float | None:
         """Length of the unit [m]; None if no unit was given."""
-        if self.unit is None:
-            return None
-        return unit_to_metres(self.unit)
+        return None if self.unit is None else unit_to_metres(self.unit)
 
     def resolve_unit(
-        self, name: str, own: float | None = None
+        self, name: str, stated: float | None = None
     ) -> tuple[float | None, tuple[str, ...]]:
         """Return the length of a file's unit [m] and the note about it.
 
         Args:
             name: name of the file.
-            own: length of the unit that the file names [m]; None if it names none.
+            stated: length of the unit that the file names [m]; None if it names none.
 
         Returns:
             The unit of the file or of the option, None if there is neither; and the notes.
 
         Raises:
-            ParameterError: a unit was given for a file that names its own.
+            ParameterError: a unit was given for a file that names its stated.
         """
         if self.metres_per_unit is None:
-            return own, ()
-        if own is not None:
+            return stated, ()
+        if stated is not None:
             raise ParameterError("unit", f"must not be given: {name} names its unit")
         note = f"no unit in the file: {self.metres_per_unit:g} m as given"
         return self.metres_per_unit, (note,)

@@ -110,7 +110,7 @@ def test_fuzz_run_reports_faulty_readers(monkeypatch: pytest.MonkeyPatch, tmp_pa
 
 def test_memory_limit_of_a_worker_is_effective() -> None:
     code = (
-        "import resource, numpy; from bench import fuzz;"
+        "import resource, numpy; from bench.stress import fuzz;"
         "resource.setrlimit(resource.RLIMIT_DATA, (fuzz.MEMORY, fuzz.MEMORY));"
         "numpy.ones(fuzz.MEMORY // 8)"
     )

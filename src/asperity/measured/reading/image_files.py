@@ -185,13 +185,13 @@ def _read_scale(file: Any, page: Any) -> pixels.ImageScale:
 
 def _resolution(page: Any) -> tuple[float, float] | None:
     """Return the pixels per unit along x and y, from the resolution tags."""
-    found = []
+    resolution = []
     for name in ("XResolution", "YResolution"):
         tag = page.tags.get(name)
         if tag is None or int(tag.value[1]) == 0:
             return None
-        found.append(int(tag.value[0]) / int(tag.value[1]))
-    return found[0], found[1]
+        resolution.append(int(tag.value[0]) / int(tag.value[1]))
+    return resolution[0], resolution[1]
 
 
 def _single_page(file: Any, pages: list[Any]) -> Any:
@@ -227,9 +227,7 @@ def _check_page(page: Any, size: int) -> None:
         raise SurfaceFileError(f"has {channels} channels; one channel of heights is expected")
     bytes_needed = page.imagelength * page.imagewidth * channels * page.dtype.itemsize
     packed = min(sum(map(int, page.databytecounts)), size)
-    ratio = _MAX_TIFF_RATIO
-    if int(page.compression) == 1:
-        ratio = 1
+    ratio = 1 if int(page.compression) == 1 else _MAX_TIFF_RATIO
     if bytes_needed > packed * ratio:
         pixel_count = f"{page.imagewidth} x {page.imagelength} pixels"
         raise SurfaceFileError(f"truncated: {packed} bytes cannot hold {pixel_count}")
@@ -275,8 +273,8 @@ def _to_heights(page: Any, values: NDArray[Any]) -> tuple[NDArray[Any], tuple[st
         code = float(str(tag.value).strip().rstrip("\x00"))
     except ValueError:
         return values, (*notes, "the tag of the missing value is not a number: ignored")
-    values, found = mask_missing(values, code)
-    return values, (*notes, *found)
+    values, missing = mask_missing(values, code)
+    return values, (*notes, *missing)
 
 
 _PARK_TAG = 50432

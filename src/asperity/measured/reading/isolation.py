@@ -55,9 +55,7 @@ def read_isolated(
         if code is None or -code == getattr(signal, "SIGXCPU", None):
             raise _limit_error(file, f"{seconds:.0f} s")
         if code or not output.tell():
-            end = f"code {code}"
-            if code < 0:
-                end = f"signal {signal.Signals(-code).name}"
+            end = f"signal {signal.Signals(-code).name}" if code < 0 else f"code {code}"
             fault = f"ends its reader with {end}: damaged, or not what it seems"
             raise SurfaceFileError(f"{file.name} {fault}")
         output.seek(0)
@@ -191,6 +189,4 @@ def reject_on_error(fault: str) -> Iterator[None]:
 def describe_exception(error: Exception) -> str:
     """Return the text of an exception on one line, or its class name if it has none."""
     text = " ".join(str(error).split())
-    if len(text) > 120:
-        return f"{text[:117]}..."
-    return text or type(error).__name__
+    return f"{text[:117]}..." if len(text) > 120 else text or type(error).__name__

@@ -55,14 +55,14 @@ def prepare_file(
     from asperity.measured.preparation import magnify_surface, prepare
     from asperity.measured.reading import read_surface
 
-    given = {k: v for k, v in arguments.items() if v is not None and v is not False}
+    provided = {k: v for k, v in arguments.items() if v is not None and v is not False}
     if progress is not None:
         progress("read")
     if is_prepared(path):
-        for name in given:
+        for name in provided:
             raise ParameterError(name, f"cannot be applied: {os.fspath(path)} was prepared already")
         return magnify_surface(load_prepared(path), magnify, magnify_height)
-    options = {**given, "magnify": magnify, "magnify_height": magnify_height}
+    options = {**provided, "magnify": magnify, "magnify_height": magnify_height}
     key = None if watch is not None else _source_digest(path, options)
 
     def read_and_prepare() -> PreparedSurface:

@@ -98,8 +98,8 @@ def _parse_text_mesh(content: bytes, mesh_format: str) -> FloatArray:
     else:
         expected = content.lower().count(b"facet normal")
     if len(triangles) != expected:  # trimesh ignores faces that it cannot parse
-        found = f"{len(triangles)} of {expected} triangles are sound"
-        raise SurfaceFileError(f"damaged or truncated {mesh_format} mesh ({found})")
+        fault = f"{len(triangles)} of {expected} triangles are sound"
+        raise SurfaceFileError(f"damaged or truncated {mesh_format} mesh ({fault})")
     return triangles
 
 
@@ -132,8 +132,8 @@ def _to_surface(corners: FloatArray, name: str) -> RawSurface:
         raise SurfaceFileError(f"a mesh of {len(corners)} triangles is no surface")
     centre, axes, note = fit_plane(corners, cross, areas)
     _check_overhangs(areas, cross @ axes[2] < 0.0)
-    heights, pitch, found = rasterise((corners - centre) @ axes.T)
-    notes.extend((note, *found))
+    heights, pitch, grid_notes = rasterise((corners - centre) @ axes.T)
+    notes.extend((note, *grid_notes))
     longest = max(np.array(heights.shape[::-1]) * pitch)
     if longest > _MAX_EXPECTED_LENGTH:
         notes.append(f"the patch is {longest:.3g} m long: check the unit")
@@ -301,11 +301,11 @@ def _grid_steps(extent: FloatArray, target_pitch: float, n_triangles: int) -> Fl
             f"too coarse a mesh: {cells[0] + 1:.0f} x {cells[1] + 1:.0f} points at the median edge"
             f" of {1e3 * target_pitch:.4g} mm; at least {_MIN_SIDE} x {_MIN_SIDE} are expected"
         )
-    most = max(_BASE_POINT_LIMIT, min(_POINTS_PER_TRIANGLE * n_triangles, _MAX_POINTS))
-    if float(np.prod(cells + 1)) > most:
+    limit = max(_BASE_POINT_LIMIT, min(_POINTS_PER_TRIANGLE * n_triangles, _MAX_POINTS))
+    if float(np.prod(cells + 1)) > limit:
         raise SurfaceFileError(
             f"too uneven a mesh: the median edge of {1e3 * target_pitch:.4g} mm requires"
-            f" {np.prod(cells + 1):.3g} grid points, at most {most} are allowed; remesh it evenly"
+            f" {np.prod(cells + 1):.3g} grid points, at most {limit} are allowed; remesh it evenly"
         )
     return np.asarray(cells)
 

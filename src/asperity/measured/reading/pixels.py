@@ -160,9 +160,7 @@ def _parse_scal(data: bytes) -> tuple[float, float] | None:
     if data[:1] != bytes([_SCAL_METRE]):
         return None
     sides = [_parse_float(text.decode("latin-1")) for text in data[1:].split(b"\0")]
-    if len(sides) != 2:
-        return None
-    return _valid_pitch((sides[0], sides[1]))
+    return None if len(sides) != 2 else _valid_pitch((sides[0], sides[1]))
 
 
 def _parse_pcal(data: bytes, max_value: int) -> tuple[float | None, float, float]:
@@ -192,9 +190,7 @@ def _parse_float(text: str) -> float:
         value = float(text)
     except ValueError:
         return math.nan
-    if not math.isfinite(value):
-        return math.nan
-    return value
+    return math.nan if not math.isfinite(value) else value
 
 
 def check_image_size(rows: int, columns: int) -> None:
@@ -256,9 +252,7 @@ def pixels_to_surface(
 
 
 def _check_opaque(alpha: NDArray[Any]) -> None:
-    opaque = 1.0
-    if alpha.dtype.kind in "iu":
-        opaque = np.iinfo(alpha.dtype).max
+    opaque = np.iinfo(alpha.dtype).max if alpha.dtype.kind in "iu" else 1.0
     transparent = int(np.count_nonzero(alpha != opaque))
     if transparent:
         raise SurfaceFileError(

@@ -96,9 +96,7 @@ def unrecognised_error(file: SurfaceFile) -> SurfaceFileError:
     """Return the error for a file that no reader recognises."""
     if file.head.startswith(TIFF_MAGIC):
         return _unsupported_error(file, "an instrument's TIFF file", _EXTRA_HINT)
-    advice = ""
-    if not has_library():
-        advice = _EXTRA_HINT
+    advice = _EXTRA_HINT if not has_library() else ""
     if file.head.startswith(ZIP_MAGIC):
         fault = "a zip archive without a main.xml is no X3P"
         return SurfaceFileError(f"{file.name}: {_with_advice(fault, advice)}")
@@ -339,7 +337,7 @@ def _check_file(path: Path, name: str) -> None:
         is_folder = path.is_dir()
         size = path.stat().st_size
     except FileNotFoundError as error:
-        near = nearest_names(path.name, [one.name for one in path.parent.glob("*")])
+        near = nearest_names(path.name, [other.name for other in path.parent.glob("*")])
         raise SurfaceFileError(f"{path}: no such file{near and f'; {near.strip()}'}") from error
     except ValueError as error:  # a NUL in the name
         raise SurfaceFileError(f"{str(path)!r} is not a file name") from error

@@ -132,9 +132,7 @@ def _to_surface(
     points = int(np.prod([int(n) for n in channel.nb_grid_pts or (0,)]))
     if points > MAX_POINTS or points > _MAX_COMPRESSION_RATIO * file.path.stat().st_size:
         raise SurfaceFileError(f"{points} points, more than are read or the file can hold")
-    stated = None
-    if channel.unit is not None:
-        stated = unit_to_metres(str(channel.unit))
+    stated = unit_to_metres(str(channel.unit)) if channel.unit is not None else None
     unit, assumed = options.resolve_unit(file.name, stated)
     if unit is None:
         requirement = f"is required: {file.name} has no unit; give one, such as 'um'"

@@ -26,6 +26,7 @@ _MAX_LINE = 1000  # a longer line is a row of data rather than a header
 _MAX_NAME = 5  # words of a channel's name; more are a remark
 _BRACKETED = re.compile(r"[\[(]([^\[\]()]*)[\])]")
 _QUANTITY = re.compile(r"([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)\s*([^\s\d/]+)")
+_CAMEL = re.compile(r"(?<=[^\W\d_])(?=[A-Z][a-z])")
 _WORD = re.compile(r"[^\W\d_]+")
 # Units of other quantities or systems; the second set are words as well, outside of brackets.
 _OTHER_UNITS = {"inch", "inche", "thou", "feet", "volt", "pixel", "kå"}
@@ -46,10 +47,11 @@ def names_other_quantity(text: str) -> bool:
     """Whether a text names another quantity than heights.
 
     Example:
-        >>> names_other_quantity("Z (Deflection)"), names_other_quantity("Topography")
+        >>> names_other_quantity("PeakForceError"), names_other_quantity("Topography")
         (True, False)
     """
-    return "other" in [_ROLE_OF.get(word) for word in _WORD.findall(text.lower())]
+    words = _WORD.findall(_CAMEL.sub(" ", text).lower())
+    return "other" in [_ROLE_OF.get(word) for word in words]
 
 
 def find_single_unit(name: str) -> float | None:
@@ -186,9 +188,7 @@ def _parse_length(text: str) -> float | None:
     if match is None:
         return None
     unit = parse_unit(match.group(2), is_bracketed=True)
-    if unit is None:
-        return None
-    return unit * float(match.group(1).replace(",", "."))
+    return None if unit is None else unit * float(match.group(1).replace(",", "."))
 
 
 def _parse_code(text: str) -> float | None:
@@ -221,9 +221,7 @@ def find_headings(table: TextTable) -> list[str]:
         _check_roles(headings)
         return headings
     heading = lines[-1].strip(" \t,;")
-    if _find_role(heading) != "z":
-        return []
-    return [heading]
+    return [] if _find_role(heading) != "z" else [heading]
 
 
 def _split_headings(line: str, table: TextTable) -> list[str]:

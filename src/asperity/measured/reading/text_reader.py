@@ -81,9 +81,7 @@ def _check_table(table: TextTable) -> None:
 def _is_list(table: TextTable) -> bool:
     """Whether rows are points of a profile or of a map rather than rows of a matrix."""
     rows, columns = table.values.shape
-    if columns == 2:
-        return _is_monotonic(table)
-    return bool(columns == 3 and rows > 3)
+    return _is_monotonic(table) if columns == 2 else bool(columns == 3 and rows > 3)
 
 
 def _is_monotonic(table: TextTable) -> bool:
@@ -91,9 +89,7 @@ def _is_monotonic(table: TextTable) -> bool:
     positions = table.values[:, 0]
     steps = np.diff(positions)
     known = steps[~np.isnan(steps)]
-    rising = 0.0
-    if known.size:
-        rising = float(np.median(known))
+    rising = float(np.median(known)) if known.size else 0.0
     wrong = np.flatnonzero(~(steps * np.sign(rising) > 0))
     if len(wrong) == 0:
         return True
@@ -118,9 +114,7 @@ def _read_list(
     units = [text_header.find_single_unit(heading) for heading in headings]
     if not units:
         units = [header.lateral_unit] * (table.values.shape[1] - 1) + [header.unit]
-    stated = units[0]
-    if None in units:
-        stated = None
+    stated = None if None in units else units[0]
     assumed, notes = options.resolve_unit(name, stated)
     if assumed is None:
         what = "positions and heights"

@@ -220,6 +220,4 @@ def _interrupted_error(block: _Block, line: int) -> SurfaceFileError:
 def _drop_empty_columns(values: FloatArray) -> FloatArray:
     """Return the values without empty columns at the right, from separators at the line's end."""
     used = np.flatnonzero(~np.isnan(values).all(axis=0))
-    if not len(used):
-        return values
-    return values[:, : int(used[-1]) + 1]
+    return values if not len(used) else values[:, : int(used[-1]) + 1]

@@ -121,10 +121,10 @@ def _checksum_notes(archive: _Archive, header: X3pHeader, main: bytes) -> list[s
     name = _text(header.root, "Record4/ChecksumFile") or "md5checksum.hex"
     if _normalise_name(name) not in archive.members:
         return [f"no {name[:60]}: main.xml is not verified"]
-    found = re.search(rb"[0-9a-fA-F]{32}", archive.read(name, limit=2**16))
-    if found is None:
+    md5 = re.search(rb"[0-9a-fA-F]{32}", archive.read(name, limit=2**16))
+    if md5 is None:
         return [f"{name[:60]} holds no MD5: main.xml is not verified"]
-    if found.group().decode().lower() != _md5(main):
+    if md5.group().decode().lower() != _md5(main):
         return ["main.xml does not match its MD5"]
     return []
 
