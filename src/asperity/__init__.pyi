@@ -18,6 +18,8 @@ from asperity.analysis.results.check_limits import Limits as Limits
 from asperity.analysis.results.check_limits import limits as limits
 from asperity.analysis.results.device_comparisons import DeviceComparisons as DeviceComparisons
 from asperity.analysis.results.device_comparisons import compare_devices as compare_devices
+from asperity.certification.certify import Certification as Certification
+from asperity.certification.certify import certify as certify
 from asperity.core.errors import AsperityError as AsperityError
 from asperity.core.errors import LawError as LawError
 from asperity.core.errors import ParameterError as ParameterError

@@ -1,0 +1,253 @@
+"""Renderers as black boxes: our own laws against their certified numbers, and planted faults."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.interpolate import RectBivariateSpline
+
+from asperity import ParameterError, Sinusoid, Surface, characteristic_number, worst_loop
+from asperity.certification import isolated
+from asperity.certification.certify import Certification, certify
+from asperity.core.checks import FloatArray
+
+BOX = ((-1e-3, 1e-3), (-1e-3, 1e-3), (-1e-3, 1e-4))
+TEXTURE = Sinusoid(amplitude=0.4e-3, period=2e-3)
+DEPTH = 0.8e-3
+
+
+def law_region(surface: Surface) -> Callable[[FloatArray], FloatArray]:
+    """Return whether points are in the working region of a law of vertical or nominal contact."""
+
+    def contains(points: FloatArray) -> FloatArray:
+        height = TEXTURE.height(points[:, :2]) * (surface.law.contact.name != "nominal")
+        depth = height - points[:, 2]
+        return np.asarray((depth > 0.0) & (depth < DEPTH))
+
+    return contains
+
+
+def certify_law(letter: str) -> tuple[Surface, Certification]:
+    surface = Surface(TEXTURE, letter, stiffness=1000.0, max_depth=DEPTH)
+    box = ((-1e-3, 1e-3), (-1e-3, 1e-3), (-1.3e-3, 0.5e-3))
+    result = certify(surface.force, region=box, inside=law_region(surface), seconds=2.0)
+    return surface, result
+
+
+@pytest.mark.parametrize("letter", ["A", "B", "C", "G"])
+def test_gain_and_leak_of_laws_are_found(letter: str) -> None:
+    surface, result = certify_law(letter)
+    gain = 1000.0 * characteristic_number(surface).upper
+    assert 0.95 * gain <= result.gain <= gain * (1.0 + 1e-6)
+    if letter == "C":
+        assert result.worst_loop is None
+    else:
+        leak = worst_loop(surface, direction=(1.0, 0.0))
+        assert result.worst_loop is not None
+        assert 0.85 * leak.energy <= result.worst_loop.energy <= 1.001 * leak.energy
+    assert result.jumps == ()
+    assert result.history_spread == 0.0
+
+
+def test_jumps_of_the_god_object_are_found_and_no_loop() -> None:
+    _surface, result = certify_law("D")
+    assert result.worst_loop is None
+    assert result.jumps
+    for jump in result.jumps:
+        assert jump.exponent < 0.01
+        # The medial axis is below the crests at l/4.
+        assert abs(jump.at[0] % 2e-3 - 0.5e-3) < 1e-8
+
+
+def planted(library: str, name: str) -> Certification:
+    return certify(library, name=name, region=BOX, seconds=3.0)
+
+
+def test_spring_of_a_library_has_its_gain_and_no_fault(library: str) -> None:
+    result = planted(library, "spring")
+    assert result.gain == pytest.approx(1000.0, rel=1e-6)
+    assert result.one_sided_gain == pytest.approx(1000.0, rel=1e-6)
+    assert result.worst_loop is None
+    assert result.jumps == ()
+    assert not result.history.has_memory
+    assert result.invalid_at is None
+    assert result.contact.highest == 0.0
+    assert 0.0 < result.cost.median < 1e-3
+
+
+def test_step_of_a_millinewton_is_a_jump(library: str) -> None:
+    jumps = planted(library, "step").jumps
+    assert jumps
+    for jump in jumps:
+        assert jump.size == pytest.approx(1e-3, rel=1e-3)
+        # The step ends at the surface, where the force jumps as well.
+        assert min(abs(jump.at[0] - 1.2345e-4), abs(jump.at[2])) < 1e-8
+    assert min(abs(jump.at[0] - 1.2345e-4) for jump in jumps) < 1e-8
+
+
+def test_steep_ramp_is_a_slope_and_not_a_jump(library: str) -> None:
+    result = planted(library, "ramp")
+    assert result.jumps == ()
+    assert result.gain == pytest.approx(1e6, rel=1e-3)
+
+
+def test_curl_of_one_percent_is_a_loop(library: str) -> None:
+    result = planted(library, "curl")
+    assert result.worst_loop is not None
+    # Both half waves of a period gain 10 N/m / pi per metre of height.
+    assert result.worst_loop.energy > 0.5 * 2 * 10.0 * 1e-3 / np.pi * 1e-3
+    assert not result.history.has_memory
+
+
+def test_memory_of_a_tick_is_dependence_on_history(library: str) -> None:
+    result = planted(library, "tick")
+    assert result.history.spread > 0.0
+    assert result.history.is_reset
+    assert result.jumps == ()
+
+
+def test_force_that_is_not_finite_is_found_with_its_place(library: str) -> None:
+    at = planted(library, "nan").invalid_at
+    assert at is not None
+    assert abs(at[0] - 2e-4) < 5e-5
+    assert abs(at[2] + 3e-4) < 5e-5
+
+
+def test_crash_is_reported_with_its_position(library: str) -> None:
+    with pytest.raises(
+        ParameterError, match=r"crashed with exit code -6 at the position .* -0\.\d"
+    ):
+        planted(library, "crash")
+
+
+def test_renderer_that_never_returns_is_reported(
+    library: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(isolated, "_CALL_TIMEOUT", 0.5)
+    with pytest.raises(ParameterError, match=r"did not return in 0\.5 s at the position"):
+        planted(library, "hang")
+
+
+def test_library_that_opens_a_renderer_in_millimetres(library: str) -> None:
+    result = certify(library, name="own", text="surface", unit="mm", region=BOX, seconds=1.0)
+    assert result.gain == pytest.approx(2000.0, rel=1e-6)
+    with pytest.raises(ParameterError, match="returned no renderer"):
+        certify(library, name="own", text="nothing", region=BOX, seconds=1.0)
+
+
+@pytest.mark.parametrize(
+    ("renderer", "arguments", "message"),
+    [
+        ("library", {"name": "none"}, "has no function none_reset"),
+        ("missing.so", {}, "is no file"),
+        ("library", {"name": "spring", "region": ((1.0, 0.0),) * 3}, "increasing"),
+        ("library", {"name": "spring", "unit": "km"}, "unit"),
+        ("library", {"name": "spring", "seconds": 0.0}, "seconds must be positive"),
+        ("library", {"name": "spring", "region": ((0.0, 1e-3),) * 3}, "has no force anywhere"),
+    ],
+)
+def test_bad_arguments_are_refused(
+    library: str, renderer: str, arguments: dict[str, object], message: str
+) -> None:
+    source = library if renderer == "library" else renderer
+    with pytest.raises(ParameterError, match=message):
+        certify(source, **{"seconds": 0.2, "region": BOX, **arguments})
+
+
+def test_function_of_another_size_is_refused() -> None:
+    with pytest.raises(ParameterError, match="returned 2 numbers for 1 points"):
+        certify(lambda _point: [1.0, 2.0], region=BOX, seconds=0.2)
+
+
+class Friction:
+    """Friction with an anchor that is set where contact begins."""
+
+    def reset(self) -> None:
+        self.anchor: FloatArray | None = None
+
+    def __call__(self, point: FloatArray) -> list[float]:
+        if point[2] >= 0.0:
+            self.anchor = None
+            return [0.0, 0.0, 0.0]
+        if self.anchor is None:
+            self.anchor = point[:2].copy()
+        pull = -300.0 * (point[:2] - self.anchor)
+        return [pull[0], pull[1], -1000.0 * point[2]]
+
+
+def test_function_with_a_reset_may_have_memory() -> None:
+    result = certify(Friction(), region=BOX, seconds=2.0)
+    assert result.history.spread > 0.02
+    assert result.history.is_reset
+
+
+# --- conservative controls: nothing may be reported ---
+
+
+def random_heights(seed: int) -> RectBivariateSpline:
+    random = np.random.default_rng(seed)
+    side = np.linspace(-2e-3, 2e-3, 24)
+    return RectBivariateSpline(side, side, random.normal(size=(24, 24)) * 2e-5)
+
+
+def gain_bound(spline: RectBivariateSpline) -> float:
+    """Return a bound of the gain of the force of a height: k (1 + |grad h|^2 + depth |hess h|)."""
+    side = np.linspace(-1e-3, 1e-3, 400)
+    height = spline(side, side)
+    slope = np.hypot(spline(side, side, dx=1), spline(side, side, dy=1))
+    parts = [(2, 0), (0, 2), (1, 1), (1, 1)]
+    curvature = np.sqrt(sum(spline(side, side, dx=i, dy=j) ** 2 for i, j in parts))
+    return float(1.02e3 * (1.0 + slope**2 + (height + 1e-3) * curvature).max())
+
+
+def potential_force(spline: RectBivariateSpline) -> Callable[[FloatArray], FloatArray]:
+    """Return the force of the potential k (h - z)^2 / 2 on a wall."""
+
+    def force(points: FloatArray) -> FloatArray:
+        x, y, z = points.T
+        depth = np.maximum(spline.ev(x, y) - z, 0.0)
+        slopes = [spline.ev(x, y, dx=1), spline.ev(x, y, dy=1), -np.ones_like(x)]
+        return -1000.0 * np.stack(slopes, axis=1) * depth[:, None]
+
+    return force
+
+
+def single_precision(force: Callable[[FloatArray], FloatArray]) -> Callable[..., FloatArray]:
+    return lambda points: force(points.astype(np.float32).astype(float)).astype(np.float32)
+
+
+def encoder(
+    force: Callable[[FloatArray], FloatArray], step: float
+) -> Callable[[FloatArray], FloatArray]:
+    return lambda points: force(step * np.round(points / step))
+
+
+def force_steps(
+    force: Callable[[FloatArray], FloatArray], step: float
+) -> Callable[[FloatArray], FloatArray]:
+    return lambda points: step * np.round(force(points) / step)
+
+
+CONTROLS = {
+    "exact": lambda force: force,
+    "single precision": single_precision,
+    "encoder of 1 um": lambda force: encoder(force, 1e-6),
+    "encoder of 20 um": lambda force: encoder(force, 2e-5),
+    "encoder of 55 um": lambda force: encoder(force, 5.5e-5),
+    "force steps": lambda force: force_steps(force, 1e-3),
+    "encoder and force steps": lambda force: force_steps(encoder(force, 1e-5), 5e-3),
+}
+
+
+@pytest.mark.parametrize("name", CONTROLS)
+def test_conservative_control_has_no_fault(name: str) -> None:
+    heights = random_heights(7)
+    result = certify(CONTROLS[name](potential_force(heights)), region=BOX, seconds=1.5)
+    assert result.jumps == ()
+    assert result.worst_loop is None
+    assert not result.history.has_memory
+    # Steps make the gain that is certain smaller, never larger.
+    bound = gain_bound(heights)
+    assert 0.1 * bound <= result.gain <= bound
