@@ -54,9 +54,8 @@ def open_input(path: str | os.PathLike[str], max_bytes: int = 2**31) -> Buffered
         if not stat.S_ISREG(status.st_mode):
             raise OSError(errno.EINVAL, "not a regular file", str(path))
         if status.st_size > max_bytes:
-            raise OSError(
-                errno.EFBIG, f"{status.st_size} bytes; at most {max_bytes} are read", str(path)
-            )
+            reason = f"{status.st_size} bytes; at most {max_bytes} are read"
+            raise OSError(errno.EFBIG, reason, str(path))
         return os.fdopen(descriptor, "rb")
     except BaseException:  # also for an interrupt
         os.close(descriptor)
@@ -299,19 +298,11 @@ def written(function: Function) -> Function:
     """Mark a property as part of the plain data of its class.
 
     Example:
-        >>> from dataclasses import dataclass, field
-        >>> @dataclass(frozen=True)
-        ... class Span(Serializable):
-        ...     low: float
-        ...     high: float
-        ...     comment: str = field(default="", metadata=OMITTED)
-        ...
-        ...     @property
-        ...     @written
-        ...     def length(self) -> float:
-        ...         return self.high - self.low
-        >>> Span(1.0, 3.0).to_dict()
-        {'low': 1.0, 'high': 3.0, 'length': 2.0}
+        >>> from dataclasses import make_dataclass
+        >>> area = property(written(lambda square: square.side**2))
+        >>> Square = make_dataclass("Square", ["side"], namespace={"area": area})
+        >>> attributes_to_dict(Square(3.0))
+        {'side': 3.0, 'area': 9.0}
     """
     vars(function)["is_written"] = True
     return function

@@ -33,6 +33,182 @@ from asperity.laws.clamps import Clamp
 from asperity.rendering import is_searched
 from asperity.surface import Surface
 
+PRECISIONS = ("double", "float")
+MAX_DATA_SIZE = 64 * 2**20
+"""Default limit of the data of a program [bytes]."""
+
+
+def is_searching(contact: Contact) -> bool:
+    """Return whether exported laws on a contact search: not where a field or a formula is used."""
+    return contact.has_warm_start and not contact.has_potential_field
+
+
+@dataclass(frozen=True)
+class ExportRequest:
+    """A surface to export, and the options of the program.
+
+    Attributes:
+        surface: the surface with its law.
+        name: prefix of all names.
+        precision: precision of real numbers, ``double`` or ``float``.
+        as_library: whether to write a library.
+        comment: comment at the top of the file, plain text.
+        q_upper: upper bound of the characteristic number.
+        max_data_size: limit of the data of the program [bytes].
+        loads_field: whether the program loads the baked field from its file; else the source holds
+            all data.
+        max_evaluations: limit of evaluations of the surface per tick; infinite for an exact search;
+            default: that of the contact of the law.
+
+    Raises:
+        ParameterError: for a name that is not a C identifier, an unknown precision, a number of
+            evaluations that is not positive, a surface with law H that is neither baked nor has a
+            closed form, or ``loads_field`` without a baked field.
+    """
+
+    surface: Surface
+    name: str = "texture"
+    precision: str = "double"
+    as_library: bool = False
+    comment: str = ""
+    q_upper: float = math.inf
+    max_data_size: int = MAX_DATA_SIZE
+    loads_field: bool = False
+    max_evaluations: float | None = None
+
+    def __post_init__(self) -> None:
+        self.validate(**vars(self))
+        if is_searched(self.surface):
+            text = "must be baked to export law H; without a period, bake a part of it"
+            raise ParameterError("surface", text)
+        if self.loads_field and not self.surface.texture.baked_numbers:
+            raise ParameterError("load", "needs a baked field: law H without a closed form")
+
+    @staticmethod
+    def validate(
+        name: str = "texture",
+        precision: str = "double",
+        max_evaluations: float | None = None,
+        **_others: object,
+    ) -> None:
+        """Check the options without a surface; others are ignored.
+
+        Raises:
+            ParameterError: see the class.
+        """
+        if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name) or "__" in name:
+            requirement = "must be a C identifier: letters, digits and single _, a letter first"
+            raise ParameterError("name", requirement, name)
+        if name in RESERVED_WORDS:
+            raise ParameterError("name", "must not be a reserved word of C or C++", name)
+        if precision not in PRECISIONS:
+            requirement = f"must be one of {', '.join(PRECISIONS)}"
+            raise ParameterError("precision", requirement, precision)
+        if max_evaluations is not None and max_evaluations != math.inf:
+            check_positive("max_evaluations", max_evaluations)
+
+    @property
+    def evaluation_budget(self) -> float:
+        """Limit of evaluations of the surface per tick; 1 for a law without a search."""
+        contact = self.surface.law.contact
+        if not is_searching(contact):
+            return 1.0
+        return self.max_evaluations or contact.max_evaluations
+
+    @property
+    def is_single_precision(self) -> bool:
+        """Whether real numbers are of single precision."""
+        return self.precision == "float"
+
+
+# Further names of a program, after the prefix.
+_RESERVED_NAMES = frozenset(("state", "reset", "force", "gap", "energy", "surface", "law"))
+
+
+@dataclass(frozen=True)
+class SurfaceFunctions:
+    """C functions of a surface.
+
+    Attributes:
+        code: definitions of the functions and their types.
+        tick_name: name of the function of force and anchor.
+        tick_type: C type of its result.
+        energy_name: name of the function of the energy; empty if there is none.
+        data: data of the program.
+    """
+
+    code: str
+    tick_name: str
+    tick_type: str
+    energy_name: str
+    data: ProgramData
+
+
+def surface_functions(request: ExportRequest) -> SurfaceFunctions:
+    """Return the C functions of a surface.
+
+    Raises:
+        ParameterError: for a law or a texture that cannot be exported.
+    """
+    surface = request.surface
+    prefix = request.name
+    single = request.is_single_precision
+    law = surface.law
+    clamp = surface.effective_clamp
+    (probe,) = [unit for unit in law_units(law, clamp) if "probe_tick" in unit.sources]
+    energy = energy_units(law, clamp)
+    roots = [("probe_tick", probe), *[("probe_energy", unit) for unit in energy[:1]]]
+    units = [*map(unit_from_module, law.contact.kernels()), *energy]
+    text = link_on_texture(law, surface.texture.sampler, clamp, roots, units)
+    program = Program(LinkedSource(text), prefix, single=single, reserved=_RESERVED_NAMES)
+    store = make_program_data(surface, prefix, single=single, loads_field=request.loads_field)
+    constants: tuple[ValueType, ValueType] = (store.texture, store.law)
+    place = (c.FLOAT, c.FLOAT, c.FLOAT)
+    kinds = (*place, c.FLOAT, c.FLOAT, c.BOOL, c.ArrayType((WARM_START_SIZE,)), *constants)
+    tick = program.function_name("probe_tick", kinds)
+    tick_type = program.c_type(program.infer_types("probe_tick", kinds).result_type)
+    energy_name = ""
+    if energy:
+        energy_name = program.function_name("probe_energy", (*place, *constants))
+    code = "\n".join([*program.types, *program.helpers, *program.functions])
+    return SurfaceFunctions(code, tick, tick_type, energy_name, store)
+
+
+@lru_cache(maxsize=64)
+def energy_units(law: Law, clamp: Clamp) -> tuple[SourceUnit, ...]:
+    """Return the energy functions of a law, ``probe_energy`` first; none without a potential.
+
+    Args:
+        law: the law.
+        clamp: the depth clamp. One that holds a part of the force has no potential.
+
+    Example:
+        >>> from asperity.laws.clamps import BACKED
+        >>> from asperity.laws import find_law
+        >>> [len(energy_units(find_law(letter), BACKED)) for letter in "BCDH"]
+        [0, 2, 2, 2]
+    """
+    from asperity.contacts.symbols import DEPTH
+    from asperity.derive.derivatives import derive
+    from asperity.derive.generate import function_source
+
+    facts = clamped_facts(law, clamp)
+    conservative = facts.conservative and facts.vanishes_at_contact and clamp.has_potential
+    if law.stateful or not conservative:
+        return ()
+    derivation = derive(law)
+    energy = law.contact.potential(derivation.force)
+    if energy is None:
+        return ()
+    values = [energy, energy.diff(DEPTH)]
+    source = function_source(derivation, "law_energy", values, "Energy [J], and by the depth [N].")
+    plan = LawCode(law, source, clamp)
+    return (
+        generated_unit(f"energy of law {law} at a probe", energy_source(plan)),
+        generated_unit(f"energy of law {law}", source),
+    )
+
+
 _SCALAR_TYPES = {
     "float64": c.FLOAT,
     "float32": c.SINGLE,
@@ -194,179 +370,3 @@ def _wrap_lines(texts: Sequence[str]) -> str:
             line = ""
         line += f"{text}, "
     return "\n".join([*lines, line]).rstrip(", ")
-
-
-@lru_cache(maxsize=64)
-def energy_units(law: Law, clamp: Clamp) -> tuple[SourceUnit, ...]:
-    """Return the energy functions of a law, ``probe_energy`` first; none without a potential.
-
-    Args:
-        law: the law.
-        clamp: the depth clamp. One that holds a part of the force has no potential.
-
-    Example:
-        >>> from asperity.laws.clamps import BACKED
-        >>> from asperity.laws import find_law
-        >>> [len(energy_units(find_law(letter), BACKED)) for letter in "BCDH"]
-        [0, 2, 2, 2]
-    """
-    from asperity.contacts.symbols import DEPTH
-    from asperity.derive.derivatives import derive
-    from asperity.derive.generate import function_source
-
-    facts = clamped_facts(law, clamp)
-    conservative = facts.conservative and facts.vanishes_at_contact and clamp.has_potential
-    if law.stateful or not conservative:
-        return ()
-    derivation = derive(law)
-    energy = law.contact.potential(derivation.force)
-    if energy is None:
-        return ()
-    values = [energy, energy.diff(DEPTH)]
-    source = function_source(derivation, "law_energy", values, "Energy [J], and by the depth [N].")
-    plan = LawCode(law, source, clamp)
-    return (
-        generated_unit(f"energy of law {law} at a probe", energy_source(plan)),
-        generated_unit(f"energy of law {law}", source),
-    )
-
-
-# Further names of a program, after the prefix.
-_RESERVED_NAMES = frozenset(("state", "reset", "force", "gap", "energy", "surface", "law"))
-
-
-@dataclass(frozen=True)
-class SurfaceFunctions:
-    """C functions of a surface.
-
-    Attributes:
-        code: definitions of the functions and their types.
-        tick_name: name of the function of force and anchor.
-        tick_type: C type of its result.
-        energy_name: name of the function of the energy; empty if there is none.
-        data: data of the program.
-    """
-
-    code: str
-    tick_name: str
-    tick_type: str
-    energy_name: str
-    data: ProgramData
-
-
-def surface_functions(request: ExportRequest) -> SurfaceFunctions:
-    """Return the C functions of a surface.
-
-    Raises:
-        ParameterError: for a law or a texture that cannot be exported.
-    """
-    surface = request.surface
-    prefix = request.name
-    single = request.is_single_precision
-    law = surface.law
-    clamp = surface.effective_clamp
-    (probe,) = [unit for unit in law_units(law, clamp) if "probe_tick" in unit.sources]
-    energy = energy_units(law, clamp)
-    roots = [("probe_tick", probe), *[("probe_energy", unit) for unit in energy[:1]]]
-    units = [*map(unit_from_module, law.contact.kernels()), *energy]
-    text = link_on_texture(law, surface.texture.sampler, clamp, roots, units)
-    program = Program(LinkedSource(text), prefix, single=single, reserved=_RESERVED_NAMES)
-    store = make_program_data(surface, prefix, single=single, loads_field=request.loads_field)
-    constants: tuple[ValueType, ValueType] = (store.texture, store.law)
-    place = (c.FLOAT, c.FLOAT, c.FLOAT)
-    kinds = (*place, c.FLOAT, c.FLOAT, c.BOOL, c.ArrayType((WARM_START_SIZE,)), *constants)
-    tick = program.function_name("probe_tick", kinds)
-    tick_type = program.c_type(program.infer_types("probe_tick", kinds).result_type)
-    energy_name = ""
-    if energy:
-        energy_name = program.function_name("probe_energy", (*place, *constants))
-    code = "\n".join([*program.types, *program.helpers, *program.functions])
-    return SurfaceFunctions(code, tick, tick_type, energy_name, store)
-
-
-PRECISIONS = ("double", "float")
-MAX_DATA_SIZE = 64 * 2**20
-"""Default limit of the data of a program [bytes]."""
-
-
-def is_searching(contact: Contact) -> bool:
-    """Return whether exported laws on a contact search: not where a field or a formula is used."""
-    return contact.has_warm_start and not contact.has_potential_field
-
-
-@dataclass(frozen=True)
-class ExportRequest:
-    """A surface to export, and the options of the program.
-
-    Attributes:
-        surface: the surface with its law.
-        name: prefix of all names.
-        precision: precision of real numbers, ``double`` or ``float``.
-        as_library: whether to write a library.
-        comment: comment at the top of the file, plain text.
-        q_upper: upper bound of the characteristic number.
-        max_data_size: limit of the data of the program [bytes].
-        loads_field: whether the program loads the baked field from its file; else the source holds
-            all data.
-        max_evaluations: limit of evaluations of the surface per tick; infinite for an exact search;
-            default: that of the contact of the law.
-
-    Raises:
-        ParameterError: for a name that is not a C identifier, an unknown precision, a number of
-            evaluations that is not positive, a surface with law H that is neither baked nor has a
-            closed form, or ``loads_field`` without a baked field.
-    """
-
-    surface: Surface
-    name: str = "texture"
-    precision: str = "double"
-    as_library: bool = False
-    comment: str = ""
-    q_upper: float = math.inf
-    max_data_size: int = MAX_DATA_SIZE
-    loads_field: bool = False
-    max_evaluations: float | None = None
-
-    def __post_init__(self) -> None:
-        self.validate(**vars(self))
-        if is_searched(self.surface):
-            text = "must be baked to export law H; without a period, bake a part of it"
-            raise ParameterError("surface", text)
-        if self.loads_field and not self.surface.texture.baked_numbers:
-            raise ParameterError("load", "needs a baked field: law H without a closed form")
-
-    @staticmethod
-    def validate(
-        name: str = "texture",
-        precision: str = "double",
-        max_evaluations: float | None = None,
-        **_others: object,
-    ) -> None:
-        """Check the options without a surface; others are ignored.
-
-        Raises:
-            ParameterError: see the class.
-        """
-        if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name) or "__" in name:
-            requirement = "must be a C identifier: letters, digits and single _, a letter first"
-            raise ParameterError("name", requirement, name)
-        if name in RESERVED_WORDS:
-            raise ParameterError("name", "must not be a reserved word of C or C++", name)
-        if precision not in PRECISIONS:
-            requirement = f"must be one of {', '.join(PRECISIONS)}"
-            raise ParameterError("precision", requirement, precision)
-        if max_evaluations is not None and max_evaluations != math.inf:
-            check_positive("max_evaluations", max_evaluations)
-
-    @property
-    def evaluation_budget(self) -> float:
-        """Limit of evaluations of the surface per tick; 1 for a law without a search."""
-        contact = self.surface.law.contact
-        if not is_searching(contact):
-            return 1.0
-        return self.max_evaluations or contact.max_evaluations
-
-    @property
-    def is_single_precision(self) -> bool:
-        """Whether real numbers are of single precision."""
-        return self.precision == "float"
