@@ -115,6 +115,11 @@ class Browser:
         """Wait until an expression is true."""
         until(lambda: bool(self.ask(script)), patience, script)
 
+    def let_loop_run(self, duration: float) -> None:
+        """Wait for a time of the loop [s], which may be faster than that of the system."""
+        end = self.ask("lab.frame.newest[0]") + duration
+        self.until(f"lab.frame.newest[0] > {end}")
+
     def expect_text(self, name: str, text: str, *, exact: bool = True) -> None:
         """Wait until the element of an id has a text, or begins with it."""
         content = f"document.getElementById('{name}').textContent"

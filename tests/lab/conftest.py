@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import pytest
 from tests.lab.browser import Browser
-from tests.lab.started import Started
+from tests.lab.started import LAB, Started
 
 from asperity.cli.plugins import load_plugin_files
 from asperity.laws import REGISTERED_LAWS
@@ -16,13 +16,13 @@ from asperity.laws import REGISTERED_LAWS
 OWN_LAW = str(Path(__file__).parents[2] / "examples" / "own_law.py")
 
 
-def start_lab() -> Iterator[Started]:
+def start_lab(command: Sequence[str]) -> Iterator[Started]:
     """Yield a lab that runs in a process of its own, as a user starts it, and end it.
 
     The device has 1000 samples a second: with the 4000 of the default, two labs and two browsers
     are too much for two cores, and samples are late.
     """
-    started = Started("--device", "touch-x", "--law", "C", "--stiffness", "250N/m")
+    started = Started("--device", "touch-x", "--law", "C", "--stiffness", "250N/m", command=command)
     yield started
     assert started.end() == (0, "")
 
@@ -30,7 +30,7 @@ def start_lab() -> Iterator[Started]:
 @pytest.fixture(scope="module")
 def lab() -> Iterator[Started]:
     """A lab for each module, of which tests may end the processes."""
-    yield from start_lab()
+    yield from start_lab(LAB)
 
 
 @pytest.fixture(scope="package")

@@ -92,6 +92,8 @@ def recovery_advice(fault: DeviceFault | None) -> str:
 
 POLL_INTERVAL = 0.05
 """Interval at which the loop is polled [s]."""
+CLOCK_SPEED = 1
+"""Seconds of a simulated loop in one of the system; tests, which wait for loops, set more."""
 START_HEIGHT = 1e-3
 """Initial height of the hand above the highest point of the surface [m]."""
 
@@ -323,7 +325,7 @@ class Session:
             return self.handle.driver
         assert self.pointer_hand is not None  # as there is no handle
         driver = pointer_driver(setup.plant, setup.hand, setup.servo, self.pointer_hand)
-        return replace(driver, follows=self.leader is not None)
+        return replace(driver, follows=self.leader is not None, clock_speed=CLOCK_SPEED)
 
     def _run_duration(self, setup: Setup) -> float | None:
         """Return the time after which the loop ends by itself [s]."""

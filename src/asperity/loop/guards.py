@@ -74,11 +74,13 @@ class Clock(NamedTuple):
         gettime: address of ``clock_gettime``; 0 for no clock, whose time is always the due time.
         nanosleep: address of ``clock_nanosleep``.
         timespec: seconds and nanoseconds, as both functions take them (2,).
+        speed: seconds of this clock in one of the system's; above 1 for tests alone.
     """
 
     gettime: int
     nanosleep: int
     timespec: IntArray
+    speed: int = 1
 
 
 def clock_now(due: int, clock: Clock) -> int:
@@ -86,17 +88,18 @@ def clock_now(due: int, clock: Clock) -> int:
     if clock.gettime == 0:
         return due
     call_address(clock.gettime, CLOCK_BOOTTIME, clock.timespec)
-    return int(clock.timespec[0]) * NANOSECONDS + int(clock.timespec[1])
+    return (int(clock.timespec[0]) * NANOSECONDS + int(clock.timespec[1])) * clock.speed
 
 
 def clock_wait_until(due: int, clock: Clock) -> int:
     """Wait until a time [ns]; return the time after the wait [ns]."""
     if clock.gettime == 0:
         return due
+    system_due = due // clock.speed
     answer = EINTR
     while answer == EINTR:
-        clock.timespec[0] = due // NANOSECONDS
-        clock.timespec[1] = due % NANOSECONDS
+        clock.timespec[0] = system_due // NANOSECONDS
+        clock.timespec[1] = system_due % NANOSECONDS
         answer = call_address(clock.nanosleep, CLOCK_BOOTTIME, TIMER_ABSTIME, clock.timespec, 0)
     return clock_now(due, clock)
 

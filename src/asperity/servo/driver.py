@@ -96,6 +96,7 @@ class Driver(ABC):
         loss_notice: what the device does if the process of the loop dies, in a sentence.
         follows: whether the device itself waits for the next sample, so that the loop needs no
             clock.
+        clock_speed: seconds of the loop in one of the system; above 1 for tests alone.
     """
 
     name: ClassVar[str]
@@ -103,6 +104,7 @@ class Driver(ABC):
     can_reopen: ClassVar[bool] = False
     loss_notice: ClassVar[str]
     follows = False
+    clock_speed = 1
 
     @property
     def frame(self) -> Frame:

@@ -106,7 +106,7 @@ class _LoopServer:
         self._memory = memory
         self._block = memory.block()
         # A device that follows another loop waits for each of its samples.
-        clock = no_clock() if job.driver.follows else system_clock()
+        clock = no_clock() if job.driver.follows else system_clock(job.driver.clock_speed)
         self._loop = DriverLoop(job.driver, job.servo, job.safety, job.reach, self._block, clock)
         self._loop.search_state = memory.search_state
         self._program = self._next_program = job.program

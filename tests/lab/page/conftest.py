@@ -9,12 +9,12 @@ from typing import Any
 import pytest
 from tests.lab.browser import Browser
 from tests.lab.conftest import start_lab
-from tests.lab.started import Started
+from tests.lab.started import FAST_LAB, Started
 
 
 @pytest.fixture(scope="package")
 def lab() -> Iterator[Started]:
-    yield from start_lab()
+    yield from start_lab(FAST_LAB)
 
 
 @pytest.fixture(scope="package")

@@ -81,10 +81,10 @@ def test_loops_are_offered_where_the_field_has_curl_and_feed_the_hand(
     page.until(FED)
     # In the other sense the hand does work on the field.
     page.ask("lab.hand.loopSpeed *= -1; lab.hand.requestMotion(); 1")
-    page.ask("new Promise(done => setTimeout(done, 1000))")
+    page.let_loop_run(1.0)
     page.press("r")
     page.until("!lab.energyMeter.awaitsFreeProbe")
-    page.ask("new Promise(done => setTimeout(done, 1500))")
+    page.let_loop_run(1.5)
     assert not page.ask(FED)
 
 
@@ -165,11 +165,11 @@ def test_a_quiet_contact_above_the_limit_says_that_it_is_conservative(page: Brow
     # The same contact below the limit exceeds none.
     render(page, "C", 600.0)
     page.until("document.getElementById('limit-text').textContent.startsWith('below the limit')")
-    page.ask("new Promise(done => setTimeout(done, 5000))")
+    page.let_loop_run(5.0)
     assert QUIET not in text(page, "limit-text")
     # Far above it the force oscillates, by one step of the encoder.
     render(page, "C", 9000.0)
     page.until("lab.quietContact.metrics.forceAmplitude > 0.05")
-    page.ask("new Promise(done => setTimeout(done, 5000))")
+    page.let_loop_run(5.0)
     page.expect_text("limit-text", "▲ above the limit", exact=False)
     assert QUIET not in text(page, "limit-text")

@@ -58,7 +58,7 @@ def what_is_told_is_one(page: Browser) -> None:
         for name in ("tour-progress", "tour-result"):
             told += re.findall(r"(?:varies|varied) by ([\d.]+ [mµ]?N)", text(page, name))
         page.ask("Object.assign(lab.hand, { pressDepth: 2e-4 }).requestMotion()")
-        page.ask("new Promise(done => setTimeout(done, 1500))")
+        page.let_loop_run(1.5)
     assert len(told) == 4
     assert len(set(told)) == 1
     assert float(told[0].split()[0]) * {"mN": 1e-3, "µN": 1e-6}[told[0].split()[1]] < 0.15

@@ -242,11 +242,13 @@ class PointerDriver(SimulatedDriver):
     Attributes:
         pointer_file: name of the file of its memory.
         follows: whether another loop moves the anchor, and this one repeats its motion.
+        clock_speed: seconds of the loop in one of the system; above 1 for tests alone.
     """
 
     name: ClassVar[str] = "simulated"
     pointer_file: str = ""
     follows: bool = False
+    clock_speed: int = 1
 
     def kernel_modules(self) -> tuple[ModuleType, ...]:
         """Return the modules of a simulated device, with the anchor of the pointer first."""
