@@ -140,12 +140,12 @@ _CONTENT_TYPES = {"html": "text/html", "js": "text/javascript", "css": "text/css
 @cache
 def page_files(package: str = "asperity.lab") -> dict[str, tuple[str, bytes]]:
     """Return type and content of each file of a package's page, by name; "" is the page itself."""
-    found = {}
+    pages = {}
     for entry in files(package).joinpath("page").iterdir():
         kind = _CONTENT_TYPES.get(entry.name.rpartition(".")[2])
         if kind is not None:
-            found[entry.name] = f"{kind}; charset=utf-8", entry.read_bytes()
-    return {**found, "": found["index.html"]}
+            pages[entry.name] = f"{kind}; charset=utf-8", entry.read_bytes()
+    return {**pages, "": pages["index.html"]}
 
 
 def respond(
@@ -165,10 +165,10 @@ def respond(
         if access_token.is_same_origin(request.headers.get_all("Origin")):
             return None
         return _text_response(HTTPStatus.FORBIDDEN, "The request comes from another page.")
-    found = page_files(package).get(name)
-    if found is None:
+    file = page_files(package).get(name)
+    if file is None:
         return _text_response(HTTPStatus.NOT_FOUND, "No such file.")
-    return _response(HTTPStatus.OK, *found)
+    return _response(HTTPStatus.OK, *file)
 
 
 def _text_response(status: HTTPStatus, text: str) -> Response:

@@ -132,11 +132,11 @@ def compute_recommendation(
     except AsperityError as error:
         return {"reason": str(error)}
     row = result.recommended_row or result.nearest_row
-    words = {"reason": result.recommendation}
+    reason = {"reason": result.recommendation}
     if row is None or row.perceptibility is None:
-        return words
+        return reason
     settings = {"law": row.law.letter, "stiffness": row.recommended_stiffness}
-    return words | {
+    return reason | {
         "changes": {**settings, **row.surface.law_parameters},
         "is_recommended": result.recommended_row is not None,
         "limit": row.stability_limit.to_dict(),

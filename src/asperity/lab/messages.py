@@ -208,12 +208,12 @@ def step_statistics(rows: FloatArray) -> dict[str, float]:
         return dict.fromkeys(_STEP_STATISTICS, 0.0)
     squares = np.square(np.diff(rows[:, POSITION], axis=0)).sum(axis=1)
     jumps = np.square(np.diff(rows[:, _LAW_FORCE], axis=0)).sum(axis=1)
-    most = int(jumps.argmax())
+    largest = int(jumps.argmax())
     return {
         "path_length": float(np.sqrt(squares).sum()),
         "squared_steps": float(squares.sum()),
-        "max_force_step": float(jumps[most] ** 0.5),
-        "position_step": float(squares[most] ** 0.5),
+        "max_force_step": float(jumps[largest] ** 0.5),
+        "position_step": float(squares[largest] ** 0.5),
     }
 
 

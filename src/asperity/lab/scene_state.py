@@ -151,10 +151,10 @@ def check_range(name: str, value: object) -> float:
     Raises:
         ParameterError: for a value out of range.
     """
-    least, most = RANGES[name]
+    lowest, highest = RANGES[name]
     number = check_real(name, value)
-    if not least <= number <= most:
-        raise ParameterError(name, f"must be {least:g} to {most:g}", value)
+    if not lowest <= number <= highest:
+        raise ParameterError(name, f"must be {lowest:g} to {highest:g}", value)
     return number
 
 
@@ -175,7 +175,8 @@ def _with_texture(state: SceneState, text: str) -> SceneState:
 def _apply_magnification(state: SceneState, *factors: float) -> SceneState:
     """Return the scene with its texture magnified, by new factors if there are any."""
     size, height = factors or state.magnification
-    state, texture = replace(state, magnification=(size, height)), state.base_texture
+    texture = state.base_texture
+    state = replace(state, magnification=(size, height))
     if not size == height == 1.0:
         texture = prepare_texture(texture, magnify=size, magnify_height=height)
     return _with_surface(state, state.setup.surface.to_texture(texture))

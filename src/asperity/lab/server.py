@@ -30,7 +30,7 @@ from asperity.lab.access import (
     respond,
 )
 from asperity.lab.background import BackgroundRenderer, BackgroundResult, BackgroundWorker
-from asperity.lab.lanes import FrameReader, Lane, SecondLane
+from asperity.lab.law_lanes import FrameReader, LawLane, SecondLane
 from asperity.lab.messages import BESIDE
 from asperity.lab.scene_state import RANGES, SceneState
 from asperity.lab.session import Handle, Session
@@ -147,7 +147,7 @@ class LabServer:
         self.recommendation = BackgroundResult(
             comparisons, background.compute_recommendation, self._broadcast_state
         )
-        self.lane = Lane(self.session, self.pictures)
+        self.lane = LawLane(self.session, self.pictures)
         beside = BackgroundRenderer(pictures, limits, self._broadcast_state, BESIDE)
         self.second_lane = SecondLane(self.session, beside)
         self.pending_tasks: set[asyncio.Task[None]] = set()

@@ -63,7 +63,7 @@ class StudyDesign:
         """All combinations of the values of the factors; the last factor varies fastest."""
         names = self.factors.keys()
         values = self.factors.values()
-        return tuple(dict(zip(names, one, strict=True)) for one in itertools.product(*values))
+        return tuple([dict(zip(names, row, strict=True)) for row in itertools.product(*values)])
 
     def check_conditions(self, minimum: int) -> int:
         """Return the number of conditions.
@@ -72,8 +72,8 @@ class StudyDesign:
             ParameterError: if it is below a minimum.
         """
         if (count := len(self.conditions)) < minimum:
-            words = f"must give at least {minimum} conditions for the method {self.kind}"
-            raise ParameterError("vary", words, count)
+            reason = f"must give at least {minimum} conditions for the method {self.kind}"
+            raise ParameterError("vary", reason, count)
         return count
 
     @property
@@ -194,7 +194,7 @@ def balanced_order(count: int, participant: int) -> list[int]:
         [[0, 3, 1, 2], [1, 0, 2, 3], [2, 1, 3, 0], [3, 2, 0, 1]]
     """
     first = [place // 2 if place % 2 == 0 else count - (place + 1) // 2 for place in range(count)]
-    order = [(one + participant) % count for one in first]
+    order = [(condition + participant) % count for condition in first]
     is_reversed = count % 2 == 1 and participant // count % 2 == 1
     return order[::-1] if is_reversed else order
 
@@ -202,8 +202,8 @@ def balanced_order(count: int, participant: int) -> list[int]:
 def repeated_order(count: int, repeats: int, participant: int) -> Iterator[tuple[int, int]]:
     """Yield repeat and condition: each repeat has all, in the next row of the balanced square."""
     for repeat in range(repeats):
-        for one in balanced_order(count, participant * repeats + repeat):
-            yield repeat, one
+        for condition in balanced_order(count, participant * repeats + repeat):
+            yield repeat, condition
 
 
 def list_pairs(design: StudyDesign) -> list[tuple[dict[str, object], dict[str, object]]]:

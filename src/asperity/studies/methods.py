@@ -46,8 +46,12 @@ class MethodKind:
 
     def complete(self, design: StudyDesign) -> StudyDesign:
         """Return the design with the defaults of the options that it does not state."""
-        given = {one.name: one.default for one in self.arguments if one.default is not None}
-        return replace(design, options={**given, **design.options})
+        defaults = {
+            argument.name: argument.default
+            for argument in self.arguments
+            if argument.default is not None
+        }
+        return replace(design, options={**defaults, **design.options})
 
     def make(self, design: StudyDesign, participant_number: int, seed: int) -> Method:
         """Return a run of the method.
@@ -95,7 +99,7 @@ _KINDS = (
     MethodKind("onset", "a value is raised until it begins, and lowered until it ends",
                _options("onset"), run_onset, score_onset),
 )  # fmt: skip
-METHODS: dict[str, MethodKind] = {one.name: one for one in _KINDS}
+METHODS: dict[str, MethodKind] = {kind.name: kind for kind in _KINDS}
 """The kinds of methods by name."""
 EXCLUSIONS = _options("exclusion")
 """Rules by which trials and participants are excluded; they are stated before the study."""

@@ -33,12 +33,15 @@ def run_rating(design: StudyDesign, participant: int, _rng: np.random.Generator)
     """Yield each condition in each repeat, in the next row of a balanced square."""
     points = range(int(design.options["points"]))
     is_likert = design.options["scale"] == LIKERT
-    answers = tuple(str(one + 1) for one in points) if is_likert else ()
-    limits = None if is_likert else _LIMITS
+    answers: tuple[str, ...] = ()
+    limits: tuple[float, float] | None = _LIMITS
+    if is_likert:
+        answers = tuple([str(point + 1) for point in points])
+        limits = None
     count = len(design.conditions)
-    for _, one in repeated_order(count, int(design.options["repeats"]), participant):
-        shown = (design.conditions[one],)
-        yield Presentation(shown, answers, design.question, limits, condition=one)
+    for _, condition in repeated_order(count, int(design.options["repeats"]), participant):
+        intervals = (design.conditions[condition],)
+        yield Presentation(intervals, answers, design.question, limits, condition=condition)
 
 
 def score_rating(design: StudyDesign, answered: Answers) -> Score:
@@ -53,7 +56,7 @@ def score_rating(design: StudyDesign, answered: Answers) -> Score:
     transform: Callable[[float], float] = float if is_likert else math.log
     cells = score_cells(
         answered, len(design.conditions),
-        lambda found: mean_interval(np.array([transform(float(one.answer)) for one in found])),
+        lambda trials: mean_interval(np.array([transform(float(t.answer)) for t in trials])),
     )  # fmt: skip
     score = Score("rating" if is_likert else "magnitude", *cells, interval=_INTERVAL)
     return score if is_likert else _equalise(score)
@@ -77,12 +80,13 @@ def run_onset(design: StudyDesign, participant: int, rng: np.random.Generator) -
     (low, high) = design.range
     key = str(design.options["level"])
     away = (high / low) ** (_JITTER * rng.random((series, count)))
-    for turn, one in repeated_order(count, series, participant):
+    for turn, condition in repeated_order(count, series, participant):
         is_ascending = (turn + participant) % 2 == 0
-        start = float(low * away[turn, one] if is_ascending else high / away[turn, one])
-        values = {**design.conditions[one], key: start}
+        distance = float(away[turn, condition])
+        start = low * distance if is_ascending else high / distance
+        values = {**design.conditions[condition], key: start}
         yield Presentation(
-            (values,), (), design.question, (low, high), adjusts=key, condition=one
+            (values,), (), design.question, (low, high), adjusts=key, condition=condition
         )  # fmt: skip
 
 
@@ -96,12 +100,12 @@ def score_onset(design: StudyDesign, answered: Answers) -> Score:
     middle = math.sqrt(math.prod(design.range))
 
     def estimate(trials: Sequence[TrialRecord]) -> Interval:
-        found: tuple[list[float], list[float]] = ([], [])
-        for one in trials:
-            is_descending = one.presentation.intervals[0][key] > middle
-            found[is_descending].append(math.log(float(one.answer)))
-        return mean_interval(np.array([(a + b) / 2.0 for a, b in zip(*found, strict=False)]))
+        onsets: tuple[list[float], list[float]] = ([], [])
+        for trial in trials:
+            is_descending = trial.presentation.intervals[0][key] > middle
+            onsets[is_descending].append(math.log(float(trial.answer)))
+        return mean_interval(np.array([(a + b) / 2.0 for a, b in zip(*onsets, strict=False)]))
 
     cells = score_cells(answered, len(design.conditions), estimate)
-    words = "Student's t over pairs of series"
-    return Score(f"onset of {key}", *cells, is_logarithmic=True, interval=words)
+    interval = "Student's t over pairs of series"
+    return Score(f"onset of {key}", *cells, is_logarithmic=True, interval=interval)

@@ -43,9 +43,13 @@ def count_choices(design: StudyDesign, answered: Sequence[TrialRecord]) -> Float
     """Return how often each condition (row) was chosen over each other (column)."""
     conditions = design.conditions
     wins = np.zeros((len(conditions), len(conditions)))
-    for one in answered:
-        first, second = (conditions.index(dict(values)) for values in one.presentation.intervals)
-        wins[(first, second) if one.answer == "1" else (second, first)] += 1.0
+    for trial in answered:
+        first, second = trial.presentation.intervals
+        chosen = conditions.index(dict(first))
+        other = conditions.index(dict(second))
+        if trial.answer == "2":
+            chosen, other = other, chosen
+        wins[chosen, other] += 1.0
     return wins
 
 
@@ -56,7 +60,7 @@ def score_comparison(design: StudyDesign, answered: Answers) -> Score:
     too consistent for finite scores; their intervals are those of Fisher's information.
     """
     count = len(design.conditions)
-    each = np.array([count_choices(design, one) for one in answered.values()])
+    each = np.array([count_choices(design, trials) for trials in answered.values()])
     each = each.reshape(-1, count, count)
     fitted = [fit_scores(wins) for wins in each]
     values, errors = np.array(fitted).reshape(-1, 2, count).swapaxes(0, 1)
@@ -71,10 +75,12 @@ def score_comparison(design: StudyDesign, answered: Answers) -> Score:
 def pair_consistency(answered: Sequence[TrialRecord]) -> float | None:
     """Return the share of repeated pairs that were answered alike; ``None`` without repeats."""
     chosen: dict[int, list[str]] = {}
-    for one in answered:
-        shown = one.presentation.intervals[int(one.answer) - 1]
-        chosen.setdefault(one.presentation.condition, []).append(str(sorted(shown.items())))
-    alike = [a == b for found in chosen.values() for a, b in itertools.combinations(found, 2)]
+    for trial in answered:
+        values = trial.presentation.intervals[int(trial.answer) - 1]
+        chosen.setdefault(trial.presentation.condition, []).append(str(sorted(values.items())))
+    alike: list[bool] = []
+    for choices in chosen.values():
+        alike += [a == b for a, b in itertools.combinations(choices, 2)]
     return sum(alike) / len(alike) if alike else None
 
 
@@ -101,7 +107,7 @@ def score_axb(design: StudyDesign, answered: Answers) -> Score:
     """Return the shares of right matches of each pair of conditions."""
     cells = score_cells(
         answered, len(list_pairs(design)),
-        lambda found: share_interval(sum(one.is_correct for one in found), len(found)),
+        lambda trials: share_interval(sum([t.is_correct for t in trials]), len(trials)),
     )  # fmt: skip
     return Score("share of right matches", *cells, interval="Wilson score", chance=0.5)
 
@@ -137,8 +143,8 @@ def fit_scores(wins: FloatArray) -> tuple[FloatArray, FloatArray]:
         value = float((wins * np.logaddexp(0.0, scores - scores[:, None])).sum())
         return value + 0.5 * float(scores.sum()) ** 2, scores.sum() - gradient(wins, scores)
 
-    found = minimize(loss, np.zeros(len(wins)), jac=True, options={"gtol": 1e-9})
-    scores: FloatArray = found.x - found.x.mean()
+    solution = minimize(loss, np.zeros(len(wins)), jac=True, options={"gtol": 1e-9})
+    scores: FloatArray = solution.x - solution.x.mean()
     return scores, np.sqrt(np.diag(covariance(wins, scores)))
 
 
@@ -177,5 +183,5 @@ def pseudo_values(each: FloatArray) -> FloatArray:
     """
     wins = complete_wins(each.sum(axis=0))
     scores, _ = fit_scores(wins)
-    steps = np.array([gradient(one, scores) for one in each]) @ covariance(wins, scores)
+    steps = np.array([gradient(choices, scores) for choices in each]) @ covariance(wins, scores)
     return np.asarray(scores + len(each) * (steps - steps.mean(axis=0)))

@@ -105,6 +105,10 @@ class LogLevels:
         thresholds, _, pairs = self.posterior(x, right)
         share = pairs.sum(axis=1)
         below = np.cumsum(share) - 0.5 * share
-        middle, low, high = (float(one) for one in np.interp(_QUANTILES, below, thresholds))
-        least, greatest = self.ends
-        return middle, low if low > least else -math.inf, high if high < greatest else math.inf
+        middle, low, high = np.interp(_QUANTILES, below, thresholds).tolist()
+        lowest, highest = self.ends
+        if low <= lowest:
+            low = -math.inf
+        if high >= highest:
+            high = math.inf
+        return middle, low, high

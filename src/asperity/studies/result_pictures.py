@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -22,7 +23,7 @@ _STRONG = "C0"
 
 def scores_figure(result: StudyResult) -> Figure:
     """Return the scores: a grey mark for each participant, and the pooled ones with intervals."""
-    labels = [label_text(result, one) or "all" for one in result.labels]
+    labels = [label_text(result, label) or "all" for label in result.labels]
     figure = style.new_figure(7.0, 1.2 + 0.45 * len(labels))
     axes = style.single_axes(figure)
     score = result.included_score
@@ -54,11 +55,11 @@ def functions_figure(result: StudyResult) -> Figure:
     name = str(result.design.options["level"])
     figure = style.new_figure(7.0, 3.4)
     axes = style.single_axes(figure)
-    answered = [one for found in result.included.values() for one in found]
+    answered = list(itertools.chain.from_iterable(result.included.values()))
     for column, label in enumerate(result.labels):
-        found = [one for one in answered if one.presentation.condition == column]
-        if found:
-            _draw_function(axes, result, found, f"C{column % 10}", label_text(result, label))
+        trials = [trial for trial in answered if trial.presentation.condition == column]
+        if trials:
+            _draw_function(axes, result, trials, f"C{column % 10}", label_text(result, label))
     axes.axhline(levels.guess, color=_FAINT, linestyle=":")
     axes.set_xscale("log")
     axes.set_ylim(0.0, 1.03)
@@ -70,11 +71,11 @@ def functions_figure(result: StudyResult) -> Figure:
 
 
 def _draw_function(
-    axes: Axes, result: StudyResult, found: Sequence[TrialRecord], colour: str, label: str
+    axes: Axes, result: StudyResult, trials: Sequence[TrialRecord], colour: str, label: str
 ) -> None:
     """Draw the function of the posterior's mean, and the shares of groups of levels."""
     levels = log_levels(result.design)
-    x, right = level_answers(result.design, found)
+    x, right = level_answers(result.design, trials)
     thresholds, slopes, share = levels.posterior(x, right)
     at = np.linspace(*levels.ends, 200)
     each: FloatArray = levels.probability(at[:, None, None], thresholds[:, None], slopes)

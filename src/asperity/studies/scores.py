@@ -112,10 +112,10 @@ class Score:
 
     def pool(self, seed: int, resamples: int = RESAMPLES) -> list[Interval]:
         """Return the mean over the participants of each column, with its interval."""
-        found = [self._pool(column, seed, resamples) for column in self._units.T]
+        intervals = [self._pool(column, seed, resamples) for column in self._units.T]
         if self.chance is None:
-            return found
-        return [(mean, max(low, 0.0), min(high, 1.0)) for mean, low, high in found]  # shares
+            return intervals
+        return [(mean, max(low, 0.0), min(high, 1.0)) for mean, low, high in intervals]  # shares
 
     def differences(self, seed: int, resamples: int = RESAMPLES) -> list[Interval]:
         """Return by how much each column but the first differs from the first.
@@ -170,9 +170,9 @@ def score_cells(
         estimate: from one answer or more.
     """
     cells = [
-        [[one for one in found if one.presentation.condition == i] for i in range(columns)]
-        for found in answered.values()
+        [[trial for trial in trials if trial.presentation.condition == i] for i in range(columns)]
+        for trials in answered.values()
     ]
-    estimates = [[estimate(one) if one else _NOTHING for one in row] for row in cells]
-    counts = np.array([[len(one) for one in row] for row in cells], int).reshape(-1, columns)
+    estimates = [[estimate(cell) if cell else _NOTHING for cell in row] for row in cells]
+    counts = np.array([[len(cell) for cell in row] for row in cells], int).reshape(-1, columns)
     return tuple(answered), np.array(estimates).reshape(-1, columns, 3).transpose(2, 0, 1), counts

@@ -60,7 +60,7 @@ class Observer:
         """
         if presentation.adjusts:
             return self._adjust(presentation, presentation.adjusts, strength, rng)
-        felt = [max(strength(one), _NONE) for one in presentation.intervals]
+        felt = [max(strength(interval), _NONE) for interval in presentation.intervals]
         if presentation.correct:
             return self._find(presentation, max(felt) - min(felt), rng)
         if len(felt) == 1:
@@ -73,7 +73,7 @@ class Observer:
 
     def _find(self, presentation: Presentation, difference: float, rng: np.random.Generator) -> str:
         """Return the right answer with the chance of the psychometric function."""
-        wrong = [one for one in presentation.answers if one != presentation.correct]
+        wrong = [answer for answer in presentation.answers if answer != presentation.correct]
         guess = 1.0 / len(presentation.answers)
         known = self._logistic(math.log(max(difference, _NONE) / self.threshold))
         is_right = rng.random() < guess + (1.0 - guess) * (1.0 - self.lapse) * known
@@ -94,8 +94,8 @@ class Observer:
         low, high = presentation.range or (_NONE, 1.0)
         values = np.geomspace(low, high, _POINTS)
         felt = [max(strength({**presentation.intervals[0], key: x}), _NONE) for x in values]
-        found = float(np.interp(math.log(self.threshold), np.log(felt), np.log(values)))
-        noisy = math.exp(found + _SPREAD_OF_ONSETS * rng.standard_normal())
+        onset = float(np.interp(math.log(self.threshold), np.log(felt), np.log(values)))
+        noisy = math.exp(onset + _SPREAD_OF_ONSETS * rng.standard_normal())
         return repr(float(min(max(noisy, low), high)))
 
 
@@ -153,8 +153,8 @@ def hand_strength(
         rest = {name: value for name, value in values.items() if name != key}
         if (name := repr(rest)) not in tables:
             stimuli = [{**rest, key: float(level)} if key else rest for level in levels]
-            found = [max(surface_strength(*make(one)), _NONE) for one in stimuli]
-            tables[name] = np.log(found)
+            strengths = [max(surface_strength(*make(stimulus)), _NONE) for stimulus in stimuli]
+            tables[name] = np.log(strengths)
         at = math.log(values.get(key, 1.0))
         return math.exp(float(np.interp(at, np.log(levels), tables[name])))
 
@@ -263,13 +263,13 @@ def plan(
     trials = 0
     for number in range(simulations):
         rng = np.random.default_rng([seed, number])
-        own = int(rng.integers(2**31))
+        study_seed = int(rng.integers(2**31))
         answered = {}
         for i in range(count):
             threshold = base.threshold * math.exp(SPREAD * rng.standard_normal())
             person = replace(base, threshold=threshold)
-            answered[str(i)] = simulate_run(design, i, person, strength, own)
-        _, low, high = kind.score(design, answered).differences(own, _RESAMPLES)[0]
+            answered[str(i)] = simulate_run(design, i, person, strength, study_seed)
+        _, low, high = kind.score(design, answered).differences(study_seed, _RESAMPLES)[0]
         found += not low <= 0.0 <= high
         trials = len(answered["0"])
     return StudyPlan(count, trials, effect, simulations, found)

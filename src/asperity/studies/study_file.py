@@ -58,8 +58,8 @@ def load_study(path: str | Path) -> Study:
     scene = content.get("study", {}).pop("scene", None)
     if scene is not None:
         for name in filter(content.__contains__, SECTIONS):
-            words = f"is given beside the section [{name}]: keep one of them"
-            raise ParameterError("study.scene", words, scene)
+            reason = f"is given beside the section [{name}]: keep one of them"
+            raise ParameterError("study.scene", reason, scene)
         sections, folder = read_scene(str(folder / str(scene)))
         content |= sections
     return build_study(content, folder)
@@ -84,9 +84,9 @@ def build_study(content: Mapping[str, Any], folder: Path) -> Study:
             raise ParameterError("vary", f"{key} must be a list of values", values)
     levels = [str(method["level"])] if "level" in method else []
     texts = {key: [str(value) for value in values] for key, values in vary.items()}
-    found = find_varied_arguments(sections, texts, *levels)
+    varied = find_varied_arguments(sections, texts, *levels)
     unit = ""
-    arguments = {argument.name: argument for argument in found.values()}
+    arguments = {argument.name: argument for argument in varied.values()}
     for name in arguments:
         if not name.startswith(("texture.", "surface.")):
             words = "cannot change while the participant holds the device: texture.* and surface.*"
@@ -94,17 +94,18 @@ def build_study(content: Mapping[str, Any], folder: Path) -> Study:
     if _STIFFNESS_KEY in arguments and "texture_force" in settings:
         raise ParameterError("study.texture_force", f"sets {_STIFFNESS_KEY}, which is varied, too")
     for level in levels:
-        method["level"] = found[level].name
-        unit = found[level].unit
+        method["level"] = varied[level].name
+        unit = varied[level].unit
     kind = METHODS[settings["kind"]]
     options = _parse_section("method", {"method": method}, kind.arguments, unit)
     options["exclusion"] = _parse_section("exclusion", content, EXCLUSIONS)
-    factors = {
-        found[key].name: tuple(map(found[key].parse, parse_values(found[key], ", ".join(values))))
-        for key, values in texts.items()
-    }
-    own = {name: settings[name] for name in ("kind", "question", "seed", "participants")}
-    design = StudyDesign(factors=factors, options=options, **own)
+    factors = {}
+    for key, values in texts.items():
+        argument = varied[key]
+        items = parse_values(argument, ", ".join(values))
+        factors[argument.name] = tuple(map(argument.parse, items))
+    plan = {name: settings[name] for name in ("kind", "question", "seed", "participants")}
+    design = StudyDesign(factors=factors, options=options, **plan)
     return Study(design, sections, arguments, folder.resolve(), settings, content)
 
 
@@ -119,11 +120,18 @@ def _parse_section(
         arguments: declarations.
         unit: of options whose declared unit is "level".
     """
-    declared = [replace(one, unit=unit) if one.unit == "level" else one for one in arguments]
-    given = parse_arguments(section, content.get(section, {}), declared)
+    declared = [
+        replace(argument, unit=unit) if argument.unit == "level" else argument
+        for argument in arguments
+    ]
+    stated = parse_arguments(section, content.get(section, {}), declared)
     values: dict[str, Any] = {}
-    for one in declared:
-        if one.required and one.name not in given:
-            raise ParameterError(f"{section}.{one.name}", f"is missing: {one.description}")
-        values[one.name] = one.validate(given[one.name]) if one.name in given else one.default
-    return {name: value for name, value in values.items() if value is not None}
+    for argument in declared:
+        name = argument.name
+        if name in stated:
+            values[name] = argument.validate(stated[name])
+        elif argument.required:
+            raise ParameterError(f"{section}.{name}", f"is missing: {argument.description}")
+        elif argument.default is not None:
+            values[name] = argument.default
+    return values

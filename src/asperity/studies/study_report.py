@@ -102,14 +102,14 @@ def _score_table(result: StudyResult) -> Table:
 def _participant_table(result: StudyResult) -> Table:
     rows = []
     for name, share in result.consistency.items():
-        found = [
+        intervals = [
             f"{label_text(result, row)} {_interval_text(row)}".strip()
             for row in _rows_of(result, name)
         ]
         text = NOT_AVAILABLE if share is None else f"{share:.0%}"
         omitted = str(result.omitted[name])
         reason = result.excluded.get(name, "")
-        rows.append(Row([Cell(name, "l"), " · ".join(found), text, omitted, reason]))
+        rows.append(Row([Cell(name, "l"), " · ".join(intervals), text, omitted, reason]))
     headings = ("participant", result.score.quantity, "consistency", "left out", "excluded")
     return Table(headings, rows, (2, 3), TableLayout(wrap=(1, 4)))
 

@@ -48,20 +48,22 @@ class TrialTable(TableFiles):
 
         The columns of the factors hold what was presented, such as the pair of laws ``A / C``.
         """
-        for one in self.trials:
-            shown = one.presentation
-            parts = enumerate(shown.intervals, 1)
-            intervals = {f"interval {i} {key}": x for i, part in parts for key, x in part.items()}
+        for trial in self.trials:
+            presentation = trial.presentation
+            intervals: dict[str, Any] = {}
+            for number, interval in enumerate(presentation.intervals, 1):
+                intervals |= {f"interval {number} {key}": x for key, x in interval.items()}
             values = {
-                key: " / ".join(dict.fromkeys(str(part[key]) for part in shown.intervals))
+                key: " / ".join(dict.fromkeys([str(part[key]) for part in presentation.intervals]))
                 for key in self.design.factors
             }
+            is_correct = trial.is_correct if presentation.correct else None
             yield {
-                "participant": one.participant, "run": one.run, "trial": one.trial,
-                **values, **intervals, "answer": one.answer,
-                "correct": one.answer == shown.correct if shown.correct else None,
-                "response time [s]": float(one.response_time), "started": one.started,
-                "used": is_used(self.design, one) and one.participant not in self.excluded,
+                "participant": trial.participant, "run": trial.run, "trial": trial.trial,
+                **values, **intervals, "answer": trial.answer,
+                "correct": is_correct,
+                "response time [s]": float(trial.response_time), "started": trial.started,
+                "used": is_used(self.design, trial) and trial.participant not in self.excluded,
             }  # fmt: skip
 
 
@@ -106,7 +108,7 @@ class StudyResult(Reportable, TableFiles):
     @property
     def included(self) -> dict[str, Sequence[TrialRecord]]:
         """The answers of participants who are not excluded."""
-        return {name: one for name, one in self.answered.items() if name not in self.excluded}
+        return {name: trials for name, trials in self.answered.items() if name not in self.excluded}
 
     @cached_property
     def score(self) -> Score:
@@ -145,8 +147,8 @@ class StudyResult(Reportable, TableFiles):
         compared = f"{score.quantity}, {word}", self.differences, labels[1:]
         if score.chance is not None:
             compared = f"{score.quantity}, difference from chance", self.differences, labels
-        for title, values, found in ((score.quantity, self.pooled, labels), compared):
-            for value, label in zip(values, found, strict=True):
+        for title, values, value_labels in ((score.quantity, self.pooled, labels), compared):
+            for value, label in zip(values, value_labels, strict=True):
                 yield {"participant": POOLED, **label, "quantity": title, **self._numbers(value),
                        "interval": self.included_score.pooled_interval}  # fmt: skip
 
@@ -154,7 +156,7 @@ class StudyResult(Reportable, TableFiles):
         """Return estimate and ends; what is unknown is ``None``."""
         scaled = self.score.to_scale(np.array(values)).tolist()
         pairs = zip(_END, scaled, values, strict=True)
-        return {name: one if math.isfinite(raw) else None for name, one, raw in pairs}
+        return {name: number if math.isfinite(raw) else None for name, number, raw in pairs}
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data with a schema number."""
@@ -171,8 +173,9 @@ def label_text(result: StudyResult, row: Mapping[str, Any]) -> str:
 
 def exclusion_rules(design: StudyDesign) -> dict[str, float]:
     """Return the rules of a design, with their defaults; a rule without a limit is infinite."""
-    rules = {one.name: math.inf if one.default is None else one.default for one in EXCLUSIONS}
-    return {**rules, **design.options.get("exclusion", {})}
+    rules = {rule.name: rule.default for rule in EXCLUSIONS if rule.default is not None}
+    unlimited = {rule.name: math.inf for rule in EXCLUSIONS}
+    return {**unlimited, **rules, **design.options.get("exclusion", {})}
 
 
 def is_used(design: StudyDesign, trial: TrialRecord) -> bool:
@@ -195,17 +198,17 @@ def analyse(design: StudyDesign, trials: Sequence[TrialRecord]) -> StudyResult:
         raise ParameterError("study", "has no trials yet")
     kind = METHODS[design.kind]
     design = kind.complete(design)
-    answered: dict[str, list[TrialRecord]] = {one.participant: [] for one in trials}
+    answered: dict[str, list[TrialRecord]] = {trial.participant: [] for trial in trials}
     omitted = dict.fromkeys(answered, 0)
-    for one in trials:
-        if is_used(design, one):
-            answered[one.participant].append(one)
+    for trial in trials:
+        if is_used(design, trial):
+            answered[trial.participant].append(trial)
         else:
-            omitted[one.participant] += 1
-    consistency = {name: kind.consistency(found) for name, found in answered.items()}
+            omitted[trial.participant] += 1
+    consistency = {name: kind.consistency(records) for name, records in answered.items()}
     reasons = {
-        name: _exclude(exclusion_rules(design), found, omitted[name], consistency[name])
-        for name, found in answered.items()
+        name: _exclude(exclusion_rules(design), records, omitted[name], consistency[name])
+        for name, records in answered.items()
     }
     excluded = {name: reason for name, reason in reasons.items() if reason}
     return StudyResult(design, trials, answered, omitted, consistency, excluded)
@@ -218,7 +221,7 @@ def _exclude(
     total = len(answered) + omitted
     if omitted > rules["largest_omission"] * total:
         return f"{omitted} of {total} trials left out"
-    right = [one.is_correct for one in answered if one.presentation.correct]
+    right = [trial.is_correct for trial in answered if trial.presentation.correct]
     if sum(right) < rules["least_correct"] * len(right):
         return f"{sum(right)} of {len(right)} answers right"
     if share is not None and share < rules["least_consistency"]:

@@ -43,8 +43,8 @@ def check_participant(code: str) -> str:
         ParameterError: for a text that may be a name.
     """
     if _CODE.fullmatch(code) is None:
-        words = "must be a code of letters and digits, such as P01, and no name"
-        raise ParameterError("participant", words, code)
+        reason = "must be a code of letters and digits, such as P01, and no name"
+        raise ParameterError("participant", reason, code)
     return code
 
 
@@ -89,8 +89,8 @@ def read_study(folder: str | Path) -> Study:
 def list_participants(folder: str | Path) -> dict[str, int]:
     """Return the numbers of the participants by code, in the order of the numbers."""
     paths = Path(folder).glob(f"*/{_NUMBER_FILE}")
-    found = sorted((int(path.read_text("utf-8")), path.parent.name) for path in paths)
-    return {code: number for number, code in found}
+    numbered = sorted([(int(path.read_text("utf-8")), path.parent.name) for path in paths])
+    return {code: number for number, code in numbered}
 
 
 def _check_known(folder: str | Path, code: str, *, is_new: bool = False) -> dict[str, int]:
@@ -116,8 +116,10 @@ def read_trials(folder: str | Path) -> list[TrialRecord]:
     """
     study = read_study(folder)
     known = list_participants(folder)
-    found = (_replay(Path(folder) / code, study, number)[1] for code, number in known.items())
-    return [record for records in found for record in records]
+    trials: list[TrialRecord] = []
+    for code, number in known.items():
+        trials += _replay(Path(folder) / code, study, number)[1]
+    return trials
 
 
 def _replay(path: Path, study: Study, number: int) -> tuple[Method, list[TrialRecord]]:
@@ -137,8 +139,8 @@ def _replay(path: Path, study: Study, number: int) -> tuple[Method, list[TrialRe
             raise ParameterError("folder", f"has a damaged line {count} in {path}") from None
         codes = shown and stimulus_codes(study, path.name, shown)
         if (record.trial, record.codes) != (count, codes):
-            words = f"trial {count} of {path.name} was not made by this study and version"
-            raise ParameterError("folder", words)
+            reason = f"trial {count} of {path.name} was not made by this study and version"
+            raise ParameterError("folder", reason)
         method.answer(record.answer)
         records.append(record)
     return method, records
@@ -181,8 +183,8 @@ class Participant:
             write_bytes("output", self.path / _NUMBER_FILE, str(self.number).encode())
             self.method, records = _replay(self.path, study, self.number)
             if self.method.next() is None:
-                words = f"{code} has answered all {len(records)} trials"
-                raise ParameterError("participant", words)
+                reason = f"{code} has answered all {len(records)} trials"
+                raise ParameterError("participant", reason)
             self._release = stack.pop_all().close
         self.trial = len(records) + 1
         self.run = 1 + max((record.run for record in records), default=0)

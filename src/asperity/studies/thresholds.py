@@ -42,8 +42,8 @@ def log_levels(design: StudyDesign) -> LogLevels:
     reference = float(options.get("reference", low))
     base = _BASES[options["scale"]] * reference
     if base >= low:
-        words = "must be below the range, whose levels are discriminated from it"
-        raise ParameterError("method.reference", words, reference)
+        reason = "must be below the range, whose levels are discriminated from it"
+        raise ParameterError("method.reference", reason, reference)
     count = int(options["intervals"])
     if count > _MAX_INTERVALS:
         raise ParameterError("method.intervals", f"must be 2 or {_MAX_INTERVALS}", count)
@@ -56,7 +56,7 @@ def run_thresholds(design: StudyDesign, participant: int, rng: np.random.Generat
     options = design.options
     key = str(options["level"])
     count = int(options["intervals"])
-    answers = tuple(str(one + 1) for one in range(count))
+    answers = tuple([str(number + 1) for number in range(count)])
     for condition in balanced_order(len(design.conditions), participant):
         values = design.conditions[condition]
         track = TRACKS[options["procedure"]](levels, options)
@@ -75,10 +75,12 @@ def level_answers(
 ) -> tuple[FloatArray, NDArray[np.bool_]]:
     """Return the level x of the interval that differs, and whether it was found, for each trial."""
     key = design.options["level"]
-    shown = [one.presentation for one in trials]
-    values = [float(one.intervals[int(one.correct or 1) - 1][key]) for one in shown]
+    values = []
+    for presentation in [trial.presentation for trial in trials]:
+        different = int(presentation.correct or 1) - 1
+        values.append(float(presentation.intervals[different][key]))
     x = np.log(np.array(values) - log_levels(design).base)
-    return x, np.array([one.is_correct for one in trials], bool)
+    return x, np.array([trial.is_correct for trial in trials], bool)
 
 
 def score_thresholds(design: StudyDesign, answered: Answers) -> Score:
@@ -86,7 +88,7 @@ def score_thresholds(design: StudyDesign, answered: Answers) -> Score:
     levels = log_levels(design)
     cells = score_cells(
         answered, len(design.conditions),
-        lambda found: levels.estimate_threshold(*level_answers(design, found)),
+        lambda trials: levels.estimate_threshold(*level_answers(design, trials)),
     )  # fmt: skip
     return Score(
         f"threshold of {design.options['level']}", *cells, is_logarithmic=True,
@@ -137,8 +139,8 @@ class Staircase:
 
     def __init__(self, levels: LogLevels, step: float, target: float) -> None:
         if target <= levels.guess:
-            words = f"must be above {levels.guess:.3g}, the share of right answers of a guess"
-            raise ParameterError("method.target", words, target)
+            reason = f"must be above {levels.guess:.3g}, the share of right answers of a guess"
+            raise ParameterError("method.target", reason, target)
         self._low, self._high = levels.ends
         self._level = self._high
         self._down = step
@@ -180,8 +182,8 @@ class BayesianTrack:
         try:
             import SweetSpot as Library
         except ImportError:
-            words = "bayesian needs the library SweetSpot: pip install 'asperity[studies]'"
-            raise ParameterError("method.procedure", words) from None
+            reason = "bayesian needs the library SweetSpot: pip install 'asperity[studies]'"
+            raise ParameterError("method.procedure", reason) from None
         low, high = levels.ends
         function = Library.PsychometricFunction(gamma=levels.guess, lambda_=levels.lapse)
         function.Grid(alpha=(low, high, _THRESHOLDS), beta=_SLOPES)

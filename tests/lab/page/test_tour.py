@@ -61,7 +61,7 @@ def what_is_told_is_one(page: Browser) -> None:
         page.let_loop_run(1.5)
     assert len(told) == 4
     assert len(set(told)) == 1
-    assert float(told[0].split()[0]) * {"mN": 1e-3, "µN": 1e-6}[told[0].split()[1]] < 0.15
+    assert float(told[0].split()[0]) * {"N": 1.0, "mN": 1e-3, "µN": 1e-6}[told[0].split()[1]] < 0.15
 
 
 @needs_browser

@@ -72,8 +72,8 @@ class Stimuli:
             low, high = design.options["range"]
             named = {low, high, design.options.get("reference", low)}
             inner = np.geomspace(min(named), max(named), _LEVEL_COUNT).tolist()
-            levels = [{key: one} for one in sorted({*inner, *named})]
-        stimuli = [{**condition, **one} for condition in design.conditions for one in levels]
+            levels = [{key: level} for level in sorted({*inner, *named})]
+        stimuli = [{**condition, **level} for condition in design.conditions for level in levels]
         for count, values in enumerate(stimuli, start=1):
             self.setup(values)
             progress(count / len(stimuli))
@@ -91,7 +91,7 @@ class Stimuli:
         key = str(sorted(values.items()))
         known = self._study.arguments
         if key not in self._checked:
-            texts = (f"{name} = {known[name].format_value(one)}" for name, one in values.items())
+            texts = [f"{name} = {known[name].format_value(x)}" for name, x in values.items()]
             stimulus = ", ".join(texts) or "the stimulus"
             try:
                 setup = self._make_setup(values)

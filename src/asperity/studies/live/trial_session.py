@@ -135,7 +135,7 @@ class StudySession:
         if presentation.adjusts:
             return self._adjust(presentation, presentation.adjusts)
         if presentation.answers:
-            keys = tuple((one, f"answer {one}") for one in presentation.answers)
+            keys = tuple([(answer, f"answer {answer}") for answer in presentation.answers])
             return self._press(View(presentation.question, keys=keys))
         return self._ask_number(presentation)
 
@@ -190,5 +190,5 @@ def simulate_session(participant: Participant, stimuli: Stimuli, observer: Obser
     setup = stimuli.setup
     strength = hand_strength(design, lambda one: (setup(one).surface, setup(one).device))
     answered = simulate_run(design, participant.number, observer, strength, design.seed)
-    for one in answered[participant.trial - 1 :]:
-        participant.record(one.answer, 1.0, _current_time())  # after a second
+    for trial in answered[participant.trial - 1 :]:
+        participant.record(trial.answer, 1.0, _current_time())  # after a second

@@ -16,7 +16,7 @@ from asperity.laws import find_law
 from asperity.servo.loop_memory import LoopStatistics
 
 
-class Lane:
+class LawLane:
     """A law that is rendered: its loop and its pictures.
 
     Args:
@@ -45,7 +45,7 @@ class Lane:
         }  # fmt: skip
 
 
-class SecondLane(Lane):
+class SecondLane(LawLane):
     """A law beside the first: same hand, surface, stiffness, device and delay.
 
     Args:
@@ -99,7 +99,7 @@ class FrameReader:
         lane: the lane.
     """
 
-    def __init__(self, lane: Lane) -> None:
+    def __init__(self, lane: LawLane) -> None:
         self._lane = lane
         self._starts = -1
         self._seen = 0
