@@ -13,6 +13,7 @@ from tests.studies.study_cases import AMPLITUDE, design_of, records
 
 from asperity.core.errors import ParameterError
 from asperity.devices import load_device
+from asperity.studies import study_report  # noqa: F401  # registers the report of results
 from asperity.studies.design import TrialRecord
 from asperity.studies.methods import METHODS
 from asperity.studies.simulated_participants import (
