@@ -247,7 +247,9 @@ def _device_envelope(laws: Sequence[LawEnvelope]) -> DeviceEnvelope:
 
 
 def _surface_name(surface: TextureLike) -> str:
-    return os.path.basename(surface) if isinstance(surface, (str, os.PathLike)) else repr(surface)
+    if isinstance(surface, (str, os.PathLike)):
+        return os.path.basename(surface)
+    return repr(surface)
 
 
 def _check_wavelengths(wavelengths: Sequence[float]) -> tuple[float, ...]:
@@ -311,7 +313,9 @@ Task = tuple[WaveCase, tuple[float, ...]]
 
 def compute_task(task: Task | None) -> tuple[WaveBorders, ...] | None:
     """Compute the borders of a task, in a worker process."""
-    return None if task is None else find_borders(*task)
+    if task is None:
+        return None
+    return find_borders(*task)
 
 
 def _compute(

@@ -297,8 +297,9 @@ class WaveBorders(Serializable):
     @property
     def decades(self) -> float:
         """Width of the rendered range in decades of amplitude; 0 for none."""
-        top = min(self.felt_up_to, AMPLITUDE_RANGE[1])
-        return 0.0 if math.isnan(self.felt_from) else math.log10(top / self.felt_from)
+        if math.isnan(self.felt_from):
+            return 0.0
+        return math.log10(min(self.felt_up_to, AMPLITUDE_RANGE[1]) / self.felt_from)
 
 
 def find_borders(case: WaveCase, wavelengths: Sequence[float]) -> tuple[WaveBorders, ...]:
@@ -340,7 +341,9 @@ def _find_wave_borders(case: WaveCase, wavelength: float, near: WaveBorders | No
 
 def _log(ratio: float) -> float:
     """Return the logarithm of a ratio that may be zero, infinite or NaN."""
-    return math.nan if math.isnan(ratio) else math.log(min(max(ratio, 1e-30), 1e30))
+    if math.isnan(ratio):
+        return math.nan
+    return math.log(min(max(ratio, 1e-30), 1e30))
 
 
 LogRatio = Callable[[float], float]
@@ -367,7 +370,9 @@ def _last_above(function: LogRatio, near: float) -> float:
     low, high = map(math.log, AMPLITUDE_RANGE)
     if function(low) < 0.0:
         return math.nan
-    return math.inf if function(high) >= 0.0 else math.exp(_root_near(function, near, low, high))
+    if function(high) >= 0.0:
+        return math.inf
+    return math.exp(_root_near(function, near, low, high))
 
 
 def _range_above(function: LogRatio, top: float, near: tuple[float, float]) -> tuple[float, float]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -52,7 +52,9 @@ class Bound(Serializable, Displayable):
     @written
     def value(self) -> float:
         """``upper`` where one is proved, else ``lower``."""
-        return self.upper if math.isfinite(self.upper) else self.lower
+        if math.isinf(self.upper):
+            return self.lower
+        return self.upper
 
     def __float__(self) -> float:
         """Return :attr:`value`."""
@@ -63,7 +65,16 @@ class Bound(Serializable, Displayable):
         """Relative gap (upper - lower)/lower; zero where both are infinite."""
         if math.isinf(self.lower):
             return 0.0
-        return (self.upper - self.lower) / self.lower if self.lower > 0.0 else math.inf
+        if self.lower <= 0.0:
+            return math.inf
+        return (self.upper - self.lower) / self.lower
+
+
+def scale_upper_bound(bound: float, factor: float) -> float:
+    """Return a proved upper bound times a factor; one unit in the last place covers rounding."""
+    if bound <= 0.0:
+        return 0.0
+    return math.nextafter(factor * bound, math.inf)
 
 
 # A witness is strictly inside: at depth zero there is no force.
@@ -150,15 +161,12 @@ def witness_in_contact(
 ) -> Witness:
     """Return the witness of the surface's own Jacobian for a contact."""
     probe = probe_position(surface, xy, depth)
-    state = None if deflection is None else deflection[None]
-    slides = None if deflection is None else np.array([sliding])
-    jacobian = surface.jacobian(probe[None], state, slides)
-    scaled = jacobian / surface.stiffness
-    value = float(measure.accurate(scaled)[0])
-    size = float(np.linalg.norm(scaled))
-    x, y, z = (float(v) for v in probe)
-    held = None if deflection is None else (float(deflection[0]), float(deflection[1]))
-    return Witness(value, size, (x, y, z), held, sliding)
+    if deflection is None:
+        return _make_witness(measure, probe, surface.jacobian(probe[None]) / surface.stiffness)
+    jacobian = surface.jacobian(probe[None], deflection[None], np.array([sliding]))
+    witness = _make_witness(measure, probe, jacobian / surface.stiffness)
+    x, y = deflection.tolist()
+    return replace(witness, deflection=(x, y), sliding=sliding)
 
 
 def witness_at_depth(
@@ -167,9 +175,14 @@ def witness_at_depth(
     """Return the witness of the surface's own Jacobian at a contact point and any depth [m]."""
     derivatives = surface.texture.derivatives(np.ascontiguousarray(xy[None]))
     probe = surface.law.contact.probe_positions(xy[None], np.array([depth]), derivatives)
-    scaled = surface.jacobian(probe) / surface.stiffness
-    x, y, z = (float(v) for v in probe[0])
-    return Witness(float(measure.accurate(scaled)[0]), float(np.linalg.norm(scaled)), (x, y, z))
+    return _make_witness(measure, probe[0], surface.jacobian(probe) / surface.stiffness)
+
+
+def _make_witness(measure: JacobianMeasure, probe: FloatArray, jacobian: FloatArray) -> Witness:
+    """Return the witness of a probe position (3,) and J/k there, shape (1, 3, 3)."""
+    x, y, z = probe.tolist()
+    value = float(measure.accurate(jacobian)[0])
+    return Witness(value, float(np.linalg.norm(jacobian)), (x, y, z))
 
 
 def checked_lower_bound(
@@ -181,7 +194,9 @@ def checked_lower_bound(
         InternalError: if the witness contradicts the theorem.
     """
     checked_upper_bound(surface, measure, value, witness)
-    return value if witness.value >= value * (1.0 - _AGREEMENT) else witness.value
+    if witness.value >= value * (1.0 - _AGREEMENT):
+        return value
+    return witness.value
 
 
 def bound_from_theorem(

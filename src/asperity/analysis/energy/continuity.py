@@ -202,12 +202,14 @@ def find_jumps(surface: Surface, levels: int = JUMP_LEVELS) -> tuple[Jump, ...]:
         (True, '0.611 N')
     """
     facts = surface.facts
-    found = [] if facts.vanishes_at_contact else _jump_at_contact(surface)
+    jumps = []
+    if not facts.vanishes_at_contact:
+        jumps += _jump_at_contact(surface)
     if not surface.law.contact.single_valued and facts.depends_on_surface:
-        found += _ridge_jumps(surface, levels)
+        jumps += _ridge_jumps(surface, levels)
     # The forces are exact up to rounding; smaller differences are not jumps.
     rounding = 1e-9 * surface.stiffness * surface.max_depth
-    return tuple(jump for jump in found if jump.size > rounding)
+    return tuple(jump for jump in jumps if jump.size > rounding)
 
 
 def _jump_at_contact(surface: Surface) -> list[Jump]:
@@ -315,7 +317,9 @@ class _Ridge:
         pair = middle + np.array([[low], [high]]) * self.across
         left, right = self.texture.nearest(pair)
         apart = np.linalg.norm(pair[1] - pair[0])
-        return pair if np.linalg.norm(right - left) > _JUMP_RATIO * apart else None
+        if np.linalg.norm(right - left) <= _JUMP_RATIO * apart:
+            return None
+        return pair
 
 
 def _bisect(

@@ -332,7 +332,9 @@ def _after_widest_gap(full: np.ndarray[Any, np.dtype[np.bool_]]) -> int:
     where = 0
     run = 0
     for i in range(2 * n):
-        run = 0 if full[i % n] else run + 1
+        run += 1
+        if full[i % n]:
+            run = 0
         if run > best:
             best = run
             where = i % n

@@ -134,8 +134,9 @@ def _sticking_distance(
     c = float(initial_deflection @ initial_deflection) - max_deflection**2
     # The greater root of r² + 2 b r + c = 0, without cancellation.
     root = math.sqrt(max(b * b - c, 0.0))
-    run = -b + root if b <= 0.0 else -c / (b + root)
-    return max(run, 0.0)
+    if b > 0.0:
+        return max(-c / (b + root), 0.0)
+    return max(-b + root, 0.0)
 
 
 def _tractrix(
@@ -285,7 +286,9 @@ def _panel_count(length: float, wave: float, edges: int) -> int:
 def _shortest_wavelength(surface: Surface) -> float:
     """Return the shortest wavelength [m] that the derivative bounds allow: 2π M/K."""
     slope, hessian = surface.texture.bounds
-    return 2.0 * np.pi * slope / hessian if hessian > 0.0 else np.inf
+    if hessian <= 0.0:
+        return np.inf
+    return 2.0 * np.pi * slope / hessian
 
 
 def _segment_work(

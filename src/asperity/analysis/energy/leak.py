@@ -9,11 +9,12 @@ from enum import Enum, auto
 
 import numpy as np
 
+from asperity.analysis.bounds.bound import scale_upper_bound
 from asperity.analysis.bounds.branch_and_bound import DIFFERENCE_AMPLIFICATION, ROUNDING_ERROR
 from asperity.analysis.energy import curl_columns
 from asperity.analysis.energy.field_energy import initial_panels, integrate, loop_work
 from asperity.analysis.energy.scan import parallel_scan_lines, scan_height, scan_line_along
-from asperity.analysis.gain.characteristic import cached_result, is_shipped_law
+from asperity.analysis.gain.characteristic import cached_result, stiffness_factor
 from asperity.core.checks import FloatArray, check_positive
 from asperity.core.display import Text
 from asperity.core.errors import InternalError
@@ -111,7 +112,9 @@ class Leak(Serializable):
     @property
     def worst_per_period(self) -> float:
         """``upper_per_period`` where one is proved, else ``energy`` [J]."""
-        return self.upper_per_period if math.isfinite(self.upper_per_period) else self.energy
+        if math.isinf(self.upper_per_period):
+            return self.energy
+        return self.upper_per_period
 
     @property
     @written
@@ -130,12 +133,14 @@ class Leak(Serializable):
         """Return the same loop in a field scaled by a factor; a bound is rounded up."""
         if factor == 1.0:
             return self
-        upper = self.upper_per_period * factor
+        thrust = self.thrust
+        if thrust is not None:
+            thrust *= factor
         return replace(
             self,
             energy=self.energy * factor,
-            upper_per_period=math.nextafter(upper, math.inf) if upper > 0.0 else 0.0,
-            thrust=None if self.thrust is None else self.thrust * factor,
+            upper_per_period=scale_upper_bound(self.upper_per_period, factor),
+            thrust=thrust,
         )
 
     def critical_speed(self, damping: float) -> float:
@@ -148,7 +153,9 @@ class Leak(Serializable):
             ParameterError: for a damping that is not positive.
         """
         sigma = check_positive("damping", damping, "N s/m")
-        return self.energy / (sigma * self.length) if self.energy > 0.0 else 0.0
+        if self.energy <= 0.0:
+            return 0.0
+        return self.energy / (sigma * self.length)
 
 
 def worst_loop(surface: Surface, direction: tuple[float, float] | None = None) -> Leak:
@@ -179,7 +186,7 @@ def worst_loop(surface: Surface, direction: tuple[float, float] | None = None) -
     line = surface.texture.scan_line() if direction is None else scan_line_along(surface, direction)
     key = repr((line.start.tolist(), line.direction.tolist(), line.length, line.periodic))
     leak = cached_result("worst loop", surface, lambda unit: _find_worst_loop(unit, line), key)
-    return leak.scale(surface.stiffness if is_shipped_law(surface.law) else 1.0)
+    return leak.scale(stiffness_factor(surface))
 
 
 def _find_worst_loop(surface: Surface, line: ScanLine) -> Leak:
@@ -203,10 +210,13 @@ def _column_leak(surface: Surface, lines: list[ScanLine]) -> Leak:
     sign = 1.0 if sides[worst][0] >= sides[worst][1] else -1.0
     vertices, energy = orient_loop(surface, curl_columns.curl_region_loop(surface, line, sign))
     bounds = curl_columns.curl_integral_bounds(surface, line)
-    upper = math.inf if bounds is None else max(high for _low, high in bounds)
+    upper = math.inf
+    method = "sampled"
+    if bounds is not None:
+        method = "certified"
+        upper = max(high for _low, high in bounds)
     if energy > upper:
         _check_against_bound(surface, line, vertices, energy)
-    method = "sampled" if bounds is None else "certified"
     origin = LoopOrigin(LoopKind.CURL_BY_DEPTH, surface.clamped_depth, lines=len(lines))
     thrust = _mean_thrust(surface, line)
     return Leak(energy, max(upper, energy), line, method, origin, vertices, thrust)
@@ -249,7 +259,9 @@ def orient_loop(
     if len(vertices) < 2:
         return np.zeros((0, 3)), 0.0
     work = loop_work(surface, vertices, tolerance)
-    return (vertices, work) if work >= 0.0 else (np.ascontiguousarray(vertices[::-1]), -work)
+    if work < 0.0:
+        return np.ascontiguousarray(vertices[::-1]), -work
+    return vertices, work
 
 
 def _nearest_leak(surface: Surface, lines: list[ScanLine]) -> Leak:

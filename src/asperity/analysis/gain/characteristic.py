@@ -183,9 +183,11 @@ def _compute_bound(surface: Surface, measure: JacobianMeasure, options: SearchOp
 
 def _search_bound(surface: Surface, measure: JacobianMeasure, options: SearchOptions) -> Bound:
     bound = _bound_without_search(surface, measure, options)
-    if bound is None:
-        proof = theorem_on(surface).special_proofs.get(measure)
-        bound = certify(surface, measure, options) if proof is None else proof(surface, options)
+    proof = theorem_on(surface).special_proofs.get(measure)
+    if bound is None and proof is not None:
+        bound = proof(surface, options)
+    elif bound is None:
+        bound = certify(surface, measure, options)
     return include_clamp(surface, measure, options, bound)
 
 
@@ -237,7 +239,16 @@ def is_shipped_law(law: Law) -> bool:
 
 def at_unit_stiffness(surface: Surface) -> Surface:
     """Return the surface at 1 N/m; a surface with a user-defined law is returned unchanged."""
-    return surface.to_stiffness(1.0) if is_shipped_law(surface.law) else surface
+    if is_shipped_law(surface.law):
+        return surface.to_stiffness(1.0)
+    return surface
+
+
+def stiffness_factor(surface: Surface) -> float:
+    """Return by which factor forces exceed those of :func:`at_unit_stiffness`."""
+    if is_shipped_law(surface.law):
+        return surface.stiffness
+    return 1.0
 
 
 def cached_result(
@@ -335,9 +346,13 @@ def certify(surface: Surface, measure: JacobianMeasure, options: SearchOptions) 
 
 def _direct_bound(problem: Problem, options: SearchOptions) -> Supremum | None:
     """Return bounds that need no search, if they meet the tolerance."""
-    found = problem.direct_bound() if options.extent is None else None
+    bound = problem.direct_bound()
+    if bound is None or options.extent is not None:
+        return None
     gap = options.cheap_tolerance(problem.cells) or options.relative_tolerance(problem.cells)
-    return found if found is not None and found.upper <= found.lower * (1.0 + gap) else None
+    if bound.upper > bound.lower * (1.0 + gap):
+        return None
+    return bound
 
 
 def _unique_depth(surface: Surface, options: SearchOptions) -> float:
@@ -345,7 +360,9 @@ def _unique_depth(surface: Surface, options: SearchOptions) -> float:
     if surface.law.contact.single_valued or theorem_on(surface).holds_beyond_medial_axis:
         return math.inf
     crest = options.crest(surface)
-    return math.inf if crest is None else crest.min_radius
+    if crest is None:
+        return math.inf
+    return crest.min_radius
 
 
 def _make_bound(

@@ -135,11 +135,15 @@ class SearchOptions:
 
     def cheap_tolerance(self, cells: Cells) -> float | None:
         """Return the relative gap to reach where it costs little."""
-        return cells.refined_gap if self.tolerance is None else None
+        if self.tolerance is not None:
+            return None
+        return cells.refined_gap
 
     def relative_tolerance(self, cells: Cells) -> float:
         """Return the relative gap to reach."""
-        return cells.default_gap if self.tolerance is None else self.tolerance
+        if self.tolerance is None:
+            return cells.default_gap
+        return self.tolerance
 
     def supremum(self, problem: Problem) -> Supremum:
         """Return proved bounds of the supremum of a problem."""
@@ -248,8 +252,12 @@ def split_number(surface: Surface, options: SearchOptions) -> bound.Bound:
 
 def _curvature_times_depth(radius: float, depth: float) -> float:
     """Return y, rounded up, infinite for a radius of zero, which means without proof."""
-    return depth / radius * (1.0 + _RELATIVE_ROUNDING) if radius > 0.0 else math.inf
+    if radius <= 0.0:
+        return math.inf
+    return depth / radius * (1.0 + _RELATIVE_ROUNDING)
 
 
 def _norm_from_curvature(y: float) -> float:
-    return math.inf if y >= 1.0 else max(1.0, y / (1.0 - y))
+    if y >= 1.0:
+        return math.inf
+    return max(1.0, y / (1.0 - y))

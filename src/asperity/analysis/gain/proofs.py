@@ -77,10 +77,16 @@ def _feasible_root(wave: SingleWave, depth: float) -> float:
     t = max(1.0 / rate, low)
     for _ in range(_MAX_ITERATIONS):
         off = (quarter * (1.0 - t) ** 2 + rate) * t - 1.0
-        low, high = (t, high) if off <= 0.0 else (low, t)
+        if off <= 0.0:
+            low = t
+        else:
+            high = t
         slope = quarter * (1.0 - t) * (1.0 - 3.0 * t) + rate
-        step = t - off / slope if slope > 0.0 else low
-        step = step if low < step < high else 0.5 * (low + high)
+        step = low
+        if slope > 0.0:
+            step = t - off / slope
+        if not low < step < high:
+            step = 0.5 * (low + high)
         if abs(step - t) <= 1e-16 * t:
             break
         t = step
@@ -117,8 +123,9 @@ def phase_trough(wave: SingleWave, depth: float) -> float:  # noqa: ARG001 - one
 
 def phase_b(wave: SingleWave, depth: float) -> float:
     """Return the phase at which q_B is attained: on the flank or in the trough."""
-    steep = math.hypot(1.0, _max_slope(wave)) >= _max_curvature_depth(wave, depth)
-    return phase_steepest(wave, depth) if steep else phase_trough(wave, depth)
+    if math.hypot(1.0, _max_slope(wave)) >= _max_curvature_depth(wave, depth):
+        return phase_steepest(wave, depth)
+    return phase_trough(wave, depth)
 
 
 def phase_c(wave: SingleWave, depth: float) -> float:

@@ -241,7 +241,9 @@ def theorem_on(surface: Surface) -> Theorem:
 
     It is empty for a law without an entry.
     """
-    return _BAKED if surface.texture.baked_numbers else THEOREMS.get(surface.law, _NO_THEOREM)
+    if surface.texture.baked_numbers:
+        return _BAKED
+    return THEOREMS.get(surface.law, _NO_THEOREM)
 
 
 def derivative_bound(surface: Surface, measure: JacobianMeasure) -> float:
@@ -249,6 +251,9 @@ def derivative_bound(surface: Surface, measure: JacobianMeasure) -> float:
 
     q⁺ is at most the norm, |curl| at most twice the norm.
     """
-    bound = theorem_on(surface).norm_bound
-    norm = math.inf if bound is None else bound(surface)
-    return 2.0 * norm if measure is CURL else norm
+    norm_bound = theorem_on(surface).norm_bound
+    if norm_bound is None:
+        return math.inf
+    if measure is CURL:
+        return 2.0 * norm_bound(surface)
+    return norm_bound(surface)

@@ -220,7 +220,9 @@ def check_sample_count(name: str, value: float | None) -> float:
     Raises:
         ParameterError: for less than the least number.
     """
-    number = DEFAULT_SAMPLES if value is None else check_real(name, value)
+    if value is None:
+        return DEFAULT_SAMPLES
+    number = check_real(name, value)
     least = LEAST_SAMPLES[name]
     if number < least:
         raise ParameterError(name, f"must be at least {least:g}", value)

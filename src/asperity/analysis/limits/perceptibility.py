@@ -91,7 +91,7 @@ def assess_perceptibility(
         >>> [f"{remedy.kind} {remedy.value:.3g}" for remedy in result.remedies]
         ['magnify 2.5', 'speed 0.029', 'apparent_mass 0.017']
     """
-    hand = load_grip() if grip is None else grip
+    hand = grip or load_grip()
     waves, doubtful, texture_rms, _scanned = scan_waves(
         surface, device, part, hand, rms=rms, explicit_depth=explicit_depth, points=None, **scan
     )
@@ -221,7 +221,9 @@ def respond(waves: WaveScan) -> HandSpectrum:
     if np.linalg.norm((motions / unnoticed)[sampled]) >= 1.0 and sampled_amplitude >= step:
         tier = "borderline"
     response = HandSpectrum(tier, frequencies, motions, unnoticed, felt, resolved, mass)
-    return replace(response, tier="felt") if felt_ratio(waves, response) >= 1.0 else response
+    if felt_ratio(waves, response) >= 1.0:
+        return replace(response, tier="felt")
+    return response
 
 
 def felt_ratio(waves: WaveScan, response: HandSpectrum) -> float:
@@ -242,7 +244,9 @@ def force_step_ratio(case: LimitCase, resolved: NDArray[np.bool_]) -> float:
     Infinite where the device has no steps that are known.
     """
     needed = case.force_steps * case.device.get("force_resolution", 0.0)
-    return float(np.linalg.norm(case.forces[resolved])) / needed if needed else math.inf
+    if not needed:
+        return math.inf
+    return float(np.linalg.norm(case.forces[resolved])) / needed
 
 
 def _find_remedies(waves: WaveScan, is_felt_magnified: Callable[[float], bool]) -> list[Remedy]:

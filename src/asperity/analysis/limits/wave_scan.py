@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from asperity.analysis.energy.scan import scan_force, scan_height
-from asperity.analysis.gain.characteristic import cached_result, is_shipped_law
+from asperity.analysis.gain.characteristic import cached_result, stiffness_factor
 from asperity.analysis.limits.limit_rules import LimitCase
 from asperity.analysis.limits.spectrum import (
     BANDS_PER_OCTAVE,
@@ -181,7 +181,7 @@ def wave_force_components(
     compute = _fit_waves if spectrum.exact else _band_force_amplitudes
     key = repr((spectrum.exact, spectrum.waves))
     forces = cached_result("wave forces", surface, lambda unit: compute(unit, spectrum), key)
-    return np.asarray(forces) * (surface.stiffness if is_shipped_law(surface.law) else 1.0)
+    return np.asarray(forces) * stiffness_factor(surface)
 
 
 def scan_forces(surface: Surface, xy: FloatArray) -> FloatArray:

@@ -103,21 +103,24 @@ def evaluate_rule(loop: DeviceLoop, rule: StiffnessRule) -> Criterion:
     proved = _max_stiffness(rule.budget, upper)
     possible = _max_stiffness(rule.budget, loop.weighted_gain(*weights, "lower"))
     # Infinity over a finite lower end: the number was only sampled, so no limit is proved.
-    is_proved = upper != math.inf or possible == 0
-    return replace(
-        result,
-        holds=True if loop.stiffness <= proved else False if loop.stiffness > possible else None,
-        limit=round_down_exactly(proved) if is_proved else None,
-        margin=round_down_exactly(proved / loop.stiffness) if is_proved else None,
-        upper_limit=round_down_exactly(possible),
-    )
+    if upper != math.inf or possible == 0:
+        limit = round_down_exactly(proved)
+        margin = round_down_exactly(proved / loop.stiffness)
+        result = replace(result, limit=limit, margin=margin)
+    if loop.stiffness <= proved:
+        result = replace(result, holds=True)
+    elif loop.stiffness > possible:
+        result = replace(result, holds=False)
+    return replace(result, upper_limit=round_down_exactly(possible))
 
 
 def _max_stiffness(budget: Fraction, gain: Number) -> Number:
     """Return the greatest k with k · gain <= budget."""
     if budget <= 0 or gain == math.inf:
         return Fraction(0)
-    return budget / gain if gain > 0 else math.inf
+    if gain <= 0:
+        return math.inf
+    return budget / gain
 
 
 _ZERO = Fraction(0)

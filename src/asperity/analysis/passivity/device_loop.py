@@ -110,7 +110,9 @@ class DeviceLoop:
         if self.damping_gain is None or self.wall_stiffness is None:
             return math.inf
         longest = self.damping_gain / self.wall_stiffness - HALF
-        return longest if longest >= 0 else None
+        if longest < 0:
+            return None
+        return longest
 
     @property
     def cycling_stiffness(self) -> Fraction | None:
@@ -119,8 +121,9 @@ class DeviceLoop:
         exact = test is not None and test.positions == "exact" and not self.virtual_damping
         if test is None or test.cycled is None or not exact:
             return None
-        same = test.update_rate is None or Fraction(test.update_rate) == self.rate
-        return Fraction(test.cycled) if same else None
+        if test.update_rate is not None and Fraction(test.update_rate) != self.rate:
+            return None
+        return Fraction(test.cycled)
 
     def weighted_gain(self, one_sided_weight: Fraction, norm_weight: Fraction, end: str) -> Number:
         """Return the weighted sum of q⁺ and q at one end; a weight of 0 drops infinity."""
@@ -129,7 +132,8 @@ class DeviceLoop:
             value = float(getattr(bound, end))
             if weight and math.isinf(value):
                 return math.inf
-            total += weight * Fraction(value) if weight else 0
+            if weight:
+                total += weight * Fraction(value)
         return total
 
 
@@ -251,7 +255,9 @@ def critical_speed(loop: DeviceLoop) -> float | None:
         return 0.0
     if loop.damping is None or loop.leak is None or not has_known_leak(loop):
         return None
-    return loop.leak.critical_speed(float(loop.damping)) if loop.damping > 0 else math.inf
+    if loop.damping <= 0:
+        return math.inf
+    return loop.leak.critical_speed(float(loop.damping))
 
 
 # --- the motion that quantisation may sustain -----------------------------------------------------
@@ -343,7 +349,9 @@ def _buzz_terms(loop: DeviceLoop) -> tuple[Fraction, Fraction, Fraction, Fractio
 def round_up_exactly(value: Fraction) -> float:
     """Return the least float that is not below the value."""
     near = float(value)
-    return near if Fraction(near) >= value else math.nextafter(near, math.inf)
+    if Fraction(near) < value:
+        return math.nextafter(near, math.inf)
+    return near
 
 
 def round_down_exactly(value: Number) -> float:
@@ -351,4 +359,6 @@ def round_down_exactly(value: Number) -> float:
     if value == math.inf:
         return math.inf
     near = float(min(value, Fraction(sys.float_info.max)))
-    return near if Fraction(near) <= value else math.nextafter(near, -math.inf)
+    if Fraction(near) > value:
+        return math.nextafter(near, -math.inf)
+    return near

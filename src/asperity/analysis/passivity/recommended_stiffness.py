@@ -89,10 +89,9 @@ def _proved_limit(main: criteria.Criterion, steps: criteria.Criterion) -> Stabil
         sampled = _limit_from_criterion("proved", main)
         return sampled if sampled.sampled else StabilityLimit(None, "none")
     stiffness = min(main.limit, steps.limit)
-    basis: Basis = "proved" if stiffness else "none"
-    return StabilityLimit(
-        stiffness, basis, main.name if stiffness else "", proved_stiffness=stiffness
-    )
+    if not stiffness:
+        return StabilityLimit(stiffness, "none")
+    return StabilityLimit(stiffness, "proved", main.name, proved_stiffness=stiffness)
 
 
 def _limit_from_criterion(
@@ -137,7 +136,9 @@ class Margin(Serializable):
     @property
     def frequency(self) -> float:
         """Frequency of a sinusoid of that speed and displacement [Hz]."""
-        return self.speed / (2.0 * math.pi * self.extent) if self.extent else 0.0
+        if not self.extent:
+            return 0.0
+        return self.speed / (2.0 * math.pi * self.extent)
 
 
 NO_MARGIN = Margin(1.0)

@@ -65,15 +65,17 @@ def decide_verdict(
     """
     main = main_rule(loop)
     if not loop.conservative:
-        unknown = by_name[criteria.LEAK].holds is None
-        return "undecided" if unknown else "not passive", criteria.LEAK, Ground.CRITERION
+        if by_name[criteria.LEAK].holds is None:
+            return "undecided", criteria.LEAK, Ground.CRITERION
+        return "not passive", criteria.LEAK, Ground.CRITERION
     if device_loop.is_contradictory(loop):
         return "undecided", main, Ground.CONTRADICTION
     if loop.delay is not None and by_name[main].holds:
         return _assess_quantization(by_name, main, buzz)
     ground = _find_unstable_motion(loop)
     if ground is not None:
-        return "not passive", criteria.WALL_TEST if ground is Ground.WALL_CYCLED else main, ground
+        deciding = criteria.WALL_TEST if ground is Ground.WALL_CYCLED else main
+        return "not passive", deciding, ground
     return _assess_wall_test(loop, by_name, main)
 
 
@@ -115,7 +117,9 @@ def _find_unstable_motion(loop: DeviceLoop) -> Ground | None:
     if loop.delay and loop.q.lower > loop.one_sided.upper:
         slack = loop.weighted_gain(Fraction(0), Fraction(1), "lower") * loop.stiffness
         gains.append(slack / 2 - loop.virtual_damping_gain)
-    return Ground.GAINS_ENERGY if max(gains) > loop.damping_gain else None
+    if max(gains) > loop.damping_gain:
+        return Ground.GAINS_ENERGY
+    return None
 
 
 def _assess_wall_test(

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from asperity.analysis.bounds.bound import NORM, ONE_SIDED, Bound
+from asperity.analysis.bounds.bound import NORM, ONE_SIDED, Bound, scale_upper_bound
 from asperity.analysis.bounds.branch_and_bound import DEFAULT_WORK_LIMIT
 from asperity.analysis.energy.continuity import Continuity, continuity
 from asperity.analysis.energy.leak import Leak, worst_loop
@@ -79,10 +79,8 @@ class Analysis(Plottable, Reportable):
         if self.curl is None:
             return None
         k = self.surface.stiffness
-        upper = self.curl.upper
-        # One unit in the last place covers the rounding of the product.
-        top = math.nextafter(k * upper, math.inf) if upper > 0.0 else 0.0
-        return replace(self.curl, lower=k * self.curl.lower, upper=top)
+        upper = scale_upper_bound(self.curl.upper, k)
+        return replace(self.curl, lower=k * self.curl.lower, upper=upper)
 
     @property
     def v_star(self) -> float | None:

@@ -122,7 +122,9 @@ class Limits(Plottable, Reportable, Tabular):
         """Share of the height variance in waves that meet every decidable limit on waves."""
         total = sum(wave.share for wave in self.waves)
         met = sum(wave.share for wave in self.waves if all(wave.holds.values()))
-        return met / total if total > 0.0 else 0.0
+        if total == 0.0:
+            return 0.0
+        return met / total
 
     def limit(self, number: int) -> Limit:
         """Return a limit by the paper's number.

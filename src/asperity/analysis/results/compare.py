@@ -87,7 +87,9 @@ class Comparison(Plottable, Reportable, Tabular):
     @property
     def recommended(self) -> str:
         """Letter of the recommended law; empty if none can be recommended."""
-        return "" if self.recommended_row is None else self.recommended_row.law.letter
+        if self.recommended_row is None:
+            return ""
+        return self.recommended_row.law.letter
 
     @cached_property
     def content_digest(self) -> str | None:
@@ -101,7 +103,9 @@ class Comparison(Plottable, Reportable, Tabular):
     def tier(self) -> Tier | None:
         """Tier of the recommended law, or of the one that comes nearest to it."""
         row = self.recommended_row or self.nearest_row
-        return None if row is None else row.tier
+        if row is None:
+            return None
+        return row.tier
 
     def row(self, letter: str) -> LawRow:
         """Return the row of a law by its letter.
@@ -114,9 +118,8 @@ class Comparison(Plottable, Reportable, Tabular):
     __getitem__ = row
 
     def __repr__(self) -> str:
-        row = self.recommended_row
-        outcome = "none recommended" if row is None else f"{row!r} recommended"
-        return f"<Comparison of {len(self.rows)} laws on {self.device.id}: {outcome}>"
+        outcome = self.recommended_row or "none"
+        return f"<Comparison of {len(self.rows)} laws on {self.device.id}: {outcome} recommended>"
 
     def table_rows(self) -> list[dict[str, Any]]:
         """Return device, depth, speed and the main numbers of each law; SI units."""
