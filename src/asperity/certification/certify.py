@@ -302,6 +302,34 @@ class _Search:
         resolution = find_resolution(calls, points, effort)
         history = find_history(calls, resolution, points, self.seed, effort)
         calls.approaches = history.has_memory
+        gain, one_sided, jumps = self._search_changes(resolution)
+        loops = LoopSearch(calls, resolution, gain.value, self.seed)
+        self._report("loops")
+        loops.run(self._deadline("loops"))
+        return Certification(
+            gain=gain.value,
+            gain_witness=gain.best,
+            one_sided_gain=one_sided.value,
+            one_sided_witness=one_sided.best,
+            worst_loop=None if loops.best is None else loops.held_work(loops.best),
+            rejected_loops=loops.rejected,
+            jumps=jumps.jumps,
+            history=history,
+            contact=contact,
+            largest_force=calls.largest_force,
+            largest_at=_plain(calls.largest_at),
+            invalid_at=_plain(calls.invalid_at),
+            resolution=resolution,
+            region_low=tuple(region.low.tolist()),
+            region_high=tuple(region.high.tolist()),
+            calls=calls.calls,
+            seconds=time.monotonic() - self.started,
+            cost=self._measure_cost(calls, points),
+        )
+
+    def _search_changes(self, resolution: Resolution) -> tuple[GainSearch, GainSearch, JumpSearch]:
+        """Return the searches of changes of force: gain, one-sided gain, jumps."""
+        calls = self.calls
         gain = GainSearch(calls, resolution, False, self.seed)
         one_sided = GainSearch(calls, resolution, True, self.seed + 1)
         self._search_gain(gain, "gain")
@@ -309,38 +337,11 @@ class _Search:
         jumps.run(self._deadline("jumps"), gain.value)
         steep = jumps.steepest
         if len(steep):
-            places = (steep - region.low) / region.size
+            places = (steep - calls.region.low) / calls.region.size
             for search in (gain, one_sided):
                 search.record(steep[:, 0], steep[:, 1], places)
         self._search_gain(one_sided, "one-sided gain")
-        loops = LoopSearch(calls, resolution, gain.value, self.seed)
-        self._report("loops")
-        loops.run(self._deadline("loops"))
-        worst_loop = loops.best
-        if worst_loop is not None:
-            worst_loop = loops.held_work(worst_loop)
-        cost = self._measure_cost(calls, points)
-        largest_at = calls.largest_at
-        return Certification(
-            gain=gain.value,
-            gain_witness=gain.best,
-            one_sided_gain=one_sided.value,
-            one_sided_witness=one_sided.best,
-            worst_loop=worst_loop,
-            rejected_loops=loops.rejected,
-            jumps=jumps.jumps,
-            history=history,
-            contact=contact,
-            largest_force=calls.largest_force,
-            largest_at=_plain(largest_at),
-            invalid_at=_plain(calls.invalid_at),
-            resolution=resolution,
-            region_low=tuple(region.low.tolist()),
-            region_high=tuple(region.high.tolist()),
-            calls=calls.calls,
-            seconds=time.monotonic() - self.started,
-            cost=cost,
-        )
+        return gain, one_sided, jumps
 
     def _find_contact(self) -> tuple[ContactRange, FloatArray]:
         """Return where the force begins, and points with a force, shape (n, 3).

@@ -67,42 +67,19 @@ def certification_page(
 
 
 def _findings_table(result: Certification) -> Table:
-    rows = [
-        ("gain", format_quantity(result.gain, "N/m", digits=5), _gain_place(result.gain_witness)),
-        (
-            "one-sided gain",
-            format_quantity(result.one_sided_gain, "N/m", digits=5),
-            _gain_place(result.one_sided_witness),
-        ),
-    ]
-    loop = result.worst_loop
-    if loop is None:
-        rows.append(("worst loop", "none found", f"{result.rejected_loops} within their errors"))
-    else:
-        error = format_quantity(loop.error, "J", digits=2)
-        held = format_quantity(loop.held_energy, "J", digits=3)
-        rows.append(
-            (
-                "worst loop",
-                format_quantity(loop.energy, "J", digits=4),
-                f"± {error}; {format_quantity(loop.length, 'm', digits=3)} long; "
-                f"{held} with the force held at 1 kHz and 0.1 m/s",
-            )
-        )
+    gain = format_quantity(result.gain, "N/m", digits=5)
+    one_sided = format_quantity(result.one_sided_gain, "N/m", digits=5)
+    spread = format_quantity(result.history_spread, "N", digits=3)
+    force = format_quantity(result.largest_force, "N", digits=4)
     largest = max((jump.size for jump in result.jumps), default=math.nan)
     jump_place = point_text(result.jumps[0].at) if result.jumps else "no larger one"
-    rows += [
+    rows = [
+        ("gain", gain, _gain_place(result.gain_witness)),
+        ("one-sided gain", one_sided, _gain_place(result.one_sided_witness)),
+        ("worst loop", *_loop_texts(result)),
         ("jumps", _quantity_or_none(largest, "N"), f"{len(result.jumps)} places; {jump_place}"),
-        (
-            "by approach",
-            format_quantity(result.history_spread, "N", digits=3),
-            point_text(result.history.at),
-        ),
-        (
-            "force",
-            format_quantity(result.largest_force, "N", digits=4),
-            point_text(result.largest_at),
-        ),
+        ("by approach", spread, point_text(result.history.at)),
+        ("force", force, point_text(result.largest_at)),
         ("contact begins", _contact_text(result), f"dead zones: {result.contact.dead:.2%}"),
         (
             "not finite",
@@ -114,6 +91,18 @@ def _findings_table(result: Certification) -> Table:
     ]
     layout = TableLayout(wrap=(1, 2), max_widths={1: 26, 2: 44})
     return Table(("", "at least", "where"), [Row(row) for row in rows], layout=layout)
+
+
+def _loop_texts(result: Certification) -> tuple[str, str]:
+    """Return the energy of the worst loop, and its error, length and held-force work."""
+    loop = result.worst_loop
+    if loop is None:
+        return "none found", f"{result.rejected_loops} within their errors"
+    energy = format_quantity(loop.energy, "J", digits=4)
+    error = format_quantity(loop.error, "J", digits=2)
+    length = format_quantity(loop.length, "m", digits=3)
+    held = format_quantity(loop.held_energy, "J", digits=3)
+    return energy, f"± {error}; {length} long; {held} with the force held at 1 kHz and 0.1 m/s"
 
 
 def _gain_place(witness: Any) -> str:
