@@ -148,7 +148,7 @@ def contact_heights(calls: RendererCalls, xy: FloatArray, low: float, high: floa
         is_touching = (force != 0.0).any(axis=1)
         below = np.where(is_touching, middle, below)
         above = np.where(is_touching, above, middle)
-    return np.where(touches.any(axis=1), np.round(below, 13), np.nan)
+    return np.where(touches.any(axis=1), np.round(below, 13) + 0.0, np.nan)  # no -0
 
 
 def find_region(renderer: Renderer) -> Region:

@@ -72,12 +72,14 @@ def _findings_table(result: Certification) -> Table:
     spread = format_quantity(result.history_spread, "N", digits=3)
     force = format_quantity(result.largest_force, "N", digits=4)
     largest = max((jump.size for jump in result.jumps), default=math.nan)
-    jump_place = point_text(result.jumps[0].at) if result.jumps else "no larger one"
+    jump_places = "–"
+    if result.jumps:
+        jump_places = f"{len(result.jumps)} places; {point_text(result.jumps[0].at)}"
     rows = [
         ("gain", gain, _gain_place(result.gain_witness)),
         ("one-sided gain", one_sided, _gain_place(result.one_sided_witness)),
         ("worst loop", *_loop_texts(result)),
-        ("jumps", _quantity_or_none(largest, "N"), f"{len(result.jumps)} places; {jump_place}"),
+        ("jumps", _quantity_or_none(largest, "N"), jump_places),
         ("by approach", spread, point_text(result.history.at)),
         ("force", force, point_text(result.largest_at)),
         ("contact begins", _contact_text(result), f"dead zones: {result.contact.dead:.2%}"),
