@@ -144,7 +144,7 @@ def measured_sections(texture: Texture) -> list[Section]:
     if not texture.history:
         return []
     table = stages_table(texture.history)
-    more = "More is in the report of show."
+    more = "More is in the report of the measured file."
     if text := roughness_text(texture.history):
         return [Section("Surface parameters", [table], text, [more])]
     parts = get_or_compute("parts", texture.digest, lambda: _compute_parts(texture))

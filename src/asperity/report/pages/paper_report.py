@@ -124,7 +124,7 @@ def evidence_page(results: Sequence[Result], command: str = "") -> Page:
 
 def _evidence_section(result: Result) -> Section:
     places = ", ".join((*result.equations, f"section {result.section}"))
-    details = _evidence_details(result)[1:]
+    details = _evidence_details(result)
     blocks: list[page.Block] = [
         page.Paragraph(result.statement),
         Table((), [Row([_verdict_cell(result)])]),
@@ -148,10 +148,9 @@ def _claims_section(section: str, members: Sequence[Result], command: str) -> Se
 
 
 def _evidence_details(result: Result) -> list[tuple[str, str]]:
-    """Return names and texts of the evidence of a claim."""
+    """Return names and texts of what qualifies the evidence of a claim."""
     evidence = result.evidence
     details = [
-        ("found", evidence.summary),
         ("not stated by the paper", evidence.fitted),
         ("correction", evidence.correction),
         ("another verdict with", result.flips_under),
@@ -161,7 +160,7 @@ def _evidence_details(result: Result) -> list[tuple[str, str]]:
 
 def _claim_row(result: Result, command: str) -> Row:
     evidence = result.evidence
-    details = _evidence_details(result)
+    details = [("found", evidence.summary), *_evidence_details(result)]
     details += [(name, evidence_text(value)) for name, value in evidence.numbers.items()]
     if command:
         details.append(("reproduce", command.format(result.id)))

@@ -17,6 +17,7 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure, SubFigure
 
 from asperity.laws import Law
+from asperity.report.sentences.number_text import readable_name
 
 BACKGROUND = "#ffffff"
 """Background of every picture."""
@@ -234,7 +235,7 @@ def set_panel_title(axes: Axes, letter: str, name: str, remark: str = "") -> Non
 
 def title_law(axes: Axes, law: Law, remark: str = "") -> None:
     """Add the title of a law with a remark, and mark the axes as of that law."""
-    set_panel_title(axes, law.letter, law.name.replace("-", " "), remark)
+    set_panel_title(axes, law.letter, readable_name(law.name), remark)
     mark_law(axes, law.letter)
 
 

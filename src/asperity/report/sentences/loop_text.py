@@ -154,7 +154,7 @@ def replay_answer(replay: Replay) -> str:
         unit = " N"
     elif "anchor" in first.column:
         unit = " m"
-    values = f"{first.replayed_value!r} instead of {first.recorded_value!r}".replace("'", "")
+    values = f"{first.replayed_value} instead of {first.recorded_value}"
     where = f"row {first.row}, at {format_quantity(first.time, 's')}"
     difference = f"the first is {where}: {first.column} is {values}{unit}"
     largest = format_quantity(replay.max_force_difference, "N", digits=3)
@@ -223,9 +223,6 @@ def _group_laws(strokes: Sequence[Stroke], gains_energy: Callable[[Stroke], bool
     return ", ".join([f"{', '.join(laws)} {when}" for when, laws in groups.items() if laws])
 
 
-_QUANTILES = (0.5, 0.99, 0.999)
-
-
 CAUSE_TEXT = {EndReason.STOPPED: "stopped", EndReason.FINISHED: "done"}
 
 
@@ -282,8 +279,8 @@ def timing_lines(statistics: LoopStatistics) -> list[str]:
     """
 
     def quantiles(quantile: Callable[[float], float]) -> str:
-        spans = [f"{100.0 * q:g} % {format_quantity(quantile(q), 's')}" for q in _QUANTILES]
-        return ", ".join(spans).replace("% ", "% within ", 1)
+        spans = [format_quantity(quantile(share), "s") for share in (0.5, 0.99, 0.999)]
+        return f"50 % within {spans[0]}, 99 % {spans[1]}, 99.9 % {spans[2]}"
 
     worst = format_quantity(statistics.max_lateness, "s")
     return [
