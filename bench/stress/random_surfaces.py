@@ -15,11 +15,11 @@ import sympy as sp
 
 from asperity.analysis.bounds.bound import Bound, curl_norm, precise_norm, precise_one_sided
 from asperity.analysis.gain.characteristic import (
-    at_unit_stiffness,
     characteristic_number,
     curl_number,
     one_sided_number,
 )
+from asperity.analysis.gain.surface_cache import at_unit_stiffness
 from asperity.contacts.symbols import ContactSymbols
 from asperity.core.checks import FloatArray
 from asperity.laws import Law

@@ -16,7 +16,7 @@ import pytest
 
 from asperity.analysis import characteristic_number
 from asperity.analysis.energy.leak import worst_loop
-from asperity.analysis.energy.scan import merit
+from asperity.analysis.energy.straight_scan import merit
 from asperity.analysis.gain import characteristic
 from asperity.analysis.results import compare
 from asperity.core import cache, files

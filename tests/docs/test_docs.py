@@ -105,7 +105,7 @@ def test_names_that_a_page_refers_to_exist(page: Path) -> None:
 
 def test_missing_name_is_detected() -> None:
     with pytest.raises(AttributeError):
-        _resolve("asperity.analysis.energy.scan.nothing_of_the_kind")
+        _resolve("asperity.analysis.energy.straight_scan.nothing_of_the_kind")
 
 
 def _run_block(kind: str, body: str, names: dict[str, Any]) -> None:

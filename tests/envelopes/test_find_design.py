@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import asperity as asp
-from asperity.analysis.energy.scan import scan_force
+from asperity.analysis.energy.straight_scan import scan_force
 from asperity.analysis.limits.wave_scan import scan_forces
 from asperity.core.cache import bypass_results
 from asperity.core.errors import ParameterError

@@ -24,8 +24,8 @@ from tests.helpers.user_modules import imported
 import asperity as asp
 from asperity.analysis import one_sided_number
 from asperity.analysis.bounds.branch_and_bound import supremum
-from asperity.analysis.gain.characteristic import surface_content
 from asperity.analysis.gain.proofs import CrestProblem
+from asperity.analysis.gain.surface_cache import surface_content
 from asperity.core.errors import InternalError, ParameterError
 from asperity.enclosures.cells import DERIVATIVE_NAMES
 from asperity.report import html_text

@@ -8,7 +8,7 @@ import pytest
 from tests.studies.study_texts import COMPARISON, FACTORS, ONSET, SCENE, make_study
 
 import asperity as asp
-from asperity.analysis.energy.scan import merit
+from asperity.analysis.energy.straight_scan import merit
 from asperity.core.errors import ParameterError
 from asperity.servo.safety import excess_stiffness_reason
 from asperity.studies.live.player import Stimuli, smooth_wall

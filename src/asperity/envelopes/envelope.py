@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from asperity.analysis.gain.characteristic import is_shipped_law
+from asperity.analysis.gain.surface_cache import is_shipped_law
 from asperity.analysis.limits.limit_rules import LIMIT_RULES, shortest_wavelengths
 from asperity.analysis.limits.spectrum import MIN_SHARE, Wave, compute_spectrum
 from asperity.analysis.results.compare import DEFAULT_DEVICE, Progress, lacks_data

@@ -139,7 +139,7 @@ def design(
         peak_force: least peak of the texture's force at the motor [N], in place of its RMS.
         at: where ``texture_force`` acts, ``"motor"`` or ``"hand"``.
         max_leak: greatest energy gained on the worst loop per period [J].
-        min_support: least support S [1]; see :func:`~asperity.analysis.energy.scan.merit`.
+        min_support: least support S [1]; see :func:`~asperity.analysis.energy.straight_scan.merit`.
         law_parameters: parameters of laws by name, each a value or several that are tried.
         progress: called with what is computed next: each law, and each comparison.
         **conditions: ``speed``, ``min_stiffness``, ``max_depth`` and ``grip``; see

@@ -15,7 +15,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from asperity.analysis.energy.leak import worst_loop
-from asperity.analysis.energy.scan import merit, scan_force
+from asperity.analysis.energy.straight_scan import merit, scan_force
 from asperity.analysis.limits import perceptibility, wave_scan
 from asperity.core.arguments import FIELD, SEARCH
 from asperity.core.checks import FloatArray

@@ -16,8 +16,9 @@ from typing import Any
 import numpy as np
 
 from asperity.analysis.bounds.bound import NORM, ONE_SIDED, Bound, JacobianMeasure
-from asperity.analysis.energy.scan import scan_force
-from asperity.analysis.gain.characteristic import cached_number, is_shipped_law
+from asperity.analysis.energy.straight_scan import scan_force
+from asperity.analysis.gain.characteristic import cached_number
+from asperity.analysis.gain.surface_cache import is_shipped_law
 from asperity.analysis.limits import perceptibility, wave_scan
 from asperity.analysis.limits.limit_rules import (
     DEFAULT_SAMPLES,

@@ -31,8 +31,8 @@ from asperity.report.pages.comparison_columns import comparison_table as compari
 from asperity.report.pages.comparison_report import comparison_page, comparisons_page, design_page
 from asperity.report.pages.limits_report import envelope_page, limits_page
 from asperity.report.pages.measured_report import surface_summary_page
-from asperity.report.sentences.catalogue import describe as describe
 from asperity.report.sentences.number_text import interval_text, readable_name, witness_text
+from asperity.report.sentences.result_texts import describe as describe
 from asperity.report.sentences.surface_text import describe_texture
 from asperity.surface import Surface
 from asperity.textures.texture import Texture

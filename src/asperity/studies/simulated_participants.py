@@ -122,7 +122,7 @@ def surface_strength(surface: Surface, device: Device) -> float:
         surface: texture, law and stiffness.
         device: the device.
     """
-    from asperity.analysis.energy.scan import merit
+    from asperity.analysis.energy.straight_scan import merit
     from asperity.analysis.limits.perceptibility import assess_perceptibility
 
     rms = merit(surface).ripple * surface.stiffness

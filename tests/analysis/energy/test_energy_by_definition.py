@@ -13,7 +13,7 @@ from asperity.analysis.energy import curl_columns as columns
 from asperity.analysis.energy import field_energy as anchor
 from asperity.analysis.energy import field_energy as loops
 from asperity.analysis.energy import leak
-from asperity.analysis.energy import scan as scan_module
+from asperity.analysis.energy import straight_scan as scan_module
 from asperity.analysis.energy.curl_columns import Layer, column_polygon, positive_interval
 from asperity.analysis.energy.leak import worst_loop
 from asperity.core.checks import FloatArray

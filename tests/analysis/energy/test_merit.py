@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from asperity.analysis.energy.scan import merit, parallel_line_points
+from asperity.analysis.energy.straight_scan import merit, parallel_line_points
 from asperity.laws import Law
 from asperity.surface import Surface
 from asperity.textures.domain import ScanLine

@@ -9,7 +9,7 @@ import pytest
 
 from asperity.analysis.bounds.bound import NORM, precise_norm, precise_one_sided
 from asperity.analysis.energy.leak import worst_loop
-from asperity.analysis.energy.scan import merit
+from asperity.analysis.energy.straight_scan import merit
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
 from asperity.analysis.gain.theorems import derivative_bound
 from asperity.analysis.limits.spectrum import compute_spectrum

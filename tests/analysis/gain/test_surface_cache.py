@@ -11,11 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from asperity.analysis.gain.characteristic import (
-    characteristic_number,
-    one_sided_number,
-    surface_content,
-)
+from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
+from asperity.analysis.gain.surface_cache import surface_content
 from asperity.core import cache
 from asperity.laws import Law
 from asperity.surface import Surface

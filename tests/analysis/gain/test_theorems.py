@@ -11,7 +11,7 @@ from tests.analysis.gain.test_gain_by_definition import LINES
 
 from asperity.analysis.bounds.bound import NORM
 from asperity.analysis.energy.continuity import continuity
-from asperity.analysis.energy.scan import merit
+from asperity.analysis.energy.straight_scan import merit
 from asperity.analysis.gain.characteristic import (
     characteristic_number,
     curl_number,

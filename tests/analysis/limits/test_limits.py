@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from tests.analysis.limits.bench_limits import A, D, L, V, default_limits, device, verdicts
 
 from asperity.analysis import characteristic_number, one_sided_number
-from asperity.analysis.energy.scan import merit
+from asperity.analysis.energy.straight_scan import merit
 from asperity.analysis.results.check_limits import limits
 from asperity.analysis.results.compare import compare
 from asperity.core.errors import ParameterError

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from asperity.analysis.energy.scan import merit
+from asperity.analysis.energy.straight_scan import merit
 from asperity.analysis.limits.perceptibility import Perceptibility, Remedy, assess_perceptibility
 from asperity.analysis.results.check_limits import limits
 from asperity.analysis.results.compare import compare

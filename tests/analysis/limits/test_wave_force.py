@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from asperity.analysis.energy.scan import scan_height
+from asperity.analysis.energy.straight_scan import scan_height
 from asperity.analysis.limits import spectrum as module
 from asperity.analysis.limits.spectrum import Spectrum, Wave, compute_spectrum
 from asperity.analysis.limits.wave_scan import scan_forces, wave_forces

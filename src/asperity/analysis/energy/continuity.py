@@ -11,8 +11,8 @@ from functools import cached_property
 import numpy as np
 
 from asperity.analysis.bounds.bound import Bound
-from asperity.analysis.gain.characteristic import cached_result
 from asperity.analysis.gain.medial_axis import Crest, sharpest_crest
+from asperity.analysis.gain.surface_cache import cached_result
 from asperity.analysis.gain.theorems import theorem_on
 from asperity.core.checks import FloatArray
 from asperity.core.display import Text

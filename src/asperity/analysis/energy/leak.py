@@ -13,8 +13,8 @@ from asperity.analysis.bounds.bound import scale_upper_bound
 from asperity.analysis.bounds.branch_and_bound import DIFFERENCE_AMPLIFICATION, ROUNDING_ERROR
 from asperity.analysis.energy import curl_columns
 from asperity.analysis.energy.field_energy import initial_panels, integrate, loop_work
-from asperity.analysis.energy.scan import parallel_scan_lines, scan_height, scan_line_along
-from asperity.analysis.gain.characteristic import cached_result, stiffness_factor
+from asperity.analysis.energy.straight_scan import parallel_scan_lines, scan_height, scan_line_along
+from asperity.analysis.gain.surface_cache import cached_result, stiffness_factor
 from asperity.core.checks import FloatArray, check_positive
 from asperity.core.display import Text
 from asperity.core.errors import InternalError

@@ -18,7 +18,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.analysis.energy.scan import scan_force
+from asperity.analysis.energy.straight_scan import scan_force
 from asperity.analysis.limits.limit_rules import LIMIT_RULES, LimitCase, evaluate_limit
 from asperity.analysis.limits.wave_scan import MASKING_FIELDS, WaveScan, scan_waves
 from asperity.core.checks import FloatArray

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from asperity.analysis.energy.scan import scan_force, scan_height
-from asperity.analysis.gain.characteristic import cached_result, stiffness_factor
+from asperity.analysis.energy.straight_scan import scan_force, scan_height
+from asperity.analysis.gain.surface_cache import cached_result, stiffness_factor
 from asperity.analysis.limits.limit_rules import LimitCase
 from asperity.analysis.limits.spectrum import (
     BANDS_PER_OCTAVE,
@@ -165,7 +165,7 @@ def wave_force_components(
     """Return the force amplitude of every wave of a texture, along the wall and along its normal.
 
     The probe moves at constant height, as deep as
-    :func:`~asperity.analysis.energy.scan.merit` scans; a law with state slides at full
+    :func:`~asperity.analysis.energy.straight_scan.merit` scans; a law with state slides at full
     deflection. For a sum of waves the force is fitted by the same waves (least squares). For bands
     it is the amplitude of the band times the square root of the ratio of force variance to height
     variance on the same patch.

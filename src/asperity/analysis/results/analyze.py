@@ -14,7 +14,7 @@ from asperity.analysis.bounds.bound import NORM, ONE_SIDED, Bound, scale_upper_b
 from asperity.analysis.bounds.branch_and_bound import DEFAULT_WORK_LIMIT
 from asperity.analysis.energy.continuity import Continuity, continuity
 from asperity.analysis.energy.leak import Leak, worst_loop
-from asperity.analysis.energy.scan import Merit, merit
+from asperity.analysis.energy.straight_scan import Merit, merit
 from asperity.analysis.gain.characteristic import cached_number, curl_number, make_options
 from asperity.analysis.passivity.recommended_stiffness import recommend_stiffness
 from asperity.analysis.passivity.verdict import Passivity, passivity

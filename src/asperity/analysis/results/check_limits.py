@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.analysis.bounds.bound import NORM, ONE_SIDED, Bound
-from asperity.analysis.energy.scan import scan_force
+from asperity.analysis.energy.straight_scan import scan_force
 from asperity.analysis.gain.characteristic import cached_number
 from asperity.analysis.limits import limit_rules
 from asperity.analysis.limits.limit_rules import Limit
@@ -231,16 +231,15 @@ def limits(
     check_keywords(surface_arguments, SURFACE_KEYWORDS, limits)
     device = load_device(device)
     texture = as_texture(texture)
-    v = limit_rules.DEFAULT_SPEED if speed is None else check_positive("speed", speed, "m/s")
-    samples = time_samples, position_samples, force_steps
-    settings: dict[str, Any] = {"speed": v} | {
-        name: limit_rules.check_sample_count(name, value)
-        for name, value in zip(limit_rules.LEAST_SAMPLES, samples, strict=True)
+    samples = {
+        "time_samples": time_samples,
+        "position_samples": position_samples,
+        "force_steps": force_steps,
     }
+    settings = _scan_settings(speed, samples)
     if law is None:
-        law = recommended_law(
-            texture, device, max_depth, speed=v, rendering=rendering, **surface_arguments
-        )
+        conditions = {"speed": settings["speed"], "rendering": rendering}
+        law = recommended_law(texture, device, max_depth, **conditions, **surface_arguments)
     k = DEFAULT_STIFFNESS if stiffness is None else stiffness
     surface = Surface(texture, law, k, max_depth, **surface_arguments)
     surface = rendered_surface(surface, rendering)
@@ -260,12 +259,7 @@ def limits(
         grip=hand,
         **settings,
     )
-    arguments = {
-        "speed": speed,
-        "stiffness": stiffness,
-        "max_depth": max_depth,
-        "samples": None if None in (time_samples, position_samples, force_steps) else 1.0,
-    }
+    arguments = {"speed": speed, "stiffness": stiffness, "max_depth": max_depth}
     return _evaluate_limits(
         surface,
         device,
@@ -276,8 +270,28 @@ def limits(
         perceptibility=perceptibility,
         grip=hand,
         contact_lost=scan.contact_lost,
-        defaults=tuple([name for name, value in arguments.items() if value is None]),
+        defaults=_default_names(arguments, samples),
     )
+
+
+def _default_names(
+    arguments: Mapping[str, float | None], samples: Mapping[str, float | None]
+) -> tuple[str, ...]:
+    """Return the names of the arguments that were not given."""
+    names = [name for name, value in arguments.items() if value is None]
+    if None in samples.values():
+        names.append("samples")
+    return tuple(names)
+
+
+def _scan_settings(speed: float | None, samples: Mapping[str, float | None]) -> dict[str, Any]:
+    """Return speed and numbers of samples, checked."""
+    settings = {"speed": limit_rules.DEFAULT_SPEED}
+    if speed is not None:
+        settings["speed"] = check_positive("speed", speed, "m/s")
+    for name, count in samples.items():
+        settings[name] = limit_rules.check_sample_count(name, count)
+    return settings
 
 
 def _evaluate_limits(

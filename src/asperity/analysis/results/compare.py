@@ -11,8 +11,9 @@ from typing import Any
 from asperity.analysis.bounds.bound import NORM, ONE_SIDED
 from asperity.analysis.energy.continuity import continuity
 from asperity.analysis.energy.leak import worst_loop
-from asperity.analysis.energy.scan import merit as compute_merit
-from asperity.analysis.gain.characteristic import cached_number, is_shipped_law, surface_content
+from asperity.analysis.energy.straight_scan import merit as compute_merit
+from asperity.analysis.gain.characteristic import cached_number
+from asperity.analysis.gain.surface_cache import is_shipped_law, surface_content
 from asperity.analysis.limits.limit_rules import DEFAULT_SPEED
 from asperity.analysis.limits.perceptibility import Tier, assess_perceptibility
 from asperity.analysis.passivity.device_loop import make_device_loop

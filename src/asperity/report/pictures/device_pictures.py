@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 from numpy.typing import NDArray
 
-from asperity.analysis.energy.scan import parallel_line_points
+from asperity.analysis.energy.straight_scan import parallel_line_points
 from asperity.analysis.limits.limit_rules import shortest_wavelengths
 from asperity.analysis.results.check_limits import Limits
 from asperity.analysis.results.compare import Comparison

@@ -16,7 +16,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-from asperity.analysis.energy.scan import scan_height
+from asperity.analysis.energy.straight_scan import scan_height
 from asperity.analysis.results.compare import Comparison
 from asperity.analysis.results.recommendation import LawRow
 from asperity.core.units import format_quantity

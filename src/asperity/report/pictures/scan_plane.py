@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from asperity.analysis.bounds.bound import spectral_norm
-from asperity.analysis.energy.scan import scan_height
+from asperity.analysis.energy.straight_scan import scan_height
 from asperity.core.checks import FloatArray
 from asperity.surface import Surface
 from asperity.textures.texture import ScanLine, Texture

@@ -17,7 +17,6 @@ from asperity.devices import Device
 from asperity.envelopes.envelope import GENTLE_WAVE, Envelope
 from asperity.rendering import rendering_sentences
 from asperity.report.sentences.comparison_sentences import simulated_loops_text
-from asperity.report.sentences.energy_sentences import jumps_clause
 from asperity.report.sentences.limit_sentences import (
     form_removal_sentences,
     grip_text,
@@ -31,6 +30,7 @@ from asperity.report.sentences.passivity_sentences import (
     buzz_text,
     damping_assumption,
     energy_gained_text,
+    jumps_clause,
     stability_limit_text,
     stiffness_limit_text,
 )

@@ -13,7 +13,6 @@ from asperity.analysis.results.device_comparisons import DeviceComparisons, Miss
 from asperity.analysis.results.recommendation import LawRow
 from asperity.core.units import format_quantity, round_down, round_up
 from asperity.devices import Device
-from asperity.report.sentences.energy_sentences import continuity_reason, leak_energy_text
 from asperity.report.sentences.limit_sentences import (
     force_magnitude_text,
     masking_text,
@@ -23,8 +22,10 @@ from asperity.report.sentences.limit_sentences import (
 )
 from asperity.report.sentences.passivity_sentences import (
     buzz_text,
+    continuity_reason,
     delay_clause,
     delivery_text,
+    leak_energy_text,
     stability_limit_text,
     stiffness_limit_text,
 )

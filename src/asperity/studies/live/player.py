@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from asperity.analysis.energy.scan import scan_force
+from asperity.analysis.energy.straight_scan import scan_force
 from asperity.core.errors import AsperityError, ParameterError
 from asperity.devices import Device
 from asperity.loop.shared_trace import COLUMNS

@@ -9,7 +9,8 @@ import numpy as np
 
 from asperity.analysis.bounds.bound import NORM, spectral_norm
 from asperity.analysis.bounds.sampling import dense_maximum
-from asperity.analysis.gain.characteristic import cached_number, cached_result
+from asperity.analysis.gain.characteristic import cached_number
+from asperity.analysis.gain.surface_cache import cached_result
 from asperity.analysis.gain.theorems import theorem_on
 from asperity.core.checks import FloatArray, check_array
 from asperity.core.errors import ParameterError
