@@ -20,6 +20,7 @@ from asperity.report.pages.measured_report import measured_sections, thin_sectio
 from asperity.report.sentences import limit_sentences
 from asperity.report.sentences.analysis_text import datum_text
 from asperity.report.sentences.comparison_text import (
+    case_title,
     design_answer,
     field_alt_text,
     force_alt_text,
@@ -191,7 +192,7 @@ def comparisons_page(comparisons: DeviceComparisons) -> Page:
     missing = [device.sentence for device in comparisons.missing_data]
     cases = comparisons.comparisons
     table = cases_table(comparisons)
-    answers = [f"{_case_title(case)}: {case.recommendation}" for case in cases]
+    answers = [f"{case_title(case)}: {case.recommendation}" for case in cases]
     assumed = page.assumption_sections(_common_assumptions(cases))
     return Page(
         title=f"{texture_name(texture)} on several devices",
@@ -230,10 +231,6 @@ def _missing_sections(sentences: Sequence[str]) -> list[Section]:
     return [Section("Missing", [page.BulletList(sentences)])]
 
 
-def _case_title(comparison: Comparison) -> str:
-    return f"{comparison.device.name}, {format_quantity(comparison.max_depth, 'm')} deep"
-
-
 def _case_section(comparison: Comparison) -> Section:
     """Return answer, laws and assumptions of one device and depth."""
 
@@ -246,7 +243,7 @@ def _case_section(comparison: Comparison) -> Section:
     answer = comparison.recommendation
     assumptions = comparison.assumptions
     return Section(
-        _case_title(comparison), [page.Paragraph(answer), table, page.BulletList(assumptions)]
+        case_title(comparison), [page.Paragraph(answer), table, page.BulletList(assumptions)]
     )
 
 

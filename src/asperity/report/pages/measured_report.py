@@ -13,7 +13,6 @@ from asperity.core.cache import get_or_compute
 from asperity.core.checks import FloatArray
 from asperity.core.errors import escape_unprintable
 from asperity.core.units import format_quantity
-from asperity.measured.filters import short_trace_text
 from asperity.measured.form import SurfaceDecomposition, decompose_surface
 from asperity.measured.parameters import SurfaceParameter, find_parameter
 from asperity.measured.prepared import PreparationStage, PreparedSurface
@@ -32,6 +31,7 @@ from asperity.report.document.page import (
 from asperity.report.sentences.number_text import NOT_AVAILABLE, decimal_text
 from asperity.report.sentences.surface_text import (
     lay_text,
+    measurement_answer,
     parts_text,
     removed_text,
     roughness_text,
@@ -176,20 +176,10 @@ def surface_summary_page(summary: MeasurementSummary) -> page.Page:
     ]
     return page.Page(
         title=f"Parameters of the surface {summary.source}",
-        answer=_answer(summary),
+        answer=measurement_answer(summary),
         facts=[("Surface", surface_summary_text(prepared))],
         sections=sections,
     )
-
-
-def _answer(summary: MeasurementSummary) -> str:
-    if summary.parts is not None:
-        return texture_text(summary.parts)
-    prepared = summary.prepared
-    roughness = roughness_text(prepared.history)
-    nesting = prepared.history[-1].nesting
-    warning = short_trace_text(prepared.heights.shape, prepared.pitch, nesting or 0.0)
-    return f"{roughness} {sentence_case(warning)}." if warning else roughness
 
 
 def preparation_page(prepared: PreparedSurface, path: str) -> page.Page:

@@ -54,6 +54,7 @@ from asperity.report.sentences.paper_text import (
     VERDICT_TEXTS,
     evidence_text,
     experiment_summaries,
+    fitted_notes,
     loop_energy_text,
     verdict_counts_text,
     wall_summary_text,
@@ -201,20 +202,16 @@ def experiment_sections(experiments: Experiments) -> list[Section]:
 
 def _cycle_section(experiment: PassivityExperiment) -> Section:
     first = experiment.counts[0]
-    notes = _fitted_notes(experiment.fitted)
+    notes = fitted_notes(experiment.fitted)
     figure = partial(paper_pictures.cycles_figure, experiment)
     counts = ", ".join([f"{count.cycles} with {count.wall}" for count in experiment.counts])
     values: dict[str, Any] = {"lag": first.delay, "starts": first.starts, "counts": counts}
     return page.figure_section("paper.cycles", figure, notes, **values)
 
 
-def _fitted_notes(sentences: Sequence[str]) -> list[str]:
-    return [f"Not stated by the paper: {'; '.join(sentences)}."]
-
-
 def _energy_section(experiment: ScanningExperiment) -> Section:
     figure = partial(paper_pictures.energies_figure, experiment)
-    notes = _fitted_notes(experiment.guessed)
+    notes = fitted_notes(experiment.guessed)
     return page.figure_section("paper.energies", figure, notes, count=len(experiment.traces))
 
 
@@ -243,13 +240,13 @@ def _bump_section(experiment: BumpExperiment) -> Section:
             for run in experiment.bumps
         ]
     )
-    notes = _fitted_notes(experiment.guessed)
+    notes = fitted_notes(experiment.guessed)
     return page.figure_section("paper.bumps", figure, notes, gains=gains)
 
 
 def _device_section(experiments: Experiments) -> Section:
     devices = experiments.devices
-    notes = _fitted_notes(devices.guessed)
+    notes = fitted_notes(devices.guessed)
     summary = wall_summary_text(devices)
     if summary:
         notes.append(f"Few misses on the left are weak evidence: {summary}.")

@@ -21,6 +21,7 @@ from asperity.core.checks import FloatArray
 from asperity.core.units import format_quantity
 from asperity.report.pictures import analysis_windows, law_pictures, style
 from asperity.report.pictures.scan_plane import CurlField, curl_field
+from asperity.report.sentences.analysis_text import gain_remark
 from asperity.report.sentences.number_text import interval_text, range_text
 
 FigureArea = Figure | SubFigure
@@ -175,17 +176,8 @@ def draw_gain(figure: FigureArea, analysis: Analysis) -> None:
         if at is not None:
             _draw_cross(axes, *window.scale(*at))
     _scale_axes(axes, window)
-    style.title_law(axes, surface.law, _gain_remark(analysis))
+    style.title_law(axes, surface.law, gain_remark(analysis))
     law_pictures.add_gain_colorbar(figure, mesh, axes, "‖J‖ / k [1]")
-
-
-def _gain_remark(analysis: Analysis) -> str:
-    if math.isinf(analysis.q.lower):
-        return "q = ∞; the cross is the onset"
-    remark = f"q = {interval_text(analysis.q)} ({analysis.q.method})"
-    if analysis.q.at is None:
-        return remark
-    return f"{remark}; the cross attains the lower end"
 
 
 def _draw_cross(axes: Axes, x: float, y: float) -> None:

@@ -24,7 +24,7 @@ from asperity.report.pictures.device_pictures import (
 )
 from asperity.report.pictures.loop_pictures import recording_figure, run_figure
 from asperity.report.pictures.surface_pictures import draw_surface, surface_size
-from asperity.report.sentences.number_text import leak_text
+from asperity.report.sentences.comparison_text import conservation_remarks
 from asperity.simulation import Run
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
@@ -82,7 +82,7 @@ def _plot_comparison(result: Comparison, picture: str | None = None) -> Figure:
     if picture is not None:
         return COMPARISON_PICTURES[picture](result)
     surfaces = [row.surface for row in result.rows]
-    fields = _fields_drawing(surfaces, _conservation_remarks(result))
+    fields = _fields_drawing(surfaces, conservation_remarks(result))
     return _stacked_figure(_texture_drawing(result.texture), _forces_drawing(surfaces), fields)
 
 
@@ -137,13 +137,6 @@ def _fields_drawing(surfaces: Sequence[Surface], remarks: Sequence[str] = ()) ->
     return law_pictures.field_size(surfaces), draw
 
 
-def _conservation_remarks(comparison: Comparison) -> list[str]:
-    return [
-        "conservative" if row.conservative else f"leaks up to {leak_text(row, comparison)} per loop"
-        for row in comparison.rows
-    ]
-
-
 def _stacked_figure(*drawings: style.SizedDrawing) -> Figure:
     """Return a figure with one drawing below the other."""
     heights = [height for (_, height), _ in drawings]
@@ -171,7 +164,7 @@ COMPARISON_PICTURES: dict[str, Callable[[Comparison], Figure]] = {
     "hand": hand_figure,
     "force": lambda result: _stacked_figure(_forces_drawing([row.surface for row in result.rows])),
     "field": lambda result: _stacked_figure(
-        _fields_drawing([row.surface for row in result.rows], _conservation_remarks(result))
+        _fields_drawing([row.surface for row in result.rows], conservation_remarks(result))
     ),
     "gain": law_pictures.gain_figure,
     "merit": law_pictures.merit_figure,

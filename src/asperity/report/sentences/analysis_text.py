@@ -13,7 +13,12 @@ from asperity.envelopes.envelope import DeviceEnvelope
 from asperity.envelopes.wave_borders import WaveBorders
 from asperity.report.sentences import limit_sentences
 from asperity.report.sentences.limit_sentences import speed_text
-from asperity.report.sentences.number_text import INFINITY_SIGN, NOT_AVAILABLE, yes_no_text
+from asperity.report.sentences.number_text import (
+    INFINITY_SIGN,
+    NOT_AVAILABLE,
+    interval_text,
+    yes_no_text,
+)
 from asperity.report.sentences.texts import sentence
 
 _SYMBOLS = {
@@ -187,3 +192,13 @@ def missing_fields(device: Device) -> list[str]:
         for field in _USED_FIELDS
         if field not in device.data
     ]
+
+
+def gain_remark(analysis: Analysis) -> str:
+    """Return q with its method, and what the cross in the figure of the gain attains."""
+    if math.isinf(analysis.q.lower):
+        return "q = ∞; the cross is the onset"
+    remark = f"q = {interval_text(analysis.q)} ({analysis.q.method})"
+    if analysis.q.at is None:
+        return remark
+    return f"{remark}; the cross attains the lower end"

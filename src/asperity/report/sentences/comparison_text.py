@@ -14,7 +14,7 @@ from asperity.envelopes.find_design import Design
 from asperity.envelopes.searches import FORCE
 from asperity.report.sentences import number_text
 from asperity.report.sentences.limit_sentences import force_magnitude_text
-from asperity.report.sentences.number_text import bound_text, count_text
+from asperity.report.sentences.number_text import bound_text, count_text, leak_text
 from asperity.report.sentences.texts import sentence, sentence_case
 from asperity.textures.texture import Texture
 
@@ -155,3 +155,16 @@ def merit_alt_text(comparison: Comparison) -> str:
 
 def _law_count_text(comparison: Comparison) -> str:
     return count_text(len(comparison.rows), "law")
+
+
+def case_title(comparison: Comparison) -> str:
+    """Return device and depth of one of several comparisons."""
+    return f"{comparison.device.name}, {format_quantity(comparison.max_depth, 'm')} deep"
+
+
+def conservation_remarks(comparison: Comparison) -> list[str]:
+    """Return for each law that it is conservative, or what it leaks."""
+    return [
+        "conservative" if row.conservative else f"leaks up to {leak_text(row, comparison)} per loop"
+        for row in comparison.rows
+    ]

@@ -148,3 +148,8 @@ def wall_summary_text(experiment: DeviceExperiment) -> str:
         return ""
     span = f"{min(ratios):.0f} to {max(ratios):.0f}"
     return f"the simulated wall itself cycles only at {span} times the catalogue's K0"
+
+
+def fitted_notes(sentences: Sequence[str]) -> list[str]:
+    """Return a note with the assumptions of an experiment."""
+    return [f"Not stated by the paper: {'; '.join(sentences)}."]

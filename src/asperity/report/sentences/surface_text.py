@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from asperity.analysis import characteristic_number, worst_loop
 from asperity.core.arguments import Argument
 from asperity.core.units import format_quantity
 from asperity.export.surface_maps import SampledMap, height_resolution, normal_error
+from asperity.measured.filters import short_trace_text
 from asperity.measured.form import SurfaceDecomposition
 from asperity.measured.lengths import format_counts, format_lengths
 from asperity.measured.parameters import MAX_CORRELATION_POINTS
@@ -21,6 +22,9 @@ from asperity.report.sentences.texts import sentence, sentence_case
 from asperity.surface import Surface
 from asperity.textures.catalogue import CATALOGUE
 from asperity.textures.texture import Texture, TextureKind
+
+if TYPE_CHECKING:
+    pass
 
 # Lengths of maps and profiles, which are not arguments of a kind.
 _LENGTH_NAMES = {"pitch", "cutoff"}
@@ -228,3 +232,14 @@ def describe_shading(texture: Texture, stiffness: float | None) -> str:
     at = format_quantity(surface.stiffness, "N/m")
     depth = format_quantity(surface.max_depth, "m")
     return sentence("shading", law=_SHADING_LAW, at=at, depth=depth, energy=energy, q=q)
+
+
+def measurement_answer(summary: MeasurementSummary) -> str:
+    """Return the RMS of texture, form and waviness, or the roughness with a warning."""
+    if summary.parts is not None:
+        return texture_text(summary.parts)
+    prepared = summary.prepared
+    roughness = roughness_text(prepared.history)
+    nesting = prepared.history[-1].nesting
+    warning = short_trace_text(prepared.heights.shape, prepared.pitch, nesting or 0.0)
+    return f"{roughness} {sentence_case(warning)}." if warning else roughness
