@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 import asperity as asp
-from asperity.contacts.closest import plane_search
-from asperity.contacts.closest.plane_search import descend
+from asperity.contacts import closest_search, distance_bounds
+from asperity.contacts.sampler_interface import DIVIDE, EXPAND
 from asperity.core.arguments import Argument
 from asperity.core.compiled import Kernels
 from asperity.textures import Domain, ScanLine, Texture
@@ -26,7 +26,7 @@ from asperity.textures.texture import TextureKind
 
 # --- the sampler: plain Python that Numba compiles ------------------------------------------------
 
-KERNELS = Kernels(provides=("sample_height", "sample_gradient", "sample_hessian", "closest_point"))
+KERNELS = Kernels(provides=("sample_height", "sample_gradient", "sample_hessian", "enclose_box"))
 
 
 class Egg(NamedTuple):
@@ -55,18 +55,13 @@ def sample_hessian(x: float, y: float, egg: Egg) -> tuple[float, float, float, f
     return h, hx, hy, -k * k * h, a * k * k * math.sin(k * x) * math.sin(k * y), -k * k * h
 
 
-def closest_point(
-    x: float, y: float, z: float, egg: Egg
-) -> tuple[float, float, float, float, float]:
-    """Return X, Y of the closest surface point, and h, h_x, h_y there: the best of 25 descents."""
-    best = descend(x, y, z, x, y, egg)
-    step = 0.5 * math.sqrt(best[2])
-    for i in range(-2, 3):
-        for j in range(-2, 3):
-            found = descend(x, y, z, x + i * step, y + j * step, egg)
-            if found[2] < best[2]:
-                best = found
-    return best[0], best[1], best[3], best[4], best[5]
+def enclose_box(
+    box: tuple[float, float, float, float], egg: Egg
+) -> tuple[float, float, float, float, float, int]:
+    """Return bounds of h, Hess h and D³h, for the search of closest points: those of the plane."""
+    a, k = egg
+    small = (box[1] - box[0]) * k < 3.0  # Taylor's formula cannot decide a box of several bumps
+    return -a, a, a * k * k, 3.0 * a * k**3, a * k * k, EXPAND if small else DIVIDE
 
 
 # --- the kind: proved bounds ---------------------------------------------------------------------
@@ -92,8 +87,8 @@ class EggBox(Texture):
 
     @property
     def sampler(self) -> tuple[ModuleType, ...]:
-        """These functions, and ``descend``, which they call."""
-        return sys.modules[__name__], plane_search
+        """These functions, and the search for closest points, which calls them."""
+        return sys.modules[__name__], closest_search, distance_bounds
 
     @property
     def arguments(self) -> Egg:

@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 from tests.helpers.exact_heights import exact_height
 
-from asperity.contacts import Contact
-from asperity.contacts.closest import closest_warm as again
-from asperity.contacts.closest import line_search, plane_search
-from asperity.contacts.closest import plane_budget as plane_within
+from asperity.contacts import Contact, closest_search, distance_bounds
+from asperity.contacts import warm_search as again
 from asperity.contacts.warm_start import (
     BUDGET,
     ERROR_BOUND,
@@ -135,9 +133,10 @@ class RecordedPolynomial:
         self.line: list[float] = []
         self.plane: list[FloatArray] = []
 
-    def along(self, x: float, _texture: object) -> tuple[float, float, float]:
+    def along(self, x: float, _y: float, _texture: object) -> tuple[float, ...]:
         self.line.append(x)
-        return polynomial_derivatives(x, self.coefficients)
+        h, hx, hxx = polynomial_derivatives(x, self.coefficients)
+        return h, hx, 0.0, hxx, 0.0, 0.0
 
     def curvature(self, x: float, y: float, _texture: object) -> tuple[float, ...]:
         self.plane.append(np.array([x, y]))
@@ -151,11 +150,12 @@ class RecordedPolynomial:
         self, probe: tuple[float, float, float], start: float, monkeypatch: pytest.MonkeyPatch
     ) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Descend along a line and in the plane; return both end points."""
-        monkeypatch.setattr(line_search, "sample_profile", self.along)
-        monkeypatch.setattr(plane_search, "sample_hessian", self.curvature)
+        monkeypatch.setattr(distance_bounds, "evaluation_cost", lambda _texture: 1.0)
         x, y, z = probe
-        on_line = line_search.descend(x, z, start, None)
-        return on_line, plane_search.descend(x, y, z, start, 0.7 * start, None)
+        monkeypatch.setattr(distance_bounds, "sample_hessian", self.along)
+        on_line = distance_bounds.descend(x, y, z, start, y, None)
+        monkeypatch.setattr(distance_bounds, "sample_hessian", self.curvature)
+        return on_line, distance_bounds.descend(x, y, z, start, 0.7 * start, None)
 
 
 def test_descent_takes_few_evaluations(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -172,7 +172,8 @@ def test_descent_takes_few_evaluations(monkeypatch: pytest.MonkeyPatch) -> None:
         )
         h, h1, _h2 = polynomial_derivatives(on_line[0], polynomial.coefficients)
         assert abs(on_line[0] - x + (h - z) * h1) < 1e-13 * (1.0 + abs(h - z) * (1.0 + abs(h1)))
-        assert on_line[2:] == pytest.approx((h, h1), rel=1e-13, abs=1e-14)
+        assert on_line[1] == y
+        assert on_line[3:] == pytest.approx((h, h1, 0.0), rel=1e-13, abs=1e-14)
         px, py = in_plane[:2]
         (hx, gx, _), (hy, gy, _) = (
             polynomial_derivatives(coordinate, polynomial.coefficients) for coordinate in (px, py)
@@ -254,11 +255,11 @@ def test_lower_bound_of_a_box_is_the_distance_to_its_plane() -> None:
     for hx, hy, depth in rng.normal(size=(300, 3)):
         offset = (-hx * depth, -hy * depth, depth)
         distance = abs(depth) * np.sqrt(1.0 + hx * hx + hy * hy)
-        bound = plane_search.distance_lower_bound(offset, hx, hy, 0.1, 0.0)
+        bound = distance_bounds.distance_lower_bound(offset, hx, hy, 0.1, 0.0)
         assert bound == pytest.approx(distance, rel=1e-12)
-        lifted_bound = plane_search.distance_lower_bound(offset, hx, hy, 0.1, 0.3 * distance)
+        lifted_bound = distance_bounds.distance_lower_bound(offset, hx, hy, 0.1, 0.3 * distance)
         assert lifted_bound == pytest.approx(0.7 * distance, rel=1e-12)
-        assert plane_search.distance_lower_bound(offset, hx, hy, 0.1, 2.0 * distance) == 0.0
+        assert distance_bounds.distance_lower_bound(offset, hx, hy, 0.1, 2.0 * distance) == 0.0
 
 
 def test_box_is_pruned_by_the_taylor_bound() -> None:
@@ -266,7 +267,7 @@ def test_box_is_pruned_by_the_taylor_bound() -> None:
 
     def is_pruned(enough: float) -> bool:
         arguments = (0.0, 0.0, 1.0), 0.0, 0.0, (0.1, 0.0, 0.1)
-        return plane_search.can_prune(*arguments, 0.1, 0.6, 2.0, 0.3, 0.4, enough)
+        return distance_bounds.can_prune(*arguments, 0.1, 0.6, 2.0, 0.3, 0.4, enough)
 
     assert is_pruned(0.975 * (1.0 - 1e-12))
     assert not is_pruned(0.975 * (1.0 + 1e-12))
@@ -282,7 +283,7 @@ def test_minimum_of_a_quadratic_over_a_box() -> None:
         a, b = np.abs(sides)
         x, y = a * s, b * t
         lattice = 2.0 * (px * x + py * y) + qxx * x * x + 2.0 * qxy * x * y + qyy * y * y
-        least = plane_search.min_quadratic(px, py, qxx, qxy, qyy, a, b)
+        least = distance_bounds.min_quadratic(px, py, qxx, qxy, qyy, a, b)
         # Beside a point of the lattice a side's parabola is lower by at most its slope.
         slack = 5e-3 * (abs(px) + abs(py) + (abs(qxx) + 2.0 * abs(qxy) + abs(qyy)) * (a + b))
         slack *= a + b
@@ -292,119 +293,67 @@ def test_minimum_of_a_quadratic_over_a_box() -> None:
     assert inside > 10
 
 
-@pytest.mark.parametrize("hessian_bound", [0.3, 1.4, 9.0])
-@pytest.mark.parametrize(
-    ("away", "slope", "curvature", "r"),
-    [(0.0, 0.0, 0.2, 0.4), (0.3, 0.5, 1.3, 0.5), (-0.2, 0.1, 0.9, 0.1)],
-)
-def test_interval_is_pruned_exactly_at_the_taylor_bound(
-    away: float,
-    slope: float,
-    curvature: float,
-    r: float,
-    hessian_bound: float,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """φ >= φ₀ - 2|p| r + (min(Q, 0) - L r/3) r², L = 3 K max|h'| + T max|h - z|, at h - z = -1."""
-    polynomial, third_bound = RecordedPolynomial(0.7, slope, 0.5 * curvature), 0.8
-    monkeypatch.setattr(line_search, "sample_profile", polynomial.along)
-    p, q = away - slope, 1.0 + slope * slope - curvature
-    max_curvature = min(hessian_bound, curvature + third_bound * r)
-    max_slope = slope + max_curvature * r
-    change = (3.0 * max_curvature * max_slope + third_bound * (1.0 + max_slope * r)) * r
-    least = away**2 + 1.0 - 2.0 * abs(p) * r + (min(q, 0.0) - change / 3.0) * r * r
-    for keep in (1.0, 0.5):
-        for share, is_pruned in ((1.0 - 1e-9, True), (1.0 + 1e-9, False)):
-            best = (-9.0, least / keep * share, 0.0, 0.0)
-            result, further, left = line_search.evaluate_box(
-                -away, 1.7, 0.0, r, hessian_bound, third_bound, best, keep, 50.0, None
-            )
-            can_be_level = abs(p) <= (abs(q) * (1.0 + 1e-6) + 0.5 * change + 1e-6) * r
-            convex = q + change >= 0.0
-            if is_pruned or not can_be_level or not convex:
-                assert (result, further, left) == (best, False, 49.0)
-            else:
-                assert further or left < 49.0
-                assert further == (q <= change)
-
-
-def test_interval_without_level_point_or_convexity_is_pruned(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Up to the slack for rounding."""
-
-    def is_interval_pruned(slope: float, curvature: float, away: float, third_bound: float) -> bool:
-        polynomial = RecordedPolynomial(0.7, slope, 0.5 * curvature)
-        monkeypatch.setattr(line_search, "sample_profile", polynomial.along)
-        best = (-9.0, 1e9, 0.0, 0.0)
-        arguments = (-away, 1.7, 0.0, 0.1, 50.0, third_bound, best, 1.0, 50.0, None)
-        _result, further, left = line_search.evaluate_box(*arguments)
-        return not further and left == 49.0
-
-    # For a plane Q is 1 and constant: the slope vanishes at a distance of |p|.
-    for away in (0.1 * (1.0 + 3e-6), 0.1 * (1.0 + 1e-6), -0.1 * (1.0 + 3e-6)):
-        assert is_interval_pruned(0.0, 0.0, away, 0.0) == (abs(away) > 0.1 * (1.0 + 2e-6))
-    # Q = 1 - h'' rises from -1 by 1: concave everywhere, except for a millionth.
-    for third_bound, is_pruned in ((1.0, True), (30.0, False)):
-        assert is_interval_pruned(0.0, 2.0, 0.0, third_bound) == is_pruned
-
-
-def test_line_search_out_of_budget_relaxes_its_accuracy(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_search_out_of_budget_relaxes_its_accuracy(monkeypatch: pytest.MonkeyPatch) -> None:
     """With the rest of the budget it searches for points nearer by a share s: d ≥ (1 - s) d₀.
 
-    The shares s fall to a quarter each time; squared distances are scaled by (1 - s)².
+    The first search has three quarters of the budget; the following ones share the rest. The shares
+    s fall to a quarter each time; squared distances are scaled by (1 - s)².
     """
-    shares: list[float] = []
-
-    def search_line(*arguments: object) -> tuple[tuple[float, ...], float]:
-        shares.append(float(arguments[3]))  # type: ignore[arg-type]  # the fourth is a number
-        return (0.0, 4.0, 0.0, 0.0), [0.0, 20.0, 10.0, 0.0][len(shares) - 1]
-
-    monkeypatch.setattr(
-        line_search, "descend_within_budget", lambda *_arguments: ((0.0, 4.0, 0.0, 0.0), 50.0)
-    )
-    monkeypatch.setattr(line_search, "search_line", search_line)
-    best, gap, evaluations = line_search.search_line_within_budget(0.0, 2.0, 0.0, 100.0, None)
-    np.testing.assert_allclose(shares[1:], [(1.0 - 0.25**n) ** 2 for n in (1, 2, 3)], rtol=1e-15)
-    assert (best[1], gap, evaluations) == (4.0, 2.0 / 16.0, 100.0)
-    monkeypatch.setattr(line_search, "search_line", lambda *_arguments: ((0.0, 4.0, 0.0, 0.0), 7.0))
-    assert line_search.search_line_within_budget(0.0, 2.0, 0.0, 100.0, None)[1:] == (0.0, 68.0)
-
-
-def test_plane_search_out_of_budget_relaxes_its_accuracy(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The first search has three quarters of the budget; the following ones share the rest."""
     searches: list[tuple[float, float]] = []
     point = (0.1, 0.2, 4.0, 0.3, 0.4, 0.5)
     remaining = [0.0, 20.0, 10.0, 0.0]
 
-    def search_plane(*arguments: object) -> tuple[tuple[float, ...], float]:
+    def search_boxes(*arguments: object) -> tuple[tuple[float, ...], float]:
         searches.append((float(arguments[4]), float(arguments[5])))  # type: ignore[arg-type]  # numbers
         return point, remaining[len(searches) - 1]
 
     monkeypatch.setattr(
-        plane_within, "descend_within_budget", lambda *arguments: (point, arguments[5])
+        closest_search, "descend_within_budget", lambda *arguments: (point, arguments[5])
     )
-    monkeypatch.setattr(plane_within, "search_plane", search_plane)
-    result = plane_within.closest_point_within_budget(0.0, 0.0, 2.0, 0.0, 0.0, 100.0, None)
+    monkeypatch.setattr(closest_search, "search_boxes", search_boxes)
+    result = closest_search.closest_point_within_budget(0.0, 0.0, 2.0, 0.0, 0.0, 100.0, None)
     shares = [(1.0 - 0.25**n) ** 2 for n in (1, 2, 3)]
     np.testing.assert_allclose([share for share, _ in searches[1:]], shares, rtol=1e-15)
     assert [budget for _, budget in searches] == [75.0, 25.0, 20.0, 10.0]
     assert result == (0.1, 0.2, 0.3, 0.4, 0.5, 2.0 / 16.0, 100.0)
     searches, remaining = [], [7.0]
-    result = plane_within.closest_point_within_budget(0.0, 0.0, 2.0, 0.0, 0.0, 100.0, None)
+    result = closest_search.closest_point_within_budget(0.0, 0.0, 2.0, 0.0, 0.0, 100.0, None)
     assert result == (0.1, 0.2, 0.3, 0.4, 0.5, 0.0, 68.0)
     assert len(searches) == 1
 
 
+def test_start_on_a_line_is_projected(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A warm start of parallel waves or a profile begins on the line through the probe."""
+    starts: list[tuple[float, ...]] = []
+
+    def descend(*arguments: float) -> tuple[tuple[float, ...], float]:
+        starts.append(arguments[3:5])
+        return (0.0,) * 6, 1.0
+
+    frame = (1.0, 2.0, 0.6, 0.8, 1.0, 0.0)
+    monkeypatch.setattr(closest_search, "search_frame", lambda *_arguments: frame)
+    monkeypatch.setattr(closest_search, "descend_within_budget", descend)
+    monkeypatch.setattr(closest_search, "search_boxes", lambda *_arguments: ((0.0,) * 6, 1.0))
+    closest_search.closest_point_within_budget(1.0, 2.0, -1.0, 1.5, 2.5, 9.0, None)
+    np.testing.assert_allclose(starts, [(1.0 + 0.7 * 0.6, 2.0 + 0.7 * 0.8)], rtol=1e-15)
+
+
 @pytest.mark.parametrize("u", [0.1, 3.3, 4.0, 7.9])
-def test_next_interval_visits_every_interval_once(u: float) -> None:
+def test_division_of_a_line_visits_every_interval_once(u: float) -> None:
     """Three levels deep: 8 intervals, the nearest first, and the nearer of each pair first."""
-    level, side, i = 3, 8.0, 0
+    stack, frame = np.empty((256, 5)), (0.0, 0.0, 1.0, 0.0, 1.0, 0.0)
+    minimum = (u, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    count = closest_search.push_box((0.0, 8.0, 0.0, 1.0), 0.0, stack, 0)
     visited = []
-    while level <= 3:
-        if level == 0:
-            visited.append(i)
-        level, side, i = line_search.next_interval(level > 0, level, side, i, 3, u)
+    while count > 0:
+        count -= 1
+        west, east, south, north, _bound = stack[count].tolist()
+        assert (south, north) == (0.0, 1.0)
+        if east - west == 1.0:
+            visited.append(int(west))
+        else:
+            box = (west, east, south, north)
+            count = closest_search.split_box(frame, minimum, box, stack, count, None)
     assert sorted(visited) == list(range(8))
     assert visited[0] == int(u)
     for first in (0, 2, 4, 6):

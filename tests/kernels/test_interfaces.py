@@ -8,6 +8,7 @@ from types import ModuleType
 
 import pytest
 
+from asperity.contacts import closest_search
 from asperity.contacts import sampler_interface as sampler
 from asperity.kernels import probe_functions as law_functions
 from asperity.kernels.fuse import kernel_source
@@ -21,13 +22,13 @@ from asperity.loop.bodies import coupled_body as dense
 from asperity.loop.bodies import elastic_band as banded
 from asperity.loop.bodies import pantograph_dynamics as five_bar
 from asperity.loop.bodies import prescribed_motion as prescribed
-from asperity.textures.kinds import fourier_line_sampler as fourier_line
 from asperity.textures.kinds import fourier_sampler as fourier
 from asperity.textures.kinds import sinusoid_sampler as sinusoid
 from asperity.textures.spline import heightmap_sampler as heightmap
 from asperity.textures.spline import profile_sampler as profile
+from asperity.textures.spline import spline_pruning, spline_search
 
-SAMPLERS = (sinusoid, fourier, fourier_line, profile, heightmap)
+SAMPLERS = (sinusoid, fourier, profile, heightmap, closest_search, spline_search, spline_pruning)
 BODIES = (axes, banded, dense, five_bar, prescribed)
 PAIRS = [(sampler, one) for one in SAMPLERS] + [(body_functions, one) for one in BODIES]
 

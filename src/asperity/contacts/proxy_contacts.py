@@ -57,9 +57,9 @@ class NearestContact(Contact):
 
     def kernels(self) -> tuple[ModuleType, ...]:
         """Return the warm-started search, with a fallback for a search without a budget."""
-        from asperity.contacts.closest import closest_warm
+        from asperity.contacts import warm_search
 
-        return (closest_warm,)
+        return (warm_search,)
 
     def detection_code(self, needed: frozenset[str]) -> tuple[list[str], str]:
         """Return the comparison with the height at the probe: no search out of contact."""

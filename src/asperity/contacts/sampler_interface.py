@@ -7,6 +7,11 @@ the record (NamedTuple) that the kind declares; it is passed on unchanged.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from asperity.core.compiled import FloatArray
+
 _SECOND_DERIVATIVES = frozenset(("hxx", "hxy", "hyy"))
 _FIRST_DERIVATIVES = frozenset(("hx", "hy"))
 
@@ -20,18 +25,32 @@ def sampler_call(needed: frozenset[str], point: str) -> list[str]:
     return [f"h = sample_height({point}, texture)"] if "h" in needed else []
 
 
-# A search prunes what is closer than the best by fewer rounding units; see ``search_plane``.
+# A search prunes what is closer than the best by fewer rounding units; see ``closest_search``.
 ROUNDING_SLACK = 450.0
-# Cost of a pruned box of the pyramid in evaluations of the surface.
+# Cost of a pruned box in evaluations of the surface.
 PRUNED_BOX_COST = 0.125
 
-# A point of the surface, X, Y, φ, h, h_x, h_y, and one of a profile, X, φ, h, h'.
-PlanePoint = tuple[float, float, float, float, float, float]
-LinePoint = tuple[float, float, float, float]
+# What to do with a box that cannot be excluded: divide it, unless Taylor's formula may decide it;
+# expand it by Taylor's formula at its centre; find a local minimum downhill from there first, if
+# none near the box is known.
+DIVIDE = 0
+EXPAND = 1
+DESCEND = 2
 
 # h, h_x, h_y, h_xx, h_xy, h_yy, and a closest point X, Y, h, h_x, h_y.
 Derivatives = tuple[float, float, float, float, float, float]
 ClosestPoint = tuple[float, float, float, float, float]
+# A point of the surface: X, Y, φ, h, h_x, h_y.
+Point = tuple[float, float, float, float, float, float]
+# A probe and the square of the radius of a ball around it: x, y, z [m], r² [m²].
+Ball = tuple[float, float, float, float]
+# A box of the plane: west, east, south, north; its coordinates and its bounds.
+Box = tuple[float, float, float, float]
+Frame = tuple[float, float, float, float, float, float]
+Bounds = tuple[float, float, float, float, float, int]
+# A local minimum of φ: its box coordinates, h - z, the smaller eigenvalue of I + (h - z) Hess h,
+# h_xx, h_xy, h_yy.
+Minimum = tuple[float, float, float, float, float, float, float]
 
 SAMPLER_FUNCTIONS = {
     "sample_height": "heights",
@@ -82,24 +101,65 @@ def evaluation_cost(texture: object) -> float:
     raise NotImplementedError  # the linker binds calls to the implementation
 
 
-def search_plane(
-    x: float, y: float, z: float, best: PlanePoint, factor: float, left: float, texture: object
-) -> tuple[PlanePoint, float]:
-    """Return the best point after a search of everything that can be closer, and what is left.
+def enclose_box(box: Box, texture: object) -> Bounds:
+    """Return bounds of the surface on a box, in the coordinates of :func:`search_frame`.
 
-    Boxes are pruned whose squared distance is nowhere less than ``factor`` times that of the best
-    point. The search is truncated once ``left``, the number of evaluations, is used up.
+    They are the least and the greatest height [m], infinite if unknown, K >= ‖Hess h‖ [1/m],
+    T >= ‖D³h‖ [1/m²], a bound of the greatest eigenvalue of -Hess h, at least 0 and at most K, and
+    what to do with the box: ``DIVIDE``, ``EXPAND`` or ``DESCEND``.
     """
     raise NotImplementedError  # the linker binds calls to the implementation
 
 
-def search_line(
-    x: float, z: float, best: LinePoint, factor: float, left: float, texture: object
-) -> tuple[LinePoint, float]:
-    """Return the same for a profile; see :func:`search_plane`."""
+def search_frame(x: float, y: float, texture: object) -> Frame:
+    """Return the coordinates of the boxes of a probe.
+
+    They are the point (0, 0) [m], the direction of the first axis, and the units of both axes [m];
+    that of the second is 0 on a line.
+    """
     raise NotImplementedError  # the linker binds calls to the implementation
 
 
-def sample_profile(x: float, texture: object) -> tuple[float, float, float]:
-    """Return h [m], h' [1], h'' [1/m] of a texture whose heights vary along one line only."""
+def search_region(x: float, y: float, z: float, square: float, texture: object) -> Box:
+    """Return a box with every surface point whose squared distance [m²] is less."""
+    raise NotImplementedError  # the linker binds calls to the implementation
+
+
+def narrow_box(ball: Ball, gap: float, box: Box, left: float, texture: object) -> tuple[Box, float]:
+    """Return the part of a box that may hold a point of a ball, and the evaluations left.
+
+    It is empty if a first border is greater than the last one. The gap is h - z at the best point.
+    """
+    raise NotImplementedError  # the linker binds calls to the implementation
+
+
+def can_prune_near(ball: Ball, minimum: Minimum, box: Box, texture: object) -> bool:
+    """Return whether no point of a box near a local minimum of the distance is in a ball."""
+    raise NotImplementedError  # the linker binds calls to the implementation
+
+
+def expand_box(
+    x: float, y: float, z: float, r: float, bounds: Bounds, left: float, texture: object
+) -> tuple[Derivatives, tuple[float, float, float], float]:
+    """Return derivatives at the centre of a box of half-diagonal r along its axes, and remainders.
+
+    The remainders bound how far Q is from its value at the centre, how far h is from the tangent
+    plane [m], and ‖D³h‖ [1/m²]; the last value is the evaluations left.
+    """
+    raise NotImplementedError  # the linker binds calls to the implementation
+
+
+def divide_box(
+    ball: Ball, frame: Frame, minimum: Minimum, box: Box, stack: FloatArray, count: int,
+    left: float, texture: object,
+) -> tuple[int, float]:  # fmt: skip
+    """Put the parts of a box that may hold a point of a ball on the stack.
+
+    Return the number of boxes on the stack and the evaluations left. The minimum is the best point.
+    """
+    raise NotImplementedError  # the linker binds calls to the implementation
+
+
+def box_middle(low: float, high: float, axis: int, texture: object) -> float:
+    """Return where an axis of a box is halved."""
     raise NotImplementedError  # the linker binds calls to the implementation

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from asperity.contacts.closest.closest_warm import record_error_bound
 from asperity.contacts.sampler_interface import sample_height
 from asperity.contacts.split_optimality import (
     split_add_atom_motion,
@@ -21,6 +20,7 @@ from asperity.contacts.split_optimality import (
     split_solve_linear,
 )
 from asperity.contacts.split_solver import split_compute_atoms
+from asperity.contacts.warm_search import record_error_bound
 from asperity.contacts.warm_start import BUDGET, FIRST_POINT, POINT_COUNT, UNLIMITED
 from asperity.core.compiled import EVERY_FUNCTION, FloatArray, Kernels, local_array
 

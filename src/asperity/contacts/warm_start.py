@@ -1,4 +1,4 @@
-"""State of a warm-started closest-point search: one array owned by the caller.
+"""State of a warm-started search for a contact point: one array owned by the caller.
 
 It only speeds up the next search. The result is that of the stateless search unless the budget was
 used up; then the array holds an error bound of the result.

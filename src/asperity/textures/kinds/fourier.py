@@ -84,12 +84,10 @@ class Fourier(Texture):
     @property
     def sampler(self) -> tuple[ModuleType, ...]:
         """See :class:`Texture`."""
-        from asperity.contacts.closest import line_search, plane_budget, plane_search
-        from asperity.textures.kinds import fourier_line_sampler, fourier_sampler, sine
+        from asperity.contacts import closest_search, distance_bounds
+        from asperity.textures.kinds import fourier_sampler, sine
 
-        if self._is_parallel:
-            return fourier_line_sampler, fourier_sampler, line_search, sine
-        return fourier_sampler, plane_search, plane_budget, sine
+        return fourier_sampler, closest_search, distance_bounds, sine
 
     @cached_property
     def arguments(self) -> FourierArguments:
@@ -101,7 +99,7 @@ class Fourier(Texture):
         kx = np.ascontiguousarray(self.wavevectors[:, 0])
         ky = np.ascontiguousarray(self.wavevectors[:, 1])
         low, high = self.extremes
-        ux, uy = self._directions[0].tolist()
+        ux, uy = self._directions[0].tolist() if self._is_parallel else (1.0, 0.0)
         return FourierArguments(
             self.amplitudes,
             kx,
@@ -114,6 +112,7 @@ class Fourier(Texture):
             float(length.max()),
             ux,
             uy,
+            self._is_parallel,
             fourth,
         )
 

@@ -3,13 +3,11 @@
 import math
 from typing import NamedTuple
 
-from asperity.contacts.closest.plane_search import next_box, search_box
-from asperity.contacts.sampler_interface import PRUNED_BOX_COST, Derivatives
-from asperity.contacts.sampler_interface import PlanePoint as Point
+from asperity.contacts.sampler_interface import DIVIDE, EXPAND, Bounds, Box, Derivatives, Frame
 from asperity.core.compiled import EVERY_FUNCTION, FloatArray, Kernels, local_array
 from asperity.textures.kinds.sine import cosine, sine, sine_and_cosine
 
-KERNELS = Kernels(provides=EVERY_FUNCTION, shared=("search_plane",), iterates=True)
+KERNELS = Kernels(provides=EVERY_FUNCTION)
 
 
 # Cost of a wave, in evaluations; of a box, and of a wave in its expansion.
@@ -31,10 +29,10 @@ class FourierArguments(NamedTuple):
         min_height: least height [m].
         max_height: greatest height [m].
         wave_number: the greatest one [rad/m].
-        ux: direction of the first wave.
+        ux: direction of the boxes of a search: that of parallel waves, else the x axis.
         uy: likewise.
-        fourth_derivative_bound: bound of the fourth derivatives [1/m³]; without one, as in earlier
-            recordings, a number that prunes nothing.
+        parallel: whether all waves have this direction.
+        fourth_derivative_bound: bound of the fourth derivatives [1/m³].
     """
 
     amplitudes: FloatArray
@@ -48,7 +46,8 @@ class FourierArguments(NamedTuple):
     wave_number: float
     ux: float
     uy: float
-    fourth_derivative_bound: float = 1e300
+    parallel: bool
+    fourth_derivative_bound: float
 
 
 def evaluation_cost(texture: FourierArguments) -> float:
@@ -91,6 +90,40 @@ def sample_hessian(x: float, y: float, texture: FourierArguments) -> Derivatives
         hxy -= texture.kx[i] * texture.ky[i] * s
         hyy -= texture.ky[i] * texture.ky[i] * s
     return h, hx, hy, hxx, hxy, hyy
+
+
+def search_frame(x: float, y: float, texture: FourierArguments) -> Frame:
+    """Return metres from the probe, along parallel waves or along x and y."""
+    return x, y, texture.ux, texture.uy, 1.0, 0.0 if texture.parallel else 1.0
+
+
+def search_region(x: float, y: float, z: float, square: float, texture: FourierArguments) -> Box:
+    """Return the square within the lateral reach of a ball, from the extremes of the height."""
+    gap = max(texture.min_height - z, z - texture.max_height, 0.0)
+    reach = math.sqrt(max(square - gap * gap, 0.0))
+    return -reach, reach, -reach, reach
+
+
+def enclose_box(box: Box, texture: FourierArguments) -> Bounds:
+    """Return bounds everywhere; Taylor's formula cannot decide a box of several waves."""
+    hessian = texture.hessian_bound
+    half = 0.5 * (box[1] - box[0])
+    effort = EXPAND if half * texture.wave_number < 1.5 else DIVIDE
+    third = texture.third_derivative_bound
+    return texture.min_height, texture.max_height, hessian, third, hessian, effort
+
+
+def expand_box(
+    x: float, y: float, z: float, r: float, bounds: Bounds, left: float, texture: FourierArguments
+) -> tuple[Derivatives, tuple[float, float, float], float]:
+    """Return the derivatives along the axes of the box, and sharp remainders."""
+    left -= BOX_COST + BOX_WAVE_COST * texture.amplitudes.size
+    derivatives, remainders = expand_waves(x, y, z, r, texture)
+    if texture.parallel:
+        h, hx, hy, hxx, _hxy, hyy = derivatives
+        slope = hx * texture.ux + hy * texture.uy
+        derivatives = (h, slope, 0.0, hxx + hyy, 0.0, 0.0)
+    return derivatives, remainders, left
 
 
 def expand_waves(
@@ -144,41 +177,3 @@ def expand_waves(
     rate += 4.0 * slope * third + 3.0 * hessian * hessian
     tangent_error = (0.5 * norm + third * r / 6.0) * r * r
     return (h, hx, hy, hxx, hxy, hyy), ((change + 0.5 * rate * r) * r, tangent_error, third)
-
-
-def search_plane(
-    x: float, y: float, z: float, best: Point, pruning_factor: float, budget: float,
-    texture: FourierArguments,
-) -> tuple[Point, float]:  # fmt: skip
-    """Return the best point after a search of all that may be closer, and the remaining budget.
-
-    A closer point lies in a square around the probe, whose half-width follows from the distance of
-    the best point and the extremes of the height. The square is divided into quarters.
-    """
-    gap = max(texture.min_height - z, z - texture.max_height, 0.0)
-    reach = math.sqrt(max(best[2] - gap * gap, 0.0))
-    u = 0.5 + 0.5 * (best[0] - x) / max(reach, 1e-300)
-    v = 0.5 + 0.5 * (best[1] - y) / max(reach, 1e-300)
-    level = 0 if reach > 0.0 else 1
-    i = j = 0
-    side = 1.0
-    while level <= 0 and budget > 0.0:
-        budget -= PRUNED_BOX_COST
-        half = reach * side
-        cx = (2 * j + 1) * half - reach
-        cy = (2 * i + 1) * half - reach
-        near_x = max(abs(cx) - half, 0.0)
-        near_y = max(abs(cy) - half, 0.0)
-        deeper = near_x * near_x + near_y * near_y + gap * gap < best[2] * pruning_factor
-        # Taylor's formula cannot decide a box of several waves.
-        if deeper and half * texture.wave_number < 1.5:
-            budget -= BOX_COST + BOX_WAVE_COST * texture.amplitudes.size
-            r = math.sqrt(2.0) * half
-            derivatives, remainders = expand_waves(x + cx, y + cy, z, r, texture)
-            best, deeper, budget = search_box(
-                (x, y, z), x + cx, y + cy, half, half, derivatives, remainders,
-                best, pruning_factor, budget, texture,
-            )  # fmt: skip
-            deeper = deeper and level > -48
-        level, side, i, j = next_box(deeper, level, side, i, j, 0, u, v)
-    return best, budget

@@ -1,11 +1,13 @@
-"""Cubic B-spline weights, mirrored borders and pyramid boxes, shared by profiles and maps."""
+"""Records of splines, cubic B-spline weights and mirrored borders, shared by profiles and maps."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.core.compiled import EVERY_FUNCTION, SQRT_EPS, Kernels
+from asperity.contacts.sampler_interface import Ball
+from asperity.core.compiled import EVERY_FUNCTION, FloatArray, Kernels
 
 KERNELS = Kernels(provides=EVERY_FUNCTION)
 
@@ -13,6 +15,41 @@ KERNELS = Kernels(provides=EVERY_FUNCTION)
 SIXTH = 1.0 / 6.0
 
 Vector4 = tuple[float, float, float, float]
+
+
+class SplineArguments(NamedTuple):
+    """Record of a map passed to the functions below.
+
+    Attributes:
+        c: coefficients [m], with one extra row and column before the first cell and two after the
+            last.
+        ix: nodes per metre along x.
+        iy: along y.
+        x0: the first node [m].
+        y0: likewise.
+        periodic: whether the map repeats.
+        boxes: bounds of the boxes of the pyramid, see :mod:`asperity.textures.spline.pyramid`.
+        levels: index of the first box and numbers of rows and columns of each level.
+    """
+
+    c: FloatArray
+    ix: float
+    iy: float
+    x0: float
+    y0: float
+    periodic: bool
+    boxes: NDArray[np.float32]
+    levels: NDArray[np.int64]
+
+
+def cell_counts(texture: SplineArguments) -> tuple[int, int]:
+    """Return the number of cells along x and y; a profile has one along y."""
+    return texture.c.shape[1] - 3, max(texture.c.shape[0] - 3, 1)
+
+
+def cell_sides(texture: SplineArguments) -> tuple[float, float]:
+    """Return the sides of a cell [m]; that of a profile is 0 along y."""
+    return 1.0 / texture.ix, 0.0 if texture.c.shape[0] == 1 else 1.0 / texture.iy
 
 
 def fold_coordinate(u: float, cells: int, periodic: bool) -> tuple[float, float]:
@@ -39,6 +76,38 @@ def find_cell(
     u, sign = fold_coordinate((x - start) * per_metre, cells, periodic)
     i = min(int(u), cells - 1)
     return i, u - i, sign
+
+
+def fold_cells(
+    low: float, high: float, cells: int, periodic: bool
+) -> tuple[int, int, float, float]:
+    """Return the first and last cell of a range in the map itself, and the sign and shift.
+
+    The coordinate in the map is sign times that of the box, plus the shift. A range across a border
+    of copies has all cells and the sign 0.
+    """
+    if low >= 0.0 and high <= cells:
+        return int(low), max(math.ceil(high) - 1, 0), 1.0, 0.0
+    copy = float(math.floor(low / cells))
+    if high > (copy + 1.0) * cells:
+        return 0, cells - 1, 0.0, 0.0
+    if periodic or copy == 2.0 * math.floor(0.5 * copy):
+        shift = -copy * cells
+        return int(low + shift), max(math.ceil(high + shift) - 1, 0), 1.0, shift
+    shift = (copy + 1.0) * cells
+    return int(shift - high), max(math.ceil(shift - low) - 1, 0), -1.0, shift
+
+
+def unfold_cells(first: int, last: int, sign: float, shift: float) -> tuple[float, float]:
+    """Return the range of box coordinates of cells of the map."""
+    start = sign * (first - shift)
+    end = sign * (last + 1 - shift)
+    return min(start, end), max(start, end)
+
+
+def probe_cells(ball: Ball, texture: SplineArguments) -> tuple[float, float]:
+    """Return the box coordinates of the probe."""
+    return (ball[0] - texture.x0) * texture.ix, (ball[1] - texture.y0) * texture.iy
 
 
 def dot4(a: Vector4, b: Vector4) -> float:
@@ -69,54 +138,3 @@ def bspline_second_weights(t: float) -> Vector4:
     """Return the second derivatives of the weights by t."""
     r = 1.0 - t
     return r, 3.0 * t - 2.0, 3.0 * r - 2.0, t
-
-
-def tile_transform(
-    tile: int, cells: int, per_metre: float, start: float, periodic: bool
-) -> tuple[float, float]:
-    """Return t, s such that x -> t x + s maps a copy of the cells onto the cells themselves."""
-    length = cells / per_metre
-    if periodic or tile % 2 == 0:
-        return 1.0, -tile * length
-    return -1.0, 2.0 * start + (tile + 1) * length
-
-
-def box_bounds(boxes: NDArray[np.float32], k: int) -> Vector4:
-    """Return the least and greatest height and the bounds K, T of box k of the pyramid."""
-    return float(boxes[k, 0]), float(boxes[k, 1]), float(boxes[k, 2]), float(boxes[k, 3])
-
-
-def lateral_reach(z: float, best: float, boxes: NDArray[np.float32]) -> float:
-    """Return the lateral distance beyond which no surface point is closer than the best one [m].
-
-    It follows from the extremes of the whole surface, which are in the last box.
-    """
-    low, high, _hessian, _third = box_bounds(boxes, boxes.shape[0] - 1)
-    gap = max(low - z, z - high, 0.0)
-    return math.sqrt(max(best - gap * gap, 0.0))
-
-
-def max_copy_distance(length: float, periodic: bool) -> float:
-    """Return the greatest distance of the closest copy of a point along a tiled axis [m].
-
-    Mirrored copies may all be one length away; the factor allows for rounding.
-    """
-    return length * (0.5 if periodic else 1.0) * (1.0 + 0.07 * SQRT_EPS)
-
-
-def is_taylor_conclusive(
-    z: float,
-    low: float,
-    high: float,
-    hessian_bound: float,
-    third_derivative_bound: float,
-    side: float,
-    per_metre: float,
-) -> bool:
-    """Return whether Taylor's formula at its centre may decide a box of several cells.
-
-    That is, whether Q of ``plane_search`` changes by less than 1 there on a surface that is not
-    very steep.
-    """
-    gap = max(abs(low - z), abs(high - z)) * per_metre
-    return (gap * third_derivative_bound + 3.0 * hessian_bound) * side < 1.0

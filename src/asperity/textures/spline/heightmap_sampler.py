@@ -1,52 +1,19 @@
 """h = Σ c_ij β(x/p_x - j) β(y/p_y - i), a bicubic B-spline."""
 
-from typing import NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
-
 from asperity.contacts.sampler_interface import Derivatives
 from asperity.core.compiled import EVERY_FUNCTION, FloatArray, Kernels
 from asperity.textures.spline.bspline_kernels import (
+    SplineArguments,
     Vector4,
     bspline_first_weights,
     bspline_second_weights,
     bspline_weights,
+    cell_counts,
     dot4,
     find_cell,
 )
 
 KERNELS = Kernels(provides=EVERY_FUNCTION)
-
-
-class HeightMapArguments(NamedTuple):
-    """Record of a map passed to the functions below.
-
-    Attributes:
-        c: coefficients [m], with one extra row and column before the first cell and two after the
-            last.
-        ix: nodes per metre along x.
-        iy: along y.
-        x0: the first node [m].
-        y0: likewise.
-        periodic: whether the map repeats.
-        boxes: bounds of the boxes of the pyramid, see :mod:`asperity.textures.spline.pyramid`.
-        levels: index of the first box and numbers of rows and columns of each level.
-    """
-
-    c: FloatArray
-    ix: float
-    iy: float
-    x0: float
-    y0: float
-    periodic: bool
-    boxes: NDArray[np.float32]
-    levels: NDArray[np.int64]
-
-
-def cell_counts(c: FloatArray) -> tuple[int, int]:
-    """Return the number of cells along x and y."""
-    return c.shape[1] - 3, c.shape[0] - 3
 
 
 def row_sum(c: FloatArray, i: int, j: int, w: Vector4) -> float:
@@ -64,17 +31,17 @@ def row_sums(c: FloatArray, i: int, j: int, w: Vector4) -> Vector4:
     )
 
 
-def sample_height(x: float, y: float, texture: HeightMapArguments) -> float:
+def sample_height(x: float, y: float, texture: SplineArguments) -> float:
     """Return h [m]."""
-    nx, ny = cell_counts(texture.c)
+    nx, ny = cell_counts(texture)
     j, t, _sx = find_cell(x, texture.x0, texture.ix, nx, texture.periodic)
     i, r, _sy = find_cell(y, texture.y0, texture.iy, ny, texture.periodic)
     return dot4(bspline_weights(r), row_sums(texture.c, i, j, bspline_weights(t)))
 
 
-def sample_gradient(x: float, y: float, texture: HeightMapArguments) -> tuple[float, float, float]:
+def sample_gradient(x: float, y: float, texture: SplineArguments) -> tuple[float, float, float]:
     """Return h [m], h_x, h_y [1]."""
-    nx, ny = cell_counts(texture.c)
+    nx, ny = cell_counts(texture)
     j, t, sx = find_cell(x, texture.x0, texture.ix, nx, texture.periodic)
     i, r, sy = find_cell(y, texture.y0, texture.iy, ny, texture.periodic)
     rows = row_sums(texture.c, i, j, bspline_weights(t))
@@ -83,9 +50,9 @@ def sample_gradient(x: float, y: float, texture: HeightMapArguments) -> tuple[fl
     return dot4(w, rows), hx, sy * texture.iy * dot4(bspline_first_weights(r), rows)
 
 
-def sample_hessian(x: float, y: float, texture: HeightMapArguments) -> Derivatives:
+def sample_hessian(x: float, y: float, texture: SplineArguments) -> Derivatives:
     """Return h [m], h_x, h_y [1], h_xx, h_xy, h_yy [1/m]."""
-    nx, ny = cell_counts(texture.c)
+    nx, ny = cell_counts(texture)
     j, t, sx = find_cell(x, texture.x0, texture.ix, nx, texture.periodic)
     i, r, sy = find_cell(y, texture.y0, texture.iy, ny, texture.periodic)
     rows = row_sums(texture.c, i, j, bspline_weights(t))

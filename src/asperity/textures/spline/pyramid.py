@@ -29,23 +29,25 @@ BernsteinPart = tuple[Float32Array, tuple[int, ...]]
 
 
 def line_pyramid(c: FloatArray, pitch: float) -> Pyramid:
-    """Return the pyramid of a profile.
+    """Return the pyramid of a profile, as of a map with one row of boxes.
 
     Args:
         c: B-spline coefficients [m], shape (n + 3,).
         pitch: of the nodes [m].
 
     Returns:
-        The boxes of all levels, shape (boxes, 5), and for each level, from the finest on, the
-        index of its first box and its number of boxes, shape (levels, 2).
+        See :func:`plane_pyramid`.
     """
     middle, spread = _midrange(c)
-    second = _upper_bounds(np.abs, np.diff(c, 2), (1,), 1)
-    third = _upper_bounds(np.abs, np.diff(c, 3), (0,), 1)
-    crest = _upper_bounds(np.negative, np.diff(c, 2), (1,), 1)
-    low, high = _height_bounds(c - middle, (3,), 1, spread)
+    # An odd last cell gets a neighbour by odd reflection.
+    c = np.pad(c - middle, (0, (len(c) - 3) % 2), mode="reflect", reflect_type="odd")
+    second = _upper_bounds(np.abs, np.diff(c, 2), (1,), 2)
+    third = _upper_bounds(np.abs, np.diff(c, 3), (0,), 2)
+    crest = _upper_bounds(np.negative, np.diff(c, 2), (1,), 2)
+    low, high = _height_bounds(c, (3,), 2, spread)
     bounds = [low, high, second / pitch, third / pitch, crest / pitch]
-    return _build_levels(_round_outward(middle, bounds))
+    boxes, levels = _build_levels(_round_outward(middle, bounds))
+    return boxes, np.insert(levels, 1, 1, axis=1)
 
 
 def plane_pyramid(c: FloatArray, pitch: tuple[float, float]) -> Pyramid:

@@ -17,8 +17,7 @@ from asperity.core.checks import FloatArray, check_array, check_positive, check_
 from asperity.core.errors import ParameterError
 from asperity.core.memory import require_memory
 from asperity.textures.domain import Domain, GridValues, LineSegments, ScanLine
-from asperity.textures.spline.heightmap_sampler import HeightMapArguments
-from asperity.textures.spline.profile_sampler import ProfileArguments
+from asperity.textures.spline.bspline_kernels import SplineArguments
 from asperity.textures.spline.pyramid import line_pyramid, plane_pyramid
 from asperity.textures.spline.spline_bounds import SplineCells, max_height, spline_segments
 from asperity.textures.texture import Texture, TexturePart
@@ -266,17 +265,19 @@ class Profile(Spline):
     @property
     def sampler(self) -> tuple[ModuleType, ...]:
         """See :class:`Texture`."""
-        from asperity.contacts.closest import line_search
-        from asperity.textures.spline import bspline_kernels, profile_sampler
+        from asperity.textures.spline import profile_sampler
 
-        return profile_sampler, bspline_kernels, line_search
+        return profile_sampler, *_search_modules()
 
     @cached_property
-    def arguments(self) -> ProfileArguments:
+    def arguments(self) -> SplineArguments:
         """See :class:`Texture`."""
         c = self.coefficients
         pyramid = line_pyramid(c, self.pitch)
-        return ProfileArguments(c, 1.0 / self.pitch, self.origin, self.periodic, *pyramid)
+        row = c.reshape(1, -1)
+        return SplineArguments(
+            row, 1.0 / self.pitch, 1.0, self.origin, 0.0, self.periodic, *pyramid
+        )
 
     def _compute_extremes(self) -> tuple[float, float]:
         c = np.lib.stride_tricks.sliding_window_view(self.coefficients, 4)
@@ -344,26 +345,18 @@ class HeightMap(Spline):
     @property
     def sampler(self) -> tuple[ModuleType, ...]:
         """See :class:`Texture`."""
-        from asperity.contacts.closest import plane_budget, plane_search
-        from asperity.textures.spline import (
-            bspline_kernels,
-            heightmap_block_sampler,
-            heightmap_pruning,
-            heightmap_sampler,
-            heightmap_search,
-        )
+        from asperity.textures.spline import heightmap_block_sampler, heightmap_sampler
 
-        search = heightmap_search, heightmap_pruning, plane_search, plane_budget
-        return heightmap_sampler, bspline_kernels, *search, heightmap_block_sampler
+        return heightmap_sampler, *_search_modules(), heightmap_block_sampler
 
     @cached_property
-    def arguments(self) -> HeightMapArguments:
+    def arguments(self) -> SplineArguments:
         """See :class:`Texture`."""
         x0, y0 = self.origin.tolist()
         c = self.coefficients
         (px, py) = self.pitch
         pyramid = plane_pyramid(c, self.pitch)
-        return HeightMapArguments(c, 1.0 / px, 1.0 / py, x0, y0, self.periodic, *pyramid)
+        return SplineArguments(c, 1.0 / px, 1.0 / py, x0, y0, self.periodic, *pyramid)
 
     def _compute_extremes(self) -> tuple[float, float]:
         return -max_height(-self.coefficients), max_height(self.coefficients)
@@ -376,6 +369,14 @@ class HeightMap(Spline):
         while counts[0] * counts[1] > _MAX_SAMPLES:
             counts = [-(-n // 2) for n in counts]
         return counts
+
+
+def _search_modules() -> tuple[ModuleType, ...]:
+    """Return the compiled modules that profiles and maps share."""
+    from asperity.contacts import closest_search, distance_bounds
+    from asperity.textures.spline import bspline_kernels, spline_pruning, spline_search
+
+    return bspline_kernels, spline_search, spline_pruning, closest_search, distance_bounds
 
 
 def fit_spline(heights: ArrayLike, pitch: Sequence[float], **options: Any) -> Profile | HeightMap:

@@ -7,18 +7,54 @@ on random boxes and is sharp on a constructed one.
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import pytest
 
-from asperity.contacts.closest import line_search as line
-from asperity.contacts.closest import plane_search as search
-from asperity.contacts.sampler_interface import ROUNDING_SLACK
+from asperity.contacts import closest_search, distance_bounds
+from asperity.contacts.sampler_interface import EXPAND, ROUNDING_SLACK
 from asperity.core.compiled import EPS
 
+Point = tuple[float, ...]
 Cubic = np.ndarray  # coefficients of x^i y^j, i + j <= 3, shape (4, 4)
 LEVEL = (0.0, 0.0, 0.0)  # a probe below the origin
 UNLIMITED = (1.0 - ROUNDING_SLACK * EPS, 1e9)  # keep everything nearer, unlimited budget
+
+
+Sampler = Callable[..., tuple[float, ...]]
+
+
+@pytest.fixture
+def link_sampler(monkeypatch: pytest.MonkeyPatch) -> Callable[[Sampler], None]:
+    """Return a function that binds a sampler as the linker does."""
+
+    def bind(sampler: Sampler) -> None:
+        monkeypatch.setattr(distance_bounds, "sample_hessian", sampler)
+        monkeypatch.setattr(closest_search, "sample_hessian", sampler)
+        monkeypatch.setattr(distance_bounds, "evaluation_cost", closest_search.evaluation_cost)
+
+    return bind
+
+
+def evaluate_box(
+    probe: Sequence[float], box: Sequence[float], k: float, t: float, best: Point, c: Cubic
+) -> tuple[Point, bool, float]:
+    """Decide a box (centre, half-widths) with bounds K and T: the best point, is it open, left.
+
+    A half-width of 0 makes it a segment of a line.
+    """
+    x, y, z = map(float, probe)
+    cx, cy, a, b = box
+    frame = (0.0, 0.0, 1.0, 0.0, 1.0, 1.0 if b > 0.0 else 0.0)
+    corners = (cx - a, cx + a, cy - b, cy + b) if b > 0.0 else (cx - a, cx + a, 0.0, 0.0)
+    factor, left = UNLIMITED
+    minimum = (best[0], best[1] if b > 0.0 else 0.0, 0.0, -np.inf, 0.0, 0.0, 0.0)
+    ball, bounds = (x, y, z, best[2] * factor), (-np.inf, np.inf, k, t, k, EXPAND)
+    result, _near, _last, is_open, left = closest_search.expand_and_prune(
+        ball, frame, corners, bounds, best, minimum, minimum, left, c
+    )
+    return result, is_open, left
 
 
 def derivative(c: Cubic, x: np.ndarray, y: np.ndarray, dx: int = 0, dy: int = 0) -> np.ndarray:
@@ -80,7 +116,7 @@ def box_points(a: float, b: float, count: int) -> np.ndarray:
 def remainders(c: Cubic, probe: np.ndarray, a: float, b: float) -> tuple[float, float]:
     h, hx, hy, hxx, hxy, hyy = curvature(0.0, 0.0, c)
     hessian_norm = float(np.sqrt(hxx**2 + 2.0 * hxy**2 + hyy**2))
-    return search.taylor_remainders(
+    return distance_bounds.taylor_remainders(
         float(np.hypot(a, b)), h - probe[2], float(np.hypot(hx, hy)), hessian_norm, *bounds(c, a, b)
     )
 
@@ -134,10 +170,10 @@ def is_pruned(c: Cubic, probe: np.ndarray, a: float, b: float, enough: float) ->
     h, hx, hy, _hxx, _hxy, _hyy = curvature(0.0, 0.0, c)
     _phi, _slope, q = expansion(c, probe, np.zeros((1, 2)))
     entries = (float(q[0, 0, 0]), float(q[0, 0, 1]), float(q[0, 1, 1]))
-    low, _high = search.symmetric_eigenvalues(*entries)
+    low, _high = distance_bounds.symmetric_eigenvalues(*entries)
     offset = (-probe[0], -probe[1], h - probe[2])
     change, lift = remainders(c, probe, a, b)
-    return search.can_prune(offset, hx, hy, entries, low, change, lift, a, b, enough)
+    return distance_bounds.can_prune(offset, hx, hy, entries, low, change, lift, a, b, enough)
 
 
 def distance_lower_bound(c: Cubic, probe: np.ndarray, a: float, b: float) -> float:
@@ -212,9 +248,9 @@ def test_box_is_pruned_iff_it_has_no_level_point(share: float, pruned: bool):
 # --- evaluating a box -----------------------------------------------------------------------------
 
 
-def test_closed_box_contains_no_better_minimum(monkeypatch: pytest.MonkeyPatch):
+def test_closed_box_contains_no_better_minimum(link_sampler: Callable[[Sampler], None]):
     """Random boxes of surfaces in two dimensions; minima by a dense grid."""
-    monkeypatch.setattr(search, "sample_hessian", curvature)
+    link_sampler(curvature)
     rng = np.random.default_rng(43)
     closed = with_minima = 0
     for _ in range(600):
@@ -222,9 +258,7 @@ def test_closed_box_contains_no_better_minimum(monkeypatch: pytest.MonkeyPatch):
         position = rng.choice([1.0, 4.0]) * rng.uniform(-1.0, 1.0, 2)
         probe = stationary_probe(c, *(np.array([a, b]) * position), rng.exponential())
         best = (9.0, 9.0, 1e9, 0.0, 0.0, 0.0)
-        result, is_open, _left = search.evaluate_box(
-            *probe, 0.0, 0.0, a, b, *bounds(c, a, b), best, *UNLIMITED, c
-        )
+        result, is_open, _left = evaluate_box(probe, (0.0, 0.0, a, b), *bounds(c, a, b), best, c)
         if is_open:
             continue
         closed += 1
@@ -241,41 +275,26 @@ def test_closed_box_contains_no_better_minimum(monkeypatch: pytest.MonkeyPatch):
     assert with_minima > 20
 
 
-def profile(x: float, c: np.ndarray) -> tuple[float, ...]:
-    """Return the polynomial's derivatives like the sampler of a profile."""
-    return tuple(float(np.polynomial.Polynomial(c).deriv(n)(x)) for n in range(3))
-
-
 def profile_as_map(x: float, _y: float, c: np.ndarray) -> tuple[float, ...]:
-    h, h1, h2 = profile(x, c)
+    h, h1, h2 = (float(np.polynomial.Polynomial(c).deriv(n)(x)) for n in range(3))
     return h, h1, 0.0, h2, 0.0, 0.0
 
 
-@pytest.mark.parametrize("as_map", [False, True])
-def test_closed_interval_contains_no_better_minimum(as_map: bool, monkeypatch: pytest.MonkeyPatch):
+@pytest.mark.parametrize("across", [1e-3, 0.0])
+def test_closed_interval_contains_no_better_minimum(
+    across: float, link_sampler: Callable[[Sampler], None]
+):
     """In one dimension all minima are roots of a quintic; an interval may contain several."""
-    monkeypatch.setattr(line, "sample_profile", profile)
-    monkeypatch.setattr(search, "sample_hessian", profile_as_map)
+    link_sampler(profile_as_map)
     rng = np.random.default_rng(44)
     closed = with_minima = 0
     for _ in range(6000):
         c = rng.normal(size=4) * [1.0, 1.0, 0.8, 0.6]
         x, z, r = 0.3 * rng.normal(), -rng.exponential(1.0), rng.uniform(0.02, 0.5)
-        hessian_bound, third_bound = (
-            max(abs(2 * c[2] + 6 * c[3] * r), abs(2 * c[2] - 6 * c[3] * r)),
-            6 * abs(c[3]),
-        )
-        if as_map:
-            start = (9.0, 9.0, 1e9, 0.0, 0.0, 0.0)
-            box = (0.0, 0.0, r, 1e-3, hessian_bound, third_bound)
-            result, is_open, _left = search.evaluate_box(x, 0.0, z, *box, start, *UNLIMITED, c)
-            best = result[2]
-        else:
-            line_start = (9.0, 1e9, 0.0, 0.0)
-            line_result, is_open, _left = line.evaluate_box(
-                x, z, 0.0, r, hessian_bound, third_bound, line_start, *UNLIMITED, c
-            )
-            best = line_result[1]
+        ends = abs(2 * c[2] + 6 * c[3] * r), abs(2 * c[2] - 6 * c[3] * r)
+        start, box = (9.0, 9.0, 1e9, 0.0, 0.0, 0.0), (0.0, 0.0, r, across)
+        probe = (x, 0.0, z)
+        result, is_open, _left = evaluate_box(probe, box, max(ends), 6 * abs(c[3]), start, c)
         if is_open:
             continue
         closed += 1
@@ -286,147 +305,144 @@ def test_closed_interval_contains_no_better_minimum(as_map: bool, monkeypatch: p
         minima = real[(np.abs(real) < 0.999 * r) & (phi.deriv(2)(real) > 1e-6)]
         if len(minima):
             with_minima += 1
-            assert best <= phi(minima).min() * (1 + 1e-9)
+            assert result[2] <= phi(minima).min() * (1 + 1e-9)
     assert closed > 2000
     assert with_minima > 200
 
 
-def test_box_stays_open_when_the_descent_leaves_it(monkeypatch: pytest.MonkeyPatch):
+def test_box_stays_open_when_the_descent_leaves_it(
+    monkeypatch: pytest.MonkeyPatch, link_sampler: Callable[[Sampler], None]
+):
     """Newton's method was expected to end in the box and did not, so the box is divided."""
-    monkeypatch.setattr(search, "sample_hessian", profile_as_map)
-    monkeypatch.setattr(line, "sample_profile", profile)
+    link_sampler(profile_as_map)
     flat, end = np.zeros(4), (0.0, 0.0)
     monkeypatch.setattr(
-        search, "descend_within_budget", lambda *_: ((*end, 0.5, 0.0, 0.0, 0.0), 1.0)
+        closest_search, "descend_within_budget", lambda *_: ((*end, 0.5, 0.0, 0.0, 0.0), 1.0)
     )
-    monkeypatch.setattr(line, "descend_within_budget", lambda *_: ((end[0], 0.5, 0.0, 0.0), 1.0))
-    start = ((9.0, 9.0, 1e9, 0.0, 0.0, 0.0), *UNLIMITED)
-    line_start = ((9.0, 1e9, 0.0, 0.0), *UNLIMITED)
+    start = (9.0, 9.0, 1e9, 0.0, 0.0, 0.0)
     for x, y in ((0.3, 0.0), (0.101, 0.0), (-0.101, 0.0), (0.0, 0.101), (0.0, -0.101), (0.1, 0.1)):
         end = x, y
-        box = (0.0, 0.0, 0.1, 0.1, 0.0, 0.0)
-        best, is_open, _left = search.evaluate_box(0.05, 0.0, -1.0, *box, *start, flat)
+        probe = (0.05, 0.0, -1.0)
+        best, is_open, _left = evaluate_box(probe, (0.0, 0.0, 0.1, 0.1), 0.0, 0.0, start, flat)
         assert (best[:2], is_open) == (end, max(abs(x), abs(y)) > 0.1)
-        best, is_open, _left = line.evaluate_box(0.05, -1.0, 0.0, 0.1, 0.0, 0.0, *line_start, flat)
+        best, is_open, _left = evaluate_box(probe, (0.0, 0.0, 0.1, 0.0), 0.0, 0.0, start, flat)
         assert (best[0], is_open) == (x, abs(x) > 0.1)
 
 
-def test_descent_starts_at_the_best_point_or_a_newton_step(monkeypatch: pytest.MonkeyPatch):
+def test_descent_starts_at_the_best_point_or_a_newton_step(
+    monkeypatch: pytest.MonkeyPatch, link_sampler: Callable[[Sampler], None]
+):
     """At the best point if it lies in the box; above a plane Newton's step ends over the probe."""
-    monkeypatch.setattr(search, "sample_hessian", profile_as_map)
-    monkeypatch.setattr(line, "sample_profile", profile)
+    link_sampler(profile_as_map)
     starts: list[tuple[float, ...]] = []
 
     def record_start(*arguments: float) -> tuple[tuple[float, ...], float]:
-        start = arguments[3:5] if len(arguments) == 7 else arguments[2:3]
-        starts.append(start)
-        return (*start, *[0.0] * (len(arguments) - 3)), 1.0
+        starts.append(arguments[3:5])
+        return (*starts[-1], *[0.0] * 4), 1.0
 
-    monkeypatch.setattr(search, "descend_within_budget", record_start)
-    monkeypatch.setattr(line, "descend_within_budget", record_start)
+    monkeypatch.setattr(closest_search, "descend_within_budget", record_start)
     flat, newton_point = np.zeros(4), (0.52, 0.31)
     for x, y in itertools.product((0.45, -0.45, 0.61), (0.35, -0.35, 0.41)):
         is_inside = (x, y) == (0.45, 0.35)
         best = (x, y, 1e9, 0.0, 0.0, 0.0)
-        search.evaluate_box(
-            *newton_point, -1.0, 0.5, 0.3, 0.1, 0.1, 0.0, 0.0, best, *UNLIMITED, flat
-        )
+        probe = (*newton_point, -1.0)
+        evaluate_box(probe, (0.5, 0.3, 0.1, 0.1), 0.0, 0.0, best, flat)
         assert starts.pop() == pytest.approx((x, y) if is_inside else newton_point, abs=1e-15)
-        line.evaluate_box(0.52, -1.0, 0.5, 0.1, 0.0, 0.0, (x, 1e9, 0.0, 0.0), *UNLIMITED, flat)
-        assert starts.pop() == pytest.approx((0.45 if x == 0.45 else 0.52,), abs=1e-15)
+        evaluate_box((0.52, 0.0, -1.0), (0.5, 0.0, 0.1, 0.0), 0.0, 0.0, best, flat)
+        assert starts.pop()[0] == pytest.approx(0.45 if x == 0.45 else 0.52, abs=1e-15)
 
 
-@pytest.mark.parametrize(("best_x", "evaluations"), [(0.05, 2), (0.5, 1)])
 def test_every_evaluation_of_an_undecided_box_is_charged(
-    monkeypatch: pytest.MonkeyPatch, best_x: float, evaluations: int
+    monkeypatch: pytest.MonkeyPatch, link_sampler: Callable[[Sampler], None]
 ):
-    """At the centre, and again where the best point lies in the box and is checked."""
-    monkeypatch.setattr(search, "sample_hessian", curvature)
-    monkeypatch.setattr(search, "evaluation_cost", lambda _texture: 7.0)
-    monkeypatch.setattr(search, "is_least_within", lambda *_arguments: True)
-    best, wide_bounds = (best_x, 0.0, 1e9, 0.0, 0.0, 0.0), (1e3, 1e3)
-    *_rest, left = search.evaluate_box(
-        0.0, 0.0, -1.0, 0.0, 0.0, 0.1, 0.1, *wide_bounds, best, *UNLIMITED, np.zeros((4, 4))
-    )
-    assert UNLIMITED[1] - left == 7.0 * evaluations
+    """Once, at the centre, at the cost of the kind."""
+    link_sampler(curvature)
+    monkeypatch.setattr(closest_search, "evaluation_cost", lambda _texture: 7.0)
+    best, wide_bounds = (0.5, 0.0, 1e9, 0.0, 0.0, 0.0), (1e3, 1e3)
+    box = (0.0, 0.0, 0.1, 0.1)
+    _best, is_open, left = evaluate_box(LEVEL, box, *wide_bounds, best, np.zeros((4, 4)))
+    assert is_open
+    assert UNLIMITED[1] - left == 7.0
 
 
-def test_level_point_on_the_border_is_not_pruned_by_rounding(monkeypatch: pytest.MonkeyPatch):
+def test_level_point_on_the_border_is_not_pruned_by_rounding(
+    link_sampler: Callable[[Sampler], None],
+):
     """On planes of any slope: the slack for rounding grows with Q."""
-    monkeypatch.setattr(line, "sample_profile", profile)
+    link_sampler(curvature)
     rng = np.random.default_rng(46)
     for slope in np.geomspace(1.0, 1e5, 100):
         c, (a, b) = np.zeros((4, 4)), rng.uniform(0.01, 0.3, 2)
         c[1, 0] = slope
         probe = stationary_probe(c, a, b, rng.exponential())
         assert not is_pruned(c, probe, a, b, np.inf)
-        start = ((9.0, 1e99, 0.0, 0.0), *UNLIMITED)
-        best, *_rest = line.evaluate_box(probe[0], probe[2], 0.0, a, 0.0, 0.0, *start, c[:, 0])
+        start = (9.0, 9.0, 1e99, 0.0, 0.0, 0.0)
+        on_line = (probe[0], 0.0, probe[2])
+        best, *_rest = evaluate_box(on_line, (0.0, 0.0, a, 0.0), 0.0, 0.0, start, c)
         assert best[0] == pytest.approx(a, rel=1e-9)
 
 
-def test_interval_is_pruned_iff_it_has_no_level_point(monkeypatch: pytest.MonkeyPatch):
+def test_interval_is_pruned_iff_it_has_no_level_point(link_sampler: Callable[[Sampler], None]):
     """The slope at the centre is just below and just above the greatest change in the interval."""
-    monkeypatch.setattr(line, "sample_profile", profile)
+    link_sampler(profile_as_map)
     gap, third, r = 1.0, 0.4, 0.3
     c = np.array([0.0, 0.0, 0.0, -third / 6.0])
     limit = r + 0.5 * third * gap * r * r
     for share, pruned in ((0.99, False), (1.04, True)):
-        start = (9.0, 1e9, 0.0, 0.0)
-        derivative_bounds = (third * r, third)
-        best, is_open, _left = line.evaluate_box(
-            -share * limit, -gap, 0.0, r, *derivative_bounds, start, *UNLIMITED, c
-        )
+        start = (9.0, 9.0, 1e9, 0.0, 0.0, 0.0)
+        probe = (-share * limit, 0.0, -gap)
+        best, is_open, _left = evaluate_box(probe, (0.0, 0.0, r, 0.0), third * r, third, start, c)
         assert (best == start and not is_open) == pruned
 
 
-def test_descent_ends_at_a_local_minimum(monkeypatch: pytest.MonkeyPatch):
+def test_descent_ends_at_a_local_minimum(link_sampler: Callable[[Sampler], None]):
     """Far away the Newton steps are too long and are halved until φ decreases."""
-    monkeypatch.setattr(search, "sample_hessian", curvature)
-    monkeypatch.setattr(line, "sample_profile", profile)
     rng = np.random.default_rng(47)
     for _ in range(100):
+        link_sampler(curvature)
         c, start = cubic(rng, 1.0), 3.0 * rng.normal(size=2)
         probe = np.append(rng.normal(size=2), -rng.exponential(2.0))
-        x, y, phi, *_surface = search.descend(*probe, *start, c)
+        x, y, phi, *_surface = distance_bounds.descend(*probe, *start, c)
         _phi, slope, q = expansion(c, probe, np.array([[x, y]]))
         assert np.hypot(*slope[0]) <= 1e-6 * np.linalg.norm(q[0], 2)
         assert np.linalg.eigvalsh(q[0])[0] > 0.0
         assert phi <= expansion(c, probe, start[None])[0][0]
+        link_sampler(profile_as_map)
         h = np.polynomial.Polynomial(c[:, 0])
         squared_distance = np.polynomial.Polynomial([-probe[0], 1.0]) ** 2 + (h - probe[2]) ** 2
-        x, phi, *_profile = line.descend(probe[0], probe[2], start[0], c[:, 0])
+        x, y, phi, *_profile = distance_bounds.descend(*probe, start[0], probe[1], c[:, 0])
+        assert y == probe[1]
         assert abs(squared_distance.deriv()(x)) <= 1e-6 * squared_distance.deriv(2)(x)
         assert phi <= squared_distance(start[0])
 
 
-def test_descent_respects_its_budget(monkeypatch: pytest.MonkeyPatch):
+def test_descent_respects_its_budget(link_sampler: Callable[[Sampler], None]):
     """A truncated descent returns the lowest point evaluated."""
-    monkeypatch.setattr(search, "sample_hessian", curvature)
-    monkeypatch.setattr(line, "sample_profile", profile)
+    link_sampler(curvature)
     c, probe = cubic(np.random.default_rng(48), 1.0), (0.3, -0.2, -1.0)
     last = np.inf
     for budget in range(1, 40):
-        best, left = search.descend_within_budget(*probe, 3.0, -2.0, float(budget), c)
+        best, left = distance_bounds.descend_within_budget(*probe, 3.0, -2.0, float(budget), c)
         assert left >= 0.0
         assert best[2] <= last
         last = best[2]
-        line_result, line_left = line.descend_within_budget(0.3, -1.0, 3.0, float(budget), c[:, 0])
-        assert line_left >= 0.0
-        assert line_result[1] >= line.descend(0.3, -1.0, 3.0, c[:, 0])[1]
     assert left > 0.0
-    assert best == search.descend(*probe, 3.0, -2.0, c)
+    assert best == distance_bounds.descend(*probe, 3.0, -2.0, c)
 
 
-def test_next_box_visits_every_box_once():
+def test_division_visits_every_box_once():
     """Three levels deep, from every side: 64 boxes, the nearest first."""
     for u, v in itertools.product((0.1, 3.3, 7.9), repeat=2):
-        visited = []
-        level, side, i, j = 3, 8.0, 0, 0
-        while level <= 3:
-            if level == 0:
-                visited.append((i, j))
-            level, side, i, j = search.next_box(level > 0, level, side, i, j, 3, u, v)
+        visited, stack = [], np.empty((256, 5))
+        minimum, frame = (u, v, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0, 1.0, 1.0)
+        count = closest_search.push_box((0.0, 8.0, 0.0, 8.0), 0.0, stack, 0)
+        while count > 0:
+            count -= 1
+            box = tuple(stack[count, :4].tolist())
+            if box[1] - box[0] == 1.0:
+                visited.append((int(box[2]), int(box[0])))
+            else:
+                count = closest_search.split_box(frame, minimum, box, stack, count, None)
         assert sorted(visited) == [(i, j) for i in range(8) for j in range(8)]
         assert visited[0] == (int(v), int(u))
 
@@ -441,35 +457,47 @@ def test_supporting_bound_holds_on_random_boxes_and_is_sharp_on_a_plane():
         h, *_rest = derivatives = curvature(0.0, 0.0, c)
         offset = (-probe[0], -probe[1], h - probe[2])
         _k, t = bounds(c, a, b)
-        bound = search.supporting_bound(offset, derivatives, t, a, b)
+        bound = distance_bounds.supporting_bound(offset, derivatives, t, a, b)
         phi, _p, _q = expansion(c, probe, box_points(a, b, 41))
         assert bound <= phi.min() * (1.0 + 1e-12)
     plane = (0.0, 40.0, -9.0, 0.0, 0.0, 0.0)
     normal = np.array([-40.0, 9.0, 1.0]) / np.sqrt(1682.0)
     offset = tuple(0.3 * normal + 0.2 * np.array([1.0, 0.0, 40.0]) / np.sqrt(1601.0))
-    bound = search.supporting_bound(offset, plane, 0.0, 0.1, 0.1)
+    bound = distance_bounds.supporting_bound(offset, plane, 0.0, 0.1, 0.1)
     assert bound == pytest.approx(0.09, rel=1e-10)
 
 
-def test_minimum_is_least_where_its_supporting_function_is_convex(monkeypatch: pytest.MonkeyPatch):
-    """Wherever it says so, no sampled point within reach is closer; it does for many minima."""
-    monkeypatch.setattr(search, "sample_hessian", curvature)
+def test_minimum_excludes_a_box_where_its_supporting_function_is_convex(
+    link_sampler: Callable[[Sampler], None],
+):
+    """Wherever it says so, no sampled point of the box is closer; it does for many minima."""
+    link_sampler(curvature)
     rng = np.random.default_rng(12)
-    answers = []
+    frame, answers = (0.0, 0.0, 1.0, 0.0, 1.0, 1.0), []
     for _ in range(300):
         c = cubic(rng, rng.choice([0.1, 0.3]))
         probe = stationary_probe(c, 0.0, 0.0, rng.uniform(0.1, 2.0))
         h, hx, hy, *_rest = curvature(0.0, 0.0, c)
         best = (0.0, 0.0, float(probe @ probe - 2 * h * probe[2] + h * h), h, hx, hy)
-        reach = rng.uniform(0.1, 1.0)
-        side = reach / np.sqrt(2.0)
-        _k, t = bounds(c, side, side)
-        least = search.is_least_within(*probe, best, t, reach, c)
+        minimum = closest_search.minimum_at(tuple(probe), frame, best, c)
+        side = rng.uniform(0.1, 1.0) / np.sqrt(2.0)
+        box, (k, t) = (-side, side, -side, side), bounds(c, side, side)
+        ball = (*probe, best[2])
+        answer = closest_search.excludes_box(
+            ball, frame, minimum, box, (-9.0, 9.0, k, t, k, EXPAND), c
+        )
         phi, _p, _q = expansion(c, probe, box_points(side, side, 41))
-        assert not least or phi.min() >= best[2] * (1.0 - 1e-12)
-        answers.append((least, bool(phi.min() >= best[2] * (1.0 - 1e-12))))
+        assert not answer or phi.min() >= best[2] * (1.0 - 1e-12)
+        answers.append((answer, bool(phi.min() >= best[2] * (1.0 - 1e-12))))
+        # The point must be in the box, and a minimum.
+        outside = (2.0 * side, *minimum[1:])
+        assert not closest_search.excludes_box(
+            ball, frame, outside, box, (-9.0, 9.0, 0.0, 0.0, 0.0, EXPAND), c
+        )
     certified, true = np.array(answers).T
     assert certified.sum() > 0.3 * true.sum()
     assert not true.all()
-    moved = search.is_least_within(0.1, 0.0, -1.0, (0.0, 0.0, 1.01, 0.0, 0.0, 0.0), 0.0, 1.0, 0 * c)
-    assert not moved  # the point is no minimum
+    beside = (0.0, 0.0, 1.01, 0.0, 0.0, 0.0)
+    moved = closest_search.minimum_at((0.1, 0.0, -1.0), frame, beside, 0 * c)
+    flat = (-9.0, 9.0, 0.0, 0.0, 0.0, EXPAND)
+    assert not closest_search.excludes_box((0.1, 0.0, -1.0, 1.01), frame, moved, box, flat, 0 * c)

@@ -1,4 +1,4 @@
-"""Shrinking of windows: dropped cells contain no closer point, and the bounds are tight."""
+"""Narrowing of boxes and the certificate: dropped cells contain no closer point."""
 
 from __future__ import annotations
 
@@ -7,16 +7,19 @@ import math
 import numpy as np
 import pytest
 
-from asperity.contacts.closest import plane_search
+from asperity.contacts import closest_search, distance_bounds
 from asperity.core.checks import FloatArray
 from asperity.textures import HeightMap
-from asperity.textures.spline import heightmap_pruning as pruning
 from asperity.textures.spline import heightmap_sampler as heightmap
-from asperity.textures.spline.heightmap_sampler import HeightMapArguments
+from asperity.textures.spline import spline_pruning as pruning
+from asperity.textures.spline import spline_search as search
+from asperity.textures.spline.bspline_kernels import SplineArguments, cell_counts
 from asperity.textures.spline.pyramid import plane_pyramid
 
 PITCH = (50e-6, 70e-6)
 Point = tuple[float, float, float, float, float, float]
+Ball = tuple[float, float, float, float]
+Window = tuple[int, int, int, int]  # first and last column and row of cells
 
 
 def rough_map(seed: int, height: float = 60e-6) -> HeightMap:
@@ -28,7 +31,7 @@ def rough_map(seed: int, height: float = 60e-6) -> HeightMap:
 
 
 def cells(texture: HeightMap) -> tuple[int, int]:
-    return heightmap.cell_counts(texture.arguments.c)
+    return cell_counts(texture.arguments)
 
 
 def min_squared_distances(texture: HeightMap, probe: FloatArray, finer: int = 8) -> FloatArray:
@@ -42,11 +45,50 @@ def min_squared_distances(texture: HeightMap, probe: FloatArray, finer: int = 8)
     return phi.reshape(ny, finer, nx, finer).min(axis=(1, 3))
 
 
-def min_outside(phi: FloatArray, left: pruning.Window) -> float:
+def is_empty(window: Window) -> bool:
+    return window[0] > window[1] or window[2] > window[3]
+
+
+def shrink_to_cells(ball: Ball, gap: float, window: Window, record: SplineArguments) -> Window:
+    """Return the cells that have a coefficient below the ball's r²."""
+    x, y, z, threshold = ball
+    u, v = (x - record.x0) * record.ix, (y - record.y0) * record.iy
+    return pruning.shrink_to_cells(u, v, z, threshold, gap, *window, record)
+
+
+def shrink_to_boxes(ball: Ball, level: int, window: Window, record: SplineArguments) -> Window:
+    """Return the boxes of a level whose least and greatest height reach into the ball."""
+    frame = search.search_frame(ball[0], ball[1], record)
+    side = 1 << level
+    columns, rows = [], []
+    for i in range(window[2], window[3] + 1, side):
+        for j in range(window[0], window[1] + 1, side):
+            east, north = min(j + side, window[1] + 1), min(i + side, window[3] + 1)
+            box = (float(j), float(east), float(i), float(north))
+            bounds = search.enclose_box(box, record)
+            if closest_search.distance_to_box(ball, frame, box, bounds) < ball[3]:
+                columns += [j, east - 1]
+                rows += [i, north - 1]
+    return (min(columns), max(columns), min(rows), max(rows)) if rows else (1, 0, 1, 0)
+
+
+def is_unique_minimum(
+    x: float, y: float, z: float, best: Point, window: Window, record: SplineArguments
+) -> bool:
+    """Return whether the bounds of second and third derivatives certify a minimum."""
+    west, east, south, north = map(float, window)
+    box = (west, east + 1.0, south, north + 1.0)
+    frame = search.search_frame(x, y, record)
+    minimum = closest_search.minimum_at((x, y, z), frame, best, record)
+    bounds = search.enclose_box(box, record)
+    return closest_search.excludes_box((x, y, z, best[2]), frame, minimum, box, bounds, record)
+
+
+def min_outside(phi: FloatArray, left: Window) -> float:
     """Return the minimum of φ over the cells outside a window."""
     west, east, south, north = left
     rest = phi.copy()
-    if not pruning.is_empty(left):
+    if not is_empty(left):
         rest[south : north + 1, west : east + 1] = np.inf
     return float(rest.min())
 
@@ -75,9 +117,9 @@ def test_dropped_cells_contain_no_closer_point(method: str) -> None:
             for share in (1.0, 0.8):
                 ball = (*map(float, probe), share * threshold)
                 if method == "cells":
-                    left = pruning.shrink_to_cells(ball, g, whole, texture.arguments)
+                    left = shrink_to_cells(ball, g, whole, texture.arguments)
                 else:
-                    left = pruning.shrink_to_boxes(ball, level, whole, texture.arguments)
+                    left = shrink_to_boxes(ball, level, whole, texture.arguments)
                 least = min_outside(phi, left)
                 if share == 1.0:
                     assert least >= threshold
@@ -88,15 +130,17 @@ def test_dropped_cells_contain_no_closer_point(method: str) -> None:
     assert lost > 5
 
 
-def find_minimum(probe: FloatArray, start: FloatArray, texture: HeightMapArguments) -> Point:
+def find_minimum(probe: FloatArray, start: FloatArray, texture: SplineArguments) -> Point:
     """Return the local minimum of φ reached by descent from a start."""
-    return plane_search.descend(*map(float, probe), *map(float, start), texture)
+    return distance_bounds.descend(*map(float, probe), *map(float, start), texture)
 
 
 @pytest.fixture(autouse=True)
 def linked_sampler(monkeypatch: pytest.MonkeyPatch) -> None:
     """Bind the sampler as the linker does."""
-    monkeypatch.setattr(plane_search, "sample_hessian", heightmap.sample_hessian)
+    monkeypatch.setattr(distance_bounds, "sample_hessian", heightmap.sample_hessian)
+    monkeypatch.setattr(distance_bounds, "evaluation_cost", closest_search.evaluation_cost)
+    monkeypatch.setattr(closest_search, "sample_hessian", heightmap.sample_hessian)
 
 
 def test_unique_minimum_is_the_closest_point() -> None:
@@ -123,10 +167,10 @@ def test_unique_minimum_is_the_closest_point() -> None:
             phi = min_squared_distances(texture, probe)[south : north + 1, west : east + 1]
             inside = west <= j <= east and south <= i <= north
             closer = inside and phi.min() < best[2] * (1.0 - 1e-12)
-            claims.append(pruning.is_unique_minimum(*map(float, probe), best, part, record))
+            claims.append(is_unique_minimum(*map(float, probe), best, part, record))
             assert not (claims[-1] and closer)
             assert inside or not claims[-1]
-            wrong += closer and pruning.is_unique_minimum(*map(float, probe), best, part, weakened)
+            wrong += closer and is_unique_minimum(*map(float, probe), best, part, weakened)
     assert 0.1 < np.mean(claims) < 0.9
     assert wrong > 3
 
@@ -136,13 +180,13 @@ def test_unique_minimum_is_the_closest_point() -> None:
 CENTRE = (10.3, 9.6)  # in cells
 
 
-def record_of(c: FloatArray) -> HeightMapArguments:
+def record_of(c: FloatArray) -> SplineArguments:
     """Return the sampler record of a map with given coefficients [m] and a pitch of 1 m."""
     nodes, levels = plane_pyramid(c, (1.0, 1.0))
-    return HeightMapArguments(c, 1.0, 1.0, 0.0, 0.0, False, nodes, levels)
+    return SplineArguments(c, 1.0, 1.0, 0.0, 0.0, False, nodes, levels)
 
 
-def cubic_map(turned: bool, second: float, third: float) -> HeightMapArguments:
+def cubic_map(turned: bool, second: float, third: float) -> SplineArguments:
     """Return h = second t²/2 + third t³/6 along x or y with t = 0 at the centre, as a spline."""
     t = np.arange(-1, 22) - CENTRE[turned]
     line = second * (t**2 / 2 - 1 / 6) + third * (t**3 - t) / 6
@@ -151,7 +195,7 @@ def cubic_map(turned: bool, second: float, third: float) -> HeightMapArguments:
 
 def test_cell_above_the_probe_stays_in_the_window() -> None:
     """The probe is between four nodes, half a cell² farther away than the closest point."""
-    left = pruning.shrink_to_cells(
+    left = shrink_to_cells(
         (10.5, 9.5, -3.0, 9.0 + 0.01), 3.0, (0, 19, 0, 19), record_of(np.zeros((23, 23)))
     )
     west, east, south, north = left
@@ -163,7 +207,7 @@ def test_one_coefficient_keeps_sixteen_cells() -> None:
     c = np.zeros((23, 23))
     c[9, 12] = -0.1
     threshold = 9.0 - 0.67  # slightly less than the coefficient of a flat map above the probe
-    left = pruning.shrink_to_cells((11.0, 8.0, -3.0, threshold), 3.0, (0, 19, 0, 19), record_of(c))
+    left = shrink_to_cells((11.0, 8.0, -3.0, threshold), 3.0, (0, 19, 0, 19), record_of(c))
     assert left == (9, 12, 6, 9)
 
 
@@ -183,7 +227,7 @@ def test_unique_minimum_is_certified_close_to_the_exact_range(
         j, i = 10, 9
         part = [j, j, i, i]
         part[(2 if turned else 0) + (0 if back else 1)] += -cells_ if back else cells_
-        claimed.append(pruning.is_unique_minimum(*CENTRE, -sign * g, best, tuple(part), record))
+        claimed.append(is_unique_minimum(*CENTRE, -sign * g, best, tuple(part), record))
     end = (CENTRE[turned] - (9 if turned else 10)) if back else 1 - CENTRE[turned] % 1
     reach = end + np.arange(1, 9)
     assert not any(claim for claim, r in zip(claimed, reach, strict=True) if r > exact)
@@ -195,10 +239,7 @@ def test_saddle_is_not_a_unique_minimum(sign: float) -> None:
     for share, expected in ((0.95, True), (1.05, False)):
         record = cubic_map(False, -sign * share / 5.0, 0.0)
         best = (*CENTRE, 25.0, 0.0, 0.0, 0.0)
-        assert (
-            pruning.is_unique_minimum(*CENTRE, -sign * 5.0, best, (9, 11, 8, 10), record)
-            == expected
-        )
+        assert is_unique_minimum(*CENTRE, -sign * 5.0, best, (9, 11, 8, 10), record) == expected
 
 
 def test_point_with_a_gradient_is_not_a_unique_minimum() -> None:
@@ -208,12 +249,12 @@ def test_point_with_a_gradient_is_not_a_unique_minimum() -> None:
     j = math.floor((best[0] - 1e-3) / PITCH[0])
     i = math.floor((best[1] + 2e-3) / PITCH[1])
     part = (j - 3, j + 3, i - 3, i + 3)
-    assert pruning.is_unique_minimum(*probe, best, part, texture.arguments)
+    assert is_unique_minimum(*probe, best, part, texture.arguments)
     x = best[0] + 1e-9
     h, hx, hy = heightmap.sample_gradient(x, best[1], texture.arguments)
     phi = (x - probe[0]) ** 2 + (best[1] - probe[1]) ** 2 + (h - probe[2]) ** 2
     beside = (x, best[1], phi, h, hx, hy)
-    assert not pruning.is_unique_minimum(*probe, beside, part, texture.arguments)
+    assert not is_unique_minimum(*probe, beside, part, texture.arguments)
 
 
 def test_min_increase_is_the_double_integral_of_the_second_derivative() -> None:
@@ -224,8 +265,8 @@ def test_min_increase_is_the_double_integral_of_the_second_derivative() -> None:
         t = np.linspace(0.0, r, 20_001)
         second = np.maximum(start - rate * t, least)
         exact = np.trapezoid((r - t) * second, t)
-        assert pruning.min_increase(start, least, rate, r) == pytest.approx(exact, abs=1e-6)
-    assert pruning.min_increase(1.0, -3.0, 0.0, 2.0) == 2.0
+        assert distance_bounds.min_increase(start, least, rate, r) == pytest.approx(exact, abs=1e-6)
+    assert distance_bounds.min_increase(1.0, -3.0, 0.0, 2.0) == 2.0
 
 
 def test_window_is_empty_for_a_shallow_probe_only() -> None:
@@ -235,11 +276,13 @@ def test_window_is_empty_for_a_shallow_probe_only() -> None:
     for depth, shallow in ((0.05e-3, True), (0.6e-3, False)):
         probe = np.array([18.5 * PITCH[0] + 1e-8, 12.3 * PITCH[1], -depth])
         best = find_minimum(probe, probe[:2] + np.array([2e-4, 0.0]), texture.arguments)
-        left, budget = pruning.narrow_window(
-            (*map(float, probe), 1.0 - 1e-13), best, (0, 36, 0, 23), 600.0, texture.arguments
-        )
-        assert pruning.is_empty(left) == shallow
+        ball = (*map(float, probe), best[2] * (1.0 - 1e-13))
+        whole = (0.0, 37.0, 0.0, 24.0)
+        left, budget = search.narrow_box(ball, best[3] - ball[2], whole, 600.0, texture.arguments)
+        window = (int(left[0]), int(left[1]) - 1, int(left[2]), int(left[3]) - 1)
+        certified = is_unique_minimum(*ball[:3], best, window, texture.arguments)
+        assert (is_empty(window) or certified) == shallow
         assert 580.0 < budget < 600.0
         if not shallow:
-            assert left[0] < 15
-            assert left[1] > 21
+            assert window[0] < 15
+            assert window[1] > 21

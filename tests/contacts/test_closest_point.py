@@ -18,7 +18,7 @@ from scipy.optimize import minimize
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Profile, Sinusoid, Texture
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
 search = importlib.import_module("bench.stress.nearest_exhaustive")
 

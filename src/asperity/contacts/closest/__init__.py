@@ -1,1 +1,0 @@
-"""The god-object: the globally nearest point of the surface."""
