@@ -88,6 +88,19 @@ def _force_unit(result: Design) -> str:
     return f"{result.target.measure} at the {result.target.at}"
 
 
+def case_title(comparison: Comparison) -> str:
+    """Return device and depth of one of several comparisons."""
+    return f"{comparison.device.name}, {format_quantity(comparison.max_depth, 'm')} deep"
+
+
+def conservation_remarks(comparison: Comparison) -> list[str]:
+    """Return for each law that it is conservative, or what it leaks."""
+    return [
+        "conservative" if row.conservative else f"leaks up to {leak_text(row, comparison)} per loop"
+        for row in comparison.rows
+    ]
+
+
 # --- text alternatives ---------------------------------------------------------------------------
 
 
@@ -155,16 +168,3 @@ def merit_alt_text(comparison: Comparison) -> str:
 
 def _law_count_text(comparison: Comparison) -> str:
     return count_text(len(comparison.rows), "law")
-
-
-def case_title(comparison: Comparison) -> str:
-    """Return device and depth of one of several comparisons."""
-    return f"{comparison.device.name}, {format_quantity(comparison.max_depth, 'm')} deep"
-
-
-def conservation_remarks(comparison: Comparison) -> list[str]:
-    """Return for each law that it is conservative, or what it leaks."""
-    return [
-        "conservative" if row.conservative else f"leaks up to {leak_text(row, comparison)} per loop"
-        for row in comparison.rows
-    ]
