@@ -17,7 +17,7 @@ import pytest
 from asperity.analysis import characteristic_number
 from asperity.analysis.energy.leak import worst_loop
 from asperity.analysis.energy.straight_scan import merit
-from asperity.analysis.gain import characteristic
+from asperity.analysis.gain import surface_cache
 from asperity.analysis.results import compare
 from asperity.core import cache, files
 from asperity.core.files import json_text
@@ -151,7 +151,7 @@ def test_key_without_a_field_gives_wrong_results(
     def incomplete(*parts: Any) -> str:
         return content_digest(*parts[:field], "omitted", *parts[field + 1 :])
 
-    monkeypatch.setattr(characteristic, "content_digest", incomplete)
+    monkeypatch.setattr(surface_cache, "content_digest", incomplete)
     numbers(before())
     assert numbers(after()) != expected
 
@@ -188,9 +188,9 @@ def test_results_of_user_defined_textures_and_laws_are_not_shared() -> None:
     law = Law("U", "own", "vertical", lambda c: (c.k * c.depth + c.k**2 * c.depth) * c.e_z)
     nonlinear = Surface(WAVE, law, stiffness=2.0)  # not proportional to k
     assert merit(nonlinear).ripple == pytest.approx(3.0 * merit(Surface(WAVE, "A")).ripple)
-    assert characteristic.at_unit_stiffness(nonlinear) is nonlinear
+    assert surface_cache.at_unit_stiffness(nonlinear) is nonlinear
     stiffer = nonlinear.to_stiffness(3.0)
-    assert characteristic.surface_content(nonlinear) != characteristic.surface_content(stiffer)
+    assert surface_cache.surface_content(nonlinear) != surface_cache.surface_content(stiffer)
 
 
 def test_every_shipped_law_is_proportional_to_the_stiffness() -> None:

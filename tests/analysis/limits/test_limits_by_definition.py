@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from asperity.analysis.bounds.bound import Bound
-from asperity.analysis.limits import perceptibility, spectrum
+from asperity.analysis.limits import perceptibility, spectrum, wave_scan
 from asperity.analysis.limits.limit_rules import (
     LIMIT_RULES,
     LimitCase,
@@ -249,7 +249,7 @@ def test_waves_beyond_the_device_are_not_felt() -> None:
 
 
 def test_missing_and_unverified_data_are_listed() -> None:
-    fields = (*perceptibility._MASKING_FIELDS, *perceptibility._HAND_FIELDS)
+    fields = (*wave_scan.MASKING_FIELDS, *perceptibility._HAND_FIELDS)
     assert assess_forces(1.0, {}).missing_data == fields
     assert assess_forces(1.0, dict.fromkeys(fields, 1e-9)).missing_data == ()
 

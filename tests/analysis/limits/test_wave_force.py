@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import quad
 
 from asperity.analysis.energy.straight_scan import scan_height
-from asperity.analysis.limits import spectrum as module
+from asperity.analysis.limits import wave_scan as module
 from asperity.analysis.limits.spectrum import Spectrum, Wave, compute_spectrum
 from asperity.analysis.limits.wave_scan import scan_forces, wave_forces
 from asperity.surface import Surface

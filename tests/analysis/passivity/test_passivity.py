@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from asperity.analysis import characteristic_number, loop_work, one_sided_number
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.leak import Leak, LoopKind, LoopOrigin, worst_loop
-from asperity.analysis.passivity import criteria
+from asperity.analysis.passivity import device_loop
 from asperity.analysis.passivity.criteria import Criterion
 from asperity.analysis.passivity.device_loop import make_device_loop
 from asperity.analysis.passivity.verdict import Passivity, passivity
@@ -128,7 +128,7 @@ def test_limits_are_rounded_down_to_the_nearest_float(
 
 def test_round_up_gives_the_smallest_float_not_below() -> None:
     for part in (Fraction(1, 3), Fraction(2, 3), Fraction(1, 10), Fraction(7, 8), Fraction(0)):
-        result = criteria._round_up(part)
+        result = device_loop.round_up_exactly(part)
         assert Fraction(result) >= part > Fraction(math.nextafter(result, -math.inf))
 
 
