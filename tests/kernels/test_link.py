@@ -50,15 +50,39 @@ MakeModule = Callable[[str], ModuleType]
 MODULES = list(compiled_modules())
 
 
-def parsed_functions(module: ModuleType) -> tuple[set[str], set[str], set[str]]:
-    """Return functions that a module defines, calls of these, and calls of others, by its AST."""
-    tree = ast.parse(inspect.getsource(module))
-    defined = {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
-    called = {
+def called_names(function: ast.FunctionDef) -> set[str]:
+    """Return the names that a function calls."""
+    return {
         node.func.id
-        for node in ast.walk(tree)
+        for node in ast.walk(function)
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
     }
+
+
+def is_record(node: ast.ClassDef) -> bool:
+    return "NamedTuple" in [getattr(base, "id", "") for base in node.bases]
+
+
+def parsed_functions(module: ModuleType) -> tuple[set[str], set[str], set[str]]:
+    """Return functions that a module compiles, calls of these, and calls of others, by its AST.
+
+    A driver's module holds its Python class and functions, too: there, what is compiled is what
+    the offered functions call.
+    """
+    tree = ast.parse(inspect.getsource(module))
+    functions = {node.name: node for node in tree.body if isinstance(node, ast.FunctionDef)}
+    calls = {name: called_names(node) for name, node in functions.items()}
+    defined = set(functions)
+    if any(isinstance(node, ast.ClassDef) and not is_record(node) for node in tree.body):
+        kernels = unit_from_module(module).kernels
+        pending = [*kernels.provides, *kernels.loops]
+        defined = set()
+        while pending:
+            name = pending.pop()
+            if name in functions and name not in defined:
+                defined.add(name)
+                pending += calls[name]
+    called = set[str]().union(*(calls[name] for name in defined))
     builtin_names = {*INTRINSIC_MODULES, *dir(__builtins__), *__builtins__}
     records = {name for name, value in vars(module).items() if isinstance(value, type)}
     return defined, called & defined, called - defined - builtin_names - records
