@@ -19,8 +19,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from asperity.analysis.results import compare
-from asperity.analysis.results.compare import precompute_row
+from asperity.analysis.results.compare import compare, precompute_row
 from asperity.core import cache, processes
 from asperity.core.compiled import COMPILE_CALLBACKS
 from asperity.core.files import json_text

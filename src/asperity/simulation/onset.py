@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from asperity.analysis.gain import characteristic
+from asperity.analysis.gain.surface_cache import surface_content
 from asperity.core.cache import get_or_compute_each
 from asperity.core.checks import FloatArray, check_array, check_positive
 from asperity.core.errors import ParameterError
@@ -247,7 +248,7 @@ def _cache_key(surface: Surface, parts: Sequence[Any], numbers: Sequence[Any]) -
     if not all(is_shipped(type(part)) for part in parts):
         return None
     values = [np.asarray(number).tolist() for number in numbers]
-    return characteristic.surface_content(surface, json_text([*parts, values]))
+    return surface_content(surface, json_text([*parts, values]))
 
 
 def _check_arguments(
