@@ -11,7 +11,7 @@ import pytest
 
 import asperity
 from asperity.analysis import characteristic_number
-from asperity.analysis.results import compare
+from asperity.analysis.results.compare import compare
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
 

@@ -18,7 +18,7 @@ from asperity.analysis import characteristic_number
 from asperity.analysis.energy.leak import worst_loop
 from asperity.analysis.energy.straight_scan import merit
 from asperity.analysis.gain import surface_cache
-from asperity.analysis.results import compare
+from asperity.analysis.results.compare import compare
 from asperity.core import cache, files
 from asperity.core.files import json_text
 from asperity.laws import LAWS, Law
