@@ -213,6 +213,7 @@ def _read(path: Path, stream: IO[bytes], size: int) -> Recording:
     for op, at, length in mcap.iterate_records(stream, size):
         if op == mcap.Opcode.DATA_END:
             is_complete = True
+            end = size
             break
         if op == mcap.Opcode.CHUNK and not texts:
             foreign = True
@@ -235,8 +236,6 @@ def _read(path: Path, stream: IO[bytes], size: int) -> Recording:
         raise mcap.DamagedError("it does not say what its rows are")
     if not is_complete and chunks and not _is_intact(stream, chunks[-1]):
         end = chunks.pop().start  # the remains of a loss of power
-    if is_complete:
-        end = size
     rows = sum([chunk.size for chunk in chunks]) // row_encoding.row_type(len(columns)).itemsize
     return Recording(
         path,
