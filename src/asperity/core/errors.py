@@ -34,6 +34,7 @@ class ParameterError(AsperityError, ValueError):
         argument: name of the argument.
         requirement: what the argument must be.
         value: the value passed, ``None`` if it is not part of the message.
+        template: the requirement with the names of the arguments in braces.
         suggestions: values [SI, or as text] of the arguments that the requirement names in braces;
             ``None`` where the name alone is to be written.
 
@@ -52,13 +53,13 @@ class ParameterError(AsperityError, ValueError):
         self.argument = argument
         self.value = value
         self.suggestions = suggestions
-        self._template = requirement
+        self.template = requirement
         self.requirement = self.write_requirement(write_keyword)
         super().__init__(self.write_message(write_keyword))
 
     def write_requirement(self, write_argument: ArgumentWriter) -> str:
         """Return the requirement with the suggestions as a function writes them."""
-        text = self._template
+        text = self.template
         for name, value in self.suggestions.items():
             text = text.replace(f"{{{name}}}", write_argument(name, value))
         return text

@@ -328,7 +328,7 @@ def _run(reader: Reader, file: SurfaceFile, options: ReadingOptions) -> RawSurfa
     except SurfaceFileError as error:
         if str(error).startswith(file.name):
             raise
-        raise SurfaceFileError(f"{file.name}: {error}") from error
+        raise SurfaceFileError(f"{file.name}: {error.template}", **error.suggestions) from error
 
 
 def _check_file(path: Path, name: str) -> None:
