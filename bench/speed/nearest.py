@@ -8,8 +8,6 @@ farther away by more than 1e-6 of the extent.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
-from time import perf_counter
 from types import ModuleType
 from typing import Any
 
@@ -59,15 +57,12 @@ class Subject:
 
 
 def run(console: Console) -> None:
-    """Print a table of µs per query, the memory of asperity and tree, and the verdict."""
+    """Print a table of µs per query, and the verdict."""
     headings = ("depth", "nearest\nµs", "slowest\nof 300", "force D\n/nearest", "k-d tree\nµs")
     table = number_table("texture", *headings, "\nratio", "\nwrong")
     missed: list[str] = []
-    memory = []
     for subject in _subjects():
         tree = _build_tree(subject)
-        size = sum(getattr(argument, "nbytes", 0) for argument in subject.texture.arguments)
-        memory.append(f"{subject.name}: asperity {size / 1e6:.3g} MB; tree {tree.describe()}")
         for depth in subject.depths:
             cells, faults = _row(subject, depth, tree)
             table.add_row(subject.name, depth, *cells)
@@ -78,7 +73,6 @@ def run(console: Console) -> None:
         "\nnone in 1e5, python -m bench.stress.nearest_exhaustive)."
     )
     console.print(table)
-    console.print("\n".join(memory), style="dim")
     answer = "met" if not missed else f"MISSED: {'; '.join(missed)}"
     console.print(f"goals: {GOALS} -> {answer}", style="bold")
 
@@ -120,15 +114,11 @@ class Tree:
         axes: unit vectors (d, 2) of the coordinates along which the height varies.
         points: the points [m], shape (n, d + 1), the height last.
         tree: of SciPy.
-        memory: that points and tree take [bytes], from the growth of the process.
-        build: time that the tree took [s].
     """
 
     axes: FloatArray
     points: FloatArray
     tree: Any
-    memory: float
-    build: float
 
     def nearest(self, probes: FloatArray) -> FloatArray:
         """Return the points (n, 2) nearest to the probes; across a profile a probe stays."""
@@ -137,17 +127,11 @@ class Tree:
         feet = probes[:, :2] + (self.points[index, :-1] - along) @ self.axes
         return np.ascontiguousarray(feet)
 
-    def describe(self) -> str:
-        """Return size, memory and build time in words."""
-        size = f"{len(self.points):,} points, {self.memory / 1e6:.0f} MB"
-        return f"{size}, built in {self.build:.1f} s"
-
 
 def _build_tree(subject: Subject) -> Tree:
     """Return the tree of a surface: its domain, and as far beyond as the deepest probe reaches."""
     from scipy.spatial import cKDTree
 
-    before = _resident_memory()
     texture, step = subject.texture, TREE_STEP * subject.pitch
     reach = max(subject.depths.values())
     domain, axes = texture.domain, np.eye(2)
@@ -160,16 +144,7 @@ def _build_tree(subject: Subject) -> Tree:
     ]
     flat = np.stack(np.meshgrid(*ticks), axis=-1).reshape(-1, len(axes))
     points = np.column_stack([flat, texture.height(flat @ axes)])
-    del flat
-    start = perf_counter()
-    tree = cKDTree(points)
-    return Tree(axes, points, tree, _resident_memory() - before, perf_counter() - start)
-
-
-def _resident_memory() -> float:
-    """Return the resident memory of this process [bytes]; 0 where it cannot be told."""
-    status = Path("/proc/self/statm")
-    return float(status.read_text().split()[1]) * 4096.0 if status.exists() else 0.0
+    return Tree(axes, points, cKDTree(points))
 
 
 def _row(subject: Subject, depth_name: str, tree: Tree) -> tuple[list[str], list[str]]:

@@ -11,7 +11,6 @@ from rich.console import Console
 from rich.table import Table
 
 from asperity.core.checks import FloatArray
-from asperity.recording.recording import open_recording
 from asperity.recording.writer import RecordingWriter
 from asperity.simulation.trace import COLUMNS
 
@@ -29,7 +28,6 @@ def run(console: Console) -> None:
         folder = Path(name)
         _at_10_khz(console, folder)
         _per_row(console, folder)
-        _read(console, folder)
 
 
 def _at_10_khz(console: Console, folder: Path) -> None:
@@ -70,14 +68,6 @@ def _per_row(console: Console, folder: Path) -> None:
     style = "red" if cost > GOAL_ROW else ""
     words = f"a row of a trace: {1e6 * cost:.2f} µs (goal {1e6 * GOAL_ROW:.0f})"
     console.print(words, style=style)
-
-
-def _read(console: Console, folder: Path) -> None:
-    recording = open_recording(folder / "a.mcap")
-    begin = time.perf_counter()
-    count = sum(len(block) for block in recording.blocks())
-    spent = time.perf_counter() - begin
-    console.print(f"reading: {1e6 * spent / count:.2f} µs a row")
 
 
 def _rows(count: int) -> FloatArray:

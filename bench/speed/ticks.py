@@ -66,16 +66,14 @@ def adversarial_textures(side: int = SIDE) -> Adversaries:
 
 def many_waves() -> tuple[Fourier, FloatArray]:
     """Return a sum of waves of all directions, and a probe (1, 3) [m] far below it."""
-    rng = np.random.default_rng(cases.SEED)
-    length, turn = 2.0 * np.pi / 1e-3 * rng.uniform(0.3, 1.5, WAVES), rng.uniform(0.0, 7.0, WAVES)
-    vectors = length[:, None] * np.column_stack([np.cos(turn), np.sin(turn)])
-    return Fourier(np.full(WAVES, 4e-5), vectors, turn), np.array([[0.0, 0.0, -1e-2]])
+    return wave_sum(WAVES, cases.SEED), np.array([[0.0, 0.0, -1e-2]])
 
 
-def wave_sum(count: int) -> Fourier:
+def wave_sum(count: int, seed: int = 5) -> Fourier:
     """Return a sum of waves of random directions with the RMS height of ``many_waves``."""
-    rng = np.random.default_rng(5)
-    length, turn = 2.0 * np.pi / 1e-3 * rng.uniform(0.3, 1.5, count), rng.uniform(0.0, 7.0, count)
+    rng = np.random.default_rng(seed)
+    length = 2.0 * np.pi / 1e-3 * rng.uniform(0.3, 1.5, count)
+    turn = rng.uniform(0.0, 7.0, count)
     vectors = length[:, None] * np.column_stack([np.cos(turn), np.sin(turn)])
     return Fourier(np.full(count, 4e-5 * np.sqrt(WAVES / count)), vectors, turn)
 

@@ -92,7 +92,6 @@ def _time_comparisons(table: Table, words: tuple[str, ...], name: str, cache: Pa
     except _NotRunError as reason:
         return [f"{name}: not run: {reason}"]
     again, changed, report = np.median(found, axis=0)
-    on_top = float(np.median(found[:, 2] - found[:, 0]))
     table.add_row(
         f"first compare of {name}", f"{first.processor:.1f}", f"{first.wall:.1f}", "1", "wall 15"
     )
@@ -100,7 +99,6 @@ def _time_comparisons(table: Table, words: tuple[str, ...], name: str, cache: Pa
         ("the same again", again, "processor 1.5"),
         ("another device and stiffness", changed, "processor 2"),
         ("with --html, again", report, ""),
-        ("--html on top", on_top, "processor 2.5"),
     ):
         table.add_row(f"  {said}", f"{value:.2f}", "", f"{value / first.processor:.3f}", goal)
     return []

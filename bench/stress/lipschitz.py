@@ -28,7 +28,6 @@ DATA = Path(__file__).parents[3] / "shared" / "data" / "sample-land.x3p"
 PAIRS_AT_ONCE = 20_000
 TOLERANCE = 1e-10
 RIDGES = 20  # one pair of so many straddles a jump of the nearest point
-STIFFNESS = cases.STIFFNESS
 
 
 def search_textures() -> dict[str, Texture]:
@@ -77,9 +76,9 @@ def _worst_ratios(surfaces: Sequence[Surface], count: int, seed: int) -> FloatAr
     apart = np.linalg.norm(b - a, axis=1)
     result = np.empty((2, len(surfaces)))
     for index, surface in enumerate(surfaces):
-        gain = STIFFNESS * max(1.0, surface.continuity)
+        gain = cases.STIFFNESS * max(1.0, surface.continuity)
         change = np.linalg.norm(surface.force(b) - surface.force(a), axis=1)
-        result[0, index] = np.max(change - gain * apart * (1.0 + 1e-6)) / (STIFFNESS * 1e-3)
+        result[0, index] = np.max(change - gain * apart * (1.0 + 1e-6)) / (cases.STIFFNESS * 1e-3)
         far = apart > 1e-7
         result[1, index] = np.max(change[far] / (gain * apart[far]))
     return result
@@ -105,7 +104,7 @@ def search(console: Console, pairs: int) -> bool:
     sound = True
     for name, texture in search_textures().items():
         for c in (1.0, 4.0):
-            surfaces = [Surface(texture, law, STIFFNESS, continuity=c) for law in "HDC"]
+            surfaces = [Surface(texture, law, cases.STIFFNESS, continuity=c) for law in "HDC"]
             excess, ratio = _search_part(surfaces, pairs, console, f"{name}, c = {c:g}")
             sound = sound and bool(excess[0] <= TOLERANCE)
             cells = [f"{ratio[0]:.7f}", *(f"{value:.1e}" for value in excess)]

@@ -59,10 +59,10 @@ def run(count: int, console: Console, seed: int = 0) -> Counter[str]:
                 fault, seconds = _end(child)
                 faults[fault] += bool(fault)
                 lost.append(seconds)
-    found = +faults
-    said = dict(found) or "no fault"
-    console.print(f"{count} kills: {said}; at most {1e3 * max(lost):.0f} ms lost")
-    return found
+    faults = +faults
+    lost_time = f"at most {1e3 * max(lost):.0f} ms lost"
+    console.print(f"{count} kills: {dict(faults) or 'no fault'}; {lost_time}")
+    return faults
 
 
 def _start(path: Path, draw: random.Random) -> _RecordingProcess:

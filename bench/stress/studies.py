@@ -12,6 +12,7 @@ import math
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 
 import numpy as np
 from rich.console import Console
@@ -70,13 +71,10 @@ def pooled_study(kind_name: str, seed: int, **options: object) -> Iterator[Inter
     yield from TRUTHS[kind_name](score.differences(seed, RESAMPLES), score.pool(seed, RESAMPLES))
 
 
-def _comparison(differences: list[tuple[float, float, float]], _pooled: object) -> list[Interval]:
-    truth = 2.0 * (SCORES[1:] - SCORES[0])
-    return [(float(a), *b) for a, b in zip(truth, differences, strict=True)]
-
-
-def _rating(differences: list[tuple[float, float, float]], _pooled: object) -> list[Interval]:
-    truth = SCORES[1:] - SCORES[0]
+def _score_differences(
+    factor: float, differences: list[tuple[float, float, float]], _pooled: object
+) -> list[Interval]:
+    truth = factor * (SCORES[1:] - SCORES[0])
     return [(float(a), *b) for a, b in zip(truth, differences, strict=True)]
 
 
@@ -94,9 +92,12 @@ def _axb(_differences: object, pooled: list[tuple[float, float, float]]) -> list
 
 
 TRUTHS: dict[str, Callable[..., list[Interval]]] = {
-    "comparison": _comparison, "rating": _rating, "onset": _onset, "axb": _axb,
+    "comparison": partial(_score_differences, 2.0),
+    "rating": partial(_score_differences, 1.0),
+    "onset": _onset,
+    "axb": _axb,
     "detection": _onset,
-}  # fmt: skip
+}
 STUDIES: dict[str, Callable[[int], Iterator[Interval]]] = {
     "staircase, 2 intervals": threshold_study,
     "staircase, 3 intervals": lambda seed: threshold_study(seed, intervals=3),
