@@ -14,7 +14,7 @@ import pytest
 from asperity.core.errors import ParameterError
 from asperity.devices import load_device
 from asperity.loop.shared_trace import COLUMNS
-from asperity.servo import driver_loop
+from asperity.servo import loop_process
 from asperity.servo.drivers.simulated import simulated_driver
 from asperity.servo.loop_memory import FAULT_SAMPLES, DeviceFault, EndReason
 from asperity.servo.process import PrestartedProcess, ServoProcess
@@ -136,7 +136,7 @@ def test_signals_do_not_end_the_process_of_a_loop(loop: ServoProcess) -> None:
 
 
 def test_unresponsive_loop_process_is_a_fault(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(driver_loop, "MAX_CALL_TIME", 0.5)
+    monkeypatch.setattr(loop_process, "MAX_CALL_TIME", 0.5)
     with servo_process(Safety(ramp=0.02, lateness=60.0, silence=2.0)) as loop:
         assert wait_until(lambda: loop.memory.row_count > 20)
         loop._heartbeat_stop.set()  # the supervising program would let it go on

@@ -291,17 +291,17 @@ def guard_force(
     dy = servo.y - before.y
     dz = servo.z - before.z
     energy = force.energy + force.fx * dx + force.fy * dy + force.fz * dz
-    most = limits.max_damping if ramp > 0.0 else 0.0
-    damping = passivity_damping(energy, dx, dy, dz, settings.period, most)
+    max_damping = limits.max_damping if ramp > 0.0 else 0.0
+    damping = passivity_damping(energy, dx, dy, dz, settings.period, max_damping)
     drag = damping / settings.period
-    wanted = limit_change(
+    bounded = limit_change(
         ramp * servo.fx - drag * dx, ramp * servo.fy - drag * dy, ramp * servo.fz - drag * dz,
         0.0, 0.0, 0.0, settings.max_force,
     )  # fmt: skip
     limited = limit_change(
-        wanted.x, wanted.y, wanted.z, force.fx, force.fy, force.fz, limits.max_change
+        bounded.x, bounded.y, bounded.z, force.fx, force.fy, force.fz, limits.max_change
     )
-    status[FORCE_LIMIT_COUNT] += wanted.is_limited
+    status[FORCE_LIMIT_COUNT] += bounded.is_limited
     status[SLEW_LIMIT_COUNT] += limited.is_limited
     return GuardedForce(limited.x, limited.y, limited.z, ramp, energy, damping)
 

@@ -137,9 +137,9 @@ def with_assumed_mass(device: Device) -> tuple[Device, tuple[str, ...]]:
     """Return a device that can be simulated, and the assumptions about it."""
     if _is_five_bar(device) or device.value("apparent_mass") is not None:
         return device, ()
-    given = {"apparent_mass": {"value": _ASSUMED_MASS, "unit": "kg", "source": "assumed"}}
+    fields = {"apparent_mass": {"value": _ASSUMED_MASS, "unit": "kg", "source": "assumed"}}
     mass = format_quantity(1e3 * _ASSUMED_MASS, "g")
-    return override_device(device, given), (
+    return override_device(device, fields), (
         f"The apparent mass of {device.name} is not known; {mass} are simulated",
     )
 

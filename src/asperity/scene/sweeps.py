@@ -108,11 +108,11 @@ def sweep_onsets(
         )  # fmt: skip
 
     by_law = map_threads(find, [(law,) for law in laws], cancelled)
-    found = [onset for _, onsets in by_law for onset in onsets]
+    all_onsets = [onset for _, onsets in by_law for onset in onsets]
     predictions = tuple(
         predict(
             loop.rendered, loop.plant, loop.hand, loop.with_delay(onset.delay).servo, onset,
-            smooth_wall_onset(found, onset.delay),
+            smooth_wall_onset(all_onsets, onset.delay),
         )
         for loop, onsets in by_law
         for onset in onsets
@@ -162,23 +162,23 @@ def sweep_strokes(
         raise ParameterError("depths", "mean nothing: the hand has no stiffness along z")
     count = max(motion.count, DEFAULT_STROKES) if strokes is None else strokes
     path = replace(motion, count=count)
-    speeds = [check_positive("speeds", one, "m/s") for one in check_items("speeds", speeds)]
-    depths = [check_real("depths", one, "m") for one in check_items("depths", depths)]
+    speeds = [check_positive("speeds", speed, "m/s") for speed in check_items("speeds", speeds)]
+    depths = [check_real("depths", depth, "m") for depth in check_items("depths", depths)]
     loops = map_threads(lambda law: setup.with_law(law).with_rendering(), [(law,) for law in laws])
     jobs = [(loop, speed, depth) for loop in loops for speed in speeds for depth in depths]
     done = [0]
 
-    def one(loop: Setup, speed: float, depth: float) -> Stroke:
-        (found,) = scan_strokes(
+    def scan(loop: Setup, speed: float, depth: float) -> Stroke:
+        (stroke,) = scan_strokes(
             loop.rendered, setup.plant, setup.hand, setup.servo, path,
             speeds=[speed], depths=[depth], start=setup.start, velocity=setup.velocity,
         )  # fmt: skip
         done[0] += 1
         if progress is not None:
             progress(done[0] / len(jobs))
-        return found
+        return stroke
 
-    return StrokeSweep(_with_notes(setup, loops), map_threads(one, jobs))
+    return StrokeSweep(_with_notes(setup, loops), map_threads(scan, jobs))
 
 
 SCHEMA = 2
@@ -203,21 +203,21 @@ class OnsetSweep(Reportable, Tabular):
         """Return law, delay, bracket of the onset and the rules; SI units."""
         return [
             {
-                "law": one.onset.law,
-                "delay [samples]": one.onset.delay,
-                "quiet [N/m]": one.onset.quiet,
-                "cycling [N/m]": one.onset.cycling,
-                "cycling starts": one.onset.cycles,
-                "starts": one.onset.starts,
-                "depth [m]": one.depth,
-                "q": one.q,
-                "one-sided q": one.one_sided,
-                "paper (1) [N/m]": one.paper_limit,
-                "delay rule [N/m]": one.delay_rule,
-                "wall rule [N/m]": one.wall_rule,
-                "conservative": one.conservative,
+                "law": prediction.onset.law,
+                "delay [samples]": prediction.onset.delay,
+                "quiet [N/m]": prediction.onset.quiet,
+                "cycling [N/m]": prediction.onset.cycling,
+                "cycling starts": prediction.onset.cycles,
+                "starts": prediction.onset.starts,
+                "depth [m]": prediction.depth,
+                "q": prediction.q,
+                "one-sided q": prediction.one_sided,
+                "paper (1) [N/m]": prediction.paper_limit,
+                "delay rule [N/m]": prediction.delay_rule,
+                "wall rule [N/m]": prediction.wall_rule,
+                "conservative": prediction.conservative,
             }
-            for one in self.onsets
+            for prediction in self.onsets
         ]
 
     def to_dict(self) -> dict[str, Any]:
@@ -245,20 +245,20 @@ class StrokeSweep(Reportable, Tabular):
         """Return law, speed, depth and the energies per stroke; SI units."""
         return [
             {
-                "law": one.law,
-                "speed [m/s]": one.speed,
-                "depth [m]": one.depth,
-                "mean depth [m]": one.mean_depth,
-                "energy per stroke [J]": one.total,
-                "energy of the field [J]": one.field,
-                "error of the field [J]": one.error,
-                "spread of the field [J]": one.spread,
-                "gains energy": one.gains_energy,
-                "the paper's sum [J]": one.same_sample_sum,
-                "contact losses per stroke": one.lost_contact,
-                "stop message": one.stop_message,
+                "law": stroke.law,
+                "speed [m/s]": stroke.speed,
+                "depth [m]": stroke.depth,
+                "mean depth [m]": stroke.mean_depth,
+                "energy per stroke [J]": stroke.total,
+                "energy of the field [J]": stroke.field,
+                "error of the field [J]": stroke.error,
+                "spread of the field [J]": stroke.spread,
+                "gains energy": stroke.gains_energy,
+                "the paper's sum [J]": stroke.same_sample_sum,
+                "contact losses per stroke": stroke.lost_contact,
+                "stop message": stroke.stop_message,
             }
-            for one in self.strokes
+            for stroke in self.strokes
         ]
 
     def to_dict(self) -> dict[str, Any]:

@@ -115,20 +115,20 @@ def check_passivity_damping(safety: Safety, device: Device, servo: Servo) -> Non
         ParameterError: for a damping above the bound, or a device whose mass is not known.
     """
     mass = device.value("apparent_mass")
-    given = safety.passivity_damping
-    if not given:
+    damping = safety.passivity_damping
+    if not damping:
         return
     if mass is None:
         text = f"needs the mass of {device.id}, which bounds it, such as {{apparent_mass}}"
         raise ParameterError("passivity_damping", text, apparent_mass="50 g")
     bound = mass / ((1 + servo.delay) * servo.period)
-    if given > bound:
+    if damping > bound:
         words = (
             f"must be at most m/((1 + d) T) = {format_quantity(bound, 'N*s/m', digits=3)}, with the"
             f" apparent mass m of {device.id}, the period T and a delay of d = {servo.delay}"
             " samples: above it the controller may feed energy into the handle"
         )
-        raise ParameterError("passivity_damping", words, given)
+        raise ParameterError("passivity_damping", words, damping)
 
 
 DEFAULT_SAFETY = Safety()

@@ -194,9 +194,10 @@ def per_axis(name: str, value: ArrayLike, unit: str, *, signed: bool = False) ->
     Raises:
         ParameterError: for another shape, a value that is not finite, or (unless signed) negative.
     """
-    given = np.asarray(value)
-    wide = np.broadcast_to(given, (3,)) if given.ndim == 0 else given
-    x, y, z = check_array(name, wide, (3,), unit)
+    axes = value
+    if np.ndim(value) == 0:
+        axes = np.full(3, value)
+    x, y, z = check_array(name, axes, (3,), unit)
     if not signed and min(x, y, z) < 0.0:
         raise ParameterError(name, f"must not be negative [{unit}]", value)
     return float(x), float(y), float(z)

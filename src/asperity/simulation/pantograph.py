@@ -128,9 +128,9 @@ class Pantograph(Plant):
         mxx, mxz, mzz, _cx, _cz, bxx, _bxz, bzz = pantograph.linkage_dynamics(
             0.0, 0.0, 0.0, 0.0, linkage
         )
-        least = float(np.linalg.eigvalsh([[mxx, mxz], [mxz, mzz]])[0])
+        min_mass = float(np.linalg.eigvalsh([[mxx, mxz], [mxz, mzz]])[0])
         # Twice the damping here: elsewhere in the workspace it may be larger.
-        rate = max_rate(least, 2.0 * self.joint_damping * (bxx + bzz), hand)
+        rate = max_rate(min_mass, 2.0 * self.joint_damping * (bxx + bzz), hand)
         substep_count(self.friction, rate, period)  # refuses too many; the number depends on speed
         record = PantographRecord(
             linkage, hand.record(), float(self.friction), rate,
@@ -184,7 +184,8 @@ class Pantograph(Plant):
         # The handle was not at corners of the box that the arms do not reach.
         points = [self.centre + p[[0, 2]] for p in grid if not self.workspace_violation(p)]
         dampings = [handle_damping(self.linkage, self.joint_damping, point) for point in points]
-        return min((float(np.linalg.eigvalsh(one)[0]) for one in dampings), default=0.0)
+        smallest = [float(np.linalg.eigvalsh(damping)[0]) for damping in dampings]
+        return min(smallest, default=0.0)
 
     def rates(self) -> list[tuple[str, float]]:
         """Return the numbers that make the linkage fast."""

@@ -186,10 +186,9 @@ def symmetric_matrix(name: str, value: ArrayLike, unit: str) -> FloatArray:
     Raises:
         ParameterError: for any other value.
     """
-    given = np.asarray(value)
-    if given.ndim < 2:
+    if np.ndim(value) < 2:
         return np.diag(per_axis(name, value, unit))
-    matrix = check_array(name, given, (3, 3), unit)
+    matrix = check_array(name, value, (3, 3), unit)
     size = float(np.abs(matrix).max())
     if np.abs(matrix - matrix.T).max() > 1e-12 * size:
         raise ParameterError(name, "must be symmetric", value)

@@ -236,10 +236,10 @@ def _connect(address: str) -> Iterator[Any]:
 
 def _check_versions(versions: dict[str, Any]) -> None:
     """Check that scheduler and workers have the Python and the Dask of this process."""
-    own = versions["client"]["packages"]
+    expected = versions["client"]["packages"]
     for other in (versions["scheduler"], *versions["workers"].values()):
         packages = other["packages"] if other else {}
         for name in ("python", "distributed", "msgpack", "cloudpickle"):
-            if packages.get(name) != own[name]:
-                words = f"has {name} {packages.get(name)}, this process {own[name]}"
+            if packages.get(name) != expected[name]:
+                words = f"has {name} {packages.get(name)}, this process {expected[name]}"
                 raise ParameterError("scheduler", words)

@@ -288,7 +288,7 @@ def test_uncertainty_of_the_rate_is_that_of_the_mean_period() -> None:
     periods = 1e-3 * (1.0 + 0.1 * np.resize([-1.0, 1.0], 400))
     periods[200] = 5.0
     calibrator._times = np.concatenate([[0.0], np.cumsum(periods)])
-    rate = calibrator._update_rate([PushRecord(np.arange(9.0), np.zeros(9), 1)], None)
+    rate = calibrator._update_rate([PushRecord(np.arange(9.0), np.zeros(9), 1)], 0.0)
     assert rate.value == pytest.approx(1e3, rel=1e-3)
     assert rate.uncertainty == pytest.approx(0.1 * 1e3 / math.sqrt(399.0), rel=1e-2)
 

@@ -121,10 +121,10 @@ def final_velocity(
 def stored_energy(x: FloatArray, ax: float, ay: float, az: float, plant: AxisBodyRecord) -> float:
     """Return ½ m v² + ½ K (a - p)² of every axis [J]."""
     table = plant.coefficients
+    anchor = (ax, ay, az)
     total = 0.0
     for i in range(3):
-        anchor = ax if i == 0 else ay if i == 1 else az
-        hand_strain = anchor - x[i]
+        hand_strain = anchor[i] - x[i]
         kinetic = 0.5 * table[i, MASS] * x[3 + i] ** 2
         total += kinetic + 0.5 * table[i, HAND_STIFFNESS] * hand_strain * hand_strain
     return total

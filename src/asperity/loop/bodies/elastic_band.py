@@ -56,12 +56,12 @@ def elastic_band_rates(
     )  # fmt: skip
     k[6] = lost
     k[7] = ux * hx + uy * hy + uz * hz
+    push = (fx + hx, fy + hy, fz + hz)
     for i in range(3):
         drag = plant.damping[i, 0] * y[3] + plant.damping[i, 1] * y[4]
         drag += plant.damping[i, 2] * y[5]
-        push = fx + hx if i == 0 else fy + hy if i == 1 else fz + hz
         k[i] = y[3 + i]
-        k[3 + i] = (push + hand.force[i] - drag) / plant.mass[i, i]
+        k[3 + i] = (push[i] + hand.force[i] - drag) / plant.mass[i, i]
         k[6] += drag * y[3 + i]
         k[7] += hand.force[i] * y[3 + i]
 
@@ -75,14 +75,15 @@ def elastic_band_step(
     for i in range(8):
         change[i] = 0.0
         rate[i] = 0.0
+    times = (0.0, 0.5, 0.5, 1.0)
+    weights = (1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0)
     for number in range(4):
-        late = 0.0 if number == 0 else 1.0 if number == 3 else 0.5
-        weight = 1.0 / 6.0 if number in (0, 3) else 1.0 / 3.0
+        time = times[number]
         for i in range(6):
-            stage[i] = x[i] + late * h * rate[i]
-        elastic_band_rates(stage, rate, late * h, inputs, plant)
+            stage[i] = x[i] + time * h * rate[i]
+        elastic_band_rates(stage, rate, time * h, inputs, plant)
         for i in range(8):
-            change[i] += weight * h * rate[i]
+            change[i] += weights[number] * h * rate[i]
     for i in range(6):
         x[i] += change[i]
 

@@ -303,13 +303,13 @@ def advance_body(
 ) -> int:
     """Move the handle over one sample; see ``body_interface``."""
     fx, _fy, fz, ax, _ay, az, ux, _uy, uz, in_contact = inputs
-    bar, hand, _friction, rate, fewest, period, share, inside_only, least = plant
-    damping = bar.joint_damping if in_contact or not inside_only else 0.0
+    linkage, hand, _friction, rate, min_steps, period, fraction, inside_only, min_sine = plant
+    damping = linkage.joint_damping if in_contact or not inside_only else 0.0
     px = x[0]
     pz = x[2]
     vx = x[3]
     vz = x[5]
-    parts = max(fewest, linkage_step_count(vx, vz, rate, period / share, bar))
+    parts = max(min_steps, linkage_step_count(vx, vz, rate, period / fraction, linkage))
     wx = wz = lost = work = rubbed = time = 0.0
     part = fine = 0
     h = period / parts
@@ -327,7 +327,7 @@ def advance_body(
         x[2] = sz + dz
         x[3] = tx + dvx
         x[5] = tz + dvz
-        if not linkage_reaches(x[0], x[2], least, bar):
+        if not linkage_reaches(x[0], x[2], min_sine, linkage):
             x[0] = px
             x[2] = pz
             x[3] = vx
@@ -357,7 +357,7 @@ def advance_body(
 
 def stored_energy(x: FloatArray, ax: float, ay: float, az: float, plant: PantographRecord) -> float:
     """Return ½ p'ᵀ M p' and the energy of the hand [J]."""
-    bar = plant.linkage
-    mxx, mxz, mzz, _cx, _cz, _bxx, _bxz, _bzz = linkage_dynamics(x[0], x[2], x[3], x[5], bar)
+    linkage = plant.linkage
+    mxx, mxz, mzz, _cx, _cz, _bxx, _bxz, _bzz = linkage_dynamics(x[0], x[2], x[3], x[5], linkage)
     kinetic = 0.5 * (mxx * x[3] * x[3] + 2.0 * mxz * x[3] * x[5] + mzz * x[5] * x[5])
     return float(kinetic + hand_energy(ax - x[0], 0.0, az - x[2], plant.hand))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -49,7 +49,9 @@ _PUSH_TIME = 2.4
 _PUSH_DURATIONS = (0.006, 0.04)  # [s] initial and largest duration of a push
 _SUFFICIENT_TRAVEL = 2e-3  # [m] range that determines mass and damping
 _IMMOBILE_TRAVEL = 0.2e-3  # [m] range below which a handle under the largest push is immobile
-_FIRST_PUSH_FRACTION = 0.2  # share of the maximum force, of the first pushes
+# shares of the maximum force, of the first and of the strongest pushes
+_FIRST_PUSH_FRACTION = 0.2
+_MAX_PUSH_FRACTION = 0.6
 MAX_WALL_STEP = 1e-3
 """Largest step of a wall that starts an oscillation [m]."""
 WALL_FORCE_FRACTION = 0.35
@@ -151,22 +153,25 @@ class Calibrator:
         pushes = {}
         for axis, name in enumerate(self._rig.axes):
             self._report_progress(f"pushing along {name}")
-            if (found := self._measure_pushes(axis)) is not None:
-                pushes[axis] = found
+            record = self._measure_pushes(axis)
+            if record is not None:
+                pushes[axis] = record
         if not pushes:
             raise CalibrationError("the handle does not move: is its force switched on?")
-        steps = (position_step(one.positions) for one in pushes.values())
-        step = max(filter(None, steps), key=lambda step: step.value, default=None)
-        noise = max((rest_noise(rest[:, 1 + axis]) for axis in pushes), key=lambda one: one.value)
-        delay, motions = fit_dynamics(list(pushes.values()), self._period)
-        self._noise_floor = FLOOR_STEPS * max(step.value if step else 0.0, noise.value)
-        axes = tuple(
-            AxisCalibration(self._rig.axes[axis], motion, self._find_wall(axis, motion))
-            for axis, motion in zip(pushes, motions, strict=True)
-        )
-        unmoved = tuple(name for axis, name in enumerate(self._rig.axes) if axis not in pushes)
-        rate = self._update_rate(list(pushes.values()), step)
-        return Calibration(rate, step, noise, delay, self._max_force, axes, unmoved)
+        records = list(pushes.values())
+        step = _largest([position_step(record.positions) for record in records])
+        noise = _largest([rest_noise(rest[:, 1 + axis]) for axis in pushes])
+        delay, motions = fit_dynamics(records, self._period)
+        self._noise_floor = FLOOR_STEPS * max(step.value, noise.value)
+        axes = []
+        for axis, motion in zip(pushes, motions, strict=True):
+            wall = self._find_wall(axis, motion)
+            axes.append(AxisCalibration(self._rig.axes[axis], motion, wall))
+        immobile = [name for axis, name in enumerate(self._rig.axes) if axis not in pushes]
+        return Calibration(
+            self._update_rate(records, step.value), step if step.value else None, noise, delay,
+            self._max_force, tuple(axes), tuple(immobile),
+        )  # fmt: skip
 
     def _apply(self, kind: float, axis: int, time: float, **more: float) -> FloatArray:
         """Apply an excitation for a time [s] and return its rows; see :class:`Excitation`."""
@@ -198,7 +203,7 @@ class Calibrator:
         """
         push = _FIRST_PUSH_FRACTION * self._max_force
         span = _PUSH_DURATIONS[0]
-        most = 0.6 * self._max_force
+        max_push = _MAX_PUSH_FRACTION * self._max_force
         while True:
             rows = self._apply_pushes(axis, push, span, _TRIAL_TIME)
             way = float(np.ptp(rows[:, 1 + axis]))
@@ -207,8 +212,8 @@ class Calibrator:
                 span = 0.7 * span
             elif way > _SUFFICIENT_TRAVEL or span >= _PUSH_DURATIONS[1]:
                 break
-            elif push < most:
-                push = min(1.5 * push, most)
+            elif push < max_push:
+                push = min(1.5 * push, max_push)
             else:
                 span *= 1.4
         if way < _IMMOBILE_TRAVEL:
@@ -224,9 +229,9 @@ class Calibrator:
         time = max(time, 6.0 * duration)
         return self._apply(PUSHING, axis, time, push_force=push, push_samples=span)
 
-    def _update_rate(self, records: list[PushRecord], step: Estimate | None) -> Estimate:
-        """Return the rate of fresh readings."""
-        share = max(fresh_fraction(one.positions, step.value if step else 0.0) for one in records)
+    def _update_rate(self, records: list[PushRecord], step: float) -> Estimate:
+        """Return the rate of fresh readings, for a step of the positions [m]; 0 for none."""
+        share = max(fresh_fraction(record.positions, step) for record in records)
         periods = np.diff(self._times)
         periods = periods[periods < _GAP_PERIODS * self._period]
         rate = share / float(periods.mean())
@@ -262,6 +267,13 @@ class Calibrator:
         way = rows[after, 1 + axis]
         amplitudes = oscillation_amplitudes(way, self._period, 1.0 / wave)
         return is_limit_cycle(*amplitudes, self._noise_floor)
+
+
+def _largest(estimates: Sequence[Estimate | None]) -> Estimate:
+    """Return the largest estimate; zero if there is none."""
+    return max(
+        filter(None, estimates), key=lambda estimate: estimate.value, default=Estimate(0.0, 0.0)
+    )
 
 
 def _tripped(rows: FloatArray) -> bool:

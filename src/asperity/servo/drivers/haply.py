@@ -62,9 +62,11 @@ def cursor_position(state: dict[str, Any]) -> Force:
         ValueError: for a state without a position.
     """
     try:
-        given = state["state"]["cursor_position"]
-        x, y, z = (given.get(axis, 0.0) for axis in "xyz")
-        if given and all(type(value) in {int, float} for value in (x, y, z)):
+        coordinates = state["state"]["cursor_position"]
+        x = coordinates.get("x", 0.0)
+        y = coordinates.get("y", 0.0)
+        z = coordinates.get("z", 0.0)
+        if coordinates and {type(x), type(y), type(z)} <= {int, float}:
             return float(x), float(y), float(z)
     except (LookupError, TypeError, AttributeError, OverflowError):
         pass
@@ -163,15 +165,16 @@ class HaplyThread(threading.Thread):
 
     def _send_newest_force(self, *, resend: bool) -> None:
         """Send the newest force if it is new, or the last one again."""
-        x, y, z, given = self.buffer.latest_force()
+        x, y, z, command_time = self.buffer.latest_force()
         force = (x, y, z)
         timeout = self.buffer.ring.words[FORCE_TIMEOUT]
-        if force != _ZERO_FORCE and _system_time() - given > timeout:
+        if force != _ZERO_FORCE and _system_time() - command_time > timeout:
             self._fail(LOOP_SILENT, "its force was released")
             return
-        is_due = (resend or given != self._last_force_time) and len(self._pending) < MAX_PENDING
+        is_new = command_time != self._last_force_time
+        is_due = (resend or is_new) and len(self._pending) < MAX_PENDING
         if is_due or force == _ZERO_FORCE != self._last_force:
-            self._last_force_time = given
+            self._last_force_time = command_time
             self._send(force)
 
     def _send(self, force: Force) -> None:
@@ -250,9 +253,12 @@ class HaplyDriver(threaded.ThreadedDriver):
 
     def describe_error(self, code: int) -> str:
         """Return what failed in the thread."""
-        reason = self._exchange.reason if self._exchange else ""
-        words = super().describe_error(code) if code in {STALE, LOOP_SILENT} else ""
-        return ": ".join(filter(None, (words, reason)))
+        parts = []
+        if code in {STALE, LOOP_SILENT}:
+            parts.append(super().describe_error(code))
+        if self._exchange is not None and self._exchange.reason:
+            parts.append(self._exchange.reason)
+        return ": ".join(parts)
 
 
 def _connect() -> WebSocketClient:

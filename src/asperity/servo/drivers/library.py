@@ -59,13 +59,13 @@ def function_addresses(library: ctypes.CDLL, *names: str) -> list[int]:
     Raises:
         ParameterError: for a missing function, with its name.
     """
-    found = []
+    addresses = []
     for name in names:
         if not hasattr(library, name):
             raise ParameterError("driver", f"{library._name} has no function {name}")
         pointer = ctypes.cast(getattr(library, name), ctypes.c_void_p)
-        found.append(int(pointer.value or 0))
-    return found
+        addresses.append(int(pointer.value or 0))
+    return addresses
 
 
 FUNCTIONS = ("asperity_open", "asperity_read", "asperity_write", "asperity_close")

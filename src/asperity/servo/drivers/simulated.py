@@ -167,8 +167,9 @@ def replay_driver(path: str, period: float) -> ReplayDriver:
     recording = open_replay(path)
     steps = np.diff(recording["time"])
     if np.abs(steps - period).max() > 1e-3 * period:
-        recorded, wanted = (format_quantity(1.0 / one, "Hz") for one in (np.median(steps), period))
-        words = f"{path} is not sampled evenly at {wanted}: most of it is at {recorded}"
+        recorded = format_quantity(1.0 / np.median(steps), "Hz")
+        rate = format_quantity(1.0 / period, "Hz")
+        words = f"{path} is not sampled evenly at {rate}: most of it is at {recorded}"
         raise ParameterError("driver", f"{words} ({{update_rate}})", update_rate=recorded)
     points = np.column_stack([recording[name] for name in "xyz"])
     return ReplayDriver(np.ascontiguousarray(points))

@@ -227,8 +227,8 @@ class ThreadBuffer:
 
     def latest_force(self) -> tuple[float, float, float, int]:
         """Return the newest force [N], and the time of its command [ns]; 0 for none."""
-        x, y, z, given = self._functions.latest_force(*self.ring)
-        return x, y, z, given
+        x, y, z, time = self._functions.latest_force(*self.ring)
+        return x, y, z, time
 
     def report_failure(self, code: int) -> None:
         """Report a failure by a nonzero code; the first one is kept."""
