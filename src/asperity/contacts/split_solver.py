@@ -374,6 +374,7 @@ def split_iterate(
         stuck = left == 0
         if not stuck:
             count = left
+            share = min(share, budget - evaluations)
             solved, taken = split_update_dual(
                 atoms, count, p, at, offset, continuity, a, share, texture
             )
