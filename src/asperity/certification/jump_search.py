@@ -130,9 +130,13 @@ class JumpSearch:
         self._record_jumps(start, end, np.array(lengths), np.array(changes), gain)
 
     def _record_jumps(
-        self, start: FloatArray, end: FloatArray, lengths: FloatArray, changes: FloatArray,
+        self,
+        start: FloatArray,
+        end: FloatArray,
+        lengths: FloatArray,
+        changes: FloatArray,
         gain: float,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Record the jumps among segments, from their lengths and changes at each halving."""
         if len(lengths) <= _HALVINGS:
             return  # the segments are as short as the resolution

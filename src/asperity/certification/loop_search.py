@@ -307,9 +307,15 @@ class LoopSearch:
         forces = self.calls.along(turns[None])[0]
         work = float((forces[:-1] * np.diff(turns, axis=0))[-count:].sum())
         return ClosedLoop(
-            loop.energy, loop.error, loop.length, loop.path, loop.turns, work,
-            loop.held_speed, loop.held_rate,
-        )  # fmt: skip
+            loop.energy,
+            loop.error,
+            loop.length,
+            loop.path,
+            loop.turns,
+            work,
+            loop.held_speed,
+            loop.held_rate,
+        )
 
 
 def cell_outlines(cells: NDArray[np.bool_]) -> list[FloatArray]:

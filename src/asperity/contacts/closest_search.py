@@ -397,9 +397,15 @@ def expand_box(
 
 
 def divide_box(
-    ball: Ball, frame: Frame, minimum: Minimum, box: Box, stack: FloatArray, count: int,
-    left: float, texture: object,
-) -> tuple[int, float]:  # fmt: skip
+    ball: Ball,
+    frame: Frame,
+    minimum: Minimum,
+    box: Box,
+    stack: FloatArray,
+    count: int,
+    left: float,
+    texture: object,
+) -> tuple[int, float]:
     """Put halves or quarters on the stack."""
     return split_box(frame, minimum, box, stack, count, texture), left
 

@@ -44,9 +44,12 @@ def descend_within_budget(
         if new <= best[2] or close:
             best = (fx, fy, new, h, hx, hy)
             sx, sy, convex = newton_step(
-                dx + gap * hx, dy + gap * hy,
-                1.0 + hx * hx + gap * hxx, hx * hy + gap * hxy, 1.0 + hy * hy + gap * hyy,
-            )  # fmt: skip
+                dx + gap * hx,
+                dy + gap * hy,
+                1.0 + hx * hx + gap * hxx,
+                hx * hy + gap * hxy,
+                1.0 + hy * hy + gap * hyy,
+            )
             size = sx * sx + sy * sy
             if size <= 0.5 * EPS * new + rounding:
                 h += hx * sx + hy * sy

@@ -150,9 +150,15 @@ def expand_box(
 
 
 def divide_box(
-    ball: Ball, frame: Frame, minimum: Minimum, box: Box, stack: FloatArray, count: int,
-    left: float, texture: object,
-) -> tuple[int, float]:  # fmt: skip
+    ball: Ball,
+    frame: Frame,
+    minimum: Minimum,
+    box: Box,
+    stack: FloatArray,
+    count: int,
+    left: float,
+    texture: object,
+) -> tuple[int, float]:
     """Put the parts of a box that may hold a point of a ball on the stack.
 
     Return the number of boxes on the stack and the evaluations left. The minimum is the best point.

@@ -80,9 +80,14 @@ def split_energy(
 
 
 def split_contact_derivative(
-    p: FloatArray, continuity: float, atoms: FloatArray, count: int, offset: FloatArray,
-    derivative: FloatArray, texture: object,
-) -> None:  # fmt: skip
+    p: FloatArray,
+    continuity: float,
+    atoms: FloatArray,
+    count: int,
+    offset: FloatArray,
+    derivative: FloatArray,
+    texture: object,
+) -> None:
     """Write M = ∂(z̄ - p)/∂p, (3, 3).
 
     One atom: P - I, P the derivative of the closest point. Several: z̄ = (p - (1 - μ) y)/μ with

@@ -177,9 +177,15 @@ def split_track_point(
 
 
 def split_solve_subset(
-    atoms: FloatArray, count: int, mask: int, p: FloatArray, mu: float, a: FloatArray,
-    trial: FloatArray, y: FloatArray,
-) -> int:  # fmt: skip
+    atoms: FloatArray,
+    count: int,
+    mask: int,
+    p: FloatArray,
+    mu: float,
+    a: FloatArray,
+    trial: FloatArray,
+    y: FloatArray,
+) -> int:
     """Write the best weights on the last atom and a subset of the others, and y.
 
     Returns:

@@ -89,9 +89,15 @@ def split_query(
 
 
 def split_newton(
-    atoms: FloatArray, count: int, p: FloatArray, y: FloatArray, mu: float, a: FloatArray,
-    budget: float, texture: object,
-) -> tuple[int, float]:  # fmt: skip
+    atoms: FloatArray,
+    count: int,
+    p: FloatArray,
+    y: FloatArray,
+    mu: float,
+    a: FloatArray,
+    budget: float,
+    texture: object,
+) -> tuple[int, float]:
     """Solve the optimality conditions for atoms, weights and y by Newton's method.
 
     Returns:
@@ -128,9 +134,15 @@ def split_newton(
 
 
 def split_try_newton(
-    atoms: FloatArray, count: int, p: FloatArray, y: FloatArray, mu: float, a: FloatArray,
-    budget: float, texture: object,
-) -> tuple[int, float]:  # fmt: skip
+    atoms: FloatArray,
+    count: int,
+    p: FloatArray,
+    y: FloatArray,
+    mu: float,
+    a: FloatArray,
+    budget: float,
+    texture: object,
+) -> tuple[int, float]:
     """Apply Newton's method; undo it and return 0 if it does not lower the energy.
 
     Returns:
@@ -165,9 +177,16 @@ def split_is_local_minimum(atoms: FloatArray, y: FloatArray, texture: object) ->
 
 
 def split_update_dual(
-    atoms: FloatArray, count: int, p: FloatArray, y: FloatArray, offset: FloatArray,
-    continuity: float, a: FloatArray, budget: float, texture: object,
-) -> tuple[int, float]:  # fmt: skip
+    atoms: FloatArray,
+    count: int,
+    p: FloatArray,
+    y: FloatArray,
+    offset: FloatArray,
+    continuity: float,
+    a: FloatArray,
+    budget: float,
+    texture: object,
+) -> tuple[int, float]:
     """Write y and z̄ - p, ``offset``, of atoms with weights; several are refined by Newton's method.
 
     Returns:
@@ -189,9 +208,16 @@ def split_update_dual(
 
 
 def split_initialize(
-    atoms: FloatArray, warm_count: int, p: FloatArray, y: FloatArray, offset: FloatArray,
-    continuity: float, a: FloatArray, budget: float, texture: object,
-) -> tuple[int, int, float]:  # fmt: skip
+    atoms: FloatArray,
+    warm_count: int,
+    p: FloatArray,
+    y: FloatArray,
+    offset: FloatArray,
+    continuity: float,
+    a: FloatArray,
+    budget: float,
+    texture: object,
+) -> tuple[int, int, float]:
     """Write the initial atoms, y and z̄ - p: moved atoms of a nearby probe, or one surface point.
 
     The old weights would move y away from the point that is equally far from all atoms, where
@@ -262,9 +288,15 @@ def split_query_nearby(y: FloatArray, atoms: FloatArray, count: int, texture: ob
 
 
 def split_query_closer(
-    y: FloatArray, atoms: FloatArray, count: int, is_final: bool, mu: float, scale: float,
-    budget: float, texture: object,
-) -> tuple[float, float, float, float]:  # fmt: skip
+    y: FloatArray,
+    atoms: FloatArray,
+    count: int,
+    is_final: bool,
+    mu: float,
+    scale: float,
+    budget: float,
+    texture: object,
+) -> tuple[float, float, float, float]:
     """Write a point closer to y than the atoms into the row after them, or the closest one.
 
     The closest one is needed to show that y is final. Otherwise any closer one improves y: it is
@@ -293,9 +325,17 @@ def split_query_closer(
 
 
 def split_compute_atoms(
-    x: float, y: float, z: float, continuity: float, warm_count: int, budget: float,
-    p: FloatArray, atoms: FloatArray, offset: FloatArray, texture: object,
-) -> tuple[int, float, float, bool]:  # fmt: skip
+    x: float,
+    y: float,
+    z: float,
+    continuity: float,
+    warm_count: int,
+    budget: float,
+    p: FloatArray,
+    atoms: FloatArray,
+    offset: FloatArray,
+    texture: object,
+) -> tuple[int, float, float, bool]:
     """Write p (3,), the atoms of law H (5, 4) and z̄ - p, ``offset`` (3,), at a probe inside.
 
     Args:
@@ -331,9 +371,15 @@ def split_compute_atoms(
 
 
 def split_iterate(
-    p: FloatArray, atoms: FloatArray, offset: FloatArray, continuity: float, warm_count: int,
-    budget: float, newton: bool, texture: object,
-) -> tuple[int, float, float, bool, bool]:  # fmt: skip
+    p: FloatArray,
+    atoms: FloatArray,
+    offset: FloatArray,
+    continuity: float,
+    warm_count: int,
+    budget: float,
+    newton: bool,
+    texture: object,
+) -> tuple[int, float, float, bool, bool]:
     """Write atoms and z̄ - p at p, with or without Newton's method; see ``split_compute_atoms``.
 
     Returns:

@@ -33,9 +33,31 @@ H_HALF = sp.Symbol("h_half", positive=True)
 
 # The order of a kernel's arguments; it takes those that it uses.
 ARGUMENT_ORDER = (
-    *POSITION, DEPTH, H, HX, HY, HXX, HXY, HYY, DX, DY, SXX, SXY, SYY,
-    *CONTACT_VECTOR, CONTACT_ENERGY, MXX, MXY, MXZ, MYY, MYZ, MZZ, K, H_MID, H_HALF,
-)  # fmt: skip
+    *POSITION,
+    DEPTH,
+    H,
+    HX,
+    HY,
+    HXX,
+    HXY,
+    HYY,
+    DX,
+    DY,
+    SXX,
+    SXY,
+    SYY,
+    *CONTACT_VECTOR,
+    CONTACT_ENERGY,
+    MXX,
+    MXY,
+    MXZ,
+    MYY,
+    MYZ,
+    MZZ,
+    K,
+    H_MID,
+    H_HALF,
+)
 
 
 def unit_normal() -> Any:

@@ -38,11 +38,15 @@ class LawLane:
         session = self.session
         pictures = self.pictures
         return {
-            "state": session.state, "message": session.message, "start_count": session.start_count,
+            "state": session.state,
+            "message": session.message,
+            "start_count": session.start_count,
             "settings": session.scene_state.settings,
-            "limit": pictures.limit, "surface_version": pictures.version,
-            "picture_message": pictures.message, "pictures_current": pictures.is_current,
-        }  # fmt: skip
+            "limit": pictures.limit,
+            "surface_version": pictures.version,
+            "picture_message": pictures.message,
+            "pictures_current": pictures.is_current,
+        }
 
 
 class SecondLane(LawLane):
@@ -119,10 +123,13 @@ class FrameReader:
         self._seen = first + len(rows)
         counted = LoopStatistics.from_status(shared.status)
         counts = {
-            "frame": frame, "acknowledged": session.steering_progress["acknowledged"],
-            "late": counted.late, "skipped": counted.skipped, "lateness": counted.max_lateness,
+            "frame": frame,
+            "acknowledged": session.steering_progress["acknowledged"],
+            "late": counted.late,
+            "skipped": counted.skipped,
+            "lateness": counted.max_lateness,
             "truncated": shared.search_state[TRUNCATED_TICKS],
-        }  # fmt: skip
+        }
         if session.leader is not None:
             counts |= _follow_time(rows, session.leader)
         places = np.concatenate([self._lane.pictures.nearest(rows[-1, 1:4]), session.anchor])

@@ -244,9 +244,14 @@ def encode_relief(surface: Surface, x: float, y: float, size: float) -> bytes:
 
 
 def encode_section(
-    surface: Surface, left: float, right: float, bottom: float, top: float, y: float,
+    surface: Surface,
+    left: float,
+    right: float,
+    bottom: float,
+    top: float,
+    y: float,
     code: float = SECTION,
-) -> bytes:  # fmt: skip
+) -> bytes:
     """Return a section along x, with the field and its curl, as a message.
 
     SECTION, PROFILE_POINTS, SECTION_COLUMNS, SECTION_ROWS, y and the box, then the heights [m],

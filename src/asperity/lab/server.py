@@ -263,17 +263,22 @@ class LabServer:
         lowest, highest = map(float, setup.surface.texture.extremes)
         electronics = session.scene_state.electronics
         status = {
-            **self.lane.status, BESIDE: self.second_lane.status,
+            **self.lane.status,
+            BESIDE: self.second_lane.status,
             "settings": session.scene_state.settings | {BESIDE: self.second_lane.law},
             "assumptions": setup.assumptions,
             "control_available": self._controller is None,
-            "request_count": session.steering_progress["requested"], "handle": session.handle,
-            "update_rate": 1.0 / setup.servo.period, "max_force": setup.servo.max_force,
+            "request_count": session.steering_progress["requested"],
+            "handle": session.handle,
+            "update_rate": 1.0 / setup.servo.period,
+            "max_force": setup.servo.max_force,
             "position_resolution": electronics.position_resolution,
             "force_resolution": electronics.force_resolution,
-            "lowest": lowest, "highest": highest, "centre": session.scene_state.centre,
+            "lowest": lowest,
+            "highest": highest,
+            "centre": session.scene_state.centre,
             "recommendation": self.recommendation.value,
-        }  # fmt: skip
+        }
         for page in tuple(self._clients):
             await page.send("status", has_control=page is self._controller, **status)
 

@@ -53,11 +53,19 @@ from asperity.loop.shared_trace import (
 
 KERNELS = Kernels(
     provides=(
-        "check_sample", "clock_now", "clock_wait_until", "finish_timing", "guard_force",
-        "read_position", "release_device", "release_force", "requested_end", "write_force",
+        "check_sample",
+        "clock_now",
+        "clock_wait_until",
+        "finish_timing",
+        "guard_force",
+        "read_position",
+        "release_device",
+        "release_force",
+        "requested_end",
+        "write_force",
     ),
     native=("call_address", "load_acquire"),
-)  # fmt: skip
+)
 
 # Linux: the monotonic clock that goes on while the machine sleeps, absolute times, and the answer
 # of a wait that a signal interrupted.
@@ -280,9 +288,13 @@ def write_force(
 
 
 def guard_force(
-    force: GuardedForce, before: ServoState, servo: ServoState, is_ending: bool,
-    settings: ServoSettings, guards: Guards,
-) -> GuardedForce:  # fmt: skip
+    force: GuardedForce,
+    before: ServoState,
+    servo: ServoState,
+    is_ending: bool,
+    settings: ServoSettings,
+    guards: Guards,
+) -> GuardedForce:
     """Return the force to hold: the law's, ramped, damped and limited."""
     limits = guards.limits
     status = guards.block.status
@@ -295,9 +307,14 @@ def guard_force(
     damping = passivity_damping(energy, dx, dy, dz, settings.period, max_damping)
     drag = damping / settings.period
     bounded = limit_change(
-        ramp * servo.fx - drag * dx, ramp * servo.fy - drag * dy, ramp * servo.fz - drag * dz,
-        0.0, 0.0, 0.0, settings.max_force,
-    )  # fmt: skip
+        ramp * servo.fx - drag * dx,
+        ramp * servo.fy - drag * dy,
+        ramp * servo.fz - drag * dz,
+        0.0,
+        0.0,
+        0.0,
+        settings.max_force,
+    )
     limited = limit_change(
         bounded.x, bounded.y, bounded.z, force.fx, force.fy, force.fz, limits.max_change
     )

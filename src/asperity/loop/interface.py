@@ -110,9 +110,16 @@ def device_write(fx: float, fy: float, fz: float, in_contact: bool, device: obje
 
 
 def trace_sample(
-    trace: object, sample: int, reading: Reading, before: ServoState, servo: ServoState,
-    force: GuardedForce, in_contact: bool, settings: ServoSettings, device: object,
-) -> None:  # fmt: skip
+    trace: object,
+    sample: int,
+    reading: Reading,
+    before: ServoState,
+    servo: ServoState,
+    force: GuardedForce,
+    in_contact: bool,
+    settings: ServoSettings,
+    device: object,
+) -> None:
     """Write the row of a sample, after its tick and before its force is commanded.
 
     Args:

@@ -98,9 +98,17 @@ class LaneTrace(NamedTuple):
 
 
 def run_lanes(
-    lanes: Lanes, samples: int, anchor: FloatArray, plant: object, settings: ServoSettings,
-    rows: FloatArray, row_counters: IntArray, every: int, texture: object, law: tuple[float, ...],
-) -> None:  # fmt: skip
+    lanes: Lanes,
+    samples: int,
+    anchor: FloatArray,
+    plant: object,
+    settings: ServoSettings,
+    rows: FloatArray,
+    row_counters: IntArray,
+    every: int,
+    texture: object,
+    law: tuple[float, ...],
+) -> None:
     """Run each lane over a number of samples; a lane that has stopped is skipped.
 
     Args:
@@ -123,9 +131,18 @@ def run_lanes(
                 continue
             is_active = True
             device = SimulatedDevice(
-                lanes.x[lane], lanes.queues[lane], lanes.counters[lane], anchor,
-                lanes.offsets[lane], lanes.ledgers[lane], rate, plant, 0.0, 0.0, (),
-            )  # fmt: skip
+                lanes.x[lane],
+                lanes.queues[lane],
+                lanes.counters[lane],
+                anchor,
+                lanes.offsets[lane],
+                lanes.ledgers[lane],
+                rate,
+                plant,
+                0.0,
+                0.0,
+                (),
+            )
             trace = LaneTrace(rows, row_counters, every, lanes.statistics[lane])
             # No stars in compiled functions.
             parameters = (lanes.stiffness[lane],) + law[1:]  # noqa: RUF005
@@ -153,10 +170,19 @@ def load_state(lanes: Lanes, lane: int) -> LoopState:
     """Return the state of a loop whose guards change no force."""
     states = lanes.servo_states
     servo = ServoState(
-        states[lane, 0], states[lane, 1], states[lane, 2], states[lane, 3],
-        states[lane, 4], states[lane, 5], states[lane, 6], states[lane, 7],
-        states[lane, 8] > 0.0, states[lane, 9], states[lane, 10], states[lane, 11],
-    )  # fmt: skip
+        states[lane, 0],
+        states[lane, 1],
+        states[lane, 2],
+        states[lane, 3],
+        states[lane, 4],
+        states[lane, 5],
+        states[lane, 6],
+        states[lane, 7],
+        states[lane, 8] > 0.0,
+        states[lane, 9],
+        states[lane, 10],
+        states[lane, 11],
+    )
     force = GuardedForce(servo.fx, servo.fy, servo.fz, 1.0, 0.0, 0.0)
     return LoopState(servo, force, LoopTiming(lanes.counters[lane, SAMPLES], 0, 0, 0, 0))
 
@@ -178,9 +204,16 @@ def store_servo_state(states: FloatArray, lane: int, servo: ServoState) -> None:
 
 
 def trace_sample(
-    trace: LaneTrace, sample: int, reading: Reading, before: ServoState, servo: ServoState,
-    force: GuardedForce, in_contact: bool, settings: ServoSettings, device: SimulatedDevice,
-) -> None:  # fmt: skip
+    trace: LaneTrace,
+    sample: int,
+    reading: Reading,
+    before: ServoState,
+    servo: ServoState,
+    force: GuardedForce,
+    in_contact: bool,
+    settings: ServoSettings,
+    device: SimulatedDevice,
+) -> None:
     """Add to the ledger, and record what the lane records; see ``interface``."""
     add_command_energies(device.ledger, before, servo)
     if trace.statistics.shape[0] != 0:

@@ -18,10 +18,18 @@ from asperity.loop.interface import (
 
 KERNELS = Kernels(
     provides=(
-        "check_sample", "clock_now", "clock_wait_until", "finish_timing", "guard_force",
-        "read_position", "release_device", "release_force", "requested_end", "write_force",
-    ),
-)  # fmt: skip
+        "check_sample",
+        "clock_now",
+        "clock_wait_until",
+        "finish_timing",
+        "guard_force",
+        "read_position",
+        "release_device",
+        "release_force",
+        "requested_end",
+        "write_force",
+    )
+)
 
 
 def clock_now(due: int, clock: object) -> int:
@@ -49,9 +57,13 @@ def read_position(position: FloatArray, late: int, guards: object, device: objec
 
 
 def guard_force(
-    force: GuardedForce, before: ServoState, servo: ServoState, is_ending: bool,
-    settings: ServoSettings, guards: object,
-) -> GuardedForce:  # fmt: skip
+    force: GuardedForce,
+    before: ServoState,
+    servo: ServoState,
+    is_ending: bool,
+    settings: ServoSettings,
+    guards: object,
+) -> GuardedForce:
     """Return the force of the law."""
     return GuardedForce(servo.fx, servo.fy, servo.fz, 1.0, 0.0, 0.0)
 

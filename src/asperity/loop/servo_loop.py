@@ -36,9 +36,17 @@ KERNELS = Kernels(provides=("run_sample",), loops=("servo_loop",))
 
 
 def servo_loop(
-    state: LoopState, end_sample: int, settings: ServoSettings, clock: Clock, guards: Guards,
-    device: object, trace: object, memory: FloatArray, texture: object, law: object,
-) -> tuple[int, int, LoopState]:  # fmt: skip
+    state: LoopState,
+    end_sample: int,
+    settings: ServoSettings,
+    clock: Clock,
+    guards: Guards,
+    device: object,
+    trace: object,
+    memory: FloatArray,
+    texture: object,
+    law: object,
+) -> tuple[int, int, LoopState]:
     """Run samples until ``end_sample``, a request to stop, or a fault.
 
     Args:
@@ -80,9 +88,17 @@ def start_timing(timing: LoopTiming, clock: Clock) -> LoopTiming:
 
 
 def run_sample(
-    state: LoopState, end_sample: int, settings: ServoSettings, clock: Clock, guards: Guards,
-    device: object, trace: object, memory: FloatArray, texture: object, law: object,
-) -> tuple[int, int, LoopState]:  # fmt: skip
+    state: LoopState,
+    end_sample: int,
+    settings: ServoSettings,
+    clock: Clock,
+    guards: Guards,
+    device: object,
+    trace: object,
+    memory: FloatArray,
+    texture: object,
+    law: object,
+) -> tuple[int, int, LoopState]:
     """Run a sample, unless the loop ends before it; see :func:`servo_loop`.
 
     Returns:

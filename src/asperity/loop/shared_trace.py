@@ -38,13 +38,25 @@ STATUS_SIZE = PERIOD_HISTOGRAM + HISTOGRAM_BINS
 
 COLUMNS = (
     ("time", "s"),
-    ("x", "m"), ("y", "m"), ("z", "m"),
-    ("commanded x", "N"), ("commanded y", "N"), ("commanded z", "N"),
-    ("applied x", "N"), ("applied y", "N"), ("applied z", "N"),
-    ("share", "1"), ("supplied", "J"), ("controlled", "N s/m"),
-    ("late", "s"), ("took", "s"), ("inside", "1"),
-    ("law anchor x", "m"), ("law anchor y", "m"), ("law held", "1"),
-)  # fmt: skip
+    ("x", "m"),
+    ("y", "m"),
+    ("z", "m"),
+    ("commanded x", "N"),
+    ("commanded y", "N"),
+    ("commanded z", "N"),
+    ("applied x", "N"),
+    ("applied y", "N"),
+    ("applied z", "N"),
+    ("share", "1"),
+    ("supplied", "J"),
+    ("controlled", "N s/m"),
+    ("late", "s"),
+    ("took", "s"),
+    ("inside", "1"),
+    ("law anchor x", "m"),
+    ("law anchor y", "m"),
+    ("law held", "1"),
+)
 """Columns of the rows with their units; positions and forces are in the surface's frame."""
 
 
@@ -65,9 +77,16 @@ class SharedBlock(NamedTuple):
 
 
 def trace_sample(
-    trace: SharedBlock, sample: int, reading: Reading, before: ServoState, servo: ServoState,
-    force: GuardedForce, in_contact: bool, settings: ServoSettings, device: object,
-) -> None:  # fmt: skip
+    trace: SharedBlock,
+    sample: int,
+    reading: Reading,
+    before: ServoState,
+    servo: ServoState,
+    force: GuardedForce,
+    in_contact: bool,
+    settings: ServoSettings,
+    device: object,
+) -> None:
     """Write the row of a sample; see ``interface``."""
     rows = trace.rows
     row = trace.status[ROW_COUNT] % rows.shape[0]

@@ -17,10 +17,15 @@ from asperity.loop.body_interface import (
 
 KERNELS = Kernels(
     provides=(
-        "add_energies", "anchor_segment", "delay_force", "device_read", "device_write", "due_force",
+        "add_energies",
+        "anchor_segment",
+        "delay_force",
+        "device_read",
+        "device_write",
+        "due_force",
         "flush_subnormals",
-    ),
-)  # fmt: skip
+    )
+)
 
 # The ledger [J]: work of the held force, per axis; the paper's same-sample sum, per axis; loss;
 # work of the hand; work of dry friction; what sampling adds; all without their signs.
@@ -142,9 +147,13 @@ def anchor_segment(device: SimulatedDevice) -> tuple[float, float, float, float,
     here = min(device.counters[SAMPLES] - device.counters[FIRST_SAMPLE], last)
     there = min(here + 1, last)
     return (
-        anchor[here, 0] + shift[0], anchor[here, 1] + shift[1], anchor[here, 2] + shift[2],
-        anchor[there, 0] + shift[0], anchor[there, 1] + shift[1], anchor[there, 2] + shift[2],
-    )  # fmt: skip
+        anchor[here, 0] + shift[0],
+        anchor[here, 1] + shift[1],
+        anchor[here, 2] + shift[2],
+        anchor[there, 0] + shift[0],
+        anchor[there, 1] + shift[1],
+        anchor[there, 2] + shift[2],
+    )
 
 
 def device_write(fx: float, fy: float, fz: float, in_contact: bool, device: SimulatedDevice) -> int:
@@ -156,9 +165,13 @@ def device_write(fx: float, fy: float, fz: float, in_contact: bool, device: Simu
     counters = device.counters
     step = device.force_step
     head, hx, hy, hz = delay_force(
-        device.queue, counters[QUEUE_HEAD], counters[DELAY],
-        quantize(fx, step), quantize(fy, step), quantize(fz, step),
-    )  # fmt: skip
+        device.queue,
+        counters[QUEUE_HEAD],
+        counters[DELAY],
+        quantize(fx, step),
+        quantize(fy, step),
+        quantize(fz, step),
+    )
     ax, ay, az, bx, by, bz = anchor_segment(device)
     rate = device.update_rate
     inputs = SampleInput(

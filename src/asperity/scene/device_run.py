@@ -109,14 +109,24 @@ def check_stiffness_limit(setup: Setup, *, accept_risk: bool = False) -> None:
 def simulated_process(setup: Setup, prestarted: PrestartedProcess | None = None) -> ServoProcess:
     """Return the process of a loop on the simulated device; it is not started."""
     driver = simulated_driver(
-        setup.plant, setup.hand, setup.servo, setup.motion, setup.duration, setup.start,
+        setup.plant,
+        setup.hand,
+        setup.servo,
+        setup.motion,
+        setup.duration,
+        setup.start,
         setup.velocity,
-    )  # fmt: skip
+    )
     reach = setup.safety.reach_limit(setup.device)
     return ServoProcess(
-        setup.rendered, driver, setup.servo, setup.safety, reach, setup.duration,
+        setup.rendered,
+        driver,
+        setup.servo,
+        setup.safety,
+        reach,
+        setup.duration,
         prestarted=prestarted,
-    )  # fmt: skip
+    )
 
 
 def run(

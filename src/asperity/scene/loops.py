@@ -167,9 +167,14 @@ def onset(
         onset, scene, device, surface_arguments, chosen, duration=duration, uses_delay=False
     )
     return sweep_onsets(
-        setup, chosen, delays, n_phases=n_phases, tolerance=tolerance,
-        min_stiffness=min_stiffness, progress=progress,
-    )  # fmt: skip
+        setup,
+        chosen,
+        delays,
+        n_phases=n_phases,
+        tolerance=tolerance,
+        min_stiffness=min_stiffness,
+        progress=progress,
+    )
 
 
 def scan(

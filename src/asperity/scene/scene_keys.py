@@ -117,10 +117,18 @@ _TEMPLATE = Path(__file__).with_name("scene_template.txt")
 # Values of the template, in TOML.
 _TEXTURE = {"amplitude": '"0.1 mm"', "period": '"2 mm"'}
 _SURFACE = {"law": '"C"', "stiffness": '"300 N/m"', "max_depth": '"0.5 mm"'}
-_HAND = {"stiffness": '["300 N/m", "300 N/m", "0 N/m"]', "damping": '"3 N*s/m"', "mass": '"50 g"',
-         "force": '["0 N", "0 N", "-0.3 N"]'}  # fmt: skip
-_MOTION = {"start": '["-10 mm", "0 mm", "0 mm"]', "end": '["10 mm", "0 mm", "0 mm"]',
-           "speed": '"0.05 m/s"', "count": "2"}  # fmt: skip
+_HAND = {
+    "stiffness": '["300 N/m", "300 N/m", "0 N/m"]',
+    "damping": '"3 N*s/m"',
+    "mass": '"50 g"',
+    "force": '["0 N", "0 N", "-0.3 N"]',
+}
+_MOTION = {
+    "start": '["-10 mm", "0 mm", "0 mm"]',
+    "end": '["10 mm", "0 mm", "0 mm"]',
+    "speed": '"0.05 m/s"',
+    "count": "2",
+}
 _AXIS_COUNTS = {"space": 3, "plane": 2}
 _FIXED_EXAMPLES = {"switch": "true", "vector": "[1, 0]"}
 

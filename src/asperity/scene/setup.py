@@ -85,10 +85,20 @@ class Setup:
     ) -> Run:
         """Run the loop; see :func:`~asperity.simulation.simulate`."""
         return simulate(
-            self.rendered, self.plant, self.hand, self.servo, self.motion, self.duration,
-            start=self.start, velocity=self.velocity, trace=trace, every=self.every,
-            max_rows=max_rows, progress=progress, metadata=self.recording_metadata(),
-        )  # fmt: skip
+            self.rendered,
+            self.plant,
+            self.hand,
+            self.servo,
+            self.motion,
+            self.duration,
+            start=self.start,
+            velocity=self.velocity,
+            trace=trace,
+            every=self.every,
+            max_rows=max_rows,
+            progress=progress,
+            metadata=self.recording_metadata(),
+        )
 
     def recording_metadata(self, driver: str = "") -> dict[str, Any]:
         """Return the metadata of a recording of this loop.
@@ -190,9 +200,12 @@ def make_setup(
     brakes = run.pop("brakes", None)
     share = run.pop("velocity_share", None)
     plant, assumed = scene_defaults.make_plant(
-        chosen, centre=run.pop("centre", None), has_resonance=run.pop("resonance", False),
-        brakes=brakes, needs_dynamics=needs_plant,
-    )  # fmt: skip
+        chosen,
+        centre=run.pop("centre", None),
+        has_resonance=run.pop("resonance", False),
+        brakes=brakes,
+        needs_dynamics=needs_plant,
+    )
     servo, notes = scene_defaults.make_servo(chosen, uses_delay=uses_delay)
     guards = Safety(**limits)
     safety.check_passivity_damping(guards, chosen, servo)
@@ -207,10 +220,20 @@ def make_setup(
         parameters = describe(whole.to_law(law), "law_parameters")
         notes += [f"{parameter} for law {law.letter}" for parameter in parameters]
     return Setup(
-        whole, chosen, plant, hand, servo, motion, span,
+        whole,
+        chosen,
+        plant,
+        hand,
+        servo,
+        motion,
+        span,
         assumptions=(*assumed, *notes, *default, *_leaving_warnings(scene.texture, motion, span)),
-        files=scene.files, safety=guards, rendering=rendering, scene_text=scene.text, **run,
-    )  # fmt: skip
+        files=scene.files,
+        safety=guards,
+        rendering=rendering,
+        scene_text=scene.text,
+        **run,
+    )
 
 
 def _make_default_setup(

@@ -101,22 +101,37 @@ def sweep_onsets(
             for delay in delays
         ]
         return loop, find_onsets(
-            rendered, loop.plant, loop.hand, loop.servo, loop.motion, delays, nears,
-            start=loop.start, velocity=loop.velocity, duration=loop.duration, starts=n_phases,
-            tolerance=tolerance, lowest=min_stiffness, progress=check_cancelled,
+            rendered,
+            loop.plant,
+            loop.hand,
+            loop.servo,
+            loop.motion,
+            delays,
+            nears,
+            start=loop.start,
+            velocity=loop.velocity,
+            duration=loop.duration,
+            starts=n_phases,
+            tolerance=tolerance,
+            lowest=min_stiffness,
+            progress=check_cancelled,
             onset_callback=progress,
-        )  # fmt: skip
+        )
 
     by_law = map_threads(find, [(law,) for law in laws], cancelled)
     all_onsets = [onset for _, onsets in by_law for onset in onsets]
     predictions = tuple(
         predict(
-            loop.rendered, loop.plant, loop.hand, loop.with_delay(onset.delay).servo, onset,
+            loop.rendered,
+            loop.plant,
+            loop.hand,
+            loop.with_delay(onset.delay).servo,
+            onset,
             smooth_wall_onset(all_onsets, onset.delay),
         )
         for loop, onsets in by_law
         for onset in onsets
-    )  # fmt: skip
+    )
     return OnsetSweep(_with_notes(setup, [loop for loop, _ in by_law]), predictions)
 
 
@@ -170,9 +185,16 @@ def sweep_strokes(
 
     def scan(loop: Setup, speed: float, depth: float) -> Stroke:
         (stroke,) = scan_strokes(
-            loop.rendered, setup.plant, setup.hand, setup.servo, path,
-            speeds=[speed], depths=[depth], start=setup.start, velocity=setup.velocity,
-        )  # fmt: skip
+            loop.rendered,
+            setup.plant,
+            setup.hand,
+            setup.servo,
+            path,
+            speeds=[speed],
+            depths=[depth],
+            start=setup.start,
+            velocity=setup.velocity,
+        )
         done[0] += 1
         if progress is not None:
             progress(done[0] / len(jobs))

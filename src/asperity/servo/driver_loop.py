@@ -61,17 +61,23 @@ def build_program(surface: Surface, driver: Driver) -> LoopProgram:
     from asperity.analysis.gain.theorems import theorem_on
 
     source = source_on_texture(
-        surface.law, surface.texture.sampler, surface.effective_clamp,
+        surface.law,
+        surface.texture.sampler,
+        surface.effective_clamp,
         (servo_loop, *loop_parts(), *driver.kernel_modules()),
-    )  # fmt: skip
+    )
     bounded = surface.effective_clamp.holds_whole_force
     everywhere = bounded or theorem_on(surface).holds_at_any_depth(surface)
     crest = surface.law.contact.extremes(surface.texture)[1]
     safe_height = -math.inf if everywhere else crest - surface.max_depth
     return LoopProgram(
-        source, surface.texture.arguments, surface.law_arguments, safe_height, surface.max_depth,
+        source,
+        surface.texture.arguments,
+        surface.law_arguments,
+        safe_height,
+        surface.max_depth,
         surface.law.contact.max_evaluations,
-    )  # fmt: skip
+    )
 
 
 def loop_limits(
@@ -82,11 +88,20 @@ def loop_limits(
     share = 1.0 if safety.ramp < period else period / safety.ramp
     x, y, z = map(float, centre)
     return LoopLimits(
-        round(1e9 * period), safety.slew_limit(servo.max_force) * period, share,
-        float(safety.passivity_damping), round(1e9 * safety.lateness_limit(period)),
-        round(1e9 * safety.silence), float(reach), x, y, z, program.safe_height, program.max_depth,
+        round(1e9 * period),
+        safety.slew_limit(servo.max_force) * period,
+        share,
+        float(safety.passivity_damping),
+        round(1e9 * safety.lateness_limit(period)),
+        round(1e9 * safety.silence),
+        float(reach),
+        x,
+        y,
+        z,
+        program.safe_height,
+        program.max_depth,
         safety.beyond_depth == "fault",
-    )  # fmt: skip
+    )
 
 
 def function_address(function: Any) -> int:
@@ -123,9 +138,14 @@ class DriverLoop:
     """
 
     def __init__(
-        self, driver: Driver, servo: Servo, safety: Safety, reach: float, block: SharedBlock,
+        self,
+        driver: Driver,
+        servo: Servo,
+        safety: Safety,
+        reach: float,
+        block: SharedBlock,
         clock: Clock,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self._servo = servo
         self._safety = safety
         self._reach = reach
@@ -169,8 +189,15 @@ class DriverLoop:
         limits = loop_limits(self._servo, self._safety, self._reach, self._frame[:3, 3], program)
         self.search_state[BUDGET] = program.max_evaluations
         answer: tuple[int, int, LoopState] = load_fused(program.source).servo_loop(
-            state, end_sample, self._servo.settings, self._clock,
-            Guards(limits, self._frame, self._block), device, self._block,
-            self.search_state, program.texture, program.law,
-        )  # fmt: skip
+            state,
+            end_sample,
+            self._servo.settings,
+            self._clock,
+            Guards(limits, self._frame, self._block),
+            device,
+            self._block,
+            self.search_state,
+            program.texture,
+            program.law,
+        )
         return answer

@@ -40,9 +40,11 @@ class LoopMemory:
     def block(self) -> SharedBlock:
         """Return the memory as the compiled loop takes it."""
         return SharedBlock(
-            np.frombuffer(self._control, np.int64), np.frombuffer(self._status, np.int64),
-            np.frombuffer(self._table, np.float64).reshape(-1, len(COLUMNS)), np.zeros(1, np.int64),
-        )  # fmt: skip
+            np.frombuffer(self._control, np.int64),
+            np.frombuffer(self._status, np.int64),
+            np.frombuffer(self._table, np.float64).reshape(-1, len(COLUMNS)),
+            np.zeros(1, np.int64),
+        )
 
     @property
     def search_state(self) -> FloatArray:

@@ -152,9 +152,17 @@ class _LoopServer:
 
 
 _IGNORED_SIGNALS = (
-    signal.SIGINT, signal.SIGHUP, signal.SIGTERM, signal.SIGQUIT, signal.SIGTSTP, signal.SIGTTIN,
-    signal.SIGTTOU, signal.SIGUSR1, signal.SIGUSR2, signal.SIGALRM,
-)  # fmt: skip
+    signal.SIGINT,
+    signal.SIGHUP,
+    signal.SIGTERM,
+    signal.SIGQUIT,
+    signal.SIGTSTP,
+    signal.SIGTTIN,
+    signal.SIGTTOU,
+    signal.SIGUSR1,
+    signal.SIGUSR2,
+    signal.SIGALRM,
+)
 _WATCH_PERIOD = 0.003  # [s]
 MAX_CALL_TIME = 10.0
 """Time for a call of a device to return before the process that waits in it is killed [s]."""

@@ -117,10 +117,16 @@ class ServoProcess:
     """
 
     def __init__(
-        self, surface: Surface | driver_loop.LoopProgram, driver: Driver, servo: Servo,
-        safety: Safety | None = None, reach: float = math.inf, duration: float | None = None,
-        device: Device | None = None, prestarted: PrestartedProcess | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        surface: Surface | driver_loop.LoopProgram,
+        driver: Driver,
+        servo: Servo,
+        safety: Safety | None = None,
+        reach: float = math.inf,
+        duration: float | None = None,
+        device: Device | None = None,
+        prestarted: PrestartedProcess | None = None,
+    ) -> None:
         require_max_force(driver, servo)
         self.driver = driver
         self._safety = safety or Safety()
@@ -379,9 +385,13 @@ class LoopRecorder:
     """
 
     def __init__(
-        self, path: str | os.PathLike[str], loop: ServoProcess | LoopMemory, surface: Surface,
-        servo: Servo, metadata: Mapping[str, Any],
-    ) -> None:  # fmt: skip
+        self,
+        path: str | os.PathLike[str],
+        loop: ServoProcess | LoopMemory,
+        surface: Surface,
+        servo: Servo,
+        metadata: Mapping[str, Any],
+    ) -> None:
         about: dict[str, Any] = {"made_by": "run", "surface": field_metadata(surface)}
         about |= {"servo": to_plain_data(servo), "every": 1, **metadata}
         self._what = path, COLUMNS, about, field_attachments(surface), "record"

@@ -41,9 +41,13 @@ NO_ROWS = np.empty((0, len(COLUMNS)))
 _NO_SHIFT = np.full(3, -0.0)
 # Attributes of a lane that the compiled loop changes, by the fields of its record.
 _TABLES = {
-    "x": "state", "counters": "counters", "servo_states": "servo_state", "ledgers": "ledger_sums",
-    "memories": "memory", "statistics": "statistics",
-}  # fmt: skip
+    "x": "state",
+    "counters": "counters",
+    "servo_states": "servo_state",
+    "ledgers": "ledger_sums",
+    "memories": "memory",
+    "statistics": "statistics",
+}
 
 
 class Lane:
@@ -69,9 +73,15 @@ class Lane:
     """
 
     def __init__(
-        self, state: FloatArray, delay: int, stiffness: float, max_evaluations: float,
-        offset: FloatArray = _NO_SHIFT, *, has_statistics: bool = False,
-    ) -> None:  # fmt: skip
+        self,
+        state: FloatArray,
+        delay: int,
+        stiffness: float,
+        max_evaluations: float,
+        offset: FloatArray = _NO_SHIFT,
+        *,
+        has_statistics: bool = False,
+    ) -> None:
         if delay > MAX_DELAY:
             raise ParameterError("delay", f"must be at most {MAX_DELAY} samples", delay)
         self.initial_state = state
@@ -125,18 +135,24 @@ class LaneLoop:
         surface = self._surface
         parts = lane_loop, servo_loop, no_guards, simulated_device
         return fuse_on_texture(
-            surface.law, surface.texture.sampler, surface.effective_clamp,
+            surface.law,
+            surface.texture.sampler,
+            surface.effective_clamp,
             (*parts, *self._plant.modules, tick),
-        )  # fmt: skip
+        )
 
     def stored_energy(self, state: FloatArray, anchor: FloatArray) -> float:
         """Return the energy stored in a state [J] with the hand's anchor at a position [m]."""
         return float(self._kernels.stored_energy_at(state, anchor, self._plant.record))
 
     def run(
-        self, lanes: Sequence[Lane], samples: int, anchor: FloatArray,
-        rows: FloatArray = NO_ROWS, every: int = 1,
-    ) -> int:  # fmt: skip
+        self,
+        lanes: Sequence[Lane],
+        samples: int,
+        anchor: FloatArray,
+        rows: FloatArray = NO_ROWS,
+        every: int = 1,
+    ) -> int:
         """Run lanes over a number of samples.
 
         Args:
@@ -167,9 +183,16 @@ class LaneLoop:
                 stiffness=np.array([lane.stiffness for lane in lanes]),
                 **tables,
             ),
-            samples, anchor, self._plant.record, self._servo.settings, rows, row_counters, every,
-            surface.texture.arguments, surface.law_arguments,
-        )  # fmt: skip
+            samples,
+            anchor,
+            self._plant.record,
+            self._servo.settings,
+            rows,
+            row_counters,
+            every,
+            surface.texture.arguments,
+            surface.law_arguments,
+        )
         for number, lane in enumerate(lanes):
             lane.queue[:] = queues[number, : lane.delay + 1]
             for field, name in _TABLES.items():
@@ -223,9 +246,14 @@ class Trajectory(Lane):
     """
 
     def __init__(
-        self, state: FloatArray, offset: FloatArray, stiffness: float, delay: int,
-        max_evaluations: float, stop_rule: StopRule,
-    ) -> None:  # fmt: skip
+        self,
+        state: FloatArray,
+        offset: FloatArray,
+        stiffness: float,
+        delay: int,
+        max_evaluations: float,
+        stop_rule: StopRule,
+    ) -> None:
         super().__init__(state, delay, stiffness, max_evaluations, offset, has_statistics=True)
         self._stop_rule = stop_rule
         self.verdict: bool | None = None
@@ -288,9 +316,15 @@ class BatchSimulation:
     """
 
     def __init__(
-        self, surface: Surface, plant: Plant, hand: Hand, servo: Servo, motion: Motion,
-        start: ArrayLike | None = None, velocity: ArrayLike | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        surface: Surface,
+        plant: Plant,
+        hand: Hand,
+        servo: Servo,
+        motion: Motion,
+        start: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+    ) -> None:
         check_parts(surface, plant, hand, servo, motion)
         self._parts = plant, hand, servo, motion
         if start is None:
@@ -366,9 +400,13 @@ def check_parts(surface: Surface, plant: Plant, hand: Hand, servo: Servo, motion
 
 
 def initial_motion(
-    plant: Plant, hand: Hand, servo: Servo, motion: Motion,
-    start: ArrayLike | None, velocity: ArrayLike | None,
-) -> tuple[FloatArray, FloatArray]:  # fmt: skip
+    plant: Plant,
+    hand: Hand,
+    servo: Servo,
+    motion: Motion,
+    start: ArrayLike | None,
+    velocity: ArrayLike | None,
+) -> tuple[FloatArray, FloatArray]:
     """Return the initial position [m] and velocity [m/s] of a handle.
 
     Args:

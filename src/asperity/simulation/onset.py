@@ -228,10 +228,16 @@ def find_onsets(
 
         searches = {number: search(number) for number in numbers}
         for number in onset_search.run_searches(batch, searches):
-            yield number, Onset(
-                surface.law.letter, delays[number], starts=len(offsets),
-                is_smooth_wall=surface.law is SMOOTH_WALL, **searches[number].result()._asdict(),
-            )  # fmt: skip
+            yield (
+                number,
+                Onset(
+                    surface.law.letter,
+                    delays[number],
+                    starts=len(offsets),
+                    is_smooth_wall=surface.law is SMOOTH_WALL,
+                    **searches[number].result()._asdict(),
+                ),
+            )
             if onset_callback is not None:
                 onset_callback()
 
@@ -353,9 +359,13 @@ def expected_onset(
 
 
 def predict(
-    surface: Surface, plant: Plant, hand: Hand, servo: Servo, onset: Onset,
+    surface: Surface,
+    plant: Plant,
+    hand: Hand,
+    servo: Servo,
+    onset: Onset,
     wall: Onset | None = None,
-) -> Prediction:  # fmt: skip
+) -> Prediction:
     """Return the stiffnesses that the criteria allow, with the simulated onset.
 
     Args:

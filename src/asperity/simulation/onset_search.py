@@ -176,10 +176,12 @@ class OnsetSearch:
     """
 
     def __init__(
-        self, start: Callable[[float, int], Trajectory], count: int,
+        self,
+        start: Callable[[float, int], Trajectory],
+        count: int,
         bracketing: Generator[float, bool, tuple[float, float]],
         progress: Callable[[], None] | None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self._start = start
         self._count = count
         self._bracketing = bracketing

@@ -133,10 +133,16 @@ class Pantograph(Plant):
         rate = max_rate(min_mass, 2.0 * self.joint_damping * (bxx + bzz), hand)
         substep_count(self.friction, rate, period)  # refuses too many; the number depends on speed
         record = PantographRecord(
-            linkage, hand.record(), float(self.friction), rate,
-            friction_substeps(self.friction), float(period), _MAX_STEP_FRACTION,
-            bool(self.inside_only), MIN_ELBOW_SINE,
-        )  # fmt: skip
+            linkage,
+            hand.record(),
+            float(self.friction),
+            rate,
+            friction_substeps(self.friction),
+            float(period),
+            _MAX_STEP_FRACTION,
+            bool(self.inside_only),
+            MIN_ELBOW_SINE,
+        )
         return SampledPlant((pantograph, body_parts), record, 6)
 
     def workspace_violation(self, position: FloatArray) -> str:
@@ -200,7 +206,13 @@ def linkage_record(plant: Pantograph, hand_mass: float = 0.0) -> LinkageRecord:
     first = masses.rotor + masses.proximal * bars.proximal**2 / 3.0
     inertia = first + masses.distal * bars.proximal**2 / 3.0
     numbers = (
-        bars.proximal, bars.distal, bars.base, inertia, masses.distal, masses.handle + hand_mass,
-        *plant.centre, plant.joint_damping,
-    )  # fmt: skip
+        bars.proximal,
+        bars.distal,
+        bars.base,
+        inertia,
+        masses.distal,
+        masses.handle + hand_mass,
+        *plant.centre,
+        plant.joint_damping,
+    )
     return LinkageRecord(*map(float, numbers))

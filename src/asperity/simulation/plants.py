@@ -34,9 +34,15 @@ _MAX_STEP_FRACTION = 0.01
 _MAX_SUBSTEPS = 10_000
 # Typical values; the error names the parameter furthest from its typical value.
 _TYPICAL_VALUES = {
-    "mass": 0.1, "handle": 0.1, "stiffness": 1e3, "damping": 1.0, "joint_damping": 1e-2,
-    "frequency": 100.0, "damping_ratio": 0.1, "period": 1e-3,
-}  # fmt: skip
+    "mass": 0.1,
+    "handle": 0.1,
+    "stiffness": 1e3,
+    "damping": 1.0,
+    "joint_damping": 1e-2,
+    "frequency": 100.0,
+    "damping_ratio": 0.1,
+    "period": 1e-3,
+}
 
 
 @dataclass(frozen=True)
@@ -305,10 +311,19 @@ def coupled_plant(plant: Cartesian, hand: SpringHand, period: float) -> SampledP
     change, loss = integrate(body.dynamics, body.loss, span)
     stops = np.asarray(span * np.linalg.inv(change[3:6, 12:15]))
     record = coupled_body.CoupledBodyRecord(
-        np.ascontiguousarray(change[:12].T), np.ascontiguousarray(loss), plant.damping, body.mass,
-        body.carrier_mass, body.coupling, body.stiffness, np.array(hand.force), plant.friction,
-        stops, parts, span,
-    )  # fmt: skip
+        np.ascontiguousarray(change[:12].T),
+        np.ascontiguousarray(loss),
+        plant.damping,
+        body.mass,
+        body.carrier_mass,
+        body.coupling,
+        body.stiffness,
+        np.array(hand.force),
+        plant.friction,
+        stops,
+        parts,
+        span,
+    )
     order = 6 if plant.resonance is None else 12
     return SampledPlant((coupled_body, body_parts), record, order)
 

@@ -127,9 +127,15 @@ def scan_strokes(
             (x1, y1, _) = motion.end
             strokes = Strokes((x0, y0, -depth), (x1, y1, -depth), speed, motion.count)
             run = simulate(
-                surface, plant, hand, servo, strokes, strokes.duration, start=start,
+                surface,
+                plant,
+                hand,
+                servo,
+                strokes,
+                strokes.duration,
+                start=start,
                 velocity=velocity,
-            )  # fmt: skip
+            )
             result.append(_analyze_stroke(surface, strokes, run, depth))
             if progress is not None:
                 progress()
@@ -146,9 +152,19 @@ def _analyze_stroke(surface: Surface, motion: Strokes, run: Run, depth: float) -
         nan = math.nan
         unknown = (nan, nan, nan)
         return Stroke(
-            law, speed, depth, mean_depth, unknown, nan, nan, nan, unknown, nan, closure,
+            law,
+            speed,
+            depth,
+            mean_depth,
+            unknown,
+            nan,
+            nan,
+            nan,
+            unknown,
+            nan,
+            closure,
             run.stop_message,
-        )  # fmt: skip
+        )
     ends = motion.period * np.arange(1, motion.count) - 1e-9 * run.period
     starts = np.searchsorted(run.time, ends)
 
@@ -171,9 +187,19 @@ def _analyze_stroke(surface: Surface, motion: Strokes, run: Run, depth: float) -
     contact = np.any(run.applied != 0.0, axis=1)
     losses = float(np.count_nonzero(contact[:-1] & ~contact[1:]))
     return Stroke(
-        law, speed, depth, mean_depth, mean("supplied"), float(works.mean()), float(error),
-        _cycle_spread(works), mean("same_sample"), losses / motion.count, closure, "",
-    )  # fmt: skip
+        law,
+        speed,
+        depth,
+        mean_depth,
+        mean("supplied"),
+        float(works.mean()),
+        float(error),
+        _cycle_spread(works),
+        mean("same_sample"),
+        losses / motion.count,
+        closure,
+        "",
+    )
 
 
 def _whole_cycles(strokes: FloatArray) -> FloatArray:

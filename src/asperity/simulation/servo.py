@@ -62,9 +62,13 @@ class Servo(Serializable):
     def settings(self) -> ServoSettings:
         """What the compiled loop receives."""
         return ServoSettings(
-            float(self.position_resolution), float(self.force_resolution), float(self.max_force),
-            float(self.virtual_damping), float(self.velocity_share), float(self.period),
-        )  # fmt: skip
+            float(self.position_resolution),
+            float(self.force_resolution),
+            float(self.max_force),
+            float(self.virtual_damping),
+            float(self.velocity_share),
+            float(self.period),
+        )
 
 
 def _to_float(value: object) -> float:

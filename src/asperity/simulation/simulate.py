@@ -62,9 +62,14 @@ class Simulation(Lane):
     """
 
     def __init__(
-        self, surface: Surface, plant: SampledPlant, servo: Servo, start: FloatArray,
-        velocity: FloatArray | None = None, max_evaluations: float | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        surface: Surface,
+        plant: SampledPlant,
+        servo: Servo,
+        start: FloatArray,
+        velocity: FloatArray | None = None,
+        max_evaluations: float | None = None,
+    ) -> None:
         if velocity is None:
             velocity = np.zeros(3)
         state = plant.initial_state(start, velocity)
@@ -210,9 +215,20 @@ def simulate(
         path = os.fspath(trace)
     truncated, error = simulation.search_truncation
     return Run(
-        table, simulation.state, simulation.samples, float(servo.period), simulation.ledger(),
-        surface, stop, stop_location, path, tail, plant.notes, truncated, error,
-    )  # fmt: skip
+        table,
+        simulation.state,
+        simulation.samples,
+        float(servo.period),
+        simulation.ledger(),
+        surface,
+        stop,
+        stop_location,
+        path,
+        tail,
+        plant.notes,
+        truncated,
+        error,
+    )
 
 
 def simulate_many(jobs: Sequence[Mapping[str, Any]], workers: int | None = None) -> list[Run]:
@@ -261,9 +277,12 @@ def count_samples(duration: float, period: float) -> int:
 
 
 def _open_trace(
-    trace: bool | str | os.PathLike[str], rows: int, max_rows: int | None,
-    metadata: Callable[[], dict[str, Any]], surface: Surface,
-) -> TraceWriter:  # fmt: skip
+    trace: bool | str | os.PathLike[str],
+    rows: int,
+    max_rows: int | None,
+    metadata: Callable[[], dict[str, Any]],
+    surface: Surface,
+) -> TraceWriter:
     if isinstance(trace, bool):
         if max_rows is not None:
             max_rows = check_integer("max_rows", max_rows)
@@ -279,10 +298,14 @@ def _open_trace(
 
 
 def _run_chunks(
-    simulation: Simulation, anchor_chunk: Callable[[int], FloatArray], samples: int,
-    trace: TraceWriter, tail: TailStatistics | None, every: int,
+    simulation: Simulation,
+    anchor_chunk: Callable[[int], FloatArray],
+    samples: int,
+    trace: TraceWriter,
+    tail: TailStatistics | None,
+    every: int,
     progress: Callable[[float], None] | None,
-) -> StopReason:  # fmt: skip
+) -> StopReason:
     buffer = NO_ROWS
     if tail is not None:
         buffer = np.empty((CHUNK_SAMPLES // every + 1, len(COLUMNS)))

@@ -19,16 +19,36 @@ from asperity.surface import Surface
 
 COLUMNS = (
     ("time", "s"),
-    ("x", "m"), ("y", "m"), ("z", "m"),
-    ("vx", "m/s"), ("vy", "m/s"), ("vz", "m/s"),
-    ("commanded x", "N"), ("commanded y", "N"), ("commanded z", "N"),
-    ("applied x", "N"), ("applied y", "N"), ("applied z", "N"),
-    ("anchor x", "m"), ("anchor y", "m"), ("anchor z", "m"),
-    ("supplied x", "J"), ("supplied y", "J"), ("supplied z", "J"),
-    ("same sample x", "J"), ("same sample y", "J"), ("same sample z", "J"),
-    ("lost", "J"), ("hand", "J"), ("friction", "J"), ("sampling", "J"), ("stored", "J"),
-    ("law anchor x", "m"), ("law anchor y", "m"), ("law held", "1"),
-)  # fmt: skip
+    ("x", "m"),
+    ("y", "m"),
+    ("z", "m"),
+    ("vx", "m/s"),
+    ("vy", "m/s"),
+    ("vz", "m/s"),
+    ("commanded x", "N"),
+    ("commanded y", "N"),
+    ("commanded z", "N"),
+    ("applied x", "N"),
+    ("applied y", "N"),
+    ("applied z", "N"),
+    ("anchor x", "m"),
+    ("anchor y", "m"),
+    ("anchor z", "m"),
+    ("supplied x", "J"),
+    ("supplied y", "J"),
+    ("supplied z", "J"),
+    ("same sample x", "J"),
+    ("same sample y", "J"),
+    ("same sample z", "J"),
+    ("lost", "J"),
+    ("hand", "J"),
+    ("friction", "J"),
+    ("sampling", "J"),
+    ("stored", "J"),
+    ("law anchor x", "m"),
+    ("law anchor y", "m"),
+    ("law held", "1"),
+)
 """Columns of the trace with their units."""
 
 
@@ -211,13 +231,19 @@ class Ledger:
     def to_dict(self) -> dict[str, Any]:
         """Return plain data [J], with the sums over the axes; None for an overflow."""
         data = {
-            "supplied": self.supplied, "supplied_sum": self.total,
-            "same_sample": self.same_sample, "same_sample_sum": sum(self.same_sample),
-            "sampling": self.sampling, "lost": self.dissipated, "hand": self.hand,
-            "friction": self.friction, "stored_before": self.stored_before,
-            "stored_after": self.stored_after, "closure": self.closure,
+            "supplied": self.supplied,
+            "supplied_sum": self.total,
+            "same_sample": self.same_sample,
+            "same_sample_sum": sum(self.same_sample),
+            "sampling": self.sampling,
+            "lost": self.dissipated,
+            "hand": self.hand,
+            "friction": self.friction,
+            "stored_before": self.stored_before,
+            "stored_after": self.stored_after,
+            "closure": self.closure,
             "exchanged": self.exchanged,
-        }  # fmt: skip
+        }
         return dict(to_plain_data(data, infinity=None))
 
 

@@ -84,21 +84,53 @@ _DISCRIMINATION = {
 }
 
 _KINDS = (
-    MethodKind("detection", "level from which one interval is told from others",
-               tuple(_DETECTION.values()), run_thresholds, score_thresholds, has_function=True),
-    MethodKind("discrimination", "difference from which one interval is told from others",
-               tuple(_DISCRIMINATION.values()), run_thresholds, score_thresholds,
-               has_function=True),
-    MethodKind("comparison", "which of two feels more so; Bradley–Terry scores",
-               _options("comparison"), pairs.run_comparison, pairs.score_comparison,
-               consistency=pairs.pair_consistency),
-    MethodKind("rating", "magnitude estimation or a Likert scale",
-               _options("rating"), run_rating, score_rating),
-    MethodKind("axb", "which of two the one between them equals",
-               _options("axb"), pairs.run_axb, pairs.score_axb, pairs.label_pairs),
-    MethodKind("onset", "a value is raised until it begins, and lowered until it ends",
-               _options("onset"), run_onset, score_onset),
-)  # fmt: skip
+    MethodKind(
+        "detection",
+        "level from which one interval is told from others",
+        tuple(_DETECTION.values()),
+        run_thresholds,
+        score_thresholds,
+        has_function=True,
+    ),
+    MethodKind(
+        "discrimination",
+        "difference from which one interval is told from others",
+        tuple(_DISCRIMINATION.values()),
+        run_thresholds,
+        score_thresholds,
+        has_function=True,
+    ),
+    MethodKind(
+        "comparison",
+        "which of two feels more so; Bradley–Terry scores",
+        _options("comparison"),
+        pairs.run_comparison,
+        pairs.score_comparison,
+        consistency=pairs.pair_consistency,
+    ),
+    MethodKind(
+        "rating",
+        "magnitude estimation or a Likert scale",
+        _options("rating"),
+        run_rating,
+        score_rating,
+    ),
+    MethodKind(
+        "axb",
+        "which of two the one between them equals",
+        _options("axb"),
+        pairs.run_axb,
+        pairs.score_axb,
+        pairs.label_pairs,
+    ),
+    MethodKind(
+        "onset",
+        "a value is raised until it begins, and lowered until it ends",
+        _options("onset"),
+        run_onset,
+        score_onset,
+    ),
+)
 METHODS: dict[str, MethodKind] = {kind.name: kind for kind in _KINDS}
 """The kinds of methods by name."""
 EXCLUSIONS = _options("exclusion")

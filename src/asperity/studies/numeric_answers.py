@@ -55,9 +55,10 @@ def score_rating(design: StudyDesign, answered: Answers) -> Score:
     is_likert = design.options["scale"] == LIKERT
     transform: Callable[[float], float] = float if is_likert else math.log
     cells = score_cells(
-        answered, len(design.conditions),
+        answered,
+        len(design.conditions),
         lambda trials: mean_interval(np.array([transform(float(t.answer)) for t in trials])),
-    )  # fmt: skip
+    )
     score = Score("rating" if is_likert else "magnitude", *cells, interval=_INTERVAL)
     return score if is_likert else _equalise(score)
 
@@ -87,7 +88,7 @@ def run_onset(design: StudyDesign, participant: int, rng: np.random.Generator) -
         values = {**design.conditions[condition], key: start}
         yield Presentation(
             (values,), (), design.question, (low, high), adjusts=key, condition=condition
-        )  # fmt: skip
+        )
 
 
 def score_onset(design: StudyDesign, answered: Answers) -> Score:

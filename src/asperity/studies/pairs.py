@@ -106,9 +106,10 @@ def label_pairs(design: StudyDesign) -> Sequence[dict[str, Any]]:
 def score_axb(design: StudyDesign, answered: Answers) -> Score:
     """Return the shares of right matches of each pair of conditions."""
     cells = score_cells(
-        answered, len(list_pairs(design)),
+        answered,
+        len(list_pairs(design)),
         lambda trials: share_interval(sum([t.is_correct for t in trials]), len(trials)),
-    )  # fmt: skip
+    )
     return Score("share of right matches", *cells, interval="Wilson score", chance=0.5)
 
 

@@ -57,7 +57,7 @@ def study_page(result: StudyResult) -> Page:
             Section("Participants", [_participant_table(result)], notes=[score.interval]),
             Section("Exclusion", [page.pairs_table(rules), *(excluded or [nobody])], _RULES),
         ],
-    )  # fmt: skip
+    )
 
 
 def _rows_of(result: StudyResult, participant: str) -> list[dict[str, Any]]:
@@ -67,9 +67,10 @@ def _rows_of(result: StudyResult, participant: str) -> list[dict[str, Any]]:
 def _answer(result: StudyResult) -> str:
     """Return which condition has the greatest pooled score."""
     known = [
-        row for row in _rows_of(result, POOLED)
+        row
+        for row in _rows_of(result, POOLED)
         if row["quantity"] == result.score.quantity and row["estimate"] is not None
-    ]  # fmt: skip
+    ]
     if not known:
         return f"{result.score.quantity}: no participant is used."
     best = max(known, key=lambda row: row["estimate"])
@@ -91,10 +92,15 @@ def _interval_text(row: Mapping[str, Any]) -> str:
 
 def _score_table(result: StudyResult) -> Table:
     cells = [
-        Row([Cell(label_text(result, row) or "all", "l"),
-             *(_number(row[name]) for name in ("estimate", "lower", "upper")), row["quantity"]])
+        Row(
+            [
+                Cell(label_text(result, row) or "all", "l"),
+                *(_number(row[name]) for name in ("estimate", "lower", "upper")),
+                row["quantity"],
+            ]
+        )
         for row in _rows_of(result, POOLED)
-    ]  # fmt: skip
+    ]
     headings = (", ".join(result.design.factors) or "condition", "estimate", "from", "to", "of")
     return Table(headings, cells, (1, 2, 3), TableLayout(wrap=(0, 4), gap=2))
 

@@ -59,12 +59,17 @@ class TrialTable(TableFiles):
             }
             is_correct = trial.is_correct if presentation.correct else None
             yield {
-                "participant": trial.participant, "run": trial.run, "trial": trial.trial,
-                **values, **intervals, "answer": trial.answer,
+                "participant": trial.participant,
+                "run": trial.run,
+                "trial": trial.trial,
+                **values,
+                **intervals,
+                "answer": trial.answer,
                 "correct": is_correct,
-                "response time [s]": float(trial.response_time), "started": trial.started,
+                "response time [s]": float(trial.response_time),
+                "started": trial.started,
                 "used": is_used(self.design, trial) and trial.participant not in self.excluded,
-            }  # fmt: skip
+            }
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,17 +145,28 @@ class StudyResult(Reportable, TableFiles):
         for row, name in enumerate(score.participants):
             for column, label in enumerate(labels):
                 numbers = self._numbers(score.estimates[:, row, column].tolist())
-                yield {"participant": name, **label, "quantity": score.quantity, **numbers,
-                       "answers": int(score.counts[row, column]), "interval": score.interval,
-                       "excluded": self.excluded.get(name, "")}  # fmt: skip
+                yield {
+                    "participant": name,
+                    **label,
+                    "quantity": score.quantity,
+                    **numbers,
+                    "answers": int(score.counts[row, column]),
+                    "interval": score.interval,
+                    "excluded": self.excluded.get(name, ""),
+                }
         word = "ratio to the first" if score.is_logarithmic else "difference from the first"
         compared = f"{score.quantity}, {word}", self.differences, labels[1:]
         if score.chance is not None:
             compared = f"{score.quantity}, difference from chance", self.differences, labels
         for title, values, value_labels in ((score.quantity, self.pooled, labels), compared):
             for value, label in zip(values, value_labels, strict=True):
-                yield {"participant": POOLED, **label, "quantity": title, **self._numbers(value),
-                       "interval": self.included_score.pooled_interval}  # fmt: skip
+                yield {
+                    "participant": POOLED,
+                    **label,
+                    "quantity": title,
+                    **self._numbers(value),
+                    "interval": self.included_score.pooled_interval,
+                }
 
     def _numbers(self, values: Sequence[float]) -> dict[str, float | None]:
         """Return estimate and ends; what is unknown is ``None``."""

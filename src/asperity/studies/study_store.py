@@ -28,8 +28,13 @@ STUDY_FILE = "study.json"
 ANSWERS_FILE = "answers.jsonl"
 KEY_FILE = "key.json"
 DERIVED_FILES = (
-    KEY_FILE, "report.html", "trials.csv", "table.csv", "trials.parquet", "table.parquet",
-)  # fmt: skip
+    KEY_FILE,
+    "report.html",
+    "trials.csv",
+    "table.csv",
+    "trials.parquet",
+    "table.parquet",
+)
 """Files that a report writes; they hold data of all participants."""
 _NUMBER_FILE = "number.txt"
 SCHEMA = 1
@@ -202,9 +207,13 @@ class Participant:
         presentation = self.method.next()
         assert presentation is not None  # an answer belongs to a trial
         line = {
-            "run": self.run, "trial": self.trial, "codes": self.codes(presentation),
-            "answer": answer, "response_time": response_time, "started": started,
-        }  # fmt: skip
+            "run": self.run,
+            "trial": self.trial,
+            "codes": self.codes(presentation),
+            "answer": answer,
+            "response_time": response_time,
+            "started": started,
+        }
         append_bytes("output", self._stream, json.dumps(line).encode() + b"\n", durable=True)
         self.method.answer(answer)
         self.trial += 1

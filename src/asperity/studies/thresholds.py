@@ -87,13 +87,16 @@ def score_thresholds(design: StudyDesign, answered: Answers) -> Score:
     """Return the thresholds of each participant in each condition, as logarithms of levels."""
     levels = log_levels(design)
     cells = score_cells(
-        answered, len(design.conditions),
+        answered,
+        len(design.conditions),
         lambda trials: levels.estimate_threshold(*level_answers(design, trials)),
-    )  # fmt: skip
+    )
     return Score(
-        f"threshold of {design.options['level']}", *cells, is_logarithmic=True,
+        f"threshold of {design.options['level']}",
+        *cells,
+        is_logarithmic=True,
         interval="posterior of the psychometric function",
-    )  # fmt: skip
+    )
 
 
 _FASTER = (4.0, 2.0, 2.0)  # multiples of the step before each of the first reversals

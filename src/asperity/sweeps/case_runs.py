@@ -121,7 +121,7 @@ RUN_KINDS = {
         RunKind("scan", scan, _scan, ("law", "speed [m/s]", "depth [m]"), (_FIELD_ENERGY,)),
         RunKind("bake", rendered_surface, _bake, (), ("size [B]", "q"), takes_laws=False),
     )
-}  # fmt: skip
+}
 """Runs by name."""
 
 

@@ -102,9 +102,12 @@ def run_cases(place: Place, template: CaseTemplate, cases: Iterator[Case], recor
 
 
 def _run_until_lost(
-    place: Place, template: CaseTemplate, cases: Iterator[Case], record: Record,
+    place: Place,
+    template: CaseTemplate,
+    cases: Iterator[Case],
+    record: Record,
     n_tasks: Callable[[], int],
-) -> list[Case]:  # fmt: skip
+) -> list[Case]:
     """Compute cases until a worker process ends; return the cases that are lost."""
     lost: list[Case] = []
     tasks: dict[Future[Any], list[Case]] = {}

@@ -86,21 +86,57 @@ class LimitRule:
 
 
 LIMIT_RULES = (
-    LimitRule(1, "scanning velocity", "α v T < l", "m", "update_rate",
-         lambda case, rate: (case.time_samples * case.speed / rate, case.wavelengths),
-         lambda case, rate: case.wavelengths * rate / case.time_samples),
-    LimitRule(2, "low speed reconstruction", "β δ < l", "m", "position_resolution",
-         lambda case, step: (case.position_samples * step, case.wavelengths)),
-    LimitRule(3, "high speed reconstruction", "α δ < l", "m", "position_resolution",
-         lambda case, step: (case.time_samples * step, case.wavelengths)),
-    LimitRule(4, "force reconstruction", "γ b < A_F", "N", "force_resolution",
-         lambda case, step: (case.force_steps * step, case.forces)),
-    LimitRule(5, "gain", "q k ≤ K₀", "N/m", "max_stiffness",
-         lambda case, wall: (case.gain * case.stiffness, wall)),
-    LimitRule(6, "device structure", "v / l < F₀", "Hz", "bandwidth",
-         lambda case, resonance: (case.speed / case.wavelengths, resonance),
-         lambda case, resonance: case.wavelengths * resonance),
-)  # fmt: skip
+    LimitRule(
+        1,
+        "scanning velocity",
+        "α v T < l",
+        "m",
+        "update_rate",
+        lambda case, rate: (case.time_samples * case.speed / rate, case.wavelengths),
+        lambda case, rate: case.wavelengths * rate / case.time_samples,
+    ),
+    LimitRule(
+        2,
+        "low speed reconstruction",
+        "β δ < l",
+        "m",
+        "position_resolution",
+        lambda case, step: (case.position_samples * step, case.wavelengths),
+    ),
+    LimitRule(
+        3,
+        "high speed reconstruction",
+        "α δ < l",
+        "m",
+        "position_resolution",
+        lambda case, step: (case.time_samples * step, case.wavelengths),
+    ),
+    LimitRule(
+        4,
+        "force reconstruction",
+        "γ b < A_F",
+        "N",
+        "force_resolution",
+        lambda case, step: (case.force_steps * step, case.forces),
+    ),
+    LimitRule(
+        5,
+        "gain",
+        "q k ≤ K₀",
+        "N/m",
+        "max_stiffness",
+        lambda case, wall: (case.gain * case.stiffness, wall),
+    ),
+    LimitRule(
+        6,
+        "device structure",
+        "v / l < F₀",
+        "Hz",
+        "bandwidth",
+        lambda case, resonance: (case.speed / case.wavelengths, resonance),
+        lambda case, resonance: case.wavelengths * resonance,
+    ),
+)
 
 
 @dataclass(frozen=True)

@@ -145,16 +145,26 @@ class Limits(Plottable, Reportable, Tabular):
         surface = self.surface
         felt = self.perceptibility
         holds = {f"limit {limit.number} holds": limit.holds for limit in self.limits}
-        return [{
-            "device": self.device.id, "law": surface.law.letter,
-            "stiffness [N/m]": surface.stiffness, "depth [m]": surface.max_depth,
-            "speed [m/s]": self.speed, "stability limit [N/m]": self.stability_limit.stiffness,
-            "gain": self.gain.value, "gain method": self.gain.method, **holds,
-            "top speed [m/s]": self.speeds[1], "resolved share": self.resolved_share,
-            "tier": felt.tier, "texture force RMS [N]": felt.rms,
-            "resolved force RMS [N]": felt.resolved_rms, "hand motion [m]": felt.hand_motion,
-            "level": felt.level,
-        }]  # fmt: skip
+        return [
+            {
+                "device": self.device.id,
+                "law": surface.law.letter,
+                "stiffness [N/m]": surface.stiffness,
+                "depth [m]": surface.max_depth,
+                "speed [m/s]": self.speed,
+                "stability limit [N/m]": self.stability_limit.stiffness,
+                "gain": self.gain.value,
+                "gain method": self.gain.method,
+                **holds,
+                "top speed [m/s]": self.speeds[1],
+                "resolved share": self.resolved_share,
+                "tier": felt.tier,
+                "texture force RMS [N]": felt.rms,
+                "resolved force RMS [N]": felt.resolved_rms,
+                "hand motion [m]": felt.hand_motion,
+                "level": felt.level,
+            }
+        ]
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units, with a schema number."""

@@ -100,9 +100,13 @@ def coupled_substep(
     multiply_columns(plant.changes, z, change)
     if plant.friction > 0.0:
         gx, gy, gz = friction_force(
-            x[3] + change[3], x[4] + change[4], x[5] + change[5], plant.friction,
-            plant.stopping_mass, span,
-        )  # fmt: skip
+            x[3] + change[3],
+            x[4] + change[4],
+            x[5] + change[5],
+            plant.friction,
+            plant.stopping_mass,
+            span,
+        )
         z[FORCE] += gx
         z[FORCE + 1] += gy
         z[FORCE + 2] += gz

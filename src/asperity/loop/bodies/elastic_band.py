@@ -51,9 +51,14 @@ def elastic_band_rates(
     fx, fy, fz, ax, ay, az, ux, uy, uz, _in_contact = inputs
     hand = plant.hand
     hx, hy, hz, lost = hand_force(
-        ax + t * ux - y[0], ay + t * uy - y[1], az + t * uz - y[2],
-        ux - y[3], uy - y[4], uz - y[5], hand,
-    )  # fmt: skip
+        ax + t * ux - y[0],
+        ay + t * uy - y[1],
+        az + t * uz - y[2],
+        ux - y[3],
+        uy - y[4],
+        uz - y[5],
+        hand,
+    )
     k[6] = lost
     k[7] = ux * hx + uy * hy + uz * hz
     push = (fx + hx, fy + hy, fz + hz)
@@ -144,9 +149,14 @@ def elastic_band_changes_state(
     ey = inputs.ay - x[1]
     ez = inputs.az - x[2]
     return band_changes_state(
-        ex + change[0], ey + change[1], ez + change[2],
-        ex + h * inputs.ux, ey + h * inputs.uy, ez + h * inputs.uz, hand,
-    )  # fmt: skip
+        ex + change[0],
+        ey + change[1],
+        ez + change[2],
+        ex + h * inputs.ux,
+        ey + h * inputs.uy,
+        ez + h * inputs.uz,
+        hand,
+    )
 
 
 def stored_energy(

@@ -22,10 +22,14 @@ from asperity.loop.simulated_device import add_energies
 
 KERNELS = Kernels(
     provides=(
-        "advance_body", "linkage_band_changes_state", "linkage_step_count", "linkage_reaches",
-        "linkage_step", "stored_energy",
+        "advance_body",
+        "linkage_band_changes_state",
+        "linkage_step_count",
+        "linkage_reaches",
+        "linkage_step",
+        "stored_energy",
     )
-)  # fmt: skip
+)
 
 
 class LinkageRecord(NamedTuple):
@@ -222,9 +226,14 @@ def linkage_friction(
 
 
 def linkage_step(
-    x1: float, z1: float, vx1: float, vz1: float, inputs: StepInput, h: float,
+    x1: float,
+    z1: float,
+    vx1: float,
+    vz1: float,
+    inputs: StepInput,
+    h: float,
     plant: PantographRecord,
-) -> tuple[float, float, float, float, float, float]:  # fmt: skip
+) -> tuple[float, float, float, float, float, float]:
     """Return the changes over one step h of Butcher's Runge-Kutta method of order five.
 
     Displacement [m] and change of velocity [m/s] in x and z, loss and work of the hand [J].

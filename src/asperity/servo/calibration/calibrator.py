@@ -169,9 +169,14 @@ class Calibrator:
             axes.append(AxisCalibration(self._rig.axes[axis], motion, wall))
         immobile = [name for axis, name in enumerate(self._rig.axes) if axis not in pushes]
         return Calibration(
-            self._update_rate(records, step.value), step if step.value else None, noise, delay,
-            self._max_force, tuple(axes), tuple(immobile),
-        )  # fmt: skip
+            self._update_rate(records, step.value),
+            step if step.value else None,
+            noise,
+            delay,
+            self._max_force,
+            tuple(axes),
+            tuple(immobile),
+        )
 
     def _apply(self, kind: float, axis: int, time: float, **more: float) -> FloatArray:
         """Apply an excitation for a time [s] and return its rows; see :class:`Excitation`."""
@@ -179,10 +184,24 @@ class Calibrator:
         x, y, z = map(float, self._centre)
         smoothing = min(1.0, self._period / _VELOCITY_TIME_CONSTANT)
         excitation = Excitation(
-            self._excitation_number, kind, axis, HOLDING_STIFFNESS, _BRAKE_DAMPING, smoothing,
-            1.0 / self._period, x, y, z, stiffness=0.0, wall_step=0.0, wait_samples=0.0,
-            push_force=0.0, push_samples=1.0, trip_distance=MAX_TRAVEL, samples=self._samples(time),
-        )  # fmt: skip
+            self._excitation_number,
+            kind,
+            axis,
+            HOLDING_STIFFNESS,
+            _BRAKE_DAMPING,
+            smoothing,
+            1.0 / self._period,
+            x,
+            y,
+            z,
+            stiffness=0.0,
+            wall_step=0.0,
+            wait_samples=0.0,
+            push_force=0.0,
+            push_samples=1.0,
+            trip_distance=MAX_TRAVEL,
+            samples=self._samples(time),
+        )
         return self._rig.apply(excitation._replace(**more))
 
     def _settle(self) -> None:
@@ -258,9 +277,16 @@ class Calibrator:
         wait = self._ramp + _WALL_DELAY
         self._settle()
         rows = self._apply(
-            WALL, axis, wait + watched, stiffness=stiffness, wall_step=step, brake_damping=0.0,
-            wait_samples=self._samples(wait), trip_distance=_TRIP_STEPS * step, x=math.nan,
-        )  # fmt: skip
+            WALL,
+            axis,
+            wait + watched,
+            stiffness=stiffness,
+            wall_step=step,
+            brake_damping=0.0,
+            wait_samples=self._samples(wait),
+            trip_distance=_TRIP_STEPS * step,
+            x=math.nan,
+        )
         if _tripped(rows):
             return True
         after = rows[:, EXCITATION_COLUMN + 1] >= self._samples(wait) + self._samples(0.5 * wave)

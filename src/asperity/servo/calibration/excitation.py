@@ -141,9 +141,16 @@ def brake_force(x: float, i: int, memory: FloatArray, law: Excitation) -> float:
 
 
 def probe_tick(
-    x: float, y: float, z: float, ax: float, ay: float, held: bool, memory: FloatArray,
-    texture: object, law: Excitation,
-) -> tuple[float, float, float, float, float, bool]:  # fmt: skip
+    x: float,
+    y: float,
+    z: float,
+    ax: float,
+    ay: float,
+    held: bool,
+    memory: FloatArray,
+    texture: object,
+    law: Excitation,
+) -> tuple[float, float, float, float, float, bool]:
     """Return the force [N], the number, the sample, and whether the excitation tripped."""
     if memory[POINT_COUNT] == 0.0:
         initialize_excitation(x, y, z, memory, law)
@@ -289,9 +296,13 @@ class ClockedRig:
     """
 
     def __init__(
-        self, driver: Driver, servo: Servo, safety: Safety, reach: float,
+        self,
+        driver: Driver,
+        servo: Servo,
+        safety: Safety,
+        reach: float,
         check: Callable[[], None] = lambda: None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.servo = servo
         self.axes = frame_axes(driver.frame)
         self._check = check

@@ -187,13 +187,17 @@ def fit_dynamics(
     delay = _best_delay(whole)
     others = set()
     for left_out in range(SEGMENTS):
-        errors = np.array([
-            [_fit(parts[:left_out] + parts[left_out + 1 :])[1] for parts in table]
-            for table in tables
-        ])  # fmt: skip
+        errors = np.array(
+            [
+                [_fit(parts[:left_out] + parts[left_out + 1 :])[1] for parts in table]
+                for table in tables
+            ]
+        )
         others.add(_best_delay(errors))
-    motions = [_estimate_dynamics(record, table[delay], delay, period)
-               for record, table in zip(records, tables, strict=True)]  # fmt: skip
+    motions = [
+        _estimate_dynamics(record, table[delay], delay, period)
+        for record, table in zip(records, tables, strict=True)
+    ]
     return DelayEstimate(delay, tuple(sorted(others - {delay}))), motions
 
 

@@ -77,9 +77,14 @@ def measured_device(
 
 
 _MEASURED_FIELDS = (
-    "max_stiffness", "position_resolution", "update_rate", "delay_samples", "damping", "friction",
+    "max_stiffness",
+    "position_resolution",
+    "update_rate",
+    "delay_samples",
+    "damping",
+    "friction",
     "apparent_mass",
-)  # fmt: skip
+)
 
 
 def _wall_test(calibration: Calibration, source: str, origin: Origin) -> WallTest | None:
@@ -96,11 +101,18 @@ def _wall_test(calibration: Calibration, source: str, origin: Origin) -> WallTes
     if cycled is not None:
         cycled = _round_to_four_digits(cycled)
     return WallTest(
-        weakest.value, "N/m", weakest.source, True, tuple(data.values()), origin,
-        directions=directions, lightest=1.0, cycled=cycled,
+        weakest.value,
+        "N/m",
+        weakest.source,
+        True,
+        tuple(data.values()),
+        origin,
+        directions=directions,
+        lightest=1.0,
+        cycled=cycled,
         update_rate=_round_to_four_digits(calibration.update_rate.value),
         positions="stepped" if calibration.position_step else "exact",
-    )  # fmt: skip
+    )
 
 
 def _datum(value: float, unit: str, source: str, origin: Origin) -> Datum:

@@ -30,9 +30,14 @@ The loop ends before, when it is late for 20 ms.
 """
 _LIBRARY_NAMES = ("libdhd.so.3", "libdhd.so", "dhd64.dll")
 _FUNCTIONS = (
-    "dhdGetDeviceCount", "dhdOpenID", "dhdEnableForce", "dhdClose", "dhdErrorGetLastStr",
-    "dhdGetPosition", "dhdSetForce",
-)  # fmt: skip
+    "dhdGetDeviceCount",
+    "dhdOpenID",
+    "dhdEnableForce",
+    "dhdClose",
+    "dhdErrorGetLastStr",
+    "dhdGetPosition",
+    "dhdSetForce",
+)
 
 
 class ForceDimensionDevice(NamedTuple):

@@ -312,6 +312,9 @@ def _choose_device(devices: Sequence[dict[str, Any]], device_id: str) -> str:
 
 
 KIND = DriverKind(
-    "haply", (RIGHT, AWAY, UP), 1.0,
-    lambda text, frame: HaplyDriver(device=text, surface_frame=frame), "haply:049D",
-)  # fmt: skip
+    "haply",
+    (RIGHT, AWAY, UP),
+    1.0,
+    lambda text, frame: HaplyDriver(device=text, surface_frame=frame),
+    "haply:049D",
+)

@@ -22,8 +22,11 @@ from asperity.servo.driver import AWAY, IDENTITY_FRAME, RIGHT, UP, Driver, Drive
 KERNELS = Kernels(provides=("device_read", "device_write"), native=("call_address",))
 
 _WRONG_ARCHITECTURE = (
-    "wrong elf class", "invalid elf header", "incompatible architecture", "exec format",
-)  # fmt: skip
+    "wrong elf class",
+    "invalid elf header",
+    "incompatible architecture",
+    "exec format",
+)
 
 
 def load_library(names: Sequence[str], variable: str, install: str) -> ctypes.CDLL:

@@ -71,10 +71,18 @@ LIBRARY = "ASPERITY_LIBHD"
 _LIBRARY_NAMES = ("libHD.so", "libHD.so.3.4", "hd.dll")
 _FRAME_FUNCTIONS = ("hdBeginFrame", "hdEndFrame", "hdGetDoublev", "hdSetDoublev", "hdGetError")
 _FUNCTIONS = (
-    *_FRAME_FUNCTIONS, "hdInitDevice", "hdDisableDevice", "hdEnable", "hdDisable",
-    "hdCheckCalibration", "hdScheduleAsynchronous", "hdUnschedule", "hdStartScheduler",
-    "hdStopScheduler", "hdGetErrorString",
-)  # fmt: skip
+    *_FRAME_FUNCTIONS,
+    "hdInitDevice",
+    "hdDisableDevice",
+    "hdEnable",
+    "hdDisable",
+    "hdCheckCalibration",
+    "hdScheduleAsynchronous",
+    "hdUnschedule",
+    "hdStartScheduler",
+    "hdStopScheduler",
+    "hdGetErrorString",
+)
 # Constants of hdDefines.h and hdScheduler.h.
 _NO_HANDLE = 0xFFFFFFFF
 _FORCE_OUTPUT = 0x4000
@@ -129,8 +137,10 @@ class _ErrorInfo(ctypes.Structure):
     """``HDErrorInfo``."""
 
     _fields_: ClassVar[Any] = [
-        ("code", ctypes.c_uint), ("internal", ctypes.c_int), ("device", ctypes.c_uint)
-    ]  # fmt: skip
+        ("code", ctypes.c_uint),
+        ("internal", ctypes.c_int),
+        ("device", ctypes.c_uint),
+    ]
 
 
 @dataclass

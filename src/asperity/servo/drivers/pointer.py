@@ -161,9 +161,12 @@ class PointerHand:
         return self._table
 
     def request_motion(
-        self, target: ArrayLike, cosine: ArrayLike = (0.0, 0.0, 0.0),
-        sine: ArrayLike = (0.0, 0.0, 0.0), angular_velocity: float = 0.0,
-    ) -> int:  # fmt: skip
+        self,
+        target: ArrayLike,
+        cosine: ArrayLike = (0.0, 0.0, 0.0),
+        sine: ArrayLike = (0.0, 0.0, 0.0),
+        angular_velocity: float = 0.0,
+    ) -> int:
         """Request the points target + cosine cos(angle) + sine sin(angle) [m].
 
         Args:

@@ -59,9 +59,11 @@ class SimulatedDriver(Driver):
         """Return a copy, so that every start is equal."""
         device = self.device
         return device._replace(
-            x=device.x.copy(), queue=np.zeros_like(device.queue), counters=device.counters.copy(),
+            x=device.x.copy(),
+            queue=np.zeros_like(device.queue),
+            counters=device.counters.copy(),
             ledger=np.zeros(LEDGER_SIZE),
-        )  # fmt: skip
+        )
 
     def describe_error(self, code: int) -> str:
         """Return what happened to the body."""
@@ -69,10 +71,16 @@ class SimulatedDriver(Driver):
 
 
 def simulated_driver(
-    plant: Plant, hand: Hand, servo: Servo, motion: Motion, duration: float,
-    start: tuple[float, ...] | None = None, velocity: tuple[float, ...] | None = None, *,
+    plant: Plant,
+    hand: Hand,
+    servo: Servo,
+    motion: Motion,
+    duration: float,
+    start: tuple[float, ...] | None = None,
+    velocity: tuple[float, ...] | None = None,
+    *,
     device_resolution: bool = False,
-) -> SimulatedDriver:  # fmt: skip
+) -> SimulatedDriver:
     """Return a simulated device.
 
     Args:
@@ -100,12 +108,17 @@ def simulated_driver(
     counters = np.zeros(COUNTERS_SIZE, np.int64)
     counters[DELAY] = servo.delay
     device = SimulatedDevice(
-        body.initial_state(position, speed), np.zeros((servo.delay + 1, 3)), counters,
-        np.ascontiguousarray(anchor), np.zeros(3), np.zeros(LEDGER_SIZE), 1.0 / servo.period,
+        body.initial_state(position, speed),
+        np.zeros((servo.delay + 1, 3)),
+        counters,
+        np.ascontiguousarray(anchor),
+        np.zeros(3),
+        np.zeros(LEDGER_SIZE),
+        1.0 / servo.period,
         body.record,
         float(servo.position_resolution) if device_resolution else 0.0,
         float(servo.force_resolution) if device_resolution else 0.0,
-    )  # fmt: skip
+    )
     return SimulatedDriver(tuple(module.__name__ for module in body.modules), device)
 
 

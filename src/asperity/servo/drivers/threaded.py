@@ -41,11 +41,16 @@ from asperity.servo.driver_loop import function_address, no_clock, system_clock
 
 KERNELS = Kernels(
     provides=(
-        "device_read", "device_write", "set_failure", "failure_code", "latest_row", "push_row",
+        "device_read",
+        "device_write",
+        "set_failure",
+        "failure_code",
+        "latest_row",
+        "push_row",
     ),
     loops=("push_position", "latest_force", "report_failure"),
     native=("call_address", "load_acquire", "store_release"),
-)  # fmt: skip
+)
 
 # Words: counts of positions and of forces, failure code or 0, and the time after which the thread
 # releases a force that the loop does not renew [ns]. The rest is free for a driver.

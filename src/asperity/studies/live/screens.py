@@ -28,8 +28,13 @@ UP = "ArrowUp"
 DOWN = "ArrowDown"
 PAGE_PACKAGE = "asperity.studies.live"
 _SEQUENCES = {
-    b"\n": GO_ON, b" ": GO_ON, b"\x1b": STOP, b"\x7f": BACK, b"\x1b[A": UP, b"\x1b[B": DOWN,
-}  # fmt: skip
+    b"\n": GO_ON,
+    b" ": GO_ON,
+    b"\x1b": STOP,
+    b"\x7f": BACK,
+    b"\x1b[A": UP,
+    b"\x1b[B": DOWN,
+}
 
 
 @dataclass(frozen=True)
@@ -121,10 +126,14 @@ class PageScreen:
         self._view = View("One moment", "The study is being prepared.")
         # A page that does not answer for two seconds is gone.
         self._server = serve(
-            self._serve_page, sock=listener, max_size=MAX_MESSAGE_BYTES, compression=None,
-            ping_interval=2.0, ping_timeout=2.0,
+            self._serve_page,
+            sock=listener,
+            max_size=MAX_MESSAGE_BYTES,
+            compression=None,
+            ping_interval=2.0,
+            ping_timeout=2.0,
             process_request=lambda _page, request: respond(token, request, PAGE_PACKAGE),
-        )  # fmt: skip
+        )
 
     def __enter__(self) -> Self:
         threading.Thread(target=self._server.serve_forever, name="study page", daemon=True).start()

@@ -22,11 +22,13 @@ CurvatureBounds = tuple[FloatArray, FloatArray]
 _DIFFERENCE_ROUNDING = 32.0 * float(np.finfo(np.float64).eps)
 _COLUMNS_PER_PART = 16
 # Weights of three nodes in the Bernstein coefficients of derivatives of order 0, 1, 2.
-_BERNSTEIN = np.array([
-    [[0.5, 0.5, 0.0], [0.0, 1.0, 0.0], [0.0, 0.5, 0.5]],
-    [[-1.0, 1.0, 0.0], [-0.5, 0.0, 0.5], [0.0, -1.0, 1.0]],
-    [[1.0, -2.0, 1.0], [1.0, -2.0, 1.0], [1.0, -2.0, 1.0]],
-])  # fmt: skip
+_BERNSTEIN = np.array(
+    [
+        [[0.5, 0.5, 0.0], [0.0, 1.0, 0.0], [0.0, 0.5, 0.5]],
+        [[-1.0, 1.0, 0.0], [-0.5, 0.0, 0.5], [0.0, -1.0, 1.0]],
+        [[1.0, -2.0, 1.0], [1.0, -2.0, 1.0], [1.0, -2.0, 1.0]],
+    ]
+)
 
 
 def curvature_bounds(

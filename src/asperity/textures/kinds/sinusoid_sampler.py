@@ -192,9 +192,13 @@ def split_contact(
 
 
 def split_contact_warm(
-    x: float, y: float, z: float, continuity: float, warm_start: FloatArray,
+    x: float,
+    y: float,
+    z: float,
+    continuity: float,
+    warm_start: FloatArray,
     texture: SinusoidArguments,
-) -> tuple[float, float, float]:  # fmt: skip
+) -> tuple[float, float, float]:
     """Return z̄ - p; the closed form needs no warm start."""
     return split_contact(x, y, z, continuity, texture)
 
@@ -228,9 +232,16 @@ def split_derivative(
     ex = texture.kx / wave
     ey = texture.ky / wave
     return (
-        texture.kx * shift / k2, texture.ky * shift / k2, gap,
-        ex * ex * along, ex * ey * along, ex * mixed, ey * ey * along, ey * mixed, upward,
-    )  # fmt: skip
+        texture.kx * shift / k2,
+        texture.ky * shift / k2,
+        gap,
+        ex * ex * along,
+        ex * ey * along,
+        ex * mixed,
+        ey * ey * along,
+        ey * mixed,
+        upward,
+    )
 
 
 def split_energy(

@@ -39,9 +39,17 @@ NEAR_DISTANCE = 2.5
 
 
 def shrink_to_cells(
-    u: float, v: float, z: float, threshold: float, gap: float,
-    west: int, east: int, south: int, north: int, texture: SplineArguments,
-) -> tuple[int, int, int, int]:  # fmt: skip
+    u: float,
+    v: float,
+    z: float,
+    threshold: float,
+    gap: float,
+    west: int,
+    east: int,
+    south: int,
+    north: int,
+    texture: SplineArguments,
+) -> tuple[int, int, int, int]:
     """Return the first and last column and row of the cells that have a coefficient below r²."""
     # Indices that cannot be negative let the compiler use vector registers.
     west = max(west, 0)
@@ -103,9 +111,15 @@ def can_prune_near(ball: Ball, minimum: Minimum, box: Box, texture: SplineArgume
 
 
 def min_coefficient_near(
-    i: int, j: int, probe: tuple[float, float, float], u: float, v: float, gap: float,
-    square: tuple[float, float, float], texture: SplineArguments,
-) -> float:  # fmt: skip
+    i: int,
+    j: int,
+    probe: tuple[float, float, float],
+    u: float,
+    v: float,
+    gap: float,
+    square: tuple[float, float, float],
+    texture: SplineArguments,
+) -> float:
     """Return the least Bernstein coefficient of ψ - q in the parts of cell (i, j).
 
     The cell is subdivided at the point closest to (u, v) along each axis. This point and the probe
@@ -185,9 +199,15 @@ def subdivide_cubic(
 
 
 def min_coefficients_in_row(
-    u: float, v: float, z: float, i: int, first: int, count: int, minima: FloatArray,
+    u: float,
+    v: float,
+    z: float,
+    i: int,
+    first: int,
+    count: int,
+    minima: FloatArray,
     texture: SplineArguments,
-) -> None:  # fmt: skip
+) -> None:
     """Write the least Bernstein coefficient of ψ in each of at most 64 cells of row i.
 
     For each cell g is the height near its middle, less z.
@@ -222,12 +242,15 @@ def min_coefficients_in_row(
         d0, d1, d2, d3 = row_bernstein(across, 2, k)
         e0, e1, e2, e3 = row_bernstein(across, 3, k)
         u0, u1, u2, u3 = square_bernstein(u - k)
-        minima[k] = min(
-            min(g * a0 + v0, g * b0 + v1, g * d0 + v2, g * e0 + v3) + u0 * side_x * side_x,
-            min(g * a1 + v0, g * b1 + v1, g * d1 + v2, g * e1 + v3) + u1 * side_x * side_x,
-            min(g * a2 + v0, g * b2 + v1, g * d2 + v2, g * e2 + v3) + u2 * side_x * side_x,
-            min(g * a3 + v0, g * b3 + v1, g * d3 + v2, g * e3 + v3) + u3 * side_x * side_x,
-        ) - gap * gap  # fmt: skip
+        minima[k] = (
+            min(
+                min(g * a0 + v0, g * b0 + v1, g * d0 + v2, g * e0 + v3) + u0 * side_x * side_x,
+                min(g * a1 + v0, g * b1 + v1, g * d1 + v2, g * e1 + v3) + u1 * side_x * side_x,
+                min(g * a2 + v0, g * b2 + v1, g * d2 + v2, g * e2 + v3) + u2 * side_x * side_x,
+                min(g * a3 + v0, g * b3 + v1, g * d3 + v2, g * e3 + v3) + u3 * side_x * side_x,
+            )
+            - gap * gap
+        )
 
 
 def cubic_bernstein(a: float, b: float, c: float, d: float) -> Vector4:

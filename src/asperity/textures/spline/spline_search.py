@@ -151,9 +151,17 @@ def narrow_box(
         return box, left
     u, v = probe_cells(ball, texture)
     first_j, last_j, first_i, last_i = shrink_to_cells(
-        sign_u * u + shift_u, sign_v * v + shift_v, ball[2], ball[3], gap,
-        first_j, last_j, first_i, last_i, texture,
-    )  # fmt: skip
+        sign_u * u + shift_u,
+        sign_v * v + shift_v,
+        ball[2],
+        ball[3],
+        gap,
+        first_j,
+        last_j,
+        first_i,
+        last_i,
+        texture,
+    )
     left -= cost
     if first_j > last_j or first_i > last_i:
         return (1.0, 0.0, 1.0, 0.0), left
@@ -163,9 +171,15 @@ def narrow_box(
 
 
 def divide_box(
-    ball: Ball, frame: Frame, minimum: Minimum, box: Box, stack: FloatArray, count: int,
-    left: float, texture: SplineArguments,
-) -> tuple[int, float]:  # fmt: skip
+    ball: Ball,
+    frame: Frame,
+    minimum: Minimum,
+    box: Box,
+    stack: FloatArray,
+    count: int,
+    left: float,
+    texture: SplineArguments,
+) -> tuple[int, float]:
     """Put the cells of a box that may hold a closer point on the stack, or quarters of others."""
     columns = box[1] - box[0]
     cells = columns * (box[3] - box[2])
