@@ -233,9 +233,7 @@ def prepare(  # noqa: D417 - the others are described by their declarations
     steps.extend(apply_filters(heights, lateral, cutoffs, record))
     start("tip")
     if tip_radius is not None:
-        heights, sentence = apply_tip(heights, lateral, tip_radius)
-        record(f"tip {format_length(tip_radius)}", heights, lateral, removes=True)
-        steps.append(sentence)
+        heights = _dilate(heights, lateral, tip_radius, steps, record)
     start("repeat")
     if periodic:
         heights, filled, sentence = make_periodic(heights, filled, lateral, blend)
@@ -246,6 +244,20 @@ def prepare(  # noqa: D417 - the others are described by their declarations
         heights, lateral, tuple(steps), some_or_none(filled), bool(periodic), tuple(record.stages)
     )
     return magnify_surface(ready, magnify, magnify_height)
+
+
+def _dilate(
+    heights: FloatArray,
+    pitch: tuple[float, ...],
+    radius: float,
+    steps: list[str],
+    record: StageRecorder,
+) -> FloatArray:
+    """Return the heights that a tip of a radius traces, and note it."""
+    heights, sentence = apply_tip(heights, pitch, radius)
+    record(f"tip {format_length(radius)}", heights, pitch, removes=True)
+    steps.append(sentence)
+    return heights
 
 
 def magnify_surface(

@@ -223,9 +223,7 @@ def _read(path: Path, stream: IO[bytes], size: int) -> Recording:
         elif op == mcap.Opcode.SCHEMA and not columns:
             columns = _columns(_record_content(stream, at, length))
         elif op == mcap.Opcode.METADATA:
-            content = _record_content(stream, at, length)
-            if content.text() == SCHEMA_NAME:
-                texts = content.texts()
+            texts = _read_texts(_record_content(stream, at, length)) or texts
         elif op == mcap.Opcode.ATTACHMENT:
             content = _record_content(stream, at, min(length, _MAX_NAME))
             content.read(16)  # times: unused
@@ -248,6 +246,11 @@ def _read(path: Path, stream: IO[bytes], size: int) -> Recording:
         tuple(chunks),
         attachments,
     )
+
+
+def _read_texts(content: mcap.ContentReader) -> dict[str, str]:
+    """Return the texts of a metadata record of asperity; none of another one."""
+    return content.texts() if content.text() == SCHEMA_NAME else {}
 
 
 def _record_content(stream: IO[bytes], at: int, length: int) -> mcap.ContentReader:

@@ -189,9 +189,7 @@ def make_setup(
         raise ParameterError("law", "is missing: give {law}, or name one in [surface]", law="B")
     if use_defaults and not {"hand", "motion"} & scene.loop.keys():
         return _make_default_setup(scene, merged, device, duration or run.get("duration"))
-    for name in ("hand", "motion"):
-        if name not in scene.loop:
-            raise ParameterError("scene", f"needs a section [{name}] with a kind to be simulated")
+    _require_sections(scene)
     hand = sections.build_section("hand", scene.loop["hand"], sections.HANDS, scene.folder)
     motion = sections.build_section("motion", scene.loop["motion"], sections.MOTIONS, scene.folder)
     limits = parse_arguments("servo", scene.loop.get("servo", {}), safety.ARGUMENTS)
@@ -214,11 +212,7 @@ def make_setup(
         servo = replace(servo, velocity_share=share)
     span, default = _resolve_duration(duration, run.pop("duration", None), motion)
     whole = _make_surface(scene.texture, merged, laws)
-    if not laws:
-        notes += describe(whole, "law_parameters")
-    for law in laws:
-        parameters = describe(whole.to_law(law), "law_parameters")
-        notes += [f"{parameter} for law {law.letter}" for parameter in parameters]
+    notes += _parameter_notes(whole, laws)
     return Setup(
         whole,
         chosen,
@@ -234,6 +228,28 @@ def make_setup(
         scene_text=scene.text,
         **run,
     )
+
+
+def _require_sections(scene: Scene) -> None:
+    """Check that a scene has a hand and a motion.
+
+    Raises:
+        ParameterError: if one is missing.
+    """
+    for name in ("hand", "motion"):
+        if name not in scene.loop:
+            raise ParameterError("scene", f"needs a section [{name}] with a kind to be simulated")
+
+
+def _parameter_notes(surface: Surface, laws: Sequence[Law]) -> list[str]:
+    """Return the notes of the parameters of a surface's law, or of several laws on it."""
+    if not laws:
+        return [*describe(surface, "law_parameters")]
+    notes = []
+    for law in laws:
+        parameters = describe(surface.to_law(law), "law_parameters")
+        notes += [f"{parameter} for law {law.letter}" for parameter in parameters]
+    return notes
 
 
 def _make_default_setup(

@@ -149,22 +149,7 @@ def _analyze_stroke(surface: Surface, motion: Strokes, run: Run, depth: float) -
     mean_depth = -float(run.position[:, 2].mean())
     closure = abs(ledger.closure) / max(ledger.exchanged, 1e-300)
     if run.stop_message:
-        nan = math.nan
-        unknown = (nan, nan, nan)
-        return Stroke(
-            law,
-            speed,
-            depth,
-            mean_depth,
-            unknown,
-            nan,
-            nan,
-            nan,
-            unknown,
-            nan,
-            closure,
-            run.stop_message,
-        )
+        return _stopped_stroke(law, speed, depth, mean_depth, closure, run.stop_message)
     ends = motion.period * np.arange(1, motion.count) - 1e-9 * run.period
     starts = np.searchsorted(run.time, ends)
 
@@ -199,6 +184,27 @@ def _analyze_stroke(surface: Surface, motion: Strokes, run: Run, depth: float) -
         losses / motion.count,
         closure,
         "",
+    )
+
+
+def _stopped_stroke(
+    law: str, speed: float, depth: float, mean_depth: float, closure: float, message: str
+) -> Stroke:
+    """Return the stroke of a run that ended early, whose energies are unknown."""
+    nan = math.nan
+    return Stroke(
+        law,
+        speed,
+        depth,
+        mean_depth,
+        energy=(nan, nan, nan),
+        field=nan,
+        error=nan,
+        spread=nan,
+        same_sample=(nan, nan, nan),
+        lost_contact=nan,
+        closure=closure,
+        stop_message=message,
     )
 
 

@@ -120,6 +120,17 @@ class Simulation(Lane):
 MAX_SAMPLES = 10**12
 
 
+def _check_every(every: object) -> int:
+    """Return a number of samples per row.
+
+    Raises:
+        ParameterError: unless it is a whole number, 1 or more.
+    """
+    if isinstance(every, bool) or not isinstance(every, (int, np.integer)) or every < 1:
+        raise ParameterError("every", "must be a whole number of samples, 1 or more", every)
+    return int(every)
+
+
 def simulate(
     surface: Surface,
     plant: Plant,
@@ -179,9 +190,7 @@ def simulate(
     """
     check_parts(surface, plant, hand, servo, motion)
     samples = count_samples(check_positive("duration", duration, "s"), servo.period)
-    if isinstance(every, bool) or not isinstance(every, (int, np.integer)) or every < 1:
-        raise ParameterError("every", "must be a whole number of samples, 1 or more", every)
-    every = min(int(every), samples)
+    every = min(_check_every(every), samples)
     position, speed = initial_motion(plant, hand, servo, motion, start, velocity)
     simulation = Simulation(surface, sampled_plant(plant, hand, servo), servo, position, speed)
 
@@ -207,15 +216,12 @@ def simulate(
     stop_location = ""
     if stop is StopReason.LEFT_WORKSPACE:
         stop_location = plant.describe_exit(simulation.state)
-    table = NO_ROWS
     path = ""
-    if isinstance(writer, DecimatedTrace):
-        table = writer.table
-    elif not isinstance(trace, bool):
+    if not isinstance(trace, bool):
         path = os.fspath(trace)
     truncated, error = simulation.search_truncation
     return Run(
-        table,
+        writer.table if isinstance(writer, DecimatedTrace) else NO_ROWS,
         simulation.state,
         simulation.samples,
         float(servo.period),

@@ -307,6 +307,14 @@ def linkage_band_changes_state(
     )
 
 
+def place_handle(x: FloatArray, px: float, pz: float, vx: float, vz: float) -> None:
+    """Write position and velocity of the handle in the plane of the linkage."""
+    x[0] = px
+    x[2] = pz
+    x[3] = vx
+    x[5] = vz
+
+
 def advance_body(
     x: FloatArray, ledger: FloatArray, inputs: SampleInput, plant: PantographRecord
 ) -> int:
@@ -337,16 +345,10 @@ def advance_body(
         x[3] = tx + dvx
         x[5] = tz + dvz
         if not linkage_reaches(x[0], x[2], min_sine, linkage):
-            x[0] = px
-            x[2] = pz
-            x[3] = vx
-            x[5] = vz
+            place_handle(x, px, pz, vx, vz)
             return LEFT_WORKSPACE
         if fine == 0 and linkage_band_changes_state(x[0], x[2], dx, dz, h, pull, hand):
-            x[0] = sx
-            x[2] = sz
-            x[3] = tx
-            x[5] = tz
+            place_handle(x, sx, sz, tx, tz)
             fine = 256  # the force has a kink there: again, in small steps
             h = period / parts / 256.0
             continue
