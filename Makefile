@@ -44,7 +44,7 @@ check: $(VENV)/development  ## Lint, types, import layers, generated files fresh
 	$(BIN)/python -m pytest -n 0 -q tests/docs/test_docs.py -k built_pages
 
 docs: $(VENV)/development  ## Build the documentation into docs/_build/html
-	$(BIN)/sphinx-build -W --keep-going -b html docs docs/_build/html
+	$(BIN)/sphinx-build -W --keep-going -j auto -b html docs docs/_build/html
 
 compatibility: $(VENV)/installer  ## Tests with the lowest and the newest versions, on each Python
 	bash .ci/compatibility

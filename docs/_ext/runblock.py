@@ -27,7 +27,7 @@ _DPI = 130
 class Page:
     """What the blocks of a page share."""
 
-    # Removed when the build ends.
+    # Removed when the page is read: pages are read in several processes.
     directory: tempfile.TemporaryDirectory[str] = field(
         default_factory=lambda: tempfile.TemporaryDirectory(prefix="asperity-docs-")
     )
@@ -148,8 +148,9 @@ def make_table(rows: Sequence[Sequence[str]]) -> nodes.table:
     return nodes.table("", group, classes=["numbers"])
 
 
-def _purge_page(_app: Sphinx, _env: Any, docname: str) -> None:
-    _PAGES.pop(docname, None)
+def _close_page(app: Sphinx, _doctree: nodes.document) -> None:
+    if (page := _PAGES.pop(app.env.docname, None)) is not None:
+        page.directory.cleanup()
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
@@ -157,5 +158,5 @@ def setup(app: Sphinx) -> dict[str, Any]:
     run: type[Directive] = Run
     app.add_directive("run", run)
     app.add_directive("shell", Shell)
-    app.connect("env-purge-doc", _purge_page)
-    return {"version": "1", "parallel_read_safe": False, "parallel_write_safe": True}
+    app.connect("doctree-read", _close_page)
+    return {"version": "1", "parallel_read_safe": True, "parallel_write_safe": True}
