@@ -323,12 +323,11 @@ Task = tuple[Surface, _ComparisonQuery]
 
 def _precompute_tasks(surfaces: Sequence[Surface], query: _ComparisonQuery) -> list[Task | None]:
     """Return one task per law; ``None`` for a law whose results are not shared by the cache."""
-    return [
-        (surface, query)
-        if is_shipped_law(surface.law) and surface_content(surface) is not None
-        else None
-        for surface in surfaces
-    ]
+    tasks: list[Task | None] = []
+    for surface in surfaces:
+        is_shared = is_shipped_law(surface.law) and surface_content(surface) is not None
+        tasks.append((surface, query) if is_shared else None)
+    return tasks
 
 
 def precompute_row(task: Task | None) -> None:

@@ -242,8 +242,8 @@ def _side_text(side: float | None, unit: str) -> str:
 def _speed_advice(result: Limits, failing: Sequence[Limit]) -> str:
     """Return the speeds at which all limits hold, or the limits that hold at no speed."""
     if result.speeds[1] == 0.0:
-        hopeless = [limit for limit in failing if limit.speeds and limit.speeds[1] == 0.0]
-        return f"No speed satisfies {_limit_numbers(hopeless)}."
+        unsatisfied = [limit for limit in failing if limit.speeds and limit.speeds[1] == 0.0]
+        return f"No speed satisfies {_limit_numbers(unsatisfied)}."
     return f"{speeds_text(result.speeds).capitalize()} they hold."
 
 
