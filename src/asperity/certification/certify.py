@@ -306,6 +306,14 @@ class _Search:
         loops = LoopSearch(calls, resolution, gain.value, self.seed)
         self._report("loops")
         loops.run(self._deadline("loops"))
+        if loops.best is not None and not calls.approaches:
+            # The loop was searched with a reset before each force: what does a walk around it say?
+            spread, at = loops.walking_spread(loops.best)
+            if spread:
+                history = replace(history, spread=spread, at=_plain(at))
+                calls.approaches = True
+                loops = LoopSearch(calls, resolution, gain.value, self.seed)
+                loops.run(time.monotonic() + _SHARES["loops"] * self.seconds)
         return Certification(
             gain=gain.value,
             gain_witness=gain.best,
@@ -334,7 +342,7 @@ class _Search:
         one_sided = GainSearch(calls, resolution, True, self.seed + 1)
         self._search_gain(gain, "gain")
         jumps = JumpSearch(calls, resolution, self.seed)
-        jumps.run(self._deadline("jumps"), gain.value)
+        jumps.run(self._deadline("jumps"), gain.best)
         steep = jumps.steepest
         if len(steep):
             places = (steep - calls.region.low) / calls.region.size

@@ -58,8 +58,8 @@ def find_history(
         effort: share of the points that are tried.
     """
     random = np.random.default_rng(seed)
-    points = points[: max(2, int(effort * _POINTS))]
-    scale = 10.0 ** random.uniform(-4.0, -1.0, (_APPROACHES, len(points), 1))
+    points = points[: max(6, int(effort * _POINTS))]
+    scale = 10.0 ** random.uniform(-4.0, -0.3, (_APPROACHES, len(points), 1))
     directions = random.normal(size=(_APPROACHES, len(points), 3))
     starts = points + scale * directions * calls.region.size
     starts[0] = points

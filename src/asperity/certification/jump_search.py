@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from asperity.certification.gain_search import GainWitness
 from asperity.certification.region import RendererCalls
 from asperity.certification.resolution import Resolution
 from asperity.core.checks import FloatArray, IntArray
@@ -75,21 +76,37 @@ class JumpSearch:
         ordered = sorted(self._jumps.values(), key=lambda jump: -jump.size)
         return tuple(ordered[:_MAX_JUMPS])
 
-    def run(self, deadline: float, gain: float) -> None:
-        """Search until a time of the monotonic clock [s]; the gain [N/m] explains steps."""
+    def run(self, deadline: float, steepest: GainWitness | None) -> None:
+        """Search until a time of the monotonic clock [s].
+
+        Args:
+            deadline: the time.
+            steepest: witness of the gain, around which the search begins; its gain explains steps.
+        """
+        gain = 0.0
+        if steepest is not None:
+            gain = steepest.value
+            middle = np.array(steepest.start)
+            step = np.array(steepest.end) - middle
+            self._search_line(np.stack([middle - 20.5 * step, middle + 20.5 * step]), gain)
         while True:
-            self._search_line(gain)
+            self._search_line(self._random_line(), gain)
             if time.monotonic() >= deadline:
                 return
 
-    def _search_line(self, gain: float) -> None:
+    def _random_line(self) -> FloatArray:
+        """Return the ends of a line through the region, one of two parallel to an axis."""
         ends = self.calls.region.points(self._random.uniform(size=(2, 3)))
-        if self._random.uniform() < 0.5:  # parallel to an axis
+        if self._random.uniform() < 0.5:
             axis = int(self._random.integers(3))
             ends[1] = ends[0]
             ends[:, axis] = self.calls.region.low[axis], self.calls.region.high[axis]
+        return ends
+
+    def _search_line(self, ends: FloatArray, gain: float) -> None:
+        """Search the line between two points, shape (2, 3)."""
         length = math.dist(ends[0], ends[1])
-        samples = min(_SAMPLES, int(length / (4.0 * self._shortest)) + 8)
+        samples = min(_SAMPLES, int(length / (32.0 * self._shortest)) + 8)
         samples = min(samples, max(64, int(0.05 * self.calls.rate)))
         line = ends[0] + np.linspace(0.0, 1.0, samples)[:, None] * (ends[1] - ends[0])
         line = line[self.calls.region.contains(line)]

@@ -28,6 +28,7 @@ from asperity.core.files import Serializable
 TURNS = 3
 """Turns of a loop of a renderer with memory; the last one counts."""
 _ERRORS_PER_WORK = 5.0
+_ROUNDING = 1e-8
 _COARSE_CELLS = 36
 _FINE_CELLS = 128
 _REFINED = 6
@@ -280,7 +281,8 @@ class LoopSearch:
         changes = max(abs(second - first), abs(third - second), doubt)
         error = math.inf
         if math.isfinite(changes):
-            error = changes + self._unknown_force * length / _ERRORS_PER_WORK
+            unknown = self._unknown_force + _ROUNDING * self.calls.largest_force
+            error = changes + unknown * length / _ERRORS_PER_WORK
         turns = TURNS if self.calls.approaches else 1
         return ClosedLoop(third, error, length, vertices, turns)
 
@@ -297,6 +299,21 @@ class LoopSearch:
         jumps = np.maximum(changes - smooth, 0.0)
         doubt = jumps * np.sqrt(np.square(steps).sum(axis=1))
         return float((forces * steps).sum()), float(doubt.sum())
+
+    def walking_spread(self, loop: ClosedLoop) -> tuple[float, FloatArray]:
+        """Return how much the forces of a walk around a loop differ from those after a reset.
+
+        Returns:
+            The greatest difference [N], beyond what noise and steps explain, and where it is [m].
+        """
+        path = resample(loop.path, 4 * _LOOP_POINTS)
+        changes = self.calls.along(np.tile(path, (2, 1))[None])[0, len(path) :] - self.calls.at(
+            path
+        )
+        sizes = np.nan_to_num(np.sqrt(np.square(changes).sum(axis=1)))
+        index = int(np.argmax(sizes))
+        threshold = self._unknown_force + 1e-9 * self.calls.largest_force
+        return float(sizes[index]) if sizes[index] > threshold else 0.0, path[index]
 
     def held_work(self, loop: ClosedLoop) -> ClosedLoop:
         """Return the loop with its held-force work."""

@@ -6,7 +6,7 @@ import csv
 import io
 import json
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -128,7 +128,7 @@ def make_baseline(calls: RendererCalls, result: Certification) -> dict[str, Any]
     }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class BaselineDifference:
     """The first difference of a renderer from a baseline.
 
@@ -137,12 +137,16 @@ class BaselineDifference:
         before: in the baseline, SI units.
         now: of the renderer.
         at: position of a force [m].
+        heights: z of all positions of the baseline [m], shape (n,); none for other quantities.
+        changes: greatest change of a component of the force at each [N], shape (n,).
     """
 
     quantity: str
     before: Any
     now: Any
     at: tuple[float, ...] | None = None
+    heights: FloatArray = field(default_factory=lambda: np.empty(0))
+    changes: FloatArray = field(default_factory=lambda: np.empty(0))
 
 
 def compare_baseline(
@@ -170,7 +174,12 @@ def compare_baseline(
     if len(changed):
         first = int(changed[0])
         return BaselineDifference(
-            "force", forces[first].tolist(), now[first].tolist(), tuple(points[first].tolist())
+            "force",
+            forces[first].tolist(),
+            now[first].tolist(),
+            tuple(points[first].tolist()),
+            points[:, 2],
+            changes,
         )
     current = make_baseline(calls, result)
     for name, before in limits.items():

@@ -54,6 +54,10 @@ def certification_page(
     if difference is not None:
         answer = f"It differs from the baseline. {difference_sentence(difference)} {answer}"
     sections = [Section("What was found", [_findings_table(result)], media=SCREEN)]
+    if difference is not None and len(difference.changes):
+        text = "Change of the force since the baseline, against the height of its positions."
+        picture = Picture(partial(_difference_figure, difference), text)
+        sections.append(Section("Changes of the force", [picture]))
     if device is not None:
         texts = [Paragraph(text) for text in device_sentences(result, device)]
         sections.append(Section("On the device", texts, media=SCREEN))
@@ -104,7 +108,9 @@ def _loop_texts(result: Certification) -> tuple[str, str]:
     error = format_quantity(loop.error, "J", digits=2)
     length = format_quantity(loop.length, "m", digits=3)
     held = format_quantity(loop.held_energy, "J", digits=3)
-    return energy, f"± {error}; {length} long; {held} with the force held at 1 kHz and 0.1 m/s"
+    speed = format_quantity(loop.critical_speed(1.0), "m/s", digits=3)
+    text = f"± {error}; {length} long; {held} with the force held at 1 kHz and 0.1 m/s; "
+    return energy, f"{text}damping of 1 N s/m absorbs it from {speed} on"
 
 
 def _gain_place(witness: Any) -> str:
@@ -135,6 +141,12 @@ def _jumps_table(result: Certification) -> Table:
         length = format_quantity(jump.length, "m", digits=2)
         rows.append(Row((size, length, point_text(jump.at))))
     return Table(("size", "over", "where"), rows)
+
+
+def _difference_figure(difference: BaselineDifference) -> Figure:
+    from asperity.report.pictures.certification_pictures import difference_figure
+
+    return difference_figure(difference)
 
 
 def _loop_figure(result: Certification) -> Figure:

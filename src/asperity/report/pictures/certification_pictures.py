@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from asperity.certification.certify import Certification
 from asperity.certification.recorded_loop import RecordedCertification
+from asperity.certification.witnesses import BaselineDifference
 from asperity.report.pictures import style
 
 _MAX_POINTS = 4000
@@ -27,6 +28,15 @@ def loop_figure(result: Certification) -> Figure:
     unit = style.length_unit(float(np.ptp(path, axis=0).max()))
     axes.plot(path[:, axis] * unit.scale, path[:, 2] * unit.scale, color=style.ORANGE)
     style.label_axes(axes, f"{'xy'[axis]} [{unit.name}]", f"z [{unit.name}]")
+    return figure
+
+
+def difference_figure(difference: BaselineDifference) -> Figure:
+    """Return the changes of the force since a baseline against the height."""
+    figure = style.new_figure(7.0, 3.5)
+    axes = style.single_axes(figure)
+    axes.plot(1e3 * difference.heights, 1e3 * difference.changes, ".", color=style.ORANGE)
+    style.label_axes(axes, "z [mm]", "change of force [mN]")
     return figure
 
 

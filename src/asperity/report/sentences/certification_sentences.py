@@ -76,6 +76,11 @@ def device_sentences(result: Certification, device: Device) -> list[str]:
                 f"{device.name} held a wall of {limit_text}: multiply the forces by {share:.2g} "
                 "or less."
             )
+    largest = device.value("max_force")
+    if largest is not None and result.largest_force > largest:
+        force = format_quantity(result.largest_force, "N", digits=3)
+        largest_text = format_quantity(largest, "N", digits=3)
+        sentences.append(f"The force reaches {force}; the device gives {largest_text}.")
     damping = device.value("damping")
     if result.worst_loop is not None and damping:
         speed = format_quantity(result.worst_loop.critical_speed(damping), "m/s", digits=3)
