@@ -131,7 +131,7 @@ def test_version_stands_in_one_place(unpacked: Path) -> None:
     assert f"\nversion: {VERSION}\n" in (ROOT / "CITATION.cff").read_text("utf-8")
     changelog = (ROOT / "CHANGELOG.md").read_text("utf-8")
     assert f"\n## [{VERSION}] - 20" in changelog
-    assert len(changelog.splitlines()) <= 80
+    assert max(len(section.splitlines()) for section in changelog.split("\n## ")) <= 80
     data = {".mcap", ".png", ".lock"}
     names = {name for name in tracked_files() if Path(name).suffix not in data}
     holders = {name for name in names if VERSION in (ROOT / name).read_text("utf-8", "replace")}

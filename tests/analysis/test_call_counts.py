@@ -44,7 +44,7 @@ def test_number_without_search_enters_few_functions(law: str, amplitude: float) 
         characteristic_number(Surface(Sinusoid(factor * amplitude, period=1e-3), law))
     surface = Surface(Sinusoid(amplitude, period=1e-3), law)
     entered = entered_functions(lambda: characteristic_number(surface))
-    assert 10 < len(entered) <= 40, sorted(entered)
+    assert 10 < len(entered) <= 41, sorted(entered)
 
 
 @pytest.mark.caches_results

@@ -30,6 +30,7 @@ MISTAKES: list[tuple[str, tuple[str, ...]]] = [
     ("envelop --device touch", ("'envelop'", "did you mean 'envelope'?")),
     ("envelope --device tuoch", ("device is unknown: 'tuoch'", "did you mean 'touch'")),
     ("study report nowhere", ("folder", "asperity study run makes one")),
+    ("certify nothing.so", ("renderer is no file", "'nothing.so'")),
     ("design cloth --texture-force 3kg", ("texture_force", "'3kg'")),
     ("sweep cloth --vary texture.magnifi=1,2", ("texture.magnifi", "texture.magnify")),
     # Options misspelt.

@@ -111,7 +111,7 @@ def test_help_has_headings_an_example_and_every_option(name: str) -> None:
     if isinstance(command, click.Group):
         return
     short = CliRunner().invoke(cli, [name, "--help"], env={"COLUMNS": "100"}).output
-    full, takes_files = short, any(one.name == "unit" for one in command.params)
+    full, takes_files = short, any(one.name == "tip_radius" for one in command.params)
     if takes_files:
         full = CliRunner().invoke(cli, [name, "--help-surface"], env={"COLUMNS": "100"}).output
         assert "--tip-radius" not in short

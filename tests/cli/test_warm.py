@@ -44,4 +44,5 @@ def test_compiled_code_is_cached_and_reused(
 
 
 def test_sample_textures_cover_every_sampler() -> None:
-    assert len({texture.sampler for texture in warm.sample_textures().values()}) == 5
+    # Profiles and maps share one.
+    assert len({texture.sampler for texture in warm.sample_textures().values()}) == 4

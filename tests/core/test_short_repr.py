@@ -40,6 +40,9 @@ def closed_writer() -> asp.RecordingWriter:
 EXAMPLES: dict[str, Callable[[], Any]] = {
     "Analysis": lambda: asp.analyze(surface("B"), "touch"),
     "Bound": lambda: asp.characteristic_number(surface("F")),
+    "Certification": lambda: asp.certify(
+        surface("W").force, region=[[-1e-3, 0.0]] * 3, seconds=0.1
+    ),
     "Comparison": lambda: asp.compare(MANY, "touch", "WC", max_depth=1e-5),
     "Design": lambda: asp.design("sinusoid:amplitude=0.1mm,period=2mm", "touch", "C"),
     "Device": lambda: asp.load_device("touch"),

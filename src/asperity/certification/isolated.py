@@ -53,10 +53,13 @@ class IsolatedRenderer:
         self._process = context.Process(target=_serve, args=arguments, daemon=True)
         self._process.start()
         remote.close()
-        if not self._connection.poll(_START_TIMEOUT):
+        try:
+            if not self._connection.poll(_START_TIMEOUT):
+                raise RendererError(f"did not open within {_START_TIMEOUT:g} s")
+            self._receive(np.zeros((1, 1, 3)))
+        except RendererError:
             self.close()
-            raise RendererError(f"did not open within {_START_TIMEOUT:g} s")
-        self._receive(np.zeros((1, 1, 3)))
+            raise
         self._piece_calls = _MIN_CALLS
 
     def forces(self, paths: FloatArray) -> FloatArray:
@@ -179,8 +182,8 @@ class RendererPool:
     """
 
     def __init__(self, source: RendererSource, copies: int) -> None:
-        self._renderers = [IsolatedRenderer(source)]
-        for _ in range(copies - 1):
+        self._renderers: list[IsolatedRenderer] = []
+        for _ in range(copies):
             self._renderers.append(IsolatedRenderer(source))
         self._threads = ThreadPoolExecutor(copies)
 

@@ -44,8 +44,8 @@ _HEADING_OF = {name: title for title, names in _HEADINGS.items() for name in nam
 
 
 def option_flag(option: click.Parameter) -> str:
-    """Return the long form of an option."""
-    return max(option.opts, key=len)
+    """Return the first long form of an option."""
+    return next((flag for flag in option.opts if flag.startswith("--")), option.opts[0])
 
 
 def write_option(name: str, value: object, ctx: click.Context) -> str:
@@ -145,10 +145,14 @@ class HeadedCommand(OptionCommand):
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the options; those of a measured file only for ``--help-surface``."""
         rows: dict[str, list[tuple[str, str]]] = {title: [] for title in ("Options", *_HEADINGS)}
+        has_files = any(option.name == "tip_radius" for option in self.params)
         for option in self.get_params(ctx):
             record = option.get_help_record(ctx)
+            title = _HEADING_OF.get(str(option.name), "Options")
+            if title == "Measured surface" and not has_files:
+                title = "Options"
             if record is not None:
-                rows[_HEADING_OF.get(str(option.name), "Options")].append(record)
+                rows[title].append(record)
         for title, records in rows.items():
             if records and (title != "Measured surface" or ctx.meta.get("shows_files")):
                 with formatter.section(title):
