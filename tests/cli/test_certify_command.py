@@ -24,6 +24,8 @@ REGION = "-1mm:1mm,-1mm:1mm,-1mm:0.1mm"
 
 def run(*arguments: str) -> tuple[int, str]:
     result = CliRunner().invoke(cli, ["certify", *arguments])
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        return result.exit_code, f"{result.output}{result.exception!r}"
     return result.exit_code, result.output
 
 

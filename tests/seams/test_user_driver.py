@@ -108,11 +108,18 @@ def serve_board(board: socket.socket, is_over: threading.Event) -> list[float]:
     return forces
 
 
-@pytest.mark.parametrize("is_silent", [False, True])
-def test_documented_driver_with_a_thread_renders_over_udp(
-    call: Call, tmp_path: Path, is_silent: bool
-) -> None:
-    """The example renders a wall on a board that replies over UDP; a silent board is an error."""
+def test_documented_driver_with_a_thread_renders_over_udp(call: Call, tmp_path: Path) -> None:
+    """The example renders a wall on a board that replies over UDP; a silent board is an error.
+
+    One after the other: both lock the same device.
+    """
+    for is_silent in (False, True):
+        folder = tmp_path / str(is_silent)
+        folder.mkdir()
+        run_on_board(call, folder, is_silent)
+
+
+def run_on_board(call: Call, tmp_path: Path, is_silent: bool) -> None:
     text = page_example("howto/extend.md", "A driver with a thread")
     long_timeouts = (
         "port: int = 9000\n    max_reading_age: float = 20.0\n    force_timeout: float = 20.0"

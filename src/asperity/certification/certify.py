@@ -409,7 +409,7 @@ class _Search:
     @staticmethod
     def _measure_cost(calls: RendererCalls, points: FloatArray) -> Cost:
         """Return the time of calls."""
-        count = int(min(_COST_CALLS, max(8.0, calls.rate)))
+        count = int(min(_COST_CALLS, max(8.0, 0.05 * calls.rate)))
         times = calls.renderer.call_times(np.resize(points, (count, 3)))
         median, high = np.quantile(times, [0.5, 0.999]).tolist()
         return Cost(median, high, float(times.max()), 1.0 / calls.rate)

@@ -13,13 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from asperity.certification.renderers import (
-    LibraryRenderer,
-    Renderer,
-    RendererError,
-    RendererSource,
-    crash_error,
-)
+from asperity.certification.renderers import Renderer, RendererError, RendererSource, crash_error
 from asperity.core.checks import FloatArray
 from asperity.core.processes import end_with_parent
 
@@ -145,8 +139,7 @@ def _serve(source: RendererSource, counter: str, connection: Connection) -> None
     request: tuple[str, FloatArray]
     try:
         renderer = source.load()
-        if isinstance(renderer, LibraryRenderer):
-            renderer.share_progress(progress)
+        renderer.progress = progress
         connection.send("opened")
         while True:
             request = connection.recv()

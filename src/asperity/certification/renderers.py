@@ -21,7 +21,7 @@ from threading import Thread
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
@@ -60,6 +60,16 @@ class Renderer(Protocol):
         ...
 
 
+class LocalRenderer(Renderer, Protocol):
+    """A renderer in this process.
+
+    Attributes:
+        progress: number of the call in progress, shape (1,), in memory that outlives a crash.
+    """
+
+    progress: NDArray[np.int64]
+
+
 @dataclass(frozen=True)
 class RendererSource:
     """Where a renderer is, and how it is called.
@@ -80,13 +90,13 @@ class RendererSource:
     unit: str = "m"
     rate: float = 0.0
 
-    def load(self) -> Renderer:
+    def load(self) -> LocalRenderer:
         """Return the renderer in this process.
 
         Raises:
             RendererError: if it cannot be loaded.
         """
-        loaders: dict[str, Callable[[RendererSource], Renderer]] = {
+        loaders: dict[str, Callable[[RendererSource], LocalRenderer]] = {
             "library": LibraryRenderer,
             "python": _load_function,
             "pipe": PipeRenderer,
@@ -125,6 +135,7 @@ class FunctionRenderer:
         self._scale = 1.0 / UNITS[unit]
         self._reset: Callable[[], object] | None = getattr(function, "reset", None)
         self._pace = Pace(rate)
+        self.progress = np.zeros(1, dtype=np.int64)
         self._takes_many = self._reset is None and not rate and self._accepts_many()
 
     def forces(self, paths: FloatArray) -> FloatArray:
@@ -133,10 +144,11 @@ class FunctionRenderer:
         if self._takes_many:
             return _checked_forces(self._function(points.reshape(-1, 3)), paths)
         forces = np.empty_like(paths)
-        for path, force in zip(points, forces, strict=True):
+        for number, (path, force) in enumerate(zip(points, forces, strict=True)):
             if self._reset is not None:
                 self._reset()
             for index, point in enumerate(path):
+                self.progress[0] = number * len(path) + index
                 self._pace.wait()
                 force[index] = _checked_forces(self._function(point), point)
         return forces
@@ -156,13 +168,14 @@ class FunctionRenderer:
             return False
 
 
-def time_calls(renderer: Renderer, points: FloatArray) -> FloatArray:
+def time_calls(renderer: LocalRenderer, points: FloatArray) -> FloatArray:
     """Return the time of a call of a renderer at each point [s], shape (n,)."""
     times = np.empty(len(points))
     for index, point in enumerate(points):
         began = time.perf_counter()
         renderer.forces(point[None, None])
         times[index] = time.perf_counter() - began
+        renderer.progress[0] = index + 1
     return times
 
 
@@ -232,27 +245,23 @@ class LibraryRenderer:
         self.rate = source.rate or self._call_number("rate", ctypes.c_double, 0.0)
         self._configure()
         self._pace = Pace(self.rate)
-        self._progress = np.zeros(1, dtype=np.int64)
+        self.progress = np.zeros(1, dtype=np.int64)
         self._call: Callable[..., None] = fuse_module(call_loop).call_renderer
         self.forces(np.zeros((0, 1, 3)))  # compiles, and calls nothing
-
-    def share_progress(self, progress: np.ndarray[Any, Any]) -> None:
-        """Count calls in an array that outlives a crash, shape (1,)."""
-        self._progress = progress
 
     def forces(self, paths: FloatArray) -> FloatArray:
         """Return forces along paths; see :class:`Renderer`."""
         points = np.ascontiguousarray(self._scale * paths)
         forces = np.zeros_like(points)
         if not self.rate:
-            self._call(self._reset, self._force, self._state, points, forces, self._progress)
+            self._call(self._reset, self._force, self._state, points, forces, self.progress)
             return forces
         reset = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(self._reset)
         force = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3)(self._force)
         for i, path in enumerate(points):
             reset(self._state)
             for j, point in enumerate(path):
-                self._progress[0] = i * points.shape[1] + j
+                self.progress[0] = i * points.shape[1] + j
                 self._pace.wait()
                 force(self._state, point.ctypes.data, forces[i, j].ctypes.data)
         return forces
@@ -264,7 +273,7 @@ class LibraryRenderer:
         times = np.empty(len(paths))
         for index, path in enumerate(paths):
             began = time.perf_counter()
-            self._call(self._reset, self._force, self._state, path, force, self._progress)
+            self._call(self._reset, self._force, self._state, path, force, self.progress)
             times[index] = time.perf_counter() - began
         return times
 
@@ -336,6 +345,7 @@ class PipeRenderer:
         self._scale = 1.0 / UNITS[source.unit]
         self._pace = Pace(source.rate)
         self._is_paced = bool(source.rate)
+        self.progress = np.zeros(1, dtype=np.int64)
         try:
             self._program = subprocess.Popen(
                 shlex.split(source.target), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
@@ -351,7 +361,10 @@ class PipeRenderer:
             lines.extend(f"{x:.17g} {y:.17g} {z:.17g}\n" for x, y, z in path)
         writer = Thread(target=self._write, args=(lines,), daemon=True)
         writer.start()
-        forces = np.array([self._read_force() for _ in range(paths.shape[0] * paths.shape[1])])
+        forces = np.empty((paths.shape[0] * paths.shape[1], 3))
+        for index in range(len(forces)):
+            self.progress[0] = index
+            forces[index] = self._read_force()
         writer.join()
         return forces.reshape(paths.shape)
 
