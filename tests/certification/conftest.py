@@ -15,7 +15,7 @@ SOURCE = Path(__file__).with_name("renderers.c")
 def library(tmp_path_factory: pytest.TempPathFactory) -> str:
     compiler = shutil.which("cc") or shutil.which("gcc")
     if compiler is None:
-        pytest.skip("no C compiler")
+        pytest.skip("not run: no C compiler here")
     path = tmp_path_factory.mktemp("library") / "renderers.so"
     command = [compiler, "-O1", "-shared", "-fPIC", "-o", path, SOURCE, "-lm"]
     subprocess.run(command, check=True)

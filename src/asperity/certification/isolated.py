@@ -147,7 +147,7 @@ def _serve(source: RendererSource, counter: str, connection: Connection) -> None
     except RendererError as error:
         connection.send(error)
     except EOFError:
-        pass
+        pass  # the other side has closed the connection
     os._exit(0)  # threads of the renderer may not end
 
 

@@ -206,7 +206,7 @@ def _load_function(source: RendererSource) -> FunctionRenderer:
     sys.path.insert(0, str(path.parent.resolve()))
     try:
         spec.loader.exec_module(module)
-    except Exception as error:
+    except Exception as error:  # of a user's file
         raise RendererError(f"{path} cannot be imported: {error}") from None
     function: Any = getattr(module, source.name, None)
     if not callable(function):

@@ -144,8 +144,7 @@ def run_lanes(
                 (),
             )
             trace = LaneTrace(rows, row_counters, every, lanes.statistics[lane])
-            # No stars in compiled functions.
-            parameters = (lanes.stiffness[lane],) + law[1:]  # noqa: RUF005
+            parameters = (lanes.stiffness[lane],) + law[1:]  # noqa: RUF005 - no stars in Numba
             state = load_state(lanes, lane)
             memory = lanes.memories[lane]
             _cause, stop, state = run_sample(
@@ -153,7 +152,7 @@ def run_lanes(
                 NO_END,
                 settings,
                 (),  # type: ignore[arg-type]  # neither clock nor guards have a record here
-                (),  # type: ignore[arg-type]
+                (),  # type: ignore[arg-type]  # no guards
                 device,
                 trace,
                 memory,
