@@ -230,7 +230,15 @@ def force_steps(
     return lambda points: step * np.round(force(points) / step)
 
 
+def noise(
+    force: Callable[[FloatArray], FloatArray], size: float
+) -> Callable[[FloatArray], FloatArray]:
+    random = np.random.default_rng(5)
+    return lambda points: force(points) + size * random.normal(size=points.shape)
+
+
 CONTROLS = {
+    "noise and encoder": lambda force: noise(encoder(force, 2e-5), 1e-3),
     "exact": lambda force: force,
     "single precision": single_precision,
     "encoder of 1 um": lambda force: encoder(force, 1e-6),

@@ -162,7 +162,12 @@ class GainSearch:
             self.record(points, points + step * directions, places)
 
     def record(self, starts: FloatArray, ends: FloatArray, places: FloatArray) -> None:
-        """Keep the greatest gain of secants [m], shape (n, 3) each, at places."""
+        """Keep the greatest gain of secants [m], shape (n, 3) each, at places.
+
+        Shorter ones than the resolution allows are extended from their beginning.
+        """
+        shares = self.resolution.secant / np.sqrt(np.square(ends - starts).sum(axis=1))
+        ends = starts + np.maximum(shares, 1.0)[:, None] * (ends - starts)
         forces = self._forces(np.stack([starts, ends], axis=1), places)
         changes = forces[:, 1] - forces[:, 0]
         steps = ends - starts

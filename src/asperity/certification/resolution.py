@@ -68,7 +68,7 @@ def find_resolution(calls: RendererCalls, points: FloatArray, effort: float = 1.
     repeated = calls.at(np.repeat(places, _REPEATS, axis=0)).reshape(len(places), _REPEATS, 3)
     noise = 2.0 * float(np.nanmax(np.ptp(repeated, axis=1), initial=0.0))
     force_step = 0.0 if noise else _common_step(calls.at(points))
-    steps = (0.0, 0.0, 0.0) if noise else _position_steps(calls, places)
+    steps = _position_steps(calls, places, noise)
     typical = _typical_gain(calls, places)
     secant = max(_SHORTEST_STEP, _STEPS_PER_SECANT * max(steps))
     if typical > 0.0:
@@ -93,15 +93,20 @@ def _common_step(forces: FloatArray) -> float:
     return step if few and is_multiple.all() and len(gaps) > 4 else 0.0
 
 
-def _position_steps(calls: RendererCalls, places: FloatArray) -> tuple[float, float, float]:
-    """Return the longest distance on each axis over which the force stays the same, then jumps."""
+def _position_steps(
+    calls: RendererCalls, places: FloatArray, noise: float
+) -> tuple[float, float, float]:
+    """Return the longest distance on each axis over which the force stays the same, then jumps.
+
+    Steps that change the force by less than the noise [N] count as noise.
+    """
     steps = np.zeros(3)
     for axis in range(3):
         for span in _SPANS[calls.region.size[axis] >= _SPANS]:
             lines = np.repeat(places[:, None], _SAMPLES, axis=1)
             lines[..., axis] += np.linspace(-0.5 * span, 0.5 * span, _SAMPLES)
             forces = calls.at(lines.reshape(-1, 3)).reshape(lines.shape)
-            changes = (np.diff(forces, axis=1) != 0.0).any(axis=2)
+            changes = np.asarray((np.abs(np.diff(forces, axis=1)) > noise).any(axis=2))
             counts = changes.sum(axis=1)
             # A smooth part beside a flat one changes from sample to sample, which steps do not.
             adjacent = (changes[:, 1:] & changes[:, :-1]).sum(axis=1)
