@@ -12,7 +12,7 @@ import pytest
 import asperity as asp
 from asperity.core.errors import ParameterError
 from asperity.core.units import format_quantity
-from asperity.devices import parse_device
+from asperity.devices import load_device, override_device, parse_device
 from asperity.laws import Law
 from asperity.report.pages.comparison_columns import FULL_COLUMNS, SUMMARY_COLUMNS, comparison_table
 from asperity.report.sentences.limit_sentences import texture_amount_text
@@ -161,6 +161,23 @@ def test_assumptions_state_every_default(result: asp.Comparison) -> None:
     assert "Default max depth" not in text
     assert "Default friction" not in text
     assert "Default modulation depth" in text
+
+
+@pytest.mark.parametrize("rate", ["50 Hz", "300 Hz", "20 kHz"])
+def test_answer_names_the_update_rate_for_which_it_holds(rate: str) -> None:
+    device = override_device(load_device("falcon"), {"update_rate": rate})
+    slow = asp.compare(PAPER, device, "WC")
+    usual = asp.compare(PAPER, "falcon", "WC")
+    hertz = device.value("update_rate") or 0.0
+    for row, other in zip(slow.rows, usual.rows, strict=True):
+        expected = other.recommended_stiffness * min(1.0, hertz / 1000.0)
+        assert row.recommended_stiffness == pytest.approx(expected, rel=5e-3)
+        assert row.stability_limit.update_rate == min(hertz, 1000.0)
+    text = "; ".join(slow.assumptions)
+    assert "K₀ = 3000 N/m at 1 kHz" in text
+    assert "assumed: CHAI3D states no update rate" in text
+    least = format_quantity(min(hertz, 1000.0), "Hz")
+    assert f"for a loop of {least} or faster" in text
 
 
 def test_to_dict_is_json_without_nan(result: asp.Comparison) -> None:

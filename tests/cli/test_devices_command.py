@@ -92,10 +92,12 @@ def test_json_has_all_data_and_is_the_only_output(call: Call) -> None:
         for field, datum in device["data"].items():
             assert datum["unit"] == FIELD_UNITS[field]
             keys = {"value", "unit", "source", "verified", "also"}
-            measured_keys = {"update_rate", "positions"} if device["id"] == "pantograph" else set()
-            assert set(datum) == keys | (measured_keys if field == "max_stiffness" else set())
-            if measured_keys and field == "max_stiffness":
+            if field == "max_stiffness":
+                keys |= {"update_rate", "rate_source"}
+            if field == "max_stiffness" and device["id"] == "pantograph":
+                keys.add("positions")
                 assert (datum["verified"], datum["positions"]) == ("measured", "stepped")
+            assert set(datum) == keys
     code, out, _err = call("touch", "omni", "--json", "-")
     assert [device["id"] for device in json.loads(out)["devices"]] == ["touch", "omni"]
 

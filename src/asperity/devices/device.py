@@ -82,7 +82,18 @@ Axis = Literal["x", "y", "z"]
 Positions = Literal["exact", "stepped"]
 
 
-WALL_KEYS = ("directions", "cycled", "update_rate", "positions", "lightest")
+ASSUMED_WALL_RATE = 1000.0
+"""Update rate of a wall test [Hz] where neither the test nor its device states one."""
+
+WALL_KEYS = (
+    "directions",
+    "cycled",
+    "update_rate",
+    "rate_source",
+    "delay_samples",
+    "positions",
+    "lightest",
+)
 """Keys of a wall test besides those of any number."""
 
 
@@ -96,10 +107,12 @@ class WallTest(Datum):
     Attributes:
         directions: axes of the device along which the wall was pushed; empty if unknown.
         cycled: the least stiffness with a limit cycle [N/m].
-        update_rate: update rate of the test [Hz]; the device's own if unknown.
+        update_rate: f₀, update rate of the test [Hz]; if unknown the device's own, or 1 kHz.
         positions: whether positions were ``"exact"``, or ``"stepped"`` by an encoder.
         lightest: damping in the lightest direction relative to that along ``directions`` [1], at
             most 1, known from geometry or other tests.
+        rate_source: source of ``update_rate`` where it is not that of the stiffness.
+        delay_samples: d₀, delay of the test [samples]; 0 if unknown.
     """
 
     directions: tuple[Axis, ...] = ()
@@ -107,6 +120,8 @@ class WallTest(Datum):
     update_rate: float | None = None
     positions: Positions | None = None
     lightest: float | None = None
+    rate_source: str = ""
+    delay_samples: float | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units, with the known details of the test."""

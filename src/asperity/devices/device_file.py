@@ -18,6 +18,7 @@ from asperity.core.errors import ParameterError, suggest_names
 from asperity.core.files import read_toml
 from asperity.core.units import parse_quantity
 from asperity.devices.device import (
+    ASSUMED_WALL_RATE,
     FIELD_TABLE,
     TEXT_FIELDS,
     USER_SOURCE,
@@ -31,7 +32,12 @@ from asperity.devices.device import (
 Table = Mapping[str, Any]
 _FOLDER = Path(__file__).parent
 _DATUM_KEYS = ("value", "unit", "source", "verified", "also")
-_WALL_UNITS = {"cycled": "N/m", "update_rate": "Hz", "lightest": ""}
+_WALL_ARGUMENTS = (
+    Argument("cycled", "", "N/m", must_be_positive=True),
+    Argument("update_rate", "", "Hz", must_be_positive=True),
+    Argument("delay_samples", ""),
+    Argument("lightest", "", must_be_positive=True),
+)
 _CONTROL_CHARACTERS = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029]")
 _NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*")
 
@@ -59,8 +65,9 @@ def load_device(device: DeviceLike) -> Device:
     A file has ``id``, ``name`` and any of the fields of the catalogue, each with its unit
     ("12 N"), or as a table with ``value``, ``unit``, ``source``, ``verified`` (``true``,
     ``"read"``, ``"measured"``, ``"simulated"`` or ``false``) and ``also``. ``max_stiffness`` is a
-    wall test, which may have ``directions``, ``cycled``, ``update_rate``, ``positions`` and
-    ``lightest``; see :class:`~asperity.devices.device.WallTest`.
+    wall test, which may have ``directions``, ``cycled``, ``update_rate``, ``rate_source``,
+    ``delay_samples``, ``positions`` and ``lightest``; see
+    :class:`~asperity.devices.device.WallTest`.
 
     Raises:
         ParameterError: the id is unknown, or the file has unknown or wrong fields.
@@ -141,6 +148,11 @@ def override_device(device: Device, content: Table) -> Device:
     changed = parse_device(content, device.id, from_file=True)
     texts = {key: getattr(changed, key) for key in TEXT_FIELDS[1:] if key in content}
     data = {**device.data, **changed.data}
+    test = device.wall_test
+    if test is not None and test.update_rate is None and "max_stiffness" not in changed.data:
+        # Another loop: the wall held in the loop of the device itself.
+        rate = device.value("update_rate") or ASSUMED_WALL_RATE
+        data["max_stiffness"] = replace(test, update_rate=rate)
     _check_forces(data)
     return replace(device, data=data, **texts)
 
@@ -205,11 +217,13 @@ def _parse_verified(name: str, value: Any) -> tuple[bool, Origin]:
 def _parse_wall_test(name: str, stiffness: float, table: Table, from_file: bool) -> dict[str, Any]:
     """Return the details of a wall test [SI] besides its stiffness."""
     details: dict[str, Any] = {}
-    for key, unit in _WALL_UNITS.items():
-        if key in table:
-            argument = Argument(f"{name}.{key}", "", unit, must_be_positive=True)
-            quantity = _parse_quantity(argument.name, table[key], unit, from_file)
-            details[key] = argument.validate(quantity)
+    for key in _WALL_ARGUMENTS:
+        if key.name in table:
+            argument = replace(key, name=f"{name}.{key.name}")
+            quantity = _parse_quantity(argument.name, table[key.name], key.unit, from_file)
+            details[key.name] = argument.validate(quantity)
+    if "rate_source" in table:
+        details["rate_source"] = _check_text(f"{name}.rate_source", table["rate_source"])
     if details.get("cycled", math.inf) <= stiffness:
         limit = f"must be above the stiffness that held, {stiffness:g} N/m"
         raise ParameterError(f"{name}.cycled", limit, table["cycled"])

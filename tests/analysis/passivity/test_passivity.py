@@ -67,8 +67,8 @@ def exact_bound(value: float) -> Bound:
         ("one-sided", 2 * SIGMA / (T * 2.0)),
         ("delay", SIGMA / (T * (2.0 / 2 + 2 * 3.0))),
         ("virtual damping", (SIGMA - 0.5) / (T * (2.0 / 2 + 2 * 3.0))),
-        ("smooth-wall rule", 5000.0 / 3.0),
-        ("wall test", 5000.0 * 2.5 / (2.0 / 2 + 2 * 3.0)),
+        ("smooth-wall rule", 5000.0 * (0.5 / 2.5) / 3.0),
+        ("wall test", 5000.0 * 0.5 / (2.0 / 2 + 2 * 3.0)),
         ("leak", math.inf),
     ],
 )
@@ -375,14 +375,17 @@ def test_conservative_law_with_a_jump_is_undecided() -> None:
 def test_wall_test_makes_limits_plausible_but_not_proved() -> None:
     """The limit K₀/q covers any delay; for a known delay it lies between K₀/q⁺ and K₀/q."""
     wall = {"max_stiffness": "5000 N/m"}
+    late = {"max_stiffness": {"value": "5000 N/m", "delay_samples": 1}}
     numbers = {"q": exact_bound(4.0), "plus": exact_bound(2.0)}
     cases = [
         (1250.0, wall, "plausible"),
         (1251.0, wall, "undecided"),
         (2500.0, {**wall, "delay_samples": 0}, "plausible"),
         (2501.0, {**wall, "delay_samples": 0}, "undecided"),
-        (1500.0, {**wall, "delay_samples": 1}, "plausible"),
-        (1501.0, {**wall, "delay_samples": 1}, "undecided"),
+        (500.0, {**wall, "delay_samples": 1}, "plausible"),
+        (501.0, {**wall, "delay_samples": 1}, "undecided"),
+        (1500.0, {**late, "delay_samples": 1}, "plausible"),
+        (1501.0, {**late, "delay_samples": 1}, "undecided"),
     ]
     for stiffness, device, verdict in cases:
         result = assess(Surface(WAVE, "C", stiffness), device, **numbers)

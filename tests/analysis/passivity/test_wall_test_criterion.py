@@ -12,12 +12,13 @@ from hypothesis import strategies as st
 
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.leak import worst_loop
+from asperity.analysis.passivity.recommended_stiffness import recommend_stiffness
 from asperity.analysis.passivity.verdict import Passivity, passivity
 from asperity.analysis.results.analyze import analyze
 from asperity.analysis.results.check_limits import limits
 from asperity.analysis.results.compare import compare
 from asperity.core.errors import ParameterError
-from asperity.devices import Device, parse_device
+from asperity.devices import Device, device_names, load_device, override_device, parse_device
 from asperity.rendering import rendered_surface
 from asperity.surface import Surface
 from asperity.textures import Fourier, Profile, Sinusoid, Texture
@@ -47,35 +48,46 @@ def assess(
     plus=st.floats(1.0, 20.0),
     more=st.floats(1.0, 5.0),
     delay=st.none() | st.integers(0, 8),
+    tested=st.none() | st.integers(0, 8),
     damping=st.none() | st.floats(0.05, 20.0),
 )
 def test_wall_test_limit_is_the_minimum_over_all_admissible_pairs(
-    held: float, plus: float, more: float, delay: int | None, damping: float | None
+    held: float,
+    plus: float,
+    more: float,
+    delay: int | None,
+    tested: int | None,
+    damping: float | None,
 ) -> None:
-    """Searches the pairs (σ₀/T, d) with σ₀/T >= K₀ (1/2 + d), with σ₀ or d fixed if known."""
+    """Searches the pairs (σ₀/T, d) with σ₀/T >= K₀ (1/2 + d₀), with σ₀, d or d₀ fixed if known.
+
+    Where d is unknown it is d₀; where d is known and d₀ is not, d₀ is 0.
+    """
     rate, q = 4000.0, plus * more
     optional = {"delay_samples": delay, "damping": damping}
     fields: dict[str, Any] = {k: v for k, v in optional.items() if v is not None}
-    fields |= {"max_stiffness": held, "update_rate": rate}
+    wall = {"value": held} if tested is None else {"value": held, "delay_samples": tested}
+    fields |= {"max_stiffness": wall, "update_rate": rate}
     limit = assess(fields, 1.0, q, plus).criterion("wall test").limit
-    delays = [0.125 * i for i in range(4000)] if delay is None else [float(delay)]
+    delays = [0.125 * i for i in range(4000)]
+    if delay is not None or tested is not None:
+        delays = [float(delay if delay is not None else tested or 0)]
     allowed = []
     for d in delays:
-        loss = held * (0.5 + d)
-        if damping is not None and delay is None and damping * rate < loss:
+        loss = held * (0.5 + (d if delay is None else tested or 0))
+        if damping is not None and len(delays) > 1 and damping * rate < loss:
             continue  # this delay would have made the wall cycle
-        if damping is not None and delay is not None:
-            loss = min(loss, damping * rate)  # the pair is known
+        if damping is not None:
+            loss = min(loss, damping * rate)
         allowed.append(loss / (0.5 * plus + d * q))
-    if not allowed:
-        assert limit is None
-        return
+    if not allowed:  # damping alone, without delay
+        allowed.append(damping * rate / (0.5 * plus) if damping is not None else 0.0)
     assert limit is not None
     assert limit <= min(allowed) * (1.0 + 1e-12)
     # No stricter than the worst pair: K₀/q is the limit for increasing delays.
-    if delay is None or damping is None:
+    if delay is None and damping is None:
         assert limit >= held / q * (1.0 - 1e-12)
-    if delay is not None:
+    if len(delays) == 1:
         assert limit == pytest.approx(min(allowed), rel=1e-12)
     elif damping is None:
         assert limit == pytest.approx(held / q, rel=1e-12)
@@ -90,11 +102,16 @@ def test_stability_limit_reports_the_binding_delay() -> None:
     assert assess({**wall, "delay_samples": 3}, 1000.0).stability_limit.delay == 3.0
 
 
-def test_wall_that_requires_more_damping_than_available_is_undecided() -> None:
-    result = assess({"max_stiffness": 5000, "update_rate": 1000.0, "damping": 1.0}, 100.0)
-    assert result.verdict == "undecided"
-    assert result.stability_limit.stiffness is None
-    assert "no delay fits" in result.criterion("wall test").assumptions
+def test_wall_that_requires_more_damping_than_available_is_limited_by_the_damping() -> None:
+    """The wall of 5000 N/m is refused, 2 σ₀/T = 2000 N/m is offered in its place."""
+    fields = {"max_stiffness": 5000, "update_rate": 1000.0, "damping": 1.0}
+    assert assess(fields, 2001.0, law="W").verdict != "plausible"
+    result = assess(fields, 2000.0, law="W")
+    assert result.verdict == "plausible"
+    assert result.stability_limit.stiffness == 2000.0
+    assert "needs more damping than the device has" in result.criterion("wall test").assumptions
+    late = assess({**fields, "delay_samples": 1}, 100.0, law="W")
+    assert late.stability_limit.stiffness == pytest.approx(1000.0 / 1.5)
 
 
 def test_limit_depends_on_lightest_direction_and_rate_of_the_test() -> None:
@@ -110,9 +127,53 @@ def test_limit_depends_on_lightest_direction_and_rate_of_the_test() -> None:
     assert assess(fields, 100.0, law="W").stability_limit.stiffness == pytest.approx(
         1000.0, rel=1e-12
     )
+    assert result.stability_limit.update_rate == 2000.0
     # A faster loop than the tested one has no larger limit.
     fields["update_rate"] = "40 kHz"
-    assert assess(fields, 100.0, law="W").stability_limit.stiffness == 2000.0
+    limit = assess(fields, 100.0, law="W").stability_limit
+    assert (limit.stiffness, limit.update_rate) == (2000.0, 4000.0)
+    # A limit of the device's own damping holds from its own rate on.
+    damped = {"damping": 1.0, "update_rate": "40 kHz", "delay_samples": 0}
+    assert assess(damped, 100.0).stability_limit.update_rate == 40_000.0
+
+
+@pytest.mark.parametrize(("rate", "expected"), [(100, 300), (300, 900), (1000, 3000), (4000, 3000)])
+@pytest.mark.parametrize("law", ["W", "A"])
+def test_wall_of_the_falcon_falls_with_the_update_rate(
+    rate: float, expected: float, law: str
+) -> None:
+    """f₀ = 1 kHz stays that of the wall test when the loop is another one."""
+    device = override_device(load_device("falcon"), {"update_rate": f"{rate} Hz"})
+    numbers = exact_bound(1.0), exact_bound(1.0)
+    surface = Surface(WAVE, law)
+    recommended = recommend_stiffness(surface, device, *numbers)
+    assert recommended.wall_stiffness == expected
+    assert recommended.stability_limit.stiffness == expected
+    assert recommended.stability_limit.update_rate == min(rate, 1000.0)
+    # Twice one sample of delay: K₀ (1/2)/(1/2 + 1).
+    late = override_device(device, {"delay_samples": 1})
+    assert recommend_stiffness(surface, late, *numbers).wall_stiffness == pytest.approx(
+        expected / 3.0
+    )
+
+
+def test_own_file_keeps_the_rate_of_its_wall_test() -> None:
+    own = {"max_stiffness": "2 kN/m", "update_rate": "4 kHz"}
+    for fields, rate in ((own, 4000.0), ({"max_stiffness": "2 kN/m"}, 1000.0)):
+        device = parse_device(fields, "mine")
+        test = override_device(device, {"update_rate": "500 Hz"}).wall_test
+        assert test is not None
+        assert test.update_rate == rate
+    # A wall that is given anew was tried in the loop that is given with it.
+    both = override_device(parse_device(own, "mine"), {"max_stiffness": "1 kN/m"}).wall_test
+    assert both is not None
+    assert both.update_rate is None
+
+
+def test_every_wall_of_the_catalogue_states_its_rate_and_source() -> None:
+    for name in device_names():
+        test = load_device(name).wall_test
+        assert test is None or (test.update_rate and test.rate_source)
 
 
 @pytest.mark.parametrize("law", sorted(set(LEAKS) - {"W"}))

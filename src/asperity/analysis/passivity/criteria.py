@@ -178,32 +178,34 @@ def _virtual_damping_rule(loop: DeviceLoop) -> StiffnessRule:
 
 
 def _wall_rule(loop: DeviceLoop) -> StiffnessRule:
-    budget = loop.wall_stiffness
+    budget = loop.delayed_wall_stiffness
     return StiffnessRule(WALL, "k q <= K₀", _ZERO, _ONE, budget, ("max_stiffness",))
 
 
 def _wall_test_rule(loop: DeviceLoop) -> StiffnessRule:
     """The least limit over all pairs of damping and delay that the wall test admits.
 
-    For a delay d the test admits σ₀/T >= K₀ (1/2 + d), so the delay rule allows
-    K₀ (1/2 + d)/(q⁺/2 + d q). That falls with d, since q⁺ <= q: to K₀/q for unbounded d. With
-    delay, the test does not show the effect of virtual damping: there is no limit.
+    A test at the delay d₀ admits σ₀/T >= K₀ (1/2 + d₀), so the delay rule allows
+    K₀ (1/2 + d₀)/(q⁺/2 + d q). Where neither delay is known they are equal; then it falls with d,
+    since q⁺ <= q: to K₀/q for unbounded d. With delay, the test does not show the effect of virtual
+    damping: there is no limit.
     """
     longest = loop.longest_delay
-    if loop.virtual_damping and loop.delay != 0:
-        longest = None
-    budget = None if longest is None else loop.wall_stiffness
+    budget = loop.wall_stiffness
     formula = "k q <= K₀"
     one_sided_weight = _ZERO
     norm_weight = _ONE
-    if longest is not None and longest != math.inf:
-        formula = "k (q⁺/2 + d q) <= K₀ (1/2 + d)"
+    if longest != math.inf:
+        formula = "k (q⁺/2 + d q) <= K₀ (1/2 + d₀)"
         one_sided_weight = HALF
         norm_weight = Fraction(longest)
         if budget is not None:
-            budget *= HALF + norm_weight
+            tested = norm_weight if loop.delay is None else loop.wall_delay
+            budget *= HALF + tested
             if loop.damping_gain is not None:
-                budget = min(budget, loop.damping_gain)  # the one admissible pair is known
+                budget = min(budget, loop.damping_gain)
+    if loop.virtual_damping and loop.delay != 0:
+        budget = None
     return StiffnessRule(
         WALL_TEST,
         formula,

@@ -15,6 +15,7 @@ from asperity.analysis.gain.theorems import theorem_on
 from asperity.core.checks import check_positive, check_real
 from asperity.core.errors import ParameterError
 from asperity.devices import Device, WallTest
+from asperity.devices.device import ASSUMED_WALL_RATE
 from asperity.surface import Surface
 
 HALF = Fraction(1, 2)
@@ -94,36 +95,68 @@ class DeviceLoop:
         share = Fraction(1)
         if self.wall_test.lightest is not None and self.surface.depends_on_texture:
             share = Fraction(self.wall_test.lightest)
-        if self.wall_test.update_rate is not None and self.rate is not None:
-            share *= min(Fraction(1), self.rate / Fraction(self.wall_test.update_rate))
-        return share * Fraction(self.wall_test.value)
+        return share * self.least_rate / self.wall_rate * Fraction(self.wall_test.value)
 
     @property
-    def longest_delay(self) -> Number | None:
-        """Greatest delay [samples] that the wall test admits; ``None`` if it admits none.
+    def wall_rate(self) -> Fraction:
+        """f₀ [Hz], update rate of the wall test; the device's own, or 1 kHz, if not stated."""
+        if self.wall_test is not None and self.wall_test.update_rate is not None:
+            return Fraction(self.wall_test.update_rate)
+        return self.rate or Fraction(ASSUMED_WALL_RATE)
 
-        With the wall on the verge of cycling, σ₀/T >= K₀ (1/2 + d): any delay, unless d or σ₀ is
-        known. It need not be whole.
+    @property
+    def least_rate(self) -> Fraction:
+        """Least update rate [Hz] at which ``wall_stiffness`` is allowed; a faster loop may be."""
+        return min(self.rate or self.wall_rate, self.wall_rate)
+
+    @property
+    def wall_delay(self) -> Fraction:
+        """d₀, delay of the wall test [samples]; 0 if it is not stated."""
+        if self.wall_test is None:
+            return Fraction(0)
+        return Fraction(self.wall_test.delay_samples or 0)
+
+    @property
+    def longest_delay(self) -> Number:
+        """Greatest delay [samples] of a loop that the wall test admits.
+
+        With the wall on the verge of cycling, σ₀/T >= K₀ (1/2 + d₀). The delay of the loop is that
+        of the test unless it is known: d₀ where it is stated, else any, unless σ₀ is known. It need
+        not be whole. 0 where a wall of K₀ needs more damping than σ₀.
         """
         if self.delay is not None:
             return Fraction(self.delay)
+        if self.wall_test is not None and self.wall_test.delay_samples is not None:
+            return self.wall_delay
         if self.damping_gain is None or self.wall_stiffness is None:
             return math.inf
-        longest = self.damping_gain / self.wall_stiffness - HALF
-        if longest < 0:
-            return None
-        return longest
+        return max(self.damping_gain / self.wall_stiffness - HALF, Fraction(0))
+
+    @property
+    def delayed_wall_stiffness(self) -> Fraction | None:
+        """Stiffest smooth wall [N/m] allowed at the delay of the loop, at its rate.
+
+        K₀ min(1, f/f₀) (1/2 + d₀)/(1/2 + d).
+        """
+        if self.wall_stiffness is None or self.delay is None:
+            return self.wall_stiffness
+        return self.wall_stiffness * (HALF + self.wall_delay) / (HALF + self.delay)
 
     @property
     def cycling_stiffness(self) -> Fraction | None:
-        """Stiffness K [N/m] at which a wall cycled with exact positions: σ₀/T < K (1/2 + d)."""
+        """Stiffness K [N/m] at which a wall cycled with exact positions: σ₀/T < K (1/2 + d).
+
+        With the delay d of the test, which is that of the loop unless both are stated.
+        """
         test = self.wall_test
         exact = test is not None and test.positions == "exact" and not self.virtual_damping
         if test is None or test.cycled is None or not exact:
             return None
         if test.update_rate is not None and Fraction(test.update_rate) != self.rate:
             return None
-        return Fraction(test.cycled)
+        if test.delay_samples is None or self.delay is None:
+            return Fraction(test.cycled)
+        return Fraction(test.cycled) * (HALF + self.wall_delay) / (HALF + self.delay)
 
     def weighted_gain(self, one_sided_weight: Fraction, norm_weight: Fraction, end: str) -> Number:
         """Return the weighted sum of q⁺ and q at one end; a weight of 0 drops infinity."""
@@ -222,6 +255,13 @@ def is_contradictory(loop: DeviceLoop) -> bool:
     if loop.cycling_stiffness is None or loop.damping_gain is None or loop.delay is None:
         return False
     return loop.damping_gain >= loop.cycling_stiffness * (loop.delay + HALF)
+
+
+def is_damping_below_wall(loop: DeviceLoop) -> bool:
+    """Return whether the device has less damping than a wall of K₀ needs at the test's delay."""
+    if loop.wall_stiffness is None or loop.damping_gain is None:
+        return False
+    return loop.damping_gain < loop.wall_stiffness * (HALF + loop.wall_delay)
 
 
 def max_proved_delay(loop: DeviceLoop) -> int | None:

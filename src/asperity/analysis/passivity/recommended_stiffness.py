@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Literal
@@ -40,6 +40,7 @@ class StabilityLimit(Serializable):
             is admissible, ``None`` where the limit has no such pair.
         sampled: whether the limit uses a number that was only sampled, so that it may be too high.
         proved_stiffness: stiffness up to which passivity is proved [N/m]; 0 for none.
+        update_rate: least update rate at which the limit holds [Hz]; ``None`` without a limit.
     """
 
     stiffness: float | None
@@ -48,6 +49,7 @@ class StabilityLimit(Serializable):
     delay: float | None = None
     sampled: bool = False
     proved_stiffness: float = 0.0
+    update_rate: float | None = field(default=None, compare=False)
 
 
 def stability_limit(
@@ -57,6 +59,19 @@ def stability_limit(
 
     Comparison, analysis and the six limits of the device share this limit.
     """
+    limit = _find_limit(loop, by_name)
+    if limit.basis == "none":
+        return limit
+    rate = loop.least_rate
+    if limit.basis in _BASES_WITHOUT_MARGIN and loop.rate is not None:
+        rate = loop.rate  # the device's damping is the basis, per period
+    return replace(limit, update_rate=float(rate))
+
+
+def _find_limit(
+    loop: device_loop.DeviceLoop, by_name: Mapping[str, criteria.Criterion]
+) -> StabilityLimit:
+    """Return the stability limit without its update rate."""
     main = by_name[criteria.main_rule(loop)]
     steps = by_name[criteria.QUANTIZATION]
     if not loop.conservative:
@@ -184,8 +199,8 @@ class StiffnessRecommendation:
         stiffness: recommended stiffness [N/m], rounded down to three digits; 0 if no stable
             stiffness is known, or if there is no limit.
         start: the same; without one the smooth wall's K₀, or 1000 N/m where that is unknown too.
-        wall_stiffness: K₀ for this law [N/m]: in the lightest direction, at the device's rate;
-            ``None`` if it is unknown.
+        wall_stiffness: K₀ for this law [N/m]: in the lightest direction, at the rate and delay of
+            the loop; ``None`` if it is unknown.
     """
 
     stability_limit: StabilityLimit
@@ -219,7 +234,8 @@ def recommend_on_loop(loop: device_loop.DeviceLoop) -> StiffnessRecommendation:
     start = stiffness
     if not stiffness:
         start = DEFAULT_STIFFNESS if loop.wall_test is None else loop.wall_test.value
-    wall = None if loop.wall_stiffness is None else float(loop.wall_stiffness)
+    allowed = loop.delayed_wall_stiffness
+    wall = None if allowed is None else float(allowed)
     return StiffnessRecommendation(limit, margin, stiffness, start, wall)
 
 

@@ -171,7 +171,10 @@ def wall_test_text(test: WallTest) -> str:
     if test.cycled:
         parts.append(f"cycled at {format_quantity(test.cycled, 'N/m')}")
     if test.update_rate:
-        parts.append(f"at {format_quantity(test.update_rate, 'Hz')}")
+        source = f" ({test.rate_source})" if test.rate_source else ""
+        parts.append(f"at {format_quantity(test.update_rate, 'Hz')}{source}")
+    if test.delay_samples is not None:
+        parts.append(f"{test.delay_samples:g} samples of delay")
     if test.positions:
         parts.append(f"{test.positions} positions")
     if test.lightest:

@@ -33,6 +33,7 @@ from asperity.report.sentences.passivity_sentences import (
     jumps_clause,
     stability_limit_text,
     stiffness_limit_text,
+    update_rate_text,
 )
 from asperity.surface import Surface, default_max_depth
 
@@ -158,12 +159,35 @@ def _wall_assumptions(comparison: Comparison) -> list[str]:
     test = device.wall_test
     if test is None:
         return []
-    sentences = [f"K₀ = {test.value:g} N/m for the {device.name} ({test.pedigree}): {test.source}"]
+    loop = comparison.rows[0].passivity.loop
+    rate = format_quantity(float(loop.wall_rate), "Hz")
+    source = f"; {rate}: {test.rate_source}" if test.rate_source else ""
+    sentences = [
+        f"K₀ = {test.value:g} N/m at {rate} for the {device.name} ({test.pedigree}): "
+        f"{test.source}{source}"
+    ]
+    sentences += _rate_sentences(comparison)
     if "plausible" in [row.stability_limit.basis for row in comparison.rows]:
         sentences.append(
             "Plausible, not proved. Assumed: the wall of stiffness K₀ was close to its stability "
             f"limit (heavy handle, loose grip); {damping_assumption(test)}"
         )
+    return sentences
+
+
+def _rate_sentences(comparison: Comparison) -> list[str]:
+    """Return the update rates at which the recommended stiffnesses hold."""
+    loop = comparison.rows[0].passivity.loop
+    limits = {row.stability_limit.update_rate: row.stability_limit for row in comparison.rows}
+    limits.pop(None, None)
+    sentences = [f"Recommended {update_rate_text(limit)}" for limit in limits.values()]
+    if loop.least_rate < loop.wall_rate:
+        share = float(loop.least_rate / loop.wall_rate)
+        sentences.append(f"A slower loop than that of K₀ is allowed less in proportion: {share:g}")
+    if loop.delay is not None and loop.delay != loop.wall_delay:
+        wall = format_quantity(float(loop.delayed_wall_stiffness or 0), "N/m")
+        delays = f"{loop.delay} samples, {float(loop.wall_delay):g} in the test of K₀"
+        sentences.append(f"A delay of {delays}, allows a wall of {wall}")
     return sentences
 
 

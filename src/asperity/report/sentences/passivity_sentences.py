@@ -16,6 +16,7 @@ from asperity.analysis.passivity.device_loop import (
     Obstacle,
     critical_speed,
     has_known_leak,
+    is_damping_below_wall,
     max_proved_delay,
 )
 from asperity.analysis.passivity.recommended_stiffness import StabilityLimit
@@ -258,12 +259,40 @@ def _quantization_assumptions(loop: DeviceLoop) -> str:
 def _wall_test_assumptions(loop: DeviceLoop) -> str:
     if loop.virtual_damping and loop.delay != 0:
         return "no limit: with delay, the wall test does not show the effect of virtual damping"
-    if loop.longest_delay is None:
-        return "no delay fits: a wall of K₀ needs more damping than the data of the device"
+    if is_damping_below_wall(loop):
+        return (
+            "plausible, not proved: a wall of K₀ needs more damping than the device has, so the "
+            f"damping limits the stiffness{delay_clause(float(loop.longest_delay))}"
+        )
     return (
         "plausible, not proved: the wall of stiffness K₀ was close to its stability limit (heavy "
-        f"handle, loose grip); {damping_assumption(loop.wall_test)}; conservative law"
+        f"handle, loose grip){_wall_conditions(loop)}; {damping_assumption(loop.wall_test)}; "
+        "conservative law"
     )
+
+
+def _wall_conditions(loop: DeviceLoop) -> str:
+    """Return update rate and delay of the wall test, and how they limit a loop."""
+    if loop.wall_test is None:
+        return ""
+    text = f" at {format_quantity(float(loop.wall_rate), 'Hz')}"
+    if loop.delay is not None:
+        text += f" with {float(loop.wall_delay):g} samples of delay"
+    if loop.least_rate < loop.wall_rate:
+        text += f"; at {format_quantity(float(loop.least_rate), 'Hz')} it is less in proportion"
+    return text
+
+
+def update_rate_text(limit: StabilityLimit) -> str:
+    """Return the update rates at which a limit holds; empty without a limit.
+
+    Example:
+        >>> update_rate_text(StabilityLimit(900.0, "plausible", update_rate=300.0))
+        'for a loop of 300 Hz or faster'
+    """
+    if limit.update_rate is None:
+        return ""
+    return f"for a loop of {format_quantity(limit.update_rate, 'Hz')} or faster"
 
 
 def damping_assumption(wall_test: WallTest | None) -> str:

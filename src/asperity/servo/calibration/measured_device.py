@@ -111,6 +111,7 @@ def _wall_test(calibration: Calibration, source: str, origin: Origin) -> WallTes
         lightest=1.0,
         cycled=cycled,
         update_rate=_round_to_four_digits(calibration.update_rate.value),
+        delay_samples=None if calibration.delay.alternatives else float(calibration.delay.samples),
         positions="stepped" if calibration.position_step else "exact",
     )
 
