@@ -54,3 +54,16 @@ kill -KILL $RUN
 wait $RUN || true
 asperity recording info run.mcap
 asperity recording export run.mcap -o run.csv
+
+# 13. A study: planned, simulated, run and reported, without mixing
+asperity study init comparison rough.toml
+sed -i.bak 's/"A", "C", "D", "H"/"C", "H"/; s/repeats = 4/repeats = 1/; s/"3 s"/"0.1 s"/' rough.toml
+asperity study plan rough.toml --effect 1.5 --simulations 5
+asperity study run rough.toml --participant S01 --simulate typical
+asperity study report rough-simulated-typical
+while printf ' 1' 2> /dev/null; do sleep 1; done |
+    python -c 'import pty, sys; pty.spawn(sys.argv[1:])' \
+        asperity study run rough.toml --participant P01 --terminal
+! asperity study run rough.toml --participant S02 --simulate typical -o rough-simulated-device
+asperity study report rough-simulated-device
+asperity study remove rough-simulated-device P01

@@ -25,6 +25,8 @@ from asperity.studies.study_store import ANSWERS_FILE, DERIVED_FILES, list_parti
 COMMAND = "study"
 EXAMPLES = Path(__file__).parents[2] / "examples" / "studies"
 SIMULATED = ("--simulate", "typical")
+TRIED = "{}-simulated-typical"
+STUDY = TRIED.format("study")
 
 
 @pytest.fixture
@@ -40,36 +42,36 @@ def test_a_template_of_each_kind_runs_as_it_is(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert call("init", kind, "mine.toml") == (
-        0, "Written: mine.toml; now: asperity study run mine.toml --participant P01\n", "",
+        0, "Written: mine.toml; now: asperity study plan mine.toml --effect 1.5\n", "",
     )  # fmt: skip
     assert "{" not in Path("mine.toml").read_text("utf-8")
     for participant in ("P01", "P02", "P03"):
         code, out, err = call("run", "mine.toml", "--participant", participant, *SIMULATED)
         assert (code, err) == (0, "")
         assert f"{participant}: " in out
-    code, out, err = call("report", "mine")
+    code, out, err = call("report", TRIED.format("mine"))
     assert (code, err) == (0, "")
-    assert "Written in mine: key.json, report.html, trials.csv" in out
+    assert "Written in mine-simulated-typical: key.json, report.html, trials.csv" in out
     question = load_study("mine.toml").design.question
-    assert question in Path("mine/report.html").read_text("utf-8")
+    assert question in Path(TRIED.format("mine"), "report.html").read_text("utf-8")
 
 
 def test_the_report_is_that_of_python(call: Call, file: str, tmp_path: Path) -> None:
     for participant in ("P01", "P02", "P03"):
         assert call("run", file, "--participant", participant, *SIMULATED)[0] == 0
-    assert not {path.name for path in Path("study").iterdir()} & set(DERIVED_FILES)
-    assert call("report", "study", "--json", "result.json")[0] == 0
-    result = asp.study_report("study")
+    assert not {path.name for path in Path(STUDY).iterdir()} & set(DERIVED_FILES)
+    assert call("report", STUDY, "--json", "result.json")[0] == 0
+    result = asp.study_report(STUDY)
     result.to_csv(tmp_path / "other.csv")
-    assert Path("study/table.csv").read_bytes() == Path("other.csv").read_bytes()
-    with Path("study/trials.csv").open(newline="", encoding="utf-8") as stream:
+    assert Path(STUDY, "table.csv").read_bytes() == Path("other.csv").read_bytes()
+    with Path(STUDY, "trials.csv").open(newline="", encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
-    assert len(rows) == len(read_trials("study")) == 9
+    assert len(rows) == len(read_trials(STUDY)) == 9
     assert json.loads(Path("result.json").read_text("utf-8"))
-    code, out, _ = call("remove", "study", "P02")
-    assert (code, out[:27]) == (0, "Deleted in study: P02/, key")
-    assert not any("P02" in str(path) for path in Path("study").rglob("*"))
-    assert not {path.name for path in Path("study").iterdir()} & set(DERIVED_FILES)
+    code, out, _ = call("remove", STUDY, "P02")
+    assert (code, out[:45]) == (0, "Deleted in study-simulated-typical: P02/, key")
+    assert not any("P02" in str(path) for path in Path(STUDY).rglob("*"))
+    assert not {path.name for path in Path(STUDY).iterdir()} & set(DERIVED_FILES)
 
 
 def test_a_plan_states_the_power(call: Call, file: str) -> None:
@@ -107,7 +109,7 @@ def test_bad_input_is_one_line(call: Call, file: str, arguments: str, message: s
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert message in err
     left = {str(path) for path in Path().rglob("*")} - {str(path) for path in before}
-    assert all(name.endswith((".lock", "study", "study.json", "P01")) for name in left)
+    assert all(name.endswith((".lock", STUDY, "study.json", "P01")) for name in left)
     assert file == "study.toml"
 
 
@@ -128,7 +130,11 @@ def test_a_seeded_study_replays_bit_for_bit(call: Call, file: str) -> None:
         assert call("run", file, "--participant", "P01", "-o", folder, *SIMULATED)[0] == 0
     lines = [
         [
-            {name: value for name, value in json.loads(line).items() if name != "started"}
+            {
+                name: value
+                for name, value in json.loads(line).items()
+                if name not in {"started", "check"}
+            }
             for line in (Path(folder) / "P01" / ANSWERS_FILE).read_text("utf-8").splitlines()
         ]
         for folder in ("one", "two")
@@ -159,7 +165,7 @@ def test_a_study_is_done_in_the_terminal(file: str) -> None:
             answered += 1
     os.close(master)
     assert process.wait(timeout=60) == 0
-    assert [one.answer for one in read_trials("study")] == ["2", "2", "2"]
+    assert [one.answer for one in read_trials("study-simulated-device")] == ["2", "2", "2"]
     assert "THE END" in shown
     assert not any(secret in shown for secret in ("stiffness", "61.5", "83.5", "97.5"))
 
@@ -174,7 +180,7 @@ def test_without_a_terminal_nobody_is_registered(file: str) -> None:
         text=True,
     )
     assert (done.returncode, "terminal is needed" in done.stderr) == (2, True)
-    assert list_participants("study") == {}
+    assert list_participants("study-simulated-device") == {}
 
 
 @pytest.mark.parametrize("name", ["alive", "click"])

@@ -210,3 +210,37 @@ def test_studies_whose_participants_are_all_excluded(kind: str) -> None:
     result = analyse(design, records(design, 3))
     assert len(result.excluded) == 3
     assert "no participant is used" in result.to_html()
+
+
+def test_figures_have_data_for_narrow_windows_and_legends() -> None:
+    from asperity.report.pictures.panel_data import extract_panels
+    from asperity.studies.result_pictures import scores_figure
+
+    result = analyse(design_of("comparison"), records(design_of("comparison"), 3))
+    figure = scores_figure(result)
+    figure.canvas.draw()
+    (panel,) = extract_panels(figure)
+    names = [series.name for series in panel.series]
+    assert names[:4] == ["P00", "P01", "P02", "mean of A"]
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert texts == ["a participant", "mean and its 95 % interval"]
+
+
+def test_a_page_states_what_was_presented() -> None:
+    design = design_of("comparison")
+    content = {
+        "study": {"texture_force": "10 mN"},
+        "vary": {"surface.law": ["A", "C", "D", "H"]},
+        "texture": {"kind": "sinusoid", "period": "2 mm"},
+        "surface": {"max_depth": "0.2 mm"},
+        "device": {"id": "touch"},
+    }
+    page = analyse(design, records(design, 3), content).to_html()
+    for text in ("surface.law A / C / D / H", "period 2 mm", "id touch", "force of 10 mN RMS"):
+        assert text in page
+
+
+def test_a_plan_tells_how_far_it_is() -> None:
+    shares: list[float] = []
+    plan(design_of("comparison", repeats=1), 2.0, 3, simulations=4, progress=shares.append)
+    assert shares == [0.25, 0.5, 0.75, 1.0]

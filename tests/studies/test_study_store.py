@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -50,7 +51,7 @@ def study(tmp_path: Path) -> Study:
 
 @pytest.fixture
 def folder(tmp_path: Path, study: Study) -> Path:
-    write_study(tmp_path / "data", study)
+    write_study(tmp_path / "data", study, "guessing")
     return tmp_path / "data"
 
 
@@ -99,7 +100,10 @@ def test_a_damaged_line_in_the_middle_is_refused(folder: Path, study: Study) -> 
     path.write_bytes(b"".join([first[:10] + b"\n", *rest]))
     with pytest.raises(ParameterError, match="damaged line 1"):
         read_trials(folder)
-    path.write_bytes(b"".join([first.replace(b'"trial": 1', b'"trial": 2'), *rest]))
+    unchecked = re.sub(rb', "check": "\w+"', b"", first)  # of an early version
+    path.write_bytes(b"".join([unchecked, *rest]))
+    assert len(read_trials(folder)) == 1 + len(rest)
+    path.write_bytes(b"".join([unchecked.replace(b'"trial": 1', b'"trial": 2'), *rest]))
     with pytest.raises(ParameterError, match="trial 1 of P01 was not made by this study"):
         read_trials(folder)
 
@@ -110,7 +114,7 @@ def test_answers_of_another_seed_are_refused(folder: Path, study: Study) -> None
     content = json.loads(text)
     content["[study]"]["seed"] = 2
     (folder / "study.json").write_text(json.dumps(content))
-    with pytest.raises(ParameterError, match="was not made by this study and version"):
+    with pytest.raises(ParameterError, match="damaged line 1, or one of another study, in P01"):
         read_trials(folder)
 
 
@@ -121,6 +125,7 @@ def test_only_codes_are_written_until_the_key_is(folder: Path, study: Study) -> 
         assert not any(secret in text for secret in ("stiffness", "61.5", "83.5", "97.5"))
     assert not (folder / KEY_FILE).exists()
     key = read_key(folder)
+    assert key.pop("simulated") == "guessing"
     assert key.keys() == {"P01"}
     assert {one["surface.stiffness"] for one in key["P01"].values()} == {61.5, 83.5, 97.5}
     lines = (folder / "P01" / ANSWERS_FILE).read_text("utf-8").splitlines()
@@ -131,13 +136,14 @@ def test_only_codes_are_written_until_the_key_is(folder: Path, study: Study) -> 
 def test_codes_of_participants_differ(folder: Path, study: Study) -> None:
     for code in ("P01", "P02"):
         finish(folder, study, code)
-    assert len({code for codes in read_key(folder).values() for code in codes}) == 6
+    key = read_key(folder)
+    assert len({*key["P01"], *key["P02"]}) == 6
 
 
 def test_another_study_or_folder_is_refused(tmp_path: Path, folder: Path) -> None:
     other = make_study(tmp_path, COMPARISON.replace("rougher", "softer"))
     with pytest.raises(ParameterError, match=r"holds another study \(other \[study\]\)"):
-        write_study(folder, other)
+        write_study(folder, other, "guessing")
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "thesis.txt").write_text("mine")
     with pytest.raises(ParameterError, match="is neither empty nor the folder of a study"):
@@ -176,7 +182,7 @@ def test_a_freed_number_is_given_again(folder: Path, study: Study) -> None:
     assert not any("P02" in path.name for path in folder.rglob("*"))
     finish(folder, study, "P09")
     assert list_participants(folder) == {"P01": 0, "P09": 1, "P03": 2}
-    with pytest.raises(ParameterError, match="P02 is unknown; known: P01, P09, P03"):
+    with pytest.raises(ParameterError, match="P02 is unknown; known: P01, P03, P09"):
         remove_participant(folder, "P02")
 
 

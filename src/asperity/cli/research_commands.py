@@ -164,7 +164,7 @@ def init_command(kind: str, file: str, *, force: bool) -> None:
     name = STUDY_ARGUMENTS["kind"].validate(kind)
     text = (_TEMPLATES / f"{name}.toml").read_text("utf-8")
     text = text.replace("{name}", escape_unprintable(file))
-    command = "asperity study run {} --participant P01"
+    command = "asperity study plan {} --effect 1.5"
     output.write_template("file", file, text, command, force=force)
 
 
@@ -182,8 +182,11 @@ def run_command(
 
     Each stimulus is analysed before the first trial, and the study is refused if one is above its
     stability limit. Each answer is on the disk before the next trial. The folder of all
-    participants is named as the file, without .toml.
+    participants is named as the file, without .toml. Answers of simulated observers, and of people
+    at a simulated device, are marked, and have folders of their own.
     """
+    from asperity.report.sentences.number_text import count_text
+    from asperity.studies.design import SIMULATED_DEVICE
     from asperity.studies.live.player import LoopPlayer, Stimuli
     from asperity.studies.live.screens import PageScreen, Terminal
     from asperity.studies.live.trial_session import SessionStopped, StudySession, simulate_session
@@ -195,14 +198,16 @@ def run_command(
     if driver.startswith(loop_setup.REPLAY_PREFIX):
         raise ParameterError("driver", "must be a device that a participant holds", driver)
     study = load_study(file)
-    path = Path(folder or Path(file).stem)
     observer = find_observer(values["simulate"] or "typical")
     is_real = driver != loop_setup.SIMULATED
+    simulated = values["simulate"] or ("" if is_real else SIMULATED_DEVICE)
+    name = f"{Path(file).stem}-simulated-{simulated}" if simulated else Path(file).stem
+    path = Path(folder or name)
     stimuli = Stimuli(study, is_real=is_real)
     with output.progress_bar("analyzing the stimuli") as update:
         first = stimuli.check_all(update)
     player = LoopPlayer(stimuli, first, loop_setup.make_driver(driver, first) if is_real else None)
-    write_study(path, study)
+    write_study(path, study, simulated)
     opened: Terminal | PageScreen | nullcontext[None] = nullcontext()
     if not values["simulate"]:
         noise = study.settings["masking_noise"]
@@ -219,7 +224,8 @@ def run_command(
                 StudySession(person, player, screen).run()
     state = "done" if person.method.next() is None else "stopped; --resume goes on"
     name = escape_unprintable(path)
-    click.echo(f"{participant}: {person.trial - before} answers in {name}; {state}")
+    answers = count_text(person.trial - before, "answer")
+    click.echo(f"{participant}: {answers} in {name}; {state}")
 
 
 def _check_study_folder(_ctx: click.Context, _argument: click.Parameter, folder: str) -> str:
@@ -260,13 +266,14 @@ def plan_command(file: str, effect: float, **values: Any) -> None:
     """
     from asperity.studies.study_report import plan_study
 
-    with output.progress_bar("simulating studies"):
-        plan = plan_study(file, effect, **options.provided_values(values, _PLAN))
+    with output.progress_bar("simulating studies") as update:
+        provided = options.provided_values(values, _PLAN)
+        plan = plan_study(file, effect, progress=update, **provided)
     click.echo(plan.text)
 
 
 @study_command.command("remove", short_help="Delete all data of a participant.")
-@click.argument("folder", callback=_check_study_folder)
+@click.argument("folder")
 @click.argument("participant")
 def remove_command(folder: str, participant: str) -> None:
     """Delete all data of PARTICIPANT in FOLDER: answers, recordings, and tables made from them."""

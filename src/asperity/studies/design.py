@@ -10,6 +10,24 @@ from typing import Any
 
 from asperity.core.errors import ParameterError, find_named
 
+SIMULATED_DEVICE = "device"
+"""Mark of answers of people at a simulated device, who feel nothing."""
+
+
+def describe_source(simulated: str) -> str:
+    """Return whose answers are recorded, see :attr:`TrialRecord.simulated`.
+
+    Example:
+        >>> describe_source(""), describe_source("typical")
+        ('people', 'simulated observers (typical)')
+    """
+    if not simulated:
+        return "people"
+    if simulated == SIMULATED_DEVICE:
+        return "people at a simulated device"
+    return f"simulated observers ({simulated})"
+
+
 Values = Mapping[str, Any]
 """Values of varied keys of a scene [SI]: ``{"surface.law": "A", "texture.amplitude": 1e-4}``."""
 
@@ -152,6 +170,8 @@ class TrialRecord:
         response_time: from the question to the answer [s].
         started: start of the trial, ISO 8601.
         codes: of the stimuli, in place of their values.
+        simulated: what was simulated: the name of the observer, or ``device``; empty for a person
+            at a real device.
     """
 
     presentation: Presentation
@@ -162,6 +182,7 @@ class TrialRecord:
     response_time: float = 0.0
     started: str = ""
     codes: Sequence[str] = ()
+    simulated: str = ""
 
     @property
     def is_correct(self) -> bool:

@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 
 from asperity.core.compiled import FloatArray
 from asperity.report.pictures import style
-from asperity.studies.design import TrialRecord
+from asperity.studies.design import TrialRecord, describe_source
 from asperity.studies.study_result import StudyResult, label_text
 from asperity.studies.thresholds import level_answers, log_levels
 
@@ -29,20 +29,24 @@ def scores_figure(result: StudyResult) -> Figure:
     score = result.included_score
     places = np.arange(len(labels))
     values = score.to_scale(score.values)
-    for row, offset in zip(values, np.linspace(-0.3, -0.1, len(values)), strict=True):
-        axes.plot(row, places + offset, "o", color=_FAINT, markersize=3)
+    offsets = np.linspace(-0.3, -0.1, len(values))
+    for name, row, offset in zip(score.participants, values, offsets, strict=True):
+        axes.plot(row, places + offset, "o", color=_FAINT, markersize=3, label=f"_{name}")
+    axes.plot([], [], "o", color=_FAINT, markersize=3, label="a participant")
+    axes.plot([], [], "s-", color=_STRONG, label="mean and its 95 % interval")
     for place, interval in enumerate(np.array(result.pooled)):
         value, *ends = score.to_scale(interval)
-        axes.plot(value, place, "s", color=_STRONG)
+        axes.plot(value, place, "s", color=_STRONG, label=f"_mean of {labels[place]}")
         if np.all(np.isfinite(interval)):
             axes.plot(ends, [place, place], color=_STRONG, linewidth=2)
     if score.is_logarithmic:
         axes.set_xscale("log")
     if score.chance is not None:
-        axes.axvline(score.chance, color=_FAINT, linestyle=":")
+        axes.axvline(score.chance, color=_FAINT, linestyle=":", label="chance")
     axes.set_yticks(places, labels)
     axes.invert_yaxis()
-    style.label_axes(axes, score.quantity, "")
+    style.add_legend(figure, loc="outside lower left", ncols=3)
+    style.label_axes(axes, f"{score.quantity}{_source(result)}", "")
     return figure
 
 
@@ -60,14 +64,19 @@ def functions_figure(result: StudyResult) -> Figure:
         trials = [trial for trial in answered if trial.presentation.condition == column]
         if trials:
             _draw_function(axes, result, trials, f"C{column % 10}", label_text(result, label))
-    axes.axhline(levels.guess, color=_FAINT, linestyle=":")
+    axes.axhline(levels.guess, color=_FAINT, linestyle=":", label="chance")
     axes.set_xscale("log")
     axes.set_ylim(0.0, 1.03)
     axes.yaxis.set_major_locator(MaxNLocator(5))
     style.add_legend(axes)
     text = f"{name} above {levels.base:.3g}" if levels.base else name
-    style.label_axes(axes, f"{text} (SI)", "share of right answers")
+    style.label_axes(axes, f"{text} (SI){_source(result)}", "share of right answers")
     return figure
+
+
+def _source(result: StudyResult) -> str:
+    """Return a second line of a label for answers that are not of people at a device."""
+    return f"\n{describe_source(result.simulated)}" if result.simulated else ""
 
 
 def _draw_function(
@@ -82,7 +91,14 @@ def _draw_function(
     axes.plot(np.exp(at), (each * share).sum(axis=(1, 2)), colour, label=label or "all")
     groups = np.array_split(np.argsort(x), min(_MAX_GROUPS, len(x)))
     middles = [np.exp(x[group].mean()) for group in groups]
-    axes.plot(middles, [right[group].mean() for group in groups], "o", color=colour, alpha=0.6)
+    axes.plot(
+        middles,
+        [right[group].mean() for group in groups],
+        "o",
+        color=colour,
+        alpha=0.6,
+        label="_shares",
+    )
 
 
 FIGURES: dict[str, Callable[[StudyResult], Figure]] = {

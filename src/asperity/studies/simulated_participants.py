@@ -230,6 +230,7 @@ def plan(
     seed: int = 0,
     simulations: int = 200,
     observer: str = "typical",
+    progress: Callable[[float], None] = lambda _share: None,
 ) -> StudyPlan:
     """Return how often a study would find an effect: its power, by simulation.
 
@@ -244,6 +245,7 @@ def plan(
         simulations: number of simulated studies.
         observer: name of the observer, see
             :data:`~asperity.studies.simulated_participants.OBSERVERS`.
+        progress: called with the fraction done.
 
     Raises:
         ParameterError: for fewer than three participants or two conditions, or an effect or a
@@ -272,6 +274,7 @@ def plan(
         _, low, high = kind.score(design, answered).differences(study_seed, _RESAMPLES)[0]
         found += not low <= 0.0 <= high
         trials = len(answered["0"])
+        progress((number + 1) / simulations)
     return StudyPlan(count, trials, effect, simulations, found)
 
 

@@ -19,6 +19,7 @@ STUDY_ARGUMENTS = read_arguments(Path(__file__).with_suffix(".toml"))
 """Arguments of the section [study] by name."""
 STUDY_ARGUMENTS["kind"] = replace(STUDY_ARGUMENTS["kind"], choices=tuple(METHODS))
 _OWN_SECTIONS = ("study", "vary", "method", "exclusion")
+_MAX_COUNT = 10_000
 _STIFFNESS_KEY = f"surface.{STIFFNESS.name}"
 
 
@@ -75,6 +76,9 @@ def build_study(content: Mapping[str, Any], folder: Path) -> Study:
     Raises:
         ParameterError: as for :func:`load_study`.
     """
+    for name, section in content.items():
+        if not isinstance(section, Mapping):
+            raise ParameterError("study", f"needs a section [{name}] of entries", section)
     settings = _parse_section("study", content, STUDY_ARGUMENTS.values())
     sections = {name: content[name] for name in SECTIONS if name in content}
     vary = content.get("vary", {})
@@ -98,6 +102,9 @@ def build_study(content: Mapping[str, Any], folder: Path) -> Study:
         unit = varied[level].unit
     kind = METHODS[settings["kind"]]
     options = _parse_section("method", {"method": method}, kind.arguments, unit)
+    for name, value in {**options, "participants": settings["participants"]}.items():
+        if isinstance(value, int) and value > _MAX_COUNT:
+            raise ParameterError(name, f"must be at most {_MAX_COUNT}", value)
     options["exclusion"] = _parse_section("exclusion", content, EXCLUSIONS)
     factors = {}
     for key, values in texts.items():

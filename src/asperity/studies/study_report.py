@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 from asperity.report.document import page
 from asperity.report.document.page import Cell, Media, Page, Row, Section, Table, TableLayout
 from asperity.report.pages.loop_pages import find_loop_page
-from asperity.report.sentences.number_text import NOT_AVAILABLE
+from asperity.report.sentences.number_text import NOT_AVAILABLE, count_text
+from asperity.studies.design import describe_source
 from asperity.studies.methods import METHODS
 from asperity.studies.simulated_participants import StudyPlan, plan
 from asperity.studies.study_file import load_study
@@ -23,6 +24,14 @@ if TYPE_CHECKING:
 
 _BARS = "Bars are 95 % intervals; an end that the data do not bound is left out."
 _FUNCTIONS = "Share of right answers over the level, with the fitted psychometric functions"
+_FACTS = {
+    "vary": "Stimuli",
+    "method": "Options",
+    "texture": "Texture",
+    "surface": "Surface",
+    "device": "Device",
+}
+"""Titles of the sections of a study file that the page repeats."""
 _RULES = "The rules stand in the study file, and were stated before the study."
 
 
@@ -39,11 +48,14 @@ def study_page(result: StudyResult) -> Page:
     rules = [(name.replace("_", " "), f"{x:g}") for name, x in exclusion_rules(design).items()]
     excluded = [page.Paragraph(f"{name}: {why}.") for name, why in result.excluded.items()]
     nobody = page.Paragraph("Nobody is excluded.")
+    source = f" – {describe_source(result.simulated)}" if result.simulated else ""
     return Page(
-        title=f"Study: {design.question or design.kind}",
+        title=f"Study: {design.question or design.kind}{source}",
         answer=_answer(result),
         facts=[
             ("Method", f"{design.kind}: {kind.description}"),
+            ("Answers", f"of {describe_source(result.simulated)}"),
+            *_list_stimuli(result),
             ("Participants", f"{len(result.included)} of {len(result.answered)} used"),
             ("Trials", str(len(result.trials))),
             ("Seed", str(design.seed)),
@@ -58,6 +70,24 @@ def study_page(result: StudyResult) -> Page:
             Section("Exclusion", [page.pairs_table(rules), *(excluded or [nobody])], _RULES),
         ],
     )
+
+
+def _list_stimuli(result: StudyResult) -> list[tuple[str, str]]:
+    """Return what was presented, as the study file states it."""
+    facts = []
+    sections = {"vary": result.design.factors, **result.content}
+    for name, title in _FACTS.items():
+        texts = []
+        for key, value in sections.get(name, {}).items():
+            items = value if isinstance(value, (list, tuple)) else [value]
+            texts.append(f"{key.replace('_', ' ')} {' / '.join(map(str, items))}")
+        if texts:
+            facts.append((title, ", ".join(texts)))
+    if "texture_force" in sections.get("study", {}):
+        force = sections["study"]["texture_force"]
+        words = f"that which gives each stimulus a texture force of {force} RMS at the motors"
+        facts.append(("Stiffness", words))
+    return facts
 
 
 def _rows_of(result: StudyResult, participant: str) -> list[dict[str, Any]]:
@@ -76,12 +106,15 @@ def _answer(result: StudyResult) -> str:
     best = max(known, key=lambda row: row["estimate"])
     which = f", the greatest of {len(known)}" if len(known) > 1 else ""
     label = f" for {text}{which}" if (text := label_text(result, best)) else ""
-    people = f"{len(result.included)} participants"
+    count = len(result.included)
+    people = count_text(count, "participant")
+    if result.simulated:
+        people = f"{people}: {describe_source(result.simulated)}"
     return f"{result.score.quantity}: {_interval_text(best)}{label}; {people}."
 
 
 def _number(value: float | None) -> str:
-    return NOT_AVAILABLE if value is None else f"{round(value, 12) + 0.0:.3g}"
+    return NOT_AVAILABLE if value is None else f"{round(value, 10) + 0.0:.3g}"
 
 
 def _interval_text(row: Mapping[str, Any]) -> str:
@@ -142,7 +175,8 @@ def study_report(folder: str | Path) -> StudyResult:
     Raises:
         ParameterError: for a folder of something else, or of another version; without answers.
     """
-    return analyse(read_study(folder).design, read_trials(folder))
+    study = read_study(folder)
+    return analyse(study.design, read_trials(folder), study.content)
 
 
 def plan_study(path: str | Path, effect: float, **options: Any) -> StudyPlan:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -13,7 +13,7 @@ import numpy as np
 from asperity.core.display import Reportable
 from asperity.core.errors import ParameterError
 from asperity.core.files import attributes_to_dict, to_plain_data
-from asperity.studies.design import StudyDesign, TrialRecord
+from asperity.studies.design import StudyDesign, TrialRecord, describe_source
 from asperity.studies.methods import EXCLUSIONS, METHODS
 from asperity.studies.scores import Interval, Score
 from asperity.sweeps.table_files import TableFiles
@@ -68,6 +68,7 @@ class TrialTable(TableFiles):
                 "correct": is_correct,
                 "response time [s]": float(trial.response_time),
                 "started": trial.started,
+                "simulated": trial.simulated,
                 "used": is_used(self.design, trial) and trial.participant not in self.excluded,
             }
 
@@ -83,6 +84,7 @@ class StudyResult(Reportable, TableFiles):
         omitted: number of trials of each participant that were left out.
         consistency: share of repeated questions that each participant answered alike.
         excluded: why participants were excluded, by the rules of the design.
+        content: sections of the study file, with those of the scene.
     """
 
     design: StudyDesign
@@ -91,9 +93,15 @@ class StudyResult(Reportable, TableFiles):
     omitted: Mapping[str, int]
     consistency: Mapping[str, float | None]
     excluded: Mapping[str, str]
+    content: Mapping[str, Any] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         return f"<StudyResult of {self.design.kind}, {len(self.answered)} participants>"
+
+    @property
+    def simulated(self) -> str:
+        """What was simulated, see :attr:`~asperity.studies.design.TrialRecord.simulated`."""
+        return self.trials[0].simulated
 
     @property
     def labels(self) -> Sequence[dict[str, Any]]:
@@ -103,7 +111,7 @@ class StudyResult(Reportable, TableFiles):
     @property
     def metadata(self) -> dict[str, Any]:
         """The design."""
-        return self.trial_table.metadata
+        return self.trial_table.metadata | {"simulated": self.simulated}
 
     @property
     def trial_table(self) -> TrialTable:
@@ -153,6 +161,7 @@ class StudyResult(Reportable, TableFiles):
                     "answers": int(score.counts[row, column]),
                     "interval": score.interval,
                     "excluded": self.excluded.get(name, ""),
+                    "simulated": self.simulated,
                 }
         word = "ratio to the first" if score.is_logarithmic else "difference from the first"
         compared = f"{score.quantity}, {word}", self.differences, labels[1:]
@@ -166,6 +175,7 @@ class StudyResult(Reportable, TableFiles):
                     "quantity": title,
                     **self._numbers(value),
                     "interval": self.included_score.pooled_interval,
+                    "simulated": self.simulated,
                 }
 
     def _numbers(self, values: Sequence[float]) -> dict[str, float | None]:
@@ -200,18 +210,25 @@ def is_used(design: StudyDesign, trial: TrialRecord) -> bool:
     return rules["shortest_response"] <= trial.response_time <= rules["longest_response"]
 
 
-def analyse(design: StudyDesign, trials: Sequence[TrialRecord]) -> StudyResult:
+def analyse(
+    design: StudyDesign, trials: Sequence[TrialRecord], content: Mapping[str, Any] | None = None
+) -> StudyResult:
     """Return what the trials of a study say.
 
     Args:
         design: the study.
         trials: all trials of all participants.
+        content: sections of the study file, for the report.
 
     Raises:
-        ParameterError: without trials.
+        ParameterError: without trials, or for answers of people and simulated ones together.
     """
     if not trials:
         raise ParameterError("study", "has no trials yet")
+    codes = {trial.simulated: trial.participant for trial in trials}
+    if len(codes) > 1:
+        sources = [f"{describe_source(source)}, such as {code}" for source, code in codes.items()]
+        raise ParameterError("study", f"must not mix answers of {', and of '.join(sources)}")
     kind = METHODS[design.kind]
     design = kind.complete(design)
     answered: dict[str, list[TrialRecord]] = {trial.participant: [] for trial in trials}
@@ -227,7 +244,7 @@ def analyse(design: StudyDesign, trials: Sequence[TrialRecord]) -> StudyResult:
         for name, records in answered.items()
     }
     excluded = {name: reason for name, reason in reasons.items() if reason}
-    return StudyResult(design, trials, answered, omitted, consistency, excluded)
+    return StudyResult(design, trials, answered, omitted, consistency, excluded, content or {})
 
 
 def _exclude(

@@ -9,8 +9,10 @@ before, see :class:`~asperity.studies.design.Method`.
 from __future__ import annotations
 
 import json
+import os
 import re
 import shutil
+from collections.abc import Iterable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Self
@@ -19,10 +21,10 @@ from asperity.core.errors import ParameterError
 from asperity.core.files import append_bytes, json_text, text_digest, write_bytes
 from asperity.core.version import __version__
 from asperity.recording.replay import file_digest
-from asperity.studies.design import Method, Presentation, TrialRecord
+from asperity.studies.design import Method, Presentation, TrialRecord, describe_source
 from asperity.studies.methods import METHODS
 from asperity.studies.study_file import Study, build_study
-from asperity.sweeps.sweep_result import check_plan, lock_folder
+from asperity.sweeps.sweep_result import LOCK_FILE, check_plan, lock_folder
 
 STUDY_FILE = "study.json"
 ANSWERS_FILE = "answers.jsonl"
@@ -39,6 +41,17 @@ DERIVED_FILES = (
 _NUMBER_FILE = "number.txt"
 SCHEMA = 1
 _CODE = re.compile(r"(?=.*\d)[A-Za-z0-9][A-Za-z0-9_-]{0,15}")
+_NUMBER = re.compile(r"\d{1,9}\s*")
+_TYPES = {
+    "run": int,
+    "trial": int,
+    "codes": list,
+    "answer": str,
+    "response_time": float,
+    "started": str,
+    "simulated": str,
+}
+"""Types of the entries of a line of answers; early versions did not state ``simulated``."""
 
 
 def check_participant(code: str) -> str:
@@ -60,8 +73,14 @@ def stimulus_codes(study: Study, participant: str, presentation: Presentation) -
     return [text_digest(text)[:8] for text in texts]
 
 
-def write_study(folder: Path, study: Study) -> None:
+def write_study(folder: Path, study: Study, simulated: str = "") -> None:
     """Write a study into an empty folder, or check that a folder holds it.
+
+    Args:
+        folder: the folder.
+        study: the study.
+        simulated: whose answers it is for, see
+            :attr:`~asperity.studies.design.TrialRecord.simulated`; others are refused.
 
     Raises:
         ParameterError: for a folder that holds something else, or that cannot be written.
@@ -70,43 +89,110 @@ def write_study(folder: Path, study: Study) -> None:
     digest = file_digest(study.folder / path) if isinstance(path, str) else None
     sections = {f"[{name}]": section for name, section in study.content.items()}
     plan = {"schema": SCHEMA, "asperity": __version__, "file": digest, **sections}
+    plan["simulated"] = simulated or None
     with lock_folder(folder):
+        if (folder / STUDY_FILE).exists():
+            _check_source(folder, simulated)
         check_plan(folder / STUDY_FILE, plan, "study")
+
+
+def _check_source(folder: Path, simulated: str) -> None:
+    """Check that a folder is for the answers of a source.
+
+    Raises:
+        ParameterError: if it is for others, or no folder of a study.
+    """
+    recorded = str(_read_plan(folder).get("simulated") or "")
+    if recorded != simulated:
+        holds = f"holds answers of {describe_source(recorded)}"
+        words = f"{holds}, with which those of {describe_source(simulated)} must not be mixed"
+        raise ParameterError("output", f"{words}: choose another folder", str(folder))
+
+
+def _read_plan(folder: str | Path) -> dict[str, Any]:
+    """Return the content of the file of a study.
+
+    Raises:
+        ParameterError: for a folder of something else, a damaged file, or another version.
+    """
+    try:
+        content = json.loads((Path(folder) / STUDY_FILE).read_bytes())
+    except FileNotFoundError:
+        raise _no_study(folder) from None
+    except (OSError, ValueError, RecursionError):
+        content = None
+    if not isinstance(content, dict):
+        raise ParameterError("folder", f"has a damaged file {STUDY_FILE}", str(folder))
+    if (schema := content.get("schema")) != SCHEMA:
+        raise ParameterError("folder", f"is of another version: schema {schema!r}, not {SCHEMA}")
+    return content
+
+
+def _no_study(folder: str | Path) -> ParameterError:
+    words = "is no folder of a study, which a session of it makes"
+    return ParameterError("folder", words, str(folder))
 
 
 def read_study(folder: str | Path) -> Study:
     """Return the study of a folder.
 
     Raises:
-        ParameterError: for a folder of something else, or of another version.
+        ParameterError: for a folder of something else, a damaged one, or of another version.
     """
-    try:
-        content = dict(json.loads((Path(folder) / STUDY_FILE).read_bytes()))
-    except (OSError, ValueError):
-        words = "is no folder of a study, which a session of it makes"
-        raise ParameterError("folder", words, str(folder)) from None
-    if (schema := content.get("schema")) != SCHEMA:
-        raise ParameterError("folder", f"is of another version: schema {schema!r}, not {SCHEMA}")
+    content = _read_plan(folder)
     sections = {name[1:-1]: part for name, part in content.items() if name.startswith("[")}
     return build_study(sections, Path(folder))
 
 
 def list_participants(folder: str | Path) -> dict[str, int]:
-    """Return the numbers of the participants by code, in the order of the numbers."""
-    paths = Path(folder).glob(f"*/{_NUMBER_FILE}")
-    numbered = sorted([(int(path.read_text("utf-8")), path.parent.name) for path in paths])
-    return {code: number for number, code in numbered}
+    """Return the numbers of the participants by code, in the order of the numbers.
+
+    Raises:
+        ParameterError: for a participant whose number cannot be read.
+    """
+    numbered = []
+    for path in _list_folders(folder):
+        numbered.append((_read_number(path), path.name))
+    return {code: number for number, code in sorted(numbered)}
 
 
-def _check_known(folder: str | Path, code: str, *, is_new: bool = False) -> dict[str, int]:
+def _list_folders(folder: str | Path) -> list[Path]:
+    """Return the folders of the participants; one without number and answers is of nobody."""
+    paths = sorted([path for path in Path(folder).glob("*/") if _CODE.fullmatch(path.name)])
+    return [path for path in paths if _has_data(path)]
+
+
+def _has_data(path: Path) -> bool:
+    """Return whether a folder holds data of a participant, in whatever state."""
+    answers = path / ANSWERS_FILE
+    is_answered = answers.exists() and (answers.is_dir() or answers.stat().st_size > 0)
+    return is_answered or os.path.lexists(path / _NUMBER_FILE) or any(path.glob("trial-*.mcap"))
+
+
+def _read_number(path: Path) -> int:
+    try:
+        text = (path / _NUMBER_FILE).read_text("ascii")
+    except (OSError, ValueError):
+        text = ""
+    if _NUMBER.fullmatch(text) is None:
+        words = f"has no number of {path.name} in {path.name}/{_NUMBER_FILE}"
+        raise ParameterError("folder", f"{words}: restore the file, or remove {path.name}")
+    return int(text)
+
+
+def _unknown_error(code: str, codes: Iterable[str]) -> ParameterError:
+    text = f"{code} is unknown; known: {', '.join(codes) or 'none'}"
+    return ParameterError("participant", text)
+
+
+def _check_known(folder: str | Path, code: str, *, is_new: bool) -> dict[str, int]:
     """Check that a participant exists, or is new; return the numbers of all by code."""
     known = list_participants(folder)
-    if (check_participant(code) in known) == is_new:
-        if is_new:
-            text = f"{code} exists already: {{resume}} goes on where it stopped"
-            raise ParameterError("participant", text, resume=True)
-        text = f"{code} is unknown; known: {', '.join(known) or 'none'}"
-        raise ParameterError("participant", text)
+    if code in known and is_new:
+        text = f"{code} exists already: {{resume}} goes on where it stopped"
+        raise ParameterError("participant", text, resume=True)
+    if code not in known and not is_new:
+        raise _unknown_error(code, known)
     return known
 
 
@@ -135,13 +221,19 @@ def _replay(path: Path, study: Study, number: int) -> tuple[Method, list[TrialRe
     """
     method = METHODS[study.design.kind].make(study.design, number, study.design.seed)
     records: list[TrialRecord] = []
-    lines = (path / ANSWERS_FILE).read_bytes().split(b"\n")
+    try:
+        lines = (path / ANSWERS_FILE).read_bytes().split(b"\n")
+    except OSError as error:
+        words = f"has no answers of {path.name}: {path.name}/{ANSWERS_FILE}: {error.strerror}"
+        raise ParameterError("folder", words) from None
     for count, line in enumerate(lines[:-1], start=1):  # the last one is empty or torn
         shown: Any = method.next()
         try:
-            record = TrialRecord(shown, participant=path.name, **json.loads(line))
-        except (ValueError, TypeError):
-            raise ParameterError("folder", f"has a damaged line {count} in {path}") from None
+            record = _parse_line(line, study, shown, path.name)
+        except (ValueError, TypeError, AttributeError, RecursionError):
+            words = f"has a damaged line {count}, or one of another study, in"
+            words = f"{words} {path.name}/{ANSWERS_FILE}"
+            raise ParameterError("folder", words) from None
         codes = shown and stimulus_codes(study, path.name, shown)
         if (record.trial, record.codes) != (count, codes):
             reason = f"trial {count} of {path.name} was not made by this study and version"
@@ -149,6 +241,27 @@ def _replay(path: Path, study: Study, number: int) -> tuple[Method, list[TrialRe
         method.answer(record.answer)
         records.append(record)
     return method, records
+
+
+def _parse_line(
+    line: bytes, study: Study, presentation: Presentation, participant: str
+) -> TrialRecord:
+    """Return the trial of a line.
+
+    Raises:
+        ValueError, TypeError, AttributeError, RecursionError: for a damaged line.
+    """
+    entries = json.loads(line)
+    check = entries.pop("check", None)  # early versions have none
+    wrong = [name for name, value in entries.items() if type(value) is not _TYPES.get(name)]
+    if wrong or check not in {None, _line_check(entries, study)}:
+        raise ValueError
+    return TrialRecord(presentation, participant=participant, **entries)
+
+
+def _line_check(entries: dict[str, Any], study: Study) -> str:
+    """Return the digest of the entries of a line and of the study."""
+    return text_digest(json_text([study.content, entries]))
 
 
 class Participant:
@@ -167,6 +280,8 @@ class Participant:
         number: position in the counterbalanced order, from 0.
         run: number of the sitting.
         method: after the recorded answers.
+        simulated: whose answers the folder is for, see
+            :attr:`~asperity.studies.design.TrialRecord.simulated`.
         trial: number of the next trial.
 
     Raises:
@@ -178,6 +293,7 @@ class Participant:
         self.path = folder / check_participant(code)
         self.code = code
         self.study = study
+        self.simulated = str(_read_plan(folder).get("simulated") or "")
         answers = self.path / ANSWERS_FILE
         with lock_folder(folder), ExitStack() as stack:
             known = _check_known(folder, code, is_new=not resume)
@@ -206,14 +322,16 @@ class Participant:
         """
         presentation = self.method.next()
         assert presentation is not None  # an answer belongs to a trial
-        line = {
+        line: dict[str, Any] = {
             "run": self.run,
             "trial": self.trial,
             "codes": self.codes(presentation),
             "answer": answer,
-            "response_time": response_time,
+            "response_time": float(response_time),
             "started": started,
+            "simulated": self.simulated,
         }
+        line["check"] = _line_check(line, self.study)
         append_bytes("output", self._stream, json.dumps(line).encode() + b"\n", durable=True)
         self.method.answer(answer)
         self.trial += 1
@@ -235,10 +353,13 @@ def write_key(folder: str | Path) -> None:
         ParameterError: as for :func:`read_trials`.
     """
     key: dict[str, dict[str, Any]] = {}
+    simulated = {}
     for record in read_trials(folder):
+        if record.simulated:
+            simulated["simulated"] = record.simulated
         stimuli = zip(record.codes, record.presentation.intervals, strict=True)
         key.setdefault(record.participant, {}).update(stimuli)
-    write_bytes("folder", Path(folder) / KEY_FILE, json_text(key).encode())
+    write_bytes("folder", Path(folder) / KEY_FILE, json_text(simulated | key).encode())
 
 
 def find_derived_files(folder: str | Path) -> list[str]:
@@ -251,18 +372,31 @@ def remove_participant(folder: str | Path, code: str) -> list[str]:
 
     Tables and reports of the study hold data of all participants, so they are deleted, too.
 
+    Damaged or missing files of the study or of the participant do not prevent it.
+
     Args:
         folder: of a study.
         code: of the participant.
 
     Raises:
-        ParameterError: for an unknown participant, or one in a session.
+        ParameterError: for an unknown participant, one in a session, or files that the system does
+            not delete.
     """
-    read_study(folder)
-    _check_known(folder, code)
-    with lock_folder(Path(folder) / code):
+    path = Path(folder) / check_participant(code)
+    known = _list_folders(folder)
+    if not known and not (Path(folder) / STUDY_FILE).exists():
+        raise _no_study(folder)
+    if path not in known:
+        raise _unknown_error(code, [one.name for one in known])
+    if (path / LOCK_FILE).is_dir():
+        shutil.rmtree(path / LOCK_FILE)  # it is damaged: a session locks a file
+    with lock_folder(path):
         derived = find_derived_files(folder)
         for name in derived:
-            (Path(folder) / name).unlink()
-        shutil.rmtree(Path(folder) / code)
+            file = Path(folder) / name
+            if file.is_dir() and not file.is_symlink():
+                shutil.rmtree(file)
+            else:
+                file.unlink()
+        shutil.rmtree(path)
     return [f"{code}/", *derived]

@@ -118,7 +118,8 @@ class SweepResult(Reportable, TableFiles):
 
 PLAN_FILE = "sweep.json"
 CASES_FILE = "cases.jsonl"
-_LOCK_FILE = ".lock"
+LOCK_FILE = ".lock"
+"""File in a folder that a process locks."""
 _MISSING = -1
 _LINE = re.compile(rb'\{"case": (\d+), .*\}\n')
 
@@ -214,7 +215,7 @@ def lock_folder(folder: Path) -> Iterator[None]:
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with FileLock(folder / _LOCK_FILE, timeout=0):
+        with FileLock(folder / LOCK_FILE, timeout=0):
             yield
     except Timeout:
         raise ParameterError("output", "is in use by another process", str(folder)) from None
@@ -239,7 +240,7 @@ def check_plan(path: Path, plan: Mapping[str, Any], kind: str) -> None:
     folder = path.parent
     text = json_text(plan)
     if not path.exists():
-        if any(file.name != _LOCK_FILE for file in folder.iterdir()):
+        if any(file.name != LOCK_FILE for file in folder.iterdir()):
             words = f"is neither empty nor the folder of a {kind}"
             raise ParameterError("output", words, str(folder))
         write_bytes("output", path, text.encode())

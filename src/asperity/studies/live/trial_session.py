@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from asperity.core.errors import ParameterError
 from asperity.scene.device_run import POLL_INTERVAL
-from asperity.studies.design import Presentation
+from asperity.studies.design import SIMULATED_DEVICE, Presentation, describe_source
 from asperity.studies.live.player import LoopPlayer, Stimuli
 from asperity.studies.live.screens import BACK, DOWN, GO_ON, PAUSE, STOP, UP, Screen, View
 from asperity.studies.simulated_participants import Observer, hand_strength, simulate_run
@@ -89,7 +90,12 @@ class StudySession:
         started = _current_time()
         codes = participant.codes(presentation)
         path = participant.path / f"trial-{participant.trial:04d}-{'-'.join(codes)}.mcap"
-        about = {"participant": participant.code, "codes": codes, "started": started}
+        about = {
+            "participant": participant.code,
+            "codes": codes,
+            "started": started,
+            "simulated": participant.simulated,
+        }
         self._player.begin_trial(path, participant.trial, about)
         if not presentation.adjusts:
             self._present_intervals(presentation)
@@ -177,7 +183,7 @@ def _current_time() -> str:
 
 
 def simulate_session(participant: Participant, stimuli: Stimuli, observer: Observer) -> None:
-    """Record the answers of a simulated observer, without a loop.
+    """Record the answers of a simulated observer, without a loop, in a folder for them.
 
     A session that goes on gives the answers of one that was not stopped.
 
@@ -185,7 +191,14 @@ def simulate_session(participant: Participant, stimuli: Stimuli, observer: Obser
         participant: whose answers are recorded.
         stimuli: of the study, which are checked.
         observer: the observer.
+
+    Raises:
+        ParameterError: for a participant in a folder for answers of people.
     """
+    if participant.simulated in {"", SIMULATED_DEVICE}:
+        source = describe_source(participant.simulated)
+        words = f"{participant.code} belongs to {source}: simulated answers need another folder"
+        raise ParameterError("participant", words)
     design = participant.study.design
     setup = stimuli.setup
     strength = hand_strength(design, lambda one: (setup(one).surface, setup(one).device))
