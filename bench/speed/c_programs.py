@@ -160,11 +160,13 @@ def surface_ticks(surface: Surface, points: Any, max_evaluations: float | None =
     Batches have a sine of their own, :mod:`asperity.kernels.batch_sine`.
     """
     law, out, told = surface.law, np.empty((len(points), 3)), np.empty((len(points), 2))
-    loops = fuse_on_texture(law, surface.texture.sampler, surface.effective_clamp, (path_loop,))
+    friction = surface.contact_friction is not None
+    clamp, sampler = surface.effective_clamp, surface.texture.sampler
+    loops = fuse_on_texture(law, sampler, clamp, (path_loop,), has_friction=friction)
     memory = new_warm_start(
         law.contact.max_evaluations if max_evaluations is None else min(max_evaluations, UNLIMITED)
     )
-    arguments = memory, surface.texture.arguments, surface.law_arguments
+    arguments = memory, surface.texture.arguments, surface.loop_arguments
     return Ticks(partial(loops.path_batch, points, out, told, *arguments), out, told[:, 0])
 
 

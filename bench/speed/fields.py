@@ -67,7 +67,7 @@ def stroke_times(surface: Surface, paths: list[FloatArray]) -> list[float]:
 
 
 def _arguments(surface: Surface) -> tuple[Any, Any]:
-    return surface.texture.arguments, surface.law_arguments
+    return surface.texture.arguments, surface.loop_arguments
 
 
 def run(console: Console) -> None:

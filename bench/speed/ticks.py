@@ -204,4 +204,4 @@ def _longest(surface: Surface, probes: FloatArray) -> tuple[float, list[str]]:
 
 
 def _arguments(surface: Surface) -> tuple[object, object]:
-    return surface.texture.arguments, surface.law_arguments
+    return surface.texture.arguments, surface.loop_arguments

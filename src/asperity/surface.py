@@ -14,10 +14,10 @@ from numpy.typing import ArrayLike
 from asperity.contacts.warm_start import UNLIMITED, check_warm_start, new_warm_start
 from asperity.core.arguments import DEFAULT_STIFFNESS, MAX_DEPTH, STIFFNESS
 from asperity.core.checks import FloatArray, Points, check_array, check_points, check_positive
-from asperity.core.display import Plottable
 from asperity.core.errors import ParameterError, suggest_names
 from asperity.core.files import content_digest
 from asperity.derive.facts import LawFacts, clamped_facts
+from asperity.frictional import Frictional
 from asperity.laws import REGISTERED_LAWS, SHIPPED_LAW_ARGUMENTS, Law, find_law
 from asperity.laws.clamps import CLAMPS, NONE, Clamp, find_clamp
 from asperity.textures.catalogue import TextureLike, as_texture
@@ -45,7 +45,7 @@ def _law_parameter(name: str, text: str) -> property:
     return property(value, doc=text)
 
 
-class Surface(Plottable):
+class Surface(Frictional):
     """A textured surface as a force field: the body is z < h(x, y), z points out of it.
 
     Args:
@@ -57,7 +57,8 @@ class Surface(Plottable):
         max_depth: D [m], the greatest intended penetration depth; it bounds the working region of
             the analysis, and clamps act there. Default: the peak-to-valley height of the texture,
             at most 1 mm.
-        friction: μ of law F; default 0.8.
+        friction: friction coefficient μ, of a surface with a conservative law without state, 0 by
+            default; of law F, 0.8.
         max_deflection: d_max [m] of law F, the greatest deflection of the anchor; default 1 mm.
         modulation_depth: a_m of law F, in [0, 1]; default 0.8.
         clamp: ``"none"`` (the law as it is), ``"whole"`` (the depth is held at max_depth),
@@ -68,9 +69,20 @@ class Surface(Plottable):
         law_parameters: values for the parameters that the law declares, also a user-defined law;
             the keywords friction, max_deflection, modulation_depth and continuity are shorthands
             for those of the shipped laws.
+        presliding_stiffness: κ [N/m] of the friction, which ``to_stiffness`` leaves unchanged;
+            by default a share of the stiffness, 2/3 for law W, else 1/4.
+        friction_modulation: a of the friction, in [0, 1]: its coefficient is μ (1 - a (1 + ĥ)/2),
+            ĥ the height at the contact point scaled to [-1, 1]; default 0.
 
     A surface is immutable. Its attribute ``law_parameters`` holds all parameters of its law,
     defaults included; kernels and certificates read them from there.
+
+    Friction is beside the force of the law, whose numbers q and q⁺ it leaves unchanged: the hand
+    gains no energy from it on a closed path (docs/theory/friction.md). It acts in the plane of the
+    wall, z = 0, and limits its force to μ N with N = √(2 k U), the pressing force of law W.
+
+    A law without a potential in closed form, such as one with curl, has none: its ``friction`` is
+    0, and that which is given serves the laws of ``to_law``.
 
     Raises:
         ParameterError: for a value that cannot be used; it names the argument.
@@ -103,16 +115,24 @@ class Surface(Plottable):
         clamp: str = NONE.name,
         continuity: float | None = None,
         law_parameters: Mapping[str, float] | None = None,
+        presliding_stiffness: float | None = None,
+        friction_modulation: float | None = None,
     ) -> None:
         law = find_law(law)
         texture = as_texture(texture)
         if max_depth is None:
             max_depth = default_max_depth(texture)
-        names = ("friction", "max_deflection", "modulation_depth", "continuity")
-        values = (friction, max_deflection, modulation_depth, continuity)
+        values = {
+            "friction": friction,
+            "max_deflection": max_deflection,
+            "modulation_depth": modulation_depth,
+            "continuity": continuity,
+            "presliding_stiffness": presliding_stiffness,
+            "friction_modulation": friction_modulation,
+        }
         keywords = {
             name: SHIPPED_LAW_ARGUMENTS[name].validate(value)
-            for name, value in zip(names, values, strict=True)
+            for name, value in values.items()
             if value is not None
         }
         named = law.check_parameters(law_parameters or {})
@@ -129,6 +149,7 @@ class Surface(Plottable):
                 "_explicit_parameters": keywords | named,
             }
         )
+        self._check_friction()
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state to pickle; a registered law is stored as its letter.
@@ -223,7 +244,6 @@ class Surface(Plottable):
             raise ParameterError("name", f"is no parameter of law {self.law}: {name!r}; {hint}")
         return self.law_parameters[name]
 
-    friction = _law_parameter("friction", "μ [1] of law F.")
     max_deflection = _law_parameter("max_deflection", "d_max [m] of law F.")
     modulation_depth = _law_parameter("modulation_depth", "a_m [1] of law F.")
     continuity = _law_parameter("continuity", "c [1] of law H.")
@@ -288,7 +308,7 @@ class Surface(Plottable):
 
         texture = type(self.texture.arguments).__name__, *map(np.asarray, self.texture.arguments)
         law = self.law.letter, kernel_source(self.law), self.effective_clamp.name
-        return content_digest(texture, law, np.array(self.law_arguments))[:16]
+        return content_digest(texture, law, np.array(self.loop_arguments))[:16]
 
     @cached_property
     def _loops(self) -> ModuleType:
@@ -303,19 +323,22 @@ class Surface(Plottable):
             points: probe positions p [m], shape (n, 3), or (3,) for one; other arguments and the
                 result then lack the first axis too.
             deflection: tangential deflection d of the anchor [m], shape (n, 2), for laws with
-                state; zero by default.
+                state, or with friction, which limits it; zero by default.
 
         Returns:
             f [N], shape (n, 3); zero out of contact.
 
         Raises:
             ParameterError: for another shape, values that are not finite, a deflection longer
-                than max_deflection, or a deflection for a law without state.
+                than max_deflection, or a deflection without state and friction.
 
         Reference:
             The paper's Table I, with the corrections named in each law.
         """
         probes = check_points("points", points, 3, "m")
+        if self.contact_friction is not None and deflection is not None:
+            deflections = probes.check_array_per_point("deflection", deflection, 2, "m")
+            return probes.restore_shape(self._deflected_force(probes.rows, deflections))
         out = np.empty(probes.rows.shape)
         state = self._anchor_state(probes, deflection)
         self._loops.force_batch(
@@ -334,7 +357,8 @@ class Surface(Plottable):
             points: see :meth:`force`.
             deflection: see :meth:`force`.
             sliding: whether the anchor slides, shape (n,), for laws with state; the derivative of
-                the deflection is then I - u uᵀ, u = d/|d|. False by default.
+                the deflection is then I - u uᵀ, u = d/|d|. With friction, whether its force is at
+                the slip limit. False by default. With neither, friction is left out.
 
         Returns:
             J [N/m], shape (n, 3, 3).
@@ -352,6 +376,9 @@ class Surface(Plottable):
     ) -> tuple[FloatArray, FloatArray]:
         """Return f [N], (n, 3), and J [N/m], (n, 3, 3), at the cost of :meth:`jacobian` alone."""
         probes = check_points("points", points, 3, "m")
+        has_state = deflection is not None or sliding is not None
+        if self.contact_friction is not None and has_state:
+            return self._with_friction(self.contact_friction, probes, deflection, sliding)
         state = self._anchor_state(probes, deflection)
         if self.law.stateful:
             state = (*state, probes.check_flags_per_point("sliding", sliding))
@@ -368,14 +395,16 @@ class Surface(Plottable):
     def _path_loops(self) -> ModuleType:
         from asperity.kernels.fuse import fuse_path
 
-        return fuse_path(self.law, self.texture.sampler, self.effective_clamp)
+        has_friction = self.contact_friction is not None
+        return fuse_path(self.law, self.texture.sampler, self.effective_clamp, has_friction)
 
     def trace(self, path: ArrayLike, warm_start: FloatArray | None = None) -> FloatArray:
         """Return the forces along a path, with the state of the law propagated along it.
 
         The anchor of a law with state is set where contact begins, slides so that the deflection
         never exceeds max_deflection, and is released where contact ends. It is released before the
-        first point.
+        first point. The anchor of friction is at the first point, and slides so that its force
+        never exceeds the slip limit, which is 0 out of contact.
 
         Args:
             path: successive probe positions [m], shape (n, 3).
@@ -390,12 +419,13 @@ class Surface(Plottable):
             ParameterError: for another shape, or positions that are not finite.
         """
         probes = check_array("path", path, (None, 3), "m")
-        if not (self.law.stateful or self.law.contact.has_warm_start):
+        has_state = self.law.stateful or self.contact_friction is not None
+        if not (has_state or self.law.contact.has_warm_start):
             return self.force(probes)
         state = new_warm_start(UNLIMITED) if warm_start is None else check_warm_start(warm_start)
         out = np.empty((len(probes), 3))
         diagnostics = np.empty((len(probes), 2))
-        arguments = (self.texture.arguments, self.law_arguments)
+        arguments = (self.texture.arguments, self.loop_arguments)
         self._path_loops.path_batch(probes, out, diagnostics, state, *arguments)
         return out
 

@@ -178,7 +178,7 @@ BAD = [
     ([SPEC, "--max-depth", "0mm"], "max_depth"),
     ([SPEC, "--max-depth", "inf"], "max_depth"),
     ([SPEC, "--modulation-depth", "1.2"], "modulation_depth"),
-    ([SPEC, "--laws", "WB", "--friction", "0.3"], "law W, B does not take it; law F does"),
+    ([SPEC, "--laws", "AB", "--friction", "0.3"], "law A, B cannot have it, law W, C, D, F, H can"),
     ([SPEC, "--laws", "W", "--set", "continuity=2"], "continuity has no effect"),
     ([SPEC, "--laws", "AXB"], "law"),
     ([SPEC, "--laws", "god-objct"], "did you mean 'god-object'"),

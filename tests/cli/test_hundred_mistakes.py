@@ -118,7 +118,7 @@ MISTAKES: list[tuple[str, tuple[str, ...]]] = [
     ("compare cloth --laws WW", ("names law W twice",)),
     ("compare cloth --laws god-objekt", ("'god-objekt'", "did you mean 'god-object'")),
     ("lab cloth --law Z", ("law is unknown: 'Z'", "known: A, B, C")),
-    ("analyze cloth --law H --friction 0.5", ("friction", "law F does")),
+    ("analyze cloth --law G --friction 0.5", ("friction", "law W, C, D, F, H can")),
     ("analyze cloth --law H --rendering fields", ("'fields'", "did you mean 'field'?")),
     # Quantities and lists.
     ("compare cloth --stiffness 500", ("stiffness needs a unit: write 500N/m",)),

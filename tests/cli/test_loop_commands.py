@@ -324,7 +324,7 @@ BAD = [
     (["onset", "{still}", "--delays", "1e20"], "delay must be at most"),
     (["simulate", "{still}", "--device", "omega.3"], "apparent_mass is not known"),
     (["simulate", "{still}", "--law", "Z"], "law"),
-    (["simulate", "{still}", "--friction", "0.3"], "law A does not take it; law F does"),
+    (["simulate", "{still}", "--friction", "0.3"], "law A cannot have it, law W, C, D, F, H can"),
     (["onset", "{still}", "--laws", "WF", "--set", "continuity=2"], "law H does"),
     (["onset", "{strokes}"], "must be at rest"),
     (["onset", "{still}", "--delays", "1.5"], "delays must be a whole number"),

@@ -168,7 +168,7 @@ def test_compare_devices_takes_one_device_and_depth() -> None:
         (lambda: asp.scan(STROKE, "A", speeds=[]), "speeds must be one or several"),
         (lambda: asp.scan(STROKE, "A", speeds=-0.1), "speeds must be positive"),
         (lambda: asp.simulate(STROKE, lw="C"), "lw is unknown; did you mean 'law'"),
-        (lambda: asp.simulate(STROKE, law="C", friction=0.3), "friction has no effect: law C"),
+        (lambda: asp.simulate(STROKE, law="A", friction=0.3), "friction has no effect: law A"),
         (lambda: asp.simulate(None), "scene must be the path of a scene file"),  # type: ignore[arg-type]  # wrong on purpose
         (lambda: asp.compare_devices("cloth", []), "device must be one or several"),
         (lambda: asp.simulate("cloth", law="C"), r"needs a section \[hand\]"),

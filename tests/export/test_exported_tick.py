@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.helpers.c_programs import (
+    as_exported,
     compile_library,
     header,
     kernel_ticks,
@@ -52,6 +53,26 @@ def test_tick_equals_the_kernel_with_any_budget(
             assert not result[:, 3].any()
         else:
             assert 0.0 < (result[:, 3] > 0.0).mean() < 1.0
+
+
+@pytest.mark.parametrize("modulation", [0.0, 0.7])
+def test_tick_with_friction_equals_the_kernel(
+    modulation: float, make_texture: Callable[[str], Texture], tmp_path: Path
+) -> None:
+    texture = make_texture("map")
+    friction = {"friction": 0.6, "friction_modulation": modulation}
+    surfaces = {
+        x: as_exported(Surface(texture, x, max_depth=2e-4, clamp="backed", **friction))  # type: ignore[arg-type]  # by name
+        for x in "WCDH"
+    }
+    headers = {x: header(surface, x, max_evaluations=np.inf) for x, surface in surfaces.items()}
+    program = library(tmp_path, "gcc", headers, "-O1")
+    for x, surface in surfaces.items():
+        path = probe_path(surface)
+        result = ticks(program, x, path)
+        assert same_bits(result, kernel_ticks(surface, path, np.inf)).all(), x
+        plain = kernel_ticks(surface.without_friction(), path, np.inf)
+        assert not same_bits(result, plain).all()
 
 
 _STATES = """

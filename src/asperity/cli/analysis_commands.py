@@ -17,7 +17,7 @@ from asperity.cli.options import GRIP, REQUESTED_STIFFNESS, SPEED
 from asperity.cli.output import Outputs, check_outputs, output_options, step_bar
 from asperity.core.arguments import MAX_DEPTH, Argument
 from asperity.core.errors import ParameterError
-from asperity.laws import REGISTERED_LAWS, SHIPPED_LAW_ARGUMENTS, registered_arguments
+from asperity.laws import LAWS, REGISTERED_LAWS, registered_arguments
 
 if TYPE_CHECKING:
     from asperity.analysis.results.compare import Comparison
@@ -153,8 +153,9 @@ def _next_commands(surface: str, result: Comparison) -> str:
     if row is None:
         return ""
     k = number_text.limit_text(row.surface.stiffness).replace(" ", "")
-    unused = set(registered_arguments()) - set(row.law.arguments)
-    names = {"device", "plugin", "settings", "max_depth", *row.law.arguments}
+    used = {*row.law.arguments, *row.surface.friction_values}
+    unused = registered_arguments().keys() - used
+    names = {"device", "plugin", "settings", "max_depth", *used}
     typed = repeat_options(names, unused)
     has_device = "--device" in typed or surface.endswith(".toml")
     device = [] if has_device else ["--device", result.device.id]
@@ -222,7 +223,7 @@ def limits_command(surface: str, device: Device | None, outputs: Outputs, **valu
 
 
 _CONDITIONS = (SPEED, *options.command_arguments("envelope"), MAX_DEPTH, GRIP, *_SAMPLING)
-_LAW_PARAMETERS = tuple(SHIPPED_LAW_ARGUMENTS.values())
+_LAW_PARAMETERS = tuple([argument for law in LAWS.values() for argument in law.arguments.values()])
 
 
 @declare_command("envelope")

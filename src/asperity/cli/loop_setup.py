@@ -13,7 +13,7 @@ from asperity.cli.options import Command, file_values
 from asperity.cli.output import progress_bar, step_bar
 from asperity.core.arguments import STIFFNESS, Argument
 from asperity.core.errors import ParameterError, print_message
-from asperity.laws import REGISTERED_LAWS, Law, check_parameters_apply, find_law
+from asperity.laws import REGISTERED_LAWS, Law, find_law
 from asperity.laws.clamps import BACKED
 
 if TYPE_CHECKING:
@@ -78,6 +78,7 @@ def load_setup(
     Raises:
         ParameterError: for a missing, unknown or invalid value.
     """
+    from asperity.frictional import check_arguments_apply
     from asperity.scene import load_scene
     from asperity.scene.device_run import without_hand
     from asperity.scene.setup import make_setup
@@ -102,7 +103,7 @@ def load_setup(
     if driver not in (None, SIMULATED):
         scene = without_hand(scene)
     if laws or "law" in surface:
-        check_parameters_apply(requested, laws or (find_law(surface["law"]),))
+        check_arguments_apply(requested, laws or (find_law(surface["law"]),))
     setup = make_setup(
         scene,
         surface=surface,

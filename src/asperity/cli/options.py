@@ -21,7 +21,6 @@ from asperity.laws import (
     REGISTERED_LAWS,
     SHIPPED_LAW_ARGUMENTS,
     Law,
-    check_parameters_apply,
     find_law,
     find_laws,
     registered_arguments,
@@ -399,6 +398,7 @@ def load_surface(
     Raises:
         ParameterError: for a missing, unknown or invalid value.
     """
+    from asperity.frictional import check_arguments_apply
     from asperity.scene import load_scene
     from asperity.scene.sections import surface_keywords
 
@@ -409,6 +409,6 @@ def load_surface(
         laws = [find_law(merged["law"])]
     elif not laws:
         laws = tuple(REGISTERED_LAWS.values())
-    check_parameters_apply(requested, laws)
+    check_arguments_apply(requested, laws)
     arguments = surface_keywords(merged, *laws)
     return scene.texture, select_device(device, scene, values), arguments

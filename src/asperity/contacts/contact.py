@@ -91,6 +91,8 @@ class Contact(ABC):
         has_potential_field: whether a law on this contact may be rendered as a baked potential
             field.
         parameters: names of parameters that every law on this contact must declare.
+        height_names: names of :meth:`sampling_code` in ``height_expression``.
+        height_expression: height of the contact point in compiled code [m].
     """
 
     name: ClassVar[str]
@@ -106,6 +108,8 @@ class Contact(ABC):
     bounds_force_error: ClassVar[bool] = False
     has_potential_field: ClassVar[bool] = False
     parameters: ClassVar[tuple[str, ...]] = ()
+    height_names: ClassVar[frozenset[str]] = frozenset({"h"})
+    height_expression: ClassVar[str] = "h"
 
     def __str__(self) -> str:
         return self.name

@@ -183,6 +183,8 @@ class SplitContact(NearestContact):
     is_determined_by_depth = False
     has_potential_field = True
     parameters = ("continuity",)
+    height_names = frozenset({"tz"})
+    height_expression = "(z + tz)"
 
     def kernels(self) -> tuple[ModuleType, ...]:
         """Return the general solver; a texture kind may provide ``split_contact`` etc. itself."""
@@ -198,7 +200,10 @@ class SplitContact(NearestContact):
 
     def warm_start_code(self, needed: frozenset[str]) -> list[str]:
         """Return the vector to the mean, computed from the atoms of the last tick."""
-        return ["tx, ty, tz = split_contact_warm(x, y, z, param_continuity, warm_start, texture)"]
+        arguments = "x, y, z, param_continuity, warm_start, texture"
+        if "energy_tk" in needed:
+            return [f"tx, ty, tz, energy_tk = split_contact_energy({arguments})"]
+        return [f"tx, ty, tz = split_contact_warm({arguments})"]
 
     def sampling_code(self, needed: frozenset[str]) -> list[str]:
         """Return the vector to the mean, with its derivative or energy if needed."""

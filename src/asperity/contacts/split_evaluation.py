@@ -65,6 +65,23 @@ def split_contact_warm(
     return offset[0], offset[1], offset[2]
 
 
+def split_contact_energy(
+    x: float, y: float, z: float, continuity: float, warm_start: FloatArray, texture: object
+) -> tuple[float, float, float, float]:
+    """Return z̄ - p [m], and U [m²] of the atoms that the warm-started search left."""
+    tx, ty, tz = split_contact_warm(x, y, z, continuity, warm_start, texture)
+    count: Any = np.int64(warm_start[POINT_COUNT])
+    spread = 0.0
+    for i in range(count):
+        first: Any = FIRST_POINT + 4 * i
+        dx = warm_start[first] - x - tx
+        dy = warm_start[first + 1] - y - ty
+        dz = warm_start[first + 2] - z - tz
+        spread += warm_start[first + 3] * (dx * dx + dy * dy + dz * dz)
+    share = continuity / (1.0 + continuity)
+    return tx, ty, tz, 0.5 * (tx * tx + ty * ty + tz * tz + share * spread)
+
+
 def split_energy(
     x: float, y: float, z: float, continuity: float, texture: object
 ) -> tuple[float, int, float]:

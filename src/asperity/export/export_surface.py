@@ -23,7 +23,6 @@ from asperity.devices import DeviceLike
 from asperity.export import c99
 from asperity.export.c_language import fill_template, load_template
 from asperity.export.surface_functions import ExportRequest, is_searching
-from asperity.laws import Law
 from asperity.laws.clamps import BACKED
 from asperity.surface import Surface
 from asperity.textures.catalogue import TextureLike
@@ -145,7 +144,7 @@ def header_comment_text(analysis: Analysis, file_name: str) -> str:
         doc = law.summary
     paragraphs = [
         [f"{file_name}: law {law}, by asperity {__version__}. Generated, do not edit."],
-        _usage(law),
+        _usage(analysis.surface),
         [doc],
         _facts(analysis),
         _wrap([analysis.answer, *analysis.assumptions]),
@@ -153,19 +152,23 @@ def header_comment_text(analysis: Analysis, file_name: str) -> str:
     return "\n\n".join(map("\n".join, paragraphs))
 
 
-def _usage(law: Law) -> list[str]:
+def _usage(surface: Surface) -> list[str]:
     """Return the lines on the use of the program."""
+    parts = []
+    if surface.law.stateful or surface.contact_friction is not None:
+        parts.append("the anchor of friction")
+    if is_searching(surface.law.contact):
+        parts.append("the closest point for a warm start")
     state = "This law stores nothing in it"
-    if is_searching(law.contact):
-        state = "It stores the closest point for a warm start"
-    if law.stateful:
-        state = "It stores the anchor of friction"
+    if parts:
+        state = f"It stores {' and '.join(parts)}"
     return _wrap(fill_template(load_template("usage.txt"), {"state": state}).splitlines())
 
 
 def _facts(analysis: Analysis) -> list[str]:
     surface = analysis.surface
-    parameters = [f"{name} = {value:g}" for name, value in surface.law_parameters.items()]
+    numbers = {**surface.law_parameters, **surface.friction_values}
+    parameters = [f"{name} = {value:g}" for name, value in numbers.items()]
     described = surface.texture.describe().items()
     rows = {
         "surface": ", ".join([f"{name} = {_format_value(value)}" for name, value in described]),

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.contacts.contact import Contact, parameter_name
+from asperity.contacts.contact import Contact
 from asperity.contacts.warm_start import WARM_START_SIZE
 from asperity.core.checks import check_positive
 from asperity.core.errors import ParameterError
@@ -25,9 +25,9 @@ from asperity.export.c_language import ValueType
 from asperity.export.expressions import real_literal
 from asperity.export.program import LinkedSource, Program
 from asperity.export.statements import RESERVED_WORDS
-from asperity.kernels.fuse import law_units, link_on_texture
+from asperity.kernels.fuse import energy_kernel_source, law_units, link_on_texture
 from asperity.kernels.link import SourceUnit, generated_unit, unit_from_module
-from asperity.kernels.probe_functions import SHARED_PARAMETERS, LawCode, energy_source
+from asperity.kernels.probe_functions import LawCode, energy_source, parameter_names
 from asperity.laws import Law
 from asperity.laws.clamps import Clamp
 from asperity.rendering import is_searched
@@ -155,11 +155,14 @@ def surface_functions(request: ExportRequest) -> SurfaceFunctions:
     single = request.is_single_precision
     law = surface.law
     clamp = surface.effective_clamp
-    (probe,) = [unit for unit in law_units(law, clamp) if "probe_tick" in unit.sources]
-    energy = energy_units(law, clamp)
+    has_friction = surface.contact_friction is not None
+    (probe,) = [
+        unit for unit in law_units(law, clamp, has_friction) if "probe_tick" in unit.sources
+    ]
+    energy = energy_units(law, clamp, has_friction)
     roots = [("probe_tick", probe), *[("probe_energy", unit) for unit in energy[:1]]]
     units = [*map(unit_from_module, law.contact.kernels()), *energy]
-    text = link_on_texture(law, surface.texture.sampler, clamp, roots, units)
+    text = link_on_texture(law, surface.texture.sampler, clamp, roots, units, has_friction)
     program = Program(LinkedSource(text), prefix, single=single, reserved=_RESERVED_NAMES)
     store = make_program_data(surface, prefix, single=single, loads_field=request.loads_field)
     constants: tuple[ValueType, ValueType] = (store.texture, store.law)
@@ -175,12 +178,13 @@ def surface_functions(request: ExportRequest) -> SurfaceFunctions:
 
 
 @lru_cache(maxsize=64)
-def energy_units(law: Law, clamp: Clamp) -> tuple[SourceUnit, ...]:
+def energy_units(law: Law, clamp: Clamp, has_friction: bool = False) -> tuple[SourceUnit, ...]:
     """Return the energy functions of a law, ``probe_energy`` first; none without a potential.
 
     Args:
         law: the law.
         clamp: the depth clamp. One that holds a part of the force has no potential.
+        has_friction: whether the record of the law also holds parameters of friction.
 
     Example:
         >>> from asperity.laws.clamps import BACKED
@@ -188,21 +192,10 @@ def energy_units(law: Law, clamp: Clamp) -> tuple[SourceUnit, ...]:
         >>> [len(energy_units(find_law(letter), BACKED)) for letter in "BCDH"]
         [0, 2, 2, 2]
     """
-    from asperity.contacts.symbols import DEPTH
-    from asperity.derive.derivatives import derive
-    from asperity.derive.generate import function_source
-
-    facts = clamped_facts(law, clamp)
-    conservative = facts.conservative and facts.vanishes_at_contact and clamp.has_potential
-    if law.stateful or not conservative:
+    source = energy_kernel_source(law)
+    if not (source and clamp.has_potential and clamped_facts(law, clamp).conservative):
         return ()
-    derivation = derive(law)
-    energy = law.contact.potential(derivation.force)
-    if energy is None:
-        return ()
-    values = [energy, energy.diff(DEPTH)]
-    source = function_source(derivation, "law_energy", values, "Energy [J], and by the depth [N].")
-    plan = LawCode(law, source, clamp)
+    plan = LawCode(law, source, clamp, has_friction)
     return (
         generated_unit(f"energy of law {law} at a probe", energy_source(plan)),
         generated_unit(f"energy of law {law}", source),
@@ -317,8 +310,8 @@ def make_program_data(
         )
     else:
         texture = _constant_record(record_name, arguments._fields, arguments, prefix, values)
-    names = (*SHARED_PARAMETERS, *map(parameter_name, surface.law.parameters))
-    numbers = [float(value) for value in surface.law_arguments]
+    names = parameter_names(surface.law, surface.contact_friction is not None)
+    numbers = [float(value) for value in surface.loop_arguments]
     law = _constant_record(f"{prefix}_law", names, numbers, prefix, values)
     law = replace(law, read_macro=f"{prefix.upper()}_READ")
     return ProgramData(prefix, single, texture, law, values)

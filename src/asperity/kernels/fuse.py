@@ -72,19 +72,41 @@ shared = cache_machine_code(njit(**internal, pipeline_class=SharedCompiler))
 def kernel_source(law: Law) -> str:
     """Return the kernels of a law: the shipped file, or derived now for a user-defined law."""
     if LAWS.get(law.letter) is law:
-        text = generated_kernel_path(law).read_text(encoding="utf-8")
-        return text[text.index("def ") :]
+        return _shipped_source(law)[0]
     from asperity.derive.generate import law_source
 
     return law_source(law)
 
 
 @lru_cache(maxsize=256)
-def law_units(law: Law, clamp: Clamp) -> tuple[SourceUnit, ...]:
+def energy_kernel_source(law: Law) -> str:
+    """Return ``law_energy`` of a law: U [J], and its derivative by the depth [N].
+
+    Empty for a law without a potential in closed form.
+    """
+    if LAWS.get(law.letter) is law:
+        return _shipped_source(law)[1]
+    from asperity.derive.generate import law_energy_source
+
+    return law_energy_source(law)
+
+
+def _shipped_source(law: Law) -> tuple[str, str]:
+    """Return the kernels of a shipped law, and its energy."""
+    text = generated_kernel_path(law).read_text(encoding="utf-8")
+    kernels, mark, energy = text[text.index("def ") :].partition("\n\ndef law_energy")
+    return kernels, mark.strip() + energy
+
+
+@lru_cache(maxsize=256)
+def law_units(law: Law, clamp: Clamp, has_friction: bool = False) -> tuple[SourceUnit, ...]:
     """Return the functions of a law, those of a probe on it, and those that its loops may call."""
     from asperity.kernels import loop_functions
 
-    code = LawCode(law, kernel_source(law), clamp)
+    source = kernel_source(law)
+    if has_friction:
+        source = f"{source}\n\n{energy_kernel_source(law)}"
+    code = LawCode(law, source, clamp, has_friction)
     title = f"law {law}"
     probe = f"law {law} at a probe"
     return (
@@ -132,24 +154,34 @@ def _samples_only_at_probe(law: Law) -> bool:
 
 
 @lru_cache(maxsize=256)
-def fuse_path(law: Law, sampler: Modules, clamp: Clamp) -> ModuleType:
+def fuse_path(law: Law, sampler: Modules, clamp: Clamp, has_friction: bool = False) -> ModuleType:
     """Return the compiled loop of a law along a path, ``path_batch``; see :func:`fuse_surface`."""
     from asperity.kernels import batch_sine, path_loop
 
     overrides = () if law.contact.has_warm_start else (batch_sine,)
-    return fuse_on_texture(law, sampler, clamp, (path_loop,), overrides)
+    return fuse_on_texture(law, sampler, clamp, (path_loop,), overrides, has_friction)
 
 
 @lru_cache(maxsize=256)
 def fuse_on_texture(
-    law: Law, sampler: Modules, clamp: Clamp, modules: Modules, overrides: Modules = ()
+    law: Law,
+    sampler: Modules,
+    clamp: Clamp,
+    modules: Modules,
+    overrides: Modules = (),
+    has_friction: bool = False,
 ) -> ModuleType:
     """Return the compiled module of :func:`source_on_texture`."""
-    return load_fused(source_on_texture(law, sampler, clamp, modules, overrides))
+    return load_fused(source_on_texture(law, sampler, clamp, modules, overrides, has_friction))
 
 
 def source_on_texture(
-    law: Law, sampler: Modules, clamp: Clamp, modules: Modules, overrides: Modules = ()
+    law: Law,
+    sampler: Modules,
+    clamp: Clamp,
+    modules: Modules,
+    overrides: Modules = (),
+    has_friction: bool = False,
 ) -> str:
     """Return the source of a module of loops that call a sampler, a law and further modules.
 
@@ -161,6 +193,7 @@ def source_on_texture(
         clamp: the depth clamp.
         modules: modules with the loops and with functions that these call.
         overrides: modules whose functions replace those of the same name elsewhere.
+        has_friction: whether the surface has friction.
 
     Raises:
         ParameterError: for a texture that lacks a function that the law requires.
@@ -168,13 +201,18 @@ def source_on_texture(
     units = [unit_from_module(module) for module in modules]
     extra = [*units, *map(unit_from_module, law.contact.kernels())]
     first = [unit_from_module(module) for module in overrides]
-    available = _available_units(law, sampler, clamp, extra, first)
+    available = _available_units(law, sampler, clamp, extra, first, has_friction=has_friction)
     with _texture_error_context(law, sampler):
         return _assemble(f"Law {law} on {sampler[0].__name__}.", loops_of(*units), available)
 
 
 def link_on_texture(
-    law: Law, sampler: Modules, clamp: Clamp, roots: Roots, extra: Sequence[SourceUnit]
+    law: Law,
+    sampler: Modules,
+    clamp: Clamp,
+    roots: Roots,
+    extra: Sequence[SourceUnit],
+    has_friction: bool = False,
 ) -> str:
     """Return the source of functions, each given with its unit, and of all functions they call.
 
@@ -184,7 +222,8 @@ def link_on_texture(
         ParameterError: for a texture that lacks a function that the law requires.
     """
     with _texture_error_context(law, sampler):
-        return link(roots, _available_units(law, sampler, clamp, extra))
+        units = _available_units(law, sampler, clamp, extra, has_friction=has_friction)
+        return link(roots, units)
 
 
 def _available_units(
@@ -193,9 +232,12 @@ def _available_units(
     clamp: Clamp,
     extra: Sequence[SourceUnit],
     overrides: Sequence[SourceUnit] = (),
+    *,
+    has_friction: bool,
 ) -> tuple[SourceUnit, ...]:
     modules = map(unit_from_module, sampler)
-    return tuple(dict.fromkeys((*overrides, *modules, *law_units(law, clamp), *extra)))
+    units = law_units(law, clamp, has_friction)
+    return tuple(dict.fromkeys((*overrides, *modules, *units, *extra)))
 
 
 @contextmanager

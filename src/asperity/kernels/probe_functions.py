@@ -2,7 +2,8 @@
 
 The linker binds the calls of the loops to the generated functions, which combine the code of the
 contact with the functions of the law and its clamp. ``texture`` is the record of a texture kind,
-``law`` the tuple :attr:`asperity.surface.Surface.law_arguments`.
+``law`` the tuple :attr:`asperity.surface.Surface.law_arguments`, or
+:attr:`~asperity.surface.Surface.loop_arguments` for a surface with friction.
 """
 
 from __future__ import annotations
@@ -83,8 +84,9 @@ def probe_tick(
 ) -> tuple[float, float, float, float, float, bool]:
     """Return the force [N], the new anchor position [m] and whether the anchor is held.
 
-    A law with state holds its anchor during contact; others leave it unchanged. A search stays
-    within the budget of ``warm_start`` and updates it; see :mod:`asperity.contacts.warm_start`.
+    A law with state holds its anchor during contact, friction from its first tick on; other laws
+    leave it unchanged. A search stays within the budget of ``warm_start`` and updates it; see
+    :mod:`asperity.contacts.warm_start`.
     """
     raise NotImplementedError  # the linker binds calls to the generated function
 
@@ -113,6 +115,13 @@ def contact_jacobian(
 
 # Parameters that every kernel receives, before those of the law.
 SHARED_PARAMETERS = ("k", "h_mid", "h_half", "clamp_depth", "floor")
+# Parameters of friction, after those of the law: see :attr:`asperity.laws.friction.Friction`.
+FRICTION_PARAMETERS = (
+    "friction_coefficient",
+    "friction_modulation",
+    "presliding_share",
+    "presliding_fixed",
+)
 
 _FORCE = ("fx", "fy", "fz")
 _JACOBIAN = tuple(f"j{row}{column}" for row in range(3) for column in range(3))
@@ -125,13 +134,16 @@ class LawCode:
 
     Attributes:
         law: the law.
-        source: its kernels; see :func:`asperity.derive.generate.law_source`.
+        source: its kernels; see :func:`asperity.derive.generate.law_source`. With friction also
+            the energy of the law.
         clamp: the depth clamp.
+        has_friction: whether the surface has friction.
     """
 
     law: Law
     source: str
     clamp: Clamp
+    has_friction: bool = False
 
     @cached_property
     def signatures(self) -> dict[str, tuple[str, ...]]:
@@ -153,8 +165,13 @@ class LawCode:
     @property
     def unpack_line(self) -> str:
         """The line that unpacks the parameters."""
-        names = (*SHARED_PARAMETERS, *map(parameter_name, self.law.parameters))
-        return f"{', '.join(names)} = law"
+        return f"{', '.join(parameter_names(self.law, self.has_friction))} = law"
+
+
+def parameter_names(law: Law, has_friction: bool) -> tuple[str, ...]:
+    """Return the names of the parameters in the functions of a probe."""
+    friction = FRICTION_PARAMETERS if has_friction else ()
+    return (*SHARED_PARAMETERS, *map(parameter_name, law.parameters), *friction)
 
 
 def probe_source(code: LawCode) -> str:
@@ -209,6 +226,8 @@ def _probe_depth(code: LawCode) -> str:
 
 
 def _probe_tick(code: LawCode) -> str:
+    if code.has_friction:
+        return f"{_probe_slip(code)}\n\n{_FRICTION_TICK.format(unpack=code.unpack_line)}"
     lines = ["dx = dy = 0.0"]
     if code.law.stateful:
         lines = [code.unpack_line, *_STICK_SLIP.splitlines()]
@@ -226,6 +245,36 @@ if probe_in_contact(x, y, z, texture):
     held = True
 else:
     held = False
+"""
+
+
+def _probe_slip(code: LawCode) -> str:
+    """Return ``probe_slip``: the force of the law [N], and the slip limit μ N (1 - m) [N].
+
+    N = √(2 k U) follows from the contact that gives the force, without another search.
+    """
+    contact = code.law.contact
+    needed = code.argument_names("law_force", "law_energy") | contact.height_names
+    lines = _contact_prologue(code, needed, (*_FORCE, "limit"), warm=contact.has_warm_start)
+    lines += code.clamp.energy_code(code.call("law_energy"))
+    lines += code.clamp.force_code(code.call("law_force"))
+    lines += _SLIP_LIMIT.format(height=contact.height_expression).splitlines()
+    head = "probe_slip(x, y, z, warm_start, texture, law)"
+    return _function_source(head, [*lines, f"return {', '.join(_FORCE)}, limit"])
+
+
+_SLIP_LIMIT = """limit = friction_coefficient * math.sqrt(2.0 * k * energy)
+if friction_modulation > 0.0:
+    relative = min(max(({height} - h_mid) / h_half, -1.0), 1.0)
+    limit *= 1.0 - 0.5 * friction_modulation * (1.0 + relative)
+"""
+
+_FRICTION_TICK = """def probe_tick(x, y, z, ax, ay, held, warm_start, texture, law):
+    {unpack}
+    presliding = presliding_share * k + presliding_fixed
+    fx, fy, fz, limit = probe_slip(x, y, z, warm_start, texture, law)
+    ax, ay, dx, dy = drag_anchor(x, y, held, ax, ay, limit / presliding)
+    return fx - presliding * dx, fy - presliding * dy, fz, ax, ay, True
 """
 
 

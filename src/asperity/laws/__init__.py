@@ -13,6 +13,7 @@ from asperity.laws.c_change_of_height import LAW as C
 from asperity.laws.d_god_object import LAW as D
 from asperity.laws.e_god_object_wall_normal import LAW as E
 from asperity.laws.f_friction_modulation import LAW as F
+from asperity.laws.friction import FRICTION_ARGUMENTS
 from asperity.laws.g_force_shading import LAW as G
 from asperity.laws.h_split_god_object import LAW as H
 from asperity.laws.law import Law as Law
@@ -21,10 +22,13 @@ from asperity.laws.w_smooth_wall import LAW as W
 # In the order of the tables of the paper, the smooth wall first.
 LAWS: dict[str, Law] = {law.letter: law for law in (W, A, B, C, D, E, F, G, H)}
 
-SHIPPED_LAW_ARGUMENTS: dict[str, Argument] = {
-    name: argument for law in LAWS.values() for name, argument in law.arguments.items()
-}
-"""The parameters of the shipped laws, by name."""
+
+def _declared_arguments(laws: Iterable[Law]) -> dict[str, Argument]:
+    return {name: argument for law in laws for name, argument in law.arguments.items()}
+
+
+SHIPPED_LAW_ARGUMENTS = _declared_arguments(LAWS.values()) | FRICTION_ARGUMENTS
+"""The parameters of the shipped laws, and those of friction, by name."""
 
 REGISTERED_LAWS: dict[str, Law] = dict(LAWS)
 """Shipped and registered laws by letter."""
@@ -59,8 +63,8 @@ def register(law: Law) -> Law:
 
 
 def registered_arguments(laws: Iterable[Law] = REGISTERED_LAWS.values()) -> dict[str, Argument]:
-    """Return the parameters of laws by name; of all registered laws by default."""
-    return {name: argument for law in laws for name, argument in law.arguments.items()}
+    """Return the parameters of laws by name, and those of friction; default: registered laws."""
+    return FRICTION_ARGUMENTS | _declared_arguments(laws)
 
 
 def check_parameters_apply(requested: Iterable[str], laws: Sequence[Law]) -> None:
@@ -86,7 +90,7 @@ def distribute_parameters(
     Raises:
         ParameterError: for a parameter that none of the laws declares; it suggests similar names.
     """
-    declared = registered_arguments(laws)
+    declared = _declared_arguments(laws)
     for name in values:
         if name not in declared:
             hint = "those laws have no parameters"

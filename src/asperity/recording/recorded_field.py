@@ -42,7 +42,8 @@ class RecordedField:
         clamp: the depth clamp.
         sampler: modules whose functions evaluate the texture.
         texture: record of the texture.
-        law_arguments: parameters of the law.
+        law_arguments: parameters of the law, and of friction.
+        has_friction: whether the surface has friction.
     """
 
     law: Law
@@ -50,6 +51,7 @@ class RecordedField:
     sampler: tuple[ModuleType, ...]
     texture: tuple[Any, ...]
     law_arguments: tuple[float, ...]
+    has_friction: bool = False
 
     def height(self, points: FloatArray) -> FloatArray:
         """Return the height of the texture [m], shape (n,), at points (n, 2) [m]."""
@@ -68,7 +70,8 @@ def surface_field(surface: Surface) -> RecordedField:
         surface.effective_clamp,
         surface.texture.sampler,
         surface.texture.arguments,
-        surface.law_arguments,
+        surface.loop_arguments,
+        surface.contact_friction is not None,
     )
 
 
@@ -88,7 +91,8 @@ def field_metadata(surface: Surface) -> dict[str, Any]:
         "stiffness": surface.stiffness,
         "max_depth": surface.max_depth,
         "parameters": dict(surface.law_parameters),
-        "law_arguments": [float(value).hex() for value in surface.law_arguments],
+        "law_arguments": [float(value).hex() for value in surface.loop_arguments],
+        "friction": surface.friction_values,
     }
 
 
@@ -138,7 +142,7 @@ def read_field(metadata: Mapping[str, Any], data: bytes) -> RecordedField:
         raise ParameterError("recording", reason) from None
     if metadata.get("texture_content") != arguments_digest(texture):
         raise ParameterError("recording", "holds another texture than its metadata: it is damaged")
-    return RecordedField(law, clamp, sampler, texture, parameters)
+    return RecordedField(law, clamp, sampler, texture, parameters, bool(metadata.get("friction")))
 
 
 def _to_scalar(value: NDArray[Any]) -> Any:

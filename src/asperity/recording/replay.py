@@ -148,6 +148,7 @@ def recorded_surface_on(recording: Recording, texture: Texture) -> Surface:
             surface_data["max_depth"],
             clamp=surface_data["clamp"],
             law_parameters=surface_data["parameters"],
+            **surface_data.get("friction", {}),
         )
     except (KeyError, TypeError) as error:
         raise ParameterError("recording", f"names no whole surface: {error!r}") from None
@@ -205,7 +206,9 @@ def _replay_blocks(
     point = [names.index(axis) for axis in "xyz"]
     compared = [0, *map(names.index, COMPARED_COLUMNS)]
     parts = servo_loop, no_guards, replayed_device, replay_trace, tick
-    loops = fuse_on_texture(field.law, field.sampler, field.clamp, parts)
+    loops = fuse_on_texture(
+        field.law, field.sampler, field.clamp, parts, has_friction=field.has_friction
+    )
     state = LoopState()
     first = 0
     memory = new_warm_start(field.law.contact.max_evaluations)

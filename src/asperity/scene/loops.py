@@ -10,14 +10,8 @@ from typing import Any
 from asperity.core.checks import check_keywords
 from asperity.core.errors import ParameterError
 from asperity.devices import DeviceLike, load_device
-from asperity.laws import (
-    REGISTERED_LAWS,
-    Law,
-    check_parameters_apply,
-    find_law,
-    find_laws,
-    registered_arguments,
-)
+from asperity.frictional import check_arguments_apply
+from asperity.laws import REGISTERED_LAWS, Law, find_law, find_laws, registered_arguments
 from asperity.scene.scene_file import Scene, load_scene
 from asperity.scene.sections import SURFACE_FIELDS
 from asperity.scene.setup import Setup, make_setup
@@ -77,7 +71,7 @@ def make_loop(
         used = [find_law(surface["law"])]
     known = registered_arguments([*REGISTERED_LAWS.values(), *used])
     check_keywords(arguments, accepted.union(known), function)
-    check_parameters_apply(arguments, used)
+    check_arguments_apply(arguments, used)
     if device is not None:
         device = load_device(device)
     return make_setup(loaded, surface=surface, device=device, laws=laws, **options)

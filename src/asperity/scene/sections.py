@@ -23,6 +23,7 @@ from asperity.core.errors import ParameterError, find_named
 from asperity.core.files import open_input, to_plain_data
 from asperity.laws import SHIPPED_LAW_ARGUMENTS, Law, registered_arguments
 from asperity.laws.clamps import CLAMPS, NONE
+from asperity.laws.friction import FRICTION_ARGUMENTS
 from asperity.recording.recording import is_recording, open_recording
 from asperity.simulation import BandHand, PrescribedHand, SpringHand, Stationary, Strokes
 from asperity.simulation import Waypoints as PathMotion
@@ -86,9 +87,9 @@ def surface_keywords(values: Mapping[str, Any], *laws: Law) -> dict[str, Any]:
     """Return values of a surface as keywords of :class:`~asperity.surface.Surface`, and rendering.
 
     Parameters declared by one of the laws, and those unknown to the shipped laws, become
-    ``law_parameters``; parameters of other shipped laws are accepted.
+    ``law_parameters``; friction and parameters of other shipped laws are keywords.
     """
-    names = set(SHIPPED_LAW_ARGUMENTS) - set(registered_arguments(laws))
+    names = set(SHIPPED_LAW_ARGUMENTS) - set(registered_arguments(laws)) | set(FRICTION_ARGUMENTS)
     names |= {argument.name for argument in SURFACE_FIELDS}
     keywords = {name: value for name, value in values.items() if name in names}
     rest = {name: value for name, value in values.items() if name not in names}

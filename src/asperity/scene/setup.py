@@ -152,6 +152,7 @@ class Setup:
         surface = attributes_to_dict(self.surface, "stiffness", "max_depth")
         surface |= {"texture": self.surface.texture.describe(), "law": self.surface.law.letter}
         surface["parameters"] = to_plain_data(self.surface.law_parameters)
+        surface["friction"] = to_plain_data(self.surface.contact_friction)
         rest = attributes_to_dict(self, exclude=("surface", "device", "files", "safety"))
         return {"surface": surface, "device": self.device.id, **rest}
 

@@ -65,6 +65,7 @@ def build_program(surface: Surface, driver: Driver) -> LoopProgram:
         surface.texture.sampler,
         surface.effective_clamp,
         (servo_loop, *loop_parts(), *driver.kernel_modules()),
+        has_friction=surface.contact_friction is not None,
     )
     bounded = surface.effective_clamp.holds_whole_force
     everywhere = bounded or theorem_on(surface).holds_at_any_depth(surface)
@@ -73,7 +74,7 @@ def build_program(surface: Surface, driver: Driver) -> LoopProgram:
     return LoopProgram(
         source,
         surface.texture.arguments,
-        surface.law_arguments,
+        surface.loop_arguments,
         safe_height,
         surface.max_depth,
         surface.law.contact.max_evaluations,

@@ -139,6 +139,7 @@ class LaneLoop:
             surface.texture.sampler,
             surface.effective_clamp,
             (*parts, *self._plant.modules, tick),
+            has_friction=surface.contact_friction is not None,
         )
 
     def stored_energy(self, state: FloatArray, anchor: FloatArray) -> float:
@@ -191,7 +192,7 @@ class LaneLoop:
             row_counters,
             every,
             surface.texture.arguments,
-            surface.law_arguments,
+            surface.loop_arguments,
         )
         for number, lane in enumerate(lanes):
             lane.queue[:] = queues[number, : lane.delay + 1]

@@ -75,7 +75,7 @@ class Simulation(Lane):
         state = plant.initial_state(start, velocity)
         if max_evaluations is None:
             max_evaluations = surface.law.contact.max_evaluations
-        super().__init__(state, servo.delay, surface.law_arguments[0], max_evaluations)
+        super().__init__(state, servo.delay, surface.stiffness, max_evaluations)
         self._loop = LaneLoop(surface, plant, servo)
         self._energy_at_start = 0.0
 

@@ -206,6 +206,11 @@ class Texture(Plottable, ABC):
         return {}
 
     @property
+    def is_body(self) -> bool:
+        """Whether the texture is a baked field of a closed body."""
+        return False
+
+    @property
     def depth_limit(self) -> float:
         """Greatest max_depth [m] of a surface with this texture: that of a baked field."""
         return math.inf

@@ -68,3 +68,11 @@ def law_jacobian_saturated(depth, hxx, hxy, hyy, k):
         0.0,
         0.0,
     )
+
+
+def law_energy(depth, k):
+    """Energy [J], and by the depth [N]."""
+    return (
+        (1/2)*(depth*depth)*k,
+        depth*k,
+    )

@@ -86,3 +86,11 @@ def law_jacobian(depth, hx, hy, hxx, hxy, hyy, k):
         k*(-q11*t30 + t24 + t27*t28),
         -k*(t16*t30 + t17*t29 + t3),
     )
+
+
+def law_energy(depth, k):
+    """Energy [J], and by the depth [N]."""
+    return (
+        (1/2)*(depth*depth)*k,
+        depth*k,
+    )

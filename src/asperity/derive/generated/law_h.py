@@ -55,3 +55,11 @@ def law_jacobian(tx, ty, tz, mxx, mxy, mxz, myy, myz, mzz, k):
         t2,
         k*mzz,
     )
+
+
+def law_energy(energy_tk, k):
+    """Energy [J], and by the depth [N]."""
+    return (
+        energy_tk*k,
+        0.0,
+    )

@@ -44,3 +44,11 @@ def law_jacobian(depth, k):
         0.0,
         -k,
     )
+
+
+def law_energy(depth, k):
+    """Energy [J], and by the depth [N]."""
+    return (
+        (1/2)*(depth*depth)*k,
+        depth*k,
+    )

@@ -307,6 +307,7 @@ def _surface_arguments(surface: Surface) -> str:
     is_shipped = LAWS.get(law.letter) is law
     parts = [repr(law.letter) if is_shipped else "law"]
     parts += [f"stiffness={surface.stiffness!r}", f"max_depth={surface.max_depth!r}"]
+    parts += [f"{name}={value!r}" for name, value in surface.friction_values.items()]
     others = {}
     for name, value in surface.law_parameters.items():
         if value == law.parameters[name]:

@@ -77,7 +77,28 @@ def law_parameter_sentences(surface: Surface) -> list[str]:
         value = surface.law_parameters[name]
         origin = "Default" if value == argument.default else "Given"
         sentences.append(f"{origin} {name.replace('_', ' ')} {argument.format_value(value)}")
-    return sentences
+    return [*sentences, *friction_sentences(surface)]
+
+
+def friction_sentences(surface: Surface) -> list[str]:
+    """Return the friction of a surface, one sentence for each of its numbers.
+
+    Example:
+        >>> from asperity.textures.kinds.sinusoid import Sinusoid
+        >>> friction_sentences(Surface(Sinusoid(1e-4, 1e-3), "H", friction=0.3))[:2]
+        ['Given friction 0.3', 'Default presliding stiffness 250 N/m, 0.25 of the stiffness']
+    """
+    friction = surface.contact_friction
+    if friction is None:
+        return []
+    stiffness = format_quantity(friction.presliding_stiffness, "N/m")
+    presliding = f"Given presliding stiffness {stiffness}"
+    if friction.stiffness_share:
+        share = f"{friction.stiffness_share:.2g} of the stiffness"
+        presliding = f"Default presliding stiffness {stiffness}, {share}"
+    origin = "Given" if friction.modulation else "Default"
+    modulation = f"{origin} friction modulation {friction.modulation:g}"
+    return [f"Given friction {friction.coefficient:g}", presliding, modulation]
 
 
 def unverified_sentences(device: Device, fields: Iterable[str]) -> list[str]:

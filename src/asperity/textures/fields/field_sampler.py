@@ -153,6 +153,14 @@ def field_triple(i: int, j: int, m: int, field: FieldArguments) -> Vector:
 
 def field_gradient(x: float, y: float, z: float, field: FieldArguments) -> Vector:
     """Return ∇T [m]."""
+    gx, gy, gz, _value = field_slope(x, y, z, field)
+    return gx, gy, gz
+
+
+def field_slope(
+    x: float, y: float, z: float, field: FieldArguments
+) -> tuple[float, float, float, float]:
+    """Return ∇T [m] and T [m²]."""
     columns = field.columns
     w = (z - field.z0) * field.iz
     u, u_sign, v, v_sign = field_coordinates(x, y, field)
@@ -160,7 +168,7 @@ def field_gradient(x: float, y: float, z: float, field: FieldArguments) -> Vecto
     i, v0, v1 = field_row_weights(columns.shape[0], v)
     rows = min(columns.shape[0], 3)
     if w >= columns[i + rows // 2, j + 1, REACH] + 0.5 or u_sign * v_sign == 0.0:
-        return 0.0, 0.0, 0.0
+        return 0.0, 0.0, 0.0, 0.0
     u0 = quadratic_weights(u - j)
     u1 = quadratic_weight_slopes(u - j)
     w, below = field_level(w, field)
@@ -182,14 +190,16 @@ def field_gradient(x: float, y: float, z: float, field: FieldArguments) -> Vecto
         gv += v1[a] * value
         gw += v0[a] * upward
     if depth <= 0.0:
-        return 0.0, 0.0, 0.0
+        return 0.0, 0.0, 0.0, 0.0
     gu *= depth * u_sign
     gv *= depth * v_sign
     gz = depth * field.iz * gw
+    energy = 0.5 * depth * depth
     if below > 0.0:
-        rate, slope, _value = field_descent(below, field)
+        rate, slope, added = field_descent(below, field)
         gz = rate * gz - slope
-    return field.m00 * gu + field.m10 * gv, field.m01 * gu + field.m11 * gv, gz
+        energy += added
+    return field.m00 * gu + field.m10 * gv, field.m01 * gu + field.m11 * gv, gz, energy
 
 
 def field_hessian(
@@ -311,6 +321,14 @@ def split_contact_warm(
     """Return -∇T [m], without a search."""
     gx, gy, gz = field_gradient(x, y, z, field)
     return -gx, -gy, -gz
+
+
+def split_contact_energy(
+    x: float, y: float, z: float, _continuity: float, _warm_start: FloatArray, field: FieldArguments
+) -> tuple[float, float, float, float]:
+    """Return -∇T [m] and T [m²]."""
+    gx, gy, gz, energy = field_slope(x, y, z, field)
+    return -gx, -gy, -gz, energy
 
 
 def split_energy(

@@ -17,7 +17,7 @@ from asperity.core.errors import ParameterError
 from asperity.core.files import content_digest, to_plain_data
 from asperity.measured.lengths import format_length
 from asperity.textures.fields.field_grid import FieldGrid
-from asperity.textures.fields.field_sampler import FieldArguments
+from asperity.textures.fields.field_sampler import ZERO, FieldArguments
 from asperity.textures.texture import CertifiedNumber, Texture
 
 
@@ -254,6 +254,11 @@ class PotentialField(Texture, Tabular):
     def baked_numbers(self) -> Mapping[str, CertifiedNumber]:
         """See :class:`Texture`."""
         return {"norm": self.gain, "one-sided": self.one_sided}
+
+    @property
+    def is_body(self) -> bool:
+        """See :class:`Texture`."""
+        return self.arguments.border == ZERO
 
     @property
     def depth_limit(self) -> float:

@@ -203,6 +203,34 @@ def split_contact_warm(
     return split_contact(x, y, z, continuity, texture)
 
 
+def split_contact_energy(
+    x: float,
+    y: float,
+    z: float,
+    continuity: float,
+    warm_start: FloatArray,
+    texture: SinusoidArguments,
+) -> tuple[float, float, float, float]:
+    """Return z̄ - p [m] and U [m²]."""
+    amplitude = texture.amplitude
+    k2 = texture.kx * texture.kx + texture.ky * texture.ky
+    u = split_phase(x, y, texture)
+    split, psi, c, _s = split_closest_point(abs(u), z, continuity, amplitude, k2 * amplitude)
+    shift = continuity * u if split else math.copysign(psi - abs(u), u)
+    spread = split_spread(split, u, psi, continuity)
+    gap = amplitude * c - z
+    energy = 0.5 * ((shift * shift + spread) / k2 + gap * gap)
+    return texture.kx * shift / k2, texture.ky * shift / k2, gap, energy
+
+
+def split_spread(split: bool, u: float, psi: float, continuity: float) -> float:
+    """Return c/(1 + c) times the variance of the phases ±ψ of the atoms about (1 + c) u."""
+    if not split:
+        return 0.0
+    mean = (1.0 + continuity) * u
+    return continuity / (1.0 + continuity) * (psi - mean) * (psi + mean)
+
+
 def split_derivative(
     x: float, y: float, z: float, continuity: float, texture: SinusoidArguments
 ) -> tuple[float, float, float, float, float, float, float, float, float]:
