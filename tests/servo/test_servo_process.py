@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 import os
+import resource
 import signal
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -127,12 +129,24 @@ def test_signals_do_not_end_the_process_of_a_loop(loop: ServoProcess) -> None:
     assert wait_until(lambda: loop.memory.row_count > 20)
     pid = int(loop.process.pid or 0)
     assert os.getsid(pid) == pid
-    for number in (1, 2, 3, 10, 12, 14, 15, 20):
+    for number in signal.valid_signals() - {signal.SIGKILL, signal.SIGSTOP}:
         os.kill(pid, number)
-    row_count = loop.memory.row_count
-    assert wait_until(lambda: loop.memory.row_count > row_count + 20)
+        row_count = loop.memory.row_count
+        assert wait_until(lambda before=row_count: loop.memory.row_count > before + 20), number
     loop.memory.request_stop(now=True)
     assert wait_until(lambda: loop.poll() is EndReason.STOPPED)
+
+
+def test_limits_of_processor_time_release_the_force(loop: ServoProcess) -> None:
+    """At the hard limit the system kills, and a device keeps the force that it was told last."""
+    assert wait_until(lambda: loop.memory.row_count > 300 and applied_force(loop)[2] > 0.3)
+    pid = int(loop.process.pid or 0)
+    times = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    used = sum(map(int, times[11:13])) / os.sysconf("SC_CLK_TCK")
+    limit = math.floor(used + 0.3) + 1  # at once, or after 0.3 s of processor time
+    resource.prlimit(pid, resource.RLIMIT_CPU, (limit, limit))
+    assert wait_until(lambda: loop.poll() is EndReason.STOPPED)
+    assert (applied_force(loop) == 0.0).all()
 
 
 def test_unresponsive_loop_process_is_a_fault(monkeypatch: pytest.MonkeyPatch) -> None:

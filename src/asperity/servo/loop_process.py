@@ -151,19 +151,9 @@ class _LoopServer:
         self._memory.request_stop(now=True)
 
 
-_IGNORED_SIGNALS = (
-    signal.SIGINT,
-    signal.SIGHUP,
-    signal.SIGTERM,
-    signal.SIGQUIT,
-    signal.SIGTSTP,
-    signal.SIGTTIN,
-    signal.SIGTTOU,
-    signal.SIGUSR1,
-    signal.SIGUSR2,
-    signal.SIGALRM,
-)
 _WATCH_PERIOD = 0.003  # [s]
+_CPU_MARGIN = 1.0  # before the limit of processor time, at which the system kills [s]
+_CPU_WATCH_PERIOD = 0.1  # [s]
 MAX_CALL_TIME = 10.0
 """Time for a call of a device to return before the process that waits in it is killed [s]."""
 
@@ -172,12 +162,13 @@ def _leave_to_supervisor(memory: LoopMemory) -> None:
     """Let the supervising process decide how the loop ends, and end with it.
 
     In a session of its own, the process gets no signals of the terminal or to the process group,
-    not even a SIGKILL or SIGSTOP. If the supervising process dies, the force is released.
+    not even a SIGKILL or SIGSTOP. All signals that can be blocked are: those of limits, timers and
+    profilers too. If the supervising process dies, the force is released, and by a ramp shortly
+    before the limit of processor time.
     """
     with suppress(OSError):  # it has a session already
         os.setsid()
-    for number in _IGNORED_SIGNALS:
-        signal.signal(number, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())  # threads inherit it
 
     def release() -> None:
         memory.request_stop(now=True)
@@ -190,8 +181,18 @@ def _leave_to_supervisor(memory: LoopMemory) -> None:
                 time.sleep(_WATCH_PERIOD)
             memory.request_stop(now=True)
 
+    def watch_processor_time() -> None:
+        """A process that reaches the hard limit is killed without a signal that it can block."""
+        is_near = False
+        while not is_near:
+            time.sleep(_CPU_WATCH_PERIOD)
+            limit = resource.getrlimit(resource.RLIMIT_CPU)[1]
+            is_near = 0 <= limit <= time.process_time() + _CPU_MARGIN
+        memory.request_stop()
+
     memory_of_parent = Path(f"/proc/{os.getppid()}/statm")
     threading.Thread(target=watch_memory, daemon=True).start()
+    threading.Thread(target=watch_processor_time, daemon=True).start()
     end_with_parent(release)
 
 
