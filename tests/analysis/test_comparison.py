@@ -16,6 +16,7 @@ from asperity.devices import load_device, override_device, parse_device
 from asperity.laws import Law
 from asperity.report.pages.comparison_columns import FULL_COLUMNS, SUMMARY_COLUMNS, comparison_table
 from asperity.report.sentences.limit_sentences import texture_amount_text
+from asperity.report.sentences.number_text import leak_text as leak_cell
 from asperity.report.sentences.number_text import limit_text
 from asperity.report.sentences.passivity_sentences import stiffness_limit_text
 
@@ -178,6 +179,20 @@ def test_answer_names_the_update_rate_for_which_it_holds(rate: str) -> None:
     assert "assumed: CHAI3D states no update rate" in text
     least = format_quantity(min(hertz, 1000.0), "Hz")
     assert f"for a loop of {least} or faster" in text
+
+
+def test_a_leak_that_cannot_be_computed_is_a_dash_and_refuses_no_law() -> None:
+    heights = 2e-3 * np.random.default_rng(3).random(1500)
+    result = asp.compare(asp.Profile(heights, 1e-6, periodic=True), "touch", "WB")
+    row = result["B"]
+    assert math.isnan(row.leak.energy)
+    assert row.table_row()["leak [J]"] is None
+    assert json.loads(json.dumps(row.to_dict(), allow_nan=False))["leak"]["energy"] is None
+    assert "too steep" in row.leak.description
+    assert "unknown energy" in row.verdict
+    assert leak_cell(row, result) == "–"
+    assert row.passivity.verdict == "undecided"
+    assert result["W"].leak.energy == 0.0
 
 
 def test_to_dict_is_json_without_nan(result: asp.Comparison) -> None:

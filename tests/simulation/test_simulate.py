@@ -56,6 +56,26 @@ def run_of(**changes: Any) -> Run:
     return simulate(**{**JOB, **changes})
 
 
+@pytest.mark.parametrize(("law", "trace"), [("C", True), ("D", False)])
+def test_samples_at_the_force_limit_and_below_the_depth_are_counted(law: str, trace: bool) -> None:
+    """A hand of 8 N on a device of 3.3 N sinks in; counted by a definition from the trace."""
+    surface = Surface(WAVE, law, 300.0, clamp="backed", max_depth=0.5e-3)
+    hand = SpringHand(100.0, 2.0, force=(0.0, 0.0, -8.0))
+    case = {"surface": surface, "hand": hand, "servo": Servo(1e-3, max_force=3.3)}
+    traced = run_of(**case)
+    run = run_of(**case, trace=trace)
+    force = np.linalg.norm(traced.table[:, 7:10], axis=1)
+    points = np.ascontiguousarray(traced.table[:, 1:4])
+    depth = surface.law.contact.depth(WAVE, points)
+    assert run.force_limited == np.sum(force > 3.3 * (1.0 - 1e-9)) > 100
+    assert run.too_deep == np.sum(depth > 0.5e-3) > 100
+    assert run.deepest == pytest.approx(depth.max())
+    assert run.deepest > 10e-3
+    assert run.to_dict()["too_deep"] == run.too_deep
+    gentle = run_of(surface=surface.to_depth(3e-3))
+    assert (gentle.force_limited, gentle.too_deep, gentle.deepest) == (0, 0, 0.0)
+
+
 def test_strokes_alternate_and_stop() -> None:
     assert STROKES.period == pytest.approx(0.1)
     assert STROKES.duration == pytest.approx(0.3)

@@ -37,6 +37,7 @@ from asperity.simulation.trace import (
     COLUMNS,
     DecimatedTrace,
     Ledger,
+    LimitCounts,
     Run,
     StopReason,
     TailStatistics,
@@ -207,10 +208,11 @@ def simulate(
     rows = math.ceil(samples / every)
     writer = _open_trace(trace, rows, max_rows, recording_metadata, surface)
     tail = None
+    counts = LimitCounts(surface, servo.max_force)
     if trace is not False:
         tail = TailStatistics(rows)
     try:
-        stop = _run_chunks(simulation, anchor_chunk, samples, writer, tail, every, progress)
+        stop = _run_chunks(simulation, anchor_chunk, samples, writer, tail, counts, every, progress)
     finally:
         writer.close()
     stop_location = ""
@@ -234,6 +236,9 @@ def simulate(
         plant.notes,
         truncated,
         error,
+        counts.force_limited,
+        counts.too_deep,
+        counts.deepest,
     )
 
 
@@ -309,16 +314,16 @@ def _run_chunks(
     samples: int,
     trace: TraceWriter,
     tail: TailStatistics | None,
+    counts: LimitCounts,
     every: int,
     progress: Callable[[float], None] | None,
 ) -> StopReason:
-    buffer = NO_ROWS
-    if tail is not None:
-        buffer = np.empty((CHUNK_SAMPLES // every + 1, len(COLUMNS)))
+    buffer = np.empty((CHUNK_SAMPLES // every + 1, len(COLUMNS)))
     while simulation.samples < samples:
         stop = simulation.run(anchor_chunk(simulation.samples), buffer, every)
+        rows = buffer[: simulation.rows_written]
+        counts.update(rows)
         if tail is not None:
-            rows = buffer[: simulation.rows_written]
             trace.append(rows)
             tail.update(rows)
         if progress is not None:

@@ -98,6 +98,7 @@ _MIN_ROWS = 4
 _NAMES = [name for name, _unit in COLUMNS]
 _POSITION = slice(_NAMES.index("x"), _NAMES.index("z") + 1)
 _VELOCITY = slice(_NAMES.index("vx"), _NAMES.index("vz") + 1)
+_COMMANDED = slice(_NAMES.index("commanded x"), _NAMES.index("commanded z") + 1)
 _SUPPLIED = slice(_NAMES.index("supplied x"), _NAMES.index("supplied z") + 1)
 _LOST = _NAMES.index("lost")
 _FRICTION = _NAMES.index("friction")
@@ -167,6 +168,41 @@ class TailStatistics:
             self._squares[i] += change**2 * (self._count_in_tail * len(part) / total)
             self._mean[i] += change * (len(part) / total)
         self._count_in_tail = total
+
+
+class LimitCounts:
+    """Counts of samples at the force limit and below ``max_depth``.
+
+    Args:
+        surface: the surface.
+        max_force: the length to which forces are limited [N].
+
+    Attributes:
+        force_limited: number of samples whose force was limited.
+        too_deep: number of samples below ``max_depth``.
+        deepest: greatest depth of these [m]; 0 for none.
+    """
+
+    def __init__(self, surface: Surface, max_force: float) -> None:
+        self._surface = surface
+        # A limited force has that length but for rounding; rounded to steps it may be less.
+        self._least_square = ((1.0 - 1e-12) * max_force) ** 2
+        self._safe_height = surface.law.contact.extremes(surface.texture)[1] - surface.max_depth
+        self.force_limited = 0
+        self.too_deep = 0
+        self.deepest = 0.0
+
+    def update(self, rows: FloatArray) -> None:
+        """Count the next rows of the trace, shape (n, columns)."""
+        squares = np.square(rows[:, _COMMANDED]).sum(axis=1)
+        self.force_limited += int(np.count_nonzero(squares >= self._least_square))
+        low = rows[rows[:, _POSITION.stop - 1] < self._safe_height, _POSITION]
+        low = low[np.isfinite(low).all(axis=1)]
+        if len(low):
+            depths = self._surface.law.contact.depth(self._surface.texture, low)
+            deep = depths[depths > self._surface.max_depth]
+            self.too_deep += len(deep)
+            self.deepest = float(max([self.deepest, *deep[deep.argsort()[-1:]]]))
 
 
 MAX_ROWS = 20_000
@@ -271,6 +307,9 @@ class Run(NamedColumns, Plottable):
         search_error: largest error bound of a truncated search [m]: on the nearest contact no
             surface point was closer than the one found by more than this; on the split contact the
             force was accurate to stiffness times this.
+        force_limited: traced samples whose force was limited to that of the device.
+        too_deep: traced samples below ``max_depth``, for which the surface was analysed.
+        deepest: greatest depth of these [m]; 0 for none.
     """
 
     table: FloatArray
@@ -286,6 +325,9 @@ class Run(NamedColumns, Plottable):
     notes: tuple[str, ...] = ()
     truncated_ticks: int = 0
     search_error: float = 0.0
+    force_limited: int = 0
+    too_deep: int = 0
+    deepest: float = 0.0
     columns = COLUMNS
 
     def __repr__(self) -> str:
@@ -320,5 +362,6 @@ class Run(NamedColumns, Plottable):
     def to_dict(self) -> dict[str, Any]:
         """Return plain data without the trace, SI units; None for an overflow."""
         names = "duration samples period stop_message state ledger truncated_ticks search_error"
+        names += " force_limited too_deep deepest"
         data = attributes_to_dict(self, *names.split(), infinity=None)
         return data | {"trace": self.path or None, "notes": list(self.notes)}

@@ -28,6 +28,11 @@ _CONTACT_STEPS_PER_WAVE = 16
 _MAX_CONTACT_STEPS = 65_536
 _CONTACT_BISECTIONS = 52
 
+
+class TooSteepError(ParameterError):
+    """A surface whose waves are too short for the loop around which work is integrated."""
+
+
 DeflectionFunction = Callable[[FloatArray], FloatArray]
 
 
@@ -258,14 +263,14 @@ def _check_panel_count(panels: float, surface: Surface, path_length: float, wave
     """Refuse a loop that is too long for the shortest wavelength, before allocating arrays.
 
     Raises:
-        ParameterError: if it needs too many panels.
+        TooSteepError: if it needs too many panels.
     """
     if panels <= _MAX_TOTAL_PANELS:
         return
     length = format_quantity(path_length, "m")
     turn = format_quantity(wave, "m")
     size = "max_deflection" if surface.law.stateful else "max_depth"
-    raise ParameterError(
+    raise TooSteepError(
         "surface",
         f"is too steep for its leak, slopes up to {surface.texture.bounds[0]:.2g}: a loop of "
         f"{length} turns every {turn}; give less amplitude (rms, height) or {size}, or a longer "

@@ -12,7 +12,12 @@ import numpy as np
 from asperity.analysis.bounds.bound import scale_upper_bound
 from asperity.analysis.bounds.branch_and_bound import DIFFERENCE_AMPLIFICATION, ROUNDING_ERROR
 from asperity.analysis.energy import curl_columns
-from asperity.analysis.energy.field_energy import initial_panels, integrate, loop_work
+from asperity.analysis.energy.field_energy import (
+    TooSteepError,
+    initial_panels,
+    integrate,
+    loop_work,
+)
 from asperity.analysis.energy.straight_scan import parallel_scan_lines, scan_height, scan_line_along
 from asperity.analysis.gain.surface_cache import cached_result, stiffness_factor
 from asperity.core.checks import FloatArray, check_positive
@@ -49,6 +54,8 @@ class LoopKind(Enum):
     """The paper's path of (27): along in light contact, back at depth."""
     IN_PLANE = auto()
     """In the plane at a depth, about an anchor that sticks."""
+    TOO_STEEP = auto()
+    """Unknown: the surface is too steep to integrate around a loop."""
 
 
 @dataclass(frozen=True)
@@ -435,3 +442,13 @@ def _in_plane_outline(
     depth = np.full((len(plane), 1), -surface.max_depth)
     above = np.array([[*anchor, 0.1 * surface.max_depth]])
     return estimate, np.concatenate([above, np.hstack([plane, depth])])
+
+
+def find_leak(surface: Surface) -> Leak:
+    """Return the worst loop; of unknown energy, NaN, where the surface is too steep for it."""
+    try:
+        return worst_loop(surface)
+    except TooSteepError:
+        origin = LoopOrigin(LoopKind.TOO_STEEP, surface.max_depth)
+        line = surface.texture.scan_line()
+        return Leak(math.nan, math.inf, line, "unknown", origin, np.zeros((0, 3)), None)

@@ -10,7 +10,7 @@ from typing import Any
 
 from asperity.analysis.bounds.bound import NORM, ONE_SIDED
 from asperity.analysis.energy.continuity import continuity
-from asperity.analysis.energy.leak import worst_loop
+from asperity.analysis.energy.leak import find_leak
 from asperity.analysis.energy.straight_scan import merit as compute_merit
 from asperity.analysis.gain.characteristic import cached_number
 from asperity.analysis.gain.surface_cache import is_shipped_law, surface_content
@@ -349,7 +349,7 @@ def _compute_row(surface: Surface, query: _ComparisonQuery) -> LawRow:
     recommended = recommend_on_loop(loop)
     if query.stiffness is None:
         surface = surface.to_stiffness(recommended.start)
-    leak = worst_loop(surface)
+    leak = find_leak(surface)
     merit = compute_merit(surface)
     perceptibility = None
     if query.stiffness or recommended.stiffness:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -141,7 +142,7 @@ class LawRow:
             "texture force RMS [N]": felt and self.texture_force,
             "resolved force RMS [N]": felt and self.resolved_force,
             "conservative": self.conservative,
-            "leak [J]": self.leak.energy,
+            "leak [J]": None if math.isnan(self.leak.energy) else self.leak.energy,
             "continuous": self.continuous,
             "ripple [m]": self.ripple,
             "support": self.support,
@@ -221,5 +222,7 @@ def _strongest(rows: Sequence[LawRow]) -> LawRow:
 
 
 def _relative_leak(row: LawRow) -> float:
-    """Return the leak over texture force times length [1]."""
+    """Return the leak over texture force times length [1]; infinite if it is unknown."""
+    if math.isnan(row.leak.energy):
+        return math.inf
     return row.leak.worst_per_period / (row.texture_force * row.leak.line.length)

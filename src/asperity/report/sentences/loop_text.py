@@ -50,9 +50,24 @@ def run_answer(setup: Setup, run: Run) -> str:
         sentences.append("The energy balance does not close: do not rely on this run")
     if run.truncated_ticks:
         sentences.append(search_error_text(run))
+    sentences += _limits_reached(run)
     if not run.stop_message:
         sentences.append(rest_text(setup, run))
     return f"{'. '.join(sentences)}."
+
+
+def _limits_reached(run: Run) -> list[str]:
+    """Return in how many samples the force was limited or the probe too deep, in sentences."""
+    sentences = []
+    if run.force_limited:
+        count = count_text(run.force_limited, "sample")
+        sentences.append(f"The device's force limit acts in {count}: not the force of the law")
+    if run.too_deep:
+        depth = format_quantity(run.surface.max_depth, "m")
+        deepest = format_quantity(run.deepest, "m", digits=3)
+        count = count_text(run.too_deep, "sample")
+        sentences.append(f"{count} lie below max_depth, {depth}: the deepest {deepest}")
+    return sentences
 
 
 def search_error_text(run: Run) -> str:

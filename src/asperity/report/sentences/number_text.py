@@ -218,15 +218,18 @@ def range_text(low: float, high: float, unit: str, digits: int = 5) -> str:
 
 
 def leak_text(row: LawRow, comparison: Comparison) -> str:
-    """Return the energy of the worst loop: "0.64 mJ"; "0" if proved.
+    """Return the energy of the worst loop: "0.64 mJ"; "0" if proved, "–" if unknown.
 
     All laws have the unit of the largest, for comparison.
     """
     leak = row.leak
     if leak.energy == 0.0 and leak.method == "theorem":
         return "0"
+    if math.isnan(leak.energy):
+        return NOT_AVAILABLE
     mark = SAMPLED_MARK if leak.method == "sampled" else ""
-    energies = [leak.worst_per_period, *(other.leak.worst_per_period for other in comparison.rows)]
+    known = [row.leak for row in comparison.rows if not math.isnan(row.leak.energy)]
+    energies = [one.worst_per_period for one in (leak, *known)]
     return f"{mark}{format_in_one_unit(energies, 'J', digits=2)[0]}"
 
 

@@ -89,8 +89,9 @@ def delivery_text(loop: DeviceLoop) -> str:
 
 def energy_gained_text(loop: DeviceLoop) -> str:
     """Return the energy gained on the worst loop, and the speed below which it is delivered."""
-    energy = 0.0 if loop.leak is None else loop.leak.energy
-    return f"a loop gains {format_quantity(energy, 'J')}; it {delivery_text(loop)}"
+    if loop.leak is None or math.isnan(loop.leak.energy):
+        return delivery_text(loop)
+    return f"a loop gains {format_quantity(loop.leak.energy, 'J')}; it {delivery_text(loop)}"
 
 
 # --- limits of the stiffness ----------------------------------------------------------------------
@@ -378,6 +379,7 @@ _LOOPS = {
         "the paper's path of (27), worst of {starts} starts: {deflection:g} mm along in light "
         "contact, back at {depth:g} mm"
     ),
+    LoopKind.TOO_STEEP: "unknown: the surface is too steep to integrate around a loop",
     LoopKind.IN_PLANE: "in the plane at {depth:g} mm about an anchor that sticks",
 }
 
@@ -403,6 +405,8 @@ def leak_energy_text(leak: Leak) -> str:
         >>> leak_energy_text(worst_loop(Surface(Sinusoid(0.8e-3, 2e-3), "A", max_depth=0.8e-3)))
         '1.28 mJ per period'
     """
+    if math.isnan(leak.energy):
+        return "an unknown energy (the surface is too steep to compute it)"
     energy = format_quantity(leak.worst_per_period, "J")
     if math.isinf(leak.upper_per_period):
         return f"{energy} per loop"
