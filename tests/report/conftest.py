@@ -54,6 +54,9 @@ def report_pages(
         "comparison": html_text(asp.compare("cloth", device="touch", laws="WAC")),
         "analysis": html_text(asp.analyze(sinusoid, device="touch", law="A")),
         "limits": html_text(asp.limits(sinusoid, device="touch", law="A")),
+        "envelope": html_text(
+            asp.envelope(["touch", "inverse3"], "BCDH", wavelengths=[0.5e-3, 1e-3, 2e-3, 5e-3])
+        ),
         "measured": html_text(show(folder / "rough.npy", **options)),
         "run": render_page(run_page(setup, setup.simulate())),
         "experiments": render_page(Page("Experiments", "", [], experiment_sections(experiments))),

@@ -22,6 +22,7 @@ from asperity.core.processes import precompute
 from asperity.devices import Device, DeviceLike, load_device
 from asperity.devices.device import USER_SOURCE
 from asperity.envelopes.wave_borders import (
+    AMPLITUDE_LIMITS,
     RenderConditions,
     WaveBorders,
     WaveCase,
@@ -40,6 +41,8 @@ WAVELENGTHS = tuple(sorted({*np.geomspace(0.05e-3, 20e-3, 54).tolist(), *LISTED}
 """Wavelengths of an envelope by default [m]."""
 GENTLE_WAVE = Sinusoid(1e-5, 1e-3)
 _MAX_PEAKS = 8
+_NEAR = 0.9
+"""Least share of the widest region with which a law renders nearly as much."""
 _EDGE = 1.0 + 1e-6
 """A wave is resolved if it is longer than a limit of the device, not if it is as long."""
 
@@ -108,6 +111,25 @@ class DeviceEnvelope(Serializable):
         """The law with the largest region, of conservative laws if one renders anything."""
         sound = [law for law in self.laws if law.conservative and law.decades]
         return max(sound or self.laws, key=lambda law: law.decades)
+
+    @property
+    def near_widest(self) -> list[LawEnvelope]:
+        """Further conservative laws whose region is at least 0.9 times the widest one."""
+        widest = self.widest
+        least = _NEAR * widest.decades
+        others = [law for law in self.laws if law is not widest and law.conservative]
+        return [law for law in others if law.decades and law.decades >= least]
+
+    def has_line(self, number: int) -> bool:
+        """Return whether a limit of the paper lies within the wavelengths and amplitudes."""
+        borders = [border for law in self.laws for border in law.borders]
+        if number in AMPLITUDE_LIMITS:
+            places = [getattr(border, AMPLITUDE_LIMITS[number]) for border in borders]
+            return any(np.isfinite(places))
+        lengths = {limit.number: limit.wavelength for limit in self.limits}
+        if number == 3 and number not in lengths:  # equal to 2
+            number = 2
+        return lengths.get(number, 0.0) > borders[0].wavelength
 
     def __getitem__(self, letter: str) -> LawEnvelope:
         """Return the envelope of a law by its letter."""

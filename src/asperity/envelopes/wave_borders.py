@@ -271,6 +271,10 @@ _TIP = 0.3
 """Least ratio, between scanned amplitudes, near which a narrow region is searched."""
 
 
+AMPLITUDE_LIMITS = {4: "force_limit", 5: "gain_limit"}
+"""Attributes of :class:`WaveBorders` that are limits of the paper on the amplitude, by number."""
+
+
 @dataclass(frozen=True)
 class WaveBorders(Serializable):
     """Borders of the amplitudes of a wave with one law on one device.
@@ -300,7 +304,12 @@ class WaveBorders(Serializable):
         """Width of the rendered range in decades of amplitude; 0 for none."""
         if math.isnan(self.felt_from):
             return 0.0
-        return math.log10(min(self.felt_up_to, AMPLITUDE_RANGE[1]) / self.felt_from)
+        return math.log10(self.top / self.felt_from)
+
+    @property
+    def top(self) -> float:
+        """Greatest amplitude that is rendered, of those searched [m]."""
+        return min(self.felt_up_to, AMPLITUDE_RANGE[1])
 
 
 def find_borders(case: WaveCase, wavelengths: Sequence[float]) -> tuple[WaveBorders, ...]:

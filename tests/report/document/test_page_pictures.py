@@ -314,12 +314,15 @@ _NARROW = """[...document.querySelectorAll("figure")].map((figure) => {
   const view = figure.querySelector(".view"), svg = view.querySelector("svg");
   const boxOf = (one) => { const b = one.getBoundingClientRect();
     return [b.left, b.top, b.right, b.bottom]; };
-  const labelsIn = (one) => [...one.querySelectorAll("g[transform]")].filter((label) =>
+  const glyphsIn = (one) => [...one.querySelectorAll("g[transform]")].filter((label) =>
     /scale\\(0\\.\\d+ -0\\.\\d+\\)/.test(label.getAttribute("transform"))
-    && getComputedStyle(label).visibility !== "hidden" && !label.closest("defs")).map(boxOf);
+    && getComputedStyle(label).visibility !== "hidden" && !label.closest("defs"));
+  const labelsIn = (one) => glyphsIn(one).map(boxOf);
   return { title: figure.closest("section").querySelector("h2, h3").textContent,
     scrolls: view.scrollWidth > view.clientWidth + 1, inCard: !!figure.closest(".cards"),
-    text: 8 * svg.getScreenCTM().a, frame: boxOf(svg), labels: labelsIn(svg),
+    text: Math.min(...glyphsIn(svg).map((label) => label.getScreenCTM())
+      .map((matrix) => 100 * Math.hypot(matrix.a, matrix.b))),
+    frame: boxOf(svg), labels: labelsIn(svg),
     axes: [...svg.querySelectorAll(".shared")].map(labelsIn) };
 })"""
 

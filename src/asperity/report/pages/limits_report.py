@@ -215,7 +215,7 @@ def _ranges_table(envelope: DeviceEnvelope) -> Table:
         cells: page.Cells = [Cell(law.letter, "l"), f"{law.decades:.2f}", curl, *ranges]
         rows.append(Row(cells, law is envelope.widest, law=law.letter))
     layout = TableLayout(drop_order=[0, 1, *range(3, 3 + len(shown)), 2], gap=2)
-    return Table(("law", "area", "curl", *lengths), rows, range(3, 3 + len(shown)), layout)
+    return Table(("law", "decades²", "curl", *lengths), rows, range(3, 3 + len(shown)), layout)
 
 
 def _points_sections(result: Envelope) -> list[Section]:

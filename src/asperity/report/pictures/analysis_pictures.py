@@ -166,7 +166,8 @@ def draw_gain(figure: FigureArea, analysis: Analysis) -> None:
     """Draw ‖J‖/k in the vertical plane through the witness of q, and the witness."""
     window = analysis_windows.gain_window(analysis)
     surface = analysis.surface
-    field = curl_field(surface, window.segment, window.bottom, *_GRID_CELLS)
+    jumps = math.isinf(analysis.q.lower)
+    field = curl_field(surface, window.segment, window.bottom, *_GRID_CELLS, jumps=jumps)
     scale = _gain_scale(analysis, field.gain)
     axes = style.single_axes(figure)
     mesh = law_pictures.draw_gain_field(axes, field, scale, window)

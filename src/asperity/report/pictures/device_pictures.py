@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, NullFormatter
 from numpy.typing import NDArray
 
 from asperity.analysis.energy.straight_scan import parallel_line_points
@@ -21,12 +20,15 @@ from asperity.core.checks import FloatArray
 from asperity.core.units import format_quantity
 from asperity.devices import Device
 from asperity.envelopes.envelope import DeviceEnvelope, Envelope, LawEnvelope, SurfacePeaks
-from asperity.envelopes.wave_borders import AMPLITUDE_RANGE
+from asperity.envelopes.wave_borders import AMPLITUDE_LIMITS, AMPLITUDE_RANGE
 from asperity.report.pictures import style
+from asperity.report.sentences.analysis_text import unseen_text
 from asperity.report.sentences.limit_sentences import grip_text, speed_text, stiffness_text
 from asperity.textures.texture import Texture
 
 _LINE_POINTS = 4096
+_LEAST_SHARE = 1e-4
+"""Least amplitude in a figure, as a share of the greatest."""
 # Samples per period for a correct reconstruction, 5 to 10 in section II.B of the paper.
 _SAMPLES_PER_PERIOD = 5.0
 _SCAN_SPEED = 0.1  # of a fast stroke [m/s]
@@ -68,7 +70,8 @@ def spectrum_figure(texture: Texture, device: Device) -> Figure:
     figure = style.new_figure(10.0, 3.4)
     axes = style.single_axes(figure)
     wavelength, amplitude = line_spectrum(texture)
-    shown = amplitude > 1e-6 * max(float(amplitude.max()), 1e-300)
+    # Below are aliases of the nodes of a map, not heights.
+    shown = amplitude > _LEAST_SHARE * max(float(amplitude.max()), 1e-300)
     unit = style.length_unit(float(amplitude.max()))
     limits = device_wavelength_limits(device)
     x = wavelength[shown] * _MILLI
@@ -85,6 +88,7 @@ def spectrum_figure(texture: Texture, device: Device) -> Figure:
     axes.set_xlim(min(edges) * _MILLI / 1.5, max(edges) * _MILLI * 2.5)
     top = float(amplitude.max()) * unit.scale
     axes.set_ylim(min(top / 300.0, float(y.min()) / 2.0), top * 4.0)
+    style.label_log_axes(axes.xaxis, axes.yaxis)
     style.label_axes(axes, "wavelength [mm]", f"amplitude [{unit.name}]")
     return figure
 
@@ -114,9 +118,7 @@ def hand_figure(comparison: Comparison) -> Figure:
     parts = {title: drawn & waves.is_resolved, "beyond the device": drawn & ~waves.is_resolved}
     _draw_marks(axes, frequencies, motions, parts)
     axes.set(xscale="log", yscale="log", xlim=(span[0], span[-1]))
-    plain = FuncFormatter(lambda value, _place: f"{value:g}")
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_formatter(plain)
+    style.label_log_axes(axes.xaxis, axes.yaxis)
     mass = format_quantity(1e3 * perceptibility.apparent_mass, "g")
     held = f"{comparison.device.name}, {mass}, {grip_text(comparison.grip)}"
     style.set_panel_title(axes, "Motion of the held tool", held)
@@ -179,10 +181,7 @@ def limits_figure(result: Limits) -> Figure:
     if least and least[-1] > 0.5 * max(edges):
         room = span**0.45
     lower.set_xlim(min(edges) * _MILLI / 1.6, max(edges) * _MILLI * room)
-    plain = FuncFormatter(lambda value, _place: f"{value:g}")
-    for axis in (lower.xaxis, upper.yaxis, lower.yaxis):
-        axis.set_major_formatter(plain)
-    lower.xaxis.set_minor_formatter(plain if span < 8.0 else NullFormatter())
+    style.label_log_axes(lower.xaxis, upper.yaxis, lower.yaxis)
     style.label_axes(upper, "", f"amplitude [{unit.name}]")
     style.label_axes(lower, "wavelength [mm]", f"force [{push.name}]")
     k = stiffness_text(result)
@@ -260,10 +259,9 @@ _MARKERS = "osD^vP"
 def envelope_figure(result: Envelope) -> Figure:
     """Return the diagram of an envelope, with devices side by side on the same scales."""
     count = len(result.devices)
-    width = 10.0 if count < 3 else 13.0
     height = 5.6 if count == 1 else 4.8
-    figure = style.new_figure(width, height * math.ceil(count / 3) + 0.6)
-    panels = style.axes_grid(figure, count, 3, x="wavelength [mm]", y="amplitude [µm]")
+    figure = style.new_figure(10.0, height * math.ceil(count / 2) + 0.6)
+    panels = style.axes_grid(figure, count, 2, x="wavelength [mm]", y="amplitude [µm]")
     handles: dict[str, Any] = {}
     for index, (axes, envelope) in enumerate(zip(panels, result.devices, strict=True)):
         _draw_device(axes, envelope)
@@ -271,11 +269,13 @@ def envelope_figure(result: Envelope) -> Figure:
             _draw_peaks(axes, surface, index, marker)
         shown = zip(*axes.get_legend_handles_labels(), strict=True)
         handles |= {label: handle for handle, label in shown}
-    ends = [
-        x for envelope in result.devices for law in envelope.laws for x in law.borders if x.decades
-    ]
-    least = min([border.felt_from for border in ends], default=1e-6) / 3.0
+    laws = [law for envelope in result.devices for law in envelope.laws]
+    borders = [border for law in laws for border in law.borders]
+    ends = [size for border in borders for size in (border.felt_from, border.force_limit)]
+    least = min([size for size in ends if size > 0.0], default=1e-6) / 3.0
     panels[0].set_ylim(least * _MICRO, AMPLITUDE_RANGE[1] * _MICRO)
+    for axes in panels:
+        style.label_log_axes(axes.xaxis, axes.yaxis)
     labels = sorted(handles)
     options = {"loc": "outside lower left", "ncols": 7}
     style.add_legend(figure, [handles[label] for label in labels], labels, **options)
@@ -292,19 +292,18 @@ def _draw_device(axes: Axes, envelope: DeviceEnvelope) -> None:
     lengths = [border.wavelength * _MILLI for border in envelope.laws[0].borders]
     widest = envelope.widest
     axes.set(xscale="log", yscale="log", xlim=(lengths[0], lengths[-1]))
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_formatter(FuncFormatter(lambda value, _place: f"{value:g}"))
     for colour, law in zip(_COLOURS * len(envelope.laws), envelope.laws, strict=False):
         _draw_region(axes, law, colour, is_filled=law is widest)
-    for level, limit in enumerate(envelope.limits):
+    inside = [limit for limit in envelope.limits if envelope.has_line(limit.number)]
+    for level, limit in enumerate(inside):
         x = limit.wavelength * _MILLI
         axes.axvline(x, color=style.ORANGE, lw=1.0, ls="--", zorder=1.0)
         text = f"{limit.number}" if limit.trusted else f"({limit.number})"
         place = {"xycoords": ("data", "axes fraction"), "xytext": (2, 0), "color": style.ORANGE}
         style.add_note(axes, text, (x, 0.02 + 0.05 * level), **place)
-    for name, number, dots in (("force_limit", 4, ":"), ("gain_limit", 5, "-.")):
+    for (number, name), dots in zip(AMPLITUDE_LIMITS.items(), (":", "-."), strict=True):
         _draw_amplitude_limit(axes, envelope, name, f"limit {number}", dots)
-    remark = f"filled: law {widest.letter}, {widest.decades:.2g} decades²"
+    remark = f"filled: law {widest.letter}, {widest.decades:.2f} decades²{unseen_text(envelope)}"
     style.set_panel_title(axes, envelope.device.name, "", remark)
 
 
@@ -337,7 +336,8 @@ def _draw_amplitude_limit(
             x = [border.wavelength * _MILLI for border in borders]
             y = [getattr(border, name) * _MICRO for border in borders]
             text = f"{label} (law {law.letter})"
-            axes.plot(x, y, color=style.ORANGE, lw=1.0, ls=dots, label=text, zorder=1.0)
+            # Above the regions, whose border it may be.
+            axes.plot(x, y, color=style.ORANGE, lw=1.5, ls=dots, label=text, zorder=3.0)
             return
 
 

@@ -337,9 +337,10 @@ def gain_figure(comparison: Comparison) -> Figure:
     """
     surfaces = [row.surface for row in comparison.rows]
     window = field_window(surfaces)
+    place = window.segment, window.bottom, *_GAIN_CELLS
     fields = [
-        scan_plane.curl_field(surface, window.segment, window.bottom, *_GAIN_CELLS)
-        for surface in surfaces
+        scan_plane.curl_field(row.surface, *place, jumps=not row.continuous)
+        for row in comparison.rows
     ]
     values = np.concatenate([field.gain.ravel() for field in fields])
     highest = max(float(np.quantile(values[np.isfinite(values)], 0.995)), 2.0)
@@ -387,6 +388,24 @@ def add_gain_colorbar(
     bar.ax.xaxis.set_minor_locator(NullLocator())
 
 
+_NARROW_WIDTH = 200.0
+"""Width of the panel in a narrow window [points]."""
+_MERIT_HEIGHT = 275.0
+"""Height of the panel [points]."""
+_LETTER = 11.0
+"""Width and height of a letter [points]."""
+
+
+def _free_rise(x: float, y: float, taken: Sequence[tuple[float, float]]) -> float:
+    """Return how far above a point a letter is free of points and letters [points]."""
+    rises = [sign * step * _LETTER for step in range(1, 10) for sign in (1.0, -1.0)]
+    for rise in [rise for rise in rises if y + rise > 0.5 * _LETTER]:
+        distances = np.abs(np.array(taken) - (x, y + rise)).max(axis=1)
+        if distances.min() >= _LETTER:
+            return rise
+    return _LETTER
+
+
 def merit_figure(comparison: Comparison) -> Figure:
     """Return strength T against support S, a point per law.
 
@@ -400,7 +419,12 @@ def merit_figure(comparison: Comparison) -> Figure:
         scale = 1e3
         label = "strength T · l [mm]"
     widest = max(max([row.strength for row in comparison.rows]) * scale, 1e-12)
-    for row in comparison.rows:
+    places = [
+        (row.strength * scale / (1.15 * widest) * _NARROW_WIDTH, row.support / 1.15 * _MERIT_HEIGHT)
+        for row in comparison.rows
+    ]
+    taken = list(places)
+    for row, (across, up) in zip(comparison.rows, places, strict=True):
         x = row.strength * scale
         y = row.support
         colour = style.GREEN if row.conservative and row.continuous else style.ORANGE
@@ -408,8 +432,10 @@ def merit_figure(comparison: Comparison) -> Figure:
         (point,) = axes.plot(x, y, "o", ms=8, color=colour, clip_on=False, label=name)
         weight = "bold" if row is comparison.recommended_row else "normal"
         font: dict[str, Any] = {"fontsize": style.TITLE, "color": style.INK, "fontweight": weight}
-        place: dict[str, Any] = {"textcoords": "offset points", "ha": "center"}
-        letter = axes.annotate(row.law.letter, (x, y), (0, 7), **place, **font)
+        place: dict[str, Any] = {"textcoords": "offset points", "ha": "center", "va": "center"}
+        rise = _free_rise(across, up, taken)
+        taken.append((across, up + rise))
+        letter = axes.annotate(row.law.letter, (x, y), (0, rise), **place, **font)
         for artist in (point, letter):
             style.mark_law(artist, row.law.letter)
     axes.set(xlim=(0.0, 1.15 * widest), ylim=(0.0, 1.15))

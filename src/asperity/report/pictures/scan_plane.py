@@ -158,7 +158,7 @@ class CurlField:
         along: corners of the cells [m], shape (n + 1, m + 1).
         z: corners of the cells [m], shape (n + 1, m + 1).
         curl: ∂f_t/∂z - ∂f_z/∂t [N/m] in the middle of each cell, shape (n, m).
-        gain: ‖J‖₂/k in the middle of each cell [1], shape (n, m).
+        gain: ‖J‖₂/k in the middle of each cell [1], or that of a jump, shape (n, m).
         max_norm: the largest Frobenius norm of J over the cells [N/m].
     """
 
@@ -169,8 +169,32 @@ class CurlField:
     max_norm: float
 
 
+def secant_gain(surface: Surface, points: FloatArray) -> FloatArray:
+    """Return |Δf| / (k |Δp|) to the farthest off of the neighbours on a grid; n, m and 3 points.
+
+    Where the force jumps, the gain is without bound on a line, which no grid of points meets; the
+    secant across that line is at least the jump over the distance of the points.
+    """
+    flat = points.reshape(-1, 3)
+    force = surface.force(flat, **sliding_state(surface, len(flat))).reshape(points.shape)
+    gain = np.zeros(points.shape[:2])
+    for axis in (0, 1):
+        change = np.linalg.norm(np.diff(force, axis=axis), axis=2)
+        ratio = change / (surface.stiffness * np.linalg.norm(np.diff(points, axis=axis), axis=2))
+        for ends in ((1, 0), (0, 1)):
+            widths = [ends if side == axis else (0, 0) for side in (0, 1)]
+            gain = np.maximum(gain, np.pad(ratio, widths))
+    return gain
+
+
 def curl_field(
-    surface: Surface, segment: ScanSegment, bottom: float, columns: int = 160, rows: int = 90
+    surface: Surface,
+    segment: ScanSegment,
+    bottom: float,
+    columns: int = 160,
+    rows: int = 90,
+    *,
+    jumps: bool = False,
 ) -> CurlField:
     """Return the curl below the surface, from the exact Jacobian.
 
@@ -180,6 +204,7 @@ def curl_field(
         bottom: of the region [m], below the surface everywhere.
         columns: number of cells along the scan; fewer for an expensive contact.
         rows: number of cells upwards; likewise.
+        jumps: whether the force may jump: the gain is then at least that of :func:`secant_gain`.
     """
     coarser = math.sqrt(min(1.0, _BUDGET / (surface.law.contact.relative_cost * columns * rows)))
     columns = max(1, round(coarser * columns))
@@ -201,6 +226,8 @@ def curl_field(
     corner_t = np.broadcast_to(edges[:, None], corner_z.shape).copy()
     norm = float(np.linalg.norm(J, axis=(1, 2)).max(initial=0.0))
     gain = spectral_norm(J).reshape(columns, rows) / surface.stiffness
+    if jumps:
+        gain = np.maximum(gain, secant_gain(surface, points.reshape(columns, rows, 3)))
     return CurlField(corner_t, corner_z, curl.reshape(columns, rows), gain, norm)
 
 

@@ -8,13 +8,17 @@ import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure, SubFigure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.ticker import FuncFormatter
 
 from asperity.laws import Law
 from asperity.report.sentences.number_text import readable_name
@@ -42,6 +46,8 @@ colours above.
 TITLE = 10.0
 LABEL = 9.0
 TICK = 8.0
+_AXES_GAP = 0.2
+"""Distance between the labels of axes beside each other [inch]."""
 HEIGHTS = "cividis"
 WIDE_COLORBAR: dict[str, Any]
 WIDE_COLORBAR = {"location": "bottom", "shrink": 0.5, "aspect": 40, "extend": "both"}
@@ -122,7 +128,8 @@ def to_png(figure: Figure) -> bytes:
 
 def new_figure(width: float, height: float) -> Figure:
     """Return an empty figure of a size [inch], without pyplot or global state."""
-    figure = NotebookFigure(figsize=(width, height), facecolor=BACKGROUND, layout="constrained")
+    layout = ConstrainedLayoutEngine(w_pad=_AXES_GAP / 2.0)
+    figure = NotebookFigure(figsize=(width, height), facecolor=BACKGROUND, layout=layout)
     FigureCanvasAgg(figure)
     return figure
 
@@ -248,6 +255,24 @@ def label_axes(axes: Axes, x: str = "", y: str = "") -> None:
     """Label the axes, with units."""
     axes.set_xlabel(x, fontsize=LABEL, color=MUTED)
     axes.set_ylabel(y, fontsize=LABEL, color=MUTED)
+
+
+def label_log_axes(*axes: Axis) -> None:
+    """Write plain numbers on logarithmic axes with limits, more of them on short ones."""
+    for axis in axes:
+        low, high = axis.get_view_interval()
+        digits: tuple[int, ...] = ()
+        if high < 100.0 * low:
+            digits = (2, 5)
+        if high < 8.0 * low:
+            digits = tuple(range(2, 10))
+        axis.set_major_formatter(FuncFormatter(lambda value, _place: f"{value:g}"))
+        axis.set_minor_formatter(FuncFormatter(partial(_minor_text, digits=digits)))
+
+
+def _minor_text(value: float, _place: int | None, digits: tuple[int, ...]) -> str:
+    """Return a value as text if its first digit is one of some."""
+    return f"{value:g}" if round(value / 10.0 ** math.floor(math.log10(value))) in digits else ""
 
 
 def label_outer_axes(axes: Axes, x: str, y: str, *, lowest: bool, first: bool = True) -> None:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 
 from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.limits.limit_rules import LIMIT_RULES
 from asperity.analysis.results import check_limits
 from asperity.analysis.results.analyze import Analysis
 from asperity.core.units import format_quantity
 from asperity.devices import FIELD_TABLE, FIELD_UNITS, Datum, Device, WallTest
-from asperity.envelopes.envelope import DeviceEnvelope
+from asperity.envelopes.envelope import DeviceEnvelope, LawEnvelope
 from asperity.envelopes.wave_borders import WaveBorders
 from asperity.report.sentences import limit_sentences
 from asperity.report.sentences.limit_sentences import speed_text
@@ -107,15 +108,42 @@ def envelope_answer(envelope: DeviceEnvelope) -> str:
     """Return the law that renders most on a device, and whether it feels alive."""
     name = envelope.device.name
     law = envelope.widest
-    largest = max(envelope.laws, key=lambda other: other.decades)
     if not law.decades:
         return f"{name} renders no sinusoid with these laws."
     lengths = [border.wavelength for border in law.borders if border.decades]
     span = f"{format_quantity(lengths[0], 'm')} to {format_quantity(lengths[-1], 'm')}"
-    best = f"{name} renders most with law {law.letter}, wavelengths from {span}"
+    parts = [f"{name} renders most with law {law.letter}, wavelengths from {span}"]
+    parts[0] += f", {law.decades:.2f} decades² of wavelength and amplitude"
+    parts += [_near_law_text(law, other) for other in envelope.near_widest]
+    largest = max(envelope.laws, key=lambda other: other.decades)
     if largest is not law:
-        return f"{best}; law {largest.letter} renders more, but feels alive."
-    return f"{best}." if law.conservative else f"{best}; it feels alive."
+        parts.append(f"law {largest.letter} renders {largest.decades:.2f}, but feels alive")
+    elif not law.conservative:
+        parts.append("it feels alive")
+    return f"{'; '.join(parts)}."
+
+
+def _near_law_text(law: LawEnvelope, other: LawEnvelope) -> str:
+    """Return how much another law renders, and where its greatest amplitudes differ most."""
+    pairs = zip(law.borders, other.borders, strict=True)
+    shared = [(one, two) for one, two in pairs if one.decades and two.decades]
+    one, two = max(shared, key=lambda pair: abs(math.log(pair[1].top / pair[0].top)))
+    tops = [format_quantity(border.top, "m", digits=2) for border in (two, one)]
+    at = format_quantity(one.wavelength, "m")
+    near = f"law {other.letter} renders nearly as much, {other.decades:.2f}"
+    return f"{near}, and at {at} amplitudes up to {tops[0]} where {law.letter} reaches {tops[1]}"
+
+
+def unseen_text(envelope: DeviceEnvelope) -> str:
+    """Return which of the limits of the paper have no line in the diagram, and why."""
+    unseen: dict[str, list[str]] = {"unknown": [], "outside": []}
+    for rule in LIMIT_RULES:
+        if envelope.device.value(rule.device_field) is None:
+            unseen["unknown"].append(str(rule.number))
+        elif not envelope.has_line(rule.number):
+            unseen["outside"].append(str(rule.number))
+    parts = [f"{', '.join(numbers)} {why}" for why, numbers in unseen.items() if numbers]
+    return f"; limits {', '.join(parts)}" if parts else ""
 
 
 def amplitude_range_text(border: WaveBorders) -> str:

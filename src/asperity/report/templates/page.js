@@ -351,6 +351,7 @@ function addSorting(table) {
 const narrowWindow = matchMedia("(max-width: 30rem)");
 const NARROW = 300; // units of the SVG across a narrow window, with which its text is readable
 const GAP = 8; // units between blocks
+const LEGEND_LINE = 12; // units of a line of a legend
 
 const setAttributes = (element, values) => Object.entries(values).forEach(([name, value]) => element.setAttribute(name, value));
 const isLabel = (element) => /scale\(0\.\d+ -0\.\d+\)/.test(element.getAttribute("transform") ?? "");
@@ -386,6 +387,23 @@ function wrapLabel(label, start, limit) {
     if (line) setAttributes(glyph, { transform: `translate(${places[i] - offset} ${-130 * line})` });
   });
   return line * height;
+}
+
+/** Put the entries of a legend, marks with a text each, in lines that end at a limit. */
+function wrapLegend(legend, limit) {
+  const box = legend.getBBox(), entries = [[]];
+  if (right(box) <= limit) return;
+  for (const child of [...legend.children].filter((one) => one.getBBox().width)) {
+    entries.at(-1).push(child);
+    if (labelsOf(child).length) entries.push([]);
+  }
+  let [x, y] = [box.x, box.y];
+  for (const entry of entries.filter((one) => one.length)) {
+    const place = unite(entry.map((one) => one.getBBox()));
+    if (x > box.x && x + place.width > limit) [x, y] = [box.x, y + LEGEND_LINE];
+    for (const child of entry) move(child, x - place.x, y - place.y + (LEGEND_LINE - place.height) / 2);
+    x += place.width + 2 * GAP;
+  }
 }
 
 /** Move an element by (dx, dy), and what is in a box from x to its new place at the left, squeezed by a factor. */
@@ -480,14 +498,18 @@ function stackPanels(svg, panels) {
   const widths = stacked.map(({ frame, rest }) => left + frame.width + rest), fitting = widths.filter((width) => width <= 1.2 * NARROW);
   const width = Math.max(fitting.length < widths.length ? NARROW : 0.85 * NARROW, ...fitting);
   let y = 0;
-  const addRow = (element, box) => {
+  const addRow = (element) => {
+    const start = element.getBBox().x;
+    if (element.classList.contains("shared")) wrapLegend(element, start + width);
+    else for (const label of labelsOf(element)) wrapLabel(label, start, start + width);
+    const box = element.getBBox();
     const factor = Math.min(1, width / box.width);
     setAttributes(element, { transform: `translate(${factor < 1 ? 0 : Math.min(left, width - box.width)} ${y}) scale(${factor}) translate(${-box.x} ${-box.y})` });
     y += factor * box.height + GAP;
   };
   const others = groups.filter((group) => !axes.some((one) => one.group === group) && group.getBBox().width);
   const figureHeight = ground.getBBox().height, isAbove = (group) => group.getBBox().y < 0.3 * figureHeight;
-  for (const group of others.filter(isAbove)) addRow(group, group.getBBox());
+  for (const group of others.filter(isAbove)) addRow(group);
   const addAxes = (one, start) => {
     const { frame, legends } = one, factor = Math.min(1, (width - start - (one.rest ?? 14)) / frame.width);
     const whole = unite([boxOf(one), ...(one.bar ? [boxOf(one.bar)] : [])]), [dx, shrinkage] = [start - frame.x, (1 - factor) * frame.width];
@@ -512,7 +534,7 @@ function stackPanels(svg, panels) {
     if (one.bar) for (const child of one.bar.group.children) move(child, dx - shrinkage, dy);
     hideOverlaps(one.shared[0]);
     y = bottom(whole) + dy + GAP;
-    for (const legend of legends) addRow(legend, legend.getBBox());
+    for (const legend of legends) addRow(legend);
     if (one.panel) one.panel.box = [start, frame.y + dy, factor * frame.width, frame.height];
   };
   for (const one of stacked) addAxes(one, left);
@@ -521,10 +543,10 @@ function stackPanels(svg, panels) {
     const key = createGroup(...bar.children.filter((one) => one.getBBox().width && bottom(one.getBBox()) < bar.frame.y - 30));
     bar.children = bar.children.filter((child) => child.parentNode !== key);
     whole.append(key);
-    if (key.children.length) addRow(key, key.getBBox());
+    if (key.children.length) addRow(key);
     addAxes(bar, Math.max(14, (width - bar.frame.width) / 2));
   }
-  for (const group of others.filter((one) => !isAbove(one))) addRow(group, group.getBBox());
+  for (const group of others.filter((one) => !isAbove(one))) addRow(group);
   setAttributes(ground.querySelector("path"), { d: `M 0 0 H ${width} V ${y} H 0 Z` });
   setAttributes(svg, { viewBox: `0 0 ${width} ${y}` });
 }
