@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,8 @@ from asperity.core.units import format_quantity
 from asperity.devices import load_device, override_device, parse_device
 from asperity.laws import Law
 from asperity.report.pages.comparison_columns import FULL_COLUMNS, SUMMARY_COLUMNS, comparison_table
-from asperity.report.sentences.limit_sentences import texture_amount_text
+from asperity.report.sentences.comparison_text import recommended_stiffness_text
+from asperity.report.sentences.limit_sentences import force_magnitude_text
 from asperity.report.sentences.number_text import leak_text as leak_cell
 from asperity.report.sentences.number_text import limit_text
 from asperity.report.sentences.passivity_sentences import stiffness_limit_text
@@ -113,18 +115,54 @@ def page_texts(result: asp.Comparison) -> list[str]:
     return [text for cell in cells for text in (cell.text, cell.note)]
 
 
+def count_sentences(text: str) -> int:
+    return len(re.findall(r"\.(?= [A-Z]|$)", text))
+
+
 def test_recommends_a_sound_law_that_is_felt(result: asp.Comparison) -> None:
+    """Two sentences: law, stiffness, depth, what is felt; what to watch. The rest are reasons."""
     assert result.recommended == "H"
-    assert "gives net energy, and its force does not jump" in result.recommendation
+    assert count_sentences(result.recommendation) == 2
+    for part in ("up to a depth of 1 mm", "RMS is felt.", "keeps contact (max_depth='1.6 mm')."):
+        assert part in result.recommendation
+    reasons = " ".join(result.reasons)
     for part in (
-        ": felt.",
+        "gives net energy, and its force does not jump",
         "The stiffest wall known to be stable on this device is 5000 N/m.",
-        "at the delay of the wall test",
-        "a longer delay",
         "simulated loops",
     ):
-        assert part in result.recommendation
+        assert part in reasons
+        assert part not in result.recommendation
+    assert "at the delay of the wall test, but not proved; a longer delay" in reasons
+    assert result.to_dict()["reasons"] == list(result.reasons)
     assert asp.compare(PAPER, laws="WABCDEFG").recommended == "C"
+
+
+def test_a_start_that_nobody_can_use_is_none_with_its_reason() -> None:
+    """Nothing is felt there, or the dry friction of the device, a trusted number, is larger."""
+    rig = {"max_stiffness": "400 N/m", "apparent_mass": "0.6 kg"}
+    steep = asp.Sinusoid(amplitude=2e-3, period=0.5e-3)
+    faint = asp.compare(steep, parse_device(rig, "mine"), "WC").row("C")
+    assert faint.recommended_stiffness > 0.0
+    assert recommended_stiffness_text(faint) == "none useful"
+    assert "not felt at " in faint.verdict
+    wave = asp.Sinusoid(amplitude=0.3e-3, period=2.3e-3)
+    free = asp.compare(wave, parse_device(rig, "mine"), "WC")
+    assert free.recommended == "C"
+    force = free.row("C").full_force
+    assert force == pytest.approx(free.row("C").recommended_stiffness * 0.6e-3)
+    texts = {}
+    for factor in (0.9, 1.1):  # of the greatest force: below it, friction hides nothing
+        stiff = {**rig, "friction": f"{factor * force:.6g} N"}
+        result = asp.compare(wave, parse_device(stiff, "mine"), "WC")
+        texts[factor] = recommended_stiffness_text(result.row("C"))
+        assert (result.recommended == "C") == (factor < 1.0)
+        assert ("less than the device's friction" in result.row("C").verdict) == (factor > 1.0)
+    assert texts == {0.9: limit_text(free.row("C").recommended_stiffness), 1.1: "none useful"}
+    assert result.recommendation.startswith("No law is useful on the mine at this depth")
+    # A number that is not verified hides nothing, but is something to watch.
+    text = asp.compare(wave, "touch", "C", max_depth=1e-4).recommendation
+    assert "260 mN (not verified)" in text
 
 
 def test_recommends_the_smallest_leak_if_no_sound_law_is_felt() -> None:
@@ -134,7 +172,8 @@ def test_recommends_the_smallest_leak_if_no_sound_law_is_felt() -> None:
     weak = result.row("C")
     assert weak.tier == "not felt"  # the premise
     assert result.recommended != "C"
-    assert "which is not felt" in result.recommendation
+    assert "which is not felt" in " ".join(result.reasons)
+    assert "is conservative and continuous" in result.recommendation
     chosen = result.row(result.recommended)
     assert chosen.tier != "not felt"
     assert chosen.continuous
@@ -190,7 +229,7 @@ def test_a_leak_that_cannot_be_computed_is_a_dash_and_refuses_no_law() -> None:
     assert json.loads(json.dumps(row.to_dict(), allow_nan=False))["leak"]["energy"] is None
     assert "too steep" in row.leak.description
     assert "unknown energy" in row.verdict
-    assert leak_cell(row, result) == "–"
+    assert leak_cell(row.leak) == "–"
     assert row.passivity.verdict == "undecided"
     assert result["W"].leak.energy == 0.0
 
@@ -286,11 +325,11 @@ def test_all_numbers_of_a_row_are_at_the_given_stiffness() -> None:
         assert row.perceptibility.texture_rms == pytest.approx(row.texture_force)
     best = result.recommended_row
     assert best is not None
-    start = stiffness_limit_text(best.recommended_stiffness)
+    start = f"{stiffness_limit_text(best.recommended_stiffness)} for a loop of 1 kHz or faster"
     assert result.recommendation.startswith(
         f"At 400 N/m use law {best.law.letter} ({best.law.name.replace('-', ' ')}) on the Force "
-        f"Dimension omega.3 (recommended is a start at {start}), which gives "
-        f"{texture_amount_text(best.perceptibility)}"
+        f"Dimension omega.3 (recommended is a start at {start}), up to a depth of 1 mm: its "
+        f"texture of {force_magnitude_text(best.resolved_force)} RMS is felt."
     )
     headings = [str(column.header) for column in comparison_table(result, 120).columns]
     assert "at" in headings
@@ -305,33 +344,38 @@ def test_a_law_above_its_limit_is_not_recommended() -> None:
     assert "can start at" in result.recommendation
 
 
+def answer_text(result: asp.Comparison) -> str:
+    """Return the answer and its reasons."""
+    return " ".join([result.recommendation, *result.reasons])
+
+
 def test_a_surface_larger_than_the_workspace_is_named() -> None:
     x = np.linspace(0.0, 0.5, 1001)
     wide = asp.Profile(2e-4 * np.sin(2 * np.pi * x / 2e-3), 0.5 / 1000)
     rig = parse_device({"max_stiffness": "1000 N/m", "workspace_radius": "50 mm"}, "mine")
-    text = asp.compare(wide, rig, "C").recommendation
+    text = answer_text(asp.compare(wide, rig, "C"))
     assert "The surface is 500 mm long and the workspace 100 mm" in text
     assert "magnified 0.2 times more" in text
     tube = {"workspace_diameter": "120 mm", "workspace_length": "30 mm"}
-    text = asp.compare(
-        wide, parse_device({"max_stiffness": "1000 N/m", **tube}, "mine"), "C"
-    ).recommendation
+    text = answer_text(
+        asp.compare(wide, parse_device({"max_stiffness": "1000 N/m", **tube}, "mine"), "C")
+    )
     assert "The surface is 500 mm long and the workspace 120 mm" in text
     narrow = asp.Profile(2e-4 * np.sin(2 * np.pi * x[:161] / 2e-3), 0.5 / 1000)
-    assert "workspace" not in asp.compare(narrow, rig, "C").recommendation
-    text = asp.compare(asp.Sinusoid(2e-3, 0.2), rig, "C").recommendation
+    assert "workspace" not in answer_text(asp.compare(narrow, rig, "C"))
+    text = answer_text(asp.compare(asp.Sinusoid(2e-3, 0.2), rig, "C"))
     assert "A period is 200 mm long and the workspace 100 mm" in text
-    assert "workspace" not in asp.compare(asp.Sinusoid(2e-3, 0.09), rig, "C").recommendation
+    assert "workspace" not in answer_text(asp.compare(asp.Sinusoid(2e-3, 0.09), rig, "C"))
     # A sum that never repeats has no end either.
     endless = asp.Fourier([1e-4, 6e-5], [[628.0, 0.0], [628.0 * 2**0.5, 0.0]], [0.3, 1.1])
-    assert "workspace" not in asp.compare(endless, rig, "C").recommendation
+    assert "workspace" not in answer_text(asp.compare(endless, rig, "C"))
 
 
 def test_loss_of_contact_names_the_depth_that_keeps_it() -> None:
     wave = asp.Sinusoid(4e-4, 2e-3)
     lost = asp.compare(wave, "omega.3", "C", max_depth=3e-4)
     assert lost.rows[0].loses_contact
-    assert "pressed to 0.8 mm it keeps contact" in lost.recommendation
+    assert "pressed to 0.8 mm it keeps contact (max_depth='0.8 mm')" in lost.recommendation
     assert not asp.compare(wave, "omega.3", "C", max_depth=8e-4).rows[0].loses_contact
 
 
@@ -343,11 +387,11 @@ def test_answer_says_how_much_calibrating_gains() -> None:
     before, after = (
         asp.compare(texture, parse_device(one, "mine"), "H") for one in (rig, calibrated)
     )
-    assert "the factor is 1: up to 2 times stiffer (calibrate)." in before.recommendation
+    assert "the factor is 1: up to 2 times stiffer." in answer_text(before)
     ratio = after.row("H").recommended_stiffness / before.row("H").recommended_stiffness
     assert ratio == pytest.approx(2.0, rel=1e-2)
-    assert "calibrated" not in after.recommendation
-    assert "calibrated" not in asp.compare(texture, parse_device(rig, "mine"), "G").recommendation
+    assert "calibrated" not in answer_text(after)
+    assert "calibrated" not in answer_text(asp.compare(texture, parse_device(rig, "mine"), "G"))
 
 
 def test_quantities_may_be_texts_and_rows_are_found_by_letter() -> None:

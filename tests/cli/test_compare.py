@@ -349,6 +349,35 @@ def _next_commands(out: str) -> list[list[str]]:
     return [shlex.split(line)[1:] for line in lines]
 
 
+@pytest.mark.parametrize("options", [[], ["--magnify", "1.5", "--magnify-height", "1.2"]])
+def test_after_not_felt_the_next_command_makes_it_felt(call: Call, options: list[str]) -> None:
+    """The change was computed again, with what was typed: the printed command is run."""
+    source = ["compare", "sinusoid:amplitude=0.3um,period=1mm", "--device", "touch"]
+    code, out, _err = call(*source, "--laws", "CH", "--max-depth", "0.5um", *options)
+    assert code == 0
+    assert "Nothing of this texture will be felt" in out
+    (command,) = _next_commands(out)
+    assert command[: len(source)] == source
+    code, out, _err = call(*command)
+    assert code == 0
+    assert "RMS is felt." in " ".join(out.split())
+    _code, out, _err = call("compare", "sinusoid:amplitude=1pm,period=1mm", "--laws", "C")
+    assert _next_commands(out) == [["envelope", "--device", "omega.3"]]
+
+
+def test_reasons_are_shown_on_request_with_options(call: Call) -> None:
+    """The answer is two sentences; options are named, not arguments of Python."""
+    command = ["compare", "sinusoid:amplitude=0.4mm,period=2mm", "--laws", "C"]
+    _code, brief, _err = call(*command, "--max-depth", "0.3mm")
+    assert "--why" in brief
+    assert "Why:" not in brief
+    assert "pressed to 0.8 mm it keeps contact (--max-depth 0.8mm)." in " ".join(brief.split())
+    _code, full, _err = call(*command, "--max-depth", "0.3mm", "--why")
+    reasons = " ".join(full.split("\nWhy:\n")[1].split("\n\n")[0].split())
+    assert "simulated loops cycle" in reasons
+    assert "simulated loops cycle" not in full.split("\nWhy:")[0]
+
+
 def test_next_commands_run_the_recommended_law(call: Call, tmp_path: Path) -> None:
     """With the options of the file, device, plugin and law that it takes, ready to paste."""
     path = tmp_path / "two words.npy"

@@ -133,8 +133,8 @@ def test_notebook_view_has_the_answer_of_the_report() -> None:
     comparison = result("comparison")
     text = comparison._repr_html_()
     assert f"<strong>{comparison.recommendation[:40]}" in text
-    assert text.count("<tr") == 1 + len(comparison.rows)
-    assert text.count('<tr style="font-weight: bold"') == 1
+    assert text.count("<tr") == 1 + 2 * len(comparison.rows)
+    assert text.count('<tr style="font-weight: bold"') == 2  # of the table, and of the verdicts
     assert "closed form" in result("bound")._repr_html_()
     assert "law F, friction modulation, at 1000 N/m" in result("surface")._repr_html_()
 

@@ -12,11 +12,18 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from asperity.cli import options
-from asperity.cli.main import HeadedCommand, declare_command, repeat_options
+from asperity.cli.main import (
+    HeadedCommand,
+    declare_command,
+    option_writer,
+    repeat_options,
+    write_option,
+)
 from asperity.cli.options import GRIP, REQUESTED_STIFFNESS, SPEED
 from asperity.cli.output import Outputs, check_outputs, output_options, step_bar
 from asperity.core.arguments import MAX_DEPTH, Argument
 from asperity.core.errors import ParameterError
+from asperity.core.units import format_quantity
 from asperity.laws import LAWS, REGISTERED_LAWS, registered_arguments
 
 if TYPE_CHECKING:
@@ -108,6 +115,7 @@ class _AskingCommand(HeadedCommand):
     is_flag=True,
     help="Show the characteristic numbers q and q⁺, the limits, leaks, strength T and support S.",
 )
+@click.option("--why", is_flag=True, help="Show the reasons of the answer, and what else to watch.")
 @options.jobs_option
 @output_options()
 def compare_command(
@@ -115,6 +123,7 @@ def compare_command(
     device: tuple[Device, ...] | None,
     laws: tuple[Law, ...] | None,
     full: bool,
+    why: bool,
     outputs: Outputs,
     **values: Any,
 ) -> None:
@@ -142,16 +151,16 @@ def compare_command(
             **options.provided_values(values, [SPEED, GRIP]),
             **arguments,
         )
-    _write_comparisons(result, outputs, full, surface)
+    _write_comparisons(result, outputs, full, why, surface)
 
 
-def _next_commands(surface: str, result: Comparison) -> str:
-    """Return the commands to type next, for the recommended law; empty without one."""
+def _next_commands(surface: str, result: Comparison, why: bool) -> str:
+    """Return the commands to type next, for the recommended law or for a texture that is felt."""
     from asperity.report.sentences import number_text
 
     row = result.recommended_row
     if row is None:
-        return ""
+        return f"\nNext:\n  {_remedy_command(surface, result)}"
     k = number_text.limit_text(row.surface.stiffness).replace(" ", "")
     used = {*row.law.arguments, *row.surface.friction_values}
     unused = registered_arguments().keys() - used
@@ -161,11 +170,48 @@ def _next_commands(surface: str, result: Comparison) -> str:
     device = [] if has_device else ["--device", result.device.id]
     rest = shlex.join([surface, "--law", row.law.letter, "--stiffness", k, *device, *typed])
     lab, run, export = (f"  asperity {name} {rest}" for name in ("lab", "run", "export"))
-    return f"\nNext:\n{lab}\n{run}\n{export} -o texture.h"
+    hint = "" if why else "\nWhy, and what else to watch: --why\n"
+    return f"{hint}\nNext:\n{lab}\n{run}\n{export} -o texture.h"
+
+
+def _remedy_command(surface: str, result: Comparison) -> str:
+    """Return the command of the first change of the options that makes the texture felt.
+
+    Without such a change, and for a scene, which may magnify too: what the device renders.
+    """
+    row = result.nearest_row
+    found = row.perceptibility.remedies if row is not None and row.perceptibility else ()
+    values = {remedy.kind: remedy.value for remedy in reversed(found)}
+    if surface.endswith(".toml") or not {"magnify", "speed"} & set(values):
+        return shlex.join(["asperity", "envelope", "--device", result.device.id])
+    ctx = click.get_current_context()
+    changed = {"speed": format_quantity(values.get("speed", 0.0), "m/s")}
+    if "magnify" in values:
+        changed = _magnified_options(ctx.params, values["magnify"])
+    names = {str(option.name) for option in ctx.command.params} - _NOT_REPEATED
+    typed = shlex.join([surface, *repeat_options(names, changed=changed)])
+    written = [write_option(name, text, ctx) for name, text in changed.items()]
+    return f"asperity compare {typed} {' '.join(written)}"
+
+
+_NOT_REPEATED = {"surface", "why", "full", "json_path", "html_path", "force", "no_cache"}
+
+
+def _magnified_options(typed: Mapping[str, Any], factor: float) -> dict[str, str]:
+    """Return the options for a surface that is magnified further, as in its confirmation.
+
+    A depth on the command line is magnified too.
+    """
+    changed = {"magnify": f"{(typed['magnify'] or 1.0) * factor:.10g}"}
+    if typed["magnify_height"] is not None:
+        changed["magnify_height"] = f"{typed['magnify_height'] * factor:.10g}"
+    if typed["max_depth"] is not None:
+        changed["max_depth"] = format_quantity(typed["max_depth"][0] * factor, "m", 6)
+    return changed
 
 
 def _write_comparisons(
-    result: DeviceComparisons, outputs: Outputs, full: bool, surface: str
+    result: DeviceComparisons, outputs: Outputs, full: bool, why: bool, surface: str
 ) -> None:
     """Write a single comparison, or the table of several.
 
@@ -178,8 +224,8 @@ def _write_comparisons(
         comparison = result.comparisons[0]
         outputs.write(
             comparison,
-            report.comparison_page(comparison, full),
-            extra_line=_next_commands(surface, comparison),
+            report.comparison_page(comparison, full, why, option_writer()),
+            extra_line=_next_commands(surface, comparison, why),
         )
         return
     if result.comparisons or len(result.missing_data) > 1:

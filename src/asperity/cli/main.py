@@ -17,6 +17,7 @@ import asperity
 from asperity.cli.plugins import plugin_error_text
 from asperity.core.cache import CacheWarning, size_limit
 from asperity.core.errors import (
+    ArgumentWriter,
     AsperityError,
     ParameterError,
     nearest_names,
@@ -77,9 +78,15 @@ def write_option(name: str, value: object, ctx: click.Context) -> str:
     return f"{option_flag(option)} {text}"
 
 
+def option_writer() -> ArgumentWriter:
+    """Return a function that writes arguments as options of the running command."""
+    ctx = click.get_current_context()
+    return lambda name, value: write_option(name, value, ctx)
+
+
 def option_message(error: ParameterError, ctx: click.Context) -> str:
     """Return the message of an error with options of the running command for its arguments."""
-    message = error.write_message(lambda name, value: write_option(name, value, ctx))
+    message = error.write_message(option_writer())
     if error.argument in _arguments_of_surface(ctx):
         kind = ctx.params["surface"].partition(":")[0]
         return f"{message}; asperity surfaces {kind} shows an example"
@@ -192,17 +199,21 @@ help_surface_option = click.option(
 """Adds ``--help-surface``."""
 
 
-def repeat_options(names: Collection[str], unused: Collection[str]) -> list[str]:
+def repeat_options(
+    names: Collection[str], unused: Collection[str] = (), changed: Collection[str] = ()
+) -> list[str]:
     """Return the options of the running command with these names, and of its file, as typed.
 
     Args:
         names: of the options.
         unused: names of values of ``--set`` to leave out.
+        changed: names of options to leave out.
     """
     ctx = click.get_current_context()
     parts = []
     for option in ctx.command.params:
-        if option.name not in ctx.meta["values"] or option.name not in {*names, *_FILE_OPTIONS}:
+        is_repeated = option.name in {*names, *_FILE_OPTIONS} - {*changed}
+        if option.name not in ctx.meta["values"] or not is_repeated:
             continue
         value = ctx.meta["values"][option.name]
         if isinstance(value, bool):

@@ -59,6 +59,11 @@ class Datum(Serializable):
         return data
 
     @property
+    def is_trusted(self) -> bool:
+        """Whether conclusions may rest on it: it was verified, or the user gave it."""
+        return self.verified or self.source == USER_SOURCE
+
+    @property
     def text(self) -> str:
         """The value as text with an SI prefix.
 

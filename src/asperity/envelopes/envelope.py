@@ -20,7 +20,6 @@ from asperity.core.errors import ParameterError
 from asperity.core.files import OMITTED, Serializable, to_plain_data, written
 from asperity.core.processes import precompute
 from asperity.devices import Device, DeviceLike, load_device
-from asperity.devices.device import USER_SOURCE
 from asperity.envelopes.wave_borders import (
     AMPLITUDE_LIMITS,
     RenderConditions,
@@ -324,7 +323,7 @@ def _wavelength_limits(case: WaveCase) -> tuple[WavelengthLimit, ...]:
     samples = conditions.speed, conditions.time_samples, conditions.position_samples
     fields = {rule.number: rule.device_field for rule in LIMIT_RULES}
     return tuple(
-        WavelengthLimit(number, length, datum.verified or datum.source == USER_SOURCE)
+        WavelengthLimit(number, length, datum.is_trusted)
         for length, number, _words in shortest_wavelengths(device, *samples)
         for datum in [device.data[fields[number]]]
     )

@@ -18,7 +18,6 @@ from asperity.analysis.limits.spectrum import (
 )
 from asperity.core.checks import FloatArray
 from asperity.devices import Device
-from asperity.devices.device import USER_SOURCE
 from asperity.perception.grip import Grip
 from asperity.surface import Surface, default_max_depth
 from asperity.textures.texture import Texture, TexturePart
@@ -110,7 +109,7 @@ def scan_waves(
     doubtful = {
         name: data.pop(name)
         for name in MASKING_FIELDS
-        if (datum := device.data.get(name)) and not datum.verified and datum.source != USER_SOURCE
+        if name in device.data and not device.data[name].is_trusted
     }
     case = LimitCase(data, spectrum.wavelengths, scale * forces, spectrum.shares, **scan)
     waves = WaveScan(case, scale * components, grip, surface.stiffness, device.workspace_size)

@@ -74,7 +74,8 @@ class Comparison(Plottable, Reportable, Tabular):
     recommended_row: LawRow | None
     nearest_row: LawRow | None
     defaults: tuple[str, ...]
-    recommendation = Text[str]("The recommendation with its reason, in words.")
+    recommendation = Text[str]("Law, stiffness, what is felt, and what to watch: two sentences.")
+    reasons = Text[tuple[str, ...]]("Why this law at this stiffness, and what else to watch.")
     assumptions = Text[tuple[str, ...]](
         "Assumptions, in sentences: defaults, unverified device data, the preparation steps of the "
         "surface, regions and resolutions of sampling."
@@ -134,7 +135,7 @@ class Comparison(Plottable, Reportable, Tabular):
             "texture": self.texture.describe(),
             **attributes_to_dict(self, "device", "stiffness", "max_depth", "speed", "grip"),
             "laws": to_plain_data(self.rows),
-            **attributes_to_dict(self, "recommended", "recommendation", "assumptions"),
+            **attributes_to_dict(self, "recommended", "recommendation", "reasons", "assumptions"),
         }
 
 

@@ -117,6 +117,26 @@ class LawRow:
         return (self.stability_limit.stiffness or 0.0) < self.surface.stiffness
 
     @property
+    def full_force(self) -> float:
+        """Bound of the mean force down to ``max_depth`` [N]: stiffness times depth."""
+        return self.surface.stiffness * self.surface.max_depth
+
+    @property
+    def is_hidden_by_friction(self) -> bool:
+        """Whether that force is less than the dry friction of the device, a trusted number."""
+        friction = self.passivity.loop.device.data.get("friction")
+        return friction is not None and friction.is_trusted and self.full_force < friction.value
+
+    @property
+    def is_useful(self) -> bool:
+        """Whether its texture is felt or borderline at its stiffness, and not hidden by friction.
+
+        The smooth wall, without a texture, is useful unless friction hides it.
+        """
+        is_faint = self.tier == "not felt" and not self.is_textureless
+        return not is_faint and not self.is_hidden_by_friction
+
+    @property
     def is_textureless(self) -> bool:
         """Whether the law renders no texture."""
         return self.ripple == 0.0
@@ -188,13 +208,13 @@ def recommend(rows: Sequence[LawRow]) -> LawRow | None:
     jump. Of such laws whose texture is felt (else: borderline), the one with the strongest texture
     at its recommended stiffness is chosen; of nearly equal ones the stiffest. Without such a law,
     the continuous law that is felt (else: borderline) and leaks least for its texture force is
-    chosen. A law that is not felt, without a known stable stiffness, or with a stability limit
-    below the given stiffness, is never recommended.
+    chosen. A law that is not felt or hidden by friction, without a known stable stiffness, or with
+    a stability limit below the given stiffness, is never recommended.
 
     Args:
         rows: the laws, with their numbers at the given stiffness or each at its recommended one.
     """
-    textured = textured_rows(rows)
+    textured = [row for row in textured_rows(rows) if row.is_useful]
     by_tier = [[row for row in textured if row.tier == tier] for tier in ("felt", "borderline")]
     for candidates in by_tier:
         sound = [row for row in candidates if row.is_sound]

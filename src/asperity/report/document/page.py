@@ -161,7 +161,6 @@ class TableLayout:
         gap: characters between columns.
         tight_below: console width [characters] below which columns are one character apart.
         has_rule: whether a line is drawn below the headings, if there are any.
-        max_console: console width [characters] up to which the table is shown at all.
     """
 
     wrap: Collection[int] = ()
@@ -175,7 +174,6 @@ class TableLayout:
     gap: int = 1
     tight_below: int = 0
     has_rule: bool = True
-    max_console: int | None = None
 
 
 @dataclass(frozen=True)

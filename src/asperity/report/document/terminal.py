@@ -53,15 +53,14 @@ def _section_parts(section: pages.Section, width: int) -> Iterator[RenderableTyp
 def _block_parts(block: pages.Block, width: int) -> Iterator[RenderableType]:
     """Yield a block; pictures and cards have no equivalent in a terminal."""
     if isinstance(block, pages.Table):
-        if block.layout.max_console is None or width <= block.layout.max_console:
-            yield rich_table(block, width)
-            hidden = _hidden_columns(block, width)
-            shown = [text for i, text in block.layout.legend.items() if i not in hidden]
-            if shown:
-                yield Text()
-                yield rich_pairs(shown, "dim")
-            if block.layout.dropped_note and _dropped_columns(block, width):
-                yield Text(block.layout.dropped_note, "dim")
+        yield rich_table(block, width)
+        hidden = _hidden_columns(block, width)
+        shown = [text for i, text in block.layout.legend.items() if i not in hidden]
+        if shown:
+            yield Text()
+            yield rich_pairs(shown, "dim")
+        if block.layout.dropped_note and _dropped_columns(block, width):
+            yield Text(block.layout.dropped_note, "dim")
     elif isinstance(block, pages.BulletList):
         yield rich_pairs(("-", sentence) for sentence in block.sentences)
     elif isinstance(block, pages.DefinitionList):

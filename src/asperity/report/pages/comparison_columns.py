@@ -22,12 +22,14 @@ from asperity.report.document.page import (
 from asperity.report.document.terminal import rich_table
 from asperity.report.sentences import number_text
 from asperity.report.sentences.comparison_text import recommended_stiffness_text, row_limit_text
-from asperity.report.sentences.limit_sentences import texture_amount_text, tier_text
+from asperity.report.sentences.limit_sentences import (
+    force_magnitude_text,
+    texture_amount_text,
+    tier_text,
+)
 from asperity.report.sentences.passivity_sentences import stability_limit_text
 from asperity.report.sentences.texts import column_meanings, table_notes
 
-VERDICT_MIN_CONSOLE = 72
-"""Console width [characters] from which the verdicts are in the table, not below it."""
 _WIDE_GAP_CONSOLE = 90
 """Console width [characters] from which columns are two characters apart."""
 
@@ -78,17 +80,16 @@ def _given_stiffness_cell(row: LawRow, _comparison: Comparison) -> Cell:
     return Cell(number_text.limit_text(row.surface.stiffness), note=limit)
 
 
-def _texture_force_cell(row: LawRow, comparison: Comparison) -> Cell:
-    """Return the RMS texture force that the device resolves, all laws in one unit."""
+def _texture_force_cell(row: LawRow, _comparison: Comparison) -> Cell:
+    """Return the RMS texture force that the device resolves."""
     if row.perceptibility is None:
         return Cell(number_text.NOT_AVAILABLE)
-    forces = [row.resolved_force, *(other.resolved_force for other in comparison.rows)]
-    text = number_text.format_in_one_unit(forces, "N", digits=2)[0]
+    text = force_magnitude_text(row.resolved_force)
     return Cell(text, note=texture_amount_text(row.perceptibility))
 
 
-def _leak_cell(row: LawRow, comparison: Comparison) -> Cell:
-    return Cell(number_text.leak_text(row, comparison), note=row.leak.description)
+def _leak_cell(row: LawRow, _comparison: Comparison) -> Cell:
+    return Cell(number_text.leak_text(row.leak), note=row.leak.description)
 
 
 def _continuity_cell(row: LawRow, value: bool | None) -> Cell:
@@ -121,7 +122,6 @@ _LETTER_COLUMN = LawColumn("law", lambda row, _: Cell(row.law.letter, "l"))
 NAME_COLUMN = LawColumn(
     "name", lambda row, _: Cell(number_text.readable_name(row.law.name)), False, 112
 )
-VERDICT_COLUMN = LawColumn("verdict", lambda row, _: Cell(row.verdict), False, VERDICT_MIN_CONSOLE)
 _START_COLUMN = LawColumn("start at", _recommendation_cell, True)
 _GIVEN_COLUMN = LawColumn("at", _given_stiffness_cell, True)
 SUMMARY_COLUMNS = (
@@ -133,7 +133,6 @@ SUMMARY_COLUMNS = (
     LawColumn("leak", _leak_cell, True, 44),
     LawColumn("clicks?", lambda row, _: _continuity_cell(row, not row.continuous), False, 36),
 )
-_CONSOLE_COLUMNS = (*SUMMARY_COLUMNS, VERDICT_COLUMN)
 FULL_COLUMNS = (
     _LETTER_COLUMN,
     NAME_COLUMN,
@@ -172,11 +171,7 @@ def laws_table(comparison: Comparison, columns: Sequence[LawColumn]) -> Table:
     rows = law_rows(comparison, lambda row: [column.cell(row, comparison) for column in columns])
     names = [single_line(column.heading) for column in columns]
     meanings = dict(column_meanings("laws"))
-    if not any("v*" in row.verdict for row in comparison.rows):
-        del meanings["verdict"]
     layout = TableLayout(
-        wrap=[i for i, column in enumerate(columns) if column in (NAME_COLUMN, VERDICT_COLUMN)],
-        max_widths={i: 24 for i, column in enumerate(columns) if column is NAME_COLUMN},
         min_console={i: column.min_console for i, column in enumerate(columns)},
         legend={i: (name, meanings[name]) for i, name in enumerate(names) if name in meanings},
         tight_below=_WIDE_GAP_CONSOLE,
@@ -188,10 +183,12 @@ def laws_table(comparison: Comparison, columns: Sequence[LawColumn]) -> Table:
     return Table(headings, rows, numeric, layout)
 
 
-def verdicts_table(comparison: Comparison, max_console: int | None) -> Table:
-    """Return letter and verdict of each law, for consoles up to a width [characters]."""
+def verdicts_table(comparison: Comparison) -> Table:
+    """Return letter and verdict of each law."""
     rows = law_rows(comparison, lambda row: [Cell(row.law.letter, "l"), row.verdict])
-    return Table((), rows, layout=TableLayout(wrap=(1,), max_console=max_console))
+    has_speed = any("v*" in row.verdict for row in comparison.rows)
+    legend = {1: ("v*", dict(column_meanings("laws"))["v*"])} if has_speed else {}
+    return Table((), rows, layout=TableLayout(wrap=(1,), legend=legend))
 
 
 # --- sections -------------------------------------------------------------------------------------
@@ -208,23 +205,22 @@ def comparison_table(comparison: Comparison, width: int = 120, full: bool = Fals
     Returns:
         A Rich table.
     """
-    columns = FULL_COLUMNS if full else _CONSOLE_COLUMNS
+    columns = FULL_COLUMNS if full else SUMMARY_COLUMNS
     return rich_table(laws_table(comparison, columns), width)
 
 
 def terminal_sections(comparison: Comparison, full: bool) -> list[Section]:
     """Return the tables of a terminal and of a notebook; ``full`` for every number."""
-    table = laws_table(comparison, FULL_COLUMNS if full else _CONSOLE_COLUMNS)
+    table = laws_table(comparison, FULL_COLUMNS if full else SUMMARY_COLUMNS)
     if has_sampled(comparison):
         mark = ("~", "sampled, not proved: leak and q may be larger, the limit lower")
         legend = {**table.layout.legend, len(table.headings): mark}
         table = replace(table, layout=replace(table.layout, legend=legend))
-    widest = None if full else VERDICT_MIN_CONSOLE - 1
-    summary = _single_line_table(comparison, _CONSOLE_COLUMNS)
+    summary = _single_line_table(comparison, SUMMARY_COLUMNS)
     return [
         terminal_section(table),
-        terminal_section(verdicts_table(comparison, widest)),
-        Section("", [summary], media=Media.NOTEBOOK),
+        terminal_section(verdicts_table(comparison)),
+        Section("", [summary, verdicts_table(comparison)], media=Media.NOTEBOOK),
     ]
 
 
@@ -241,8 +237,7 @@ def law_sections(comparison: Comparison) -> list[Section]:
     notes = table_notes("sampled") if has_sampled(comparison) else []
     wrong = law_rows(comparison, lambda row: [Cell(row.law.letter, "l"), "; ".join(row.artefacts)])
     artefacts = Table((), [row for row in wrong if row.cells[1]])
-    return [
-        Section("The laws compared", [summary]),
-        Section("What will go wrong", [artefacts]),
-        Section("Every number", [full], notes=notes),
-    ]
+    sections = [Section("The laws compared", [summary])]
+    if artefacts.rows:
+        sections.append(Section("What will go wrong", [artefacts]))
+    return [*sections, Section("Every number", [full], notes=notes)]

@@ -9,6 +9,7 @@ from operator import attrgetter
 from asperity.analysis.results.compare import Comparison
 from asperity.analysis.results.device_comparisons import DeviceComparisons
 from asperity.analysis.results.recommendation import LawRow
+from asperity.core.errors import ArgumentWriter, write_keyword
 from asperity.core.units import format_quantity
 from asperity.envelopes.find_design import Design
 from asperity.envelopes.searches import MET
@@ -19,6 +20,7 @@ from asperity.report.pages.comparison_columns import law_rows, law_sections, ter
 from asperity.report.pages.measured_report import measured_sections, thin_sections
 from asperity.report.sentences import limit_sentences
 from asperity.report.sentences.analysis_text import datum_text
+from asperity.report.sentences.answer_sentences import recommendation_reasons, recommendation_text
 from asperity.report.sentences.comparison_text import (
     case_title,
     design_answer,
@@ -45,19 +47,29 @@ from asperity.report.sentences.texts import column_meanings, figure_text, glossa
 _FOOTER = f"{page.PAPER_CITATION}. {page.NO_PERCEPTUAL_TEST}"
 
 
-def comparison_page(comparison: Comparison, full: bool = False) -> Page:
+def comparison_page(
+    comparison: Comparison,
+    full: bool = False,
+    why: bool = False,
+    write_argument: ArgumentWriter = write_keyword,
+) -> Page:
     """Return the report: answer, tables, figures, assumptions and provenance.
 
     Args:
         comparison: the result.
         full: whether a terminal shows every number instead of the summary.
+        why: whether a terminal shows the reasons of the answer.
+        write_argument: writes an argument that changes the answer, as in Python or as an option.
     """
+    reasons = [page.BulletList(recommendation_reasons(comparison, write_argument))]
     return Page(
         title=f"{texture_name(comparison.texture)} on the {comparison.device.name}",
-        answer=comparison.recommendation,
+        answer=recommendation_text(comparison, write_argument),
         facts=_facts(comparison),
         sections=[
+            *([Section("Why:", reasons, media=page.HEADED)] if why else []),
             *terminal_sections(comparison, full),
+            Section("Why", reasons),
             *law_sections(comparison),
             *_figure_sections(comparison),
             *thin_sections(comparison.texture),
@@ -163,13 +175,16 @@ def _case_row(comparison: Comparison) -> Row:
     best = comparison.recommended_row or comparison.nearest_row
     if best is None:
         return Row([comparison.device.name, depth, "none", *[NOT_AVAILABLE] * 3])
+    start = recommended_stiffness_text(best)
+    if comparison.stiffness is not None:
+        start = limit_text(comparison.stiffness)
     text = best.law.letter if comparison.recommended else f"({best.law.letter})"
     return Row(
         [
             comparison.device.name,
             depth,
             Cell(text, "l", note=comparison.recommendation),
-            limit_text(comparison.stiffness or best.recommended_stiffness),
+            start,
             limit_sentences.force_magnitude_text(best.resolved_force),
             limit_sentences.tier_text(best.perceptibility),
         ]

@@ -16,7 +16,7 @@ from asperity.core.units import format_quantity
 from asperity.devices import Device
 from asperity.envelopes.envelope import GENTLE_WAVE, Envelope
 from asperity.rendering import rendering_sentences
-from asperity.report.sentences.comparison_sentences import simulated_loops_text
+from asperity.report.sentences.answer_sentences import simulated_loops_text
 from asperity.report.sentences.limit_sentences import (
     form_removal_sentences,
     grip_text,

@@ -29,8 +29,10 @@ def row_limit_text(row: LawRow) -> str:
 
 
 def recommended_stiffness_text(row: LawRow) -> str:
-    """Return the recommended stiffness: "3050 N/m", or "none"."""
+    """Return the recommended stiffness: "3050 N/m", "none", or "none useful"."""
     stiffness = row.recommended_stiffness
+    if stiffness == row.surface.stiffness and not row.is_useful:
+        return "none useful"
     return number_text.limit_text(stiffness) if stiffness else "none"
 
 
@@ -96,7 +98,7 @@ def case_title(comparison: Comparison) -> str:
 def conservation_remarks(comparison: Comparison) -> list[str]:
     """Return for each law that it is conservative, or what it leaks."""
     return [
-        "conservative" if row.conservative else f"leaks up to {leak_text(row, comparison)} per loop"
+        "conservative" if row.conservative else f"leaks up to {leak_text(row.leak)} per loop"
         for row in comparison.rows
     ]
 

@@ -5,21 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
-from typing import TYPE_CHECKING
 
 from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.energy.leak import Leak
 from asperity.analysis.results.compare import Comparison
-from asperity.analysis.results.recommendation import LawRow
 from asperity.core.units import format_quantity, round_down
-
-if TYPE_CHECKING:
-    pass
-
-if TYPE_CHECKING:
-    pass
-
-if TYPE_CHECKING:
-    pass
 
 INFINITY_SIGN = "∞"
 NOT_AVAILABLE = "–"
@@ -217,20 +207,14 @@ def range_text(low: float, high: float, unit: str, digits: int = 5) -> str:
     return f"{lower} {name}" if lower == upper else f"{lower} to {upper} {name}"
 
 
-def leak_text(row: LawRow, comparison: Comparison) -> str:
-    """Return the energy of the worst loop: "0.64 mJ"; "0" if proved, "–" if unknown.
-
-    All laws have the unit of the largest, for comparison.
-    """
-    leak = row.leak
+def leak_text(leak: Leak) -> str:
+    """Return the energy of the worst loop: "147 µJ"; "0" if proved, "–" if unknown."""
     if leak.energy == 0.0 and leak.method == "theorem":
         return "0"
     if math.isnan(leak.energy):
         return NOT_AVAILABLE
     mark = SAMPLED_MARK if leak.method == "sampled" else ""
-    known = [row.leak for row in comparison.rows if not math.isnan(row.leak.energy)]
-    energies = [one.worst_per_period for one in (leak, *known)]
-    return f"{mark}{format_in_one_unit(energies, 'J', digits=2)[0]}"
+    return f"{mark}{format_quantity(leak.worst_per_period, 'J')}"
 
 
 def strength_has_unit(comparison: Comparison) -> bool:

@@ -16,6 +16,7 @@ from asperity.analysis.results.device_comparisons import DeviceComparisons, Miss
 from asperity.analysis.results.recommendation import LawRow
 from asperity.envelopes.envelope import Envelope
 from asperity.report.sentences import (
+    answer_sentences,
     assumption_sentences,
     comparison_sentences,
     limit_sentences,
@@ -26,7 +27,8 @@ from asperity.surface import Surface
 _TEXTS: dict[tuple[type, str], Callable[[Any], Any]] = {
     (Analysis, "answer"): assumption_sentences.analysis_answer,
     (Analysis, "assumptions"): assumption_sentences.analysis_assumptions,
-    (Comparison, "recommendation"): comparison_sentences.recommendation_text,
+    (Comparison, "recommendation"): answer_sentences.recommendation_text,
+    (Comparison, "reasons"): answer_sentences.recommendation_reasons,
     (Comparison, "assumptions"): assumption_sentences.comparison_assumptions,
     (Continuity, "reason"): passivity_sentences.continuity_reason,
     (DeviceComparisons, "recommendation"): comparison_sentences.device_recommendation,
