@@ -79,7 +79,7 @@ def test_witness_attains_the_lower_bound(law: str, rig: Device) -> None:
 
 
 def test_worst_loop_and_critical_speed_of_law_a(groove: Analysis) -> None:
-    """The energy is k D 2A and v* = W/(σ₀ length)."""
+    """The energy is k D 2A; v* is the greatest W/length over σ₀."""
     energy = 2 * K * DEPTH * AMPLITUDE
     assert groove.leak.energy == pytest.approx(energy, rel=1e-3)
     assert groove.leak.energy <= energy <= groove.leak.upper_per_period
@@ -88,7 +88,8 @@ def test_worst_loop_and_critical_speed_of_law_a(groove: Analysis) -> None:
     )
     corners = np.vstack([groove.leak.vertices, groove.leak.vertices[:1]])
     length = np.linalg.norm(np.diff(corners, axis=0), axis=1).sum()
-    assert groove.v_star == pytest.approx(groove.leak.energy / (2.0 * length), rel=1e-12)
+    assert groove.v_star == groove.leak.absorbing.found / 2.0
+    assert groove.leak.absorbing.found > 1.2 * groove.leak.energy / length
     assert not groove.conservative
     assert groove.passivity.verdict == "not passive"
     assert "is not passive: a loop gains" in groove.answer

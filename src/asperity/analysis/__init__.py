@@ -1,9 +1,10 @@
 """Analysis: frozen results from a surface and a device."""
 
 from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.energy.closed_loops import Leak
 from asperity.analysis.energy.continuity import Continuity, Jump
 from asperity.analysis.energy.field_energy import loop_work
-from asperity.analysis.energy.leak import Leak, worst_loop
+from asperity.analysis.energy.leak import worst_loop
 from asperity.analysis.gain.characteristic import (
     characteristic_number,
     curl_number,

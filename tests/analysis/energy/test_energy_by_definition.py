@@ -207,14 +207,14 @@ def test_scan_line_in_a_direction_spans_the_domain() -> None:
 def test_worst_loop_is_the_worst_of_all_scan_lines() -> None:
     """The description contains the depth and the number of lines."""
     surface = Surface(LUMPS, "A", K, 2e-5)
-    loop = worst_loop(surface)
+    loop = worst_loop(surface, (1.0, 0.0))
     line = LUMPS.scan_line()
     sides = [
         max(columns.sample_curl_integrals(surface, one))
         for one in leak.parallel_scan_lines(surface, line)
     ]
     assert loop.energy == pytest.approx(max(sides), rel=0.02)
-    assert loop.description.endswith("depth to 0.02 mm, the worst of 33 lines")
+    assert loop.description.endswith("depth to 0.02 mm, the worst of 33 lines in one direction")
     assert loop_work(surface, loop.vertices) == pytest.approx(loop.energy, rel=1e-12)
     assert loop.per_length == loop.energy / loop.line.length
 

@@ -15,7 +15,14 @@ from hypothesis import strategies as st
 
 from asperity.analysis import characteristic_number, loop_work, one_sided_number
 from asperity.analysis.bounds.bound import Bound
-from asperity.analysis.energy.leak import Leak, LoopKind, LoopOrigin, worst_loop
+from asperity.analysis.energy.closed_loops import (
+    AbsorbingFriction,
+    Leak,
+    LoopKind,
+    LoopOrigin,
+    polygon_length,
+)
+from asperity.analysis.energy.leak import worst_loop
 from asperity.analysis.passivity import device_loop
 from asperity.analysis.passivity.criteria import Criterion
 from asperity.analysis.passivity.device_loop import make_device_loop
@@ -50,7 +57,10 @@ def rectangle(surface: Surface) -> Leak:
     energy = loop_work(surface, corners)
     origin = LoopOrigin(LoopKind.CURL_BY_DEPTH)
     vertices = corners if energy > 0.0 else np.ascontiguousarray(corners[::-1])
-    return Leak(abs(energy), math.inf, along, "sampled", origin, vertices, None)
+    absorbing = AbsorbingFriction(
+        abs(energy) / polygon_length(vertices), 1.0, abs(energy), vertices
+    )
+    return Leak(abs(energy), math.inf, along, "sampled", origin, vertices, None, absorbing)
 
 
 def exact_bound(value: float) -> Bound:
@@ -428,7 +438,7 @@ def test_to_dict_is_json_without_infinities() -> None:
 def test_notebook_table_escapes_html() -> None:
     page = assess(Surface(WAVE, "H"), RIG)._repr_html_()
     assert "k q⁺ &lt;= 2σ₀/T" in page
-    assert page.count("<tr") == 9
+    assert page.count("<tr") == 10
 
 
 def test_unknown_criterion_raises_a_key_error() -> None:

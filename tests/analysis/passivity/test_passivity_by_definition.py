@@ -16,6 +16,7 @@ from asperity.analysis.passivity import criteria, device_loop
 from asperity.analysis.passivity import verdict as judgement
 from asperity.analysis.passivity.criteria import (
     DELAY,
+    DRY_FRICTION,
     LEAK,
     ONE_SIDED,
     QUANTIZATION,
@@ -427,6 +428,7 @@ def decide(loop: DeviceLoop, buzz: BuzzBound | None = None, **holds: bool | None
         "steps": (QUANTIZATION,),
         "wall": (WALL_TEST,),
         "leak": (LEAK,),
+        "friction": (DRY_FRICTION,),
     }
     by_name = {
         name: Criterion(
@@ -447,6 +449,7 @@ def test_deciding_criterion_and_ground_of_each_verdict() -> None:
     nonconservative = make_loop(conservative=False)
     assert decide(nonconservative, leak=None)[:2] == ("undecided", LEAK)
     assert decide(nonconservative, leak=False)[:2] == ("not passive", LEAK)
+    assert decide(nonconservative, leak=False, friction=True)[:2] == ("undecided", DRY_FRICTION)
     proved = make_loop(delay=1, damping=Fraction(100))
     buzz = BuzzBound(1.0, 1.0)
     assert decide(proved, main=True, steps=True) == ("passive", DELAY, Ground.PROVED)

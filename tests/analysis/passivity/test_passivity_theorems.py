@@ -15,6 +15,7 @@ from scipy.linalg import expm
 
 from asperity.analysis import characteristic_number, loop_work, one_sided_number
 from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.energy.closed_loops import AbsorbingFriction, polygon_length
 from asperity.analysis.energy.field_energy import split_state
 from asperity.analysis.energy.leak import worst_loop
 from asperity.analysis.passivity.verdict import Passivity, passivity
@@ -359,7 +360,8 @@ def test_counterexample_to_the_paper_s_condition() -> None:
     damping = 2.0 * period * k * q.value
     corners = np.array([[0, 0, 0], [length / 4, 0, 0], [length / 4, 0, height], [0, 0, height]])
     energy = loop_work(surface, corners)
-    leak = replace(worst_loop(surface), energy=energy, vertices=corners)
+    friction = AbsorbingFriction(energy / polygon_length(corners), math.inf, energy, corners)
+    leak = replace(worst_loop(surface), energy=energy, vertices=corners, absorbing=friction)
     rig = parse_device({"damping": damping, "update_rate": 1.0 / period, "delay_samples": 0}, "p")
     result = passivity(surface, rig, q, one_sided_number(surface), leak)
     assert result.criterion("paper (1)").limit == pytest.approx(k, rel=1e-14)

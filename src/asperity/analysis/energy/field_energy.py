@@ -236,6 +236,37 @@ def loop_work(surface: Surface, vertices: ArrayLike, tolerance: float = DEFAULT_
     return float(sum(_segment_work(surface, segment, wave, tolerance) for segment in segments))
 
 
+# Turns after which those of a law with state are taken to be alike.
+_TURNS = 3
+
+
+def steady_work(surface: Surface, vertices: ArrayLike) -> float:
+    """Return the work of the field in a turn around a closed polygon once turns are alike [J].
+
+    For a law with state that is the third turn, with the anchor released before the first one;
+    without state each turn is like the first, :func:`loop_work`.
+
+    Args:
+        surface: the surface.
+        vertices: vertices of the polygon [m], shape (n, 3), n >= 2, closed by an edge.
+
+    Raises:
+        ParameterError: as :func:`loop_work`.
+
+    Example:
+        >>> from asperity.textures.kinds.sinusoid import Sinusoid
+        >>> surface = Surface(Sinusoid(amplitude=0.1e-3, period=1e-3), "F")
+        >>> path = [[0, 0, -1e-4], [5e-3, 0, -1e-4]]  # the anchor slides at each end
+        >>> loop_work(surface, path) > steady_work(surface, path)
+        True
+    """
+    corners = check_array("vertices", vertices, (None, 3), "m")
+    if not surface.law.stateful:
+        return loop_work(surface, corners)
+    before, after = (loop_work(surface, np.tile(corners, (n, 1))) for n in (_TURNS - 1, _TURNS))
+    return after - before
+
+
 def _field_work(
     surface: Surface, starts: FloatArray, ends: FloatArray, wave: float, tolerance: float
 ) -> float:

@@ -4,165 +4,43 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
-from enum import Enum, auto
+from dataclasses import replace
 
 import numpy as np
 
-from asperity.analysis.bounds.bound import scale_upper_bound
 from asperity.analysis.bounds.branch_and_bound import DIFFERENCE_AMPLIFICATION, ROUNDING_ERROR
 from asperity.analysis.energy import curl_columns
+from asperity.analysis.energy.absorbing_friction import (
+    LOOP_TOLERANCE,
+    NEAREST_TOLERANCE,
+    find_absorbing_friction,
+    region_floor,
+)
+from asperity.analysis.energy.closed_loops import AbsorbingFriction, Leak, LoopKind, LoopOrigin
 from asperity.analysis.energy.field_energy import (
     TooSteepError,
     initial_panels,
     integrate,
     loop_work,
+    steady_work,
 )
-from asperity.analysis.energy.straight_scan import parallel_scan_lines, scan_height, scan_line_along
+from asperity.analysis.energy.straight_scan import (
+    lines_across,
+    parallel_scan_lines,
+    scan_height,
+    scan_line_along,
+)
 from asperity.analysis.gain.surface_cache import cached_result, stiffness_factor
-from asperity.core.checks import FloatArray, check_positive
-from asperity.core.display import Text
+from asperity.analysis.gain.theorems import residual_bound
+from asperity.core.checks import FloatArray
 from asperity.core.errors import InternalError
-from asperity.core.files import OMITTED, Serializable, written
 from asperity.surface import Surface
 from asperity.textures.texture import ScanLine
 
-# Relative error of the work of an edge.
-_TOLERANCE = 1e-12
-# The same where each force requires a closest-point search.
-_NEAREST_TOLERANCE = 1e-4
-# Grid of the region: columns along the line and levels of depth, for profiles and for maps, and
-# bisections to the distance max_depth from the surface.
+# Grid of the region: columns along the line and levels of depth, for profiles and for maps.
 _GRID = {True: (512, 96), False: (160, 24)}
-_DEPTH_BISECTIONS = 16
 # Equal steps, accurate for a periodic mean.
 _THRUST_STEPS = 512
-
-
-class LoopKind(Enum):
-    """What the worst loop is."""
-
-    EVERY_LOOP = auto()
-    """Every closed loop: a conservative law."""
-    NO_GAIN = auto()
-    """No evaluated loop gains energy."""
-    CURL_BY_DEPTH = auto()
-    """Around the region of one sign of the curl, down to a depth."""
-    CURL_BY_DISTANCE = auto()
-    """Around the region of one sign of the curl within a distance of the surface."""
-    FRICTION_PATH = auto()
-    """The paper's path of (27): along in light contact, back at depth."""
-    IN_PLANE = auto()
-    """In the plane at a depth, about an anchor that sticks."""
-    TOO_STEEP = auto()
-    """Unknown: the surface is too steep to integrate around a loop."""
-
-
-@dataclass(frozen=True)
-class LoopOrigin:
-    """How the worst loop was found.
-
-    Attributes:
-        kind: what it is.
-        depth: depth or distance that bounds it [m].
-        starts: number of starting points of which it is the worst.
-        deflection: distance along in light contact [m].
-        lines: number of lines of which it is the worst.
-    """
-
-    kind: LoopKind
-    depth: float = 0.0
-    starts: int = 1
-    deflection: float = 0.0
-    lines: int = 1
-
-
-@dataclass(frozen=True)
-class Leak(Serializable):
-    """The worst simple loop, traversed once, in a vertical plane along a scan line.
-
-    Its energy is the larger of ∬curl⁺ and ∬curl⁻ over the length of the line and the depth range,
-    curl = ∂f_t/∂z - ∂f_z/∂t, t along the line. For a law with state loops in a plane of constant
-    depth are evaluated too.
-
-    Attributes:
-        energy: work of the field on the probe around ``vertices`` [J]; 0 for a conservative law.
-        upper_per_period: proved bound for every simple loop in that plane [J] within one period of
-            the line, or within its length where it does not repeat; a loop around n periods may
-            gain n times as much. Infinite without proof.
-        line: the scan line of the plane.
-        method: ``"theorem"`` (zero by proof), ``"certified"`` or ``"sampled"``.
-        origin: how the loop was found.
-        vertices: the loop as a closed polygon (n, 3) [m], empty if no loop gains energy;
-            ``loop_work(surface, vertices)`` is ``energy``.
-        thrust: mean tangential force on a straight scan along the line at the scan height [N],
-            > 0 along it; ``None`` for a law with state, whose friction opposes the motion, and for
-            a conservative law on a line that does not repeat.
-    """
-
-    energy: float
-    upper_per_period: float
-    line: ScanLine
-    method: str
-    origin: LoopOrigin = field(metadata=OMITTED)
-    vertices: FloatArray
-    thrust: float | None
-    description = Text[str]("The loop in words.")
-    energy_text = Text[str](
-        "The energy that it gains, per period or line length if that is proved.", is_written=False
-    )
-
-    def __repr__(self) -> str:
-        upper = f"at most {self.upper_per_period:.4g} J per period"
-        return f"<Leak: {self.energy:.4g} J per traversal, {upper}, {self.method}>"
-
-    @property
-    def worst_per_period(self) -> float:
-        """``upper_per_period`` where one is proved, else ``energy`` [J]."""
-        if math.isinf(self.upper_per_period):
-            return self.energy
-        return self.upper_per_period
-
-    @property
-    @written
-    def length(self) -> float:
-        """Length of the loop [m]."""
-        edges = self.vertices - np.roll(self.vertices, 1, axis=0)
-        return float(np.linalg.norm(edges, axis=1).sum())
-
-    @property
-    @written
-    def per_length(self) -> float:
-        """Energy over the length of the line [J/m]: a mean thrust [N]."""
-        return self.energy / self.line.length
-
-    def scale(self, factor: float) -> Leak:
-        """Return the same loop in a field scaled by a factor; a bound is rounded up."""
-        if factor == 1.0:
-            return self
-        thrust = self.thrust
-        if thrust is not None:
-            thrust *= factor
-        return replace(
-            self,
-            energy=self.energy * factor,
-            upper_per_period=scale_upper_bound(self.upper_per_period, factor),
-            thrust=thrust,
-        )
-
-    def critical_speed(self, damping: float) -> float:
-        """Return v* = W/(σ₀ · length), the speed below which damping does not absorb the loop.
-
-        Args:
-            damping: σ₀(B), the least damping of the device [N s/m].
-
-        Raises:
-            ParameterError: for a damping that is not positive.
-        """
-        sigma = check_positive("damping", damping, "N s/m")
-        if self.energy <= 0.0:
-            return 0.0
-        return self.energy / (sigma * self.length)
 
 
 def worst_loop(surface: Surface, direction: tuple[float, float] | None = None) -> Leak:
@@ -170,12 +48,13 @@ def worst_loop(surface: Surface, direction: tuple[float, float] | None = None) -
 
     For a law on the nominal or the vertical contact the depth is measured from its own boundary
     and the energy is certified; for the nearest contact the region is where the distance to the
-    surface is at most max_depth. On maps the worst of several parallel lines is taken. For a law
-    with state, whose force is no field of position, loops are traced from many starting points.
+    surface is at most max_depth. On maps the worst of lines in many directions is taken; on a
+    profile no plane is worse than that across its grooves. For a law with state, whose force is no
+    field of position, loops are traced from many starting points.
 
     Args:
         surface: the surface.
-        direction: direction (x, y) of the vertical plane; that of the scan line by default.
+        direction: direction (x, y) of the vertical planes; by default all are searched.
 
     Raises:
         ParameterError: for a direction without length.
@@ -191,12 +70,17 @@ def worst_loop(surface: Surface, direction: tuple[float, float] | None = None) -
         (1.28, 1.28)
     """
     line = surface.texture.scan_line() if direction is None else scan_line_along(surface, direction)
-    key = repr((line.start.tolist(), line.direction.tolist(), line.length, line.periodic))
-    leak = cached_result("worst loop", surface, lambda unit: _find_worst_loop(unit, line), key)
+    key = (line.start.tolist(), line.direction.tolist(), line.length, line.periodic)
+    leak = cached_result(
+        "worst loop",
+        surface,
+        lambda unit: _find_worst_loop(unit, line, in_all_directions=direction is None),
+        repr((key, direction is None)),
+    )
     return leak.scale(stiffness_factor(surface))
 
 
-def _find_worst_loop(surface: Surface, line: ScanLine) -> Leak:
+def _find_worst_loop(surface: Surface, line: ScanLine, *, in_all_directions: bool) -> Leak:
     if surface.law.stateful:
         return _stateful_leak(surface, line)
     if surface.facts.conservative:
@@ -204,9 +88,18 @@ def _find_worst_loop(surface: Surface, line: ScanLine) -> Leak:
         origin = LoopOrigin(LoopKind.EVERY_LOOP)
         return Leak(0.0, 0.0, line, "theorem", origin, np.zeros((0, 3)), thrust)
     lines = parallel_scan_lines(surface, line)
-    if surface.law.contact.is_above_probe:
-        return _column_leak(surface, lines)
-    return _nearest_leak(surface, lines)
+    directions = 1
+    if in_all_directions:
+        others, more = lines_across(surface)
+        lines += others
+        directions += more
+    search = _column_leak if surface.law.contact.is_above_probe else _nearest_leak
+    leak = search(surface, lines)
+    return replace(
+        leak,
+        origin=replace(leak.origin, lines=len(lines), directions=directions),
+        absorbing=find_absorbing_friction(surface, line, leak.vertices),
+    )
 
 
 def _column_leak(surface: Surface, lines: list[ScanLine]) -> Leak:
@@ -224,7 +117,7 @@ def _column_leak(surface: Surface, lines: list[ScanLine]) -> Leak:
         upper = max(high for _low, high in bounds)
     if energy > upper:
         _check_against_bound(surface, line, vertices, energy)
-    origin = LoopOrigin(LoopKind.CURL_BY_DEPTH, surface.clamped_depth, lines=len(lines))
+    origin = LoopOrigin(LoopKind.CURL_BY_DEPTH, surface.clamped_depth)
     thrust = _mean_thrust(surface, line)
     return Leak(energy, max(upper, energy), line, method, origin, vertices, thrust)
 
@@ -250,7 +143,7 @@ def _check_against_bound(
     edges = np.linalg.norm(np.diff(vertices, axis=0, append=vertices[:1]), axis=1)
     force = float(np.linalg.norm(surface.force(vertices), axis=1).max())
     height = 1.0 + max(map(abs, surface.texture.extremes)) / surface.max_depth
-    error = len(edges) * _TOLERANCE + ROUNDING_ERROR * DIFFERENCE_AMPLIFICATION * height
+    error = len(edges) * LOOP_TOLERANCE + ROUNDING_ERROR * DIFFERENCE_AMPLIFICATION * height
     if energy > proved + error * force * float(edges.sum()):
         raise InternalError(
             f"the leak of {surface!r} along {line.direction} from {line.start} m is proved to be "
@@ -260,7 +153,7 @@ def _check_against_bound(
 
 
 def orient_loop(
-    surface: Surface, vertices: FloatArray, tolerance: float = _TOLERANCE
+    surface: Surface, vertices: FloatArray, tolerance: float = LOOP_TOLERANCE
 ) -> tuple[FloatArray, float]:
     """Return a polygon in the orientation in which it gains energy, and its work [J]."""
     if len(vertices) < 2:
@@ -275,8 +168,8 @@ def _nearest_leak(surface: Surface, lines: list[ScanLine]) -> Leak:
     """Return the loop around the curl of one sign within the distance max_depth of the surface."""
     outlines = [outline for line in lines for outline in _nearest_outlines(surface, line)]
     _estimate, polygon, line = max(outlines, key=lambda outline: outline[0])
-    vertices, energy = orient_loop(surface, polygon, _NEAREST_TOLERANCE)
-    origin = LoopOrigin(LoopKind.CURL_BY_DISTANCE, surface.max_depth, lines=len(lines))
+    vertices, energy = orient_loop(surface, polygon, NEAREST_TOLERANCE)
+    origin = LoopOrigin(LoopKind.CURL_BY_DISTANCE, surface.max_depth)
     thrust = _mean_thrust(surface, line)
     return Leak(energy, math.inf, line, "sampled", origin, vertices, thrust)
 
@@ -296,7 +189,7 @@ def _nearest_outlines(
     along = np.linspace(0.0, line.length, columns + 1)
     xy = np.ascontiguousarray(line.start + along[:, None] * line.direction)
     tops = surface.texture.height(xy)
-    reach = _region_depth(surface, xy, tops)
+    reach = tops - region_floor(surface, xy)
     parts: FloatArray = np.linspace(0.0, 1.0, levels + 1)
     # At the surface the curl is evaluated just below it.
     inside = np.maximum(parts, 0.5 / levels)
@@ -310,21 +203,6 @@ def _nearest_outlines(
         low = tops - bottom * reach
         high = tops - top * reach
         yield estimate, curl_columns.column_polygon(xy, high, low, periodic=line.periodic), line
-
-
-def _region_depth(surface: Surface, xy: FloatArray, heights: FloatArray) -> FloatArray:
-    """Return the vertical distance [m] below the surface at which the distance is max_depth."""
-    # max_depth below the lowest point, the distance is at least max_depth.
-    low = np.full(len(heights), 0.0)
-    high = heights - surface.texture.extremes[0] + surface.max_depth
-    for _ in range(_DEPTH_BISECTIONS):
-        middle = 0.5 * (low + high)
-        points = np.column_stack([xy, heights - middle])
-        closest = surface.texture.nearest(points)
-        near = np.linalg.norm(closest - points, axis=1) <= surface.max_depth
-        low = np.where(near, middle, low)
-        high = np.where(near, high, middle)
-    return low
 
 
 def _mean_thrust(surface: Surface, line: ScanLine) -> float:
@@ -365,9 +243,16 @@ def _stateful_leak(surface: Surface, line: ScanLine) -> Leak:
     found = [light_then_deep_loop(surface, line), in_plane_loop(surface, line)]
     worst = max(found, key=lambda loop: loop.energy)
     pressing = 0.5 * surface.stiffness * surface.max_depth**2
-    if worst.energy <= _TOLERANCE * pressing:  # error of the quadrature
-        return _sampled_leak(0.0, line, LoopOrigin(LoopKind.NO_GAIN), np.zeros((0, 3)))
-    return worst
+    if worst.energy <= LOOP_TOLERANCE * pressing:  # error of the quadrature
+        none = LoopOrigin(LoopKind.NO_GAIN)
+        return replace(_sampled_leak(0.0, line, none, np.zeros((0, 3))), steady=0.0)
+    densest = max(found, key=lambda loop: loop.energy / loop.length)
+    density = densest.energy / densest.length
+    absorbing = AbsorbingFriction(density, math.inf, densest.energy, densest.vertices)
+    winding = [both_sides_path(surface, at, line.direction) for at in line.points(_START_POINTS)]
+    path = winding[int(np.argmax([loop_work(surface, path) for path in winding]))]
+    steady = max([steady_work(surface, vertices) for vertices in (worst.vertices, path)])
+    return replace(worst, absorbing=absorbing, steady=steady)
 
 
 def _sampled_leak(energy: float, line: ScanLine, origin: LoopOrigin, vertices: FloatArray) -> Leak:
@@ -386,6 +271,16 @@ def friction_path(surface: Surface, start: FloatArray, along: FloatArray) -> Flo
     return np.array(
         [[*start, above], [*start, -light], [*end, -light], [*end, -depth], [*start, -depth]]
     )
+
+
+def both_sides_path(surface: Surface, start: FloatArray, along: FloatArray) -> FloatArray:
+    """Return a path that winds in contact, vertices (8, 3) [m]: forth, and the same backwards.
+
+    The anchor is loaded in light contact and unloaded at max_depth on one side of the point, then
+    on the other.
+    """
+    sides = [friction_path(surface, start, sign * along)[1:] for sign in (1.0, -1.0)]
+    return np.concatenate(sides)
 
 
 def light_then_deep_loop(surface: Surface, line: ScanLine) -> Leak:
@@ -451,4 +346,5 @@ def find_leak(surface: Surface) -> Leak:
     except TooSteepError:
         origin = LoopOrigin(LoopKind.TOO_STEEP, surface.max_depth)
         line = surface.texture.scan_line()
-        return Leak(math.nan, math.inf, line, "unknown", origin, np.zeros((0, 3)), None)
+        absorbing = AbsorbingFriction(0.0, residual_bound(surface), 0.0, np.zeros((0, 3)), planes=0)
+        return Leak(math.nan, math.inf, line, "unknown", origin, np.zeros((0, 3)), None, absorbing)

@@ -15,6 +15,7 @@ from asperity.analysis.gain.theorems import theorem_on
 from asperity.core.checks import FloatArray, check_array
 from asperity.core.errors import ParameterError
 from asperity.surface import Surface
+from asperity.textures.domain import Domain
 from asperity.textures.texture import ScanLine, Texture
 
 # Parallel lines on a map: for strength and support, and for the leak.
@@ -75,6 +76,45 @@ def parallel_scan_lines(surface: Surface, line: ScanLine) -> list[ScanLine]:
         ScanLine(line.start + shift * across, line.direction, line.length, line.periodic)
         for shift in shifts
     ]
+
+
+# Further lines across a map, by whether the contact searches: directions, and lines in each.
+_DIRECTIONS = {False: 12, True: 4}
+_CHORDS = {False: 12, True: 3}
+
+
+def lines_across(surface: Surface) -> tuple[list[ScanLine], int]:
+    """Return lines across a map in many directions, and the number of directions.
+
+    Each is the part of a straight line within the domain of the texture; none on a profile, where
+    no other plane is worse than that across the grooves.
+    """
+    domain = surface.texture.domain
+    if surface.texture.is_profile:
+        return [], 0
+    costly = surface.law.contact.requires_search
+    lines = []
+    for angle in np.arange(_DIRECTIONS[costly]) * (math.pi / _DIRECTIONS[costly]):
+        direction = np.array([math.cos(angle), math.sin(angle)])
+        across = np.array([-direction[1], direction[0]])
+        reach = domain.spans @ across
+        low = float(np.minimum(reach, 0.0).sum())
+        width = float(np.abs(reach).sum())
+        for part in (np.arange(_CHORDS[costly]) + 0.5) / _CHORDS[costly]:
+            start, length = _clip_to_domain(domain, (low + part * width) * across, direction)
+            lines.append(ScanLine(start, direction, length, periodic=False))
+    return lines, _DIRECTIONS[costly]
+
+
+def _clip_to_domain(
+    domain: Domain, offset: FloatArray, direction: FloatArray
+) -> tuple[FloatArray, float]:
+    """Return start and length [m] of the part of a line in the domain of a map."""
+    place, rate = np.linalg.solve(domain.spans.T, np.stack([offset, direction]).T).T
+    with np.errstate(divide="ignore"):
+        ends = np.stack([-place / rate, (1.0 - place) / rate])
+    first = float(ends.min(axis=0).max())
+    return domain.origin + offset + first * direction, float(ends.max(axis=0).min()) - first
 
 
 _SCAN_POINTS_PER_LINE = 2048

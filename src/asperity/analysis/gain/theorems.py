@@ -9,7 +9,14 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from asperity.analysis.bounds.bound import CURL, NORM, ONE_SIDED, Bound, JacobianMeasure
+from asperity.analysis.bounds.bound import (
+    CURL,
+    NORM,
+    ONE_SIDED,
+    Bound,
+    JacobianMeasure,
+    scale_upper_bound,
+)
 from asperity.analysis.bounds.branch_and_bound import Problem
 from asperity.analysis.gain import medial_axis, proofs
 from asperity.analysis.gain import proofs as forms
@@ -80,6 +87,8 @@ class Theorem:
             only down to max_depth.
         not_raised_by_clamp: by depth clamp, numbers that are nowhere greater where the clamp acts
             than above max_depth.
+        residual: for a law with curl, |r|/(k δ) at most, f = -∇U + r with a potential U of
+            choice, as a function of the angle of the steepest slope; see docs/theory/friction.md.
     """
 
     constants: Mapping[JacobianMeasure, Constant] = field(default_factory=dict)
@@ -95,6 +104,7 @@ class Theorem:
     detects_medial_axis: bool = False
     holds_at_any_depth: Callable[[Surface], bool] = lambda _surface: False
     not_raised_by_clamp: Mapping[Clamp, tuple[JacobianMeasure, ...]] = field(default_factory=dict)
+    residual: Callable[[float], float] | None = None
 
 
 # --- the table ------------------------------------------------------------------------------------
@@ -153,11 +163,13 @@ THEOREMS: dict[Law, Theorem] = {
         },
         norm_bound=_norm_bound_from(lambda slope, _curvature: math.hypot(1.0, slope)),
         not_raised_by_clamp=dict.fromkeys(_ALL_CLAMPS, (NORM, ONE_SIDED, CURL)),
+        residual=math.sin,
     ),
     LAWS["B"]: Theorem(
         closed_forms={NORM: ClosedForm(forms.q_b, forms.phase_b)},
         norm_bound=_norm_bound_from(lambda slope, curvature: math.hypot(1.0, slope) + curvature),
         not_raised_by_clamp={WHOLE: (NORM,)},
+        residual=lambda angle: math.tan(0.5 * angle) ** 2,
     ),
     LAWS["C"]: Theorem(
         closed_forms={
@@ -184,6 +196,7 @@ THEOREMS: dict[Law, Theorem] = {
         },
         gain_above_height=lambda _surface, _height: 1.0,
         holds_beyond_medial_axis=True,
+        residual=math.sin,
     ),
     LAWS["F"]: Theorem(
         reductions={
@@ -203,6 +216,7 @@ THEOREMS: dict[Law, Theorem] = {
         },
         norm_bound=_norm_bound_from(lambda _slope, curvature: max(1.0, curvature)),
         not_raised_by_clamp={WHOLE: (NORM,)},
+        residual=math.sin,
     ),
     LAWS["H"]: Theorem(
         constants={ONE_SIDED: Constant(1.0, _SPLIT_REASON)},
@@ -257,3 +271,17 @@ def derivative_bound(surface: Surface, measure: JacobianMeasure) -> float:
     if measure is CURL:
         return 2.0 * norm_bound(surface)
     return norm_bound(surface)
+
+
+def residual_bound(surface: Surface) -> float:
+    """Return a proved bound of |r| [N], f = -∇U + r; infinite where none is proved.
+
+    Dry friction of that size absorbs what the field gains on every closed path. It also holds below
+    max_depth for a clamp that holds the whole force there.
+    """
+    clamp = surface.effective_clamp
+    residual = theorem_on(surface).residual
+    if residual is None or (clamp.changes_force and not clamp.holds_whole_force):
+        return math.inf
+    angle = math.atan(surface.texture.bounds[0])
+    return scale_upper_bound(residual(angle) * (1.0 + 1e-12), surface.stiffness * surface.max_depth)

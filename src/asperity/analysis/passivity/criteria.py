@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
+from asperity.analysis.gain.theorems import residual_bound
 from asperity.analysis.passivity.device_loop import (
     HALF,
     DeviceLoop,
@@ -33,6 +34,7 @@ QUANTIZATION = "steps and friction"
 WALL = "smooth-wall rule"
 WALL_TEST = "wall test"
 LEAK = "leak"
+DRY_FRICTION = "dry friction"
 
 
 @dataclass(frozen=True)
@@ -277,6 +279,34 @@ def _leak_criterion(loop: DeviceLoop) -> Criterion:
     return replace(result, holds=False, limit=0.0, margin=0.0, missing=missing)
 
 
+def dry_friction_criterion(loop: DeviceLoop) -> Criterion:
+    """Dry friction that absorbs what a field gains on closed paths, at every speed.
+
+    It holds where the friction is at least the proved bound of W/length, and does not where a path
+    exceeds it.
+    """
+    result = Criterion(DRY_FRICTION, "W <= f_c length for every loop")
+    if loop.conservative:
+        return replace(result, holds=True, limit=math.inf, margin=math.inf)
+    fields = ("least_friction",)
+    missing = () if loop.device.value("least_friction") is not None else fields
+    result = replace(result, used_fields=fields, missing=missing)
+    if missing or loop.leak is None:
+        return result
+    bound = residual_bound(loop.surface)
+    proved: Number = Fraction(0)
+    if math.isfinite(bound):
+        proved = _max_stiffness(loop.friction, Fraction(bound) / loop.stiffness)
+        margin = round_down_exactly(proved / loop.stiffness)
+        result = replace(result, limit=round_down_exactly(proved), margin=margin)
+    found = Fraction(loop.leak.absorbing.found) / loop.stiffness
+    possible = _max_stiffness(loop.friction, found)
+    result = replace(result, upper_limit=round_down_exactly(possible))
+    if loop.stiffness <= proved:
+        return replace(result, holds=True)
+    return replace(result, holds=False if loop.stiffness > possible else None)
+
+
 # --- all of them ----------------------------------------------------------------------------------
 
 CriterionFunction = Callable[[DeviceLoop], Criterion | StiffnessRule]
@@ -289,6 +319,7 @@ CRITERIA: dict[str, CriterionFunction] = {
     WALL: _wall_rule,
     WALL_TEST: _wall_test_rule,
     LEAK: _leak_criterion,
+    DRY_FRICTION: dry_friction_criterion,
 }
 """The criteria by name, in the order of the tables: a criterion, or a rule, of a loop."""
 

@@ -9,8 +9,8 @@ from enum import Enum, auto
 from fractions import Fraction
 
 from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.energy.closed_loops import Leak
 from asperity.analysis.energy.continuity import Continuity, continuity
-from asperity.analysis.energy.leak import Leak
 from asperity.analysis.gain.theorems import theorem_on
 from asperity.core.checks import check_positive, check_real
 from asperity.core.errors import ParameterError
@@ -290,7 +290,7 @@ def has_known_leak(loop: DeviceLoop) -> bool:
 
 
 def critical_speed(loop: DeviceLoop) -> float | None:
-    """Return v* = W/(σ₀ length) [m/s], 0 for a conservative law, ``None`` if unknown."""
+    """Return v* = f_c*/σ₀ [m/s], 0 for a conservative law, ``None`` if unknown."""
     if loop.conservative:
         return 0.0
     if loop.damping is None or loop.leak is None or not has_known_leak(loop):

@@ -10,7 +10,7 @@ from fractions import Fraction
 from typing import Literal
 
 from asperity.analysis.bounds.bound import Bound
-from asperity.analysis.energy.leak import Leak
+from asperity.analysis.energy.closed_loops import Leak
 from asperity.analysis.passivity import criteria, device_loop
 from asperity.analysis.passivity.criteria import Criterion, evaluate_criteria, main_rule
 from asperity.analysis.passivity.device_loop import (
@@ -61,13 +61,12 @@ def decide_verdict(
 ) -> tuple[Verdict, str, Ground]:
     """Return the verdict, the name of the deciding criterion, and the ground.
 
-    For a law that is not conservative the leak decides, never a norm.
+    For a law that is not conservative the leak decides, never a norm; dry friction that absorbs the
+    leak ends the gain of slow motions, and proves nothing about fast ones.
     """
     main = main_rule(loop)
     if not loop.conservative:
-        if by_name[criteria.LEAK].holds is None:
-            return "undecided", criteria.LEAK, Ground.CRITERION
-        return "not passive", criteria.LEAK, Ground.CRITERION
+        return _assess_leak(by_name)
     if device_loop.is_contradictory(loop):
         return "undecided", main, Ground.CONTRADICTION
     if loop.delay is not None and by_name[main].holds:
@@ -77,6 +76,15 @@ def decide_verdict(
         deciding = criteria.WALL_TEST if ground is Ground.WALL_CYCLED else main
         return "not passive", deciding, ground
     return _assess_wall_test(loop, by_name, main)
+
+
+def _assess_leak(by_name: Mapping[str, Criterion]) -> tuple[Verdict, str, Ground]:
+    """Return the verdict on a law with curl."""
+    if by_name[criteria.DRY_FRICTION].holds:
+        return "undecided", criteria.DRY_FRICTION, Ground.CRITERION
+    if by_name[criteria.LEAK].holds is None:
+        return "undecided", criteria.LEAK, Ground.CRITERION
+    return "not passive", criteria.LEAK, Ground.CRITERION
 
 
 def _assess_quantization(
@@ -176,7 +184,7 @@ class Passivity(Serializable, Displayable):
     @property
     @written
     def critical_speed(self) -> float | None:
-        """v* [m/s], the speed on the worst loop below which damping does not absorb its energy.
+        """v* = f_c*/σ₀ [m/s], the speed below which damping does not absorb every loop's energy.
 
         0 for a conservative law, ``None`` if unknown.
         """
@@ -224,7 +232,8 @@ def passivity(
     * smooth-wall rule: k q <= K₀, as printed in the paper's III.B: a rule of thumb;
     * wall test: k (q⁺/2 + d q) <= K₀ (1/2 + d), k q <= K₀ for any delay, for a conservative law:
       plausible, not proved;
-    * leak: no loop of the field gains energy.
+    * leak: no loop of the field gains energy;
+    * dry friction: f_c takes as much on every loop as the field gains, whatever the speed.
 
     Missing data of the device are never guessed: an unknown delay, damping or rate decides
     nothing. Virtual damping, quantisation and dry friction that are not given count as none.

@@ -12,8 +12,9 @@ import numpy as np
 
 from asperity.analysis.bounds.bound import NORM, ONE_SIDED, Bound, scale_upper_bound
 from asperity.analysis.bounds.branch_and_bound import DEFAULT_WORK_LIMIT
+from asperity.analysis.energy.closed_loops import Leak
 from asperity.analysis.energy.continuity import Continuity, continuity
-from asperity.analysis.energy.leak import Leak, worst_loop
+from asperity.analysis.energy.leak import worst_loop
 from asperity.analysis.energy.straight_scan import Merit, merit
 from asperity.analysis.gain.characteristic import cached_number, curl_number, make_options
 from asperity.analysis.passivity.recommended_stiffness import recommend_stiffness
@@ -84,7 +85,7 @@ class Analysis(Plottable, Reportable):
 
     @property
     def v_star(self) -> float | None:
-        """v* [m/s], the speed below which damping does not absorb the worst loop.
+        """v* = f_c*/σ₀ [m/s], the speed below which damping does not absorb every loop.
 
         0 for a conservative law; ``None`` where the device's damping is not known.
         """
@@ -139,7 +140,8 @@ def analyze(
     """Analyze one law on one surface and one device.
 
     q = sup ‖J‖₂/k, q⁺ = sup λ_max(-sym J)/k and sup |curl f|/k between proved bounds, each with
-    the point that attains it; the worst simple loop and v* = W/(σ₀ · length); the jumps of the
+    the point that attains it; the worst simple loop, and v* = f_c*/σ₀ with the
+    greatest energy per length f_c*; the jumps of the
     force; every criterion of passivity, and the deciding one.
 
     Args:

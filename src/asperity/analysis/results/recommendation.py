@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.energy.closed_loops import Leak
 from asperity.analysis.energy.continuity import Continuity
-from asperity.analysis.energy.leak import Leak
 from asperity.analysis.limits.perceptibility import Perceptibility, Tier
 from asperity.analysis.passivity.recommended_stiffness import Margin, StabilityLimit
 from asperity.analysis.passivity.verdict import Passivity

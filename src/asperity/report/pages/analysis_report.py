@@ -22,7 +22,10 @@ from asperity.report.sentences.analysis_text import (
     critical_speed_text,
     thrust_text,
 )
-from asperity.report.sentences.passivity_sentences import stability_limit_text
+from asperity.report.sentences.passivity_sentences import (
+    absorbing_friction_text,
+    stability_limit_text,
+)
 from asperity.report.sentences.surface_text import texture_name
 from asperity.report.sentences.texts import glossary, sentence
 from asperity.surface import Surface
@@ -61,6 +64,14 @@ def leak_facts(analysis: Analysis) -> list[tuple[str, str]]:
         mean = format_quantity(leak.per_length, "N")
         facts.append(("polygon", path))
         facts.append(("per length", f"{mean}: energy over the length of the line"))
+    if leak.steady is not None:
+        steady = format_quantity(leak.steady, "J")
+        facts.append(("steady", f"{steady} a turn, once turns are alike, on the worst path found"))
+    if not analysis.conservative:
+        friction = leak.absorbing
+        facts.append(("f_c*", f"{absorbing_friction_text(friction)} at every speed"))
+        loop = f"{format_quantity(friction.energy, 'J')} on {format_quantity(friction.length, 'm')}"
+        facts.append(("greatest W/length", loop))
     facts += [("v*", critical_speed_text(analysis)), ("thrust", thrust_text(analysis))]
     if density is not None and density.upper > 0.0:
         area = number_text.range_text(density.lower, density.upper, "J/m²")

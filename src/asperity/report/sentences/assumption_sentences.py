@@ -281,7 +281,11 @@ def analysis_assumptions(analysis: Analysis) -> tuple[str, ...]:
             f"compared down to depths of {lowest}"
         )
     x, y = analysis.leak.line.direction.tolist()
-    sentences.append(f"Loops in the vertical plane along ({x:g}, {y:g}) are compared")
+    plane = f"Loops in the vertical plane along ({x:g}, {y:g}) are compared"
+    directions = analysis.leak.origin.directions
+    if directions > 1:
+        plane = f"Loops in vertical planes of {directions} directions are compared"
+    sentences.append(plane)
     if any(math.isinf(bound.upper - bound.lower) for bound in analysis.bounds):
         sentences.append("A number without an upper bound is the greatest one found, not a proof")
     if not analysis.continuity.continuous:

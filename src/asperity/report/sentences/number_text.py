@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 
 from asperity.analysis.bounds.bound import Bound
-from asperity.analysis.energy.leak import Leak
+from asperity.analysis.energy.closed_loops import Leak
 from asperity.analysis.results.compare import Comparison
 from asperity.core.units import format_quantity, round_down
 

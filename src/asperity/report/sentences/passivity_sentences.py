@@ -6,8 +6,8 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
+from asperity.analysis.energy.closed_loops import AbsorbingFriction, Leak, LoopKind
 from asperity.analysis.energy.continuity import Continuity, ContinuityCause
-from asperity.analysis.energy.leak import Leak, LoopKind
 from asperity.analysis.passivity import criteria
 from asperity.analysis.passivity.criteria import Criterion
 from asperity.analysis.passivity.device_loop import (
@@ -72,19 +72,38 @@ def buzz_text(buzz: BuzzBound) -> str:
 def delivery_text(loop: DeviceLoop) -> str:
     """Return below which speed the field of a law with curl delivers energy, and at which power.
 
-    On its worst loop the field does the work W over the length ℓ, a mean force W/ℓ; at the speed v
-    damping absorbs σ₀ v of it. So it delivers energy below v* = W/(σ₀ ℓ), at most σ₀ v*²/4 at v*/2.
+    On a loop the field does the work W over the length ℓ, a mean force W/ℓ of at most f_c*; at the
+    speed v damping absorbs σ₀ v of it. So it delivers energy below v* = f_c*/σ₀, at most σ₀ v*²/4
+    at v*/2.
     """
+    if criteria.dry_friction_criterion(loop).holds:
+        return "delivers no energy on slow loops: the device's dry friction absorbs it"
     speed = critical_speed(loop)
     if loop.leak is None or (speed is None and not has_known_leak(loop)):
         return "may deliver energy at any stiffness: the law has curl"
     if speed is None or loop.damping is None:
-        mean = format_quantity(loop.leak.energy / loop.leak.length, "N")
+        mean = format_quantity(loop.leak.absorbing.found, "N")
         return f"delivers energy below v* = {mean} / damping (missing)"
     if math.isinf(speed):
         return "delivers energy at any speed: the device has no damping"
     power = format_quantity(float(loop.damping) * speed**2 / 4.0, "W")
     return f"delivers energy below v* = {format_quantity(speed, 'm/s')}, at most {power}"
+
+
+def absorbing_friction_text(friction: AbsorbingFriction) -> str:
+    """Return the dry friction of a device that ends the gain of a law with curl at every speed.
+
+    Example:
+        >>> import numpy as np
+        >>> absorbing_friction_text(AbsorbingFriction(0.29, 0.74, 9e-4, np.zeros((0, 3))))
+        'at least 0.29 N, greatest W/length of 1 plane; 0.74 N proved to be enough'
+    """
+    planes = "1 plane" if friction.planes == 1 else f"{friction.planes} planes"
+    least = format_quantity(round_down(friction.found), "N")
+    found = f"at least {least}, greatest W/length of {planes}"
+    if math.isinf(friction.upper):
+        return f"{found}; no friction is proved to be enough"
+    return f"{found}; {format_quantity(round_up(friction.upper), 'N')} proved to be enough"
 
 
 def energy_gained_text(loop: DeviceLoop) -> str:
@@ -177,6 +196,8 @@ def _conclusion(loop: DeviceLoop, criterion: Criterion) -> str:
     """Return the conclusion of a criterion in words."""
     if criterion.name == criteria.LEAK:
         return _leak_conclusion(loop, criterion)
+    if criterion.name == criteria.DRY_FRICTION:
+        return _dry_friction_conclusion(loop, criterion)
     if criterion.obstacle is Obstacle.CURL:
         return f"not applicable: the law is not conservative ({loop.surface.facts.reason})"
     if criterion.obstacle is Obstacle.JUMPS and loop.continuity is not None:
@@ -220,11 +241,21 @@ def _leak_conclusion(loop: DeviceLoop, criterion: Criterion) -> str:
     return f"does not hold: {energy_gained_text(loop)}"
 
 
+def _dry_friction_conclusion(loop: DeviceLoop, criterion: Criterion) -> str:
+    if loop.conservative:
+        return "holds: no loop gains, none is needed"
+    needs = "the leak is not known"
+    if loop.leak is not None:
+        needs = f"f_c* is {absorbing_friction_text(loop.leak.absorbing)}"
+    lacks = f": needs {', '.join(criterion.missing)}" if criterion.missing else ""
+    return f"{_HOLDS_TEXT[criterion.holds]}{lacks}{_limit_clause(criterion)}; {needs}"
+
+
 def _criterion_assumptions(loop: DeviceLoop, criterion: Criterion) -> str:
     """Return the assumptions with the region and the numbers used, unverified ones marked."""
     describe = _ASSUMPTIONS.get(criterion.name)
     assumptions = criterion.assumptions if describe is None else describe(loop)
-    if criterion.name == criteria.LEAK and criterion.holds:
+    if criterion.name in (criteria.LEAK, criteria.DRY_FRICTION) and loop.conservative:
         return assumptions
     data = loop.device.data
     numbers = []
@@ -310,7 +341,13 @@ def _leak_assumptions(loop: DeviceLoop) -> str:
     if loop.conservative:
         return "the law's curl is identically zero; no data of the device are needed"
     method = "" if loop.leak is None else f" ({loop.leak.method})"
-    return f"one slow traversal of the loop{method}; dry friction is not counted"
+    return f"one slow traversal of the loop{method}; dry friction counts apart"
+
+
+def _dry_friction_assumptions(loop: DeviceLoop) -> str:
+    if loop.conservative:
+        return "the law's curl is identically zero; no data of the device are needed"
+    return "f_c: least_friction, taken per length of path at every speed; slow motion, no hold"
 
 
 _ASSUMPTIONS: dict[str, Callable[[DeviceLoop], str]] = {
@@ -329,6 +366,7 @@ _ASSUMPTIONS: dict[str, Callable[[DeviceLoop], str]] = {
     ),
     criteria.WALL_TEST: _wall_test_assumptions,
     criteria.LEAK: _leak_assumptions,
+    criteria.DRY_FRICTION: _dry_friction_assumptions,
 }
 """The assumptions of the shipped criteria; a user-defined one has its own."""
 
@@ -390,8 +428,10 @@ def loop_description(leak: Leak) -> str:
     text = _LOOPS[origin.kind].format(
         depth=1e3 * origin.depth, starts=origin.starts, deflection=1e3 * origin.deflection
     )
+    if origin.directions > 1:
+        return f"{text}, the worst of {origin.lines} lines in {origin.directions} directions"
     if origin.lines > 1:
-        return f"{text}, the worst of {origin.lines} lines"
+        return f"{text}, the worst of {origin.lines} lines in one direction"
     return text
 
 

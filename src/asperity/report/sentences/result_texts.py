@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from asperity.analysis.energy.closed_loops import Leak
 from asperity.analysis.energy.continuity import Continuity
-from asperity.analysis.energy.leak import Leak
 from asperity.analysis.limits.spectrum import Spectrum
 from asperity.analysis.passivity.verdict import Passivity
 from asperity.analysis.results.analyze import Analysis

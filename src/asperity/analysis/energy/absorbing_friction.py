@@ -1,0 +1,276 @@
+"""The search for the closed path of greatest energy per length, f_c* = sup W/length.
+
+A path in a vertical plane is a polygon of points (t, u): distance along the plane, and height above
+the floor of the working region, so that u >= 0 keeps it inside. Ellipses of many sizes in many
+places are compared; the best of them are improved by a quasi-Newton method with the exact gradient
+of the discrete W/length. The work of what is returned is integrated adaptively: a search maximizes
+the error of its own quadrature too.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from asperity.analysis.energy.closed_loops import AbsorbingFriction, polygon_length
+from asperity.analysis.energy.field_energy import loop_work
+from asperity.analysis.gain.theorems import residual_bound
+from asperity.core.checks import FloatArray
+from asperity.surface import Surface
+from asperity.textures.texture import ScanLine
+
+LOOP_TOLERANCE = 1e-12
+"""Relative error of the work of an edge."""
+NEAREST_TOLERANCE = 1e-4
+"""The same where each force requires a closest-point search."""
+# Ellipses that are compared and how many of the best are improved: on profiles and where each force
+# requires a closest-point search, and on other maps.
+_ELLIPSES = {True: (2048, 4), False: (8192, 8)}
+_ELLIPSE_POINTS = 32
+# Points of a path that are free, those of the polygon for each of them, and quasi-Newton steps.
+_FREE_POINTS = 48
+_REFINEMENT = 4
+_STEPS = 400
+_MEMORY = 10
+_HALVINGS = 6
+_FIRST_STEP = 0.02
+# Half widths of the ellipses: decades below half the length of the line.
+_DECADES = {True: 1.0, False: 2.0}
+_FLOOR_COLUMNS = 1025
+_DEPTH_BISECTIONS = 16
+
+
+def region_floor(surface: Surface, xy: FloatArray) -> FloatArray:
+    """Return the lowest z [m] of the working region at points (n, 2) of the plane.
+
+    For a contact that searches for its point, that is where the distance to the surface first
+    exceeds max_depth.
+    """
+    contact = surface.law.contact
+    if contact.is_above_probe:
+        return contact.contact_height(surface.texture, xy) - surface.clamped_depth
+    heights: FloatArray = surface.texture.height(xy)
+    # max_depth below the lowest point, the distance is at least max_depth.
+    low = np.full(len(heights), 0.0)
+    high = heights - surface.texture.extremes[0] + surface.max_depth
+    for _ in range(_DEPTH_BISECTIONS):
+        middle = 0.5 * (low + high)
+        points = np.column_stack([xy, heights - middle])
+        closest = surface.texture.nearest(points)
+        near = np.linalg.norm(closest - points, axis=1) <= surface.max_depth
+        low = np.where(near, middle, low)
+        high = np.where(near, high, middle)
+    return np.asarray(heights - low)
+
+
+def work_tolerance(surface: Surface) -> float:
+    """Return the relative error to which the work of an edge is integrated."""
+    return NEAREST_TOLERANCE if surface.law.contact.requires_search else LOOP_TOLERANCE
+
+
+def find_absorbing_friction(
+    surface: Surface, line: ScanLine, worst: FloatArray
+) -> AbsorbingFriction:
+    """Return the greatest W/length found, with its path, and the proved bound.
+
+    On a profile the plane of the line is searched; on a map one plane for each ellipse, through a
+    random place in a random direction.
+
+    Args:
+        surface: a surface whose law has no state and curl.
+        line: a line across the surface.
+        worst: another path to compare with, vertices (n, 3) [m].
+    """
+    is_profile = surface.texture.is_profile
+    count, groups = _ELLIPSES[is_profile or surface.law.contact.requires_search]
+    planes = 1 if is_profile else count
+    paths = [worst] if len(worst) else []
+    paths += [_improve(*start) for start in _best_ellipses(surface, line, count, groups)]
+    best = AbsorbingFriction(0.0, residual_bound(surface), 0.0, np.zeros((0, 3)), planes)
+    for path in paths:
+        work = loop_work(surface, path, work_tolerance(surface))
+        density = abs(work) / polygon_length(path)
+        if density > best.found:
+            vertices = np.ascontiguousarray(path if work > 0.0 else path[::-1])
+            best = AbsorbingFriction(density, best.upper, abs(work), vertices, planes)
+    return best
+
+
+def _best_ellipses(
+    surface: Surface, line: ScanLine, count: int, group_count: int
+) -> list[tuple[_Plane, FloatArray]]:
+    """Return planes, and paths in them (2, n) [m], the best of each group of ellipses."""
+    rng = np.random.default_rng(0)
+    is_profile = surface.texture.is_profile
+    directions = np.tile(line.direction, (count, 1))
+    centres = line.start + rng.uniform(0.0, line.length, (count, 1)) * line.direction
+    if not is_profile:
+        angles = rng.uniform(0.0, math.pi, count)
+        directions = np.column_stack([np.cos(angles), np.sin(angles)])
+        centres = surface.texture.domain.points(rng.uniform(size=(count, 2)))
+    half = 0.5 * 10.0 ** -rng.uniform(0.0, [[_DECADES[is_profile]], [1.0]], (2, count))
+    width = (half[0] * line.length)[:, None]
+    height = (2.0 * half[1] * surface.max_depth)[:, None]
+    middle = rng.uniform(0.0, surface.max_depth, (count, 1))
+    phases = 2.0 * math.pi * np.arange(_ELLIPSE_POINTS) / _ELLIPSE_POINTS
+    t = width * np.cos(phases)
+    u = np.maximum(middle + height * np.sin(phases), 0.0)
+    xy = (centres[:, None] + t[..., None] * directions[:, None]).reshape(-1, 2)
+    # Right below its surface a vertical depth of max_depth is never out of the region.
+    top = surface.law.contact.contact_height(surface.texture, xy)
+    z = top - surface.max_depth + u.ravel()
+    points = np.column_stack([xy, z])
+    forces = surface.force(points).reshape(*t.shape, 3)
+    loops = points.reshape(*t.shape, 3)
+    steps = np.roll(loops, -1, axis=1) - loops
+    work = np.einsum("lpi,lpi->l", forces + np.roll(forces, -1, axis=1), steps) / 2.0
+    densities = work / np.linalg.norm(steps, axis=2).sum(axis=1)
+    groups = np.abs(densities).reshape(group_count, -1)
+    starts = []
+    for index in groups.argmax(axis=1) + np.arange(group_count) * groups.shape[1]:
+        turn = 1 if densities[index] > 0.0 else -1
+        plane = _make_plane(
+            surface, centres[index], directions[index], 2.0 * float(width[index, 0])
+        )
+        above = z.reshape(t.shape)[index] - np.interp(t[index], plane.columns, plane.floor)
+        starts.append((plane, np.stack([t[index], np.maximum(above, 0.0)])[:, ::turn]))
+    return starts
+
+
+@dataclass(frozen=True)
+class _Plane:
+    """A vertical plane with the floor of the working region.
+
+    Attributes:
+        surface: the surface.
+        line: origin and direction; the length is that of the columns.
+        columns: distances along it [m], shape (c,).
+        floor: z of the floor there [m], shape (c,).
+        slope: its derivative, shape (c,).
+        refinement: fine points from free points, shape (m, n).
+    """
+
+    surface: Surface
+    line: ScanLine
+    columns: FloatArray
+    floor: FloatArray
+    slope: FloatArray
+    refinement: FloatArray
+
+    def points(self, curve: FloatArray) -> FloatArray:
+        """Return points (n, 3) of coordinates t and z, shape (2, n) [m]."""
+        return np.column_stack(
+            [self.line.start + curve[0][:, None] * self.line.direction, curve[1]]
+        )
+
+    def curve(self, free: FloatArray) -> FloatArray:
+        """Return t and z of the polygon, shape (2, m), from free points (t, u), shape (2, n)."""
+        t, u = free @ self.refinement.T
+        return np.stack([t, np.interp(t, self.columns, self.floor) + u])
+
+    def density(self, free: FloatArray) -> tuple[float, FloatArray]:
+        """Return W/length of the polygon by the midpoint rule [N], and its gradient [N/m]."""
+        curve = self.curve(free)
+        step = np.roll(curve, -1, axis=1) - curve
+        forces, jacobians = self.surface.force_and_jacobian(self.points(curve + 0.5 * step))
+        axes = np.array([[*self.line.direction, 0.0], [0.0, 0.0, 1.0]])
+        force = axes @ forces.T
+        pull = force - 0.5 * np.einsum("ai,mij,bj,am->bm", axes, jacobians, axes, step)
+        push = force + 0.5 * np.einsum("ai,mij,bj,am->bm", axes, jacobians, axes, step)
+        lengths = np.maximum(np.hypot(*step), np.finfo(float).tiny)
+        length = float(lengths.sum())
+        density = float((force * step).sum()) / length
+        unit = step / lengths
+        slopes = np.roll(push, 1, axis=1) - pull - density * (np.roll(unit, 1, axis=1) - unit)
+        slopes[0] += np.interp(curve[0], self.columns, self.slope) * slopes[1]
+        return density, slopes @ self.refinement / length
+
+
+def _make_plane(
+    surface: Surface, centre: FloatArray, direction: FloatArray, reach: float
+) -> _Plane:
+    columns: FloatArray = np.linspace(-reach, reach, _FLOOR_COLUMNS)
+    floor = region_floor(surface, np.ascontiguousarray(centre + columns[:, None] * direction))
+    slope = np.gradient(floor, columns)
+    free = np.arange(_FREE_POINTS * _REFINEMENT) / _REFINEMENT
+    distance = np.abs(free[:, None] - np.arange(_FREE_POINTS))
+    refinement = np.maximum(1.0 - np.minimum(distance, _FREE_POINTS - distance), 0.0)
+    line = ScanLine(centre, direction, 2.0 * reach, periodic=False)
+    return _Plane(surface, line, columns, floor, slope, refinement)
+
+
+def _improve(plane: _Plane, path: FloatArray) -> FloatArray:
+    """Return the polygon (n, 3) [m] of greatest W/length that is reached from a path."""
+    count = path.shape[1]
+    where = np.arange(_FREE_POINTS) * (count / _FREE_POINTS)
+    rows = [np.interp(where, np.arange(count), row, period=count) for row in path]
+    sizes = np.array([[plane.columns[-1]], [plane.surface.max_depth]])
+
+    def evaluate(scaled: FloatArray) -> tuple[float, FloatArray]:
+        density, slopes = plane.density(scaled * sizes)
+        return density, slopes * sizes
+
+    low = np.array([[-1.0], [0.0]])
+    high = np.array([[1.0], [math.inf]])
+    curve = plane.curve(_climb(evaluate, np.stack(rows) / sizes, low, high) * sizes)
+    points = plane.points(curve)
+    above = curve[1] - np.interp(curve[0], plane.columns, plane.floor)
+    points[:, 2] = region_floor(plane.surface, np.ascontiguousarray(points[:, :2])) + above
+    return points
+
+
+def _climb(
+    evaluate: Callable[[FloatArray], tuple[float, FloatArray]],
+    start: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+) -> FloatArray:
+    """Return where a function within bounds is greatest, by limited-memory BFGS steps."""
+    x = np.clip(start, low, high)
+    value, slope = evaluate(x)
+    pairs: deque[tuple[FloatArray, FloatArray]] = deque(maxlen=_MEMORY)
+    for _ in range(_STEPS):
+        is_free = ~((x <= low) & (slope < 0.0) | (x >= high) & (slope > 0.0))
+        direction = _quasi_newton_direction(slope * is_free, pairs) * is_free
+        for _ in range(_HALVINGS):
+            trial = np.clip(x + direction, low, high)
+            reached, trial_slope = evaluate(trial)
+            if reached > value:
+                break
+            direction = 0.25 * direction
+        else:
+            if not pairs:
+                break
+            pairs.clear()
+            continue
+        step = trial - x
+        change = slope - trial_slope
+        if float((step * change).sum()) > 0.0:
+            pairs.append((step, change))
+        x, value, slope = trial, reached, trial_slope
+    return x
+
+
+def _quasi_newton_direction(
+    slope: FloatArray, pairs: deque[tuple[FloatArray, FloatArray]]
+) -> FloatArray:
+    """Return the inverse Hessian times the slope, from steps and the changes of slope on them."""
+    if not pairs:
+        return np.asarray(slope * (_FIRST_STEP / max(float(np.abs(slope).max()), 1e-300)))
+    direction = slope.copy()
+    shares = []
+    for step, change in reversed(pairs):
+        share = float((step * direction).sum()) / float((step * change).sum())
+        direction -= share * change
+        shares.append(share)
+    step, change = pairs[-1]
+    direction *= float((step * change).sum()) / float((change * change).sum())
+    for (step, change), share in zip(pairs, reversed(shares), strict=True):
+        direction += step * (
+            share - float((change * direction).sum()) / float((step * change).sum())
+        )
+    return direction
