@@ -50,7 +50,9 @@ def number(lower: float, upper: float | None = None) -> Bound:
 def make_loop(stiffness: float = 1.0, **more: Any) -> DeviceLoop:
     """Return a device loop at 1 Hz with the given data."""
     plain: dict[str, Any] = {
-        "surface": SimpleNamespace(stiffness=stiffness, max_depth=2.0, depends_on_texture=True),
+        "surface": SimpleNamespace(
+            stiffness=stiffness, max_depth=2.0, depends_on_texture=True, contact_friction=None
+        ),
         "device": DEVICE,
         "q": number(1.0),
         "one_sided": number(1.0),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from enum import Enum, auto
+from typing import Literal
 
 import numpy as np
 
@@ -12,7 +13,28 @@ from asperity.analysis.bounds.bound import scale_upper_bound
 from asperity.core.checks import FloatArray, check_positive
 from asperity.core.display import Text
 from asperity.core.files import OMITTED, Serializable, written
+from asperity.surface import Surface
 from asperity.textures.texture import ScanLine
+
+EnergyBalance = Literal["conservative", "dissipative", "leaking"]
+"""Energy on closed paths: none, taken from the hand wherever an anchor slips, or also given."""
+
+
+def energy_balance(surface: Surface) -> EnergyBalance:
+    """Return whether closed paths in a surface take energy from the hand, or give it.
+
+    With friction of constant presliding stiffness the hand gains nothing on any closed path that
+    starts without deflection (docs/theory/friction.md).
+
+    Example:
+        >>> from asperity.textures.kinds.sinusoid import Sinusoid
+        >>> surfaces = [Surface(Sinusoid(1e-4, 1e-3), law, friction=0.4) for law in "HA"]
+        >>> [energy_balance(surface) for surface in surfaces]
+        ['dissipative', 'leaking']
+    """
+    if not surface.facts.conservative:
+        return "leaking"
+    return "conservative" if surface.contact_friction is None else "dissipative"
 
 
 class LoopKind(Enum):

@@ -20,6 +20,7 @@ from asperity.analysis.passivity.device_loop import (
     DeviceLoop,
     Number,
     Obstacle,
+    friction_steps,
     has_known_leak,
     round_down_exactly,
 )
@@ -78,7 +79,10 @@ class Criterion:
 
 @dataclass(frozen=True)
 class StiffnessRule:
-    """k (w⁺ q⁺ + w q) <= budget [N/m], with the fields of the device that it requires."""
+    """k (w⁺ q⁺ + w q) <= budget [N/m], with the fields of the device that it requires.
+
+    With friction k (w⁺ q⁺ + w q) + w_f κ <= budget, where w_f is w⁺ + 3 w/2 by default.
+    """
 
     name: str
     formula: str
@@ -89,21 +93,33 @@ class StiffnessRule:
     assumptions: str = ""
     obstacle: Obstacle | None = None
     used_fields: tuple[str, ...] = ()
+    friction_weight: Fraction | None = None
+    friction_term: str = "(3d + 1)/2 κ"
+    further_gain: Number = Fraction(0)
 
 
 def evaluate_rule(loop: DeviceLoop, rule: StiffnessRule) -> Criterion:
     """Return the criterion of a rule for a surface on a device."""
     missing = tuple(field for field in rule.required_fields if loop.device.value(field) is None)
     fields = (*rule.required_fields, *rule.used_fields)
-    result = Criterion(rule.name, rule.formula, assumptions=rule.assumptions, used_fields=fields)
+    formula = rule.formula
+    if any(loop.presliding):
+        sign = " +" if loop.surface.depends_on_texture else ","
+        formula = formula.replace(" <=", f"{sign} {rule.friction_term} <=", 1)
+    result = Criterion(rule.name, formula, assumptions=rule.assumptions, used_fields=fields)
     if rule.obstacle is not None:
         return replace(result, obstacle=rule.obstacle)
     if missing or rule.budget is None:
         return replace(result, missing=missing)
     weights = rule.one_sided_weight, rule.norm_weight
-    upper = loop.weighted_gain(*weights, "upper")
-    proved = _max_stiffness(rule.budget, upper)
-    possible = _max_stiffness(rule.budget, loop.weighted_gain(*weights, "lower"))
+    weight = rule.friction_weight
+    if weight is None:
+        weight = rule.one_sided_weight + Fraction(3, 2) * rule.norm_weight
+    upper = loop.weighted_gain(*weights, "upper") + rule.further_gain
+    upper, budget = loop.add_friction(upper, rule.budget, weight)
+    lower = loop.weighted_gain(*weights, "lower")
+    proved = _max_stiffness(budget, upper)
+    possible = _max_stiffness(*loop.add_friction(lower, rule.budget, weight)[::-1])
     # Infinity over a finite lower end: the number was only sampled, so no limit is proved.
     if upper != math.inf or possible == 0:
         limit = round_down_exactly(proved)
@@ -131,8 +147,22 @@ _DAMPING_FIELDS = ("update_rate", "damping")
 
 
 def _paper_rule(loop: DeviceLoop) -> StiffnessRule:
+    """With friction, |Δf| <= (k q + κ + l) |Δp|, l the greatest slope of the slip limit."""
+    share, fixed = loop.presliding
     budget = loop.damping_gain
-    return StiffnessRule(PAPER, "k q <= σ₀/(2T)", _ZERO, Fraction(2), budget, _DAMPING_FIELDS)
+    if budget is not None:
+        budget -= 2 * fixed
+    return StiffnessRule(
+        PAPER,
+        "k q <= σ₀/(2T)",
+        _ZERO,
+        Fraction(2),
+        budget,
+        _DAMPING_FIELDS,
+        friction_weight=_ZERO,
+        friction_term="κ + l",
+        further_gain=2 * (share + loop.slip_slope),
+    )
 
 
 def _one_sided_rule(loop: DeviceLoop) -> StiffnessRule:
@@ -144,6 +174,7 @@ def _one_sided_rule(loop: DeviceLoop) -> StiffnessRule:
         loop.damping_gain,
         _DAMPING_FIELDS,
         obstacle=loop.obstacle,
+        friction_term="κ",
     )
 
 
@@ -165,8 +196,10 @@ def _virtual_damping_rule(loop: DeviceLoop) -> StiffnessRule:
     if budget is not None:
         budget -= abs(loop.virtual_damping_gain)
     formula = "k q⁺ T/2 + |b_v| <= σ₀"
+    friction_term = "κ T/2"
     if loop.delay:
         formula = "k (q⁺/2 + d q) T + |b_v| <= σ₀"
+        friction_term = "(3d + 1)/2 κ T"
     return StiffnessRule(
         VIRTUAL,
         formula,
@@ -176,12 +209,15 @@ def _virtual_damping_rule(loop: DeviceLoop) -> StiffnessRule:
         (*_DAMPING_FIELDS, "virtual_damping"),
         obstacle=loop.obstacle,
         used_fields=("delay_samples",),
+        friction_term=friction_term,
     )
 
 
 def _wall_rule(loop: DeviceLoop) -> StiffnessRule:
     budget = loop.delayed_wall_stiffness
-    return StiffnessRule(WALL, "k q <= K₀", _ZERO, _ONE, budget, ("max_stiffness",))
+    return StiffnessRule(
+        WALL, "k q <= K₀", _ZERO, _ONE, budget, ("max_stiffness",), friction_term="3/2 κ"
+    )
 
 
 def _wall_test_rule(loop: DeviceLoop) -> StiffnessRule:
@@ -195,9 +231,11 @@ def _wall_test_rule(loop: DeviceLoop) -> StiffnessRule:
     longest = loop.longest_delay
     budget = loop.wall_stiffness
     formula = "k q <= K₀"
+    friction_term = "3/2 κ"
     one_sided_weight = _ZERO
     norm_weight = _ONE
     if longest != math.inf:
+        friction_term = StiffnessRule.friction_term
         formula = "k (q⁺/2 + d q) <= K₀ (1/2 + d₀)"
         one_sided_weight = HALF
         norm_weight = Fraction(longest)
@@ -217,6 +255,7 @@ def _wall_test_rule(loop: DeviceLoop) -> StiffnessRule:
         ("max_stiffness",),
         obstacle=loop.obstacle,
         used_fields=("delay_samples", "damping", "update_rate"),
+        friction_term=friction_term,
     )
 
 
@@ -250,6 +289,8 @@ def _quantization_criterion(loop: DeviceLoop) -> Criterion:
             (),
             obstacle=loop.obstacle,
             used_fields=fields,
+            friction_weight=friction_steps(loop),
+            friction_term="κ |δ|" if loop.delay == 0 else "4 κ |δ|",
         )
         return evaluate_rule(loop, rule)
     limit = math.inf if friction >= 0 else 0.0

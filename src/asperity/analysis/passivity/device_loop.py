@@ -83,6 +83,51 @@ class DeviceLoop:
         """K of the surface [N/m]."""
         return Fraction(self.surface.stiffness)
 
+    @property
+    def presliding(self) -> tuple[Fraction, Fraction]:
+        """κ of the friction: its part that is a share of the stiffness [1], and the rest [N/m]."""
+        friction = self.surface.contact_friction
+        if friction is None:
+            return Fraction(0), Fraction(0)
+        _coefficient, _modulation, share, fixed = friction.arguments
+        return Fraction(share), Fraction(fixed)
+
+    def add_friction(
+        self, gain: Number, budget: Fraction, weight: Fraction
+    ) -> tuple[Number, Fraction]:
+        """Return gain g and budget b of a rule k g + weight κ <= b as those of k g <= b.
+
+        On a smooth wall, friction and wall act along different axes, and each is compared with b.
+
+        Reference:
+            docs/theory/friction.md.
+        """
+        share, fixed = self.presliding
+        if self.surface.depends_on_texture:
+            return gain + weight * share, budget - weight * fixed
+        if weight * fixed > budget:
+            budget = Fraction(0)
+        return max(gain, weight * share), budget
+
+    @property
+    def slip_slope(self) -> Number:
+        """Upper bound of the slope of the slip limit over the stiffness [1].
+
+        |∇N| <= k √q⁺ and N <= k √q⁺ D; the height at the contact point rises by at most
+        ``slope`` of the texture, or 1 + q where the contact point moves with the depth.
+        """
+        friction = self.surface.contact_friction
+        if friction is None:
+            return Fraction(0)
+        texture = self.surface.texture
+        rise = texture.bounds[0]
+        if not self.surface.law.contact.is_above_probe:
+            rise = 1.0 + self.q.upper
+        rise *= self.surface.max_depth / self.surface.loop_arguments[2]
+        variation = 0.5 * friction.modulation * rise if friction.modulation else 0.0
+        bound = friction.coefficient * math.sqrt(self.one_sided.upper) * (1.0 + variation)
+        return Fraction(bound * (1.0 + 1e-12)) if math.isfinite(bound) else math.inf
+
     def with_leak(self, surface: Surface, leak: Leak) -> DeviceLoop:
         """Return the loop of the same surface at another stiffness, with its worst loop."""
         return replace(self, surface=surface, leak=leak)
@@ -271,14 +316,23 @@ def max_proved_delay(loop: DeviceLoop) -> int | None:
     """
     if loop.damping_gain is None or loop.obstacle:
         return None
-    rest = (loop.damping_gain - abs(loop.virtual_damping_gain)) / loop.stiffness
+    budget = loop.damping_gain - abs(loop.virtual_damping_gain)
     half = loop.weighted_gain(HALF, Fraction(0), "upper")
-    if half == math.inf or rest < half:
-        return None
     q = loop.weighted_gain(Fraction(0), Fraction(1), "upper")
+    gain, rest = loop.add_friction(half, budget, HALF)
+    if gain == math.inf or rest < loop.stiffness * gain:
+        return None
     if q == math.inf:
         return 0
-    return math.floor((rest - Fraction(half)) / Fraction(q)) if q > 0 else None
+    share, fixed = loop.presliding
+    presliding = share * loop.stiffness + fixed
+    start = Fraction(half) * loop.stiffness
+    slope = Fraction(q) * loop.stiffness
+    rules = [(start, slope), (HALF * presliding, 3 * HALF * presliding)]
+    if loop.surface.depends_on_texture:
+        rules = [(start + HALF * presliding, slope + 3 * HALF * presliding)]
+    delays = [math.floor((budget - least) / rise) for least, rise in rules if rise > 0]
+    return min(delays, default=None)
 
 
 def has_known_leak(loop: DeviceLoop) -> bool:
@@ -381,9 +435,23 @@ def _buzz_terms(loop: DeviceLoop) -> tuple[Fraction, Fraction, Fraction, Fractio
     if math.inf in (q, gain):
         return None
     virtual = abs(loop.virtual_damping_gain)
+    share, presliding = loop.presliding
+    steps = friction_steps(loop)
     fixed = loop.force_step / 2 + virtual * loop.position_step - loop.friction
     per_stiffness = Fraction(q) * loop.position_step / 2
-    return per_stiffness, fixed, Fraction(gain), loop.damping_gain - virtual
+    gain, budget = loop.add_friction(
+        gain, loop.damping_gain - virtual, HALF + 3 * HALF * loop.known_delay
+    )
+    fixed += steps * presliding
+    return per_stiffness + steps * share, fixed, Fraction(gain), budget
+
+
+def friction_steps(loop: DeviceLoop) -> Fraction:
+    """Return the error [m] whose product with κ is that of the friction force by position steps.
+
+    2 ε without delay and 8 ε with delay, or where it is unknown, ε = |δ|/2.
+    """
+    return loop.position_step * (1 if loop.delay == 0 else 4)
 
 
 def round_up_exactly(value: Fraction) -> float:

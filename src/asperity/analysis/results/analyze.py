@@ -12,7 +12,7 @@ import numpy as np
 
 from asperity.analysis.bounds.bound import NORM, ONE_SIDED, Bound, scale_upper_bound
 from asperity.analysis.bounds.branch_and_bound import DEFAULT_WORK_LIMIT
-from asperity.analysis.energy.closed_loops import Leak
+from asperity.analysis.energy.closed_loops import EnergyBalance, Leak, energy_balance
 from asperity.analysis.energy.continuity import Continuity, continuity
 from asperity.analysis.energy.leak import worst_loop
 from asperity.analysis.energy.straight_scan import Merit, merit
@@ -75,6 +75,11 @@ class Analysis(Plottable, Reportable):
     )
 
     @property
+    def energy_balance(self) -> EnergyBalance:
+        """Whether closed paths take no energy, take it from the hand, or give it to the hand."""
+        return energy_balance(self.surface)
+
+    @property
     def curl_density(self) -> Bound | None:
         """Sup |curl f| [N/m]: the greatest work of a small loop per area [J/m²]."""
         if self.curl is None:
@@ -111,7 +116,8 @@ class Analysis(Plottable, Reportable):
         """Return plain data, SI units, with a schema number; infinity is the string "inf"."""
         surface = self.surface
         fields = (
-            "device q one_sided curl curl_density conservative conservative_reason leak v_star "
+            "device q one_sided curl curl_density conservative conservative_reason "
+            "energy_balance leak v_star "
             "continuity passivity merit rendering assumptions"
         )
         return {
@@ -121,6 +127,7 @@ class Analysis(Plottable, Reportable):
             "law": surface.law.letter,
             "law_name": surface.law.name,
             **attributes_to_dict(surface, "law_parameters", "clamp", "stiffness", "max_depth"),
+            "friction": to_plain_data(surface.contact_friction),
             **attributes_to_dict(self, *fields.split()),
         }
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from asperity.analysis.bounds.bound import Bound
-from asperity.analysis.energy.closed_loops import Leak
+from asperity.analysis.energy.closed_loops import EnergyBalance, Leak, energy_balance
 from asperity.analysis.energy.continuity import Continuity
 from asperity.analysis.limits.perceptibility import Perceptibility, Tier
 from asperity.analysis.passivity.recommended_stiffness import Margin, StabilityLimit
@@ -85,6 +85,11 @@ class LawRow:
     def continuous_reason(self) -> str:
         """Why the force is continuous, or not, in one sentence."""
         return self.continuity.reason
+
+    @property
+    def energy_balance(self) -> EnergyBalance:
+        """Whether closed paths take no energy, take it from the hand, or give it to the hand."""
+        return energy_balance(self.surface)
 
     @property
     def is_sound(self) -> bool:
@@ -173,13 +178,14 @@ class LawRow:
         """Return plain data, SI units."""
         before = "q one_sided stability_limit margin recommended_stiffness"
         after = (
-            "conservative conservative_reason leak continuous continuous_reason strength support "
-            "contact_lost texture_force rendering verdict"
+            "conservative conservative_reason energy_balance leak continuous continuous_reason "
+            "strength support contact_lost texture_force rendering verdict"
         )
         return {
             "law": self.law.letter,
             "name": self.law.name,
             "law_parameters": to_plain_data(self.surface.law_parameters),
+            "friction": to_plain_data(self.surface.contact_friction),
             **attributes_to_dict(self, *before.split()),
             "stiffness": self.surface.stiffness,
             "perceptibility": to_plain_data(self.perceptibility),

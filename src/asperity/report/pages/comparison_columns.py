@@ -97,7 +97,10 @@ def _continuity_cell(row: LawRow, value: bool | None) -> Cell:
 
 
 def _conservation_cell(row: LawRow, _comparison: Comparison) -> Cell:
-    return Cell(number_text.yes_no_text(row.conservative), note=row.conservative_reason)
+    reason = row.conservative_reason
+    if row.energy_balance == "dissipative":
+        reason = f"{reason}; {number_text.FRICTION_PROOF}"
+    return Cell(number_text.balance_text(row.energy_balance), note=reason)
 
 
 def _basis_cell(row: LawRow, _comparison: Comparison) -> Cell:

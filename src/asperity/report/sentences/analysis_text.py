@@ -15,6 +15,7 @@ from asperity.envelopes.wave_borders import WaveBorders
 from asperity.report.sentences import limit_sentences
 from asperity.report.sentences.limit_sentences import speed_text
 from asperity.report.sentences.number_text import (
+    FRICTION_PROOF,
     INFINITY_SIGN,
     NOT_AVAILABLE,
     interval_text,
@@ -43,8 +44,10 @@ def computed_bounds(analysis: Analysis) -> list[tuple[str, Bound]]:
 def bound_notes(analysis: Analysis) -> list[str]:
     """Return how each number was obtained, and whether and why the law is conservative."""
     notes = [f"{name}: {bound.note}" for name, bound in computed_bounds(analysis) if bound.note]
-    answer = yes_no_text(analysis.conservative)
-    return [*notes, f"conservative: {answer}, {analysis.conservative_reason}"]
+    answer = f"conservative: {yes_no_text(analysis.conservative)}, {analysis.conservative_reason}"
+    if analysis.energy_balance == "dissipative":
+        answer = f"dissipative: {FRICTION_PROOF}; {analysis.conservative_reason}"
+    return [*notes, answer]
 
 
 def critical_speed_text(analysis: Analysis) -> str:

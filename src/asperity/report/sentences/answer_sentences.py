@@ -20,6 +20,7 @@ from asperity.report.sentences.limit_sentences import (
     texture_amount_text,
     unverified_text,
 )
+from asperity.report.sentences.number_text import FRICTION_PROOF
 from asperity.report.sentences.passivity_sentences import (
     buzz_text,
     delay_clause,
@@ -77,7 +78,9 @@ def _choice_text(comparison: Comparison) -> str:
 
 
 def _law_title(row: LawRow) -> str:
-    return f"{row.law.letter} ({row.law.name.replace('-', ' ')})"
+    title = f"{row.law.letter} ({row.law.name.replace('-', ' ')})"
+    friction = row.surface.contact_friction
+    return title if friction is None else f"{title} with friction {friction.coefficient:g}"
 
 
 def _no_choice_text(comparison: Comparison) -> str:
@@ -287,6 +290,8 @@ def _reasons(comparison: Comparison) -> list[str]:
     if comparison.recommended_row is None:
         return reasons
     sound = "No closed path of its field gives net energy, and its force does not jump."
+    if row.energy_balance == "dissipative":
+        sound += f" {sentence_case(FRICTION_PROOF)}."
     reasons.append(sound if row.is_sound else _least_leak_reason(row, comparison))
     if row.stability_limit.basis in ("plausible", "wall gain", "none"):
         reasons += [_wall_text(comparison.device), _margin_text(row)]

@@ -15,6 +15,7 @@ from asperity.core.arguments import DEFAULT_STIFFNESS
 from asperity.core.units import format_quantity
 from asperity.devices import Device
 from asperity.envelopes.envelope import GENTLE_WAVE, Envelope
+from asperity.laws.f_friction_modulation import LAW as F
 from asperity.rendering import rendering_sentences
 from asperity.report.sentences.answer_sentences import simulated_loops_text
 from asperity.report.sentences.limit_sentences import (
@@ -171,7 +172,19 @@ def _comparison_defaults(comparison: Comparison) -> list[str]:
     for row in comparison.rows:
         for parameter in law_parameter_sentences(row.surface):
             sentences.append(f"{parameter} for law {row.law.letter}")
+    has_friction = any(row.surface.contact_friction is not None for row in comparison.rows)
+    mended = [row.surface for row in comparison.rows if has_friction and row.law is F]
+    sentences += map(_mended_text, mended)
     return sentences
+
+
+def _mended_text(surface: Surface) -> str:
+    """Return the friction that has the slip limit of law F, and no leak."""
+    depth = surface.modulation_depth
+    coefficient = surface.friction * (1.0 + depth) / 2.0
+    modulation = 2.0 * depth / (1.0 + depth)
+    mended = f"law W with friction {coefficient:.3g} and friction modulation {modulation:.3g}"
+    return f"Law F leaks, as in the paper; the same friction without a leak: {mended}"
 
 
 def _wall_assumptions(comparison: Comparison) -> list[str]:

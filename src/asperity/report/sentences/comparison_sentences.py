@@ -27,6 +27,8 @@ def row_verdict(row: LawRow) -> str:
     artefacts = row_artefacts(row)
     if row.conservative and not _instability_text(row):
         artefacts.insert(0, _passivity_text(row))
+    if row.energy_balance == "dissipative":
+        artefacts.append(row.energy_balance)
     return "; ".join(artefacts)
 
 

@@ -96,9 +96,9 @@ def case_title(comparison: Comparison) -> str:
 
 
 def conservation_remarks(comparison: Comparison) -> list[str]:
-    """Return for each law that it is conservative, or what it leaks."""
+    """Return for each law that it is conservative or dissipative, or what it leaks."""
     return [
-        "conservative" if row.conservative else f"leaks up to {leak_text(row.leak)} per loop"
+        row.energy_balance if row.conservative else f"leaks up to {leak_text(row.leak)} per loop"
         for row in comparison.rows
     ]
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 
 from asperity.analysis.bounds.bound import Bound
-from asperity.analysis.energy.closed_loops import Leak
+from asperity.analysis.energy.closed_loops import EnergyBalance, Leak
 from asperity.analysis.results.compare import Comparison
 from asperity.core.units import format_quantity, round_down
 
@@ -46,6 +46,19 @@ def force_text(value: float) -> str:
     if value < 0.01:
         return format_quantity(value, "N", digits=2)
     return f"{float(f'{value:.2g}'):.10g} N"
+
+
+FRICTION_PROOF = "friction takes energy from the hand on every closed path, proved"
+
+
+def balance_text(balance: EnergyBalance) -> str:
+    """Return the answer to whether a surface is conservative.
+
+    Example:
+        >>> balance_text("conservative"), balance_text("dissipative"), balance_text("leaking")
+        ('yes', 'dissipative', 'no')
+    """
+    return {"conservative": "yes", "leaking": "no"}.get(balance, balance)
 
 
 def yes_no_text(holds: bool | None) -> str:
