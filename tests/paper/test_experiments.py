@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from asperity.paper import cycle_experiments, get_claim
-from asperity.paper.cases import SAMPLING_PERIOD
+from asperity.paper.cases import MENDED, SAMPLING_PERIOD, SCANNING
 from asperity.paper.claims import simulated_claims
 from asperity.paper.claims.simulated_claims import SIMULATED_CLAIM_IDS
 from asperity.paper.cycle_experiments import (
@@ -223,3 +223,26 @@ def test_energy_ledger_of_a_bump_closes() -> None:
     assert bump.lost > 1
     assert math.isfinite(bump.jump)
     assert PRESSING_HAND.force == (0.0, 0.0, -1.0)
+
+
+def test_mended_friction_has_the_slip_limit_of_law_f_and_no_leak() -> None:
+    """The force of a full slip is that of F; around the paper's path of (27) F gains, it loses."""
+    surface = SCANNING.surface("F")
+    mended = SCANNING.surface(MENDED)
+    x = np.linspace(0.0, 10 * SCANNING.deflection, 20_001)
+    scan = np.column_stack([x, 0.0 * x, np.full(len(x), -1e-4)])
+    last = x > 5 * SCANNING.deflection
+    forces = [one.trace(scan)[last] for one in (surface, mended)]
+    np.testing.assert_allclose(forces[1], forces[0], rtol=1e-9)
+    corners = SCANNING.friction_path(1e-5)
+    parts = np.linspace(0.0, 1.0, 4000, endpoint=False)[:, None]
+    edges = zip(corners, np.roll(corners, -1, axis=0), strict=True)
+    path = np.concatenate([start + parts * (end - start) for start, end in edges])
+    path = np.concatenate([path, path[:1]])
+    works = []
+    for one in (surface, mended):
+        force = one.trace(path)
+        works.append(float((0.5 * (force[1:] + force[:-1]) * np.diff(path, axis=0)).sum()))
+    assert works[0] > 9e-5
+    assert works[1] < -1e-4
+    assert FIGURE_6_LAWS[-1] == MENDED

@@ -18,6 +18,8 @@ from asperity.surface import Surface
 from asperity.textures.kinds.sinusoid import Sinusoid
 
 PAPER_LAWS = "ABCDEFG"
+MENDED = "F mended"
+"""Law W with the slip limit of law F and a constant presliding stiffness."""
 TURNING_DEPTH = 0.1e-3
 """Depth at which the paths of (27) and (29) turn [m]; not stated by the paper."""
 
@@ -60,11 +62,20 @@ class ExperimentCase:
         return self.period**2 / (4.0 * math.pi**2 * self.amplitude)
 
     def surface(self, law: str, **changes: Any) -> Surface:
-        """Return this texture with a law; ``changes`` are arguments of ``Surface``."""
+        """Return this texture with a law, or ``MENDED``; ``changes`` are arguments of a surface."""
+        if law == MENDED:
+            return self.mended_friction(**changes)
         arguments: dict[str, Any] = {"stiffness": self.stiffness, "max_depth": self.depth}
         if law == "F":
             arguments |= {"friction": self.friction, "max_deflection": self.deflection}
         return Surface(self.texture, law, **(arguments | changes))
+
+    def mended_friction(self, **changes: Any) -> Surface:
+        """Return law W with friction whose slip limit is that of law F: μ(1 - m) times the load."""
+        modulation = self.surface("F").modulation_depth
+        friction = 0.5 * self.friction * (1.0 + modulation)
+        contrast = 2.0 * modulation / (1.0 + modulation)
+        return self.surface("W", friction=friction, friction_modulation=contrast, **changes)
 
     def untextured_friction(self) -> Surface:
         """Return law F without texture, with twice the friction.

@@ -296,6 +296,8 @@ def always_passive() -> claim.Check:
             work = loop_work(cases.SCANNING.surface(law, stiffness=stiffness), path)
             speeds[law].append(max(work, 0.0) / (damping * length))
     greatest = {law: max(values) for law, values in speeds.items()}
+    surfaces = [cases.SCANNING.surface("A", stiffness=stiffness) for stiffness in (1000.0, 10.0)]
+    friction, less = (worst_loop(surface).absorbing for surface in surfaces)
     return claim.check_statement(
         "A gains energy below "
         + ", ".join([f"{speed * 1e3:.3g} mm/s" for speed in speeds["A"]])
@@ -304,6 +306,10 @@ def always_passive() -> claim.Check:
         printed=max(greatest.values()) <= 1e-12,
         speeds_for_A=speeds["A"],
         speeds_for_C=speeds["C"],
+        friction_for_A=friction.upper,
+        friction_at_less_gain=less.upper,
+        found_per_length=friction.found,
+        found_at_less_gain=less.found,
     )
 
 
