@@ -51,6 +51,8 @@ def test_thresholds_pass_through_their_points_and_are_straight_in_logarithms() -
     assert low == pytest.approx(math.sqrt(0.25e-6 * 0.01e-6))
     assert high == pytest.approx(10.0 * low)
     assert PEN.threshold(1.0)[1] == pytest.approx(PEN.felt[0])
+    known = PEN.is_known(np.array([10.0, 39.9, 40.0, 200.0, 500.0, 501.0]))
+    assert known.tolist() == [False, False, True, True, True, False]
 
 
 TABLE = {

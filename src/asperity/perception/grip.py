@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError, suggest_names
@@ -77,7 +78,8 @@ class Grip(Serializable):
         """Return the thresholds at frequencies [Hz]: amplitudes unnoticed and felt [m].
 
         Interpolated linearly in the logarithms of both; constant beyond the frequencies of the
-        data.
+        data, see :meth:`is_known`. Thresholds against frequency are U-shaped, so what is unnoticed
+        there is unnoticed; what is felt there is not known.
         """
         f = np.log(np.asarray(frequency, dtype=float))
         known = np.log(self.frequency)
@@ -85,6 +87,10 @@ class Grip(Serializable):
             np.exp(np.interp(f, known, np.log(level))) for level in (self.unnoticed, self.felt)
         )
         return lower, upper
+
+    def is_known(self, frequency: FloatArray) -> NDArray[np.bool_]:
+        """Return at which frequencies [Hz], shape (n,), the data have thresholds, shape (n,)."""
+        return (frequency >= self.frequency[0]) & (frequency <= self.frequency[-1])
 
     def compliance(
         self,

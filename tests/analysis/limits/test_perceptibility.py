@@ -39,6 +39,16 @@ def device(**fields: Any) -> Device:
     return parse_device({"max_stiffness": "1000 N/m", **fields}, "mine")
 
 
+PEN = load_grip()
+# The same with thresholds at every frequency, so that magnified waves do not become unknown.
+WIDE = replace(
+    PEN,
+    frequency=(1e-3, *PEN.frequency),
+    unnoticed=(PEN.unnoticed[0], *PEN.unnoticed),
+    felt=(PEN.felt[0], *PEN.felt),
+)
+
+
 def assess_wave(
     amplitude: float,
     own_device: Device,
@@ -50,6 +60,7 @@ def assess_wave(
     wave = Sinusoid(amplitude, period)
     surface = Surface(wave, "A", stiffness, 1e-3)
     rms = stiffness * amplitude * RMS
+    options = {"grip": WIDE, **options}
     return assess_perceptibility(surface, own_device, TexturePart(wave), rms=rms, **options)
 
 
@@ -293,7 +304,7 @@ def test_compare_and_limits_give_the_same_perceptibility() -> None:
 
 
 def test_imperceptible_laws_are_not_recommended() -> None:
-    result = compare(Sinusoid(1e-7, 1e-3), "touch")
+    result = compare(Sinusoid(1e-7, 1e-3), "touch", grip=WIDE)
     assert result.recommended == ""
     sound = [row for row in result.rows if row.conservative and row.continuous]
     assert result.nearest_row is max(sound, key=lambda row: row.resolved_force)
@@ -321,22 +332,43 @@ def test_waviness_of_rounding_size_is_reported_as_none() -> None:
 
 
 @pytest.mark.parametrize(
-    ("period", "extrapolates"), [(9e-3, False), (10.5e-3, True), (0.21e-3, False), (0.19e-3, True)]
+    ("period", "extrapolates"), [(2.4e-3, False), (2.6e-3, True), (0.21e-3, False), (0.19e-3, True)]
 )
 def test_thresholds_beyond_their_frequencies_are_reported(
     period: float, extrapolates: bool
 ) -> None:
-    """At 0.1 m/s these waves are at 11, 9.5, 476 and 526 Hz; the thresholds cover 10 to 500 Hz."""
+    """At 0.1 m/s these waves are at 42, 38, 476 and 526 Hz; the thresholds cover 40 to 500 Hz."""
     for laws in ("C", "WC"):  # the wall, which has no waves, extrapolates nothing
         result = compare(Sinusoid(period / 20.0, period), device(), laws)
         perceptibility = result.row("C").perceptibility
         assert perceptibility is not None
         assert perceptibility.extrapolated is extrapolates
-        assert ("thresholds are extrapolated" in " ".join(result.assumptions)) is extrapolates
+        text = "below 40 Hz and above 500 Hz no threshold is known"
+        assert (text in " ".join(result.assumptions)) is extrapolates
+
+
+def test_nothing_is_felt_at_frequencies_without_thresholds() -> None:
+    """1 mN and more at 10 Hz on a Touch: unknown; faster it is felt, smaller it is not felt."""
+    for amplitude, speed, tier in (
+        (50e-6, 0.1, "unknown"),
+        (50e-6, 0.45, "felt"),
+        (1e-12, 0.1, "not felt"),
+    ):
+        result = compare(Sinusoid(amplitude, 10e-3), "touch", "C", speed=speed)
+        texture = result.rows[0].perceptibility
+        assert texture is not None
+        assert texture.tier == tier
+        assert (texture.level == 0.0) is (speed == 0.1)
+    slow = compare(Sinusoid(50e-6, 10e-3), "touch", "C")
+    assert slow.tier == "unknown"
+    assert slow.rows[0].perceptibility.remedies[0].kind == "speed"
+    # A second wave within the thresholds decides, whatever the first one is.
+    both = Fourier([50e-6, 20e-6], [[200.0 * math.pi, 0.0], [2000.0 * math.pi, 0.0]], [0.0, 0.0])
+    assert compare(both, "touch", "C").tier == "felt"
 
 
 def test_wave_longer_than_the_workspace_is_not_felt() -> None:
-    """4 µm on 8 m, at 13 mHz: a wave that no stroke passes through, only extrapolated as felt."""
+    """4 µm on 8 m, at 13 mHz: a wave that no stroke passes through."""
     width = 0.15
     for period, tier in ((8.0, "not felt"), (1.001 * width, "not felt"), (0.999 * width, "felt")):
         result = assess_wave(4e-3 * period / 8.0, device(workspace_radius=width / 2.0), period)
@@ -370,7 +402,7 @@ def test_magnification_stays_within_the_workspace(make: str) -> None:
 
     def magnification(own_device: Device) -> float | None:
         part = TexturePart(texture)
-        found = assess_perceptibility(surface, own_device, part, rms=rms).remedies
+        found = assess_perceptibility(surface, own_device, part, rms=rms, grip=WIDE).remedies
         return next((remedy.value for remedy in found if remedy.kind == "magnify"), None)
 
     factor = magnification(device())

@@ -157,11 +157,10 @@ def classify_perceptibility(
     resolved = response.is_resolved
     motions = np.where(resolved, response.motions, 0.0)
     total = float(forces @ forces)
-    levels = motions / response.felt
+    levels = np.where(response.is_known, motions / response.felt, 0.0)
     step = known.get("force_resolution", 0.0)
     amplitude = math.sqrt(float(np.square(forces[resolved]).sum()))
     rendered = response.frequencies[resolved & (forces > 0.0)]
-    ends = waves.grip.frequency[0], waves.grip.frequency[-1]
     is_stepped = amplitude < waves.case.force_steps * step
     return Perceptibility(
         tier=response.tier,
@@ -173,12 +172,13 @@ def classify_perceptibility(
         hand_motion=float(np.linalg.norm(motions)),
         hand_force=float(np.linalg.norm(motions / waves.grip.compliance(response.frequencies))),
         level=float(np.linalg.norm(levels)),
-        frequency=float(response.frequencies[np.argmax(levels)]) if len(levels) else 0.0,
+        frequency=float(response.frequencies[np.argmax(levels)]) if levels.any() else 0.0,
         masked_by=MaskingSource.STEPS if is_stepped else MaskingSource.HAND,
         force_step=step,
         speed=waves.case.speed,
         apparent_mass=response.apparent_mass,
-        extrapolated=bool(np.any((rendered < ends[0]) | (rendered > ends[1]))),
+        extrapolated=not waves.grip.is_known(rendered).all(),
+        known_frequencies=(waves.grip.frequency[0], waves.grip.frequency[-1]),
         missing_data=tuple(one for one in (*MASKING_FIELDS, *_HAND_FIELDS) if one not in data),
         unverified=tuple(masking),
         remedies=(),
@@ -194,7 +194,8 @@ def respond(waves: WaveScan) -> HandSpectrum:
 
     Felt: root of the sum of squares of motion over the felt amplitude at least 1, and an amplitude
     of force of at least γ steps. Not felt: the same with the unnoticed amplitude below 1, or less
-    than one step of force, in waves with at least two samples.
+    than one step of force, in waves with at least two samples. Waves at whose frequencies the grip
+    has no thresholds count for neither; unknown: with them it may be noticed, without them not.
     """
     case = waves.case
     grip = waves.grip
@@ -218,9 +219,11 @@ def respond(waves: WaveScan) -> HandSpectrum:
     step = case.device.get("force_resolution", 0.0)
     sampled_amplitude = float(np.linalg.norm(case.forces[sampled]))
     tier: Tier = "not felt"
-    if np.linalg.norm((motions / unnoticed)[sampled]) >= 1.0 and sampled_amplitude >= step:
-        tier = "borderline"
-    response = HandSpectrum(tier, frequencies, motions, unnoticed, felt, resolved, mass)
+    known = grip.is_known(frequencies)
+    noticed = motions / unnoticed
+    if np.linalg.norm(noticed[sampled]) >= 1.0 and sampled_amplitude >= step:
+        tier = "borderline" if np.linalg.norm(noticed[sampled & known]) >= 1.0 else "unknown"
+    response = HandSpectrum(tier, frequencies, motions, unnoticed, felt, resolved, known, mass)
     if felt_ratio(waves, response) >= 1.0:
         return replace(response, tier="felt")
     return response
@@ -230,11 +233,13 @@ def felt_ratio(waves: WaveScan, response: HandSpectrum) -> float:
     """Return by which factor a texture exceeds what it needs to be felt; it is felt from 1 on.
 
     The lesser of the ratio of motion and felt amplitude, root of the sum of squares, and of that
-    of the amplitude of the force and γ force steps, over the waves that the device resolves.
+    of the amplitude of the force and γ force steps, over the waves that the device resolves; the
+    first over those at whose frequencies the grip has thresholds.
     """
     case = waves.case
     resolved = response.is_resolved
-    level = float(np.linalg.norm((response.motions / response.felt)[resolved]))
+    known = resolved & response.is_known
+    level = float(np.linalg.norm((response.motions / response.felt)[known]))
     return min(level, force_step_ratio(case, resolved))
 
 
@@ -279,7 +284,7 @@ def _first_felt(values: Iterable[float], change: Callable[[float], WaveScan]) ->
     return next((float(one) for one in values if respond(change(one)).tier == "felt"), None)
 
 
-Tier = Literal["felt", "borderline", "not felt"]
+Tier = Literal["felt", "borderline", "unknown", "not felt"]
 
 
 class MaskingSource(Enum):
@@ -315,6 +320,7 @@ class HandSpectrum(Serializable):
         unnoticed: amplitudes that nobody notices below [m], shape (n,).
         felt: amplitudes that are felt [m], shape (n,).
         is_resolved: whether the device resolves the wave and is as wide, shape (n,).
+        is_known: whether the grip has thresholds at its frequency, shape (n,).
         apparent_mass: of the device, or the assumed one [kg].
     """
 
@@ -324,6 +330,7 @@ class HandSpectrum(Serializable):
     unnoticed: FloatArray
     felt: FloatArray
     is_resolved: NDArray[np.bool_]
+    is_known: NDArray[np.bool_]
     apparent_mass: float
 
 
@@ -332,7 +339,8 @@ class Perceptibility(Serializable):
     """Perceptibility of a texture on a device.
 
     Attributes:
-        tier: ``"felt"``, ``"borderline"`` or ``"not felt"``.
+        tier: ``"felt"``, ``"borderline"``, ``"not felt"``, or ``"unknown"``: waves at frequencies
+            without known thresholds decide.
         rms: RMS of the oscillating force of the whole surface on a scan [N].
         texture_rms: RMS of the same without form and waviness [N].
         nesting_index: wavelength above which waves count as waviness [m]; ``None`` where nothing
@@ -350,6 +358,7 @@ class Perceptibility(Serializable):
         speed: speed of the scan [m/s].
         apparent_mass: mass of the device that was used [kg].
         extrapolated: whether waves are outside of the frequencies of the thresholds.
+        known_frequencies: first and last frequency of the thresholds [Hz].
         missing_data: unknown fields of the device that could mask the texture.
         unverified: fields of the device from unverified sources that would mask the texture; the
             tier leaves them out.
@@ -372,6 +381,7 @@ class Perceptibility(Serializable):
     speed: float
     apparent_mass: float
     extrapolated: bool
+    known_frequencies: tuple[float, float]
     missing_data: tuple[str, ...]
     unverified: tuple[str, ...]
     remedies: tuple[Remedy, ...]

@@ -211,17 +211,18 @@ def recommend(rows: Sequence[LawRow]) -> LawRow | None:
     """Return the recommended law; ``None`` if no law has a texture that is felt.
 
     A conservative and continuous law gains no energy on any closed path, and its force does not
-    jump. Of such laws whose texture is felt (else: borderline), the one with the strongest texture
-    at its recommended stiffness is chosen; of nearly equal ones the stiffest. Without such a law,
-    the continuous law that is felt (else: borderline) and leaks least for its texture force is
-    chosen. A law that is not felt or hidden by friction, without a known stable stiffness, or with
-    a stability limit below the given stiffness, is never recommended.
+    jump. Of such laws whose texture is felt (else: borderline, else: unknown), the one with the
+    strongest texture at its recommended stiffness is chosen; of nearly equal ones the stiffest.
+    Without such a law, the continuous law that is felt (else as before) and leaks least for its
+    texture force is chosen. A law that is not felt or hidden by friction, without a known stable
+    stiffness, or with a stability limit below the given stiffness, is never recommended.
 
     Args:
         rows: the laws, with their numbers at the given stiffness or each at its recommended one.
     """
     textured = [row for row in textured_rows(rows) if row.is_useful]
-    by_tier = [[row for row in textured if row.tier == tier] for tier in ("felt", "borderline")]
+    tiers: tuple[Tier, ...] = ("felt", "borderline", "unknown")
+    by_tier = [[row for row in textured if row.tier == tier] for tier in tiers]
     for candidates in by_tier:
         sound = [row for row in candidates if row.is_sound]
         if sound:

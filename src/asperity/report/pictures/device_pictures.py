@@ -111,6 +111,7 @@ def hand_figure(comparison: Comparison) -> Figure:
     motions = waves.motions * _MICRO
     span = np.geomspace(min(5.0, frequencies.min() / 1.5), max(600.0, frequencies.max() * 1.5), 300)
     unnoticed, felt = np.array(comparison.grip.threshold(span)) * _MICRO
+    felt[~comparison.grip.is_known(span)] = np.nan  # no source has thresholds there
     axes.plot(span, felt, color=style.GREEN, lw=1.2, ls="--", label="felt above")
     axes.plot(span, unnoticed, color=style.GREEN, lw=1.2, ls=":", label="nobody notices below")
     title = f"law {row.law.letter}, {perceptibility.tier}"
@@ -236,7 +237,9 @@ def _draw_force_limits(result: Limits, axes: Axes, scale: float) -> None:
         frequencies, texture.apparent_mass, damping, result.surface.stiffness
     )
     names = "unnoticed below, along the normal", "felt above, along the normal"
-    for level, name, line in zip(result.grip.threshold(frequencies), names, ":-", strict=True):
+    unnoticed, felt = result.grip.threshold(frequencies)
+    felt[~result.grip.is_known(frequencies)] = np.nan
+    for level, name, line in zip((unnoticed, felt), names, ":-", strict=True):
         needed = level / compliance * scale
         axes.plot(lengths * _MILLI, needed, color=style.GREEN, lw=1.0, ls=line, label=name)
     lines = [line for line in axes.lines if line.get_label() in names]

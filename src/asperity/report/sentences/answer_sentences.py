@@ -18,6 +18,7 @@ from asperity.report.sentences.limit_sentences import (
     masking_text,
     remedies_text,
     texture_amount_text,
+    unknown_frequencies_text,
     unverified_text,
 )
 from asperity.report.sentences.number_text import FRICTION_PROOF
@@ -74,7 +75,11 @@ def _choice_text(comparison: Comparison) -> str:
         choice = f"At {stiffness} use {law} ({known})"
     force = force_magnitude_text(row.resolved_force)
     depth = format_quantity(row.surface.max_depth, "m")
-    return f"{choice}, up to a depth of {depth}: its texture of {force} RMS is {row.tier}."
+    effect = f"its texture of {force} RMS is {row.tier}"
+    if row.tier == "unknown":
+        ends = unknown_frequencies_text(row.perceptibility)
+        effect = f"whether its texture of {force} RMS is felt, {ends}, is not known"
+    return f"{choice}, up to a depth of {depth}: {effect}."
 
 
 def _law_title(row: LawRow) -> str:

@@ -98,7 +98,7 @@ def device_recommendation(result: DeviceComparisons) -> str:
     count = len(result.comparisons)
     tiers = Counter([case.tier or _NO_LAW for case in result.comparisons])
     if count:
-        order = ("felt", "borderline", "not felt", _NO_LAW)
+        order = ("felt", "borderline", "unknown", "not felt", _NO_LAW)
         counts = ", ".join([f"{tier} in {tiers[tier]}" for tier in order if tiers[tier]])
         plural = "s" if count > 1 else ""
         sentences.append(f"Of {count} case{plural}: {counts}.")

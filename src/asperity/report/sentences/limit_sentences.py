@@ -67,6 +67,18 @@ def tier_text(texture: Perceptibility | None) -> str:
     return "–" if texture is None else texture.tier
 
 
+def unknown_frequencies_text(texture: Perceptibility) -> str:
+    """Return at which frequencies it is not known what is felt.
+
+    Example:
+        >>> from types import SimpleNamespace
+        >>> unknown_frequencies_text(SimpleNamespace(known_frequencies=(40.0, 500.0)))
+        'below 40 Hz and above 500 Hz'
+    """
+    low, high = [format_quantity(frequency, "Hz") for frequency in texture.known_frequencies]
+    return f"below {low} and above {high}"
+
+
 def texture_amount_text(texture: Perceptibility) -> str:
     """Return the RMS of the oscillating force, the part that is texture, and what is resolved."""
     texture_force = force_magnitude_text(texture.texture_rms)
@@ -81,10 +93,15 @@ def texture_amount_text(texture: Perceptibility) -> str:
 
 def masking_text(texture: Perceptibility) -> str:
     """Return what hides a texture, with the motion of the held tool or the force that is needed."""
+    motion = format_quantity(texture.hand_motion, "m", digits=2)
     if texture.masked_by is MaskingSource.STEPS:
         step = force_magnitude_text(texture.force_step)
         return f"the device's force steps of {step} hide it"
-    motion = format_quantity(texture.hand_motion, "m", digits=2)
+    if texture.tier == "unknown":
+        return (
+            f"it moves the held tool by {motion}, but {unknown_frequencies_text(texture)}, where "
+            "its waves are, no threshold is known"
+        )
     place = "in waves that it resolves"
     if texture.level:
         place = f"above all at {texture.frequency:.3g} Hz"
@@ -128,7 +145,10 @@ def _remedy_text(remedy: Remedy) -> str:
 def perceptibility_assumptions(texture: Perceptibility, device: Device, grip: Grip) -> list[str]:
     """Return what a tier of perceptibility assumes of the hand and of the device, in sentences."""
     assumed = "" if "apparent_mass" in device.data else ", assumed"
-    extrapolated = "; thresholds are extrapolated" if texture.extrapolated else ""
+    extrapolated = ""
+    if texture.extrapolated:
+        ends = unknown_frequencies_text(texture)
+        extrapolated = f"; {ends} no threshold is known, and nothing counts as felt"
     sentences = [
         f"Felt: the texture moves the held tool, at {speed_text(texture.speed)}, by more than a "
         f"person notices at its frequencies{extrapolated}; apparent mass "
