@@ -67,3 +67,7 @@ while printf ' 1' 2> /dev/null; do sleep 1; done |
 ! asperity study run rough.toml --participant S02 --simulate typical -o rough-simulated-device
 asperity study report rough-simulated-device
 asperity study remove rough-simulated-device P01
+
+# 14. From a game asset: a normal map, whose name tells where green points, as a texture that is felt
+asperity maps $SURFACE --normals gltf -o plate_nor_gl.png --extent "4mm; 4mm"
+asperity compare plate_nor_gl.png --device touch --laws WC

@@ -76,6 +76,7 @@ EXPECTED: dict[int, tuple[str, dict[str, str]]] = {
         r"must not be mixed[\s\S]*P01: 1 answer in[\s\S]*Deleted in rough-simulated-device: P01/",
         {"rough-simulated-typical/trials.csv": ",typical"},
     ),
+    14: (r"^Use law C [\s\S]*its texture of [\s\S]*RMS is\s+felt\.", {}),
 }
 """A pattern of stderr and stdout, and words of the files that each task writes."""
 

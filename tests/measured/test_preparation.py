@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -189,6 +190,21 @@ def test_missing_pitch_is_required_and_file_pitch_can_be_replaced() -> None:
     assert replaced.pitch == (3e-6, 4e-6)
     assert replaced.steps[0] == "pitch 3 µm x 4 µm as given instead of the file's 1 µm x 2 µm"
     assert prepare(surface(bumpy()[0]), pitch=[2e-6]).pitch == (2e-6,)
+
+
+def test_one_message_names_all_that_an_image_lacks() -> None:
+    """With values that can be pasted; what was given is not asked for again."""
+    raw = replace(surface(bumpy(), pitch=None), relative=True, has_units=False)
+    match = r"pitch and height_range must be given: .* such as pitch=5e-05 height_range=0.0002$"
+    with pytest.raises(ParameterError, match=match):
+        prepare(raw)
+    with pytest.raises(ParameterError, match=r"pitch must be given: .* add pitch=5e-05$"):
+        prepare(raw, height_range=1e-4)
+    with pytest.raises(ParameterError, match=r"height_range is required: .* height_range=0.0002$"):
+        prepare(raw, pitch=1e-5)
+    text = replace(raw, lacks_unit=True)
+    with pytest.raises(ParameterError, match=r"pitch and unit must be given: .*unit='um'$"):
+        prepare(text)
 
 
 def test_height_range_scales_relative_heights() -> None:

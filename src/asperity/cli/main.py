@@ -35,6 +35,8 @@ GROUPS = read_toml("commands", Path(__file__).with_name("commands.toml"))
 COMMANDS = {name: entry for group in GROUPS.values() for name, entry in group.items()}
 
 _FILE_OPTIONS = {argument.name: argument for argument in FILE_ARGUMENTS}
+_USUAL = {"unit", "green", "pitch", "height_range", "tip_radius", "magnify"}
+"""Options of a measured file that every help shows."""
 _HEADINGS = {
     "Law": {"law", "laws", "clamp", "stiffness", "max_depth", "rendering", *SHIPPED_LAW_ARGUMENTS},
     "Device and hand": {"device", "driver", "speed", "grip", "settings"},
@@ -150,10 +152,12 @@ class HeadedCommand(OptionCommand):
     """Command whose help has options under headings, and an example."""
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the options; those of a measured file only for ``--help-surface``."""
+        """Write the options; the rarer of a measured file only for ``--help-surface``."""
         rows: dict[str, list[tuple[str, str]]] = {title: [] for title in ("Options", *_HEADINGS)}
         has_files = any(option.name == "tip_radius" for option in self.params)
         for option in self.get_params(ctx):
+            if option.name in _FILE_OPTIONS.keys() - _USUAL and not ctx.meta.get("shows_files"):
+                continue
             record = option.get_help_record(ctx)
             title = _HEADING_OF.get(str(option.name), "Options")
             if title == "Measured surface" and not has_files:
@@ -161,7 +165,7 @@ class HeadedCommand(OptionCommand):
             if record is not None:
                 rows[title].append(record)
         for title, records in rows.items():
-            if records and (title != "Measured surface" or ctx.meta.get("shows_files")):
+            if records:
                 with formatter.section(title):
                     formatter.write_dl(records)
 
@@ -194,7 +198,7 @@ help_surface_option = click.option(
     is_eager=True,
     expose_value=False,
     callback=_show_file_options,
-    help="Show the options of a measured surface, too: unit, filters, magnification ...",
+    help="Show all options of a measured surface: filters, form, missing points ...",
 )
 """Adds ``--help-surface``."""
 

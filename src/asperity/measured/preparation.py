@@ -71,10 +71,10 @@ def check_plausible(raw: RawSurface, heights: FloatArray, pitch: Pitch) -> None:
         ParameterError: the user must give the unit or the height range, with the options for it.
     """
     if raw.relative:
-        text = f"is required: the values of {raw.source} have no unit; give their range [m]"
+        text = f"is required: the values of {raw.source} have no unit; give {{height_range}}"
         if raw.lacks_unit:
             text += ", or their unit, such as {unit}"
-        raise ParameterError("height_range", text, unit="um")
+        raise ParameterError("height_range", text, unit="um", height_range=_EXAMPLE_RANGE)
     span = float(np.nanmax(heights)) - float(np.nanmin(heights))
     slope = mean_slope(heights, pitch)
     fixes, suggestions = _suggest_fixes(raw, span, slope)
@@ -210,6 +210,9 @@ def prepare(  # noqa: D417 - the others are described by their declarations
     require_memory(*raw.heights.shape[::-1])
     start("outliers")
     heights = np.array(raw.heights, dtype=np.float64)
+    if raw.in_pitches:
+        _check_square(lateral)
+        heights *= lateral[0]
     if height_range is None:
         record("as read", heights, lateral)
     if outliers is not None:
@@ -364,12 +367,7 @@ def _resolve_pitch(
     if pitch is not None:
         chosen = pitch
     if chosen is None:
-        text = f"must be given [m]: {raw.source} has none; give it, such as {{pitch}}"
-        if raw.lacks_unit and height_range is None:
-            text += " and {unit}"
-        elif raw.relative and height_range is None:
-            text += " and {height_range}"
-        raise ParameterError("pitch", text, pitch=1e-6, unit="um", height_range=1e-6)
+        raise _missing_pitch_error(raw, height_range)
     values = np.atleast_1d(np.asarray(chosen, dtype=np.float64))
     if values.ndim != 1 or len(values) not in (1, axes):
         wanted = ("one number [m]", "one number or (px, py) [m]")[axes - 1]
@@ -390,6 +388,31 @@ def _resolve_pitch(
             pitch=lateral[0],
         )
     return lateral
+
+
+def _check_square(pitch: Pitch) -> None:
+    if len(set(pitch)) > 1:
+        raise ParameterError("pitch", "must be equal along x and y: slopes of a normal map", pitch)
+
+
+def _missing_pitch_error(raw: RawSurface, height_range: float | None) -> ParameterError:
+    """Return the error for a file without a pitch, with all that is missing, ready to paste."""
+    text = f"must be given: {raw.source} has none; add {{pitch}}"
+    values = {"pitch": 1e-6, "unit": "um", "height_range": _EXAMPLE_RANGE}
+    if raw.lacks_unit and height_range is None:
+        text = f"and unit must be given: {raw.source} has neither; add {{pitch}} {{unit}}"
+    elif raw.relative and height_range is None:
+        text = (
+            f"and height_range must be given: {raw.source} has neither; add the distance of its"
+            " points and its height, such as {pitch} {height_range}"
+        )
+    if raw.in_pitches or (raw.relative and not raw.lacks_unit):
+        values["pitch"] = _EXAMPLE_PITCH
+    return ParameterError("pitch", text, **values)
+
+
+_EXAMPLE_PITCH = 5e-5
+_EXAMPLE_RANGE = 2e-4
 
 
 def _scale_heights(

@@ -47,6 +47,7 @@ class RawSurface:
         relative: whether the heights are not lengths (pixel values of an image): a height range
             converts them to lengths.
         lacks_unit: whether relative heights are lengths, whose unit ``read_surface`` accepts.
+        in_pitches: whether the heights are in units of the pitch, which is to be given.
 
     Example:
         >>> flat = RawSurface(np.zeros((4, 5)), (1e-6, 1e-6), "flat.npy", ())
@@ -61,6 +62,7 @@ class RawSurface:
     has_units: bool = True
     relative: bool = False
     lacks_unit: bool = False
+    in_pitches: bool = False
 
     @property
     def is_profile(self) -> bool:
@@ -143,10 +145,12 @@ class ReadingOptions:
     Attributes:
         channel: name or number (from 0) of the height channel, for a file with several.
         unit: unit of length of a file that has none.
+        green: direction that the green channel of a normal map encodes, "up" or "down".
     """
 
     channel: str | int | None = None
     unit: str | None = None
+    green: str | None = None
 
     @property
     def metres_per_unit(self) -> float | None:
@@ -220,6 +224,7 @@ class Reader:
         for argument, reason in (
             ("channel", "has no channels to choose from"),
             ("unit", "has its own unit, or none at all"),
+            ("green", "is no image"),
         ):
             value = getattr(options, argument)
             if value is not None and argument not in self.arguments:

@@ -93,6 +93,7 @@ def load_texture(  # noqa: D417 - the others are described where they are declar
     *,
     channel: str | int | None = None,
     unit: str | None = None,
+    green: str | None = None,
     pitch: float | Sequence[float] | None = None,
     height_range: float | None = None,
     outliers: float | None = None,

@@ -21,7 +21,9 @@ from asperity.measured.preparation import prepare
 
 def test_a_map_without_pitch_and_unit_asks_once_for_both(tmp_path: Path) -> None:
     raw = read_text(tmp_path, f"Pixel size: 2 um\nZ unit: nm\n{MAP}{MAP}")
-    with pytest.raises(ParameterError, match=r"pitch must be given.*pitch=1e-06 and unit='um'"):
+    with pytest.raises(
+        ParameterError, match=r"pitch and unit must be given.*pitch=1e-06 unit='um'"
+    ):
         prepare(raw)
 
 

@@ -6,7 +6,7 @@ import math
 import re
 import struct
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.measured.lengths import format_lengths, is_pitch, unit_to_metres
 from asperity.measured.reader import RawSurface, ReadingOptions, check_point_count
+from asperity.measured.reading.normal_map import decode_normals, normals_to_surface
 
 _MAX_DESCRIPTION = 10**6
 _OME_PIXELS = re.compile(r"<(?:\w{1,20}:)?Pixels\s([^<>]{0,5000})>")
@@ -238,6 +239,12 @@ def pixels_to_surface(
         _check_opaque(values[..., -1])
         values = values[..., :-1]
         notes = (*notes, "alpha channel dropped: opaque everywhere")
+    normals = decode_normals(values)
+    if normals is not None:
+        found = normals_to_surface(normals, name, options.green)
+        return replace(found, pitch=scale.pitch, notes=(*notes, *found.notes))
+    if options.green is not None:
+        raise ParameterError("green", f"must not be given: {name} is no normal map", options.green)
     grey, notes = _to_grey(values, notes)
     with np.errstate(invalid="ignore"):  # a signalling NaN is a missing point too
         heights = scale.factor * grey.astype(np.float64) + scale.offset
@@ -274,6 +281,5 @@ def _to_grey(values: NDArray[Any], notes: tuple[str, ...]) -> tuple[NDArray[Any]
         return first, (*notes, "three equal channels: read as one grey image")
     raise SurfaceFileError(
         "is a colour image: its three channels differ, and a colour is no height;"
-        " save the heights, for a normal map those from which it was made, as a grey image (16 bit"
-        " if possible)"
+        " save the heights as a grey image (16 bit if possible)"
     )

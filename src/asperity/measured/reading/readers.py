@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from asperity.core.errors import AsperityError, ParameterError, SurfaceFileError, nearest_names
+from asperity.measured.file_arguments import READING_ARGUMENTS
 from asperity.measured.lengths import is_pitch
 from asperity.measured.reader import (
     ARCHIVE_ERRORS,
@@ -139,12 +140,12 @@ def _read_text(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
 SIGNATURE_READERS = (
     Reader("an X3P file", _is_x3p, read_x3p),
     Reader("an NPY file", lambda file: file.head.startswith(NPY_MAGIC), read_npy, ("unit",)),
-    Reader("a PNG image", lambda f: f.head.startswith(PNG_MAGIC), read_png),
+    Reader("a PNG image", lambda f: f.head.startswith(PNG_MAGIC), read_png, ("green",)),
     Reader(
         "a TIFF image",
         lambda file: file.head.startswith(TIFF_MAGIC),
         read_tiff,
-        ("unit",),
+        ("unit", "green"),
         is_isolated=True,
     ),
     Reader("an SDF file", lambda file: is_sdf(file.head), read_sdf),
@@ -252,7 +253,11 @@ def _describe_error(error: Exception) -> str:
 
 
 def read_surface(
-    path: str | os.PathLike[str], *, channel: str | int | None = None, unit: str | None = None
+    path: str | os.PathLike[str],
+    *,
+    channel: str | int | None = None,
+    unit: str | None = None,
+    green: str | None = None,
 ) -> RawSurface:
     r"""Read a measured or synthetic surface; the content of the file decides its format.
 
@@ -267,10 +272,14 @@ def read_surface(
         unit: unit of length of a file that has none, such as "mm": required for STL and OBJ,
             optional for NPY (metres if not given)
             and for text that does not state it.
+        green: direction that the green channel of a normal map encodes in the picture, "up"
+            (glTF, OpenGL) or "down" (DirectX); required unless the name of the file ends like
+            "normal_gl" or "NormalDX".
 
     Returns:
         The heights [m] of the file, and the pitch if the file has one. Heights of images have no
-        unit: ``relative`` is True, and the pitch None.
+        unit: ``relative`` is True, and the pitch None. Those of a normal map follow from its slopes
+        (:func:`asperity.measured.slopes.integrate_slopes`) and are in units of the pitch.
 
     Raises:
         SurfaceFileError: the file cannot be read, with the reason.
@@ -286,7 +295,9 @@ def read_surface(
         ((4,), ['5.0e-07'])
     """
     name = Path(path).name or str(path)
-    options = ReadingOptions(channel, unit)
+    if green is not None:
+        green = READING_ARGUMENTS[-1].validate(green)
+    options = ReadingOptions(channel, unit, green)
     try:
         _ = options.metres_per_unit  # refuses an unknown unit, whatever the file is
         _check_file(Path(path), name)
