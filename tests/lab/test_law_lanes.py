@@ -6,6 +6,7 @@ import os
 import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from websockets.sync.client import ClientConnection
 
 from asperity.core.checks import FloatArray
 from asperity.kernels.tick import quantize
+from asperity.lab.law_lanes import LawLane
 from asperity.lab.scene_state import make_scene_state
 from asperity.scene import load_scene
 
@@ -203,3 +205,26 @@ def test_a_loop_that_dies_is_said_and_the_other_goes_on(
     say(page, "start")
     heard(page, beside("A", "H", start_count=count + 1))
     heard(page, lane(1))
+
+
+def test_pictures_of_the_law_before_are_never_said_to_be_current() -> None:
+    """Between a change of the session and the request of its pictures."""
+    state = make_scene_state(load_scene("sinusoid:amplitude=0.2mm,period=2mm"))
+    session: Any = SimpleNamespace(
+        state="running", message="", start_count=1, scene_state=state.with_changes({"law": "W"})
+    )
+    shown = session.scene_state.setup.rendered
+    pictures: Any = SimpleNamespace(
+        limit={"stiffness": 400.0},
+        version=1,
+        message="",
+        is_current=True,
+        shows=lambda surface: surface is shown,
+    )
+    lane_of_w = LawLane(session, pictures)
+    assert lane_of_w.status["pictures_current"]
+    assert lane_of_w.status["limit"]
+    session.scene_state = state.with_changes({"law": "A"})
+    assert lane_of_w.status["settings"]["law"] == "A"
+    assert not lane_of_w.status["pictures_current"]
+    assert not lane_of_w.status["limit"]

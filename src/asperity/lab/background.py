@@ -262,6 +262,10 @@ class BackgroundRenderer:
         self.message = ""
         start_task(self._tasks, self._compute(surface))
 
+    def shows(self, surface: Surface) -> bool:
+        """Whether pictures and limit are those of a surface, or are being computed for it."""
+        return surface is self._requested_surface
+
     def close(self) -> None:
         """Cancel all tasks."""
         for task in self._tasks:

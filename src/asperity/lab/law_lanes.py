@@ -37,15 +37,17 @@ class LawLane:
         """State of loop and pictures, for the page."""
         session = self.session
         pictures = self.pictures
+        # The session may have changed since the pictures were requested last.
+        is_shown = pictures.shows(session.scene_state.setup.rendered)
         return {
             "state": session.state,
             "message": session.message,
             "start_count": session.start_count,
             "settings": session.scene_state.settings,
-            "limit": pictures.limit,
+            "limit": pictures.limit if is_shown else {},
             "surface_version": pictures.version,
             "picture_message": pictures.message,
-            "pictures_current": pictures.is_current,
+            "pictures_current": pictures.is_current and is_shown,
         }
 
 

@@ -209,6 +209,8 @@ class LabServer:
             self._clients.remove(page)
             if self._controller is page:
                 self._controller = None
+                if self.session.handle is None:
+                    self.session.end_tour()
                 await self._broadcast_state()
 
     async def _receive(self, client: Client) -> None:

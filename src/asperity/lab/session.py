@@ -16,7 +16,7 @@ from asperity.core.checks import FloatArray
 from asperity.core.errors import AsperityError, ParameterError
 from asperity.devices import Device
 from asperity.lab.messages import SteerRequest
-from asperity.lab.scene_state import SCENE_KEY, SavedScenes, SceneState
+from asperity.lab.scene_state import PREVIOUS_SCENE, SCENE_KEY, TOUR_SCENE, SavedScenes, SceneState
 from asperity.scene.setup import Setup
 from asperity.servo.driver import Driver
 from asperity.servo.drivers.pointer import PointerHand, pointer_driver
@@ -219,6 +219,18 @@ class Session:
         """Request a change of the scene, which starts a stopped loop on the simulated device."""
         self._requests.put(dict(changes))
 
+    def end_tour(self) -> None:
+        """If a guided tour runs, discard requested changes, and request the scene before it."""
+        with self._requests.mutex:
+            queue = self._requests.queue
+            changes = [one for one in queue if isinstance(one, Mapping)]
+            names = {one.get(SCENE_KEY) for one in changes}
+            is_running = PREVIOUS_SCENE in self.saved_scenes.scenes or TOUR_SCENE in names
+            for one in changes if is_running else ():
+                queue.remove(one)
+        if is_running:
+            self.change({SCENE_KEY: PREVIOUS_SCENE})
+
     def start(self) -> None:
         """Request the start of a stopped loop."""
         self._requests.put(_StartRequest(self._stop_count))
@@ -339,6 +351,8 @@ class Session:
         if scene is self.scene_state and self._loop is not None:
             self._set_state("running")
             return
+        if scene is self.scene_state and SCENE_KEY in changes:
+            return  # no tour to be ended: a stopped loop stays so
         if not (self._is_rendered(scene.setup) and self._is_accepted(scene)):
             return
         if self.handle is not None and self._loop is None:

@@ -150,3 +150,44 @@ def test_the_tour_shows_one_law(page: Browser) -> None:
     page.until(f"!lab.tour.isActive && lab.status.start_count === {starts} + 2")
     assert page.ask("lab.status.settings.beside") == ""
     assert page.said == []
+
+
+@needs_browser
+def test_a_field_with_curl_is_never_said_to_be_not_alive(page: Browser) -> None:
+    """What sampling may explain is no proof that the field gains nothing."""
+    findings = """((hasCurl, energy) => {
+      const verdict = Object.create(lab.secondLane.verdicts[0]);
+      Object.assign(verdict, { hasCurl, energyMeter: { energy, suppliesEnergy: false } });
+      return verdict.findings[0];
+    })"""
+    for energy in (0.0, 4.27e-3):
+        text, is_fault = page.ask(f"{findings}(true, {energy})")
+        assert "not alive" not in text
+        assert text.startswith("has curl")
+        assert not is_fault
+        assert page.ask(f"{findings}(false, {energy})")[0].startswith("not alive")
+    assert "4.27 mJ" in page.ask(f"{findings}(true, 4.27e-3)")[0]
+
+
+@needs_browser
+def test_traces_of_long_strokes_show_a_line_in_a_faint_band(page: Browser) -> None:
+    """A force that varies faster than the picture resolves is no filled block."""
+    opaque = page.ask("""(() => {
+      const { columns } = lab.connection.layout, width = Object.keys(columns).length;
+      const plot = new lab.traces.constructor(document.createElement("canvas"));
+      const stroke = {};
+      plot.scaledCanvas = { clear: () => [context, 800, 300] };
+      const canvas = Object.assign(document.createElement("canvas"), { width: 800, height: 300 });
+      const context = canvas.getContext("2d");
+      for (let k = 0; k < 500; k++) {
+        const row = new Float64Array(width), low = new Float64Array(width).fill(-1);
+        row[columns.time ?? 0] = 0.01 * k;
+        plot.addFrame({ newest: row, minima: low, maxima: low.map(value => -value) }, columns);
+      }
+      plot.draw(0);
+      const strip = context.getImageData(100, 110, 600, 80).data;
+      let count = 0;
+      for (let k = 3; k < strip.length; k += 4) count += strip[k] > 200;
+      return count / (600 * 80);
+    })()""")
+    assert 0.005 < opaque < 0.2

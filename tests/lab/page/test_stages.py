@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from queue import Queue
 from typing import Any
@@ -113,6 +113,30 @@ def test_wishes_for_the_stage_before_are_not_made_of_the_next(tmp_path: Path) ->
             {"saved_scene": TOUR_SCENE, "law": "W", "stiffness": 9.0},
             {"saved_scene": PREVIOUS_SCENE, "law": "H"},
         ]
+    finally:
+        assert session.pointer_hand is not None
+        session.pointer_hand.close()
+
+
+def test_what_a_page_requested_before_it_was_closed_is_not_done(tmp_path: Path) -> None:
+    session = Session(stage_of("band", tmp_path), lambda: None)
+    try:
+        for changes in ({"saved_scene": TOUR_SCENE, "law": "W"}, {"law": "A"}):
+            session.change(changes)
+        session.start()
+        session.end_tour()
+        requests = session._next_requests()
+        assert [one for one in requests if isinstance(one, Mapping)] == [
+            {"saved_scene": PREVIOUS_SCENE}
+        ]
+        assert len(requests) == 2  # the start is still there
+        # Without a tour the changes of a page that is closed are done.
+        session.change({"law": "A"})
+        session.end_tour()
+        assert session._next_requests() == [{"law": "A"}]
+        # There was no tour: a loop that is stopped stays so.
+        session._apply_changes({"saved_scene": PREVIOUS_SCENE})
+        assert session.start_count == 0
     finally:
         assert session.pointer_hand is not None
         session.pointer_hand.close()

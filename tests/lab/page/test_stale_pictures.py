@@ -41,6 +41,7 @@ def test_a_picture_of_another_law_is_grey_and_says_so(page: Browser) -> None:
     label = page.ask("document.getElementById('section').getAttribute('aria-label')")
     assert "curl" not in label
     assert "of law A" in label
+    assert page.ask("lab.section.label") == "law A"  # in the picture, too
     assert colourfulness(page, "section") < 20.0
     # The relief is that of the surface, whatever the law.
     assert "heights" in text(page, "relief-note")
@@ -80,3 +81,21 @@ def test_a_picture_of_another_surface_is_grey(page: Browser) -> None:
     page.ask("lab.pictures.send = globalThis.sendPicture; 1")
     page.until("lab.hasCurrentPictures && !document.querySelector('.stale')")
     change(page, "texture", former)
+
+
+@needs_browser
+def test_a_part_of_the_view_without_a_picture_is_requested_at_once_and_says_so(
+    page: Browser,
+) -> None:
+    page.until("lab.hasCurrentPictures && lab.section.covers(lab.sectionBox())")
+    # A slow picture before: the next one would come after eight times its time.
+    page.ask("lab.pictures.requests.section.nextTime = performance.now() + 1e6")
+    drawn = "lab.texts = []; const c = CanvasRenderingContext2D.prototype, fill = c.fillText;"
+    drawn += "c.fillText = function (text, ...place) { lab.texts.push(text);"
+    drawn += " fill.call(this, text, ...place); }"
+    page.ask(f"(() => {{ {drawn} }})()")
+    page.ask("Object.assign(lab.hand, { x: lab.hand.x + 0.02 }).requestMotion()")
+    page.until("!lab.section.covers(lab.sectionBox())", 20.0)
+    page.until("lab.section.covers(lab.sectionBox())", 20.0)
+    assert page.ask("lab.texts.includes('computing …')")
+    assert page.said == []

@@ -109,3 +109,22 @@ def test_what_is_not_there_is_not_found(page: Browser) -> None:
     assert not page.ask("lab.energyMeter.suppliesEnergy")
     page.press("t")
     page.until(f"lab.status.start_count === {starts} + 2 && lab.status.state === 'running'")
+
+
+@needs_browser
+def test_a_page_that_is_closed_in_mid_tour_leaves_nothing_to_the_next(page: Browser) -> None:
+    former = page.ask("lab.status.settings")
+    address, fragment = page.ask("[location.href.split('#')[0], location.hash]")
+    page.press("t")
+    page.until("lab.tour.isActive && lab.status.settings.texture.includes('0.4mm')")
+    page.until("lab.status.settings.law === 'W' && lab.status.state === 'running'")
+    assert page.ask("location.hash") == fragment  # a page that is loaded again has no tour
+    page.ask("lab.tour.goTo(1), lab.tour.goTo(2), lab.tour.goTo(3)")  # and more requests
+    page.call("Page.navigate", url="about:blank")
+    page.call("Page.navigate", url=f"{address}?again")
+    page.until("globalThis.lab?.status?.has_control && lab.status.state === 'running'")
+    page.until(f"JSON.stringify(lab.status.settings) === JSON.stringify({json.dumps(former)})")
+    page.let_loop_run(1.0)
+    assert page.ask("lab.status.settings") == former
+    # The hand is that of the page, free.
+    page.until("lab.probeState() && !lab.probeState().isInside")

@@ -19,7 +19,7 @@ import { RecommendationPanel } from "./recommendation_panel.js";
 import { Tour } from "./tour.js";
 import { TourPanel } from "./tour_panel.js";
 import { SpectrumPlot, TracePlot } from "./traces.js";
-import { ReliefView, SectionView, isBeside, isRelief } from "./views.js";
+import { ReliefView, SectionView, isBeside, isRelief, pictureLabel } from "./views.js";
 import { formatMillimetres, formatQuantity } from "./format.js";
 
 const $ = id => document.getElementById(id);
@@ -63,6 +63,7 @@ const connection = new Connection({
     if (isFirstStatus && status.has_control && !status.handle) applyUrlSettings(); // never on a real device
     isFirstStatus = false;
     hand.surfaceHeight = status.highest;
+    if (status.has_control && !previous?.has_control) hand.requestMotion(); // that of the page before goes on otherwise
     lastRun.requestPictures = -Infinity; // they may have changed
     showStatus();
     secondLane.setStatus(status);
@@ -80,6 +81,7 @@ const connection = new Connection({
     const notice = status?.handle ? " The force is released when no page with control is connected." : "";
     isFirstStatus = false;
     status = null;
+    tour.end(); // the server ends it, too
     for (const one of [pictures, secondLane]) one.setStatus(null);
     $("state").className = "stopped";
     $("state").textContent = "connection lost";
@@ -106,7 +108,8 @@ const motionPanel = new MotionPanel({
   get isSectionCurrent() { return (this.section === section ? pictures : secondLane.pictures).isCurrent(this.section); },
 });
 
-const secondLane = new SecondLane({ changeScene, send(kind, content) { return connection.send(kind, content); }, energyMeter, tour });
+const secondLane = new SecondLane({ changeScene, send(kind, content) { return connection.send(kind, content); }, energyMeter, tour,
+  get hasCurl() { return pictures.isCurrent(section) && section.hasCurl; } });
 const updateRate = () => status?.update_rate ?? 1000;
 
 /** Tell the server that a frame was processed, so that it sends further ones. */
@@ -165,14 +168,15 @@ function showStatus() {
     Object.assign(document.createElement("li"), { textContent: text })));
   showCurrentLimit();
   recommendationPanel.update(status);
-  if (hasControl && state === "running" && !status.handle) storeUrlSettings(settings);
+  if (hasControl && state === "running" && !status.handle && !tour.isActive) storeUrlSettings(settings);
 }
 
 /** Name the first lane, if there are two. */
 function showLanes() {
   const { law } = status.settings, { isShown } = secondLane;
   secondLane.update(law);
-  for (const view of [section, traces]) view.label = isShown ? `law ${law}` : "";
+  traces.label = isShown ? `law ${law}` : "";
+  section.label = isShown || !pictures.isCurrent(section) ? pictureLabel(section, law) : "";
   $("section-title").textContent = isShown ? `Law ${law}` : "Section below the probe";
   $("trace-title").textContent = isShown ? `Law ${law}` : "Position, force and energy";
 }
@@ -248,6 +252,7 @@ function requestPictures(state) {
     if (Math.abs(x - viewCentre[0]) > 0.45 * viewWidth || Math.abs(y - viewCentre[1]) > 0.45 * viewWidth) viewCentre = [x, y];
   }
   pictures.request("relief", { x: viewCentre[0], y: viewCentre[1], size: viewWidth });
+  if (!section.covers(sectionBox())) pictures.endPauses(); // a part of the view is blank
   const cut = { box: sectionBox(), y: state ? Math.round(state.probe[1] / 5e-5) * 5e-5 : 0 };
   pictures.request("section", cut);
   secondLane.requestPicture(cut);
@@ -370,7 +375,7 @@ readTheme();
 requestAnimationFrame(paint);
 // For the tests and for the console of the browser.
 globalThis.lab = {
-  connection, hand, pictures, quietContact, tour, energyMeter, relief, section, probeState, sectionBox,
+  connection, hand, pictures, quietContact, tour, energyMeter, relief, section, traces, probeState, sectionBox,
   latencies: latencyMonitor.latencies, toSvg: () => toSvg(views()), toPng: () => toPng(views()), secondLane,
   get viewWidth() { return viewWidth; }, get frame() { return frame; }, get status() { return status; },
   get errorCount() { return errorCount; },

@@ -10,6 +10,7 @@ export class LaneVerdict {
     this.energyMeter = energyMeter;
     this.metrics = new ContactMetrics();
     this.hasBuzzed = false;
+    this.hasCurl = false; // of the field
   }
 
   reset() {
@@ -29,8 +30,10 @@ export class LaneVerdict {
   get findings() {
     const { energyMeter, metrics, hasBuzzed } = this, energy = formatQuantity(energyMeter.energy, "J");
     const buzz = hasBuzzed ? `buzzes ±${formatQuantity(metrics.forceAmplitude, "N")}` : "no buzz";
+    // Sampling explains at most what it was given; a field with curl is alive on the right path only.
+    const unfed = this.hasCurl ? "has curl; not shown alive yet" : "not alive";
     return [
-      energyMeter.suppliesEnergy ? [`alive: gave ${energy}`, true] : [`not alive${energyMeter.energy > 2e-6 ? ` (${energy} by sampling)` : ""}`, false],
+      energyMeter.suppliesEnergy ? [`alive: gave ${energy}`, true] : [`${unfed}${energyMeter.energy > 2e-6 ? ` (${energy}, as sampling may)` : ""}`, false],
       [metrics.stillTime > 0.6 || hasBuzzed ? buzz : "buzz: not judged in motion", hasBuzzed],
       [metrics.clickCount ? `${metrics.clickCount} clicks` : "no clicks", metrics.clickCount > 0],
     ];

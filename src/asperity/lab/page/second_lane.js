@@ -3,7 +3,7 @@
 import { Pictures } from "./pictures.js";
 import { LaneVerdict } from "./lane_verdict.js";
 import { Spectrum, TracePlot } from "./traces.js";
-import { SectionView } from "./views.js";
+import { SectionView, pictureLabel } from "./views.js";
 import { formatQuantity } from "./format.js";
 import { probeStateOf } from "./probe_overlay.js";
 
@@ -12,7 +12,7 @@ const IN_TOUR = "not offered in the guided tour, which shows one law at a time";
 const setText = (name, text) => { if ($(name).textContent !== text) $(name).textContent = text; };
 
 export class SecondLane {
-  /** @param host object with changeScene(changes), send(kind, content), energyMeter of the first lane, and tour */
+  /** @param host object with changeScene(changes), send(kind, content), energyMeter and hasCurl of the first lane, and tour */
   constructor(host) {
     this.host = host;
     this.section = new SectionView($("beside-section"));
@@ -76,7 +76,11 @@ export class SecondLane {
 
   receivePicture(numbers) { this.pictures.receive(this.section, numbers); }
 
-  requestPicture(content) { if (this.isShown && this.status.start_count) this.pictures.request("beside", content); }
+  requestPicture(content) {
+    if (!this.isShown || !this.status.start_count) return;
+    if (!this.section.covers(content.box)) this.pictures.endPauses(); // a part of the view is blank
+    this.pictures.request("beside", content);
+  }
 
   /** The traces with the offset of the energy, for a scale common to both lanes; null if it is not shown. */
   get scale() { return this.isShown ? { plot: this.traces, offset: this.energyMeter.offset } : null; }
@@ -96,7 +100,8 @@ export class SecondLane {
     document.body.classList.toggle("two-lanes", isShown);
     if (unavailable) $("beside").disabled = true;
     setText("beside-note", unavailable || (status ? this.noteText : "Both laws under the same hand, side by side."));
-    for (const view of [this.section, this.traces]) view.label = isShown ? `law ${law}` : "";
+    this.traces.label = isShown ? `law ${law}` : "";
+    this.section.label = isShown ? pictureLabel(this.section, law) : "";
     if (!isShown) return;
     setText("beside-title", `Law ${law}`);
     const stale = this.pictures.staleText(this.section), { section } = this;
@@ -105,6 +110,8 @@ export class SecondLane {
     setText("beside-trace-note", this.frame ? this.lagText : status.state);
     setText("first-curve", `law ${firstLaw}`);
     setText("second-curve", `law ${law}`);
+    this.verdicts[0].hasCurl = this.host.hasCurl;
+    this.verdicts[1].hasCurl = !stale && section.hasCurl;
     this.verdicts[0].update();
     this.verdicts[1].update(status.state === "running" ? "" : `${status.state}${status.message && `: ${status.message}`}`);
     const force = this.frame ? formatQuantity(Math.hypot(...this.probe.force), "N") : "not known", energy = formatQuantity(this.energyMeter.energy, "J");

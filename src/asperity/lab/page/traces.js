@@ -1,4 +1,4 @@
-// Plots of the last seconds: traces of position, force and energy, and the spectrum of the normal force.
+// Plots of the last seconds: traces (the middle of each moment over its range) of position, force and energy, and the spectrum of the normal force.
 
 import { ScaledCanvas, colours } from "./canvas.js";
 import { formatQuantity } from "./format.js";
@@ -81,11 +81,18 @@ export class TracePlot {
 
   drawTrace(context, width, trace, y, colour) {
     const binWidth = (width - 8) / BINS, firstBin = this.newestBin - this.binCount + 1;
-    context.fillStyle = colour;
+    context.fillStyle = context.strokeStyle = colour;
+    context.lineWidth = 1.4;
+    context.beginPath();
+    context.globalAlpha = 0.3;
     for (let k = firstBin; k <= this.newestBin; k++) {
       const upper = y(this.maxima[trace][k % BINS]), lower = y(this.minima[trace][k % BINS]);
-      context.fillRect(width - 4 - (this.newestBin + 1 - k) * binWidth, upper - 0.8, binWidth + 0.3, lower - upper + 1.6);
+      const x = width - 4 - (this.newestBin + 1 - k) * binWidth;
+      context.fillRect(x, upper - 0.8, binWidth, lower - upper + 1.6);
+      context.lineTo(x + binWidth / 2, (upper + lower) / 2);
     }
+    context.globalAlpha = 1;
+    context.stroke();
   }
 }
 

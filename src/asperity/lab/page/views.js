@@ -94,6 +94,12 @@ export class SectionView {
 
   get hasCurl() { return this.maxCurl > CURL_TOLERANCE * (this.maxForce ?? 1); }
 
+  /** Whether the picture contains a box. */
+  covers([left, right, bottom, top]) {
+    const { box } = this, margin = 1e-9;
+    return Boolean(box) && box[0] <= left + margin && box[1] >= right - margin && box[2] <= bottom + margin && box[3] >= top - margin;
+  }
+
   /** Return x and z at a pixel of the page, for the box shown. */
   pointAt(px, py, [left, right, bottom, top]) {
     const { width, height, unit } = this.scaledCanvas;
@@ -105,16 +111,17 @@ export class SectionView {
     const { width, height, needsRepaint } = this.scaledCanvas, [left, right, bottom, top] = shownBox;
     const project = ([x, , z]) => [(x - left) / (right - left) * width, (top - z) / (top - bottom) * height];
     const paintKey = [this.label, colours().plus, ...shownBox].join();
-    if (needsRepaint || this.paintKey !== paintKey) this.paint(project, right - left);
+    if (needsRepaint || this.paintKey !== paintKey) this.paint(project, shownBox);
     this.paintKey = paintKey;
     if (probeState) this.overlay.draw(project, probeState, ([x, , z]) => [x, -z]);
   }
 
-  paint(project, span) {
-    const [context, width, height] = this.scaledCanvas.clear();
+  paint(project, shownBox) {
+    const [context, width, height] = this.scaledCanvas.clear(), span = shownBox[1] - shownBox[0];
     context.fillStyle = colours().ground;
     context.fillRect(0, 0, width, height);
     if (this.box) this.drawSection(context, project);
+    this.drawMissing(context, project, shownBox, height);
     this.drawScaleBar(context, width, height, span);
     context.font = "bold 15px system-ui, sans-serif";
     if (this.label) context.fillText(this.label, 12, 22);
@@ -143,6 +150,19 @@ export class SectionView {
     context.strokeStyle = colours().ink;
     context.lineWidth = 2;
     context.stroke();
+  }
+
+  /** Write into what is shown beside the picture that it is not drawn yet. */
+  drawMissing(context, project, [left, right], height) {
+    const [start, end] = this.box ?? [right, right];
+    context.font = "12px system-ui, sans-serif";
+    context.fillStyle = colours().soft;
+    context.textAlign = "center";
+    for (const [from, to] of [[left, Math.min(start, right)], [Math.max(end, left), right]]) {
+      const [x0] = project([from, 0, 0]), [x1] = project([to, 0, 0]);
+      if (x1 - x0 > 80) context.fillText("computing …", (x0 + x1) / 2, height / 2);
+    }
+    context.textAlign = "start";
   }
 
   /** Draw the force field as arrows, at every third grid point. */
@@ -191,5 +211,7 @@ export class SectionView {
   }
 }
 
+/** Return the law of the picture of a view; without a picture, the law that it will be of. */
+export const pictureLabel = ({ settings }, law) => `law ${settings?.law ?? law}`;
 export const isRelief = numbers => numbers[0] === RELIEF;
 export const isBeside = numbers => numbers[0] === BESIDE_SECTION;
