@@ -18,7 +18,7 @@
 #include <cstring>
 #include <thread>
 
-#define TEXTURE_POSIX // map the file and lock it; leave out on Windows
+#define TEXTURE_POSIX // lock the field in memory; leave out on Windows
 #include "chai3d_effect.hpp"
 
 namespace

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -27,7 +28,7 @@ from asperity.export.c99 import c99_files
 from asperity.export.surface_functions import ExportRequest
 from asperity.surface import Surface
 from asperity.textures import Texture
-from asperity.textures.fields.field_file import save_field
+from asperity.textures.fields.field_file import HEADER, save_field
 
 KINDS = ("fourier", "map", "periodic profile")
 
@@ -148,14 +149,68 @@ def test_damaged_fields_are_refused(
     assert len(run_loader(tmp_path, "whole.field")) == 8
 
 
+@pytest.mark.parametrize("flags", [(), ("-DT_POSIX",)])
+def test_offset_of_the_heights_lies_behind_the_header(
+    make_texture: Callable[[str], Texture], flags: tuple[str, ...], tmp_path: Path
+) -> None:
+    """Up to it pages are touched before the loop: with 0 the byte before the file was read."""
+    surface = bake(make_texture("map"))
+    build_loader(tmp_path, surface, "gcc", *flags)
+    save_field(tmp_path / "a.field", surface.texture)
+    probes(surface.texture, surface.max_depth, 8, 5).tofile(tmp_path / "points.bin")
+    for offset in (0, 255):
+        content = bytearray((tmp_path / "a.field").read_bytes())
+        header = np.frombuffer(content, HEADER, 1)
+        header["heights_offset"] = offset
+        header["header_checksum"] = zlib.crc32(content[:252])
+        (tmp_path / "b.field").write_bytes(content)
+        (tmp_path / "run.sh").write_text("./main b.field; test $? -eq 13\n")
+        run_command(tool("sh"), "run.sh", cwd=tmp_path)
+
+
+_CHANGED_LOADER = """
+#include <stdio.h>
+#include "t.h"
+
+int main(void)
+{
+    const double at[3] = {1e-4, 2e-4, -1e-4};
+    double before[3], after[3];
+    t_state state;
+    FILE *file;
+    t_reset(&state);
+    if (t_load("a.field") != 0) {
+        return 1;
+    }
+    t_force(&state, at, before);
+    file = fopen("a.field", "wb"); /* cut */
+    if (file == NULL || fclose(file) != 0) {
+        return 2;
+    }
+    t_reset(&state);
+    t_force(&state, at, after);
+    return before[2] == 0.0 || before[0] != after[0] || before[2] != after[2];
+}
+"""
+
+
+@pytest.mark.parametrize("flags", [(), ("-DT_POSIX",)])
+def test_a_file_that_is_cut_does_not_reach_the_loaded_field(
+    make_texture: Callable[[str], Texture], flags: tuple[str, ...], tmp_path: Path
+) -> None:
+    surface = bake(make_texture("map"))
+    build_loader(tmp_path, surface, "gcc", *flags)
+    save_field(tmp_path / "a.field", surface.texture)
+    (tmp_path / "main.c").write_text(_CHANGED_LOADER)
+    command = (tool("gcc"), *STRICT, *SANITIZE, *flags, "main.c", "-o", "main", "-lm")
+    run_command(*command, cwd=tmp_path)
+    run_command(str(tmp_path / "main"), cwd=tmp_path)
+
+
 def test_wrong_checksum_does_not_hide_a_table_that_points_outside(
     make_texture: Callable[[str], Texture], tmp_path: Path
 ) -> None:
     """The checksums of a file can be right and its table wrong: it is refused all the same."""
-    import zlib
-
-    from asperity.textures.fields.field_file import HEADER
-
     surface = bake(make_texture("map"))
     build_loader(tmp_path, surface, "gcc")
     save_field(tmp_path / "a.field", surface.texture)

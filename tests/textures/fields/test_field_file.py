@@ -49,6 +49,20 @@ def test_undamaged_file_is_read(tmp_path: Path) -> None:
     assert asp.load_texture(path).digest == asp.Surface(path, "H").texture.digest
 
 
+@pytest.mark.parametrize("change", ["cut", "zeros"])
+def test_a_loaded_field_does_not_depend_on_its_file(change: str, tmp_path: Path) -> None:
+    """A mapped file would end the process when it is cut, and change the force when overwritten."""
+    path = tmp_path / "wave.field"
+    path.write_bytes(content())
+    surface = asp.Surface(path, "H", stiffness=500.0)
+    points = np.array([[1e-4, 0.0, -5e-5], [3e-4, 0.0, -2e-5]])
+    before = surface.force(points)
+    with path.open("r+b") as stream:
+        stream.truncate(0) if change == "cut" else stream.write(bytes(len(content())))
+    assert np.array_equal(asp.Surface(surface.texture, "H", stiffness=500.0).force(points), before)
+    assert before.any()
+
+
 DAMAGES: dict[str, tuple[Callable[[], bytes], str]] = {
     "coefficient": (lambda: flip(HEADER.itemsize + 5000), "is damaged: its checksum is wrong"),
     "header": (lambda: flip(60), "has a damaged header"),

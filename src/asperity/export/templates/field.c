@@ -16,23 +16,9 @@ typedef struct {
 
 typedef char @name@_header_has_256_bytes[sizeof(@name@_field_header) == 256 ? 1 : -1];
 
+/* Read a file into memory: a mapped one could be cut or changed by others while it is rendered. */
 static inline void *@name@_read_file(const char *path, size_t *size)
 {
-#if defined(@NAME@_POSIX)
-    struct stat status;
-    void *memory = MAP_FAILED;
-    const int file = open(path, O_RDONLY);
-    if (file < 0) {
-        return NULL;
-    }
-    if (fstat(file, &status) == 0 && status.st_size > 0
-        && (uint64_t)status.st_size <= (uint64_t)SIZE_MAX) {
-        *size = (size_t)status.st_size;
-        memory = mmap(NULL, *size, PROT_READ, MAP_PRIVATE, file, 0);
-    }
-    close(file);
-    return memory == MAP_FAILED ? NULL : memory;
-#else
     void *memory = NULL;
     long end = -1;
     FILE *file = fopen(path, "rb");
@@ -52,19 +38,6 @@ static inline void *@name@_read_file(const char *path, size_t *size)
     }
     fclose(file);
     return memory;
-#endif
-}
-
-static inline void @name@_release_file(void *memory, size_t size)
-{
-#if defined(@NAME@_POSIX)
-    if (memory != NULL) {
-        munmap(memory, size);
-    }
-#else
-    (void)size;
-    free(memory);
-#endif
 }
 
 /* CRC-32 of ISO-HDLC: polynomial 0x04C11DB7, reflected, inverted before and after. */
@@ -104,7 +77,8 @@ static inline int @name@_fits(const @name@_field_header *head, size_t size)
         && head->columns_offset <= size && head->columns_offset % 4 == 0
         && places <= (size - head->columns_offset) / 16
         && head->values_offset <= size && head->values_offset % 4 == 0
-        && head->count <= (size - head->values_offset) / 4 && head->heights_offset <= size;
+        && head->count <= (size - head->values_offset) / 4
+        && head->heights_offset >= sizeof *head && head->heights_offset <= size;
 }
 
 /* Whether every column lies inside the coefficients, and these are finite. */
@@ -188,16 +162,15 @@ static inline void @name@_use(const @name@_field_header *head, const unsigned ch
         }
         result = @name@_check_file((const unsigned char *)memory, size, &head);
         if (result != @NAME@_LOADED) {
-            @name@_release_file(memory, size);
+            free(memory);
             return result;
         }
     }
-    @name@_release_file(@name@_surface.file, @name@_surface.size);
+    free(@name@_surface.file);
     @name@_surface = @name@_no_field;
     if (memory != NULL) {
         @name@_use(&head, (const unsigned char *)memory);
         @name@_surface.file = memory;
-        @name@_surface.size = size;
         @name@_surface.used = (size_t)head.heights_offset;
     }
     return @NAME@_LOADED;

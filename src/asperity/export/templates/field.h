@@ -8,8 +8,7 @@
 /*
  * Load the field of a .field file, not while the loop runs; before it the force is zero. Another
  * result than @NAME@_LOADED leaves everything as it was; NULL unloads the field.
- * With @NAME@_POSIX defined the file is mapped (mmap) and must not be changed while in use;
- * otherwise it is read into memory.
+ * The file is read into memory, and may be changed or deleted afterwards.
  */
 @link@ int @name@_load(const char *path);
 

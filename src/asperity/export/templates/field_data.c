@@ -1,11 +1,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#if defined(@NAME@_POSIX)
-#include <fcntl.h>
-#include <sys/stat.h>
-#include <unistd.h>
-#endif
 
 /* A field in memory, and the file that holds its arrays. */
 typedef struct {
@@ -16,13 +11,13 @@ typedef struct {
     int64_t levels, below, border;
     double q;
     void *file;
-    size_t size, used;
+    size_t used;
 } @name@_field;
 
 static const int32_t @name@_no_columns[16] = {0};
 static const float @name@_no_values[1] = {0};
 #define @NAME@_NOTHING \
     {@name@_no_values, @name@_no_columns, 1, 4, 1, 0, 0, 0, 0, 0, 0, 0, 1, \
-     1, 0, 3, 1, 2, 0, NULL, 0, 0}
+     1, 0, 3, 1, 2, 0, NULL, 0}
 static const @name@_field @name@_no_field = @NAME@_NOTHING;
 static @name@_field @name@_surface = @NAME@_NOTHING;

@@ -1,4 +1,4 @@
-"""Files of baked fields: little-endian, versioned, checked, and loaded by memory map.
+"""Files of baked fields: little-endian, versioned, checked, and read into memory.
 
 A file is a header of 256 bytes (:data:`HEADER`), the table of columns, the coefficients, the
 heights of a texture that is a spline, and a description as JSON. A C program needs the header, the
@@ -147,7 +147,7 @@ def is_field(path: str | os.PathLike[str]) -> bool:
 
 
 def load_field(path: str | os.PathLike[str], build_texture: BuildTexture) -> PotentialField:
-    """Load a baked field by memory map.
+    """Load a baked field into memory, where no change of the file reaches it.
 
     Args:
         path: the file.
@@ -163,7 +163,7 @@ def load_field(path: str | os.PathLike[str], build_texture: BuildTexture) -> Pot
             free = free_memory()
             if free is not None and size > free:
                 raise SurfaceFileError(f"its {size:,} bytes exceed the free memory, {free:,} bytes")
-            data = np.memmap(stream, np.uint8, "c")
+            data = np.fromfile(stream, np.uint8)
         return _decode(data, build_texture)
     except SurfaceFileError as error:
         raise SurfaceFileError(f"{name}: {error}") from None
