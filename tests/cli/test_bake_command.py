@@ -33,6 +33,17 @@ def test_field_of_a_surface_is_accepted_by_other_commands(tmp_path: Path) -> Non
     assert '"law": "A"' not in comparison.output
 
 
+def test_field_is_shown_with_its_accuracy(tmp_path: Path) -> None:
+    path = tmp_path / "waves.field"
+    baked = call("bake", SURFACE, "-o", path, "--resolution", "40um")
+    result = call("show", path)
+    assert (result.exit_code, result.output) == (0, baked.output)
+    numbers = json.loads(call("show", path, "--json", "-").output)
+    assert numbers["kind"] == "field"
+    refused = call("show", path, "--s-cutoff", "1mm")
+    assert "was baked already" in str(refused.exception)
+
+
 def test_existing_file_is_kept(tmp_path: Path) -> None:
     path = tmp_path / "waves.field"
     path.write_text("mine")

@@ -287,3 +287,23 @@ def test_command_uses_one_thread_of_linear_algebra() -> None:
         env=os.environ | {"OPENBLAS_NUM_THREADS": "7"},
     )
     assert process.stdout.split() == ["1", "1"]
+
+
+@pytest.mark.parametrize("where", ["pool", "task"])
+def test_without_room_for_workers_this_process_does_all(
+    monkeypatch: pytest.MonkeyPatch, where: str
+) -> None:
+    """Containers may have no /dev/shm for semaphores, or no more processes."""
+
+    def refuse(*_: Any) -> Any:
+        raise OSError(30, "Read-only file system")
+
+    pool = ProcessPoolExecutor(1)
+    monkeypatch.setattr(pool, "submit", refuse)
+    monkeypatch.setattr(processes, "make_pool", refuse if where == "pool" else lambda _count: pool)
+    failures: list[Any] = []
+    monkeypatch.setattr("threading.excepthook", failures.append)
+    with processes.limit_processes(2), processes.precompute(math.sqrt, [1.0, 4.0]) as results:
+        time.sleep(0.2)
+        assert list(results) == [None, None]
+    assert failures == []

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import asperity as asp
 from asperity.core.errors import ParameterError
 from asperity.lab.access import (
     MAX_MESSAGE_BURST,
@@ -223,3 +224,13 @@ def test_a_page_that_was_slow_gets_the_newest_forces_and_all_extremes() -> None:
     numbers = np.frombuffer(encode_frame(rows, 0, counts, np.zeros(6)))
     assert numbers[frame_layout()["minima"] + COLUMN_NAMES.index("x")] == -5.0
     assert numbers[frame_layout()["forces"] :: 3].tolist() == list(range(10, len(rows)))
+
+
+@pytest.mark.parametrize("kind", ["acknowledge", "relief"])
+def test_integers_beyond_floating_point_are_refused(kind: str) -> None:
+    digits = "9" * 400
+    text = {"acknowledge": f'"frame": {digits}', "relief": f'"x": -{digits}, "y": 0, "size": 1'}
+    with pytest.raises(ParameterError, match="must be"):
+        parse_message(f'{{"type": "{kind}", {text[kind]}}}')
+    with pytest.raises(ParameterError, match="amplitude must be at most 1e\\+30"):
+        asp.Sinusoid(10**5000, 1e-3)

@@ -149,6 +149,17 @@ def test_limits_of_processor_time_release_the_force(loop: ServoProcess) -> None:
     assert (applied_force(loop) == 0.0).all()
 
 
+def test_without_shared_memory_the_message_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Containers may have a /dev/shm that cannot be written."""
+
+    def refuse(*_: object) -> object:
+        raise OSError(30, "Read-only file system", "/dev/shm/pym-1")
+
+    monkeypatch.setattr("asperity.servo.loop_memory.SpawnContext.RawArray", refuse)
+    with pytest.raises(ParameterError, match=r"two processes \(Read-only .*: /dev/shm/pym-1\)"):
+        servo_process()
+
+
 def test_unresponsive_loop_process_is_a_fault(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(loop_process, "MAX_CALL_TIME", 0.5)
     with servo_process(Safety(ramp=0.02, lateness=60.0, silence=2.0)) as loop:

@@ -309,3 +309,12 @@ def test_fields_are_baked_by_the_engine_and_kept() -> None:
         assert row["nodes"] * 4 == row["size [B]"]
     with pytest.raises(ParameterError, match="needs no field: its contact has a closed form"):
         asp.sweep("sinusoid:amplitude=1mm,period=5mm", depths, "bake", processes=1)
+
+
+def test_without_room_for_processes_this_one_computes(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: Any) -> Any:
+        raise OSError(30, "Read-only file system")
+
+    monkeypatch.setattr("asperity.sweeps.engine.make_pool", refuse)
+    with local_place(2).open() as executor:
+        assert executor.submit(os.getpid).result() == os.getpid()

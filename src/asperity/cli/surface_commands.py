@@ -165,16 +165,29 @@ def show_command(file: str, outputs: Outputs, **values: Any) -> None:
 
     For maps, the parameters are those of ISO 25178-2 (Sq, Sa, Sz, Sdr ...); for profiles, those of
     ISO 21920-2 (Rq, Ra, Rz ...). The report also shows what each step removed and separates form,
-    waviness and texture. FILE may also be an output of asperity prepare.
+    waviness and texture. FILE may also be an output of asperity prepare. Of a baked field, the
+    report has its accuracy.
     """
     from asperity.measured.reading.measured_file import show
+    from asperity.textures.fields.field_file import is_field
 
+    if is_field(file):
+        _show_field(file, outputs, options.file_values(values))
+        return
     with preparation_progress() as start_stage:
         summary = show(file, progress=start_stage, **options.file_values(values))
 
     from asperity.report.pages.measured_report import surface_summary_page
 
     outputs.write(summary, surface_summary_page(summary))
+
+
+def _show_field(file: str, outputs: Outputs, values: dict[str, Any]) -> None:
+    from asperity.report.pages.measured_report import field_page
+    from asperity.textures import load_texture
+
+    field: Any = load_texture(file, **values)
+    outputs.write(field.describe(), field_page(field, file))
 
 
 _LANG, *_REQUEST_ARGUMENTS, _CLAMP = options.command_arguments("export")

@@ -196,13 +196,14 @@ class _TaskQueue:
         from multiprocessing import active_children
 
         self.other_children = set(active_children())
-        self.pool = make_pool(self.workers)
+        with suppress(OSError):  # no room for semaphores, or no processes: this one does all
+            self.pool = make_pool(self.workers)
         for _ in range(self.workers):
             self._submit_last(self.pool)
 
-    def _submit_last(self, pool: ProcessPoolExecutor) -> None:
-        with self.lock, suppress(RuntimeError):  # the pool is broken
-            if self.pending:
+    def _submit_last(self, pool: ProcessPoolExecutor | None) -> None:
+        with self.lock, suppress(RuntimeError, OSError):  # the pool is broken, or cannot grow
+            if self.pending and pool is not None:
                 future = pool.submit(self.work, self.tasks[self.pending[-1]])
                 self.results[self.pending.pop()] = future
                 future.add_done_callback(lambda done: self._continue(pool, done))

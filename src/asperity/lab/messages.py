@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -11,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from asperity.core.checks import FloatArray
+from asperity.core.checks import FloatArray, check_real
 from asperity.core.errors import ParameterError
 from asperity.lab.access import MalformedMessageError
 from asperity.loop.shared_trace import COLUMNS
@@ -94,9 +93,10 @@ def _reject_constant(constant: str) -> float:
 def _parse_number(name: str, value: object, minimum: float, maximum: float) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise MalformedMessageError(f"{name} must be a number")
-    if not minimum <= value <= maximum:
-        raise ParameterError(name, f"must be {minimum:g} to {maximum:g}", value)
-    return float(value)
+    number = check_real(name, value)
+    if not minimum <= number <= maximum:
+        raise ParameterError(name, f"must be {minimum:g} to {maximum:g}", number)
+    return number
 
 
 def _parse_numbers(name: str, value: object, count: int, limit: float) -> tuple[float, ...]:
@@ -134,6 +134,7 @@ def _parse_section(kind: str, *code: float, box: object, y: object) -> ViewReque
     return ViewRequest(kind, (*sides, _parse_number("y", y, -1.0, 1.0), *code))
 
 
+_MAX_FRAME = 1e15  # of years
 STATE = 1.0
 RELIEF = 2.0
 SECTION = 3.0
@@ -146,7 +147,7 @@ _PARSERS: dict[str, tuple[tuple[str, ...], Callable[..., Any]]] = {
     "relief": (("x", "y", "size"), _parse_relief),
     "section": (("box", "y"), partial(_parse_section, "section")),
     BESIDE: (("box", "y"), partial(_parse_section, BESIDE, BESIDE_SECTION)),
-    "acknowledge": (("frame",), lambda frame: _parse_number("frame", frame, 0.0, math.inf)),
+    "acknowledge": (("frame",), lambda frame: _parse_number("frame", frame, 0.0, _MAX_FRAME)),
     **{kind: ((), lambda: None) for kind in ("take_control", "start", "stop")},
 }
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from asperity.contacts.warm_start import WARM_START_SIZE
 from asperity.core.checks import FloatArray
-from asperity.core.errors import AsperityError
+from asperity.core.errors import AsperityError, ParameterError
 from asperity.core.files import Serializable
 from asperity.loop import shared_trace as words
 from asperity.loop.interface import STOP_NOW, STOP_RAMPED
@@ -21,6 +21,10 @@ from asperity.loop.shared_trace import COLUMNS, SharedBlock
 
 BUFFER_ROWS = 40_000
 """Rows that the memory holds: 4 s of the fastest loop."""
+
+
+def _allocate(kind: type[ctypes.c_int64 | ctypes.c_double], size: int) -> Any:
+    return SpawnContext().RawArray(kind, size)
 
 
 class LoopMemory:
@@ -31,11 +35,16 @@ class LoopMemory:
     """
 
     def __init__(self) -> None:
-        context = SpawnContext()
-        self._control: Any = context.RawArray(ctypes.c_int64, words.CONTROL_SIZE)
-        self._status: Any = context.RawArray(ctypes.c_int64, words.STATUS_SIZE)
-        self._table: Any = context.RawArray(ctypes.c_double, BUFFER_ROWS * len(COLUMNS))
-        self._search: Any = context.RawArray(ctypes.c_double, WARM_START_SIZE)
+        try:
+            self._control = _allocate(ctypes.c_int64, words.CONTROL_SIZE)
+            self._status = _allocate(ctypes.c_int64, words.STATUS_SIZE)
+            self._table = _allocate(ctypes.c_double, BUFFER_ROWS * len(COLUMNS))
+            self._search = _allocate(ctypes.c_double, WARM_START_SIZE)
+        except OSError as error:
+            reason = f"{error.strerror}: {error.filename}"
+            raise ParameterError(
+                "driver", f"needs memory shared by two processes ({reason})"
+            ) from None
 
     def block(self) -> SharedBlock:
         """Return the memory as the compiled loop takes it."""

@@ -10,7 +10,7 @@ import logging
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import islice
@@ -69,7 +69,12 @@ def _open_pool(processes: int) -> Iterator[Executor]:
     from multiprocessing import active_children
 
     others = set(active_children())
-    pool = make_pool(processes)
+    pool = None
+    with suppress(OSError):  # no room for semaphores, as in some containers
+        pool = make_pool(processes)
+    if pool is None:
+        yield SerialExecutor()
+        return
     try:
         try:
             pool.submit(int).result()

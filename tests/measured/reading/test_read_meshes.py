@@ -278,3 +278,15 @@ def test_arguments_of_other_formats_are_refused(tmp_path: Path) -> None:
     path = write_stl(tmp_path / "a.stl", triangles_of(relief()))
     with pytest.raises(ParameterError, match="channel must not be given"):
         read_surface(path, unit="mm", channel=1)
+
+
+@pytest.mark.starts_readers
+@pytest.mark.parametrize(("distance", "noted"), [(0.0, False), (1e5, True)])
+def test_coarse_coordinates_are_noted(distance: float, noted: bool, tmp_path: Path) -> None:
+    """A binary STL has single precision: 100 m from the origin its steps are 7.8 µm."""
+    triangles = triangles_of(relief()) + np.array([distance, 0.0, 0.0])
+    write_stl(tmp_path / "far.stl", triangles)
+    notes = read_surface(tmp_path / "far.stl", unit="mm").notes
+    assert (
+        any("far from the origin for numbers in single precision" in one for one in notes) is noted
+    )

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import json
+import math
+import random
 import tempfile
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +18,7 @@ from click.testing import CliRunner
 
 import asperity as asp
 from asperity.cli.main import cli
-from asperity.core.errors import SurfaceFileError
+from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.textures.fields import field_file
 from asperity.textures.fields.field_file import HEADER
 
@@ -76,6 +80,61 @@ DAMAGES: dict[str, tuple[Callable[[], bytes], str]] = {
     "size": (lambda: change_header(file_bytes=2**43), f"is cut: .* of {2**43} bytes"),
     "levels": (lambda: change_header(levels=2), "has a damaged table of columns"),
 }
+
+
+WRONG = (None, True, -1, 10**30, "", "x", [], ["a"], [[1]], [{}], {}, {"a": 1}, [1, 2, 3], math.inf)
+NESTED = (b"", b"[]", b"null", b'"x"', b"\xff", b"[" * 200_000, b'{"a":' * 100_000)
+
+
+def seal(text: bytes) -> bytes:
+    """Return the file with another description, and the right checksums."""
+    header = np.frombuffer(content()[: HEADER.itemsize], HEADER).copy()
+    body = content()[HEADER.itemsize : int(header["json_offset"][0])] + text
+    header["file_bytes"] = HEADER.itemsize + len(body)
+    header["checksum"] = zlib.crc32(body)
+    header["header_checksum"] = zlib.crc32(header.tobytes()[:-4])
+    return header.tobytes() + body
+
+
+def described() -> dict[str, Any]:
+    place = int(np.frombuffer(content()[: HEADER.itemsize], HEADER)["json_offset"][0])
+    description: dict[str, Any] = json.loads(content()[place:])
+    return description
+
+
+def entries(value: Any, place: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    """Yield the place of each entry of a description."""
+    items = value.items() if isinstance(value, dict) else ()
+    for key, part in enumerate(value) if isinstance(value, list) else items:
+        yield (*place, key)
+        yield from entries(part, (*place, key))
+
+
+def test_descriptions_of_other_types_are_refused_or_read(tmp_path: Path) -> None:
+    path = tmp_path / "bad.field"
+    n_refused = 0
+    arguments = set()
+    contents = list(NESTED)
+    for place in entries(described()):
+        for value in random.Random(str(place)).sample(WRONG, 4):
+            changed = described()
+            part = changed
+            for key in place[:-1]:
+                part = part[key]
+            part[place[-1]] = value
+            contents.append(json.dumps(changed).encode())
+    for text in contents:
+        path.write_bytes(seal(text))
+        try:
+            surface = asp.Surface(path, "H", stiffness=100.0)
+            surface.force(np.array([[0.0, 0.0, -1e-5]]))
+            surface.texture.describe()
+        except SurfaceFileError:
+            n_refused += 1
+        except ParameterError as error:  # arguments of the surface that was baked
+            arguments.add(error.argument)
+    assert n_refused > len(NESTED) + 50
+    assert arguments <= {"amplitude", "period", "direction", "phase", "texture", "max_depth"}
 
 
 @pytest.mark.parametrize("name", DAMAGES)

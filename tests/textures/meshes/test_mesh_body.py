@@ -284,6 +284,24 @@ def test_faults_are_counted_with_their_place() -> None:
     assert len(body.triangles) == len(faces)
 
 
+@pytest.mark.parametrize("repair", [False, True])
+def test_vertices_that_coincide_enclose_nothing(repair: bool) -> None:
+    faces = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]])
+    with pytest.raises(SurfaceFileError, match="is flat: it encloses no volume"):
+        MeshBody.from_arrays(np.full((4, 3), 0.25), faces, repair=repair)
+
+
+@pytest.mark.parametrize(("distance", "noted"), [(0.0, False), (1000.0, False), (1e5, True)])
+def test_coarse_coordinates_are_noted(distance: float, noted: bool, tmp_path: Path) -> None:
+    """A binary STL has single precision: 100 m from the origin its steps are 7.8 µm."""
+    box = trimesh.creation.box((2.0, 2.0, 2.0)).apply_translation((distance, 0.0, 0.0))
+    box.export(tmp_path / "box.stl")
+    notes = load_mesh(tmp_path / "box.stl", "mm").notes
+    assert [("in steps of 7.81 µm, 0.39% of the height" in note) for note in notes] == [
+        True
+    ] * noted
+
+
 def test_repair_on_request() -> None:
     pytest.importorskip("networkx", reason="not run: the extra 'meshes' is not installed")
     mesh = trimesh.creation.icosphere(2, radius=1 * MM)

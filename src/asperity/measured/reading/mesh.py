@@ -25,6 +25,7 @@ _OBJ_FACE = re.compile(rb"^f[ \t]+-?[0-9]", re.MULTILINE)
 _MAX_EXPECTED_LENGTH = 1.0  # [m]; a longer patch has probably another unit
 _OBJ_FACE_LINE = re.compile(rb"^f[ \t]+([^\r\n]*)", re.MULTILINE)
 _OBJ_ZERO = re.compile(rb"[+-]?0+(/|$)")  # indices of corners start at 1, or at -1 backwards
+_FINE_STEP = 1e-3  # of coordinates over the height, which needs no note
 _CLOSED_BODY_FRACTION = 0.25  # share of overhanging area that suggests a closed body
 
 
@@ -77,7 +78,7 @@ def read_mesh(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
         corners = corners.astype(np.float64)
     if not np.isfinite(corners).all():
         raise SurfaceFileError("has corners that are not finite numbers")
-    return _to_surface(corners * unit, file.name)
+    return _to_surface(corners * unit, file.name, unit * find_precision(corners))
 
 
 def _parse_text_mesh(content: bytes, mesh_format: str) -> FloatArray:
@@ -115,7 +116,28 @@ def _count_obj_triangles(content: bytes) -> int:
     return count
 
 
-def _to_surface(corners: FloatArray, name: str) -> RawSurface:
+def find_precision(coordinates: FloatArray) -> float:
+    """Return the greatest step of coordinates that are numbers in single precision, else 0.
+
+    Far from the origin these steps are coarse: 0.1 µm at 1 m.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):
+        single = coordinates.astype(np.float32)
+    if not np.array_equal(single, coordinates):
+        return 0.0
+    return float(np.spacing(np.abs(single).max(initial=0.0)))
+
+
+def precision_notes(step: float, height: float) -> tuple[str, ...]:
+    """Return what to note where the steps of coordinates [m] matter for a height [m]."""
+    if step <= _FINE_STEP * height:
+        return ()
+    share = f"{step / height:.2%} of the height" if height else "of no height"
+    words = f"in single precision, in steps of {1e6 * step:.3g} µm, {share}"
+    return (f"its coordinates are far from the origin for numbers {words}: move it there first",)
+
+
+def _to_surface(corners: FloatArray, name: str, step: float) -> RawSurface:
     notes: list[str] = []
     with np.errstate(over="ignore", invalid="ignore"):
         cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -133,7 +155,9 @@ def _to_surface(corners: FloatArray, name: str) -> RawSurface:
     centre, axes, note = fit_plane(corners, cross, areas)
     _check_overhangs(areas, cross @ axes[2] < 0.0)
     heights, pitch, grid_notes = rasterise((corners - centre) @ axes.T)
-    notes.extend((note, *grid_notes))
+    notes.extend(
+        (note, *grid_notes, *precision_notes(step, float(np.ptp(heights[np.isfinite(heights)]))))
+    )
     longest = max(np.array(heights.shape[::-1]) * pitch)
     if longest > _MAX_EXPECTED_LENGTH:
         notes.append(f"the patch is {longest:.3g} m long: check the unit")

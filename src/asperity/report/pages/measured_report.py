@@ -253,7 +253,7 @@ def field_page(field: PotentialField, path: str) -> page.Page:
         *[f"{text}." for text in others],
         f"{baked}; at most {bound} times the stiffness from it, proved.",
         f"q⁺ at most {field.one_sided.upper:.4g}. Valid down to z = {floor}. {field.bytes} bytes.",
-        f"Saved: {escape_unprintable(path)}",
+        f"File: {escape_unprintable(path)}",
     )
     numbers = Section("", [page.Paragraph(text) for text in texts], media=SCREEN)
     return page.Page("Baked field", "", (), [numbers, *thin_sections(field)])

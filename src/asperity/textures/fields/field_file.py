@@ -33,6 +33,8 @@ VERSION = 2
 _BYTE_ORDER = 0x01020304
 _ALIGNMENT = 4096
 _COUNTS = ("levels", "below", "border")
+_TUPLES = {"at", "depths", "shares"}
+"""Tuples of numbers in the description; all others are single numbers."""
 _SCALARS = ("x0", "y0", "z0", "m00", "m01", "m10", "m11", "iz", "margin", "lift")
 
 HEADER = np.dtype(
@@ -169,7 +171,9 @@ def load_field(path: str | os.PathLike[str], build_texture: BuildTexture) -> Pot
         raise SurfaceFileError(f"{name}: {error}") from None
     except (OSError, MemoryError) as error:
         raise SurfaceFileError(f"{name}: cannot be read ({error})") from None
-    except (KeyError, TypeError, ValueError, OverflowError) as error:
+    except RecursionError:
+        raise SurfaceFileError(f"{name}: damaged field (its description is nested)") from None
+    except (LookupError, TypeError, ValueError, OverflowError) as error:
         raise SurfaceFileError(f"{name}: damaged field ({error})") from None
 
 
@@ -206,37 +210,57 @@ def assemble_field(
     """
     numbers = described["grid"]
     grid = FieldGrid(
-        steps=np.array(numbers["steps"]),
-        cells=tuple(numbers["cells"]),
-        start=np.array(numbers["start"]),
+        steps=np.array(numbers["steps"], float),
+        cells=tuple(map(int, numbers["cells"])),
+        start=np.array(numbers["start"], float),
         levels=record.levels,
-        level_spacing=numbers["level_spacing"],
-        floor=numbers["floor"],
+        level_spacing=_number(numbers["level_spacing"]),
+        floor=_number(numbers["floor"]),
         below=record.below,
         border=record.border,
     )
+    if grid.steps.shape != (len(grid.cells), 2) or not np.isfinite(grid.steps).all():
+        raise ValueError("its grid has no steps")
     _check_record(record, grid)
     thin_map = described.get("thin_map")
     return PotentialField(
         _source(described, heights, build_texture),
         grid,
         record,
-        max_depth=described["max_depth"],
-        continuity=described["continuity"],
-        passes=described["passes"],
-        gain=CertifiedNumber(**_with_place(described["gain"])),
-        one_sided=CertifiedNumber(**_with_place(described["one_sided"])),
-        accuracy=FieldAccuracy(**described["accuracy"]),
+        max_depth=_number(described["max_depth"]),
+        continuity=_number(described["continuity"]),
+        passes=int(described["passes"]),
+        gain=CertifiedNumber(**_numbers(described["gain"])),
+        one_sided=CertifiedNumber(**_numbers(described["one_sided"])),
+        accuracy=FieldAccuracy(**_numbers(described["accuracy"])),
         thin_regions=tuple(
-            ThinRegion(**_with_place(region)) for region in described.get("thin_regions", ())
+            [ThinRegion(**_numbers(region)) for region in described.get("thin_regions", ())]
         ),
         thin_map=None if thin_map is None else np.array(thin_map, float),
     )
 
 
-def _with_place(number: dict[str, Any]) -> dict[str, Any]:
-    """Return the fields of a number with its place as a tuple, which JSON knows as a list."""
-    return number | {"at": tuple(number["at"])}
+def _numbers(entries: Mapping[str, Any]) -> dict[str, Any]:
+    """Return numbers by name, and tuples of them, which JSON knows as lists.
+
+    Raises:
+        TypeError, ValueError: for anything else.
+    """
+    values: dict[str, Any] = {}
+    for name in entries:
+        value = entries[name]
+        if name in _TUPLES:
+            values[name] = tuple(map(_number, value))
+        else:
+            values[name] = _number(value)
+    return values
+
+
+def _number(value: Any) -> float:
+    number = float(value)  # also of the text "inf"
+    if math.isnan(number):
+        raise ValueError(f"{value!r} is not a number")
+    return value if isinstance(value, int) else number
 
 
 def _read_header(data: NDArray[np.uint8]) -> Any:
@@ -296,6 +320,8 @@ def _section(data: NDArray[np.uint8], offset: Any, count: int, dtype: str) -> ND
 
 def _source(described: Mapping[str, Any], heights: FloatArray, build: BuildTexture) -> Texture:
     source = described["source"]
+    if not isinstance(source, Mapping):
+        raise TypeError("its source is not described")
     if not described["shape"]:
         return build(source)
     origin = described["origin"] if len(described["shape"]) == 2 else described["origin"][0]

@@ -73,7 +73,9 @@ def lay_texture(body: MeshBody, texture: Texture, side: str = "+z") -> MeshBody:
         raise ParameterError("texture", reason, texture)
     height = format_length(float(np.ptp(texture.extremes)))
     note = f"texture of {height} on faces within 60 degrees of {side}"
-    return replace(body, triangles=triangles, notes=(note,), coarsest=wave / _NODES_PER_WAVE)
+    return replace(
+        body, triangles=triangles, notes=(*body.notes, note), coarsest=wave / _NODES_PER_WAVE
+    )
 
 
 def _wavelength(texture: Texture, lower: FloatArray, upper: FloatArray) -> float:

@@ -8,7 +8,7 @@ import os
 import re
 import struct
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.util import find_spec
 from pathlib import Path
@@ -21,6 +21,7 @@ from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.measured.lengths import format_length, unit_to_metres
 from asperity.measured.reading.isolation import reject_on_error
+from asperity.measured.reading.mesh import find_precision, precision_notes
 from asperity.textures.meshes.triangle_tree import LEAF_SIZE, TriangleTree
 
 MESH_FORMATS = ("stl", "obj", "ply", "glb", "gltf")
@@ -92,7 +93,7 @@ class MeshBody:
             reasons = "; ".join(map(str, _unsound(faults)))
             raise SurfaceFileError(f"{name} has no defined inside{tried}: {reasons}")
         triangles = vertices[faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]]
-        if not np.ptp(triangles.reshape(-1, 3), axis=0).all():
+        if not len(triangles) or not np.ptp(triangles.reshape(-1, 3), axis=0).all():
             raise SurfaceFileError(f"{name} is flat: it encloses no volume")
         return cls(triangles, name, tuple(faults), tuple(repaired))
 
@@ -133,8 +134,10 @@ def load_mesh(
     _check_count(path, suffix)
     vertices, faces = _parse(path, suffix)
     gc.collect()  # trimesh's objects refer to each other, and hold several copies
+    step = metres * find_precision(vertices)
     np.multiply(vertices, metres, out=vertices)
-    return MeshBody.from_arrays(vertices, faces, path.name, repair)
+    body = MeshBody.from_arrays(vertices, faces, path.name, repair)
+    return replace(body, notes=precision_notes(step, float(np.subtract(*body.box[::-1]).min())))
 
 
 def _check_count(path: Path, suffix: str) -> None:
