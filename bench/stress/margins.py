@@ -13,6 +13,9 @@ A loop cycles if its motion lasts without steps of position and force and is one
 
 The factor is the greatest of ``FACTORS`` up to which at most 1 % of the loops cycle, at that factor
 and at those below it. The share is then counted in further loops, and printed with the factor.
+
+Above it the share is counted up to K₀/q itself: the curve, for other risks than 1 %. ``--rates``
+counts at the factor in loops of 100 Hz to 10 kHz whose K₀ was tested at 1 kHz.
 """
 
 from __future__ import annotations
@@ -21,13 +24,15 @@ import argparse
 import math
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from rich.console import Console
 
 from asperity.analysis import characteristic_number
+from asperity.analysis.passivity.recommended_stiffness import load_margins
+from asperity.laws import LAWS as LAWS_BY_LETTER
 from asperity.loop import lane_loop
 from asperity.scene.sweeps import map_threads
 from asperity.simulation import Cartesian, Servo, SpringHand, Stationary
@@ -49,6 +54,10 @@ DURATION = 1.0  # [s] of the first run; one that still moves is extended to 16 t
 LASTING_SHARE = 0.9  # of the loss that the texture supplies in a motion that lasts
 DELAYS = (0, 0, 1, 2, 6)
 MAX_GAIN = 50.0  # a law whose q is greater has no start to speak of
+CURVE_FACTORS = (0.1, 0.2, 0.3, 0.5, 0.7, 1.0)
+CURVE_LOOPS = 1000
+RATES = 100.0, 10_000.0  # [Hz] of the loops of ``--rates``
+WALL_RATE = 1000.0  # [Hz] at which their K₀ was tested
 
 
 @dataclass(frozen=True)
@@ -196,6 +205,16 @@ def random_loop(seed: int, number: int) -> RandomLoop:
     )
 
 
+def to_random_rate(loop: RandomLoop, seed: int) -> RandomLoop:
+    """Return a loop at an update rate between 100 Hz and 10 kHz, with the K₀ allowed there.
+
+    Below ``WALL_RATE`` the damping is that of the test at ``WALL_RATE``; above it less, as if the
+    same wall had been tested at the higher rate.
+    """
+    rate = _log_uniform(np.random.default_rng([seed, loop.number, 1]), *RATES)
+    return replace(loop, period=1.0 / rate, wall=loop.wall * min(1.0, rate / WALL_RATE))
+
+
 def _random_axes(rng: np.random.Generator) -> np.ndarray:
     return np.linalg.qr(rng.standard_normal((3, 3)))[0]
 
@@ -291,7 +310,12 @@ def _record(rule: StopRule, seen: list[SegmentStatistics]) -> StopRule:
 
 
 def count_cycles(
-    law: str, factor: float, count: int, seed: int, along_lightest: bool = False
+    law: str,
+    factor: float,
+    count: int,
+    seed: int,
+    along_lightest: bool = False,
+    any_rate: bool = False,
 ) -> MarginResult:
     """Return what becomes of random loops at a factor of K₀/q.
 
@@ -302,10 +326,13 @@ def count_cycles(
         seed: of the loops.
         along_lightest: whether K₀ is that of the weakest of the three axes, as a calibration
             measures it.
+        any_rate: whether the loops have update rates from 100 Hz to 10 kHz.
     """
     loops = admissible_loops(law, seed, has_start)
 
     def motion(loop: RandomLoop, q: float) -> Motion | None:
+        if any_rate:
+            loop = to_random_rate(loop, seed)
         wall = loop.wall * (loop.weakest_axis if along_lightest else 1.0)
         return lasting_motion(loop, law, factor * wall / q)
 
@@ -342,8 +369,32 @@ def measure(
             return result
 
 
-def write_margins(found: dict[tuple[str, bool], MarginResult], path: Path = TARGET) -> None:
-    """Write the margins: factor, loops, cycles and the fastest motion of each law."""
+def measure_curve(
+    law: str, along_lightest: bool, factor: float, console: Console, count: int
+) -> list[str]:
+    """Return lines of the curve of a law: factor, cycles, and the fastest motion there."""
+    lines = []
+    for tried in (factor, *(one for one in CURVE_FACTORS if one > factor)):
+        result = count_cycles(law, tried, count, SEED + 1, along_lightest)
+        console.print(f"{law}: {result.cycles} of {count} loops at {tried:g}")
+        worst = max(result.motions, key=lambda motion: motion.speed, default=AT_REST)
+        numbers = f"{tried:g}, {result.cycles}, {worst.speed:.3g}, {worst.extent:.3g}"
+        lines.append(f"    [{numbers}],")
+    return [f"curve_loops = {count}", "curve = [", *lines, "]"]
+
+
+def count_at_any_rate(law: str, along_lightest: bool, console: Console, count: int) -> int:
+    """Return 1 if at the factor more loops cycle than stated, at rates of 100 Hz to 10 kHz."""
+    factor = load_margins(along_lightest)[LAWS_BY_LETTER[law]].factor
+    result = count_cycles(law, factor, count, SEED + 2, along_lightest, any_rate=True)
+    console.print(f"{law}: {result.cycles} of {count} loops at {factor:g}, 100 Hz to 10 kHz")
+    return int(result.share > MAX_SHARE)
+
+
+def write_margins(
+    found: dict[tuple[str, bool], tuple[MarginResult, list[str]]], path: Path = TARGET
+) -> None:
+    """Write the margins: factor, loops, cycles, the fastest motion, and the curve of each law."""
     lines = [
         "# Written by `python -m bench.stress.margins`: random loops in which a smooth wall of",
         "# K₀ is just passive. factor: stiffness over K₀/q at which at most 1 % of the loops",
@@ -351,9 +402,10 @@ def write_margins(found: dict[tuple[str, bool], MarginResult], path: Path = TARG
         "# motion that a hand feels; speed [m/s], extent [m]: RMS of the fastest of these.",
         "# lightest: the same with K₀ along the weakest of three axes, as `asperity calibrate`",
         "# measures it. A and E: at most the factor at which a pantograph held loosely cycles,",
-        "# which is not among the random loops.",
+        "# which is not among the random loops. curve: factor, loops that cycle of curve_loops,",
+        "# speed and extent of the fastest, from the factor up to 1, K₀/q itself.",
     ]
-    for (law, along), one in found.items():
+    for (law, along), (one, curve) in found.items():
         worst = max(one.motions, key=lambda motion: motion.speed, default=AT_REST)
         lines += [
             "",
@@ -363,6 +415,8 @@ def write_margins(found: dict[tuple[str, bool], MarginResult], path: Path = TARG
             f"cycles = {one.cycles}",
             f"speed = {worst.speed:.3g}",
             f"extent = {worst.extent:.3g}",
+            *([f"ceiling = {CEILINGS[law]:g}"] if law in CEILINGS else []),
+            *curve,
         ]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
@@ -372,13 +426,17 @@ def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--laws", default=LAWS, help="laws; only all of them are written")
     parser.add_argument("--loops", type=int, default=LOOPS, help="loops at the factor found")
+    parser.add_argument("--rates", action="store_true", help="count at any update rate instead")
     options = parser.parse_args(arguments)
     console = Console(width=120, highlight=False)
-    found = {
-        (law, along): measure(law, along, console, SEARCH_LOOPS, options.loops)
-        for law in options.laws
-        for along in (False, True)
-    }
+    cases = [(law, along) for law in options.laws for along in (False, True)]
+    if options.rates:
+        return max(count_at_any_rate(law, along, console, options.loops) for law, along in cases)
+    found = {}
+    for law, along in cases:
+        result = measure(law, along, console, SEARCH_LOOPS, options.loops)
+        curve = measure_curve(law, along, result.factor, console, CURVE_LOOPS)
+        found[law, along] = result, curve
     if options.laws == LAWS:
         write_margins(found)
     return 0

@@ -234,6 +234,18 @@ def test_a_leak_that_cannot_be_computed_is_a_dash_and_refuses_no_law() -> None:
     assert result["W"].leak.energy == 0.0
 
 
+def test_risk_is_the_users(result: asp.Comparison) -> None:
+    risky = asp.compare(PAPER, device="omega.3", laws="WGH", risk="5%")
+    assert (result.risk, risky.risk, risky.to_dict()["risk"]) == (0.01, 0.05, 0.05)
+    for letter, ratio in (("W", 1.0), ("G", 0.3 / 0.07), ("H", 0.7 / 0.5)):
+        starts = [one[letter].recommended_stiffness for one in (result, risky)]
+        assert starts[1] == pytest.approx(ratio * starts[0], rel=1e-2)
+        assert risky[letter].stability_limit == result[letter].stability_limit
+    assert "7.5 % do at 5000 N/m itself" in " ".join(risky.reasons)
+    with pytest.raises(ParameterError, match="risk must be 1% or 5%"):
+        asp.compare(PAPER, risk="3%")
+
+
 def test_to_dict_is_json_without_nan(result: asp.Comparison) -> None:
     text = json.dumps(result.to_dict(), allow_nan=False)
     data = json.loads(text)

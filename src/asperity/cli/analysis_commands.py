@@ -87,6 +87,9 @@ _STIFFNESS = replace(
 _MAX_DEPTHS = replace(MAX_DEPTH, form="items", example="0.1mm; 0.5mm")
 
 
+_COMPARISON = (SPEED, GRIP, *options.command_arguments("compare"))
+
+
 class _AskingCommand(HeadedCommand):
     """Command that asks for its arguments on a terminal, if there are none."""
 
@@ -106,7 +109,7 @@ class _AskingCommand(HeadedCommand):
     "Devices of the catalogue, or TOML files, 'touch,mine.toml'.  [default: omega.3]",
     options.parse_devices,
 )
-@options.argument_options([SPEED, GRIP])
+@options.argument_options(_COMPARISON)
 @options.laws_option("Laws to compare, 'WAC' or names with commas.  [default: all]")
 @options.law_options((_STIFFNESS, _MAX_DEPTHS, *options.LAW_OPTIONS[2:]))
 @options.file_options
@@ -148,7 +151,7 @@ def compare_command(
             [depths] if isinstance(depths, float) else depths,
             chosen,
             progress=lambda on, _depth, law: step(f"{on.id}, law {law}"),
-            **options.provided_values(values, [SPEED, GRIP]),
+            **options.provided_values(values, _COMPARISON),
             **arguments,
         )
     _write_comparisons(result, outputs, full, why, surface)

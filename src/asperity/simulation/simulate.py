@@ -236,9 +236,7 @@ def simulate(
         plant.notes,
         truncated,
         error,
-        counts.force_limited,
-        counts.too_deep,
-        counts.deepest,
+        *counts.totals,
     )
 
 

@@ -192,6 +192,11 @@ class LimitCounts:
         self.too_deep = 0
         self.deepest = 0.0
 
+    @property
+    def totals(self) -> tuple[int, int, float]:
+        """Samples at the force limit, samples below ``max_depth``, and the greatest depth [m]."""
+        return self.force_limited, self.too_deep, self.deepest
+
     def update(self, rows: FloatArray) -> None:
         """Count the next rows of the trace, shape (n, columns)."""
         squares = np.square(rows[:, _COMMANDED]).sum(axis=1)

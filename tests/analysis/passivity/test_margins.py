@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -17,6 +18,7 @@ from bench.stress.margins import (
     has_start,
     lasting_motion,
     random_loop,
+    to_random_rate,
 )
 
 from asperity.analysis import characteristic_number, one_sided_number, worst_loop
@@ -148,3 +150,55 @@ def test_weakest_axis_is_what_walls_along_the_axes_feel() -> None:
         felt = [1.0 / (np.linalg.inv(loop.damping) @ axis @ axis) for axis in np.eye(3)]
         assert loop.weakest_axis == pytest.approx(min(felt) / needed)
         assert loop.lightest - 1e-12 <= loop.weakest_axis <= 1.0 + 1e-12
+
+
+def test_margin_at_a_risk_is_the_greatest_factor_up_to_which_the_curve_allows_it() -> None:
+    for along in (False, True):
+        for margin in load_margins(along_lightest=along).values():
+            assert margin.curve[0].factor == margin.factor
+            assert margin.curve[-1].factor == 1.0
+            assert margin.limit_share == margin.curve[-1].cycles / margin.curve_loops
+            assert margin.at_risk(0.01) is margin
+            five = margin.at_risk(0.05)
+            for point in margin.curve[1:]:
+                if point.factor <= five.factor:
+                    assert point.cycles <= 0.05 * margin.curve_loops
+            beyond = [point for point in margin.curve if point.factor > five.factor]
+            assert not beyond or beyond[0].cycles > 0.05 * margin.curve_loops
+            if five.factor > margin.factor:
+                assert (five.loops, five.cycles) == (margin.curve_loops, five.cycles)
+    shading = load_margins()[find_law("G")]
+    assert (shading.factor, shading.at_risk(0.05).factor, shading.limit_share) == (0.07, 0.3, 0.102)
+    assert shading.at_risk(1.0).factor == 1.0
+
+
+@pytest.mark.parametrize("letter", ["G", "H"])
+def test_a_sample_of_the_curve_is_reproduced(letter: str) -> None:
+    """The first 60 of the loops of the curve: no more cycle than of all of them."""
+    margin = load_margins()[find_law(letter)]
+    five = margin.at_risk(0.05)
+    found = count_cycles(letter, five.factor, 60, SEED + 1)
+    assert found.share <= 0.05
+    assert count_cycles(letter, 1.0, 60, SEED + 1).cycles >= found.cycles
+
+
+def test_loops_of_any_rate_have_the_damping_of_their_wall_test() -> None:
+    """Below 1 kHz the damping is that of a wall of K₀ at 1 kHz; K₀ falls with the rate."""
+    rates = []
+    for number in range(60):
+        tested = random_loop(SEED, number)
+        loop = to_random_rate(tested, SEED)
+        rate = 1.0 / loop.period
+        rates.append(rate)
+        assert loop.wall == pytest.approx(tested.wall * min(1.0, rate / 1000.0))
+        if rate < 1000.0:
+            same = replace(tested, period=1e-3).damping
+            np.testing.assert_allclose(loop.damping, same, rtol=1e-12)
+    assert 100.0 <= min(rates) < 300.0
+    assert 3000.0 < max(rates) <= 10_000.0
+
+
+@pytest.mark.parametrize("letter", ["C", "G"])
+def test_a_sample_of_loops_of_any_rate_keeps_the_stated_risk(letter: str) -> None:
+    factor = load_margins()[find_law(letter)].factor
+    assert count_cycles(letter, factor, 80, SEED + 2, any_rate=True).cycles <= 2

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal, NamedTuple
 
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.passivity import criteria, device_loop
@@ -127,6 +127,20 @@ _MARGINS_FILE = Path(__file__).with_name("margins.toml")
 _BASES_WITHOUT_MARGIN = ("proved", "bounded")
 
 
+class CurvePoint(NamedTuple):
+    """The random loops at a factor of K₀/q: how many cycle, and the fastest motion."""
+
+    factor: float
+    cycles: int
+    speed: float
+    extent: float
+
+
+RISKS = {"1%": 0.01, "5%": 0.05}
+"""Shares of random loops that may cycle at the recommended stiffness."""
+LEAST_RISK = RISKS["1%"]
+
+
 @dataclass(frozen=True)
 class Margin(Serializable):
     """Safety margin: the recommended stiffness over K₀/q, from random admissible loops.
@@ -139,6 +153,9 @@ class Margin(Serializable):
         cycles: in how many of them a motion lasts, without steps, that a hand feels.
         speed: RMS speed of the fastest of these motions, summed over the axes [m/s].
         extent: its RMS displacement [m].
+        curve: numbers of random loops that cycle, from the factor for 1 % up to the limit.
+        curve_loops: number of random loops simulated at each point of the curve.
+        ceiling: factor at which the paper's pantograph, held loosely, cycles; 1 if it does not.
     """
 
     factor: float
@@ -147,6 +164,23 @@ class Margin(Serializable):
     cycles: int = 0
     speed: float = 0.0
     extent: float = 0.0
+    curve: tuple[CurvePoint, ...] = ()
+    curve_loops: int = 0
+    ceiling: float = 1.0
+
+    @property
+    def limit_share(self) -> float:
+        """Share of the random loops that cycle at the stability limit itself, K₀/q."""
+        return self.curve[-1].cycles / self.curve_loops
+
+    def at_risk(self, risk: float) -> Margin:
+        """Return the margin at which at most a share of the random loops cycles, 1 % or more."""
+        found = self
+        for point in self.curve[1:]:
+            if risk <= LEAST_RISK or point.cycles > risk * self.curve_loops:
+                break
+            found = replace(self, loops=self.curve_loops, **point._asdict())
+        return found
 
     @property
     def frequency(self) -> float:
@@ -168,10 +202,16 @@ def load_margins(along_lightest: bool = False) -> dict[Law, Margin]:
     """
     table = tomllib.loads(_MARGINS_FILE.read_text(encoding="utf-8"))
     entries = table["lightest" if along_lightest else "normal"]
-    return {LAWS[law]: Margin(law=law, **entry) for law, entry in entries.items()}
+    return {LAWS[law]: _parse_margin(law, **entry) for law, entry in entries.items()}
 
 
-def safety_margin(surface: Surface, device: Device, limit: StabilityLimit) -> Margin:
+def _parse_margin(law: str, curve: list[list[Any]], **entry: Any) -> Margin:
+    return Margin(law=law, curve=tuple([CurvePoint(*point) for point in curve]), **entry)
+
+
+def safety_margin(
+    surface: Surface, device: Device, limit: StabilityLimit, risk: float = LEAST_RISK
+) -> Margin:
     """Return the safety margin below a stability limit.
 
     A proved limit needs no margin. Where K₀ is known along the device's lightest direction, the
@@ -181,12 +221,14 @@ def safety_margin(surface: Surface, device: Device, limit: StabilityLimit) -> Ma
         surface: the surface, of which the law counts.
         device: the device.
         limit: the stability limit.
+        risk: greatest share of the random loops that cycle.
     """
     if limit.basis in _BASES_WITHOUT_MARGIN or not surface.depends_on_texture:
         return NO_MARGIN
     test = device.wall_test
     margins = load_margins(along_lightest=test is not None and test.lightest is not None)
-    return margins.get(surface.law) or min(margins.values(), key=lambda margin: margin.factor)
+    margin = margins.get(surface.law) or min(margins.values(), key=lambda margin: margin.factor)
+    return margin.at_risk(risk)
 
 
 @dataclass(frozen=True)
@@ -224,10 +266,17 @@ def recommend_stiffness(
     return recommend_on_loop(device_loop.make_device_loop(surface, device, q, one_sided))
 
 
-def recommend_on_loop(loop: device_loop.DeviceLoop) -> StiffnessRecommendation:
-    """Return the recommended stiffness of a surface's law on a device; its own does not count."""
+def recommend_on_loop(
+    loop: device_loop.DeviceLoop, risk: float = LEAST_RISK
+) -> StiffnessRecommendation:
+    """Return the recommended stiffness of a surface's law on a device; its own does not count.
+
+    Args:
+        loop: the surface on the device.
+        risk: greatest share of random loops that cycle at that stiffness.
+    """
     limit = stability_limit(loop, criteria.evaluate_criteria(loop))
-    margin = safety_margin(loop.surface, loop.device, limit)
+    margin = safety_margin(loop.surface, loop.device, limit, risk)
     stiffness = 0.0
     if limit.stiffness is not None and math.isfinite(limit.stiffness):
         stiffness = round_down(margin.factor * limit.stiffness)

@@ -17,7 +17,7 @@ from asperity.analysis.gain.surface_cache import is_shipped_law, surface_content
 from asperity.analysis.limits.limit_rules import DEFAULT_SPEED
 from asperity.analysis.limits.perceptibility import Tier, assess_perceptibility
 from asperity.analysis.passivity.device_loop import make_device_loop
-from asperity.analysis.passivity.recommended_stiffness import recommend_on_loop
+from asperity.analysis.passivity.recommended_stiffness import RISKS, recommend_on_loop
 from asperity.analysis.passivity.verdict import assess_loop
 from asperity.analysis.results.recommendation import (
     LawRow,
@@ -58,6 +58,7 @@ class Comparison(Plottable, Reportable, Tabular):
         max_depth: depth to which the surface is pressed [m].
         speed: speed of the scan for which perceptibility is assessed [m/s].
         grip: the hand that holds the device.
+        risk: share of random loops that may cycle at the recommended stiffnesses.
         rows: one per law, in the given order.
         recommended_row: row of the recommended law; ``None`` if none can be recommended.
         nearest_row: where no texture is felt, row of the law that comes nearest; else ``None``.
@@ -70,6 +71,7 @@ class Comparison(Plottable, Reportable, Tabular):
     max_depth: float
     speed: float
     grip: Grip
+    risk: float
     rows: tuple[LawRow, ...]
     recommended_row: LawRow | None
     nearest_row: LawRow | None
@@ -133,7 +135,7 @@ class Comparison(Plottable, Reportable, Tabular):
         return {
             "schema": SCHEMA,
             "texture": self.texture.describe(),
-            **attributes_to_dict(self, "device", "stiffness", "max_depth", "speed", "grip"),
+            **attributes_to_dict(self, "device", "stiffness", "max_depth", "speed", "grip", "risk"),
             "laws": to_plain_data(self.rows),
             **attributes_to_dict(self, "recommended", "recommendation", "reasons", "assumptions"),
         }
@@ -151,6 +153,7 @@ def compare(
     law_parameters: Mapping[str, float] | None = None,
     rendering: str = FIELD,
     grip: str | os.PathLike[str] | Grip = DEFAULT_GRIP,
+    risk: str = "1%",
     **surface_arguments: Any,
 ) -> Comparison:
     """Compare laws on a surface and a device: stability, perceptibility and artefacts.
@@ -179,6 +182,8 @@ def compare(
             :func:`~asperity.rendering.rendered_surface`.
         grip: the hand that holds the device: an id, a TOML file, or a
             :class:`~asperity.perception.grip.Grip`.
+        risk: ``"1%"`` or ``"5%"``: how many random loops may cycle at the recommended stiffness
+            (docs/theory/passivity.md).
         **surface_arguments: further arguments of :class:`~asperity.surface.Surface`.
 
     Raises:
@@ -194,7 +199,7 @@ def compare(
         raise ParameterError("device", "must be one: asp.compare_devices compares several")
     check_keywords(surface_arguments, SURFACE_KEYWORDS - {"law"}, compare)
     texture = as_texture(texture)
-    query = _make_query(texture, device, stiffness, max_depth, speed, rendering, grip)
+    query = _make_query(texture, device, stiffness, max_depth, speed, rendering, grip, risk)
     surface_arguments |= {"stiffness": query.stiffness or DEFAULT_STIFFNESS, "max_depth": max_depth}
     compared = _compared_laws(texture, laws)
     parameters = distribute_parameters(law_parameters or {}, compared)
@@ -218,6 +223,7 @@ def compare(
         max_depth=surfaces[0].max_depth,
         speed=query.speed,
         grip=query.grip,
+        risk=query.risk,
         rows=tuple(rows),
         recommended_row=recommended,
         nearest_row=nearest,
@@ -284,6 +290,7 @@ class _ComparisonQuery:
     explicit_depth: bool
     rendering: str
     grip: Grip
+    risk: float
 
 
 def _make_query(
@@ -294,6 +301,7 @@ def _make_query(
     speed: float | None,
     rendering: str,
     grip: str | os.PathLike[str] | Grip,
+    risk: str,
 ) -> _ComparisonQuery:
     """Return the conditions from arguments of :func:`compare`, checked."""
     loaded = load_device(device)
@@ -301,6 +309,8 @@ def _make_query(
         stiffness = check_positive("stiffness", stiffness, "N/m")
     if speed is not None:
         speed = check_positive("speed", speed, "m/s")
+    if risk not in RISKS:
+        raise ParameterError("risk", f"must be {' or '.join(RISKS)}", risk)
     if lacks_data(loaded):
         raise ParameterError(
             "device",
@@ -316,6 +326,7 @@ def _make_query(
         explicit_depth=max_depth is not None,
         rendering=rendering,
         grip=load_grip(grip),
+        risk=RISKS[risk],
     )
 
 
@@ -347,7 +358,7 @@ def _compute_row(surface: Surface, query: _ComparisonQuery) -> LawRow:
     q = cached_number(surface, NORM)
     one_sided = cached_number(surface, ONE_SIDED)
     loop = make_device_loop(surface, device, q, one_sided)
-    recommended = recommend_on_loop(loop)
+    recommended = recommend_on_loop(loop, query.risk)
     if query.stiffness is None:
         surface = surface.to_stiffness(recommended.start)
     leak = find_leak(surface)

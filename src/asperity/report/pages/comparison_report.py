@@ -31,6 +31,7 @@ from asperity.report.sentences.comparison_text import (
     merit_alt_text,
     recommended_stiffness_text,
     requested_stiffness_text,
+    risk_alt_text,
     spectrum_alt_text,
     surface_alt_text,
 )
@@ -140,6 +141,7 @@ _FIGURE_DESCRIPTIONS: dict[str, Callable[[Comparison], str]] = {
     "field": field_alt_text,
     "gain": gain_alt_text,
     "merit": merit_alt_text,
+    "risk": risk_alt_text,
 }
 """Functions that describe the figures of a comparison, in the order of its page."""
 

@@ -128,6 +128,29 @@ def hand_figure(comparison: Comparison) -> Figure:
     return figure
 
 
+def risk_figure(comparison: Comparison) -> Figure:
+    """Return the share of random loops that cycle against the stiffness over K₀/q, by law."""
+    figure = style.new_figure(10.0, 3.4)
+    axes = style.single_axes(figure)
+    rows = [row for row in comparison.rows if row.margin.curve]
+    for row, colour in zip(rows, _COLOURS * len(rows), strict=False):
+        margin = row.margin
+        factors = [point.factor for point in margin.curve]
+        shares = [100.0 * point.cycles / margin.curve_loops for point in margin.curve]
+        axes.plot(factors, shares, "o-", ms=3.0, lw=1.2, color=colour, label=row.law.letter)
+        chosen = 100.0 * margin.cycles / margin.loops
+        axes.plot(margin.factor, chosen, "s", ms=8.0, mfc="none", mec=colour, label="_chosen")
+    axes.axhline(100.0 * comparison.risk, color=style.ORANGE, lw=1.0, ls="--", zorder=1.0)
+    axes.set(xscale="log", xlim=(0.05, 1.1), ylim=(0.0, None))
+    style.label_log_axes(axes.xaxis)
+    style.label_axes(axes, "stiffness over K₀/q [1]", "loops that cycle [%]")
+    if rows:
+        style.add_legend(axes, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    else:
+        style.add_note(axes, "no limit needs a margin", (0.3, 0.5), ha="center")
+    return figure
+
+
 def _draw_marks(
     axes: Axes, x: FloatArray, y: FloatArray, parts: Mapping[str, NDArray[np.bool_]]
 ) -> None:

@@ -20,6 +20,7 @@ from asperity.report.pictures.device_pictures import (
     envelope_figure,
     hand_figure,
     limits_figure,
+    risk_figure,
     spectrum_figure,
 )
 from asperity.report.pictures.loop_pictures import recording_figure, run_figure
@@ -45,8 +46,8 @@ def plot(result: Any, picture: str | None = None) -> Figure:
             :class:`~asperity.simulation.Run` or a :class:`~asperity.Recording` (motion, force,
             energy, phase).
         picture: name of one figure of the report: of a comparison "surface", "spectrum", "hand",
-            "force", "field", "gain" or "merit", of an analysis "field", "gain", "depth", and for
-            a map "top".
+            "force", "field", "gain", "merit" or "risk", of an analysis "field", "gain", "depth",
+            and for a map "top".
 
     Returns:
         A figure; ``figure.savefig(path)`` writes it, as PNG or SVG by the path.
@@ -168,4 +169,5 @@ COMPARISON_PICTURES: dict[str, Callable[[Comparison], Figure]] = {
     ),
     "gain": law_pictures.gain_figure,
     "merit": law_pictures.merit_figure,
+    "risk": risk_figure,
 }

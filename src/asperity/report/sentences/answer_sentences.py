@@ -16,6 +16,7 @@ from asperity.devices import Device
 from asperity.report.sentences.limit_sentences import (
     force_magnitude_text,
     masking_text,
+    percent,
     remedies_text,
     texture_amount_text,
     unknown_frequencies_text,
@@ -323,7 +324,7 @@ def _margin_text(row: LawRow) -> str:
     relation = "equals" if margin.factor == 1.0 else f"is {margin.factor:g} times"
     whole = "the limit" if row.conservative else "K₀/q, the gain of that wall"
     loops = simulated_loops_text(margin)
-    text = f"The recommended stiffness {relation} {whole}: there {loops}."
+    text = f"The recommended stiffness {relation} {whole}: there {loops}{_limit_share_text(row)}."
     calibrated = {other.law: other.factor for other in load_margins(along_lightest=True).values()}
     factor = calibrated[margin.law]
     if factor <= margin.factor:
@@ -332,6 +333,16 @@ def _margin_text(row: LawRow) -> str:
         f"{text} On a calibrated device, where a wall was tried along every axis, the factor is "
         f"{factor:g}: up to {factor / margin.factor:.2g} times stiffer."
     )
+
+
+def _limit_share_text(row: LawRow) -> str:
+    """Return which share of the random loops cycles at the limit itself, after a semicolon."""
+    limit = row.stability_limit.stiffness
+    if row.margin.factor > row.margin.ceiling:
+        return f"; the paper's pantograph, held loosely, does from {row.margin.ceiling:g} times on"
+    if row.margin.factor == 1.0 or not limit:
+        return ""
+    return f"; {percent(row.margin.limit_share)} do at {stiffness_limit_text(limit)} itself"
 
 
 def simulated_loops_text(margin: Margin) -> str:

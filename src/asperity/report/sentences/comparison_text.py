@@ -13,7 +13,7 @@ from asperity.core.units import format_quantity, round_down
 from asperity.envelopes.find_design import Design
 from asperity.envelopes.searches import FORCE
 from asperity.report.sentences import number_text
-from asperity.report.sentences.limit_sentences import force_magnitude_text
+from asperity.report.sentences.limit_sentences import force_magnitude_text, percent
 from asperity.report.sentences.number_text import bound_text, count_text, leak_text
 from asperity.report.sentences.texts import sentence, sentence_case
 from asperity.textures.texture import Texture
@@ -166,6 +166,15 @@ def merit_alt_text(comparison: Comparison) -> str:
     sound = [row.law.letter for row in comparison.rows if row.conservative and row.continuous]
     points = f"Strength against support, a point for each of {_law_count_text(comparison)}"
     return f"{points}. Conservative and continuous: {join_letters(sound)}."
+
+
+def risk_alt_text(comparison: Comparison) -> str:
+    """Return the share of random loops that cycle at the limit, for each law."""
+    rows = [row for row in comparison.rows if row.margin.curve]
+    if not rows:
+        return "No limit of these laws needs a margin."
+    shares = [f"{row.law.letter} {percent(row.margin.limit_share)}" for row in rows]
+    return f"Share of random loops that cycle, at the limit itself: {', '.join(shares)}."
 
 
 def _law_count_text(comparison: Comparison) -> str:
