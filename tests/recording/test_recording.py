@@ -10,10 +10,12 @@ import subprocess
 import sys
 import time
 import zlib
+from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -328,6 +330,57 @@ def test_flipped_bits_raise_only_parameter_errors(tmp_path: Path) -> None:
         path.write_bytes(damaged)
         with suppress(ParameterError):
             open_recording(path).table()
+
+
+def contents(path: Path) -> tuple[object, ...]:
+    recording = open_recording(path)
+    files = {name: recording.attachment(name) for name in recording._attachments}
+    rows = recording.table().tobytes(), recording.duration
+    return recording.metadata, recording.version, recording.columns, files, rows
+
+
+def test_flipped_bits_change_nothing_in_silence(tmp_path: Path) -> None:
+    """A recording is read as it was written, or refused, or not closed: it ends earlier."""
+    path = tmp_path / "run.mcap"
+    data = write_recording(path, random_rows(40), block=10).read_bytes()
+    whole = contents(path)
+    rng = np.random.default_rng(7)
+    outcomes = Counter[str]()
+    for bit in rng.choice(8 * len(data), 1500, replace=False).tolist():
+        damaged = bytearray(data)
+        damaged[bit // 8] ^= 1 << bit % 8
+        path.write_bytes(damaged)
+        outcome = "refused"
+        with suppress(ParameterError):
+            outcome = "equal" if contents(path) == whole else "changed"
+            if not open_recording(path).is_complete:
+                outcome = "not closed"
+        outcomes[outcome] += 1
+    assert outcomes["changed"] == 0
+    assert outcomes["refused"] > outcomes["equal"] > 0  # the latter in the index at the end
+
+
+def test_recordings_without_a_checksum_of_the_metadata_are_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Those of early versions; their metadata can change in silence, which is the control."""
+    path = tmp_path / "run.mcap"
+    encode = mcap._encode_part
+
+    def leave_out(part: Any) -> bytes:
+        texts = isinstance(part, dict) and {**part}
+        return encode({key: x for key, x in texts.items() if key != "checksum"} if texts else part)
+
+    monkeypatch.setattr(mcap, "_encode_part", leave_out)
+    data = write_recording(path, random_rows(3)).read_bytes()
+    monkeypatch.undo()
+    assert open_recording(path).metadata == {"law": "B"}
+    path.write_bytes(data.replace(b'"law": "B"', b'"law": "C"'))
+    assert open_recording(path).metadata == {"law": "C"}
+    data = write_recording(path, random_rows(3)).read_bytes()
+    path.write_bytes(data.replace(b'"law": "B"', b'"law": "C"'))
+    with pytest.raises(ParameterError, match="its metadata is damaged: the checksum is wrong"):
+        open_recording(path)
 
 
 def test_recordings_are_recognised_by_their_first_bytes(tmp_path: Path) -> None:

@@ -13,17 +13,21 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import IO
 
 MAGIC = b"\x89MCAP0\r\n"
+CHECKSUM = "checksum"
+"""Name of the checksum among the metadata."""
 CHANNEL = 1
 """Number of the only channel and of its schema."""
 # Before the rows of a chunk: first and last time, size, checksum, no compression, size again.
 _CHUNK = struct.Struct("<QQQIIQ")
 _RECORD = struct.Struct("<BQ")
+# A row: its record, channel, number, time.
+_ROW = struct.Struct("<BQHIQ")
 _MEDIA_TYPE = "application/octet-stream"
 
 
@@ -101,7 +105,8 @@ def encode_head(
     repeated = encode_record(Opcode.SCHEMA, channel, f"{name}/Row", "ros2msg", schema)
     repeated += encode_record(Opcode.CHANNEL, channel, channel, f"/{name}", "cdr", {})
     content = MAGIC + encode_record(Opcode.HEADER, "", library) + repeated
-    metadata = encode_record(Opcode.METADATA, name, texts)
+    checksum = head_checksum(content, texts, attachments)
+    metadata = encode_record(Opcode.METADATA, name, {**texts, CHECKSUM: checksum})
     place = struct.pack("<QQ", len(content), len(metadata))
     index = encode_record(Opcode.METADATA_INDEX, place, name)
     content += metadata
@@ -111,6 +116,18 @@ def encode_head(
         index += encode_record(Opcode.ATTACHMENT_INDEX, place, file, _MEDIA_TYPE)
         content += record
     return Head(content, repeated, index, len(attachments))
+
+
+def head_checksum(before: bytes, texts: Mapping[str, str], attachments: Iterable[str]) -> str:
+    """Return the checksum of the records before the rows, which is one of the metadata.
+
+    Args:
+        before: the file up to the metadata.
+        texts: metadata without the checksum.
+        attachments: their names; their content has checksums of its own.
+    """
+    names = "".join(attachments)
+    return f"{zlib.crc32(_encode_part(texts) + _encode_part(names), zlib.crc32(before)):08x}"
 
 
 def _encode_attachment(name: str, data: bytes) -> bytes:
@@ -131,6 +148,7 @@ class Chunk:
         checksum: CRC-32 of its rows.
         times: times of the first and the last row [ns].
         index_size: size of the index of its rows, which follows [bytes].
+        first_row: number, modulo 2³², and time [ns] of its first row.
     """
 
     start: int
@@ -139,6 +157,7 @@ class Chunk:
     checksum: int
     times: tuple[int, int]
     index_size: int = 0
+    first_row: tuple[int, int] = (0, 0)
 
     @property
     def end(self) -> int:
@@ -291,4 +310,7 @@ def read_chunk(stream: IO[bytes], at: int, length: int) -> Chunk:
         raise DamagedError("its blocks are compressed, which asperity never does: unpack it first")
     if size != stored or _CHUNK.size + size != length:
         raise DamagedError("a block contradicts its size")
-    return Chunk(at - _RECORD.size, at + _CHUNK.size, size, checksum, (first, last))
+    row = stream.read(min(_ROW.size, size))
+    number, logged = _ROW.unpack(row)[3:] if len(row) == _ROW.size else (0, 0)
+    place = at - _RECORD.size, at + _CHUNK.size
+    return Chunk(*place, size, checksum, (first, last), first_row=(number, logged))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any
@@ -23,6 +23,7 @@ from asperity.recording.writer import FORMAT, SCHEMA_NAME
 _MAX_BYTES = 2**40
 # Of one of the records before the rows: a map of 11000 x 11000 points.
 _MAX_RECORD_BYTES = 2**30
+_TEXTS = {"format", "version", "about"}
 _MAX_NAME = 2**10  # of an attachment [bytes]
 
 
@@ -210,6 +211,7 @@ def _read(path: Path, stream: IO[bytes], size: int) -> Recording:
     is_complete = False
     foreign = False
     end = len(mcap.MAGIC)
+    head_end = 0
     for op, at, length in mcap.iterate_records(stream, size):
         if op == mcap.Opcode.DATA_END:
             is_complete = True
@@ -224,6 +226,7 @@ def _read(path: Path, stream: IO[bytes], size: int) -> Recording:
             columns = _columns(_record_content(stream, at, length))
         elif op == mcap.Opcode.METADATA:
             texts = _read_texts(_record_content(stream, at, length)) or texts
+            head_end = end
         elif op == mcap.Opcode.ATTACHMENT:
             content = _record_content(stream, at, min(length, _MAX_NAME))
             content.read(16)  # times: unused
@@ -234,7 +237,9 @@ def _read(path: Path, stream: IO[bytes], size: int) -> Recording:
         raise mcap.DamagedError("it does not say what its rows are")
     if not is_complete and chunks and not _is_intact(stream, chunks[-1]):
         end = chunks.pop().start  # the remains of a loss of power
-    rows = sum([chunk.size for chunk in chunks]) // row_encoding.row_type(len(columns)).itemsize
+    if is_complete or chunks:
+        _check_head(stream, head_end, texts, attachments)
+    rows = _check_rows(stream, chunks, row_encoding.row_type(len(columns)))
     return Recording(
         path,
         columns,
@@ -246,6 +251,40 @@ def _read(path: Path, stream: IO[bytes], size: int) -> Recording:
         tuple(chunks),
         attachments,
     )
+
+
+def _check_head(
+    stream: IO[bytes], head_end: int, texts: dict[str, str], attachments: Iterable[str]
+) -> None:
+    """Check the checksum of the records before the rows, which early versions did not write.
+
+    Raises:
+        DamagedError: if it differs.
+    """
+    checksum = texts.pop(mcap.CHECKSUM, None)
+    stream.seek(0)
+    expected = mcap.head_checksum(stream.read(head_end), texts, attachments)
+    if checksum not in {None, expected} or texts.keys() != _TEXTS:
+        raise mcap.DamagedError("its metadata is damaged: the checksum is wrong")
+
+
+def _check_rows(stream: IO[bytes], chunks: Sequence[mcap.Chunk], row: np.dtype[Any]) -> int:
+    """Return the number of rows, none of which is missing before the last.
+
+    Raises:
+        DamagedError: for a block that is missing, or a last time that is not that of the last row.
+    """
+    count = 0
+    for chunk in chunks:
+        if chunk.first_row != (count % 2**32, chunk.times[0]):
+            raise mcap.DamagedError(f"the block after row {count} is damaged or missing")
+        count += chunk.size // row.itemsize
+    if chunks and chunks[-1].size >= row.itemsize:
+        stream.seek(chunks[-1].end - row.itemsize)
+        (last,) = np.frombuffer(stream.read(row.itemsize), row)
+        if last["logged"] != chunks[-1].times[1]:
+            raise mcap.DamagedError("its last block contradicts the time of its last row")
+    return count
 
 
 def _read_texts(content: mcap.ContentReader) -> dict[str, str]:
@@ -276,7 +315,7 @@ def _is_intact(stream: IO[bytes], chunk: mcap.Chunk) -> bool:
 
 def _parse_metadata(texts: Mapping[str, str], foreign: bool) -> dict[str, Any]:
     """Return the metadata of a recording, if this version of asperity reads it."""
-    if not {"format", "version", "about"} <= texts.keys():
+    if not texts.keys() >= _TEXTS:
         if foreign:
             raise mcap.DamagedError("it was not written by asperity")
         raise mcap.DamagedError("it ends before its first row")
