@@ -248,7 +248,17 @@ def _dry_friction_conclusion(loop: DeviceLoop, criterion: Criterion) -> str:
     if loop.leak is not None:
         needs = f"f_c* is {absorbing_friction_text(loop.leak.absorbing)}"
     lacks = f": needs {', '.join(criterion.missing)}" if criterion.missing else ""
-    return f"{_HOLDS_TEXT[criterion.holds]}{lacks}{_limit_clause(criterion)}; {needs}"
+    answer = f"{_HOLDS_TEXT[criterion.holds]}{lacks}{_limit_clause(criterion)}; {needs}"
+    datum = loop.device.data.get("friction")
+    if datum is None or loop.leak is None or not criterion.missing:
+        return answer
+    words = "may be enough"
+    if datum.value >= loop.leak.absorbing.upper:
+        words = "would be enough"
+    elif datum.value < loop.leak.absorbing.found:
+        words = "is not enough"
+    mark = "" if datum.verified else " (not verified)"
+    return f"{answer}; friction {datum.text}{mark}, typical or at most, {words}"
 
 
 def _criterion_assumptions(loop: DeviceLoop, criterion: Criterion) -> str:
