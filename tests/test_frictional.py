@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bench.stress import friction as friction_stress
 
 from asperity.core.errors import ParameterError
 from asperity.frictional import accepts_friction
@@ -212,3 +213,14 @@ def test_friction_is_carried_by_copies() -> None:
 def test_wrong_friction_is_refused(arguments: dict[str, Any], words: str) -> None:
     with pytest.raises(ParameterError, match=words):
         Surface(WAVE, **{"law": "H", **arguments})
+
+
+def test_sample_of_the_stress_run() -> None:
+    """Closed paths under a noisy limit, and closed loops at the rule and at twice the rule."""
+    wall = Surface(WAVE, "W", 1000.0, 3e-4, friction=0.8, friction_modulation=0.8)
+    works = friction_stress.walk(wall, 300)
+    assert (works.above, works.gains) == (0, 0)
+    assert friction_stress.walk(wall, 300, reach=2e-4).gains > 0
+    for steps in ("exact", "rubbed", "bounded"):
+        assert friction_stress.close_loops(9, 1.0, steps).beyond == 0
+    assert friction_stress.close_loops(9, 2.0).gains > 0

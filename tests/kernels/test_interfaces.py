@@ -11,7 +11,7 @@ import pytest
 from asperity.contacts import closest_search
 from asperity.contacts import sampler_interface as sampler
 from asperity.kernels import probe_functions as law_functions
-from asperity.kernels.fuse import kernel_source
+from asperity.kernels.fuse import energy_kernel_source, kernel_source
 from asperity.kernels.link import unit_from_module
 from asperity.kernels.probe_functions import LawCode, contact_source, probe_source
 from asperity.laws import LAWS
@@ -61,3 +61,14 @@ def test_generated_law_code_matches_its_interface(letter: str, clamp: Clamp) -> 
     declared = argument_counts(law_functions)
     assert defined == {name: declared[name] for name in defined}
     assert set(defined) >= {"probe_force", "probe_jacobian", "probe_in_contact", "probe_tick"}
+
+
+@pytest.mark.parametrize("letter", "WCDH")
+def test_generated_friction_matches_its_interface(letter: str) -> None:
+    law = LAWS[letter]
+    source = f"{kernel_source(law)}\n\n{energy_kernel_source(law)}"
+    text = probe_source(LawCode(law, source, CLAMPS["backed"], has_friction=True))
+    declared = argument_counts(law_functions)
+    functions = [n for n in ast.parse(text).body if isinstance(n, ast.FunctionDef)]
+    assert "probe_slip" in [function.name for function in functions]
+    assert all(len(one.args.args) == declared[one.name] for one in functions)

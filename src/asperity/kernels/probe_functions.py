@@ -91,6 +91,13 @@ def probe_tick(
     raise NotImplementedError  # the linker binds calls to the generated function
 
 
+def probe_slip(
+    x: float, y: float, z: float, warm_start: FloatArray, texture: object, law: object
+) -> tuple[float, float, float, float]:
+    """Return the force [N] of the law of a surface with friction, and the slip limit [N]."""
+    raise NotImplementedError  # the linker binds calls to the generated function
+
+
 def contact_jacobian(
     x: float,
     y: float,
