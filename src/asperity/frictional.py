@@ -21,6 +21,7 @@ from asperity.kernels.fuse import energy_kernel_source
 from asperity.laws import REGISTERED_LAWS, Law, check_parameters_apply
 from asperity.laws.friction import (
     FLAT_SHARE,
+    FRICTION,
     FRICTION_ARGUMENTS,
     TEXTURED_SHARE,
     Friction,
@@ -133,6 +134,19 @@ class Frictional(Plottable, ABC):
         given = self._explicit_parameters.items()
         rest = {name: value for name, value in given if name not in FRICTION_ARGUMENTS}
         return self._replace(_explicit_parameters=rest)
+
+    def to_friction(self, friction: float) -> Self:
+        """Return a copy with another friction coefficient μ [1]; 0 is without friction.
+
+        It is that of the surface, or of law F. A law that cannot have friction keeps it for the
+        next law.
+        """
+        if not friction and "friction" not in self.law.parameters:
+            return self.without_friction()
+        values = {FRICTION.name: FRICTION.validate(friction)}
+        result = self._replace(_explicit_parameters={**self._explicit_parameters, **values})
+        result._check_friction()
+        return result
 
     def _check_friction(self) -> None:
         """Check the friction that was given; on a law with curl it has no effect."""

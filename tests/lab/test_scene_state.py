@@ -88,7 +88,7 @@ def test_several_wishes_come_together_in_any_order(stage: SceneState) -> None:
         ({"stiffness": "many"}, "stiffness"),
         ({"delay": 101}, "delay must be 0 to 100"),
         ({"law": "Q"}, "law"),
-        ({"friction": 0.5}, "friction cannot be changed"),  # which law C does not have
+        ({"modulation_depth": 0.5}, "modulation_depth cannot be changed"),  # law C has none
         ({"law": "F", "friction": -1.0}, "friction"),
         ({"magnify": 0.0}, "magnify must be 0.01 to 1000"),
         ({"texture": "examples/demo.toml"}, "texture must be a kind"),
@@ -125,3 +125,21 @@ def test_a_surface_that_ends_is_felt_in_its_middle(tmp_path: Path) -> None:
     # The page may come back to the file of the start, which it cannot name otherwise.
     away = stage.with_changes({"texture": DEFAULT_SURFACE})
     assert away.with_changes({"texture": str(path)}).setup.surface.texture is scene.texture
+
+
+def test_friction_is_changed_and_kept_for_the_next_law_that_can_have_it() -> None:
+    state = make_scene_state(load_scene("sinusoid:amplitude=0.2mm,period=2mm"))
+    assert state.settings["friction"] == 0.0
+    slides = state.with_changes({"law": "H", "friction": 0.4})
+    assert slides.settings["friction"] == 0.4
+    assert slides.setup.surface.contact_friction is not None
+    leaks = slides.with_changes({"law": "A"})
+    assert leaks.settings["friction"] == 0.0  # it would not end the leak
+    assert leaks.with_changes({"law": "W"}).settings["friction"] == 0.4
+    ice = slides.with_changes({"friction": 0.0})
+    assert ice.setup.surface.contact_friction is None
+    # Law F has friction of its own, which that of a surface without friction is not.
+    assert ice.with_changes({"law": "F"}).settings["friction"] == 0.8
+    assert ice.with_changes({"law": "F", "friction": 0.0}).settings["friction"] == 0.0
+    with pytest.raises(ParameterError, match="friction must be 0 to 2"):
+        state.with_changes({"friction": -0.1})

@@ -44,6 +44,7 @@ class LawLane:
             "message": session.message,
             "start_count": session.start_count,
             "settings": session.scene_state.settings,
+            "friction": session.scene_state.setup.surface.contact_friction,
             "limit": pictures.limit if is_shown else {},
             "surface_version": pictures.version,
             "picture_message": pictures.message,

@@ -154,8 +154,12 @@ _PARSERS: dict[str, tuple[tuple[str, ...], Callable[..., Any]]] = {
 COLUMN_NAMES = [name for name, _unit in COLUMNS]
 FORCE_COLUMNS = slice(COLUMN_NAMES.index("applied x"), COLUMN_NAMES.index("applied z") + 1)
 POSITION = slice(COLUMN_NAMES.index("x"), COLUMN_NAMES.index("z") + 1)
+ANCHOR = slice(COLUMN_NAMES.index("law anchor x"), COLUMN_NAMES.index("law anchor y") + 1)
 _LAW_FORCE = slice(COLUMN_NAMES.index("commanded x"), COLUMN_NAMES.index("commanded z") + 1)
-_STEP_STATISTICS = ("path_length", "squared_steps", "max_force_step", "position_step")
+_STEP_STATISTICS = (
+    *("path_length", "squared_steps", "max_force_step", "position_step"),
+    "anchor_slip",
+)
 HEADER = (
     *("kind", "lane", "frame", "rows", "first", "acknowledged", "forces"),
     *("late", "skipped", "lateness", "truncated"),
@@ -203,18 +207,23 @@ def step_statistics(rows: FloatArray) -> dict[str, float]:
 
     ``path_length`` is the sum of the steps of the position [m], ``squared_steps`` that of their
     squares [m²], ``max_force_step`` the greatest step of the force of the law [N], and
-    ``position_step`` the step of the position at that row [m].
+    ``position_step`` the step of the position at that row [m]. ``anchor_slip`` is what the anchor
+    of friction loses: the sum of its ways times the deflection in the middle of each [m²], of which
+    the presliding stiffness makes the energy that friction takes.
     """
     if len(rows) < 2:
         return dict.fromkeys(_STEP_STATISTICS, 0.0)
     squares = np.square(np.diff(rows[:, POSITION], axis=0)).sum(axis=1)
     jumps = np.square(np.diff(rows[:, _LAW_FORCE], axis=0)).sum(axis=1)
     largest = int(jumps.argmax())
+    ways = np.diff(rows[:, ANCHOR], axis=0)
+    deflections = rows[1:, POSITION][:, :2] - rows[1:, ANCHOR]
     return {
         "path_length": float(np.sqrt(squares).sum()),
         "squared_steps": float(squares.sum()),
         "max_force_step": float(jumps[largest] ** 0.5),
         "position_step": float(squares[largest] ** 0.5),
+        "anchor_slip": float(np.sum((deflections + 0.5 * ways) * ways)),
     }
 
 

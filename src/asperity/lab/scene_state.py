@@ -37,6 +37,7 @@ MAX_DELAY = 100
 RANGES: dict[str, tuple[float, float]] = {
     "stiffness": (1.0, 20_000.0),
     "max_depth": (1e-5, 5e-3),
+    "friction": (0.0, 2.0),
     "delay": (0, MAX_DELAY),
     "hand_stiffness": (10.0, 3000.0),
     "hand_damping": (0.0, 30.0),
@@ -110,6 +111,7 @@ class SceneState:
             **setup.hand.settings,
             "magnify": self.magnification[0],
             "magnify_height": self.magnification[1],
+            "friction": setup.surface.friction,
             **setup.surface.law_parameters,
         }
 
@@ -206,6 +208,7 @@ _SETTERS: dict[str, Any] = {
     "delay": _with_delay,
     "law": lambda state, law: replace(state, setup=state.setup.with_law(find_law(law))),
     "stiffness": lambda state, value: _with_surface(state, state.setup.surface.to_stiffness(value)),
+    "friction": lambda state, value: _with_surface(state, state.setup.surface.to_friction(value)),
     "max_depth": lambda state, value: _with_surface(state, state.setup.surface.to_depth(value)),
     "magnify": lambda state, value: _apply_magnification(state, value, value),
     "magnify_height": lambda state, value: _apply_magnification(

@@ -21,6 +21,7 @@ from websockets.exceptions import ConnectionClosed
 from asperity.core.errors import ParameterError
 from asperity.core.files import to_plain_data
 from asperity.devices import device_names
+from asperity.frictional import accepts_friction
 from asperity.lab import background, messages
 from asperity.lab.access import (
     MAX_MESSAGE_BYTES,
@@ -344,7 +345,9 @@ async def _run_while_connected(
 def _greeting() -> dict[str, Any]:
     names = ("letter", "name", "summary")
     laws = [
-        {name: getattr(law, name) for name in names} | {"parameters": [*law.arguments.values()]}
+        {name: getattr(law, name) for name in names}
+        | {"parameters": [*law.arguments.values()]}
+        | {"has_friction": accepts_friction(law)}
         for law in REGISTERED_LAWS.values()
     ]
     kinds = [name for name, kind in KINDS.items() if not kind.required_arguments]

@@ -165,3 +165,35 @@ def test_what_comes_through_the_memory_is_whole_and_in_its_order(page: Browser) 
         late, heard, said, same = page.ask(f"{through}({size}, 400)")
         assert (heard == said, same) == (True, True)
         assert (late > 20) is (size == 150)
+
+
+@needs_browser
+def test_friction_takes_energy_and_its_anchor_is_drawn(page: Browser) -> None:
+    slide = """((value) => {
+      const slider = document.getElementById('friction-coefficient');
+      slider.value = value; slider.dispatchEvent(new Event('change'));
+    })"""
+    page.ask("lab.connection.send('change', { changes: { law: 'H' } })")
+    page.until("lab.status.settings.law === 'H' && lab.status.state === 'running'")
+    assert page.ask("document.getElementById('taken').hidden")
+    page.ask(f"{slide}(0.4)")
+    page.until("lab.status.friction && lab.status.state === 'running'")
+    page.until("!document.getElementById('taken').hidden")
+    page.expect_text("friction-note", "presliding stiffness", exact=False)
+    page.ask("lab.hand.setMotion({ motion: 'stroke', pressDepth: 4e-4, strokeAmplitude: 2e-3 })")
+    page.until("lab.probeState().anchor && lab.energyMeter.takenByFriction > 2e-4")
+    # What friction takes, the hand gives: within what sampling explains.
+    page.let_loop_run(1.0)
+    taken, given, bound = page.ask("""[lab.energyMeter.takenByFriction,
+      lab.energyMeter.energy, lab.energyMeter.samplingBound]""")
+    assert abs(taken + given) < bound + 0.2 * taken
+    probe, anchor = page.ask("[lab.probeState().probe, lab.probeState().anchor]")
+    assert 0.0 < abs(probe[0] - anchor[0]) < 2e-3
+    for law, reason in (("A", "would not end its leak"), ("F", "that of law F itself")):
+        page.ask(f"lab.connection.send('change', {{ changes: {{ law: '{law}' }} }})")
+        page.until(f"lab.status.settings.law === '{law}' && lab.status.state === 'running'")
+        page.until(f"document.getElementById('friction-note').textContent.includes({reason!r})")
+        assert page.ask("document.getElementById('friction-coefficient').disabled")
+        assert not page.ask("lab.probeState().anchor")
+    page.ask("lab.hand.setMotion({ motion: 'pointer', isLatched: false })")
+    assert page.said == []

@@ -191,3 +191,32 @@ def test_traces_of_long_strokes_show_a_line_in_a_faint_band(page: Browser) -> No
       return count / (600 * 80);
     })()""")
     assert 0.005 < opaque < 0.2
+
+
+@needs_browser
+def test_the_second_pane_names_the_law_that_was_chosen_before_its_loop_runs(page: Browser) -> None:
+    """Its session has the law of the first lane until it is started."""
+    titles = page.ask("""(() => {
+      const { secondLane, status } = lab, { law } = status.settings;
+      const settings = { ...status.settings, beside: law === "H" ? "A" : "H" };
+      const beside = { ...status.beside, state: "starting", message: "", settings };
+      beside.settings = { ...settings, law };
+      secondLane.setStatus({ ...status, settings, beside });
+      const names = ["beside-title", "beside-trace-title", "second-curve"];
+      const found = names.map(name => document.getElementById(name).textContent.toLowerCase());
+      secondLane.setStatus(status);
+      return [`law ${settings.beside}`.toLowerCase(), ...found];
+    })()""")
+    assert titles == [titles[0]] * 4
+
+
+@needs_browser
+def test_a_narrow_pane_requests_a_box_that_the_server_accepts(page: Browser) -> None:
+    left, right, bottom, top = page.ask("""(() => {
+      const canvas = lab.section.scaledCanvas, { width } = canvas;
+      canvas.width = 2;
+      const box = lab.sectionBox();
+      canvas.width = width;
+      return box;
+    })()""")
+    assert 0.0 < top - bottom <= 4.0 * (right - left)

@@ -69,7 +69,7 @@ def tour_settings() -> dict[str, Any]:
 @pytest.mark.parametrize("name", SCENES)
 def test_the_tour_knows_its_own_stage_and_no_other(tmp_path: Path, name: str) -> None:
     stage, stages, wanted = stage_of(name, tmp_path), SavedScenes(), tour_settings()
-    assert len(wanted) == 8
+    assert len(wanted) == 9
     tour = stages.apply_changes(stage, {"saved_scene": TOUR_SCENE, **wanted})
     plain = make_scene_state(load_scene("sinusoid:amplitude=0.4mm,period=2mm")).with_changes(wanted)
     for part in ("surface", "hand", "servo", "plant", "safety"):

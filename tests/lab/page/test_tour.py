@@ -17,6 +17,7 @@ TITLES = (
     "D clicks",
     "C is soft",
     "H avoids all of these",
+    "Friction takes energy",
 )
 
 
@@ -74,7 +75,7 @@ def test_the_tour_shows_itself_to_its_end_by_keys(page: Browser) -> None:
         page.expect_text("tour-title", title)
         page.until("lab.tour.isStepCompleted")
         page.until("document.getElementById('tour').classList.contains('completed')")
-        page.expect_text("tour-step", f"Step {number} of 6", exact=False)
+        page.expect_text("tour-step", f"Step {number} of 7", exact=False)
         page.expect_text("tour-result", "✓", exact=False)
         views_have_their_height(page)
         if number == 1:

@@ -16,7 +16,7 @@ function decodeFrame(numbers, layout) {
     acknowledged: value("acknowledged"), late: value("late"), skipped: value("skipped"),
     lateness: value("lateness"), truncated: value("truncated"),
     pathLength: value("path_length"), squaredSteps: value("squared_steps"),
-    maxForceStep: value("max_force_step"), positionStep: value("position_step"),
+    maxForceStep: value("max_force_step"), anchorSlip: value("anchor_slip"), positionStep: value("position_step"),
     closest: point("closest"), hand: point("hand"), newest: numbers.subarray(newest, newest + width),
     minima: numbers.subarray(minima, minima + width), maxima: numbers.subarray(maxima, maxima + width),
     forces: numbers.subarray(forces, forces + 3 * value("forces")),

@@ -27,6 +27,7 @@ const $ = id => document.getElementById(id);
 const NUMBER_FIELDS = ["delay", "hand_stiffness", "hand_damping", "magnify", "magnify_height"];
 const LOCAL_CONTROLS = ["sound", "volume", "save-png", "save-svg", "reset-energy"]; // need no control of the loop
 const MIN_VIEW_WIDTH = 5e-4, MAX_VIEW_WIDTH = 0.06; // m
+const MAX_ASPECT = 3; // height over width of a section, whose sides the server limits
 const relief = new ReliefView($("relief")), section = new SectionView($("section"));
 const traces = new TracePlot($("traces")), spectrum = new SpectrumPlot($("spectrum")), sound = new ForceSound();
 const energyMeter = new EnergyMeter(), quietContact = new QuietContact(), latencyMonitor = new LatencyMonitor();
@@ -162,6 +163,7 @@ function showStatus() {
   for (const name of ["texture", "device", ...NUMBER_FIELDS]) setField(name, settings[name]);
   showLawParameters(settings);
   setField("max_depth", (1e3 * settings.max_depth).toFixed(3).replace(/\.?0+$/, ""));
+  showFriction(settings);
   setField("stiffness", 1000 * toSliderFraction(settings.stiffness));
   $("stiffness-value").textContent = formatQuantity(settings.stiffness, "N/m");
   $("assumptions").replaceChildren(...status.assumptions.map(text =>
@@ -210,6 +212,16 @@ function showLawParameters(settings) {
   for (const { name } of parameters) { setField(name, settings[name]); $(name).disabled = !status.has_control; }
 }
 
+/** Show the friction of a law that can have it, and of law F, whose own it is. */
+function showFriction({ law, friction }) {
+  const { has_friction: isShared, parameters } = laws.find(({ letter }) => letter === law), kappa = status.friction?.presliding_stiffness;
+  setField("friction-coefficient", friction);
+  $("friction-coefficient").disabled ||= !isShared;
+  $("friction-value").textContent = friction.toFixed(2);
+  const own = parameters.some(({ name }) => name === "friction") ? `that of law ${law} itself` : `law ${law} can have none: it would not end its leak`;
+  $("friction-note").textContent = !isShared ? own : kappa ? `presliding stiffness ${formatQuantity(kappa, "N/m")}: takes energy on every closed path` : "none: like ice";
+}
+
 /** Set the value of a field that has no focus; null disables it, as for the stiffness of an elastic band. */
 function setField(id, value) {
   const field = $(id);
@@ -235,11 +247,11 @@ function storeUrlSettings(settings) {
 
 // --- painting -------------------------------------------------------------------------------------
 
-const probeState = () => frame && probeStateOf(frame, connection.layout.columns, energyMeter.energy);
+const probeState = () => frame && probeStateOf(frame, connection.layout.columns, energyMeter.energy, status?.friction);
 
 /** Return the box of the section to be shown: left, right, bottom, top [m]. */
 function sectionBox() {
-  const { width, height } = section.scaledCanvas, halfHeight = 0.5 * Math.max(0.15, height / width) * viewWidth;
+  const { width, height } = section.scaledCanvas, halfHeight = 0.5 * Math.max(0.15, Math.min(height / width, MAX_ASPECT)) * viewWidth;
   const middle = status ? 0.5 * (status.lowest + status.highest) : 0;
   return [viewCentre[0] - viewWidth / 2, viewCentre[0] + viewWidth / 2, middle - halfHeight, middle + halfHeight];
 }
@@ -306,6 +318,8 @@ function updateTexts({ probe, force, energy, isInside }) {
   $("energy").textContent = formatQuantity(energy, "J");
   $("energy-card").classList.toggle("supplies-energy", energyMeter.suppliesEnergy);
   $("verdict").textContent = energyMeter.verdict;
+  $("taken").hidden = $("anchor-legend").hidden = !status?.friction;
+  $("taken").textContent = `taken by friction: ${formatQuantity(energyMeter.takenByFriction, "J")}`;
   const [frequency, amplitude] = spectrum.draw(updateRate(), secondLane.otherSpectrum);
   $("peak").textContent = amplitude > 1e-3 ? `strongest ${formatQuantity(frequency, "Hz")}, ${formatQuantity(amplitude, "N")}` : "quiet";
   $("trace-note").textContent = tickText(frame);
@@ -340,6 +354,8 @@ obeyKeys(inputHost);
 
 $("stiffness").oninput = event => { $("stiffness-value").textContent = formatQuantity(fromSliderValue(event.target.value), "N/m"); };
 $("stiffness").onchange = event => changeScene({ stiffness: fromSliderValue(event.target.value) });
+$("friction-coefficient").oninput = event => { $("friction-value").textContent = Number(event.target.value).toFixed(2); };
+$("friction-coefficient").onchange = event => changeScene({ friction: Number(event.target.value) });
 $("press-depth").oninput = event => { hand.pressDepth = 1e-3 * event.target.value; hand.requestMotion(); };
 $("texture").onchange = event => changeScene({ texture: event.target.value });
 $("device").onchange = event => changeScene({ device: event.target.value });

@@ -39,6 +39,14 @@ function drawCross(context, x, y, colour) {
   context.stroke();
 }
 
+/** Draw the anchor of friction: a square, with the spring to the probe. */
+function drawAnchor(context, position, [x, y], colour) {
+  context.strokeStyle = context.fillStyle = colour;
+  context.lineWidth = 3;
+  context.beginPath(); context.moveTo(...position); context.lineTo(x, y); context.stroke();
+  context.fillRect(x - 5, y - 5, 10, 10);
+}
+
 /** Return the arrow of a force in pixels: proportional to the force, but limited in length. */
 function forceArrow(force, projectVector, { width, height }) {
   const limit = Math.min(MAX_ARROW, MAX_ARROW_FRACTION * Math.min(width, height));
@@ -53,12 +61,13 @@ function enclosingInterval(coordinates, limit) {
   return [Math.min(start, Math.ceil(limit) - length), length];
 }
 
-/** Return the probe of a frame, for the views. */
-export function probeStateOf(frame, columns, energy) {
+/** Return the probe of a frame, for the views; the anchor of friction at its height, null without friction. */
+export function probeStateOf(frame, columns, energy, friction = null) {
   const value = name => frame.newest[columns[name]];
   return {
     probe: [value("x"), value("y"), value("z")], closest: frame.closest, hand: frame.hand,
     force: [value("applied x"), value("applied y"), value("applied z")], isInside: value("inside") > 0, energy,
+    anchor: friction && value("inside") > 0 ? [value("law anchor x"), value("law anchor y"), value("z")] : null,
   };
 }
 
@@ -78,12 +87,13 @@ export class ProbeOverlay {
    * @param project maps a point to pixels of the view
    * @param projectVector maps a direction to the view
    */
-  draw(project, { probe, closest, hand, force, isInside }, projectVector) {
+  draw(project, { probe, closest, hand, force, isInside, anchor }, projectVector) {
     const theme = colours(), { context } = this, isKnown = point => point.every(Number.isFinite);
     const position = project(probe), arrow = forceArrow(force, projectVector, this.base);
     const handPosition = isKnown(hand) && project(hand), closestPosition = isInside && isKnown(closest) && project(closest);
+    const anchorPosition = anchor && project(anchor);
     const arrowTip = position.map((value, k) => value + arrow[k]);
-    if (!this.fitTo([position, arrowTip, handPosition, closestPosition].filter(Boolean))) return;
+    if (!this.fitTo([position, arrowTip, handPosition, closestPosition, anchorPosition].filter(Boolean))) return;
     context.strokeStyle = theme.soft;
     context.lineWidth = 1.5;
     context.setLineDash([4, 4]);
@@ -91,6 +101,7 @@ export class ProbeOverlay {
     context.setLineDash([]);
     if (handPosition) drawCross(context, ...handPosition, theme.soft);
     if (closestPosition) drawDot(context, ...closestPosition, 5, theme.green, theme.card);
+    if (anchorPosition) drawAnchor(context, position, anchorPosition, theme.orange);
     drawDot(context, ...position, 8, theme.card, theme.ink);
     drawArrow(context, ...position, ...arrow, theme.red);
   }

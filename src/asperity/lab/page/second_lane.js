@@ -47,6 +47,7 @@ export class SecondLane {
     const previous = this.status, law = status?.settings.beside;
     // What concerns the loop and its pictures is of this lane; the rest is common to both.
     this.status = law ? { ...status, ...status.beside } : null;
+    this.law = law; // as chosen, also before its loop runs
     this.pictures.setStatus(this.status);
     if (!law) $("beside-section").classList.remove("stale"); // it is hidden
     if (law) this.lastLaw = law;
@@ -71,7 +72,7 @@ export class SecondLane {
     this.verdicts[1].addFrame(frame, columns, this.status);
     this.traces.addFrame(frame, columns);
     this.spectrum.addForces(frame.forces);
-    this.probe = probeStateOf(frame, columns, this.energyMeter.energy);
+    this.probe = probeStateOf(frame, columns, this.energyMeter.energy, this.status.friction);
   }
 
   receivePicture(numbers) { this.pictures.receive(this.section, numbers); }
@@ -96,7 +97,7 @@ export class SecondLane {
   /** Update texts and layout. */
   update(firstLaw = this.firstLaw) {
     this.firstLaw = firstLaw;
-    const { isShown, status } = this, law = status?.settings.law, unavailable = this.unavailableText;
+    const { isShown, status, law } = this, unavailable = this.unavailableText;
     document.body.classList.toggle("two-lanes", isShown);
     if (unavailable) $("beside").disabled = true;
     setText("beside-note", unavailable || (status ? this.noteText : "Both laws under the same hand, side by side."));

@@ -19,29 +19,33 @@ export class EnergyMeter {
     this.awaitsFreeProbe = true;
     this.offset = null; // of the supplied energy
     this.energy = this.samplingBound = this.storedEnergy = 0;
+    this.takenByFriction = 0; // J, by the slip of its anchor
   }
 
   /**
    * Add a frame. A field without curl that is evaluated at quantised positions, sampled, held and
    * delayed by d samples supplies a hand with at most k (q⁺/2 + d q) Σ|Δp|² + φ Σ|Δp|, where
    * φ = k q |δ|/2 + |b|/2 for the resolutions δ of position and b of force, in any motion
-   * (docs/theory/passivity). Any further energy is due to the curl of the field.
+   * (docs/theory/passivity). Friction adds κ (3 d + 1)/2 to the stiffness, and 2 κ |δ|/2 to φ, with delay 10 κ |δ|/2.
+   * Any further energy is due to the curl of the field.
    */
   addFrame(frame, columns, status) {
     const { rowCount, pathLength, squaredSteps, newest } = frame, { settings, limit } = status;
     const { position_resolution: positionResolution, force_resolution: forceResolution } = status;
-    const supplied = newest[columns.supplied];
+    const supplied = newest[columns.supplied], kappa = status.friction?.presliding_stiffness ?? 0;
+    this.takenByFriction += kappa * frame.anchorSlip * rowCount / Math.max(rowCount - 1, 1);
     this.offset ??= supplied;
     if (frame.maxima[columns.inside]) {
       const q = limit.q === "inf" ? Infinity : limit.q ?? 1, k = settings.stiffness, halfDiagonal = 0.5 * Math.sqrt(3);
       const delayTerm = settings.delay ? settings.delay * q : 0;
-      const quantisation = positionResolution ? k * q * halfDiagonal * positionResolution : 0;
-      const bound = k * (0.5 * (limit.one_sided ?? 1) + delayTerm) * squaredSteps + (quantisation + halfDiagonal * forceResolution) * pathLength;
+      const steps = k * q + kappa * (settings.delay ? 10 : 2), quantisation = positionResolution ? steps * halfDiagonal * positionResolution : 0;
+      const stiffness = k * (0.5 * (limit.one_sided ?? 1) + delayTerm) + kappa * (3 * settings.delay + 1) / 2;
+      const bound = stiffness * squaredSteps + (quantisation + halfDiagonal * forceResolution) * pathLength;
       this.samplingBound += bound * rowCount / Math.max(rowCount - 1, 1); // includes the step from the previous frame
     }
     // A wall that was pressed at the reset may give back what it stored, f²/(2k) at most.
     const force = Math.hypot(...["applied x", "applied y", "applied z"].map(name => newest[columns[name]]));
-    if (this.awaitsFreeProbe) this.storedEnergy = Math.max(this.storedEnergy, 0.5 * force ** 2 / settings.stiffness);
+    if (this.awaitsFreeProbe) this.storedEnergy = Math.max(this.storedEnergy, 0.5 * force ** 2 / Math.min(settings.stiffness, kappa || Infinity));
     if (this.awaitsFreeProbe && !newest[columns.inside]) {
       this.awaitsFreeProbe = false;
       if (!this.suppliesEnergy) {

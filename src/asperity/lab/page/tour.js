@@ -1,4 +1,4 @@
-// The guided tour: six steps, each of which detects by itself whether its effect has occurred.
+// The guided tour: seven steps, each of which detects by itself whether its effect has occurred.
 
 import { BUZZ_AMPLITUDE, ContactMetrics } from "./tactile_metrics.js";
 import { formatQuantity } from "./format.js";
@@ -6,7 +6,7 @@ import { formatQuantity } from "./format.js";
 const TOUR_SETTINGS = { // the same surface, device and hand in all steps
   texture: "sinusoid:amplitude=0.4mm,period=2mm", device: "omega.3", delay: 1, max_depth: 8e-4,
   hand_stiffness: 800, hand_damping: 2.3,
-  magnify: 1, magnify_height: 1,
+  magnify: 1, magnify_height: 1, friction: 0,
 };
 const STROKE_PATH = 12e-3; // m, four strokes of the hand
 const LOOP_PATH = 12e-3; // m, four loops of 2 mm back and forth, partly in contact
@@ -17,6 +17,7 @@ const CLICK_COUNT = 3; // more than chance
 const SOFT_FRACTION = 0.5; // of the wall's stiffness: the difference threshold of compliance is about 22 % (Tan, Durlach, Beauregard and Srinivasan, 1995)
 const STIFF_FRACTION = 0.8; // of the nominal stiffness, measured in a trough
 
+const FRICTION = 0.4; // of wood, about
 const LAW_H_PARAMETERS = { continuity: 1 }; // with which the limit of law H is that of the wall
 const TOUR_VIEW_WIDTH = 5e-3; // m of the surface: two and a half periods
 const TROUGH = -5e-4, FLANK = 0; // x [m]
@@ -49,6 +50,11 @@ const checkEnergySupplied = ({ energyMeter, isSettled }) => ({
   text: `given ${formatOf(energyMeter.energy, SUPPLIED_ENERGY, "J")}; at most ${formatQuantity(energyMeter.samplingBound, "J")} of it by sampling`,
   fraction: energyMeter.energy / SUPPLIED_ENERGY,
   isDone: isSettled && energyMeter.suppliesEnergy && energyMeter.energy >= SUPPLIED_ENERGY,
+});
+const checkFriction = ({ metrics, energyMeter, isSettled }) => ({
+  text: `taken by friction ${formatOf(energyMeter.takenByFriction, SUPPLIED_ENERGY, "J")}; given ${formatQuantity(energyMeter.energy, "J")}`,
+  fraction: energyMeter.takenByFriction / SUPPLIED_ENERGY,
+  isDone: isSettled && metrics.isFree && energyMeter.takenByFriction >= SUPPLIED_ENERGY && !energyMeter.suppliesEnergy,
 });
 const checkBuzz = ({ metrics, status }) => ({
   text: `${handText(metrics)}; the force varies by ${formatOf(metrics.forceAmplitude, BUZZ_AMPLITUDE, "N")}`,
@@ -117,6 +123,11 @@ export const STEPS = [
       { law: "H", stiffness: 1500, parameters: LAW_H_PARAMETERS, instruction: "Move in loops on a slope, as with law A.", demo: LOOP, evaluate: checkNoEnergySupplied },
       { law: "H", stiffness: 1500, parameters: LAW_H_PARAMETERS, instruction: "Stroke deep across the crests, as with law D.", demo: STROKE, evaluate: checkNoClicks },
     ],
+  }, {
+    title: "Friction takes energy", watch: "The square, the anchor of friction: it sticks, then slides behind the probe. The energy taken by friction grows; that given to the hand does not.",
+    explanation: `Without friction, law H feels like ice. Here its friction is ${FRICTION}, with a spring of constant stiffness to the anchor: on every closed path it takes energy, whatever the texture does.`,
+    result: "Friction took energy, and gave none.",
+    tasks: [{ law: "H", stiffness: 1500, parameters: { ...LAW_H_PARAMETERS, friction: FRICTION }, instruction: "Press, move in loops, and lift.", demo: LOOP, evaluate: checkFriction }],
   },
 ];
 

@@ -121,8 +121,8 @@ export class SectionView {
     context.fillStyle = colours().ground;
     context.fillRect(0, 0, width, height);
     if (this.box) this.drawSection(context, project);
-    this.drawMissing(context, project, shownBox, height);
     this.drawScaleBar(context, width, height, span);
+    if (!this.covers(shownBox)) context.fillText("computing …", 12, this.label ? 42 : 22); // what is blank
     context.font = "bold 15px system-ui, sans-serif";
     if (this.label) context.fillText(this.label, 12, 22);
   }
@@ -150,19 +150,6 @@ export class SectionView {
     context.strokeStyle = colours().ink;
     context.lineWidth = 2;
     context.stroke();
-  }
-
-  /** Write into what is shown beside the picture that it is not drawn yet. */
-  drawMissing(context, project, [left, right], height) {
-    const [start, end] = this.box ?? [right, right];
-    context.font = "12px system-ui, sans-serif";
-    context.fillStyle = colours().soft;
-    context.textAlign = "center";
-    for (const [from, to] of [[left, Math.min(start, right)], [Math.max(end, left), right]]) {
-      const [x0] = project([from, 0, 0]), [x1] = project([to, 0, 0]);
-      if (x1 - x0 > 80) context.fillText("computing …", (x0 + x1) / 2, height / 2);
-    }
-    context.textAlign = "start";
   }
 
   /** Draw the force field as arrows, at every third grid point. */
