@@ -222,3 +222,24 @@ class _TaskQueue:
         self.timer.join()
         if self.pool is not None:
             end_pool(self.pool, self.other_children)
+
+
+def run_in_threads(
+    function: Callable[[Any], None], parts: Sequence[Any], progress: Callable[[float], None] | None
+) -> None:
+    """Apply a function to the parts in threads; compiled loops release the GIL.
+
+    The first part is computed alone, so that the loop is compiled once.
+    """
+    from concurrent.futures import ThreadPoolExecutor, as_completed
+
+    if parts:
+        function(parts[0])
+    with ThreadPoolExecutor(max_workers=available_cores()) as pool:
+        rest = [pool.submit(function, part) for part in parts[1:]]
+        for done, future in enumerate(as_completed(rest), 2):
+            future.result()
+            if progress is not None:
+                progress(done / len(parts))
+    if progress is not None and len(parts) <= 1:
+        progress(1.0)

@@ -130,6 +130,22 @@ class Texture(Plottable, ABC):
     def arguments(self) -> tuple[Any, ...]:
         """Record (NamedTuple) passed to the sampler functions after the position."""
 
+    def closest_lattice(
+        self,
+        spacing: tuple[float, ...],  # noqa: ARG002 - for kinds that have a lattice
+        bottom: float,  # noqa: ARG002 - likewise
+    ) -> tuple[tuple[ModuleType, ...], tuple[Any, ...]]:
+        """Return modules that replace the closest-point search by a quick one, and their record.
+
+        A quick search starts from a lattice and proves nothing: its point is one of the surface
+        and mostly the closest. By default the search is that of the sampler.
+
+        Args:
+            spacing: distance of the places where it is used along each axis [m], z last.
+            bottom: z of the lowest one [m].
+        """
+        return (), self.arguments
+
     @cached_property
     @abstractmethod
     def extremes(self) -> tuple[float, float]:

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from asperity.core.processes import run_in_threads
 from asperity.kernels import fuse
 from asperity.textures.fields import field_certificate
-from asperity.textures.fields.field_certificate import curvature_bounds, run_in_threads
+from asperity.textures.fields.field_certificate import curvature_bounds
 from asperity.textures.fields.field_grid import FieldGrid
 from asperity.textures.fields.field_sampler import MIRRORED, PERIODIC
 

@@ -12,7 +12,7 @@ from asperity.kernels.fuse import fuse_surface
 from asperity.laws import LAWS
 from asperity.laws.clamps import NONE
 from asperity.textures.fields.field_grid import BLENDED, COARSE_STEP, FieldGrid
-from asperity.textures.fields.node_potentials import compute_potentials, split_columns
+from asperity.textures.fields.node_potentials import compute_potentials, split_columns, wrong_nodes
 from asperity.textures.kinds.fourier import Fourier
 from asperity.textures.kinds.named_surfaces import named_surface
 from asperity.textures.kinds.sinusoid import Sinusoid
@@ -137,3 +137,53 @@ def test_interpolated_depths_are_close_and_rise_at_most_as_counted(name: str) ->
     steps = -np.diff(found, axis=-1) / grid.level_spacing
     assert steps.min() >= 0.0
     assert steps.max() <= 1.0 + 1.875 / BLENDED * 0.25 * COARSE_STEP
+
+
+# --- depths from a lattice ------------------------------------------------------------------------
+
+
+def small_grid(texture: Texture) -> FieldGrid:
+    return FieldGrid.fit(texture.domain, texture.extremes, DEPTH, 0.0, MARGIN / 3.0)
+
+
+@pytest.mark.parametrize("continuity", [1.0, 4.0])
+@pytest.mark.parametrize("name", ["profile", "ridges", "finite map", "cloth"])
+def test_columns_from_a_lattice_are_mostly_exact_and_never_less_deep(
+    name: str, continuity: float
+) -> None:
+    """Their points are points of the surface, so the potential is that of some weights."""
+    texture = TEXTURES[name]
+    grid = small_grid(texture)
+    xy = texture.domain.points(RNG.uniform(size=(80, len(texture.domain.spans))))
+    z = grid.height(np.arange(grid.levels, dtype=float))
+    exact = np.empty((len(xy), len(z)), np.float32)
+    found = np.empty_like(exact)
+    split_columns(texture, continuity)(xy, z, grid.margin, exact)
+    split_columns(texture, continuity, grid)(xy, z, grid.margin, found)
+    inside = exact > 0.0
+    difference = (found - exact)[inside] / max(grid.spacing)
+    assert difference.min() > -1e-5
+    assert (difference < 1e-5).mean() > 0.98
+    assert difference.max() < 0.2
+    outside = (exact <= 0.0) & (exact > -grid.margin)
+    assert np.abs(found - exact)[outside].max() < 0.2 * max(grid.spacing)
+
+
+@pytest.mark.parametrize("name", ["profile", "ridges", "finite map"])
+def test_nodes_of_wrong_depth_are_found_and_replaced(name: str) -> None:
+    texture = TEXTURES[name]
+    grid = replace(small_grid(texture), deep=0)
+    columns = split_columns(texture, 1.0)
+    exact = compute_potentials(columns, grid)
+    assert not wrong_nodes(exact, grid, 1.0).any()
+    step = max(grid.spacing)
+
+    def disturbed(xy: FloatArray, z: FloatArray, margin: float, out: np.ndarray) -> None:
+        columns(xy, z, margin, out)
+        deeper = (np.arange(out.size) % 97 == 5).reshape(out.shape) & (out > 3.0 * step)
+        out[deeper] += 0.5 * step
+
+    spoilt = compute_potentials(disturbed, grid)
+    assert (spoilt != exact).mean() > 0.004
+    found = compute_potentials(disturbed, grid, exact=columns)
+    np.testing.assert_array_equal(found, exact)

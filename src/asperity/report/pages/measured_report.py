@@ -251,7 +251,7 @@ def field_page(field: PotentialField, path: str) -> page.Page:
     *others, baked = field.preparation
     texts = (
         *[f"{text}." for text in others],
-        f"{baked}; at most {bound} times the stiffness from it, proved.",
+        f"{baked}; a spline through exact depths differs by at most {bound} times the stiffness.",
         f"q⁺ at most {field.one_sided.upper:.4g}. Valid down to z = {floor}. {field.bytes} bytes.",
         f"File: {escape_unprintable(path)}",
     )

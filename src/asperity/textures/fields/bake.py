@@ -194,7 +194,10 @@ class BakePlan:
         grid = self.grid(resolution)
         self.check_size(grid)
         first_part = scale_progress(progress, 0.0, 0.9)
-        potentials = node_potentials.compute_potentials(self.columns, grid, first_part)
+        columns = node_potentials.split_columns(self.texture, self.continuity, grid)
+        potentials = node_potentials.compute_potentials(
+            columns, grid, first_part, exact=self.columns, continuity=self.continuity
+        )
         return self.certify(potentials, grid, scale_progress(progress, 0.9, 0.1))
 
     def bake_coarsest(self, progress: Progress | None) -> PotentialField:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from asperity.core.checks import FloatArray
-from asperity.core.processes import available_cores
+from asperity.core.processes import run_in_threads
 from asperity.textures.fields import field_curvature, field_sampler
 from asperity.textures.fields.field_grid import FieldGrid
 from asperity.textures.fields.field_sampler import PERIODIC, ZERO, FieldArguments
@@ -132,22 +130,3 @@ def product_weights(field: FieldArguments) -> tuple[NDArray[np.int64], FloatArra
         places = (5 * places[:, None, :, None] + place[:, None]).reshape(size, size)
         weights = np.kron(weights, weight)
     return np.ascontiguousarray(places), np.ascontiguousarray(weights)
-
-
-def run_in_threads(
-    function: Callable[[Any], None], parts: Sequence[Any], progress: Progress | None
-) -> None:
-    """Apply a function to the parts in threads; compiled loops release the GIL.
-
-    The first part is computed alone, so that the loop is compiled once.
-    """
-    if parts:
-        function(parts[0])
-    with ThreadPoolExecutor(max_workers=available_cores()) as pool:
-        rest = [pool.submit(function, part) for part in parts[1:]]
-        for done, future in enumerate(as_completed(rest), 2):
-            future.result()
-            if progress is not None:
-                progress(done / len(parts))
-    if progress is not None and len(parts) <= 1:
-        progress(1.0)

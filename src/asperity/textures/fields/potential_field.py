@@ -26,8 +26,9 @@ class FieldAccuracy:
     """Difference of a baked field from exact law H, forces over the stiffness.
 
     Attributes:
-        bound: the greatest one possible [m], proved for all z above the floor.
-        potential_bound: greatest difference of the potentials [m²], proved there.
+        bound: greatest difference [m] of a spline through exact depths, proved for all z above the
+            floor. The depths of a map are not proved, but those at probes are compared with them.
+        potential_bound: that of the potentials [m²], likewise.
         rms: RMS difference of the forces [m], measured at random probes of the depths.
         largest: the greatest one measured [m].
         depths: depths below the highest point of which the probes are [m]; of a body, below its

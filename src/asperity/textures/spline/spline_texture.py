@@ -120,6 +120,15 @@ class Spline(Texture):
         parts = decompose_surface(self.heights, self._pitches, periodic=self.periodic)
         return parts.heights, parts.nesting, parts.form.range, parts.waviness.range
 
+    def closest_lattice(
+        self, spacing: tuple[float, ...], bottom: float
+    ) -> tuple[tuple[ModuleType, ...], tuple[Any, ...]]:
+        """See :class:`Texture`."""
+        from asperity.textures.spline import lattice_search
+        from asperity.textures.spline.spline_lattice import build_lattice
+
+        return (lattice_search,), build_lattice(self, self._pitches, spacing, bottom)
+
     @property
     def _sides(self) -> tuple[float, ...]:
         """One period, or the extent, along each axis [m]."""
