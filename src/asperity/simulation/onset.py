@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from asperity.analysis.gain import characteristic
 from asperity.analysis.gain.surface_cache import surface_content
+from asperity.analysis.passivity.device_loop import add_friction
 from asperity.core.cache import get_or_compute_each
 from asperity.core.checks import FloatArray, check_array, check_positive
 from asperity.core.errors import ParameterError
@@ -290,7 +292,7 @@ class Prediction:
         one_sided: the same for the one-sided number.
         conservative: whether the law is conservative; only then is the delay rule a proof.
         paper_limit: limit of the paper's (1), σ₀/(2 T q) [N/m].
-        delay_rule: σ₀/(T (q⁺/2 + d q)) [N/m].
+        delay_rule: σ₀/(T (q⁺/2 + d q)) [N/m], with friction that of its rule.
         wall_rule: the onset of the smooth wall at the same delay over q [N/m]; ``None`` if it was
             not simulated.
     """
@@ -352,10 +354,8 @@ def expected_onset(
     # Below a medial axis q is unbounded; most trajectories never reach it.
     if not math.isfinite(q):
         q = plus
-    weight = 0.5 * plus + servo.delay * q
-    if damping <= 0.0 or not 0.0 < weight < math.inf:
-        return None
-    return damping / servo.period / weight
+    limit = _delay_rule(surface, damping / servo.period, plus, q, servo.delay)
+    return limit if 0.0 < limit < math.inf else None
 
 
 def predict(
@@ -395,9 +395,6 @@ def predict(
         q = characteristic.characteristic_number(surface, TOLERANCE).value
         plus = characteristic.one_sided_number(surface, TOLERANCE).value
     budget = damping / servo.period
-    weight = 0.5 * plus
-    if servo.delay:  # q may be infinite
-        weight += servo.delay * q
     wall_rule = None
     if wall is not None and q != 0.0:
         wall_rule = wall.quiet / q
@@ -409,9 +406,20 @@ def predict(
         one_sided=plus,
         conservative=surface.facts.conservative,
         paper_limit=_limit(0.5 * budget, q),
-        delay_rule=_limit(budget, weight),
+        delay_rule=_delay_rule(surface, budget, plus, q, servo.delay),
         wall_rule=wall_rule,
     )
+
+
+def _delay_rule(surface: Surface, budget: float, plus: float, q: float, delay: int) -> float:
+    """Return the limit of k (q⁺/2 + d q) + (3d + 1)/2 κ <= budget [N/m]."""
+    weight = 0.5 * plus
+    if delay:  # q may be infinite
+        weight += delay * q
+    if surface.contact_friction is not None:
+        gain, rest = add_friction(surface, weight, Fraction(budget), Fraction(3 * delay + 1, 2))
+        return _limit(max(float(rest), 0.0), float(gain))
+    return _limit(budget, weight)
 
 
 def _limit(budget: float, weight: float) -> float:

@@ -86,28 +86,13 @@ class DeviceLoop:
     @property
     def presliding(self) -> tuple[Fraction, Fraction]:
         """κ of the friction: its part that is a share of the stiffness [1], and the rest [N/m]."""
-        friction = self.surface.contact_friction
-        if friction is None:
-            return Fraction(0), Fraction(0)
-        _coefficient, _modulation, share, fixed = friction.arguments
-        return Fraction(share), Fraction(fixed)
+        return presliding(self.surface)
 
     def add_friction(
         self, gain: Number, budget: Fraction, weight: Fraction
     ) -> tuple[Number, Fraction]:
-        """Return gain g and budget b of a rule k g + weight κ <= b as those of k g <= b.
-
-        On a smooth wall, friction and wall act along different axes, and each is compared with b.
-
-        Reference:
-            docs/theory/friction.md.
-        """
-        share, fixed = self.presliding
-        if self.surface.depends_on_texture:
-            return gain + weight * share, budget - weight * fixed
-        if weight * fixed > budget:
-            budget = Fraction(0)
-        return max(gain, weight * share), budget
+        """Return gain and budget of a rule with friction; see :func:`add_friction`."""
+        return add_friction(self.surface, gain, budget, weight)
 
     @property
     def slip_slope(self) -> Number:
@@ -213,6 +198,33 @@ class DeviceLoop:
             if weight:
                 total += weight * Fraction(value)
         return total
+
+
+def presliding(surface: Surface) -> tuple[Fraction, Fraction]:
+    """Return κ of the friction: its part that is a share of k [1], and the rest [N/m]."""
+    friction = surface.contact_friction
+    if friction is None:
+        return Fraction(0), Fraction(0)
+    _coefficient, _modulation, share, fixed = friction.arguments
+    return Fraction(share), Fraction(fixed)
+
+
+def add_friction(
+    surface: Surface, gain: Number, budget: Fraction, weight: Fraction
+) -> tuple[Number, Fraction]:
+    """Return gain g and budget b of a rule k g + weight κ <= b as those of k g <= b.
+
+    On a smooth wall, friction and wall act along different axes, and each is compared with b.
+
+    Reference:
+        docs/theory/friction.md.
+    """
+    share, fixed = presliding(surface)
+    if surface.depends_on_texture:
+        return gain + weight * share, budget - weight * fixed
+    if weight * fixed > budget:
+        budget = Fraction(0)
+    return max(gain, weight * share), budget
 
 
 def make_device_loop(
