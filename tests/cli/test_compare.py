@@ -349,11 +349,11 @@ def _next_commands(out: str) -> list[list[str]]:
     return [shlex.split(line)[1:] for line in lines]
 
 
-@pytest.mark.parametrize("options", [[], ["--magnify", "1.5", "--magnify-height", "1.2"]])
+@pytest.mark.parametrize("options", [[], ["--magnify", "1.1", "--magnify-height", "1.05"]])
 def test_after_not_felt_the_next_command_makes_it_felt(call: Call, options: list[str]) -> None:
     """The change was computed again, with what was typed: the printed command is run."""
-    source = ["compare", "sinusoid:amplitude=0.3um,period=1mm", "--device", "touch"]
-    code, out, _err = call(*source, "--laws", "CH", "--max-depth", "0.5um", *options)
+    source = ["compare", "sinusoid:amplitude=3um,period=0.3mm", "--device", "touch"]
+    code, out, _err = call(*source, "--laws", "CH", "--max-depth", "6um", *options)
     assert code == 0
     assert "Nothing of this texture will be felt" in out
     (command,) = _next_commands(out)
@@ -406,14 +406,27 @@ def test_next_commands_run_the_recommended_law(call: Call, tmp_path: Path) -> No
     assert target.exists()
 
 
-def test_compare_without_arguments_asks_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_compare_without_arguments_asks_on_a_terminal(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Each answer is checked at once: what is wrong is explained and asked for again."""
     code = CliRunner().invoke(cli, ["compare"]).exit_code
     assert code == 2
     terminal = SimpleNamespace(stdin=SimpleNamespace(isatty=lambda: True))
-    monkeypatch.setattr("asperity.cli.analysis_commands.sys", terminal)
-    done = CliRunner().invoke(
-        cli, ["compare"], input="sinusoid:amplitude=0.1mm,period=2mm\ntouch\n0.2mm\n"
-    )
-    assert "Surface" in done.output
-    assert "on the 3D Systems Touch" in " ".join(done.output.split())
-    assert "--max-depth 0.2mm" in done.output
+    monkeypatch.setattr("asperity.cli.questions.sys", terminal)
+    wave = "sinusoid:amplitude=0.1mm,period=2mm"
+    answers = ["?", "sinusoidd", wave, "?", "tuoch", "touch", "0.2", "0.2mm"]
+    done = CliRunner().invoke(cli, ["compare"], input="\n".join([*answers, ""]))
+    text = " ".join(done.output.split())
+    assert "known: " in text
+    assert "did you mean 'sinusoid'" in text
+    assert "did you mean 'touch'" in text
+    assert "max_depth needs a unit" in text
+    assert f"asperity compare {wave} --device touch --max-depth 0.2mm" in text
+    assert "on the 3D Systems Touch" in text
+    path = tmp_path / "wave.npy"
+    np.save(path, 2e-4 * np.sin(np.linspace(0.0, 12.0 * np.pi, 400)))
+    answers = [str(path), "20um", "touch", ""]
+    done = CliRunner().invoke(cli, ["compare"], input="\n".join([*answers, ""]))
+    assert "pitch must be given" in done.output
+    assert f"asperity compare {path} --pitch 20um --device touch\n" in done.output

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import shlex
 from pathlib import Path
 
 import pytest
@@ -46,7 +47,8 @@ def test_design_writes_what_python_returns(call: Call, tmp_path: Path) -> None:
     files = ("--json", paths[0], "--html", paths[1])
     code, out, err = call(*DESIGN, "--texture-force", "5mN", *files, width=80)
     assert (code, err) == (0, "")
-    assert max(len(line) for line in out.splitlines() if not line.startswith("Report: ")) <= 80
+    unwrapped = ("Report: ", "  asperity ")
+    assert max(len(line) for line in out.splitlines() if not line.startswith(unwrapped)) <= 80
     assert "…" not in out
     result = asp.design(WAVE, "touch", "C", texture_force=5e-3)
     data = json.loads(Path(paths[0]).read_text("utf-8"))
@@ -89,6 +91,32 @@ def test_design_tries_several_values_of_a_parameter(call: Call) -> None:
     code, out, err = call("design", *surface, *values)
     assert (code, err) == (0, "")
     assert "Given continuity 1.5 for law H" in out
+    assert "--continuity 1.5" in out.split("\nNext:\n")[1]
+
+
+@pytest.mark.parametrize(
+    "surface", [(WAVE,), ("grating:height=40um,period=2mm", "--magnify", "1.5")]
+)
+def test_design_ends_with_commands_of_its_result(call: Call, surface: tuple[str, ...]) -> None:
+    """The last one is run: size, law and stiffness are those of the design."""
+    code, out, _err = call("design", *surface, "--device=touch", "--laws=C", "--json=-")
+    assert code == 0
+    found = json.loads(out)
+    _code, out, _err = call("design", *surface, "--device=touch", "--laws=C")
+    lines = out.split("\nNext:\n")[1].splitlines()
+    assert [shlex.split(line)[1] for line in lines] == ["lab", "run", "export"]
+    arguments = shlex.split(lines[2])[2:-2]
+    code, out, _err = call("analyze", *arguments, "--json=-")
+    assert code == 0
+    again = json.loads(out)
+    (row,) = found["comparison"]["laws"]
+    assert ("magnified 8.4351 times" in str(again["texture"])) == ("--magnify" in surface)
+    found["comparison"]["texture"].pop("preparation", None)  # in two steps, and in one
+    for name, value in found["comparison"]["texture"].items():
+        expected = pytest.approx(value, rel=1e-6) if isinstance(value, float) else value
+        assert again["texture"][name] == expected
+    assert again["stiffness"] == pytest.approx(row["stiffness"], rel=5e-3)
+    assert again["law"] == "C"
 
 
 @pytest.mark.parametrize(

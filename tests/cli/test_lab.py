@@ -57,7 +57,9 @@ def test_address_is_printed_when_no_browser_is_found(
     monkeypatch.setattr("webbrowser.open", open_browser)
     result = CliRunner().invoke(cli, ["lab", "--port", "0"])
     assert result.exit_code == 0
-    assert "the lab is at http://127.0.0.1:1/token/" in result.output + capfd.readouterr().err
+    messages = result.output + capfd.readouterr().err
+    started = messages.index("the address of the lab follows")
+    assert started < messages.index("the lab is at http://127.0.0.1:1/token/")
     assert "no browser was found: open the address in a browser of this machine" in result.output
     # The address on the command line of the browser holds no token.
     (address, text, mode), folder_mode = opened

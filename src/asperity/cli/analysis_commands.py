@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-import shlex
-import sys
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -12,22 +10,16 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from asperity.cli import options
-from asperity.cli.main import (
-    HeadedCommand,
-    declare_command,
-    option_writer,
-    repeat_options,
-    write_option,
-)
+from asperity.cli.main import declare_command, option_writer
+from asperity.cli.next_commands import design_commands, next_commands
 from asperity.cli.options import GRIP, REQUESTED_STIFFNESS, SPEED
 from asperity.cli.output import Outputs, check_outputs, output_options, step_bar
+from asperity.cli.questions import AskingCommand
 from asperity.core.arguments import MAX_DEPTH, Argument
 from asperity.core.errors import ParameterError
-from asperity.core.units import format_quantity
-from asperity.laws import LAWS, REGISTERED_LAWS, registered_arguments
+from asperity.laws import LAWS, REGISTERED_LAWS
 
 if TYPE_CHECKING:
-    from asperity.analysis.results.compare import Comparison
     from asperity.analysis.results.device_comparisons import DeviceComparisons, MissingData
     from asperity.devices import Device
     from asperity.laws import Law
@@ -90,20 +82,7 @@ _MAX_DEPTHS = replace(MAX_DEPTH, form="items", example="0.1mm; 0.5mm")
 _COMPARISON = (SPEED, GRIP, *options.command_arguments("compare"))
 
 
-class _AskingCommand(HeadedCommand):
-    """Command that asks for its arguments on a terminal, if there are none."""
-
-    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Parse the arguments, or the answers."""
-        if not args and sys.stdin.isatty():
-            surface = click.prompt("Surface: a kind, a name such as cloth, or a file")
-            device = click.prompt("Device of the catalogue, or a TOML file", "omega.3")
-            depth = click.prompt("Greatest depth, such as 0.5mm, or Enter", "", show_default=False)
-            args = [surface, "--device", device, *(["--max-depth", depth] if depth else [])]
-        return super().parse_args(ctx, args)
-
-
-@click.command("compare", cls=_AskingCommand)
+@click.command("compare", cls=AskingCommand)
 @click.argument("surface")
 @options.device_option(
     "Devices of the catalogue, or TOML files, 'touch,mine.toml'.  [default: omega.3]",
@@ -157,62 +136,6 @@ def compare_command(
     _write_comparisons(result, outputs, full, why, surface)
 
 
-def _next_commands(surface: str, result: Comparison, why: bool) -> str:
-    """Return the commands to type next, for the recommended law or for a texture that is felt."""
-    from asperity.report.sentences import number_text
-
-    row = result.recommended_row
-    if row is None:
-        return f"\nNext:\n  {_remedy_command(surface, result)}"
-    k = number_text.limit_text(row.surface.stiffness).replace(" ", "")
-    used = {*row.law.arguments, *row.surface.friction_values}
-    unused = registered_arguments().keys() - used
-    names = {"device", "plugin", "settings", "max_depth", *used}
-    typed = repeat_options(names, unused)
-    has_device = "--device" in typed or surface.endswith(".toml")
-    device = [] if has_device else ["--device", result.device.id]
-    rest = shlex.join([surface, "--law", row.law.letter, "--stiffness", k, *device, *typed])
-    lab, run, export = (f"  asperity {name} {rest}" for name in ("lab", "run", "export"))
-    hint = "" if why else "\nWhy, and what else to watch: --why\n"
-    return f"{hint}\nNext:\n{lab}\n{run}\n{export} -o texture.h"
-
-
-def _remedy_command(surface: str, result: Comparison) -> str:
-    """Return the command of the first change of the options that makes the texture felt.
-
-    Without such a change, and for a scene, which may magnify too: what the device renders.
-    """
-    row = result.nearest_row
-    found = row.perceptibility.remedies if row is not None and row.perceptibility else ()
-    values = {remedy.kind: remedy.value for remedy in reversed(found)}
-    if surface.endswith(".toml") or not {"magnify", "speed"} & set(values):
-        return shlex.join(["asperity", "envelope", "--device", result.device.id])
-    ctx = click.get_current_context()
-    changed = {"speed": format_quantity(values.get("speed", 0.0), "m/s")}
-    if "magnify" in values:
-        changed = _magnified_options(ctx.params, values["magnify"])
-    names = {str(option.name) for option in ctx.command.params} - _NOT_REPEATED
-    typed = shlex.join([surface, *repeat_options(names, changed=changed)])
-    written = [write_option(name, text, ctx) for name, text in changed.items()]
-    return f"asperity compare {typed} {' '.join(written)}"
-
-
-_NOT_REPEATED = {"surface", "why", "full", "json_path", "html_path", "force", "no_cache"}
-
-
-def _magnified_options(typed: Mapping[str, Any], factor: float) -> dict[str, str]:
-    """Return the options for a surface that is magnified further, as in its confirmation.
-
-    A depth on the command line is magnified too.
-    """
-    changed = {"magnify": f"{(typed['magnify'] or 1.0) * factor:.10g}"}
-    if typed["magnify_height"] is not None:
-        changed["magnify_height"] = f"{typed['magnify_height'] * factor:.10g}"
-    if typed["max_depth"] is not None:
-        changed["max_depth"] = format_quantity(typed["max_depth"][0] * factor, "m", 6)
-    return changed
-
-
 def _write_comparisons(
     result: DeviceComparisons, outputs: Outputs, full: bool, why: bool, surface: str
 ) -> None:
@@ -228,7 +151,7 @@ def _write_comparisons(
         outputs.write(
             comparison,
             report.comparison_page(comparison, full, why, option_writer()),
-            extra_line=_next_commands(surface, comparison, why),
+            extra_line=next_commands(surface, comparison, why),
         )
         return
     if result.comparisons or len(result.missing_data) > 1:
@@ -379,7 +302,7 @@ def design_command(
             progress=step,
             **options.provided_values(values, _TARGET),
         )
-    outputs.write(result, design_page(result))
+    outputs.write(result, design_page(result), extra_line=design_commands(surface, result))
 
 
 def _law_parameters(values: dict[str, Any]) -> dict[str, Any]:

@@ -6,6 +6,7 @@ import functools
 import os
 import shlex
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -27,7 +28,8 @@ if TYPE_CHECKING:
 def progress_bar(description: str) -> Iterator[Callable[..., None]]:
     """Show a progress bar with the time left, if standard error is a terminal.
 
-    The description counts the functions that are compiled, which slows a first run.
+    The seconds of the present step change while nothing else does; the description counts the
+    functions that are compiled, which slows a first run.
 
     Args:
         description: description of the task.
@@ -40,11 +42,22 @@ def progress_bar(description: str) -> Iterator[Callable[..., None]]:
         return
     from rich import progress
     from rich.console import Console
+    from rich.text import Text
 
     from asperity.core.compiled import COMPILE_CALLBACKS
 
+    start_of_step = [time.monotonic()]
+
+    class StepTimeColumn(progress.ProgressColumn):
+        """Seconds since the description changed."""
+
+        def render(self, task: progress.Task) -> Text:
+            del task  # the time is that of the step
+            return Text(f"{time.monotonic() - start_of_step[0]:.0f} s", "dim")
+
     columns = (
         progress.TextColumn("{task.description:<24}"),
+        StepTimeColumn(),
         progress.BarColumn(),
         progress.TaskProgressColumn(),
         progress.TimeElapsedColumn(),
@@ -59,10 +72,13 @@ def progress_bar(description: str) -> Iterator[Callable[..., None]]:
         current = [description]
 
         def report_compilation(_loop: str) -> None:
-            text = f"{current[0]}: compiling loop {next(loops)}, cached for the next run"
+            start_of_step[0] = time.monotonic()
+            text = f"{current[0]}: compiling loop {next(loops)}, on a first run only"
             bar.update(task, description=text, refresh=True)
 
         def update(fraction: float, text: str | None = None) -> None:
+            if text not in (None, current[0]):
+                start_of_step[0] = time.monotonic()
             current[0] = text or current[0]
             bar.update(task, completed=fraction, description=current[0])
 
@@ -78,7 +94,12 @@ def step_bar(description: str, steps: int) -> Iterator[Callable[[str], None]]:
     """Show the progress over a number of steps; yield a function to call before each step."""
     with progress_bar(description) as update:
         done = count()
-        yield lambda name: update(next(done) / steps, name)
+
+        def begin(name: str) -> None:
+            index = next(done)
+            update(index / steps, f"{name} ({min(index + 1, steps)} of {steps})")
+
+        yield begin
 
 
 @dataclass(frozen=True)

@@ -267,6 +267,7 @@ def lab_command(
     from asperity.lab.server import LabOptions, serve_lab
 
     source = surface or DEFAULT_SURFACE
+    print_message(f"reading {source}; the address of the lab follows")
     handle = None
     if driver == loop_setup.SIMULATED:
         scene = _simulated_scene(source, values)

@@ -1,0 +1,103 @@
+"""Commands to type next, below the answer of a command, ready to paste."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from asperity.cli.main import repeat_options, write_option
+from asperity.core.units import format_quantity
+from asperity.laws import registered_arguments
+
+if TYPE_CHECKING:
+    from asperity.analysis.results.compare import Comparison
+    from asperity.analysis.results.recommendation import LawRow
+    from asperity.envelopes.find_design import Design
+
+
+def next_commands(surface: str, result: Comparison, why: bool) -> str:
+    """Return the commands to type next, for the recommended law or for a texture that is felt."""
+    row = result.recommended_row
+    if row is None:
+        return f"\nNext:\n  {_remedy_command(surface, result)}"
+    hint = "" if why else "\nWhy, and what else to watch: --why\n"
+    return f"{hint}{_use_commands(surface, row, {})}"
+
+
+def _use_commands(surface: str, row: LawRow, changed: Mapping[str, str]) -> str:
+    """Return the commands that render a law, with the options of the running command.
+
+    Args:
+        surface: the surface as typed.
+        row: the law at its stiffness.
+        changed: texts of options that differ from those of the running command.
+    """
+    from asperity.report.sentences import number_text
+
+    k = number_text.limit_text(row.surface.stiffness).replace(" ", "")
+    used = {*row.law.arguments, *row.surface.friction_values}
+    names = {"device", "plugin", "settings", "max_depth", *used}
+    typed = repeat_options(names, registered_arguments().keys() - used, changed)
+    has_device = "--device" in typed or surface.endswith(".toml")
+    device = [] if has_device else ["--device", row.passivity.loop.device.id]
+    rest = shlex.join([surface, "--law", row.law.letter, "--stiffness", k, *device, *typed])
+    ctx = click.get_current_context()
+    rest = " ".join([rest, *[write_option(name, text, ctx) for name, text in changed.items()]])
+    lab, run, export = (f"  asperity {name} {rest}" for name in ("lab", "run", "export"))
+    return f"\nNext:\n{lab}\n{run}\n{export} -o texture.h"
+
+
+def design_commands(surface: str, result: Design) -> str:
+    """Return the commands that render a design: its law with parameters, stiffness and size."""
+    typed = click.get_current_context().params
+    lateral = typed["magnify"] or 1.0
+    upward = typed["magnify_height"]
+    is_high = result.comparison.texture.single_wave is not None  # its height alone is scaled
+    changed = {}
+    if not is_high:
+        changed["magnify"] = f"{lateral * result.factor:.10g}"
+    if is_high or upward is not None:
+        changed["magnify_height"] = f"{(upward or lateral) * result.factor:.10g}"
+    for name, argument in result.row.law.arguments.items():
+        if typed.get(name) is not None:
+            changed[name] = argument.format_value(result.row.surface.law_parameters[name])
+    return _use_commands(surface, result.row, changed)
+
+
+def _remedy_command(surface: str, result: Comparison) -> str:
+    """Return the command of the first change of the options that makes the texture felt.
+
+    Without such a change, and for a scene, which may magnify too: what the device renders.
+    """
+    row = result.nearest_row
+    found = row.perceptibility.remedies if row is not None and row.perceptibility else ()
+    values = {remedy.kind: remedy.value for remedy in reversed(found)}
+    if surface.endswith(".toml") or not {"magnify", "speed"} & set(values):
+        return shlex.join(["asperity", "envelope", "--device", result.device.id])
+    ctx = click.get_current_context()
+    changed = {"speed": format_quantity(values.get("speed", 0.0), "m/s")}
+    if "magnify" in values:
+        changed = _magnified_options(ctx.params, values["magnify"])
+    names = {str(option.name) for option in ctx.command.params} - _NOT_REPEATED
+    typed = shlex.join([surface, *repeat_options(names, changed=changed)])
+    written = [write_option(name, text, ctx) for name, text in changed.items()]
+    return f"asperity compare {typed} {' '.join(written)}"
+
+
+_NOT_REPEATED = {"surface", "why", "full", "json_path", "html_path", "force", "no_cache"}
+
+
+def _magnified_options(typed: Mapping[str, Any], factor: float) -> dict[str, str]:
+    """Return the options for a surface that is magnified further, as in its confirmation.
+
+    A depth on the command line is magnified too.
+    """
+    changed = {"magnify": f"{(typed['magnify'] or 1.0) * factor:.10g}"}
+    if typed["magnify_height"] is not None:
+        changed["magnify_height"] = f"{typed['magnify_height'] * factor:.10g}"
+    if typed["max_depth"] is not None:
+        changed["max_depth"] = format_quantity(typed["max_depth"][0] * factor, "m", 6)
+    return changed
