@@ -118,7 +118,8 @@ def test_loop_energy_above_its_proved_bound_is_detected(
     case: tuple[Any, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     surface = Surface(*case)
-    correct = worst_loop(surface)
+    x, y = surface.texture.scan_line().direction
+    correct = worst_loop(surface, (x, y))
     assert 0.9 * correct.upper_per_period < correct.energy <= correct.upper_per_period
     intact, share = leaks.curl_columns.curl_integral_bounds, [0.8]
 
@@ -129,10 +130,10 @@ def test_loop_energy_above_its_proved_bound_is_detected(
 
     monkeypatch.setattr(leaks.curl_columns, "curl_integral_bounds", scaled_down)
     with pytest.raises(InternalError, match="gains"):
-        worst_loop(surface)
+        worst_loop(surface, (x, y))
     share[0] = correct.energy / correct.upper_per_period * (1.0 - 1e-12)  # that much is rounding
     # Scaled to the stiffness, a bound is rounded up.
-    assert worst_loop(surface).upper_per_period == math.nextafter(correct.energy, math.inf)
+    assert worst_loop(surface, (x, y)).upper_per_period == math.nextafter(correct.energy, math.inf)
 
 
 def test_rounding_error_is_not_a_contradiction() -> None:

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from asperity.analysis.energy.closed_loops import AbsorbingFriction, polygon_length
-from asperity.analysis.energy.field_energy import loop_work
+from asperity.analysis.energy.field_energy import loop_work, shortest_wavelength
 from asperity.analysis.gain.theorems import residual_bound
 from asperity.core.checks import FloatArray
 from asperity.surface import Surface
@@ -29,7 +29,7 @@ NEAREST_TOLERANCE = 1e-4
 """The same where each force requires a closest-point search."""
 # Ellipses that are compared and how many of the best are improved: on profiles and where each force
 # requires a closest-point search, and on other maps.
-_ELLIPSES = {True: (2048, 4), False: (8192, 8)}
+_ELLIPSES = {True: (2048, 4), False: (16_384, 8)}
 _ELLIPSE_POINTS = 32
 # Points of a path that are free, those of the polygon for each of them, and quasi-Newton steps.
 _FREE_POINTS = 48
@@ -38,8 +38,9 @@ _STEPS = 400
 _MEMORY = 10
 _HALVINGS = 6
 _FIRST_STEP = 0.02
-# Half widths of the ellipses: decades below half the length of the line.
-_DECADES = {True: 1.0, False: 2.0}
+# Half widths of the ellipses in shortest wavelengths: the points of a longer path would not resolve
+# the force on it.
+_WIDTHS = (0.1, 2.0)
 _FLOOR_COLUMNS = 1025
 _DEPTH_BISECTIONS = 16
 
@@ -112,9 +113,13 @@ def _best_ellipses(
         angles = rng.uniform(0.0, math.pi, count)
         directions = np.column_stack([np.cos(angles), np.sin(angles)])
         centres = surface.texture.domain.points(rng.uniform(size=(count, 2)))
-    half = 0.5 * 10.0 ** -rng.uniform(0.0, [[_DECADES[is_profile]], [1.0]], (2, count))
-    width = (half[0] * line.length)[:, None]
-    height = (2.0 * half[1] * surface.max_depth)[:, None]
+    wave = min(shortest_wavelength(surface), line.length)
+    widest = min(_WIDTHS[1] * wave, 0.5 * line.length)
+    logarithms = rng.uniform(
+        np.log([[_WIDTHS[0] * wave], [0.1]]), np.log([[widest], [1.0]]), (2, count)
+    )
+    width, height = np.exp(logarithms)[..., None]
+    height *= surface.max_depth
     middle = rng.uniform(0.0, surface.max_depth, (count, 1))
     phases = 2.0 * math.pi * np.arange(_ELLIPSE_POINTS) / _ELLIPSE_POINTS
     t = width * np.cos(phases)

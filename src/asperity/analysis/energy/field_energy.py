@@ -227,7 +227,7 @@ def loop_work(surface: Surface, vertices: ArrayLike, tolerance: float = DEFAULT_
     if len(corners) < 2:
         raise ParameterError("vertices", "must be at least 2 points (n, 3) [m]", len(corners))
     ends = np.roll(corners, -1, axis=0)
-    wave = _shortest_wavelength(surface)
+    wave = shortest_wavelength(surface)
     if not surface.law.stateful:
         return _field_work(surface, corners, ends, wave, tolerance)
     length = float(np.linalg.norm(ends - corners, axis=1).sum())
@@ -311,7 +311,7 @@ def _check_panel_count(panels: float, surface: Surface, path_length: float, wave
 
 def initial_panels(surface: Surface, length: float) -> int:
     """Return the initial number of panels on a straight line of a length [m]."""
-    return _panel_count(length, _shortest_wavelength(surface), 1)
+    return _panel_count(length, shortest_wavelength(surface), 1)
 
 
 def _panel_count(length: float, wave: float, edges: int) -> int:
@@ -319,7 +319,7 @@ def _panel_count(length: float, wave: float, edges: int) -> int:
     return int(min(max(np.ceil(2.0 * length / wave), least), _MAX_PANELS))
 
 
-def _shortest_wavelength(surface: Surface) -> float:
+def shortest_wavelength(surface: Surface) -> float:
     """Return the shortest wavelength [m] that the derivative bounds allow: 2π M/K."""
     slope, hessian = surface.texture.bounds
     if hessian <= 0.0:
