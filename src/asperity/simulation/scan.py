@@ -46,6 +46,7 @@ class Stroke:
         lost_contact: contact losses per stroke.
         closure: closure error of the whole run over the energy exchanged [1].
         stop_message: why the run ended early; empty if it did not.
+        slipped: energy that the surface's friction took by slip, mean per stroke [J].
     """
 
     law: str
@@ -60,6 +61,7 @@ class Stroke:
     lost_contact: float
     closure: float
     stop_message: str
+    slipped: float = 0.0
 
     @property
     def total(self) -> float:
@@ -82,7 +84,7 @@ class Stroke:
         """Return plain data, SI units; ``None`` for an unknown number or an overflow."""
         names = (
             "law speed depth mean_depth energy energy_sum field error spread same_sample"
-            " same_sample_sum lost_contact closure stop_message"
+            " same_sample_sum lost_contact closure stop_message slipped"
         )
         return attributes_to_dict(self, *names.split(), infinity=None)
 
@@ -184,6 +186,7 @@ def _analyze_stroke(surface: Surface, motion: Strokes, run: Run, depth: float) -
         losses / motion.count,
         closure,
         "",
+        run.slipped / motion.count,
     )
 
 

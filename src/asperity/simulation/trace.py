@@ -100,6 +100,7 @@ _POSITION = slice(_NAMES.index("x"), _NAMES.index("z") + 1)
 _VELOCITY = slice(_NAMES.index("vx"), _NAMES.index("vz") + 1)
 _COMMANDED = slice(_NAMES.index("commanded x"), _NAMES.index("commanded z") + 1)
 _SUPPLIED = slice(_NAMES.index("supplied x"), _NAMES.index("supplied z") + 1)
+_ANCHOR = slice(_NAMES.index("law anchor x"), _NAMES.index("law anchor y") + 1)
 _LOST = _NAMES.index("lost")
 _FRICTION = _NAMES.index("friction")
 # Smallest share of the loss that the texture supplies in a cycle: not always all, as amplitudes
@@ -171,7 +172,7 @@ class TailStatistics:
 
 
 class LimitCounts:
-    """Counts of samples at the force limit and below ``max_depth``.
+    """Counts of samples at the force limit and below ``max_depth``, and energies of friction.
 
     Args:
         surface: the surface.
@@ -181,6 +182,8 @@ class LimitCounts:
         force_limited: number of samples whose force was limited.
         too_deep: number of samples below ``max_depth``.
         deepest: greatest depth of these [m]; 0 for none.
+        slipped: energy that the slip of the friction's anchor took, Σ κ d·Δa [J].
+        deflected: energy κ|d|²/2 stored in the deflection of the anchor [J].
     """
 
     def __init__(self, surface: Surface, max_force: float) -> None:
@@ -191,14 +194,26 @@ class LimitCounts:
         self.force_limited = 0
         self.too_deep = 0
         self.deepest = 0.0
+        self.slipped = 0.0
+        self.deflected = 0.0
+        self._anchor = np.empty((0, 2))
 
     @property
-    def totals(self) -> tuple[int, int, float]:
-        """Samples at the force limit, samples below ``max_depth``, and the greatest depth [m]."""
-        return self.force_limited, self.too_deep, self.deepest
+    def totals(self) -> tuple[int, int, float, float, float]:
+        """The attributes, in their order."""
+        return self.force_limited, self.too_deep, self.deepest, self.slipped, self.deflected
 
     def update(self, rows: FloatArray) -> None:
         """Count the next rows of the trace, shape (n, columns)."""
+        friction = self._surface.contact_friction
+        if friction is not None and len(rows):
+            anchors = rows[:, _ANCHOR]
+            deflection = rows[:, _POSITION][:, :2] - anchors
+            steps = np.diff(anchors, axis=0, prepend=self._anchor)[-len(rows) :]
+            stiffness = friction.presliding_stiffness
+            self.slipped += stiffness * float((deflection[-len(steps) :] * steps).sum())
+            self.deflected = 0.5 * stiffness * float(np.square(deflection[-1]).sum())
+            self._anchor = anchors[-1:].copy()
         squares = np.square(rows[:, _COMMANDED]).sum(axis=1)
         self.force_limited += int(np.count_nonzero(squares >= self._least_square))
         low = rows[rows[:, _POSITION.stop - 1] < self._safe_height, _POSITION]
@@ -315,6 +330,8 @@ class Run(NamedColumns, Plottable):
         force_limited: traced samples whose force was limited to that of the device.
         too_deep: traced samples below ``max_depth``, for which the surface was analysed.
         deepest: greatest depth of these [m]; 0 for none.
+        slipped: energy that the slip of the friction's anchor took [J], by the traced samples.
+        deflected: energy stored in the deflection of that anchor at the end [J].
     """
 
     table: FloatArray
@@ -333,6 +350,8 @@ class Run(NamedColumns, Plottable):
     force_limited: int = 0
     too_deep: int = 0
     deepest: float = 0.0
+    slipped: float = 0.0
+    deflected: float = 0.0
     columns = COLUMNS
 
     def __repr__(self) -> str:
@@ -367,6 +386,6 @@ class Run(NamedColumns, Plottable):
     def to_dict(self) -> dict[str, Any]:
         """Return plain data without the trace, SI units; None for an overflow."""
         names = "duration samples period stop_message state ledger truncated_ticks search_error"
-        names += " force_limited too_deep deepest"
+        names += " force_limited too_deep deepest slipped deflected"
         data = attributes_to_dict(self, *names.split(), infinity=None)
         return data | {"trace": self.path or None, "notes": list(self.notes)}

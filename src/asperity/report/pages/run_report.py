@@ -99,8 +99,15 @@ def ledger_rows(run: Run) -> list[tuple[str, list[str]]]:
     def single(value: float) -> list[str]:
         return ["", "", "", energy_text(value)]
 
+    friction = []
+    if run.surface.contact_friction is not None:
+        friction = [
+            ("of it taken by friction that slips", single(-run.slipped)),
+            ("of it stored in friction at the end", single(-run.deflected)),
+        ]
     return [
         ("texture, exact", axes(ledger.supplied)),
+        *friction,
         ("texture, the paper's sum", axes(ledger.same_sample)),
         ("of it by sampling", single(ledger.sampling)),
         ("anchor of the hand", single(ledger.hand)),
