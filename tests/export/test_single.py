@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import pytest
 from bench.stress import single as bench_single
 from bench.stress.single import measure_single_precision
 from tests.helpers.c_programs import header
 
+from asperity.export.expressions import real_literal, real_literals
 from asperity.laws import LAWS
 from asperity.surface import Surface
 from asperity.textures import Texture
@@ -51,3 +54,17 @@ def test_single_precision_code_contains_no_double(make_texture: Callable[[str], 
     assert "2.220446e-16f" not in code
     assert not re.search(r"\b(sqrt|sin|cos|fabs|copysign)\(", code)
     assert not re.search(r"\d\.\d+(e-?\d+)?(?![\dfe])", code)
+
+
+def test_literals_of_an_array_have_the_bits_of_each_number() -> None:
+    special = [0.0, -0.0, 1.0, -3e7, 1e-300, -1e-40, 1e39, -1e39, math.inf, math.nan, 2.0**-126]
+    random = np.random.default_rng(8).normal(size=(60, 30)) * 10.0 ** np.arange(-30, 30)[:, None]
+    random = random.ravel()
+    values = np.concatenate([special, random])
+    for single, kind in ((True, np.float32), (False, np.float64)):
+        texts = real_literals(values, single)
+        assert texts[: len(special)] == [real_literal(value, single) for value in special]
+        for text, value in zip(texts[len(special) :], random, strict=True):
+            assert single == text.endswith("f")
+            assert "." in text or "e" in text
+            assert kind(text.removesuffix("f")) == kind(value)

@@ -5,12 +5,15 @@ from __future__ import annotations
 import ast
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from asperity.export import c_language as c
 from asperity.export.c_language import ValueType
 from asperity.export.expression_types import ProgramContext, called_name, indices_of
 from asperity.export.function_analysis import FunctionTypes
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 _PRIMARY = 12
 _UNARY = 11
@@ -360,3 +363,20 @@ def real_literal(value: float, single: bool) -> str:
     if single:
         return f"{np.float32(value)!s}f"
     return repr(float(value))
+
+
+def real_literals(values: NDArray[Any], single: bool) -> list[str]:
+    """Return real numbers, shape (n,), as C literals; see :func:`real_literal`."""
+    import numpy as np
+
+    if not single:
+        return [real_literal(value, single) for value in values.tolist()]
+    with np.errstate(over="ignore"):  # of numbers that become infinite
+        rounded = values.astype(np.float32)
+    # Nine digits determine a number of single precision; whole ones lack a point, others a rule.
+    is_plain = np.isfinite(rounded) & (np.abs(values) >= np.finfo(np.float32).tiny)
+    is_plain &= rounded != np.floor(rounded)
+    texts = ("%.9gf " * len(rounded) % tuple(rounded.tolist())).split()
+    for index in np.flatnonzero(~is_plain).tolist():
+        texts[index] = real_literal(float(values[index]), single)
+    return texts

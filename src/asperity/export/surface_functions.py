@@ -22,7 +22,7 @@ from asperity.core.errors import ParameterError
 from asperity.derive.facts import clamped_facts
 from asperity.export import c_language as c
 from asperity.export.c_language import ValueType
-from asperity.export.expressions import real_literal
+from asperity.export.expressions import real_literal, real_literals
 from asperity.export.program import LinkedSource, Program
 from asperity.export.statements import RESERVED_WORDS
 from asperity.kernels.fuse import energy_kernel_source, law_units, link_on_texture
@@ -277,7 +277,10 @@ class ProgramData:
         if values.ndim > 1:
             return "{\n" + ",\n".join(map(self._initializer, values)) + "\n}"
         kind = _element_type(values)
-        texts = [self._literal(value, kind) for value in values.tolist()]
+        if kind in {c.BOOL, c.INT}:
+            texts = list(map(str, values.astype(int).tolist()))
+        else:
+            texts = real_literals(values, self.single or kind == c.SINGLE)
         return "{" + _wrap_lines(texts) + "}"
 
     def _c_type(self, value_type: ValueType) -> str:
@@ -354,12 +357,7 @@ def _fits_32_bits(values: NDArray[Any]) -> bool:
 
 
 def _wrap_lines(texts: Sequence[str]) -> str:
-    """Return numbers separated by commas, in lines of limited length."""
-    lines = []
-    line = ""
-    for text in texts:
-        if line and len(line) + len(text) > _WIDTH:
-            lines.append(line)
-            line = ""
-        line += f"{text}, "
-    return "\n".join([*lines, line]).rstrip(", ")
+    """Return numbers separated by commas, as many in each line as fit for the longest."""
+    count = max(_WIDTH // (max(map(len, texts)) + 2), 1)
+    lines = [", ".join(texts[first : first + count]) for first in range(0, len(texts), count)]
+    return ",\n".join(lines)
