@@ -57,7 +57,7 @@ def test_single_precision_code_contains_no_double(make_texture: Callable[[str], 
 
 
 def test_literals_of_an_array_have_the_bits_of_each_number() -> None:
-    special = [0.0, -0.0, 1.0, -3e7, 1e-300, -1e-40, 1e39, -1e39, math.inf, math.nan, 2.0**-126]
+    special = [0.0, -0.0, 1.0, -3e7, 1e-300, -1e-40, 1e39, -1e39, math.inf, math.nan]
     random = np.random.default_rng(8).normal(size=(60, 30)) * 10.0 ** np.arange(-30, 30)[:, None]
     random = random.ravel()
     values = np.concatenate([special, random])
