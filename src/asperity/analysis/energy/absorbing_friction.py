@@ -31,8 +31,10 @@ NEAREST_TOLERANCE = 1e-4
 # requires a closest-point search, and on other maps.
 _ELLIPSES = {True: (2048, 4), False: (16_384, 8)}
 _ELLIPSE_POINTS = 32
-# Points of a path that are free, those of the polygon for each of them, and quasi-Newton steps.
+# Points of a path that are free, points for each of them at which it is integrated, vertices of the
+# polygon that is returned, and quasi-Newton steps.
 _FREE_POINTS = 48
+_VERTICES = 768
 _REFINEMENT = 4
 _STEPS = 400
 _MEMORY = 10
@@ -101,48 +103,72 @@ def find_absorbing_friction(
     return best
 
 
-def _best_ellipses(
-    surface: Surface, line: ScanLine, count: int, group_count: int
-) -> list[tuple[_Plane, FloatArray]]:
-    """Return planes, and paths in them (2, n) [m], the best of each group of ellipses."""
+@dataclass(frozen=True)
+class _Ellipses:
+    """Ellipses in vertical planes.
+
+    Attributes:
+        centres: points of the planes [m], shape (count, 2).
+        directions: directions of the planes, shape (count, 2).
+        widths: half widths [m], shape (count,).
+        along: distances from the centre along the plane [m], shape (count, n).
+        points: the paths [m], shape (count, n, 3).
+    """
+
+    centres: FloatArray
+    directions: FloatArray
+    widths: FloatArray
+    along: FloatArray
+    points: FloatArray
+
+    def densities(self, surface: Surface) -> FloatArray:
+        """Return W/length of each path by trapezoids [N]."""
+        forces = surface.force(self.points.reshape(-1, 3)).reshape(self.points.shape)
+        steps = np.roll(self.points, -1, axis=1) - self.points
+        pull = 0.5 * (forces + np.roll(forces, -1, axis=1))
+        work = np.einsum("lpi,lpi->l", pull, steps)
+        return np.asarray(work / np.linalg.norm(steps, axis=2).sum(axis=1))
+
+
+def _random_ellipses(surface: Surface, line: ScanLine, count: int) -> _Ellipses:
+    """Return ellipses of many sizes in the working region, cut off at its floor."""
     rng = np.random.default_rng(0)
-    is_profile = surface.texture.is_profile
     directions = np.tile(line.direction, (count, 1))
     centres = line.start + rng.uniform(0.0, line.length, (count, 1)) * line.direction
-    if not is_profile:
+    if not surface.texture.is_profile:
         angles = rng.uniform(0.0, math.pi, count)
         directions = np.column_stack([np.cos(angles), np.sin(angles)])
         centres = surface.texture.domain.points(rng.uniform(size=(count, 2)))
     wave = min(shortest_wavelength(surface), line.length)
-    widest = min(_WIDTHS[1] * wave, 0.5 * line.length)
-    logarithms = rng.uniform(
-        np.log([[_WIDTHS[0] * wave], [0.1]]), np.log([[widest], [1.0]]), (2, count)
-    )
-    width, height = np.exp(logarithms)[..., None]
-    height *= surface.max_depth
-    middle = rng.uniform(0.0, surface.max_depth, (count, 1))
+    least = np.log([[_WIDTHS[0] * wave], [0.1 * surface.max_depth]])
+    most = np.log([[min(_WIDTHS[1] * wave, 0.5 * line.length)], [surface.max_depth]])
+    widths, heights = np.exp(rng.uniform(least, most, (2, count)))
     phases = 2.0 * math.pi * np.arange(_ELLIPSE_POINTS) / _ELLIPSE_POINTS
-    t = width * np.cos(phases)
-    u = np.maximum(middle + height * np.sin(phases), 0.0)
-    xy = (centres[:, None] + t[..., None] * directions[:, None]).reshape(-1, 2)
+    along = widths[:, None] * np.cos(phases)
+    middle = rng.uniform(0.0, surface.max_depth, (count, 1))
+    above = np.maximum(middle + heights[:, None] * np.sin(phases), 0.0)
+    xy = centres[:, None] + along[..., None] * directions[:, None]
     # Right below its surface a vertical depth of max_depth is never out of the region.
-    top = surface.law.contact.contact_height(surface.texture, xy)
-    z = top - surface.max_depth + u.ravel()
-    points = np.column_stack([xy, z])
-    forces = surface.force(points).reshape(*t.shape, 3)
-    loops = points.reshape(*t.shape, 3)
-    steps = np.roll(loops, -1, axis=1) - loops
-    work = np.einsum("lpi,lpi->l", forces + np.roll(forces, -1, axis=1), steps) / 2.0
-    densities = work / np.linalg.norm(steps, axis=2).sum(axis=1)
+    top = surface.law.contact.contact_height(surface.texture, xy.reshape(-1, 2))
+    z = top.reshape(above.shape) - surface.max_depth + above
+    return _Ellipses(centres, directions, widths, along, np.concatenate([xy, z[..., None]], axis=2))
+
+
+def _best_ellipses(
+    surface: Surface, line: ScanLine, count: int, group_count: int
+) -> list[tuple[_Plane, FloatArray]]:
+    """Return planes, and paths in them (2, n) [m], the best of each group of ellipses."""
+    ellipses = _random_ellipses(surface, line, count)
+    densities = ellipses.densities(surface)
     groups = np.abs(densities).reshape(group_count, -1)
     starts = []
     for index in groups.argmax(axis=1) + np.arange(group_count) * groups.shape[1]:
         turn = 1 if densities[index] > 0.0 else -1
-        plane = _make_plane(
-            surface, centres[index], directions[index], 2.0 * float(width[index, 0])
-        )
-        above = z.reshape(t.shape)[index] - np.interp(t[index], plane.columns, plane.floor)
-        starts.append((plane, np.stack([t[index], np.maximum(above, 0.0)])[:, ::turn]))
+        reach = 2.0 * float(ellipses.widths[index])
+        plane = _make_plane(surface, ellipses.centres[index], ellipses.directions[index], reach)
+        along = ellipses.along[index]
+        above = ellipses.points[index, :, 2] - np.interp(along, plane.columns, plane.floor)
+        starts.append((plane, np.stack([along, np.maximum(above, 0.0)])[:, ::turn]))
     return starts
 
 
@@ -201,11 +227,16 @@ def _make_plane(
     columns: FloatArray = np.linspace(-reach, reach, _FLOOR_COLUMNS)
     floor = region_floor(surface, np.ascontiguousarray(centre + columns[:, None] * direction))
     slope = np.gradient(floor, columns)
-    free = np.arange(_FREE_POINTS * _REFINEMENT) / _REFINEMENT
-    distance = np.abs(free[:, None] - np.arange(_FREE_POINTS))
-    refinement = np.maximum(1.0 - np.minimum(distance, _FREE_POINTS - distance), 0.0)
+    refinement = _hat_functions(_REFINEMENT)
     line = ScanLine(centre, direction, 2.0 * reach, periodic=False)
     return _Plane(surface, line, columns, floor, slope, refinement)
+
+
+def _hat_functions(parts: int) -> FloatArray:
+    """Return the matrix that interpolates a number of points for each free point of a path."""
+    where = np.arange(_FREE_POINTS * parts) / parts
+    distance = np.abs(where[:, None] - np.arange(_FREE_POINTS))
+    return np.asarray(np.maximum(1.0 - np.minimum(distance, _FREE_POINTS - distance), 0.0))
 
 
 def _improve(plane: _Plane, path: FloatArray) -> FloatArray:
@@ -221,10 +252,10 @@ def _improve(plane: _Plane, path: FloatArray) -> FloatArray:
 
     low = np.array([[-1.0], [0.0]])
     high = np.array([[1.0], [math.inf]])
-    curve = plane.curve(_climb(evaluate, np.stack(rows) / sizes, low, high) * sizes)
-    points = plane.points(curve)
-    above = curve[1] - np.interp(curve[0], plane.columns, plane.floor)
-    points[:, 2] = region_floor(plane.surface, np.ascontiguousarray(points[:, :2])) + above
+    free = _climb(evaluate, np.stack(rows) / sizes, low, high) * sizes
+    along, above = free @ _hat_functions(_VERTICES // _FREE_POINTS).T
+    points = plane.points(np.stack([along, above]))
+    points[:, 2] += region_floor(plane.surface, np.ascontiguousarray(points[:, :2]))
     return points
 
 
