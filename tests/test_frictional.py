@@ -224,3 +224,24 @@ def test_sample_of_the_stress_run() -> None:
     for steps in ("exact", "rubbed", "bounded"):
         assert friction_stress.close_loops(9, 1.0, steps).beyond == 0
     assert friction_stress.close_loops(9, 2.0).gains > 0
+
+
+@pytest.mark.parametrize(
+    ("ratio", "amplitude", "difference"),
+    [(2.0, 1.0, 1e-9), (1.0, 1.0, 0.01), (0.9, 0.995, 1.0), (0.5, 0.79, 1.0), (0.25, 0.48, 1.0)],
+)
+def test_sliding_friction_is_that_of_law_f_where_the_limit_is_gentle(
+    ratio: float, amplitude: float, difference: float
+) -> None:
+    """κ over the greatest slope of the limit; law F at the default has μ 0.72 and a 0.889."""
+    texture, depth = Sinusoid(1e-4, 1e-3), 2e-4
+    x = np.linspace(0.0, 6e-3, 48_001)
+    path = np.column_stack([x, 0.0 * x, np.full_like(x, -depth)])
+    expected = Surface(texture, "F", 1000.0, depth, max_deflection=1e-6).trace(path)[24_000:, 0]
+    modulation = 1.6 / 1.8
+    slope = 0.72 * 1000.0 * depth * modulation / 2.0 * 2.0 * np.pi / 1e-3
+    friction = {"friction": 0.72, "friction_modulation": modulation}
+    mended = Surface(texture, "W", 1000.0, depth, presliding_stiffness=ratio * slope, **friction)  # type: ignore[arg-type]  # by name
+    force = mended.trace(path)[24_000:, 0]
+    assert force.std() / expected.std() == pytest.approx(amplitude, abs=0.01)
+    assert np.abs(force - expected).max() <= difference * np.abs(expected).max()
