@@ -3,8 +3,11 @@
 ``python -m bench.stress.certification [SECONDS]`` compares the gain and the leak that a search of
 so many seconds (10 by default) finds with the certified ones, on five surfaces;
 ``python -m bench.stress.certification controls [COUNT]`` searches so many conservative renderers
-(200 by default), exact, in single precision, with steps of position and of force, for a second
-each, and prints how many had a fault.
+(200 by default), exact, in single precision, with steps of position and of force, with noise, for
+0.7 s each, and prints how many had a fault;
+``python -m bench.stress.certification jumps [CELLS [SECONDS]]`` prints in how many of the connected
+sets of jumps of law D, as a grid of so many cells along each axis (100 by default) shows them, a
+search of so many seconds (30 by default) finds one.
 """
 
 from __future__ import annotations
@@ -17,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.progress import track
+from scipy import ndimage
 from scipy.interpolate import RectBivariateSpline
 
 from asperity import certify, characteristic_number, named_surface, worst_loop
@@ -28,9 +32,10 @@ from bench.speed.timing import number_table
 
 LAWS = "ABCEGH"
 LEAKING = "ABEG"
-STEPS = ("exact", "single", "encoder", "force steps", "both")
+STEPS = ("exact", "single", "encoder", "force steps", "both", "noise", "rare noise")
 _BOX = ((-1e-3, 1e-3), (-1e-3, 1e-3), (-1e-3, 1e-4))
-_CELLS = 24
+_NODES = 24
+CONTROL_SECONDS = 0.7
 
 
 def search_laws(seconds: float) -> None:
@@ -79,13 +84,84 @@ def _working_region(surface: Surface) -> Callable[[FloatArray], NDArray[np.bool_
     return contains
 
 
-def conservative_force(seed: int) -> Callable[[FloatArray], FloatArray]:
-    """Return the force of a spring, a kinked wall or a random potential, with steps of a kind."""
+def search_jumps(cells: int, seconds: float = 30.0) -> None:
+    """Print in how many connected sets of jumps of D, as a grid shows them, one was found.
+
+    A pair of neighbours of the grid shows a jump where the closest point still jumps after twelve
+    halvings of the distance between them. Cells of such pairs that touch are one set.
+    """
+    table = number_table("surface", "sets", "found", "jumps", "calls")
+    textures = cases.textures()
+    for name in ("sinusoid", "fourier", "heightmap"):
+        texture = textures[name]
+        surface = Surface(texture, "D", stiffness=cases.STIFFNESS)
+        box = _box(texture, surface.max_depth)
+        inside = _working_region(surface)
+        labels, count = jump_sets(surface, box, inside, cells)
+        found = certify(surface.force, region=box, inside=inside, seconds=seconds)
+        places = np.array([jump.at for jump in found.jumps]).reshape(-1, 3)
+        numbers = (count, len(found_sets(labels, box, places)), len(places))
+        table.add_row(name, *map(str, numbers), f"{found.calls:.2g}")
+    Console().print(table)
+
+
+def found_sets(labels: NDArray[np.int_], box: FloatArray, places: FloatArray) -> set[int]:
+    """Return the numbers of the sets of jumps in or beside whose cells places are [m]."""
+    cells = len(labels)
+    fractions = (places - box[:, 0]) / np.ptp(box, axis=1)
+    indices = np.floor(cells * fractions).astype(int)
+    found: set[int] = set()
+    for offset in np.ndindex(3, 3, 3):  # a jump may be in the cell beside
+        near = np.clip(indices + np.array(offset) - 1, 0, cells - 1)
+        found.update(labels[tuple(near.T)].tolist())
+    return found - {0}
+
+
+def jump_sets(
+    surface: Surface, box: FloatArray, inside: Callable[[FloatArray], NDArray[np.bool_]], cells: int
+) -> tuple[NDArray[np.int_], int]:
+    """Return the number of the set of jumps of each cell of a box, 0 for none, and how many."""
+    low, size = box[:, 0], np.ptp(box, axis=1)
+    nodes = np.stack(np.meshgrid(*[np.arange(cells)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    points = low + (nodes + 0.5) / cells * size
+    is_inside = inside(points)
+    forces = np.full(points.shape, np.nan)
+    forces[is_inside] = surface.force(points[is_inside])
+    marks = np.zeros((cells, cells, cells), dtype=bool)
+    for axis in range(3):
+        step = np.zeros(3)
+        step[axis] = size[axis] / cells
+        index = np.arange(len(points)).reshape(marks.shape)
+        first = np.take(index, range(cells - 1), axis).ravel()
+        second = np.take(index, range(1, cells), axis).ravel()
+        change = np.sqrt(np.square(forces[second] - forces[first]).sum(axis=1))
+        # The distance to the closest point changes by at most the step: more is a jump or steep.
+        first = first[change > 2.0 * cases.STIFFNESS * step[axis]]
+        start = points[first]
+        end = start + step
+        for _ in range(12):
+            middle = 0.5 * (start + end)
+            left, force, right = [surface.force(p) for p in (start, middle, end)]
+            is_right = (np.square(right - force) - np.square(force - left)).sum(axis=1) > 0.0
+            start = np.where(is_right[:, None], middle, start)
+            end = np.where(is_right[:, None], end, middle)
+        size_now = np.sqrt(np.square(surface.force(end) - surface.force(start)).sum(axis=1))
+        marks.reshape(-1)[first[size_now > 2.0 * cases.STIFFNESS * step[axis]]] = True
+    labels, count = ndimage.label(marks, np.ones((3, 3, 3)))
+    return labels, int(count)
+
+
+def conservative_force(seed: int) -> tuple[Callable[[FloatArray], FloatArray], float]:
+    """Return the force of a wall with a random potential, and a bound of its gain [N/m].
+
+    A third of them are plane, and all have a kink where contact begins. They are exact, or have
+    steps of position or of force, or noise.
+    """
     random = np.random.default_rng(seed)
     stiffness = 10.0 ** random.uniform(2.0, 3.5)
-    side = np.linspace(-2e-3, 2e-3, _CELLS)
+    side = np.linspace(-2e-3, 2e-3, _NODES)
     amplitude = (seed % 3) * 1e-5
-    spline = RectBivariateSpline(side, side, amplitude * random.normal(size=(_CELLS, _CELLS)))
+    spline = RectBivariateSpline(side, side, amplitude * random.normal(size=(_NODES, _NODES)))
 
     def exact(points: FloatArray) -> FloatArray:
         x, y, z = points.T
@@ -105,28 +181,48 @@ def conservative_force(seed: int) -> Callable[[FloatArray], FloatArray]:
         forces = exact(points)
         if kind in ("force steps", "both"):
             forces = force_step * np.round(forces / force_step)
+        if kind in ("noise", "rare noise"):
+            is_noisy = random.uniform(size=(len(points), 1)) < (1e-3 if kind == "rare noise" else 1)
+            forces = forces + force_step * is_noisy * random.normal(size=points.shape)
         return forces
 
-    return force
+    places = np.linspace(-1e-3, 1e-3, 400)
+    slope = np.hypot(spline(places, places, dx=1), spline(places, places, dy=1))
+    squares = 0.0
+    for dx, dy in ((2, 0), (0, 2), (1, 1), (1, 1)):
+        squares = squares + spline(places, places, dx=dx, dy=dy) ** 2
+    depth = np.maximum(spline(places, places) + 1e-3, 0.0)
+    return force, 1.02 * stiffness * float((1.0 + slope**2 + depth * np.sqrt(squares)).max())
 
 
 def search_controls(count: int) -> None:
     """Print how many conservative renderers were said to have a fault."""
-    faults: Counter[str] = Counter()
+    table = number_table(
+        "renderers", "searched", "jumps", "loops", "history", "gain above truth", "calls"
+    )
+    counts = dict.fromkeys(STEPS, 0)
+    faults: Counter[tuple[str, str]] = Counter()
     for seed in track(range(count), "searching"):
-        found = certify(conservative_force(seed), region=_BOX, seconds=1.0)
+        force, bound = conservative_force(seed)
+        found = certify(force, region=_BOX, seconds=CONTROL_SECONDS)
         name = STEPS[seed % len(STEPS)]
-        faults[f"{name}: jumps"] += bool(found.jumps)
-        faults[f"{name}: loop"] += found.worst_loop is not None
-        faults[f"{name}: history"] += found.history.has_memory
-    table = number_table(f"of {count} renderers", "with this fault")
-    for name, number in sorted(faults.items()):
-        table.add_row(name, str(number))
+        counts[name] += 1
+        faults[name, "calls"] += found.calls
+        faults[name, "jumps"] += bool(found.jumps)
+        faults[name, "loops"] += found.worst_loop is not None
+        faults[name, "history"] += found.history.has_memory or not found.history.is_reset
+        faults[name, "gain"] += found.gain > bound
+    for name, number in counts.items():
+        numbers = [faults[name, fault] for fault in ("jumps", "loops", "history", "gain")]
+        table.add_row(name, *map(str, [number, *numbers]), f"{faults[name, 'calls']:.2g}")
     Console().print(table)
 
 
 if __name__ == "__main__":
+    numbers = [float(argument) for argument in sys.argv[2:]]
     if sys.argv[1:2] == ["controls"]:
-        search_controls(int(sys.argv[2]) if len(sys.argv) > 2 else 200)
+        search_controls(*[int(number) for number in numbers or [200]])
+    elif sys.argv[1:2] == ["jumps"]:
+        search_jumps(*[int(number) for number in numbers or [100]])
     else:
         search_laws(float(sys.argv[1]) if len(sys.argv) > 1 else 10.0)

@@ -6,11 +6,17 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from bench.stress.certification import found_sets, jump_sets
+from numpy.typing import NDArray
 from scipy.interpolate import RectBivariateSpline
 
-from asperity import ParameterError, Sinusoid, Surface, characteristic_number, worst_loop
+from asperity import Fourier, ParameterError, Sinusoid, Surface, characteristic_number, worst_loop
 from asperity.certification import isolated
 from asperity.certification.certify import Certification, certify
+from asperity.certification.jump_search import JumpSearch
+from asperity.certification.region import Region, RendererCalls
+from asperity.certification.renderers import FunctionRenderer
+from asperity.certification.resolution import Resolution
 from asperity.core.checks import FloatArray
 
 BOX = ((-1e-3, 1e-3), (-1e-3, 1e-3), (-1e-3, 1e-4))
@@ -59,6 +65,27 @@ def test_jumps_of_the_god_object_are_found_and_no_loop() -> None:
         assert jump.exponent < 0.01
         # The medial axis is below the crests at l/4.
         assert abs(jump.at[0] % 2e-3 - 0.5e-3) < 1e-8
+
+
+def test_every_large_set_of_jumps_of_the_god_object_has_a_witness() -> None:
+    texture = Fourier([1e-4, 6e-5], np.array([[9e3, 2e3], [-3e3, 8e3]]), [0.3, 1.1])
+    surface = Surface(texture, "D", stiffness=1000.0, max_depth=4e-4)
+    box = np.array([[-1e-3, 1e-3], [-1e-3, 1e-3], [-5e-4, 1.6e-4]])
+
+    def inside(points: FloatArray) -> NDArray[np.bool_]:
+        depth = texture.height(points[:, :2]) - points[:, 2]
+        return np.asarray((depth > 0.0) & (depth < 4e-4))
+
+    labels, _count = jump_sets(surface, box, inside, 24)
+    large = np.flatnonzero(np.bincount(labels.ravel()) >= 4)[1:]
+    assert len(large) > 4
+    calls = RendererCalls(FunctionRenderer(surface.force), Region(box[:, 0], box[:, 1], inside))
+    resolution = Resolution(0.0, (0.0, 0.0, 0.0), 0.0, 1e-7)
+    search = JumpSearch(calls, resolution, seed=0)
+    for _ in range(24):
+        search.run(0.0, None)
+    places = np.array([jump.at for jump in search.jumps])
+    assert found_sets(labels, box, places) >= set(large.tolist())
 
 
 def planted(library: str, name: str) -> Certification:

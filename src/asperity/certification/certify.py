@@ -351,10 +351,15 @@ class _Search:
         jumps.run(self._deadline("jumps"), gain.best)
         steep = jumps.steepest
         if len(steep):
-            places = (steep - calls.region.low) / calls.region.size
             for search in (gain, one_sided):
-                search.record(steep[:, 0], steep[:, 1], places)
+                for ends in (steep, steep[:, ::-1]):
+                    search.record(ends[:, 0], ends[:, 1], ends)
         self._search_gain(one_sided, "one-sided gain")
+        if one_sided.best is not None:  # no one-sided gain exceeds the gain
+            start, end, approach = np.array(
+                [one_sided.best.start, one_sided.best.end, one_sided.best.approach]
+            )
+            gain.record(start[None], end[None], np.stack([start, approach])[None])
         return gain, one_sided, jumps
 
     def _find_contact(self) -> tuple[ContactRange, FloatArray]:
@@ -389,7 +394,8 @@ class _Search:
             dead=float(silent.mean()),
             dead_at=_plain(below[np.argmax(silent)]) if silent.any() else None,
         )
-        return contact, points[has_force][:_PLACES]
+        order = np.argsort(-np.square(forces[has_force]).sum(axis=1))
+        return contact, points[has_force][order[:_PLACES]]
 
     def _search_gain(self, search: GainSearch, name: str) -> None:
         climbs = number_of_climbs(search.calls, _SHARES[name] * self.seconds)
@@ -412,7 +418,7 @@ class _Search:
         count = int(min(_COST_CALLS, max(8.0, 0.05 * calls.rate)))
         times = calls.renderer.call_times(np.resize(points, (count, 3)))
         median, high = np.quantile(times, [0.5, 0.999]).tolist()
-        return Cost(median, high, float(times.max()), 1.0 / calls.rate)
+        return Cost(median, high, float(times.max()), calls.seconds / calls.calls)
 
 
 def _plain(point: NDArray[np.float64] | None) -> tuple[float, ...] | None:

@@ -9,53 +9,64 @@ import numpy as np
 from asperity.core.checks import FloatArray
 
 STEPS = 60
-_SELECTION = 16
+_GROWTH = 1.8
+_SHRINKAGE = 0.88
+_LEAST_SPREAD = 1e-6
+_REPEATED = 1.5
 
 
 def climb(
     start: FloatArray,
     evaluate: Callable[[FloatArray], FloatArray],
+    limit: Callable[[FloatArray, FloatArray], FloatArray],
     is_over: Callable[[], bool],
     random: np.random.Generator,
-    *,
-    spread: float,
-    selects: bool = False,
+    spread: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return improved points of the unit cube and their values, the best first.
+    """Return improved places and their values, the best first.
+
+    A step that improves is repeated, longer; the others are random: of all points of a place
+    alike, of some of them, or along one axis, so that steps along a border exist.
 
     Args:
-        start: shape (n, k, 3), each number in [0, 1].
-        evaluate: values of such points, shape (n,).
+        start: places of k points each [m], shape (n, k, 3).
+        evaluate: values of places, shape (n,).
+        limit: ends of steps within the region, from their beginnings and their ends.
         is_over: whether to end.
         random: source of the steps.
-        spread: standard deviation of the first steps.
-        selects: whether the better half replaces the other every 16 steps.
+        spread: standard deviation of the first steps along each axis [m], shape (3,).
     """
-    points = start
-    values = evaluate(points)
-    count = len(points)
-    spreads = np.full(count, spread)
-    for step in range(1, STEPS + 1):
+    places = start
+    values = evaluate(places)
+    count = len(places)
+    scales = np.ones(count)
+    steps = np.zeros_like(places)
+    for _ in range(STEPS):
         if is_over():
             break
-        moves = random.normal(size=points.shape)
-        # A third of the steps move all k points alike, the others about half of them.
-        is_shift = random.uniform(size=(count, 1, 1)) < 1 / 3
-        is_moved = random.uniform(size=(count, points.shape[1], 1)) < 0.5
-        moves = np.where(is_shift, moves[:, :1], np.where(is_moved, moves, 0.0))
-        tried = 1.0 - np.abs(1.0 - np.abs(points + spreads[:, None, None] * moves) % 2.0)
+        is_repeated = (steps != 0.0).any(axis=(1, 2))
+        moves = scales[:, None, None] * spread * _random_moves(places.shape, random)
+        moves = np.where(is_repeated[:, None, None], _REPEATED * steps, moves)
+        tried = limit(places, places + moves)
         tried_values = evaluate(tried)
         is_better = tried_values > values
-        points = np.where(is_better[:, None, None], tried, points)
+        steps = np.where(is_better[:, None, None], tried - places, 0.0)
+        places = np.where(is_better[:, None, None], tried, places)
         values = np.where(is_better, tried_values, values)
-        spreads = np.where(is_better, 1.8 * spreads, 0.88 * spreads)
-        spreads = np.where(spreads < 1e-6, spread, spreads)
-        if selects and step % _SELECTION == 0:
-            order = np.argsort(-values)
-            worse = order[count // 2 :]
-            better = order[: len(worse)]
-            points[worse] = points[better]
-            values[worse] = values[better]
-            spreads[worse] = spread
+        factors = np.where(is_better, _GROWTH, _SHRINKAGE)
+        scales = np.where(is_repeated, scales, factors * scales)
+        scales = np.where(scales < _LEAST_SPREAD, 1.0, scales)
     order = np.argsort(-values)
-    return points[order], values[order]
+    return places[order], values[order]
+
+
+def _random_moves(shape: tuple[int, ...], random: np.random.Generator) -> FloatArray:
+    """Return moves of standard deviation 1, shape (n, k, 3)."""
+    moves = random.normal(size=shape)
+    is_shift = random.uniform(size=(shape[0], 1, 1)) < 1 / 3
+    is_moved = random.uniform(size=(shape[0], shape[1], 1)) < 0.5
+    if shape[1] > 1:
+        moves = np.where(is_shift, moves[:, :1], np.where(is_moved, moves, 0.0))
+    is_along_axis = random.uniform(size=(shape[0], 1, 1)) < 0.3
+    axis = random.integers(3, size=(shape[0], 1, 1))
+    return np.where(is_along_axis & (axis != np.arange(3)), 0.0, moves)

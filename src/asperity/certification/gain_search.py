@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from asperity.analysis.bounds.bound import one_sided, spectral_norm
 from asperity.certification import climbing
-from asperity.certification.region import RendererCalls
+from asperity.certification.region import RendererCalls, approach_paths, step_changes
 from asperity.certification.resolution import Resolution
 from asperity.core.checks import FloatArray
 from asperity.core.files import Serializable
@@ -24,6 +24,7 @@ from asperity.core.files import Serializable
 _MAX_CLIMBS = 2048
 _MIN_CLIMBS = 8
 _SEEDS_PER_CLIMB = 8
+_MAX_SEEDS_PER_PLACE = 3
 _CALLS_PER_JACOBIAN = 4
 _CONFIRMED = 16
 _FIRST_SPREAD = 0.05
@@ -90,17 +91,18 @@ class GainSearch:
             climbs: number of climbs of a round.
             progress: called after each round with a text.
         """
+        region = self.calls.region
         while True:
             places = self._seeds(_SEEDS_PER_CLIMB * climbs)
             order = np.argsort(-self._values(places))[:climbs]
             self._confirm(places[order])
-            start = np.concatenate([*self._best_places, places[order]])
             places, _values = climbing.climb(
-                start,
+                np.concatenate([*self._best_places, places[order]]),
                 self._values,
+                region.limit,
                 lambda: time.monotonic() >= deadline,
                 self._random,
-                spread=_FIRST_SPREAD,
+                _FIRST_SPREAD * region.size,
             )
             self._confirm(places)
             self._best_places = [places[: max(1, climbs // 8)]]
@@ -110,45 +112,36 @@ class GainSearch:
 
     def _seeds(self, count: int) -> FloatArray:
         """Return places: Halton points, with approaches from near at many scales."""
-        points = self._halton.random(count)[:, None]
+        region = self.calls.region
+        points = region.points(self._halton.random(_MAX_SEEDS_PER_PLACE * count))
+        points = points[region.contains(points)][:count, None]
         if not self.calls.approaches:
-            return np.asarray(points)
-        scales = 10.0 ** self._random.uniform(-3.0, -0.5, (count, 1, 1))
-        starts = points + scales * self._random.normal(size=points.shape)
-        return np.concatenate([points, np.clip(starts, 0.0, 1.0)], axis=1)
+            return points
+        scales = 10.0 ** self._random.uniform(-3.0, -0.5, (len(points), 1, 1))
+        starts = points + scales * region.size * self._random.normal(size=points.shape)
+        return np.concatenate([points, np.clip(starts, region.low, region.high)], axis=1)
 
     def _values(self, places: FloatArray) -> FloatArray:
-        """Return the measure of the Jacobians at places, -1 outside of the region."""
+        """Return the measure of the Jacobians at places, -1 where they do not exist."""
         jacobians, is_valid = self._jacobians(places)
         return np.where(is_valid, self._measure(jacobians), -1.0)
 
     def _jacobians(self, places: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
         """Return finite-difference Jacobians, and whether they are inside of the region."""
-        points = self.calls.region.points(places[:, 0])
+        region = self.calls.region
         step = self.resolution.secant
-        signs = np.where(points + step > self.calls.region.high, -step, step)
-        stencils = np.repeat(points[:, None], 4, axis=1)
+        stencils = np.repeat(places[:, :1], 4, axis=1)
         for axis in range(3):
-            stencils[:, axis + 1, axis] += signs[:, axis]
-        forces = self._forces(stencils, places)
-        change = forces[:, 1:] - forces[:, :1]
-        jacobians = np.swapaxes(change / signs[:, :, None], 1, 2)
-        inside = self.calls.region.contains(stencils.reshape(-1, 3)).reshape(-1, 4).all(axis=1)
+            stencils[:, axis + 1, axis] += step
+            is_outside = ~region.contains(stencils[:, axis + 1])
+            stencils[is_outside, axis + 1, axis] -= 2.0 * step
+        forces = self.calls.after(places[:, -1], places[:, 0], stencils)
+        steps = np.diagonal(stencils[:, 1:] - stencils[:, :1], axis1=1, axis2=2)
+        jacobians = np.swapaxes((forces[:, 1:] - forces[:, :1]) / steps[:, :, None], 1, 2)
+        inside = region.contains(stencils.reshape(-1, 3)).reshape(-1, 4).all(axis=1)
         is_valid = np.asarray(inside & np.isfinite(jacobians).all(axis=(1, 2)))
         jacobians[~is_valid] = 0.0
         return jacobians, is_valid
-
-    def _forces(self, stencils: FloatArray, places: FloatArray) -> FloatArray:
-        """Return the forces at several points each, shape (n, m, 3).
-
-        A renderer with memory goes from its approach to the first point and from there to each.
-        """
-        if not self.calls.approaches:
-            return self.calls.at(stencils.reshape(-1, 3)).reshape(stencils.shape)
-        first = np.broadcast_to(stencils[:, :1], stencils.shape)
-        start = np.broadcast_to(self.calls.region.points(places[:, 1:]), stencils.shape)
-        paths = np.stack([start, first, stencils], axis=2).reshape(-1, 3, 3)
-        return self.calls.along(paths)[:, 2].reshape(stencils.shape)
 
     def _confirm(self, places: FloatArray) -> None:
         """Measure secants along the directions in which Jacobians are greatest."""
@@ -157,36 +150,41 @@ class GainSearch:
         directions = np.linalg.svd(jacobians)[2][:, 0]
         if self.is_one_sided:
             directions = np.linalg.eigh(-jacobians - np.swapaxes(jacobians, 1, 2))[1][..., -1]
-        points = self.calls.region.points(places[:, 0])
+        points = places[:, 0]
         for step in (self.resolution.secant, -self.resolution.secant):
             self.record(points, points + step * directions, places)
 
     def record(self, starts: FloatArray, ends: FloatArray, places: FloatArray) -> None:
         """Keep the greatest gain of secants [m], shape (n, 3) each, at places.
 
-        Shorter ones than the resolution allows are extended from their beginning.
+        Shorter ones than the resolution allows are extended from their beginning. Each is measured
+        twice, and the smaller gain counts: noise that is rare does not come again.
         """
         shares = self.resolution.secant / np.sqrt(np.square(ends - starts).sum(axis=1))
         ends = starts + np.maximum(shares, 1.0)[:, None] * (ends - starts)
-        forces = self._forces(np.stack([starts, ends], axis=1), places)
-        changes = forces[:, 1] - forces[:, 0]
         steps = ends - starts
         lengths = np.sqrt(np.square(steps).sum(axis=1))
-        sizes = np.sqrt(np.square(changes).sum(axis=1))
-        if self.is_one_sided:
-            sizes = -(changes * steps).sum(axis=1) / lengths
-        gains = sizes - self.resolution.force_error
-        gains /= lengths + 2.0 * self.resolution.position_error
         region = self.calls.region
-        is_valid = np.isfinite(gains) & region.contains(starts) & region.contains(ends)
-        gains = np.where(is_valid, gains, 0.0)
+        gains = np.where(region.contains(starts) & region.contains(ends), np.inf, 0.0)
+        paths = approach_paths(places[:, -1], starts, ends)
+        for _ in range(2):
+            changes, sizes = step_changes(self.calls.along(paths))
+            shown = self._gains(changes, sizes, steps, lengths)
+            gains = np.minimum(gains, np.nan_to_num(shown, nan=0.0))
         index = int(np.argmax(gains))
         if gains[index] > self.value:
-            approach = starts[index]
-            if self.calls.approaches:
-                approach = region.points(places[index, 1])
-            rows = (starts[index], ends[index], approach, changes[index])
+            rows = (starts[index], ends[index], places[index, -1], changes[index])
             self.best = GainWitness(float(gains[index]), *[tuple(row.tolist()) for row in rows])
+
+    def _gains(
+        self, changes: FloatArray, sizes: FloatArray, steps: FloatArray, lengths: FloatArray
+    ) -> FloatArray:
+        """Return what changes of force show beyond noise and steps [N/m], shape (n,)."""
+        if self.is_one_sided:
+            sizes = sizes - np.sqrt(np.square(changes).sum(axis=1))
+            sizes -= (changes * steps).sum(axis=1) / lengths
+        beyond = sizes - self.resolution.force_error
+        return np.asarray(beyond / (lengths + 2.0 * self.resolution.position_error))
 
 
 def number_of_climbs(calls: RendererCalls, seconds: float) -> int:

@@ -1,4 +1,4 @@
-"""A renderer in a process of its own, which reports where it crashed or does not return."""
+"""A renderer in processes of its own, which reports where it crashed or does not return."""
 
 from __future__ import annotations
 
@@ -6,24 +6,26 @@ import mmap
 import os
 import tempfile
 import time
-from concurrent.futures import ThreadPoolExecutor
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from typing import Any
 
 import numpy as np
 
-from asperity.certification.renderers import Renderer, RendererError, RendererSource, crash_error
+from asperity.certification.renderers import (
+    LocalRenderer,
+    RendererError,
+    RendererSource,
+    crash_error,
+)
 from asperity.core.checks import FloatArray
 from asperity.core.processes import end_with_parent
 
 _START_TIMEOUT = 60.0
 _CALL_TIMEOUT = 10.0
 """Times [s] after which a renderer that does not open, or a call, is given up."""
-_MIN_CALLS = 64
-_MAX_CALLS = 100_000
-_PIECE_TIME = 0.2
-"""Calls of one message, and the time [s] that it should take."""
+_LEAST_SHARED = 64
+"""Number of paths from which on processes share them."""
 
 
 class IsolatedRenderer:
@@ -31,72 +33,47 @@ class IsolatedRenderer:
 
     Args:
         source: where it is.
-
-    Raises:
-        RendererError: if it cannot be opened.
     """
 
     def __init__(self, source: RendererSource) -> None:
+        context = get_context("spawn")
         self._counter = tempfile.NamedTemporaryFile()  # noqa: SIM115  # closed with the process
         self._counter.write(bytes(8))
         self._counter.flush()
         self._progress = _progress_array(self._counter.name)
-        context = get_context("spawn")
         self._connection, remote = context.Pipe()
         arguments = (source, self._counter.name, remote)
         self._process = context.Process(target=_serve, args=arguments, daemon=True)
         self._process.start()
         remote.close()
-        try:
-            if not self._connection.poll(_START_TIMEOUT):
-                raise RendererError(f"did not open within {_START_TIMEOUT:g} s")
-            self._receive(np.zeros((1, 1, 3)))
-        except RendererError:
-            self.close()
-            raise
-        self._piece_calls = _MIN_CALLS
 
-    def forces(self, paths: FloatArray) -> FloatArray:
-        """Return forces along paths; see :class:`~asperity.certification.renderers.Renderer`.
+    def check_opened(self) -> None:
+        """Wait until the renderer is open.
 
         Raises:
-            RendererError: if it crashes or does not return, with the position.
+            RendererError: if it cannot be opened.
         """
-        forces = np.empty_like(paths)
-        start = 0
-        while start < len(paths):
-            count = max(1, self._piece_calls // paths.shape[1])
-            forces[start : start + count] = self._piece_forces(paths[start : start + count])
-            start += count
-        return forces
+        if not self._connection.poll(_START_TIMEOUT):
+            raise RendererError(f"did not open within {_START_TIMEOUT:g} s")
+        try:
+            answer = self._connection.recv()
+        except (EOFError, ConnectionError):
+            self._process.join()
+            reason = f"ended with exit code {self._process.exitcode} while it was opened"
+            raise RendererError(reason) from None
+        if isinstance(answer, RendererError):
+            raise answer
 
-    def call_times(self, points: FloatArray) -> FloatArray:
-        """Return the time of a call at each point [s], shape (n,)."""
-        return self._request("call_times", points)
-
-    def close(self) -> None:
-        """End the process."""
-        self._process.kill()
-        self._process.join()
-        self._connection.close()
-        self._counter.close()
-
-    def _piece_forces(self, paths: FloatArray) -> FloatArray:
-        began = time.monotonic()
-        forces = self._request("forces", paths)
-        duration = max(time.monotonic() - began, 1e-6)
-        calls = int(self._piece_calls * min(2.0, _PIECE_TIME / duration))
-        self._piece_calls = min(max(calls, _MIN_CALLS), _MAX_CALLS)
-        return forces
-
-    def _request(self, method: str, points: FloatArray) -> FloatArray:
+    def send(self, method: str, points: FloatArray) -> None:
+        """Call a method of the renderer without waiting for its result."""
         self._connection.send((method, points))
-        self._wait(points)
-        answer: FloatArray = self._receive(points)
-        return answer
 
-    def _wait(self, paths: FloatArray) -> None:
-        """Wait for an answer as long as calls return."""
+    def receive(self, points: FloatArray) -> FloatArray:
+        """Return the result of the method that was called with points.
+
+        Raises:
+            RendererError: if it crashed or does not return, with the position.
+        """
         calls = int(self._progress[0])
         changed = time.monotonic()
         while not self._connection.poll(0.1):
@@ -105,26 +82,27 @@ class IsolatedRenderer:
                 calls = int(self._progress[0])
                 changed = now
             if now - changed > _CALL_TIMEOUT:
-                self.close()
-                reason = f"did not return in {_CALL_TIMEOUT:g} s"
-                raise crash_error(self._point(paths, calls), reason)
-
-    def _receive(self, paths: FloatArray) -> Any:
+                raise self._error(points, f"did not return in {_CALL_TIMEOUT:g} s")
         try:
-            answer = self._connection.recv()
+            answer: FloatArray | RendererError = self._connection.recv()
         except (EOFError, ConnectionError):
             self._process.join()
-            code = self._process.exitcode
-            point = self._point(paths, int(self._progress[0]))
-            raise crash_error(point, f"crashed with exit code {code}") from None
+            reason = f"crashed with exit code {self._process.exitcode}"
+            raise self._error(points, reason) from None
         if isinstance(answer, RendererError):
             raise answer
         return answer
 
-    @staticmethod
-    def _point(paths: FloatArray, call: int) -> FloatArray:
-        points: FloatArray = paths.reshape(-1, 3)
-        return np.asarray(points[min(call, len(points) - 1)])
+    def close(self) -> None:
+        """End the process."""
+        self._process.kill()
+        self._process.join()
+        self._connection.close()
+        self._counter.close()
+
+    def _error(self, points: FloatArray, reason: str) -> RendererError:
+        places: FloatArray = points.reshape(-1, 3)
+        return crash_error(places[min(int(self._progress[0]), len(places) - 1)], reason)
 
 
 def _progress_array(path: str) -> Any:
@@ -135,15 +113,13 @@ def _progress_array(path: str) -> Any:
 def _serve(source: RendererSource, counter: str, connection: Connection) -> None:
     """Answer requests until the connection is closed."""
     end_with_parent()
-    progress = _progress_array(counter)
-    request: tuple[str, FloatArray]
     try:
         renderer = source.load()
-        renderer.progress = progress
+        renderer.progress = _progress_array(counter)
         connection.send("opened")
         while True:
-            request = connection.recv()
-            connection.send(_answer(renderer, *request, progress))
+            method, points = connection.recv()
+            connection.send(_answer(renderer, method, points))
     except RendererError as error:
         connection.send(error)
     except EOFError:
@@ -151,18 +127,15 @@ def _serve(source: RendererSource, counter: str, connection: Connection) -> None
     os._exit(0)  # threads of the renderer may not end
 
 
-def _answer(
-    renderer: Renderer, method: str, points: FloatArray, progress: Any
-) -> FloatArray | RendererError:
+def _answer(renderer: LocalRenderer, method: str, points: FloatArray) -> FloatArray | RendererError:
     """Return what a method of the renderer returns, or its error."""
-    methods = {"forces": renderer.forces, "call_times": renderer.call_times}
     try:
-        answer = methods[method](points)
+        answer: FloatArray = getattr(renderer, method)(points)
     except RendererError as error:
         return error
     except Exception as error:  # of a user's function
         return RendererError(f"raised {type(error).__name__}: {error}")
-    progress[0] += 1
+    renderer.progress[0] += 1
     return answer
 
 
@@ -172,31 +145,41 @@ class RendererPool:
     Args:
         source: where it is.
         copies: number of processes.
+
+    Raises:
+        RendererError: if it cannot be opened.
     """
 
     def __init__(self, source: RendererSource, copies: int) -> None:
-        self._renderers: list[IsolatedRenderer] = []
-        for _ in range(copies):
-            self._renderers.append(IsolatedRenderer(source))
-        self._threads = ThreadPoolExecutor(copies)
+        self._renderers = [IsolatedRenderer(source) for _ in range(copies)]
+        try:
+            for renderer in self._renderers:
+                renderer.check_opened()
+        except RendererError:
+            self.close()
+            raise
 
     def forces(self, paths: FloatArray) -> FloatArray:
-        """Return forces along paths; see :class:`IsolatedRenderer`."""
-        if len(paths) < _MIN_CALLS:
-            return self._renderers[0].forces(paths)
-        parts = np.array_split(paths, len(self._renderers))
-        return np.concatenate(list(self._threads.map(_part_forces, self._renderers, parts)))
+        """Return forces along paths; see :class:`~asperity.certification.renderers.Renderer`.
+
+        Raises:
+            RendererError: if it crashes or does not return, with the position.
+        """
+        copies = len(self._renderers) if len(paths) >= _LEAST_SHARED else 1
+        parts = np.array_split(paths, copies)
+        for renderer, part in zip(self._renderers, parts, strict=False):
+            renderer.send("forces", part)
+        forces = []
+        for renderer, part in zip(self._renderers, parts, strict=False):
+            forces.append(renderer.receive(part))
+        return np.concatenate(forces)
 
     def call_times(self, points: FloatArray) -> FloatArray:
         """Return the time of a call at each point [s], shape (n,)."""
-        return self._renderers[0].call_times(points)
+        self._renderers[0].send("call_times", points)
+        return self._renderers[0].receive(points)
 
     def close(self) -> None:
         """End the processes."""
         for renderer in self._renderers:
             renderer.close()
-        self._threads.shutdown()
-
-
-def _part_forces(renderer: IsolatedRenderer, paths: FloatArray) -> FloatArray:
-    return renderer.forces(paths)

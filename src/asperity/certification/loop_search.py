@@ -1,7 +1,7 @@
 """Search for closed loops on which a renderer gains energy, and their work under refinement.
 
-For a renderer without memory the circulation of the cells of a plane grid is computed; the cells of
-one sign, walked around, gain the sum of their circulations. For a renderer with memory, polygons
+For a renderer without memory the circulation of the cells of a plane grid is computed; the regions
+of one sign, walked around, gain the sum of their circulations. For a renderer with memory, polygons
 are improved by random steps, walked until the work of a turn is steady.
 
 **The work of a loop is what it tends to under refinement.** Its error is the larger of the last two
@@ -14,10 +14,10 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from asperity.certification.climbing import climb
 from asperity.certification.region import RendererCalls
@@ -30,13 +30,15 @@ TURNS = 3
 _ERRORS_PER_WORK = 5.0
 _ROUNDING = 1e-8
 _COARSE_CELLS = 36
-_FINE_CELLS = 128
+_FINE_CELLS = 320
+_PLANES = 64
 _REFINED = 6
+_OUTLINES = 24
 _POLYGONS = 64
 _VERTICES = 6
 _SIDE_POINTS = 24
 _LOOP_POINTS = 512
-_MAX_SIDES = 20_000
+_FIRST_SPREAD = 0.3
 
 
 @dataclass(frozen=True)
@@ -117,115 +119,102 @@ class LoopSearch:
 
     def _search_planes(self, deadline: float) -> None:
         """Try planes at random on a coarse grid, and the best ones on a fine grid."""
-        budget = self.calls.rate * max(deadline - time.monotonic(), 0.0)
+        now = time.monotonic()
+        budget = self.calls.rate * max(deadline - now, 0.0)
         cells = int(min(_COARSE_CELLS, max(6.0, math.sqrt(budget / 80.0))))
-        fine_cells = int(min(_FINE_CELLS, max(cells, 0.3 * math.sqrt(budget))))
-        planes = [self._random_plane() for _ in range(4 * _REFINED)]
+        fine_cells = int(min(_FINE_CELLS, max(cells, 0.2 * math.sqrt(budget))))
+        planes = [self._random_plane() for _ in range(_PLANES)]
         energies = []
         for plane in planes:
-            circulations = self._circulations(plane, cells)
-            positive = circulations[circulations > 0.0].sum()
-            negative = -circulations[circulations < 0.0].sum()
-            energies.append(max(positive, negative))
-            if time.monotonic() >= deadline:
+            energies.append(np.nansum(np.abs(self._circulations(plane, cells))))
+            if time.monotonic() >= now + 0.4 * (deadline - now):
                 break
         for index in np.argsort(energies)[::-1][:_REFINED]:
-            self._walk_around(planes[index], fine_cells)
+            circulations = self._circulations(planes[index], fine_cells)
+            for sign in (1, -1):
+                self._record_outlines(_sign_outlines(sign * circulations, planes[index]))
             if time.monotonic() >= deadline:
                 break
 
     def _random_plane(self) -> FloatArray:
-        """Return corner and two sides of a rectangle in the region, shape (3, 3).
+        """Return corner and two sides of a rectangle across the region, shape (3, 3).
 
-        Most planes are vertical, along the axes or at any angle; some are horizontal.
+        Most planes are vertical, half of these along an axis; some are horizontal.
         """
         region = self.calls.region
-        size = region.size
-        at = region.points(self._random.uniform(size=3))
-        kind = int(self._random.integers(8))
-        if kind == 7:
-            corner = np.array([region.low[0], region.low[1], at[2]])
-            return np.array([corner, [size[0], 0.0, 0.0], [0.0, size[1], 0.0]])
-        angle = self._random.uniform(0.0, math.pi)
-        if kind < 6:
-            angle = 0.5 * math.pi * (kind % 2)
-        direction = np.array([math.cos(angle), math.sin(angle), 0.0])
-        start, end = _chord(region.low[:2], region.high[:2], at[:2], direction[:2])
-        corner = np.array([*(at[:2] + start * direction[:2]), region.low[2]])
-        return np.array([corner, (end - start) * direction, [0.0, 0.0, size[2]]])
+        start, end = region.points(self._random.uniform(size=(2, 3)))
+        if self._random.integers(8) == 0:
+            corner = np.array([region.low[0], region.low[1], start[2]])
+            return np.stack([corner, region.size * [1, 0, 0], region.size * [0, 1, 0]])
+        across = int(self._random.integers(2))
+        along = 1 - across
+        if self._random.uniform() < 0.5:
+            end[across] = start[across]
+        start[along] = region.low[along]
+        end[along] = region.high[along]
+        start[2] = region.low[2]
+        end[2] = region.low[2]
+        return np.stack([start, end - start, region.size * [0, 0, 1]])
 
     def _circulations(self, plane: FloatArray, cells: int) -> FloatArray:
-        """Return the work around each cell of a grid, zero outside of the region, shape (n, n)."""
+        """Return the work around each cell of a grid, NaN outside of the region, shape (n, m)."""
         corner, side, height = plane
-        nodes = np.arange(cells + 1.0) / cells
-        middles = nodes[:-1] + 0.5 / cells
-        along = corner + middles[:, None, None] * side + nodes[None, :, None] * height
-        up = corner + nodes[:, None, None] * side + middles[None, :, None] * height
-        work_along = self.calls.at(along.reshape(-1, 3)).reshape(along.shape) @ side / cells
-        work_up = self.calls.at(up.reshape(-1, 3)).reshape(up.shape) @ height / cells
+        # About square cells, as many in all.
+        ratio = min(max(math.sqrt(math.hypot(*side) / math.hypot(*height)), 1 / 3), 3.0)
+        columns = int(cells * ratio)
+        rows = int(cells / ratio)
+        x = np.arange(columns + 1.0)[:, None, None] / columns * side
+        z = np.arange(rows + 1.0)[:, None] / rows * height
+        along = corner + x[:-1] + 0.5 / columns * side + z
+        up = corner + x + z[:-1] + 0.5 / rows * height
+        work_along = self.calls.at(along.reshape(-1, 3)).reshape(along.shape) @ side / columns
+        work_up = self.calls.at(up.reshape(-1, 3)).reshape(up.shape) @ height / rows
         work = work_along[:, :-1] + work_up[1:] - work_along[:, 1:] - work_up[:-1]
-        corners = corner + nodes[:, None, None] * side + nodes[None, :, None] * height
-        inside = self.calls.region.contains(corners.reshape(-1, 3)).reshape(cells + 1, cells + 1)
+        corners = corner + x + z
+        inside = self.calls.region.contains(corners.reshape(-1, 3)).reshape(columns + 1, rows + 1)
         whole = inside[:-1, :-1] & inside[1:, :-1] & inside[:-1, 1:] & inside[1:, 1:]
-        return np.where(whole & np.isfinite(work), work, 0.0)
-
-    def _walk_around(self, plane: FloatArray, cells: int) -> None:
-        """Record the loop around all cells of one sign, joined by ways there and back."""
-        from scipy import ndimage
-
-        circulations = self._circulations(plane, cells)
-        threshold = 1e-3 * np.abs(circulations).max()
-        for sign in (1, -1):
-            labels, count = ndimage.label(sign * circulations > threshold)
-            energies = ndimage.sum(sign * circulations, labels, np.arange(1, count + 1))
-            outlines: list[FloatArray] = []
-            for label in np.argsort(energies)[::-1] + 1:
-                for outline in cell_outlines(labels == label):
-                    vertices = outline[::sign] / cells
-                    outlines.append(plane[0] + vertices @ plane[1:])
-                if sum(map(len, outlines)) > _MAX_SIDES:
-                    break
-            self._record_outlines(outlines)
+        return np.where(whole, work, np.nan)
 
     def _record_outlines(self, outlines: list[FloatArray]) -> None:
-        """Record the loop that consists of the outlines which gain more than their error."""
+        """Record the loop that consists of the outlines which gain more than their error.
+
+        They are joined by ways there and back.
+        """
         parts = []
         for outline in outlines:
             part = self.measure(outline)
+            if part.energy < 0.0:
+                part = replace(part, energy=-part.energy, path=part.path[::-1])
             if part.counts:
                 parts.append(part)
         self.rejected += len(outlines) - len(parts)
         if not parts:
             return
-        parts.sort(key=lambda part: -part.energy)
-        energy = sum(part.energy for part in parts)
-        if self.best is not None and energy <= self.best.energy:
-            return
-        path = parts[0].path
-        for part in parts[1:]:  # from the first vertex there, around it, and back
-            path = np.concatenate([path, path[:1], part.path, part.path[:1]])
-        path = path if len(parts) == 1 else np.concatenate([path, path[:1]])
-        error = sum(part.error for part in parts)
-        self.best = ClosedLoop(energy, error, _length(path), path)
+        self._keep(_join(parts))
+
+    def _keep(self, loop: ClosedLoop) -> None:
+        if self.best is None or loop.energy > self.best.energy:
+            self.best = loop
 
     # --- polygons of a renderer with memory ---
 
     def _search_polygons(self, deadline: float) -> None:
         """Improve polygons by random steps."""
+        region = self.calls.region
         polygons, _energies = climb(
-            self._random_polygons(),
+            region.points(self._random_polygons()),
             self._polygon_works,
+            region.limit,
             lambda: time.monotonic() >= deadline,
             self._random,
-            spread=0.3,
-            selects=True,
+            _FIRST_SPREAD * region.size,
         )
         for polygon in polygons[:_REFINED]:
-            loop = self.measure(self.calls.region.points(polygon))
-            if not loop.counts:
+            loop = self.measure(polygon)
+            if loop.counts:
+                self._keep(loop)
+            else:
                 self.rejected += 1
-            elif self.best is None or loop.energy > self.best.energy:
-                self.best = loop
 
     def _random_polygons(self) -> FloatArray:
         """Return polygons in vertical planes as fractions of the region, of many sizes."""
@@ -241,25 +230,10 @@ class LoopSearch:
 
     def _polygon_works(self, polygons: FloatArray) -> FloatArray:
         """Return the work of the last turn of each polygon [J], shape (polygons,)."""
-        corners = self.calls.region.points(polygons)
-        following = np.roll(corners, -1, axis=1)
+        following = np.roll(polygons, -1, axis=1)
         shares = np.arange(_SIDE_POINTS)[:, None] / _SIDE_POINTS
-        paths = corners[:, :, None] + shares * (following - corners)[:, :, None]
-        paths = paths.reshape(len(polygons), -1, 3)
-        energies: FloatArray = self._turn_works(paths)[0]
-        return energies
-
-    def _turn_works(self, curves: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the works of the last turn and of the one before [J], shape (curves,) each."""
-        turns = np.concatenate([np.tile(curves, (1, TURNS, 1)), curves[:, :1]], axis=1)
-        forces = self.calls.along(turns)
-        steps = np.diff(turns, axis=1)
-        works = (0.5 * (forces[:, 1:] + forces[:, :-1]) * steps).sum(axis=2)
-        works = works.reshape(len(curves), TURNS, -1).sum(axis=2)
-        inside = self.calls.region.contains(curves.reshape(-1, 3)).reshape(curves.shape[:2])
-        is_valid = np.asarray(inside.all(axis=1)) & np.isfinite(works).all(axis=1)
-        works = np.where(is_valid[:, None], works, -np.inf)
-        return works[:, -1], works[:, -2]
+        paths = polygons[:, :, None] + shares * (following - polygons)[:, :, None]
+        return self._turn_works(paths.reshape(len(polygons), -1, 3))[0]
 
     # --- work under refinement ---
 
@@ -270,35 +244,43 @@ class LoopSearch:
         doubt = 0.0
         for factor in (1, 2, 4):
             path = subdivide(vertices, length / (_LOOP_POINTS * factor), 2 * factor)
-            if self.calls.approaches:
-                last, previous = self._turn_works(path[None])
-                work = float(last[0])
-                doubt = abs(work - float(previous[0]))
-            else:
-                work, doubt = self._middle_work(path)
-            works.append(work)
+            turn_works, doubts = self._turn_works(path[None])
+            works.append(float(turn_works[0]))
+            doubt = float(doubts[0])
         first, second, third = works
         changes = max(abs(second - first), abs(third - second), doubt)
         error = math.inf
         if math.isfinite(changes):
             unknown = self._unknown_force + _ROUNDING * self.calls.largest_force
             error = changes + unknown * length / _ERRORS_PER_WORK
-        turns = TURNS if self.calls.approaches else 1
-        return ClosedLoop(third, error, length, vertices, turns)
+        return ClosedLoop(third, error, length, vertices, self._turns)
 
-    def _middle_work(self, path: FloatArray) -> tuple[float, float]:
-        """Return the work with the force at the middle of each side, and what jumps make of it.
+    @property
+    def _turns(self) -> int:
+        return TURNS if self.calls.approaches else 1
 
-        Where the force jumps within a side, doubling the points may change nothing by chance. A
-        jump is a change between neighbours that exceeds twice those beside it.
+    def _turn_works(self, curves: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the works of the last turn, and their doubts [J], shape (curves,) each.
+
+        A work is in doubt by its change from turn to turn, and by the jumps within steps, since
+        doubling the points may change nothing there by chance.
         """
-        steps = np.roll(path, -1, axis=0) - path
-        forces = self.calls.at(path + 0.5 * steps)
-        changes = np.sqrt(np.square(np.roll(forces, -1, axis=0) - forces).sum(axis=1))
-        smooth = 2.0 * (np.roll(changes, 1) + np.roll(changes, -1))
-        jumps = np.maximum(changes - smooth, 0.0)
-        doubt = jumps * np.sqrt(np.square(steps).sum(axis=1))
-        return float((forces * steps).sum()), float(doubt.sum())
+        turns = self._turns
+        walks = np.concatenate([np.tile(curves, (1, turns, 1)), curves[:, :1]], axis=1)
+        if self.calls.approaches:
+            forces = self.calls.along(walks)
+        else:
+            forces = self.calls.at(walks.reshape(-1, 3)).reshape(walks.shape)
+        steps = np.diff(walks, axis=1)
+        works = (0.5 * (forces[:, 1:] + forces[:, :-1]) * steps).sum(axis=2)
+        works = works.reshape(len(curves), turns, -1).sum(axis=2)
+        last = curves.shape[1]
+        doubts = _jump_doubts(forces[:, -last - 1 :], steps[:, -last:])
+        if turns > 1:
+            doubts = np.maximum(doubts, np.abs(works[:, -1] - works[:, -2]))
+        inside = self.calls.region.contains(curves.reshape(-1, 3)).reshape(curves.shape[:2])
+        is_valid = np.asarray(inside.all(axis=1)) & np.isfinite(works).all(axis=1)
+        return np.where(is_valid, works[:, -1], -np.inf), doubts
 
     def walking_spread(self, loop: ClosedLoop) -> tuple[float, FloatArray]:
         """Return how much the forces of a walk around a loop differ from those after a reset.
@@ -307,11 +289,9 @@ class LoopSearch:
             The greatest difference [N], beyond what noise and steps explain, and where it is [m].
         """
         path = resample(loop.path, 4 * _LOOP_POINTS)
-        changes = self.calls.along(np.tile(path, (2, 1))[None])[0, len(path) :] - self.calls.at(
-            path
-        )
-        sizes = np.nan_to_num(np.sqrt(np.square(changes).sum(axis=1)))
-        index = int(np.argmax(sizes))
+        walked = self.calls.along(np.tile(path, (2, 1))[None])[0, len(path) :]
+        sizes = np.sqrt(np.square(walked - self.calls.at(path)).sum(axis=1))
+        index = int(np.argmax(np.nan_to_num(sizes)))
         threshold = self._unknown_force + 1e-9 * self.calls.largest_force
         return float(sizes[index]) if sizes[index] > threshold else 0.0, path[index]
 
@@ -323,50 +303,48 @@ class LoopSearch:
         turns = np.concatenate([np.tile(path, (loop.turns, 1)), path[:1]])
         forces = self.calls.along(turns[None])[0]
         work = float((forces[:-1] * np.diff(turns, axis=0))[-count:].sum())
-        return ClosedLoop(
-            loop.energy,
-            loop.error,
-            loop.length,
-            loop.path,
-            loop.turns,
-            work,
-            loop.held_speed,
-            loop.held_rate,
-        )
+        return replace(loop, held_energy=work)
 
 
-def cell_outlines(cells: NDArray[np.bool_]) -> list[FloatArray]:
-    """Return the outlines of a set of cells, counter-clockwise around them, shape (n, 2) each.
+def _join(parts: list[ClosedLoop]) -> ClosedLoop:
+    """Return the loop along all parts, from the first vertex to each and back."""
+    path = parts[0].path
+    for part in parts[1:]:
+        path = np.concatenate([path, path[:1], part.path, part.path[:1]])
+    if len(parts) > 1:
+        path = np.concatenate([path, path[:1]])
+    energy = sum(part.energy for part in parts)
+    error = sum(part.error for part in parts)
+    return ClosedLoop(energy, error, _length(path), path)
 
-    Straight runs have no vertices between their ends.
+
+def _jump_doubts(forces: FloatArray, steps: FloatArray) -> FloatArray:
+    """Return what jumps within steps may do to works [J], shape (curves,).
+
+    A jump is a change between neighbours that exceeds twice those beside it.
     """
-    padded = np.pad(cells, 1)
-    following: dict[tuple[int, int], list[tuple[int, int]]] = {}
-    # Each side with a cell on its left and none on its right, as its first and second node.
-    for i, j in np.argwhere(cells).tolist():
-        if not padded[i + 1, j]:
-            following.setdefault((i, j), []).append((i + 1, j))
-        if not padded[i + 2, j + 1]:
-            following.setdefault((i + 1, j), []).append((i + 1, j + 1))
-        if not padded[i + 1, j + 2]:
-            following.setdefault((i + 1, j + 1), []).append((i, j + 1))
-        if not padded[i, j + 1]:
-            following.setdefault((i, j + 1), []).append((i, j))
-    outlines = []
-    while following:
-        node = next(iter(following))
-        nodes = []
-        while node in following:
-            nodes.append(node)
-            targets = following[node]
-            target = targets.pop()
-            if not targets:
-                del following[node]
-            node = target
-        corners = np.array(nodes, dtype=float)
-        turn = np.diff(np.concatenate([corners[-1:], corners, corners[:1]]), 2, axis=0)
-        outlines.append(corners[(turn != 0.0).any(axis=1)])
-    return outlines
+    changes = np.sqrt(np.square(np.diff(forces, axis=1)).sum(axis=2))
+    beside = np.roll(changes, 1, axis=1) + np.roll(changes, -1, axis=1)
+    jumps = np.maximum(changes - 2.0 * beside, 0.0)
+    return np.asarray((jumps * np.sqrt(np.square(steps).sum(axis=2))).sum(axis=1))
+
+
+def _sign_outlines(circulations: FloatArray, plane: FloatArray) -> list[FloatArray]:
+    """Return the outlines of the positive cells of a plane, the longest first, shape (n, 3) each.
+
+    The region ends in the middle of a cell whose circulation is NaN, and at the plane's border.
+    """
+    from contourpy import contour_generator
+
+    greatest = np.nanmax(np.abs(circulations), initial=0.0)
+    padded = np.pad(np.nan_to_num(circulations, nan=-1e3 * greatest), 1)
+    x, y = [np.clip((np.arange(n + 2) - 0.5) / n, 0.0, 1.0) for n in circulations.shape]
+    lines: list[Any] = list(contour_generator(x, y, padded.T).lines(1e-3 * greatest))
+    outlines: list[FloatArray] = []
+    for line in lines:
+        outlines.append(plane[0] + line[:-1] @ plane[1:])
+    outlines.sort(key=lambda outline: -_length(outline))
+    return outlines[:_OUTLINES]
 
 
 def subdivide(vertices: FloatArray, spacing: float, least: int) -> FloatArray:
@@ -398,15 +376,3 @@ def resample(vertices: FloatArray, count: int) -> FloatArray:
 def _length(vertices: FloatArray) -> float:
     steps = np.roll(vertices, -1, axis=0) - vertices
     return float(np.sqrt(np.square(steps).sum(axis=1)).sum())
-
-
-def _chord(
-    low: FloatArray, high: FloatArray, at: FloatArray, direction: FloatArray
-) -> tuple[float, float]:
-    """Return the range of t for which at + t direction is in a rectangle."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        first = (low - at) / direction
-        second = (high - at) / direction
-    start = np.fmax.reduce(np.fmin(first, second))
-    end = np.fmin.reduce(np.fmax(first, second))
-    return float(start), float(end)

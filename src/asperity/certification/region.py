@@ -18,6 +18,10 @@ Predicate = Callable[[FloatArray], NDArray[np.bool_]]
 
 _REACH = 0.1
 """Distance from the origin [m] within which a surface is looked for."""
+_BORDER_HALVINGS = 8
+_OVERHEAD = 1e-6
+_APPROACH = np.append(np.linspace(0.0, 1.0, 25), [1.0, 1.0, 1.0])
+"""Shares of an approach: steps, and a rest in which a proxy settles."""
 _HALF_WIDTH = 5e-3
 _DEPTH = 1e-3
 """Half the width of a region that was found, and its depth below the lowest contact [m]."""
@@ -56,6 +60,25 @@ class Region:
         """Return the points at fractions of the box, shape (n, 3)."""
         return self.low + fractions * self.size
 
+    def limit(self, starts: FloatArray, ends: FloatArray) -> FloatArray:
+        """Return the ends of steps [m], or where they leave the region, shape (..., 3).
+
+        Args:
+            starts: points of the region, shape (..., 3).
+            ends: as many.
+        """
+        limited = np.clip(ends, self.low, self.high).reshape(-1, 3)
+        beyond = np.flatnonzero(~self.contains(limited))
+        inside = starts.reshape(-1, 3)[beyond]
+        outside = limited[beyond]
+        for _ in range(_BORDER_HALVINGS if len(beyond) else 0):
+            middle = 0.5 * (inside + outside)
+            is_inside = self.contains(middle)[:, None]
+            inside = np.where(is_inside, middle, inside)
+            outside = np.where(is_inside, outside, middle)
+        limited[beyond] = inside
+        return limited.reshape(ends.shape)
+
 
 class RendererCalls:
     """Counted calls of a renderer in a region, with the extremes of all answers.
@@ -85,8 +108,8 @@ class RendererCalls:
 
     @property
     def rate(self) -> float:
-        """Calls per second so far [Hz]."""
-        return self.calls / max(self.seconds, 1e-6)
+        """Calls per second so far, with what a search does for each [Hz]."""
+        return self.calls / (self.seconds + _OVERHEAD * self.calls + 1e-6)
 
     def along(self, paths: FloatArray) -> FloatArray:
         """Return forces along paths, each after a reset, shape (n, m, 3); NaN if not finite."""
@@ -99,17 +122,28 @@ class RendererCalls:
         self._record(paths.reshape(-1, 3), forces.reshape(-1, 3))
         return forces
 
-    def at(self, points: FloatArray, offsets: FloatArray | None = None) -> FloatArray:
-        """Return the force at points, shape (n, 3).
+    def at(self, points: FloatArray) -> FloatArray:
+        """Return the force at points, each after a reset, shape (n, 3)."""
+        return self.along(points[:, None])[:, 0]
+
+    def after(self, approaches: FloatArray, starts: FloatArray, points: FloatArray) -> FloatArray:
+        """Return the forces at points [N], shape (n, m, 3).
+
+        A renderer with memory walks after a reset in small steps from its approach to its start,
+        rests there, and steps to the point.
 
         Args:
-            points: [m], shape (n, 3).
-            offsets: where the approach of a renderer with memory begins, relative to the point [m];
-                by default at the point itself.
+            approaches: where the approach begins [m], shape (n, 3).
+            starts: where it ends [m], shape (n, 3).
+            points: [m], shape (n, m, 3).
         """
-        if offsets is None or not self.approaches:
-            return self.along(points[:, None])[:, 0]
-        return self.along(np.stack([points + offsets, points], axis=1))[:, 1]
+        if not self.approaches:
+            return self.at(points.reshape(-1, 3)).reshape(points.shape)
+        paths = []
+        for index in range(points.shape[1]):
+            paths.append(approach_paths(approaches, starts, points[:, index]))
+        forces = self.along(np.concatenate(paths))[:, -1]
+        return np.swapaxes(forces.reshape(points.shape[1], -1, 3), 0, 1)
 
     def _record(self, points: FloatArray, forces: FloatArray) -> None:
         invalid = ~np.isfinite(forces).all(axis=1)
@@ -122,6 +156,24 @@ class RendererCalls:
         if magnitudes[index] > self.largest_force:
             self.largest_force = float(magnitudes[index])
             self.largest_at = points[index].copy()
+
+
+def approach_paths(approaches: FloatArray, starts: FloatArray, ends: FloatArray) -> FloatArray:
+    """Return paths from approaches by starts to ends, shape (n, 3) each, as shape (n, k, 3)."""
+    walks = approaches[:, None] + _APPROACH[:, None] * (starts - approaches)[:, None]
+    return np.concatenate([walks, ends[:, None]], axis=1)
+
+
+def step_changes(forces: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the changes of forces in the last step of paths [N], shape (n, m, 3).
+
+    Returns:
+        The changes, shape (n, 3), and their magnitudes beyond the change in the rest before, since
+        the force of a renderer with memory may change without a step, shape (n,).
+    """
+    steps = np.diff(forces[:, -3:], axis=1)
+    rests, sizes = np.sqrt(np.square(steps).sum(axis=2)).T
+    return steps[:, 1], sizes - rests
 
 
 def contact_heights(calls: RendererCalls, xy: FloatArray, low: float, high: float) -> FloatArray:

@@ -14,14 +14,15 @@ import shlex
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from threading import Thread
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
@@ -33,6 +34,8 @@ ForceFunction = Callable[[Any], ArrayLike]
 STATE_BYTES = 2**16
 """Size of the state of a library without ``NAME_state_size``."""
 _ALIGNMENT = 64
+_LINES_AT_ONCE = 200
+"""Lines to a program at once: they and their answers fit into the buffer of a pipe."""
 UNITS = {"m": 1.0, "mm": 1e-3}
 """Units of position of a renderer [m]."""
 
@@ -58,16 +61,6 @@ class Renderer(Protocol):
     def close(self) -> None:
         """Release the renderer."""
         ...
-
-
-class LocalRenderer(Renderer, Protocol):
-    """A renderer in this process.
-
-    Attributes:
-        progress: number of the call in progress, shape (1,), in memory that outlives a crash.
-    """
-
-    progress: NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -104,21 +97,63 @@ class RendererSource:
         return loaders[self.kind](self)
 
 
-class Pace:
-    """Calls a renderer at the rate of its own loop."""
+class LocalRenderer(ABC):
+    """A renderer in this process, which is called point by point at the rate of its own loop.
 
-    def __init__(self, rate: float) -> None:
-        self._period = 1.0 / rate if rate else 0.0
+    Args:
+        unit: unit of position.
+        rate: update rate of its own loop [Hz], 0 for none.
+
+    Attributes:
+        progress: number of the call in progress, shape (1,), in memory that outlives a crash.
+    """
+
+    def __init__(self, unit: str, rate: float) -> None:
+        self.scale = 1.0 / UNITS[unit]
+        self.rate = rate
+        self.progress = np.zeros(1, dtype=np.int64)
         self._due = time.perf_counter()
 
+    @abstractmethod
+    def reset(self) -> None:
+        """Forget what was before."""
+
+    @abstractmethod
+    def force(self, point: FloatArray) -> ArrayLike:
+        """Return the force [N] at a point in its unit, shape (3,)."""
+
+    def forces(self, paths: FloatArray) -> FloatArray:
+        """Return forces along paths; see :class:`Renderer`."""
+        forces = np.empty_like(paths)
+        for number, path in enumerate(self.scale * paths):
+            self.reset()
+            for index, point in enumerate(path):
+                self.progress[0] = number * len(path) + index
+                self.wait()
+                forces[number, index] = _checked_forces(self.force(point), point)
+        return forces
+
+    def call_times(self, points: FloatArray) -> FloatArray:
+        """Return the time of a call at each point [s], shape (n,)."""
+        times = np.empty(len(points))
+        for index, point in enumerate(points):
+            began = time.perf_counter()
+            self.forces(point[None, None])
+            times[index] = time.perf_counter() - began
+        return times
+
     def wait(self) -> None:
-        """Wait until the next call is due."""
-        if self._period:
-            self._due = max(self._due + self._period, time.perf_counter())
+        """Wait until the next call of its loop is due."""
+        if self.rate:
+            self._due = max(self._due + 1.0 / self.rate, time.perf_counter())
             time.sleep(max(self._due - time.perf_counter(), 0.0))
 
+    def close(self) -> None:
+        """Release what it holds."""
+        return
 
-class FunctionRenderer:
+
+class FunctionRenderer(LocalRenderer):
     """A function in Python; a method ``reset`` of it is called before each path.
 
     Args:
@@ -131,34 +166,23 @@ class FunctionRenderer:
     """
 
     def __init__(self, function: ForceFunction, unit: str = "m", rate: float = 0.0) -> None:
+        super().__init__(unit, rate)
         self._function = function
-        self._scale = 1.0 / UNITS[unit]
-        self._reset: Callable[[], object] | None = getattr(function, "reset", None)
-        self._pace = Pace(rate)
-        self.progress = np.zeros(1, dtype=np.int64)
-        self._takes_many = self._reset is None and not rate and self._accepts_many()
+        self._takes_many = not hasattr(function, "reset") and not rate and self._accepts_many()
 
     def forces(self, paths: FloatArray) -> FloatArray:
         """Return forces along paths; see :class:`Renderer`."""
-        points = self._scale * paths
-        if self._takes_many:
-            return _checked_forces(self._function(points.reshape(-1, 3)), paths)
-        forces = np.empty_like(paths)
-        for number, (path, force) in enumerate(zip(points, forces, strict=True)):
-            if self._reset is not None:
-                self._reset()
-            for index, point in enumerate(path):
-                self.progress[0] = number * len(path) + index
-                self._pace.wait()
-                force[index] = _checked_forces(self._function(point), point)
-        return forces
+        if not self._takes_many:
+            return super().forces(paths)
+        return _checked_forces(self._function(self.scale * paths.reshape(-1, 3)), paths)
 
-    def call_times(self, points: FloatArray) -> FloatArray:
-        """Return the time of a call at each point [s], shape (n,)."""
-        return time_calls(self, points)
+    def reset(self) -> None:
+        """Call the function's method ``reset``, if it has one."""
+        getattr(self._function, "reset", lambda: None)()
 
-    def close(self) -> None:
-        """Do nothing: the function is the caller's."""
+    def force(self, point: FloatArray) -> ArrayLike:
+        """Return the force at a point."""
+        return self._function(point)
 
     def _accepts_many(self) -> bool:
         two = np.zeros((2, 3))
@@ -166,17 +190,6 @@ class FunctionRenderer:
             return np.shape(self._function(two)) == two.shape
         except Exception:  # any error of a function of one point
             return False
-
-
-def time_calls(renderer: LocalRenderer, points: FloatArray) -> FloatArray:
-    """Return the time of a call of a renderer at each point [s], shape (n,)."""
-    times = np.empty(len(points))
-    for index, point in enumerate(points):
-        began = time.perf_counter()
-        renderer.forces(point[None, None])
-        times[index] = time.perf_counter() - began
-        renderer.progress[0] = index + 1
-    return times
 
 
 def _checked_forces(values: ArrayLike, points: FloatArray) -> FloatArray:
@@ -216,7 +229,7 @@ def _load_function(source: RendererSource) -> FunctionRenderer:
     return FunctionRenderer(function, source.unit, source.rate)
 
 
-class LibraryRenderer:
+class LibraryRenderer(LocalRenderer):
     """A shared library with ``NAME_reset(state)`` and ``NAME_force(state, position, force)``.
 
     The state is what ``NAME_open(text)`` returns, else ``NAME_state_size()`` bytes of zeros, else
@@ -232,94 +245,69 @@ class LibraryRenderer:
         from asperity.certification import call_loop
         from asperity.kernels.fuse import fuse_module
 
+        super().__init__(source.unit, source.rate)
         try:
             self._library = ctypes.CDLL(str(Path(source.target).resolve()))
         except OSError as error:
             raise RendererError(f"{source.target} cannot be loaded: {error}") from None
         self._prefix = source.name
-        self._scale = 1.0 / UNITS[source.unit]
-        self._reset = self._address("reset")
-        self._force = self._address("force")
-        self._memory = np.zeros(self._state_size() + _ALIGNMENT, dtype=np.uint8)
-        self._state = self._open(source.text)
-        self.rate = source.rate or self._call_number("rate", ctypes.c_double, 0.0)
-        self._configure()
-        self._pace = Pace(self.rate)
-        self.progress = np.zeros(1, dtype=np.int64)
-        self._call: Callable[..., None] = fuse_module(call_loop).call_renderer
+        self._addresses = [self._address("reset"), self._address("force")]
+        self._is_opened = self._has("open")
+        self._state = ctypes.c_void_p(self._find_state(source.text))
+        self.rate = source.rate or self._call("rate", ctypes.c_double, self._state) or 0.0
+        rotation = (ctypes.c_double * 9)(1, 0, 0, 0, 1, 0, 0, 0, 1)
+        self._call("set_pose", None, self._state, rotation)
+        period = 1.0 / self.rate if self.rate else 1e-3
+        self._call("set_time_step", None, self._state, ctypes.c_double(period))
+        self._loop: Callable[..., None] = fuse_module(call_loop).call_renderer
         self.forces(np.zeros((0, 1, 3)))  # compiles, and calls nothing
 
     def forces(self, paths: FloatArray) -> FloatArray:
         """Return forces along paths; see :class:`Renderer`."""
-        points = np.ascontiguousarray(self._scale * paths)
+        if self.rate:
+            return super().forces(paths)
+        points = np.ascontiguousarray(self.scale * paths)
         forces = np.zeros_like(points)
-        if not self.rate:
-            self._call(self._reset, self._force, self._state, points, forces, self.progress)
-            return forces
-        reset = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(self._reset)
-        force = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3)(self._force)
-        for i, path in enumerate(points):
-            reset(self._state)
-            for j, point in enumerate(path):
-                self.progress[0] = i * points.shape[1] + j
-                self._pace.wait()
-                force(self._state, point.ctypes.data, forces[i, j].ctypes.data)
+        self._loop(*self._addresses, self._state.value, points, forces, self.progress)
         return forces
 
-    def call_times(self, points: FloatArray) -> FloatArray:
-        """Return the time of a call at each point [s], shape (n,)."""
-        paths = np.ascontiguousarray(self._scale * points[:, None, None])
-        force = np.zeros((1, 1, 3))
-        times = np.empty(len(paths))
-        for index, path in enumerate(paths):
-            began = time.perf_counter()
-            self._call(self._reset, self._force, self._state, path, force, self.progress)
-            times[index] = time.perf_counter() - began
-        return times
+    def reset(self) -> None:
+        """Call the library's function ``reset``."""
+        self._call("reset", None, self._state)
+
+    def force(self, point: FloatArray) -> ArrayLike:
+        """Return the force at a point."""
+        force = (ctypes.c_double * 3)()
+        self._call("force", None, self._state, (ctypes.c_double * 3)(*point), force)
+        return list(force)
 
     def close(self) -> None:
         """Close the renderer of a library that opens one."""
-        if self._has("open") and self._has("close"):
-            self._function("close", None, ctypes.c_void_p)(self._state)
+        if self._is_opened:
+            self._call("close", None, self._state)
 
-    def _configure(self) -> None:
-        if self._has("set_pose"):
-            rotation = (ctypes.c_double * 9)(1, 0, 0, 0, 1, 0, 0, 0, 1)
-            self._function("set_pose", None, *[ctypes.c_void_p] * 2)(self._state, rotation)
-        if self._has("set_time_step"):
-            step = 1.0 / self.rate if self.rate else 1e-3
-            self._function("set_time_step", None, ctypes.c_void_p, ctypes.c_double)(
-                self._state, step
-            )
-
-    def _open(self, text: str) -> int:
+    def _find_state(self, text: str) -> int:
         """Return the address of the state."""
-        if self._has("open"):
-            state = self._function("open", ctypes.c_void_p, ctypes.c_char_p)(text.encode())
+        if self._is_opened:
+            state = self._call("open", ctypes.c_void_p, ctypes.c_char_p(text.encode()))
             if not state:
                 raise RendererError(f"{self._prefix}_open({text!r}) returned no renderer")
             return int(state)
+        size = self._call("state_size", ctypes.c_size_t) or STATE_BYTES
+        self._memory = np.zeros(size + _ALIGNMENT, dtype=np.uint8)
         address = int(self._memory.ctypes.data)
         return address + -address % _ALIGNMENT
 
-    def _state_size(self) -> int:
-        if not self._has("state_size"):
-            return STATE_BYTES
-        return int(self._function("state_size", ctypes.c_size_t)())
-
-    def _call_number(self, name: str, kind: Any, default: float) -> float:
+    def _call(self, name: str, result: Any, *arguments: Any) -> Any:
+        """Call a function of the library; ``None`` if it has none of this name."""
         if not self._has(name):
-            return default
-        return float(self._function(name, kind, ctypes.c_void_p)(self._state))
+            return None
+        function = getattr(self._library, f"{self._prefix}_{name}")
+        function.restype = result
+        return function(*arguments)
 
     def _has(self, name: str) -> bool:
         return hasattr(self._library, f"{self._prefix}_{name}")
-
-    def _function(self, name: str, result: Any, *arguments: Any) -> Any:
-        function = getattr(self._library, f"{self._prefix}_{name}")
-        function.restype = result
-        function.argtypes = arguments
-        return function
 
     def _address(self, name: str) -> int:
         if not self._has(name):
@@ -331,7 +319,7 @@ class LibraryRenderer:
         return int(ctypes.cast(function, ctypes.c_void_p).value or 0)
 
 
-class PipeRenderer:
+class PipeRenderer(LocalRenderer):
     """A program that reads positions from standard input and writes forces to standard output.
 
     It reads ``reset``, to which it does not answer, or three numbers in a line, to which it answers
@@ -342,10 +330,7 @@ class PipeRenderer:
     """
 
     def __init__(self, source: RendererSource) -> None:
-        self._scale = 1.0 / UNITS[source.unit]
-        self._pace = Pace(source.rate)
-        self._is_paced = bool(source.rate)
-        self.progress = np.zeros(1, dtype=np.int64)
+        super().__init__(source.unit, source.rate)
         try:
             self._program = subprocess.Popen(
                 shlex.split(source.target), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
@@ -355,42 +340,41 @@ class PipeRenderer:
 
     def forces(self, paths: FloatArray) -> FloatArray:
         """Return forces along paths; see :class:`Renderer`."""
+        if self.rate:
+            return super().forces(paths)
         lines: list[str] = []
-        for path in (self._scale * paths).tolist():
+        for path in self.scale * paths:
             lines.append("reset\n")
-            lines.extend(f"{x:.17g} {y:.17g} {z:.17g}\n" for x, y, z in path)
-        writer = Thread(target=self._write, args=(lines,), daemon=True)
-        writer.start()
-        forces = np.empty((paths.shape[0] * paths.shape[1], 3))
-        for index in range(len(forces)):
-            self.progress[0] = index
-            forces[index] = self._read_force()
-        writer.join()
-        return forces.reshape(paths.shape)
+            lines.extend([_line(point) for point in path])
+        forces: list[list[float]] = []
+        for start in range(0, len(lines), _LINES_AT_ONCE):
+            sent = lines[start : start + _LINES_AT_ONCE]
+            self._write("".join(sent))
+            for _ in range(len(sent) - sent.count("reset\n")):
+                self.progress[0] = len(forces)
+                forces.append(self._read_force())
+        return np.array(forces).reshape(paths.shape)
 
-    def call_times(self, points: FloatArray) -> FloatArray:
-        """Return the time of a call at each point [s], shape (n,)."""
-        return time_calls(self, points)
+    def reset(self) -> None:
+        """Send the line ``reset``."""
+        self._write("reset\n")
+
+    def force(self, point: FloatArray) -> ArrayLike:
+        """Return the force at a point."""
+        self._write(_line(point))
+        return self._read_force()
 
     def close(self) -> None:
         """End the program."""
         self._program.kill()
         self._program.wait()
 
-    def _write(self, lines: Sequence[str]) -> None:
+    def _write(self, text: str) -> None:
         stream = self._program.stdin
         assert stream is not None  # it was started with a pipe
-        try:
-            if not self._is_paced:
-                stream.write("".join(lines))
-            else:
-                for line in lines:
-                    self._pace.wait()
-                    stream.write(line)
-                    stream.flush()
+        with suppress(OSError):  # the program has ended, which the reader reports
+            stream.write(text)
             stream.flush()
-        except OSError:
-            pass  # the program has ended, which the reader reports
 
     def _read_force(self) -> list[float]:
         stream = self._program.stdout
@@ -405,6 +389,11 @@ class PipeRenderer:
         if len(force) != 3:
             raise RendererError(f"answered {line.strip()!r}; three numbers [N] are needed")
         return force
+
+
+def _line(point: FloatArray) -> str:
+    x, y, z = point.tolist()
+    return f"{x:.17g} {y:.17g} {z:.17g}\n"
 
 
 def crash_error(point: FloatArray, reason: str) -> RendererError:

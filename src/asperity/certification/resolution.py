@@ -23,6 +23,7 @@ _SPANS = 10.0 ** np.arange(-9.0, -2.0)
 """Lengths of the lines on which steps are looked for [m]."""
 _SHORTEST_STEP = 1e-7
 _STEPS_PER_SECANT = 40.0
+_ROUNDING = 1e-7
 
 
 @dataclass(frozen=True)
@@ -98,15 +99,16 @@ def _position_steps(
 ) -> tuple[float, float, float]:
     """Return the longest distance on each axis over which the force stays the same, then jumps.
 
-    Steps that change the force by less than the noise [N] count as noise.
+    Steps that change the force by less than the noise [N], or by its rounding, do not count.
     """
+    least = max(noise, _ROUNDING * calls.largest_force)
     steps = np.zeros(3)
     for axis in range(3):
         for span in _SPANS[calls.region.size[axis] >= _SPANS]:
             lines = np.repeat(places[:, None], _SAMPLES, axis=1)
             lines[..., axis] += np.linspace(-0.5 * span, 0.5 * span, _SAMPLES)
             forces = calls.at(lines.reshape(-1, 3)).reshape(lines.shape)
-            changes = np.asarray((np.abs(np.diff(forces, axis=1)) > noise).any(axis=2))
+            changes = np.asarray((np.abs(np.diff(forces, axis=1)) > least).any(axis=2))
             counts = changes.sum(axis=1)
             # A smooth part beside a flat one changes from sample to sample, which steps do not.
             adjacent = (changes[:, 1:] & changes[:, :-1]).sum(axis=1)

@@ -14,7 +14,7 @@ import numpy as np
 
 from asperity.certification.certify import Certification
 from asperity.certification.loop_search import resample
-from asperity.certification.region import RendererCalls
+from asperity.certification.region import RendererCalls, approach_paths, step_changes
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
 from asperity.core.files import open_input
@@ -47,11 +47,11 @@ class WitnessPath:
             steps = np.diff(self.path, axis=0)
             return float((0.5 * (self.forces[1:] + self.forces[:-1]) * steps).sum())
         step = self.path[-1] - self.path[-2]
-        change = self.forces[-1] - self.forces[-2]
+        changes, sizes = step_changes(self.forces[None])
         length = math.hypot(*step)
         if self.name == "one-sided gain":
-            return -float(change @ step) / length**2
-        return math.hypot(*change) / (1.0 if self.name == "jump" else length)
+            return -float(changes[0] @ step) / length**2
+        return float(sizes[0]) / (1.0 if self.name == "jump" else length)
 
 
 def witness_paths(result: Certification) -> dict[str, FloatArray]:
@@ -60,11 +60,15 @@ def witness_paths(result: Certification) -> dict[str, FloatArray]:
     gains = {"gain": result.gain_witness, "one-sided gain": result.one_sided_witness}
     for name, witness in gains.items():
         if witness is not None:
-            paths[name] = np.array([witness.approach, witness.start, witness.end])
+            start = np.array([witness.start])
+            paths[name] = approach_paths(
+                np.array([witness.approach]), start, np.array([witness.end])
+            )[0]
     if result.jumps:
         jump = result.jumps[0]
         half = 0.5 * jump.length * np.array(jump.direction)
-        paths["jump"] = np.array([jump.at - half, jump.at + half])
+        approach = np.array([jump.approach])
+        paths["jump"] = approach_paths(approach, jump.at - half[None], jump.at + half[None])[0]
     if result.worst_loop is not None:
         loop = resample(result.worst_loop.path, _LOOP_POINTS)
         paths["loop"] = np.concatenate([np.tile(loop, (result.worst_loop.turns, 1)), loop[:1]])
