@@ -251,6 +251,14 @@ class StiffnessRecommendation:
     start: float
     wall_stiffness: float | None
 
+    @property
+    def exact_stiffness(self) -> float:
+        """Margin times stability limit [N/m], not rounded; 0 if there is none."""
+        limit = self.stability_limit.stiffness
+        if limit is None or math.isinf(limit):
+            return 0.0
+        return self.margin.factor * limit
+
 
 def recommend_stiffness(
     surface: Surface, device: Device, q: Bound, one_sided: Bound

@@ -4,19 +4,25 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 from asperity.analysis.bounds.bound import NORM, ONE_SIDED
 from asperity.analysis.energy.continuity import continuity
 from asperity.analysis.energy.leak import find_leak
+from asperity.analysis.energy.press import (
+    depth_at_press,
+    holds_at_any_press,
+    mean_press,
+    region_of_press,
+)
 from asperity.analysis.energy.straight_scan import merit as compute_merit
 from asperity.analysis.gain.characteristic import cached_number
 from asperity.analysis.gain.surface_cache import is_shipped_law, surface_content
 from asperity.analysis.limits.limit_rules import DEFAULT_SPEED
 from asperity.analysis.limits.perceptibility import Tier, assess_perceptibility
-from asperity.analysis.passivity.device_loop import make_device_loop
+from asperity.analysis.passivity.device_loop import DeviceLoop, make_device_loop
 from asperity.analysis.passivity.recommended_stiffness import RISKS, recommend_on_loop
 from asperity.analysis.passivity.verdict import assess_loop
 from asperity.analysis.results.recommendation import (
@@ -31,10 +37,11 @@ from asperity.core.display import Plottable, Reportable, Tabular, Text
 from asperity.core.errors import ParameterError
 from asperity.core.files import attributes_to_dict, content_digest, json_text, to_plain_data
 from asperity.core.processes import precompute
+from asperity.core.units import round_down
 from asperity.devices import Device, DeviceLike, load_device
 from asperity.laws import LAWS, Law, distribute_parameters, find_laws
 from asperity.perception.grip import DEFAULT_GRIP, Grip, load_grip
-from asperity.rendering import assess_rendering, rendered_surface
+from asperity.rendering import assess_rendering, is_searched, rendered_surface
 from asperity.surface import SURFACE_KEYWORDS, Surface
 from asperity.textures.catalogue import TextureLike, as_texture
 from asperity.textures.texture import Texture, TexturePart
@@ -56,6 +63,8 @@ class Comparison(Plottable, Reportable, Tabular):
         stiffness: the given stiffness [N/m]; ``None`` if each law is taken at its recommended
             stiffness.
         max_depth: depth to which the surface is pressed [m].
+        press: mean normal force of the hand that chose ``max_depth`` of each law [N]; ``None`` if
+            it was not given, see :attr:`LawRow.press`.
         speed: speed of the scan for which perceptibility is assessed [m/s].
         grip: the hand that holds the device.
         risk: share of random loops that may cycle at the recommended stiffnesses.
@@ -69,6 +78,7 @@ class Comparison(Plottable, Reportable, Tabular):
     device: Device
     stiffness: float | None
     max_depth: float
+    press: float | None
     speed: float
     grip: Grip
     risk: float
@@ -135,7 +145,8 @@ class Comparison(Plottable, Reportable, Tabular):
         return {
             "schema": SCHEMA,
             "texture": self.texture.describe(),
-            **attributes_to_dict(self, "device", "stiffness", "max_depth", "speed", "grip", "risk"),
+            **attributes_to_dict(self, "device", "stiffness", "max_depth", "press"),
+            **attributes_to_dict(self, "speed", "grip", "risk"),
             "laws": to_plain_data(self.rows),
             **attributes_to_dict(self, "recommended", "recommendation", "reasons", "assumptions"),
         }
@@ -154,6 +165,7 @@ def compare(
     rendering: str = FIELD,
     grip: str | os.PathLike[str] | Grip = DEFAULT_GRIP,
     risk: str = "1%",
+    press: float | None = None,
     **surface_arguments: Any,
 ) -> Comparison:
     """Compare laws on a surface and a device: stability, perceptibility and artefacts.
@@ -184,6 +196,8 @@ def compare(
             :class:`~asperity.perception.grip.Grip`.
         risk: ``"1%"`` or ``"5%"``: how many random loops may cycle at the recommended stiffness
             (docs/theory/passivity.md).
+        press: mean normal force of the hand [N], in place of ``max_depth``: each law is analysed
+            down to the depth that it reaches, at the stiffest start that holds down to there.
         **surface_arguments: further arguments of :class:`~asperity.surface.Surface`.
 
     Raises:
@@ -199,7 +213,7 @@ def compare(
         raise ParameterError("device", "must be one: asp.compare_devices compares several")
     check_keywords(surface_arguments, SURFACE_KEYWORDS - {"law"}, compare)
     texture = as_texture(texture)
-    query = _make_query(texture, device, stiffness, max_depth, speed, rendering, grip, risk)
+    query = _make_query(texture, device, stiffness, max_depth, speed, rendering, grip, risk, press)
     surface_arguments |= {"stiffness": query.stiffness or DEFAULT_STIFFNESS, "max_depth": max_depth}
     compared = _compared_laws(texture, laws)
     parameters = distribute_parameters(law_parameters or {}, compared)
@@ -221,6 +235,7 @@ def compare(
         device=query.device,
         stiffness=query.stiffness,
         max_depth=surfaces[0].max_depth,
+        press=query.press,
         speed=query.speed,
         grip=query.grip,
         risk=query.risk,
@@ -291,6 +306,7 @@ class _ComparisonQuery:
     rendering: str
     grip: Grip
     risk: float
+    press: float | None
 
 
 def _make_query(
@@ -302,6 +318,7 @@ def _make_query(
     rendering: str,
     grip: str | os.PathLike[str] | Grip,
     risk: str,
+    press: float | None,
 ) -> _ComparisonQuery:
     """Return the conditions from arguments of :func:`compare`, checked."""
     loaded = load_device(device)
@@ -309,6 +326,12 @@ def _make_query(
         stiffness = check_positive("stiffness", stiffness, "N/m")
     if speed is not None:
         speed = check_positive("speed", speed, "m/s")
+    if press is not None:
+        press = check_positive("press", press, "N")
+        if max_depth is not None:
+            raise ParameterError(
+                "press", "chooses the depth: leave {max_depth} out", max_depth=None
+            )
     if risk not in RISKS:
         raise ParameterError("risk", f"must be {' or '.join(RISKS)}", risk)
     if lacks_data(loaded):
@@ -323,10 +346,11 @@ def _make_query(
         stiffness=stiffness,
         speed=DEFAULT_SPEED if speed is None else speed,
         part=texture.texture_part(),
-        explicit_depth=max_depth is not None,
+        explicit_depth=max_depth is not None or press is not None,
         rendering=rendering,
         grip=load_grip(grip),
         risk=RISKS[risk],
+        press=press,
     )
 
 
@@ -350,14 +374,66 @@ def precompute_row(task: Task | None) -> None:
 
 def _render_row(surface: Surface, query: _ComparisonQuery) -> LawRow:
     """Return the row of a law as a loop renders it."""
-    return _compute_row(rendered_surface(surface, query.rendering), query)
+    greatest_press = None
+    if query.press is not None:
+        surface, greatest_press = _pressed_surface(surface, query, query.press)
+    row = _compute_row(rendered_surface(surface, query.rendering), query)
+    if greatest_press is None:
+        return row
+    none = replace(row.passivity.stability_limit, stiffness=0.0, basis="none")
+    return replace(
+        row,
+        passivity=replace(row.passivity, stability_limit=none),
+        recommended_stiffness=0.0,
+        perceptibility=None,
+        greatest_press=greatest_press,
+    )
+
+
+_PRESS_TOLERANCE = 1e-3
+_FIELD_GAIN = 1.1  # of a baked law over the law itself, or less: one field is enough
+_RENDERINGS = 4
+
+
+def _pressed_surface(
+    surface: Surface, query: _ComparisonQuery, press: float
+) -> tuple[Surface, float | None]:
+    """Return a surface for the depth of a press [N]; and the greatest press where none is enough.
+
+    A field that is baked for a depth may have a greater gain, and a smaller start, than the law.
+    """
+    if query.stiffness is not None:
+        stiff = surface.to_stiffness(query.stiffness)
+        return surface.to_depth(depth_at_press(stiff, press)), None
+
+    def start(trial: Surface) -> float:
+        return recommend_on_loop(_device_loop(trial, query), query.risk).exact_stiffness
+
+    depth, greatest = region_of_press(surface, press, start)
+    if depth is None:
+        return surface, greatest
+    surface = surface.to_depth(depth)
+    if is_searched(surface) and query.rendering == FIELD:
+        soft = surface.to_stiffness(start(surface) / _FIELD_GAIN)
+        surface = surface.to_depth(depth_at_press(soft, press))
+    for _ in range(_RENDERINGS):
+        stiffness = round_down(start(rendered_surface(surface, query.rendering)))
+        stiff = surface.to_stiffness(stiffness)
+        if mean_press(stiff) >= press * (1.0 - _PRESS_TOLERANCE):
+            break
+        surface = surface.to_depth(depth_at_press(stiff, press))
+    return surface, None
+
+
+def _device_loop(surface: Surface, query: _ComparisonQuery) -> DeviceLoop:
+    q = cached_number(surface, NORM)
+    return make_device_loop(surface, query.device, q, cached_number(surface, ONE_SIDED))
 
 
 def _compute_row(surface: Surface, query: _ComparisonQuery) -> LawRow:
     device = query.device
-    q = cached_number(surface, NORM)
-    one_sided = cached_number(surface, ONE_SIDED)
-    loop = make_device_loop(surface, device, q, one_sided)
+    loop = _device_loop(surface, query)
+    q = loop.q
     recommended = recommend_on_loop(loop, query.risk)
     if query.stiffness is None:
         surface = surface.to_stiffness(recommended.start)
@@ -377,10 +453,12 @@ def _compute_row(surface: Surface, query: _ComparisonQuery) -> LawRow:
     return LawRow(
         surface=surface,
         q=q,
-        one_sided=one_sided,
+        one_sided=loop.one_sided,
         passivity=assess_loop(loop.with_leak(surface, leak)),
         margin=recommended.margin,
         recommended_stiffness=recommended.stiffness,
+        press=mean_press(surface),
+        holds_at_any_press=holds_at_any_press(surface),
         perceptibility=perceptibility,
         conservative=surface.facts.conservative,
         conservative_reason=surface.facts.reason,

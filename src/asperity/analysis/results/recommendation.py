@@ -46,6 +46,11 @@ class LawRow:
         contact_lost: fraction of the scan without contact.
         ripple: RMS of the oscillating force per stiffness [m].
         rendering: how a loop renders the law.
+        press: mean normal force at ``max_depth`` and the stiffness of ``surface`` [N], at which the
+            texture is taken and up to which the limit holds.
+        holds_at_any_press: whether the limit holds at every depth.
+        greatest_press: where a given press is beyond the law at any stiffness, the greatest found
+            that is not [N]; else ``None``.
     """
 
     surface: Surface
@@ -64,6 +69,9 @@ class LawRow:
     contact_lost: float
     ripple: float
     rendering: Rendering
+    press: float
+    holds_at_any_press: bool
+    greatest_press: float | None = None
     verdict = Text[str]("Limit of a law that is quiet, and the artefacts to expect, in one line.")
     artefacts = Text[list[str]]("Artefacts to expect from the law, each in a few words.")
 
@@ -171,6 +179,7 @@ class LawRow:
             "continuous": self.continuous,
             "ripple [m]": self.ripple,
             "support": self.support,
+            "press [N]": self.press,
             "verdict": self.verdict,
         }
 
@@ -179,7 +188,7 @@ class LawRow:
         before = "q one_sided stability_limit margin recommended_stiffness"
         after = (
             "conservative conservative_reason energy_balance leak continuous continuous_reason "
-            "strength support contact_lost texture_force rendering verdict"
+            "strength support contact_lost texture_force rendering press holds_at_any_press verdict"
         )
         return {
             "law": self.law.letter,

@@ -95,9 +95,15 @@ def _facts(comparison: Comparison) -> list[tuple[str, str]]:
         ("Device", device.name),
         ("K₀, stiffest smooth wall", datum_text(device.wall_test)),
         ("Stiffness", requested_stiffness_text(comparison)),
-        ("Pressed to", format_quantity(comparison.max_depth, "m")),
+        ("Pressed to", _pressed_text(comparison)),
         ("Scanned at", limit_sentences.speed_text(comparison.speed)),
     ]
+
+
+def _pressed_text(comparison: Comparison) -> str:
+    if comparison.press is not None:
+        return format_quantity(comparison.press, "N")
+    return format_quantity(comparison.max_depth, "m")
 
 
 def _figure_sections(comparison: Comparison) -> list[Section]:

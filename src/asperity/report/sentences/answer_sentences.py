@@ -17,6 +17,7 @@ from asperity.report.sentences.limit_sentences import (
     force_magnitude_text,
     masking_text,
     percent,
+    press_text,
     remedies_text,
     texture_amount_text,
     unknown_frequencies_text,
@@ -75,12 +76,11 @@ def _choice_text(comparison: Comparison) -> str:
             known = f"recommended is a start at {start}"
         choice = f"At {stiffness} use {law} ({known})"
     force = force_magnitude_text(row.resolved_force)
-    depth = format_quantity(row.surface.max_depth, "m")
     effect = f"its texture of {force} RMS is {row.tier}"
     if row.tier == "unknown":
         ends = unknown_frequencies_text(row.perceptibility)
         effect = f"whether its texture of {force} RMS is felt, {ends}, is not known"
-    return f"{choice}, up to a depth of {depth}: {effect}."
+    return f"{choice}, {press_text(row)}: {effect}."
 
 
 def _law_title(row: LawRow) -> str:

@@ -167,7 +167,16 @@ def _comparison_defaults(comparison: Comparison) -> list[str]:
     sentences = []
     if "speed" in comparison.defaults:
         sentences.append(f"Default scanning speed {speed_text(comparison.speed)}")
-    if "max_depth" in comparison.defaults:
+    if comparison.press is not None:
+        press = format_quantity(comparison.press, "N")
+        sentences.append(
+            f"Press of {press}: the mean normal force of a scan at constant height; each law has "
+            "its own depth for it"
+        )
+        strongest = comparison.device.value("max_force")
+        if strongest is not None and strongest < comparison.press:
+            sentences.append(f"The device gives {format_quantity(strongest, 'N')}, less than that")
+    elif "max_depth" in comparison.defaults:
         sentences.append(default_depth_text(comparison.rows[0].surface))
     for row in comparison.rows:
         for parameter in law_parameter_sentences(row.surface):

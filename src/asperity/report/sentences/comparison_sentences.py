@@ -7,9 +7,9 @@ from collections import Counter
 from asperity.analysis.results.compare import Comparison
 from asperity.analysis.results.device_comparisons import DeviceComparisons, MissingData
 from asperity.analysis.results.recommendation import LawRow
-from asperity.core.units import format_quantity
+from asperity.core.units import format_quantity, round_down
 from asperity.report.sentences.answer_sentences import friction_text
-from asperity.report.sentences.limit_sentences import texture_amount_text
+from asperity.report.sentences.limit_sentences import press_text, texture_amount_text
 from asperity.report.sentences.passivity_sentences import (
     buzz_text,
     continuity_reason,
@@ -54,6 +54,8 @@ def row_artefacts(row: LawRow) -> list[str]:
     if row.rendering.truncated:
         share = 100.0 * row.rendering.truncated / row.rendering.samples
         parts.append(f"search truncated in {share:.2g} % of samples")
+    if row.recommended_stiffness:
+        parts.append(press_text(row))
     if row.loses_contact:
         parts.append(f"no contact on {100.0 * row.contact_lost:.0f} % of the scan")
     return parts
@@ -61,6 +63,9 @@ def row_artefacts(row: LawRow) -> list[str]:
 
 def _instability_text(row: LawRow) -> str:
     """Return how a law may be unstable at its stiffness; empty if nothing is known of it."""
+    if row.greatest_press is not None:
+        press = format_quantity(round_down(row.greatest_press, 2), "N")
+        return f"none: above {press} at any stiffness"
     stiffness = stiffness_limit_text(row.surface.stiffness)
     stability = stability_limit_text(row.stability_limit, row.passivity.loop)
     if row.passivity.verdict == "not passive" and row.conservative:

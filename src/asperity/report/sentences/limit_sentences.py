@@ -9,6 +9,7 @@ from asperity.analysis.limits.limit_rules import Limit
 from asperity.analysis.limits.perceptibility import MaskingSource, Perceptibility, Remedy
 from asperity.analysis.limits.spectrum import Spectrum
 from asperity.analysis.results.check_limits import Limits
+from asperity.analysis.results.recommendation import LawRow
 from asperity.core.units import format_quantity, round_down
 from asperity.devices import Device
 from asperity.perception.grip import Grip
@@ -36,6 +37,15 @@ def force_magnitude_text(force: float) -> str:
         ('110 mN', '250 µN')
     """
     return format_quantity(force, "N", digits=2)
+
+
+def press_text(row: LawRow) -> str:
+    """Return up to which mean normal force of a hand the numbers of a row hold."""
+    press = format_quantity(row.press, "N", digits=2)
+    depth = format_quantity(row.surface.max_depth, "m")
+    if row.holds_at_any_press:
+        return f"at any press (texture taken at {press}, {depth} deep)"
+    return f"up to a press of {press} ({depth} deep)"
 
 
 def mass_text(mass: float) -> str:

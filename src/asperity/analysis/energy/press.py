@@ -1,0 +1,138 @@
+"""The press: the mean normal force on a scan at constant height, and the depth that it reaches."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from asperity.analysis.energy.straight_scan import parallel_line_points, scan_height
+from asperity.analysis.gain.surface_cache import cached_result, stiffness_factor
+from asperity.analysis.gain.theorems import theorem_on
+from asperity.surface import Surface
+
+_POINTS = 2048
+_NEAREST_POINTS = {True: 1024, False: 128}
+_TOLERANCE = 1e-6
+_MAX_STEPS = 80
+_MAX_DOUBLINGS = 24
+_MAX_HALVINGS = 8
+_ROOT_TOLERANCE = 2e-3
+_LEAST_GAIN = 1.01
+"""Growth of the press per doubling of the depth below which it counts as its greatest."""
+
+
+def mean_press(surface: Surface) -> float:
+    """Return the mean of f_z [N] over the scan at ``max_depth``.
+
+    The scan runs at z = max h - max_depth, or -max_depth on the nominal contact, as in
+    :func:`~asperity.analysis.energy.straight_scan.merit`; with that press a hand reaches
+    ``max_depth``.
+    """
+    return cached_result("mean press", surface, _mean_force) * stiffness_factor(surface)
+
+
+def _mean_force(surface: Surface) -> float:
+    count = _POINTS
+    if surface.law.contact.requires_search:
+        count = _NEAREST_POINTS[surface.texture.is_profile]
+    line = surface.texture.scan_line()
+    xy = parallel_line_points(surface.texture, line, count).reshape(-1, 2)
+    points = np.column_stack([xy, np.full(len(xy), scan_height(surface))])
+    return float(surface.force(points)[:, 2].mean())
+
+
+def holds_at_any_press(surface: Surface) -> bool:
+    """Return whether what is proved down to ``max_depth`` holds at every depth.
+
+    So it does where a clamp holds the whole force, and for laws whose numbers are the same.
+    """
+    clamped = surface.effective_clamp.holds_whole_force
+    return clamped or theorem_on(surface).holds_at_any_depth(surface)
+
+
+def depth_at_press(surface: Surface, press: float) -> float:
+    """Return the depth [m] at which the mean normal force is a press [N].
+
+    Args:
+        surface: the surface at its stiffness; its ``max_depth`` does not count.
+        press: F [N].
+
+    Example:
+        >>> from asperity.textures.kinds.sinusoid import Sinusoid
+        >>> wall = Surface(Sinusoid(1e-4, 1e-3), "W", 500.0)
+        >>> round(depth_at_press(wall, 0.2), 9)
+        0.0004
+    """
+    low = 0.0
+    high = press / surface.stiffness
+    while _press_at(surface, high) < press:
+        low = high
+        high *= 2.0
+    for _ in range(_MAX_STEPS):
+        middle = 0.5 * (low + high)
+        if _press_at(surface, middle) < press:
+            low = middle
+        else:
+            high = middle
+        if high - low <= _TOLERANCE * high:
+            break
+    return high
+
+
+def _press_at(surface: Surface, depth: float) -> float:
+    return _mean_force(surface.to_depth(depth))
+
+
+def region_of_press(
+    surface: Surface, press: float, start: Callable[[Surface], float]
+) -> tuple[float | None, float]:
+    """Return the least depth at which a law, at its start, is pressed with a force; and the force.
+
+    A deeper region has a smaller start, and a greater press at it: the least depth D with
+    start(D) m(D) >= F gives the stiffest start, m being the mean force per stiffness.
+
+    Args:
+        surface: the surface.
+        press: F [N].
+        start: start [N/m] of a surface for its ``max_depth``; 0 for none.
+
+    Returns:
+        The depth [m], ``None`` if no depth has that press; and the greatest press found [N].
+    """
+    unit = surface.to_stiffness(1.0)
+
+    def excess(depth: float) -> float:
+        reached = start(surface.to_depth(depth)) * _press_at(unit, depth)
+        return math.log(reached / press) if reached > 0.0 else -math.inf
+
+    low, high = _bracket(excess, press / max(start(surface), 1e-3))
+    if high is None:
+        return None, press * math.exp(excess(low))
+    while excess(high) > _ROOT_TOLERANCE and high > low * (1.0 + _TOLERANCE):
+        middle = math.sqrt(low * high)
+        if excess(middle) < 0.0:
+            low = middle
+        else:
+            high = middle
+    return high, press
+
+
+def _bracket(excess: Callable[[float], float], depth: float) -> tuple[float, float | None]:
+    """Return a depth with too little press, and one with enough; ``None`` if there is none."""
+    value = excess(depth)
+    for _ in range(_MAX_HALVINGS):
+        if math.isfinite(value) and value < 0.0:
+            break
+        depth *= 0.5
+        value = excess(depth)
+    for _ in range(_MAX_DOUBLINGS):
+        deeper = excess(2.0 * depth)
+        if deeper >= 0.0:
+            return depth, 2.0 * depth
+        if deeper < value + math.log(_LEAST_GAIN):
+            return depth, None
+        depth *= 2.0
+        value = deeper
+    return depth, None
