@@ -17,7 +17,7 @@ from asperity.devices import load_device, override_device, parse_device
 from asperity.laws import Law
 from asperity.report.pages.comparison_columns import FULL_COLUMNS, SUMMARY_COLUMNS, comparison_table
 from asperity.report.sentences.comparison_text import recommended_stiffness_text
-from asperity.report.sentences.limit_sentences import force_magnitude_text
+from asperity.report.sentences.limit_sentences import force_magnitude_text, press_text
 from asperity.report.sentences.number_text import leak_text as leak_cell
 from asperity.report.sentences.number_text import limit_text
 from asperity.report.sentences.passivity_sentences import stiffness_limit_text
@@ -123,7 +123,11 @@ def test_recommends_a_sound_law_that_is_felt(result: asp.Comparison) -> None:
     """Two sentences: law, stiffness, depth, what is felt; what to watch. The rest are reasons."""
     assert result.recommended == "H"
     assert count_sentences(result.recommendation) == 2
-    for part in ("up to a depth of 1 mm", "RMS is felt.", "keeps contact (max_depth='1.6 mm')."):
+    for part in (
+        "at any press (texture taken at",
+        "RMS is felt.",
+        "keeps contact (max_depth='1.6 mm').",
+    ):
         assert part in result.recommendation
     reasons = " ".join(result.reasons)
     for part in (
@@ -340,7 +344,7 @@ def test_all_numbers_of_a_row_are_at_the_given_stiffness() -> None:
     start = f"{stiffness_limit_text(best.recommended_stiffness)} for a loop of 1 kHz or faster"
     assert result.recommendation.startswith(
         f"At 400 N/m use law {best.law.letter} ({best.law.name.replace('-', ' ')}) on the Force "
-        f"Dimension omega.3 (recommended is a start at {start}), up to a depth of 1 mm: its "
+        f"Dimension omega.3 (recommended is a start at {start}), {press_text(best)}: its "
         f"texture of {force_magnitude_text(best.resolved_force)} RMS is felt."
     )
     headings = [str(column.header) for column in comparison_table(result, 120).columns]

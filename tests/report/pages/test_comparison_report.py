@@ -62,7 +62,7 @@ def test_recommendation_answers_the_questions_of_a_new_user(result: asp.Comparis
         "which law": f"Use law {best.law.letter} ({best.law.name.replace('-', ' ')})",
         "on what": "on the Force Dimension omega.3",
         "which stiffness": f"start at {limit_text(best.recommended_stiffness)}",
-        "up to where": "up to a depth of 300 µm",
+        "up to where": "300 µm deep)",
         "is it felt": "is felt.",
         "how much": "its texture of",
         "what to watch": "it loses contact on 33 % of the scan",
