@@ -99,3 +99,20 @@ def test_a_part_of_the_view_without_a_picture_is_requested_at_once_and_says_so(
     page.until("lab.section.covers(lab.sectionBox())", 20.0)
     assert page.ask("lab.texts.includes('computing …')")
     assert page.said == []
+
+
+@needs_browser
+def test_strokes_leave_the_view_in_place(page: Browser) -> None:
+    """A view that followed the probe to each end of a stroke had no picture of a half."""
+    page.ask("document.querySelector('#motion [value=stroke]').click()")
+    page.let_loop_run(2.0)
+    page.until("lab.section.covers(lab.sectionBox())")
+    box = page.ask("lab.sectionBox()")
+    reached = []
+    for _moment in range(12):
+        page.let_loop_run(0.4)
+        reached.append(page.ask("lab.probeState().probe[0]"))
+        assert page.ask("lab.sectionBox()") == box
+        assert page.ask("lab.section.covers(lab.sectionBox())")
+    assert max(reached) - min(reached) > 0.5 * (box[1] - box[0])
+    page.ask("document.querySelector('#motion [value=pointer]').click()")

@@ -29,13 +29,13 @@ def numbers_are_what_is_measured(page: Browser, number: int) -> None:
     """Whether a step tells of limits as they are, and of what was felt."""
     limits, told = page.ask("lab.tour.limits"), text(page, "tour-explanation")
     law = {3: "B", 5: "C"}[number]
-    assert f"{1e-3 * limits[law]:.2f} kN/m, {100 * limits[law] / limits['W']:.0f}\u00a0%" in told
+    assert f"{limits[law]:.0f} N/m, {100 * limits[law] / limits['W']:.0f}\u00a0%" in told
     if number == 3:
-        assert f"set to 8.00 kN/m, {8000 / limits[law]:.1f} times that" in told
+        assert f"set to 8.00 kN/m, {8000 / limits[law]:.2g} times that" in told
         return
     times = float(re.search(r"yields ([\d.]+) times", text(page, "tour-result"))[1])  # type: ignore[index]  # it is there
     # The progress stays what it was at the end, while the hand goes on.
-    soft = 1e3 * float(re.search(r"felt: ([\d.]+) kN/m", text(page, "tour-progress"))[1])  # type: ignore[index]  # it is there
+    soft = float(re.search(r"felt: ([\d.]+) N/m", text(page, "tour-progress"))[1])  # type: ignore[index]  # it is there
     assert times > 2
     assert times == pytest.approx(page.ask("lab.tour.reference") / soft, rel=0.025)
 

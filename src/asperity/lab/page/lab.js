@@ -256,11 +256,16 @@ function sectionBox() {
   return [viewCentre[0] - viewWidth / 2, viewCentre[0] + viewWidth / 2, middle - halfHeight, middle + halfHeight];
 }
 
+/** Whether the hand of this page moves back and forth within a view about the middle of its motion. */
+function fitsPeriodicMotion() {
+  return status.has_control && !status.handle && hand.reach > 0 && hand.reach <= 0.5 * viewWidth;
+}
+
 /** Request the pictures that have changed, centred on the probe when it leaves the view. */
 function requestPictures(state) {
   if (!status) return;
   if (state) {
-    const [x, y] = state.probe;
+    const [x, y] = fitsPeriodicMotion() ? [hand.x, hand.y] : state.probe;
     if (Math.abs(x - viewCentre[0]) > 0.45 * viewWidth || Math.abs(y - viewCentre[1]) > 0.45 * viewWidth) viewCentre = [x, y];
   }
   pictures.request("relief", { x: viewCentre[0], y: viewCentre[1], size: viewWidth });

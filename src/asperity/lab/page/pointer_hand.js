@@ -54,6 +54,9 @@ export class PointerHand {
     return { x: clamp(this.x, MAX_REACH), z: -radiusZ, radiusX: this.loopRadius, radiusZ };
   }
 
+  /** Greatest distance from the middle of a periodic motion [m]; 0 of another one. */
+  get reach() { return { stroke: this.strokeAmplitude, loop: this.loopRadius }[this.motion] ?? 0; }
+
   /** Return the requested trajectory, target + cosine cos(speed t) + sine sin(speed t): a point or an ellipse. */
   trajectory() {
     const none = [0, 0, 0], x = clamp(this.x, MAX_REACH), y = clamp(this.y, MAX_REACH);

@@ -111,15 +111,15 @@ export const STEPS = [
     explanation: ({ C, W }) => `Law C has no curl and no jumps. But it stiffens where the surface is curved, and its limit is ${C && W ? `${formatQuantity(C, "N/m")}, ${formatPercent(C, W)} of the wall's` : "below the wall's"}: below that limit it is soft.`,
     result: ratio => `Near its limit, law C yields ${ratio} times as much as the wall.`,
     tasks: [
-      { law: "W", stiffness: 4500, usesPlane: true, instruction: "First the wall, near its limit: press, and hold still.", demo: PRESS_IN_TROUGH, evaluate: checkStiff },
-      { law: "C", stiffness: 1350, instruction: "Now law C, near its own limit: press in a trough, and hold still.", demo: PRESS_IN_TROUGH, evaluate: checkSoft },
+      { law: "W", stiffness: 1600, usesPlane: true, instruction: "First the wall, near its limit: press, and hold still.", demo: PRESS_IN_TROUGH, evaluate: checkStiff },
+      { law: "C", stiffness: 480, instruction: "Now law C, near its own limit: press in a trough, and hold still.", demo: PRESS_IN_TROUGH, evaluate: checkSoft },
     ],
   }, {
     title: "H avoids all of these", watch: "No energy, no click, no buzz, and the stiffness of the wall.",
     explanation: "Law H splits the god-object: between two equally close points it pulls to a point between them. No curl, no jump, and the limit of the wall.",
     result: "As stiff as the wall, without energy gain, clicks or buzz.",
     tasks: [
-      { law: "H", stiffness: 4500, parameters: LAW_H_PARAMETERS, instruction: "Press in a trough, and hold still: it is as stiff as the wall, and does not buzz.", demo: PRESS_IN_TROUGH, evaluate: checkStiff },
+      { law: "H", stiffness: 1600, parameters: LAW_H_PARAMETERS, instruction: "Press in a trough, and hold still: it is as stiff as the wall, and does not buzz.", demo: PRESS_IN_TROUGH, evaluate: checkStiff },
       { law: "H", stiffness: 1500, parameters: LAW_H_PARAMETERS, instruction: "Move in loops on a slope, as with law A.", demo: LOOP, evaluate: checkNoEnergySupplied },
       { law: "H", stiffness: 1500, parameters: LAW_H_PARAMETERS, instruction: "Stroke deep across the crests, as with law D.", demo: STROKE, evaluate: checkNoClicks },
     ],
