@@ -126,6 +126,16 @@ class LoopStatistics(Serializable):
         histograms = tuple(status[first:second]), tuple(status[second : words.STATUS_SIZE])
         return cls(rows, late, skipped, 1e-9 * lateness, forces, slews, deep, *histograms)
 
+    def measured_rate(self, period: float) -> float:
+        """Return the mean update rate [Hz] of a loop with a period [s], whose skipped ticks lack.
+
+        Example:
+            >>> LoopStatistics(900, 100, 100, 2e-3, 0, 0, 0, (), ()).measured_rate(1e-3)
+            900.0
+        """
+        ticks = self.samples + self.skipped
+        return self.samples / (ticks * period) if ticks else 0.0
+
     def lateness_quantile(self, fraction: float) -> float:
         """Return an upper bound of the lateness of a share of the samples [s], to a factor of 2.
 

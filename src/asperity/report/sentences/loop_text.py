@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from asperity.core.units import format_quantity
+from asperity.devices import Device
 from asperity.recording.recording import Recording
 from asperity.recording.replay import Replay
 from asperity.report.sentences.number_text import count_text, energy_text
@@ -303,6 +304,35 @@ def timing_lines(statistics: LoopStatistics) -> list[str]:
         f"{statistics.skipped} skipped",
         f"Start delay:   {quantiles(statistics.lateness_quantile)}, worst {worst}",
         f"Period error:  {quantiles(statistics.jitter_quantile)}",
+    ]
+
+
+_RATE_TOLERANCE = 0.99
+
+
+def rate_lines(device: Device, period: float, statistics: LoopStatistics) -> list[str]:
+    """Return the measured update rate, if it is below the one for which a stiffness holds.
+
+    That is the rate of the loop, or that of the test of K₀ if it is less: a faster loop is not
+    allowed more.
+
+    Example:
+        >>> from asperity.devices import load_device
+        >>> statistics = LoopStatistics(700, 300, 300, 2e-3, 0, 0, 0, (), ())
+        >>> print(rate_lines(load_device("touch"), 1e-3, statistics)[0])
+        Measured update rate 700 Hz, below 1 kHz: only 0.7 of the stiffness for that rate holds
+    """
+    needed = 1.0 / period
+    test = device.wall_test
+    if test is not None and test.update_rate is not None:
+        needed = min(needed, test.update_rate)
+    measured = statistics.measured_rate(period)
+    if not statistics.samples or measured >= _RATE_TOLERANCE * needed:
+        return []
+    rates = [format_quantity(rate, "Hz", digits=3) for rate in (measured, needed)]
+    return [
+        f"Measured update rate {rates[0]}, below {rates[1]}: only {measured / needed:.2g} of the "
+        "stiffness for that rate holds"
     ]
 
 
