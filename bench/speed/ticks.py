@@ -15,6 +15,7 @@ from rich.table import Table
 
 from asperity.contacts.warm_start import new_warm_start
 from asperity.core.checks import FloatArray
+from asperity.rendering import rendered_surface
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Texture
 from asperity.textures.catalogue import as_texture
@@ -27,6 +28,8 @@ RATE = 4000.0
 TICKS = 800
 # Goals, in µs.
 LONGEST = {"D": 50.0, "H": 150.0}
+# Goal, time of a tick of H with friction over that without.
+FRICTION_RATIO = 1.1
 PROBES = 40
 TURNS = 5
 WAVES = 32
@@ -134,7 +137,31 @@ def run(console: Console) -> None:
     answer = "met" if not missed else f"MISSED: {'; '.join(missed)}"
     console.print(f"goal: at most {TRUNCATED:.1%} truncated -> {answer}", style="bold")
     console.print()
+    ratios = friction_ratios()
+    cells = ", ".join(f"{law} {ratio:.2f}" for law, ratio in ratios.items())
+    answer = "met" if ratios["H"] <= FRICTION_RATIO else "MISSED"
+    console.print(f"a tick on knurl with friction over one without: {cells}")
+    console.print(f"goal: H at most {FRICTION_RATIO} -> {answer}", style="bold")
+    console.print()
     _run_longest(console)
+
+
+def friction_ratios() -> dict[str, float]:
+    """Return the time of a tick on knurl with friction over that without, by law."""
+    ratios = {}
+    for law in "CDH":
+        times = []
+        for friction in (0.0, 0.4):
+            surface = rendered_surface(Surface("knurl", law, friction=friction))
+            path = strokes(surface)[3]
+            out, told = np.empty_like(path), np.empty((TICKS, 2))
+            memory = new_warm_start(surface.law.contact.max_evaluations)
+            loop = surface._path_loops.path_batch
+            turn = partial(loop, path, out, told, memory, *_arguments(surface))
+            turn()
+            times.append(min(seconds(turn) for _turn in range(20 * TURNS)))
+        ratios[law] = times[1] / times[0]
+    return ratios
 
 
 def _run_longest(console: Console) -> None:

@@ -279,8 +279,9 @@ if friction_modulation > 0.0:
 _FRICTION_TICK = """def probe_tick(x, y, z, ax, ay, held, warm_start, texture, law):
     {unpack}
     presliding = presliding_share * k + presliding_fixed
+    compliance = 1.0 / presliding  # a constant of the loop, which saves a division per tick
     fx, fy, fz, limit = probe_slip(x, y, z, warm_start, texture, law)
-    ax, ay, dx, dy = drag_anchor(x, y, held, ax, ay, limit / presliding)
+    ax, ay, dx, dy = drag_anchor(x, y, held, ax, ay, limit * compliance)
     return fx - presliding * dx, fy - presliding * dy, fz, ax, ay, True
 """
 
