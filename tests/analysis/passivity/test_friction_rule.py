@@ -9,6 +9,7 @@ import pytest
 from asperity.analysis import characteristic_number, one_sided_number
 from asperity.analysis.energy.closed_loops import energy_balance
 from asperity.analysis.energy.leak import worst_loop
+from asperity.analysis.energy.straight_scan import friction_scan
 from asperity.analysis.passivity import criteria
 from asperity.analysis.passivity.verdict import Passivity, passivity
 from asperity.analysis.results.analyze import analyze
@@ -112,3 +113,17 @@ def test_verdict_and_starts_follow() -> None:
     assert ratios == pytest.approx([8.0 / 11.0, 1.0, ratios[2], 1.0], rel=5e-3)
     assert "law W with friction 0.36 and friction modulation 0.889" in str(rows.assumptions)
     assert "law W with friction" not in str(plain.assumptions)
+
+
+def test_friction_on_a_scan_is_stated_with_what_the_presliding_stiffness_keeps() -> None:
+    """Law W at 0.2 mm: κ of half the slope of the limit keeps 0.79 of its oscillation."""
+    slope = 0.4 * 1000.0 * 2e-4 * 0.5 * 2.0 * math.pi / 1e-3
+    options = {"friction": 0.4, "friction_modulation": 1.0, "presliding_stiffness": slope / 2.0}
+    scan = friction_scan(Surface(WAVE, "W", 1000.0, 2e-4, **options))  # type: ignore[arg-type]  # by name
+    assert scan is not None
+    assert 0.03 < scan.mean < 0.04  # a spring that is too soft does not reach the limit everywhere
+    assert scan.kept == pytest.approx(0.79, abs=0.01)
+    assert friction_scan(Surface(WAVE, "W")) is None
+    row = compare(WAVE, "omega.3", "W", friction=0.4).row("W")
+    assert row.to_dict()["friction_force"]["kept"] == 1.0
+    assert "constant friction of 400 mN" in row.verdict

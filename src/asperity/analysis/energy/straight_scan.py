@@ -14,6 +14,7 @@ from asperity.analysis.gain.surface_cache import cached_result
 from asperity.analysis.gain.theorems import theorem_on
 from asperity.core.checks import FloatArray, check_array
 from asperity.core.errors import ParameterError
+from asperity.core.files import Serializable
 from asperity.surface import Surface
 from asperity.textures.domain import Domain
 from asperity.textures.texture import ScanLine, Texture
@@ -115,6 +116,50 @@ def _clip_to_domain(
         ends = np.stack([-place / rate, (1.0 - place) / rate])
     first = float(ends.min(axis=0).max())
     return domain.origin + offset + first * direction, float(ends.max(axis=0).min()) - first
+
+
+@dataclass(frozen=True)
+class FrictionScan(Serializable):
+    """Friction on the scan line at the height of :func:`merit`, sliding.
+
+    Attributes:
+        mean: mean force of friction against the motion [N].
+        ripple: RMS of its oscillating part [N].
+        kept: that over the RMS with which the slip limit oscillates [1]; less than 1 where the
+            limit changes along the line by more than κ.
+    """
+
+    mean: float
+    ripple: float
+    kept: float
+
+
+def friction_scan(surface: Surface) -> FrictionScan | None:
+    """Return the friction on a straight scan; ``None`` for a surface without friction.
+
+    Example:
+        >>> from asperity.textures.kinds.sinusoid import Sinusoid
+        >>> options = {"friction": 0.5, "presliding_stiffness": 1e3, "friction_modulation": 1.0}
+        >>> wall = Surface(Sinusoid(1e-4, 1e-3), "W", 1000.0, 2e-4, **options)
+        >>> scan = friction_scan(wall)
+        >>> round(scan.mean, 3), round(scan.ripple, 4), round(scan.kept, 2)
+        (0.05, 0.0354, 1.0)
+    """
+    if surface.contact_friction is None:
+        return None
+    line = surface.texture.scan_line()
+    along = np.append(line.direction, 0.0)
+    way = np.linspace(-line.length, line.length, 2 * _SCAN_POINTS_PER_LINE)
+    path = np.full((len(way), 3), scan_height(surface))
+    path[:, :2] = line.start + way[:, None] * line.direction
+    law = surface.force(path)
+    beyond = np.tile(line.direction, (len(way), 1))
+    forces = law - surface.trace(path), law - surface.force(path, beyond)
+    rendered, limit = (force[_SCAN_POINTS_PER_LINE:] @ along for force in forces)
+    ripple = float(rendered.std())
+    varies = float(limit.std()) > 1e-9 * float(np.abs(limit).max())
+    kept = ripple / float(limit.std()) if varies else 1.0
+    return FrictionScan(float(rendered.mean()), ripple, kept)
 
 
 _SCAN_POINTS_PER_LINE = 2048

@@ -15,7 +15,7 @@ from asperity.analysis.bounds.branch_and_bound import DEFAULT_WORK_LIMIT
 from asperity.analysis.energy.closed_loops import EnergyBalance, Leak, energy_balance
 from asperity.analysis.energy.continuity import Continuity, continuity
 from asperity.analysis.energy.leak import worst_loop
-from asperity.analysis.energy.straight_scan import Merit, merit
+from asperity.analysis.energy.straight_scan import FrictionScan, Merit, friction_scan, merit
 from asperity.analysis.gain.characteristic import cached_number, curl_number, make_options
 from asperity.analysis.passivity.recommended_stiffness import recommend_stiffness
 from asperity.analysis.passivity.verdict import Passivity, passivity
@@ -79,6 +79,11 @@ class Analysis(Plottable, Reportable):
         """Whether closed paths take no energy, take it from the hand, or give it to the hand."""
         return energy_balance(self.surface)
 
+    @cached_property
+    def friction_force(self) -> FrictionScan | None:
+        """Friction on a straight scan; ``None`` without friction."""
+        return friction_scan(self.surface)
+
     @property
     def curl_density(self) -> Bound | None:
         """Sup |curl f| [N/m]: the greatest work of a small loop per area [J/m²]."""
@@ -128,6 +133,7 @@ class Analysis(Plottable, Reportable):
             "law_name": surface.law.name,
             **attributes_to_dict(surface, "law_parameters", "clamp", "stiffness", "max_depth"),
             "friction": to_plain_data(surface.contact_friction),
+            "friction_force": to_plain_data(self.friction_force),
             **attributes_to_dict(self, *fields.split()),
         }
 

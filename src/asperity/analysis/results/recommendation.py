@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.closed_loops import EnergyBalance, Leak, energy_balance
 from asperity.analysis.energy.continuity import Continuity
+from asperity.analysis.energy.straight_scan import FrictionScan, friction_scan
 from asperity.analysis.limits.perceptibility import Perceptibility, Tier
 from asperity.analysis.passivity.recommended_stiffness import Margin, StabilityLimit
 from asperity.analysis.passivity.verdict import Passivity
@@ -98,6 +100,11 @@ class LawRow:
     def energy_balance(self) -> EnergyBalance:
         """Whether closed paths take no energy, take it from the hand, or give it to the hand."""
         return energy_balance(self.surface)
+
+    @cached_property
+    def friction_force(self) -> FrictionScan | None:
+        """Friction on a straight scan; ``None`` without friction."""
+        return friction_scan(self.surface)
 
     @property
     def is_sound(self) -> bool:
@@ -195,6 +202,7 @@ class LawRow:
             "name": self.law.name,
             "law_parameters": to_plain_data(self.surface.law_parameters),
             "friction": to_plain_data(self.surface.contact_friction),
+            "friction_force": to_plain_data(self.friction_force),
             **attributes_to_dict(self, *before.split()),
             "stiffness": self.surface.stiffness,
             "perceptibility": to_plain_data(self.perceptibility),

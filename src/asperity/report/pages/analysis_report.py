@@ -92,6 +92,8 @@ def merit_facts(analysis: Analysis) -> list[tuple[str, str]]:
         ("RMS force", f"{format_quantity(scan.ripple * surface.stiffness, 'N')} RMS at this k"),
         ("height", f"z = {format_quantity(scan.height, 'm')}"),
     ]
+    if analysis.friction_force is not None:
+        facts.append(("friction", number_text.friction_force_text(analysis.friction_force)))
     if scan.contact_lost > 0.0:
         facts.append(("no contact", f"on {100.0 * scan.contact_lost:.0f} % of the scan"))
     return facts

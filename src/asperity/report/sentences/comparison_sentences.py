@@ -10,6 +10,7 @@ from asperity.analysis.results.recommendation import LawRow
 from asperity.core.units import format_quantity, round_down
 from asperity.report.sentences.answer_sentences import friction_text
 from asperity.report.sentences.limit_sentences import press_text, texture_amount_text
+from asperity.report.sentences.number_text import friction_force_text
 from asperity.report.sentences.passivity_sentences import (
     buzz_text,
     continuity_reason,
@@ -27,8 +28,8 @@ def row_verdict(row: LawRow) -> str:
     artefacts = row_artefacts(row)
     if row.conservative and not _instability_text(row):
         artefacts.insert(0, _passivity_text(row))
-    if row.energy_balance == "dissipative":
-        artefacts.append(row.energy_balance)
+    if row.friction_force is not None:
+        artefacts.append(f"{row.energy_balance}: {friction_force_text(row.friction_force)}")
     return "; ".join(artefacts)
 
 

@@ -8,6 +8,7 @@ from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.closed_loops import EnergyBalance, Leak
+from asperity.analysis.energy.straight_scan import FrictionScan
 from asperity.analysis.results.compare import Comparison
 from asperity.core.units import format_quantity, round_down
 
@@ -59,6 +60,20 @@ def balance_text(balance: EnergyBalance) -> str:
         ('yes', 'dissipative', 'no')
     """
     return {"conservative": "yes", "leaking": "no"}.get(balance, balance)
+
+
+def friction_force_text(scan: FrictionScan) -> str:
+    """Return how great friction is on a scan, how it varies, and what κ leaves of that.
+
+    Example:
+        >>> friction_force_text(FrictionScan(0.05, 0.0121, 0.79))
+        'friction of 50 mN varies by 12 mN RMS, 79 % of what its limit does'
+    """
+    mean, ripple = format_in_one_unit([scan.mean, scan.ripple], "N", digits=2)
+    if scan.ripple < 1e-3 * scan.mean:
+        return f"constant friction of {mean}"
+    kept = f"{100.0 * scan.kept:.0f} % of what its limit does"
+    return f"friction of {mean} varies by {ripple} RMS, {kept}"
 
 
 def yes_no_text(holds: bool | None) -> str:
