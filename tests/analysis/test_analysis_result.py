@@ -111,7 +111,7 @@ def test_conservative_law_has_zero_leak_and_v_star(rig: Device) -> None:
     ("law", "device", "verdict", "words"),
     [
         ("H", RIG, "passive", "is passive by k q⁺ <= 2σ₀/T, whose limit is 16000 N/m"),
-        ("H", PARTIAL, "plausible", "is plausible, not proved: k q <= K₀, limit 3000 N/m"),
+        ("H", PARTIAL, "plausible", "plausibly passive, not proved so: k q <= K₀, limit 3000 N/m"),
         ("A", PARTIAL, "not passive", "is not passive: a loop gains"),
         ("D", PARTIAL, "undecided", "is passive is undecided"),
     ],

@@ -16,6 +16,7 @@ from asperity.core.units import format_quantity
 from asperity.devices import load_device, override_device, parse_device
 from asperity.laws import Law
 from asperity.report.pages.comparison_columns import FULL_COLUMNS, SUMMARY_COLUMNS, comparison_table
+from asperity.report.pages.comparison_report import comparison_page
 from asperity.report.sentences.comparison_text import recommended_stiffness_text
 from asperity.report.sentences.limit_sentences import force_magnitude_text, press_text
 from asperity.report.sentences.number_text import leak_text as leak_cell
@@ -426,3 +427,17 @@ def test_quantities_may_be_texts_and_rows_are_found_by_letter() -> None:
         asp.Surface(texture, "C", "500")  # type: ignore[arg-type]  # as above
     with pytest.raises(asp.ParameterError, match="unit is of another dimension"):
         asp.Surface(texture, "C", "5mm")  # type: ignore[arg-type]  # as above
+
+
+def test_a_stiffness_has_one_spelling_everywhere() -> None:
+    """A given one as typed; a leak in the table as in the verdict."""
+    result = asp.compare(asp.Sinusoid(0.2e-3, 2e-3), "touch", "AC", stiffness=219.7)
+    page = comparison_page(result)
+    cells = [str(cell) for cell in comparison_table(result, 80).columns[1].cells]
+    assert cells == ["219.7 N/m"] * 2
+    texts = " ".join([page.answer, *result.reasons, *(row.verdict for row in result.rows)])
+    texts += " ".join([value for _name, value in page.facts])
+    assert "219.7 N/m" in texts
+    assert not re.findall(r"\b2(?:19|20) N/m", texts)
+    leak = leak_cell(result["A"].leak)
+    assert f"gains up to {leak}" in result["A"].verdict

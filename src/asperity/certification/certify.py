@@ -40,7 +40,7 @@ from asperity.core.display import Displayable
 from asperity.core.errors import ParameterError, find_named
 from asperity.core.files import Serializable, written
 from asperity.core.processes import available_cores
-from asperity.core.units import format_quantity
+from asperity.core.units import count_text, format_quantity
 
 DEFAULT_SECONDS = 10.0
 """Time of a search [s]."""
@@ -137,7 +137,8 @@ class Certification(Serializable, Displayable):
     def __repr__(self) -> str:
         leak = format_quantity(self.leak, "J", digits=3)
         gain = format_quantity(self.gain, "N/m", digits=4)
-        return f"<Certification: gain at least {gain}, leak {leak}, {len(self.jumps)} jumps>"
+        jumps = count_text(len(self.jumps), "jump")
+        return f"<Certification: gain at least {gain}, leak {leak}, {jumps}>"
 
     @property
     @written

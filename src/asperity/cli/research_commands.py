@@ -185,7 +185,7 @@ def run_command(
     participants is named as the file, without .toml. Answers of simulated observers, and of people
     at a simulated device, are marked, and have folders of their own.
     """
-    from asperity.report.sentences.number_text import count_text
+    from asperity.core.units import count_text
     from asperity.studies.design import SIMULATED_DEVICE
     from asperity.studies.live.player import LoopPlayer, Stimuli
     from asperity.studies.live.screens import PageScreen, Terminal

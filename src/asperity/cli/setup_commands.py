@@ -18,6 +18,7 @@ from asperity.cli.output import Outputs, check_outputs, output_options, progress
 from asperity.cli.servo_commands import stop_on_signals, suspend_if_requested
 from asperity.core import cache
 from asperity.core.errors import AsperityError, ParameterError, escape_unprintable, print_message
+from asperity.core.units import count_text
 
 if TYPE_CHECKING:
     from asperity.devices import Device
@@ -99,7 +100,7 @@ def warm_command() -> None:
     textures = sample_textures()
     with output.step_bar("compiling", len(textures) * len(laws)) as step:
         precompile(laws, textures, step)
-    click.echo(f"Compiled: {len(laws)} laws on {', '.join(textures)}")
+    click.echo(f"Compiled: {count_text(len(laws), 'law')} on {', '.join(textures)}")
 
 
 def sample_textures() -> dict[str, Texture]:

@@ -25,6 +25,7 @@ from asperity.cli.plugins import load_plugin_files, plugin_files
 from asperity.core.errors import ParameterError, escape_unprintable
 from asperity.core.files import check_output
 from asperity.core.processes import available_cores
+from asperity.core.units import count_text
 
 if TYPE_CHECKING:
     from asperity.laws import Law
@@ -238,7 +239,7 @@ def sweep_command(
     )
     if not yes and len(plan) > _MAX_UNASKED_CASES:
         _confirm_many_cases(plan, processes)
-    with progress_bar(f"computing {len(plan)} cases") as update:
+    with progress_bar(f"computing {count_text(len(plan), 'case')}") as update:
         result = run_plan(plan, place, output, update)
 
     from asperity.report.pages.sweep_report import sweep_page
@@ -276,7 +277,9 @@ def _confirm_many_cases(plan: SweepPlan, processes: int) -> None:
 
     seconds = estimate_case_time(plan) * len(plan)
     time = timedelta(seconds=round(seconds / processes))
-    size_text = f"{len(plan)} cases, which take about {time} on {processes} processes here"
+    size_text = (
+        f"{count_text(len(plan), 'case')}, which take about {time} on {processes} processes here"
+    )
     if not is_confirmed(f"{size_text}. Compute?"):
         raise ParameterError("vary", f"makes {size_text}; --yes computes them")
 

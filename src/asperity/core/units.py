@@ -212,6 +212,26 @@ def format_quantity(value: float, unit: str, digits: int = 3) -> str:
     return f"{float(f'{value / 10.0**exponent:.{digits}g}'):.10g} {_PREFIXES[exponent]}{unit}"
 
 
+def count_text(count: int, noun: str) -> str:
+    """Return a number of things.
+
+    Example:
+        >>> count_text(1, "law"), count_text(3, "law")
+        ('1 law', '3 laws')
+    """
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def format_stiffness(stiffness: float) -> str:
+    """Return a stiffness as it was typed or computed, neither prefixed nor rounded for display.
+
+    Example:
+        >>> format_stiffness(219.7), format_stiffness(1480.0)
+        ('219.7 N/m', '1480 N/m')
+    """
+    return format_quantity(stiffness, "N/m", digits=6)
+
+
 def round_down(value: float, digits: int = 3) -> float:
     """Return the value rounded down to a number of significant digits.
 

@@ -17,7 +17,7 @@ from asperity.analysis.results.analyze import Analysis, Progress, analyze
 from asperity.analysis.results.compare import DEFAULT_DEVICE
 from asperity.core.display import describe
 from asperity.core.files import check_not_existing
-from asperity.core.units import format_quantity
+from asperity.core.units import format_quantity, format_stiffness
 from asperity.core.version import __version__
 from asperity.devices import DeviceLike
 from asperity.export import c99
@@ -142,6 +142,8 @@ def header_comment_text(analysis: Analysis, file_name: str) -> str:
     doc = (sys.modules[law.force.__module__].__doc__ or "").strip()
     if not doc.startswith(law.letter):
         doc = law.summary
+    if analysis.surface.texture.baked_numbers:
+        doc += "\n\n" + "\n".join(_wrap([_FIELD_NOTE]))
     paragraphs = [
         [f"{file_name}: law {law}, by asperity {__version__}. Generated, do not edit."],
         _usage(analysis.surface),
@@ -150,6 +152,9 @@ def header_comment_text(analysis: Analysis, file_name: str) -> str:
         _wrap([analysis.answer, *analysis.assumptions]),
     ]
     return "\n\n".join(map("\n".join, paragraphs))
+
+
+_FIELD_NOTE = "This is the exact law; the file evaluates a baked field of it. Numbers of the field:"
 
 
 def _usage(surface: Surface) -> list[str]:
@@ -174,7 +179,7 @@ def _facts(analysis: Analysis) -> list[str]:
         "surface": ", ".join([f"{name} = {_format_value(value)}" for name, value in described]),
         "place": _format_extent(surface.texture),
         "device": analysis.device.name,
-        "stiffness": ", ".join([f"k = {format_quantity(surface.stiffness, 'N/m')}", *parameters]),
+        "stiffness": ", ".join([f"k = {format_stiffness(surface.stiffness)}", *parameters]),
         "region": f"{surface.texture.domain.description}, {describe(surface, 'depth_range')}",
         "clamp": _format_clamp(analysis),
         "q": _format_bound(analysis.q),

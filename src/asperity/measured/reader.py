@@ -18,6 +18,7 @@ from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.core.files import open_input
 from asperity.core.memory import require_memory
+from asperity.core.units import count_text
 from asperity.measured.lengths import unit_to_metres
 
 MAX_POINTS = 2**27
@@ -90,12 +91,13 @@ def mask_missing(values: NDArray[Any], code: float) -> tuple[NDArray[Any], tuple
 
     Example:
         >>> mask_missing(np.array([1.0, -9999.0]), -9999.0)
-        (array([ 1., nan]), ('1 points hold -9999, which marks a missing point',))
+        (array([ 1., nan]), ('1 point of -9999, which marks a missing point',))
     """
     missing = values.astype(np.float64, copy=False) == code
     if not missing.any():
         return values, ()
-    note = f"{int(missing.sum())} points hold {code:g}, which marks a missing point"
+    points = count_text(int(missing.sum()), "point")
+    note = f"{points} of {code:g}, which marks a missing point"
     return np.where(missing, np.nan, values), (note,)
 
 

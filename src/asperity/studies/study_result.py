@@ -13,6 +13,7 @@ import numpy as np
 from asperity.core.display import Reportable
 from asperity.core.errors import ParameterError
 from asperity.core.files import attributes_to_dict, to_plain_data
+from asperity.core.units import count_text
 from asperity.studies.design import StudyDesign, TrialRecord, describe_source
 from asperity.studies.methods import EXCLUSIONS, METHODS
 from asperity.studies.scores import Interval, Score
@@ -96,7 +97,9 @@ class StudyResult(Reportable, TableFiles):
     content: Mapping[str, Any] = field(default_factory=dict)
 
     def __repr__(self) -> str:
-        return f"<StudyResult of {self.design.kind}, {len(self.answered)} participants>"
+        return (
+            f"<StudyResult of {self.design.kind}, {count_text(len(self.answered), 'participant')}>"
+        )
 
     @property
     def simulated(self) -> str:

@@ -158,7 +158,7 @@ def test_float_tiff_with_missing_points(tmp_path: Path) -> None:
     expected = values.astype(np.float64)
     expected[3, 4] = np.nan
     np.testing.assert_array_equal(raw.heights, expected)
-    assert "1 points hold -9999, which marks a missing point" in raw.notes
+    assert "1 point of -9999, which marks a missing point" in raw.notes
     values[0, 0] = np.inf
     with pytest.raises(SurfaceFileError, match=r"infinite height at index \(0, 0\)"):
         read_surface(write_tiff(tmp_path / "a.tif", values))

@@ -83,7 +83,7 @@ def test_integer_markers_of_missing_points(tmp_path: Path, kind: int, marker: fl
     stored[1, 2] = marker
     raw = read_binary(tmp_path, SdfSpec(stored, kind=kind))
     assert np.argwhere(np.isnan(raw.heights)).tolist() == [[1, 2]]
-    assert any("1 points hold" in note for note in raw.notes)
+    assert any("1 point of" in note for note in raw.notes)
 
 
 @pytest.mark.parametrize(("kind", "type_"), [(3, np.float32), (7, np.float64)])

@@ -103,9 +103,7 @@ def test_codes_of_missing_points_are_missing(tmp_path: Path, code: str) -> None:
 
 def test_codes_among_the_heights_are_asked_about(tmp_path: Path) -> None:
     text = "z [nm]\n-9000 2 -9999 4\n5 3 7 8000\n"
-    assert_refused(
-        tmp_path, text, r"hold -9999, which may be a height or mark a missing point: decl"
-    )
+    assert_refused(tmp_path, text, r"of -9999, which may be a height or mark a missing point: decl")
     for declared, missing in (("-9999", 1), ("nan", 0)):
         raw = read_text(tmp_path, f"nodata: {declared}\n{text}")
         assert int(np.isnan(raw.heights).sum()) == missing

@@ -266,7 +266,7 @@ def test_declared_value_of_missing_points(tmp_path: Path) -> None:
     raw = read_text(tmp_path, "columns 4\nNODATA_value -9999\n1 2 3 -9999\n5 6 7 8\n-9999 2 3 4\n")
     n = np.nan
     np.testing.assert_array_equal(raw.heights, [[1, 2, 3, n], [5, 6, 7, 8], [n, 2, 3, 4]])
-    assert any("points hold -9999, which marks a missing point" in note for note in raw.notes)
+    assert any("of -9999, which marks a missing point" in note for note in raw.notes)
 
 
 def test_mutated_files_raise_only_asperity_errors(tmp_path: Path) -> None:

@@ -2,11 +2,12 @@
 
 const PREFIXES = [[1e9, "G"], [1e6, "M"], [1e3, "k"], [1, ""], [1e-3, "m"], [1e-6, "µ"], [1e-9, "n"], [1e-12, "p"]];
 
-/** Return a value with three digits and a prefix: (0.00123, "J") is "1.23 mJ". */
+/** Return a value with three digits and a prefix: (0.00123, "J") is "1.23 mJ"; 1480 N/m has none, as in the terminal. */
 export function formatQuantity(value, unit) {
   if (!Number.isFinite(value)) return "–";
   const size = Math.abs(value);
   if (size < 1e-12) return `0 ${unit}`;
+  if (unit.includes("/") && size >= 1) return `${Number(value.toPrecision(3))} ${unit}`.replace("-", "−");
   const [factor, prefix] = PREFIXES.find(([step]) => size >= step * 0.9995) ?? PREFIXES.at(-1);
   const scaled = value / factor;
   const digits = Math.abs(scaled) >= 99.95 ? 0 : Math.abs(scaled) >= 9.995 ? 1 : 2;

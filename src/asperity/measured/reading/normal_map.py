@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
 from asperity.core.memory import require_memory
+from asperity.core.units import count_text
 from asperity.measured.reader import RawSurface
 from asperity.measured.slopes import IntegratedSlopes, integrate_slopes
 
@@ -73,7 +74,9 @@ def normals_to_surface(normals: FloatArray, name: str, green: str | None) -> Raw
     notes.append(border)
     flat = int(np.count_nonzero(normals[..., 2] < _MIN_Z))
     if flat:
-        notes.append(f"{flat} normals point sideways or down: taken as flanks of 87°")
+        notes.append(
+            f"flanks of 87° in place of {count_text(flat, 'normal')} that point sideways or down"
+        )
     return replace(RawSurface(surface.heights, None, name, tuple(notes)), in_pitches=True)
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from asperity.core.checks import FloatArray
 from asperity.core.errors import SurfaceFileError
 from asperity.core.files import read_toml
+from asperity.core.units import count_text
 from asperity.measured.lengths import METRES_PER_UNIT, format_lengths
 from asperity.measured.reader import mask_missing
 from asperity.measured.reading.text_table import TextTable
@@ -324,7 +325,7 @@ def mask_codes(values: FloatArray, declared: float | None) -> tuple[FloatArray, 
         rest = values[~is_code & ~np.isnan(values)]
         if not is_code.any() or not rest.size:
             continue
-        what = f"{int(is_code.sum())} points hold {code:g}, which"
+        what = f"{count_text(int(is_code.sum()), 'point')} of {code:g}, which"
         if max(rest.min() - code, code - rest.max()) > np.ptp(rest):
             values = np.where(is_code, np.nan, values)
             notes += (f"{what} marks a missing point",)

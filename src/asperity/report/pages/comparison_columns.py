@@ -10,6 +10,7 @@ from rich.table import Table as RichTable
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.results.compare import Comparison
 from asperity.analysis.results.recommendation import LawRow
+from asperity.core.units import format_stiffness
 from asperity.report.document.page import (
     Cell,
     Media,
@@ -77,7 +78,7 @@ def _recommendation_cell(row: LawRow, _comparison: Comparison) -> Cell:
 
 def _given_stiffness_cell(row: LawRow, _comparison: Comparison) -> Cell:
     limit = stability_limit_text(row.stability_limit)
-    return Cell(number_text.limit_text(row.surface.stiffness), note=limit)
+    return Cell(format_stiffness(row.surface.stiffness), note=limit)
 
 
 def _texture_force_cell(row: LawRow, _comparison: Comparison) -> Cell:

@@ -10,7 +10,7 @@ from asperity.analysis.results.compare import Comparison
 from asperity.analysis.results.device_comparisons import DeviceComparisons
 from asperity.analysis.results.recommendation import LawRow
 from asperity.core.errors import ArgumentWriter, write_keyword
-from asperity.core.units import format_quantity
+from asperity.core.units import format_quantity, format_stiffness
 from asperity.envelopes.find_design import Design
 from asperity.envelopes.searches import MET
 from asperity.report.document import page
@@ -36,12 +36,7 @@ from asperity.report.sentences.comparison_text import (
     surface_alt_text,
 )
 from asperity.report.sentences.limit_sentences import percent
-from asperity.report.sentences.number_text import (
-    NOT_AVAILABLE,
-    bound_text,
-    limit_text,
-    position_text,
-)
+from asperity.report.sentences.number_text import NOT_AVAILABLE, bound_text, position_text
 from asperity.report.sentences.surface_text import describe_texture, texture_name
 from asperity.report.sentences.texts import column_meanings, figure_text, glossary
 
@@ -185,7 +180,7 @@ def _case_row(comparison: Comparison) -> Row:
         return Row([comparison.device.name, depth, "none", *[NOT_AVAILABLE] * 3])
     start = recommended_stiffness_text(best)
     if comparison.stiffness is not None:
-        start = limit_text(comparison.stiffness)
+        start = format_stiffness(comparison.stiffness)
     text = best.law.letter if comparison.recommended else f"({best.law.letter})"
     return Row(
         [

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError, escape_unprintable
 from asperity.core.files import json_text, text_digest, write_bytes
-from asperity.core.units import format_quantity
+from asperity.core.units import count_text, format_quantity
 from asperity.devices import Device
 from asperity.recording.recording import Recording, open_recording
 from asperity.recording.replay import Replay
@@ -40,12 +40,7 @@ from asperity.report.sentences.loop_text import (
     surface_metadata,
     timing_lines,
 )
-from asperity.report.sentences.number_text import (
-    NOT_AVAILABLE,
-    count_text,
-    energy_text,
-    readable_name,
-)
+from asperity.report.sentences.number_text import NOT_AVAILABLE, energy_text, readable_name
 from asperity.report.sentences.surface_text import describe_texture, texture_name
 from asperity.scene.setup import Setup
 from asperity.servo.calibration.calibrator import AxisCalibration, Calibration
@@ -277,11 +272,12 @@ def calibration_page(
             :func:`~asperity.analysis.passivity.recommended_stiffness.unit_starts`.
     """
     force = format_quantity(calibration.max_force, "N")
+    axes = "1 axis" if len(calibration.axes) == 1 else f"{len(calibration.axes)} axes"
     rows = [Row(_calibration_cells(axis)) for axis in calibration.axes]
     changes = [Row(_start_cells(law, *pair)) for law, pair in starts.items()]
     numeric = range(1, len(_CALIBRATION_HEADINGS))
     return terminal_page(
-        Paragraph(f"{device.name}: {len(calibration.axes)} axes, with up to {force}"),
+        Paragraph(f"{device.name}: {axes}, with up to {force}"),
         Table(_CALIBRATION_HEADINGS, rows, numeric),
         *map(Paragraph, calibration_lines(calibration)),
         Table(_START_HEADINGS, changes, (1, 2, 3)),

@@ -10,7 +10,7 @@ from functools import partial
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
-from asperity.core.units import format_quantity
+from asperity.core.units import count_text, format_quantity
 from asperity.report.document import page
 from asperity.report.document.page import Cell, Cells, Media, Page, Row, Section, Table, TableLayout
 from asperity.report.pages.run_report import LOOP_FOOTER, loop_facts
@@ -193,7 +193,7 @@ def sweep_page(result: SweepResult) -> Page:
     names = [name for name in result.run.shown if name in result.columns]
     return Page(
         title=f"Sweep of {plan.source}: {plan.template.run}",
-        answer=f"{len(plan)} cases of {plan.template.run} over {keys}: {failures}.",
+        answer=f"{count_text(len(plan), 'case')} of {plan.template.run} over {keys}: {failures}.",
         facts=[(key, text) for key, text in plan.vary.items()],
         sections=[
             page.terminal_section(table, *errors),

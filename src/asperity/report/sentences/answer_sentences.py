@@ -11,7 +11,7 @@ from asperity.analysis.passivity.recommended_stiffness import Margin, load_margi
 from asperity.analysis.results.compare import Comparison
 from asperity.analysis.results.recommendation import LawRow
 from asperity.core.errors import ArgumentWriter, write_keyword
-from asperity.core.units import format_quantity, round_down, round_up
+from asperity.core.units import format_quantity, format_stiffness, round_down, round_up
 from asperity.devices import Device
 from asperity.report.sentences.limit_sentences import (
     force_magnitude_text,
@@ -70,7 +70,7 @@ def _choice_text(comparison: Comparison) -> str:
     start = f"{start} {update_rate_text(row.stability_limit)}".rstrip()
     choice = f"Use {law} and start at {start}"
     if comparison.stiffness is not None:
-        stiffness = format_quantity(comparison.stiffness, "N/m")
+        stiffness = format_stiffness(comparison.stiffness)
         known = "no start is known"
         if row.recommended_stiffness:
             known = f"recommended is a start at {start}"
@@ -119,7 +119,7 @@ def _too_stiff_text(comparison: Comparison, stiffness: float) -> str:
     row = max(comparison.rows, key=lambda row: row.recommended_stiffness)
     text = (
         "No law that renders this texture is known to be stable at "
-        f"{format_quantity(stiffness, 'N/m')} on the {comparison.device.name}"
+        f"{format_stiffness(stiffness)} on the {comparison.device.name}"
     )
     if not row.recommended_stiffness:
         return f"{text}."

@@ -12,7 +12,7 @@ from asperity.analysis.results.analyze import PASSIVITY_FIELDS, Analysis, surfac
 from asperity.analysis.results.check_limits import Limits
 from asperity.analysis.results.compare import Comparison
 from asperity.core.arguments import DEFAULT_STIFFNESS
-from asperity.core.units import format_quantity
+from asperity.core.units import format_quantity, format_stiffness
 from asperity.devices import Device
 from asperity.envelopes.envelope import GENTLE_WAVE, Envelope
 from asperity.laws.f_friction_modulation import LAW as F
@@ -266,7 +266,7 @@ def _passivity_text(analysis: Analysis) -> str:
     passivity = analysis.passivity
     depth = format_quantity(surface.max_depth, "m")
     case = (
-        f"{surface.law.letter} at {surface.stiffness:g} N/m, pressed to {depth}, "
+        f"{surface.law.letter} at {format_stiffness(surface.stiffness)}, pressed to {depth}, "
         f"on the {analysis.device.name}"
     )
     rule = passivity.criterion(passivity.decided_by)
@@ -274,7 +274,7 @@ def _passivity_text(analysis: Analysis) -> str:
     if passivity.verdict == "passive":
         return f"Law {case} is passive by {rule.formula}, whose limit is {limit}"
     if passivity.verdict == "plausible":
-        return f"That law {case} is passive is plausible, not proved: {rule.formula}, limit {limit}"
+        return f"Law {case} is plausibly passive, not proved so: {rule.formula}, limit {limit}"
     if passivity.verdict == "bounded" and passivity.buzz is not None:
         return f"Law {case} is passive but for steps: {buzz_text(passivity.buzz)}"
     if passivity.verdict == "not passive" and rule.name == LEAK:

@@ -7,7 +7,7 @@ from collections import Counter
 from asperity.analysis.results.compare import Comparison
 from asperity.analysis.results.device_comparisons import DeviceComparisons, MissingData
 from asperity.analysis.results.recommendation import LawRow
-from asperity.core.units import format_quantity, round_down
+from asperity.core.units import format_quantity, format_stiffness, round_down
 from asperity.report.sentences.answer_sentences import friction_text
 from asperity.report.sentences.limit_sentences import press_text, texture_amount_text
 from asperity.report.sentences.number_text import friction_force_text
@@ -46,7 +46,7 @@ def row_artefacts(row: LawRow) -> list[str]:
     if row.is_textureless:
         parts.append("no texture")
     elif row.perceptibility is not None and row.tier != "felt":
-        stiffness = stiffness_limit_text(row.surface.stiffness)
+        stiffness = _row_stiffness_text(row)
         amount = texture_amount_text(row.perceptibility)
         parts.append(f"{row.tier} at {stiffness}: {amount}")
     friction = friction_text(row)
@@ -62,12 +62,19 @@ def row_artefacts(row: LawRow) -> list[str]:
     return parts
 
 
+def _row_stiffness_text(row: LawRow) -> str:
+    """Return the stiffness of a row as in its table: a given one as typed."""
+    if row.surface.stiffness == row.recommended_stiffness:
+        return stiffness_limit_text(row.surface.stiffness)
+    return format_stiffness(row.surface.stiffness)
+
+
 def _instability_text(row: LawRow) -> str:
     """Return how a law may be unstable at its stiffness; empty if nothing is known of it."""
     if row.greatest_press is not None:
         press = format_quantity(round_down(row.greatest_press, 2), "N")
         return f"none: above {press} at any stiffness"
-    stiffness = stiffness_limit_text(row.surface.stiffness)
+    stiffness = _row_stiffness_text(row)
     stability = stability_limit_text(row.stability_limit, row.passivity.loop)
     if row.passivity.verdict == "not passive" and row.conservative:
         return f"not passive at {stiffness}; {stability}"
@@ -83,7 +90,7 @@ def _instability_text(row: LawRow) -> str:
 def _passivity_text(row: LawRow) -> str:
     """Return the passivity of a conservative law at its stiffness."""
     passivity = row.passivity
-    stiffness = stiffness_limit_text(row.surface.stiffness)
+    stiffness = _row_stiffness_text(row)
     if passivity.verdict == "bounded" and passivity.buzz is not None:
         return f"passive at {stiffness} but for steps: {buzz_text(passivity.buzz)}"
     if passivity.verdict == "plausible":
@@ -118,7 +125,7 @@ def _best_case_text(best: Comparison, row: LawRow) -> str:
     """Return the device, depth and law of the strongest texture, in a sentence."""
     law = f"law {row.law.letter}"
     if best.stiffness is not None:
-        law += f" at {format_quantity(best.stiffness, 'N/m')}"
+        law += f" at {format_stiffness(best.stiffness)}"
     elif row.recommended_stiffness:
         law += f" from {format_quantity(row.recommended_stiffness, 'N/m')}"
     if row.perceptibility is not None:

@@ -9,12 +9,12 @@ from collections.abc import Iterable, Sequence
 
 from asperity.analysis.results.compare import Comparison
 from asperity.analysis.results.recommendation import LawRow
-from asperity.core.units import format_quantity, round_down
+from asperity.core.units import count_text, format_quantity, format_stiffness, round_down
 from asperity.envelopes.find_design import Design
 from asperity.envelopes.searches import FORCE
 from asperity.report.sentences import number_text
 from asperity.report.sentences.limit_sentences import force_magnitude_text, percent
-from asperity.report.sentences.number_text import bound_text, count_text, leak_text
+from asperity.report.sentences.number_text import bound_text, leak_text
 from asperity.report.sentences.texts import sentence, sentence_case
 from asperity.textures.texture import Texture
 
@@ -41,7 +41,7 @@ def requested_stiffness_text(comparison: Comparison) -> str:
     stiffness = comparison.stiffness
     if stiffness is None:
         return "the recommended one of each law"
-    return format_quantity(stiffness, "N/m", 4)
+    return format_stiffness(stiffness)
 
 
 def design_answer(result: Design) -> str:
@@ -63,7 +63,7 @@ def design_answer(result: Design) -> str:
 def _design_text(result: Design) -> str:
     """Return letter, stiffness and size of a design."""
     texture = result.comparison.texture
-    stiffness = format_quantity(result.row.surface.stiffness, "N/m", 4)
+    stiffness = number_text.limit_text(result.row.surface.stiffness)
     height = format_quantity(texture.peak_to_valley, "m")
     measure = "large" if texture.single_wave is None else "high"
     letter = result.row.law.letter

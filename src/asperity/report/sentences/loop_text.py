@@ -6,11 +6,11 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from asperity.core.units import format_quantity
+from asperity.core.units import count_text, format_quantity
 from asperity.devices import Device
 from asperity.recording.recording import Recording
 from asperity.recording.replay import Replay
-from asperity.report.sentences.number_text import count_text, energy_text
+from asperity.report.sentences.number_text import energy_text
 from asperity.report.sentences.surface_text import describe_texture
 from asperity.report.sentences.texts import sentence
 from asperity.scene.setup import Setup

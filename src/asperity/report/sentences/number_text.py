@@ -83,16 +83,6 @@ def yes_no_text(holds: bool | None) -> str:
     return "yes" if holds else "no"
 
 
-def count_text(count: int, noun: str) -> str:
-    """Return a number of things.
-
-    Example:
-        >>> count_text(1, "law"), count_text(3, "law")
-        ('1 law', '3 laws')
-    """
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
-
-
 def readable_name(name: str) -> str:
     """Return the name of a law, or of a field of a device, with spaces.
 

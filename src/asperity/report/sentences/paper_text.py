@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from asperity.core.units import format_quantity
+from asperity.core.units import count_text, format_quantity
 from asperity.paper import VERDICTS, Result, Verdict
 from asperity.paper.claim import Number
 from asperity.paper.cycle_experiments import RESOLUTION, DeviceExperiment
@@ -35,7 +35,7 @@ def verdict_counts_text(results: Sequence[Result]) -> str:
     """Return the number of claims by verdict: "Of 60 claims 55 hold, ..."."""
     counts = {verdict: sum([r.verdict == verdict for r in results]) for verdict in VERDICTS}
     parts = [f"{count} {VERDICT_TEXTS[verdict].plural}" for verdict, count in counts.items()]
-    return f"Of {len(results)} claims {', '.join(parts)}."
+    return f"Of {count_text(len(results), 'claim')} {', '.join(parts)}."
 
 
 def evidence_text(value: Number) -> str:
