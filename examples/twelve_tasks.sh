@@ -71,3 +71,12 @@ asperity study remove rough-simulated-device P01
 # 14. From a game asset: a normal map, whose name tells where green points, as a texture that is felt
 asperity maps $SURFACE --normals gltf -o plate_nor_gl.png --extent "4mm; 4mm"
 asperity compare plate_nor_gl.png --device touch --laws WC
+
+# 15. For a paper: a table and a paragraph for its methods section, in a document that compiles
+asperity compare $SURFACE --device touch --laws WCA --latex table.tex
+printf '%s\n' '\documentclass{article}' '\begin{document}' '\input{table}' '\end{document}' > paper.tex
+if command -v pdflatex > /dev/null; then
+    pdflatex -interaction=nonstopmode -halt-on-error paper.tex
+else
+    echo 'not run: no pdflatex here'
+fi

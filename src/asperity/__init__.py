@@ -24,7 +24,10 @@ __all__ = list(_MODULE_OF_NAME)
 
 def __getattr__(name: str) -> Any:
     if name not in _MODULE_OF_NAME:
-        raise AttributeError(f"module 'asperity' has no attribute {name!r}")
+        from asperity.core.errors import nearest_names
+
+        hint = nearest_names(name, __all__).strip()
+        raise AttributeError(f"module 'asperity' has no attribute {name!r}; {hint}".rstrip("; "))
     return getattr(import_module(_MODULE_OF_NAME[name]), name)
 
 

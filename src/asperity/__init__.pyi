@@ -34,6 +34,7 @@ from asperity.envelopes.find_design import design as design
 from asperity.export.export_surface import export_code as export_code
 from asperity.laws import Law as Law
 from asperity.measured.reading.measured_file import show as show
+from asperity.measured.reading.readers import read_surface as read_surface
 from asperity.recording.recording import Recording as Recording
 from asperity.recording.recording import open_recording as open_recording
 from asperity.recording.replay import Replay as Replay

@@ -77,6 +77,7 @@ EXPECTED: dict[int, tuple[str, dict[str, str]]] = {
         {"rough-simulated-typical/trials.csv": ",typical"},
     ),
     14: (r"^Use law C [\s\S]*its texture of [\s\S]*RMS is\s+felt\.", {}),
+    15: (r"Output written on paper\.pdf|not run: no pdflatex here", {"table.tex": "tabular"}),
 }
 """A pattern of stderr and stdout, and words of the files that each task writes."""
 
@@ -92,6 +93,8 @@ def test_task_succeeds_within_two_minutes(number: int, tmp_path: Path) -> None:
     assert re.search(pattern, text, re.M), text
     for name, words in files.items():
         assert words in (tmp_path / name).read_text("utf-8")
+    if missing := re.search(r"^not run: .*", text, re.M):
+        pytest.skip(missing[0])
 
 
 def test_failing_task_is_detected(tmp_path: Path) -> None:

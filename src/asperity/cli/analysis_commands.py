@@ -98,6 +98,13 @@ _COMPARISON = (SPEED, GRIP, *options.command_arguments("compare"))
     help="Show the characteristic numbers q and q⁺, the limits, leaks, strength T and support S.",
 )
 @click.option("--why", is_flag=True, help="Show the reasons of the answer, and what else to watch.")
+@click.option(
+    "--latex",
+    "latex_path",
+    metavar="PATH",
+    help="Write the table and a paragraph for a methods section (LaTeX); - writes to standard"
+    " output.",
+)
 @options.jobs_option
 @output_options()
 def compare_command(

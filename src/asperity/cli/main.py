@@ -41,7 +41,16 @@ _HEADINGS = {
     "Law": {"law", "laws", "clamp", "stiffness", "max_depth", "rendering", *SHIPPED_LAW_ARGUMENTS},
     "Device and hand": {"device", "driver", "speed", "grip", "settings"},
     "Measured surface": set(_FILE_OPTIONS),
-    "Output": {"output", "json_path", "html_path", "trace_path", "record", "force", "no_cache"},
+    "Output": {
+        "output",
+        "json_path",
+        "html_path",
+        "latex_path",
+        "trace_path",
+        "record",
+        "force",
+        "no_cache",
+    },
 }
 _HEADING_OF = {name: title for title, names in _HEADINGS.items() for name in names}
 

@@ -87,7 +87,16 @@ def _remedy_command(surface: str, result: Comparison) -> str:
     return f"asperity compare {typed} {' '.join(written)}"
 
 
-_NOT_REPEATED = {"surface", "why", "full", "json_path", "html_path", "force", "no_cache"}
+_NOT_REPEATED = {
+    "surface",
+    "why",
+    "full",
+    "json_path",
+    "html_path",
+    "latex_path",
+    "force",
+    "no_cache",
+}
 
 
 def _magnified_options(typed: Mapping[str, Any], factor: float) -> dict[str, str]:

@@ -109,12 +109,14 @@ class Outputs:
     Attributes:
         json: path of the result as JSON, "-" for standard output, ``None`` for none.
         html: path of the report, likewise.
+        latex: path of the tables and a paragraph as LaTeX, likewise.
         trace: path of the samples of a run, for commands with a trace.
         force: whether existing files are replaced.
     """
 
     json: str | None = None
     html: str | None = None
+    latex: str | None = None
     trace: str | None = None
     force: bool = False
 
@@ -139,7 +141,11 @@ class Outputs:
             with progress_bar("drawing the report"):
                 text = render_page(page, origin)
             write_output("html", self.html, text)
-        if STANDARD_OUTPUT in {self.json, self.html}:
+        if self.latex is not None:
+            from asperity.report.document.latex import render_latex
+
+            write_output("latex", self.latex, render_latex(page))
+        if STANDARD_OUTPUT in {self.json, self.html, self.latex}:
             return
         from rich.console import Console
 
@@ -152,6 +158,9 @@ class Outputs:
         for label, path in ((page_label, self.html), ("Trace", self.trace)):
             if path is not None:
                 console.print(f"{label}: {escape_unprintable(path)}", soft_wrap=True, markup=False)
+
+
+_OUTPUT_PATHS = ("json", "html", "latex", "trace")
 
 
 def output_options(
@@ -171,7 +180,7 @@ def output_options(
     def decorate(command: Callable[..., None]) -> Callable[..., None]:
         @functools.wraps(command)
         def run(**values: Any) -> None:
-            paths = {name: values.pop(f"{name}_path", None) for name in ("json", "html", "trace")}
+            paths = {name: values.pop(f"{name}_path", None) for name in _OUTPUT_PATHS}
             force = values.pop("force") if keeps else True
             check_outputs(force=force, **paths)
             command(outputs=Outputs(**paths, force=force), **values)

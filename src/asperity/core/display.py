@@ -135,6 +135,18 @@ class Reportable(Displayable):
         write_bytes("path", path, text.encode())
         return None
 
+    def to_latex(self) -> str:
+        r"""Return a paragraph for a methods section, and the tables, as LaTeX for ``\input``.
+
+        Example:
+            >>> import asperity as asp
+            >>> result = asp.compare("sinusoid:amplitude=0.2mm,period=2mm", laws="W")
+            >>> result.to_latex().count("tabular")
+            2
+        """
+        text: str = _load_renderer().latex_text(self)
+        return text
+
     def __rich_console__(self, console: Any, options: Any) -> Iterator[Any]:
         """Yield the output of the command line, for a console of this width."""
         del console  # the options contain its width

@@ -142,7 +142,7 @@ class SurfaceFile:
 
 @dataclass(frozen=True)
 class ReadingOptions:
-    """The arguments of :func:`asperity.measured.reading.read_surface`.
+    """The arguments of :func:`asperity.read_surface`.
 
     Attributes:
         channel: name or number (from 0) of the height channel, for a file with several.

@@ -23,6 +23,7 @@ from asperity.envelopes.envelope import Envelope
 from asperity.envelopes.find_design import Design
 from asperity.measured.reading.measured_file import MeasurementSummary
 from asperity.report.document.html import Origin, render_notebook, render_page
+from asperity.report.document.latex import render_latex
 from asperity.report.document.page import Page, Picture, notebook_page, plot_later
 from asperity.report.document.terminal import page_renderables
 from asperity.report.pages.analysis_report import analysis_page, criteria_table
@@ -40,7 +41,15 @@ from asperity.textures.texture import Texture
 if TYPE_CHECKING:
     from asperity.report.pictures.plotting import plot as plot
 
-__all__ = ["comparison_table", "describe", "html_text", "notebook_html", "plot", "rich_renderables"]
+__all__ = [
+    "comparison_table",
+    "describe",
+    "html_text",
+    "latex_text",
+    "notebook_html",
+    "plot",
+    "rich_renderables",
+]
 
 
 def __getattr__(name: str) -> Any:
@@ -123,6 +132,20 @@ def html_text(result: Any) -> str:
     if page is None or not page.title:
         raise TypeError(f"a {type(result).__name__} has no report")
     return render_page(page, Origin(content=text_digest(json_text(result))))
+
+
+def latex_text(result: Any) -> str:
+    r"""Return a result as LaTeX: a paragraph for a methods section, and its tables.
+
+    A document reads it with ``\input``; no package is needed.
+
+    Raises:
+        TypeError: for a result without a report.
+    """
+    page = find_page(result)
+    if page is None or not page.title:
+        raise TypeError(f"a {type(result).__name__} has no report")
+    return render_latex(page)
 
 
 def notebook_html(result: Any) -> str | None:

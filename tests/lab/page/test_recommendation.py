@@ -21,7 +21,7 @@ def text(page: Browser, name: str) -> str:
 
 def stiffness_text(value: float) -> str:
     """Return a stiffness [N/m] as the page shows it."""
-    return f"{1e-3 * value:.2f} kN/m" if value >= 1000.0 else f"{value:.0f} N/m"
+    return f"{float(f'{value:.3g}'):.10g} N/m"
 
 
 def change_depth(page: Browser, depth: float) -> None:

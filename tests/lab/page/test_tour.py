@@ -31,7 +31,7 @@ def numbers_are_what_is_measured(page: Browser, number: int) -> None:
     law = {3: "B", 5: "C"}[number]
     assert f"{limits[law]:.0f} N/m, {100 * limits[law] / limits['W']:.0f}\u00a0%" in told
     if number == 3:
-        assert f"set to 8.00 kN/m, {8000 / limits[law]:.2g} times that" in told
+        assert f"set to 8000 N/m, {8000 / limits[law]:.2g} times that" in told
         return
     times = float(re.search(r"yields ([\d.]+) times", text(page, "tour-result"))[1])  # type: ignore[index]  # it is there
     # The progress stays what it was at the end, while the hand goes on.

@@ -240,6 +240,7 @@ class Page:
         facts: names and values of the given arguments, on a page alone.
         sections: in order.
         footer: origin of the method.
+        methods: a paragraph for the methods section of a paper; may be empty.
     """
 
     title: str
@@ -247,6 +248,12 @@ class Page:
     facts: Sequence[tuple[str, str]] = ()
     sections: Sequence[Section] = ()
     footer: str = ""
+    methods: str = ""
+
+
+def single_line(heading: str) -> str:
+    """Return a heading in one line."""
+    return heading.replace("-\n", "").replace("\n", " ")
 
 
 def pairs_table(rows: Sequence[tuple[str, str]]) -> Table:

@@ -18,6 +18,7 @@ from asperity.report.document.page import (
     Section,
     Table,
     TableLayout,
+    single_line,
     terminal_section,
 )
 from asperity.report.document.terminal import rich_table
@@ -151,11 +152,6 @@ FULL_COLUMNS = (
     LawColumn("S", lambda row, _: Cell(number_text.merit_text(row.support)), True, 80),
     LawColumn("RMS\nforce", _oscillation_cell, True, 80),
 )
-
-
-def single_line(heading: str) -> str:
-    """Return a heading in one line."""
-    return heading.replace("-\n", "").replace("\n", " ")
 
 
 def law_rows(comparison: Comparison, cells: Callable[[LawRow], Sequence[str | Cell]]) -> list[Row]:

@@ -20,7 +20,11 @@ from asperity.report.pages.comparison_columns import law_rows, law_sections, ter
 from asperity.report.pages.measured_report import measured_sections, thin_sections
 from asperity.report.sentences import limit_sentences
 from asperity.report.sentences.analysis_text import datum_text
-from asperity.report.sentences.answer_sentences import recommendation_reasons, recommendation_text
+from asperity.report.sentences.answer_sentences import (
+    methods_text,
+    recommendation_reasons,
+    recommendation_text,
+)
 from asperity.report.sentences.comparison_text import (
     case_title,
     design_answer,
@@ -78,6 +82,7 @@ def comparison_page(
             Section("How to read it", [page.DefinitionList(glossary("comparison"))]),
         ],
         footer=_FOOTER,
+        methods=methods_text(comparison),
     )
 
 

@@ -12,6 +12,7 @@ from asperity.analysis.results.compare import Comparison
 from asperity.analysis.results.recommendation import LawRow
 from asperity.core.errors import ArgumentWriter, write_keyword
 from asperity.core.units import format_quantity, format_stiffness, round_down, round_up
+from asperity.core.version import __version__
 from asperity.devices import Device
 from asperity.report.sentences.limit_sentences import (
     force_magnitude_text,
@@ -19,6 +20,7 @@ from asperity.report.sentences.limit_sentences import (
     percent,
     press_text,
     remedies_text,
+    speed_text,
     texture_amount_text,
     unknown_frequencies_text,
     unverified_text,
@@ -32,6 +34,7 @@ from asperity.report.sentences.passivity_sentences import (
     stiffness_limit_text,
     update_rate_text,
 )
+from asperity.report.sentences.surface_text import describe_texture
 from asperity.report.sentences.texts import sentence_case
 
 
@@ -54,6 +57,30 @@ def recommendation_reasons(
     """Return the reasons of the recommendation and all else to watch, in sentences."""
     further = _remarks(comparison, write_argument)[1:]
     return (*further, *filter(None, _reasons(comparison)))
+
+
+def methods_text(comparison: Comparison) -> str:
+    """Return a paragraph for a methods section: software, surface, law, device, assumptions."""
+    texture = comparison.texture
+    height = format_quantity(texture.peak_to_valley, "m")
+    surface = f"{describe_texture(texture.describe())}; {height} peak to valley"
+    row = comparison.recommended_row
+    outcome = recommendation_text(comparison)
+    if row is not None:
+        depth = format_quantity(row.surface.max_depth, "m")
+        outcome = (
+            f"Law {_law_title(row)} was chosen, at {format_stiffness(row.surface.stiffness)} and "
+            f"down to a depth of {depth}; its texture of {force_magnitude_text(row.resolved_force)}"
+            f" RMS is {row.tier}, by the model. {_limit_text(row, comparison.device)}"
+        )
+    others = [f"for law {other.law.letter}" for other in comparison.rows if other is not row]
+    assumed = [text for text in comparison.assumptions if not text.endswith(tuple(others))]
+    return (
+        f"Laws were compared with asperity {__version__} (after Campion and Hayward, 2008) on the "
+        f"surface {surface}, for the {comparison.device.name} and scans at "
+        f"{speed_text(comparison.speed)}. {outcome} "
+        f"Assumptions: {'; '.join(assumed)}."
+    )
 
 
 # --- the first sentence ---------------------------------------------------------------------------
