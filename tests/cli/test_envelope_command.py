@@ -57,10 +57,42 @@ def test_design_writes_what_python_returns(call: Call, tmp_path: Path) -> None:
     assert "Margins: by which factor" in Path(paths[1]).read_text("utf-8")
 
 
+def test_design_ends_with_the_command_that_exports_it(call: Call, tmp_path: Path) -> None:
+    """The command describes the surface whose numbers were printed, also magnified before."""
+    magnified = ("--magnify-height", "2", "--texture-force", "20mN")
+    code, out, _ = call(*DESIGN, *magnified, "--json", str(tmp_path / "design.json"))
+    assert code == 0
+    command = out.rstrip().splitlines()[-1]
+    assert command.startswith(f"  asperity export {WAVE} --law C --stiffness ")
+    assert "Asked for: at least 20 mN RMS at the motor." in " ".join(out.split())
+    assert "What will go wrong" not in out
+    _, _, surface, *options, _o, _header = shlex.split(command)
+    options[0] = "--laws"
+    code, out, err = call("compare", surface, *options, "--json", "-")
+    assert (code, err) == (0, "")
+    row = json.loads(out)["laws"][0]
+    expected = json.loads((tmp_path / "design.json").read_text("utf-8"))["comparison"]["laws"][0]
+    assert row["q"] == expected["q"]
+    assert 0.99 * expected["stiffness"] <= row["stiffness"] <= expected["stiffness"]
+
+
+def test_design_of_a_scene_magnifies_what_it_states(call: Call, tmp_path: Path) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text(
+        '[texture]\nkind = "sinusoid"\namplitude = "0.05 mm"\nperiod = "1 mm"\nmagnify = 2\n'
+        '[device]\nid = "touch"\n'
+    )
+    code, out, err = call("design", str(scene), "--laws", "C", "--texture-force", "20mN")
+    assert (code, err) == (0, "")
+    _, direct, _ = call(*DESIGN, "--texture-force", "20mN")
+    height = float(direct.rpartition("--magnify-height ")[2].split()[0])
+    assert f"--magnify-height {2 * height:.10g} -o" in out
+
+
 def test_design_beyond_reach_is_an_answer(call: Call) -> None:
     code, out, err = call(*DESIGN, "--texture-force=1N")
     assert (code, err) == (0, "")
-    assert "Not met. 50 mN RMS at the motor can be reached; stability limits it." in " ".join(
+    assert "Not met. 49.6 mN RMS at the motor can be reached; stability limits it." in " ".join(
         out.split()
     )
 
@@ -70,7 +102,7 @@ def test_design_beyond_reach_is_an_answer(call: Call) -> None:
     [
         (("--peak-force", "15mN"), "20 mN RMS of texture, 25 mN peak at the motor, felt."),
         (("--texture-force", "5mN", "--at", "hand"), "RMS of texture, 6.1 mN RMS at the hand,"),
-        (("--peak-force", "1N"), "Not met. 69 mN peak at the motor can be reached; stability"),
+        (("--peak-force", "1N"), "Not met. 69.5 mN peak at the motor can be reached; stability"),
         (
             ("--texture-force", "10mN", "--min-support", "0.9"),
             "RMS of texture, support 0.98, felt.",

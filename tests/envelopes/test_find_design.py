@@ -17,6 +17,7 @@ from asperity.analysis.energy.straight_scan import scan_force
 from asperity.analysis.limits.wave_scan import scan_forces
 from asperity.core.cache import bypass_results
 from asperity.core.errors import ParameterError
+from asperity.devices import override_device
 from asperity.envelopes.find_design import Design, design
 from asperity.envelopes.searches import FORCE, RANGE, Search, Target
 from asperity.envelopes.wave_borders import RenderConditions, WaveCase
@@ -360,3 +361,21 @@ def test_largest_measured_texture_states_what_is_lost() -> None:
 def test_bad_input_names_the_argument(arguments: dict[str, Any], words: str) -> None:
     with pytest.raises(ParameterError, match=words):
         design(**{"texture": WAVE, "device": "touch", "laws": "C", **arguments})
+
+
+def test_steps_of_the_device_are_a_requirement_of_their_own() -> None:
+    """A margin has one meaning: what the hand feels, or what the device resolves."""
+    device = replace_force_resolution(3e-3)
+    result = design("sinusoid:amplitude=0.1mm,period=2mm", device, "C", texture_force=20e-3)
+    felt = result.row.perceptibility
+    assert felt is not None
+    assert result.margins["perceptibility"] == pytest.approx(felt.level, rel=1e-6)
+    amplitude = math.sqrt(2.0) * felt.texture_rms
+    assert result.margins["force steps"] == pytest.approx(amplitude / (5 * 3e-3), rel=1e-3)
+    assert result.margins["force steps"] < 0.5 * result.margins["perceptibility"]
+    without = design("sinusoid:amplitude=0.1mm,period=2mm", "touch", "C", texture_force=20e-3)
+    assert "force steps" not in without.margins
+
+
+def replace_force_resolution(step: float) -> asp.Device:
+    return override_device(asp.load_device("touch"), {"force_resolution": f"{step} N"})

@@ -52,15 +52,18 @@ def _use_commands(surface: str, row: LawRow, changed: Mapping[str, str]) -> str:
 
 def design_commands(surface: str, result: Design) -> str:
     """Return the commands that render a design: its law with parameters, stiffness and size."""
+    from asperity.scene.scene_file import read_scene
+
     typed = click.get_current_context().params
-    lateral = typed["magnify"] or 1.0
-    upward = typed["magnify_height"]
+    scene = read_scene(surface)[0].get("texture", {})  # an option replaces what it states
+    lateral = typed["magnify"] or float(scene.get("magnify", 1.0))
+    upward = typed["magnify_height"] or scene.get("magnify_height")
     is_high = result.comparison.texture.single_wave is not None  # its height alone is scaled
     changed = {}
     if not is_high:
         changed["magnify"] = f"{lateral * result.factor:.10g}"
     if is_high or upward is not None:
-        changed["magnify_height"] = f"{(upward or lateral) * result.factor:.10g}"
+        changed["magnify_height"] = f"{float(upward or lateral) * result.factor:.10g}"
     for name, argument in result.row.law.arguments.items():
         if typed.get(name) is not None:
             changed[name] = argument.format_value(result.row.surface.law_parameters[name])

@@ -23,6 +23,7 @@ from asperity.envelopes.searches import (
     FORCE,
     MET,
     MOTOR,
+    PERCEPTIBILITY,
     RMS,
     Answer,
     Search,
@@ -32,7 +33,7 @@ from asperity.envelopes.searches import (
 from asperity.laws import Law
 from asperity.textures.catalogue import TextureLike, as_texture
 
-SCHEMA = 1
+SCHEMA = 2
 _COMPARISONS = 3
 
 
@@ -124,7 +125,8 @@ def design(
     """Find law, stiffness and factor of a texture that meet a target with the greatest margin.
 
     Requirements: the stiffness is at most the recommended and at least the least one, the texture
-    is felt, its force is at least ``texture_force`` or ``peak_force``, the leak at most
+    is felt: it moves the hand by more than what is felt, and its force exceeds some force steps of
+    the device; its force is at least ``texture_force`` or ``peak_force``, the leak at most
     ``max_leak``, the support at least ``min_support``, contact is kept on half of the scan, and a
     texture with a border fits into the workspace. The margin is the least factor by which they are
     exceeded. Without a force the answer is the largest texture that meets the others, at its
@@ -262,7 +264,12 @@ def _confirm(search: Search, answer: Answer, report: Progress) -> Design:
         }
         search = replace(search, relaxed=relaxed)
         answer = search.find_answer()
-    return max(designs, key=lambda compared: (compared.is_feasible, compared.reachable))
+    best = max(designs, key=lambda compared: (compared.is_feasible, compared.reachable))
+    felt = best.row.perceptibility
+    if felt is None or PERCEPTIBILITY not in best.margins:
+        return best
+    # The comparison counts numbers of the device that are not verified, too.
+    return replace(best, margins={**best.margins, PERCEPTIBILITY: felt.level})
 
 
 def _make_design(search: Search, answer: Answer, factor: float, stiffness: float) -> Design:

@@ -28,6 +28,7 @@ from asperity.textures.texture import Texture
 STABILITY = "stability"
 LEAST_STIFFNESS = "least stiffness"
 PERCEPTIBILITY = "perceptibility"
+STEPS = "force steps"
 WORKSPACE = "workspace"
 CONTACT = "contact"
 LEAK = "leak"
@@ -37,7 +38,7 @@ FORCE = "texture force"
 RANGE = "range of factors"
 """What limits a design at the least or the greatest factor."""
 MET_WITH_LESS_STIFFNESS = {STABILITY, LEAK}
-MET_WITH_MORE_STIFFNESS = {LEAST_STIFFNESS, PERCEPTIBILITY, FORCE}
+MET_WITH_MORE_STIFFNESS = {LEAST_STIFFNESS, PERCEPTIBILITY, STEPS, FORCE}
 """Requirements that a greater stiffness exceeds by less, and by more."""
 
 MOTOR = "motor"
@@ -106,7 +107,8 @@ class Sample(NamedTuple):
         ratios = {
             STABILITY: self.trial.recommended.stiffness / stiffness,
             LEAST_STIFFNESS: stiffness / self.trial.min_stiffness,
-            PERCEPTIBILITY: perceptibility.felt_ratio(waves, response),
+            PERCEPTIBILITY: perceptibility.felt_level(response),
+            STEPS: perceptibility.force_step_ratio(waves.case, response.is_resolved),
             WORKSPACE: _workspace_ratio(texture, waves.reach),
             CONTACT: perceptibility.MAX_CONTACT_LOST / max(self.contact_lost, _LEAST_RATIO),
             LEAK: target.max_leak / max(self.leak * stiffness, _LEAST_RATIO),

@@ -236,11 +236,13 @@ def felt_ratio(waves: WaveScan, response: HandSpectrum) -> float:
     of the amplitude of the force and γ force steps, over the waves that the device resolves; the
     first over those at whose frequencies the grip has thresholds.
     """
-    case = waves.case
-    resolved = response.is_resolved
-    known = resolved & response.is_known
-    level = float(np.linalg.norm((response.motions / response.felt)[known]))
-    return min(level, force_step_ratio(case, resolved))
+    return min(felt_level(response), force_step_ratio(waves.case, response.is_resolved))
+
+
+def felt_level(response: HandSpectrum) -> float:
+    """Return the ratio of motion and felt amplitude over the waves that the device resolves."""
+    known = response.is_resolved & response.is_known
+    return float(np.linalg.norm((response.motions / response.felt)[known]))
 
 
 def force_step_ratio(case: LimitCase, resolved: NDArray[np.bool_]) -> float:

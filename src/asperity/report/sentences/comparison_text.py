@@ -52,12 +52,14 @@ def design_answer(result: Design) -> str:
     if not result.is_feasible:
         reached = "Nothing"
         if result.reachable:
-            reached = f"{force_magnitude_text(result.reachable)} {_force_unit(result)}"
+            reached = f"{format_quantity(result.reachable, 'N')} {_force_unit(result)}"
         return f"Not met. {reached} can be reached; {names} {verb} it. Nearest: law {design}."
     if result.target.texture_force is None:
         return f"The largest is law {design}. {sentence_case(names)} {verb} it."
     margin = min(result.margins.values())
-    return f"Law {design}. Least margin {margin:.3g}; {names} {verb} it."
+    target = format_quantity(result.target.texture_force, "N")
+    wanted = f"Asked for: at least {target} {_force_unit(result)}"
+    return f"Law {design}. {wanted}. Least margin {margin:.3g}; {names} {verb} it."
 
 
 def _design_text(result: Design) -> str:
