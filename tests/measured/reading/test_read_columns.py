@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from asperity.core.errors import SurfaceFileError
+from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.measured.reading import RawSurface, read_surface
 
 
@@ -60,6 +60,52 @@ def test_uneven_profile_of_an_instrument_file(tmp_path: Path) -> None:
     line.to_netcdf(str(path))
     with pytest.raises(SurfaceFileError, match="not evenly spaced: interpolate them"):
         read_surface(path)
+
+
+PRF = (
+    "1 2\r\nNAME 0.0 PRF\r\nCX M {count} MM 1.0e+0 D\r\nCZ M {count} {unit} 1.0e-6 L\r\nEOR\r\n"
+    "STYLUS_RADIUS 2.0e-3 MM\r\nSPACING CX {spacing}\r\nEOR\r\n1500\r\n-20\r\n300\r\nEOR\r\nEOF\r\n"
+)
+
+
+def test_prf_profiles_have_unit_and_spacing(tmp_path: Path) -> None:
+    raw = read_text(tmp_path, PRF.format(count="3.0e+0", unit="MM", spacing="5.0e-4"))
+    np.testing.assert_allclose(raw.heights, [1.5e-6, -20e-9, 300e-9], rtol=1e-12)
+    assert raw.pitch == pytest.approx((0.5e-6,))
+    assert (raw.has_units, raw.notes) == (True, ())
+
+
+@pytest.mark.parametrize(
+    ("entries", "message"),
+    [
+        ({"count": "4"}, r"truncated PRF profile \(3 of 4 heights\)"),
+        ({"count": "x"}, "damaged PRF profile"),
+        ({"unit": "FURLONG"}, "FURLONG|furlong"),
+        ({"spacing": "0"}, "its points are 0 m apart"),
+        ({"spacing": ""}, "an axis, SPACING or EOR lacks|damaged PRF"),
+    ],
+)
+def test_damaged_prf_profiles_are_refused(
+    tmp_path: Path, entries: dict[str, str], message: str
+) -> None:
+    text = PRF.format(**{"count": "3", "unit": "MM", "spacing": "5e-4"} | entries)
+    with pytest.raises((SurfaceFileError, ParameterError), match=message):
+        read_text(tmp_path, text)
+
+
+@pytest.mark.parametrize(
+    ("head", "words"),
+    [
+        (b"Gwyddion Simple Field 1.0\nXRes = 2\nYRes = 2\n\0\0", r"Gwyddion simple field \(GSF\)"),
+        (b"DSAA\n2 2\n0 1\n0 1\n0 1\n1 2\n3 4\n", r"Surfer grid \(GRD, text\)"),
+        (b"DSBB" + bytes(60), r"Surfer grid \(GRD\)"),
+        (b"DSRB" + bytes(60), r"Surfer grid \(GRD\)"),
+    ],
+)
+def test_formats_that_are_not_read_are_named(tmp_path: Path, head: bytes, words: str) -> None:
+    (tmp_path / "land.bin").write_bytes(head)
+    with pytest.raises(SurfaceFileError, match=f"looks like a {words}: .*save i?ts?"):
+        read_surface(tmp_path / "land.bin")
 
 
 def test_esri_grid_is_refused_with_advice(tmp_path: Path) -> None:

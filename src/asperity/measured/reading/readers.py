@@ -34,6 +34,7 @@ from asperity.measured.reading.grids import NPY_MAGIC, is_sdf, read_npy, read_sd
 from asperity.measured.reading.image_files import PNG_MAGIC, TIFF_MAGIC, read_png, read_tiff
 from asperity.measured.reading.isolation import describe_exception, read_isolated
 from asperity.measured.reading.mesh import is_binary_stl, is_obj, is_text_stl, read_mesh
+from asperity.measured.reading.prf import is_prf, read_prf
 from asperity.measured.reading.surface_topography import has_library
 from asperity.measured.reading.text_reader import read_text
 from asperity.measured.reading.x3p import read_x3p
@@ -67,7 +68,7 @@ def classify_archive(path: Path) -> str:
     return "other"
 
 
-SUPPORTED_FORMATS = "X3P, SDF, NPY, text matrix, two-column profile, PNG, TIFF, STL, OBJ"
+SUPPORTED_FORMATS = "X3P, SDF, PRF, NPY, text matrix, two-column profile, PNG, TIFF, STL, OBJ"
 _EXTRA_HINT = "the files of most instruments need the extra: pip install 'asperity[formats]'"
 
 # Signatures of formats that are mistaken for surfaces, so that the message can name them.
@@ -148,6 +149,7 @@ SIGNATURE_READERS = (
         ("unit", "green"),
         is_isolated=True,
     ),
+    Reader("a PRF profile", is_prf, read_prf),
     Reader("an SDF file", lambda file: is_sdf(file.head), read_sdf),
     Reader("a binary STL mesh", is_binary_stl, read_mesh, ("unit",)),
     Reader("a text STL mesh", is_text_stl, read_mesh, ("unit",), is_isolated=True),
