@@ -95,6 +95,15 @@ def test_papers_criterion_counts_the_slope_of_the_slip_limit() -> None:
     assert limit == pytest.approx((8000.0 - 200.0) / (2.0 + 2.0 * slope), rel=1e-6)
 
 
+def test_presliding_stiffness_above_what_the_device_allows_is_said() -> None:
+    surface = Surface(WAVE, "H", friction=0.4, presliding_stiffness=20_000.0)
+    words = "the presliding stiffness, 20000 N/m, is more than the device allows"
+    for device in (rig(0), "omega.3"):
+        result = analyze(surface, device)
+        assert words in result.passivity.criterion(result.passivity.decided_by).conclusion
+        assert not result.passivity.stability_limit.stiffness
+
+
 def test_verdict_and_starts_follow() -> None:
     assert energy_balance(Surface(WAVE, "H")) == "conservative"
     result = analyze(Surface(WAVE, "H", friction=0.4), "omega.3")

@@ -206,7 +206,16 @@ def _conclusion(loop: DeviceLoop, criterion: Criterion) -> str:
     if criterion.holds is None and criterion.missing:
         missing = ", ".join(criterion.missing)
         return f"{answer}: needs {missing}{_proved_delays_text(loop, criterion)}"
-    return f"{answer}{_limit_clause(criterion)}"
+    return f"{answer}{_presliding_clause(loop, criterion) or _limit_clause(criterion)}"
+
+
+def _presliding_clause(loop: DeviceLoop, criterion: Criterion) -> str:
+    """Return that κ alone is too stiff for a device; empty if it is not."""
+    _share, presliding = loop.presliding
+    if not presliding or criterion.limit != 0.0 or criterion.name == criteria.QUANTIZATION:
+        return ""
+    stiffness = format_quantity(float(presliding), "N/m")
+    return f": the presliding stiffness, {stiffness}, is more than the device allows"
 
 
 def _limit_clause(criterion: Criterion) -> str:
