@@ -373,14 +373,14 @@ def measure_curve(
     law: str, along_lightest: bool, factor: float, console: Console, count: int
 ) -> list[str]:
     """Return lines of the curve of a law: factor, cycles, and the fastest motion there."""
-    lines = []
+    points = []
     for tried in (factor, *(one for one in CURVE_FACTORS if one > factor)):
         result = count_cycles(law, tried, count, SEED + 1, along_lightest)
         console.print(f"{law}: {result.cycles} of {count} loops at {tried:g}")
         worst = max(result.motions, key=lambda motion: motion.speed, default=AT_REST)
         numbers = f"{tried:g}, {result.cycles}, {worst.speed:.3g}, {worst.extent:.3g}"
-        lines.append(f"    [{numbers}],")
-    return [f"curve_loops = {count}", "curve = [", *lines, "]"]
+        points.append(f"[{numbers}]")
+    return [f"curve_loops = {count}", f"curve = [{', '.join(points)}]"]
 
 
 def count_at_any_rate(law: str, along_lightest: bool, console: Console, count: int) -> int:

@@ -61,7 +61,7 @@ def test_cached_row_of_a_comparison_enters_few_functions(
     law: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     compare(_TEXTURE, laws=law)
-    module, entered = sys.modules["asperity.analysis.results.compare"], set()
+    module, entered = sys.modules["asperity.analysis.results.comparison_rows"], set()
     compute_row = module._compute_row
 
     def count(*arguments: Any) -> Any:
@@ -71,5 +71,6 @@ def test_cached_row_of_a_comparison_enters_few_functions(
 
     monkeypatch.setattr(module, "_compute_row", count)
     compare(_TEXTURE, laws=law)
-    # 90, three of perceptibility shared with envelopes, 18 of friction and of the risk.
-    assert 50 < len(entered) <= 111, sorted(entered)
+    # 90, three of perceptibility shared with envelopes, 18 of friction and of the risk,
+    # four of the press.
+    assert 50 < len(entered) <= 115, sorted(entered)

@@ -19,7 +19,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from asperity.analysis.results.compare import compare, precompute_row
+from asperity.analysis.results.compare import compare
+from asperity.analysis.results.comparison_rows import precompute_row
 from asperity.core import cache, processes
 from asperity.core.compiled import COMPILE_CALLBACKS
 from asperity.core.files import json_text

@@ -218,9 +218,7 @@ def simulate(
     stop_location = ""
     if stop is StopReason.LEFT_WORKSPACE:
         stop_location = plant.describe_exit(simulation.state)
-    path = ""
-    if not isinstance(trace, bool):
-        path = os.fspath(trace)
+    path = "" if isinstance(trace, bool) else os.fspath(trace)
     truncated, error = simulation.search_truncation
     return Run(
         writer.table if isinstance(writer, DecimatedTrace) else NO_ROWS,

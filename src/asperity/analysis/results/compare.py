@@ -4,27 +4,20 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from asperity.analysis.bounds.bound import NORM, ONE_SIDED
-from asperity.analysis.energy.continuity import continuity
-from asperity.analysis.energy.leak import find_leak
-from asperity.analysis.energy.press import (
-    depth_at_press,
-    holds_at_any_press,
-    mean_press,
-    region_of_press,
-)
-from asperity.analysis.energy.straight_scan import merit as compute_merit
-from asperity.analysis.gain.characteristic import cached_number
 from asperity.analysis.gain.surface_cache import is_shipped_law, surface_content
 from asperity.analysis.limits.limit_rules import DEFAULT_SPEED
-from asperity.analysis.limits.perceptibility import Tier, assess_perceptibility
-from asperity.analysis.passivity.device_loop import DeviceLoop, make_device_loop
-from asperity.analysis.passivity.recommended_stiffness import RISKS, recommend_on_loop
-from asperity.analysis.passivity.verdict import assess_loop
+from asperity.analysis.limits.perceptibility import Tier
+from asperity.analysis.passivity.recommended_stiffness import RISKS
+from asperity.analysis.results.comparison_rows import (
+    ComparisonQuery,
+    Task,
+    precompute_row,
+    render_row,
+)
 from asperity.analysis.results.recommendation import (
     LawRow,
     nearest_to_felt,
@@ -37,14 +30,12 @@ from asperity.core.display import Plottable, Reportable, Tabular, Text
 from asperity.core.errors import ParameterError
 from asperity.core.files import attributes_to_dict, content_digest, json_text, to_plain_data
 from asperity.core.processes import precompute
-from asperity.core.units import round_down
 from asperity.devices import Device, DeviceLike, load_device
 from asperity.laws import LAWS, Law, distribute_parameters, find_laws
 from asperity.perception.grip import DEFAULT_GRIP, Grip, load_grip
-from asperity.rendering import assess_rendering, is_searched, rendered_surface
 from asperity.surface import SURFACE_KEYWORDS, Surface
 from asperity.textures.catalogue import TextureLike, as_texture
-from asperity.textures.texture import Texture, TexturePart
+from asperity.textures.texture import Texture
 
 SCHEMA = 4
 DEFAULT_DEVICE = "omega.3"
@@ -226,7 +217,7 @@ def compare(
         for surface, _ in zip(surfaces, precomputed, strict=True):
             if progress is not None:
                 progress(surface.law.letter)
-            rows.append(_render_row(surface, query))
+            rows.append(render_row(surface, query))
     recommended = recommend(rows)
     nearest = nearest_to_felt(rows) if recommended is None else None
     arguments = {"max_depth": max_depth, "speed": speed}
@@ -294,21 +285,6 @@ def recommended_law(
     return row.law
 
 
-@dataclass(frozen=True)
-class _ComparisonQuery:
-    """The conditions under which every law is analysed."""
-
-    device: Device
-    stiffness: float | None
-    speed: float
-    part: TexturePart
-    explicit_depth: bool
-    rendering: str
-    grip: Grip
-    risk: float
-    press: float | None
-
-
 def _make_query(
     texture: Texture,
     device: DeviceLike,
@@ -319,7 +295,7 @@ def _make_query(
     grip: str | os.PathLike[str] | Grip,
     risk: str,
     press: float | None,
-) -> _ComparisonQuery:
+) -> ComparisonQuery:
     """Return the conditions from arguments of :func:`compare`, checked."""
     loaded = load_device(device)
     if stiffness is not None:
@@ -341,7 +317,7 @@ def _make_query(
             "stiffest smooth wall that held, to its file; or damping, update_rate and "
             "delay_samples",
         )
-    return _ComparisonQuery(
+    return ComparisonQuery(
         device=loaded,
         stiffness=stiffness,
         speed=DEFAULT_SPEED if speed is None else speed,
@@ -354,119 +330,10 @@ def _make_query(
     )
 
 
-Task = tuple[Surface, _ComparisonQuery]
-
-
-def _precompute_tasks(surfaces: Sequence[Surface], query: _ComparisonQuery) -> list[Task | None]:
+def _precompute_tasks(surfaces: Sequence[Surface], query: ComparisonQuery) -> list[Task | None]:
     """Return one task per law; ``None`` for a law whose results are not shared by the cache."""
     tasks: list[Task | None] = []
     for surface in surfaces:
         is_shared = is_shipped_law(surface.law) and surface_content(surface) is not None
         tasks.append((surface, query) if is_shared else None)
     return tasks
-
-
-def precompute_row(task: Task | None) -> None:
-    """Compute a row in a worker process, which leaves its numbers in the cache."""
-    if task is not None:
-        _render_row(*task)
-
-
-def _render_row(surface: Surface, query: _ComparisonQuery) -> LawRow:
-    """Return the row of a law as a loop renders it."""
-    greatest_press = None
-    if query.press is not None:
-        surface, greatest_press = _pressed_surface(surface, query, query.press)
-    row = _compute_row(rendered_surface(surface, query.rendering), query)
-    if greatest_press is None:
-        return row
-    none = replace(row.passivity.stability_limit, stiffness=0.0, basis="none")
-    return replace(
-        row,
-        passivity=replace(row.passivity, stability_limit=none),
-        recommended_stiffness=0.0,
-        perceptibility=None,
-        greatest_press=greatest_press,
-    )
-
-
-_PRESS_TOLERANCE = 1e-3
-_FIELD_GAIN = 1.1  # of a baked law over the law itself, or less: one field is enough
-_RENDERINGS = 4
-
-
-def _pressed_surface(
-    surface: Surface, query: _ComparisonQuery, press: float
-) -> tuple[Surface, float | None]:
-    """Return a surface for the depth of a press [N]; and the greatest press where none is enough.
-
-    A field that is baked for a depth may have a greater gain, and a smaller start, than the law.
-    """
-    if query.stiffness is not None:
-        stiff = surface.to_stiffness(query.stiffness)
-        return surface.to_depth(depth_at_press(stiff, press)), None
-
-    def start(trial: Surface) -> float:
-        return recommend_on_loop(_device_loop(trial, query), query.risk).exact_stiffness
-
-    depth, greatest = region_of_press(surface, press, start)
-    if depth is None:
-        return surface, greatest
-    surface = surface.to_depth(depth)
-    if is_searched(surface) and query.rendering == FIELD:
-        soft = surface.to_stiffness(start(surface) / _FIELD_GAIN)
-        surface = surface.to_depth(depth_at_press(soft, press))
-    for _ in range(_RENDERINGS):
-        stiffness = round_down(start(rendered_surface(surface, query.rendering)))
-        stiff = surface.to_stiffness(stiffness)
-        if mean_press(stiff) >= press * (1.0 - _PRESS_TOLERANCE):
-            break
-        surface = surface.to_depth(depth_at_press(stiff, press))
-    return surface, None
-
-
-def _device_loop(surface: Surface, query: _ComparisonQuery) -> DeviceLoop:
-    q = cached_number(surface, NORM)
-    return make_device_loop(surface, query.device, q, cached_number(surface, ONE_SIDED))
-
-
-def _compute_row(surface: Surface, query: _ComparisonQuery) -> LawRow:
-    device = query.device
-    loop = _device_loop(surface, query)
-    q = loop.q
-    recommended = recommend_on_loop(loop, query.risk)
-    if query.stiffness is None:
-        surface = surface.to_stiffness(recommended.start)
-    leak = find_leak(surface)
-    merit = compute_merit(surface)
-    perceptibility = None
-    if query.stiffness or recommended.stiffness:
-        perceptibility = assess_perceptibility(
-            surface,
-            device,
-            query.part,
-            rms=merit.ripple * surface.stiffness,
-            speed=query.speed,
-            explicit_depth=query.explicit_depth,
-            grip=query.grip,
-        )
-    return LawRow(
-        surface=surface,
-        q=q,
-        one_sided=loop.one_sided,
-        passivity=assess_loop(loop.with_leak(surface, leak)),
-        margin=recommended.margin,
-        recommended_stiffness=recommended.stiffness,
-        press=mean_press(surface),
-        holds_at_any_press=holds_at_any_press(surface),
-        perceptibility=perceptibility,
-        conservative=surface.facts.conservative,
-        conservative_reason=surface.facts.reason,
-        leak=leak,
-        continuity=continuity(surface, q),
-        strength=merit.strength,
-        support=merit.support,
-        contact_lost=merit.contact_lost,
-        ripple=merit.ripple,
-        rendering=assess_rendering(surface, query.speed, device.value("update_rate")),
-    )
