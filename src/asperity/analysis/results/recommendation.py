@@ -17,6 +17,7 @@ from asperity.analysis.passivity.recommended_stiffness import Margin, StabilityL
 from asperity.analysis.passivity.verdict import Passivity
 from asperity.core.display import Text
 from asperity.core.files import attributes_to_dict, to_plain_data
+from asperity.devices.device import Datum
 from asperity.laws import Law
 from asperity.rendering import Rendering
 from asperity.surface import Surface
@@ -137,15 +138,17 @@ class LawRow:
         return (self.stability_limit.stiffness or 0.0) < self.surface.stiffness
 
     @property
-    def full_force(self) -> float:
-        """Bound of the mean force down to ``max_depth`` [N]: stiffness times depth."""
-        return self.surface.stiffness * self.surface.max_depth
+    def device_friction(self) -> Datum | None:
+        """Dry friction of the device that exceeds the greatest press at which the limit holds."""
+        friction = self.passivity.loop.device.data.get("friction")
+        if friction is None or self.holds_at_any_press or self.press >= friction.value:
+            return None
+        return friction
 
     @property
     def is_hidden_by_friction(self) -> bool:
-        """Whether that force is less than the dry friction of the device, a trusted number."""
-        friction = self.passivity.loop.device.data.get("friction")
-        return friction is not None and friction.is_trusted and self.full_force < friction.value
+        """Whether the dry friction of the device, a trusted number, exceeds that press."""
+        return self.device_friction is not None and self.device_friction.is_trusted
 
     @property
     def is_useful(self) -> bool:

@@ -155,17 +155,14 @@ def _too_stiff_text(comparison: Comparison, stiffness: float) -> str:
 
 
 def friction_text(row: LawRow) -> str:
-    """Return that the force of a law stays below the device's dry friction; empty if it does not.
-
-    The force at full depth is compared, which no press down to that depth exceeds.
-    """
-    friction = row.passivity.loop.device.data.get("friction")
-    if friction is None or row.full_force >= friction.value:
+    """Return that the device's dry friction exceeds the press at which a law holds; else empty."""
+    friction = row.device_friction
+    if friction is None:
         return ""
     mark = "" if friction.is_trusted else " (not verified)"
-    force = force_magnitude_text(round_up(row.full_force, 2))
+    force = force_magnitude_text(row.press)
     limit = force_magnitude_text(friction.value)
-    return f"presses back with at most {force}, less than the device's friction of {limit}{mark}"
+    return f"may be pressed with at most {force}, less than the device's friction of {limit}{mark}"
 
 
 # --- what to watch --------------------------------------------------------------------------------
@@ -209,10 +206,11 @@ def _leak_text(row: LawRow) -> str:
 def _saturation_text(row: LawRow, device: Device) -> str:
     """Return a warning if the force at full depth exceeds the device's maximum force."""
     limit = device.value("max_force")
-    if limit is None or row.full_force <= limit:
+    force = row.surface.stiffness * row.surface.max_depth
+    if limit is None or force <= limit:
         return ""
     depth = format_quantity(row.surface.max_depth, "m")
-    needed = format_quantity(row.full_force, "N")
+    needed = format_quantity(force, "N")
     available = format_quantity(limit, "N")
     return f"Pressed to {depth} it needs {needed}; the device gives {available}."
 
@@ -235,7 +233,7 @@ def _size_text(row: LawRow, device: Device) -> str:
 
 def _row_friction_text(row: LawRow) -> str:
     text = friction_text(row)
-    return f"Down to that depth it {text}: near rest, friction holds the tool." if text else ""
+    return f"It {text}: near rest, friction holds the tool." if text else ""
 
 
 def _contact_loss_text(row: LawRow, write_argument: ArgumentWriter) -> str:
