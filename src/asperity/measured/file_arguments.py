@@ -30,6 +30,7 @@ SYNTHETIC_ARGUMENTS = (
     _BY_NAME["height_range"],
     replace(_BY_NAME["s_cutoff"], default_description="none"),
     _BY_NAME["l_cutoff"],
+    _BY_NAME["tip_radius"],
     *MAGNIFICATION_ARGUMENTS,
 )
 """Arguments for any texture: a synthetic one has no missing points, no spikes and no form."""

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -206,13 +206,15 @@ def _check_at_most(name: str, length: float, max_length: float) -> None:
 _MAX_COMPARISONS = 5e10  # about a minute at 1 to 3 ns each
 
 
-def dilate(heights: FloatArray, pitch: Pitch, radius: float) -> FloatArray:
+def dilate(
+    heights: FloatArray, pitch: Pitch, radius: float, *, periodic: bool = False
+) -> FloatArray:
     """Return the path of the lowest point of a ball that slides over the surface.
 
     d(x) = max over |u| < R of h(x + u) + √(R² - |u|²) - R, over the nodes: the locus of the ball's
     centre, lowered by its radius, as recorded by a stylus instrument and felt with a probe of that
     radius. The radius of a crest grows by R; a groove that the ball cannot enter becomes a crease.
-    The surface is mirrored at its border nodes.
+    The surface is mirrored at its border nodes, or repeats.
 
     Offsets at which the ball has risen by more than the height range of the neighbourhood cannot
     attain the maximum and are omitted: the work depends on √(2 R · range) rather than on R.
@@ -221,6 +223,7 @@ def dilate(heights: FloatArray, pitch: Pitch, radius: float) -> FloatArray:
         heights: [m], shape (ny, nx) or (n,), finite.
         pitch: (px, py) or (px,) [m].
         radius: R [m].
+        periodic: whether the surface repeats: the last node is followed by the first.
 
     Returns:
         The dilated heights [m], same shape; nowhere below the surface.
@@ -240,7 +243,9 @@ def dilate(heights: FloatArray, pitch: Pitch, radius: float) -> FloatArray:
 
     check_positive("tip_radius", radius, "m")
     span = float(heights.max()) - float(heights.min())
-    rises, is_compared = _ball(heights.shape, pitch, radius, span)
+    # Of a surface that repeats the nearest repetition of a point is the one that is touched.
+    farthest = [count // 2 if periodic else count - 1 for count in heights.shape]
+    rises, is_compared = _ball(farthest, pitch, radius, span)
     count = int(is_compared.sum())
     if count * heights.size > _MAX_COMPARISONS:
         raise ParameterError(
@@ -250,7 +255,13 @@ def dilate(heights: FloatArray, pitch: Pitch, radius: float) -> FloatArray:
             radius,
         )
     ball: Any = -rises  # typed as if it had to be whole numbers
-    return np.asarray(grey_dilation(heights, footprint=is_compared, structure=ball, mode="mirror"))
+    mode: Literal["wrap", "mirror"] = "wrap" if periodic else "mirror"
+    try:
+        felt = grey_dilation(heights, footprint=is_compared, structure=ball, mode=mode)
+    except MemoryError:  # its offsets at a border are the square of the compared points
+        limit = f"is {count} points wide, more than fit into memory; give a coarser map"
+        raise ParameterError("tip_radius", limit, radius) from None
+    return np.asarray(felt)
 
 
 def check_tip_radius(shape: Shape, pitch: Pitch, radius: float) -> None:
@@ -266,14 +277,17 @@ def check_tip_radius(shape: Shape, pitch: Pitch, radius: float) -> None:
         raise ParameterError("tip_radius", limit, radius)
 
 
-def apply_tip(heights: FloatArray, pitch: Pitch, radius: float) -> tuple[FloatArray, str]:
+def apply_tip(
+    heights: FloatArray, pitch: Pitch, radius: float, *, periodic: bool = False
+) -> tuple[FloatArray, str]:
     """Return the heights felt with a tip of that radius, and a sentence about the change.
 
     Raises:
         ParameterError: :func:`check_tip_radius` refuses the radius, or it needs too much work.
     """
-    check_tip_radius(heights.shape, pitch, radius)
-    felt = dilate(heights, pitch, radius)
+    if not periodic:
+        check_tip_radius(heights.shape, pitch, radius)
+    felt = dilate(heights, pitch, radius, periodic=periodic)
     change = felt - heights
     raised = float((change > 0).mean())
     body = "disk" if heights.ndim == 1 else "ball"
@@ -287,13 +301,13 @@ def apply_tip(heights: FloatArray, pitch: Pitch, radius: float) -> tuple[FloatAr
 
 
 def _ball(
-    shape: Shape, pitch: Pitch, radius: float, span: float
+    farthest: Sequence[int], pitch: Pitch, radius: float, span: float
 ) -> tuple[FloatArray, NDArray[np.bool_]]:
     """Return how far a ball rises [m] around its lowest point, and where that is compared."""
     # Where the ball has risen by more than the height range, the point below its centre is higher.
     reach = math.sqrt(max(span * (2.0 * radius - span), 0.0)) if span < radius else radius
     limits = [math.floor(reach / p * (1 + 1e-12)) for p in pitch[::-1]]
-    counts = np.minimum(limits, np.array(shape) - 1)
+    counts = np.minimum(limits, farthest)
     sides = [p * np.arange(-n, n + 1) for n, p in zip(counts, pitch[::-1], strict=True)]
     squares = np.sum(np.square(np.meshgrid(*sides, indexing="ij")), axis=0)
     # R - √(R² - u²), without cancellation for large balls.

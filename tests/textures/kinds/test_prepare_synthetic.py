@@ -112,7 +112,7 @@ def test_texture_without_optional_members_is_sampled() -> None:
 
 BAD = [
     ("sinusoid:amplitude=1mm,period=1mm", {"form": 2}, "form applies to measured surfaces only"),
-    ("knurl", {"outliers": 6.0}, "others take height_range, s_cutoff, l_cutoff, magn"),
+    ("knurl", {"outliers": 6.0}, "others take height_range, s_cutoff, l_cutoff, tip_radius"),
     ("knurl", {"magnify": 0.0}, "magnify must be positive"),
     ("knurl", {"s_cutoff": 1.0}, "s_cutoff must be at most"),
     ("sinusoid:amplitude=1mm,period=1mm", {"s_cutoff": -1.0}, "s_cutoff must be positive"),
@@ -154,12 +154,66 @@ def test_texture_argument_precedes_a_preparation_of_the_same_name() -> None:
     assert any("filtered" in step for step in filtered.preparation)
 
 
-def test_tip_is_for_measured_surfaces() -> None:
-    with pytest.raises(ParameterError, match="tip_radius applies to measured surfaces only"):
-        load_scene("sinusoid:amplitude=0.1mm,period=1mm", {"tip_radius": 1e-4})
+def test_a_scene_may_trace_a_texture_by_a_tip() -> None:
+    scene = load_scene("sinusoid:amplitude=0.1mm,period=1mm", {"tip_radius": 1e-3})
+    assert "tip of radius 1 mm" in scene.texture.preparation[-1]
+    assert scene.texture.peak_to_valley < 0.15e-3
 
 
 def test_preparation_arguments_are_declared() -> None:
     names = list(prepare_texture.__annotations__)[1:-1]
     assert names == [argument.name for argument in SYNTHETIC_ARGUMENTS]
     assert math.isclose(transfer(1.0, 1.0), 0.5)
+
+
+_TURNS = 2.0 * math.pi * np.arange(100) / 100.0
+SMOOTH_MAP = 3e-5 * (np.sin(_TURNS) + 0.5 * np.cos(2.0 * _TURNS[:, None] + 0.3))
+
+
+def traced_by_definition(texture: Texture, radius: float, x: float, y: float) -> float:
+    """Return max over |u| < R of h(x + u) + sqrt(R² - |u|²) - R on a dense grid."""
+    reach = min(radius, math.sqrt(2.0 * radius * texture.peak_to_valley))
+    steps = np.linspace(-reach, reach, 1001)
+    u, v = np.meshgrid(steps, [0.0] if texture.is_profile else steps)
+    left = radius**2 - u**2 - v**2
+    inside = left > 0.0
+    points = np.column_stack([x + u[inside], y + v[inside]])
+    return float((texture.height(points) + np.sqrt(left[inside]) - radius).max())
+
+
+@pytest.mark.parametrize("radius", [0.1e-3, 0.5e-3, 2e-3])
+@pytest.mark.parametrize(
+    "texture",
+    [
+        Sinusoid(4e-4, 1.5e-3, phase=0.4),
+        Fourier([1e-4, 5e-5], [[3000.0, 0.0], [0.0, 4000.0]], [0.2, 0.9]),
+        HeightMap(SMOOTH_MAP, (1e-5, 1e-5), periodic=True),
+    ],
+)
+def test_a_ball_traces_every_texture(texture: Texture, radius: float) -> None:
+    """Also balls larger than a period, and around the seam of a surface that repeats."""
+    if not texture.is_profile:
+        radius *= 0.25
+    traced = prepare_texture(texture, tip_radius=radius)
+    assert traced.domain.periodic
+    assert "felt with a tip of radius" in traced.preparation[-1]
+    tolerance = 2e-3 * texture.peak_to_valley
+    if isinstance(texture, HeightMap):
+        tolerance *= 4.0  # the ball touches nodes, which are 10 µm apart
+    for x, y in ((1e-5, 2e-5), (7e-4, 5e-4), (1.45e-3, 1.9e-3)):
+        expected = traced_by_definition(texture, radius, x, y)
+        assert traced.height(np.array([[x, y]]))[0] == pytest.approx(expected, abs=tolerance)
+    assert traced.peak_to_valley <= texture.peak_to_valley * (1.0 + 1e-3)
+
+
+def test_a_tip_comes_before_magnification_and_larger_than_a_finite_surface_is_refused() -> None:
+    wave = Sinusoid(4e-4, 1.5e-3)
+    once = prepare_texture(wave, tip_radius=0.5e-3)
+    larger = prepare_texture(wave, tip_radius=0.5e-3, magnify=2.0)
+    assert larger.peak_to_valley == pytest.approx(2.0 * once.peak_to_valley)
+    assert once.peak_to_valley < 0.8 * wave.peak_to_valley
+    small = HeightMap(1e-5 * RNG.random((20, 20)), (1e-5, 1e-5))
+    with pytest.raises(ParameterError, match="tip_radius must be at most"):
+        prepare_texture(small, tip_radius=1e-3)
+    with pytest.raises(ParameterError, match="tip_radius must be positive"):
+        prepare_texture(wave, tip_radius=0.0)

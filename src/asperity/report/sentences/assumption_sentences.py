@@ -151,6 +151,9 @@ def comparison_assumptions(comparison: Comparison) -> tuple[str, ...]:
             f"{format_quantity(surface.max_depth, 'm')}, not bounds"
         )
     sentences.append(
+        "The probe is a point on the surface as prepared; tip_radius traces it by a ball first"
+    )
+    sentences.append(
         "The leak is the work of the field on one slow traversal of its worst loop, without "
         "delay, quantisation and friction of the device"
     )

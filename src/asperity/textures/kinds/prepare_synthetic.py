@@ -1,7 +1,8 @@
 """Scale, filter and magnify synthetic textures.
 
 Sums of waves remain exact sums of waves: each amplitude is multiplied by the transfer of the
-filters. Other textures become the spline through their nodes, or through samples.
+filters. Other textures, and all that a ball traces, become the spline through their nodes, or
+through samples.
 """
 
 from __future__ import annotations
@@ -24,6 +25,10 @@ from asperity.textures.plane_waves import PlaneWaves
 from asperity.textures.spline.spline_texture import fit_spline
 from asperity.textures.texture import Texture
 
+_TIP_REFINEMENT = 16
+"""Points per node of a grid for a sum of waves that a tip traces: it leaves creases."""
+_MAX_TIP_POINTS = 1024  # along a side
+
 
 @document_arguments(SYNTHETIC_ARGUMENTS)
 def prepare_texture(  # noqa: D417 - the others are described where they are declared
@@ -32,12 +37,13 @@ def prepare_texture(  # noqa: D417 - the others are described where they are dec
     height_range: float | None = None,
     s_cutoff: float | None = None,
     l_cutoff: float | None = None,
+    tip_radius: float | None = None,
     magnify: float = 1.0,
     magnify_height: float | None = None,
 ) -> Texture:
     """Return a texture prepared like a measured surface.
 
-    The steps are, in this order: scale, filter (S, then L), magnify. Only the
+    The steps are, in this order: scale, filter (S, then L), dilate by a tip, magnify. Only the
     requested ones are done; the ``preparation`` of the result lists them.
 
     Args:
@@ -53,6 +59,14 @@ def prepare_texture(  # noqa: D417 - the others are described where they are dec
         (0.0015, 0.006, 'magnified 3 times laterally and in height')
     """
     lateral, vertical = magnification_factors(magnify, magnify_height)
+    if tip_radius is not None and texture.waves is not None:
+        filtered = prepare_texture(
+            texture, height_range=height_range, s_cutoff=s_cutoff, l_cutoff=l_cutoff
+        )
+        nodes = _sampled_waves(filtered)
+        return prepare_texture(
+            nodes, tip_radius=tip_radius, magnify=magnify, magnify_height=magnify_height
+        )
     steps = [*texture.preparation]
     scale = 1.0
     if height_range is not None:
@@ -71,6 +85,9 @@ def prepare_texture(  # noqa: D417 - the others are described where they are dec
         heights, pitch, periodic = _sample(texture)
         heights = _filter_heights(scale * heights, pitch, periodic, s_cutoff, l_cutoff)
         steps += _filter_steps(s_cutoff, l_cutoff)
+        if tip_radius is not None:
+            heights, sentence = filters.apply_tip(heights, pitch, tip_radius, periodic=periodic)
+            steps.append(sentence)
         grown = heights * vertical
         spacing = tuple(step * lateral for step in pitch)
         mask = texture.filled_mask
@@ -79,6 +96,19 @@ def prepare_texture(  # noqa: D417 - the others are described where they are dec
         steps.append(describe_magnification(lateral, vertical))
     prepared.preparation = tuple(steps)
     return prepared
+
+
+def _sampled_waves(texture: Texture) -> Texture:
+    """Return the spline through samples of a sum of waves."""
+    own = texture.grid_counts()
+    counts = [max(count, min(_TIP_REFINEMENT * count, _MAX_TIP_POINTS)) for count in own]
+    points, spacing, periodic = texture.domain.grid(counts)
+    heights = texture.height(points.reshape(-1, 2)).reshape(points.shape[:2])
+    if texture.is_profile:
+        heights = heights[0]
+    nodes = fit_spline(heights, spacing[: heights.ndim], periodic=periodic)
+    nodes.preparation = texture.preparation or (f"made from {texture!r}",)
+    return nodes
 
 
 def _height_scale(texture: Texture, height_range: float) -> float:
