@@ -15,6 +15,8 @@ from __future__ import annotations
 import sys
 from collections import Counter
 from collections.abc import Callable
+from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,15 +25,16 @@ from rich.progress import track
 from scipy import ndimage
 from scipy.interpolate import RectBivariateSpline
 
-from asperity import certify, characteristic_number, named_surface, worst_loop
+from asperity import certify, characteristic_number, export_code, named_surface, worst_loop
+from asperity.certification.certify import Certification
 from asperity.core.checks import FloatArray
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
-from bench.speed import cases
+from bench.speed import c_programs, cases
 from bench.speed.timing import number_table
 
-LAWS = "ABCEGH"
-LEAKING = "ABEG"
+LAWS = "ABCEFGH"
+LEAKING = "ABEFG"
 STEPS = ("exact", "single", "encoder", "force steps", "both", "noise", "rare noise")
 _BOX = ((-1e-3, 1e-3), (-1e-3, 1e-3), (-1e-3, 1e-4))
 _NODES = 24
@@ -46,18 +49,31 @@ def search_laws(seconds: float) -> None:
     for name, texture in track(textures.items(), "searching"):
         for law in LAWS:
             surface = Surface(texture, law, stiffness=cases.STIFFNESS)
-            found = certify(
-                surface.force,
-                region=_box(texture, surface.max_depth),
-                inside=_working_region(surface),
-                seconds=seconds,
-            )
+            found = _search(surface, seconds)
             gain = cases.STIFFNESS * characteristic_number(surface).upper
             leak = "–"
             if law in LEAKING:
                 leak = f"{found.leak / worst_loop(surface).energy:.3f}"
             table.add_row(name, law, f"{found.gain / gain:.3f}", leak, f"{found.calls:.2g}")
     Console().print(table)
+
+
+def _search(surface: Surface, seconds: float) -> Certification:
+    """Return what is found of a law in its working region; one with memory is compiled from C."""
+    renderer: Any = surface.force
+    with TemporaryDirectory() as folder:
+        if surface.law.stateful:
+            export_code(surface, f"{folder}/texture.h", shared=True)
+            renderer = f"{folder}/texture.so"
+            c_programs.run_command(
+                "cc", "-O2", "-shared", "-fPIC", f"{folder}/texture.c", "-lm", "-o", renderer
+            )
+        return certify(
+            renderer,
+            region=_box(surface.texture, surface.max_depth),
+            inside=_working_region(surface),
+            seconds=seconds,
+        )
 
 
 def _box(texture: Texture, depth: float) -> FloatArray:

@@ -264,7 +264,20 @@ def noise(
     return lambda points: force(points) + size * random.normal(size=points.shape)
 
 
+def rare_noise(
+    force: Callable[[FloatArray], FloatArray], size: float
+) -> Callable[[FloatArray], FloatArray]:
+    random = np.random.default_rng(6)
+
+    def noisy(points: FloatArray) -> FloatArray:
+        is_noisy = random.uniform(size=(len(points), 1)) < 1e-3
+        return force(points) + size * is_noisy * random.normal(size=points.shape)
+
+    return noisy
+
+
 CONTROLS = {
+    "rare noise": lambda force: rare_noise(force, 1e-3),
     "noise and encoder": lambda force: noise(encoder(force, 2e-5), 1e-3),
     "exact": lambda force: force,
     "single precision": single_precision,

@@ -8,7 +8,6 @@ import numpy as np
 
 from asperity.core.checks import FloatArray
 
-STEPS = 60
 _GROWTH = 1.8
 _SHRINKAGE = 0.88
 _LEAST_SPREAD = 1e-6
@@ -22,6 +21,7 @@ def climb(
     is_over: Callable[[], bool],
     random: np.random.Generator,
     spread: FloatArray,
+    count: int,
 ) -> tuple[FloatArray, FloatArray]:
     """Return improved places and their values, the best first.
 
@@ -35,13 +35,13 @@ def climb(
         is_over: whether to end.
         random: source of the steps.
         spread: standard deviation of the first steps along each axis [m], shape (3,).
+        count: number of steps.
     """
     places = start
     values = evaluate(places)
-    count = len(places)
-    scales = np.ones(count)
+    scales = np.ones(len(places))
     steps = np.zeros_like(places)
-    for _ in range(STEPS):
+    for _ in range(count):
         if is_over():
             break
         is_repeated = (steps != 0.0).any(axis=(1, 2))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.analysis.bounds.bound import one_sided, spectral_norm
-from asperity.certification import climbing
+from asperity.certification.climbing import climb
 from asperity.certification.region import RendererCalls, approach_paths, step_changes
 from asperity.certification.resolution import Resolution
 from asperity.core.checks import FloatArray
@@ -26,6 +26,7 @@ _MIN_CLIMBS = 8
 _SEEDS_PER_CLIMB = 8
 _MAX_SEEDS_PER_PLACE = 3
 _CALLS_PER_JACOBIAN = 4
+_STEPS = 60
 _CONFIRMED = 16
 _FIRST_SPREAD = 0.05
 
@@ -96,13 +97,14 @@ class GainSearch:
             places = self._seeds(_SEEDS_PER_CLIMB * climbs)
             order = np.argsort(-self._values(places))[:climbs]
             self._confirm(places[order])
-            places, _values = climbing.climb(
+            places, _values = climb(
                 np.concatenate([*self._best_places, places[order]]),
                 self._values,
                 region.limit,
                 lambda: time.monotonic() >= deadline,
                 self._random,
                 _FIRST_SPREAD * region.size,
+                _STEPS,
             )
             self._confirm(places)
             self._best_places = [places[: max(1, climbs // 8)]]
@@ -189,6 +191,6 @@ class GainSearch:
 
 def number_of_climbs(calls: RendererCalls, seconds: float) -> int:
     """Return how many climbs a round has so that three rounds fit into a time [s]."""
-    per_climb = _CALLS_PER_JACOBIAN * (_SEEDS_PER_CLIMB + climbing.STEPS)
-    climbs = int(calls.rate * seconds / (3 * per_climb))
+    per_climb = _CALLS_PER_JACOBIAN * (_SEEDS_PER_CLIMB + _STEPS)
+    climbs = int(calls.rate * seconds / (3 * per_climb * calls.per_force))
     return min(max(climbs, _MIN_CLIMBS), _MAX_CLIMBS)

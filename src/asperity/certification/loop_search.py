@@ -34,9 +34,10 @@ _FINE_CELLS = 320
 _PLANES = 64
 _REFINED = 6
 _OUTLINES = 24
-_POLYGONS = 64
-_VERTICES = 6
-_SIDE_POINTS = 24
+_POLYGONS = 48
+_VERTICES = 8
+_STEPS = 100
+_SIDE_POINTS = 16
 _LOOP_POINTS = 512
 _FIRST_SPREAD = 0.3
 
@@ -104,6 +105,7 @@ class LoopSearch:
         self.rejected = 0
         self._unknown_force = resolution.explained(gain)
         self._random = np.random.default_rng(seed)
+        self._best_polygons: list[FloatArray] = []
 
     def run(self, deadline: float) -> None:
         """Search until a time of the monotonic clock [s]."""
@@ -202,13 +204,15 @@ class LoopSearch:
         """Improve polygons by random steps."""
         region = self.calls.region
         polygons, _energies = climb(
-            region.points(self._random_polygons()),
+            np.concatenate([*self._best_polygons, self._random_polygons()]),
             self._polygon_works,
             region.limit,
             lambda: time.monotonic() >= deadline,
             self._random,
             _FIRST_SPREAD * region.size,
+            _STEPS,
         )
+        self._best_polygons = [polygons[: _POLYGONS // 2]]
         for polygon in polygons[:_REFINED]:
             loop = self.measure(polygon)
             if loop.counts:
@@ -217,16 +221,19 @@ class LoopSearch:
                 self.rejected += 1
 
     def _random_polygons(self) -> FloatArray:
-        """Return polygons in vertical planes as fractions of the region, of many sizes."""
-        angle = self._random.uniform(0.0, math.pi, (_POLYGONS, 1))
+        """Return polygons in vertical planes of the region [m], of many sizes."""
+        region = self.calls.region
+        centres = region.points(self._random.uniform(size=(100 * _POLYGONS, 3)))
+        centres = centres[region.contains(centres)][:_POLYGONS, None]
+        count = len(centres)
+        angle = self._random.uniform(0.0, math.pi, (count, 1))
         angle[::2] = 0.5 * math.pi * self._random.integers(2, size=(len(angle[::2]), 1))
-        along = self._random.uniform(-0.5, 0.5, (_POLYGONS, _VERTICES))
-        along *= 10.0 ** self._random.uniform(-1.0, 0.3, (_POLYGONS, 1))
-        centre = self._random.uniform(size=(2, _POLYGONS, 1))
-        x = centre[0] + along * np.cos(angle)
-        y = centre[1] + along * np.sin(angle)
-        z = self._random.uniform(size=(_POLYGONS, _VERTICES))
-        return np.asarray(np.clip(np.stack([x, y, z], axis=2), 0.0, 1.0))
+        along = self._random.uniform(-0.5, 0.5, (count, _VERTICES))
+        along *= 10.0 ** self._random.uniform(-1.0, 0.3, (count, 1))
+        across = self._random.uniform(-1.0, 1.0, (count, _VERTICES))
+        moves = np.stack([along * np.cos(angle), along * np.sin(angle), across], axis=2)
+        starts = np.broadcast_to(centres, moves.shape)
+        return region.limit(starts, centres + moves * region.size)
 
     def _polygon_works(self, polygons: FloatArray) -> FloatArray:
         """Return the work of the last turn of each polygon [J], shape (polygons,)."""
@@ -289,8 +296,11 @@ class LoopSearch:
             The greatest difference [N], beyond what noise and steps explain, and where it is [m].
         """
         path = resample(loop.path, 4 * _LOOP_POINTS)
-        walked = self.calls.along(np.tile(path, (2, 1))[None])[0, len(path) :]
-        sizes = np.sqrt(np.square(walked - self.calls.at(path)).sum(axis=1))
+        sizes = np.full(len(path), np.inf)
+        for _ in range(3):  # noise that is rare does not come again
+            walked = self.calls.along(np.tile(path, (2, 1))[None])[0, len(path) :]
+            changes = walked - self.calls.at(path)
+            sizes = np.fmin(sizes, np.sqrt(np.square(changes).sum(axis=1)))
         index = int(np.argmax(np.nan_to_num(sizes)))
         threshold = self._unknown_force + 1e-9 * self.calls.largest_force
         return float(sizes[index]) if sizes[index] > threshold else 0.0, path[index]

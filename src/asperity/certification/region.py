@@ -20,7 +20,7 @@ _REACH = 0.1
 """Distance from the origin [m] within which a surface is looked for."""
 _BORDER_HALVINGS = 8
 _OVERHEAD = 1e-6
-_APPROACH = np.append(np.linspace(0.0, 1.0, 25), [1.0, 1.0, 1.0])
+_APPROACH = np.append(np.linspace(0.0, 1.0, 13), [1.0, 1.0, 1.0])
 """Shares of an approach: steps, and a rest in which a proxy settles."""
 _HALF_WIDTH = 5e-3
 _DEPTH = 1e-3
@@ -110,6 +110,11 @@ class RendererCalls:
     def rate(self) -> float:
         """Calls per second so far, with what a search does for each [Hz]."""
         return self.calls / (self.seconds + _OVERHEAD * self.calls + 1e-6)
+
+    @property
+    def per_force(self) -> int:
+        """Calls per force: those of an approach count for a renderer with memory."""
+        return len(_APPROACH) + 1 if self.approaches else 1
 
     def along(self, paths: FloatArray) -> FloatArray:
         """Return forces along paths, each after a reset, shape (n, m, 3); NaN if not finite."""
