@@ -336,7 +336,7 @@ class Surface(Frictional):
             The paper's Table I, with the corrections named in each law.
         """
         probes = check_points("points", points, 3, "m")
-        if self.contact_friction is not None and deflection is not None:
+        if deflection is not None and self.contact_friction is not None:
             deflections = probes.check_array_per_point("deflection", deflection, 2, "m")
             return probes.restore_shape(self._deflected_force(probes.rows, deflections))
         out = np.empty(probes.rows.shape)
@@ -377,7 +377,7 @@ class Surface(Frictional):
         """Return f [N], (n, 3), and J [N/m], (n, 3, 3), at the cost of :meth:`jacobian` alone."""
         probes = check_points("points", points, 3, "m")
         has_state = deflection is not None or sliding is not None
-        if self.contact_friction is not None and has_state:
+        if has_state and self.contact_friction is not None:
             return self._with_friction(self.contact_friction, probes, deflection, sliding)
         state = self._anchor_state(probes, deflection)
         if self.law.stateful:

@@ -131,8 +131,8 @@ def test_friction_on_a_scan_is_stated_with_what_the_presliding_stiffness_keeps()
     scan = friction_scan(Surface(WAVE, "W", 1000.0, 2e-4, **options))  # type: ignore[arg-type]  # by name
     assert scan is not None
     assert 0.03 < scan.mean < 0.04  # a spring that is too soft does not reach the limit everywhere
-    assert scan.kept == pytest.approx(0.79, abs=0.01)
+    assert scan.remaining == pytest.approx(0.79, abs=0.01)
     assert friction_scan(Surface(WAVE, "W")) is None
     row = compare(WAVE, "omega.3", "W", friction=0.4).row("W")
-    assert row.to_dict()["friction_force"]["kept"] == 1.0
+    assert row.to_dict()["friction_force"]["remaining"] == 1.0
     assert "constant friction of 400 mN" in row.verdict

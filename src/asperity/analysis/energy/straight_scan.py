@@ -125,13 +125,13 @@ class FrictionScan(Serializable):
     Attributes:
         mean: mean force of friction against the motion [N].
         ripple: RMS of its oscillating part [N].
-        kept: that over the RMS with which the slip limit oscillates [1]; less than 1 where the
+        remaining: that over the RMS with which the slip limit oscillates [1]; less than 1 where the
             limit changes along the line by more than κ.
     """
 
     mean: float
     ripple: float
-    kept: float
+    remaining: float
 
 
 def friction_scan(surface: Surface) -> FrictionScan | None:
@@ -142,7 +142,7 @@ def friction_scan(surface: Surface) -> FrictionScan | None:
         >>> options = {"friction": 0.5, "presliding_stiffness": 1e3, "friction_modulation": 1.0}
         >>> wall = Surface(Sinusoid(1e-4, 1e-3), "W", 1000.0, 2e-4, **options)
         >>> scan = friction_scan(wall)
-        >>> round(scan.mean, 3), round(scan.ripple, 4), round(scan.kept, 2)
+        >>> round(scan.mean, 3), round(scan.ripple, 4), round(scan.remaining, 2)
         (0.05, 0.0354, 1.0)
     """
     if surface.contact_friction is None:
@@ -158,8 +158,8 @@ def friction_scan(surface: Surface) -> FrictionScan | None:
     rendered, limit = (force[_SCAN_POINTS_PER_LINE:] @ along for force in forces)
     ripple = float(rendered.std())
     varies = float(limit.std()) > 1e-9 * float(np.abs(limit).max())
-    kept = ripple / float(limit.std()) if varies else 1.0
-    return FrictionScan(float(rendered.mean()), ripple, kept)
+    remaining = ripple / float(limit.std()) if varies else 1.0
+    return FrictionScan(float(rendered.mean()), ripple, remaining)
 
 
 _SCAN_POINTS_PER_LINE = 2048

@@ -20,8 +20,10 @@ from asperity.analysis.passivity.device_loop import (
     DeviceLoop,
     Number,
     Obstacle,
+    add_friction,
     friction_steps,
     has_known_leak,
+    presliding,
     round_down_exactly,
 )
 from asperity.core.errors import ParameterError
@@ -103,7 +105,7 @@ def evaluate_rule(loop: DeviceLoop, rule: StiffnessRule) -> Criterion:
     missing = tuple(field for field in rule.required_fields if loop.device.value(field) is None)
     fields = (*rule.required_fields, *rule.used_fields)
     formula = rule.formula
-    if any(loop.presliding):
+    if any(presliding(loop.surface)):
         sign = " +" if loop.surface.depends_on_texture else ","
         formula = formula.replace(" <=", f"{sign} {rule.friction_term} <=", 1)
     result = Criterion(rule.name, formula, assumptions=rule.assumptions, used_fields=fields)
@@ -116,10 +118,10 @@ def evaluate_rule(loop: DeviceLoop, rule: StiffnessRule) -> Criterion:
     if weight is None:
         weight = rule.one_sided_weight + Fraction(3, 2) * rule.norm_weight
     upper = loop.weighted_gain(*weights, "upper") + rule.further_gain
-    upper, budget = loop.add_friction(upper, rule.budget, weight)
+    upper, budget = add_friction(loop.surface, upper, rule.budget, weight)
     lower = loop.weighted_gain(*weights, "lower")
     proved = _max_stiffness(budget, upper)
-    possible = _max_stiffness(*loop.add_friction(lower, rule.budget, weight)[::-1])
+    possible = _max_stiffness(*add_friction(loop.surface, lower, rule.budget, weight)[::-1])
     # Infinity over a finite lower end: the number was only sampled, so no limit is proved.
     if upper != math.inf or possible == 0:
         limit = round_down_exactly(proved)
@@ -148,7 +150,7 @@ _DAMPING_FIELDS = ("update_rate", "damping")
 
 def _paper_rule(loop: DeviceLoop) -> StiffnessRule:
     """With friction, |Δf| <= (k q + κ + l) |Δp|, l the greatest slope of the slip limit."""
-    share, fixed = loop.presliding
+    share, fixed = presliding(loop.surface)
     budget = loop.damping_gain
     if budget is not None:
         budget -= 2 * fixed

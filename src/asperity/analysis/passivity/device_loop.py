@@ -84,17 +84,6 @@ class DeviceLoop:
         return Fraction(self.surface.stiffness)
 
     @property
-    def presliding(self) -> tuple[Fraction, Fraction]:
-        """κ of the friction: its part that is a share of the stiffness [1], and the rest [N/m]."""
-        return presliding(self.surface)
-
-    def add_friction(
-        self, gain: Number, budget: Fraction, weight: Fraction
-    ) -> tuple[Number, Fraction]:
-        """Return gain and budget of a rule with friction; see :func:`add_friction`."""
-        return add_friction(self.surface, gain, budget, weight)
-
-    @property
     def slip_slope(self) -> Number:
         """Upper bound of the slope of the slip limit over the stiffness [1].
 
@@ -331,18 +320,18 @@ def max_proved_delay(loop: DeviceLoop) -> int | None:
     budget = loop.damping_gain - abs(loop.virtual_damping_gain)
     half = loop.weighted_gain(HALF, Fraction(0), "upper")
     q = loop.weighted_gain(Fraction(0), Fraction(1), "upper")
-    gain, rest = loop.add_friction(half, budget, HALF)
+    gain, rest = add_friction(loop.surface, half, budget, HALF)
     if gain == math.inf or rest < loop.stiffness * gain:
         return None
     if q == math.inf:
         return 0
-    share, fixed = loop.presliding
-    presliding = share * loop.stiffness + fixed
+    share, fixed = presliding(loop.surface)
+    kappa = share * loop.stiffness + fixed
     start = Fraction(half) * loop.stiffness
     slope = Fraction(q) * loop.stiffness
-    rules = [(start, slope), (HALF * presliding, 3 * HALF * presliding)]
+    rules = [(start, slope), (HALF * kappa, 3 * HALF * kappa)]
     if loop.surface.depends_on_texture:
-        rules = [(start + HALF * presliding, slope + 3 * HALF * presliding)]
+        rules = [(start + HALF * kappa, slope + 3 * HALF * kappa)]
     delays = [math.floor((budget - least) / rise) for least, rise in rules if rise > 0]
     return min(delays, default=None)
 
@@ -447,14 +436,14 @@ def _buzz_terms(loop: DeviceLoop) -> tuple[Fraction, Fraction, Fraction, Fractio
     if math.inf in (q, gain):
         return None
     virtual = abs(loop.virtual_damping_gain)
-    share, presliding = loop.presliding
+    share, kappa = presliding(loop.surface)
     steps = friction_steps(loop)
     fixed = loop.force_step / 2 + virtual * loop.position_step - loop.friction
     per_stiffness = Fraction(q) * loop.position_step / 2
-    gain, budget = loop.add_friction(
-        gain, loop.damping_gain - virtual, HALF + 3 * HALF * loop.known_delay
+    gain, budget = add_friction(
+        loop.surface, gain, loop.damping_gain - virtual, HALF + 3 * HALF * loop.known_delay
     )
-    fixed += steps * presliding
+    fixed += steps * kappa
     return per_stiffness + steps * share, fixed, Fraction(gain), budget
 
 

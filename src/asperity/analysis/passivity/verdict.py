@@ -124,7 +124,7 @@ def _find_unstable_motion(loop: DeviceLoop) -> Ground | None:
         gains.append(stiff * (loop.delay + device_loop.HALF) - loop.virtual_damping_gain)
     if loop.delay and loop.q.lower > loop.one_sided.upper:
         slack = loop.weighted_gain(Fraction(0), Fraction(1), "lower") * loop.stiffness
-        share, fixed = loop.presliding
+        share, fixed = device_loop.presliding(loop.surface)
         slack -= share * loop.stiffness + fixed  # an anchor that sticks stiffens the direction
         gains.append(slack / 2 - loop.virtual_damping_gain)
     if max(gains) > loop.damping_gain:

@@ -72,8 +72,8 @@ def friction_force_text(scan: FrictionScan) -> str:
     mean, ripple = format_in_one_unit([scan.mean, scan.ripple], "N", digits=2)
     if scan.ripple < 1e-3 * scan.mean:
         return f"constant friction of {mean}"
-    kept = f"{100.0 * scan.kept:.0f} % of what its limit does"
-    return f"friction of {mean} varies by {ripple} RMS, {kept}"
+    remaining = f"{100.0 * scan.remaining:.0f} % of what its limit does"
+    return f"friction of {mean} varies by {ripple} RMS, {remaining}"
 
 
 def yes_no_text(holds: bool | None) -> str:

@@ -18,6 +18,7 @@ from asperity.analysis.passivity.device_loop import (
     has_known_leak,
     is_damping_below_wall,
     max_proved_delay,
+    presliding,
 )
 from asperity.analysis.passivity.recommended_stiffness import StabilityLimit
 from asperity.analysis.passivity.verdict import Ground, Passivity
@@ -211,10 +212,10 @@ def _conclusion(loop: DeviceLoop, criterion: Criterion) -> str:
 
 def _presliding_clause(loop: DeviceLoop, criterion: Criterion) -> str:
     """Return that κ alone is too stiff for a device; empty if it is not."""
-    _share, presliding = loop.presliding
-    if not presliding or criterion.limit != 0.0 or criterion.name == criteria.QUANTIZATION:
+    _share, fixed = presliding(loop.surface)
+    if not fixed or criterion.limit != 0.0 or criterion.name == criteria.QUANTIZATION:
         return ""
-    stiffness = format_quantity(float(presliding), "N/m")
+    stiffness = format_quantity(float(fixed), "N/m")
     return f": the presliding stiffness, {stiffness}, is more than the device allows"
 
 
