@@ -74,15 +74,7 @@ class IsolatedRenderer:
         Raises:
             RendererError: if it crashed or does not return, with the position.
         """
-        calls = int(self._progress[0])
-        changed = time.monotonic()
-        while not self._connection.poll(0.1):
-            now = time.monotonic()
-            if self._progress[0] != calls:
-                calls = int(self._progress[0])
-                changed = now
-            if now - changed > _CALL_TIMEOUT:
-                raise self._error(points, f"did not return in {_CALL_TIMEOUT:g} s")
+        self._wait(points)
         try:
             answer: FloatArray | RendererError = self._connection.recv()
         except (EOFError, ConnectionError):
@@ -99,6 +91,18 @@ class IsolatedRenderer:
         self._process.join()
         self._connection.close()
         self._counter.close()
+
+    def _wait(self, points: FloatArray) -> None:
+        """Wait for an answer as long as calls return."""
+        calls = int(self._progress[0])
+        changed = time.monotonic()
+        while not self._connection.poll(0.1):
+            now = time.monotonic()
+            if self._progress[0] != calls:
+                calls = int(self._progress[0])
+                changed = now
+            if now - changed > _CALL_TIMEOUT:
+                raise self._error(points, f"did not return in {_CALL_TIMEOUT:g} s")
 
     def _error(self, points: FloatArray, reason: str) -> RendererError:
         places: FloatArray = points.reshape(-1, 3)

@@ -249,9 +249,7 @@ def _position_steps(steps: FloatArray) -> tuple[float, ...]:
 
 def _contact_stiffness(samples: RecordedSamples) -> tuple[float, int]:
     """Return the stiffness by regression in contact, and the lag at which it fits best."""
-    best = math.nan
-    best_lag = 0
-    least = math.inf
+    fits = []
     for lag in range(MAX_LAG + 1):
         forces = samples.forces[lag:, 2]
         heights = samples.positions[: len(forces), 2]
@@ -260,12 +258,9 @@ def _contact_stiffness(samples: RecordedSamples) -> tuple[float, int]:
             continue
         slope, offset = np.polyfit(heights[in_contact], forces[in_contact], 1)
         rest = forces[in_contact] - slope * heights[in_contact] - offset
-        misfit = float(np.square(rest).mean())
-        if misfit < least:
-            least = misfit
-            best = -float(slope)
-            best_lag = lag
-    return best, best_lag
+        fits.append((float(np.square(rest).mean()), lag, -float(slope)))
+    _misfit, lag, stiffness = min(fits, default=(math.inf, 0, math.nan))
+    return stiffness, lag
 
 
 def _find_limit_cycle(
