@@ -202,3 +202,18 @@ def test_the_study_of_our_own_is_ready_to_run(call: Call, tmp_path: Path, name: 
         "shortest_response": 0.2, "longest_response": 30.0, "largest_omission": 0.2,
         "least_correct": 0.0, "least_consistency": 0.6,
     }  # fmt: skip
+
+
+def test_the_study_of_friction_has_the_same_texture_with_and_without_it() -> None:
+    study = load_study(str(EXAMPLES / "real.toml"))
+    assert [dict(one) for one in study.design.conditions] == [
+        {"surface.friction": friction} for friction in (0.0, 0.2, 0.4)
+    ]
+    # Law H for all: the file of the scene names it, and what friction it has is the condition.
+    scene = (EXAMPLES / "board.toml").read_text("utf-8")
+    assert 'law = "H"' in scene
+    assert "friction =" not in scene
+    other = load_study(str(EXAMPLES / "alive.toml")).design
+    assert study.design.participants == other.participants == 12
+    for name in ("exclusion", "repeats"):
+        assert study.design.options[name] == other.options[name]
