@@ -72,9 +72,10 @@ def test_recommendation_answers_the_questions_of_a_new_user(result: asp.Comparis
     assert "simulated loops" in reasons
     missing = [question for question, words in checks.items() if words not in text]
     assert not missing
-    # Ten times smaller, it would have to be 0.4 m long to be felt, on 0.15 m.
-    for height, cure in ((1e-7, "magnify it 41 times more"), (1e-8, "No magnification within")):
-        faint = asp.compare(asp.Sinusoid(height, 1e-3), "touch", "CH")
+    # The other would have to be longer than the workspace to be felt.
+    faint_waves = {(3e-6, 0.3e-3): "magnify it 6.4 times more", (1e-8, 1e-3): "No magnification"}
+    for (height, period), cure in faint_waves.items():
+        faint = asp.compare(asp.Sinusoid(height, period), "touch", "CH")
         for words in ("Nothing of this texture will be felt", cure):
             assert words in faint.recommendation
         assert "moves the held tool" in " ".join(faint.reasons)
