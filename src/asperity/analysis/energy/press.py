@@ -18,7 +18,7 @@ _TOLERANCE = 1e-6
 _MAX_STEPS = 80
 _MAX_DOUBLINGS = 24
 _MAX_HALVINGS = 8
-_ROOT_TOLERANCE = 2e-3
+_ROOT_TOLERANCE = 1e-4
 _LEAST_GAIN = 1.01
 """Growth of the press per doubling of the depth below which it counts as its greatest."""
 
