@@ -106,7 +106,7 @@ def test_page_lists_only_what_goes_wrong(result: asp.Comparison, page: str) -> N
     listed = re.findall(r'data-law="(\w)"', section)
     assert set(listed) == {row.law.letter for row in result.rows if row.artefacts}
     assert "feels alive" in section
-    quiet = asp.compare(asp.Sinusoid(0.1e-3, 5e-3), device="omega.3", laws="C").rows[0]
+    quiet = asp.compare(asp.Sinusoid(0.1e-3, 2e-3), device="omega.3", laws="C").rows[0]
     assert quiet.artefacts == []
     assert quiet.verdict.startswith("plausible up to")
 

@@ -28,6 +28,8 @@ def row_verdict(row: LawRow) -> str:
     artefacts = row_artefacts(row)
     if row.conservative and not _instability_text(row):
         artefacts.insert(0, _passivity_text(row))
+    if row.recommended_stiffness:
+        artefacts.append(press_text(row))
     if row.friction_force is not None:
         artefacts.append(f"{row.energy_balance}: {friction_force_text(row.friction_force)}")
     return "; ".join(artefacts)
@@ -55,8 +57,6 @@ def row_artefacts(row: LawRow) -> list[str]:
     if row.rendering.truncated:
         share = 100.0 * row.rendering.truncated / row.rendering.samples
         parts.append(f"search truncated in {share:.2g} % of samples")
-    if row.recommended_stiffness:
-        parts.append(press_text(row))
     if row.loses_contact:
         parts.append(f"no contact on {100.0 * row.contact_lost:.0f} % of the scan")
     return parts
