@@ -125,8 +125,7 @@ def _load_plugin(file: str, registries: tuple[PluginRegistry, ...]) -> None:
     if before == [registry.entries for registry in registries]:
         types = [registry.plugin_type for registry in registries]
         names = ", ".join(kind.__name__ for kind in types if kind is not None)
-        functions = "register_criterion"
-        fault = f"{file} registers nothing: no {names} at its top level, and no call of {functions}"
+        fault = f"{file} registers nothing: no {names} at its top level, no register_criterion call"
         raise ParameterError(_OPTION, fault)
 
 

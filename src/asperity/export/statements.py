@@ -303,18 +303,22 @@ class FunctionPrinter(ast.NodeVisitor):
                 calls = [part for part in ast.walk(piece) if isinstance(part, ast.Call)]
                 acting = [call for call in calls if self.types.written_arrays(call)]
                 written = {name for call in acting for name in self.types.written_arrays(call)}
-                inside = {id(part) for call in acting for part in ast.walk(call)}
-                read = {
-                    part.value.id
-                    for part in ast.walk(piece)
-                    if isinstance(part, ast.Subscript)
-                    and isinstance(part.value, ast.Name)
-                    and id(part) not in inside
-                }
-                if len(acting) > 1 or read & written:
+                if len(acting) > 1 or _arrays_read_beside(piece, acting) & written:
                     raise self.types.not_exportable(
                         "depends on an evaluation order that C leaves open", value
                     )
+
+
+def _arrays_read_beside(piece: ast.AST, calls: Sequence[ast.Call]) -> set[str]:
+    """Return the names of the arrays that an expression reads outside of some of its calls."""
+    inside = {id(part) for call in calls for part in ast.walk(call)}
+    names = set()
+    for part in ast.walk(piece):
+        if id(part) in inside or not isinstance(part, ast.Subscript):
+            continue
+        if isinstance(part.value, ast.Name):
+            names.add(part.value.id)
+    return names
 
 
 def _returns_zeros(node: ast.stmt) -> bool:

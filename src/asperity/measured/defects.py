@@ -180,8 +180,8 @@ def fill_in_place(heights: FloatArray, pitch: Pitch) -> None:
     if not missing.any():
         return
     if heights.ndim == 1:
-        index = np.arange(len(heights), dtype=np.float64)
-        heights[missing] = np.interp(index[missing], index[~missing], heights[~missing])
+        valid = np.flatnonzero(~missing)
+        heights[missing] = np.interp(np.flatnonzero(missing), valid, heights[valid])
         return
     # Without the mean, the solver's tolerance is relative to the range of heights.
     mean = float(np.nanmean(heights))

@@ -288,10 +288,15 @@ def _decay_distances(
         along = np.arange(0.0, reach + 0.5 * step, step)
         indices = [along * direction[1] / pitch[1], along * direction[0] / pitch[0]]
         values = map_coordinates(autocorrelation, indices, order=1, mode="grid-wrap")
-        low = int(np.argmax(values < CORRELATION_LEVEL))
-        if values[low] >= CORRELATION_LEVEL:
-            distances.append(None)
-            continue
-        share = (values[low - 1] - CORRELATION_LEVEL) / (values[low - 1] - values[low])
-        distances.append(float(along[low - 1] + share * step))
+        steps = _steps_to_level(values)
+        distances.append(None if steps is None else steps * step)
     return distances
+
+
+def _steps_to_level(values: FloatArray) -> float | None:
+    """Return after how many steps values fall to the level; ``None`` if they do not."""
+    low = int(np.argmax(values < CORRELATION_LEVEL))
+    if values[low] >= CORRELATION_LEVEL:
+        return None
+    share = (values[low - 1] - CORRELATION_LEVEL) / (values[low - 1] - values[low])
+    return float(low - 1 + share)

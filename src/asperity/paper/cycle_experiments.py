@@ -33,7 +33,7 @@ from asperity.simulation import (
     find_onset,
 )
 from asperity.simulation.hands import Hand
-from asperity.simulation.lanes import BatchSimulation, StopRule
+from asperity.simulation.lanes import BatchSimulation, StopRule, Trajectory
 from asperity.simulation.onset import Onset, Prediction, predict, run_starts, start_offsets
 from asperity.surface import Surface
 from asperity.textures import named_surface
@@ -219,12 +219,18 @@ def count_cycles(
     slow = sum([run.samples * servo.period > duration and not run.verdict for run in runs])
     samples = range(0, round(duration / servo.period), TRACE_STRIDE)
     first = loop.new_trajectory(stiffness, delay, shifts[0], _observe_at(samples[1:]))
-    path = [first.state[[0, 2]].copy()]
-    while first.verdict is None:
-        loop.run([first])
-        path.append(first.state[[0, 2]].copy())
+    x, z = _observe_path(loop, first)
     time = np.array(samples) * servo.period
-    return CycleCount(law, divisor, delay, starts, cycling, slow, time, *np.array(path).T)
+    return CycleCount(law, divisor, delay, starts, cycling, slow, time, x, z)
+
+
+def _observe_path(loop: BatchSimulation, trajectory: Trajectory) -> FloatArray:
+    """Run a trajectory to its end and return x and z [m] where it pauses, shape (2, n)."""
+    path = [trajectory.state[[0, 2]].copy()]
+    while trajectory.verdict is None:
+        loop.run([trajectory])
+        path.append(trajectory.state[[0, 2]].copy())
+    return np.array(path).T
 
 
 def _observe_at(sample_counts: Sequence[int]) -> StopRule:

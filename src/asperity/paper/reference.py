@@ -62,18 +62,23 @@ def exact_jacobian(
         p = [mpmath.mpf(c) for c in point]
         d = [mpmath.mpf(c) for c in deflection]
         step = mpmath.mpf(10) ** (-digits) * mpmath.mpf(surface.max_depth)
-        square = d[0] ** 2 + d[1] ** 2
         columns = []
         for axis in range(3):
             move = [step if i == axis else mpmath.mpf(0) for i in range(3)]
-            follow = move[:2]
-            if sliding and square > 0:
-                along = (d[0] * move[0] + d[1] * move[1]) / square
-                follow = [move[0] - along * d[0], move[1] - along * d[1]]
+            follow = _anchor_motion(move, d, sliding)
             ahead = _force(surface, height, _offset(p, 1, move), _offset(d, 1, follow))
             behind = _force(surface, height, _offset(p, -1, move), _offset(d, -1, follow))
             columns.append((ahead - behind) / (2 * step))
         return mpmath.matrix([[columns[c][r] for c in range(3)] for r in range(3)])
+
+
+def _anchor_motion(move: Sequence[Any], deflection: Sequence[Any], sliding: bool) -> list[Any]:
+    """Return the change of the deflection: the motion of the probe, or its part across it."""
+    square = deflection[0] ** 2 + deflection[1] ** 2
+    if not sliding or square == 0:
+        return list(move[:2])
+    along = (deflection[0] * move[0] + deflection[1] * move[1]) / square
+    return [move[0] - along * deflection[0], move[1] - along * deflection[1]]
 
 
 def _offset(point: list[Any], sign: int, step: list[Any]) -> list[Any]:

@@ -240,16 +240,10 @@ def _read(path: Path, stream: IO[bytes], size: int) -> Recording:
     if is_complete or chunks:
         _check_head(stream, head_end, texts, attachments)
     rows = _check_rows(stream, chunks, row_encoding.row_type(len(columns)))
+    version = texts["version"]
+    found = tuple(chunks)
     return Recording(
-        path,
-        columns,
-        rows,
-        metadata,
-        texts["version"],
-        is_complete,
-        size - end,
-        tuple(chunks),
-        attachments,
+        path, columns, rows, metadata, version, is_complete, size - end, found, attachments
     )
 
 

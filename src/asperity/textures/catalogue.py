@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections import ChainMap
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -251,13 +251,17 @@ def build_texture(
     preparation = {name: read.pop(name) for name in read.keys() - constructing} | dict(values or {})
     if kind == "file":
         return entry.factory(**_require_all(entry, read | preparation))
-    names = [argument.name for argument in synthetic]
-    for name in preparation:
-        if name not in names:
-            reason = f"applies to measured surfaces only; others take {', '.join(names)}"
-            raise ParameterError(name, reason)
+    _check_preparation(preparation, [argument.name for argument in synthetic])
     texture = entry.factory(**_require_all(entry, read))
     return prepare_texture(texture, **preparation) if preparation else texture
+
+
+def _check_preparation(names: Iterable[str], allowed: Sequence[str]) -> None:
+    """Raise an error for an argument of the preparation that a synthetic surface does not take."""
+    for name in names:
+        if name not in allowed:
+            reason = f"applies to measured surfaces only; others take {', '.join(allowed)}"
+            raise ParameterError(name, reason)
 
 
 def _require_all(kind: TextureKind, arguments: dict[str, Any]) -> dict[str, Any]:

@@ -6,7 +6,7 @@ import csv
 import io
 from pathlib import Path
 
-from asperity.analysis.limits.limit_rules import LIMIT_RULES
+from asperity.analysis.limits.limit_rules import LIMIT_RULES, Limit
 from asperity.analysis.results import check_limits
 from asperity.core.errors import ParameterError
 from asperity.core.files import write_bytes
@@ -58,9 +58,6 @@ def six_limits_table(result: check_limits.Limits) -> Table:
     """Return one row per limit: number, name, condition, both sides, result, share and speeds."""
     rows = []
     for limit in result.limits:
-        speeds = limit_sentences.speeds_text(limit.speeds)
-        if limit.missing_data:
-            speeds = f"needs {', '.join(limit.missing_data)}"
         cells: page.Cells = [
             Cell(str(limit.number), "l"),
             limit.name,
@@ -69,10 +66,16 @@ def six_limits_table(result: check_limits.Limits) -> Table:
             side_text(limit.right, limit.unit),
             page.holds_cell(limit.holds),
             "" if limit.share is None else limit_sentences.percent(limit.share),
-            speeds,
+            _speeds_cell(limit),
         ]
         rows.append(Row(cells, style=_STYLES[limit.holds]))
     return Table(_LIMIT_HEADINGS, rows, (3, 4, _SHARE_COLUMN), _LIMITS_LAYOUT)
+
+
+def _speeds_cell(limit: Limit) -> str:
+    if limit.missing_data:
+        return f"needs {', '.join(limit.missing_data)}"
+    return limit_sentences.speeds_text(limit.speeds)
 
 
 def listed_waves(result: check_limits.Limits) -> list[check_limits.RenderedWave]:

@@ -16,7 +16,7 @@ from asperity.core.units import format_quantity
 from asperity.measured.form import SurfaceDecomposition, decompose_surface
 from asperity.measured.parameters import SurfaceParameter, find_parameter
 from asperity.measured.prepared import PreparationStage, PreparedSurface
-from asperity.measured.reading.measured_file import MeasurementSummary, decimate
+from asperity.measured.reading.measured_file import MeasurementSummary, StepChange, decimate
 from asperity.report.document import page
 from asperity.report.document.page import (
     HEADED,
@@ -224,17 +224,18 @@ def _figure_sections(summary: MeasurementSummary) -> list[Section]:
         heights = {"heights": decimate(summary.prepared.heights)}
         figure = partial(_draw_heights, heights, summary.sides)
         return [page.picture_section("The surface", figure, description, "After preparation.")]
-    sections = []
-    for number, change in enumerate(summary.changes):
-        caption = f"Before, after, and what the step removed: {removed_text(change.stage)}"
-        title = sentence_case(change.stage.name)
-        removed = change.before - change.after
-        maps = {"before": change.before, "after": change.after, "removed": removed}
-        figure = partial(_draw_heights, maps, change.sides)
-        text = f"{title}. {caption}."
-        level = 3 if number else 2
-        sections.append(page.picture_section(title, figure, text, caption, level=level))
-    return sections
+    first, *others = summary.changes
+    return [_change_section(first, 2), *(_change_section(change, 3) for change in others)]
+
+
+def _change_section(change: StepChange, level: int) -> Section:
+    """Return the picture of what a step of the preparation changed."""
+    caption = f"Before, after, and what the step removed: {removed_text(change.stage)}"
+    title = sentence_case(change.stage.name)
+    removed = change.before - change.after
+    maps = {"before": change.before, "after": change.after, "removed": removed}
+    figure = partial(_draw_heights, maps, change.sides)
+    return page.picture_section(title, figure, f"{title}. {caption}.", caption, level=level)
 
 
 def _draw_heights(heights_by_title: Mapping[str, FloatArray], sides: tuple[float, ...]) -> Figure:

@@ -121,11 +121,10 @@ def _draw_energy(axes: Axes, run: NamedColumns, selection: slice) -> None:
             axes.plot(time, supplied[:, i], color=_AXIS_COLOURS[i], lw=0.8, label=_AXIS_NAMES[i])
         total = supplied.sum(axis=1)
         paper = energies["same_sample"][selection].sum(axis=1) * 1e3
-        axes.plot(time, total, color=style.INK, lw=1.4, label="sum, exact")
         axes.plot(time, paper, color=style.MUTED, lw=0.9, ls="--", label="the paper's sum")
     else:  # a real device records the sum alone
         total = run.select("supplied")[selection, 0] * 1e3
-        axes.plot(time, total, color=style.INK, lw=1.4, label="sum, exact")
+    axes.plot(time, total, color=style.INK, lw=1.4, label="sum, exact")
     style.draw_zero_line(axes)
     style.add_legend(axes)
     style.label_axes(axes, "time [s]", "energy [mJ]")

@@ -214,16 +214,17 @@ def _panel_dict(panel: Panel) -> dict[str, Any]:
         "box": [round(part, 2) for part in panel.box],
         "x": _axis_dict(panel.x, panel.axes.get_xlim(), panel.axes.xaxis),
         "y": _axis_dict(panel.y, panel.axes.get_ylim(), panel.axes.yaxis),
-        "series": [
-            {
-                "name": series.name,
-                "law": series.law,
-                "x": _compress_steps(series.x),
-                "y": _round_values(series.y, _DIGITS),
-            }
-            for series in panel.series
-        ],
+        "series": [_series_dict(series) for series in panel.series],
         "field": _field_dict(panel.field),
+    }
+
+
+def _series_dict(series: Series) -> dict[str, Any]:
+    return {
+        "name": series.name,
+        "law": series.law,
+        "x": _compress_steps(series.x),
+        "y": _round_values(series.y, _DIGITS),
     }
 
 
