@@ -56,7 +56,7 @@ def test_every_mutated_file_is_read_or_refused(
 def test_seed_files_are_read(
     reader: str, tmp_path: Path, worker: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from asperity.core.errors import SurfaceFileError
+    from asperity.core.errors import ParameterError, SurfaceFileError
     from asperity.measured.reading import isolation, read_surface
 
     monkeypatch.setattr(isolation, "run_subprocess", worker.start)
@@ -69,11 +69,11 @@ def test_seed_files_are_read(
         path.write_bytes(content)
         try:
             raw = read_surface(path, **seeds.OPTIONS.get(reader, {}))
-        except SurfaceFileError as error:
+        except (ParameterError, SurfaceFileError) as error:
             refused.append(str(error))
         else:
             assert raw.heights.size > 0
-    reasons = {"archive": "archive", "png": "colour image", "tiff": "colour image", "marks": ""}
+    reasons = {"archive": "archive", "png": "normal map", "tiff": "normal map", "marks": ""}
     expected = reasons.get(reader)
     assert all(expected is not None and expected in message for message in refused)
 
