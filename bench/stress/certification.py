@@ -121,7 +121,7 @@ def search_jumps(cells: int, seconds: float = 30.0) -> None:
     Console().print(table)
 
 
-def found_sets(labels: NDArray[np.int_], box: FloatArray, places: FloatArray) -> set[int]:
+def found_sets(labels: NDArray[Any], box: FloatArray, places: FloatArray) -> set[int]:
     """Return the numbers of the sets of jumps in or beside whose cells places are [m]."""
     cells = len(labels)
     fractions = (places - box[:, 0]) / np.ptp(box, axis=1)
@@ -135,7 +135,7 @@ def found_sets(labels: NDArray[np.int_], box: FloatArray, places: FloatArray) ->
 
 def jump_sets(
     surface: Surface, box: FloatArray, inside: Callable[[FloatArray], NDArray[np.bool_]], cells: int
-) -> tuple[NDArray[np.int_], int]:
+) -> tuple[NDArray[Any], int]:
     """Return the number of the set of jumps of each cell of a box, 0 for none, and how many."""
     low, size = box[:, 0], np.ptp(box, axis=1)
     nodes = np.stack(np.meshgrid(*[np.arange(cells)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -204,7 +204,7 @@ def conservative_force(seed: int) -> tuple[Callable[[FloatArray], FloatArray], f
 
     places = np.linspace(-1e-3, 1e-3, 400)
     slope = np.hypot(spline(places, places, dx=1), spline(places, places, dy=1))
-    squares = 0.0
+    squares = np.zeros_like(slope)
     for dx, dy in ((2, 0), (0, 2), (1, 1), (1, 1)):
         squares = squares + spline(places, places, dx=dx, dy=dy) ** 2
     depth = np.maximum(spline(places, places) + 1e-3, 0.0)

@@ -15,7 +15,7 @@ TURNS = 3
 
 def path_point(shapes: FloatArray, i: int, axis: int, phase: float) -> float:
     """Return a coordinate [m] of a path at a phase [rad]."""
-    value = shapes[i, axis]
+    value: float = shapes[i, axis]
     for harmonic in range(1, 4):
         row = 6 * harmonic - 3 + axis
         value += shapes[i, row] * math.sin(harmonic * phase)

@@ -29,6 +29,7 @@ from asperity.core.arguments import MAX_DEPTH, Argument
 from asperity.core.units import format_quantity
 from asperity.lab.scene_state import START_LAW, START_STIFFNESS
 from asperity.laws import LAWS
+from asperity.laws.friction import FRICTION_ARGUMENTS
 from asperity.measured.file_arguments import FILE_ARGUMENTS
 
 READ_A_SURFACE = ["analyze", "compare", "limits", "onset", "scan", "simulate"]
@@ -52,6 +53,7 @@ def test_every_declared_argument_is_an_option_with_its_help(command: str) -> Non
 
 def test_every_parameter_of_a_shipped_law_is_an_option() -> None:
     declared = {name for law in LAWS.values() for name in law.arguments}
+    declared |= FRICTION_ARGUMENTS.keys()
     assert {argument.name for argument in LAW_OPTIONS} == declared | {
         "stiffness",
         "max_depth",

@@ -70,15 +70,14 @@ def check_real(name: str, value: object, unit: str = "") -> float:
         value = parse_quantity(name, value, unit)
     if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
         raise ParameterError(name, f"must be a number{_unit_text(unit)}", value)
-    too_large = f"must be at most {_LARGEST:g}{_unit_text(unit)}"
     try:
         number = float(value)
     except OverflowError:  # an integer, perhaps of more digits than can be printed
-        raise ParameterError(name, too_large) from None
+        raise ParameterError(name, f"must be at most {_LARGEST:g}{_unit_text(unit)}") from None
     if not math.isfinite(number):
         raise ParameterError(name, f"must be finite{_unit_text(unit)}", value)
     if abs(number) > _LARGEST:
-        raise ParameterError(name, too_large, value)
+        raise ParameterError(name, f"must be at most {_LARGEST:g}{_unit_text(unit)}", value)
     return number
 
 

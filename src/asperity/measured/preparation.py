@@ -209,10 +209,7 @@ def prepare(  # noqa: D417 - the others are described by their declarations
     _check_arguments(raw.heights.shape, lateral, tip_radius, periodic, blend)
     require_memory(*raw.heights.shape[::-1])
     start("outliers")
-    heights = np.array(raw.heights, dtype=np.float64)
-    if raw.in_pitches:
-        _check_square(lateral)
-        heights *= lateral[0]
+    heights = _copy_heights(raw, lateral)
     if height_range is None:
         record("as read", heights, lateral)
     if outliers is not None:
@@ -388,6 +385,15 @@ def _resolve_pitch(
             pitch=lateral[0],
         )
     return lateral
+
+
+def _copy_heights(raw: RawSurface, pitch: Pitch) -> FloatArray:
+    """Return a copy of the heights; those in units of the pitch [m] are multiplied by it."""
+    heights = np.array(raw.heights, dtype=np.float64)
+    if raw.in_pitches:
+        _check_square(pitch)
+        heights *= pitch[0]
+    return heights
 
 
 def _check_square(pitch: Pitch) -> None:

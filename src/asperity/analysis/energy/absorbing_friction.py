@@ -29,7 +29,7 @@ NEAREST_TOLERANCE = 1e-4
 """The same where each force requires a closest-point search."""
 # Ellipses that are compared and how many of the best are improved: on profiles and where each force
 # requires a closest-point search, and on other maps.
-_ELLIPSES = {True: (2048, 4), False: (16_384, 8)}
+_ELLIPSES = {True: (2048, 2), False: (16_384, 4)}
 _ELLIPSE_POINTS = 32
 # Points of a path that are free, points for each of them at which it is integrated, vertices of the
 # polygon that is returned, and quasi-Newton steps.
@@ -37,6 +37,9 @@ _FREE_POINTS = 48
 _VERTICES = 768
 _REFINEMENT = 4
 _STEPS = 400
+# A climb ends when so many steps raise the value by less than this share.
+_STALLED_STEPS = 10
+_STALLED_GAIN = 1e-4
 _MEMORY = 10
 _HALVINGS = 6
 _FIRST_STEP = 0.02
@@ -269,7 +272,12 @@ def _climb(
     x = np.clip(start, low, high)
     value, slope = evaluate(x)
     pairs: deque[tuple[FloatArray, FloatArray]] = deque(maxlen=_MEMORY)
-    for _ in range(_STEPS):
+    before = value
+    for count in range(_STEPS):
+        if count % _STALLED_STEPS == 0:
+            if count and value < before + _STALLED_GAIN * abs(value):
+                break
+            before = value
         is_free = ~((x <= low) & (slope < 0.0) | (x >= high) & (slope > 0.0))
         direction = _quasi_newton_direction(slope * is_free, pairs) * is_free
         for _ in range(_HALVINGS):

@@ -97,7 +97,7 @@ def absorbing_friction_text(friction: AbsorbingFriction) -> str:
     Example:
         >>> import numpy as np
         >>> absorbing_friction_text(AbsorbingFriction(0.29, 0.74, 9e-4, np.zeros((0, 3))))
-        'at least 0.29 N, greatest W/length of 1 plane; 0.74 N proved to be enough'
+        'at least 290 mN, greatest W/length of 1 plane; 740 mN proved to be enough'
     """
     planes = "1 plane" if friction.planes == 1 else f"{friction.planes} planes"
     least = format_quantity(round_down(friction.found), "N")
