@@ -77,7 +77,7 @@ def test_verdicts_describe_the_artefacts(result: asp.Comparison) -> None:
     assert "clicks" in result.row("D").verdict
     assert (
         result.row("W").verdict
-        == "plausible up to 5000 N/m at the delay of the wall test; no texture"
+        == "plausible up to 5000 N/m at the delay of the wall test; no texture; at any press"
     )
     assert "; delivers energy below v* = " in result.row("A").verdict
 
@@ -380,13 +380,13 @@ def test_a_surface_larger_than_the_workspace_is_named() -> None:
     )
     assert "The surface is 500 mm long and the workspace 120 mm" in text
     narrow = asp.Profile(2e-4 * np.sin(2 * np.pi * x[:161] / 2e-3), 0.5 / 1000)
-    assert "workspace" not in answer_text(asp.compare(narrow, rig, "C"))
+    assert "and the workspace" not in answer_text(asp.compare(narrow, rig, "C"))
     text = answer_text(asp.compare(asp.Sinusoid(2e-3, 0.2), rig, "C"))
     assert "A period is 200 mm long and the workspace 100 mm" in text
-    assert "workspace" not in answer_text(asp.compare(asp.Sinusoid(2e-3, 0.09), rig, "C"))
+    assert "and the workspace" not in answer_text(asp.compare(asp.Sinusoid(2e-3, 0.09), rig, "C"))
     # A sum that never repeats has no end either.
     endless = asp.Fourier([1e-4, 6e-5], [[628.0, 0.0], [628.0 * 2**0.5, 0.0]], [0.3, 1.1])
-    assert "workspace" not in answer_text(asp.compare(endless, rig, "C"))
+    assert "and the workspace" not in answer_text(asp.compare(endless, rig, "C"))
 
 
 def test_loss_of_contact_names_the_depth_that_keeps_it() -> None:

@@ -43,6 +43,8 @@ def press_text(row: LawRow) -> str:
     """Return up to which mean normal force of a hand the numbers of a row hold."""
     press = format_quantity(row.press, "N", digits=2)
     depth = format_quantity(row.surface.max_depth, "m")
+    if row.holds_at_any_press and row.is_textureless:
+        return "at any press"
     if row.holds_at_any_press:
         return f"at any press (texture taken at {press}, {depth} deep)"
     return f"up to a press of {press} ({depth} deep)"
