@@ -14,6 +14,8 @@ from asperity.rendering import bake
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Texture
 from asperity.textures.catalogue import as_texture
+from asperity.textures.fields.field_grid import FieldGrid
+from asperity.textures.fields.node_potentials import split_columns
 from asperity.textures.fields.potential_field import PotentialField
 from bench.speed import cases, ticks
 from bench.speed.timing import number_table, take_turns
@@ -23,6 +25,7 @@ RATES = (4000.0, 1000.0)
 TICKS, SEARCHED_TICKS = 1_000_000, 2_000
 TURNS = 3
 GOALS_NS = (60.0, 90.0)
+NODE_COLUMNS = 400
 PITCH = 50e-6
 DEPTH = 0.15e-3
 
@@ -70,8 +73,34 @@ def _arguments(surface: Surface) -> tuple[Any, Any]:
     return surface.texture.arguments, surface.loop_arguments
 
 
+def print_nodes(console: Console) -> None:
+    """Print what a node of a field takes by the proved search and from a lattice."""
+    headings = ("surface", "nodes\ninside", "proved\nus", "lattice\nus", "equal to\n1e-6 spacings")
+    table = number_table(*headings, "greatest difference\n[spacings]")
+    for name, (texture, resolution) in surfaces().items():
+        if isinstance(texture, Fourier):  # without a lattice
+            continue
+        grid = FieldGrid.fit(texture.domain, texture.extremes, DEPTH, 0.0, resolution)
+        xy = texture.domain.points(np.random.default_rng(1).uniform(size=(NODE_COLUMNS, 2)))
+        z = grid.height(np.arange(grid.levels, dtype=float))
+        depths = np.empty((2, NODE_COLUMNS, grid.levels), np.float32)
+        searches = [split_columns(texture, 1.0), split_columns(texture, 1.0, grid)]
+        batches = [
+            partial(search, xy, z, grid.margin, out)
+            for search, out in zip(searches, depths, strict=True)
+        ]
+        times = np.median(take_turns(batches, TURNS), axis=0) / depths[0].size * 1e6
+        inside = depths[0] > 0.0
+        difference = np.abs(depths[1] - depths[0])[inside] / max(grid.spacing)
+        equal = float((difference < 1e-6).mean())
+        cells = (f"{times[0]:.1f}", f"{times[1]:.1f}", f"{equal:.3%}", f"{difference.max():.3f}")
+        table.add_row(name, str(int(inside.sum())), *cells)
+    console.print(table)
+
+
 def run(console: Console) -> None:
     """Print a row for each surface, and whether the goals are met."""
+    print_nodes(console)
     headings = ("surface", "MB", "baked H\n4 kHz ns", "1 kHz\nns")
     table = number_table(*headings, "C\nns", "G\nns", "D\nns", "H search\nns")
     missed: list[str] = []
