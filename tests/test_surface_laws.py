@@ -162,7 +162,8 @@ def test_law_with_state_needs_max_deflection(wave: Sinusoid):
 def test_default_arguments_of_a_surface():
     surface = Surface(Sinusoid(0.2e-3, 1e-3))
     assert (surface.law, surface.stiffness, surface.clamp) == (LAWS["C"], 1000.0, "none")
-    assert (surface.friction, surface.max_deflection, surface.modulation_depth) == (0.8, 1e-3, 0.8)
+    assert (surface.friction, surface.max_deflection, surface.modulation_depth) == (0.0, 1e-3, 0.8)
+    assert surface.to_law("F").friction == 0.8
     assert surface.max_depth == 0.4e-3
 
 

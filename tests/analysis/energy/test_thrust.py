@@ -9,6 +9,7 @@ import pytest
 
 from asperity.analysis import loop_work
 from asperity.analysis.energy import leak
+from asperity.analysis.energy.absorbing_friction import region_floor
 from asperity.analysis.energy.curl_columns import (
     curl_region_loop,
     plane_curl,
@@ -62,8 +63,7 @@ def test_mean_thrust_of_laws_on_the_nearest_contact(letter: str) -> None:
 def test_region_depth_is_at_distance_max_depth_from_the_surface() -> None:
     surface = Surface(SAW, "E", K, D)
     xy = np.random.default_rng(0).uniform(0.0, L, (50, 2))
-    tops = SAW.height(xy)
-    points = np.column_stack([xy, tops - leak._region_depth(surface, xy, tops)])
+    points = np.column_stack([xy, region_floor(surface, xy)])
     distance = np.linalg.norm(SAW.nearest(points) - points, axis=1)
     assert (distance <= D).all()
     assert distance == pytest.approx(D, rel=1e-4)
@@ -77,7 +77,8 @@ def test_work_around_outlines_equals_their_estimates() -> None:
     t = (np.arange(400) + 0.5) / 400 * line.length
     xy = line.start + t[:, None] * line.direction
     tops = SAW.height(xy)
-    depth, total = leak._region_depth(surface, xy, tops), np.zeros(2)
+    depth = tops - region_floor(surface, xy)
+    total = np.zeros(2)
     for part in (np.arange(100) + 0.5) / 100:
         points = np.column_stack([xy, tops - part * depth])
         curl = plane_curl(surface.jacobian(points), line) * depth

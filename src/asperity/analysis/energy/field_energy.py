@@ -256,8 +256,8 @@ def steady_work(surface: Surface, vertices: ArrayLike) -> float:
     Example:
         >>> from asperity.textures.kinds.sinusoid import Sinusoid
         >>> surface = Surface(Sinusoid(amplitude=0.1e-3, period=1e-3), "F")
-        >>> path = [[0, 0, -1e-4], [5e-3, 0, -1e-4]]  # the anchor slides at each end
-        >>> loop_work(surface, path) > steady_work(surface, path)
+        >>> path = [[0, 0, -1e-4], [5e-3, 0, -1e-4]]  # the first turn loads the anchor
+        >>> loop_work(surface, path) < steady_work(surface, path)
         True
     """
     corners = check_array("vertices", vertices, (None, 3), "m")
