@@ -125,7 +125,7 @@ def test_every_picture_shows_its_content(
     shoot_page: ShootPage, page: Path, width: int, dark: bool
 ) -> None:
     shots = shoot_page(page, width, dark)
-    assert len(shots) == 7
+    assert len(shots) == 8
     assert blank_pictures(shots) == []
     for some in (shots, shoot_page(page, width, dark, end=True)):
         assert empty_panels(some) == []

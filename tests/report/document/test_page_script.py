@@ -68,7 +68,7 @@ def page() -> str:
 def test_content_security_policy_allows_only_the_own_script(page: str, tmp_path: Path) -> None:
     injected = page.replace("</body>", "<script>document.title = 'taken'</script></body>")
     dom = dump_dom(injected, tmp_path / "page.html")
-    assert dom.count('class="tools"') == 7
+    assert dom.count('class="tools"') == 8
     assert dom.count('type="checkbox"') == 3
     assert "<title>taken" not in dom
     assert "<title>Sinusoid on the " in dom

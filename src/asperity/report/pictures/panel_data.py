@@ -211,7 +211,7 @@ def _panel_dict(panel: Panel) -> dict[str, Any]:
     return {
         "name": panel.name,
         "law": panel.law,
-        "box": [round(part, 2) for part in panel.box],
+        "box": [round(part, 3) for part in panel.box],
         "x": _axis_dict(panel.x, panel.axes.get_xlim(), panel.axes.xaxis),
         "y": _axis_dict(panel.y, panel.axes.get_ylim(), panel.axes.yaxis),
         "series": [_series_dict(series) for series in panel.series],
