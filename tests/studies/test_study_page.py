@@ -102,7 +102,7 @@ def test_escape_stops_and_a_closed_page_pauses(browser: Browser, tmp_path: Path)
         await_title(browser, QUESTION)
         browser.press("Escape")
         output, _ = session.process.communicate(timeout=60)
-        assert "P01: 1 answers in" in output
+        assert "P01: 1 answer in " in output
         assert "stopped; --resume goes on" in output
         await_title(browser, "Stopped")
         assert browser.ask("document.getElementById('keys').offsetHeight") == 0

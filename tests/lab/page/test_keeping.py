@@ -25,8 +25,12 @@ def fetched(page: Browser, what: str) -> bytes:
 @needs_browser
 def test_the_picture_is_saved_as_lines_and_as_points(page: Browser) -> None:
     page.press(" ")
-    page.until("lab.probeState().force[2] > 0.02 && lab.hasCurrentPictures")
-    root = ElementTree.fromstring(page.ask("lab.toSvg()"))
+    # Saved at once: a moment later the view may have moved on to what is still computed.
+    page.until(
+        "lab.probeState().force[2] > 0.02 && lab.hasCurrentPictures"
+        " && lab.section.covers(lab.sectionBox()) && (globalThis.saved = lab.toSvg())"
+    )
+    root = ElementTree.fromstring(page.ask("saved"))
     views = root.findall(f"{SVG}svg")
     counts = [
         {name: len(view.findall(f"{SVG}{name}")) for name in ("path", "image", "text")}
