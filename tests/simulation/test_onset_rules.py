@@ -109,9 +109,9 @@ def test_velocity_spread_of_a_cycle_exceeds_the_threshold() -> None:
     assert apply_rule(*CYCLING, *quarters(1.0, math.nextafter(1.0, 2.0)))[0]
 
 
-@pytest.mark.parametrize("frequency", [24.0, 100.0, 300.0])
+@pytest.mark.parametrize("frequency", [40.0, 100.0, 300.0])
 def test_default_threshold_is_what_a_hand_feels_at_the_frequency(frequency: float) -> None:
-    """An amplitude of the threshold curve: 13 mm/s at 24 Hz is no rest."""
+    """An amplitude of the threshold curve."""
     amplitude = float(load_grip().threshold(frequency)[1])
     for factor, ends in ((0.99, False), (1.01, True)):
         extent = factor * amplitude / math.sqrt(2.0)
@@ -122,10 +122,13 @@ def test_default_threshold_is_what_a_hand_feels_at_the_frequency(frequency: floa
 
 def test_felt_speed_beyond_the_curve_is_that_of_its_ends() -> None:
     grip = load_grip()
-    ends = [math.sqrt(2.0) * math.pi * f * float(grip.threshold(f)[1]) for f in (10.0, 500.0)]
+    ends = [math.sqrt(2.0) * math.pi * f * float(grip.threshold(f)[1]) for f in (40.0, 500.0)]
     assert felt_speed(1e-9, 1.0) == pytest.approx(ends[0])
     assert felt_speed(1.0, 1e-9) == pytest.approx(ends[1])
     assert felt_speed(1.0, 0.0) == pytest.approx(ends[1])
+    slow = 13e-3  # 13 mm/s at 24 Hz is no rest
+    assert felt_speed(slow, slow / (2.0 * math.pi * 24.0)) == pytest.approx(ends[0])
+    assert ends[0] < slow
 
 
 @pytest.mark.parametrize(("supplied", "ends"), [(0.2, False), (0.21, True), (-1.0, False)])

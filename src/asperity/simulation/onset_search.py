@@ -46,8 +46,10 @@ def felt_speed(speed: float, extent: float, grip: Grip | None = None) -> float:
         grip: grip with its thresholds; default: a tool held like a pen.
 
     Example:
-        >>> round(felt_speed(0.1, 0.1 / (2 * math.pi * 24)) * 1e3, 3)  # 24 Hz, in mm/s
-        0.267
+        >>> round(felt_speed(0.1, 0.1 / (2 * math.pi * 100)) * 1e3, 3)  # 100 Hz, in mm/s
+        0.178
+        >>> round(felt_speed(0.1, 0.1 / (2 * math.pi * 24)) * 1e3, 3)  # 24 Hz: that at 40 Hz
+        0.444
     """
     if grip is None:
         grip = _default_grip()
