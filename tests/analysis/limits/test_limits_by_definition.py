@@ -178,7 +178,7 @@ def test_waves_with_significant_height_or_force_are_reported() -> None:
 
 # --- tiers ----------------------------------------------------------------------------------------
 
-FLAT = Grip("flat", 1.0, 0.0, 0.0, (1e-3, 1e3), (1.0, 1.0), (4.0, 4.0), {})
+FLAT = Grip("flat", 1.0, 0.0, 0.0, (1e-8, 1e3), (1.0, 1.0), (4.0, 4.0), {})
 """At low frequencies one metre per newton; one metre is noticed and four metres are felt."""
 
 

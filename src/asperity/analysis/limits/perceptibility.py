@@ -89,7 +89,7 @@ def assess_perceptibility(
         >>> result.tier, f"{result.level:.2f}", f"{result.frequency:.0f} Hz"
         ('borderline', '0.36', '100 Hz')
         >>> [f"{remedy.kind} {remedy.value:.3g}" for remedy in result.remedies]
-        ['magnify 2.5', 'speed 0.029', 'apparent_mass 0.017']
+        ['magnify 2.5', 'apparent_mass 0.017']
     """
     hand = grip or load_grip()
     waves, doubtful, texture_rms, _scanned = scan_waves(

@@ -192,7 +192,7 @@ def analyze(
         >>> round(result.q.value, 4), result.passivity.decided_by, result.continuity.continuous
         (5.1251, 'leak', True)
         >>> round(result.leak.energy * 1e3, 3), round(result.v_star, 3)
-        (1.6, 0.255)
+        (1.6, 0.346)
     """
     device = load_device(device)
     surface = _resolve_surface(surface, device, rendering, extent, surface_arguments)
