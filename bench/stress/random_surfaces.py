@@ -22,7 +22,7 @@ from asperity.analysis.gain.characteristic import (
 from asperity.analysis.gain.surface_cache import at_unit_stiffness
 from asperity.contacts.symbols import ContactSymbols
 from asperity.core.checks import FloatArray
-from asperity.laws import Law
+from asperity.laws import Law, find_law
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Profile, Sinusoid
 from asperity.textures.texture import Texture
@@ -220,12 +220,16 @@ def random_surface(rng: Generator, letters: str = SHIPPED) -> tuple[str, Surface
     own = {}
     if isinstance(law, Law):
         own = {name: depth for name in law.parameters if name in {"stiffening", "saturation"}}
+    stiffness, friction = float(10.0 ** rng.uniform(1.0, 4.0)), float(rng.uniform(0.0, 2.0))
+    found = find_law(law)
+    # A law with state of its own refuses friction, other than as a parameter.
+    takes_friction = not found.stateful or "friction" in found.parameters
     surface = Surface(
         texture,
         law,
-        stiffness=float(10.0 ** rng.uniform(1.0, 4.0)),
+        stiffness=stiffness,
         max_depth=depth,
-        friction=float(rng.uniform(0.0, 2.0)),
+        friction=friction if takes_friction else None,
         max_deflection=float(depth * 10.0 ** rng.uniform(-1.0, 1.0)),
         modulation_depth=float(rng.choice([0.0, 1.0, rng.uniform()])),
         continuity=float(10.0 ** rng.uniform(-1.0, 1.0)),
