@@ -65,7 +65,7 @@ EXPECTED: dict[int, tuple[str, dict[str, str]]] = {
     6: (r"texture\.h", {"texture.h": "texture_force", "chai3d_effect.hpp": "texture_force"}),
     7: (r"^1\.\d+ \d{4,}$", {}),
     8: (RECOMMENDATION, {"phone.html": "width=device-width"}),
-    9: (r"law C", {"print.html": "@media print"}),
+    9: (r"^Law C at \d", {"print.html": "@media print"}),
     10: (
         r"http://(127\.0\.0\.1|localhost):\d+",
         {"claim.html": "eq-5", "lecture/fig-3.svg": "<svg"},
