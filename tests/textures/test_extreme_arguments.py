@@ -57,8 +57,15 @@ def test_extreme_arguments_take_bounded_time_and_memory(specification: str) -> N
 
 
 def test_wave_too_steep_for_a_loop_is_an_error() -> None:
+    """One law in full needs its leak; a comparison of laws leaves it unknown, and undecided."""
+    wave = load_scene(WAVES[0]).texture
     with pytest.raises(ParameterError, match=r"too steep for its leak.*amplitude.*period"):
-        compare(load_scene(WAVES[0]).texture, laws="A")
+        analyze(Surface(wave, "A"))
+    (row,) = compare(wave, laws="A").rows
+    assert math.isnan(row.leak.energy)
+    assert row.leak.upper_per_period == math.inf
+    assert "too steep" in row.leak.description
+    assert (row.passivity.verdict, row.tier) == ("undecided", "not felt")
     with pytest.raises(ParameterError, match="amplitudes and wavevectors make a curvature"):
         load_scene("fourier:amplitudes=1e30m,wavevectors=1e30 0 rad/m")
 
