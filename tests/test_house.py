@@ -228,7 +228,7 @@ MAX_STATEMENTS = 42_525
 MAX_OTHER_LINES = 7_395
 """Lines with text in the package's files that are not Python."""
 
-MAX_PYTHON_FILES = 390
+MAX_PYTHON_FILES = 391
 
 MAX_FORMAT_SKIPS = 0
 """``fmt: skip`` is for tables of numbers, of which there are none."""
