@@ -22,6 +22,7 @@ from asperity.envelopes.find_design import Design, design
 from asperity.envelopes.searches import FORCE, RANGE, Search, Target
 from asperity.envelopes.wave_borders import RenderConditions, WaveCase
 from asperity.laws.clamps import CLAMPS
+from asperity.perception.grip import load_grip
 
 LAND = Path(__file__).parents[2].parent / "shared" / "data" / "sample-land.x3p"
 DEVICES = ("touch", "omega.3", "pantograph", "falcon")
@@ -204,8 +205,18 @@ def test_no_clamp_improves_what_a_design_requires(letter: str, texture: Any) -> 
 
 
 def test_the_best_of_several_values_of_a_parameter_is_chosen() -> None:
-    """On the hand the force of H is greatest below the limit, where more continuity adds force."""
-    target: Any = {"texture_force": 0.1, "at": "hand", "speed": 0.02}
+    """On the hand the force of H is greatest below the limit, where more continuity adds force.
+
+    That is at 20 Hz, so the hand is one whose thresholds are known there.
+    """
+    pen = load_grip()
+    hand = replace(
+        pen,
+        frequency=(10.0, *pen.frequency),
+        unnoticed=(pen.unnoticed[0], *pen.unnoticed),
+        felt=(pen.felt[0], *pen.felt),
+    )
+    target: Any = {"texture_force": 0.1, "at": "hand", "speed": 0.02, "grip": hand}
     found = {
         c: design(STEEP, "omega.3", "H", law_parameters={"continuity": c}, **target)
         for c in (1.0, 1.5, 4.0)

@@ -49,7 +49,7 @@ def test_spectrum_shows_no_aliases_of_the_nodes() -> None:
 
 @pytest.fixture(scope="module")
 def envelope() -> Envelope:
-    return asp.envelope(["touch", "inverse3"], "BCDH", wavelengths=[1e-3, 2e-3, 5e-3, 8e-3])
+    return asp.envelope(["touch", "inverse3"], "BCDH", wavelengths=[1e-3, 1.4e-3, 1.8e-3, 2.4e-3])
 
 
 def test_limits_of_an_envelope_are_seen_or_named_with_a_reason(envelope: Envelope) -> None:
