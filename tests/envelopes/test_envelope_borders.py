@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import random
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -153,6 +154,22 @@ def test_region_ends_at_a_verified_limit_of_the_wavelength() -> None:
     fast = envelope("omega.3", "H", wavelengths=LENGTHS, speed=0.02)["omega.3"]
     shortest = max(limit.wavelength for limit in limits)
     assert any(x.felt_from > 0.0 and x.wavelength < shortest for x in fast["H"].borders)
+
+
+def test_region_ends_where_the_thresholds_of_the_grip_end() -> None:
+    """At 0.1 m/s at 2.5 mm, 40 Hz, whatever wavelengths are next to it; so it may at 0.2 mm."""
+    law = envelope("omega.3", "C", wavelengths=[0.15e-3, 1e-3, 8e-3], speed=0.1)["omega.3"]["C"]
+    felt = [border.wavelength for border in law.borders if border.decades]
+    assert (felt[0], felt[-1]) == pytest.approx((1e-3, 2.5e-3), rel=2e-6)
+    lengths = [border.wavelength for border in law.borders]
+    assert lengths[1:3] == pytest.approx([0.2e-3] * 2, rel=2e-6)
+    assert lengths[1] < 0.2e-3 < lengths[2]
+    rise = 0.5 * law.borders[3].decades * math.log10(1e-3 / 0.2e-3)
+    area = sum(
+        0.5 * (a.decades + b.decades) * math.log10(b.wavelength / a.wavelength)
+        for a, b in pairwise(border for border in law.borders if border.decades)
+    )
+    assert law.decades == pytest.approx(area + rise, rel=1e-4)
 
 
 def test_peaks_are_rendered_where_their_wave_is(two_laws: Envelope) -> None:

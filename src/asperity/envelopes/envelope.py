@@ -6,6 +6,7 @@ import math
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -43,7 +44,8 @@ _MAX_PEAKS = 8
 _NEAR = 0.9
 """Least share of the widest region with which a law renders nearly as much."""
 _EDGE = 1.0 + 1e-6
-"""A wave is resolved if it is longer than a limit of the device, not if it is as long."""
+"""Ratio of the wavelengths on both sides of an edge. A wave is resolved if it is longer than a
+limit of the device, not if it is as long."""
 
 
 @dataclass(frozen=True)
@@ -359,11 +361,16 @@ def _compute(
 
 
 def _with_edges(case: WaveCase, lengths: Sequence[float]) -> tuple[float, ...]:
-    """Return the wavelengths with those on both sides of the limits that bound the region."""
-    limits = _wavelength_limits(case)
-    edges = (limit.wavelength for limit in limits if limit.trusted)
-    inner = [edge for edge in edges if lengths[0] < edge and edge * _EDGE < lengths[-1]]
-    return tuple(sorted({*lengths, *inner, *(edge * _EDGE for edge in inner)}))
+    """Return the wavelengths with those on both sides of what bounds the region.
+
+    These are the limits of the device and the frequencies between which the grip has thresholds.
+    """
+    edges = [limit.wavelength for limit in _wavelength_limits(case) if limit.trusted]
+    grip = case.conditions.grip
+    ends = [case.conditions.speed / grip.frequency[place] for place in (0, -1)]
+    pairs = [(edge, edge * _EDGE) for edge in edges] + [(end / _EDGE, end * _EDGE) for end in ends]
+    inner = [pair for pair in pairs if lengths[0] < pair[0] and pair[1] < lengths[-1]]
+    return tuple(sorted({*lengths, *chain.from_iterable(inner)}))
 
 
 def _locate_peaks(
