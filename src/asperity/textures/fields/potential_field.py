@@ -154,13 +154,15 @@ class PotentialField(Texture, Tabular):
         spacing = max(self.grid.spacing)
         accuracy = self.accuracy
         depth = format_length(accuracy.worst_depth)
+        deepest = format_length(max(accuracy.depths, default=0.0))
         onset = format_length(accuracy.onset)
         missed = ": more than asked for, the memory allows no finer field"
         text = (
             f"Law H baked as a potential field: {nodes} nodes, {1e6 * spacing:.3g} µm apart, {how};"
-            f" q at most {self.gain.upper:.4g}; force at most {100 * accuracy.share:.2g} % RMS from"
-            f" exact H where pressed with 0.1 N or more (at {depth}){missed * accuracy.is_limited};"
-            f" contact begins at most {onset} from the surface"
+            f" q at most {self.gain.upper:.4g}; force {100 * accuracy.share:.2g} % RMS from exact H"
+            f" at the worst of {len(accuracy.depths)} depths (at {depth}; deeper than {deepest} it"
+            f" is not known){missed * accuracy.is_limited}; contact begins up to {onset} from the"
+            " surface at sampled places"
         )
         return (*self.source.preparation, text)
 
