@@ -157,8 +157,9 @@ class PotentialField(Texture, Tabular):
         onset = format_length(accuracy.onset)
         missed = ": more than asked for, the memory allows no finer field"
         text = (
-            f"Law H baked as a potential field: {nodes} nodes, {1e6 * self.resolution:.3g} µm apart,"
-            f" {how}; q at most {self.gain.upper:.4g}; force {100 * accuracy.share:.2g} % RMS from exact H"
+            f"Law H baked as a potential field: {nodes} nodes, {1e6 * self.resolution:.3g} µm"
+            f" apart, {how}; q at most {self.gain.upper:.4g};"
+            f" force {100 * accuracy.share:.2g} % RMS from exact H"
             f" at the worst of {len(accuracy.depths)} depths (at {depth}; deeper than {deepest} it"
             f" is not known){missed * accuracy.is_limited}; contact begins up to {onset} from the"
             " surface at sampled places"
