@@ -18,6 +18,7 @@ import pytest
 from click.testing import CliRunner
 from tests.report.report_pages import check_alone, check_alts
 
+import asperity as asp
 from asperity.cli.main import COMMANDS, cli
 
 Call = Callable[..., tuple[int, str, str]]
@@ -306,6 +307,19 @@ def test_thresholds_beyond_their_frequencies_are_named_for_all_laws(call: Call) 
         code, out, _err = call("compare", spec, "--speed", speed, "--set", "update_rate=20kHz")
         assert code == 0
         assert ("nothing counts as felt" in " ".join(out.split())) is is_beyond
+
+
+def test_next_commands_have_the_depth_that_a_press_chose(call: Call) -> None:
+    spec = "sinusoid:amplitude=0.4mm,period=1.5mm"
+    code, out, _err = call("compare", spec, "--device", "falcon", "--laws", "C", "--press", "100mN")
+    assert code == 0
+    texture = asp.Sinusoid(amplitude=0.4e-3, period=1.5e-3)
+    (row,) = asp.compare(texture, "falcon", "C", press=0.1).rows
+    commands = _next_commands(out)
+    assert [command[0] for command in commands] == ["lab", "run", "export"]
+    for command in commands:
+        depth = command[command.index("--max-depth") + 1]
+        assert float(depth.removesuffix("um")) == pytest.approx(1e6 * row.surface.max_depth)
 
 
 def test_help_and_version_are_printed(call: Call) -> None:

@@ -24,7 +24,10 @@ def next_commands(surface: str, result: Comparison, why: bool) -> str:
     if row is None:
         return f"\nNext:\n  {_remedy_command(surface, result)}"
     hint = "" if why else "\nWhy, and what else to watch: --why\n"
-    return f"{hint}{_use_commands(surface, row, {})}"
+    changed = {}
+    if result.press is not None:
+        changed["max_depth"] = format_quantity(row.surface.max_depth, "m", 6)
+    return f"{hint}{_use_commands(surface, row, changed)}"
 
 
 def _use_commands(surface: str, row: LawRow, changed: Mapping[str, str]) -> str:
