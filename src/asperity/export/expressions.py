@@ -374,9 +374,8 @@ def real_literals(values: NDArray[Any], single: bool) -> list[str]:
     with np.errstate(over="ignore"):  # of numbers that become infinite
         rounded = values.astype(np.float32)
     # Nine digits determine a number of single precision; whole ones lack a point, others a rule.
-    is_plain = np.isfinite(rounded) & (np.abs(values) >= np.finfo(np.float32).tiny)
-    is_plain &= rounded != np.floor(rounded)
+    is_normal = np.isfinite(rounded) & (np.abs(values) >= np.finfo(np.float32).tiny)
     texts = ("%.9gf " * len(rounded) % tuple(rounded.tolist())).split()
-    for index in np.flatnonzero(~is_plain).tolist():
+    for index in np.flatnonzero(~is_normal | (rounded == np.floor(rounded))).tolist():
         texts[index] = real_literal(float(values[index]), single)
     return texts

@@ -110,16 +110,13 @@ def _replace_wrong(
     depths: SingleArray, exact: ColumnFunction, grid: FieldGrid, z: FloatArray, continuity: float
 ) -> None:
     """Replace depths at nodes, (columns, levels) [m], around which they are not those of law H."""
-    is_exact = np.zeros(depths.shape, bool)
     for _ in range(_MAX_REPLACEMENTS):
         volume = depths.reshape(*grid.node_counts[:-1], -1)
-        wrong = wrong_nodes(volume, grid, continuity).reshape(depths.shape) & ~is_exact
-        columns = np.flatnonzero(wrong.any(axis=1))
-        if len(columns) == 0:
+        wrong = wrong_nodes(volume, grid, continuity).reshape(depths.shape)
+        columns = np.flatnonzero(wrong.any(axis=1)).tolist()
+        if not columns:
             return
-        replace = partial(_replace_column, depths, exact, grid, z, wrong)
-        run_in_threads(replace, columns.tolist(), None)
-        is_exact |= wrong
+        run_in_threads(partial(_replace_column, depths, exact, grid, z, wrong), columns, None)
 
 
 def _replace_column(

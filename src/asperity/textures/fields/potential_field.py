@@ -150,15 +150,14 @@ class PotentialField(Texture, Tabular):
         """See :class:`Texture`; the last step is the baking."""
         smoothed = {0: "not smoothed", 1: "smoothed locally once"}
         how = smoothed.get(self.passes, f"smoothed locally {self.passes} times")
-        nodes = self.arguments.c.size
         accuracy = self.accuracy
         depth = format_length(accuracy.worst_depth)
         deepest = format_length(max(accuracy.depths, default=0.0))
         onset = format_length(accuracy.onset)
         missed = ": more than asked for, the memory allows no finer field"
         text = (
-            f"Law H baked as a potential field: {nodes} nodes, {1e6 * self.resolution:.3g} µm"
-            f" apart, {how}; q at most {self.gain.upper:.4g};"
+            f"Law H baked as a potential field: {self.arguments.c.size} nodes,"
+            f" {1e6 * self.resolution:.3g} µm apart, {how}; q at most {self.gain.upper:.4g};"
             f" force {100 * accuracy.share:.2g} % RMS from exact H"
             f" at the worst of {len(accuracy.depths)} depths (at {depth}; deeper than {deepest} it"
             f" is not known){missed * accuracy.is_limited}; contact begins up to {onset} from the"
