@@ -316,8 +316,55 @@ def test_overlapping_bodies_are_refused() -> None:
     first = trimesh.creation.box((2 * MM, 2 * MM, 2 * MM))
     second = first.copy().apply_translation((1 * MM, 0.3 * MM, 0.2 * MM))
     both = trimesh.util.concatenate([first, second])
-    with pytest.raises(SurfaceFileError, match="overlaps itself"):
+    with pytest.raises(SurfaceFileError, match="overlaps"):
         bake_body(to_body(both), 0.3 * MM, resolution=0.2 * MM)
+
+
+def test_parts_that_share_a_face_are_united() -> None:
+    """The force over the joint is that beside it, whatever the triangles of the shared face."""
+    first = trimesh.creation.box((4 * MM, 4 * MM, 2 * MM))
+    second = first.copy().apply_translation((4 * MM, 0.0, 0.0))
+    mirrored = first.copy().apply_scale((-1.0, 1.0, 1.0)).apply_translation((4 * MM, 0.0, 0.0))
+    for other in (second, mirrored):
+        both = to_body(trimesh.util.concatenate([first, other]))
+        assert both.notes == ("parts united: 4 triangles between them removed",)
+        assert (len(both.triangles), both.faults) == (20, ())
+        joint, beside = exact(both, np.array([[2 * MM, 0.0, 0.6 * MM], [0.0, 0.0, 0.6 * MM]]))
+        assert joint == pytest.approx(beside, abs=1e-12)
+        assert joint[3] == pytest.approx(0.4 * MM)
+    corner = to_body(
+        trimesh.util.concatenate([first, first.copy().apply_translation((4 * MM, 4 * MM, 0.0))])
+    )
+    assert len(corner.triangles) == 24
+    assert not _BodyLoops(corner, BodyLaw(1.0, MM, np.inf)).find_contacts()
+
+
+@pytest.mark.parametrize("shift", [(4, 1, 0), (0.5, 0.3, 2), (4 + 2e-6, 1, 0)])
+def test_parts_that_touch_in_another_way_are_refused(shift: tuple[float, float, float]) -> None:
+    turn = trimesh.transformations.rotation_matrix(0.7, (0.3, 1.0, 0.6))
+    first = trimesh.creation.box((4 * MM, 4 * MM, 2 * MM))
+    second = first.copy().apply_translation(MM * np.array(shift))
+    both = to_body(trimesh.util.concatenate([first, second]).apply_transform(turn))
+    with pytest.raises(SurfaceFileError, match=r"touches or overlaps .* one at \("):
+        bake_body(both, 0.3 * MM, resolution=0.2 * MM)
+
+
+def test_gaps_and_sharp_hollows_are_no_contacts() -> None:
+    first = trimesh.creation.box((4 * MM, 4 * MM, 2 * MM))
+    second = first.copy().apply_translation((4.001 * MM, 1 * MM, 0.0))
+    spiky = trimesh.creation.icosphere(4, radius=MM)
+    spiky.vertices *= 1.0 + 0.3 * np.random.default_rng(0).random((len(spiky.vertices), 1))
+    for mesh in (trimesh.util.concatenate([first, second]), spiky):
+        assert not _BodyLoops(to_body(mesh), BodyLaw(1.0, MM, np.inf)).find_contacts()
+
+
+@pytest.mark.parametrize("factor", [1e-6, 1e3])
+def test_fields_without_a_force_are_refused(factor: float) -> None:
+    vertices = factor * cube().triangles.reshape(-1, 3)
+    body = MeshBody.from_arrays(vertices, np.arange(len(vertices)).reshape(-1, 3))
+    with pytest.raises(ParameterError, match="check the unit") as caught:
+        bake_body(body, goal=BakeGoal(max_bytes=500_000))
+    assert caught.value.argument == "max_depth"
 
 
 def test_depth_and_resolution_must_fit() -> None:

@@ -14,7 +14,13 @@ from asperity.textures.fields.field_grid import FieldGrid, SingleArray
 from asperity.textures.fields.node_potentials import ColumnFunction, compute_potentials
 from asperity.textures.fields.potential_field import PotentialField, ThinRegion
 from asperity.textures.meshes import mesh_potential, triangle_tree
-from asperity.textures.meshes.mesh_body import INTERSECTING, MeshBody, make_fault
+from asperity.textures.meshes.mesh_body import (
+    INTERSECTING,
+    TOUCHING,
+    MeshBody,
+    MeshFault,
+    make_fault,
+)
 from asperity.textures.meshes.mesh_potential import (
     DEEPEST,
     FAULT_Z,
@@ -29,12 +35,21 @@ from asperity.textures.spline.spline_texture import HeightMap
 
 # Greatest default of the depth to which the field of a body is exact [m].
 DEFAULT_DEPTH = 1e-3
+# Greatest depth [m] with which a body is not felt: 3 mN at 3000 N/m.
+_LEAST_DEPTH = 1e-6
+# RMS error of the force at every depth, over its RMS, of a field that has hardly any force.
+_GREATEST_SHARE = 0.9
 DEFAULT_GOAL = bake.BakeGoal()
 _MOST_CROSSINGS = 4096
 _LEAST_CELLS = 4
 _DIGITS = 12  # of places and thickness of thin parts [m]
 # Duality gap in squared spacings: it adds less than 4 times as much to the gain.
 _GAP = 1e-4
+# Gap below which parts touch over the size of the body, and radius around a sample over the gap.
+_TOUCHING_GAP = 1e-6
+_TOUCHING_RADIUS = 30.0
+_TOUCHING_SAMPLES = 2**14
+_TOUCHING_DIRECTIONS = 64
 
 
 def bake_body(
@@ -63,20 +78,38 @@ def bake_body(
 
     Raises:
         ParameterError: for a depth that the body does not have, a resolution coarser than the body,
-            or a field that is larger than allowed.
-        SurfaceFileError: if the mesh overlaps itself.
+            or a field that is larger than allowed, or without a force that is felt.
+        SurfaceFileError: if the mesh overlaps itself, or parts of it touch and are not united.
     """
     if not continuity >= 1.0:
         raise ParameterError("continuity", "must be at least 1 for a body", continuity)
     depth = DEFAULT_DEPTH if max_depth is None else check_positive("max_depth", max_depth, "m")
-    deepest = _BodyLoops(body, BodyLaw(continuity, depth, np.inf)).sample_depth()
+    loops = _BodyLoops(body, BodyLaw(continuity, depth, np.inf))
+    _check_faults(body, loops.find_contacts())
+    deepest = loops.sample_depth()
     if max_depth is None and deepest > 0.0:
         depth = min(depth, deepest)
+    if depth < _LEAST_DEPTH:
+        reason = f"{format_length(depth)} is too small to be felt: check the unit of the body"
+        raise ParameterError("max_depth", reason)
     plan = _BodyPlan(body, depth, continuity, goal)
     plan.deepest = deepest
     if resolution is None:
-        return plan.bake_coarsest(progress)
-    return plan.bake(check_positive("resolution", resolution, "m"), progress)
+        return _checked_force(plan.bake_coarsest(progress))
+    return _checked_force(plan.bake(check_positive("resolution", resolution, "m"), progress))
+
+
+def _checked_force(field: PotentialField) -> PotentialField:
+    if min(field.accuracy.shares) > _GREATEST_SHARE:
+        nodes = f"nodes {format_length(field.resolution)} apart give hardly any force"
+        reason = f"{format_length(field.max_depth)} is too small: {nodes}; check the unit"
+        raise ParameterError("max_depth", reason)
+    return field
+
+
+def _check_faults(body: MeshBody, faults: list[MeshFault]) -> None:
+    if faults:
+        raise SurfaceFileError(f"{body.name} has no defined inside: {faults[0]}")
 
 
 class _BodyLoops:
@@ -121,6 +154,20 @@ class _BodyLoops:
         points = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1).reshape(-1, 3)
         return float(self.evaluate(points)[:, 4].max())
 
+    def find_contacts(self) -> list[MeshFault]:
+        """Return where parts of the mesh touch.
+
+        There, and where they overlap, a point just outside of a part and all around it are inside,
+        unlike at a concave edge.
+        """
+        gap = _TOUCHING_GAP * float(np.ptp(np.array(self.body.box), axis=0).max())
+        places = self.surface_probes(np.full(_TOUCHING_SAMPLES, -gap))
+        places = places[self.evaluate(places)[:, 4] > 0.0]
+        around = np.random.default_rng(1).normal(size=(_TOUCHING_DIRECTIONS, 1, 3))
+        around *= _TOUCHING_RADIUS * gap / np.linalg.norm(around, axis=2, keepdims=True)
+        depths = self.evaluate((places + around).reshape(-1, 3))[:, 4]
+        return make_fault(TOUCHING, places[(depths.reshape(len(around), -1) > 0.0).all(axis=0)])
+
     def surface_probes(self, depths: FloatArray) -> FloatArray:
         """Return random points of the surface, moved inward by depths [m], (n, 3) [m]."""
         # The areas of all triangles of a large mesh would take much memory.
@@ -151,8 +198,7 @@ class _BodyLoops:
         self._summary = self.columns(self._xy, np.empty(0), grid.margin, empty)
         wrong = (self._summary[:, LEAST_WINDING] < 0.0) | (self._summary[:, GREATEST_WINDING] > 1.0)
         places = np.column_stack([self._xy, self._summary[:, FAULT_Z]])[wrong]
-        if fault := make_fault(INTERSECTING, places):
-            raise SurfaceFileError(f"{self.body.name} has no defined inside: {fault[0]}")
+        _check_faults(self.body, make_fault(INTERSECTING, places))
 
     def record_columns(
         self, xy: FloatArray, z: FloatArray, margin: float, out: SingleArray

@@ -30,6 +30,7 @@ MAX_TRIANGLES = 30_000_000
 # A triangle takes at least these bytes in a file of each format, whatever its header states.
 _LEAST_BYTES = {"stl": 50, "obj": 8, "ply": 7, "glb": 6, "gltf": 6}
 _STL_HEADER = 84
+_SAME_PLANE = 1e-9  # 1 - cosine of the angle between triangles of one plane
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +84,15 @@ class MeshBody:
             raise SurfaceFileError(f"{name} has corners that are not finite numbers")
         vertices, faces = merge_vertices(vertices, faces)
         faults = find_faults(vertices, faces)
+        notes: tuple[str, ...] = ()
+        if any(fault.kind == NON_MANIFOLD for fault in faults):
+            united = remove_shared_faces(vertices, faces)
+            if len(united) < len(faces):
+                notes = (
+                    f"parts united: {len(faces) - len(united)} triangles between them removed",
+                )
+                faces = united
+                faults = find_faults(vertices, faces)
         repaired: list[MeshFault] = []
         if repair and _unsound(faults):
             repaired = faults
@@ -95,7 +105,7 @@ class MeshBody:
         triangles = vertices[faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]]
         if not len(triangles) or not np.ptp(triangles.reshape(-1, 3), axis=0).all():
             raise SurfaceFileError(f"{name} is flat: it encloses no volume")
-        return cls(triangles, name, tuple(faults), tuple(repaired))
+        return cls(triangles, name, tuple(faults), tuple(repaired), notes)
 
 
 def _unsound(faults: Sequence[MeshFault]) -> list[MeshFault]:
@@ -137,7 +147,8 @@ def load_mesh(
     step = metres * find_precision(vertices)
     np.multiply(vertices, metres, out=vertices)
     body = MeshBody.from_arrays(vertices, faces, path.name, repair)
-    return replace(body, notes=precision_notes(step, float(np.subtract(*body.box[::-1]).min())))
+    coarse = precision_notes(step, float(np.subtract(*body.box[::-1]).min()))
+    return replace(body, notes=(*body.notes, *coarse))
 
 
 def _check_count(path: Path, suffix: str) -> None:
@@ -200,6 +211,52 @@ def merge_vertices(
     return vertices[order[new]], index[faces]
 
 
+def remove_shared_faces(vertices: FloatArray, faces: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Return the faces (n, 3) without plane patches that two parts share, which become one.
+
+    Patches of opposite orientation with the same border, whatever their triangles, enclose no
+    volume: the number of times that the mesh winds around a point is the same without them.
+
+    Args:
+        vertices: [m], shape (m, 3), each once.
+        faces: indices of vertices, shape (n, 3).
+    """
+    ends = np.roll(faces, -1, axis=1)
+    is_shared = np.zeros(len(faces), dtype=bool)
+    patches: dict[frozenset[tuple[int, int]], NDArray[np.intp]] = {}
+    for patch in _plane_patches(vertices, faces):
+        edges = set(zip(faces[patch].ravel().tolist(), ends[patch].ravel().tolist(), strict=True))
+        turned = {(end, start) for start, end in edges}
+        other = patches.pop(frozenset(turned - edges), None)
+        if other is None:
+            patches[frozenset(edges - turned)] = patch
+        else:
+            is_shared[np.append(patch, other)] = True
+    return faces[~is_shared]
+
+
+def _plane_patches(vertices: FloatArray, faces: NDArray[np.int32]) -> list[NDArray[np.intp]]:
+    """Return the connected faces of one plane that end at an edge of more than two triangles."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    a, b, c = np.moveaxis(vertices[faces], 1, 0)
+    normals = np.cross(b - a, c - a)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
+    _, index, counts = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
+    index = index.ravel()
+    order = np.argsort(index, kind="stable")
+    sizes = counts[index[order]]
+    pairs = (order[sizes == 2] // 3).reshape(-1, 2)
+    pairs = pairs[np.prod(normals[pairs], axis=1).sum(axis=1) > 1.0 - _SAME_PLANE]
+    graph = coo_array((np.ones(len(pairs)), tuple(pairs.T)), shape=(len(faces), len(faces)))
+    labels = connected_components(graph, directed=False)[1]
+    rows = np.flatnonzero(np.isin(labels, labels[order[sizes > 2] // 3]))
+    rows = rows[np.argsort(labels[rows], kind="stable")]
+    return np.split(rows, np.flatnonzero(np.diff(labels[rows])) + 1)
+
+
 def _repair(vertices: FloatArray, faces: NDArray[np.int32]) -> tuple[FloatArray, NDArray[np.int32]]:
     """Return the mesh with holes filled and triangles turned by trimesh."""
     import trimesh
@@ -223,7 +280,8 @@ NON_MANIFOLD = "edges shared by more than two triangles"
 DEGENERATE = "triangles without extent"
 INVERTED = "bodies turned inside out"
 INTERSECTING = "columns of nodes where the mesh overlaps itself"
-UNSOUND = (OPEN, ORIENTATION, INVERTED, INTERSECTING)
+TOUCHING = "sampled places where a part touches or overlaps another one: unite them first"
+UNSOUND = (OPEN, ORIENTATION, INVERTED, INTERSECTING, TOUCHING)
 """Faults with which the inside is undefined."""
 
 
