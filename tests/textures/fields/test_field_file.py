@@ -32,7 +32,7 @@ def content() -> bytes:
         return path.read_bytes()
 
 
-def change_header(**values: int) -> bytes:
+def change_header(**values: float) -> bytes:
     """Return the file with a header that is changed, and with the right checksum."""
     header = np.frombuffer(content()[: HEADER.itemsize], HEADER).copy()
     for name, value in values.items():
@@ -173,3 +173,74 @@ def test_resolution_coarser_than_the_texture_is_refused(tmp_path: Path) -> None:
     result = CliRunner().invoke(cli, ["bake", "cloth", "--resolution", "0.3mm", "-o", str(path)])
     assert "resolution is coarser than the texture" in str(result.exception)
     assert not path.exists()
+
+
+# --- edited files, with the right checksums -------------------------------------------------------
+
+
+def edit_values(change: Callable[[np.ndarray], np.ndarray]) -> bytes:
+    """Return the file with other coefficients."""
+    header = np.frombuffer(content()[: HEADER.itemsize], HEADER)[0]
+    start = int(header["values_offset"])
+    values = np.frombuffer(content(), "<f4", int(header["count"]), start)
+    edited = change(values).astype("<f4").tobytes()
+    body = content()[HEADER.itemsize : start] + edited + content()[start + len(edited) :]
+    changed = change_header(checksum=zlib.crc32(body))
+    return changed[: HEADER.itemsize] + body
+
+
+def noise(values: np.ndarray) -> np.ndarray:
+    return values * np.random.default_rng(0).uniform(0.97, 1.03, values.shape)
+
+
+def attained_gain(surface: asp.Surface) -> float:
+    """Return the greatest norm of the Jacobian at random points, over the stiffness."""
+    points = np.random.default_rng(1).uniform(-1.0, 1.0, (20_000, 3)) * [1e-3, 1e-3, 2.4e-4]
+    return float(np.linalg.norm(surface.jacobian(points), 2, axis=(1, 2)).max())
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        lambda: edit_values(lambda values: 3.0 * values),
+        lambda: edit_values(noise),
+        lambda: change_header(lift=5e-2),
+    ],
+    ids=["times 3", "noise", "lift"],
+)
+def test_gain_of_an_edited_file_is_computed_from_its_coefficients(
+    data: Callable[[], bytes], tmp_path: Path
+) -> None:
+    path = tmp_path / "edited.field"
+    path.write_bytes(content())
+    stated = asp.Surface(path, "H", 1.0).texture
+    path.write_bytes(data())
+    surface = asp.Surface(path, "H", 1.0)
+    field = surface.texture
+    assert isinstance(stated, asp.PotentialField)
+    assert isinstance(field, asp.PotentialField)
+    found = attained_gain(surface)
+    assert found > 1.5 * stated.gain.upper
+    assert field.claimed_gain == stated.gain.upper
+    assert found <= asp.characteristic_number(surface).upper == field.gain.upper
+    assert "computed from its coefficients: the file claims 1" in field.preparation[-1]
+
+
+def test_undamaged_file_states_what_is_a_claim(tmp_path: Path) -> None:
+    path = tmp_path / "wave.field"
+    path.write_bytes(content())
+    field = asp.Surface(path, "H").texture
+    assert isinstance(field, asp.PotentialField)
+    text = field.preparation[-1]
+    assert "the file claims: force" in text
+    assert "computed from" not in text
+    assert field.claimed_gain == field.gain.upper
+
+
+@pytest.mark.parametrize("name", ["x0", "z0", "m00", "iz", "margin", "q", "floor"])
+def test_header_that_differs_from_the_description_is_refused(name: str, tmp_path: Path) -> None:
+    path = tmp_path / "bad.field"
+    number = np.frombuffer(content()[: HEADER.itemsize], HEADER)[0][name].item()
+    path.write_bytes(change_header(**{name: 10.0 * number + 1.0}))
+    with pytest.raises(SurfaceFileError, match=f"{name} of its header is .*, of its description"):
+        asp.load_texture(path)

@@ -12,5 +12,6 @@
  */
 @link@ int @name@_load(const char *path);
 
-/* Return the certified characteristic number q of the field that is loaded, 0 without one. */
+/* Return the characteristic number q that the file of the loaded field states, 0 without one; it is not
+ * computed here: asperity show FILE computes it from the coefficients. */
 @link@ double @name@_q(void);

@@ -14,9 +14,9 @@ from asperity.core.units import round_up
 from asperity.laws import LAWS
 from asperity.laws.clamps import NONE
 from asperity.textures.fields import node_potentials
-from asperity.textures.fields.field_certificate import Progress, cells_above, curvature_bounds
+from asperity.textures.fields.field_certificate import Progress, cells_above, certify_gain
 from asperity.textures.fields.field_grid import RAMP, FieldGrid, SingleArray
-from asperity.textures.fields.potential_field import FieldAccuracy, PotentialField, certified_number
+from asperity.textures.fields.potential_field import FieldAccuracy, PotentialField
 from asperity.textures.texture import Texture
 
 _MAX_PASSES = 10
@@ -322,10 +322,7 @@ class BakePlan:
             weights, cells = node_potentials.spread_marks(cells, grid.border, ramp)
             node_potentials.smooth(potentials, weights, grid)
             passes += 1
-        upper, attained = curvature_bounds(grid, arguments, progress)
-        one_sided = certified_number(float(upper[0]), attained[0])
-        other = certified_number(float(upper[1]), attained[1])
-        larger = max(one_sided, other, key=lambda number: number.lower)
+        gain, one_sided = certify_gain(grid, arguments, progress)
         largest = float(arguments.c.max(initial=0.0))
         force, energy = grid.error_bounds(self.lipschitz, passes, largest)
         field = PotentialField(
@@ -335,7 +332,7 @@ class BakePlan:
             max_depth=self.max_depth,
             continuity=self.continuity,
             passes=passes,
-            gain=replace(larger, upper=max(one_sided.upper, other.upper)),
+            gain=gain,
             one_sided=one_sided,
             accuracy=FieldAccuracy(force, energy),
         )

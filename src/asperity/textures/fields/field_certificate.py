@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from asperity.core.processes import run_in_threads
 from asperity.textures.fields import field_curvature, field_sampler
 from asperity.textures.fields.field_grid import FieldGrid
 from asperity.textures.fields.field_sampler import PERIODIC, ZERO, FieldArguments
+from asperity.textures.texture import CertifiedNumber
 
 Progress = Callable[[float], None]
 CurvatureBounds = tuple[FloatArray, FloatArray]
@@ -53,6 +55,21 @@ def curvature_bounds(
     at = grid.positions(best[:, 2 : 2 + len(grid.cells)])
     attained = np.column_stack([best[:, 1], at, grid.height(best[:, 4])])
     return numbers[:, :, 0].max(axis=0) + rounding, attained
+
+
+def certify_gain(
+    grid: FieldGrid, field: FieldArguments, progress: Progress | None = None
+) -> tuple[CertifiedNumber, CertifiedNumber]:
+    """Return the certified sup ‖Hess T‖ and sup λ_max(Hess T) of a field."""
+    upper, attained = curvature_bounds(grid, field, progress)
+    one_sided, other = map(_certified_number, upper.tolist(), attained.tolist())
+    larger = max(one_sided, other, key=lambda number: number.lower)
+    return replace(larger, upper=max(one_sided.upper, other.upper)), one_sided
+
+
+def _certified_number(upper: float, attained: list[float]) -> CertifiedNumber:
+    value, x, y, z = attained
+    return CertifiedNumber(value, upper, (x, y, z))
 
 
 def cells_above(field: FieldArguments, limit: float, cells: NDArray[np.uint8]) -> NDArray[np.uint8]:

@@ -18,10 +18,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from asperity.core.cache import get_or_compute
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError, SurfaceFileError
-from asperity.core.files import json_text, open_atomic, open_input
+from asperity.core.files import content_digest, json_text, open_atomic, open_input
 from asperity.core.memory import free_memory
+from asperity.textures.fields.field_certificate import certify_gain
 from asperity.textures.fields.field_grid import FieldGrid
 from asperity.textures.fields.field_sampler import MIRRORED, PERIODIC, ZERO, FieldArguments
 from asperity.textures.fields.potential_field import FieldAccuracy, PotentialField, ThinRegion
@@ -32,6 +34,9 @@ MAGIC = b"ASPFIELD"
 VERSION = 2
 _BYTE_ORDER = 0x01020304
 _ALIGNMENT = 4096
+_SCALE_TOLERANCE = 1e-9
+# Relative difference of bounds that a search finds in another order.
+_CLAIM_TOLERANCE = 1e-6
 _COUNTS = ("levels", "below", "border")
 _TUPLES = {"at", "depths", "shares"}
 """Tuples of numbers in the description; all others are single numbers."""
@@ -151,6 +156,9 @@ def is_field(path: str | os.PathLike[str]) -> bool:
 def load_field(path: str | os.PathLike[str], build_texture: BuildTexture) -> PotentialField:
     """Load a baked field into memory, where no change of the file reaches it.
 
+    Its gain is computed from its coefficients, once for each content; what the file states is a
+    claim: :attr:`PotentialField.claimed_gain`. So is its difference from exact law H.
+
     Args:
         path: the file.
         build_texture: builds the texture that was baked, unless it is a spline.
@@ -166,14 +174,14 @@ def load_field(path: str | os.PathLike[str], build_texture: BuildTexture) -> Pot
             if free is not None and size > free:
                 raise SurfaceFileError(f"its {size:,} bytes exceed the free memory, {free:,} bytes")
             data = np.fromfile(stream, np.uint8)
-        return _decode(data, build_texture)
+        return _certify(_decode(data, build_texture))
     except SurfaceFileError as error:
         raise SurfaceFileError(f"{name}: {error}") from None
     except (OSError, MemoryError) as error:
         raise SurfaceFileError(f"{name}: cannot be read ({error})") from None
     except RecursionError:
         raise SurfaceFileError(f"{name}: damaged field (its description is nested)") from None
-    except (LookupError, TypeError, ValueError, OverflowError) as error:
+    except (LookupError, TypeError, ValueError, ArithmeticError) as error:
         raise SurfaceFileError(f"{name}: damaged field ({error})") from None
 
 
@@ -187,7 +195,29 @@ def _decode(data: NDArray[np.uint8], build_texture: BuildTexture) -> PotentialFi
     record = FieldArguments(values, columns.reshape(shape), **numbers)
     count = math.prod(described["shape"]) * bool(described["shape"])
     heights = _section(data, header["heights_offset"], count, "<f8")
-    return assemble_field(record, described, heights, build_texture)
+    field = assemble_field(record, described, heights, build_texture)
+    _check_scales(header, field)
+    return field
+
+
+def _certify(field: PotentialField) -> PotentialField:
+    """Replace the numbers that a file claims by those of its coefficients, up to rounding."""
+    grid = field.grid
+    content = content_digest(*field.arguments, *grid.cells, grid.level_spacing)
+    gain, one_sided = get_or_compute(
+        "field gain", content, lambda: certify_gain(grid, field.arguments)
+    )
+    field.claimed_gain = field.gain.upper
+    if not _agree(field.gain, gain) or not _agree(field.one_sided, one_sided):
+        field.gain = gain
+        field.one_sided = one_sided
+    return field
+
+
+def _agree(claim: CertifiedNumber, computed: CertifiedNumber) -> bool:
+    """Return whether two numbers are the same but for the order of a search."""
+    pairs = [(claim.lower, computed.lower), (claim.upper, computed.upper)]
+    return all(math.isclose(*pair, rel_tol=_CLAIM_TOLERANCE) for pair in pairs)
 
 
 def assemble_field(
@@ -304,6 +334,21 @@ def _check_record(record: FieldArguments, grid: FieldGrid) -> None:
         raise SurfaceFileError("has a damaged table of columns")
     if not (np.isfinite(numbers).all() and record.iz > 0.0 and np.isfinite(record.c).all()):
         raise SurfaceFileError("has numbers that are not finite")
+
+
+def _check_scales(header: Any, field: PotentialField) -> None:
+    """Refuse a header whose numbers are not those of the description.
+
+    Raises:
+        ValueError: it states both numbers.
+    """
+    grid = field.grid
+    scales = grid.scales() | {"q": field.gain.upper, "floor": grid.floor}
+    for name in scales:
+        number = header[name].item()
+        if not math.isclose(number, scales[name], rel_tol=_SCALE_TOLERANCE, abs_tol=1e-12):
+            expected = f"of its description {scales[name]:.9g}"
+            raise ValueError(f"{name} of its header is {number:.9g}, {expected}")
 
 
 def _section(data: NDArray[np.uint8], offset: Any, count: int, dtype: str) -> NDArray[Any]:

@@ -251,28 +251,19 @@ class FieldGrid:
             values[start : start + len(part)] = np.maximum(part + self.margin, 0.0)
         table = np.stack([starts - first, first, end, reach], axis=-1).astype(np.int32)
         table = self._with_borders(table)
+        counts = {"levels": self.levels, "below": self.below, "border": self.border}
+        return FieldArguments(values, table, **self.scales(), lift=lift, **counts)
+
+    def scales(self) -> dict[str, Any]:
+        """Return the numbers of the record that follow from the nodes."""
         x0, y0 = self.start.tolist()
         rates = np.zeros((2, 2))
         # Rows of the pseudo-inverse's transpose: nodes per metre along each axis.
         rates[: len(self.cells)] = np.linalg.pinv(self.steps).T
         (m00, m01), (m10, m11) = rates.tolist()
-        return FieldArguments(
-            values,
-            table,
-            x0,
-            y0,
-            float(self.height(0)),
-            m00,
-            m01,
-            m10,
-            m11,
-            1.0 / self.level_spacing,
-            self.margin,
-            lift,
-            self.levels,
-            self.below,
-            self.border,
-        )
+        scales = {"x0": x0, "y0": y0, "z0": float(self.height(0))}
+        scales |= {"m00": m00, "m01": m01, "m10": m10, "m11": m11}
+        return scales | {"iz": 1.0 / self.level_spacing, "margin": self.margin}
 
     def _with_borders(self, table: NDArray[np.int32]) -> NDArray[np.int32]:
         """Return the columns (rows, columns, 4) with those beyond the borders, and their reach."""

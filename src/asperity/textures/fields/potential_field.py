@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -105,6 +106,9 @@ class PotentialField(Texture, Tabular):
         gain: certified sup ‖Hess T‖, the characteristic number q.
         one_sided: certified sup λ_max(Hess T), the one-sided number q⁺.
         accuracy: difference from exact law H.
+        claimed_gain: upper bound of q that the file states from which the field was loaded, whose
+            ``accuracy`` is a claim of that file; ``None`` for a field that was baked here. All
+            other numbers are computed from the coefficients.
         thin_regions: where a body can be pressed less deep than ``max_depth``, the thinnest first.
         thin_map: half of the thickness there [m] at the nodes of ``source``, NaN elsewhere;
             ``None`` without thin parts.
@@ -115,6 +119,7 @@ class PotentialField(Texture, Tabular):
 
     kind: ClassVar[str] = "field"
     finds_contacts: ClassVar[bool] = True
+    claimed_gain: float | None = None
 
     def __init__(
         self,
@@ -155,9 +160,15 @@ class PotentialField(Texture, Tabular):
         deepest = format_length(max(accuracy.depths, default=0.0))
         onset = format_length(accuracy.onset)
         missed = ": more than asked for, the memory allows no finer field"
+        claim = ""
+        q = f"q at most {self.gain.upper:.4g}"
+        if self.claimed_gain is not None:
+            claim = " the file claims:"
+            if not math.isclose(self.claimed_gain, self.gain.upper, rel_tol=1e-4):
+                q += f", computed from its coefficients: the file claims {self.claimed_gain:.4g}"
         text = (
             f"Law H baked as a potential field: {self.arguments.c.size} nodes,"
-            f" {1e6 * self.resolution:.3g} µm apart, {how}; q at most {self.gain.upper:.4g};"
+            f" {1e6 * self.resolution:.3g} µm apart, {how}; {q};{claim}"
             f" force {100 * accuracy.share:.2g} % RMS from exact H"
             f" at the worst of {len(accuracy.depths)} depths (at {depth}; deeper than {deepest} it"
             f" is not known){missed * accuracy.is_limited}; contact begins up to {onset} from the"
@@ -284,9 +295,3 @@ class PotentialField(Texture, Tabular):
         """See :class:`Texture`."""
         source = self.source.digest
         return source and content_digest(source, type(self).__qualname__, *self.arguments)
-
-
-def certified_number(upper: float, attained: FloatArray) -> CertifiedNumber:
-    """Return a number of a field from a row of :func:`curvature_bounds`."""
-    value, x, y, z = attained.tolist()
-    return CertifiedNumber(value, upper, (x, y, z))
