@@ -304,7 +304,8 @@ def test_thresholds_beyond_their_frequencies_are_named_for_all_laws(call: Call) 
     """A wave of 0.1 mm at 0.06 m/s is at 600 Hz; the thresholds end at 500 Hz."""
     for speed, is_beyond in (("0.06m/s", True), ("0.02m/s", False)):
         spec = "sinusoid:amplitude=20um,period=0.1mm"
-        code, out, _err = call("compare", spec, "--speed", speed, "--set", "update_rate=20kHz")
+        options = ("--speed", speed, "--set", "update_rate=20kHz", "--why")
+        code, out, _err = call("compare", spec, *options)
         assert code == 0
         assert ("nothing counts as felt" in " ".join(out.split())) is is_beyond
 
@@ -390,6 +391,9 @@ def test_reasons_are_shown_on_request_with_options(call: Call) -> None:
     reasons = " ".join(full.split("\nWhy:\n")[1].split("\n\n")[0].split())
     assert "simulated loops cycle" in reasons
     assert "simulated loops cycle" not in full.split("\nWhy:")[0]
+    assumed = [text.split("\nAssumed:\n")[1].split("\n\n")[0] for text in (brief, full)]
+    assert assumed[0].split() == ["-", "Default", "scanning", "speed", "0.1", "m/s"]
+    assert "were not tested with people" in " ".join(assumed[1].split())
 
 
 def test_next_commands_run_the_recommended_law(call: Call, tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import click
 
 from asperity.cli import options
 from asperity.cli.main import declare_command, option_writer
-from asperity.cli.next_commands import design_commands, next_commands
+from asperity.cli.next_commands import design_commands, next_commands, why_hint
 from asperity.cli.options import GRIP, REQUESTED_STIFFNESS, SPEED
 from asperity.cli.output import Outputs, check_outputs, output_options, step_bar
 from asperity.cli.questions import AskingCommand
@@ -82,6 +82,11 @@ _MAX_DEPTHS = replace(MAX_DEPTH, form="items", example="0.1mm; 0.5mm")
 _COMPARISON = (SPEED, GRIP, *options.command_arguments("compare"))
 
 
+_why_option = click.option(
+    "--why", is_flag=True, help="Show reasons of the answer, what else to watch, all assumptions."
+)
+
+
 @click.command("compare", cls=AskingCommand)
 @click.argument("surface")
 @options.device_option(
@@ -97,7 +102,7 @@ _COMPARISON = (SPEED, GRIP, *options.command_arguments("compare"))
     is_flag=True,
     help="Show the characteristic numbers q and q⁺, the limits, leaks, strength T and support S.",
 )
-@click.option("--why", is_flag=True, help="Show the reasons of the answer, and what else to watch.")
+@_why_option
 @click.option(
     "--latex",
     "latex_path",
@@ -163,7 +168,8 @@ def _write_comparisons(
         return
     if result.comparisons or len(result.missing_data) > 1:
         remedies = [_missing_data_text(missing) for missing in result.missing_data]
-        outputs.write(result, report.comparisons_page(result), extra_line="\n".join(remedies))
+        page = report.comparisons_page(result, why)
+        outputs.write(result, page, extra_line="\n".join([*remedies, why_hint(why)]))
     if not result.comparisons:
         reasons = "; ".join(comparison.sentence for comparison in result.missing_data)
         raise ParameterError("device", f"lacks data to compare laws: {reasons}")
@@ -278,11 +284,13 @@ _TARGET = (*options.command_arguments("design"), *_CONDITIONS[:4])
 @options.law_options(())
 @options.file_options
 @options.jobs_option
+@_why_option
 @output_options()
 def design_command(
     surface: str,
     device: Device | None,
     laws: tuple[Law, ...] | None,
+    why: bool,
     outputs: Outputs,
     **values: Any,
 ) -> None:
@@ -309,7 +317,8 @@ def design_command(
             progress=step,
             **options.provided_values(values, _TARGET),
         )
-    outputs.write(result, design_page(result), extra_line=design_commands(surface, result))
+    commands = design_commands(surface, result)
+    outputs.write(result, design_page(result, why), extra_line=f"{why_hint(why)}{commands}")
 
 
 def _law_parameters(values: dict[str, Any]) -> dict[str, Any]:

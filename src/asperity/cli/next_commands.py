@@ -18,12 +18,17 @@ if TYPE_CHECKING:
     from asperity.envelopes.find_design import Design
 
 
+def why_hint(why: bool) -> str:
+    """Return how to see what the terminal does not show; empty if it shows it."""
+    return "" if why else "\nWhy, what else to watch, and all that is assumed: --why\n"
+
+
 def next_commands(surface: str, result: Comparison, why: bool) -> str:
     """Return the commands to type next, for the recommended law or for a texture that is felt."""
+    hint = why_hint(why)
     row = result.recommended_row
     if row is None:
-        return f"\nNext:\n  {_remedy_command(surface, result)}"
-    hint = "" if why else "\nWhy, and what else to watch: --why\n"
+        return f"{hint}\nNext:\n  {_remedy_command(surface, result)}"
     changed = {}
     if result.press is not None:
         changed["max_depth"] = format_quantity(row.surface.max_depth, "m", 6)

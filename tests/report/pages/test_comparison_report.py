@@ -33,7 +33,7 @@ def page(result: asp.Comparison) -> str:
 @pytest.mark.parametrize("full", [False, True])
 @pytest.mark.parametrize("width", [40, 60, 80, 100, 120, 200])
 def test_report_fits_the_terminal_width(result: asp.Comparison, width: int, full: bool) -> None:
-    text = terminal(comparison_page(result, full), width)
+    text = terminal(comparison_page(result, full, why=True), width)
     assert max(len(line) for line in text.splitlines()) <= width
     for row in result.rows:
         lines = [line for line in text.splitlines() if re.match(rf"{row.law.letter} +\S", line)]

@@ -328,20 +328,23 @@ def facts_section(facts: Sequence[tuple[str, str]]) -> Section:
     return terminal_section(notes=[f"{name}: {value}" for name, value in facts])
 
 
-def assumption_sections(sentences: Sequence[str], *blocks: Block) -> list[Section]:
+def assumption_sections(
+    sentences: Sequence[str], *blocks: Block, brief: Sequence[str] | None = None
+) -> list[Section]:
     """Return the sections of the assumptions; none without any.
 
     Args:
         sentences: the assumptions.
         blocks: shown below them on a page.
+        brief: those that a terminal shows; ``None`` for all.
     """
-    if not sentences:
-        return []
-    listed = BulletList(sentences)
-    return [
-        Section("Assumptions", [listed, *blocks], kind="assumed"),
-        Section("Assumed:", [listed], media=HEADED),
-    ]
+    listed = sentences if brief is None else brief
+    sections = []
+    if sentences:
+        sections.append(Section("Assumptions", [BulletList(sentences), *blocks], kind="assumed"))
+    if listed:
+        sections.append(Section("Assumed:", [BulletList(listed)], media=HEADED))
+    return sections
 
 
 def holds_cell(holds: bool | None) -> Cell:

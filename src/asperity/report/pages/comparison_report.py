@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
+from itertools import chain
 from operator import attrgetter
 
 from asperity.analysis.results.compare import Comparison
@@ -25,6 +26,7 @@ from asperity.report.sentences.answer_sentences import (
     recommendation_reasons,
     recommendation_text,
 )
+from asperity.report.sentences.assumption_sentences import comparison_defaults
 from asperity.report.sentences.comparison_text import (
     case_title,
     design_answer,
@@ -58,10 +60,15 @@ def comparison_page(
     Args:
         comparison: the result.
         full: whether a terminal shows every number instead of the summary.
-        why: whether a terminal shows the reasons of the answer.
+        why: whether a terminal shows the reasons of the answer and all assumptions.
         write_argument: writes an argument that changes the answer, as in Python or as an option.
     """
     reasons = [page.BulletList(recommendation_reasons(comparison, write_argument))]
+    assumed = page.assumption_sections(
+        comparison.assumptions,
+        device_numbers_table(comparison.device, list(comparison.device.data)),
+        brief=None if why else comparison_defaults(comparison),
+    )
     return Page(
         title=f"{texture_name(comparison.texture)} on the {comparison.device.name}",
         answer=recommendation_text(comparison, write_argument),
@@ -74,10 +81,7 @@ def comparison_page(
             *_figure_sections(comparison),
             *thin_sections(comparison.texture),
             *measured_sections(comparison.texture),
-            *page.assumption_sections(
-                comparison.assumptions,
-                device_numbers_table(comparison.device, list(comparison.device.data)),
-            ),
+            *assumed,
             _provenance_section(comparison),
             Section("How to read it", [page.DefinitionList(glossary("comparison"))]),
         ],
@@ -209,14 +213,17 @@ def cases_table(comparisons: DeviceComparisons) -> Table:
     return Table(_CASE_HEADINGS, rows, (1, 3, 4), layout)
 
 
-def comparisons_page(comparisons: DeviceComparisons) -> Page:
+def comparisons_page(comparisons: DeviceComparisons, why: bool = False) -> Page:
     """Return the report: the table, then each device and depth with its laws and assumptions."""
     texture = comparisons.texture
     missing = [device.sentence for device in comparisons.missing_data]
     cases = comparisons.comparisons
     table = cases_table(comparisons)
     answers = [f"{case_title(case)}: {case.recommendation}" for case in cases]
-    assumed = page.assumption_sections(_common_assumptions(cases))
+    common = _common_assumptions(cases)
+    defaults = set(chain.from_iterable(map(comparison_defaults, cases)))
+    brief = None if why else [text for text in common if text in defaults]
+    assumed = page.assumption_sections(common, brief=brief)
     return Page(
         title=f"{texture_name(texture)} on several devices",
         answer=comparisons.recommendation,
@@ -270,9 +277,9 @@ def _case_section(comparison: Comparison) -> Section:
     )
 
 
-def design_page(result: Design) -> page.Page:
+def design_page(result: Design, why: bool = False) -> page.Page:
     """Return the report: answer, margins, what is lost, and the comparison of the answer."""
-    compared = comparison_page(result.comparison)
+    compared = comparison_page(result.comparison, why=why)
     rows = []
     for name, ratio in result.margins.items():
         remark = Cell("")

@@ -132,7 +132,7 @@ def comparison_assumptions(comparison: Comparison) -> tuple[str, ...]:
     for row in rows:
         steps += rendering_sentences(row.surface)
     searches = [row.rendering.sentence(row.law) for row in rows]
-    sentences = [*dict.fromkeys(steps), *filter(None, searches), *_comparison_defaults(comparison)]
+    sentences = [*dict.fromkeys(steps), *filter(None, searches), *comparison_defaults(comparison)]
     sentences += form_removal_sentences(texture, part.form, part.waviness)
     sentences += _wall_assumptions(comparison)
     sentences += _margin_assumptions(comparison)
@@ -166,7 +166,8 @@ def _assessed_texture(comparison: Comparison) -> Perceptibility | None:
     return max(assessed, key=lambda texture: texture.extrapolated, default=None)
 
 
-def _comparison_defaults(comparison: Comparison) -> list[str]:
+def comparison_defaults(comparison: Comparison) -> list[str]:
+    """Return speed, press or depth and parameters of the laws: the defaults that were used."""
     sentences = []
     if "speed" in comparison.defaults:
         sentences.append(f"Default scanning speed {speed_text(comparison.speed)}")
