@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import random
 import shutil
 import tomllib
@@ -44,11 +45,13 @@ def folder(tmp_path: Path) -> Path:
 
 
 def damage(folder: Path, random_numbers: random.Random) -> None:
-    """Damage one to three entries of a folder: content, length, or what they are."""
+    """Damage one to three entries of a folder: content, length, rights, or what they are."""
     for _ in range(random_numbers.randint(1, 3)):
         files = sorted([path for path in folder.rglob("*") if path.is_file()])
         if not files:
             return
+        if damage_folder(folder, random_numbers):
+            continue
         path = random_numbers.choice(files)
         content = bytearray(path.read_bytes())
         kind = random_numbers.choice(("flip", "cut", "garbage", "delete", "folder", "repeat"))
@@ -63,6 +66,23 @@ def damage(folder: Path, random_numbers: random.Random) -> None:
             path.mkdir()
         elif kind != "delete":
             path.write_bytes(content * (2 if kind == "repeat" else 1))
+
+
+def damage_folder(folder: Path, random_numbers: random.Random) -> bool:
+    """Replace, link or lock one of the two folders of participants, in two of five cases."""
+    path = folder / random_numbers.choice(("P01", "P02"))
+    kind = random_numbers.choice(("file", "link", "broken link", "locked", *6 * ["none"]))
+    if kind == "none" or path.is_symlink() or not path.is_dir() or not os.access(path, os.W_OK):
+        return False
+    if kind == "locked":
+        path.chmod(0)
+        return True
+    moved = path.rename(folder.parent / f"{folder.name} {path.name}")
+    if kind == "file":
+        path.write_bytes(random_numbers.choice(GARBAGE))
+    else:
+        path.symlink_to(moved if kind == "link" else "nowhere")
+    return True
 
 
 def read_all(folder: Path) -> StudyResult | None:
@@ -98,9 +118,11 @@ def test_damaged_folders_are_refused_in_one_line_and_removal_works(
         n_refused += result is None
         for one in result.trials if result else ():
             assert whole[one.participant, one.trial] == one.answer or one.run == 2
-        if any((copy / "P02" / name).exists() for name in (ANSWERS_FILE, "number.txt")):
+        person = copy / "P02"
+        is_other = person.is_symlink() or person.is_file()
+        if is_other or any(map(os.path.exists, (person / ANSWERS_FILE, person / "number.txt"))):
             remove_participant(copy, "P02")
-            assert not (copy / "P02").exists()
+            assert not os.path.lexists(person)
             assert not [name for name in DERIVED_FILES if (copy / name).exists()]
     assert COUNT // 4 < n_refused < COUNT  # a control: they are damaged, and not all beyond use
 
@@ -113,6 +135,26 @@ def test_a_participant_is_removed_from_each_damaged_file(
     (folder / "P01" / name).write_bytes(content)
     remove_participant(folder, "P01")
     assert not any("P01" in path.name for path in folder.rglob("*"))
+
+
+@pytest.mark.parametrize("kind", ["file", "link", "nowhere", "locked", "read-only"])
+def test_a_participant_is_removed_whose_folder_is_something_else(folder: Path, kind: str) -> None:
+    """What a link points to stays, and is named."""
+    path = folder / "P02"
+    if kind in {"locked", "read-only"}:
+        for place in (path / ANSWERS_FILE, path, folder):
+            place.chmod(0 if kind == "locked" else 0o500)
+    else:
+        moved = path.rename(folder.parent / "moved")
+    if kind == "file":
+        path.write_bytes(b"")
+    elif kind in {"link", "nowhere"}:
+        path.symlink_to(moved if kind == "link" else "nowhere")
+    names = remove_participant(folder, "P02")
+    assert not os.path.lexists(path)
+    assert any(" stays)" in name for name in names) == (kind in {"link", "nowhere"})
+    assert kind != "link" or (moved / ANSWERS_FILE).exists()
+    assert list(study_report(folder).answered) == ["P01"]
 
 
 def test_what_is_no_participant_is_not_deleted(folder: Path) -> None:

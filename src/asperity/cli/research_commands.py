@@ -228,18 +228,8 @@ def run_command(
     click.echo(f"{participant}: {answers} in {name}; {state}")
 
 
-def _check_study_folder(_ctx: click.Context, _argument: click.Parameter, folder: str) -> str:
-    from asperity.studies.study_store import STUDY_FILE
-
-    if not (Path(folder) / STUDY_FILE).is_file():
-        raise ParameterError(
-            "folder", "is no folder of a study: asperity study run makes one", folder
-        )
-    return folder
-
-
 @study_command.command("report", short_help="Write scores, tables and a page; unblinds.")
-@click.argument("folder", callback=_check_study_folder)
+@click.argument("folder")
 @output.output_options(uses_cache=False)
 def report_command(folder: str, outputs: output.Outputs) -> None:
     """Write scores with intervals, pictures and tables into FOLDER, with the key of the codes.
@@ -280,4 +270,4 @@ def remove_command(folder: str, participant: str) -> None:
     from asperity.studies.study_store import remove_participant
 
     names = ", ".join(remove_participant(folder, participant))
-    click.echo(f"Deleted in {escape_unprintable(folder)}: {names}")
+    click.echo(escape_unprintable(f"Deleted in {folder}: {names}"))

@@ -12,8 +12,9 @@ import json
 import os
 import re
 import shutil
+import stat
 from collections.abc import Iterable
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any, Self
 
@@ -158,14 +159,16 @@ def list_participants(folder: str | Path) -> dict[str, int]:
 
 def _list_folders(folder: str | Path) -> list[Path]:
     """Return the folders of the participants; one without number and answers is of nobody."""
-    paths = sorted([path for path in Path(folder).glob("*/") if _CODE.fullmatch(path.name)])
+    paths = sorted([path for path in Path(folder).glob("*") if _CODE.fullmatch(path.name)])
     return [path for path in paths if _has_data(path)]
 
 
 def _has_data(path: Path) -> bool:
     """Return whether a folder holds data of a participant, in whatever state."""
+    if path.is_dir() and not os.access(path, os.R_OK | os.X_OK):
+        return True
     answers = path / ANSWERS_FILE
-    is_answered = answers.exists() and (answers.is_dir() or answers.stat().st_size > 0)
+    is_answered = os.path.lexists(answers) and (answers.is_dir() or answers.lstat().st_size > 0)
     return is_answered or os.path.lexists(path / _NUMBER_FILE) or any(path.glob("trial-*.mcap"))
 
 
@@ -364,7 +367,7 @@ def write_key(folder: str | Path) -> None:
 
 def find_derived_files(folder: str | Path) -> list[str]:
     """Return the names of the files in the folder of a study that a report has written."""
-    return [name for name in DERIVED_FILES if (Path(folder) / name).exists()]
+    return [name for name in DERIVED_FILES if os.path.lexists(Path(folder) / name)]
 
 
 def remove_participant(folder: str | Path, code: str) -> list[str]:
@@ -372,7 +375,8 @@ def remove_participant(folder: str | Path, code: str) -> list[str]:
 
     Tables and reports of the study hold data of all participants, so they are deleted, too.
 
-    Damaged or missing files of the study or of the participant do not prevent it.
+    Damaged, missing or read-only files of the study or of the participant do not prevent it. What
+    a link points to outside stays, and is named.
 
     Args:
         folder: of a study.
@@ -383,20 +387,53 @@ def remove_participant(folder: str | Path, code: str) -> list[str]:
             not delete.
     """
     path = Path(folder) / check_participant(code)
+    _allow_changes(path.parent)
     known = _list_folders(folder)
-    if not known and not (Path(folder) / STUDY_FILE).exists():
+    if not known and not os.path.lexists(path.parent / STUDY_FILE):
         raise _no_study(folder)
-    if path not in known:
+    is_replaced = path.is_symlink() or path.is_file()  # where the folder was
+    if path not in known and not is_replaced and not os.path.lexists(path / ANSWERS_FILE):
         raise _unknown_error(code, [one.name for one in known])
-    if (path / LOCK_FILE).is_dir():
-        shutil.rmtree(path / LOCK_FILE)  # it is damaged: a session locks a file
-    with lock_folder(path):
-        derived = find_derived_files(folder)
-        for name in derived:
-            file = Path(folder) / name
-            if file.is_dir() and not file.is_symlink():
-                shutil.rmtree(file)
-            else:
-                file.unlink()
+    locked = path.parent if is_replaced else path
+    derived = find_derived_files(folder)
+    names = [f"{code}/", *derived]
+    for name in names:
+        _allow_all_changes(path.parent / name)
+    names += _link_texts(path)
+    lock = locked / LOCK_FILE
+    if lock.is_symlink() or lock.is_dir():
+        _delete(lock)  # it is damaged: a session locks a file
+    with lock_folder(locked):
+        for name in (*derived, code):
+            _delete(path.parent / name)
+    return names
+
+
+def _delete(path: Path) -> None:
+    if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path)
-    return [f"{code}/", *derived]
+    else:
+        path.unlink()
+
+
+def _allow_all_changes(path: Path) -> None:
+    """Give the owner all rights to a file or folder and to all in it."""
+    _allow_changes(path)
+    if path.is_symlink():
+        return
+    for parent, folders, files in os.walk(path):  # top down: a folder is opened after its change
+        for name in (*folders, *files):
+            _allow_changes(Path(parent) / name)
+
+
+def _allow_changes(path: Path) -> None:
+    if not path.is_symlink():
+        with suppress(OSError):  # the deletion tells
+            path.chmod(path.stat().st_mode | stat.S_IRWXU)
+
+
+def _link_texts(path: Path) -> list[str]:
+    """Return the links that are deleted with a participant, whose targets are not."""
+    paths = [path] if path.is_symlink() else sorted(path.rglob("*"))
+    links = [one for one in paths if one.is_symlink()]
+    return [f"{link.name} (a link; {os.readlink(link)} stays)" for link in links]
