@@ -188,7 +188,7 @@ def test_baked_field_and_user_defined_law_have_friction() -> None:
 def test_friction_is_carried_by_copies() -> None:
     surface = Surface(WAVE, "H", friction=0.4, presliding_stiffness=150.0, friction_modulation=0.3)
     for copy in (surface.to_stiffness(2000.0), pickle.loads(pickle.dumps(surface))):
-        assert copy.contact_friction.arguments == (0.4, 0.3, 0.0, 150.0)
+        assert copy.contact_friction.arguments == (0.4, 0.3, 0.0, 150.0, 0.0)
     share = Surface(WAVE, "C", friction=0.4).to_stiffness(2000.0)
     assert share.contact_friction.presliding_stiffness == 500.0  # type: ignore[union-attr]  # it has
     assert surface.to_law("A").friction == 0.0

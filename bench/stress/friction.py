@@ -121,6 +121,7 @@ def walk(surface: Surface, count: int, ticks: int = TICKS, reach: float = 0.0) -
             friction.presliding_stiffness,
             (0.0, 2e-5)[turn % 2],
             reach,
+            friction.in_space,
             out,
             new_warm_start(UNLIMITED),
             surface.texture.arguments,

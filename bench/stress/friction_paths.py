@@ -3,7 +3,7 @@
 import math
 
 from asperity.core.compiled import FloatArray, Kernels
-from asperity.kernels.loop_functions import drag_anchor
+from asperity.kernels.loop_functions import drag_anchor, drag_anchor_in_space
 from asperity.kernels.probe_functions import probe_slip
 
 KERNELS = Kernels(loops=("closed_paths",))
@@ -30,6 +30,7 @@ def closed_paths(
     presliding: float,
     speed: float,
     reach: float,
+    in_space: bool,
     out: FloatArray,
     warm_start: FloatArray,
     texture: object,
@@ -44,13 +45,14 @@ def closed_paths(
         presliding: κ [N/m].
         speed: distance per tick at which the slip limit is halved [m]; 0 for no dependence.
         reach: greatest deflection [m] where κ follows the slip limit, as in F; 0 for constant κ.
+        in_space: whether the anchor moves in three directions.
         out: result.
         warm_start: of the contact.
         texture: record of the texture.
         law: parameters of law and friction.
     """
     for i in range(shapes.shape[0]):
-        ax = ay = px = py = pz = dx = dy = fx = fy = fz = 0.0
+        ax = ay = az = px = py = pz = dx = dy = dz = fx = fy = fz = 0.0
         stiffness = presliding
         own = bound = total = coarse = 0.0
         for tick in range(TURNS * ticks + 1):
@@ -71,12 +73,21 @@ def closed_paths(
             longest = limit / stiffness if stiffness > 0.0 else 0.0
             old_x = dx
             old_y = dy
-            ax, ay, dx, dy = drag_anchor(x, y, tick > 0, ax, ay, longest)
+            old_z = dz
+            if in_space:
+                ax, ay, az, dx, dy, dz = drag_anchor_in_space(
+                    x, y, z, tick > 0, ax, ay, az, gx, gy, gz, longest
+                )
+            else:
+                ax, ay, dx, dy = drag_anchor(x, y, tick > 0, ax, ay, longest)
             if tick > 0:
                 square = ux * ux + uy * uy
-                own -= 0.5 * (before * (old_x * ux + old_y * uy) + stiffness * (dx * ux + dy * uy))
+                if in_space:
+                    square += uz * uz
+                old = old_x * ux + old_y * uy + old_z * uz
+                own -= 0.5 * (before * old + stiffness * (dx * ux + dy * uy + dz * uz))
                 bound += presliding * square / 8.0
-                coarse += square + uz * uz
+                coarse += ux * ux + uy * uy + uz * uz
                 total += 0.5 * ((fx + gx) * ux + (fy + gy) * uy + (fz + gz) * uz)
             px = x
             py = y
@@ -85,6 +96,6 @@ def closed_paths(
             fy = gy
             fz = gz
         out[i, 0] = own
-        out[i, 1] = bound - 0.5 * presliding * (dx * dx + dy * dy)
+        out[i, 1] = bound - 0.5 * presliding * (dx * dx + dy * dy + dz * dz)
         out[i, 2] = total + own
         out[i, 3] = coarse / 8.0

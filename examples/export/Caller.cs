@@ -12,8 +12,8 @@ using System.Runtime.InteropServices;
 
 public static class Texture
 {
-    // As large as texture_state, 25 numbers; what is in it concerns the library alone.
-    [StructLayout(LayoutKind.Sequential, Size = 25 * sizeof(double))]
+    // As large as texture_state, 26 numbers; what is in it concerns the library alone.
+    [StructLayout(LayoutKind.Sequential, Size = 26 * sizeof(double))]
     public struct State
     {
     }

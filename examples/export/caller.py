@@ -10,7 +10,7 @@ import sys
 
 Vector = ctypes.c_double * 3
 # As large as texture_state; what is in it concerns the library alone.
-State = ctypes.c_double * 25
+State = ctypes.c_double * 26
 
 texture = ctypes.CDLL(sys.argv[1])
 state, force = State(), Vector()

@@ -119,7 +119,7 @@ class Frictional(Plottable, ABC):
         if not (self.facts.conservative and accepts_friction(self.law)):
             return None
         share = TEXTURED_SHARE if self.depends_on_texture else FLAT_SHARE
-        return make_friction(given, self.stiffness, share)
+        return make_friction(given, self.stiffness, share, in_space=self.texture.is_body)
 
     @property
     def friction_values(self) -> dict[str, float]:
@@ -173,7 +173,13 @@ class Frictional(Plottable, ABC):
         return (stiffness, *middle_and_half, *self.law_arguments[3:], *friction.arguments)
 
     def _deflected_force(self, rows: FloatArray, deflections: FloatArray) -> FloatArray:
-        """Return forces with friction (n, 3) [N]; a probe out of contact sets each anchor."""
+        """Return forces with friction (n, 3) [N]; a probe out of contact sets each anchor.
+
+        In space a path of two points for each.
+        """
+        if deflections.shape[1] > 2:
+            paths = np.stack([rows - deflections, rows], axis=1)
+            return np.array([self.trace(path)[1] for path in paths]).reshape(-1, 3)
         path = np.repeat(rows, 2, axis=0)
         path[::2, :2] -= deflections
         path[::2, 2] = self.texture.extremes[1] + _CLEARANCE
@@ -187,6 +193,8 @@ class Frictional(Plottable, ABC):
         sliding: ArrayLike | None,
     ) -> tuple[FloatArray, FloatArray]:
         """Return forces and Jacobians of a surface with friction; see :func:`friction_jacobian`."""
+        if friction.in_space:
+            raise ParameterError("deflection", "has no Jacobian on a closed body: leave it out")
         flags = probes.check_flags_per_point("sliding", sliding)
         deflections = np.zeros((probes.count, 2))
         if deflection is not None:

@@ -323,7 +323,8 @@ class Surface(Frictional):
             points: probe positions p [m], shape (n, 3), or (3,) for one; other arguments and the
                 result then lack the first axis too.
             deflection: tangential deflection d of the anchor [m], shape (n, 2), for laws with
-                state, or with friction, which limits it; zero by default.
+                state, or with friction, which limits it; (n, 3) for friction on a closed body;
+                zero by default.
 
         Returns:
             f [N], shape (n, 3); zero out of contact.
@@ -337,7 +338,8 @@ class Surface(Frictional):
         """
         probes = check_points("points", points, 3, "m")
         if deflection is not None and self.contact_friction is not None:
-            deflections = probes.check_array_per_point("deflection", deflection, 2, "m")
+            axes = self.contact_friction.axes
+            deflections = probes.check_array_per_point("deflection", deflection, axes, "m")
             return probes.restore_shape(self._deflected_force(probes.rows, deflections))
         out = np.empty(probes.rows.shape)
         state = self._anchor_state(probes, deflection)

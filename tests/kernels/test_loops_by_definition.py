@@ -100,16 +100,16 @@ def test_path_carries_the_state_of_the_law(monkeypatch: pytest.MonkeyPatch) -> N
     states: list[tuple[Any, ...]] = []
 
     def probe_tick(x: float, y: float, z: float, *rest: Any) -> Any:
-        ax, ay, held, memory, texture, parameters = rest
+        ax, ay, az, held, memory, texture, parameters = rest
         assert (memory[ERROR_BOUND], memory[EVALUATIONS], texture, parameters) == (
             0.0,
             0.0,
             TEXTURE,
             LAW,
         )
-        states.append((ax, ay, held))
+        states.append((ax, ay, az, held))
         memory[ERROR_BOUND], memory[EVALUATIONS] = x, y
-        return x + y, y + z, z + x, 2.0 * x, 3.0 * y, True
+        return x + y, y + z, z + x, 2.0 * x, 3.0 * y, 5.0 * z, True
 
     monkeypatch.setattr(path_loops, "probe_tick", probe_tick)
     out, bounds, memory = np.empty((COUNT, 3)), np.empty((COUNT, 2)), np.full(20, np.nan)
@@ -117,7 +117,10 @@ def test_path_carries_the_state_of_the_law(monkeypatch: pytest.MonkeyPatch) -> N
     x, y, z = POINTS.T
     np.testing.assert_array_equal(out, np.column_stack([x + y, y + z, z + x]))
     np.testing.assert_array_equal(bounds, POINTS[:, :2])
-    expected = [(0.0, 0.0, False), *((2.0 * a, 3.0 * b, True) for a, b, _c in POINTS[:-1])]
+    expected = [
+        (0.0, 0.0, 0.0, False),
+        *((2.0 * a, 3.0 * b, 5.0 * c, True) for a, b, c in POINTS[:-1]),
+    ]
     assert states == expected
 
 
@@ -219,9 +222,9 @@ def test_positions_and_forces_are_quantised() -> None:
 
 
 def test_subnormal_state_is_flushed_to_zero() -> None:
-    state = tick.ServoState(*[1e-60 * (-1.0) ** k for k in range(8)], True, 1e-60, -1e-60, 1e-60)
+    state = tick.ServoState(*[1e-60 * (-1.0) ** k for k in range(8)], True, *[1e-60] * 4)
     assert tick.flush_subnormal_state(state) == state
-    small = tick.ServoState(*[0.9e-60] * 8, True, *[-0.9e-60] * 3)
+    small = tick.ServoState(*[0.9e-60] * 8, True, *[-0.9e-60] * 4)
     assert tick.flush_subnormal_state(small) == tick.ServoState(held=True)
 
 
@@ -229,26 +232,26 @@ def test_tick_quantises_damps_limits_and_rounds(monkeypatch: pytest.MonkeyPatch)
     memory = np.zeros(3)
 
     def probe_tick(*arguments: Any) -> Any:
-        assert arguments == (0.5, -1.0, 2.0, 7.0, 8.0, True, memory, TEXTURE, LAW)
-        return 3.0, -4.0, 12.0, 0.1, 0.2, False
+        assert arguments == (0.5, -1.0, 2.0, 7.0, 8.0, 6.0, True, memory, TEXTURE, LAW)
+        return 3.0, -4.0, 12.0, 0.1, 0.2, 0.3, False
 
     monkeypatch.setattr(tick, "probe_tick", probe_tick)
-    state = tick.ServoState(0.25, -0.5, 1.0, 1.0, 2.0, 3.0, 7.0, 8.0, True, 9.0, 9.0, 9.0)
+    state = tick.ServoState(0.25, -0.5, 1.0, 1.0, 2.0, 3.0, 7.0, 8.0, True, 9.0, 9.0, 9.0, 6.0)
 
     def next_state(**more: float) -> tick.ServoState:
         servo_settings = settings(position_step=0.5, **more)
         return tick.servo_tick(state, servo_settings, 0.6, -1.1, 2.1, memory, TEXTURE, LAW)
 
     undamped = next_state(max_force=13.0)
-    assert undamped == (0.5, -1.0, 2.0, 1.0, 2.0, 3.0, 0.1, 0.2, False, 3.0, -4.0, 12.0)
-    assert next_state(max_force=6.5)[9:] == pytest.approx((1.5, -2.0, 6.0), rel=1e-15)
-    assert next_state(max_force=6.5, force_step=4.0)[9:] == (0.0, 0.0, 4.0)
+    assert undamped == (0.5, -1.0, 2.0, 1.0, 2.0, 3.0, 0.1, 0.2, False, 3.0, -4.0, 12.0, 0.3)
+    assert next_state(max_force=6.5)[9:12] == pytest.approx((1.5, -2.0, 6.0), rel=1e-15)
+    assert next_state(max_force=6.5, force_step=4.0)[9:12] == (0.0, 0.0, 4.0)
     # The newest velocities over a period of 0.5 s are 0.5, -1 and 2 m/s.
     velocity = (1.0 + 0.25 * (0.5 - 1.0), 2.0 + 0.25 * (-1.0 - 2.0), 3.0 + 0.25 * (2.0 - 3.0))
     damped = next_state(virtual_damping=2.0, velocity_share=0.25)
     assert damped[3:6] == velocity
     force = (3.0 - 2.0 * velocity[0], -4.0 - 2.0 * velocity[1], 12.0 - 2.0 * velocity[2])
-    assert damped[9:] == force
+    assert damped[9:12] == force
     initial = tick.initial_servo_state(0.6, -1.1, 2.1, settings(position_step=0.5))
-    assert initial == (0.5, -1.0, 2.0, 0, 0, 0, 0, 0, False, 0, 0, 0)
-    assert math.isclose(float(np.linalg.norm(next_state(max_force=1e-3)[9:])), 1e-3)
+    assert initial == (0.5, -1.0, 2.0, 0, 0, 0, 0, 0, False, 0, 0, 0, 0)
+    assert math.isclose(float(np.linalg.norm(next_state(max_force=1e-3)[9:12])), 1e-3)

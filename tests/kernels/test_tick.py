@@ -64,7 +64,7 @@ def commanded_forces(device: ModuleType, surface: Surface, positions: FloatArray
     memory = new_warm_start(surface.law.contact.max_evaluations)
     state = fused.device_batch(positions, forces, SERVO.settings, memory, *arguments)
     assert isinstance(state, tick.ServoState)
-    assert state[-3:] == tuple(forces[-1])
+    assert (state.fx, state.fy, state.fz) == tuple(forces[-1])
     return forces
 
 

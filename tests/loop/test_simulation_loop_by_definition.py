@@ -37,7 +37,7 @@ from asperity.simulation.trace import COLUMNS
 
 RNG = np.random.default_rng(61)
 NAMES = [name for name, _unit in COLUMNS]
-SERVO = ServoState(*RNG.normal(size=8), True, *RNG.normal(size=3))
+SERVO = ServoState(*RNG.normal(size=8), True, *RNG.normal(size=4))
 SAMPLE_INPUT = SampleInput(*RNG.normal(size=9), True)
 
 
@@ -105,7 +105,8 @@ def test_row_values_match_their_column_names(monkeypatch: pytest.MonkeyPatch) ->
         np.testing.assert_array_equal(row[7:16], [servo.fx, servo.fy, servo.fz, *due, ax, ay, az])
         np.testing.assert_array_equal(row[16:26], ledger[:10])
         assert row[26] == stored_energy(x, ax, ay, az, "plant")
-        assert tuple(row[27:]) == (servo.anchor_x, servo.anchor_y, float(held))
+        state = servo.anchor_x, servo.anchor_y, float(held), servo.anchor_z
+        assert tuple(row[27:]) == state
     undelayed = lane_loop.due_force(1.0, 2.0, 3.0, device(x, 0))
     assert undelayed == (1.0, 2.0, 3.0)
 

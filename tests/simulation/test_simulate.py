@@ -98,7 +98,7 @@ def test_anchor_follows_the_motion() -> None:
 def test_every_decimates_only_the_trace() -> None:
     whole, decimated, untraced = run_of(), run_of(every=7), run_of(trace=False)
     np.testing.assert_array_equal(decimated.table, whole.table[::7])
-    assert untraced.table.shape == (0, 30)
+    assert untraced.table.shape == (0, 31)
     assert whole.ledger == decimated.ledger == untraced.ledger
     sparse = run_of(every=10**30)
     np.testing.assert_array_equal(sparse.table, whole.table[:1])

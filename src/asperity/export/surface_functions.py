@@ -167,7 +167,7 @@ def surface_functions(request: ExportRequest) -> SurfaceFunctions:
     store = make_program_data(surface, prefix, single=single, loads_field=request.loads_field)
     constants: tuple[ValueType, ValueType] = (store.texture, store.law)
     place = (c.FLOAT, c.FLOAT, c.FLOAT)
-    kinds = (*place, c.FLOAT, c.FLOAT, c.BOOL, c.ArrayType((WARM_START_SIZE,)), *constants)
+    kinds = (*place, c.FLOAT, c.FLOAT, c.FLOAT, c.BOOL, c.ArrayType((WARM_START_SIZE,)), *constants)
     tick = program.function_name("probe_tick", kinds)
     tick_type = program.c_type(program.infer_types("probe_tick", kinds).result_type)
     energy_name = ""

@@ -31,6 +31,58 @@ def drag_anchor(
     return ax, ay, dx, dy
 
 
+def clip_factor(
+    dx: float, dy: float, dz: float, fx: float, fy: float, fz: float, max_deflection: float
+) -> float:
+    """Return the factor at most 1 that clips a deflection to max_deflection sin α.
+
+    α is the angle between the deflection and the force (fx, fy, fz).
+    """
+    force = fx * fx + fy * fy + fz * fz
+    if force == 0.0:
+        return 0.0
+    cx = dy * fz - dz * fy
+    cy = dz * fx - dx * fz
+    cz = dx * fy - dy * fx
+    square = dx * dx + dy * dy + dz * dz
+    limit = max_deflection * math.sqrt((cx * cx + cy * cy + cz * cz) / force)
+    return limit / square if square > limit else 1.0
+
+
+def drag_anchor_in_space(
+    x: float,
+    y: float,
+    z: float,
+    held: bool,
+    ax: float,
+    ay: float,
+    az: float,
+    fx: float,
+    fy: float,
+    fz: float,
+    max_deflection: float,
+) -> tuple[float, float, float, float, float, float]:
+    """Return anchor and deflection [m] of a body that presses with a force (fx, fy, fz).
+
+    The limit is max_deflection times the sine of the angle between deflection and force: whole
+    along the surface, 0 across it.
+    """
+    if not held:
+        return x, y, z, 0.0, 0.0, 0.0
+    dx = x - ax
+    dy = y - ay
+    dz = z - az
+    share = clip_factor(dx, dy, dz, fx, fy, fz, max_deflection)
+    if share < 1.0:
+        dx *= share
+        dy *= share
+        dz *= share
+        ax = x - dx
+        ay = y - dy
+        az = z - dz
+    return ax, ay, az, dx, dy, dz
+
+
 def sliding_derivative(dx: float, dy: float, is_sliding: bool) -> tuple[float, float, float]:
     """Return xx, xy, yy of ∂d/∂p: I, or I - u uᵀ if dragged, u the direction of d."""
     square = dx * dx + dy * dy

@@ -26,13 +26,13 @@ def path_batch(
         texture: record of the texture.
         law: parameters of the law.
     """
-    ax = ay = 0.0
+    ax = ay = az = 0.0
     held = False
     for i in range(points.shape[0]):
         warm_start[ERROR_BOUND] = 0.0
         warm_start[EVALUATIONS] = 0.0
-        fx, fy, fz, ax, ay, held = probe_tick(
-            points[i, 0], points[i, 1], points[i, 2], ax, ay, held, warm_start, texture, law
+        fx, fy, fz, ax, ay, az, held = probe_tick(
+            points[i, 0], points[i, 1], points[i, 2], ax, ay, az, held, warm_start, texture, law
         )
         store_force(out, i, (fx, fy, fz))
         diagnostics[i, 0] = warm_start[ERROR_BOUND]

@@ -77,16 +77,17 @@ def probe_tick(
     z: float,
     ax: float,
     ay: float,
+    az: float,
     held: bool,
     warm_start: FloatArray,
     texture: object,
     law: object,
-) -> tuple[float, float, float, float, float, bool]:
+) -> tuple[float, float, float, float, float, float, bool]:
     """Return the force [N], the new anchor position [m] and whether the anchor is held.
 
     A law with state holds its anchor during contact, friction from its first tick on; other laws
-    leave it unchanged. A search stays within the budget of ``warm_start`` and updates it; see
-    :mod:`asperity.contacts.warm_start`.
+    leave it unchanged. Friction on a closed body alone changes ``az``. A search stays within the
+    budget of ``warm_start`` and updates it; see :mod:`asperity.contacts.warm_start`.
     """
     raise NotImplementedError  # the linker binds calls to the generated function
 
@@ -128,6 +129,7 @@ FRICTION_PARAMETERS = (
     "friction_modulation",
     "presliding_share",
     "presliding_fixed",
+    "in_space",
 )
 
 _FORCE = ("fx", "fy", "fz")
@@ -241,8 +243,9 @@ def _probe_tick(code: LawCode) -> str:
     call = "probe_force(x, y, z, dx, dy, texture, law)"
     if code.law.contact.has_warm_start:
         call = "probe_force_warm(x, y, z, dx, dy, warm_start, texture, law)"
-    lines += [f"fx, fy, fz = {call}", "return fx, fy, fz, ax, ay, held"]
-    return _function_source("probe_tick(x, y, z, ax, ay, held, warm_start, texture, law)", lines)
+    lines += [f"fx, fy, fz = {call}", "return fx, fy, fz, ax, ay, az, held"]
+    head = "probe_tick(x, y, z, ax, ay, az, held, warm_start, texture, law)"
+    return _function_source(head, lines)
 
 
 _STICK_SLIP = """dx = 0.0
@@ -276,13 +279,19 @@ if friction_modulation > 0.0:
     limit *= 1.0 - 0.5 * friction_modulation * (1.0 + relative)
 """
 
-_FRICTION_TICK = """def probe_tick(x, y, z, ax, ay, held, warm_start, texture, law):
+_FRICTION_TICK = """def probe_tick(x, y, z, ax, ay, az, held, warm_start, texture, law):
     {unpack}
     presliding = presliding_share * k + presliding_fixed
     compliance = 1.0 / presliding  # a constant of the loop, which saves a division per tick
     fx, fy, fz, limit = probe_slip(x, y, z, warm_start, texture, law)
-    ax, ay, dx, dy = drag_anchor(x, y, held, ax, ay, limit * compliance)
-    return fx - presliding * dx, fy - presliding * dy, fz, ax, ay, True
+    dz = 0.0
+    if in_space > 0.0:
+        ax, ay, az, dx, dy, dz = drag_anchor_in_space(
+            x, y, z, held, ax, ay, az, fx, fy, fz, limit * compliance
+        )
+    else:
+        ax, ay, dx, dy = drag_anchor(x, y, held, ax, ay, limit * compliance)
+    return fx - presliding * dx, fy - presliding * dy, fz - presliding * dz, ax, ay, az, True
 """
 
 

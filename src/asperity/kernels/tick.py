@@ -50,6 +50,7 @@ class ServoState(NamedTuple):
         fx: commanded force [N].
         fy: likewise.
         fz: likewise.
+        anchor_z: the anchor of friction on a closed body [m]; 0 elsewhere.
     """
 
     x: float = 0.0
@@ -64,6 +65,7 @@ class ServoState(NamedTuple):
     fx: float = 0.0
     fy: float = 0.0
     fz: float = 0.0
+    anchor_z: float = 0.0
 
 
 def quantize(value: float, step: float) -> float:
@@ -95,7 +97,7 @@ def initial_servo_state(x: float, y: float, z: float, settings: ServoSettings) -
     x = quantize(x, settings.position_step)
     y = quantize(y, settings.position_step)
     z = quantize(z, settings.position_step)
-    return ServoState(x, y, z, 0.0, 0.0, 0.0, 0.0, 0.0, False, 0.0, 0.0, 0.0)
+    return ServoState(x, y, z, 0.0, 0.0, 0.0, 0.0, 0.0, False, 0.0, 0.0, 0.0, 0.0)
 
 
 def flush_subnormal(value: float) -> float:
@@ -118,6 +120,7 @@ def flush_subnormal_state(state: ServoState) -> ServoState:
         flush_subnormal(state.fx),
         flush_subnormal(state.fy),
         flush_subnormal(state.fz),
+        flush_subnormal(state.anchor_z),
     )
 
 
@@ -158,8 +161,17 @@ def servo_tick(
     x = quantize(x, settings.position_step)
     y = quantize(y, settings.position_step)
     z = quantize(z, settings.position_step)
-    fx, fy, fz, ax, ay, held = probe_tick(
-        x, y, z, state.anchor_x, state.anchor_y, state.held, warm_start, texture, law
+    fx, fy, fz, ax, ay, az, held = probe_tick(
+        x,
+        y,
+        z,
+        state.anchor_x,
+        state.anchor_y,
+        state.anchor_z,
+        state.held,
+        warm_start,
+        texture,
+        law,
     )
     vx = state.vx
     vy = state.vy
@@ -180,4 +192,4 @@ def servo_tick(
         fy *= scale
         fz *= scale
     fx, fy, fz = quantize_force(fx, fy, fz, settings.force_step, largest)
-    return ServoState(x, y, z, vx, vy, vz, ax, ay, held, fx, fy, fz)
+    return ServoState(x, y, z, vx, vy, vz, ax, ay, held, fx, fy, fz, az)

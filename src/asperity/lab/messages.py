@@ -154,7 +154,7 @@ _PARSERS: dict[str, tuple[tuple[str, ...], Callable[..., Any]]] = {
 COLUMN_NAMES = [name for name, _unit in COLUMNS]
 FORCE_COLUMNS = slice(COLUMN_NAMES.index("applied x"), COLUMN_NAMES.index("applied z") + 1)
 POSITION = slice(COLUMN_NAMES.index("x"), COLUMN_NAMES.index("z") + 1)
-ANCHOR = slice(COLUMN_NAMES.index("law anchor x"), COLUMN_NAMES.index("law anchor y") + 1)
+ANCHOR = [COLUMN_NAMES.index(f"law anchor {axis}") for axis in "xyz"]
 _LAW_FORCE = slice(COLUMN_NAMES.index("commanded x"), COLUMN_NAMES.index("commanded z") + 1)
 _STEP_STATISTICS = (
     *("path_length", "squared_steps", "max_force_step", "position_step"),
@@ -217,7 +217,7 @@ def step_statistics(rows: FloatArray) -> dict[str, float]:
     jumps = np.square(np.diff(rows[:, _LAW_FORCE], axis=0)).sum(axis=1)
     largest = int(jumps.argmax())
     ways = np.diff(rows[:, ANCHOR], axis=0)
-    deflections = rows[1:, POSITION][:, :2] - rows[1:, ANCHOR]
+    deflections = rows[1:, POSITION] - rows[1:, ANCHOR]
     return {
         "path_length": float(np.sqrt(squares).sum()),
         "squared_steps": float(squares.sum()),

@@ -7,7 +7,8 @@ deflection d of the anchor follows the tangential displacement u of a tick,
 
 where clip shortens a vector to a length, and ĥ is the height at the contact point scaled to
 [-1, 1]. With constant κ the hand gains no energy on a closed path, whatever the limit does
-(docs/theory/friction.md).
+(docs/theory/friction.md). On a closed body d and u have three coordinates, and the
+length is multiplied by the sine of the angle between d + u and f₀.
 """
 
 from __future__ import annotations
@@ -63,24 +64,31 @@ class Friction(Serializable):
         presliding_stiffness: κ [N/m].
         modulation: a [1].
         stiffness_share: κ/k where κ follows the stiffness of the surface, 0 where it is given.
+        in_space: whether the anchor moves in three directions, on a closed body.
     """
 
     coefficient: float
     presliding_stiffness: float
     modulation: float
     stiffness_share: float
+    in_space: bool = False
 
     @property
-    def arguments(self) -> tuple[float, float, float, float]:
-        """The last parameters of the functions of a probe: μ, a, κ/k and the rest of κ [N/m]."""
+    def axes(self) -> int:
+        """Number of coordinates of the deflection."""
+        return 3 if self.in_space else 2
+
+    @property
+    def arguments(self) -> tuple[float, ...]:
+        """The last parameters of a probe: μ, a, κ/k, the rest of κ [N/m], 1 in space."""
         fixed = 0.0
         if not self.stiffness_share:
             fixed = self.presliding_stiffness
-        return self.coefficient, self.modulation, self.stiffness_share, fixed
+        return self.coefficient, self.modulation, self.stiffness_share, fixed, float(self.in_space)
 
 
 def make_friction(
-    values: Mapping[str, float], stiffness: float, default_share: float
+    values: Mapping[str, float], stiffness: float, default_share: float, *, in_space: bool = False
 ) -> Friction | None:
     """Return the friction of the arguments that were given; ``None`` without friction.
 
@@ -88,14 +96,15 @@ def make_friction(
         values: arguments by name.
         stiffness: k [N/m].
         default_share: κ/k if no presliding stiffness is given.
+        in_space: whether the surface is a closed body.
     """
     coefficient = values.get(FRICTION.name, 0.0)
     if not coefficient:
         return None
     modulation = values.get(FRICTION_MODULATION.name, 0.0)
     if PRESLIDING_STIFFNESS.name in values:
-        return Friction(coefficient, values[PRESLIDING_STIFFNESS.name], modulation, 0.0)
-    return Friction(coefficient, default_share * stiffness, modulation, default_share)
+        return Friction(coefficient, values[PRESLIDING_STIFFNESS.name], modulation, 0.0, in_space)
+    return Friction(coefficient, default_share * stiffness, modulation, default_share, in_space)
 
 
 def friction_jacobian(

@@ -34,7 +34,7 @@ KERNELS = Kernels(
 )
 
 # Numbers of a servo's state.
-SERVO_STATE_SIZE = 12
+SERVO_STATE_SIZE = 13
 # Counter of a lane after those of its device: why it stopped.
 STOP = COUNTERS_SIZE
 LANE_COUNTERS_SIZE = COUNTERS_SIZE + 1
@@ -181,6 +181,7 @@ def load_state(lanes: Lanes, lane: int) -> LoopState:
         states[lane, 9],
         states[lane, 10],
         states[lane, 11],
+        states[lane, 12],
     )
     force = GuardedForce(servo.fx, servo.fy, servo.fz, 1.0, 0.0, 0.0)
     return LoopState(servo, force, LoopTiming(lanes.counters[lane, SAMPLES], 0, 0, 0, 0))
@@ -200,6 +201,7 @@ def store_servo_state(states: FloatArray, lane: int, servo: ServoState) -> None:
     states[lane, 9] = servo.fx
     states[lane, 10] = servo.fy
     states[lane, 11] = servo.fz
+    states[lane, 12] = servo.anchor_z
 
 
 def trace_sample(
@@ -267,6 +269,7 @@ def write_row(
     trace[row, 27] = servo.anchor_x
     trace[row, 28] = servo.anchor_y
     trace[row, 29] = 1.0 if servo.held else 0.0
+    trace[row, 30] = servo.anchor_z
 
 
 def update_statistics(statistics: FloatArray, x: FloatArray, ledger: FloatArray) -> None:

@@ -56,6 +56,7 @@ COLUMNS = (
     ("law anchor x", "m"),
     ("law anchor y", "m"),
     ("law held", "1"),
+    ("law anchor z", "m"),
 )
 """Columns of the rows with their units; positions and forces are in the surface's frame."""
 
@@ -107,6 +108,7 @@ def trace_sample(
     rows[row, 16] = servo.anchor_x
     rows[row, 17] = servo.anchor_y
     rows[row, 18] = 1.0 if servo.held else 0.0
+    rows[row, 19] = servo.anchor_z
 
 
 def trace_timing(trace: SharedBlock, lateness: int, duration: int) -> None:

@@ -44,6 +44,7 @@ COMPARED_COLUMNS = (
     "law anchor x",
     "law anchor y",
     "law held",
+    "law anchor z",
 )
 """The columns that are computed and compared."""
 
@@ -200,11 +201,14 @@ def _replay_blocks(
 ) -> Iterator[tuple[int, FloatArray, FloatArray]]:
     """Yield number of the first row, time and recorded columns, and the same computed again."""
     names = recording.names
-    for name in ("x", "y", "z", *COMPARED_COLUMNS):
+    compared_names = list(COMPARED_COLUMNS)
+    if COMPARED_COLUMNS[-1] not in names:  # recorded before closed bodies had friction
+        compared_names.pop()
+    for name in ("x", "y", "z", *compared_names):
         if name not in names:
             raise ParameterError("recording", f"cannot be replayed: it has no column {name!r}")
     point = [names.index(axis) for axis in "xyz"]
-    compared = [0, *map(names.index, COMPARED_COLUMNS)]
+    compared = [0, *map(names.index, compared_names)]
     parts = servo_loop, no_guards, replayed_device, replay_trace, tick
     loops = fuse_on_texture(
         field.law, field.sampler, field.clamp, parts, has_friction=field.has_friction
@@ -229,7 +233,7 @@ def _replay_blocks(
             field.texture,
             field.law_arguments,
         )
-        yield first, block[:, compared], out
+        yield first, block[:, compared], np.ascontiguousarray(out[:, : len(compared_names)])
         first += len(block)
 
 

@@ -15,7 +15,7 @@ class ReplayTrace(NamedTuple):
     """The trace of a replay.
 
     Attributes:
-        rows: force [N], anchor of the law [m] and whether it is held (n, 6).
+        rows: force [N], anchor of the law [m] and whether it is held (n, 7).
         first_sample: number of the sample of the first row.
     """
 
@@ -42,6 +42,7 @@ def trace_sample(
     trace.rows[row, 3] = servo.anchor_x
     trace.rows[row, 4] = servo.anchor_y
     trace.rows[row, 5] = 1.0 if servo.held else 0.0
+    trace.rows[row, 6] = servo.anchor_z
 
 
 def trace_timing(trace: ReplayTrace, lateness: int, duration: int) -> None:

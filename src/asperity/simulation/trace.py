@@ -48,6 +48,7 @@ COLUMNS = (
     ("law anchor x", "m"),
     ("law anchor y", "m"),
     ("law held", "1"),
+    ("law anchor z", "m"),
 )
 """Columns of the trace with their units."""
 
@@ -100,7 +101,7 @@ _POSITION = slice(_NAMES.index("x"), _NAMES.index("z") + 1)
 _VELOCITY = slice(_NAMES.index("vx"), _NAMES.index("vz") + 1)
 _COMMANDED = slice(_NAMES.index("commanded x"), _NAMES.index("commanded z") + 1)
 _SUPPLIED = slice(_NAMES.index("supplied x"), _NAMES.index("supplied z") + 1)
-_ANCHOR = slice(_NAMES.index("law anchor x"), _NAMES.index("law anchor y") + 1)
+_ANCHOR = [_NAMES.index(f"law anchor {axis}") for axis in "xyz"]
 _LOST = _NAMES.index("lost")
 _FRICTION = _NAMES.index("friction")
 # Smallest share of the loss that the texture supplies in a cycle: not always all, as amplitudes
@@ -196,7 +197,7 @@ class LimitCounts:
         self.deepest = 0.0
         self.slipped = 0.0
         self.deflected = 0.0
-        self._anchor = np.empty((0, 2))
+        self._anchor = np.empty((0, 3))
 
     @property
     def totals(self) -> tuple[int, int, float, float, float]:
@@ -208,8 +209,8 @@ class LimitCounts:
         friction = self._surface.contact_friction
         if friction is not None and len(rows):
             anchors = rows[:, _ANCHOR]
-            deflection = rows[:, _POSITION][:, :2] - anchors
-            steps = np.diff(anchors, axis=0, prepend=self._anchor)[-len(rows) :]
+            deflection = (rows[:, _POSITION] - anchors)[:, : friction.axes]
+            steps = np.diff(anchors, axis=0, prepend=self._anchor)[-len(rows) :, : friction.axes]
             stiffness = friction.presliding_stiffness
             self.slipped += stiffness * float((deflection[-len(steps) :] * steps).sum())
             self.deflected = 0.5 * stiffness * float(np.square(deflection[-1]).sum())

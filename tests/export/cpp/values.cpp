@@ -3,7 +3,7 @@
 
 #include "texture.hpp"
 
-static_assert(sizeof(texture_state) == 25 * sizeof(double)); // as C# and Python believe
+static_assert(sizeof(texture_state) == 26 * sizeof(double)); // as C# and Python believe
 static_assert(Texture::content.size() == 16 && Texture::stiffness == 800.0);
 
 int main()

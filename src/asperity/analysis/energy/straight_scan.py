@@ -153,7 +153,7 @@ def friction_scan(surface: Surface) -> FrictionScan | None:
     path = np.full((len(way), 3), scan_height(surface))
     path[:, :2] = line.start + way[:, None] * line.direction
     law = surface.force(path)
-    beyond = np.tile(line.direction, (len(way), 1))
+    beyond = np.tile(along[: surface.contact_friction.axes], (len(way), 1))
     forces = law - surface.trace(path), law - surface.force(path, beyond)
     rendered, limit = (force[_SCAN_POINTS_PER_LINE:] @ along for force in forces)
     ripple = float(rendered.std())

@@ -88,11 +88,14 @@ class DeviceLoop:
         """Upper bound of the slope of the slip limit over the stiffness [1].
 
         |∇N| <= k √q⁺ and N <= k √q⁺ D; the height at the contact point rises by at most
-        ``slope`` of the texture, or 1 + q where the contact point moves with the depth.
+        ``slope`` of the texture, or 1 + q where the contact point moves with the depth. On a
+        closed body it also depends on the direction, without a bound.
         """
         friction = self.surface.contact_friction
         if friction is None:
             return Fraction(0)
+        if friction.in_space:
+            return math.inf
         texture = self.surface.texture
         rise = texture.bounds[0]
         if not self.surface.law.contact.is_above_probe:
@@ -194,7 +197,7 @@ def presliding(surface: Surface) -> tuple[Fraction, Fraction]:
     friction = surface.contact_friction
     if friction is None:
         return Fraction(0), Fraction(0)
-    _coefficient, _modulation, share, fixed = friction.arguments
+    _coefficient, _modulation, share, fixed, _in_space = friction.arguments
     return Fraction(share), Fraction(fixed)
 
 

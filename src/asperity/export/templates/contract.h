@@ -6,7 +6,7 @@
 
 /* State between calls: the anchor of friction, and the warm start of the search. */
 typedef struct @name@_state {
-    @real@ anchor[2]; /* [m] */
+    @real@ anchor[3]; /* [m] */
     @real@ memory[@memory@];
     int held;
 } @name@_state;

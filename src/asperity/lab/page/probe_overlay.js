@@ -61,13 +61,13 @@ function enclosingInterval(coordinates, limit) {
   return [Math.min(start, Math.ceil(limit) - length), length];
 }
 
-/** Return the probe of a frame, for the views; the anchor of friction at its height, null without friction. */
+/** Return the probe of a frame, for the views; the anchor of friction, null without friction. */
 export function probeStateOf(frame, columns, energy, friction = null) {
   const value = name => frame.newest[columns[name]];
   return {
     probe: [value("x"), value("y"), value("z")], closest: frame.closest, hand: frame.hand,
     force: [value("applied x"), value("applied y"), value("applied z")], isInside: value("inside") > 0, energy,
-    anchor: friction && value("inside") > 0 ? [value("law anchor x"), value("law anchor y"), value("z")] : null,
+    anchor: friction && value("inside") > 0 ? [value("law anchor x"), value("law anchor y"), value("law anchor z") || value("z")] : null,
   };
 }
 

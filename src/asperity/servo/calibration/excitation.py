@@ -146,12 +146,13 @@ def probe_tick(
     z: float,
     ax: float,
     ay: float,
+    az: float,
     held: bool,
     memory: FloatArray,
     texture: object,
     law: Excitation,
-) -> tuple[float, float, float, float, float, bool]:
-    """Return the force [N], the number, the sample, and whether the excitation tripped."""
+) -> tuple[float, float, float, float, float, float, bool]:
+    """Return the force [N], the number, the sample, zero, and whether the excitation tripped."""
     if memory[POINT_COUNT] == 0.0:
         initialize_excitation(x, y, z, memory, law)
     count = memory[SAMPLE_INDEX]
@@ -169,7 +170,7 @@ def probe_tick(
         memory[TRIPPED] = 1.0
     over = memory[TRIPPED] != 0.0
     if over or count >= law.samples:
-        return 0.0, 0.0, 0.0, law.number, count, over
+        return 0.0, 0.0, 0.0, law.number, count, 0.0, over
     force = local_array((3,))
     for i in range(3):
         force[i] = -law.holding_stiffness * offset[i]
@@ -180,7 +181,7 @@ def probe_tick(
     fx = force[0] + brake_force(x, 0, memory, law)
     fy = force[1] + brake_force(y, 1, memory, law)
     fz = force[2] + brake_force(z, 2, memory, law)
-    return fx, fy, fz, law.number, count, over
+    return fx, fy, fz, law.number, count, 0.0, over
 
 
 def probe_in_contact(x: float, y: float, z: float, texture: object) -> bool:
