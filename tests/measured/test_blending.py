@@ -128,3 +128,42 @@ def test_width_needs_periodic_and_periodic_must_be_boolean() -> None:
         prepare(raw, blend=20e-6)
     with pytest.raises(ParameterError, match="periodic must be true or false"):
         prepare(raw, periodic="no")  # wrong type on purpose
+
+
+# --- borders that fit -----------------------------------------------------------------------------
+
+
+def seamless(count: int = 64) -> np.ndarray:
+    """A map that repeats after ``count`` points, with a slope at its seam."""
+    phase = 2.0 * np.pi * np.arange(count) / count
+    return 100e-6 * np.sin(phase)[:, None] + 50e-6 * np.cos(2.0 * phase)
+
+
+@pytest.mark.parametrize("arguments", [{}, {"form": 2}, {"tip_radius": 1e-4}, {"l_cutoff": 6e-3}])
+def test_map_whose_borders_fit_is_believed(arguments: dict[str, Any]) -> None:
+    """Shifted by part of a period before the preparation or after, it is the same."""
+    heights = seamless()
+    shifted = np.roll(heights, (11, 23), axis=(0, 1))
+    both = [
+        prepare(RawSurface(h, (1e-4, 1e-4), "tile", ()), periodic=True, **arguments)
+        for h in (heights, shifted)
+    ]
+    assert both[0].periodic
+    np.testing.assert_allclose(
+        both[1].heights, np.roll(both[0].heights, (11, 23), axis=(0, 1)), atol=1e-12
+    )
+    if "l_cutoff" not in arguments:
+        np.testing.assert_allclose(both[0].heights, heights, atol=1e-6)
+    assert sum("opposite borders fit, so nothing is blended" in step for step in both[0].steps) == 1
+
+
+def test_borders_that_fit_are_noted() -> None:
+    steps = prepare(RawSurface(seamless(), (1e-4, 1e-4), "tile", ())).steps
+    assert "if the surface repeats, declare it periodic" in steps[0]
+    noise = RawSurface(np.random.default_rng(0).normal(size=(32, 32)) * 1e-6, (1e-5,) * 2, "n", ())
+    assert "borders fit" not in " ".join(prepare(noise).steps)
+    assert "borders fit" in " ".join(prepare(noise, periodic=True).steps)
+    for part in (seamless()[:-1], seamless()[:, 3:], np.square(np.linspace(-1e-4, 1e-4, 64))):
+        raw = RawSurface(part, (1e-4,) * part.ndim, "part", ())
+        assert "borders fit" not in " ".join(prepare(raw).steps)
+        assert "blended over" in " ".join(prepare(raw, periodic=True).steps)

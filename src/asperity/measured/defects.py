@@ -256,6 +256,40 @@ DEFAULT_FRACTION = 0.1
 _MIN_SAMPLES = 4  # in the band, and in the rest of the surface
 
 
+_FIT_LINES = 1024
+_FIT = 1.5  # steps and bends across the border over the greatest inside, RMS of a line
+
+
+def borders_fit(heights: FloatArray, *, smooth: bool = False) -> bool:
+    """Return whether a surface repeats without a seam: opposite borders fit in height and slope.
+
+    Across the border, first and second differences are at most 1.5 times those inside, each the RMS
+    over a line.
+
+    Args:
+        heights: [m], shape (ny, nx) or (n,); a missing point at a border does not fit.
+        smooth: whether steps must be smaller than the heights, too, unlike those of white noise.
+
+    Example:
+        >>> wave = np.sin(2 * np.pi * np.arange(32) / 32)
+        >>> borders_fit(wave), borders_fit(wave[:-1]), borders_fit(np.append(wave, 0.0))
+        (True, False, False)
+    """
+    for axis in range(heights.ndim):
+        lines = np.moveaxis(heights, axis, 0).reshape(heights.shape[axis], -1)
+        lines = lines[:, :: -(-lines.shape[1] // _FIT_LINES)]
+        for order in (1, 2):
+            inside = np.sqrt(np.mean(np.diff(lines, order, axis=0) ** 2, axis=1))
+            seam = np.diff(np.concatenate([lines[-order:], lines[:order]]), order, axis=0)
+            across = np.sqrt(np.mean(seam**2, axis=1)).max()
+            limit = _FIT * np.max(inside, initial=0.0, where=np.isfinite(inside))
+            if smooth:
+                limit = min(limit, float(np.nanstd(lines)))
+            if not across <= limit:
+                return False
+    return True
+
+
 def to_blend_samples(shape: Shape, pitch: Pitch, width: float | None) -> tuple[int, ...]:
     """Return the width of the band in samples, (nx,) or (nx, ny).
 

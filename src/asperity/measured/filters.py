@@ -76,12 +76,14 @@ def lowpass_in_place(
             heights[...] = idct(response * dct(heights, 1, axis=axis), 1, axis=axis)
 
 
-def highpass_in_place(heights: FloatArray, pitch: Pitch, cutoff: float) -> None:
+def highpass_in_place(
+    heights: FloatArray, pitch: Pitch, cutoff: float, *, periodic: bool = False
+) -> None:
     """Apply the complementary high-pass of :func:`gaussian_filter` in place.
 
     The transmission at wavelength l is 1 - exp(-pi (ALPHA cutoff / l)^2).
     """
-    heights -= gaussian_filter(heights, pitch, cutoff)
+    heights -= gaussian_filter(heights, pitch, cutoff, periodic=periodic)
 
 
 @dataclass(frozen=True)
@@ -123,7 +125,12 @@ def find_cutoffs(
 
 
 def apply_filters(
-    heights: FloatArray, pitch: Pitch, cutoffs: Cutoffs, record: Callable[..., None]
+    heights: FloatArray,
+    pitch: Pitch,
+    cutoffs: Cutoffs,
+    record: Callable[..., None],
+    *,
+    periodic: bool = False,
 ) -> list[str]:
     """Apply the S-filter, then the L-filter, in place.
 
@@ -132,6 +139,7 @@ def apply_filters(
         pitch: (px, py) or (px,) [m].
         cutoffs: result of :func:`find_cutoffs`.
         record: called after each filter, see :class:`asperity.measured.prepared.StageRecorder`.
+        periodic: whether the surface repeats after n times the pitch instead of being mirrored.
 
     Returns:
         One sentence for each filter.
@@ -139,10 +147,10 @@ def apply_filters(
     part = "21" if heights.ndim == 1 else "61"
     short = format_length(cutoffs.short)
     steps = [f"filtered: Gaussian ISO 16610-{part}, cut-off {short}{cutoffs.note}"]
-    lowpass_in_place(heights, pitch, cutoffs.short)
+    lowpass_in_place(heights, pitch, cutoffs.short, periodic=periodic)
     record(f"S-filter {short}", heights, pitch, removes=True)
     if cutoffs.long is not None:
-        highpass_in_place(heights, pitch, cutoffs.long)
+        highpass_in_place(heights, pitch, cutoffs.long, periodic=periodic)
         long = format_length(cutoffs.long)
         record(f"L-filter {long}", heights, pitch, removes=True, nesting=cutoffs.long)
         steps.append(f"waviness removed: Gaussian L-filter ISO 16610-{part}, cut-off {long}")

@@ -15,6 +15,7 @@ from asperity.core.checks import FloatArray, check_positive
 from asperity.core.errors import ParameterError
 from asperity.core.memory import require_memory
 from asperity.measured.defects import (
+    borders_fit,
     fill_in_place,
     make_periodic,
     remove_outliers,
@@ -143,6 +144,10 @@ _MIN_POINTS = 4
 MAX_MISSING = 0.25
 """Default for the greatest share of missing points."""
 
+_BORDERS_FIT = (
+    "opposite borders fit: if the surface repeats, declare it periodic, and it stays as it is",
+    "periodic: opposite borders fit, so nothing is blended and no form but the mean subtracted",
+)
 _FORM_STAGE_NAMES = {0: "mean removed", 1: "levelled"}
 
 
@@ -170,8 +175,9 @@ def prepare(  # noqa: D417 - the others are described by their declarations
     In this order: remove outliers, subtract the form (which levels), fill missing points, filter
     (S, then L), dilate by a tip, make periodic, magnify. The form is fitted to the valid points,
     and the residual is interpolated harmonically over holes. All lengths are in the surface's own
-    metres, before magnification. The tip is applied after the filter: where it bridges a groove,
-    the heights have creases as sharp as the sampling.
+    metres, before magnification. A periodic surface whose borders fit is believed: its mean is the
+    only form subtracted, filters and tip repeat it, and nothing is blended. The tip is applied
+    after the filter: where it bridges a groove, the heights have creases as sharp as the sampling.
 
     Args:
         raw: the surface as read.
@@ -221,6 +227,9 @@ def prepare(  # noqa: D417 - the others are described by their declarations
     elif height_range is not None:
         record("as read", heights, lateral)
     start("form")
+    repeats = blend is None and _repeats(heights, bool(periodic), steps)
+    if repeats:  # a polynomial would break it
+        form = 0
     sentence = subtract_form(heights, fit_form(heights, form), lateral)
     record(_FORM_STAGE_NAMES.get(form, "form removed"), heights, lateral, removes=True)
     start("fill")
@@ -230,12 +239,14 @@ def prepare(  # noqa: D417 - the others are described by their declarations
         record("holes filled", heights, lateral)
     steps.append(sentence)
     start("filter")
-    steps.extend(apply_filters(heights, lateral, cutoffs, record))
+    steps.extend(apply_filters(heights, lateral, cutoffs, record, periodic=repeats))
     start("tip")
     if tip_radius is not None:
-        heights = _dilate(heights, lateral, tip_radius, steps, record)
+        heights, sentence = apply_tip(heights, lateral, tip_radius, periodic=repeats)
+        record(f"tip {format_length(tip_radius)}", heights, lateral, removes=True)
+        steps.append(sentence)
     start("repeat")
-    if periodic:
+    if periodic and not repeats:
         heights, filled, sentence = make_periodic(heights, filled, lateral, blend)
         record("periodic", heights, lateral)
         steps.append(sentence)
@@ -246,18 +257,12 @@ def prepare(  # noqa: D417 - the others are described by their declarations
     return magnify_surface(ready, magnify, magnify_height)
 
 
-def _dilate(
-    heights: FloatArray,
-    pitch: tuple[float, ...],
-    radius: float,
-    steps: list[str],
-    record: StageRecorder,
-) -> FloatArray:
-    """Return the heights that a tip of a radius traces, and note it."""
-    heights, sentence = apply_tip(heights, pitch, radius)
-    record(f"tip {format_length(radius)}", heights, pitch, removes=True)
-    steps.append(sentence)
-    return heights
+def _repeats(heights: FloatArray, periodic: bool, steps: list[str]) -> bool:
+    """Return whether heights are declared periodic and their borders fit, and note the latter."""
+    fits = borders_fit(heights, smooth=not periodic)
+    if fits:
+        steps.append(_BORDERS_FIT[periodic])
+    return fits and periodic
 
 
 def magnify_surface(
