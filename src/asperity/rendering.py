@@ -16,6 +16,7 @@ from asperity.core.cache import get_or_compute
 from asperity.core.checks import check_positive
 from asperity.core.errors import ParameterError
 from asperity.core.files import Serializable, content_digest
+from asperity.core.processes import report_fraction
 from asperity.core.units import format_quantity
 from asperity.laws import Law
 from asperity.surface import Surface
@@ -168,7 +169,7 @@ def rendered_surface(
     surface: Surface,
     rendering: str = FIELD,
     extent: Extent | None = None,
-    progress: Progress | None = None,
+    progress: Progress = report_fraction,
 ) -> Surface:
     """Return the surface as a loop renders it: law H baked where it would be searched.
 

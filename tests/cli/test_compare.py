@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 import os
+import re
 import shlex
 import subprocess
 import sys
+import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import click
 import numpy as np
@@ -19,6 +24,7 @@ from click.testing import CliRunner
 from tests.report.report_pages import check_alone, check_alts
 
 import asperity as asp
+from asperity.analysis.results import comparison_rows
 from asperity.cli.main import COMMANDS, cli
 
 Call = Callable[..., tuple[int, str, str]]
@@ -394,6 +400,30 @@ def test_reasons_are_shown_on_request_with_options(call: Call) -> None:
     assumed = [text.split("\nAssumed:\n")[1].split("\n\n")[0] for text in (brief, full)]
     assert assumed[0].split() == ["-", "Default", "scanning", "speed", "0.1", "m/s"]
     assert "were not tested with people" in " ".join(assumed[1].split())
+
+
+def test_rows_appear_on_a_terminal_when_they_are_ready(
+    call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Above the progress bar; what is printed at the end is that without a terminal."""
+    command = ("compare", "sinusoid:amplitude=0.2mm,period=2mm", "--laws", "WC")
+    expected = call(*command, width=100)
+    stream = io.StringIO()
+    monkeypatch.setattr(stream, "isatty", lambda: True)
+    monkeypatch.setattr(sys, "stderr", stream)
+    slow = partial(wait, comparison_rows._compute_row)
+    monkeypatch.setattr(comparison_rows, "_compute_row", slow)
+    assert call(*command, width=100) == expected
+    frames = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", stream.getvalue())
+    first = re.split(r"law C \(2 of 2\)", frames)[0]
+    assert re.search(r"^W .*N/m", first, re.M)  # in the frame of the step after it
+    assert not re.search(r"^C .*N/m", first, re.M)
+
+
+def wait(compute: Callable[..., Any], *arguments: Any) -> Any:
+    """Compute a row after some refreshes of the terminal."""
+    time.sleep(0.4)
+    return compute(*arguments)
 
 
 def test_next_commands_run_the_recommended_law(call: Call, tmp_path: Path) -> None:

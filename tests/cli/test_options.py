@@ -26,6 +26,7 @@ from asperity.cli.main import COMMANDS, GROUPS, cli
 from asperity.cli.options import LAW_OPTIONS, SPEED, option_help
 from asperity.cli.output import progress_bar, step_bar
 from asperity.core.arguments import MAX_DEPTH, Argument
+from asperity.core.processes import PROGRESS_CALLBACKS, report_fraction
 from asperity.core.units import format_quantity
 from asperity.lab.scene_state import START_LAW, START_STIFFNESS
 from asperity.laws import LAWS
@@ -157,11 +158,34 @@ def test_progress_is_shown_only_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -
         assert ("1 s" in stream.getvalue()) == is_terminal  # where nothing else changes
 
 
+def test_progress_has_no_percentage_before_a_part_is_done(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A bar that stands at 0 % tells nothing; a field that is baked has a bar of its own."""
+    stream = _Terminal()
+    monkeypatch.setattr(sys, "stderr", stream)
+    monkeypatch.setenv("COLUMNS", "120")
+    with step_bar("reading", 2) as step:
+        step("law H")
+        time.sleep(0.3)
+        first = stream.getvalue()
+        for fraction in (0.25, 0.75):
+            report_fraction(fraction)
+            time.sleep(0.3)
+        baking = stream.getvalue()[len(first) :]
+        step("law W")
+        time.sleep(0.3)
+    assert "law H (1 of 2)" in first
+    assert "%" not in first
+    assert "law H (1 of 2): baking" in baking
+    assert "75%" in baking
+    assert re.search(r"law W \(2 of 2\) .*50%", stream.getvalue())
+    assert PROGRESS_CALLBACKS == []
+
+
 @pytest.mark.parametrize("is_cached", [False, True])
 def test_progress_reports_compilation_only_when_code_is_not_cached(
     is_cached: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The bar counts the loops as they are compiled; loops in the cache are not compiled."""
+    """Loops in the cache are not compiled."""
     from asperity.core.compiled import COMPILE_CALLBACKS
     from asperity.kernels.fuse import _HEADER, _load_module, load_fused
 
@@ -181,7 +205,7 @@ def test_progress_reports_compilation_only_when_code_is_not_cached(
         assert len(COMPILE_CALLBACKS) == 1
         output = stream.getvalue()
         report(0.5)
-    assert ("comparing: compiling loop 2, on a first run only" in output) != is_cached
+    assert ("comparing: compiling, on a first run only" in output) != is_cached
     assert COMPILE_CALLBACKS == []
 
 

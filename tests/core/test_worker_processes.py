@@ -50,9 +50,9 @@ def started_workers(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     counts: list[int] = []
     make = processes.make_pool
 
-    def record(workers: int) -> Any:
+    def record(workers: int, *arguments: Any) -> Any:
         counts.append(workers)
-        return make(workers)
+        return make(workers, *arguments)
 
     monkeypatch.setattr(processes, "make_pool", record)
     return counts
@@ -119,6 +119,29 @@ def test_compilation_starts_the_workers(
         assert started_workers == [1]
     assert COMPILE_CALLBACKS == []
     assert workers() == []
+
+
+def report_a_quarter(seconds: float) -> float:
+    """Report a quarter of a task, which then takes a time [s]."""
+    processes.report_fraction(0.25)
+    time.sleep(seconds)
+    return seconds
+
+
+def test_progress_of_the_worker_that_is_waited_for_is_reported(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Not that of another task."""
+    monkeypatch.setattr(processes, "REPORT_PERIOD", 0.1)
+    reported: list[float] = []
+    monkeypatch.setattr(processes, "PROGRESS_CALLBACKS", [reported.append])
+    for work in (report_a_quarter, time.sleep):
+        with processes.limit_processes(2), processes.precompute(work, [0.5] * 2) as results:
+            next(results)
+            time.sleep(0.2)
+            next(results)
+        assert (set(reported) == {0.25}) == (work is report_a_quarter)
+        reported.clear()
 
 
 def test_task_that_fails_in_a_worker_is_left_to_the_caller() -> None:
@@ -301,7 +324,7 @@ def test_without_room_for_workers_this_process_does_all(
 
     pool = ProcessPoolExecutor(1)
     monkeypatch.setattr(pool, "submit", refuse)
-    monkeypatch.setattr(processes, "make_pool", refuse if where == "pool" else lambda _count: pool)
+    monkeypatch.setattr(processes, "make_pool", refuse if where == "pool" else lambda *_: pool)
     failures: list[Any] = []
     monkeypatch.setattr("threading.excepthook", failures.append)
     with processes.limit_processes(2), processes.precompute(math.sqrt, [1.0, 4.0]) as results:

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import os
+import shutil
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -20,6 +23,7 @@ from asperity.core.errors import ParameterError
 from asperity.laws import LAWS, REGISTERED_LAWS
 
 if TYPE_CHECKING:
+    from asperity.analysis.results.compare import Comparison
     from asperity.analysis.results.device_comparisons import DeviceComparisons, MissingData
     from asperity.devices import Device
     from asperity.laws import Law
@@ -132,7 +136,8 @@ def compare_command(
     chosen = laws or tuple(REGISTERED_LAWS.values())
     first, *others = device or (None,)
     cases = (1 + len(others)) * len(values["max_depth"] or [None])
-    with step_bar("reading the surface", len(chosen) * cases) as step:
+    above: list[Any] = []
+    with step_bar("reading the surface", len(chosen) * cases, above) as step:
         texture, known, arguments = options.load_surface(surface, first, values, chosen)
         arguments.pop("law", None)  # the law of a scene is for running it
         depths = arguments.pop("max_depth", None)  # a single value in a scene
@@ -142,10 +147,18 @@ def compare_command(
             [depths] if isinstance(depths, float) else depths,
             chosen,
             progress=lambda on, _depth, law: step(f"{on.id}, law {law}"),
+            on_row=partial(_show_rows, above) if sys.stderr.isatty() else None,
             **options.provided_values(values, _COMPARISON),
             **arguments,
         )
     _write_comparisons(result, outputs, full, why, surface)
+
+
+def _show_rows(above: list[Any], comparison: Comparison) -> None:
+    """Show the laws that are ready above the progress bar."""
+    from asperity.report.pages.comparison_columns import comparison_table
+
+    above[:] = [comparison_table(comparison, shutil.get_terminal_size().columns)]
 
 
 def _write_comparisons(

@@ -7,7 +7,7 @@ import os
 import shlex
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import count
@@ -24,15 +24,73 @@ if TYPE_CHECKING:
     from asperity.report.document.page import Page
 
 
-@contextmanager
-def progress_bar(description: str) -> Iterator[Callable[..., None]]:
-    """Show a progress bar with the time left, if standard error is a terminal.
+class _Steps:
+    """A bar, and the step that it shows.
 
-    The seconds of the present step change while nothing else does; the description counts the
-    functions that are compiled, which slows a first run.
+    Attributes:
+        name: of the step.
+        start: when it began [s].
+        is_part: whether the bar is that of a long part of the step, with a time of its own.
+        bar: the bar, with one task.
+        task: its id.
+    """
+
+    def __init__(self, name: str) -> None:
+        from rich import progress
+
+        self.name = name
+        self.start = time.monotonic()
+        self.is_part = False
+        columns = (
+            progress.TextColumn("{task.description:<24}"),
+            progress.TextColumn("{task.fields[steps].seconds:.0f} s", "dim"),
+            progress.BarColumn(),
+            progress.TaskProgressColumn(),
+            progress.TimeElapsedColumn(),
+            progress.TextColumn("left:"),
+            progress.TimeRemainingColumn(),
+        )
+        # Rich forgets steps after the period [s], and needs two for the time left; some take
+        # minutes.
+        self.bar = progress.Progress(*columns, speed_estimate_period=1e5)
+        self.task = self.bar.add_task(name, total=None, steps=self)  # pulses until some is done
+
+    @property
+    def seconds(self) -> float:
+        """Time since the step began [s]; it changes while nothing else does."""
+        return time.monotonic() - self.start
+
+    def update(self, fraction: float, name: str | None = None) -> None:
+        """Show the completed fraction, and the name of the next step."""
+        if name not in (None, self.name):
+            self.start = time.monotonic()
+        self.name = name or self.name
+        if self.is_part:
+            self.bar.reset(self.task)
+        self.is_part = False
+        total = 1.0 if fraction > 0.0 else None
+        self.bar.update(self.task, total=total, completed=fraction, description=self.name)
+
+    def report_compilation(self, _loop: str) -> None:
+        """Show that functions are compiled."""
+        text = f"{self.name}: compiling, on a first run only"
+        self.bar.update(self.task, description=text, refresh=True)
+
+    def report_part(self, fraction: float) -> None:
+        """Show the completed fraction of a field that is baked."""
+        if not self.is_part:
+            self.bar.reset(self.task, total=1.0)
+        self.is_part = True
+        self.bar.update(self.task, completed=fraction, description=f"{self.name}: baking")
+
+
+@contextmanager
+def progress_bar(description: str, above: Sequence[Any] = ()) -> Iterator[Callable[..., None]]:
+    """Show a progress bar with the time left, if standard error is a terminal.
 
     Args:
         description: description of the task.
+        above: what is shown above the bar; the caller may change it meanwhile.
 
     Yields:
         A function of the completed fraction in [0, 1] and, optionally, a new description.
@@ -40,59 +98,36 @@ def progress_bar(description: str) -> Iterator[Callable[..., None]]:
     if not sys.stderr.isatty():
         yield lambda _fraction, _description=None: None
         return
-    from rich import progress
-    from rich.console import Console
-    from rich.text import Text
+    from rich.console import Console, Group
+    from rich.live import Live
 
     from asperity.core.compiled import COMPILE_CALLBACKS
+    from asperity.core.processes import PROGRESS_CALLBACKS
 
-    start_of_step = [time.monotonic()]
-
-    class StepTimeColumn(progress.ProgressColumn):
-        """Seconds since the description changed."""
-
-        def render(self, task: progress.Task) -> Text:
-            del task  # the time is that of the step
-            return Text(f"{time.monotonic() - start_of_step[0]:.0f} s", "dim")
-
-    columns = (
-        progress.TextColumn("{task.description:<24}"),
-        StepTimeColumn(),
-        progress.BarColumn(),
-        progress.TaskProgressColumn(),
-        progress.TimeElapsedColumn(),
-        progress.TextColumn("left:"),
-        progress.TimeRemainingColumn(),
-    )
+    steps = _Steps(description)
     err = Console(stderr=True)
-    # Rich forgets steps after the period [s], and needs two for the time left; some take minutes.
-    with progress.Progress(*columns, console=err, transient=True, speed_estimate_period=1e5) as bar:
-        task = bar.add_task(description, total=1.0)
-        loops = count(1)
-        current = [description]
-
-        def report_compilation(_loop: str) -> None:
-            start_of_step[0] = time.monotonic()
-            text = f"{current[0]}: compiling loop {next(loops)}, on a first run only"
-            bar.update(task, description=text, refresh=True)
-
-        def update(fraction: float, text: str | None = None) -> None:
-            if text not in (None, current[0]):
-                start_of_step[0] = time.monotonic()
-            current[0] = text or current[0]
-            bar.update(task, completed=fraction, description=current[0])
-
-        COMPILE_CALLBACKS.append(report_compilation)
-        try:
-            yield update
-        finally:
-            COMPILE_CALLBACKS.remove(report_compilation)
+    COMPILE_CALLBACKS.append(steps.report_compilation)
+    PROGRESS_CALLBACKS.append(steps.report_part)
+    try:
+        with Live(
+            get_renderable=lambda: Group(*above, steps.bar),
+            console=err,
+            transient=True,
+            refresh_per_second=10,
+        ) as steps.bar.live:
+            steps.bar.refresh()
+            yield steps.update
+    finally:
+        COMPILE_CALLBACKS.remove(steps.report_compilation)
+        PROGRESS_CALLBACKS.remove(steps.report_part)
 
 
 @contextmanager
-def step_bar(description: str, steps: int) -> Iterator[Callable[[str], None]]:
+def step_bar(
+    description: str, steps: int, above: Sequence[Any] = ()
+) -> Iterator[Callable[[str], None]]:
     """Show the progress over a number of steps; yield a function to call before each step."""
-    with progress_bar(description) as update:
+    with progress_bar(description, above) as update:
         done = count()
 
         def begin(name: str) -> None:

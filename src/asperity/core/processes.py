@@ -19,6 +19,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -30,6 +31,11 @@ START_DELAY = 1.0
 SINGLE_THREADED = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 """Environment of every process: the last digit of linear algebra depends on its threads."""
 
+REPORT_PERIOD = 0.5
+"""Time [s] between two looks at the progress of a worker."""
+PROGRESS_CALLBACKS: list[Callable[[float], None]] = []
+"""Functions called with the finished fraction of a long part of a task, from 0 to 1."""
+
 _MAX_PROCESSES: ContextVar[int] = ContextVar("max_processes", default=1)
 
 
@@ -38,6 +44,12 @@ def available_cores() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
+
+
+def report_fraction(fraction: float) -> None:
+    """Report the finished fraction of a long part of a task, of this process or of a worker."""
+    for callback in PROGRESS_CALLBACKS:
+        callback(fraction)
 
 
 @contextmanager
@@ -161,6 +173,20 @@ def precompute(work: Callable[[Any], Any], tasks: Sequence[Any]) -> Iterator[Ite
         queue.stop()
 
 
+_FRACTIONS: list[Any] = []
+"""In a worker: where the calling process reads the progress of each task."""
+
+
+def _share_fractions(fractions: Any) -> None:
+    _FRACTIONS.append(fractions)
+
+
+def _run_task(work: Callable[[Any], Any], index: int, task: Any) -> Any:
+    """Do a task in a worker, and write its progress."""
+    PROGRESS_CALLBACKS[:] = [partial(_FRACTIONS[0].__setitem__, index)]
+    return work(task)
+
+
 class _TaskQueue:
     """Tasks that are left, and the results of the others."""
 
@@ -174,6 +200,7 @@ class _TaskQueue:
         self.started = threading.Lock()
         self.timer = threading.Timer(START_DELAY, self.start)
         self.pool: ProcessPoolExecutor | None = None
+        self.fractions: Any = None
         self.other_children: set[BaseProcess] = set()
 
     def iterate_results(self) -> Iterator[Any]:
@@ -185,26 +212,38 @@ class _TaskQueue:
                     self.pending.popleft()
             value = None
             if future is not None:
+                self._wait(index, future)
                 with suppress(Exception):  # the caller meets the error when it does the task
                     value = future.result()
             yield value
+
+    def _wait(self, index: int, future: Future[Any]) -> None:
+        """Wait until a worker has ended a task, and report its progress."""
+        from concurrent.futures import wait
+
+        while wait([future], REPORT_PERIOD).not_done:
+            if self.fractions[index]:
+                report_fraction(self.fractions[index])
 
     def start(self, _name: str = "") -> None:
         """Start the workers, unless they were started or stopped."""
         if not self.started.acquire(blocking=False):
             return
         from multiprocessing import active_children
+        from multiprocessing.sharedctypes import RawArray
 
         self.other_children = set(active_children())
         with suppress(OSError):  # no room for semaphores, or no processes: this one does all
-            self.pool = make_pool(self.workers)
+            self.fractions = RawArray("d", len(self.tasks))
+            self.pool = make_pool(self.workers, partial(_share_fractions, self.fractions))
         for _ in range(self.workers):
             self._submit_last(self.pool)
 
     def _submit_last(self, pool: ProcessPoolExecutor | None) -> None:
         with self.lock, suppress(RuntimeError, OSError):  # the pool is broken, or cannot grow
             if self.pending and pool is not None:
-                future = pool.submit(self.work, self.tasks[self.pending[-1]])
+                index = self.pending[-1]
+                future = pool.submit(_run_task, self.work, index, self.tasks[index])
                 self.results[self.pending.pop()] = future
                 future.add_done_callback(lambda done: self._continue(pool, done))
 

@@ -152,6 +152,7 @@ def compare(
     *,
     speed: float | None = None,
     progress: Progress | None = None,
+    on_row: Callable[[Comparison], None] | None = None,
     law_parameters: Mapping[str, float] | None = None,
     rendering: str = FIELD,
     grip: str | os.PathLike[str] | Grip = DEFAULT_GRIP,
@@ -180,6 +181,7 @@ def compare(
             height, at most 1 mm.
         speed: speed of the scan for which perceptibility is assessed [m/s]; 0.1 by default.
         progress: called with the letter of each law before it is analysed.
+        on_row: called after each law with the comparison of the laws that are ready.
         law_parameters: parameters of laws by name; each goes to the laws that declare it.
         rendering: how law H is rendered: ``"field"`` or ``"search"``; see
             :func:`~asperity.rendering.rendered_surface`.
@@ -212,20 +214,35 @@ def compare(
         Surface(texture, law, law_parameters=own, **surface_arguments)
         for law, own in zip(compared, parameters, strict=True)
     ]
-    rows = []
+    arguments = {"max_depth": max_depth, "speed": speed}
+    defaults = tuple([name for name, value in arguments.items() if value is None])
+    rows: list[LawRow] = []
     with precompute(precompute_row, _precompute_tasks(surfaces, query)) as precomputed:
-        for surface, _ in zip(surfaces, precomputed, strict=True):
+        for surface in surfaces:
             if progress is not None:
                 progress(surface.law.letter)
+            next(precomputed)
             rows.append(render_row(surface, query))
+            if on_row is not None:
+                on_row(_make_comparison(texture, surfaces[0].max_depth, query, rows, defaults))
+    return _make_comparison(texture, surfaces[0].max_depth, query, rows, defaults)
+
+
+def _make_comparison(
+    texture: Texture,
+    max_depth: float,
+    query: ComparisonQuery,
+    rows: Sequence[LawRow],
+    defaults: tuple[str, ...],
+) -> Comparison:
+    """Return the comparison of rows, with the recommended one."""
     recommended = recommend(rows)
     nearest = nearest_to_felt(rows) if recommended is None else None
-    arguments = {"max_depth": max_depth, "speed": speed}
     return Comparison(
         texture=texture,
         device=query.device,
         stiffness=query.stiffness,
-        max_depth=surfaces[0].max_depth,
+        max_depth=max_depth,
         press=query.press,
         speed=query.speed,
         grip=query.grip,
@@ -233,7 +250,7 @@ def compare(
         rows=tuple(rows),
         recommended_row=recommended,
         nearest_row=nearest,
-        defaults=tuple([name for name, value in arguments.items() if value is None]),
+        defaults=defaults,
     )
 
 
