@@ -25,6 +25,8 @@ from asperity.report.sentences.limit_sentences import (
     remedies_text,
     texture_amount_text,
 )
+from asperity.simulation import Cartesian, PrescribedHand, Servo, Strokes, simulate
+from asperity.simulation.trace import COLUMNS
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Sinusoid
 from asperity.textures.catalogue import as_texture
@@ -430,3 +432,41 @@ def test_scan_without_speed_is_refused(options: dict[str, float], message: str) 
 def test_mass_and_damping_of_a_device_are_positive(field: str, value: float) -> None:
     with pytest.raises(ParameterError, match=f"{field} must be positive"):
         device(**{field: value})
+
+
+@pytest.mark.parametrize("ratio", [2.0, 0.5, 0.25])
+def test_friction_that_varies_is_felt_as_a_simulated_scan_renders_it(ratio: float) -> None:
+    """On law W nothing else is; the presliding stiffness leaves 0.79 and 0.48 of the limit."""
+    wave, depth, speed = Sinusoid(1e-4, 1e-3), 2e-4, 0.1
+    slope = 0.4 * 1000.0 * depth * 0.5 * 2.0 * math.pi / 1e-3
+    friction = {"friction": 0.4, "friction_modulation": 1.0, "presliding_stiffness": ratio * slope}
+    surface = Surface(wave, "W", 1000.0, depth, **friction)  # type: ignore[arg-type]  # by name
+    part = TexturePart(wave)
+    found = assess_perceptibility(surface, device(), part, rms=0.0, speed=speed)
+    stroke = Strokes((0.0, 0.0, -depth), (10e-3, 0.0, -depth), speed=speed, count=1)
+    servo = Servo(2.5e-5)
+    run = simulate(surface, Cartesian(0.1), PrescribedHand(), servo, stroke, stroke.duration)
+    names = [name for name, _unit in COLUMNS]
+    force = run.table[-2000:, names.index("commanded x")]  # the last five periods
+    assert found.texture_rms == found.rms
+    assert found.texture_rms == pytest.approx(force.std(), rel=0.01)
+    compliance = PEN.compliance(np.array([100.0]), 0.1)[0]
+    assert found.hand_motion == pytest.approx(compliance * math.sqrt(2.0) * force.std(), rel=0.01)
+    assert found.tier == "felt"
+    plain = surface.without_friction()
+    assert assess_perceptibility(plain, device(), part, rms=0.0, speed=speed).tier == "not felt"
+
+
+def test_constant_friction_adds_nothing_and_friction_adds_in_squares() -> None:
+    wave = Sinusoid(1e-4, 1e-3)
+    still = Surface(wave, "W", 1000.0, 2e-4, friction=0.4)
+    assert assess_perceptibility(still, device(), TexturePart(wave), rms=0.0).texture_rms < 1e-9
+    for law in ("C", "H"):
+        surface = Surface(wave, law, 1000.0, 2e-4, friction=0.8, friction_modulation=1.0)
+        rms = merit(surface).ripple * 1000.0
+        found = assess_perceptibility(surface, device(), TexturePart(wave), rms=rms)
+        x = np.linspace(0.0, 10e-3, 40_001)
+        height = wave.extremes[1] - 2e-4
+        path = np.column_stack([x, 0.0 * x, np.full_like(x, height)])
+        rendered = surface.trace(path)[20_000:-1]
+        assert found.texture_rms == pytest.approx(math.sqrt(rendered.var(axis=0).sum()), rel=0.02)

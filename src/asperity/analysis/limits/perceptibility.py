@@ -1,9 +1,10 @@
 """Perceptibility of a texture: the motion of the held tool against what a hand notices.
 
 The texture force is the oscillating force of a straight scan, without form and waviness, in the
-waves that the device resolves at that speed. Each wave moves the apparent mass of the device and
-the hand that holds it (docs/theory/limits.md); the amplitude of this motion is compared with the
-detection thresholds of the grip at the frequency of the wave.
+waves that the device resolves at that speed; friction that varies along the scan is part of it.
+Each wave moves the apparent mass of the device and the hand that holds it (docs/theory/limits.md);
+the amplitude of this motion is compared with the detection thresholds of the grip at the frequency
+of the wave.
 """
 
 from __future__ import annotations
@@ -71,7 +72,7 @@ def assess_perceptibility(
         device: device with apparent mass, damping, force and position resolution, update rate and
             bandwidth; unknown data mask nothing, an unknown mass is assumed.
         part: the part of the surface that is texture, not form.
-        rms: RMS of the oscillating force of the surface [N].
+        rms: RMS of the oscillating force of the surface without its friction [N].
         explicit_depth: whether max_depth was given; by default the texture without form is
             pressed as deep as it is high.
         grip: the hand; by default a tool held like a pen.
@@ -95,7 +96,9 @@ def assess_perceptibility(
     waves, doubtful, texture_rms, _scanned = scan_waves(
         surface, device, part, hand, rms=rms, explicit_depth=explicit_depth, points=None, **scan
     )
-    result = classify_perceptibility(waves, doubtful, rms, texture_rms, part.nesting)
+    result = classify_perceptibility(
+        waves, doubtful, max(rms, texture_rms), texture_rms, part.nesting
+    )
     if not find_remedies or result.tier == "felt" or texture_rms == 0.0:
         return result
     options = {"explicit_depth": explicit_depth, "grip": grip, **scan}
@@ -344,7 +347,7 @@ class Perceptibility(Serializable):
         tier: ``"felt"``, ``"borderline"``, ``"not felt"``, or ``"unknown"``: waves at frequencies
             without known thresholds decide.
         rms: RMS of the oscillating force of the whole surface on a scan [N].
-        texture_rms: RMS of the same without form and waviness [N].
+        texture_rms: RMS of the same without form and waviness [N], with friction that varies.
         nesting_index: wavelength above which waves count as waviness [m]; ``None`` where nothing
             was removed.
         resolved: share of the texture force's variance in waves that the device resolves at this

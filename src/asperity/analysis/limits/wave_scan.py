@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from asperity.analysis.energy.straight_scan import scan_force, scan_height
+from asperity.analysis.energy.straight_scan import friction_scan, scan_force, scan_height
 from asperity.analysis.gain.surface_cache import cached_result, stiffness_factor
 from asperity.analysis.limits.limit_rules import LimitCase
 from asperity.analysis.limits.spectrum import (
@@ -22,6 +23,7 @@ from asperity.perception.grip import Grip
 from asperity.surface import Surface, default_max_depth
 from asperity.textures.texture import Texture, TexturePart
 
+ForceFunction = Callable[[Surface, FloatArray], FloatArray]
 MASKING_FIELDS = "force_resolution", "friction", "bandwidth", "update_rate", "position_resolution"
 """Device data that may hide a texture."""
 
@@ -79,6 +81,9 @@ def scan_waves(
 ) -> tuple[WaveScan, dict[str, float], float, Surface]:
     """Return the waves of a surface on a scan with the trusted numbers of a device.
 
+    Friction adds to each wave the variation of its slip limit, less what the presliding stiffness
+    does not follow, in squares.
+
     Args:
         surface: texture, law and stiffness.
         device: see :func:`assess_perceptibility`.
@@ -105,14 +110,22 @@ def scan_waves(
     # The waves share the RMS of the scan; their sum differs by what is not periodic in the scan.
     total = math.sqrt(float(forces @ forces))
     scale = math.sqrt(2.0) * texture_rms / total if total > 0.0 else 0.0
+    components = scale * components
+    forces = scale * forces
+    friction = friction_scan(scanned)
+    if friction is not None:
+        slip = wave_force_components(scanned, spectrum, points, slip_forces) * friction.remaining
+        components = np.hypot(components, slip)
+        forces = np.hypot(*components.T)
+        texture_rms = math.hypot(texture_rms, float(np.linalg.norm(slip)) / math.sqrt(2.0))
     data = {name: datum.value for name, datum in device.data.items()}
     doubtful = {
         name: data.pop(name)
         for name in MASKING_FIELDS
         if name in device.data and not device.data[name].is_trusted
     }
-    case = LimitCase(data, spectrum.wavelengths, scale * forces, spectrum.shares, **scan)
-    waves = WaveScan(case, scale * components, grip, surface.stiffness, device.workspace_size)
+    case = LimitCase(data, spectrum.wavelengths, forces, spectrum.shares, **scan)
+    waves = WaveScan(case, components, grip, surface.stiffness, device.workspace_size)
     return waves, doubtful, texture_rms, scanned
 
 
@@ -158,31 +171,6 @@ def wave_forces(surface: Surface, spectrum: Spectrum) -> FloatArray:
     return np.asarray(np.hypot(*wave_force_components(surface, spectrum).T))
 
 
-def wave_force_components(
-    surface: Surface, spectrum: Spectrum, points: int | None = None
-) -> FloatArray:
-    """Return the force amplitude of every wave of a texture, along the wall and along its normal.
-
-    The probe moves at constant height, as deep as
-    :func:`~asperity.analysis.energy.straight_scan.merit` scans; a law with state slides at full
-    deflection. For a sum of waves the force is fitted by the same waves (least squares). For bands
-    it is the amplitude of the band times the square root of the ratio of force variance to height
-    variance on the same patch.
-
-    Returns:
-        Amplitudes [N], shape (n, 2): of the components along x and y, their squares added; and of
-        the component along z.
-    """
-    if not spectrum.waves:
-        return np.zeros((0, 2))
-    if points is not None and spectrum.exact:
-        return _fit_waves(surface, spectrum, points)
-    compute = _fit_waves if spectrum.exact else _band_force_amplitudes
-    key = repr((spectrum.exact, spectrum.waves))
-    forces = cached_result("wave forces", surface, lambda unit: compute(unit, spectrum), key)
-    return np.asarray(forces) * stiffness_factor(surface)
-
-
 def scan_forces(surface: Surface, xy: FloatArray) -> FloatArray:
     """Return the forces [N], shape (n, 3), at points (n, 2) [m] of the scan's height."""
     probes = np.column_stack([xy, np.full(len(xy), scan_height(surface))])
@@ -194,14 +182,58 @@ def scan_forces(surface: Surface, xy: FloatArray) -> FloatArray:
     )
 
 
-def _fit_waves(surface: Surface, spectrum: Spectrum, points: int | None = None) -> FloatArray:
+def slip_forces(surface: Surface, xy: FloatArray) -> FloatArray:
+    """Return the friction [N] there of a surface that slides along its scan line, at the limit."""
+    probes = np.column_stack([xy, np.full(len(xy), scan_height(surface))])
+    friction = surface.contact_friction
+    axes = 2 if friction is None else friction.axes
+    beyond = np.zeros((len(xy), axes))
+    beyond[:, :2] = surface.texture.scan_line().direction
+    return surface.force(probes, beyond) - surface.force(probes)
+
+
+def wave_force_components(
+    surface: Surface,
+    spectrum: Spectrum,
+    points: int | None = None,
+    evaluate: ForceFunction = scan_forces,
+) -> FloatArray:
+    """Return the force amplitude of every wave of a texture, along the wall and along its normal.
+
+    The probe moves at constant height, as deep as
+    :func:`~asperity.analysis.energy.straight_scan.merit` scans; a law with state slides at full
+    deflection. With ``slip_forces`` it is the force of friction. For a sum of waves the force is
+    fitted by the same waves (least squares). For bands it is the amplitude of the band times the
+    square root of the ratio of force variance to height variance on the same patch.
+
+    Returns:
+        Amplitudes [N], shape (n, 2): of the components along x and y, their squares added; and of
+        the component along z.
+    """
+    if not spectrum.waves:
+        return np.zeros((0, 2))
+    if points is not None and spectrum.exact:
+        return _fit_waves(surface, spectrum, evaluate, points)
+    compute = _fit_waves if spectrum.exact else _band_force_amplitudes
+    key = [repr((spectrum.exact, spectrum.waves))]
+    if evaluate is slip_forces:
+        key.append(repr(surface.friction_values))
+    forces = cached_result(
+        "wave forces", surface, lambda unit: compute(unit, spectrum, evaluate), *key
+    )
+    return np.asarray(forces) * stiffness_factor(surface)
+
+
+def _fit_waves(
+    surface: Surface, spectrum: Spectrum, evaluate: ForceFunction, points: int | None = None
+) -> FloatArray:
     """Return the amplitudes of the least-squares fit of waves to the force."""
     count = points or _FIT_POINTS[surface.law.contact.requires_search]
     xy = _fit_points(surface.texture, spectrum, count)
     vectors = np.array([wave.vector for wave in spectrum.waves])
     angles = xy @ vectors.T + np.array([wave.phase for wave in spectrum.waves])
     columns = np.hstack([np.ones((len(xy), 1)), np.sin(angles), np.cos(angles)])
-    fit = np.linalg.lstsq(columns, scan_forces(surface, xy), rcond=None)[0][1:]
+    fit = np.linalg.lstsq(columns, evaluate(surface, xy), rcond=None)[0][1:]
     squares = fit[: len(vectors)] ** 2 + fit[len(vectors) :] ** 2
     pairs = np.column_stack([squares[:, 0] + squares[:, 1], squares[:, 2]])
     return np.asarray(np.sqrt(pairs))
@@ -220,7 +252,9 @@ def _fit_points(texture: Texture, spectrum: Spectrum, count: int) -> FloatArray:
     return np.asarray(domain.origin + np.stack(fractions, axis=-1) @ spans)
 
 
-def _band_force_amplitudes(surface: Surface, spectrum: Spectrum) -> FloatArray:
+def _band_force_amplitudes(
+    surface: Surface, spectrum: Spectrum, evaluate: ForceFunction
+) -> FloatArray:
     """Return the amplitude of each band, from the ratio of force to height on a patch."""
     texture = surface.texture
     costly = surface.law.contact.requires_search
@@ -228,10 +262,10 @@ def _band_force_amplitudes(surface: Surface, spectrum: Spectrum) -> FloatArray:
     points, spacing, repeats = texture.domain.grid(texture.grid_counts(), max_count)
     flat = points.reshape(-1, 2)
     shape = points.shape[:2]
-    pushed = scan_forces(surface, flat)
+    pushed = evaluate(surface, flat)
     if not pushed.any():  # nothing is touched here: take the patch around the highest point
         flat = flat + _highest_point(texture) - flat.mean(axis=0)
-        pushed = scan_forces(surface, flat)
+        pushed = evaluate(surface, flat)
     heights = band_variances(texture.height(flat).reshape(1, *shape), spacing, repeats)
     forces = np.ascontiguousarray(pushed.T).reshape(3, *shape)
     along, normal = (band_variances(part, spacing, repeats) for part in (forces[:2], forces[2:]))
