@@ -111,7 +111,7 @@ def test_prepared_file_is_used_by_compare_and_scenes(
 ) -> None:
     target = tmp_path / "surface.npz"
     assert call("prepare", source, "-o", str(target), "--pitch", "20um", "--outliers", "6")[0] == 0
-    code, out, err = call("compare", str(target), "--laws", "W", "--magnify-height", "2")
+    code, out, err = call("compare", str(target), "--laws", "W", "--magnify-height", "2", "--why")
     assert (code, err) == (0, "")
     assert "outliers: 1 point beyond 6 robust" in flat(out)
     code, _out, err = call("compare", str(target), "--laws", "W", "--s-cutoff", "90um")

@@ -182,7 +182,7 @@ def test_split_run_equals_whole_run(letter: str) -> None:
     # The trace and the ledger are equal to the bit.
     np.testing.assert_array_equal(split_table, table)
     assert split.ledger() == whole.ledger()
-    with pytest.raises(ParameterError, match="trace must have rows of 30 numbers"):
+    with pytest.raises(ParameterError, match="trace must have rows of 31 numbers"):
         whole.run(anchors, table[:, :27])
 
 

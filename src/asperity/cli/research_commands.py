@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from contextlib import nullcontext, suppress
 from pathlib import Path
@@ -228,8 +229,19 @@ def run_command(
     click.echo(f"{participant}: {answers} in {name}; {state}")
 
 
+def _check_study_folder(_ctx: click.Context, _argument: click.Parameter, folder: str) -> str:
+    from asperity.studies.study_store import STUDY_FILE
+
+    is_locked = os.path.isdir(folder) and not os.access(folder, os.X_OK)
+    if not is_locked and not os.path.lexists(Path(folder) / STUDY_FILE):
+        raise ParameterError(
+            "folder", "is no folder of a study: asperity study run makes one", folder
+        )
+    return folder
+
+
 @study_command.command("report", short_help="Write scores, tables and a page; unblinds.")
-@click.argument("folder")
+@click.argument("folder", callback=_check_study_folder)
 @output.output_options(uses_cache=False)
 def report_command(folder: str, outputs: output.Outputs) -> None:
     """Write scores with intervals, pictures and tables into FOLDER, with the key of the codes.

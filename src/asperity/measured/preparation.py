@@ -215,17 +215,7 @@ def prepare(  # noqa: D417 - the others are described by their declarations
     _check_arguments(raw.heights.shape, lateral, tip_radius, periodic, blend)
     require_memory(*raw.heights.shape[::-1])
     start("outliers")
-    heights = _copy_heights(raw, lateral)
-    if height_range is None:
-        record("as read", heights, lateral)
-    if outliers is not None:
-        steps.append(remove_outliers(heights, outliers))
-        _check_missing(heights, max_missing)
-    _scale_heights(heights, raw, lateral, height_range, steps)
-    if outliers is not None:
-        record("without outliers", heights, lateral)
-    elif height_range is not None:
-        record("as read", heights, lateral)
+    heights = _scaled_heights(raw, lateral, height_range, outliers, max_missing, record, steps)
     start("form")
     repeats = blend is None and _repeats(heights, bool(periodic), steps)
     if repeats:  # a polynomial would break it
@@ -255,6 +245,30 @@ def prepare(  # noqa: D417 - the others are described by their declarations
         heights, lateral, tuple(steps), some_or_none(filled), bool(periodic), tuple(record.stages)
     )
     return magnify_surface(ready, magnify, magnify_height)
+
+
+def _scaled_heights(
+    raw: RawSurface,
+    lateral: Pitch,
+    height_range: float | None,
+    outliers: float | None,
+    max_missing: float,
+    record: StageRecorder,
+    steps: list[str],
+) -> FloatArray:
+    """Return the heights [m] without outliers, scaled to the range where it is given."""
+    heights = _copy_heights(raw, lateral)
+    if height_range is None:
+        record("as read", heights, lateral)
+    if outliers is not None:
+        steps.append(remove_outliers(heights, outliers))
+        _check_missing(heights, max_missing)
+    _scale_heights(heights, raw, lateral, height_range, steps)
+    if outliers is not None:
+        record("without outliers", heights, lateral)
+    elif height_range is not None:
+        record("as read", heights, lateral)
+    return heights
 
 
 def _repeats(heights: FloatArray, periodic: bool, steps: list[str]) -> bool:
