@@ -89,12 +89,10 @@ def _box(texture: Texture, depth: float) -> FloatArray:
 
 
 def _working_region(surface: Surface) -> Callable[[FloatArray], NDArray[np.bool_]]:
-    contact = surface.law.contact.name
+    """Return whether points are no deeper than max_depth, the depth being that of the contact."""
 
     def contains(points: FloatArray) -> NDArray[np.bool_]:
-        depth = -points[:, 2]
-        if contact != "nominal":
-            depth = depth + surface.texture.height(points[:, :2])
+        depth = surface.law.contact.depth(surface.texture, points)
         return np.asarray((depth > 0.0) & (depth <= surface.max_depth))
 
     return contains

@@ -100,6 +100,8 @@ class Certification(Serializable, Displayable):
         one_sided_gain: largest change of force against the motion, per metre [N/m].
         one_sided_witness: two points that show it.
         worst_loop: closed path of the greatest energy gained; ``None`` if none was found.
+        densest_loop: closed path of the greatest energy gained per length, which damping or dry
+            friction has to absorb.
         rejected_loops: loops whose gain was within its error.
         jumps: jumps of the force, the largest first.
         history: dependence on what was before.
@@ -120,6 +122,7 @@ class Certification(Serializable, Displayable):
     one_sided_gain: float
     one_sided_witness: GainWitness | None
     worst_loop: ClosedLoop | None
+    densest_loop: ClosedLoop | None
     rejected_loops: int
     jumps: tuple[ForceJump, ...]
     history: History
@@ -327,6 +330,7 @@ class _Search:
             one_sided_gain=one_sided.value,
             one_sided_witness=one_sided.best,
             worst_loop=None if loops.best is None else loops.held_work(loops.best),
+            densest_loop=loops.densest,
             rejected_loops=loops.rejected,
             jumps=jumps.jumps,
             history=history,

@@ -1,8 +1,9 @@
 """Search for closed loops on which a renderer gains energy, and their work under refinement.
 
-For a renderer without memory the circulation of the cells of a plane grid is computed; the regions
-of one sign, walked around, gain the sum of their circulations. For a renderer with memory, polygons
-are improved by random steps, walked until the work of a turn is steady.
+For a renderer without memory the circulation of the cells of a plane grid is computed. A loop that
+passes the columns of the grid forwards at one height and backwards at a higher one gains the sum of
+the circulations between them, and so does, with the other sign, its reverse. For a renderer with
+memory, polygons are improved by random steps, walked until the work of a turn is steady.
 
 **The work of a loop is what it tends to under refinement.** Its error is the larger of the last two
 changes on doubling the points; a loop counts only if its work exceeds five times its error. Without
@@ -15,7 +16,6 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -29,12 +29,12 @@ TURNS = 3
 """Turns of a loop of a renderer with memory; the last one counts."""
 _ERRORS_PER_WORK = 5.0
 _ROUNDING = 1e-8
-_COARSE_CELLS = 36
+_COARSE_CELLS = 24
 _FINE_CELLS = 320
-_PLANES = 64
+_PLANES = 32
 _REFINED = 6
-_OUTLINES = 24
 _POLYGONS = 48
+_TRIED_POLYGONS = 1000
 _VERTICES = 8
 _STEPS = 100
 _SIDE_POINTS = 16
@@ -94,6 +94,7 @@ class LoopSearch:
 
     Attributes:
         best: the loop of greatest energy; ``None`` for none.
+        densest: the loop of greatest energy per length.
         rejected: number of loops whose gain was within its error.
     """
 
@@ -102,6 +103,7 @@ class LoopSearch:
     ) -> None:
         self.calls = calls
         self.best: ClosedLoop | None = None
+        self.densest: ClosedLoop | None = None
         self.rejected = 0
         self._unknown_force = resolution.explained(gain)
         self._random = np.random.default_rng(seed)
@@ -120,43 +122,77 @@ class LoopSearch:
     # --- grids of planes ---
 
     def _search_planes(self, deadline: float) -> None:
-        """Try planes at random on a coarse grid, and the best ones on a fine grid."""
+        """Find planes of much circulation on a coarse grid, and their loops on a fine one."""
         now = time.monotonic()
         budget = self.calls.rate * max(deadline - now, 0.0)
-        cells = int(min(_COARSE_CELLS, max(6.0, math.sqrt(budget / 80.0))))
+        cells = int(min(_COARSE_CELLS, max(6.0, math.sqrt(budget / 200.0))))
         fine_cells = int(min(_FINE_CELLS, max(cells, 0.2 * math.sqrt(budget))))
-        planes = [self._random_plane() for _ in range(_PLANES)]
-        energies = []
-        for plane in planes:
-            energies.append(np.nansum(np.abs(self._circulations(plane, cells))))
-            if time.monotonic() >= now + 0.4 * (deadline - now):
-                break
-        for index in np.argsort(energies)[::-1][:_REFINED]:
-            circulations = self._circulations(planes[index], fine_cells)
-            for sign in (1, -1):
-                self._record_outlines(_sign_outlines(sign * circulations, planes[index]))
+        count = int(min(_PLANES, max(4.0, 0.05 * budget / cells**2)))
+        for plane in self._best_planes(count, cells, now + 0.5 * (deadline - now)):
+            circulations = self._circulations(plane, fine_cells)
+            for sign in (1.0, -1.0):
+                self._record_columns(sign * circulations, plane)
             if time.monotonic() >= deadline:
                 break
 
-    def _random_plane(self) -> FloatArray:
-        """Return corner and two sides of a rectangle across the region, shape (3, 3).
+    def _best_planes(self, count: int, cells: int, deadline: float) -> FloatArray:
+        """Return the planes of most circulation on a grid, the best first, shape (n, 3, 3).
 
-        Most planes are vertical, half of these along an axis; some are horizontal.
+        Vertical planes climb; a horizontal plane has a random height.
         """
         region = self.calls.region
-        start, end = region.points(self._random.uniform(size=(2, 3)))
-        if self._random.integers(8) == 0:
-            corner = np.array([region.low[0], region.low[1], start[2]])
-            return np.stack([corner, region.size * [1, 0, 0], region.size * [0, 1, 0]])
-        across = int(self._random.integers(2))
-        along = 1 - across
-        if self._random.uniform() < 0.5:
-            end[across] = start[across]
-        start[along] = region.low[along]
-        end[along] = region.high[along]
-        start[2] = region.low[2]
-        end[2] = region.low[2]
-        return np.stack([start, end - start, region.size * [0, 0, 1]])
+
+        def energies(planes: FloatArray) -> FloatArray:
+            sums = []
+            for plane in planes:
+                sums.append(np.nansum(np.abs(self._circulations(plane, cells))))
+            return np.array(sums)
+
+        flat = self._horizontal_planes(count // 4)
+        ends, vertical_energies = climb(
+            self._random_ends(count),
+            lambda ends: energies(self._vertical_planes(ends)),
+            lambda _starts, ends: np.clip(ends, region.low, region.high),
+            lambda: time.monotonic() >= deadline,
+            self._random,
+            _FIRST_SPREAD * region.size,
+            _STEPS,
+        )
+        planes = np.concatenate([self._vertical_planes(ends), flat])
+        order = np.argsort(-np.concatenate([vertical_energies, energies(flat)]))
+        return planes[order[:_REFINED]]
+
+    def _random_ends(self, count: int) -> FloatArray:
+        """Return two points for each vertical plane, half of these along an axis, (n, 2, 3)."""
+        region = self.calls.region
+        ends = region.points(self._random.uniform(size=(count, 2, 3)))
+        for pair in ends:
+            across = int(self._random.integers(2))
+            along = 1 - across
+            if self._random.uniform() < 0.5:
+                pair[1, across] = pair[0, across]
+            pair[:, along] = region.low[along], region.high[along]
+        return ends
+
+    def _vertical_planes(self, ends: FloatArray) -> FloatArray:
+        """Return corners and sides of rectangles above lines, as high as the region, (n, 3, 3)."""
+        region = self.calls.region
+        corners = ends[:, 0].copy()
+        corners[:, 2] = region.low[2]
+        sides = ends[:, 1] - ends[:, 0]
+        sides[:, 2] = 0.0
+        heights = np.broadcast_to(region.size * [0.0, 0.0, 1.0], corners.shape)
+        return np.stack([corners, sides, heights], axis=1)
+
+    def _horizontal_planes(self, count: int) -> FloatArray:
+        """Return corners and sides of rectangles across the region at heights, (n, 3, 3)."""
+        region = self.calls.region
+        planes = np.zeros((count, 3, 3))
+        planes[:, 0] = region.low
+        planes[:, 0, 2] += region.size[2] * self._random.uniform(size=count)
+        planes[:, 1, 0] = region.size[0]
+        planes[:, 2, 1] = region.size[1]
+        return planes
 
     def _circulations(self, plane: FloatArray, cells: int) -> FloatArray:
         """Return the work around each cell of a grid, NaN outside of the region, shape (n, m)."""
@@ -177,34 +213,54 @@ class LoopSearch:
         whole = inside[:-1, :-1] & inside[1:, :-1] & inside[:-1, 1:] & inside[1:, 1:]
         return np.where(whole, work, np.nan)
 
-    def _record_outlines(self, outlines: list[FloatArray]) -> None:
-        """Record the loop that consists of the outlines which gain more than their error.
+    def _record_columns(self, circulations: FloatArray, plane: FloatArray) -> None:
+        """Measure the simple loop of greatest energy in a plane, and a part of greater density.
 
-        They are joined by ways there and back.
+        A loop passes the columns of the grid forwards at one height and backwards at another; that
+        against the sense of the circulations is tried with their signs changed.
         """
-        parts = []
-        for outline in outlines:
-            part = self.measure(outline)
-            if part.energy < 0.0:
-                part = replace(part, energy=-part.energy, path=part.path[::-1])
-            if part.counts:
-                parts.append(part)
-        self.rejected += len(outlines) - len(parts)
-        if not parts:
+        work, forwards, backwards = _best_heights(circulations)
+        columns = np.flatnonzero(work > 0.0)
+        if not len(columns):
             return
-        self._keep(_join(parts))
+        first = columns[0]
+        end = columns[-1] + 1
+        for _ in range(2):
+            way = np.concatenate([np.arange(first, end), np.arange(first, end)[::-1]])
+            heights = np.concatenate([forwards[first:end], backwards[first:end][::-1]])
+            shares = np.column_stack([(way + 0.5) / len(work), heights])
+            loop = self.measure(plane[0] + shares @ plane[1:])
+            if loop.energy < 0.0:
+                loop = replace(loop, energy=-loop.energy, path=loop.path[::-1])
+            if not loop.counts:
+                self.rejected += 1
+                return
+            self._keep(loop)
+            # The columns whose work exceeds most what their length takes from the mean density.
+            taken = 2.0 * loop.density * math.hypot(*plane[1]) / len(work)
+            sums = np.concatenate([np.zeros(1), np.cumsum(work - taken)])
+            least = np.minimum.accumulate(sums)
+            end = int(np.argmax(sums - least))
+            first = int(np.argmin(sums[: end + 1]))
 
     def _keep(self, loop: ClosedLoop) -> None:
         if self.best is None or loop.energy > self.best.energy:
             self.best = loop
+        if self.densest is None or loop.density > self.densest.density:
+            self.densest = loop
 
     # --- polygons of a renderer with memory ---
 
     def _search_polygons(self, deadline: float) -> None:
-        """Improve polygons by random steps."""
+        """Improve the best of random polygons, and of those before, by random steps."""
         region = self.calls.region
+        calls = _VERTICES * _SIDE_POINTS * TURNS
+        budget = self.calls.rate * max(deadline - time.monotonic(), 0.0)
+        count = int(min(_TRIED_POLYGONS, max(_POLYGONS, 0.1 * budget / calls)))
+        tried = self._random_polygons(count)
+        best = np.argsort(-self._polygon_works(tried))[:_POLYGONS]
         polygons, _energies = climb(
-            np.concatenate([*self._best_polygons, self._random_polygons()]),
+            np.concatenate([*self._best_polygons, tried[best]]),
             self._polygon_works,
             region.limit,
             lambda: time.monotonic() >= deadline,
@@ -220,11 +276,11 @@ class LoopSearch:
             else:
                 self.rejected += 1
 
-    def _random_polygons(self) -> FloatArray:
+    def _random_polygons(self, number: int) -> FloatArray:
         """Return polygons in vertical planes of the region [m], of many sizes."""
         region = self.calls.region
-        centres = region.points(self._random.uniform(size=(100 * _POLYGONS, 3)))
-        centres = centres[region.contains(centres)][:_POLYGONS, None]
+        centres = region.points(self._random.uniform(size=(100 * number, 3)))
+        centres = centres[region.contains(centres)][:number, None]
         count = len(centres)
         angle = self._random.uniform(0.0, math.pi, (count, 1))
         angle[::2] = 0.5 * math.pi * self._random.integers(2, size=(len(angle[::2]), 1))
@@ -316,18 +372,6 @@ class LoopSearch:
         return replace(loop, held_energy=work)
 
 
-def _join(parts: list[ClosedLoop]) -> ClosedLoop:
-    """Return the loop along all parts, from the first vertex to each and back."""
-    path = parts[0].path
-    for part in parts[1:]:
-        path = np.concatenate([path, path[:1], part.path, part.path[:1]])
-    if len(parts) > 1:
-        path = np.concatenate([path, path[:1]])
-    energy = sum(part.energy for part in parts)
-    error = sum(part.error for part in parts)
-    return ClosedLoop(energy, error, _length(path), path)
-
-
 def _jump_doubts(forces: FloatArray, steps: FloatArray) -> FloatArray:
     """Return what jumps within steps may do to works [J], shape (curves,).
 
@@ -339,22 +383,30 @@ def _jump_doubts(forces: FloatArray, steps: FloatArray) -> FloatArray:
     return np.asarray((jumps * np.sqrt(np.square(steps).sum(axis=2))).sum(axis=1))
 
 
-def _sign_outlines(circulations: FloatArray, plane: FloatArray) -> list[FloatArray]:
-    """Return the outlines of the positive cells of a plane, the longest first, shape (n, 3) each.
+def _best_heights(circulations: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the greatest work in each column of a grid, and between which heights it is done.
 
-    The region ends in the middle of a cell whose circulation is NaN, and at the plane's border.
+    Args:
+        circulations: work around each cell [J], shape (n, m); NaN outside of the region.
+
+    Returns:
+        The work [J], and the heights of the ways forwards and backwards as shares of the column,
+        no farther out than the middle of a cell of the region, shape (n,) each.
     """
-    from contourpy import contour_generator
-
-    greatest = np.nanmax(np.abs(circulations), initial=0.0)
-    padded = np.pad(np.nan_to_num(circulations, nan=-1e3 * greatest), 1)
-    x, y = [np.clip((np.arange(n + 2) - 0.5) / n, 0.0, 1.0) for n in circulations.shape]
-    lines: list[Any] = list(contour_generator(x, y, padded.T).lines(1e-3 * greatest))
-    outlines: list[FloatArray] = []
-    for line in lines:
-        outlines.append(plane[0] + line[:-1] @ plane[1:])
-    outlines.sort(key=lambda outline: -_length(outline))
-    return outlines[:_OUTLINES]
+    rows = circulations.shape[1]
+    is_inside = np.isfinite(circulations)
+    sums = np.pad(np.cumsum(np.where(is_inside, circulations, 0.0), axis=1), ((0, 0), (1, 0)))
+    is_reached = np.pad(is_inside, ((0, 0), (0, 1))) | np.pad(is_inside, ((0, 0), (1, 0)))
+    least = np.minimum.accumulate(np.where(is_reached, sums, np.inf), axis=1)
+    works = np.where(is_reached, sums - least, 0.0)
+    highest = np.argmax(works, axis=1)
+    columns = np.arange(len(sums))
+    is_lowest = is_reached & (sums == least[columns, highest][:, None])
+    first = np.argmax(is_inside, axis=1) + 0.5
+    last = rows - np.argmax(is_inside[:, ::-1], axis=1) - 0.5
+    forwards = np.clip(np.argmax(is_lowest, axis=1), first, last) / rows
+    backwards = np.clip(highest, first, last) / rows
+    return works[columns, highest], forwards, backwards
 
 
 def subdivide(vertices: FloatArray, spacing: float, least: int) -> FloatArray:

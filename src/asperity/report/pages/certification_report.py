@@ -102,15 +102,16 @@ def _findings_table(result: Certification) -> Table:
 def _loop_texts(result: Certification) -> tuple[str, str]:
     """Return the energy of the worst loop, and its error, length and held-force work."""
     loop = result.worst_loop
-    if loop is None:
+    densest = result.densest_loop
+    if loop is None or densest is None:
         return "none found", f"{result.rejected_loops} within their errors"
     energy = format_quantity(loop.energy, "J", digits=4)
     error = format_quantity(loop.error, "J", digits=2)
     length = format_quantity(loop.length, "m", digits=3)
     held = format_quantity(loop.held_energy, "J", digits=3)
-    speed = format_quantity(loop.critical_speed(1.0), "m/s", digits=3)
+    speed = format_quantity(densest.critical_speed(1.0), "m/s", digits=3)
     text = f"± {error}; {length} long; {held} with the force held at 1 kHz and 0.1 m/s; "
-    return energy, f"{text}damping of 1 N s/m absorbs it from {speed} on"
+    return energy, f"{text}damping of 1 N s/m absorbs all loops found from {speed} on"
 
 
 def _gain_place(witness: Any) -> str:

@@ -82,9 +82,9 @@ def device_sentences(result: Certification, device: Device) -> list[str]:
         largest_text = format_quantity(largest, "N", digits=3)
         sentences.append(f"The force reaches {force}; the device gives {largest_text}.")
     damping = device.value("damping")
-    if result.worst_loop is not None and damping:
-        speed = format_quantity(result.worst_loop.critical_speed(damping), "m/s", digits=3)
-        sentences.append(f"Below {speed} its damping absorbs less than the worst loop gives.")
+    if result.densest_loop is not None and damping:
+        speed = format_quantity(result.densest_loop.critical_speed(damping), "m/s", digits=3)
+        sentences.append(f"Below {speed} its damping absorbs less than a loop gives.")
     return sentences
 
 

@@ -1,0 +1,56 @@
+"""Loops between two heights of each column of a plane grid."""
+
+import math
+
+import numpy as np
+import pytest
+
+from asperity import certify
+from asperity.certification.loop_search import _best_heights
+from asperity.core.checks import FloatArray
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_heights_are_those_of_the_best_sum_of_neighbours(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    columns, rows = 30, 12
+    circulations = random.normal(size=(columns, rows))
+    circulations[::4, 8:] = np.nan  # outside of the region
+    circulations[5, :3] = np.nan
+    circulations[9] = -1.0
+    circulations[10] = np.nan
+    works, forwards, backwards = _best_heights(circulations)
+    for column, values in enumerate(circulations):
+        inside = np.flatnonzero(np.isfinite(values))
+        best = 0.0
+        for start in inside:
+            best = max(best, float(np.nancumsum(values[start:]).max()))
+        assert works[column] == pytest.approx(best, abs=1e-12)
+        if best == 0.0:
+            continue
+        # Heights are nodes, but no farther out than the middle of the outermost cells.
+        low = math.floor(rows * forwards[column])
+        high = math.ceil(rows * backwards[column])
+        assert np.nansum(values[low:high]) == pytest.approx(best, abs=1e-12)
+        assert forwards[column] * rows >= inside[0] + 0.5
+        assert backwards[column] * rows <= inside[-1] + 0.5
+
+
+def vortex_force(points: FloatArray) -> FloatArray:
+    """Return a force that circulates around a vertical tube off the axes of the region [N]."""
+    across = (points[:, 0] + points[:, 1]) / math.sqrt(2.0) - 3e-4
+    along = (points[:, 0] - points[:, 1]) / math.sqrt(2.0)
+    height = points[:, 2] - 2e-4
+    size = 1e3 * np.exp(-(across**2 + height**2) / (2e-4) ** 2 - along**2 / (3e-4) ** 2)
+    horizontal = -size * height / math.sqrt(2.0)
+    return np.stack([horizontal, horizontal, size * across], axis=1)
+
+
+def test_planes_climb_to_an_oblique_circulation() -> None:
+    found = certify(vortex_force, region=((-1e-3, 1e-3),) * 3, seconds=3.0)
+    # The curl of the plane through the axis is positive within the radius: its work is 2πk a²/e.
+    expected = 2.0 * math.pi * 1e3 * (2e-4) ** 2 / math.e
+    assert found.worst_loop is not None
+    assert found.densest_loop is not None
+    assert 0.97 * expected < found.worst_loop.energy <= 1.001 * expected
+    assert found.densest_loop.density >= found.worst_loop.density
