@@ -20,6 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from asperity.certification.climbing import climb
+from asperity.certification.column_loops import find_column_loops
 from asperity.certification.region import RendererCalls
 from asperity.certification.resolution import Resolution
 from asperity.core.checks import FloatArray
@@ -141,17 +142,10 @@ class LoopSearch:
         Vertical planes climb; a horizontal plane has a random height.
         """
         region = self.calls.region
-
-        def energies(planes: FloatArray) -> FloatArray:
-            sums = []
-            for plane in planes:
-                sums.append(np.nansum(np.abs(self._circulations(plane, cells))))
-            return np.array(sums)
-
         flat = self._horizontal_planes(count // 4)
-        ends, vertical_energies = climb(
+        ends, energies = climb(
             self._random_ends(count),
-            lambda ends: energies(self._vertical_planes(ends)),
+            lambda ends: self._plane_energies(self._vertical_planes(ends), cells),
             lambda _starts, ends: np.clip(ends, region.low, region.high),
             lambda: time.monotonic() >= deadline,
             self._random,
@@ -159,8 +153,15 @@ class LoopSearch:
             _STEPS,
         )
         planes = np.concatenate([self._vertical_planes(ends), flat])
-        order = np.argsort(-np.concatenate([vertical_energies, energies(flat)]))
-        return planes[order[:_REFINED]]
+        energies = np.concatenate([energies, self._plane_energies(flat, cells)])
+        return planes[np.argsort(-energies)[:_REFINED]]
+
+    def _plane_energies(self, planes: FloatArray, cells: int) -> FloatArray:
+        """Return the sums of the magnitudes of the circulations of planes [J], shape (n,)."""
+        sums = []
+        for plane in planes:
+            sums.append(np.nansum(np.abs(self._circulations(plane, cells))))
+        return np.array(sums)
 
     def _random_ends(self, count: int) -> FloatArray:
         """Return two points for each vertical plane, half of these along an axis, (n, 2, 3)."""
@@ -219,29 +220,21 @@ class LoopSearch:
         A loop passes the columns of the grid forwards at one height and backwards at another; that
         against the sense of the circulations is tried with their signs changed.
         """
-        work, forwards, backwards = _best_heights(circulations)
-        columns = np.flatnonzero(work > 0.0)
+        column_loops = find_column_loops(plane, circulations)
+        columns = np.flatnonzero(column_loops.works > 0.0)
         if not len(columns):
             return
-        first = columns[0]
-        end = columns[-1] + 1
+        first = int(columns[0])
+        end = int(columns[-1]) + 1
         for _ in range(2):
-            way = np.concatenate([np.arange(first, end), np.arange(first, end)[::-1]])
-            heights = np.concatenate([forwards[first:end], backwards[first:end][::-1]])
-            shares = np.column_stack([(way + 0.5) / len(work), heights])
-            loop = self.measure(plane[0] + shares @ plane[1:])
+            loop = self.measure(column_loops.path(first, end))
             if loop.energy < 0.0:
                 loop = replace(loop, energy=-loop.energy, path=loop.path[::-1])
             if not loop.counts:
                 self.rejected += 1
                 return
             self._keep(loop)
-            # The columns whose work exceeds most what their length takes from the mean density.
-            taken = 2.0 * loop.density * math.hypot(*plane[1]) / len(work)
-            sums = np.concatenate([np.zeros(1), np.cumsum(work - taken)])
-            least = np.minimum.accumulate(sums)
-            end = int(np.argmax(sums - least))
-            first = int(np.argmin(sums[: end + 1]))
+            first, end = column_loops.densest_columns(loop.density)
 
     def _keep(self, loop: ClosedLoop) -> None:
         if self.best is None or loop.energy > self.best.energy:
@@ -254,13 +247,8 @@ class LoopSearch:
     def _search_polygons(self, deadline: float) -> None:
         """Improve the best of random polygons, and of those before, by random steps."""
         region = self.calls.region
-        calls = _VERTICES * _SIDE_POINTS * TURNS
-        budget = self.calls.rate * max(deadline - time.monotonic(), 0.0)
-        count = int(min(_TRIED_POLYGONS, max(_POLYGONS, 0.1 * budget / calls)))
-        tried = self._random_polygons(count)
-        best = np.argsort(-self._polygon_works(tried))[:_POLYGONS]
         polygons, _energies = climb(
-            np.concatenate([*self._best_polygons, tried[best]]),
+            np.concatenate([*self._best_polygons, self._starting_polygons(deadline)]),
             self._polygon_works,
             region.limit,
             lambda: time.monotonic() >= deadline,
@@ -275,6 +263,13 @@ class LoopSearch:
                 self._keep(loop)
             else:
                 self.rejected += 1
+
+    def _starting_polygons(self, deadline: float) -> FloatArray:
+        """Return the best of random polygons, of more the faster the renderer is [m]."""
+        budget = self.calls.rate * max(deadline - time.monotonic(), 0.0)
+        share = 0.1 * budget / (_VERTICES * _SIDE_POINTS * TURNS)
+        tried = self._random_polygons(int(min(_TRIED_POLYGONS, max(_POLYGONS, share))))
+        return tried[np.argsort(-self._polygon_works(tried))[:_POLYGONS]]
 
     def _random_polygons(self, number: int) -> FloatArray:
         """Return polygons in vertical planes of the region [m], of many sizes."""
@@ -381,32 +376,6 @@ def _jump_doubts(forces: FloatArray, steps: FloatArray) -> FloatArray:
     beside = np.roll(changes, 1, axis=1) + np.roll(changes, -1, axis=1)
     jumps = np.maximum(changes - 2.0 * beside, 0.0)
     return np.asarray((jumps * np.sqrt(np.square(steps).sum(axis=2))).sum(axis=1))
-
-
-def _best_heights(circulations: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the greatest work in each column of a grid, and between which heights it is done.
-
-    Args:
-        circulations: work around each cell [J], shape (n, m); NaN outside of the region.
-
-    Returns:
-        The work [J], and the heights of the ways forwards and backwards as shares of the column,
-        no farther out than the middle of a cell of the region, shape (n,) each.
-    """
-    rows = circulations.shape[1]
-    is_inside = np.isfinite(circulations)
-    sums = np.pad(np.cumsum(np.where(is_inside, circulations, 0.0), axis=1), ((0, 0), (1, 0)))
-    is_reached = np.pad(is_inside, ((0, 0), (0, 1))) | np.pad(is_inside, ((0, 0), (1, 0)))
-    least = np.minimum.accumulate(np.where(is_reached, sums, np.inf), axis=1)
-    works = np.where(is_reached, sums - least, 0.0)
-    highest = np.argmax(works, axis=1)
-    columns = np.arange(len(sums))
-    is_lowest = is_reached & (sums == least[columns, highest][:, None])
-    first = np.argmax(is_inside, axis=1) + 0.5
-    last = rows - np.argmax(is_inside[:, ::-1], axis=1) - 0.5
-    forwards = np.clip(np.argmax(is_lowest, axis=1), first, last) / rows
-    backwards = np.clip(highest, first, last) / rows
-    return works[columns, highest], forwards, backwards
 
 
 def subdivide(vertices: FloatArray, spacing: float, least: int) -> FloatArray:

@@ -404,3 +404,12 @@ def test_law_problem_covers_all_depths_and_anchor_states() -> None:
             best = np.maximum(best, np.linalg.norm(matrices, 2, axis=(1, 2)))
         if letter != "D":  # its probes may be nearer to another surface point
             np.testing.assert_allclose(values, best, rtol=1e-5)
+
+
+def test_measures_of_vanishing_matrices_are_numbers() -> None:
+    matrices = np.eye(3) * np.array([0.0, 1e-200, 1e-80, 1e-60])[:, None, None]
+    matrices[:, 0, 1] = matrices[:, 1, 1]
+    for measure in (spectral_norm, one_sided):
+        values = measure(matrices)
+        assert np.isfinite(values).all()
+        np.testing.assert_allclose(values, 0.0, atol=1e-59)

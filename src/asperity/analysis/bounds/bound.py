@@ -230,6 +230,7 @@ Measure = Callable[[FloatArray], FloatArray]
 # arccos turns an error of 16 units near -1 into √(32 units), of which a third times √3 remains.
 _FAST_ERROR = 1e-7
 _LAPACK_ERROR = 1e-14
+_LEAST_SPREAD = 1e-100  # its cube is a floating-point number
 
 
 def spectral_norm(matrices: FloatArray) -> FloatArray:
@@ -271,7 +272,7 @@ def _largest_eigenvalue(
     z = zz - centre
     spread = np.sqrt((x * x + y * y + z * z + 2.0 * (xy * xy + xz * xz + yz * yz)) / 6.0)
     det = x * (y * z - yz * yz) - xy * (xy * z - yz * xz) + xz * (xy * yz - y * xz)
-    cube = np.where(spread > 0.0, spread, 1.0) ** 3
+    cube = np.where(spread > _LEAST_SPREAD, spread, 1.0) ** 3
     angle = np.arccos(np.clip(0.5 * det / cube, -1.0, 1.0)) / 3.0
     return np.asarray(centre + 2.0 * spread * np.cos(angle))
 
