@@ -181,6 +181,80 @@ def test_directions_between_folders_are_detected() -> None:
     assert imports_of_subfolders(texts) == ["p.b.y imports p.b.c"]
 
 
+# --- one room for the operating system -----------------------------------------------------------
+
+MODULES_BELOW_THE_ROOM = {
+    "asperity.core.cache": {"os.fchmod", "os.geteuid", "os.getuid"},
+    "asperity.core.files": {"/proc/", "os.O_TMPFILE"},
+    "asperity.core.memory": {"/proc/", "/sys/"},
+    "asperity.core.processes": {"os.nice", "os.sched_getaffinity"},
+    "asperity.__main__": {"platform.system"},
+}
+"""What modules that cannot import the room ask, each after a check that it is there; and the name
+of the system in the message of an internal error."""
+PLATFORM_MODULES = re.compile("fcntl|msvcrt|pwd|grp|resource|termios|tty|winreg|_winapi")
+PLATFORM_NAMES = re.compile(
+    r"sys\.platform|os\.name|platform\.system|ctypes\.(WinDLL|windll)"
+    r"|os\.(fchmod|fork|gete?[ug]id|getpg\w+|killpg|mkfifo|nice|pread|pwrite|sched_\w+|set_blocking"
+    r"|setsid|O_NOFOLLOW|O_TMPFILE)"
+    r"|select\.(e?poll|POLL\w+)|time\.(clock_\w+|CLOCK_\w+)"
+    r"|signal\.(pthread_\w+|SIG(?!INT$|TERM$|_IGN$|_DFL$)\w+)"
+)
+PLATFORM_FOLDERS = re.compile("/(proc|dev|sys)/")
+
+
+def platform_questions(text: str) -> list[tuple[int, str]]:
+    """Return the lines that ask for the operating system, or for what only one of them has."""
+    found = []
+    for node in ast.walk(parse(text)):
+        questions: list[re.Match[str] | None] = []
+        if isinstance(node, ast.Import):
+            questions = [PLATFORM_MODULES.fullmatch(alias.name) for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            names = [f"{node.module}.{alias.name}" for alias in node.names]
+            questions = [PLATFORM_NAMES.fullmatch(name) for name in names]
+            questions.append(PLATFORM_MODULES.fullmatch(str(node.module)))
+        elif isinstance(node, ast.Attribute):
+            questions = [PLATFORM_NAMES.fullmatch(ast.unparse(node))]
+        elif isinstance(node, ast.Call):
+            questions = [re.fullmatch(r".*CDLL\(None.*\)", ast.unparse(node))]
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            questions = [PLATFORM_FOLDERS.match(node.value)]
+        found += [(node.lineno, question[0]) for question in questions if question is not None]
+    return found
+
+
+def questions_outside_the_room(texts: Mapping[str, str]) -> list[str]:
+    return [
+        f"{module}:{line} {name}"
+        for module, text in texts.items()
+        for line, name in platform_questions(text)
+        if name not in MODULES_BELOW_THE_ROOM.get(module, set())
+    ]
+
+
+def test_only_one_room_asks_for_the_operating_system() -> None:
+    assert questions_outside_the_room(modules_outside("core.platform")) == []
+
+
+def test_questions_for_the_operating_system_are_detected() -> None:
+    for text in (
+        "import fcntl",
+        "from termios import tcgetattr",
+        "if sys.platform == 'win32': ...",
+        "os.name",
+        "platform.system()",
+        "signal.SIGHUP",
+        "os.setsid()",
+        "ctypes.CDLL(None)",
+        "Path('/proc/self/statm')",
+        "select.poll()",
+    ):
+        assert len(platform_questions(text)) == 1, text
+    for text in ("driver.name", "signal.SIGINT", "hasattr(os, 'nice')", "ctypes.CDLL(path)"):
+        assert platform_questions(text) == [], text
+
+
 # --- options and commands are known to the command line only -------------------------------------
 
 

@@ -26,7 +26,7 @@ import asperity
 
 ROOT = Path(__file__).parents[1]
 VERSION = asperity.__version__
-PYTHONS = ("3.11", "3.12", "3.13")
+PYTHONS = ("3.11", "3.12", "3.13", "3.14")
 JUNK = (
     ".mypy_cache/x.json",
     ".pytest_cache/x",

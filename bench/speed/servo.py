@@ -19,13 +19,9 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
-from asperity.servo.driver_loop import (
-    DriverLoop,
-    build_program,
-    function_address,
-    no_clock,
-    system_clock,
-)
+from asperity.core.platform.clocks import no_clock, system_clock
+from asperity.core.platform.system import function_address
+from asperity.servo.driver_loop import DriverLoop, build_program
 from asperity.servo.drivers.library import LibraryDriver
 from asperity.servo.drivers.simulated import simulated_driver
 from asperity.servo.loop_memory import EndReason, LoopMemory, LoopStatistics
@@ -69,7 +65,7 @@ def loop_overhead(console: Console) -> None:
         driver = LibraryDriver(str(path))
         shown, record = build_program(Surface(TEXTURE, "W", stiffness=300.0), driver), driver.open()
         at_once = function_address(ctypes.CDLL(str(path)).at_once)
-        clocks = no_clock(), system_clock()._replace(nanosleep=at_once)
+        clocks = no_clock(), system_clock()._replace(wait=at_once)
 
         def go(index: int) -> None:
             servo, board = Servo(1e-4, max_force=3.0), LoopMemory().block()

@@ -12,6 +12,7 @@ from multiprocessing.connection import Connection
 from multiprocessing.context import ForkServerProcess
 from typing import IO, Any, Self
 
+from asperity.core.platform.process_control import limit_process
 from asperity.measured.reading import ReadingOptions, SurfaceFile, isolation
 
 LIBRARIES = ("SurfaceTopography.IO", "trimesh", "tifffile")
@@ -87,7 +88,7 @@ def _serve(pipe: Connection) -> None:
     with contextlib.suppress(EOFError):
         while True:
             read, file, options, (seconds, memory) = pipe.recv()
-            isolation.set_limits(time.process_time() + seconds, memory)
+            limit_process(time.process_time() + seconds, memory)
             output = io.BytesIO()
             isolation.write_result(read, file, options, output)
             pipe.send_bytes(output.getvalue())

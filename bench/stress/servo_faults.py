@@ -23,9 +23,10 @@ import numpy as np
 from rich.console import Console
 
 from asperity.core.errors import AsperityError
+from asperity.core.platform.clocks import system_clock
 from asperity.loop.shared_trace import COLUMNS
 from asperity.recording.recording import Recording, open_recording
-from asperity.servo.driver_loop import DriverLoop, build_program, system_clock
+from asperity.servo.driver_loop import DriverLoop, build_program
 from asperity.servo.loop_memory import EndReason, LoopMemory
 from asperity.servo.process import LoopRecorder, ServoProcess
 from asperity.servo.safety import Safety

@@ -46,6 +46,7 @@ MISTAKES: list[tuple[str, tuple[str, ...]]] = [
     ("compare cloth --velocity 0.1m/s", ("--velocity", "did you mean '--speed'?")),
     ("compare cloth --no-cach", ("--no-cach", "did you mean '--no-cache'?")),
     ("reproduce --skip-experiment", ("--skip-experiment;", "did you mean '--skip-experiments'?")),
+    ("doctor --jason", ("--jason", "did you mean '--json'?")),
     ("cache --clean", ("--clean", "did you mean '--clear'?")),
     # Options of other commands.
     ("compare cloth --law H", ("compare has no option --law", "'--laws'", "analyze, limits")),

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from tests.servo.python_device import SURFACE, PythonClock, PythonDevice, program_for
 
-from asperity.servo.driver_loop import DriverLoop, no_clock
+from asperity.core.platform.clocks import no_clock
+from asperity.servo.driver_loop import DriverLoop
 from asperity.servo.loop_memory import LoopMemory
 from asperity.servo.safety import Safety
 from asperity.simulation import Servo

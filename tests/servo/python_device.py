@@ -11,9 +11,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from asperity.loop.guards import Clock
+from asperity.core.platform.clock_interface import Clock
+from asperity.core.platform.system import function_address
 from asperity.servo.driver import Driver
-from asperity.servo.driver_loop import LoopProgram, build_program, function_address
+from asperity.servo.driver_loop import LoopProgram, build_program
 from asperity.servo.drivers import library as by_address
 from asperity.servo.drivers.library import LibraryDevice
 from asperity.surface import Surface

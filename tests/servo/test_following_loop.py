@@ -10,14 +10,16 @@ import pytest
 from tests.servo.python_device import SURFACE
 
 from asperity.core.checks import FloatArray
+from asperity.core.platform.clocks import no_clock
 from asperity.loop.shared_trace import COLUMNS
-from asperity.servo.driver_loop import DriverLoop, build_program, no_clock
+from asperity.servo.driver_loop import DriverLoop, build_program
 from asperity.servo.drivers import pointer as pointer_driver_module
 from asperity.servo.drivers.pointer import (
     FOLLOWER_ROW,
     MAX_LAG,
     MAX_POLLS,
     NEXT_SAMPLE,
+    POLL_TIME,
     SAMPLE_COUNT,
     STATE_ROW,
     PointerDriver,
@@ -78,7 +80,10 @@ def test_a_following_anchor_repeats_waits_and_leaves_out(
     pointer: PointerHand, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     waits: list[int] = []
-    monkeypatch.setattr(pointer_driver_module, "call_address", lambda *_: waits.append(1))
+    monkeypatch.setattr(pointer_driver_module, "clock_now", lambda due, _clock: due)
+    monkeypatch.setattr(
+        pointer_driver_module, "clock_wait_until", lambda due, _clock: waits.append(due)
+    )
     leading, following = driver(pointer).open(), driver(pointer, follows=True).open()
     pointer.request_motion((2e-3, -1e-3, 0.0))
 
@@ -100,7 +105,7 @@ def test_a_following_anchor_repeats_waits_and_leaves_out(
     assert not waits
     # Without a further sample the hand rests, and no sample is lost.
     assert follow() == points[18][:3] * 2
-    assert len(waits) == MAX_POLLS
+    assert waits == [POLL_TIME] * MAX_POLLS
     points += lead(MAX_LAG)
     assert [follow() for _ in range(3)] == points[18:21]
     assert pointer.follower_lag == (len(points) - 1 - 21, 0)

@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 from tests.servo.python_device import SURFACE, PythonClock, PythonDevice, program_for
 
 from asperity.contacts.warm_start import TRUNCATED_TICKS
-from asperity.servo.driver_loop import DriverLoop, build_program, no_clock
+from asperity.core.platform.clocks import no_clock
+from asperity.servo.driver_loop import DriverLoop, build_program
 from asperity.servo.drivers.simulated import simulated_driver
 from asperity.servo.loop_memory import EndReason, LoopMemory, LoopStatistics
 from asperity.servo.safety import Safety

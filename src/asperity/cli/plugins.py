@@ -1,7 +1,8 @@
-"""The option ``--plugin``: Python files with user-defined laws, textures, readers and more.
+"""Plugins: files of the option ``--plugin``, and modules that installed packages declare.
 
-Only the command line names such files: the user who types the command runs the code. What a file
-defines is registered until the command ends.
+They define laws, textures, readers, drivers and more. Only the command line names files, and only
+an installed package declares an entry point of the group ``asperity.plugins``: the user decides
+which code runs. What a plugin defines is registered until the command ends.
 """
 
 from __future__ import annotations
@@ -13,14 +14,16 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
+from importlib.metadata import EntryPoints, entry_points
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import click
 
-from asperity.core.errors import AsperityError, ParameterError
+from asperity.core.errors import AsperityError, ParameterError, print_message
 from asperity.core.files import open_input
+from asperity.core.version import PLUGIN_GROUP
 
 _OPTION = "plugin"
 _LOADED_FILES: list[str] = []
@@ -84,19 +87,26 @@ def plugin_registries() -> tuple[PluginRegistry, ...]:
 
 
 def load_plugins(ctx: click.Context, _option: click.Parameter, files: tuple[str, ...]) -> None:
-    """Run files and register what they define until the command ends.
+    """Register what installed plugins and files define until the command ends.
 
     Raises:
         ParameterError: for a file that cannot be read or run, with line and reason, that
             registers nothing, or that uses a name that is taken.
     """
-    if not files:
+    installed = entry_points(group=PLUGIN_GROUP)
+    if not (files or installed):
         return
     registries = plugin_registries()
     for registry in registries:
         ctx.find_root().call_on_close(partial(registry.restore, registry.snapshot()))
+    _load_installed(installed, registries)
     for file in files:
         _load_plugin(file, registries)
+
+
+def has_plugins() -> bool:
+    """Return whether a file was run, or a plugin is installed."""
+    return bool(_LOADED_FILES or entry_points(group=PLUGIN_GROUP))
 
 
 def plugin_files() -> tuple[str, ...]:
@@ -105,9 +115,23 @@ def plugin_files() -> tuple[str, ...]:
 
 
 def load_plugin_files(files: tuple[str, ...]) -> None:
-    """Run files and register what they define, in a worker process."""
+    """Register what installed plugins and files define, in a worker process."""
+    if has_plugins():
+        _load_installed(entry_points(group=PLUGIN_GROUP), plugin_registries())
     for file in files:
         _load_plugin(file, plugin_registries())
+
+
+def _load_installed(installed: EntryPoints, registries: tuple[PluginRegistry, ...]) -> None:
+    """Register what modules define; one that fails is named in a message and is not used."""
+    for entry in installed:
+        try:
+            for value in vars(entry.load()).values():
+                for registry in registries:
+                    if registry.accepts(value):
+                        registry.register(value)
+        except (Exception, SystemExit) as error:
+            print_message(f"the installed plugin {entry.value} fails: {_error_text(error)}")
 
 
 def _load_plugin(file: str, registries: tuple[PluginRegistry, ...]) -> None:

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import os
-import select
 import signal
-import stat
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -24,6 +21,13 @@ from asperity.cli.options import file_values, surface_values
 from asperity.cli.output import Outputs, check_outputs, output_options, progress_bar
 from asperity.cli.plugins import load_plugin_files, plugin_files
 from asperity.core.errors import ParameterError, print_message
+from asperity.core.platform.console import leave_lost_terminal
+from asperity.core.platform.process_control import (
+    STOP_NOW_SIGNALS,
+    STOP_SIGNALS,
+    SUSPEND_SIGNALS,
+    suspend_this_process,
+)
 from asperity.laws.clamps import BACKED
 
 if TYPE_CHECKING:
@@ -122,11 +126,6 @@ def make_loop(
     )
 
 
-_STOP_NOW_SIGNALS = (signal.SIGQUIT, signal.SIGUSR1)
-STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGTSTP, *_STOP_NOW_SIGNALS)
-"""Signals that end a loop: SIGQUIT and SIGUSR1 without a ramp, the others with one."""
-
-
 @contextmanager
 def stop_on_signals(memory: LoopMemory | None = None) -> Iterator[list[int]]:
     """Stop the loop of a memory at each of ``STOP_SIGNALS``; yield the list of those received."""
@@ -134,7 +133,7 @@ def stop_on_signals(memory: LoopMemory | None = None) -> Iterator[list[int]]:
 
     def collect(number: int, _frame: FrameType | None) -> None:
         if memory is not None:
-            memory.request_stop(now=number in _STOP_NOW_SIGNALS)
+            memory.request_stop(now=number in STOP_NOW_SIGNALS)
         received.append(number)
 
     handlers = {number: signal.signal(number, collect) for number in STOP_SIGNALS}
@@ -147,22 +146,8 @@ def stop_on_signals(memory: LoopMemory | None = None) -> Iterator[list[int]]:
 
 def suspend_if_requested(signals: list[int]) -> None:
     """Suspend this program if Ctrl-Z ended its loop, which does not start again by itself."""
-    if signal.SIGTSTP in signals:
-        os.kill(os.getpid(), signal.SIGSTOP)
-
-
-def leave_lost_terminal() -> bool:
-    """Return whether the terminal of this program is gone; its output then goes nowhere."""
-    poller = select.poll()
-    is_lost = False
-    for stream in range(3):
-        poller.register(stream, 0)
-    for stream, event in poller.poll(0):
-        # A pipe whose reader has ended is no terminal.
-        if event & select.POLLHUP and stat.S_ISCHR(os.fstat(stream).st_mode):
-            os.dup2(os.open(os.devnull, os.O_RDWR), stream)
-            is_lost = True
-    return is_lost
+    if not {*SUSPEND_SIGNALS}.isdisjoint(signals):
+        suspend_this_process()
 
 
 @contextmanager

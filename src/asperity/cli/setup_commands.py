@@ -1,4 +1,4 @@
-"""The commands ``init``, ``devices``, ``calibrate``, ``cache`` and ``warm``."""
+"""The commands ``init``, ``devices``, ``calibrate``, ``doctor``, ``cache`` and ``warm``."""
 
 from __future__ import annotations
 
@@ -84,6 +84,24 @@ def cache_command(outputs: output.Outputs, *, clear: bool) -> None:
 
 def _format_megabytes(sizes: Iterable[int]) -> str:
     return f"{sum(sizes) / 1e6:.1f} MB"
+
+
+@declare_command("doctor")
+@output.output_options(html=False, uses_cache=False)
+def doctor_command(outputs: output.Outputs) -> None:
+    """Report what a report of a fault has to say about this machine.
+
+    The system, versions, real-time priority and the timing of a simulated loop of 2 s, which
+    drivers of vendors find their library or service, and the cache. Nothing moves.
+    """
+    from asperity.report.document.page import Paragraph, terminal_page
+    from asperity.report.sentences.loop_text import machine_lines
+    from asperity.scene.doctor import examine_machine
+
+    with progress_bar("running a simulated loop"):
+        report = examine_machine()
+    lines = Paragraph("\n".join(machine_lines(report)), "code")
+    outputs.write({"schema": 1, **report.to_dict()}, terminal_page(lines))
 
 
 @declare_command("warm")

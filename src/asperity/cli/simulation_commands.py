@@ -21,7 +21,7 @@ from asperity.cli.loop_setup import load_setup, loop_options, select_laws, stiff
 from asperity.cli.main import StrictGroup, declare_command
 from asperity.cli.options import plugin_option
 from asperity.cli.output import Outputs, force_option, is_confirmed, output_options, progress_bar
-from asperity.cli.plugins import load_plugin_files, plugin_files
+from asperity.cli.plugins import has_plugins, load_plugin_files, plugin_files
 from asperity.core.errors import ParameterError, escape_unprintable
 from asperity.core.files import check_output
 from asperity.core.processes import available_cores
@@ -264,7 +264,7 @@ def _parse_vary(texts: tuple[str, ...]) -> dict[str, str]:
 def _prepare_worker() -> bytes:
     """Return the pickled function that loads the plugins; empty without any."""
     files = tuple([str(Path(file).resolve()) for file in plugin_files()])
-    return b"" if not files else pickle.dumps(partial(load_plugin_files, files))
+    return pickle.dumps(partial(load_plugin_files, files)) if has_plugins() else b""
 
 
 def _confirm_many_cases(plan: SweepPlan, processes: int) -> None:

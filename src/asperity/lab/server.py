@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import json
-import os
-import signal
 import socket
 import time
 from collections.abc import Callable, Coroutine, Sequence
@@ -20,6 +18,12 @@ from websockets.exceptions import ConnectionClosed
 
 from asperity.core.errors import ParameterError
 from asperity.core.files import to_plain_data
+from asperity.core.platform.process_control import (
+    STOP_NOW_SIGNALS,
+    STOP_SIGNALS,
+    SUSPEND_SIGNALS,
+    suspend_this_process,
+)
 from asperity.devices import device_names
 from asperity.frictional import accepts_friction
 from asperity.lab import background, messages
@@ -412,7 +416,7 @@ def _handle_signals(session: Session, stopped: asyncio.Event) -> None:
 
     def suspend() -> None:
         if session.is_ended:
-            os.kill(os.getpid(), signal.SIGSTOP)
+            suspend_this_process()
         else:
             events.call_later(0.01, suspend)
 
@@ -420,10 +424,9 @@ def _handle_signals(session: Session, stopped: asyncio.Event) -> None:
         session.release_force("stopped by Ctrl-Z; Start runs it again")
         suspend()
 
-    handlers: dict[int, Callable[[], None]] = dict.fromkeys(
-        (signal.SIGINT, signal.SIGTERM, signal.SIGHUP), stop
-    )
-    handlers |= {signal.SIGQUIT: partial(stop, now=True), signal.SIGTSTP: release_and_suspend}
+    handlers: dict[int, Callable[[], None]] = dict.fromkeys(STOP_SIGNALS, stop)
+    handlers |= dict.fromkeys(STOP_NOW_SIGNALS, partial(stop, now=True))
+    handlers |= dict.fromkeys(SUSPEND_SIGNALS, release_and_suspend)
     for number, handler in handlers.items():
         # Without support by system or thread, Ctrl-C cancels the task.
         with suppress(NotImplementedError, RuntimeError, ValueError):

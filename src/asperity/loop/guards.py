@@ -1,7 +1,4 @@
-"""The clock of a loop, and the guards between law and motor: reach, depth, ramp, force, timing.
-
-The clock is that of the system, or none for a loop that runs unpaced. It counts the time in which
-the machine sleeps, so that the sample after it is late.
+"""The guards of a loop between law and motor: reach, depth, ramp, force, timing.
 
 The passivity observer sums the energy given to the hand, E += f·Δp, with the force held over the
 sample and the measured displacement. For a force that is held from sample to sample this is the
@@ -19,7 +16,7 @@ Reference:
 import math
 from typing import NamedTuple
 
-from asperity.core.compiled import FloatArray, IntArray, Kernels, call_address, load_acquire
+from asperity.core.compiled import FloatArray, Kernels, load_acquire
 from asperity.kernels.probe_functions import probe_depth
 from asperity.kernels.tick import ServoSettings, ServoState
 from asperity.loop.interface import (
@@ -54,8 +51,6 @@ from asperity.loop.shared_trace import (
 KERNELS = Kernels(
     provides=(
         "check_sample",
-        "clock_now",
-        "clock_wait_until",
         "finish_timing",
         "guard_force",
         "read_position",
@@ -64,52 +59,8 @@ KERNELS = Kernels(
         "requested_end",
         "write_force",
     ),
-    native=("call_address", "load_acquire"),
+    native=("load_acquire",),
 )
-
-# Linux: the monotonic clock that goes on while the machine sleeps, absolute times, and the answer
-# of a wait that a signal interrupted.
-CLOCK_BOOTTIME = 7
-TIMER_ABSTIME = 1
-EINTR = 4
-NANOSECONDS = 1_000_000_000
-
-
-class Clock(NamedTuple):
-    """A clock.
-
-    Attributes:
-        gettime: address of ``clock_gettime``; 0 for no clock, whose time is always the due time.
-        nanosleep: address of ``clock_nanosleep``.
-        timespec: seconds and nanoseconds, as both functions take them (2,).
-        speed: seconds of this clock in one of the system's; above 1 for tests alone.
-    """
-
-    gettime: int
-    nanosleep: int
-    timespec: IntArray
-    speed: int = 1
-
-
-def clock_now(due: int, clock: Clock) -> int:
-    """Return the time [ns]."""
-    if clock.gettime == 0:
-        return due
-    call_address(clock.gettime, CLOCK_BOOTTIME, clock.timespec)
-    return (int(clock.timespec[0]) * NANOSECONDS + int(clock.timespec[1])) * clock.speed
-
-
-def clock_wait_until(due: int, clock: Clock) -> int:
-    """Wait until a time [ns]; return the time after the wait [ns]."""
-    if clock.gettime == 0:
-        return due
-    system_due = due // clock.speed
-    answer = EINTR
-    while answer == EINTR:
-        clock.timespec[0] = system_due // NANOSECONDS
-        clock.timespec[1] = system_due % NANOSECONDS
-        answer = call_address(clock.nanosleep, CLOCK_BOOTTIME, TIMER_ABSTIME, clock.timespec, 0)
-    return clock_now(due, clock)
 
 
 class LoopLimits(NamedTuple):

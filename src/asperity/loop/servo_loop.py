@@ -6,14 +6,12 @@ within the same sample.
 """
 
 from asperity.core.compiled import FloatArray, Kernels, local_array
+from asperity.core.platform.clock_interface import Clock, clock_now, clock_wait_until
 from asperity.kernels.probe_functions import probe_in_contact
 from asperity.kernels.tick import ServoSettings, servo_tick, state_before_tick
 from asperity.loop.guards import (
-    Clock,
     Guards,
     check_sample,
-    clock_now,
-    clock_wait_until,
     finish_timing,
     guard_force,
     read_position,

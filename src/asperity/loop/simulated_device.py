@@ -61,7 +61,8 @@ class SimulatedDevice(NamedTuple):
         plant: record of the body.
         position_step: step of the device's own encoders [m]; 0 for none.
         force_step: step of the device's own force [N]; 0 for none.
-        clock: clock of an ``anchor_segment`` that waits, see :mod:`asperity.loop.guards`.
+        clock: :class:`~asperity.core.platform.clock_interface.Clock` of an ``anchor_segment`` that
+            waits.
     """
 
     x: FloatArray

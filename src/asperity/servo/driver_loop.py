@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import ctypes
 import math
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from asperity.contacts.warm_start import BUDGET, POINT_COUNT, UNLIMITED, new_warm_start
 from asperity.core.checks import FloatArray
+from asperity.core.platform.clock_interface import Clock
+from asperity.core.platform.clocks import clock_module
 from asperity.kernels.fuse import load_fused, source_on_texture
 from asperity.kernels.tick import ServoState
 from asperity.loop import guards, servo_loop, shared_trace
-from asperity.loop.guards import Clock, Guards, LoopLimits
+from asperity.loop.guards import Guards, LoopLimits
 from asperity.loop.interface import NO_END, LoopState
 from asperity.loop.shared_trace import SharedBlock
 from asperity.servo.driver import Driver
@@ -49,7 +48,7 @@ def loop_parts() -> tuple[Any, ...]:
     """Return the modules of the loop's parts but the device."""
     from asperity.kernels import tick
 
-    return tick, guards, shared_trace
+    return tick, clock_module(), guards, shared_trace
 
 
 def build_program(surface: Surface, driver: Driver) -> LoopProgram:
@@ -103,24 +102,6 @@ def loop_limits(
         program.max_depth,
         safety.beyond_depth == "fault",
     )
-
-
-def function_address(function: Any) -> int:
-    """Return the address of a C function."""
-    return int(ctypes.cast(function, ctypes.c_void_p).value or 0)
-
-
-def system_clock(speed: int = 1) -> Clock:
-    """Return the system's clock, or a faster one."""
-    library = ctypes.CDLL(None)
-    gettime = function_address(library.clock_gettime)
-    sleep = function_address(library.clock_nanosleep)
-    return Clock(gettime, sleep, np.zeros(2, np.int64), speed)
-
-
-def no_clock() -> Clock:
-    """Return a clock whose time is always that of the next due sample."""
-    return Clock(0, 0, np.zeros(2, np.int64))
 
 
 class DriverLoop:

@@ -2,60 +2,58 @@
 
 from __future__ import annotations
 
-import ctypes
-import fcntl
-import hashlib
 import importlib.util
 import os
 import pickle
-import resource
-import signal
 import sys
-import tempfile
 import threading
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
-from pathlib import Path
 from typing import Any
 
 from asperity.core.errors import AsperityError, ParameterError
+from asperity.core.platform import lateness
+from asperity.core.platform.clocks import clock_module, no_clock, system_clock
+from asperity.core.platform.device_locks import hold_lock
+from asperity.core.platform.priority import request_realtime_priority
+from asperity.core.platform.process_control import (
+    leave_terminal,
+    memory_file_of_parent,
+    processor_time_left,
+)
 from asperity.core.processes import end_with_parent
+from asperity.kernels.fuse import fuse_module
 from asperity.servo.driver import Driver
-from asperity.servo.driver_loop import DriverLoop, LoopProgram, no_clock, system_clock
+from asperity.servo.driver_loop import DriverLoop, LoopProgram
 from asperity.servo.loop_memory import EndReason, LoopMemory
 from asperity.servo.safety import Safety
 from asperity.simulation.servo import Servo
 
-PRIORITY = 80
-"""Real-time priority of the loop, 1 to 99: above user programs, below kernel threads."""
-# Linux: lock all current and future pages; set the timer slack [ns].
-_LOCK_ALL_PAGES = 1 | 2
-_SET_TIMER_SLACK = 29
+LATENESS_WAITS = 100
+"""Waits that are measured where a loop has no real-time priority."""
 
 
-def request_realtime_priority() -> tuple[str, ...]:
-    """Request real-time priority and locked memory for this thread.
+def realtime_notes(period: float) -> tuple[str, ...]:
+    """Request real-time priority for a loop with a period [s]; return what is not permitted.
 
-    Returns:
-        What was not permitted, in sentences; nothing if all was.
+    Without the priority, the notes say by how much waits ended late.
     """
-    notes = []
-    library = ctypes.CDLL(None, use_errno=True)
-    library.prctl(_SET_TIMER_SLACK, ctypes.c_ulong(1), 0, 0, 0)
-    try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
-    except OSError:
-        notes.append(
-            "Real-time priority is not allowed: samples may be late when the machine is busy"
-            " (allow it by 'rtprio' in /etc/security/limits.conf)"
-        )
-    unlimited = resource.getrlimit(resource.RLIMIT_MEMLOCK)[0] == resource.RLIM_INFINITY
-    if not (unlimited or os.geteuid() == 0) or library.mlockall(_LOCK_ALL_PAGES) != 0:
-        notes.append("Memory may be paged out ('memlock' in the same file forbids it)")
-    return tuple(notes)
+    priority = request_realtime_priority(period)
+    if priority.is_realtime:
+        return priority.notes
+    worst = measure_lateness(period, LATENESS_WAITS)
+    words = f"{LATENESS_WAITS} waits of {1e3 * period:g} ms: late by up to {1e3 * worst:.2g} ms"
+    return (*priority.notes, f"Measured without real-time priority, {words}")
+
+
+def measure_lateness(period: float, count: int) -> float:
+    """Return by how much the worst of a number of waits for a period [s] ended late [s]."""
+    loops = fuse_module(lateness, clock_module())
+    worst: int = loops.measure_lateness(system_clock(), round(1e9 * period), count)
+    return 1e-9 * worst
 
 
 ModuleFiles = Sequence[tuple[str, str]]
@@ -122,7 +120,7 @@ class _LoopServer:
         device = driver.open()
         try:
             threading.Thread(target=self._receive_programs, daemon=True).start()
-            self._connection.send(("ready", request_realtime_priority()))
+            self._connection.send(("ready", realtime_notes(self._job.servo.period)))
             cause = EndReason.SWAP
             code = 0
             while cause is EndReason.SWAP:
@@ -161,14 +159,11 @@ MAX_CALL_TIME = 10.0
 def _leave_to_supervisor(memory: LoopMemory) -> None:
     """Let the supervising process decide how the loop ends, and end with it.
 
-    In a session of its own, the process gets no signals of the terminal or to the process group,
-    not even a SIGKILL or SIGSTOP. All signals that can be blocked are: those of limits, timers and
-    profilers too. If the supervising process dies, the force is released, and by a ramp shortly
-    before the limit of processor time.
+    All signals that can be blocked are: those of limits, timers and profilers too. If the
+    supervising process dies, the force is released, and by a ramp shortly before the limit of
+    processor time.
     """
-    with suppress(OSError):  # it has a session already
-        os.setsid()
-    signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())  # threads inherit it
+    leave_terminal()
 
     def release() -> None:
         memory.request_stop(now=True)
@@ -186,11 +181,10 @@ def _leave_to_supervisor(memory: LoopMemory) -> None:
         is_near = False
         while not is_near:
             time.sleep(_CPU_WATCH_PERIOD)
-            limit = resource.getrlimit(resource.RLIMIT_CPU)[1]
-            is_near = 0 <= limit <= time.process_time() + _CPU_MARGIN
+            is_near = processor_time_left() <= _CPU_MARGIN
         memory.request_stop()
 
-    memory_of_parent = Path(f"/proc/{os.getppid()}/statm")
+    memory_of_parent = memory_file_of_parent()
     threading.Thread(target=watch_memory, daemon=True).start()
     threading.Thread(target=watch_processor_time, daemon=True).start()
     end_with_parent(release)
@@ -232,42 +226,9 @@ def lock_device(driver: Driver) -> Iterator[None]:
     names = [kind, f"{kind}:{device}"] if device else [kind]
     with ExitStack() as stack:
         for name in names if driver.has_moving_handle else ():
-            shared = name == kind and bool(device)
-            file = _open_lock(name)
-            if file is not None:
-                stack.callback(os.close, file)
-                _lock(file, shared=shared)
+            try:
+                stack.enter_context(hold_lock(name, shared=name == kind and bool(device)))
+            except BlockingIOError as user:
+                words = f"finds the device in use by process {user}"
+                raise ParameterError("driver", words) from None
         yield
-
-
-def _open_lock(name: str) -> int | None:
-    digest = hashlib.sha256(name.encode()).hexdigest()[:16]
-    path = Path(tempfile.gettempdir(), f"asperity-{digest}.lock")
-    # A file of another user must not be opened with O_CREAT in a folder that all may write.
-    for flags in (0, os.O_CREAT | os.O_EXCL, 0):
-        with suppress(OSError):
-            file = os.open(path, os.O_RDWR | os.O_NOFOLLOW | flags, 0o666)
-            with suppress(OSError):
-                os.fchmod(file, 0o666)
-            return file
-    return None
-
-
-def _lock(file: int, *, shared: bool) -> None:
-    try:
-        fcntl.flock(file, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
-    except OSError:
-        user = os.pread(file, 1000, 0).decode(errors="replace")
-        raise ParameterError("driver", f"finds the device in use by process {user}") from None
-    os.ftruncate(file, 0)
-    os.pwrite(file, _supervisor().encode(errors="replace"), 0)
-
-
-def _supervisor() -> str:
-    """Return number and command of the process that supervises this one."""
-    number = os.getppid()
-    command = b""
-    with suppress(OSError):
-        command = Path(f"/proc/{number}/cmdline").read_bytes()
-    words = " ".join(command.decode(errors="replace").split("\0")).strip()
-    return f"{number} ({words})" if words else str(number)

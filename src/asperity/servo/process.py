@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 import pickle
-import signal
 import sys
 import threading
 import time
@@ -21,6 +20,7 @@ from typing import Any, Self
 from asperity.core.checks import FloatArray
 from asperity.core.errors import AsperityError, ParameterError, print_message
 from asperity.core.files import to_plain_data
+from asperity.core.platform.process_control import resume_process
 from asperity.devices import Device
 from asperity.loop.interface import NO_END
 from asperity.loop.shared_trace import COLUMNS
@@ -285,8 +285,7 @@ class ServoProcess:
             count = self.memory.row_count
             if count == previous_count:
                 # If it is suspended: its next sample is late, and releases the force.
-                with suppress(OSError):
-                    os.kill(self.process.pid or os.getpid(), signal.SIGCONT)
+                resume_process(self.process.pid or os.getpid())
             previous_count = count
 
     def _receive(self, timeout: float = 0.0) -> None:

@@ -14,10 +14,11 @@ from bench.stand_ins.fakes import compile_library
 from tests.servo.python_device import SURFACE
 
 from asperity.core.errors import ParameterError
-from asperity.loop.guards import Clock
+from asperity.core.platform.clock_interface import Clock
+from asperity.core.platform.clocks import no_clock
 from asperity.recording.recording import open_recording
 from asperity.servo.driver import RIGHT, TOWARDS, UP, Driver, Frame, surface_frame
-from asperity.servo.driver_loop import DriverLoop, LoopProgram, build_program, no_clock
+from asperity.servo.driver_loop import DriverLoop, LoopProgram, build_program
 from asperity.servo.drivers.driver_registry import hardware_driver
 from asperity.servo.drivers.force_dimension import LIBRARY, ForceDimensionDriver
 from asperity.servo.drivers.library import LibraryDriver

@@ -14,7 +14,7 @@ from tests.servo.drivers.test_haply import wait_until, write_force
 from tests.servo.python_device import SURFACE
 
 from asperity.core.errors import ParameterError
-from asperity.servo.driver_loop import system_clock
+from asperity.core.platform.clocks import system_clock
 from asperity.servo.drivers import threaded as exchanged
 from asperity.servo.drivers.driver_registry import hardware_driver
 from asperity.servo.drivers.open_haptics import LIBRARY, OpenHapticsDriver

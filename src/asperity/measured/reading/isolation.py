@@ -8,7 +8,6 @@ readers run in the calling process, which saves the start of another one.
 from __future__ import annotations
 
 import contextlib
-import math
 import os
 import pickle
 import signal
@@ -21,6 +20,7 @@ from collections.abc import Iterator
 from typing import IO, Any
 
 from asperity.core.errors import ParameterError, SurfaceFileError
+from asperity.core.platform.process_control import PROCESSOR_TIME_SIGNALS, limit_process
 from asperity.core.processes import SINGLE_THREADED
 from asperity.measured.reader import RawSurface, ReadFunction, ReadingOptions, SurfaceFile
 
@@ -52,7 +52,7 @@ def read_isolated(
     memory = MEMORY_LIMIT + _BYTES_PER_BYTE * size
     with tempfile.TemporaryFile() as output:
         code = run_subprocess(read, file, options, (seconds, memory), output)
-        if code is None or -code == getattr(signal, "SIGXCPU", None):
+        if code is None or -code in PROCESSOR_TIME_SIGNALS:
             raise _limit_error(file, f"{seconds:.0f} s")
         if code or not output.tell():
             end = f"signal {signal.Signals(-code).name}" if code < 0 else f"code {code}"
@@ -123,29 +123,13 @@ def main() -> None:
     threading.Thread(target=_exit_with_parent, daemon=True).start()
     output = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # discards what a library prints
-    set_limits(*limits)
+    limit_process(*limits)
     write_result(read, SurfaceFile.open(path), options, output)
 
 
 def _exit_with_parent() -> None:
     os.read(0, 1)  # returns when the parent has ended, for whatever reason
     os._exit(1)
-
-
-def set_limits(seconds: float, memory: int) -> None:
-    """Limit processor time and memory of this process, where the system supports it."""
-    try:
-        import resource
-    except ModuleNotFoundError:  # the parent's clock is the only limit
-        return
-    # RLIMIT_DATA rather than RLIMIT_AS: mapped libraries do not count.
-    for name, wanted in {"DATA": memory, "CPU": math.ceil(seconds), "CORE": 0}.items():
-        limit = wanted
-        kind = getattr(resource, f"RLIMIT_{name}")
-        hard = resource.getrlimit(kind)[1]
-        if hard >= 0:
-            limit = min(limit, hard)
-        resource.setrlimit(kind, (limit, hard))
 
 
 def write_result(

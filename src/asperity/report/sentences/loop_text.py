@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from asperity.core.errors import escape_unprintable
 from asperity.core.units import count_text, format_quantity
 from asperity.devices import Device
 from asperity.recording.recording import Recording
@@ -13,6 +14,7 @@ from asperity.recording.replay import Replay
 from asperity.report.sentences.number_text import energy_text
 from asperity.report.sentences.surface_text import describe_texture
 from asperity.report.sentences.texts import sentence
+from asperity.scene.doctor import MachineReport
 from asperity.scene.setup import Setup
 from asperity.servo.calibration.calibrator import Calibration
 from asperity.servo.calibration.measured_device import effective_resolution, format_uncertainty
@@ -344,3 +346,27 @@ def limited_lines(statistics: LoopStatistics) -> list[str]:
         "{} samples below max_depth, outside the analysed region": statistics.too_deep,
     }
     return [text.format(count) for text, count in texts.items() if count]
+
+
+def machine_lines(report: MachineReport) -> list[str]:
+    """Return system, versions, timing of the loop, drivers and cache, in lines."""
+    versions = [f"{name} {number}" for name, number in report.versions.items()]
+    loop = [f"Simulated loop: it did not run: {report.failure}"]
+    if report.statistics is not None:
+        loop = ["Simulated loop at 1 kHz:", *_indent(timing_lines(report.statistics))]
+        loop += _indent(report.notes or ["Real-time priority is granted"])
+    drivers = [f"{driver.name}: {driver.failure or 'found'}" for driver in report.drivers]
+    size = f"{report.cache_size / 1e6:.1f} MB of at most {report.cache_limit / 1e6:.1f} MB"
+    return [
+        f"System: {report.system}, {count_text(report.cores, 'core')}",
+        f"Versions: {', '.join(versions)}",
+        f"Installed plugins: {', '.join(report.plugins) or 'none'}",
+        *loop,
+        "Drivers:",
+        *_indent(drivers),
+        f"Cache: {escape_unprintable(report.cache_folder)}, {size}",
+    ]
+
+
+def _indent(lines: list[str] | tuple[str, ...]) -> list[str]:
+    return [f"  {line}" for line in lines]

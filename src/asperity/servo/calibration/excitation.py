@@ -20,12 +20,13 @@ import numpy as np
 
 from asperity.contacts.warm_start import FIRST_POINT, POINT_COUNT
 from asperity.core.compiled import FloatArray, Kernels, local_array
+from asperity.core.platform.clocks import no_clock
 from asperity.devices.device import Axis
 from asperity.kernels.fuse import module_source
 from asperity.loop import servo_loop
 from asperity.loop.shared_trace import COLUMNS
 from asperity.servo.driver import Driver, Frame
-from asperity.servo.driver_loop import DriverLoop, LoopProgram, loop_parts, no_clock
+from asperity.servo.driver_loop import DriverLoop, LoopProgram, loop_parts
 from asperity.servo.loop_memory import (
     FAULT_DESCRIPTIONS,
     FAULT_SAMPLES,

@@ -15,6 +15,7 @@ from typing import ClassVar, NamedTuple
 
 from asperity.core.compiled import FloatArray, Kernels, call_address, local_array
 from asperity.core.errors import ParameterError
+from asperity.core.platform.system import LibraryNames, System
 from asperity.servo import driver
 from asperity.servo.driver import RIGHT, TOWARDS, UP, Driver, DriverKind
 from asperity.servo.drivers.library import function_addresses, load_library
@@ -28,7 +29,11 @@ WATCHDOG = 255
 
 The loop ends before, when it is late for 20 ms.
 """
-_LIBRARY_NAMES = ("libdhd.so.3", "libdhd.so", "dhd64.dll")
+_LIBRARY_NAMES: LibraryNames = {
+    System.LINUX: ("libdhd.so.3", "libdhd.so"),
+    System.WINDOWS: ("dhd64.dll",),
+    System.MACOS: ("libdhd.dylib",),
+}
 _FUNCTIONS = (
     "dhdGetDeviceCount",
     "dhdOpenID",

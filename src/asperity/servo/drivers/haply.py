@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import json
 import os
-import select
+import selectors
 import sys
 import threading
-import time
 from collections import deque
 from collections.abc import Sequence
 from contextlib import suppress
@@ -19,12 +18,13 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 from asperity.core.errors import ParameterError
-from asperity.loop.guards import CLOCK_BOOTTIME
+from asperity.core.platform.clocks import system_time
+from asperity.core.platform.priority import request_thread_priority
+from asperity.core.platform.wakeup import Wakeup
 from asperity.servo.driver import AWAY, RIGHT, UP, DriverKind
 from asperity.servo.drivers import threaded
 from asperity.servo.drivers.threaded import FORCE_TIMEOUT, LOOP_SILENT, STALE, ThreadedDevice
 from asperity.servo.drivers.websocket_client import ProtocolError, WebSocketClient
-from asperity.servo.loop_process import PRIORITY
 
 CONNECTION_LOST = 3
 INVALID_STATE = 4
@@ -79,11 +79,6 @@ def force_message(device: str, force: Force) -> str:
     return json.dumps({"inverse3": [{"device_id": device, "commands": commands}]})
 
 
-def _system_time() -> int:
-    """Return the system's time as the loop reads it [ns]."""
-    return time.clock_gettime_ns(CLOCK_BOOTTIME)
-
-
 class HaplyThread(threading.Thread):
     """The thread of a device; it ends with the connection, or by :meth:`stop`.
 
@@ -94,7 +89,7 @@ class HaplyThread(threading.Thread):
 
     Attributes:
         buffer: buffer between this thread and the loop.
-        wakeup: file that wakes this thread when a byte is written to it.
+        wakeup: wakes this thread.
         reason: what failed, in words.
     """
 
@@ -104,9 +99,7 @@ class HaplyThread(threading.Thread):
         self.reason = ""
         self._connection = connection
         self._device_id = device
-        self._wakeup_reader, self.wakeup = os.pipe()
-        for end in (self._wakeup_reader, self.wakeup):
-            os.set_blocking(end, False)
+        self.wakeup = Wakeup()
         self._pending: deque[int] = deque()
         self._last_force = _ZERO_FORCE
         self._last_force_time = 0
@@ -114,8 +107,7 @@ class HaplyThread(threading.Thread):
 
     def run(self) -> None:
         """Exchange until a failure or :meth:`stop`; the last message is no force."""
-        with suppress(OSError, AttributeError):  # not permitted, or not supported
-            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY - 1))
+        request_thread_priority(below=1)
         try:
             self._exchange()
         except OSError as error:
@@ -129,25 +121,23 @@ class HaplyThread(threading.Thread):
     def stop(self, timeout: float) -> None:
         """End the thread: the service receives no force, and has time to answer [s]."""
         self._stopping = True
-        with suppress(BlockingIOError):  # the pipe is full: it wakes the thread
-            os.write(self.wakeup, b"\0")
+        self.wakeup.wake()
         self.join(timeout)
         self._connection.close()
-        os.close(self._wakeup_reader)
-        os.close(self.wakeup)
+        self.wakeup.close()
 
     def _exchange(self) -> None:
-        poller = select.poll()
-        poller.register(self._connection, select.POLLIN)
-        poller.register(self._wakeup_reader, select.POLLIN)
-        self._send(_ZERO_FORCE)
-        while not self._stopping and not self.reason:
-            ready = [file for file, _event in poller.poll(1e3 * KEEP_ALIVE)]
-            if self._wakeup_reader in ready:
-                os.read(self._wakeup_reader, 1 << 16)
-            if self._connection.fileno() in ready:
-                self._process_messages(self._connection.receive())
-            self._send_newest_force(resend=not ready)
+        with selectors.DefaultSelector() as selector:
+            for file in (self._connection, self.wakeup.reader):
+                selector.register(file, selectors.EVENT_READ)
+            self._send(_ZERO_FORCE)
+            while not self._stopping and not self.reason:
+                ready = [key.fileobj for key, _event in selector.select(KEEP_ALIVE)]
+                if self.wakeup.reader in ready:
+                    self.wakeup.clear()
+                if self._connection in ready:
+                    self._process_messages(self._connection.receive())
+                self._send_newest_force(resend=not ready)
 
     def _process_messages(self, messages: Sequence[bytes]) -> None:
         """Push the positions of messages to the loop."""
@@ -168,7 +158,7 @@ class HaplyThread(threading.Thread):
         x, y, z, command_time = self.buffer.latest_force()
         force = (x, y, z)
         timeout = self.buffer.ring.words[FORCE_TIMEOUT]
-        if force != _ZERO_FORCE and _system_time() - command_time > timeout:
+        if force != _ZERO_FORCE and system_time() - command_time > timeout:
             self._fail(LOOP_SILENT, "its force was released")
             return
         is_new = command_time != self._last_force_time
@@ -178,7 +168,7 @@ class HaplyThread(threading.Thread):
             self._send(force)
 
     def _send(self, force: Force) -> None:
-        self._pending.append(_system_time())
+        self._pending.append(system_time())
         self._connection.send(force_message(self._device_id, force))
         self._last_force = force
 
@@ -215,6 +205,10 @@ class HaplyDriver(threaded.ThreadedDriver):
     def device_name(self) -> str:
         """Name of the device for its lock."""
         return self.device.lower()
+
+    def check_library(self) -> None:
+        """Connect to the service."""
+        _connect().close()
 
     def open(self) -> ThreadedDevice:
         """Find the device, start the thread, and wait for the first state."""

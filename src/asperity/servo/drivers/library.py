@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import ctypes
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar, NamedTuple
 
 from asperity.core.compiled import FloatArray, Kernels, call_address, local_array
 from asperity.core.errors import ParameterError
+from asperity.core.platform.system import LibraryNames, find_system, library_file
 from asperity.servo.driver import AWAY, IDENTITY_FRAME, RIGHT, UP, Driver, DriverKind, Frame
 
 KERNELS = Kernels(provides=("device_read", "device_write"), native=("call_address",))
@@ -29,11 +30,11 @@ _WRONG_ARCHITECTURE = (
 )
 
 
-def load_library(names: Sequence[str], variable: str, install: str) -> ctypes.CDLL:
+def load_library(names: Sequence[str] | LibraryNames, variable: str, install: str) -> ctypes.CDLL:
     """Return a shared library.
 
     Args:
-        names: possible names on the system.
+        names: possible names or the path of it, or possible names by system.
         variable: environment variable of its path, which takes precedence.
         install: what to install if it is missing.
 
@@ -41,10 +42,12 @@ def load_library(names: Sequence[str], variable: str, install: str) -> ctypes.CD
         ParameterError: if it is not found, or built for another machine.
     """
     path = os.environ.get(variable)
+    if isinstance(names, Mapping):
+        names = names.get(find_system(), ())
     reasons = []
     for name in [path] if path else names:
         try:
-            return ctypes.CDLL(name)
+            return ctypes.CDLL(library_file(name))
         except OSError as error:
             reasons.append(str(error))
     for reason in reasons:

@@ -26,9 +26,11 @@ from asperity.core.compiled import (
     store_release,
 )
 from asperity.core.errors import ParameterError
+from asperity.core.platform.clock_interface import UNIT, read_time
+from asperity.core.platform.clocks import clock_module, system_clock
+from asperity.core.platform.system import LibraryNames, System, find_system
 from asperity.kernels.fuse import fuse_module
 from asperity.servo.driver import RIGHT, TOWARDS, UP, DriverKind, Frame, surface_frame
-from asperity.servo.driver_loop import system_clock
 from asperity.servo.drivers import threaded
 from asperity.servo.drivers.library import function_addresses, load_library
 from asperity.servo.drivers.threaded import (
@@ -52,23 +54,26 @@ from asperity.servo.drivers.threaded import (
 KERNELS = Kernels(loops=("haptic_frame",), native=("call_address", "store_release"))
 
 # Words of the driver: number of frames, addresses of functions, handle of the device, address of
-# the ring buffer, and the time as the system writes it.
+# the ring buffer, and the words of the clock.
 FRAMES, BEGIN_FRAME, END_FRAME, GET_DOUBLE, SET_DOUBLE = range(DRIVER_WORDS, DRIVER_WORDS + 5)
 GET_ERROR, GETTIME, HANDLE, BUFFER_ADDRESS = range(DRIVER_WORDS + 5, DRIVER_WORDS + 9)
-TIME = BUFFER_ADDRESS + 1
+TIME = BUFFER_ADDRESS + 1  # and two more
+ERROR, RETURNS_BY_ADDRESS = range(TIME + 3, TIME + 5)
 # Constants of hdDefines.h and hdScheduler.h.
 CURRENT_POSITION = 0x2050
 CURRENT_FORCE = 0x2700
 CALLBACK_CONTINUE = 1
-_MONOTONIC = 1
-_NANOSECONDS = 1_000_000_000
 
 AXES = (RIGHT, UP, TOWARDS)
 MILLIMETRE = 1e-3
 LYING_FRAME = surface_frame(AXES, "lying", (0.0, 0.0, 0.0), MILLIMETRE)
 LIBRARY = "ASPERITY_LIBHD"
 """Environment variable of the path of the library."""
-_LIBRARY_NAMES = ("libHD.so", "libHD.so.3.4", "hd.dll")
+_LIBRARY_NAMES: LibraryNames = {
+    System.LINUX: ("libHD.so", "libHD.so.3.4"),
+    System.WINDOWS: ("hd.dll",),
+    System.MACOS: ("/Library/Frameworks/HD.framework/HD",),
+}
 _FRAME_FUNCTIONS = ("hdBeginFrame", "hdEndFrame", "hdGetDoublev", "hdSetDoublev", "hdGetError")
 _FUNCTIONS = (
     *_FRAME_FUNCTIONS,
@@ -88,6 +93,7 @@ _NO_HANDLE = 0xFFFFFFFF
 _FORCE_OUTPUT = 0x4000
 _CALIBRATED = 0x5000
 _MAX_PRIORITY = 0xFFFF  # the greatest priority of a callback
+_LOW_HALF = 0xFFFFFFFF  # of a word: the first number of a record
 _CLOSED = -1  # failure code of a closed device
 _RELEASE_TIMEOUT = 0.05  # [s] for the scheduler to release the force
 
@@ -96,7 +102,8 @@ def haptic_frame(words: IntArray, numbers: FloatArray) -> int:
     """Push the position of the handle, and apply the force of the loop.
 
     The force is zero after any failure, and if the loop does not renew it.
-    ``hdGetError`` returns a record, whose first number is the error, in a register.
+    ``hdGetError`` returns a record of 12 bytes, whose first number is the error: in a register, or
+    on Windows in the memory whose address is passed.
 
     Args:
         words: words of the ring buffer.
@@ -107,8 +114,7 @@ def haptic_frame(words: IntArray, numbers: FloatArray) -> int:
     """
     place = local_array((3,))
     force = local_array((3,))
-    call_address(words[GETTIME], _MONOTONIC, words[BUFFER_ADDRESS] + 8 * TIME)
-    now = words[TIME] * _NANOSECONDS + words[TIME + 1]
+    now = read_time(words[GETTIME], words[BUFFER_ADDRESS] + 8 * TIME, words, TIME)
     wanted = latest_row(words, numbers, FORCES)
     is_nonzero = wanted.x != 0.0 or wanted.y != 0.0 or wanted.z != 0.0
     if is_nonzero and now - wanted.time > words[FORCE_TIMEOUT]:
@@ -124,7 +130,10 @@ def haptic_frame(words: IntArray, numbers: FloatArray) -> int:
     call_address(words[GET_DOUBLE], CURRENT_POSITION, place)
     call_address(words[SET_DOUBLE], CURRENT_FORCE, force)
     call_address(words[END_FRAME], words[HANDLE])
-    wrong = call_address(words[GET_ERROR])
+    words[ERROR] = 0
+    wrong = call_address(words[GET_ERROR], words[BUFFER_ADDRESS] + 8 * ERROR)
+    if words[RETURNS_BY_ADDRESS] != 0:
+        wrong = words[ERROR] & _LOW_HALF
     if wrong != 0:
         set_failure(words, wrong)
     else:
@@ -222,9 +231,14 @@ class OpenHapticsDriver(ThreadedDriver):
     def _create_buffer(self, library: ctypes.CDLL) -> RingBuffer:
         """Return a ring buffer with the addresses that the callback needs."""
         buffer = new_ring_buffer(self.force_timeout)
-        addresses = [*function_addresses(library, *_FRAME_FUNCTIONS), system_clock().gettime]
-        buffer.words[BEGIN_FRAME : BEGIN_FRAME + len(addresses)] = addresses
-        buffer.words[HANDLE], buffer.words[BUFFER_ADDRESS] = self._handle, buffer.words.ctypes.data
+        clock = system_clock()
+        addresses = [*function_addresses(library, *_FRAME_FUNCTIONS), clock.gettime]
+        words = buffer.words
+        words[BEGIN_FRAME : BEGIN_FRAME + len(addresses)] = addresses
+        words[HANDLE] = self._handle
+        words[BUFFER_ADDRESS] = words.ctypes.data
+        words[TIME + UNIT] = clock.words[UNIT]
+        words[RETURNS_BY_ADDRESS] = find_system() is System.WINDOWS
         return buffer
 
     def _failure(self, library: ctypes.CDLL) -> str:
@@ -237,7 +251,7 @@ def _callback() -> Any:
     """Return the compiled callback of the scheduler: no interpreter runs in its thread."""
     from numba import carray, cfunc, types  # type: ignore[attr-defined]  # it has no stubs
 
-    frame = fuse_module(sys.modules[__name__], threaded).haptic_frame
+    frame = fuse_module(sys.modules[__name__], threaded, clock_module()).haptic_frame
 
     @cfunc(types.uint32(types.voidptr))
     def callback(memory: Any) -> Any:

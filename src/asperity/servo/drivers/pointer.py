@@ -16,7 +16,6 @@ import sys
 import tempfile
 from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
 from types import ModuleType
 from typing import Any, ClassVar, Self
 
@@ -24,17 +23,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from asperity.core.checks import FloatArray, check_array, check_real
-from asperity.core.compiled import Kernels, call_address
+from asperity.core.compiled import Kernels
 from asperity.core.errors import ParameterError
-from asperity.loop.guards import CLOCK_BOOTTIME
+from asperity.core.platform.clock_interface import clock_now, clock_wait_until
+from asperity.core.platform.clocks import no_clock, system_clock
+from asperity.core.platform.system import memory_folder
 from asperity.loop.simulated_device import FIRST_SAMPLE, SAMPLES, SimulatedDevice
-from asperity.servo.driver_loop import no_clock, system_clock
 from asperity.servo.drivers.simulated import SimulatedDriver, simulated_driver
 from asperity.simulation.hands import Hand, Stationary
 from asperity.simulation.plants import Plant
 from asperity.simulation.servo import Servo
 
-KERNELS = Kernels(provides=("anchor_segment",), native=("call_address",))
+KERNELS = Kernels(provides=("anchor_segment",))
 
 # Rows of the memory: the pointer writes the first four, the loop the next three, a following loop
 # the last. The request is the point TARGET + COSINE cos(angle) + SINE sin(angle) [m].
@@ -63,7 +63,6 @@ MAX_LAG = 2000
 """Samples behind the other loop, beyond which a following loop leaves samples out."""
 
 _ROW_COUNT = HEADER_ROWS + HISTORY_SAMPLES
-_MEMORY_FOLDER = "/dev/shm" if Path("/dev/shm").is_dir() else None
 
 
 def history_row(sample: int) -> int:
@@ -81,7 +80,7 @@ def follow_anchor(device: SimulatedDevice) -> tuple[float, float, float, float, 
     sample = device.counters[SAMPLES] + device.counters[FIRST_SAMPLE]
     polls = 0
     while at[STATE_ROW, SAMPLE_COUNT] < sample + 2 and polls < MAX_POLLS:
-        call_address(device.clock.nanosleep, CLOCK_BOOTTIME, 0, device.clock.timespec, 0)
+        clock_wait_until(clock_now(0, device.clock) + POLL_TIME, device.clock)
         polls += 1
     lag = int(at[STATE_ROW, SAMPLE_COUNT]) - 2 - sample
     left_out = lag if lag > MAX_LAG else 0
@@ -100,7 +99,7 @@ def anchor_segment(device: SimulatedDevice) -> tuple[float, float, float, float,
     v' = ω² (target - a) - 2 ω v, with |v| limited to ``MAX_SPEED``. With a clock that can wait, the
     anchor is that of another loop.
     """
-    if device.clock.nanosleep != 0:
+    if device.clock.wait != 0:
         return follow_anchor(device)
     at = device.anchor
     # Written in the call after that of the row.
@@ -147,7 +146,7 @@ class PointerHand:
     def __init__(self, start: ArrayLike = (0.0, 0.0, 0.0)) -> None:
         position = check_array("start", start, (3,), "m")
         # A file in memory, if the system provides it.
-        descriptor, self.name = tempfile.mkstemp(prefix="asperity-", dir=_MEMORY_FOLDER)
+        descriptor, self.name = tempfile.mkstemp(prefix="asperity-", dir=memory_folder())
         with open(descriptor, "wb") as file:
             file.write(bytes(8 * 3 * _ROW_COUNT))
         self._table: FloatArray | None = open_pointer_table(self.name)
@@ -274,8 +273,7 @@ class PointerDriver(SimulatedDriver):
         count = table[STATE_ROW, SAMPLE_COUNT]
         device.counters[FIRST_SAMPLE] = max(count - 1.0, 0.0)
         table[FOLLOWER_ROW] = device.counters[FIRST_SAMPLE], 0.0, 0.0
-        wait = np.array([0, POLL_TIME])
-        return device._replace(clock=system_clock()._replace(timespec=wait))
+        return device._replace(clock=system_clock())
 
 
 def pointer_driver(plant: Plant, hand: Hand, servo: Servo, pointer: PointerHand) -> PointerDriver:

@@ -14,7 +14,6 @@ numbers.
 
 from __future__ import annotations
 
-import ctypes
 import sys
 import time
 from collections.abc import Callable
@@ -33,11 +32,12 @@ from asperity.core.compiled import (
     store_release,
 )
 from asperity.core.errors import ParameterError
+from asperity.core.platform.clock_interface import Clock, clock_now
+from asperity.core.platform.clocks import no_clock, system_clock
+from asperity.core.platform.wakeup import Wakeup
 from asperity.kernels.fuse import fuse_module
-from asperity.loop.guards import Clock, clock_now
 from asperity.loop.interface import OK
 from asperity.servo.driver import IDENTITY_FRAME, Driver, Frame
-from asperity.servo.driver_loop import function_address, no_clock, system_clock
 
 KERNELS = Kernels(
     provides=(
@@ -59,7 +59,7 @@ FORCES = 1
 FAILURE_CODE = 2
 FORCE_TIMEOUT = 3
 DRIVER_WORDS = 4
-HEADER_WORDS = 16
+HEADER_WORDS = 24
 # Failure codes: of the loop, a position that is too old; of the thread, a force not renewed.
 STALE = 1
 LOOP_SILENT = 2
@@ -164,15 +164,15 @@ class ThreadedDevice(NamedTuple):
         numbers: numbers of the ring buffer.
         max_age: largest age of a position [ns].
         clock: clock of the rows.
-        write_function: address of ``write`` of the C library; 0 if the thread is not to be woken.
-        wakeup: file that wakes the thread when a byte is written to it.
+        send_function: address of ``send`` of the system; 0 if the thread is not to be woken.
+        wakeup: socket that wakes the thread when a byte is sent to it.
     """
 
     words: IntArray
     numbers: FloatArray
     max_age: int
     clock: Clock
-    write_function: int
+    send_function: int
     wakeup: int
 
 
@@ -191,9 +191,9 @@ def device_read(position: FloatArray, device: ThreadedDevice) -> int:
 def device_write(fx: float, fy: float, fz: float, in_contact: bool, device: ThreadedDevice) -> int:
     """Push a force to the thread, and wake it; the next reading reports a failure."""
     push_row(device.words, device.numbers, FORCES, fx, fy, fz, clock_now(0, device.clock))
-    if device.write_function != 0:
-        # A full pipe wakes the thread as well.
-        call_address(device.write_function, device.wakeup, device.words, 1)
+    if device.send_function != 0:
+        # A full socket wakes the thread as well.
+        call_address(device.send_function, device.wakeup, device.words, 1, 0)
     return OK
 
 
@@ -262,19 +262,18 @@ class ThreadedDriver(Driver):
         """Return a record of no device."""
         return ThreadedDevice(*new_ring_buffer(), 0, no_clock(), 0, -1)
 
-    def device_record(self, buffer: RingBuffer, wakeup: int | None = None) -> ThreadedDevice:
+    def device_record(self, buffer: RingBuffer, wakeup: Wakeup | None = None) -> ThreadedDevice:
         """Return the record of an open device.
 
         Args:
             buffer: ring buffer of the thread.
-            wakeup: file that wakes the thread; ``None`` for a thread that polls.
+            wakeup: wakes the thread; ``None`` for a thread that polls.
         """
         max_age = round(1e9 * self.max_reading_age)
         clock = system_clock()
         if wakeup is None:
             return ThreadedDevice(*buffer, max_age, clock, 0, -1)
-        write = function_address(ctypes.CDLL(None).write)
-        return ThreadedDevice(*buffer, max_age, clock, write, wakeup)
+        return ThreadedDevice(*buffer, max_age, clock, wakeup.address, wakeup.number)
 
     def describe_error(self, code: int) -> str:
         """Return what went wrong between loop and thread."""

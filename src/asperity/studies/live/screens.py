@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import select
 import sys
 import threading
 from contextlib import ExitStack, suppress
@@ -17,6 +15,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.server import ServerConnection, serve
 
 from asperity.core.errors import ParameterError
+from asperity.core.platform.console import open_keyboard
 from asperity.lab.access import MAX_MESSAGE_BYTES, AccessToken, bind_socket, respond
 
 # Keys, as browsers name them.
@@ -69,15 +68,10 @@ class Terminal(ExitStack):
     url = ""
 
     def __init__(self) -> None:
-        import termios
-        import tty
-
         super().__init__()
         if not sys.stdin.isatty():
             raise ParameterError("terminal", "is needed: run the command in one")
-        before = termios.tcgetattr(sys.stdin)
-        self.callback(termios.tcsetattr, sys.stdin, termios.TCSADRAIN, before)
-        tty.setcbreak(sys.stdin)
+        self._press = self.enter_context(open_keyboard())
 
     def show(self, view: View) -> None:
         """Print a view."""
@@ -92,14 +86,12 @@ class Terminal(ExitStack):
         Raises:
             ParameterError: if the terminal is lost.
         """
-        if not select.select([sys.stdin], [], [], timeout)[0]:
+        pressed = self._press(timeout)
+        if pressed is None:
             return None
-        pressed = os.read(sys.stdin.fileno(), 1)
         if not pressed:
             text = "is closed: {resume} goes on where it stopped"
             raise ParameterError("terminal", text, resume=True)
-        if pressed == b"\x1b" and select.select([sys.stdin], [], [], 0.02)[0]:
-            pressed += os.read(sys.stdin.fileno(), 2)  # the rest of an arrow key
         return _SEQUENCES.get(pressed, pressed.decode("ascii", "replace").lower())
 
 

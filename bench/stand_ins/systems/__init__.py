@@ -1,0 +1,1 @@
+"""Stand-ins of operating systems; see ``other_systems.py``."""
