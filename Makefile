@@ -54,7 +54,7 @@ dist: $(VENV)/runtime  ## Build the wheel and the source distribution into dist/
 	rm -rf dist
 	$(BIN)/python -m hatchling build
 
-dist-test: $(VENV)/development  ## Install the wheel on Python 3.11 to 3.13 without a compiler, run it
+dist-test: $(VENV)/development  ## Install the wheel on Python 3.11 to 3.14 without a compiler, run it
 	ASPERITY_DIST_TEST=yes $(BIN)/python -m pytest -n 0 tests/test_distribution.py
 
 bench: $(VENV)/development  ## Speed and memory, as ratios against C and peers

@@ -89,10 +89,10 @@ def _format_megabytes(sizes: Iterable[int]) -> str:
 @declare_command("doctor")
 @output.output_options(html=False, uses_cache=False)
 def doctor_command(outputs: output.Outputs) -> None:
-    """Report what a report of a fault has to say about this machine.
+    """Describe this machine for a report of a fault.
 
-    The system, versions, real-time priority and the timing of a simulated loop of 2 s, which
-    drivers of vendors find their library or service, and the cache. Nothing moves.
+    Shows the system, versions, real-time priority, the timing of a simulated loop of 2 s, which
+    drivers find the library or service of their vendor, and the cache. No device is moved.
     """
     from asperity.report.document.page import Paragraph, terminal_page
     from asperity.report.sentences.loop_text import machine_lines

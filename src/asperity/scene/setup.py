@@ -15,6 +15,7 @@ from asperity.core.arguments import FIELD, parse_arguments
 from asperity.core.display import describe
 from asperity.core.errors import ParameterError
 from asperity.core.files import OMITTED, attributes_to_dict, to_plain_data
+from asperity.core.processes import report_fraction
 from asperity.core.units import format_quantity
 from asperity.devices import Device, load_device
 from asperity.devices.device_file import to_device_toml
@@ -124,7 +125,7 @@ class Setup:
         return {name: content for name, content in contents.items() if content is not None}
 
     def with_rendering(
-        self, notes: Iterable[str] = (), progress: Callable[[float], None] | None = None
+        self, notes: Iterable[str] = (), progress: Callable[[float], None] = report_fraction
     ) -> Setup:
         """Return the same loop with its field baked, and notes about it among its assumptions."""
         rendered = rendered_surface(self.surface, self.rendering, progress=progress)

@@ -34,6 +34,7 @@ from asperity.simulation.servo import Servo
 
 LATENESS_WAITS = 100
 """Waits that are measured where a loop has no real-time priority."""
+_LATENESS_PERIOD = 1_000_000  # of these waits [ns]
 
 
 def realtime_notes(period: float) -> tuple[str, ...]:
@@ -44,16 +45,10 @@ def realtime_notes(period: float) -> tuple[str, ...]:
     priority = request_realtime_priority(period)
     if priority.is_realtime:
         return priority.notes
-    worst = measure_lateness(period, LATENESS_WAITS)
-    words = f"{LATENESS_WAITS} waits of {1e3 * period:g} ms: late by up to {1e3 * worst:.2g} ms"
-    return (*priority.notes, f"Measured without real-time priority, {words}")
-
-
-def measure_lateness(period: float, count: int) -> float:
-    """Return by how much the worst of a number of waits for a period [s] ended late [s]."""
     loops = fuse_module(lateness, clock_module())
-    worst: int = loops.measure_lateness(system_clock(), round(1e9 * period), count)
-    return 1e-9 * worst
+    worst = loops.measure_lateness(system_clock(), _LATENESS_PERIOD, LATENESS_WAITS)
+    words = f"{LATENESS_WAITS} waits of 1 ms: late by up to {1e-6 * worst:.2g} ms"
+    return (*priority.notes, f"Measured without real-time priority, {words}")
 
 
 ModuleFiles = Sequence[tuple[str, str]]

@@ -14,7 +14,10 @@ from tests.servo.drivers.test_haply import wait_until, write_force
 from tests.servo.python_device import SURFACE
 
 from asperity.core.errors import ParameterError
-from asperity.core.platform.clocks import system_clock
+from asperity.core.platform.clocks import clock_module, no_clock, system_clock
+from asperity.core.platform.system import System, function_address
+from asperity.kernels.fuse import fuse_module
+from asperity.servo.drivers import open_haptics
 from asperity.servo.drivers import threaded as exchanged
 from asperity.servo.drivers.driver_registry import hardware_driver
 from asperity.servo.drivers.open_haptics import LIBRARY, OpenHapticsDriver
@@ -140,6 +143,63 @@ def test_failed_open_has_a_helpful_error(
     with pytest.raises(ParameterError, match=message):
         tolerant_driver(device=device).open()
     assert [hd.fake_state(index) for index in (OPENED, ENABLED, RUNNING)] == [0, 0, 0]
+
+
+_SLEPT = """
+#define _POSIX_C_SOURCE 200809L
+#include <time.h>
+int slept_gettime(int clock, struct timespec *time)
+{
+    const int answer = clock_gettime(CLOCK_MONOTONIC, time);
+    time->tv_sec += clock == 7 ? 1000 : 0; /* CLOCK_BOOTTIME */
+    return answer;
+}
+"""
+
+
+@pytest.mark.usefixtures("hd")
+def test_readings_are_fresh_after_the_machine_slept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Loop and scheduler read the same clock, which counts the time of sleep."""
+    source = tmp_path / "slept.c"
+    source.write_text(_SLEPT, encoding="utf-8")
+    library = ctypes.CDLL(str(compile_library(source, tmp_path)))
+    clock = system_clock()._replace(gettime=function_address(library.slept_gettime))
+    for module in (exchanged, open_haptics):
+        monkeypatch.setattr(module, "system_clock", lambda: clock)
+    assert run(tolerant_driver(), 30, no_clock)[0] is EndReason.FINISHED
+
+
+_WINDOWS_ERROR = """
+typedef struct { unsigned int code; int internal; unsigned int device; } Error;
+unsigned int code;
+void hdBeginFrame(unsigned int device) { (void)device; }
+void hdEndFrame(unsigned int device) { (void)device; }
+void hdGetDoublev(unsigned int what, double *values) { values[0] = values[1] = values[2] = what; }
+void hdSetDoublev(unsigned int what, double *values) { (void)what, (void)values; }
+Error *hdGetError(Error *error)
+{
+    *error = (Error){code, -7, 0};
+    return error;
+}
+"""
+
+
+def test_error_that_windows_returns_in_memory_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A record of 12 bytes, whose last number is the handle: that of the first device is 0."""
+    monkeypatch.setattr(open_haptics, "find_system", lambda: System.WINDOWS)
+    source = tmp_path / "windows_error.c"
+    source.write_text(_WINDOWS_ERROR, encoding="utf-8")
+    library = ctypes.CDLL(str(compile_library(source, tmp_path)))
+    buffer = OpenHapticsDriver()._create_buffer(library)
+    frame = fuse_module(open_haptics, exchanged, clock_module()).haptic_frame
+    for code in (0, 0, 0x0302):
+        ctypes.c_uint.in_dll(library, "code").value = code
+        frame(buffer.words, buffer.numbers)
+        assert buffer.words[FAILURE_CODE] == code
 
 
 def test_missing_library_names_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -70,7 +70,7 @@ def library_file(name: str) -> str:
     There, Python itself searches beside the program and among the system's libraries only.
     """
     if find_system() is System.WINDOWS:
-        for folder in os.environ.get("PATH", "").split(os.pathsep):
+        for folder in filter(None, os.environ.get("PATH", "").split(os.pathsep)):
             file = Path(folder, name)
             if file.is_file():
                 return str(file.resolve())

@@ -54,7 +54,7 @@ def load_library(names: Sequence[str] | LibraryNames, variable: str, install: st
         if any(sign in reason.lower() for sign in _WRONG_ARCHITECTURE):
             words = f"finds a library for another kind of machine: {reason}"
             raise ParameterError("driver", words)
-    tried = path or ", ".join(names)
+    tried = path or " or ".join(names)
     words = f"needs {tried}, which is not found: install {install}, or name the file in {variable}"
     raise ParameterError("driver", words)
 

@@ -54,11 +54,12 @@ from asperity.servo.drivers.threaded import (
 KERNELS = Kernels(loops=("haptic_frame",), native=("call_address", "store_release"))
 
 # Words of the driver: number of frames, addresses of functions, handle of the device, address of
-# the ring buffer, and the words of the clock.
+# the ring buffer, the words of the clock, and the record of an error.
 FRAMES, BEGIN_FRAME, END_FRAME, GET_DOUBLE, SET_DOUBLE = range(DRIVER_WORDS, DRIVER_WORDS + 5)
 GET_ERROR, GETTIME, HANDLE, BUFFER_ADDRESS = range(DRIVER_WORDS + 5, DRIVER_WORDS + 9)
 TIME = BUFFER_ADDRESS + 1  # and two more
-ERROR, RETURNS_BY_ADDRESS = range(TIME + 3, TIME + 5)
+RETURNS_BY_ADDRESS = TIME + 3
+ERROR = RETURNS_BY_ADDRESS + 1  # and one more
 # Constants of hdDefines.h and hdScheduler.h.
 CURRENT_POSITION = 0x2050
 CURRENT_FORCE = 0x2700
