@@ -161,8 +161,10 @@ class LawRow:
 
     @property
     def is_textureless(self) -> bool:
-        """Whether the law renders no texture."""
-        return self.ripple == 0.0
+        """Whether the law renders no texture, nor does friction that varies with the texture."""
+        friction = self.surface.contact_friction
+        varies = friction is not None and friction.modulation > 0.0
+        return self.ripple == 0.0 and not varies
 
     @property
     def loses_contact(self) -> bool:

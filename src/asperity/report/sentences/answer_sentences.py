@@ -113,7 +113,10 @@ def _choice_text(comparison: Comparison) -> str:
 def _law_title(row: LawRow) -> str:
     title = f"{row.law.letter} ({row.law.name.replace('-', ' ')})"
     friction = row.surface.contact_friction
-    return title if friction is None else f"{title} with friction {friction.coefficient:g}"
+    if friction is None:
+        return title
+    kind = "modulated friction" if friction.modulation > 0.0 else "friction"
+    return f"{title} with {kind} {friction.coefficient:g}"
 
 
 def _no_choice_text(comparison: Comparison) -> str:

@@ -185,9 +185,7 @@ def comparison_defaults(comparison: Comparison) -> list[str]:
     for row in comparison.rows:
         for parameter in law_parameter_sentences(row.surface):
             sentences.append(f"{parameter} for law {row.law.letter}")
-    has_friction = any(row.surface.contact_friction is not None for row in comparison.rows)
-    mended = [row.surface for row in comparison.rows if has_friction and row.law is F]
-    sentences += map(_mended_text, mended)
+    sentences += [_mended_text(row.surface) for row in comparison.rows if row.law is F]
     return sentences
 
 

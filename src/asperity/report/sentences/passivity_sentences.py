@@ -22,7 +22,7 @@ from asperity.analysis.passivity.device_loop import (
 )
 from asperity.analysis.passivity.recommended_stiffness import StabilityLimit
 from asperity.analysis.passivity.verdict import Ground, Passivity
-from asperity.core.units import format_quantity, round_down, round_up
+from asperity.core.units import format_quantity, format_stiffness, round_down, round_up
 from asperity.devices import WallTest
 from asperity.surface import Surface
 
@@ -117,6 +117,14 @@ def energy_gained_text(loop: DeviceLoop) -> str:
 # --- limits of the stiffness ----------------------------------------------------------------------
 
 
+def _given_friction_text(loop: DeviceLoop | None) -> str:
+    """Return with which given presliding stiffness; empty without one."""
+    if loop is None or "presliding_stiffness" not in loop.surface.friction_values:
+        return ""
+    stiffness = loop.surface.friction_values["presliding_stiffness"]
+    return f" with a presliding stiffness of {format_stiffness(stiffness)}"
+
+
 def stability_limit_text(limit: StabilityLimit, loop: DeviceLoop | None = None) -> str:
     """Return the stability limit and its basis.
 
@@ -137,7 +145,7 @@ def stability_limit_text(limit: StabilityLimit, loop: DeviceLoop | None = None) 
     if limit.stiffness is None:
         return "no stable stiffness is known: the device data are insufficient"
     if limit.basis == "none":
-        return "no stable stiffness is known"
+        return "no stable stiffness is known" + _given_friction_text(loop)
     if limit.basis == "wall gain" and loop is not None:
         return delivery_text(loop)
     if limit.basis == "wall gain":
