@@ -47,6 +47,11 @@ int main(int count, char **words)
 {
     texture_state state;
     double position[3], force[3];
+    if (texture_abi_version() != TEXTURE_ABI) { /* of a library; a header has its own number */
+        fprintf(stderr, "the library has ABI %d, this program ABI %d\n", texture_abi_version(),
+                TEXTURE_ABI);
+        return 1;
+    }
 #if defined(TEXTURE_LOADED) /* exported with --load */
     if (texture_load(count > 1 ? words[1] : "texture.field") != TEXTURE_LOADED) {
         fprintf(stderr, "the field cannot be loaded\n");

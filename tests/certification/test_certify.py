@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
+from bench.stress.callers import build_library, compile_source, map_surface
 from bench.stress.certification import found_sets, jump_sets
 from numpy.typing import NDArray
 from scipy.interpolate import RectBivariateSpline
@@ -15,7 +17,7 @@ from asperity.certification import isolated
 from asperity.certification.certify import Certification, certify
 from asperity.certification.jump_search import JumpSearch
 from asperity.certification.region import Region, RendererCalls
-from asperity.certification.renderers import FunctionRenderer
+from asperity.certification.renderers import FunctionRenderer, LibraryRenderer, RendererSource
 from asperity.certification.resolution import Resolution
 from asperity.core.checks import FloatArray
 
@@ -162,6 +164,32 @@ def test_library_that_opens_a_renderer_in_millimetres(library: str) -> None:
     assert result.gain == pytest.approx(2000.0, rel=1e-6)
     with pytest.raises(ParameterError, match="returned no renderer"):
         certify(library, name="own", text="nothing", region=BOX, seconds=1.0)
+
+
+@pytest.mark.parametrize(
+    ("precision", "version", "message"),
+    [
+        ("float", "1", "is in single precision"),
+        ("double", "2", "has ABI 2, this version calls ABI 1"),
+    ],
+)
+def test_exported_library_that_does_not_fit_is_refused(
+    precision: str, version: str, message: str, tmp_path: Path
+) -> None:
+    built = build_library(map_surface(), tmp_path, precision=precision)
+    header = tmp_path / "texture.h"
+    header.write_text(header.read_text().replace("_ABI 1\n", f"_ABI {version}\n"))
+    compile_source(tmp_path)
+    with pytest.raises(ParameterError, match=message):
+        certify(str(built), name="texture", region=BOX, seconds=1.0)
+
+
+def test_exported_library_is_given_a_state_of_its_size(tmp_path: Path) -> None:
+    library = str(build_library(map_surface(), tmp_path))
+    renderer = LibraryRenderer(RendererSource("library", library, "texture"))
+    assert len(renderer._memory) == 208 + 64
+    expected = map_surface().force([[0.0, 0.0, -1e-4]])
+    np.testing.assert_allclose([renderer.force(np.array([0.0, 0.0, -1e-4]))], expected, rtol=1e-12)
 
 
 @pytest.mark.parametrize(

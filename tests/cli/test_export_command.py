@@ -15,7 +15,7 @@ from tests.helpers.c_programs import STRICT, run_command, tool
 
 import asperity as asp
 from asperity.export import c99
-from asperity.export import c99 as writing
+from asperity.export import targets as writing
 
 Call = Callable[..., tuple[int, str, str]]
 WAVE = "sinusoid:amplitude=0.2mm,period=2mm"
@@ -190,7 +190,7 @@ BAD = {
     ("--name", "double"): "name must not be a reserved word of C or C++, got 'double'",
     ("--name", "class"): "name must not be a reserved word of C or C++",
     ("--name", "a__b"): "name must be a C identifier",
-    ("--lang", "fortran"): "lang is unknown: 'fortran'; known: c99",
+    ("--lang", "fortran"): "lang is unknown: 'fortran'; known: c99, unity",
     ("--precision", "half"): "precision must be one of double, float",
     ("--clamp", "soft"): "clamp must be one of none, whole, lateral, backed",
     ("-o", "wall.txt"): "output must be a file that ends in .h",

@@ -12,8 +12,9 @@ from bench.speed.firmware import build_firmware, missing_tool
 from tests.helpers.c_programs import COMPILERS, STRICT, kernel_ticks, run_command, tool
 
 import asperity as asp
-from asperity.export.c99 import find_target, write_files
+from asperity.export.abi import ABI_VERSION
 from asperity.export.surface_functions import ExportRequest
+from asperity.export.targets import find_target, write_files
 
 CPP = Path(__file__).parent / "cpp"
 EXAMPLES = Path(__file__).parents[2] / "examples" / "export"
@@ -100,6 +101,10 @@ def test_library_exports_only_its_public_functions(shared_library: Path) -> None
         "texture_gap",
         "texture_energy",
         "texture_prepare",
+        "texture_abi_version",
+        "texture_state_size",
+        "texture_info",
+        f"texture_abi_{ABI_VERSION}",
     }
 
 

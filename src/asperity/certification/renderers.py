@@ -27,6 +27,7 @@ from numpy.typing import ArrayLike
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
 from asperity.core.units import format_quantity
+from asperity.export.abi import ABI_VERSION
 
 ForceFunction = Callable[[Any], ArrayLike]
 """Forces [N] at points [m], shape (n, 3) each, or at one point, shape (3,)."""
@@ -238,7 +239,8 @@ class LibraryRenderer(LocalRenderer):
     for the update rate [Hz] of a loop that the renderer runs by itself. ``NAME_close(state)`` ends.
 
     Raises:
-        RendererError: if the library cannot be loaded, or lacks a function.
+        RendererError: if the library cannot be loaded, lacks a function, or is exported code of
+            another ABI or in single precision.
     """
 
     def __init__(self, source: RendererSource) -> None:
@@ -251,6 +253,7 @@ class LibraryRenderer(LocalRenderer):
         except OSError as error:
             raise RendererError(f"{source.target} cannot be loaded: {error}") from None
         self._prefix = source.name
+        self._check_abi()
         self._addresses = [self._address("reset"), self._address("force")]
         self._is_opened = self._has("open")
         self._state = ctypes.c_void_p(self._find_state(source.text))
@@ -285,6 +288,19 @@ class LibraryRenderer(LocalRenderer):
         """Close the renderer of a library that opens one."""
         if self._is_opened:
             self._call("close", None, self._state)
+
+    def _check_abi(self) -> None:
+        """Refuse an exported library of another ABI, or in single precision."""
+        abi = self._call("abi_version", ctypes.c_int)
+        if abi is None:
+            return
+        name = self._library._name
+        if abi != ABI_VERSION:
+            raise RendererError(f"{name} has ABI {abi}, this version calls ABI {ABI_VERSION}")
+        facts = (ctypes.c_uint32 * 4)(16)
+        self._call("info", None, facts)
+        if facts[2] != ctypes.sizeof(ctypes.c_double):
+            raise RendererError(f"{name} is in single precision; export it in double precision")
 
     def _find_state(self, text: str) -> int:
         """Return the address of the state."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -219,12 +220,12 @@ def export_command(
     force: bool,
     **values: Any,
 ) -> None:
-    """Export SURFACE and its law as C code with one function, texture_force().
+    """Export SURFACE and its law as C code with one function, texture_force(), or for Unity.
 
     SURFACE is a texture with its arguments (sinusoid:amplitude=0.8mm,period=1mm), a measured file
     or a scene file (TOML).
     """
-    from asperity.export import c99
+    from asperity.export import targets
     from asperity.export.surface_functions import ExportRequest
     from asperity.textures.fields.field_file import is_field
 
@@ -233,10 +234,10 @@ def export_command(
         if "max_evaluations" in request:
             raise ParameterError("exact", "searches without a budget: leave out --max-evaluations")
         request["max_evaluations"] = math.inf
-    target = c99.find_target(values["lang"] or "c99")
+    target = targets.find_target(values["lang"] or "c99")
     path = Path(output)
-    c99.check_name(path, target)
-    check_output("output", output, force=force)
+    target.check_place(path, force=force)
+    target.check(**request, loads_field=load)
     field = None
     if load and not is_field(surface):
         field = path.with_suffix(".field")
@@ -255,6 +256,8 @@ def export_command(
     request |= {"as_library": shared, "loads_field": load}
     files = export_analysis(analysis, path, target, field, request, force=force)
     click.echo(f"Written: {', '.join(escape_unprintable(file) for file in files)}")
+    if target.compiler and shutil.which(target.compiler) is None:
+        click.echo(f"Library not built, no {target.compiler} here: README.txt says how")
     for source in [file.name for file in files if file.name.endswith("_data.c")]:
         click.echo(f"To be compiled with the program: {escape_unprintable(source)}")
     click.echo(

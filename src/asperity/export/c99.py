@@ -6,16 +6,13 @@ The data of large maps are written to a source file beside the header.
 from __future__ import annotations
 
 import math
-import os
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
-from dataclasses import dataclass
-from pathlib import Path
+import re
+from collections.abc import Mapping, Sequence
 
 from asperity.contacts.warm_start import BUDGET, ERROR_BOUND, UNLIMITED, WARM_START_SIZE
-from asperity.core.errors import ParameterError, escape_unprintable, find_named
-from asperity.core.files import check_not_existing, open_atomic
-from asperity.export.c_language import fill_template, load_template
+from asperity.core.errors import ParameterError
+from asperity.export.abi import ABI_VERSION, abi_values, bound_literal, linked_name
+from asperity.export.c_language import REAL_FUNCTIONS, fill_template, load_template
 from asperity.export.expressions import real_literal
 from asperity.export.program import block_comment
 from asperity.export.surface_functions import (
@@ -82,15 +79,19 @@ def _program_files(
     values = {**values, "link": "static inline"}
     if request.as_library:
         values["link"] = f"{values['NAME']}_API"
+    values |= {name: _render(f"{file}.h", values) for name, file in _PARTS.items()}
     contract = _render("contract.h", values)
-    public = _render("public.c", values)
+    public = _render("public.c", values) + "\n" + _render("abi.c", values)
     if request.loads_field:
         contract += _render("field.h", values)
         public += _render("field.c", values)
     if functions.energy_name:
         contract += _render("energy.h", values)
         public += _render("energy.c", values)
-    values |= {"contract": contract, "inside": "\n".join([data, functions.code, public])}
+    if request.as_library:
+        public += f"\n{values['link']} const int {linked_name(request)} = {ABI_VERSION};\n"
+    code = "\n".join([data, functions.code, public])
+    values |= {"contract": contract, "inside": _with_builtins(code, values)}
     values["guards"] = _render("guards.h", values)
     files = {"@stem@.h": "header.h"}
     if request.as_library:
@@ -102,12 +103,27 @@ def _program_files(
     return {fill_template(file, values): _render(name, values) for file, name in files.items()}
 
 
+_PARTS = {"includes": "no_libc", "abi_header": "abi", "linked_header": "linked"}
+"""Templates that stand in others, by the name of their placeholder."""
+_FUNCTIONS = frozenset((*REAL_FUNCTIONS.values(), "floor", "fmod", "rint"))
+
+
+def _with_builtins(code: str, values: Mapping[str, str]) -> str:
+    """Return code whose mathematical functions are the compiler's own without a C library."""
+    words = sorted(set(re.findall(r"\b([a-z]\w*)\(", code)))
+    used = [word for word in words if word in _FUNCTIONS or word.removesuffix("f") in _FUNCTIONS]
+    head = "".join([f"#define {word} __builtin_{word}\n" for word in used])
+    tail = "".join([f"#undef {word}\n" for word in used])
+    guard = f"#if defined({values['NAME']}_NO_LIBC)\n"
+    return f"{_render('builtins.c', {**values, 'defined': head})}\n{code}{guard}{tail}#endif\n"
+
+
 def _substitutions(
     request: ExportRequest, functions: SurfaceFunctions, stem: str
 ) -> dict[str, str]:
     surface = request.surface
     single = request.is_single_precision
-    q_upper = _bound_literal(request.q_upper)
+    q_upper = bound_literal(request.q_upper)
     if request.loads_field:
         q_upper = f"{request.name}_q()"
     absolute = "fabs"
@@ -130,15 +146,11 @@ def _substitutions(
         "stiffness": repr(surface.stiffness),
         "max_depth": repr(surface.max_depth),
         "q_upper": q_upper,
-        "max_evaluations": _bound_literal(request.evaluation_budget),
+        "max_evaluations": bound_literal(request.evaluation_budget),
         "content": surface.digest,
         "note": block_comment(request.comment),
+        **abi_values(request),
     }
-
-
-def _bound_literal(value: float) -> str:
-    """Return a number as a C constant."""
-    return repr(value) if math.isfinite(value) else "HUGE_VAL"
 
 
 def _size_error(
@@ -157,75 +169,3 @@ def _size_error(
     needed = f"must be at least {size} bytes, the data of this surface; at most {points} points fit"
     advice = "crop it, or prepare it with fewer; a field may be loaded"
     return ParameterError("max_data", f"{needed}: {advice}", request.max_data_size)
-
-
-@dataclass(frozen=True)
-class ExportTarget:
-    """A format to export to.
-
-    Attributes:
-        name: name of the target, such as ``c99``.
-        description: short description.
-        suffix: suffix of the main file, such as ``.h``.
-        files: function of an export request and the stem of the file names that returns the texts
-            of the files by name, the main file first.
-    """
-
-    name: str
-    description: str
-    suffix: str
-    files: Callable[[ExportRequest, str], dict[str, str]]
-
-
-TARGETS = {"c99": ExportTarget("c99", "a C header, or a C library", ".h", c99_files)}
-"""Export targets by name."""
-
-
-def find_target(name: str) -> ExportTarget:
-    """Return an export target by its name.
-
-    Raises:
-        ParameterError: for an unknown name.
-    """
-    return find_named("lang", name.lower(), TARGETS)
-
-
-def check_name(path: Path, target: ExportTarget) -> None:
-    """Check that the file name has the suffix of the target.
-
-    Raises:
-        ParameterError: for another suffix, or a name that is not printable.
-    """
-    if path.suffix != target.suffix or not path.stem.isprintable() or '"' in path.stem:
-        requirement = f"must be a file that ends in {target.suffix}"
-        raise ParameterError("output", requirement, escape_unprintable(path.name))
-
-
-def write_files(
-    path: str | os.PathLike[str], target: ExportTarget, request: ExportRequest, *, force: bool
-) -> list[Path]:
-    """Write all files of an exported program, or none, and return their paths.
-
-    Args:
-        path: the main file; further files are written to the same folder.
-        target: the export target.
-        request: the export request.
-        force: whether to replace existing files.
-
-    Raises:
-        ParameterError: for a file that exists, or cannot be written.
-    """
-    place = Path(path)
-    check_name(place, target)
-    files = target.files(request, place.stem)
-    for name in files:
-        check_not_existing("output", place.parent / name, force=force)
-    try:
-        with ExitStack() as written:
-            for name, text in files.items():
-                stream = written.enter_context(open_atomic(place.parent / name))
-                stream.write(text.encode())
-                stream.flush()
-    except OSError as error:
-        raise ParameterError("output", f"cannot be written: {error.strerror}", str(path)) from None
-    return [place.parent / name for name in files]

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.energy.press import holds_at_any_press, mean_press, scan_force_peak
 from asperity.analysis.results.analyze import Analysis, Progress, analyze
 from asperity.analysis.results.compare import DEFAULT_DEVICE
 from asperity.core.display import describe
@@ -20,7 +21,7 @@ from asperity.core.files import check_not_existing
 from asperity.core.units import format_quantity, format_stiffness
 from asperity.core.version import __version__
 from asperity.devices import DeviceLike
-from asperity.export import c99
+from asperity.export import targets
 from asperity.export.c_language import fill_template, load_template
 from asperity.export.surface_functions import ExportRequest, is_searching
 from asperity.laws.clamps import BACKED
@@ -30,7 +31,7 @@ from asperity.textures.fields.field_file import is_field, save_field
 from asperity.textures.texture import Texture
 
 if TYPE_CHECKING:
-    from asperity.export.c99 import ExportTarget
+    from asperity.export.targets import ExportTarget
     from asperity.textures.fields.potential_field import PotentialField
 
 
@@ -57,9 +58,10 @@ def export_code(
     Args:
         surface: the surface; or a texture, or what names one, which gets the law and the stiffness
             that are recommended on the device.
-        path: the main file ("texture.h"); further files are written beside it.
+        path: the main file ("texture.h"), beside which further files are written; a folder for
+            Unity.
         device: device whose limits stand in the file.
-        lang: export target, "c99".
+        lang: export target, "c99" or "unity".
         load: whether the program loads the field of law H from a file, which is written as well.
         shared: whether to write a library: header, source and CMakeLists.txt.
         force: whether to replace existing files.
@@ -81,12 +83,13 @@ def export_code(
         >>> [file.name for file in files]
         ['texture.h', 'texture_data.c']
     """
-    target = c99.find_target(lang)
+    target = targets.find_target(lang)
     place = Path(path)
-    c99.check_name(place, target)
+    targets.check_name(place, target)
     names = ("name", "precision", "max_data_size", "max_evaluations")
     request = {name: arguments.pop(name) for name in names if name in arguments}
     ExportRequest.validate(**request)
+    target.check(**request, loads_field=load)
     is_file = isinstance(surface, (str, os.PathLike)) and is_field(surface)
     field = None
     if load and not is_file:
@@ -119,11 +122,19 @@ def export_analysis(
         request: options of :class:`~asperity.export.surface_functions.ExportRequest`.
         force: whether to replace existing files.
     """
+    surface = analysis.surface
+    numbers: dict[str, Any] = {
+        "q_upper": analysis.q.upper,
+        "one_sided_upper": analysis.one_sided.upper,
+        "max_force": scan_force_peak(surface),
+        "max_press": mean_press(surface),
+        "holds_deeper": holds_at_any_press(surface),
+    }
     comment = header_comment_text(analysis, path.name)
-    order = ExportRequest(analysis.surface, comment=comment, q_upper=analysis.q.upper, **request)
-    files = c99.write_files(path, target, order, force=force)
+    order = ExportRequest(surface, comment=comment, **numbers, **request)
+    files = targets.write_files(path, target, order, force=force)
     if field is not None:
-        save_field(field, cast("PotentialField", analysis.surface.texture))
+        save_field(field, cast("PotentialField", surface.texture))
         files.append(field)
     return files
 

@@ -54,6 +54,10 @@ class ExportRequest:
         as_library: whether to write a library.
         comment: comment at the top of the file, plain text.
         q_upper: upper bound of the characteristic number.
+        one_sided_upper: upper bound of the one-sided number.
+        max_force: greatest force on a straight scan at ``max_depth`` [N]; infinite if unknown.
+        max_press: mean normal force on that scan [N]; infinite if unknown.
+        holds_deeper: whether both numbers hold at any depth.
         max_data_size: limit of the data of the program [bytes].
         loads_field: whether the program loads the baked field from its file; else the source holds
             all data.
@@ -72,6 +76,10 @@ class ExportRequest:
     as_library: bool = False
     comment: str = ""
     q_upper: float = math.inf
+    one_sided_upper: float = math.inf
+    max_force: float = math.inf
+    max_press: float = math.inf
+    holds_deeper: bool = False
     max_data_size: int = MAX_DATA_SIZE
     loads_field: bool = False
     max_evaluations: float | None = None
@@ -122,7 +130,12 @@ class ExportRequest:
 
 
 # Further names of a program, after the prefix.
-_RESERVED_NAMES = frozenset(("state", "reset", "force", "gap", "energy", "surface", "law"))
+_RESERVED_NAMES = frozenset(
+    (
+        *("state", "reset", "force", "gap", "energy", "surface", "law", "prepare"),
+        *("abi_version", "state_size", "facts", "info"),
+    )
+)
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ import numpy as np
 from asperity.analysis.energy.straight_scan import parallel_line_points, scan_height
 from asperity.analysis.gain.surface_cache import cached_result, stiffness_factor
 from asperity.analysis.gain.theorems import theorem_on
+from asperity.core.checks import FloatArray
 from asperity.surface import Surface
 
 _POINTS = 2048
@@ -33,14 +34,24 @@ def mean_press(surface: Surface) -> float:
     return cached_result("mean press", surface, _mean_force) * stiffness_factor(surface)
 
 
+def scan_force_peak(surface: Surface) -> float:
+    """Return the greatest magnitude of the force [N] at the points of that scan."""
+    return float(np.linalg.norm(_scan_forces(surface), axis=1).max())
+
+
 def _mean_force(surface: Surface) -> float:
+    return float(_scan_forces(surface)[:, 2].mean())
+
+
+def _scan_forces(surface: Surface) -> FloatArray:
+    """Return the forces [N] on the scan at ``max_depth``, shape (n, 3)."""
     count = _POINTS
     if surface.law.contact.requires_search:
         count = _NEAREST_POINTS[surface.texture.is_profile]
     line = surface.texture.scan_line()
     xy = parallel_line_points(surface.texture, line, count).reshape(-1, 2)
     points = np.column_stack([xy, np.full(len(xy), scan_height(surface))])
-    return float(surface.force(points)[:, 2].mean())
+    return surface.force(points)
 
 
 def holds_at_any_press(surface: Surface) -> bool:

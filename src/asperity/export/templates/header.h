@@ -1,10 +1,7 @@
 @note@#ifndef @NAME@_H
 #define @NAME@_H
 
-#include <math.h>
-#include <stddef.h>
-#include <stdint.h>
-#if defined(@NAME@_POSIX)
+@includes@#if defined(@NAME@_POSIX)
 #include <sys/mman.h>
 #endif
 

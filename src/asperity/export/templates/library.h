@@ -1,8 +1,7 @@
 @note@#ifndef @NAME@_H
 #define @NAME@_H
 
-#include <math.h>
-
+@includes@
 #if defined(_WIN32) && defined(@NAME@_BUILD)
 #define @NAME@_API __declspec(dllexport)
 #elif defined(_WIN32)
@@ -18,7 +17,8 @@ extern "C" {
 #endif
 
 @contract@
-#if defined(__cplusplus)
+
+@linked_header@#if defined(__cplusplus)
 }
 #endif
 

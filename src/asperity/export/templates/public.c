@@ -4,7 +4,7 @@
     state->anchor[0] = 0;
     state->anchor[1] = 0;
     state->anchor[2] = 0;
-    state->held = 0;
+    state->mark = @mark@;
     for (i = 0; i < @memory@; i++) {
         state->memory[i] = 0;
     }
@@ -21,17 +21,20 @@
         @name@_reset(state);
         return;
     }
+    if (state->mark != @mark@ && state->mark != @held@) {
+        @name@_reset(state);
+    }
     state->memory[@at_budget@] = @budget@;
     state->memory[@at_gap@] = 0;
-    now = @tick@(x, y, z, state->anchor[0], state->anchor[1], state->anchor[2], state->held,
-        state->memory);
+    now = @tick@(x, y, z, state->anchor[0], state->anchor[1], state->anchor[2],
+        state->mark == @held@, state->memory);
     force[0] = now.f0;
     force[1] = now.f1;
     force[2] = now.f2;
     state->anchor[0] = now.f3;
     state->anchor[1] = now.f4;
     state->anchor[2] = now.f5;
-    state->held = now.f6;
+    state->mark = now.f6 ? @held@ : @mark@;
 }
 
 @link@ @real@ @name@_gap(const @name@_state *state)
