@@ -28,6 +28,7 @@ extensions = [
     "mathsvg",
     "device_page",
     "docstrings",
+    "live_force",
     "runblock",
 ]
 exclude_patterns = [
