@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Callable
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from asperity.certification.jump_search import JumpSearch
 from asperity.certification.region import Region, RendererCalls
 from asperity.certification.renderers import FunctionRenderer, LibraryRenderer, RendererSource
 from asperity.certification.resolution import Resolution
+from asperity.contacts.warm_start import WARM_START_SIZE
 from asperity.core.checks import FloatArray
 
 BOX = ((-1e-3, 1e-3), (-1e-3, 1e-3), (-1e-3, 1e-4))
@@ -187,7 +189,9 @@ def test_exported_library_that_does_not_fit_is_refused(
 def test_exported_library_is_given_a_state_of_its_size(tmp_path: Path) -> None:
     library = str(build_library(map_surface(), tmp_path))
     renderer = LibraryRenderer(RendererSource("library", library, "texture"))
-    assert len(renderer._memory) == 208 + 64
+    size = renderer._call("state_size", ctypes.c_size_t)
+    assert size > 8 * (3 + WARM_START_SIZE)
+    assert len(renderer._memory) == size + 64
     expected = map_surface().force([[0.0, 0.0, -1e-4]])
     np.testing.assert_allclose([renderer.force(np.array([0.0, 0.0, -1e-4]))], expected, rtol=1e-12)
 
