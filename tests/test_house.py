@@ -220,15 +220,16 @@ def test_other_comparisons_are_ignored(text: str) -> None:
 
 # The first three limits are what the package has today: lower a limit with each removal. It is to
 # shrink to 34 500 statements, 7 000 lines and 260 files, and what certification, friction, the loop
-# and press of the user, quick answers and first steps have added: 2 600 statements by plan.
+# and press of the user, quick answers, platforms and first steps have added: 3 300 statements and
+# 1 000 lines by plan.
 
-MAX_STATEMENTS = 42_525
+MAX_STATEMENTS = 43_483
 """Statements of the package without docstrings; packing or unpacking lines does not change them."""
 
-MAX_OTHER_LINES = 7_395
+MAX_OTHER_LINES = 7_505
 """Lines with text in the package's files that are not Python."""
 
-MAX_PYTHON_FILES = 391
+MAX_PYTHON_FILES = 409
 
 MAX_FORMAT_SKIPS = 0
 """``fmt: skip`` is for tables of numbers, of which there are none."""
