@@ -16,6 +16,7 @@ from tests.helpers.c_programs import STRICT, run_command, tool
 import asperity as asp
 from asperity.export import c99
 from asperity.export import targets as writing
+from asperity.export.surface_functions import ExportRequest
 
 Call = Callable[..., tuple[int, str, str]]
 WAVE = "sinusoid:amplitude=0.2mm,period=2mm"
@@ -181,6 +182,34 @@ def test_error_for_too_much_data_names_the_size_that_fits(
     match = re.search(r"at most (\d+) x (\d+) points", err)
     assert match is not None
     assert int(match[1]) / int(match[2]) == pytest.approx(32 / 42, rel=0.1)
+
+
+def test_map_is_coarsened_until_it_fits(call: Call, large_map: Path, tmp_path: Path) -> None:
+    target = tmp_path / "m.h"
+    options = ("--pitch", "0.2mm", "--law", "D", "-o", str(target), "--max-bytes")
+    code, out, err = call("export", str(large_map), *options, "6kB")
+    assert (code, err) == (0, "")
+    match = re.search(
+        r"resampled to (\d+) x (\d+) of 40 x 30 points: heights differ by (\S+) (\S+) \(", out
+    )
+    assert match is not None
+    counts = int(match[1]), int(match[2])
+    whole = asp.load_texture(large_map, pitch=0.2e-3)
+    coarse = whole.coarsened(max(counts[0] / 40, counts[1] / 30) + 1e-9)
+    assert coarse is not None
+    assert tuple(coarse.grid_counts()) == counts
+    surface = asp.Surface(coarse, "D", clamp="backed")
+    assert 5000 < c99.data_size(ExportRequest(surface)) <= 6000
+    points = np.random.default_rng(1).uniform(0.0, 5.7e-3, (4000, 2))
+    lost = np.abs(whole.height(points) - coarse.height(points)).max()
+    unit = {"mm": 1e-3, "µm": 1e-6, "nm": 1e-9}[match[4]]
+    assert 0.3 * float(match[3]) * unit < lost <= 1.01 * float(match[3]) * unit
+    code, out, _err = call("export", str(large_map), "--force", *options, "64kB")
+    assert code == 0
+    assert "resampled" not in out
+    code, _out, err = call("export", str(large_map), "--force", *options, "90B")
+    assert code == 2
+    assert err.startswith("asperity: max_bytes is too small: the coarsest data")
 
 
 BAD = {

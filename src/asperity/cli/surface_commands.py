@@ -245,15 +245,18 @@ def export_command(
     ExportRequest.validate(**request)
 
     from asperity.analysis.results.analyze import STEPS, analyze
-    from asperity.export.export_surface import export_analysis
+    from asperity.export.export_surface import export_analysis, fit_analysis
 
+    request |= {"as_library": shared, "loads_field": load}
     clamp = options.provided_values(values, [_CLAMP])
     with step_bar("reading the surface", len(STEPS)) as step:
         texture, device, arguments = options.load_surface(
             surface, device, values, clamp=BACKED.name
         )
-        analysis = analyze(texture, device, progress=step, **{**arguments, **clamp})
-    request |= {"as_library": shared, "loads_field": load}
+        whole = analyze(texture, device, progress=step, **{**arguments, **clamp})
+    analysis = fit_analysis(whole, request)
+    if analysis is not whole:
+        click.echo(f"To fit, the map is {analysis.surface.texture.preparation[-1]}")
     files = export_analysis(analysis, path, target, field, request, force=force)
     click.echo(f"Written: {', '.join(escape_unprintable(file) for file in files)}")
     if target.compiler and shutil.which(target.compiler) is None:

@@ -61,6 +61,13 @@ def c99_files(request: ExportRequest, stem: str) -> dict[str, str]:
     return {**files, f"{stem}_data.c": head + "\n".join(arrays)}
 
 
+def data_size(request: ExportRequest) -> int:
+    """Return the size of the data of a program [bytes]."""
+    functions = surface_functions(request)
+    store = functions.data
+    return sum(map(store.size_in_bytes, store.used_by(functions.code)[0]))
+
+
 def _render(name: str, values: Mapping[str, str]) -> str:
     return fill_template(load_template(name), values)
 

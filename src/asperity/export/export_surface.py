@@ -17,11 +17,13 @@ from asperity.analysis.energy.press import holds_at_any_press, mean_press, scan_
 from asperity.analysis.results.analyze import Analysis, Progress, analyze
 from asperity.analysis.results.compare import DEFAULT_DEVICE
 from asperity.core.display import describe
+from asperity.core.errors import ParameterError
 from asperity.core.files import check_not_existing
 from asperity.core.units import format_quantity, format_stiffness
 from asperity.core.version import __version__
 from asperity.devices import DeviceLike
 from asperity.export import targets
+from asperity.export.c99 import data_size
 from asperity.export.c_language import fill_template, load_template
 from asperity.export.surface_functions import ExportRequest, is_searching
 from asperity.laws.clamps import BACKED
@@ -66,7 +68,8 @@ def export_code(
         shared: whether to write a library: header, source and CMakeLists.txt.
         force: whether to replace existing files.
         progress: called with the name of each step of the analysis.
-        **arguments: ``name``, ``precision``, ``max_data_size``, ``max_evaluations`` of
+        **arguments: ``name``, ``precision``, ``max_data_size``, ``max_bytes``,
+            ``max_evaluations`` of
             :class:`~asperity.export.surface_functions.ExportRequest`; those of
             :func:`~asperity.analysis.results.analyze.analyze` otherwise.
 
@@ -86,7 +89,7 @@ def export_code(
     target = targets.find_target(lang)
     place = Path(path)
     targets.check_name(place, target)
-    names = ("name", "precision", "max_data_size", "max_evaluations")
+    names = ("name", "precision", "max_data_size", "max_bytes", "max_evaluations")
     request = {name: arguments.pop(name) for name in names if name in arguments}
     ExportRequest.validate(**request)
     target.check(**request, loads_field=load)
@@ -98,9 +101,41 @@ def export_code(
         check_not_existing("path", file, force=force)
     if not isinstance(surface, Surface):
         arguments = {"clamp": BACKED.name, **arguments}
-    analysis = analyze(surface, device, progress=progress, **arguments)
     request |= {"as_library": shared, "loads_field": load}
+    analysis = analyze(surface, device, progress=progress, **arguments)
+    analysis = fit_analysis(analysis, request, progress)
     return tuple(export_analysis(analysis, place, target, field, request, force=force))
+
+
+def fit_analysis(
+    analysis: Analysis, request: Mapping[str, Any], progress: Progress | None = None
+) -> Analysis:
+    """Return the analysis of the finest map whose data fit into ``max_bytes`` of a request.
+
+    Raises:
+        ParameterError: if the data do not fit, and there is no coarser map that does.
+    """
+    limit = request.get("max_bytes")
+    surface = fit_surface(analysis.surface, limit or math.inf, request)
+    if surface is analysis.surface:
+        return analysis
+    return analyze(surface, analysis.device, progress=progress)
+
+
+def fit_surface(surface: Surface, limit: float, request: Mapping[str, Any]) -> Surface:
+    """Return the surface, or one with a coarser map, whose data are at most so many bytes."""
+    fitted = surface
+    share = 1.0
+    size = 0 if math.isinf(limit) else data_size(ExportRequest(surface, **request))
+    while size > limit:
+        share *= min(math.sqrt(limit / size), 0.99)
+        texture = surface.texture.coarsened(share)
+        if texture is None:
+            reason = f"is too small: the coarsest data of this surface are {size} bytes"
+            raise ParameterError("max_bytes", reason, limit)
+        fitted = surface.to_texture(texture, surface.max_depth)
+        size = data_size(ExportRequest(fitted, **request))
+    return fitted
 
 
 def export_analysis(

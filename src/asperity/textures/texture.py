@@ -212,6 +212,15 @@ class Texture(Plottable, ABC):
         """The only wave of the height, for closed forms; ``None`` for other heights."""
         return None
 
+    def coarsened(self, share: float) -> Texture | None:  # noqa: ARG002 - of kinds with nodes
+        """Return the texture with a share of its nodes along each axis.
+
+        Returns:
+            The texture, whose last step of preparation states what is lost; ``None`` for one
+            without nodes, or with too few left.
+        """
+        return None
+
     def stored_heights(self) -> FloatArray:
         """Return the heights at the nodes [m] that a file needs besides the description, if any."""
         return np.empty(0)

@@ -16,6 +16,7 @@ from asperity.core.cache import get_or_compute
 from asperity.core.checks import FloatArray, check_array, check_positive, check_real
 from asperity.core.errors import ParameterError
 from asperity.core.memory import require_memory
+from asperity.core.units import format_quantity
 from asperity.textures.domain import Domain, GridValues, LineSegments, ScanLine
 from asperity.textures.spline.bspline_kernels import SplineArguments
 from asperity.textures.spline.pyramid import line_pyramid, plane_pyramid
@@ -69,6 +70,25 @@ class Spline(Texture):
     def stored_heights(self) -> FloatArray:
         """See :class:`Texture`."""
         return self.heights
+
+    def coarsened(self, share: float) -> Texture | None:
+        """See :class:`Texture`; the heights of this spline at the nodes of a coarser grid."""
+        counts = [int(share * count) for count in self.grid_counts()]
+        if min(counts) < MIN_NODES:
+            return None
+        points, spacing, _repeats = self.domain.grid(counts)
+        heights = self.height(points.reshape(-1, 2)).reshape(counts[::-1])
+        coarse = fit_spline(heights, spacing, periodic=self.periodic, origin=self.origin)
+        lost = format_quantity(self._difference(coarse), "m")
+        sizes = [" x ".join(map(str, size)) for size in (counts, self.grid_counts())]
+        text = f"resampled to {sizes[0]} of {sizes[1]} points: heights differ by {lost} (sampled)"
+        coarse.preparation = (*self.preparation, text)
+        return coarse
+
+    def _difference(self, other: Texture) -> float:
+        """Return the greatest difference of heights at and between the nodes of this spline [m]."""
+        points = self.domain.grid([2 * count for count in self.grid_counts()])[0].reshape(-1, 2)
+        return float(np.abs(self.height(points) - other.height(points)).max())
 
     @abstractmethod
     def _compute_extremes(self) -> tuple[float, float]: ...
