@@ -209,7 +209,7 @@ def test_map_is_coarsened_until_it_fits(call: Call, large_map: Path, tmp_path: P
     assert "resampled" not in out
     code, _out, err = call("export", str(large_map), "--force", *options, "90B")
     assert code == 2
-    assert err.startswith("asperity: max_bytes is too small: the coarsest data")
+    assert err.startswith("asperity: max_bytes is too small: a map keeps 4 points")
 
 
 BAD = {

@@ -131,7 +131,7 @@ def fit_surface(surface: Surface, limit: float, request: Mapping[str, Any]) -> S
         share *= min(math.sqrt(limit / size), 0.99)
         texture = surface.texture.coarsened(share)
         if texture is None:
-            reason = f"is too small: the coarsest data of this surface are {size} bytes"
+            reason = "is too small: a map keeps 4 points along each axis, a field all its nodes"
             raise ParameterError("max_bytes", reason, limit)
         fitted = surface.to_texture(texture, surface.max_depth)
         size = data_size(ExportRequest(fitted, **request))
