@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import multiprocessing
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from types import SimpleNamespace
@@ -16,9 +18,13 @@ from tests.servo.python_device import SURFACE, PythonClock, PythonDevice, progra
 
 from asperity.contacts.warm_start import TRUNCATED_TICKS
 from asperity.core.platform.clocks import no_clock
+from asperity.core.platform.priority import Priority
+from asperity.servo import loop_process
 from asperity.servo.driver_loop import DriverLoop, build_program
+from asperity.servo.drivers.library import LibraryDevice
 from asperity.servo.drivers.simulated import simulated_driver
 from asperity.servo.loop_memory import EndReason, LoopMemory, LoopStatistics
+from asperity.servo.loop_process import LoopJob, _LoopServer
 from asperity.servo.safety import Safety
 from asperity.simulation import (
     BandHand,
@@ -359,3 +365,31 @@ def test_truncated_searches_are_counted_in_the_shared_memory() -> None:
     # Two evaluations end no search in contact; those of the contact end all.
     assert counts[0] > 50
     assert counts[1] == 0
+
+
+def test_lateness_without_priority_is_measured_before_the_device_is_open(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A device may switch its motors off while it waits for the first force."""
+    calls: list[str] = []
+
+    def refuse(_period: float) -> Priority:
+        calls.append("priority")
+        return Priority(False, ("not allowed",))
+
+    class Recorded(PythonDevice):
+        def open(self) -> LibraryDevice:
+            calls.append("open")
+            return super().open()
+
+    monkeypatch.setattr(loop_process, "request_realtime_priority", refuse)
+    monkeypatch.setattr(loop_process, "LATENESS_WAITS", 3)
+    ours, theirs = multiprocessing.Pipe()
+    driver = Recorded(lambda _k: (0.0, 0.0, 0.0))
+    job = LoopJob(program_for(SURFACE), driver, Servo(1e-3), Safety(), 1.0, 5)
+    _LoopServer(theirs, LoopMemory(), job).serve()
+    assert calls == ["priority", "open", "priority"]
+    kind, notes = ours.recv()
+    assert (kind, notes[0]) == ("ready", "not allowed")
+    assert re.fullmatch(r"Measured .*, 3 waits of 1 ms: late by up to \S+ ms", notes[1])
+    ours.close()

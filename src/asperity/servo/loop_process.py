@@ -9,6 +9,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
@@ -108,14 +109,18 @@ class _LoopServer:
         """Run until the loop ends, and report why."""
         driver = self._job.driver
         self._loop.compile(self._program)
+        # In a thread that ends, before the device is open: it may not wait for its first force.
+        with ThreadPoolExecutor(1) as thread:
+            notes = thread.submit(realtime_notes, self._job.servo.period).result()
         with lock_device(driver):
-            self._serve(driver)
+            self._serve(driver, notes)
 
-    def _serve(self, driver: Driver) -> None:
+    def _serve(self, driver: Driver, notes: tuple[str, ...]) -> None:
         device = driver.open()
         try:
             threading.Thread(target=self._receive_programs, daemon=True).start()
-            self._connection.send(("ready", realtime_notes(self._job.servo.period)))
+            request_realtime_priority(self._job.servo.period)
+            self._connection.send(("ready", notes))
             cause = EndReason.SWAP
             code = 0
             while cause is EndReason.SWAP:

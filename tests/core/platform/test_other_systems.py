@@ -247,7 +247,7 @@ def answer():
     found = []
     for _ in range(2):
         try:
-            found.append(load_library(force_dimension._LIBRARY_NAMES, "X", "the SDK")._name)
+            found.append(load_library(force_dimension._LIBRARY_NAMES, "X", "install the SDK")._name)
         except ParameterError as error:
             found.append(str(error))
         os.environ["PATH"] = f"{Path.cwd()}{os.pathsep}{os.environ['PATH']}"

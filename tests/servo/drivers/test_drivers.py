@@ -157,8 +157,13 @@ def test_missing_or_unusable_library_has_a_helpful_error(
     foreign = tmp_path / "foreign.so"
     # The ELF header of a library for another, 32-bit processor.
     foreign.write_bytes(b"\x7fELF\x01\x01\x01" + bytes(9) + b"\x03\x00\x28\x00" + bytes(60))
-    with pytest.raises(ParameterError, match="another kind of machine"):
-        LibraryDriver(str(foreign)).open()
+    damaged = tmp_path / "beschädigte Datei.dll"
+    damaged.write_text("no library")
+    for file in (foreign, damaged):
+        with pytest.raises(ParameterError, match=f"does not load .*{file.name}: "):
+            LibraryDriver(str(file)).open()
+    with pytest.raises(ParameterError, match=r"not found: compile your C file$"):
+        LibraryDriver(str(tmp_path / "missing.so")).open()
     source = tmp_path / "empty.c"
     source.write_text("int asperity_open(void) { return 0; }\n")
     with pytest.raises(ParameterError, match="has no function asperity_read"):

@@ -26,7 +26,6 @@ from asperity.core.platform.system import (
 # CREATE_WAITABLE_TIMER_HIGH_RESOLUTION, since Windows 10 version 1803; TIMER_ALL_ACCESS.
 _HIGH_RESOLUTION = 2
 _ALL_ACCESS = 0x1F0003
-_FINEST_TICK = 1  # of the system, for timers without it [ms]
 _MODULES: dict[System, ModuleType] = {
     System.LINUX: linux_clock,
     System.MACOS: macos_clock,
@@ -68,7 +67,7 @@ def _prepare_windows_clock(library: ctypes.CDLL, words: IntArray) -> None:
     create.restype = ctypes.c_void_p
     timer = create(None, None, _HIGH_RESOLUTION, _ALL_ACCESS)
     if not timer:
-        system_library("winmm").timeBeginPeriod(_FINEST_TICK)
+        system_library("winmm").timeBeginPeriod(1)  # the finest tick of the system [ms]
         timer = create(None, None, 0, _ALL_ACCESS)
     library.QueryPerformanceFrequency(words[UNIT:].ctypes.data_as(ctypes.c_void_p))
     words[windows_clock.TIMER] = timer or 0

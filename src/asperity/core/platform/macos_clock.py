@@ -1,6 +1,7 @@
 """The clock of macOS: monotonic, it goes on while the machine sleeps.
 
-``mach_wait_until`` takes the time for which the machine was awake, in units of its own.
+``mach_wait_until`` takes the time for which the machine was awake, in units of its own: a unit
+is the word at UNIT over that at WAIT, in ns.
 """
 
 from asperity.core.compiled import IntArray, Kernels, call_address
@@ -10,9 +11,6 @@ KERNELS = Kernels(provides=("clock_now", "clock_wait_until", "read_time"), nativ
 
 CLOCK_MONOTONIC = 6
 CLOCK_UPTIME_RAW = 8
-# Words: a unit of Mach is NUMERATOR / DENOMINATOR ns.
-NUMERATOR = UNIT
-DENOMINATOR = WAIT
 
 
 def read_time(gettime: int, place: IntArray | int, words: IntArray, first: int) -> int:
@@ -37,6 +35,6 @@ def clock_wait_until(due: int, clock: Clock) -> int:
         call_address(clock.gettime, CLOCK_UPTIME_RAW, clock.words)
         awake = int(clock.words[0]) * NANOSECONDS + int(clock.words[1])
         end = awake + (due - now) // clock.speed + 1
-        call_address(clock.wait, end * int(clock.words[DENOMINATOR]) // int(clock.words[NUMERATOR]))
+        call_address(clock.wait, end * int(clock.words[WAIT]) // int(clock.words[UNIT]))
         now = clock_now(due, clock)
     return now

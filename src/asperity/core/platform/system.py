@@ -23,7 +23,6 @@ class System(Enum):
 # Only Windows has its calling convention; only macOS waits until a time of the Mach kernel. Other
 # systems have what Linux has, or say what they lack.
 _WINDOWS_LOADER = "WinDLL"
-_MACOS_FUNCTION = "mach_wait_until"
 
 
 @cache
@@ -31,7 +30,7 @@ def find_system() -> System:
     """Return the system that this process runs on."""
     if hasattr(ctypes, _WINDOWS_LOADER):
         return System.WINDOWS
-    if hasattr(ctypes.CDLL(None), _MACOS_FUNCTION):
+    if hasattr(ctypes.CDLL(None), "mach_wait_until"):
         return System.MACOS
     return System.LINUX
 

@@ -159,7 +159,9 @@ def _set_watchdog(library: ctypes.CDLL, duration: int, device: int) -> None:
 
 
 def _library() -> ctypes.CDLL:
-    return load_library(_LIBRARY_NAMES, LIBRARY, "the SDK of Force Dimension (forcedimension.com)")
+    return load_library(
+        _LIBRARY_NAMES, LIBRARY, "install the SDK of Force Dimension (forcedimension.com)"
+    )
 
 
 def _last_error(library: ctypes.CDLL) -> str:

@@ -36,27 +36,29 @@ def load_library(names: Sequence[str] | LibraryNames, variable: str, install: st
     Args:
         names: possible names or the path of it, or possible names by system.
         variable: environment variable of its path, which takes precedence.
-        install: what to install if it is missing.
+        install: what to do if it is missing.
 
     Raises:
-        ParameterError: if it is not found, or built for another machine.
+        ParameterError: if it is not found, damaged, or built for another machine.
     """
     path = os.environ.get(variable)
     if isinstance(names, Mapping):
         names = names.get(find_system(), ())
-    reasons = []
+    reasons = {}
     for name in [path] if path else names:
         try:
             return ctypes.CDLL(library_file(name))
         except OSError as error:
-            reasons.append(str(error))
-    for reason in reasons:
-        if any(sign in reason.lower() for sign in _WRONG_ARCHITECTURE):
-            words = f"finds a library for another kind of machine: {reason}"
-            raise ParameterError("driver", words)
+            reasons[name] = str(error)
+    for name, reason in reasons.items():
+        is_there = os.path.dirname(name) and Path(name).is_file()
+        if is_there or any(sign in reason.lower() for sign in _WRONG_ARCHITECTURE):
+            raise ParameterError(
+                "driver", f"finds a library that does not load (is it for this machine?): {reason}"
+            )
     tried = path or " or ".join(names)
-    words = f"needs {tried}, which is not found: install {install}, or name the file in {variable}"
-    raise ParameterError("driver", words)
+    elsewhere = f", or name the file in {variable}" if variable else ""
+    raise ParameterError("driver", f"needs {tried}, which is not found: {install}{elsewhere}")
 
 
 def function_addresses(library: ctypes.CDLL, *names: str) -> list[int]:
@@ -150,7 +152,7 @@ class LibraryDriver(Driver):
 
     def _load(self) -> ctypes.CDLL:
         # The system takes a name for a path only if it contains a slash.
-        return load_library([str(Path(self.path).resolve())], "", "it: compile your C file")
+        return load_library([str(Path(self.path).resolve())], "", "compile your C file")
 
 
 KIND = DriverKind("own", (RIGHT, AWAY, UP), 1.0, LibraryDriver, "own:./device.so")

@@ -263,8 +263,9 @@ def _callback() -> Any:
 
 
 def _library() -> ctypes.CDLL:
-    install = "the Touch driver and OpenHaptics (support.3dsystems.com)"
-    library = load_library(_LIBRARY_NAMES, LIBRARY, install)
+    library = load_library(
+        _LIBRARY_NAMES, LIBRARY, "install the Touch driver and OpenHaptics (support.3dsystems.com)"
+    )
     function_addresses(library, *_FUNCTIONS)
     library.hdInitDevice.restype = ctypes.c_uint
     library.hdInitDevice.argtypes = [ctypes.c_char_p]
