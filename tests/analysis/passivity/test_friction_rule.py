@@ -121,7 +121,7 @@ def test_verdict_and_starts_follow() -> None:
     ]
     assert ratios == pytest.approx([8.0 / 11.0, 1.0, ratios[2], 1.0], rel=5e-3)
     assert "law W with friction 0.36 and friction modulation 0.889" in str(rows.assumptions)
-    assert "law W with friction" not in str(plain.assumptions)
+    assert "law W with friction 0.72 and friction modulation 0.889" in str(plain.assumptions)
 
 
 def test_friction_on_a_scan_is_stated_with_what_the_presliding_stiffness_keeps() -> None:

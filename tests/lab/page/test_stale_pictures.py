@@ -94,9 +94,14 @@ def test_a_part_of_the_view_without_a_picture_is_requested_at_once_and_says_so(
     drawn += "c.fillText = function (text, ...place) { lab.texts.push(text);"
     drawn += " fill.call(this, text, ...place); }"
     page.ask(f"(() => {{ {drawn} }})()")
+    # A slow server, so that the view is drawn before the picture comes.
+    page.ask("globalThis.sendPicture = lab.pictures.send; 1")
+    late = "setTimeout(() => globalThis.sendPicture.apply(lab.pictures, content), 500)"
+    page.ask(f"lab.pictures.send = (...content) => {{ {late}; return true; }}; 1")
     page.ask("Object.assign(lab.hand, { x: lab.hand.x + 0.02 }).requestMotion()")
     page.until("!lab.section.covers(lab.sectionBox())", 20.0)
     page.until("lab.section.covers(lab.sectionBox())", 20.0)
+    page.ask("lab.pictures.send = globalThis.sendPicture; 1")
     assert page.ask("lab.texts.includes('computing …')")
     assert page.said == []
 
