@@ -71,7 +71,10 @@ def test_jumps_of_the_god_object_are_found_and_no_loop() -> None:
         assert abs(jump.at[0] % 2e-3 - 0.5e-3) < 1e-8
 
 
-def test_every_large_set_of_jumps_of_the_god_object_has_a_witness() -> None:
+def test_every_large_set_of_jumps_of_the_god_object_has_a_witness(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(RendererCalls, "rate", 1e5)  # [1/s], whatever else the machine does
     texture = Fourier([1e-4, 6e-5], np.array([[9e3, 2e3], [-3e3, 8e3]]), [0.3, 1.1])
     surface = Surface(texture, "D", stiffness=1000.0, max_depth=4e-4)
     box = np.array([[-1e-3, 1e-3], [-1e-3, 1e-3], [-5e-4, 1.6e-4]])

@@ -36,6 +36,20 @@ def test_heights_are_those_of_the_best_sum_of_neighbours(seed: int) -> None:
         assert loops.backwards[column] * rows <= inside[-1] + 0.5
 
 
+def test_ways_along_one_height_enclose_no_area() -> None:
+    """One cell a column is inside: the ways both pass its middle."""
+    circulations = np.full((4, 3), np.nan)
+    circulations[:, 1] = 1.0
+    loops = find_column_loops(np.eye(3), circulations)
+    assert (loops.works > 0.0).all()
+    assert not loops.encloses_area(0, 4)
+    circulations[2, 2] = 1.0
+    loops = find_column_loops(np.eye(3), circulations)
+    assert loops.encloses_area(0, 4)
+    assert loops.encloses_area(2, 3)
+    assert not loops.encloses_area(2, 2)
+
+
 def vortex_force(points: FloatArray) -> FloatArray:
     """Return a force that circulates around a vertical tube off the axes of the region [N]."""
     across = (points[:, 0] + points[:, 1]) / math.sqrt(2.0) - 3e-4

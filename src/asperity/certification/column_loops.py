@@ -35,6 +35,10 @@ class ColumnLoops:
         shares = np.column_stack([columns / len(self.works), heights])
         return np.asarray(self.plane[0] + shares @ self.plane[1:])
 
+    def encloses_area(self, first: int, end: int) -> bool:
+        """Return whether the ways through some columns differ."""
+        return bool(np.any(self.forwards[first:end] != self.backwards[first:end]))
+
     def densest_columns(self, density: float) -> tuple[int, int]:
         """Return the columns whose work exceeds most what a density takes on their length [N]."""
         taken = 2.0 * density * math.hypot(*self.plane[1]) / len(self.works)

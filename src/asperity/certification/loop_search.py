@@ -227,6 +227,8 @@ class LoopSearch:
         first = int(columns[0])
         end = int(columns[-1]) + 1
         for _ in range(2):
+            if not column_loops.encloses_area(first, end):
+                return
             loop = self.measure(column_loops.path(first, end))
             if loop.energy < 0.0:
                 loop = replace(loop, energy=-loop.energy, path=loop.path[::-1])
