@@ -203,6 +203,27 @@ def rendered_surface(
     return surface.to_texture(get_or_compute("field", content, compute))
 
 
+def coarsened_surface(surface: Surface, share: float) -> Surface | None:
+    """Return a surface with about a share of the nodes of its texture along each axis of the plane.
+
+    A field is baked again within the square of the share of its size.
+
+    Returns:
+        The surface, whose last step of preparation states what is lost; ``None`` for a texture
+        without nodes, or with too few left.
+    """
+    field: Any = surface.texture
+    if not field.baked_numbers:
+        texture = field.coarsened(share)
+        return texture and surface.to_texture(texture, surface.max_depth)
+    goal = BakeGoal(max_bytes=int(share**2 * field.bytes))
+    try:
+        texture = bake_texture(field.source, field.max_depth, field.continuity, goal=goal)
+    except ParameterError:  # the coarsest is larger, or it is the field of a body
+        return None
+    return surface.to_texture(texture)
+
+
 @dataclass(frozen=True)
 class Rendering(Serializable):
     """How a loop renders a law, and how far that may be from the law.

@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import numpy as np
 import pytest
@@ -16,6 +16,7 @@ from tests.helpers.c_programs import STRICT, run_command, tool
 import asperity as asp
 from asperity.export import c99
 from asperity.export import targets as writing
+from asperity.export.export_surface import fit_surface
 from asperity.export.surface_functions import ExportRequest
 
 Call = Callable[..., tuple[int, str, str]]
@@ -209,7 +210,28 @@ def test_map_is_coarsened_until_it_fits(call: Call, large_map: Path, tmp_path: P
     assert "resampled" not in out
     code, _out, err = call("export", str(large_map), "--force", *options, "90B")
     assert code == 2
-    assert err.startswith("asperity: max_bytes is too small: a map keeps 4 points")
+    assert err.startswith("asperity: max_bytes is too small for the coarsest map or field")
+
+
+def test_field_is_baked_again_until_it_fits(call: Call, tmp_path: Path) -> None:
+    source = tmp_path / "gentle.npy"
+    wave = np.cos(np.linspace(0.0, 2.0 * np.pi, 13))
+    np.save(source, 3e-5 * wave[:, None] * wave)
+    options = ("--pitch", "0.2mm", "--law", "H", "-o", str(tmp_path / "m.h"), "--max-bytes")
+    texture = asp.load_texture(source, pitch=0.2e-3)
+    whole = asp.bake(asp.Surface(texture, "H"), max_bytes=2**17)
+    limit = c99.data_size(ExportRequest(whole)) // 2
+    small = fit_surface(whole, limit, {})
+    assert 0.7 * limit < c99.data_size(ExportRequest(small)) <= limit
+    field: Any = small.texture
+    assert field.accuracy.share > 1.5 * whole.texture.accuracy.share
+    code, out, err = call("export", str(source), *options, f"{limit}B")
+    assert (code, err) == (0, "")
+    assert f"To fit: Law H baked as a potential field: {field.arguments.c.size} nodes" in out
+    assert f"force {100 * field.accuracy.share:.2g} % RMS from exact H" in out
+    code, _out, err = call("export", str(source), "--force", *options, "50B")
+    assert code == 2
+    assert err.startswith("asperity: max_bytes is too small for the coarsest map or field")
 
 
 BAD = {

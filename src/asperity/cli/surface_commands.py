@@ -256,7 +256,7 @@ def export_command(
         whole = analyze(texture, device, progress=step, **{**arguments, **clamp})
     analysis = fit_analysis(whole, request)
     if analysis is not whole:
-        click.echo(f"To fit, the map is {analysis.surface.texture.preparation[-1]}")
+        click.echo(f"To fit: {analysis.surface.texture.preparation[-1]}")
     files = export_analysis(analysis, path, target, field, request, force=force)
     click.echo(f"Written: {', '.join(escape_unprintable(file) for file in files)}")
     if target.compiler and shutil.which(target.compiler) is None:

@@ -27,6 +27,7 @@ from asperity.export.c99 import data_size
 from asperity.export.c_language import fill_template, load_template
 from asperity.export.surface_functions import ExportRequest, is_searching
 from asperity.laws.clamps import BACKED
+from asperity.rendering import coarsened_surface
 from asperity.surface import Surface
 from asperity.textures.catalogue import TextureLike
 from asperity.textures.fields.field_file import is_field, save_field
@@ -110,10 +111,10 @@ def export_code(
 def fit_analysis(
     analysis: Analysis, request: Mapping[str, Any], progress: Progress | None = None
 ) -> Analysis:
-    """Return the analysis of the finest map whose data fit into ``max_bytes`` of a request.
+    """Return the analysis of the finest map or field whose data fit into ``max_bytes``.
 
     Raises:
-        ParameterError: if the data do not fit, and there is no coarser map that does.
+        ParameterError: if the data do not fit, and there is no coarser map or field that does.
     """
     limit = request.get("max_bytes")
     surface = fit_surface(analysis.surface, limit or math.inf, request)
@@ -123,17 +124,17 @@ def fit_analysis(
 
 
 def fit_surface(surface: Surface, limit: float, request: Mapping[str, Any]) -> Surface:
-    """Return the surface, or one with a coarser map, whose data are at most so many bytes."""
+    """Return the surface, or one with a coarser texture, whose data are at most so many bytes."""
     fitted = surface
     share = 1.0
     size = 0 if math.isinf(limit) else data_size(ExportRequest(surface, **request))
     while size > limit:
         share *= min(math.sqrt(limit / size), 0.99)
-        texture = surface.texture.coarsened(share)
-        if texture is None:
-            reason = "is too small: a map keeps 4 points along each axis, a field all its nodes"
+        coarser = coarsened_surface(surface, share)
+        if coarser is None:
+            reason = "is too small for the coarsest map or field of this surface"
             raise ParameterError("max_bytes", reason, limit)
-        fitted = surface.to_texture(texture, surface.max_depth)
+        fitted = coarser
         size = data_size(ExportRequest(fitted, **request))
     return fitted
 

@@ -59,7 +59,7 @@ class ExportRequest:
         max_press: mean normal force on that scan [N]; infinite if unknown.
         holds_deeper: whether both numbers hold at any depth.
         max_data_size: limit of the data of the program [bytes].
-        max_bytes: size of the data [bytes] to which a map was coarsened.
+        max_bytes: size of the data [bytes] to which a map or field was coarsened.
         loads_field: whether the program loads the baked field from its file; else the source holds
             all data.
         max_evaluations: limit of evaluations of the surface per tick; infinite for an exact search;

@@ -213,7 +213,7 @@ class Texture(Plottable, ABC):
         return None
 
     def coarsened(self, share: float) -> Texture | None:  # noqa: ARG002 - of kinds with nodes
-        """Return the texture with a share of its nodes along each axis.
+        """Return the texture with about a share of its nodes along each axis of the plane.
 
         Returns:
             The texture, whose last step of preparation states what is lost; ``None`` for one
