@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
+from bench.stress import friction as friction_stress
 
 from asperity.analysis.results.analyze import analyze
 from asperity.analysis.results.compare import compare
@@ -13,7 +15,14 @@ from asperity.contacts.proxy_contacts import SplitContact
 from asperity.core.errors import ParameterError
 from asperity.kernels.link import unit_from_module
 from asperity.laws import LAWS
-from asperity.rendering import assess_rendering, bake, is_searched, rendered_surface
+from asperity.rendering import (
+    assess_rendering,
+    bake,
+    bake_mesh,
+    coarsened_surface,
+    is_searched,
+    rendered_surface,
+)
 from asperity.surface import Surface
 from asperity.textures.kinds.fourier import Fourier
 from asperity.textures.kinds.sinusoid import Sinusoid
@@ -106,3 +115,9 @@ def test_search_is_tried_on_a_stroke(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_formulas_are_not_searched(law: str) -> None:
     assert assess_rendering(Surface(ROUGH, law)).method == "formula"
     assert assess_rendering(Surface(ROUGH, law)).sentence(LAWS[law]) == ""
+
+
+def test_field_of_a_body_is_not_baked_again_as_a_wall(tmp_path: Path) -> None:
+    """It has no mesh, and the heights of its source are those of another surface."""
+    body = bake_mesh(friction_stress.cube(tmp_path), "m", 3e-4, 2e-4)
+    assert coarsened_surface(body, 0.5) is None

@@ -210,16 +210,18 @@ def coarsened_surface(surface: Surface, share: float) -> Surface | None:
 
     Returns:
         The surface, whose last step of preparation states what is lost; ``None`` for a texture
-        without nodes, or with too few left.
+        without nodes, or with too few left, and for the field of a body, which has no mesh.
     """
     field: Any = surface.texture
     if not field.baked_numbers:
         texture = field.coarsened(share)
         return texture and surface.to_texture(texture, surface.max_depth)
+    if field.is_body:  # its mesh is not part of the field
+        return None
     goal = BakeGoal(max_bytes=int(share**2 * field.bytes))
     try:
         texture = bake_texture(field.source, field.max_depth, field.continuity, goal=goal)
-    except ParameterError:  # the coarsest is larger, or it is the field of a body
+    except ParameterError:  # the coarsest is larger
         return None
     return surface.to_texture(texture)
 

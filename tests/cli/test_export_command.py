@@ -208,9 +208,10 @@ def test_map_is_coarsened_until_it_fits(call: Call, large_map: Path, tmp_path: P
     code, out, _err = call("export", str(large_map), "--force", *options, "64kB")
     assert code == 0
     assert "resampled" not in out
-    code, _out, err = call("export", str(large_map), "--force", *options, "90B")
-    assert code == 2
-    assert err.startswith("asperity: max_bytes is too small for the coarsest map or field")
+    for size in ("90B", "0B"):
+        code, _out, err = call("export", str(large_map), "--force", *options, size)
+        assert code == 2
+        assert err.startswith("asperity: max_bytes is too small: no coarser map or field")
 
 
 def test_field_is_baked_again_until_it_fits(call: Call, tmp_path: Path) -> None:
@@ -231,7 +232,7 @@ def test_field_is_baked_again_until_it_fits(call: Call, tmp_path: Path) -> None:
     assert f"force {100 * field.accuracy.share:.2g} % RMS from exact H" in out
     code, _out, err = call("export", str(source), "--force", *options, "50B")
     assert code == 2
-    assert err.startswith("asperity: max_bytes is too small for the coarsest map or field")
+    assert err.startswith("asperity: max_bytes is too small: no coarser map or field")
 
 
 BAD = {

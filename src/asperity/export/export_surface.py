@@ -117,7 +117,9 @@ def fit_analysis(
         ParameterError: if the data do not fit, and there is no coarser map or field that does.
     """
     limit = request.get("max_bytes")
-    surface = fit_surface(analysis.surface, limit or math.inf, request)
+    if limit is None:
+        return analysis
+    surface = fit_surface(analysis.surface, limit, request)
     if surface is analysis.surface:
         return analysis
     return analyze(surface, analysis.device, progress=progress)
@@ -127,12 +129,12 @@ def fit_surface(surface: Surface, limit: float, request: Mapping[str, Any]) -> S
     """Return the surface, or one with a coarser texture, whose data are at most so many bytes."""
     fitted = surface
     share = 1.0
-    size = 0 if math.isinf(limit) else data_size(ExportRequest(surface, **request))
+    size = data_size(ExportRequest(surface, **request))
     while size > limit:
         share *= min(math.sqrt(limit / size), 0.99)
         coarser = coarsened_surface(surface, share)
         if coarser is None:
-            reason = "is too small for the coarsest map or field of this surface"
+            reason = "is too small: no coarser map or field of this surface fits"
             raise ParameterError("max_bytes", reason, limit)
         fitted = coarser
         size = data_size(ExportRequest(fitted, **request))

@@ -42,14 +42,14 @@ def read_time(gettime: int, place: IntArray | int, words: IntArray, first: int) 
         words: an array of which they are a part.
         first: index of the first word of the clock in it.
     """
-    raise NotImplementedError
+    raise NotImplementedError  # the linker binds calls to the clock of the system
 
 
 def clock_now(due: int, clock: Clock) -> int:
     """Return the time [ns]; without a clock the due time."""
-    raise NotImplementedError
+    raise NotImplementedError  # the linker binds calls to the clock of the system
 
 
 def clock_wait_until(due: int, clock: Clock) -> int:
     """Wait until a time [ns]; return the time after the wait [ns]."""
-    raise NotImplementedError
+    raise NotImplementedError  # the linker binds calls to the clock of the system
