@@ -110,10 +110,15 @@ def test_conservative_law_has_zero_leak_and_v_star(rig: Device) -> None:
 @pytest.mark.parametrize(
     ("law", "device", "verdict", "words"),
     [
-        ("H", RIG, "passive", "is passive by k q⁺ <= 2σ₀/T, whose limit is 16000 N/m"),
-        ("H", PARTIAL, "plausible", "plausibly passive, not proved so: k q <= K₀, limit 3000 N/m"),
+        ("H", RIG, "passive", "is passive up to 16000 N/m, proved by k q⁺ <= 2σ₀/T;"),
+        (
+            "H",
+            PARTIAL,
+            "plausible",
+            "is plausibly passive up to 3000 N/m, by k q <= K₀, not proved",
+        ),
         ("A", PARTIAL, "not passive", "is not passive: a loop gains"),
-        ("D", PARTIAL, "undecided", "is passive is undecided"),
+        ("D", PARTIAL, "undecided", "is not known to be passive: "),
     ],
 )
 def test_answer_states_the_verdict(

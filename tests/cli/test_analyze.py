@@ -213,7 +213,7 @@ def test_device_without_data_leaves_criteria_undecided(call: Call, tmp_path: Pat
     code, out, err = call(SPEC, "--law", "C", "--device", str(tmp_path / "bare.toml"))
     assert (code, err) == (0, "")
     text = " ".join(out.split())
-    assert "is passive is undecided" in text
+    assert "is not known to be passive: " in text
     assert "not decidable: needs max_stiffness" in text
     assert "not decidable: needs update_rate, damping" in text
 

@@ -19,6 +19,7 @@ from asperity.export import targets as writing
 from asperity.export.export_surface import fit_surface
 from asperity.export.surface_functions import ExportRequest
 
+FILE = ("--pitch", "50um", "--unit", "m")
 Call = Callable[..., tuple[int, str, str]]
 WAVE = "sinusoid:amplitude=0.2mm,period=2mm"
 MAIN = '#include <stdio.h>\n#include "{stem}.h"\nint main(void)\n{{\n{body}\n    return 0;\n}}\n'
@@ -70,6 +71,17 @@ def test_header_comment_describes_the_law_and_the_device(call: Call, tmp_path: P
         "heights -200 µm to 200 µm",
     ):
         assert words in comment, words
+    assert "between" not in comment
+
+
+def test_header_of_a_baked_field_has_each_number_once(call: Call, tmp_path: Path) -> None:
+    target = tmp_path / "t.h"
+    np.save(tmp_path / "map.npy", 1e-5 * np.sin(np.add.outer(np.arange(24.0), np.arange(32.0))))
+    call("export", str(tmp_path / "map.npy"), *FILE, "--law", "H", "-o", str(target))
+    comment = target.read_text().split("#ifndef")[0]
+    assert comment.index("The exact law:") < comment.index("q⁺ = 1")
+    assert re.search(r"q\+ +1\.[\d.]+ to 1\.\d+ \(certified\)", comment)
+    assert "{" not in comment.split(" * surface ")[1]
 
 
 def test_content_digest_depends_on_the_law_and_not_on_the_name(call: Call, tmp_path: Path) -> None:

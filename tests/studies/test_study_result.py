@@ -153,7 +153,8 @@ def test_plans_find_effects_and_nothing_else() -> None:
     assert none.found <= 7  # of 40: 5 % are expected, more than 7 come once in 700 times
     assert few.found < more.found
     assert strong == plan(design, 2.0, 10, simulations=30)
-    assert "10 participants of 12 trials" in strong.text
+    assert "10 participants of 12 trials each" in strong.text
+    assert "With 1 participant of 1 trial each" in replace(strong, participants=1, trials=1).text
 
 
 def test_observers_who_guess_show_no_effect() -> None:

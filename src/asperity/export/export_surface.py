@@ -192,7 +192,7 @@ def header_comment_text(analysis: Analysis, file_name: str) -> str:
     if not doc.startswith(law.letter):
         doc = law.summary
     if analysis.surface.texture.baked_numbers:
-        doc += "\n\n" + "\n".join(_wrap([_FIELD_NOTE]))
+        doc = "\n".join(_wrap([_FIELD_NOTE])) + f"\n\n{doc}"
     paragraphs = [
         [f"{file_name}: law {law}, by asperity {__version__}. Generated, do not edit."],
         _usage(analysis.surface),
@@ -203,7 +203,10 @@ def header_comment_text(analysis: Analysis, file_name: str) -> str:
     return "\n\n".join(map("\n".join, paragraphs))
 
 
-_FIELD_NOTE = "This is the exact law; the file evaluates a baked field of it. Numbers of the field:"
+_FIELD_NOTE = (
+    "This file evaluates a baked field of the law, whose q, q+ and leak are those in the list "
+    "below. The exact law:"
+)
 
 
 def _usage(surface: Surface) -> list[str]:
@@ -224,8 +227,9 @@ def _facts(analysis: Analysis) -> list[str]:
     numbers = {**surface.law_parameters, **surface.friction_values}
     parameters = [f"{name} = {value:g}" for name, value in numbers.items()]
     described = surface.texture.describe().items()
+    arguments = [(name, value) for name, value in described if _is_argument(value)]
     rows = {
-        "surface": ", ".join([f"{name} = {_format_value(value)}" for name, value in described]),
+        "surface": ", ".join([f"{name} = {_format_value(value)}" for name, value in arguments]),
         "place": _format_extent(surface.texture),
         "device": analysis.device.name,
         "stiffness": ", ".join([f"k = {format_stiffness(surface.stiffness)}", *parameters]),
@@ -255,6 +259,12 @@ def _format_range(ends: tuple[float, float]) -> str:
     return f"{format_quantity(ends[0], 'm')} to {format_quantity(ends[1], 'm')}"
 
 
+def _is_argument(value: object) -> bool:
+    """Return whether a value is no sentence on the preparation and no result, given elsewhere."""
+    is_text = isinstance(value, list) and set(map(type, value)) <= {str}
+    return not isinstance(value, dict) and not is_text
+
+
 def _format_value(value: object) -> str:
     """Return a value of a description as text, truncated if it is long."""
     if isinstance(value, list):
@@ -275,11 +285,9 @@ def _format_clamp(analysis: Analysis) -> str:
 
 
 def _format_bound(bound: Bound) -> str:
-    if math.isfinite(bound.upper):
-        return f"between {bound.lower:.6g} and {bound.upper:.6g} ({bound.method})"
-    if math.isinf(bound.lower):
-        return f"unbounded ({bound.method})"
-    return f"at least {bound.lower:.6g}, no upper bound ({bound.method})"
+    if math.isfinite(bound.lower) and math.isinf(bound.upper):
+        return f"at least {bound.lower:.6g}, no upper bound ({bound.method})"
+    return f"{describe(bound, 'interval')} ({bound.method})"
 
 
 def _wrap(sentences: list[str]) -> list[str]:

@@ -17,6 +17,7 @@ from asperity.core.checks import check_positive
 from asperity.core.compiled import FloatArray
 from asperity.core.errors import ParameterError, find_named
 from asperity.core.files import Serializable
+from asperity.core.units import count_text
 from asperity.studies.design import Presentation, StudyDesign, TrialRecord, Values
 from asperity.studies.methods import METHODS
 from asperity.studies.scores import Interval, share_interval
@@ -216,8 +217,10 @@ class StudyPlan(Serializable):
     def text(self) -> str:
         """The plan in a sentence."""
         power, low, high = self.power
+        people = count_text(self.participants, "participant")
+        trials = count_text(self.trials, "trial")
         return (
-            f"With {self.participants} participants of {self.trials} trials each, "
+            f"With {people} of {trials} each, "
             f"{power:.0%} ({low:.0%} to {high:.0%}) of {self.simulations} simulated studies find "
             f"that the first condition is {self.effect:g} times as strong."
         )

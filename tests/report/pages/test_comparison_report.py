@@ -9,6 +9,7 @@ import pytest
 from tests.report.report_pages import Reader, check_alone, check_alts, terminal
 
 import asperity as asp
+from asperity.core.units import parse_quantity
 from asperity.devices import parse_device
 from asperity.report import comparison_table, html_text
 from asperity.report.pages.comparison_report import comparison_page
@@ -40,6 +41,17 @@ def test_report_fits_the_terminal_width(result: asp.Comparison, width: int, full
         assert len(lines) == 2  # the row of the table, in one line, and the verdict below it
     assert "…" not in text
     assert "K₀" in text
+
+
+def test_equal_quantities_of_a_page_are_written_alike(page: str) -> None:
+    """One number has one spelling: not both 0.041 N and 41 mN."""
+    text = re.sub(r"<[^>]+>", " ", page)
+    spellings: dict[tuple[float, str], str] = {}
+    for number, unit in re.findall(r"(?<![\w.])(\d+(?:\.\d+)?) ([mµ]?[NJ])\b(?![/·])", text):
+        value, base = parse_quantity("page", f"{number} {unit}", unit[-1]), unit[-1]
+        written = f"{number} {unit}"
+        assert spellings.setdefault((round(value, 12), base), written) == written
+    assert len(spellings) > 8
 
 
 def test_narrow_table_has_fewer_columns_and_rounded_numbers(result: asp.Comparison) -> None:

@@ -116,7 +116,7 @@ def _basis_cell(row: LawRow, _comparison: Comparison) -> Cell:
 def _oscillation_cell(row: LawRow, _comparison: Comparison) -> Cell:
     if row.perceptibility is None and not row.is_textureless:
         return Cell(number_text.NOT_AVAILABLE)
-    return Cell(number_text.force_text(row.texture_force))
+    return Cell(force_magnitude_text(row.texture_force))
 
 
 def _bound_cell(bound: Bound) -> Cell:

@@ -49,7 +49,7 @@ from asperity.report.document.page import (
 from asperity.report.pages import sweep_report
 from asperity.report.pictures import paper_pictures
 from asperity.report.pictures.loop_pictures import onset_figure
-from asperity.report.sentences.number_text import energy_text, stiffness_number
+from asperity.report.sentences.number_text import energy_text, number_text
 from asperity.report.sentences.paper_text import (
     VERDICT_TEXTS,
     evidence_text,
@@ -268,12 +268,12 @@ def _device_table_section(experiment: DeviceExperiment) -> Section:
 
 def _device_cells(device_onset: DeviceOnset) -> Cells:
     prediction = device_onset.prediction
-    allowed = stiffness_number(device_onset.catalogue_rule)
+    allowed = number_text(device_onset.catalogue_rule)
     return [
         device_onset.device,
         device_onset.surface,
         Cell(prediction.onset.law, "l"),
-        stiffness_number(prediction.q),
+        number_text(prediction.q),
         page.flagged_cell(allowed, device_onset.catalogue_rule_missed),
         sweep_report.delay_rule_cell(prediction),
         *sweep_report.bracket_cells(prediction),

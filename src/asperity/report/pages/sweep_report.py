@@ -15,7 +15,7 @@ from asperity.report.document import page
 from asperity.report.document.page import Cell, Cells, Media, Page, Row, Section, Table, TableLayout
 from asperity.report.pages.run_report import LOOP_FOOTER, loop_facts
 from asperity.report.sentences.loop_text import onset_answer, stroke_answer
-from asperity.report.sentences.number_text import NOT_AVAILABLE, millijoules, stiffness_number
+from asperity.report.sentences.number_text import NOT_AVAILABLE, millijoules, number_text
 from asperity.report.sentences.texts import table_notes
 from asperity.scene.sweeps import OnsetSweep, StrokeSweep
 from asperity.simulation.onset import Prediction
@@ -45,14 +45,14 @@ def onset_cells(prediction: Prediction) -> Cells:
     onset = prediction.onset
     wall_rule = NOT_AVAILABLE
     if prediction.wall_rule is not None:
-        wall_rule = stiffness_number(prediction.wall_rule)
+        wall_rule = number_text(prediction.wall_rule)
     return [
         Cell(onset.law, "l"),
         str(onset.delay),
-        stiffness_number(onset.quiet),
+        number_text(onset.quiet),
         *bracket_cells(prediction),
-        stiffness_number(prediction.q),
-        stiffness_number(prediction.paper_limit),
+        number_text(prediction.q),
+        number_text(prediction.paper_limit),
         delay_rule_cell(prediction),
         page.flagged_cell(wall_rule, prediction.violates_wall_rule),
     ]
@@ -61,14 +61,14 @@ def onset_cells(prediction: Prediction) -> Cells:
 def bracket_cells(prediction: Prediction) -> Cells:
     """Return the stiffness that cycles, the starts that do, and the depth of the handle."""
     onset = prediction.onset
-    cycling = "none" if math.isinf(onset.cycling) else stiffness_number(onset.cycling)
+    cycling = "none" if math.isinf(onset.cycling) else number_text(onset.cycling)
     depth = format_quantity(prediction.depth, "m", digits=2)
     return [cycling, f"{onset.cycles}/{onset.starts}", depth]
 
 
 def delay_rule_cell(prediction: Prediction) -> Cell:
     """Return the stiffness that the delay rule allows, in brackets where it proves nothing."""
-    rule = stiffness_number(prediction.delay_rule)
+    rule = number_text(prediction.delay_rule)
     if not prediction.conservative:
         rule = f"({rule})"
     return page.flagged_cell(rule, prediction.violates_delay_rule)

@@ -274,16 +274,16 @@ def _passivity_text(analysis: Analysis) -> str:
     rule = passivity.criterion(passivity.decided_by)
     limit = stiffness_limit_text(rule.limit or 0.0)
     if passivity.verdict == "passive":
-        return f"Law {case} is passive by {rule.formula}, whose limit is {limit}"
+        return f"Law {case} is passive up to {limit}, proved by {rule.formula}"
     if passivity.verdict == "plausible":
-        return f"Law {case} is plausibly passive, not proved so: {rule.formula}, limit {limit}"
+        return f"Law {case} is plausibly passive up to {limit}, by {rule.formula}, not proved"
     if passivity.verdict == "bounded" and passivity.buzz is not None:
         return f"Law {case} is passive but for steps: {buzz_text(passivity.buzz)}"
     if passivity.verdict == "not passive" and rule.name == LEAK:
         return f"Law {case} is not passive: {energy_gained_text(passivity.loop)}"
     if passivity.verdict == "not passive":
         return f"Law {case} is not passive: {passivity.reason}"
-    return f"Whether law {case} is passive is undecided: {passivity.reason}"
+    return f"Law {case} is not known to be passive: {passivity.reason}"
 
 
 def analysis_assumptions(analysis: Analysis) -> tuple[str, ...]:

@@ -50,16 +50,25 @@ def design_answer(result: Design) -> str:
     names = " and ".join(result.binding)
     verb = "limits" if len(result.binding) == 1 else "limit"
     if not result.is_feasible:
-        reached = "Nothing"
-        if result.reachable:
-            reached = f"{format_quantity(result.reachable, 'N')} {_force_unit(result)}"
+        reached = _reached_text(result)
         return f"Not met. {reached} can be reached; {names} {verb} it. Nearest: law {design}."
     if result.target.texture_force is None:
         return f"The largest is law {design}. {sentence_case(names)} {verb} it."
     margin = min(result.margins.values())
-    target = format_quantity(result.target.texture_force, "N")
-    wanted = f"Asked for: at least {target} {_force_unit(result)}"
+    wanted = f"Asked for: at least {_target_text(result)}"
     return f"Law {design}. {wanted}. Least margin {margin:.3g}; {names} {verb} it."
+
+
+def _reached_text(result: Design) -> str:
+    """Return which share of the force asked for can be reached."""
+    target = result.target.texture_force
+    if target is None or not result.reachable:
+        return "Nothing"
+    return f"{percent(result.reachable / target)} of {_target_text(result)}"
+
+
+def _target_text(result: Design) -> str:
+    return f"{format_quantity(result.target.texture_force or 0.0, 'N')} {_force_unit(result)}"
 
 
 def _design_text(result: Design) -> str:

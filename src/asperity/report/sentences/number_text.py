@@ -40,15 +40,6 @@ def merit_text(value: float) -> str:
     return number_text(value, digits=2)
 
 
-def force_text(value: float) -> str:
-    """Return a force as text: "0.12 N"; "–" for none."""
-    if math.isnan(value):
-        return NOT_AVAILABLE
-    if value < 0.01:
-        return format_quantity(value, "N", digits=2)
-    return f"{float(f'{value:.2g}'):.10g} N"
-
-
 FRICTION_PROOF = "friction takes energy from the hand on every closed path, proved"
 
 
@@ -285,15 +276,6 @@ def energy_text(value: float) -> str:
         return "not finite"
     text = format_quantity(abs(value), "J", digits=3)
     return f"{'+' if value > 0.0 else '-'}{text}"
-
-
-def stiffness_number(value: float) -> str:
-    """Return a stiffness [N/m] with three digits, without the unit."""
-    if math.isinf(value):
-        return INFINITY_SIGN
-    if value < 1000.0:
-        return f"{value:.3g}"
-    return f"{float(f'{value:.3g}'):,.0f}".replace(",", " ")
 
 
 def millijoules(value: float, *, signed: bool = True) -> str:

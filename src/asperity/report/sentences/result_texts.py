@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.closed_loops import Leak
 from asperity.analysis.energy.continuity import Continuity
 from asperity.analysis.limits.spectrum import Spectrum
@@ -20,6 +21,7 @@ from asperity.report.sentences import (
     assumption_sentences,
     comparison_sentences,
     limit_sentences,
+    number_text,
     passivity_sentences,
 )
 from asperity.surface import Surface
@@ -27,6 +29,7 @@ from asperity.surface import Surface
 _TEXTS: dict[tuple[type, str], Callable[[Any], Any]] = {
     (Analysis, "answer"): assumption_sentences.analysis_answer,
     (Analysis, "assumptions"): assumption_sentences.analysis_assumptions,
+    (Bound, "interval"): number_text.interval_text,
     (Comparison, "recommendation"): answer_sentences.recommendation_text,
     (Comparison, "reasons"): answer_sentences.recommendation_reasons,
     (Comparison, "assumptions"): assumption_sentences.comparison_assumptions,
