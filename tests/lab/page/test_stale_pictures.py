@@ -56,8 +56,8 @@ def test_a_picture_of_another_law_is_grey_and_says_so(page: Browser) -> None:
     page.ask("lab.pictures.send = globalThis.sendPicture; 1")
     page.until("lab.hasCurrentPictures")
     page.until("document.getElementById('section-note').textContent.startsWith('no curl')")
-    assert not page.ask("document.getElementById('section').classList.contains('stale')")
-    assert not page.ask("document.getElementById('save-png').disabled")
+    page.until("!document.getElementById('section').classList.contains('stale')")
+    page.until("!document.getElementById('save-png').disabled")
     assert page.said == []
 
 

@@ -41,7 +41,7 @@ const COMMANDS = {
     socket.onclose = event => postMessage({ closed: event.reason });
     socket.onmessage = ({ data }) => passOn(data);
   },
-  send(text) { socket.send(text); },
+  send(text) { if (socket.readyState === WebSocket.OPEN) socket.send(text); }, // the page learns of its closing later
   setBuffer(shared) { positions = new Int32Array(shared.positions); ring = new Float64Array(shared.ring); },
   useBuffer(isRead) { usesBuffer = isRead && Boolean(ring); postMessage({ usesBuffer }); },
 };
