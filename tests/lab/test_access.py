@@ -203,7 +203,7 @@ def test_a_frame_keeps_the_extremes_between_two_pictures() -> None:
     place = COLUMN_NAMES.index("applied z")
     rows[:, place] = 0.3 * np.sin(2.0 * np.pi * 800.0 * time + 0.1)
     counts = {"frame": 5, "acknowledged": 3, "late": 1, "skipped": 2, "lateness": 0.5}
-    counts["truncated"] = 4
+    counts |= {"truncated": 4, "force_limited": 6, "too_deep": 8, "deepest": 0.25}
     numbers = np.frombuffer(encode_frame(rows, 7, counts, np.arange(6.0)))
     named = frame_layout()
     # The newest row alone would show nothing of it.
@@ -211,7 +211,7 @@ def test_a_frame_keeps_the_extremes_between_two_pictures() -> None:
     assert numbers[named["minima"] + place] == rows[:, place].min() < -0.29
     assert numbers[named["maxima"] + place] == rows[:, place].max() > 0.29
     head = [numbers[named["header"][name]] for name in HEADER]
-    known = [1.0, 0.0, 5.0, 50.0, 7.0, 3.0, 50.0, 1.0, 2.0, 0.5, 4.0]
+    known = [1.0, 0.0, 5.0, 50.0, 7.0, 3.0, 50.0, 1.0, 2.0, 0.5, 4.0, 6.0, 8.0, 0.25]
     assert head == [*known, 0.0, 0.0, 0.0, 0.0, 0.0]  # the probe and its anchor stand still
     forces = numbers[named["forces"] :].reshape(-1, 3)
     assert (forces == rows[:, FORCE_COLUMNS]).all()
@@ -221,7 +221,8 @@ def test_a_page_that_was_slow_gets_the_newest_forces_and_all_extremes() -> None:
     rows = np.zeros((MAX_FORCE_ROWS + 10, len(COLUMN_NAMES)))
     rows[0, COLUMN_NAMES.index("x")] = -5.0
     rows[:, FORCE_COLUMNS.start] = np.arange(len(rows))
-    counts = {"frame": 1, "acknowledged": 0, "late": 0, "skipped": 0, "lateness": 0, "truncated": 0}
+    names = "acknowledged late skipped lateness truncated force_limited too_deep deepest"
+    counts = dict.fromkeys(names.split(), 0) | {"frame": 1}
     numbers = np.frombuffer(encode_frame(rows, 0, counts, np.zeros(6)))
     assert numbers[frame_layout()["minima"] + COLUMN_NAMES.index("x")] == -5.0
     assert numbers[frame_layout()["forces"] :: 3].tolist() == list(range(10, len(rows)))

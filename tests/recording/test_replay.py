@@ -11,13 +11,21 @@ import numpy as np
 import pytest
 
 import asperity as asp
+from asperity.certification.recorded_loop import certify_recording, read_samples
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
 from asperity.recording import recorded_field as field
 from asperity.recording import replay
 from asperity.recording.recording import open_recording
-from asperity.recording.replay import COMPARED_COLUMNS, recorded_field, recorded_surface_on
+from asperity.recording.replay import (
+    COMPARED_COLUMNS,
+    recorded_field,
+    recorded_limits,
+    recorded_surface_on,
+)
 from asperity.recording.row_encoding import row_type
+from asperity.recording.writer import RecordingWriter
+from asperity.report.sentences.loop_text import recording_answer
 from asperity.simulation import Cartesian, Servo, SpringHand, Strokes, simulate
 from asperity.simulation.trace import COLUMNS
 
@@ -61,6 +69,30 @@ def test_replayed_forces_are_bit_identical(
     assert repr(result) == "<Replay of 20000 rows, the same bit for bit>"
     assert np.abs(recording["commanded x"]).max() > 0.1
     assert bool(recording["law held"].any()) is (law != "B")
+
+
+@pytest.mark.parametrize("law", ["C", "D"])
+def test_rows_at_the_force_limit_and_below_the_depth_are_counted(tmp_path: Path, law: str) -> None:
+    surface = asp.Surface(WAVE, law, 700.0, 0.4e-3)
+    hand = SpringHand(stiffness=(300.0, 300.0, 0.0), damping=2.0, mass=0.05, force=(0.0, 0.0, -2.5))
+    path = tmp_path / "run.mcap"
+    run = simulate(surface, Cartesian(0.02, 1.0), hand, SERVO, STROKES, 0.1, trace=path)
+    recording = open_recording(path)
+    limits = recorded_limits(recording)
+    assert limits is not None
+    assert 100 < limits.force_limited == run.force_limited < 1000
+    assert 100 < limits.too_deep == run.too_deep <= 1000
+    assert limits.deepest == pytest.approx(run.deepest)
+    assert f"{limits.too_deep} samples lie below max_depth, 400 µm" in recording_answer(recording)
+    assert certify_recording(read_samples(path)).limits == limits
+    assert asp.replay(recording).limits == limits
+
+
+def test_limits_of_a_recording_without_a_surface_are_unknown(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with RecordingWriter(path, COLUMNS) as writer:
+        writer.append(np.zeros((20, len(COLUMNS))))
+    assert recorded_limits(open_recording(path)) is None
 
 
 def test_truncated_file_replays_to_its_end(tmp_path: Path) -> None:

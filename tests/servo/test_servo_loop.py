@@ -173,11 +173,24 @@ def test_excess_depth_can_be_reported_without_stopping(run_loop: RunLoop) -> Non
     assert result.cause is EndReason.FINISHED
     assert LoopStatistics.from_status(result.shared.status).too_deep > 100
     backed = Surface(SURFACE.texture, "C", 900.0, 5e-3, clamp="backed")
-    result = run_loop(PythonDevice(sink_too_deep), 200, surface=backed)
-    assert (result.cause, LoopStatistics.from_status(result.shared.status).too_deep) == (
-        EndReason.FINISHED,
-        0,
-    )
+    assert run_loop(PythonDevice(sink_too_deep), 200, surface=backed).cause is EndReason.FINISHED
+
+
+@pytest.mark.parametrize("step", [0.0, 0.05])
+def test_samples_at_the_force_limit_and_below_the_depth_are_counted(
+    run_loop: RunLoop, step: float
+) -> None:
+    """Each sample at the limit counts, however it is rounded, where depth is no fault, too."""
+    backed = Surface(SURFACE.texture, "C", 900.0, 5e-3, clamp="backed")
+    servo = Servo(1e-3, max_force=3.0, force_resolution=step)
+    result = run_loop(PythonDevice(sink_too_deep), 200, surface=backed, safety=OPEN, servo=servo)
+    counts = LoopStatistics.from_status(result.shared.status)
+    depths = backed.law.contact.depth(backed.texture, result.rows[:, 1:4])
+    forces = np.linalg.norm(backed.force(result.rows[:, 1:4]), axis=1)
+    assert 20 < (forces > 3.0).sum() < 190
+    assert abs(counts.force_limited - (forces > 3.0).sum()) <= 2.0 * (step > 0.0)
+    assert 20 < counts.too_deep == (depths > 5e-3).sum() < 190
+    assert counts.deepest == pytest.approx(depths.max(), abs=1e-11)
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,9 @@ from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
 from asperity.core.files import Serializable, open_input
 from asperity.core.units import parse_quantity
+from asperity.recording.recorded_field import LimitCounts
 from asperity.recording.recording import is_recording, open_recording
+from asperity.recording.replay import recorded_limits
 
 MAX_LAG = 3
 _MAX_BYTES = 2**31
@@ -42,12 +44,15 @@ class RecordedSamples:
         times: [s], shape (n,).
         positions: [m], shape (n, 3).
         forces: [N], shape (n, 3), held from each sample to the next.
+        limits: samples at the force limit and below ``max_depth``; ``None`` where these are not
+            known.
     """
 
     name: str
     times: FloatArray
     positions: FloatArray
     forces: FloatArray
+    limits: LimitCounts | None = None
 
 
 @dataclass(frozen=True)
@@ -94,6 +99,8 @@ class RecordedCertification(Serializable):
         lag: delay of the force at which this regression fits best [samples].
         position_step: least change of position on each axis [m].
         limit_cycle: a sustained oscillation at the end; ``None`` for none.
+        limits: samples at the force limit and below ``max_depth``; ``None`` where these are not
+            known.
         energy_trace: held-force work along each axis up to each sample [J], shape (n, 3).
         times: of the samples [s], shape (n,).
     """
@@ -117,6 +124,7 @@ class RecordedCertification(Serializable):
     lag: int
     position_step: tuple[float, ...]
     limit_cycle: LimitCycle | None
+    limits: LimitCounts | None
     energy_trace: FloatArray
     times: FloatArray
 
@@ -129,11 +137,13 @@ def read_samples(path: str | Path) -> RecordedSamples:
             whose time runs backwards.
     """
     place = Path(path)
+    limits = None
     if is_recording(place):
         recording = open_recording(place)
         names = recording.names
         force = "applied" if "applied x" in names else "commanded"
         columns = ["time", *_AXES, *[f"{force} {axis}" for axis in _AXES]]
+        limits = recorded_limits(recording)
         table = recording.table()[:, [names.index(column) for column in columns if column in names]]
         if table.shape[1] != len(columns):
             raise ParameterError("recording", f"{place} lacks one of the columns {columns}")
@@ -146,7 +156,7 @@ def read_samples(path: str | Path) -> RecordedSamples:
         raise ParameterError("recording", f"{place}: time does not increase after row {number}")
     if len(times) < 16:
         raise ParameterError("recording", f"{place} has {len(times)} rows; 16 are needed")
-    return RecordedSamples(place.name, times, table[:, 1:4], table[:, 4:7])
+    return RecordedSamples(place.name, times, table[:, 1:4], table[:, 4:7], limits)
 
 
 def _read_csv(path: Path) -> FloatArray:
@@ -230,6 +240,7 @@ def certify_recording(samples: RecordedSamples) -> RecordedCertification:
         lag=lag,
         position_step=position_step,
         limit_cycle=_find_limit_cycle(samples, held, period, position_step),
+        limits=samples.limits,
         energy_trace=energy_trace,
         times=samples.times,
     )

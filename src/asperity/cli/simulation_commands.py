@@ -304,10 +304,11 @@ def recording_command() -> None:
 
 @recording_command.command("info", short_help="Show surface, law, device and column ranges.")
 @click.argument("file")
-@output_options(html=False, uses_cache=False)
+@output_options(html=False)
 def info_command(file: str, outputs: Outputs) -> None:
     """Show surface, law and device of the recording FILE, and the range of each column."""
     from asperity.recording.recording import open_recording
+    from asperity.recording.replay import recorded_limits
     from asperity.report.pages.run_report import recording_page
 
     recording = open_recording(file)
@@ -317,7 +318,7 @@ def info_command(file: str, outputs: Outputs) -> None:
         {"name": name, "unit": unit, "least": low, "greatest": high}
         for (name, unit), low, high in zip(recording.columns, *ranges, strict=True)
     ]
-    data = recording.to_dict() | {"columns": columns}
+    data = recording.to_dict() | {"columns": columns, "limits": recorded_limits(recording)}
     outputs.write(data, recording_page(recording, ranges))
 
 

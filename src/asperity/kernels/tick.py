@@ -92,6 +92,12 @@ def quantize_force(
     return x, y, z
 
 
+def least_limited_square(max_force: float, force_step: float) -> float:
+    """Return the least square [N²] of a force that was limited, then rounded to steps."""
+    least = max((1.0 - 1e-12) * max_force - 1.75 * force_step, 0.5 * max_force)
+    return least * least
+
+
 def initial_servo_state(x: float, y: float, z: float, settings: ServoSettings) -> ServoState:
     """Return the state before the first tick, of a handle at rest at a position [m]."""
     x = quantize(x, settings.position_step)

@@ -131,6 +131,9 @@ class FrameReader:
             "late": counted.late,
             "skipped": counted.skipped,
             "lateness": counted.max_lateness,
+            "force_limited": counted.force_limited,
+            "too_deep": counted.too_deep,
+            "deepest": counted.deepest,
             "truncated": shared.search_state[TRUNCATED_TICKS],
         }
         if session.leader is not None:

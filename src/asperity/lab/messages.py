@@ -162,7 +162,7 @@ _STEP_STATISTICS = (
 )
 HEADER = (
     *("kind", "lane", "frame", "rows", "first", "acknowledged", "forces"),
-    *("late", "skipped", "lateness", "truncated"),
+    *("late", "skipped", "lateness", "truncated", "force_limited", "too_deep", "deepest"),
     *_STEP_STATISTICS,
 )
 _POSITION_NAMES = ("closest x", "closest y", "closest z", "hand x", "hand y", "hand z")
@@ -191,7 +191,8 @@ def encode_frame(
         first: number of the first row.
         counts: ``lane`` (default 0; 1 for the second), ``frame`` (its number),
             ``acknowledged``, ``late`` and ``skipped`` ticks, ``lateness`` (greatest delay of a
-            start [s]) and ``truncated`` (ticks whose search was).
+            start [s]), ``truncated`` (ticks whose search was), ``force_limited`` and ``too_deep``
+            (ticks at the force limit and below the depth), ``deepest`` (of these [m]).
         positions: of closest point and hand (6,) [m].
     """
     forces = rows[-MAX_FORCE_ROWS:, FORCE_COLUMNS]

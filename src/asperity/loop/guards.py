@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 from asperity.core.compiled import FloatArray, Kernels, load_acquire
 from asperity.kernels.probe_functions import probe_depth
-from asperity.kernels.tick import ServoSettings, ServoState
+from asperity.kernels.tick import ServoSettings, ServoState, least_limited_square
 from asperity.loop.interface import (
     DEPTH,
     DEVICE,
@@ -40,6 +40,7 @@ from asperity.loop.interface import (
 )
 from asperity.loop.shared_trace import (
     DEEP_COUNT,
+    DEEPEST,
     FORCE_LIMIT_COUNT,
     HEARTBEAT_WORD,
     SLEW_LIMIT_COUNT,
@@ -269,7 +270,9 @@ def guard_force(
     limited = limit_change(
         bounded.x, bounded.y, bounded.z, force.fx, force.fy, force.fz, limits.max_change
     )
-    status[FORCE_LIMIT_COUNT] += bounded.is_limited
+    square = servo.fx * servo.fx + servo.fy * servo.fy + servo.fz * servo.fz
+    least = least_limited_square(settings.max_force, settings.force_step)
+    status[FORCE_LIMIT_COUNT] += bounded.is_limited or square >= least
     status[SLEW_LIMIT_COUNT] += limited.is_limited
     return GuardedForce(limited.x, limited.y, limited.z, ramp, energy, damping)
 
@@ -277,12 +280,14 @@ def guard_force(
 def check_sample(servo: ServoState, force: GuardedForce, guards: Guards, texture: object) -> int:
     """Return the fault of a sample, or ``RUNNING``; count a depth beyond the limit."""
     limits = guards.limits
+    status = guards.block.status
     cause = RUNNING
-    if (
-        servo.z < limits.safe_height
-        and probe_depth(servo.x, servo.y, servo.z, texture) > limits.max_depth
-    ):
-        guards.block.status[DEEP_COUNT] += 1
+    depth = 0.0
+    if servo.z < limits.safe_height:
+        depth = probe_depth(servo.x, servo.y, servo.z, texture)
+    if depth > limits.max_depth:
+        status[DEEP_COUNT] += 1
+        status[DEEPEST] = max(status[DEEPEST], int(1e12 * depth))
         cause = DEPTH if limits.depth_is_fault else RUNNING
     return cause if is_finite_vector(force.fx, force.fy, force.fz) else NOT_FINITE
 

@@ -19,10 +19,12 @@ from numpy.typing import NDArray
 
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
-from asperity.core.files import content_digest, text_digest, to_plain_data
-from asperity.kernels.fuse import kernel_source
+from asperity.core.files import Serializable, content_digest, text_digest, to_plain_data
+from asperity.kernels.fuse import fuse_on_texture, kernel_source
+from asperity.kernels.tick import least_limited_square
 from asperity.laws import Law, find_law
 from asperity.laws.clamps import Clamp, find_clamp
+from asperity.recording import replay_trace
 from asperity.surface import Surface
 
 TEXTURE_FILE = "texture.npz"
@@ -61,6 +63,49 @@ class RecordedField:
         places = np.ascontiguousarray(points, dtype=np.float64)
         fuse_sampler(self.sampler).height_batch(places, out, self.texture)
         return out[:, 0]
+
+    def depths(self, points: FloatArray) -> FloatArray:
+        """Return the depths [m], shape (n,), of probes (n, 3) [m]; 0 out of contact."""
+        loops = fuse_on_texture(self.law, self.sampler, self.clamp, (replay_trace,))
+        out = np.empty(len(points))
+        loops.depth_batch(np.ascontiguousarray(points), out, self.texture)
+        return out
+
+
+@dataclass
+class LimitCounts(Serializable):
+    """Samples of a loop at the force limit of the device and below ``max_depth``.
+
+    Attributes:
+        max_force: the length to which forces are limited [N].
+        force_resolution: step to which they are then rounded [N].
+        max_depth: depth for which the surface was analysed [m].
+        force_limited: number of samples whose force was limited.
+        too_deep: number of samples below ``max_depth``.
+        deepest: greatest depth of these [m]; 0 for none.
+
+    Example:
+        >>> counts = LimitCounts(max_force=2.0, force_resolution=0.0, max_depth=1e-3)
+        >>> counts.count(np.array([[0.0, 0.0, 2.0], [0.0, 0.0, 1.9]]), np.array([3e-3, 0.5e-3]))
+        >>> counts.force_limited, counts.too_deep, counts.deepest
+        (1, 1, 0.003)
+    """
+
+    max_force: float
+    force_resolution: float
+    max_depth: float
+    force_limited: int = 0
+    too_deep: int = 0
+    deepest: float = 0.0
+
+    def count(self, forces: FloatArray, depths: FloatArray) -> None:
+        """Count samples with forces (n, 3) [N], and the depths of some (m,) [m]."""
+        squares = np.square(forces).sum(axis=1)
+        least = least_limited_square(self.max_force, self.force_resolution)
+        deep = depths[depths > self.max_depth]
+        self.force_limited += int(np.count_nonzero(squares >= least))
+        self.too_deep += len(deep)
+        self.deepest = float(deep.max(initial=self.deepest))
 
 
 def surface_field(surface: Surface) -> RecordedField:

@@ -6,6 +6,7 @@ import hashlib
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -24,9 +25,10 @@ from asperity.laws import Law
 from asperity.loop import no_guards, replayed_device, servo_loop
 from asperity.loop.interface import LoopState
 from asperity.loop.replayed_device import ReplayedDevice
-from asperity.recording import replay_trace
+from asperity.recording import replay_trace, row_encoding
 from asperity.recording.recorded_field import (
     TEXTURE_FILE,
+    LimitCounts,
     RecordedField,
     formula_digest,
     read_field,
@@ -79,6 +81,7 @@ class Replay(Serializable, Displayable):
         first_difference: the first difference; ``None`` if there is none.
         max_force_difference: largest difference of a component of the force [N].
         notes: changes since the recording, in sentences.
+        limits: rows at the force limit and below ``max_depth``, see :func:`recorded_limits`.
     """
 
     path: str
@@ -87,6 +90,7 @@ class Replay(Serializable, Displayable):
     first_difference: Difference | None
     max_force_difference: float
     notes: tuple[str, ...] = ()
+    limits: LimitCounts | None = None
 
     def __repr__(self) -> str:
         if self.is_identical:
@@ -128,10 +132,32 @@ def replay(recording: Recording | str | os.PathLike[str], surface: Surface | Non
             note = f"Recorded on another surface: content {content}, this is {surface.digest}."
             notes.append(note)
     notes = [*describe_changes(recording, field.law), *notes]
-    result = Replay(str(recording.path), 0, 0, None, 0.0, tuple(notes))
+    result = Replay(str(recording.path), 0, 0, None, 0.0, tuple(notes), recorded_limits(recording))
     for first, block, forces in _replay_blocks(recording, field, settings):
         result = _compare(result, first, block, forces)
     return result
+
+
+@lru_cache(maxsize=4)
+def recorded_limits(recording: Recording) -> LimitCounts | None:
+    """Return how many rows of a recording are at the force limit and below ``max_depth``.
+
+    ``None`` for a recording that does not hold its surface, or not the limits.
+    """
+    try:
+        field = recorded_field(recording)
+        servo = recording.metadata["servo"]
+        depth = float(_surface_metadata(recording)["max_depth"])
+        counts = LimitCounts(float(servo["max_force"]), float(servo["force_resolution"]), depth)
+        columns = [
+            row_encoding.find_column(recording.columns, name)
+            for name in ("x", "y", "z", *COMPARED_COLUMNS[:3])
+        ]
+    except (ParameterError, KeyError, TypeError, ValueError):
+        return None
+    for block in recording.blocks():
+        counts.count(block[:, columns[3:]], field.depths(block[:, columns[:3]]))
+    return counts
 
 
 def recorded_surface_on(recording: Recording, texture: Texture) -> Surface:

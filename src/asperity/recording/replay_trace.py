@@ -5,10 +5,11 @@
 from typing import NamedTuple
 
 from asperity.core.compiled import FloatArray, Kernels
+from asperity.kernels.probe_functions import probe_depth
 from asperity.kernels.tick import ServoSettings, ServoState
 from asperity.loop.interface import GuardedForce, Reading
 
-KERNELS = Kernels(provides=("trace_sample", "trace_timing"))
+KERNELS = Kernels(provides=("trace_sample", "trace_timing"), loops=("depth_batch",))
 
 
 class ReplayTrace(NamedTuple):
@@ -47,3 +48,9 @@ def trace_sample(
 
 def trace_timing(trace: ReplayTrace, lateness: int, duration: int) -> None:
     """Do nothing: there is no clock."""
+
+
+def depth_batch(points: FloatArray, out: FloatArray, texture: object) -> None:
+    """Write the depths [m] of probes (n, 3) [m], 0 out of contact."""
+    for i in range(points.shape[0]):
+        out[i] = probe_depth(points[i, 0], points[i, 1], points[i, 2], texture)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,6 +32,7 @@ class LoopProgram:
         law: parameters of the law.
         safe_height: height above which the depth is within its limit at every position [m].
         max_depth: limit of the depth [m].
+        depth_can_fault: whether the law is certified to this depth only.
         max_evaluations: evaluation budget of a tick.
     """
 
@@ -41,6 +41,7 @@ class LoopProgram:
     law: tuple[float, ...]
     safe_height: float
     max_depth: float
+    depth_can_fault: bool
     max_evaluations: float
 
 
@@ -69,13 +70,13 @@ def build_program(surface: Surface, driver: Driver) -> LoopProgram:
     bounded = surface.effective_clamp.holds_whole_force
     everywhere = bounded or theorem_on(surface).holds_at_any_depth(surface)
     crest = surface.law.contact.extremes(surface.texture)[1]
-    safe_height = -math.inf if everywhere else crest - surface.max_depth
     return LoopProgram(
         source,
         surface.texture.arguments,
         surface.loop_arguments,
-        safe_height,
+        crest - surface.max_depth,
         surface.max_depth,
+        not everywhere,
         surface.law.contact.max_evaluations,
     )
 
@@ -100,7 +101,7 @@ def loop_limits(
         z,
         program.safe_height,
         program.max_depth,
-        safety.beyond_depth == "fault",
+        safety.beyond_depth == "fault" and program.depth_can_fault,
     )
 
 

@@ -101,7 +101,8 @@ class LoopStatistics(Serializable):
         max_lateness: largest start delay of a sample [s].
         force_limited: samples whose force was limited.
         slew_limited: samples whose change of force was limited.
-        too_deep: samples deeper than the analysed depth.
+        too_deep: samples deeper than ``max_depth``.
+        deepest: greatest depth of these [m]; 0 for none.
         lateness_histogram: number of samples that started less than 2ⁿ ns late, but not less than
             2ⁿ⁻¹, by n.
         period_histogram: the same for the difference between two starts and the period.
@@ -114,23 +115,26 @@ class LoopStatistics(Serializable):
     force_limited: int
     slew_limited: int
     too_deep: int
+    deepest: float
     lateness_histogram: tuple[int, ...]
     period_histogram: tuple[int, ...]
 
     @classmethod
     def from_status(cls, status: Sequence[int]) -> LoopStatistics:
         """Return the statistics of the words of a loop, see :mod:`asperity.loop.shared_trace`."""
-        rows, late, skipped, lateness, forces, slews, deep = status[: words.LAST_START_TIME]
+        rows, late, skipped, lateness = status[: words.FORCE_LIMIT_COUNT]
+        forces, slews, deep, deepest = status[words.FORCE_LIMIT_COUNT : words.LAST_START_TIME]
         first = words.LATENESS_HISTOGRAM
         second = words.PERIOD_HISTOGRAM
         histograms = tuple(status[first:second]), tuple(status[second : words.STATUS_SIZE])
-        return cls(rows, late, skipped, 1e-9 * lateness, forces, slews, deep, *histograms)
+        limits = forces, slews, deep, 1e-12 * deepest
+        return cls(rows, late, skipped, 1e-9 * lateness, *limits, *histograms)
 
     def measured_rate(self, period: float) -> float:
         """Return the mean update rate [Hz] of a loop with a period [s], whose skipped ticks lack.
 
         Example:
-            >>> LoopStatistics(900, 100, 100, 2e-3, 0, 0, 0, (), ()).measured_rate(1e-3)
+            >>> LoopStatistics(900, 100, 100, 2e-3, 0, 0, 0, 0.0, (), ()).measured_rate(1e-3)
             900.0
         """
         ticks = self.samples + self.skipped
@@ -140,7 +144,7 @@ class LoopStatistics(Serializable):
         """Return an upper bound of the lateness of a share of the samples [s], to a factor of 2.
 
         Example:
-            >>> words = [3, 0, 0, 900, 0, 0, 0, 0] + [0] * 9 + [2, 1] + [0] * 69
+            >>> words = [3, 0, 0, 900, 0, 0, 0, 0, 0] + [0] * 9 + [2, 1] + [0] * 69
             >>> LoopStatistics.from_status(words).lateness_quantile(0.5)
             5.12e-07
         """

@@ -37,8 +37,8 @@ from asperity.simulation.trace import (
     COLUMNS,
     DecimatedTrace,
     Ledger,
-    LimitCounts,
     Run,
+    RunCounts,
     StopReason,
     TailStatistics,
     TraceWriter,
@@ -208,7 +208,7 @@ def simulate(
     rows = math.ceil(samples / every)
     writer = _open_trace(trace, rows, max_rows, recording_metadata, surface)
     tail = None
-    counts = LimitCounts(surface, servo.max_force)
+    counts = RunCounts(surface, servo)
     if trace is not False:
         tail = TailStatistics(rows)
     try:
@@ -310,7 +310,7 @@ def _run_chunks(
     samples: int,
     trace: TraceWriter,
     tail: TailStatistics | None,
-    counts: LimitCounts,
+    counts: RunCounts,
     every: int,
     progress: Callable[[float], None] | None,
 ) -> StopReason:

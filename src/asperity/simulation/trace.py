@@ -13,8 +13,10 @@ from asperity.core.checks import FloatArray
 from asperity.core.display import Plottable
 from asperity.core.errors import ParameterError
 from asperity.core.files import attributes_to_dict, to_plain_data
+from asperity.recording.recorded_field import LimitCounts
 from asperity.recording.row_encoding import NamedColumns
 from asperity.recording.writer import RecordingWriter
+from asperity.simulation.servo import Servo
 from asperity.surface import Surface
 
 COLUMNS = (
@@ -172,37 +174,33 @@ class TailStatistics:
         self._count_in_tail = total
 
 
-class LimitCounts:
+class RunCounts:
     """Counts of samples at the force limit and below ``max_depth``, and energies of friction.
 
     Args:
         surface: the surface.
-        max_force: the length to which forces are limited [N].
+        servo: largest force, and its steps.
 
     Attributes:
-        force_limited: number of samples whose force was limited.
-        too_deep: number of samples below ``max_depth``.
-        deepest: greatest depth of these [m]; 0 for none.
+        limits: samples at the force limit, and below ``max_depth``.
         slipped: energy that the slip of the friction's anchor took, Σ κ d·Δa [J].
         deflected: energy κ|d|²/2 stored in the deflection of the anchor [J].
     """
 
-    def __init__(self, surface: Surface, max_force: float) -> None:
+    def __init__(self, surface: Surface, servo: Servo) -> None:
         self._surface = surface
-        # A limited force has that length but for rounding; rounded to steps it may be less.
-        self._least_square = ((1.0 - 1e-12) * max_force) ** 2
+        depth = surface.max_depth
+        self.limits = LimitCounts(servo.max_force, servo.force_resolution, depth)
         self._safe_height = surface.law.contact.extremes(surface.texture)[1] - surface.max_depth
-        self.force_limited = 0
-        self.too_deep = 0
-        self.deepest = 0.0
         self.slipped = 0.0
         self.deflected = 0.0
         self._anchor = np.empty((0, 3))
 
     @property
     def totals(self) -> tuple[int, int, float, float, float]:
-        """The attributes, in their order."""
-        return self.force_limited, self.too_deep, self.deepest, self.slipped, self.deflected
+        """Counts and the greatest depth [m] of the limits, then the energies."""
+        limits = self.limits
+        return limits.force_limited, limits.too_deep, limits.deepest, self.slipped, self.deflected
 
     def update(self, rows: FloatArray) -> None:
         """Count the next rows of the trace, shape (n, columns)."""
@@ -215,15 +213,12 @@ class LimitCounts:
             self.slipped += stiffness * float((deflection[-len(steps) :] * steps).sum())
             self.deflected = 0.5 * stiffness * float(np.square(deflection[-1]).sum())
             self._anchor = anchors[-1:].copy()
-        squares = np.square(rows[:, _COMMANDED]).sum(axis=1)
-        self.force_limited += int(np.count_nonzero(squares >= self._least_square))
         low = rows[rows[:, _POSITION.stop - 1] < self._safe_height, _POSITION]
         low = low[np.isfinite(low).all(axis=1)]
+        depths = np.empty(0)
         if len(low):
             depths = self._surface.law.contact.depth(self._surface.texture, low)
-            deep = depths[depths > self._surface.max_depth]
-            self.too_deep += len(deep)
-            self.deepest = float(max([self.deepest, *deep[deep.argsort()[-1:]]]))
+        self.limits.count(rows[:, _COMMANDED], depths)
 
 
 MAX_ROWS = 20_000

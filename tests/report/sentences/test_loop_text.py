@@ -26,7 +26,7 @@ def test_a_loop_below_the_rate_of_its_answer_is_named(
     wall = {"max_stiffness": {"value": 1000.0, "update_rate": tested}}
     device = override_device(parse_device(wall, "mine"), {"update_rate": f"{rate} Hz"})
     lines = rate_lines(
-        device, 1.0 / rate, LoopStatistics(1000, skipped, skipped, 0.0, 0, 0, 0, (), ())
+        device, 1.0 / rate, LoopStatistics(1000, skipped, skipped, 0.0, 0, 0, 0, 0.0, (), ())
     )
     if share is None:
         assert lines == []

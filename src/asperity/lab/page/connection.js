@@ -15,6 +15,7 @@ function decodeFrame(numbers, layout) {
     number: value("frame"), lane: value("lane"), rowCount: value("rows"), firstRow: value("first"),
     acknowledged: value("acknowledged"), late: value("late"), skipped: value("skipped"),
     lateness: value("lateness"), truncated: value("truncated"),
+    forceLimited: value("force_limited"), tooDeep: value("too_deep"), deepest: value("deepest"),
     pathLength: value("path_length"), squaredSteps: value("squared_steps"),
     maxForceStep: value("max_force_step"), anchorSlip: value("anchor_slip"), positionStep: value("position_step"),
     closest: point("closest"), hand: point("hand"), newest: numbers.subarray(newest, newest + width),

@@ -309,8 +309,10 @@ function drawTraces() {
 }
 
 /** Return the counts of ticks since the start of the loop. */
-function tickText({ late, skipped, lateness, truncated, firstRow, rowCount }) {
-  const text = `${late} late (${formatQuantity(lateness, "s")}), ${skipped} skipped, ${truncated} truncated ticks`;
+function tickText({ late, skipped, lateness, truncated, forceLimited, tooDeep, deepest, firstRow, rowCount }) {
+  let text = `${late} late (${formatQuantity(lateness, "s")}), ${skipped} skipped, ${truncated} truncated ticks`;
+  if (forceLimited) text += `, ${forceLimited} at the force limit`;
+  if (tooDeep) text += `, ${tooDeep} below the depth (deepest ${formatQuantity(deepest, "m")})`;
   const share = (firstRow + rowCount) / (firstRow + rowCount + skipped);
   return share < 0.99 ? `${text}; measured ${(100 * share).toFixed(0)} % of the update rate that the stiffness is for` : text;
 }

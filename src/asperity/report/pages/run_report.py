@@ -327,7 +327,7 @@ def device_run_page(setup: Setup, loop: ServoProcess, cause: EndReason, path: st
         f"{statistics.samples} samples in {span}, at {format_quantity(1.0 / period, 'Hz')}",
         *timing_lines(statistics),
         *rate_lines(setup.device, period, statistics),
-        *limited_lines(statistics),
+        *limited_lines(statistics, surface.max_depth),
         *[f"Energy to the hand: {energy_text(float(row[11]))}" for row in rows[-1:]],
         *[f"- {assumption}" for assumption in (*setup.assumptions, *loop.notes)],
     ]

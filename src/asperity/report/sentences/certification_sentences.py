@@ -12,6 +12,7 @@ from asperity.certification.recorded_loop import RecordedCertification
 from asperity.certification.witnesses import BaselineDifference
 from asperity.core.units import format_quantity
 from asperity.devices import Device
+from asperity.report.sentences.loop_text import limit_texts
 
 DIFFERENCE_UNITS = {"force": "N", "gain": "N/m", "leak": "J", "jump": "N"}
 
@@ -138,4 +139,6 @@ def recording_answer(result: RecordedCertification) -> str:
     if result.late_samples:
         count = result.late_samples
         sentences.append(f"Late samples: {count}, which lack {result.missing_samples} more.")
+    if result.limits is not None:
+        sentences += [f"{text}." for text in limit_texts(result.limits, result.limits.max_depth)]
     return " ".join(sentences)

@@ -9,8 +9,9 @@ from typing import Any
 from asperity.core.errors import escape_unprintable
 from asperity.core.units import count_text, format_quantity
 from asperity.devices import Device
+from asperity.recording.recorded_field import LimitCounts
 from asperity.recording.recording import Recording
-from asperity.recording.replay import Replay
+from asperity.recording.replay import Replay, recorded_limits
 from asperity.report.sentences.number_text import energy_text
 from asperity.report.sentences.surface_text import describe_texture
 from asperity.report.sentences.texts import sentence
@@ -53,22 +54,22 @@ def run_answer(setup: Setup, run: Run) -> str:
         sentences.append("The energy balance does not close: do not rely on this run")
     if run.truncated_ticks:
         sentences.append(search_error_text(run))
-    sentences += _limits_reached(run)
+    sentences += limit_texts(run, run.surface.max_depth)
     if not run.stop_message:
         sentences.append(rest_text(setup, run))
     return f"{'. '.join(sentences)}."
 
 
-def _limits_reached(run: Run) -> list[str]:
+def limit_texts(counts: Run | LoopStatistics | LimitCounts, max_depth: float) -> list[str]:
     """Return in how many samples the force was limited or the probe too deep, in sentences."""
     sentences = []
-    if run.force_limited:
-        count = count_text(run.force_limited, "sample")
+    if counts.force_limited:
+        count = count_text(counts.force_limited, "sample")
         sentences.append(f"The device's force limit acts in {count}: not the force of the law")
-    if run.too_deep:
-        depth = format_quantity(run.surface.max_depth, "m")
-        deepest = format_quantity(run.deepest, "m", digits=3)
-        count = count_text(run.too_deep, "sample")
+    if counts.too_deep:
+        depth = format_quantity(max_depth, "m")
+        deepest = format_quantity(counts.deepest, "m", digits=3)
+        count = count_text(counts.too_deep, "sample")
         sentences.append(f"{count} lie below max_depth, {depth}: the deepest {deepest}")
     return sentences
 
@@ -123,6 +124,9 @@ def recording_answer(recording: Recording) -> str:
     if surface is not None:
         stiffness = format_quantity(float(surface["stiffness"]), "N/m")
         text += f": law {surface['law']} at {stiffness} on {describe_texture(surface['texture'])}"
+    limits = recorded_limits(recording)
+    if limits is not None:
+        text = ". ".join([text, *limit_texts(limits, limits.max_depth)])
     return f"{text}. {_truncation_text(recording)}".rstrip()
 
 
@@ -165,7 +169,10 @@ def _are_positive_numbers(*values: Any) -> bool:
 def replay_answer(replay: Replay) -> str:
     """Return the result of a replay in one or two sentences."""
     if replay.first_difference is None:
-        return f"All {replay.rows} rows are reproduced bit for bit."
+        texts = [f"All {replay.rows} rows are reproduced bit for bit"]
+        if replay.limits is not None:
+            texts += limit_texts(replay.limits, replay.limits.max_depth)
+        return f"{'. '.join(texts)}."
     first = replay.first_difference
     unit = ""
     if first.column.startswith("commanded"):
@@ -288,7 +295,7 @@ def timing_lines(statistics: LoopStatistics) -> list[str]:
     Example:
         >>> counts = [0] * 9 + [900] * 1 + [99, 1] + [0] * 29
         >>> for line in timing_lines(
-        ...     LoopStatistics(1000, 1, 2, 2e-6, 0, 0, 0, tuple(counts), tuple(counts))
+        ...     LoopStatistics(1000, 1, 2, 2e-6, 0, 0, 0, 0.0, tuple(counts), tuple(counts))
         ... ):
         ...     print(line)
         Late: 1 of 1000 samples finished after the next was due, 2 skipped
@@ -320,7 +327,7 @@ def rate_lines(device: Device, period: float, statistics: LoopStatistics) -> lis
 
     Example:
         >>> from asperity.devices import load_device
-        >>> statistics = LoopStatistics(700, 300, 300, 2e-3, 0, 0, 0, (), ())
+        >>> statistics = LoopStatistics(700, 300, 300, 2e-3, 0, 0, 0, 0.0, (), ())
         >>> print(rate_lines(load_device("touch"), 1e-3, statistics)[0])
         Measured update rate 700 Hz, below 1 kHz: only 0.7 of the stiffness for that rate holds
     """
@@ -338,14 +345,13 @@ def rate_lines(device: Device, period: float, statistics: LoopStatistics) -> lis
     ]
 
 
-def limited_lines(statistics: LoopStatistics) -> list[str]:
+def limited_lines(statistics: LoopStatistics, max_depth: float) -> list[str]:
     """Return in how many samples a limit was active, and why that matters."""
-    texts = {
-        "Force limit active in {} samples: not the force of the law": statistics.force_limited,
-        "Slew limit active in {} samples: not the force of the law": statistics.slew_limited,
-        "{} samples below max_depth, outside the analysed region": statistics.too_deep,
-    }
-    return [text.format(count) for text, count in texts.items() if count]
+    lines = limit_texts(statistics, max_depth)
+    if statistics.slew_limited:
+        count = count_text(statistics.slew_limited, "sample")
+        lines.append(f"The slew limit acts in {count}: not the force of the law")
+    return lines
 
 
 def machine_lines(report: MachineReport) -> list[str]:

@@ -234,7 +234,7 @@ def excitation_renderer(driver: Driver) -> Callable[[Excitation], LoopProgram]:
         servo_loop, *loop_parts(), sys.modules[__name__], *driver.kernel_modules()
     )
     return lambda excitation: LoopProgram(
-        source, (0.0,), Excitation(*map(float, excitation)), -math.inf, math.inf, 1.0
+        source, (0.0,), Excitation(*map(float, excitation)), -math.inf, math.inf, False, 1.0
     )
 
 
