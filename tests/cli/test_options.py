@@ -26,7 +26,7 @@ from asperity.cli.main import COMMANDS, GROUPS, cli
 from asperity.cli.options import LAW_OPTIONS, SPEED, option_help
 from asperity.cli.output import progress_bar, step_bar
 from asperity.core.arguments import MAX_DEPTH, Argument
-from asperity.core.processes import PROGRESS_CALLBACKS, report_fraction
+from asperity.core.processes import PROGRESS_CALLBACKS, Part, report_fraction, report_part
 from asperity.core.units import format_quantity
 from asperity.lab.scene_state import START_LAW, START_STIFFNESS
 from asperity.laws import LAWS
@@ -173,11 +173,14 @@ def test_progress_has_no_percentage_before_a_part_is_done(monkeypatch: pytest.Mo
         baking = stream.getvalue()[len(first) :]
         step("law W")
         time.sleep(0.3)
+        report_part(Part.LEAK)
+        time.sleep(0.3)
     assert "law H (1 of 2)" in first
     assert "%" not in first
     assert "law H (1 of 2): baking" in baking
     assert "75%" in baking
     assert re.search(r"law W \(2 of 2\) .*50%", stream.getvalue())
+    assert re.search(r"law W \(2 of 2\): leak .*83%", stream.getvalue())
     assert PROGRESS_CALLBACKS == []
 
 
@@ -206,6 +209,7 @@ def test_progress_reports_compilation_only_when_code_is_not_cached(
         output = stream.getvalue()
         report(0.5)
     assert ("comparing: compiling, on a first run only" in output) != is_cached
+    assert is_cached or "comparing  " in output.rpartition("first run only")[2]
     assert COMPILE_CALLBACKS == []
 
 

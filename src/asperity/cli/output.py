@@ -29,18 +29,24 @@ class _Steps:
 
     Attributes:
         name: of the step.
+        text: the name, with the part of the step.
         start: when it began [s].
-        is_part: whether the bar is that of a long part of the step, with a time of its own.
+        is_baking: whether the bar is that of a field, with a time of its own.
+        fraction: completed before the step.
+        size: of a step, as a fraction.
         bar: the bar, with one task.
         task: its id.
     """
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, size: float) -> None:
         from rich import progress
 
         self.name = name
+        self.text = name
         self.start = time.monotonic()
-        self.is_part = False
+        self.is_baking = False
+        self.fraction = 0.0
+        self.size = size
         columns = (
             progress.TextColumn("{task.description:<24}"),
             progress.TextColumn("{task.fields[steps].seconds:.0f} s", "dim"),
@@ -65,32 +71,42 @@ class _Steps:
         if name not in (None, self.name):
             self.start = time.monotonic()
         self.name = name or self.name
-        if self.is_part:
-            self.bar.reset(self.task)
-        self.is_part = False
-        total = 1.0 if fraction > 0.0 else None
-        self.bar.update(self.task, total=total, completed=fraction, description=self.name)
+        self.fraction = fraction
+        self._show(self.name, fraction)
 
-    def report_compilation(self, _loop: str) -> None:
-        """Show that functions are compiled."""
-        text = f"{self.name}: compiling, on a first run only"
+    def _show(self, text: str, fraction: float, *, is_baking: bool = False) -> None:
+        if self.is_baking != is_baking:
+            self.bar.reset(self.task)
+        self.is_baking = is_baking
+        self.text = text
+        total = 1.0 if fraction > 0.0 or is_baking else None
+        self.bar.update(self.task, total=total, completed=fraction, description=text)
+
+    def report_compilation(self, loop: str) -> None:
+        """Show that a function is compiled, or that it has been."""
+        text = f"{self.name}: compiling, on a first run only" if loop else self.text
         self.bar.update(self.task, description=text, refresh=True)
 
-    def report_part(self, fraction: float) -> None:
-        """Show the completed fraction of a field that is baked."""
-        if not self.is_part:
-            self.bar.reset(self.task, total=1.0)
-        self.is_part = True
-        self.bar.update(self.task, completed=fraction, description=f"{self.name}: baking")
+    def report_part(self, value: float) -> None:
+        """Show a part of the step: see :data:`asperity.core.processes.PROGRESS_CALLBACKS`."""
+        from asperity.core.processes import Part
+
+        part = Part(int(value))
+        is_baking = part is Part.BAKING
+        share = value if is_baking else self.fraction + self.size * value / len(Part)
+        self._show(f"{self.name}: {part.name.lower()}", share, is_baking=is_baking)
 
 
 @contextmanager
-def progress_bar(description: str, above: Sequence[Any] = ()) -> Iterator[Callable[..., None]]:
+def progress_bar(
+    description: str, above: Sequence[Any] = (), size: float = 0.0
+) -> Iterator[Callable[..., None]]:
     """Show a progress bar with the time left, if standard error is a terminal.
 
     Args:
         description: description of the task.
         above: what is shown above the bar; the caller may change it meanwhile.
+        size: of a step, as a fraction; its parts advance the bar.
 
     Yields:
         A function of the completed fraction in [0, 1] and, optionally, a new description.
@@ -104,7 +120,7 @@ def progress_bar(description: str, above: Sequence[Any] = ()) -> Iterator[Callab
     from asperity.core.compiled import COMPILE_CALLBACKS
     from asperity.core.processes import PROGRESS_CALLBACKS
 
-    steps = _Steps(description)
+    steps = _Steps(description, size)
     err = Console(stderr=True)
     COMPILE_CALLBACKS.append(steps.report_compilation)
     PROGRESS_CALLBACKS.append(steps.report_part)
@@ -127,7 +143,7 @@ def step_bar(
     description: str, steps: int, above: Sequence[Any] = ()
 ) -> Iterator[Callable[[str], None]]:
     """Show the progress over a number of steps; yield a function to call before each step."""
-    with progress_bar(description, above) as update:
+    with progress_bar(description, above, 1.0 / max(steps, 1)) as update:
         done = count()
 
         def begin(name: str) -> None:

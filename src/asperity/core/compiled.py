@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 COMPILE_CALLBACKS: list[Callable[[str], None]] = []
-"""Functions called with the name of a loop before it is compiled; not called for cached loops."""
+"""Functions called with the name of a loop before it is compiled, and "" after; not if cached."""
 EPS = 2.0**-52
 """Machine epsilon of double precision; replaced by that of ``float`` in single-precision exports.
 

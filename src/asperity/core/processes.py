@@ -19,6 +19,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
+from enum import IntEnum
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -34,7 +35,16 @@ SINGLE_THREADED = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 REPORT_PERIOD = 0.5
 """Time [s] between two looks at the progress of a worker."""
 PROGRESS_CALLBACKS: list[Callable[[float], None]] = []
-"""Functions called with the finished fraction of a long part of a task, from 0 to 1."""
+"""Functions called with the number of a :class:`Part` of a task plus its finished fraction."""
+
+
+class Part(IntEnum):
+    """Long parts of a task; a field that is baked reports its finished fraction."""
+
+    BAKING = 0
+    GAIN = 1
+    LEAK = 2
+
 
 _MAX_PROCESSES: ContextVar[int] = ContextVar("max_processes", default=1)
 
@@ -47,9 +57,14 @@ def available_cores() -> int:
 
 
 def report_fraction(fraction: float) -> None:
-    """Report the finished fraction of a long part of a task, of this process or of a worker."""
+    """Report the finished fraction of a field that is baked, in this process or a worker."""
+    report_part(Part.BAKING + min(fraction, 0.999))
+
+
+def report_part(part: float) -> None:
+    """Report which part of a task begins, in this process or a worker."""
     for callback in PROGRESS_CALLBACKS:
-        callback(fraction)
+        callback(part)
 
 
 @contextmanager
@@ -223,7 +238,7 @@ class _TaskQueue:
 
         while wait([future], REPORT_PERIOD).not_done:
             if self.fractions[index]:
-                report_fraction(self.fractions[index])
+                report_part(self.fractions[index])
 
     def start(self, _name: str = "") -> None:
         """Start the workers, unless they were started or stopped."""

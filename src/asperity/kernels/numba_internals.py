@@ -246,9 +246,12 @@ class MachineCodeCache:
             if overload is not None:
                 cache.unlock(CODE_NAMESPACE, key)
         if overload is None:
-            for callback in COMPILE_CALLBACKS:
-                callback(self._function.__name__)
+            self._report(self._function.__name__)
         return overload
+
+    def _report(self, loop: str) -> None:
+        for callback in COMPILE_CALLBACKS:
+            callback(loop)
 
     def _load_cached(self, key: str, target_context: Any) -> Any:
         target_context.refresh()
@@ -275,6 +278,7 @@ class MachineCodeCache:
         content = (*parts, own, _shared_callees(data.library))
         cache.put_entry(CODE_NAMESPACE, key, _serialize(content))
         cache.unlock(CODE_NAMESPACE, key)
+        self._report("")
 
     def _mark(self, result: Any) -> Any:
         """Return compiled code with what its callers find it by in another process."""

@@ -21,6 +21,7 @@ from asperity.analysis.passivity.recommended_stiffness import recommend_on_loop
 from asperity.analysis.passivity.verdict import assess_loop
 from asperity.analysis.results.recommendation import LawRow
 from asperity.core.arguments import FIELD
+from asperity.core.processes import Part, report_part
 from asperity.core.units import round_down
 from asperity.devices import Device
 from asperity.perception.grip import Grip
@@ -114,11 +115,13 @@ def _device_loop(surface: Surface, query: ComparisonQuery) -> DeviceLoop:
 
 def _compute_row(surface: Surface, query: ComparisonQuery) -> LawRow:
     device = query.device
+    report_part(Part.GAIN)
     loop = _device_loop(surface, query)
     q = loop.q
     recommended = recommend_on_loop(loop, query.risk)
     if query.stiffness is None:
         surface = surface.to_stiffness(recommended.start)
+    report_part(Part.LEAK)
     leak = find_leak(surface)
     merit = compute_merit(surface)
     perceptibility = None
