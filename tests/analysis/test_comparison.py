@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -226,7 +227,7 @@ def test_answer_names_the_update_rate_for_which_it_holds(rate: str) -> None:
     assert f"for a loop of {least} or faster" in text
 
 
-def test_a_leak_that_cannot_be_computed_is_a_dash_and_refuses_no_law() -> None:
+def test_a_leak_that_cannot_be_computed_is_a_dash_and_refuses_no_law(tmp_path: Path) -> None:
     heights = 2e-3 * np.random.default_rng(3).random(1500)
     result = asp.compare(asp.Profile(heights, 1e-6, periodic=True), "touch", "WB")
     row = result["B"]
@@ -238,6 +239,9 @@ def test_a_leak_that_cannot_be_computed_is_a_dash_and_refuses_no_law() -> None:
     assert leak_cell(row.leak) == "–"
     assert row.passivity.verdict == "undecided"
     assert result["W"].leak.energy == 0.0
+    surface = asp.Surface(result.texture, "B", stiffness=0.01)
+    (header, *_others) = asp.export_code(surface, tmp_path / "texture.h")
+    assert "an unknown energy (the surface is too steep" in header.read_text()
 
 
 def test_risk_is_the_users(result: asp.Comparison) -> None:

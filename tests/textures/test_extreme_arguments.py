@@ -10,9 +10,11 @@ from contextlib import suppress
 
 import pytest
 
+from asperity.analysis.energy.leak import worst_loop
 from asperity.analysis.results.analyze import analyze
 from asperity.analysis.results.compare import compare
 from asperity.core.errors import ParameterError
+from asperity.report.pages.analysis_report import leak_facts
 from asperity.scene import load_scene
 from asperity.surface import Surface
 from asperity.textures.catalogue import CATALOGUE
@@ -56,11 +58,18 @@ def test_extreme_arguments_take_bounded_time_and_memory(specification: str) -> N
     )  # kilobytes
 
 
-def test_wave_too_steep_for_a_loop_is_an_error() -> None:
-    """One law in full needs its leak; a comparison of laws leaves it unknown, and undecided."""
+def test_leak_of_a_wave_too_steep_for_a_loop_is_unknown() -> None:
+    """Everything else is computed, and the passivity of the law is undecided."""
     wave = load_scene(WAVES[0]).texture
     with pytest.raises(ParameterError, match=r"too steep for its leak.*amplitude.*period"):
-        analyze(Surface(wave, "A"))
+        worst_loop(Surface(wave, "A"))
+    full = analyze(Surface(wave, "A"))
+    assert math.isnan(full.leak.energy)
+    facts = dict(leak_facts(full))
+    assert facts["energy"] == "–"
+    assert "f_c*" in facts
+    assert "W/length" not in str(facts)
+    assert full.passivity.reason.startswith("not decidable: the surface is too steep")
     (row,) = compare(wave, laws="A").rows
     assert math.isnan(row.leak.energy)
     assert row.leak.upper_per_period == math.inf

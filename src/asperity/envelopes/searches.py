@@ -14,7 +14,7 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from asperity.analysis.energy.leak import worst_loop
+from asperity.analysis.energy.leak import find_leak
 from asperity.analysis.energy.straight_scan import merit, scan_force
 from asperity.analysis.limits import perceptibility, wave_scan
 from asperity.core.arguments import FIELD, SEARCH
@@ -219,7 +219,8 @@ class Search:
         surface = trial.surface
         leak = 0.0
         if math.isfinite(self.target.max_leak) and not surface.facts.conservative:
-            leak = worst_loop(surface).worst_per_period / surface.stiffness
+            leak = find_leak(surface).worst_per_period / surface.stiffness
+            leak = math.inf if math.isnan(leak) else leak
         support = 1.0
         if self.target.min_support:
             support = merit(trial.numbered).support

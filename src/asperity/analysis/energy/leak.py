@@ -339,10 +339,10 @@ def _in_plane_outline(
     return estimate, np.concatenate([above, np.hstack([plane, depth])])
 
 
-def find_leak(surface: Surface) -> Leak:
+def find_leak(surface: Surface, direction: tuple[float, float] | None = None) -> Leak:
     """Return the worst loop; of unknown energy, NaN, where the surface is too steep for it."""
     try:
-        return worst_loop(surface)
+        return worst_loop(surface, direction)
     except TooSteepError:
         origin = LoopOrigin(LoopKind.TOO_STEEP, surface.max_depth)
         line = surface.texture.scan_line()

@@ -14,7 +14,7 @@ from asperity.analysis.bounds.bound import NORM, ONE_SIDED, Bound, scale_upper_b
 from asperity.analysis.bounds.branch_and_bound import DEFAULT_WORK_LIMIT
 from asperity.analysis.energy.closed_loops import EnergyBalance, Leak, energy_balance
 from asperity.analysis.energy.continuity import Continuity, continuity
-from asperity.analysis.energy.leak import worst_loop
+from asperity.analysis.energy.leak import find_leak
 from asperity.analysis.energy.straight_scan import FrictionScan, Merit, friction_scan, merit
 from asperity.analysis.gain.characteristic import cached_number, curl_number, make_options
 from asperity.analysis.passivity.recommended_stiffness import recommend_stiffness
@@ -206,7 +206,7 @@ def analyze(
     report_step(STEPS[2])
     curl = None if surface.law.stateful else curl_number(surface, tolerance, work_limit, extent)
     report_step(STEPS[3])
-    leak = worst_loop(surface, direction)
+    leak = find_leak(surface, direction)
     report_step(STEPS[4])
     force = continuity(surface, q)
     _ = force.jumps  # located now, so that no picture has to wait for them

@@ -53,9 +53,12 @@ def leak_facts(analysis: Analysis) -> list[tuple[str, str]]:
     direction = ", ".join([f"{float(part) + 0.0:.6g}" for part in line.direction])
     start = ", ".join([f"{1e3 * float(part) + 0.0:.6g}" for part in line.start])
     plane = f"vertical, along ({direction}) through ({start}) mm"
-    energy = number_text.range_text(leak.energy, leak.upper_per_period, "J")
+    energy = number_text.NOT_AVAILABLE
+    if not math.isnan(leak.energy):
+        energy = number_text.range_text(leak.energy, leak.upper_per_period, "J")
+        energy += f" per traversal ({leak.method})"
     facts = [
-        ("energy", f"{energy} per traversal ({leak.method})"),
+        ("energy", energy),
         ("description", leak.description),
         ("plane", f"{plane}, {format_quantity(line.length, 'm')} of it"),
     ]
@@ -67,9 +70,10 @@ def leak_facts(analysis: Analysis) -> list[tuple[str, str]]:
     if leak.steady is not None:
         steady = format_quantity(leak.steady, "J")
         facts.append(("steady", f"{steady} a turn, once turns are alike, on the worst path found"))
+    friction = leak.absorbing
     if not analysis.conservative:
-        friction = leak.absorbing
         facts.append(("f_c*", f"{absorbing_friction_text(friction)} at every speed"))
+    if friction.planes and not analysis.conservative:
         loop = f"{format_quantity(friction.energy, 'J')} on {format_quantity(friction.length, 'm')}"
         facts.append(("greatest W/length", loop))
     facts += [("v*", critical_speed_text(analysis)), ("thrust", thrust_text(analysis))]

@@ -83,6 +83,8 @@ def draw_field(figure: FigureArea, analysis: Analysis) -> None:
     if len(leak.vertices):
         gain = range_text(leak.energy, leak.upper_per_period, "J")
         remark = f"the worst loop of one period gains {gain}"
+    elif math.isnan(leak.energy):
+        remark = leak.description
     elif not analysis.conservative:
         remark = "no loop found that gains energy"
     axes = law_pictures.draw_fields(figure, [analysis.surface], [remark], window)[0]

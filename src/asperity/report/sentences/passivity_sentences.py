@@ -101,7 +101,7 @@ def absorbing_friction_text(friction: AbsorbingFriction) -> str:
     """
     planes = "1 plane" if friction.planes == 1 else f"{friction.planes} planes"
     least = format_quantity(round_down(friction.found), "N")
-    found = f"at least {least}, greatest W/length of {planes}"
+    found = f"at least {least}, greatest W/length of {planes}" if friction.planes else "unknown"
     if math.isinf(friction.upper):
         return f"{found}; no friction is proved to be enough"
     return f"{found}; {format_quantity(round_up(friction.upper), 'N')} proved to be enough"
@@ -252,6 +252,8 @@ def _proved_delays_text(loop: DeviceLoop, criterion: Criterion) -> str:
 
 
 def _leak_conclusion(loop: DeviceLoop, criterion: Criterion) -> str:
+    if loop.leak is not None and math.isnan(loop.leak.energy):
+        return f"not decidable: {_TOO_STEEP}"
     if criterion.holds is None:
         return "not decidable: no loop found that gains energy, and no proof that none does"
     if criterion.holds:
@@ -434,6 +436,7 @@ def jumps_clause(continuity: Continuity) -> str:
     return f"its force jumps, by up to {largest} where that was located"
 
 
+_TOO_STEEP = "the surface is too steep to integrate around a loop"
 _LOOPS = {
     LoopKind.EVERY_LOOP: "every closed loop: zero by the symbolic curl",
     LoopKind.NO_GAIN: "no evaluated loop gains energy",
@@ -445,7 +448,7 @@ _LOOPS = {
         "the paper's path of (27), worst of {starts} starts: {deflection:g} mm along in light "
         "contact, back at {depth:g} mm"
     ),
-    LoopKind.TOO_STEEP: "unknown: the surface is too steep to integrate around a loop",
+    LoopKind.TOO_STEEP: f"unknown: {_TOO_STEEP}",
     LoopKind.IN_PLANE: "in the plane at {depth:g} mm about an anchor that sticks",
 }
 

@@ -6,7 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from asperity.analysis import characteristic_number, worst_loop
+from asperity.analysis import characteristic_number
+from asperity.analysis.energy.leak import find_leak
 from asperity.core.arguments import Argument
 from asperity.core.units import format_quantity
 from asperity.export.surface_maps import SampledMap, height_resolution, normal_error
@@ -225,9 +226,11 @@ def describe_shading(texture: Texture, stiffness: float | None) -> str:
     if stiffness is not None:
         surface = surface.to_stiffness(stiffness)
     q = characteristic_number(surface)
-    leak = worst_loop(surface)
+    leak = find_leak(surface)
     energy = "no loop gains energy"
-    if leak.energy > 0.0:
+    if math.isnan(leak.energy):
+        energy = f"a loop gains {leak.energy_text}"
+    elif leak.energy > 0.0:
         energy = f"a loop gains {energy_text(leak.energy)}"
     at = format_quantity(surface.stiffness, "N/m")
     depth = format_quantity(surface.max_depth, "m")
