@@ -12,6 +12,7 @@ import asperity as asp
 from asperity.analysis import characteristic_number
 from asperity.analysis.energy.press import depth_at_press, holds_at_any_press, mean_press
 from asperity.analysis.passivity.recommended_stiffness import load_margins
+from asperity.analysis.results import comparison_rows
 from asperity.core.errors import ParameterError
 from asperity.devices import load_device
 from asperity.laws import find_law
@@ -136,6 +137,30 @@ def test_curvature_gives_the_gain_a_floor() -> None:
     assert greatest[1] == pytest.approx(2.0 * greatest[0], rel=2e-2)
     assert asp.compare(WAVE, device, "C", press=0.9 * greatest[0]).rows[0].recommended_stiffness
     assert not asp.compare(WAVE, device, "C", press=1.1 * greatest[0]).rows[0].recommended_stiffness
+
+
+def test_a_law_that_jumps_is_pressed_as_far_as_it_does_not() -> None:
+    """D: no start below the onset of its jumps, and one above it, however soft the press."""
+    row = asp.compare(WAVE, "touch", "D", press=1.0).rows[0]
+    assert row.greatest_press is not None
+    assert row.recommended_stiffness == 0.0 < row.greatest_press
+    assert asp.compare(WAVE, "touch", "D", press=0.9 * row.greatest_press).rows[0].tier
+    assert not asp.compare(WAVE, "touch", "D", press=1.2 * row.greatest_press).rows[0].tier
+
+
+def test_the_depth_of_a_press_needs_few_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each depth costs a certified number, which takes half a second on a map."""
+    depths = []
+    start = comparison_rows.recommend_on_loop
+    monkeypatch.setattr(
+        comparison_rows,
+        "recommend_on_loop",
+        lambda loop, risk: depths.append(loop.surface.max_depth) or start(loop, risk),
+    )
+    for law in "DE":
+        depths.clear()
+        asp.compare(WAVE, "touch", law, press=0.3)
+        assert len(set(depths)) <= 16
 
 
 def test_press_and_depth_are_not_given_together_and_a_given_stiffness_has_its_depth() -> None:

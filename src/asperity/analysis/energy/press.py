@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 
@@ -16,9 +17,11 @@ from asperity.surface import Surface
 _POINTS = 2048
 _NEAREST_POINTS = {True: 1024, False: 128}
 _TOLERANCE = 1e-6
-_MAX_STEPS = 80
+_DOUBLING = math.log(2.0)
 _MAX_DOUBLINGS = 24
 _MAX_HALVINGS = 8
+_EDGE_HALVINGS = 4
+_LEAST_SHARE = 1e-300
 _ROOT_TOLERANCE = 1e-4
 _LEAST_GAIN = 1.01
 """Growth of the press per doubling of the depth below which it counts as its greatest."""
@@ -76,20 +79,17 @@ def depth_at_press(surface: Surface, press: float) -> float:
         >>> round(depth_at_press(wall, 0.2), 9)
         0.0004
     """
+    from scipy.optimize import brentq
+
+    def excess(depth: float) -> float:
+        return (_press_at(surface, depth) if depth > 0.0 else 0.0) - press
+
     low = 0.0
     high = press / surface.stiffness
-    while _press_at(surface, high) < press:
+    while excess(high) < 0.0:
         low = high
         high *= 2.0
-    for _ in range(_MAX_STEPS):
-        middle = 0.5 * (low + high)
-        if _press_at(surface, middle) < press:
-            low = middle
-        else:
-            high = middle
-        if high - low <= _TOLERANCE * high:
-            break
-    return high
+    return float(brentq(excess, low, high, xtol=_TOLERANCE * high))
 
 
 def _press_at(surface: Surface, depth: float) -> float:
@@ -112,38 +112,60 @@ def region_of_press(
     Returns:
         The depth [m], ``None`` if no depth has that press; and the greatest press found [N].
     """
+    from scipy.optimize import brentq
+
     unit = surface.to_stiffness(1.0)
 
-    def excess(depth: float) -> float:
-        reached = start(surface.to_depth(depth)) * _press_at(unit, depth)
-        return math.log(reached / press) if reached > 0.0 else -math.inf
+    @cache
+    def excess(logarithm: float) -> float:
+        depth = math.exp(logarithm)
+        stiffness = start(surface.to_depth(depth))
+        if not stiffness:
+            return math.nan
+        return math.log(max(stiffness * _press_at(unit, depth) / press, _LEAST_SHARE))
 
-    low, high = _bracket(excess, press / max(start(surface), 1e-3))
+    stiffness = start(surface)
+    first_depth = press / stiffness if stiffness else surface.max_depth
+    low, high = _bracket(excess, math.log(first_depth))
     if high is None:
-        return None, press * math.exp(excess(low))
-    while excess(high) > _ROOT_TOLERANCE and high > low * (1.0 + _TOLERANCE):
-        middle = math.sqrt(low * high)
-        if excess(middle) < 0.0:
-            low = middle
-        else:
-            high = middle
-    return high, press
+        greatest = 0.0 if math.isnan(excess(low)) else math.exp(excess(low))
+        return None, press * greatest
+    if excess(low) >= 0.0:
+        return math.exp(low), press
+    return math.exp(brentq(excess, low, high, xtol=_ROOT_TOLERANCE)), press
 
 
 def _bracket(excess: Callable[[float], float], depth: float) -> tuple[float, float | None]:
-    """Return a depth with too little press, and one with enough; ``None`` if there is none."""
+    """Return a depth with too little press, and one with enough; ``None`` if there is none.
+
+    Depths are natural logarithms; without a start the excess is NaN.
+    """
     value = excess(depth)
     for _ in range(_MAX_HALVINGS):
-        if math.isfinite(value) and value < 0.0:
+        if value < 0.0:
             break
-        depth *= 0.5
+        depth -= _DOUBLING
         value = excess(depth)
     for _ in range(_MAX_DOUBLINGS):
-        deeper = excess(2.0 * depth)
+        deeper = excess(depth + _DOUBLING)
         if deeper >= 0.0:
-            return depth, 2.0 * depth
-        if deeper < value + math.log(_LEAST_GAIN):
-            return depth, None
-        depth *= 2.0
+            return depth, depth + _DOUBLING
+        if math.isnan(deeper):
+            return _deepest_start(excess, depth)
+        if math.log(_LEAST_SHARE) < deeper <= value + math.log(_LEAST_GAIN):
+            break
+        depth += _DOUBLING
         value = deeper
+    return depth, None
+
+
+def _deepest_start(excess: Callable[[float], float], depth: float) -> tuple[float, float | None]:
+    """Return the same for a depth beyond whose double there is no start."""
+    step = _DOUBLING
+    for _ in range(_EDGE_HALVINGS):
+        step *= 0.5
+        if excess(depth + step) >= 0.0:
+            return depth, depth + step
+        if excess(depth + step) > excess(depth):
+            depth += step
     return depth, None

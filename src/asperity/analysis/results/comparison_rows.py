@@ -74,7 +74,7 @@ def render_row(surface: Surface, query: ComparisonQuery) -> LawRow:
 
 
 _PRESS_TOLERANCE = 1e-3
-_FIELD_GAIN = 1.1  # of a baked law over the law itself, or less: one field is enough
+_FIELD_GAIN = 1.15  # of a baked law over the law itself, at most: one field is enough
 _RENDERINGS = 4
 
 
