@@ -7,6 +7,8 @@ from collections.abc import Iterator
 import pytest
 from tests.lab.browser import Browser, needs_browser
 
+from asperity.report.sentences.number_text import limit_text
+
 FED = "document.getElementById('energy-card').classList.contains('supplies-energy')"
 QUIET = "The limit is conservative for this hand: in "
 
@@ -161,7 +163,9 @@ def test_a_quiet_contact_above_the_limit_says_that_it_is_conservative(page: Brow
     page.press(" ")
     page.until(f"document.getElementById('limit-text').textContent.includes('{QUIET}')", 30.0)
     limit = page.ask("lab.status.limit.stiffness")
-    page.expect_text("limit-text", f"▲ above the limit of {limit:.0f} N/m for law C", exact=False)
+    page.expect_text(
+        "limit-text", f"▲ above the limit of {limit_text(limit)} for law C", exact=False
+    )
     # The same contact below the limit exceeds none.
     render(page, "C", 600.0)
     page.until("document.getElementById('limit-text').textContent.startsWith('below the limit')")

@@ -9,6 +9,7 @@ from tests.lab.page.test_motions import render
 
 import asperity as asp
 from asperity.lab.scene_state import make_scene_state
+from asperity.report.sentences.number_text import limit_text
 from asperity.scene import load_scene
 
 DEPTH = 1e-6 * round(random.uniform(300.0, 340.0), 3)
@@ -54,7 +55,7 @@ def test_the_recommendation_comes_from_compare_and_is_applied(page: Browser) -> 
     named = f"law {best.law.letter} at {stiffness_text(best.recommended_stiffness)}"
     page.expect_text("recommendation", f"{named}: {best.tier}")
     note = text(page, "recommendation-note")
-    assert f"limit {stiffness_text(best.stability_limit.stiffness)} (plausible)" in note
+    assert f"limit {limit_text(best.stability_limit.stiffness)} (plausible)" in note
     assert "Assumed hand: tool held like a pen" in text(page, "recommendation-reason")
     # Applied by the button, as a user does it.
     page.expect_text("apply-recommendation", f"Use {named}")

@@ -14,6 +14,13 @@ export function formatQuantity(value, unit) {
   return `${scaled.toFixed(digits).replace("-", "−")} ${prefix}${unit}`;
 }
 
+/** Return the limit of a stiffness, rounded down to three digits as in the terminal. */
+export function formatLimit(stiffness) {
+  if (!(stiffness > 0)) return formatQuantity(stiffness, "N/m");
+  const step = 10 ** (Math.floor(Math.log10(stiffness)) - 2);
+  return formatQuantity(step * Math.floor(stiffness / step * (1 + 1e-12)), "N/m");
+}
+
 /** Return a length in millimetres with constant width, so that a changing value does not jitter. */
 export const formatMillimetres = value => (1e3 * value).toFixed(3).replace("-", "−").padStart(7, " ");
 

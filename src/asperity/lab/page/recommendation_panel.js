@@ -1,6 +1,6 @@
 // What the comparison of all laws recommends for the surface, device and hand, and a button that applies it.
 
-import { formatQuantity } from "./format.js";
+import { formatLimit, formatQuantity } from "./format.js";
 
 const $ = name => document.getElementById(name);
 
@@ -40,6 +40,6 @@ function headline({ changes, reason, tier, is_recommended: isRecommended }) {
 function note({ changes, reason, limit, amount }) {
   if (!reason) return "All laws are compared on this surface and device.";
   if (!changes) return reason;
-  const bound = limit.basis === "wall gain" ? "no stiffness is stable for it" : `limit ${formatQuantity(limit.stiffness, "N/m")} (${limit.basis})`;
+  const bound = limit.basis === "wall gain" ? "no stiffness is stable for it" : `limit ${formatLimit(limit.stiffness)} (${limit.basis})`;
   return `${bound}; ${amount}`;
 }

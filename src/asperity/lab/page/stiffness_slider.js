@@ -1,6 +1,6 @@
 // Scale of the stiffness slider, and the mark of the stability limit on it.
 
-import { formatQuantity } from "./format.js";
+import { formatLimit } from "./format.js";
 
 const $ = id => document.getElementById(id);
 
@@ -20,11 +20,11 @@ export function showLimit({ stiffness, law }, limit, quietText) {
 
 function limitText(stiffness, law, limit, isKnown) {
   if (limit.basis === "wall gain") {
-    return `No stiffness is stable: below a speed v* law ${law} delivers energy. ▲ marks the gain of the tested wall, ${formatQuantity(limit.stiffness, "N/m")}`;
+    return `No stiffness is stable: below a speed v* law ${law} delivers energy. ▲ marks the gain of the tested wall, ${formatLimit(limit.stiffness)}`;
   }
   if (isKnown) {
     const side = stiffness > limit.stiffness ? "▲ above" : "below";
-    return `${side} the limit of ${formatQuantity(limit.stiffness, "N/m")} for law ${law}: ${limit.criterion} (${limit.basis})`;
+    return `${side} the limit of ${formatLimit(limit.stiffness)} for law ${law}: ${limit.criterion} (${limit.basis})`;
   }
   if (limit.q === "inf") return `No limit: the force of law ${law} jumps`;
   if (!("basis" in limit)) return "Computing the limit …";
