@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import sys
@@ -14,10 +15,12 @@ INTERRUPTED = 130  # 128 + SIGINT, as in shells
 IO_ERROR = 74  # as in sysexits.h
 BROKEN_PIPE = 141  # 128 + SIGPIPE
 _TRACEBACK = "ASPERITY_TRACEBACK"
+_GARBAGE_THRESHOLD = 20_000  # objects: imports and compilers create many, of which few are garbage
 
 
 def main() -> NoReturn:
     """Run the command line; every error is an exit code and one line on standard error."""
+    gc.set_threshold(_GARBAGE_THRESHOLD)
     try:
         status = _flush_output(_run())
     except KeyboardInterrupt:
