@@ -1,5 +1,6 @@
 """Loops between two heights of each column of a plane grid."""
 
+import itertools
 import math
 from types import SimpleNamespace
 
@@ -79,3 +80,28 @@ def test_planes_climb_to_an_oblique_circulation(monkeypatch: pytest.MonkeyPatch)
     assert search.densest is not None
     assert 0.99 * expected < search.best.energy <= 1.001 * expected
     assert search.densest.density >= search.best.density
+
+
+RADIUS = 5e-4
+RING = 8e-5
+"""Radius of a ring in which a force goes round, and its thickness [m]."""
+
+
+def ring_force(points: FloatArray) -> FloatArray:
+    """Return a force of 1 N at most that goes round in a thin ring [N]."""
+    radius = np.hypot(points[:, 0], points[:, 1])
+    size = np.exp(-((radius - RADIUS) ** 2 + points[:, 2] ** 2) / RING**2) / (radius + 1e-9)
+    return np.stack([-size * points[:, 1], size * points[:, 0], 0.0 * size], axis=1)
+
+
+def test_polygons_get_vertices_to_wind_twice_in_a_ring(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Eight vertices make little more than a turn; the clock counts how often it is asked."""
+    monkeypatch.setattr(loop_search, "time", SimpleNamespace(monotonic=itertools.count().__next__))
+    monkeypatch.setattr(RendererCalls, "rate", 1e6)
+    corner = np.full(3, 1e-3)
+    calls = RendererCalls(FunctionRenderer(ring_force), Region(-corner, corner))
+    calls.approaches = True
+    search = loop_search.LoopSearch(calls, Resolution(0.0, (0.0, 0.0, 0.0), 0.0, 1e-7), 0.0, seed=0)
+    search._search_polygons(1500.0)
+    assert search.best is not None
+    assert search.best.energy > 1.8 * 2.0 * math.pi * RADIUS

@@ -25,8 +25,8 @@ def climb(
 ) -> tuple[FloatArray, FloatArray]:
     """Return improved places and their values, the best first.
 
-    A step that improves is repeated, longer; the others are random: of all points of a place
-    alike, of some of them, or along one axis, so that steps along a border exist.
+    A step that improves is repeated, longer; the others are random: of all points of a place or of
+    a run of them, alike or each for itself, or along one axis, so that steps along a border exist.
 
     Args:
         start: places of k points each [m], shape (n, k, 3).
@@ -35,7 +35,7 @@ def climb(
         is_over: whether to end.
         random: source of the steps.
         spread: standard deviation of the first steps along each axis [m], shape (3,).
-        count: number of steps.
+        count: number of steps, at most.
     """
     places = start
     values = evaluate(places)
@@ -61,12 +61,16 @@ def climb(
 
 
 def _random_moves(shape: tuple[int, ...], random: np.random.Generator) -> FloatArray:
-    """Return moves of standard deviation 1, shape (n, k, 3)."""
+    """Return moves of standard deviation 1: of all points alike, or of a run of them, (n, k, 3)."""
+    number, points, _axes = shape
     moves = random.normal(size=shape)
-    is_shift = random.uniform(size=(shape[0], 1, 1)) < 1 / 3
-    is_moved = random.uniform(size=(shape[0], shape[1], 1)) < 0.5
-    if shape[1] > 1:
-        moves = np.where(is_shift, moves[:, :1], np.where(is_moved, moves, 0.0))
-    is_along_axis = random.uniform(size=(shape[0], 1, 1)) < 0.3
-    axis = random.integers(3, size=(shape[0], 1, 1))
+    if points > 1:
+        is_shift = random.uniform(size=(number, 1)) < 1 / 3
+        is_alike = is_shift | (random.uniform(size=(number, 1)) < 0.5)
+        length = np.rint(points ** random.uniform(size=(number, 1)))
+        after = (np.arange(points) - random.integers(points, size=(number, 1))) % points
+        is_moved = is_shift | (after < length)
+        moves = np.where(is_alike[:, :, None], moves[:, :1], moves) * is_moved[:, :, None]
+    is_along_axis = random.uniform(size=(number, 1, 1)) < 0.3
+    axis = random.integers(3, size=(number, 1, 1))
     return np.where(is_along_axis & (axis != np.arange(3)), 0.0, moves)

@@ -3,7 +3,8 @@
 For a renderer without memory the circulation of the cells of a plane grid is computed. A loop that
 passes the columns of the grid forwards at one height and backwards at a higher one gains the sum of
 the circulations between them, and so does, with the other sign, its reverse. For a renderer with
-memory, polygons are improved by random steps, walked until the work of a turn is steady.
+memory, polygons are improved by random steps, walked until the work of a turn is steady; the best
+get twice the vertices, again and again.
 
 **The work of a loop is what it tends to under refinement.** Its error is the larger of the last two
 changes on doubling the points; a loop counts only if its work exceeds five times its error. Without
@@ -16,6 +17,7 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -38,7 +40,13 @@ _POLYGONS = 48
 _TRIED_POLYGONS = 1000
 _VERTICES = 8
 _STEPS = 100
+_STAGE_ENDS = (0.1, 0.2, 0.35, 0.6, 1.0)
+"""Shares of the time at which each stage of polygons ends; each has twice the vertices."""
+_STAGE_STEPS = 2**31  # as many as the time allows
+_LEAST_POLYGONS = 4
 _SIDE_POINTS = 16
+_SEARCHED_POINTS = 512
+"""Points of a side of a polygon, and of all its sides, at most, while it is searched."""
 _LOOP_POINTS = 512
 _FIRST_SPREAD = 0.3
 
@@ -108,7 +116,6 @@ class LoopSearch:
         self.rejected = 0
         self._unknown_force = resolution.explained(gain)
         self._random = np.random.default_rng(seed)
-        self._best_polygons: list[FloatArray] = []
 
     def run(self, deadline: float) -> None:
         """Search until a time of the monotonic clock [s]."""
@@ -117,7 +124,7 @@ class LoopSearch:
                 self._search_polygons(deadline)
             else:
                 self._search_planes(deadline)
-            if time.monotonic() >= deadline:
+            if _is_past(deadline):
                 return
 
     # --- grids of planes ---
@@ -133,7 +140,7 @@ class LoopSearch:
             circulations = self._circulations(plane, fine_cells)
             for sign in (1.0, -1.0):
                 self._record_columns(sign * circulations, plane)
-            if time.monotonic() >= deadline:
+            if _is_past(deadline):
                 break
 
     def _best_planes(self, count: int, cells: int, deadline: float) -> FloatArray:
@@ -147,7 +154,7 @@ class LoopSearch:
             self._random_ends(count),
             lambda ends: self._plane_energies(self._vertical_planes(ends), cells),
             lambda _starts, ends: np.clip(ends, region.low, region.high),
-            lambda: time.monotonic() >= deadline,
+            partial(_is_past, deadline),
             self._random,
             _FIRST_SPREAD * region.size,
             _STEPS,
@@ -247,19 +254,30 @@ class LoopSearch:
     # --- polygons of a renderer with memory ---
 
     def _search_polygons(self, deadline: float) -> None:
-        """Improve the best of random polygons, and of those before, by random steps."""
+        """Improve the best of random polygons by random steps, with more and more vertices."""
         region = self.calls.region
-        polygons, _energies = climb(
-            np.concatenate([*self._best_polygons, self._starting_polygons(deadline)]),
-            self._polygon_works,
-            region.limit,
-            lambda: time.monotonic() >= deadline,
-            self._random,
-            _FIRST_SPREAD * region.size,
-            _STEPS,
-        )
-        self._best_polygons = [polygons[: _POLYGONS // 2]]
-        for polygon in polygons[:_REFINED]:
+        now = time.monotonic()
+        polygons = self._starting_polygons(deadline)
+        for share in _STAGE_ENDS:
+            end = now + share * (deadline - now)
+            polygons, _energies = climb(
+                polygons,
+                self._polygon_works,
+                region.limit,
+                partial(_is_past, end),
+                self._random,
+                _FIRST_SPREAD * region.size,
+                _STAGE_STEPS,
+            )
+            self._measure_polygons(polygons[:_REFINED])
+            if _is_past(deadline):
+                return
+            best = polygons[: max(len(polygons) // 4, _LEAST_POLYGONS)]
+            middles = 0.5 * (best + np.roll(best, -1, axis=1))
+            polygons = np.stack([best, middles], axis=2).reshape(len(best), -1, 3)
+
+    def _measure_polygons(self, polygons: FloatArray) -> None:
+        for polygon in polygons:
             loop = self.measure(polygon)
             if loop.counts:
                 self._keep(loop)
@@ -274,24 +292,39 @@ class LoopSearch:
         return tried[np.argsort(-self._polygon_works(tried))[:_POLYGONS]]
 
     def _random_polygons(self, number: int) -> FloatArray:
-        """Return polygons in vertical planes of the region [m], of many sizes."""
+        """Return polygons of many sizes [m], a third of them horizontal, shape (n, vertices, 3)."""
         region = self.calls.region
         centres = region.points(self._random.uniform(size=(100 * number, 3)))
         centres = centres[region.contains(centres)][:number, None]
-        count = len(centres)
+        moves = self._vertical_moves(len(centres))
+        moves[::3] = self._circular_moves(len(moves[::3]))
+        starts = np.broadcast_to(centres, moves.shape)
+        return region.limit(starts, centres + moves * region.size)
+
+    def _vertical_moves(self, count: int) -> FloatArray:
+        """Return vertices in vertical planes, as shares of the region from their centre."""
         angle = self._random.uniform(0.0, math.pi, (count, 1))
         angle[::2] = 0.5 * math.pi * self._random.integers(2, size=(len(angle[::2]), 1))
         along = self._random.uniform(-0.5, 0.5, (count, _VERTICES))
         along *= 10.0 ** self._random.uniform(-1.0, 0.3, (count, 1))
         across = self._random.uniform(-1.0, 1.0, (count, _VERTICES))
-        moves = np.stack([along * np.cos(angle), along * np.sin(angle), across], axis=2)
-        starts = np.broadcast_to(centres, moves.shape)
-        return region.limit(starts, centres + moves * region.size)
+        return np.stack([along * np.cos(angle), along * np.sin(angle), across], axis=2)
+
+    def _circular_moves(self, count: int) -> FloatArray:
+        """Return vertices on horizontal circles that wind once or more, in either sense."""
+        windings = self._random.integers(1, 4, (count, 1)) * self._random.choice(
+            (-1, 1), (count, 1)
+        )
+        angle = 2.0 * math.pi * windings * np.arange(_VERTICES) / _VERTICES
+        radius = 0.5 * 10.0 ** self._random.uniform(-1.0, 0.0, (count, 1))
+        around = [radius * np.cos(angle), radius * np.sin(angle), np.zeros_like(angle)]
+        return np.stack(around, axis=2)
 
     def _polygon_works(self, polygons: FloatArray) -> FloatArray:
         """Return the work of the last turn of each polygon [J], shape (polygons,)."""
         following = np.roll(polygons, -1, axis=1)
-        shares = np.arange(_SIDE_POINTS)[:, None] / _SIDE_POINTS
+        count = min(_SIDE_POINTS, _SEARCHED_POINTS // polygons.shape[1])
+        shares = np.arange(count)[:, None] / count
         paths = polygons[:, :, None] + shares * (following - polygons)[:, :, None]
         return self._turn_works(paths.reshape(len(polygons), -1, 3))[0]
 
@@ -404,6 +437,10 @@ def resample(vertices: FloatArray, count: int) -> FloatArray:
     distances = np.concatenate([np.zeros(1), np.cumsum(lengths)])
     wanted = distances[-1] * np.arange(count) / count
     return np.column_stack([np.interp(wanted, distances, closed[:, axis]) for axis in range(3)])
+
+
+def _is_past(deadline: float) -> bool:
+    return time.monotonic() >= deadline
 
 
 def _length(vertices: FloatArray) -> float:
