@@ -61,6 +61,8 @@ def test_body_needs_a_unit_and_renders_its_side(tmp_path: Path) -> None:
     assert "unit" in str(refused.exception)
     assert not path.exists()
     options = ["--unit", "mm", "--resolution", "0.15mm", "--max-depth", "0.5mm"]
+    tip = call("bake", mesh, "--body", *options, "--tip-radius", "0.5mm", "-o", path)
+    assert "tip_radius does not apply to a body" in str(tip.exception)
     result = call("bake", mesh, "--body", *options, "-o", path)
     assert result.exit_code == 0, result.output
     force = Surface(path, "H", 1000.0).force([[5e-3 - 0.4e-3, 0.0, 0.0]])[0]

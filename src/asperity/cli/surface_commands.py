@@ -145,7 +145,7 @@ def bake_command(surface: str, output: str, *, body: bool, outputs: Outputs, **v
         )
         bake_values = options.provided_values(values, _BAKE)
         if body:
-            bake_values |= {"repair": repair, **options.file_values(values)}
+            bake_values |= {"repair": repair, **_body_values(options.file_values(values))}
             baked = bake_mesh(surface, progress=update, **law_values, **bake_values)
         else:
             texture = load_scene(surface, options.file_values(values)).texture
@@ -154,6 +154,13 @@ def bake_command(surface: str, output: str, *, body: bool, outputs: Outputs, **v
     from asperity.report.pages.measured_report import field_page
 
     outputs.write(field.describe(), field_page(field, output))
+
+
+def _body_values(values: dict[str, Any]) -> dict[str, Any]:
+    """Return the options of a file that apply to a mesh: its unit."""
+    for name in values.keys() - {"unit"}:
+        raise ParameterError(name, "does not apply to a body, which a point probes as it is")
+    return values
 
 
 @declare_command("show")

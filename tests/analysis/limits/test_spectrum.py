@@ -7,9 +7,12 @@ import math
 import numpy as np
 import pytest
 
+from asperity.analysis.energy.straight_scan import parallel_line_points
 from asperity.analysis.limits import spectrum as module
-from asperity.analysis.limits.spectrum import Spectrum, band_variances, compute_spectrum
+from asperity.analysis.limits.spectrum import Spectrum, band_variances, compute_spectrum, tip_gain
+from asperity.scene import load_scene
 from asperity.textures import Fourier, Grating, HeightMap, Noise, NoiseProfile, Profile, Sinusoid
+from asperity.textures.kinds.prepare_synthetic import prepare_texture
 
 
 def total_variance(spectrum: Spectrum) -> float:
@@ -25,6 +28,35 @@ def hann_variance(heights: np.ndarray) -> float:
         window = np.multiply.outer(window, one)
     mean = np.sum(window * heights) / np.sum(window)
     return float(np.sum((window * (heights - mean)) ** 2) / np.sum(window**2))
+
+
+@pytest.mark.parametrize(
+    ("name", "tolerance"), [("sinusoid:amplitude=20um,period=0.5mm", 0.01), ("sandpaper", 0.06)]
+)
+def test_what_a_tip_feels_is_that_of_the_dilated_texture(name: str, tolerance: float) -> None:
+    band = 0.4e-3, 0.8333e-3
+    texture = load_scene(name).texture
+    gains = []
+    for radius in (0.25e-3, 0.5e-3):
+        variances = []
+        for one in (texture, prepare_texture(texture, tip_radius=radius)):
+            line = one.scan_line()
+            points = parallel_line_points(one, line, 4096)
+            heights = one.height(points.reshape(-1, 2)).reshape(points.shape[:2])
+            spacing = line.length / 4096, 1.0
+            bands = band_variances(heights[:, None], spacing, line.periodic)
+            within = (bands.wavelength >= band[0]) & (bands.wavelength <= band[1])
+            variances.append(bands.variance[within].sum())
+        gains.append(tip_gain(texture, radius, band))
+        expected = math.sqrt(variances[1] / variances[0])
+        assert gains[-1] == pytest.approx(expected, rel=tolerance)
+    assert gains[1] < gains[0] < 0.94
+    assert tip_gain(texture, 1e-6, band) == pytest.approx(1.0, abs=2e-2)
+
+
+def test_a_band_without_waves_has_no_gain_of_a_tip() -> None:
+    assert tip_gain(Sinusoid(2e-5, 5e-4), 5e-4, (1e-3, 2e-3)) is None
+    assert tip_gain(Profile(np.zeros(50), 1e-4), 5e-4, (1e-3, 2e-3)) is None
 
 
 def test_spectrum_of_a_sinusoid_is_one_wave() -> None:

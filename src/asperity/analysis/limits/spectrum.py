@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from asperity.analysis.energy.straight_scan import parallel_line_points
 from asperity.core.cache import get_or_compute
 from asperity.core.checks import FloatArray
 from asperity.core.display import Text
@@ -27,6 +28,13 @@ MIN_SHARE = 1e-3
 _MAX_WAVES = 64
 # Rounding of the transform, as a share of the variance.
 _TRANSFORM_ROUNDING = 1e-18
+# Samples per shortest wave along the lines that a tip traces, and of a line at most; one of so many
+# lines of a map; points across what a ball can touch; least share of variance of a band with waves.
+_TIP_SAMPLES = 16
+_MAX_TIP_SAMPLES = 1024
+_TIP_LINE_STEP = 4
+_TIP_GRID = 33
+_LEAST_TIP_SHARE = 1e-4
 # Rows of a map processed at once, to bound the memory.
 _ROWS_PER_BLOCK = 512
 
@@ -214,6 +222,53 @@ def band_variances(values: FloatArray, spacing: tuple[float, float], is_periodic
     # A band without variance has no logarithms either, and no wavelength.
     wavelength = np.exp(-logs / np.maximum(variances, np.finfo(float).tiny))
     return Bands(np.array(numbers, dtype=float), variances, wavelength)
+
+
+def tip_gain(texture: Texture, radius: float, band: tuple[float, float]) -> float | None:
+    """Return the RMS of the waves that a ball traces over that of the height, within a band.
+
+    The ball of radius R that rests on the surface has its lowest point at the greatest of
+    h(p + d) - R + √(R² - |d|²). The surface is sampled along lines of a scan, and around them no
+    farther than the ball can touch.
+
+    Args:
+        texture: a texture.
+        radius: R [m].
+        band: shortest and longest wavelength [m].
+
+    Returns:
+        The gain [1]; ``None`` where the lines have no such waves, or are too short for them.
+
+    Example:
+        >>> from asperity.textures.kinds.sinusoid import Sinusoid
+        >>> wave = Sinusoid(amplitude=4e-6, period=1e-3)  # a trough has a radius of 6.3 mm
+        >>> [round(tip_gain(wave, radius, (9e-4, 1.1e-3)), 2) for radius in (1e-3, 20e-3)]
+        [1.0, 0.48]
+    """
+    line = texture.scan_line()
+    count = min(max(math.ceil(_TIP_SAMPLES * line.length / band[0]), 64), _MAX_TIP_SAMPLES)
+    points = parallel_line_points(texture, line, count)[::_TIP_LINE_STEP]
+    heights = texture.height(points.reshape(-1, 2)).reshape(points.shape[:2])
+    lost = min(texture.peak_to_valley, radius)
+    reach = math.sqrt(lost * (2.0 * radius - lost))
+    traced = heights
+    side = np.linspace(-reach, reach, _TIP_GRID)
+    for dx, dy in np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2):
+        if math.hypot(dx, dy) <= reach:
+            around = texture.height((points + np.array([dx, dy])).reshape(-1, 2)).reshape(
+                heights.shape
+            )
+            drop = radius - math.sqrt(radius**2 - dx**2 - dy**2)
+            traced = np.maximum(traced, around - drop)
+    variances = []
+    for values in (heights, traced):
+        bands = band_variances(values[:, None], (line.length / count, 1.0), line.periodic)
+        within = (bands.wavelength >= band[0]) & (bands.wavelength <= band[1])
+        variances.append(float(bands.variance[within].sum()))
+    is_short = not line.periodic and line.length < 2.0 * band[1]
+    if is_short or not variances[0] > _LEAST_TIP_SHARE * float(np.var(heights)):
+        return None
+    return math.sqrt(variances[1] / variances[0])
 
 
 def _add_to_bands(

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 
 from asperity.analysis.limits.limit_rules import LIMIT_RULES
 from asperity.analysis.limits.perceptibility import Perceptibility
+from asperity.analysis.limits.spectrum import tip_gain
 from asperity.analysis.passivity.criteria import LEAK
 from asperity.analysis.results.analyze import PASSIVITY_FIELDS, Analysis, surface_width
 from asperity.analysis.results.check_limits import Limits
@@ -27,6 +28,7 @@ from asperity.report.sentences.limit_sentences import (
     speed_text,
     stiffness_text,
 )
+from asperity.report.sentences.number_text import loss_text
 from asperity.report.sentences.passivity_sentences import (
     buzz_text,
     damping_assumption,
@@ -37,6 +39,7 @@ from asperity.report.sentences.passivity_sentences import (
     update_rate_text,
 )
 from asperity.surface import Surface, default_max_depth
+from asperity.textures.texture import Texture
 
 SCOPE_SENTENCE = "Results concern energy and forces; they were not tested with people"
 """The last assumption of a comparison and of an analysis."""
@@ -150,9 +153,7 @@ def comparison_assumptions(comparison: Comparison) -> tuple[str, ...]:
             f"{surface.texture.domain.description} and depths to "
             f"{format_quantity(surface.max_depth, 'm')}, not bounds"
         )
-    sentences.append(
-        "The probe is a point on the surface as prepared; tip_radius traces it by a ball first"
-    )
+    sentences.append(_probe_sentence(surface.texture, comparison.speed))
     sentences.append(
         "The leak is the work of the field on one slow traversal of its worst loop, without "
         "delay, quantisation and friction of the device"
@@ -196,6 +197,22 @@ def _mended_text(surface: Surface) -> str:
     modulation = 2.0 * depth / (1.0 + depth)
     mended = f"law W with friction {coefficient:.3g} and friction modulation {modulation:.3g}"
     return f"Law F leaks, as in the paper; the same friction without a leak: {mended}"
+
+
+_TIP_RADIUS = 0.5e-3
+_TIP_BAND = (120.0, 250.0)  # [Hz], where a hand feels the smallest motion
+
+
+def _probe_sentence(texture: Texture, speed: float) -> str:
+    """Return that the probe is a point, and how much less a ball would feel."""
+    text = "The probe is a point on the surface as prepared; tip_radius traces it by a ball first"
+    low, high = _TIP_BAND
+    gain = tip_gain(texture, _TIP_RADIUS, (speed / high, speed / low))
+    if gain is None:
+        return text
+    ball = format_quantity(_TIP_RADIUS, "m")
+    at = f"{low:g} to {high:g} Hz, at {format_quantity(speed, 'm/s')}"
+    return f"{text}: one of {ball} would feel about {loss_text(gain)} of its heights at {at}"
 
 
 def _wall_assumptions(comparison: Comparison) -> list[str]:

@@ -278,6 +278,19 @@ def energy_text(value: float) -> str:
     return f"{'+' if value > 0.0 else '-'}{text}"
 
 
+def loss_text(gain: float) -> str:
+    """Return a gain as a loss in whole decibels.
+
+    Example:
+        >>> loss_text(0.5), loss_text(1.0), loss_text(1.3)
+        ('6 dB less', 'as much', '2 dB more')
+    """
+    level = round(20.0 * math.log10(max(gain, 1e-6)))
+    if not level:
+        return "as much"
+    return f"{abs(level)} dB {'less' if level < 0 else 'more'}"
+
+
 def millijoules(value: float, *, signed: bool = True) -> str:
     """Return an energy [J] as text in mJ."""
     # Fewer decimal places for greater energies.
