@@ -126,7 +126,9 @@ _MARK = """(() => {
       (one.matches(".view") || one.textContent.trim())
       && heading.compareDocumentPosition(one) & Node.DOCUMENT_POSITION_FOLLOWING);
     if (!first || first.querySelector("a")) continue;
+    const last = first.closest("table")?.querySelector("tbody tr:last-child > :first-child");
     mark(first, "content" + count);
+    if (last && !last.querySelector("a")) mark(last, "end" + count);
     mark(heading, "heading" + count++);
   }
   return count;
@@ -135,6 +137,8 @@ _MARK = """(() => {
 
 def printed_places(browser: Browser) -> dict[str, list[tuple[int, float, float]]]:
     """Return page, upper and lower border [pt] of headings and of what follows them, on paper.
+
+    "heading0", "content0", and for a table "end0", its last row.
 
     Links mark headings and the first line or picture of their content; a printed page lists the
     rectangles of its links.
@@ -164,4 +168,14 @@ def lonely_headings(places: dict[str, list[tuple[int, float, float]]]) -> list[s
         for name in places
         if name.startswith("heading")
         and places[name][-1][0] != places[name.replace("heading", "content")][0][0]
+    ]
+
+
+def torn_tables(places: dict[str, list[tuple[int, float, float]]]) -> list[str]:
+    """Return the tables whose last row is on a later page than the first."""
+    return [
+        name
+        for name in places
+        if name.startswith("end")
+        and places[name][0][0] != places[name.replace("end", "content")][0][0]
     ]

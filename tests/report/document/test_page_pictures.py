@@ -26,6 +26,7 @@ from tests.report.browsed import (
     open_page,
     pictures,
     printed_places,
+    torn_tables,
 )
 
 import asperity as asp
@@ -408,7 +409,8 @@ def test_pictures_follow_the_width_of_the_window(browser: Browser, cloth_page: P
 
 OFFSETS = (0, 130, 260, 390, 520)
 """Heights of a block before the page [px], so that headings come to lie at other places."""
-_BREAKS = "* { break-before: auto !important; break-after: auto !important }"
+_BREAKS = """* { break-before: auto !important; break-after: auto !important }
+section { break-inside: auto !important }"""
 
 
 def print_shifted(browser: Browser, path: Path, offset: int, fault: str = "") -> Any:
@@ -418,15 +420,18 @@ def print_shifted(browser: Browser, path: Path, offset: int, fault: str = "") ->
     return printed_places(browser)
 
 
-def test_no_heading_is_alone_at_the_foot_of_a_page(browser: Browser, page: Path) -> None:
+def test_no_heading_is_alone_at_the_foot_of_a_page_and_no_table_is_torn(
+    browser: Browser, page: Path
+) -> None:
     for offset in OFFSETS:
         places = print_shifted(browser, page, offset)
-        assert (offset, lonely_headings(places)) == (offset, [])
+        assert (offset, lonely_headings(places), torn_tables(places)) == (offset, [], [])
         split = [name for name, parts in places.items() if len({one[0] for one in parts}) > 1]
         assert split == []
 
 
-def test_lonely_heading_is_detected(browser: Browser, cloth_page: Path) -> None:
-    """Without the rules of the style, some offset leaves a heading alone."""
-    found = [lonely_headings(print_shifted(browser, cloth_page, one, _BREAKS)) for one in OFFSETS]
-    assert any(found)
+def test_lonely_heading_and_torn_table_are_detected(browser: Browser, cloth_page: Path) -> None:
+    """Without the rules of the style, some offset leaves a heading alone, or tears a table."""
+    found = [print_shifted(browser, cloth_page, one, _BREAKS) for one in OFFSETS]
+    assert any(map(lonely_headings, found))
+    assert any(map(torn_tables, found))
