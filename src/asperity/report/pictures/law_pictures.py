@@ -435,6 +435,8 @@ def merit_figure(comparison: Comparison) -> Figure:
         place: dict[str, Any] = {"textcoords": "offset points", "ha": "center", "va": "center"}
         rise = _free_rise(across, up, taken)
         taken.append((across, up + rise))
+        if abs(rise) > _LETTER:  # to the point, as other letters are in between
+            place["arrowprops"] = {"arrowstyle": "-", "color": style.MUTED, "lw": 0.4}
         letter = axes.annotate(row.law.letter, (x, y), (0, rise), **place, **font)
         for artist in (point, letter):
             style.mark_law(artist, row.law.letter)
