@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator, Sequence
+from functools import lru_cache
 
 from asperity.export import c_language as c
 from asperity.export.c_language import ValueType, is_constant
@@ -212,11 +213,10 @@ def without_docstring(body: Sequence[ast.stmt]) -> Sequence[ast.stmt]:
     return body
 
 
-def names_in(target: ast.AST) -> Iterator[str]:
-    """Yield the names in an expression or a statement."""
-    for node in ast.walk(target):
-        if isinstance(node, ast.Name):
-            yield node.id
+@lru_cache(maxsize=10_000)
+def names_in(target: ast.AST) -> frozenset[str]:
+    """Return the names in an expression or a statement."""
+    return frozenset([node.id for node in ast.walk(target) if isinstance(node, ast.Name)])
 
 
 def stored_names(node: ast.stmt) -> Iterator[str]:
