@@ -91,8 +91,9 @@ def bake(
     )
     share = min(field.accuracy.shares)
     if resolution is not None and share > _MAX_SHARE:
-        lost = f"would differ from law H by {share:.0%} of the texture's force at every depth"
-        raise ParameterError("resolution", f"is coarser than the texture: {lost}", resolution)
+        lost = f"would differ from law H by {100.0 * share:.0f} % of the texture's force"
+        reason = f"is coarser than the texture: {lost} at every depth"
+        raise ParameterError("resolution", reason, resolution)
     return surface.to_texture(field)
 
 

@@ -169,7 +169,7 @@ def test_measured_file_with_too_many_missing_points_is_refused(call: Call) -> No
     pytest.importorskip("SurfaceTopography", reason="SurfaceTopography is not installed")
     code, out, err = call("compare", str(DATA / "frt-2.frt"))
     assert (code, out) == (2, "")
-    assert "27.4% of its points" in err
+    assert "27.4 % of its points" in err
     assert "--max-missing" in err
 
 

@@ -278,7 +278,7 @@ def test_limits_of_the_cutoff_are_accepted() -> None:
         (np.zeros((30, 3)), "got 30 x 3"),
         (np.zeros(3), "at least 4 points, got 3"),
         (np.full((5, 5), np.nan), "all heights are missing"),
-        (np.where(np.arange(400).reshape(20, 20) < 101, np.nan, 1.0), "misses 25.2%"),
+        (np.where(np.arange(400).reshape(20, 20) < 101, np.nan, 1.0), "misses 25.2 %"),
         (np.array([0, 1, np.inf, 3, 4]), "infinite heights"),
         (np.array([0, 1e308, -1e308, 3, 4]), "too large"),
     ],
@@ -297,9 +297,9 @@ def test_a_quarter_missing_is_accepted() -> None:
 def test_more_than_a_quarter_missing_needs_max_missing() -> None:
     heights = bumpy(20, 20)
     heights.ravel()[:109] = np.nan
-    with pytest.raises(ParameterError, match=r"misses 27.3% .* a quarter .* max_missing=0.28"):
+    with pytest.raises(ParameterError, match=r"misses 27.3 % .* a quarter .* max_missing=0.28"):
         prepare(surface(heights))
-    with pytest.raises(ParameterError, match=r"misses 27.3% .* at most 27.0% can be filled"):
+    with pytest.raises(ParameterError, match=r"misses 27.3 % .* at most 27.0 % can be filled"):
         prepare(surface(heights), max_missing=0.27)
     prepared = prepare(surface(heights), max_missing=0.28)
     assert prepared.filled_mask is not None
@@ -328,5 +328,5 @@ def test_real_surfaces_are_prepared(
     assert texture.heights.shape == shape
     assert np.isfinite(texture.heights).all()
     if max_missing is not None:
-        with pytest.raises(ParameterError, match=r"misses 27.4% .* max_missing=0.28"):
+        with pytest.raises(ParameterError, match=r"misses 27.4 % .* max_missing=0.28"):
             load_texture(DATA / name)

@@ -366,10 +366,10 @@ def _check_missing(heights: FloatArray, max_missing: float) -> None:
     if missing == 1.0:
         raise ParameterError("surface", "has no valid point: all heights are missing")
     if missing > max_missing:
-        share = "a quarter" if max_missing == MAX_MISSING else f"{max_missing:.1%}"
+        share = "a quarter" if max_missing == MAX_MISSING else f"{100.0 * max_missing:.1f} %"
         text = (
-            f"misses {missing:.1%} of its points; at most {share} can be filled, unless you allow"
-            " more: {max_missing}"
+            f"misses {100.0 * missing:.1f} % of its points; at most {share} can be filled, "
+            "unless you allow more: {max_missing}"
         )
         raise ParameterError("surface", text, max_missing=math.ceil(100 * missing) / 100)
 

@@ -216,12 +216,12 @@ class StudyPlan(Serializable):
     @property
     def text(self) -> str:
         """The plan in a sentence."""
-        power, low, high = self.power
+        power, low, high = [f"{100.0 * share:.0f} %" for share in self.power]
         people = count_text(self.participants, "participant")
         trials = count_text(self.trials, "trial")
         return (
             f"With {people} of {trials} each, "
-            f"{power:.0%} ({low:.0%} to {high:.0%}) of {self.simulations} simulated studies find "
+            f"{power} ({low} to {high}) of {self.simulations} simulated studies find "
             f"that the first condition is {self.effect:g} times as strong."
         )
 

@@ -146,7 +146,7 @@ def _participant_table(result: StudyResult) -> Table:
             f"{label_text(result, row)} {_interval_text(row)}".strip()
             for row in _rows_of(result, name)
         ]
-        text = NOT_AVAILABLE if share is None else f"{share:.0%}"
+        text = NOT_AVAILABLE if share is None else f"{100.0 * share:.0f} %"
         omitted = str(result.omitted[name])
         reason = result.excluded.get(name, "")
         rows.append(Row([Cell(name, "l"), " · ".join(intervals), text, omitted, reason]))

@@ -261,5 +261,5 @@ def _exclude(
     if sum(right) < rules["least_correct"] * len(right):
         return f"{sum(right)} of {len(right)} answers right"
     if share is not None and share < rules["least_consistency"]:
-        return f"{share:.0%} of repeated questions answered alike"
+        return f"{100.0 * share:.0f} % of repeated questions answered alike"
     return ""

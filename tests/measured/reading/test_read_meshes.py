@@ -165,7 +165,7 @@ def test_overhangs_are_refused_with_their_area(tmp_path: Path) -> None:
     flipped = corners.copy()
     flipped[5:8] = flipped[5:8, ::-1]
     message = assert_refused(write_stl(tmp_path / "a.stl", flipped), "3 triangles overhang")
-    match = re.search(r"overhang, (\S+) mm² or (\S+)% of the surface", message)
+    match = re.search(r"overhang, (\S+) mm² or (\S+) % of the surface", message)
     assert match is not None
     assert float(match[1]) == pytest.approx(area[5:8].sum(), rel=1e-3)
     assert float(match[2]) == pytest.approx(100 * area[5:8].sum() / area.sum(), abs=0.006)

@@ -297,7 +297,7 @@ def test_coarse_coordinates_are_noted(distance: float, noted: bool, tmp_path: Pa
     box = trimesh.creation.box((2.0, 2.0, 2.0)).apply_translation((distance, 0.0, 0.0))
     box.export(tmp_path / "box.stl")
     notes = load_mesh(tmp_path / "box.stl", "mm").notes
-    assert [("in steps of 7.81 µm, 0.39% of the height" in note) for note in notes] == [
+    assert [("in steps of 7.81 µm, 0.39 % of the height" in note) for note in notes] == [
         True
     ] * noted
 

@@ -132,7 +132,7 @@ def precision_notes(step: float, height: float) -> tuple[str, ...]:
     """Return what to note where the steps of coordinates [m] matter for a height [m]."""
     if step <= _FINE_STEP * height:
         return ()
-    share = f"{step / height:.2%} of the height" if height else "of no height"
+    share = f"{100.0 * step / height:.2f} % of the height" if height else "of no height"
     words = f"in single precision, in steps of {1e6 * step:.3g} µm, {share}"
     return (f"its coordinates are far from the origin for numbers {words}: move it there first",)
 
@@ -172,7 +172,7 @@ def _check_overhangs(areas: FloatArray, overhanging: NDArray[np.bool_]) -> None:
     advice = "a height field has one height at each point: cut them off"
     if area > _CLOSED_BODY_FRACTION * total:
         advice = "it looks like a whole body: cut off the textured side"
-    part = f"{1e6 * area:.4g} mm² or {area / total:.2%} of the surface"
+    part = f"{1e6 * area:.4g} mm² or {100.0 * area / total:.2f} % of the surface"
     raise SurfaceFileError(f"{int(overhanging.sum())} triangles overhang, {part}; {advice}")
 
 

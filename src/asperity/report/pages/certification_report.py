@@ -86,7 +86,11 @@ def _findings_table(result: Certification) -> Table:
         ("jumps", _quantity_or_none(largest, "N"), jump_places),
         ("by approach", spread, point_text(result.history.at)),
         ("force", force, point_text(result.largest_at)),
-        ("contact begins", _contact_text(result), f"dead zones: {result.contact.dead:.2%}"),
+        (
+            "contact begins",
+            _contact_text(result),
+            f"dead zones: {100.0 * result.contact.dead:.2f} %",
+        ),
         (
             "not finite",
             "found" if result.invalid_at else "not found",

@@ -203,9 +203,9 @@ def onset_answer(setup: Setup, predictions: Sequence[Prediction]) -> str:
 def _delay_rule_text(predictions: Sequence[Prediction]) -> str:
     """Return the cases that cycle below the delay rule, or how many it holds for."""
     shares = [
-        f"{_case_name(prediction)} ({prediction.onset.cycling / prediction.delay_rule:.0%})"
-        for prediction in predictions
-        if prediction.violates_delay_rule
+        f"{_case_name(case)} ({100.0 * case.onset.cycling / case.delay_rule:.0f} %)"
+        for case in predictions
+        if case.violates_delay_rule
     ]
     if shares:
         return f"Limit cycles below the delay rule, at this share of it: {', '.join(shares)}."
