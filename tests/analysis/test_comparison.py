@@ -227,6 +227,15 @@ def test_answer_names_the_update_rate_for_which_it_holds(rate: str) -> None:
     assert f"for a loop of {least} or faster" in text
 
 
+def test_a_texture_that_the_loop_samples_too_coarsely_is_not_of_no_force() -> None:
+    slow = override_device(load_device("falcon"), {"update_rate": "300 Hz"})
+    result = asp.compare("sinusoid:amplitude=0.4mm,period=1.5mm", slow, "C")
+    assert (result["C"].tier, result["C"].resolved_force) == ("borderline", 0.0)
+    assert "its texture of 80 mN RMS, sampled too coarsely, is borderline" in result.recommendation
+    fast = asp.compare("sinusoid:amplitude=0.4mm,period=1.5mm", "falcon", "C")
+    assert "its texture of 270 mN RMS is felt" in fast.recommendation
+
+
 def test_a_leak_that_cannot_be_computed_is_a_dash_and_refuses_no_law(tmp_path: Path) -> None:
     heights = 2e-3 * np.random.default_rng(3).random(1500)
     result = asp.compare(asp.Profile(heights, 1e-6, periodic=True), "touch", "WB")

@@ -104,6 +104,9 @@ def _choice_text(comparison: Comparison) -> str:
         choice = f"At {stiffness} use {law} ({known})"
     force = force_magnitude_text(row.resolved_force)
     effect = f"its texture of {force} RMS is {row.tier}"
+    if row.resolved_force == 0.0:
+        whole = force_magnitude_text(row.perceptibility.texture_rms)
+        effect = f"its texture of {whole} RMS, sampled too coarsely, is {row.tier}"
     if row.tier == "unknown":
         ends = unknown_frequencies_text(row.perceptibility)
         effect = f"whether its texture of {force} RMS is felt, {ends}, is not known"
