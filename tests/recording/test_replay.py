@@ -88,6 +88,17 @@ def test_rows_at_the_force_limit_and_below_the_depth_are_counted(tmp_path: Path,
     assert asp.replay(recording).limits == limits
 
 
+def test_gain_of_a_recording_counts_the_steps_that_the_loop_rounded_to(tmp_path: Path) -> None:
+    """Positions are recorded exactly, and a step of 50 µm lies between neighbours."""
+    surface = asp.Surface(WAVE, "W", 700.0, 0.4e-3)
+    path = tmp_path / "run.mcap"
+    servo = Servo(1e-3, position_resolution=5e-5, max_force=5.0)
+    simulate(surface, Cartesian(0.05, 1.0), HAND, servo, STROKES, 0.5, trace=path)
+    result = certify_recording(read_samples(path))
+    assert result.position_step == (5e-5, 5e-5, 5e-5)
+    assert result.gain < 1.2 * 700.0
+
+
 def test_limits_of_a_recording_without_a_surface_are_unknown(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     with RecordingWriter(path, COLUMNS) as writer:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import csv
 import math
 import re
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -46,6 +47,7 @@ class RecordedSamples:
         forces: [N], shape (n, 3), held from each sample to the next.
         limits: samples at the force limit and below ``max_depth``; ``None`` where these are not
             known.
+        position_resolution: step to which the loop rounded positions that are recorded exactly [m].
     """
 
     name: str
@@ -53,6 +55,7 @@ class RecordedSamples:
     positions: FloatArray
     forces: FloatArray
     limits: LimitCounts | None = None
+    position_resolution: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -138,12 +141,15 @@ def read_samples(path: str | Path) -> RecordedSamples:
     """
     place = Path(path)
     limits = None
+    resolution = 0.0
     if is_recording(place):
         recording = open_recording(place)
         names = recording.names
         force = "applied" if "applied x" in names else "commanded"
         columns = ["time", *_AXES, *[f"{force} {axis}" for axis in _AXES]]
         limits = recorded_limits(recording)
+        with suppress(KeyError, TypeError, ValueError):
+            resolution = float(recording.metadata["servo"]["position_resolution"])
         table = recording.table()[:, [names.index(column) for column in columns if column in names]]
         if table.shape[1] != len(columns):
             raise ParameterError("recording", f"{place} lacks one of the columns {columns}")
@@ -156,7 +162,8 @@ def read_samples(path: str | Path) -> RecordedSamples:
         raise ParameterError("recording", f"{place}: time does not increase after row {number}")
     if len(times) < 16:
         raise ParameterError("recording", f"{place} has {len(times)} rows; 16 are needed")
-    return RecordedSamples(place.name, times, table[:, 1:4], table[:, 4:7], limits)
+    positions = table[:, 1:4]
+    return RecordedSamples(place.name, times, positions, table[:, 4:7], limits, resolution)
 
 
 def _read_csv(path: Path) -> FloatArray:
@@ -212,7 +219,8 @@ def certify_recording(samples: RecordedSamples) -> RecordedCertification:
     period = float(np.median(intervals))
     late = intervals > _LATE * period
     missing = np.round(intervals[late] / period).astype(int) - 1
-    position_step = _position_steps(steps)
+    found = _position_steps(steps)
+    position_step = tuple([max(step, samples.position_resolution) for step in found])
     stiffness, lag = _contact_stiffness(samples)
     changes = np.sqrt(np.square(np.diff(samples.forces, axis=0)).sum(axis=1))
     lengths = np.sqrt(np.square(steps).sum(axis=1))
