@@ -217,15 +217,18 @@ def test_export_refuses_what_the_command_refuses(
     assert [file.name for file in tmp_path.iterdir()] == ["here.h"]
 
 
-def test_export_writes_the_field_beside_the_program(tmp_path: Path) -> None:
+def test_export_writes_the_field_beside_the_program(
+    make_texture: Callable[[str], asp.Texture], tmp_path: Path
+) -> None:
+    texture = make_texture("periodic map")
     law = {"law": "H", "stiffness": 300, "load": True}
-    files = asp.export_code("cloth", tmp_path / "soft.h", "touch", **law)
+    files = asp.export_code(texture, tmp_path / "soft.h", "touch", **law)
     assert [file.name for file in files] == ["soft.h", "soft.field"]
     with pytest.raises(ParameterError, match="path exists"):
-        asp.export_code("cloth", tmp_path / "soft.h", "touch", **law)
+        asp.export_code(texture, tmp_path / "soft.h", "touch", **law)
     (tmp_path / "soft.h").unlink()
     with pytest.raises(ParameterError, match="path exists"):
-        asp.export_code("cloth", tmp_path / "soft.h", "touch", **law)
+        asp.export_code(texture, tmp_path / "soft.h", "touch", **law)
 
 
 def test_run_is_the_command(call: Call, tmp_path: Path) -> None:
