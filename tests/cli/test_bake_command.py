@@ -39,6 +39,7 @@ def test_field_is_shown_with_its_accuracy(tmp_path: Path) -> None:
     result = call("show", path)
     words = " ".join(baked.output.split()).replace("; force", "; the file claims: force")
     assert (result.exit_code, " ".join(result.output.split())) == (0, words)
+    assert "its contact begins at most" in words
     numbers = json.loads(call("show", path, "--json", "-").output)
     assert numbers["kind"] == "field"
     refused = call("show", path, "--s-cutoff", "1mm")

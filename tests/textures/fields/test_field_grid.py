@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -104,6 +105,24 @@ def test_arguments_contain_the_position_of_the_first_node() -> None:
     assert arguments.below == 1
     assert arguments.margin == pytest.approx(0.55)
     assert (arguments.levels, arguments.border) == (6, MIRRORED)
+
+
+@pytest.mark.parametrize("passes", [0, 5, 10])
+def test_contact_begins_within_the_bound_and_near_it_at_worst(passes: int) -> None:
+    """At a distance from a half-space, for points of the mean square of a spline.
+
+    A share of the points is at one distance inside, the others beside the probe.
+    """
+    fitted = replace(grid([[0.1, 0.0], [0.0, 0.1]], (4, 4)), deep=1)
+    bound = fitted.onset_bound(passes)
+    shares = np.linspace(1e-3, 1.0, 1000)
+    heights = np.linspace(0.0, 3.0 * bound, 3001)[:, None]
+    inside = np.maximum(
+        math.sqrt(fitted.spread(passes)) / np.sqrt(shares) - heights, -fitted.margin
+    )
+    means = shares * inside + (1.0 - shares) * np.maximum(-heights, -fitted.margin)
+    highest = heights[(means > 1e-12).any(axis=1)].max()
+    assert 0.99 * bound < highest <= bound
 
 
 # --- error bounds ---------------------------------------------------------------------------------
