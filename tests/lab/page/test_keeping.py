@@ -27,7 +27,7 @@ def test_the_picture_is_saved_as_lines_and_as_points(page: Browser) -> None:
     page.press(" ")
     # Saved at once: a moment later the view may have moved on to what is still computed.
     page.until(
-        "lab.probeState().force[2] > 0.02 && lab.hasCurrentPictures"
+        "lab.probeState().force[2] > 0.02 && lab.hasCurrentPictures && !lab.section.label"
         " && lab.section.covers(lab.sectionBox()) && (globalThis.saved = lab.toSvg())"
     )
     root = ElementTree.fromstring(page.ask("saved"))

@@ -16,7 +16,7 @@ from asperity.analysis.energy.straight_scan import parallel_line_points
 from asperity.core.cache import get_or_compute
 from asperity.core.checks import FloatArray
 from asperity.core.display import Text
-from asperity.core.files import OMITTED, Serializable, written
+from asperity.core.files import OMITTED, Serializable, content_digest, written
 from asperity.textures.plane_waves import PlaneWaves
 from asperity.textures.texture import Texture
 
@@ -245,6 +245,11 @@ def tip_gain(texture: Texture, radius: float, band: tuple[float, float]) -> floa
         >>> [round(tip_gain(wave, radius, (9e-4, 1.1e-3)), 2) for radius in (1e-3, 20e-3)]
         [1.0, 0.48]
     """
+    content = texture.digest and content_digest(texture.digest, radius, *band)
+    return get_or_compute("tip gain", content, lambda: _compute_tip_gain(texture, radius, band))
+
+
+def _compute_tip_gain(texture: Texture, radius: float, band: tuple[float, float]) -> float | None:
     line = texture.scan_line()
     count = min(max(math.ceil(_TIP_SAMPLES * line.length / band[0]), 64), _MAX_TIP_SAMPLES)
     points = parallel_line_points(texture, line, count)[::_TIP_LINE_STEP]
