@@ -11,7 +11,12 @@ import pytest
 import asperity as asp
 from asperity.analysis import characteristic_number
 from asperity.analysis.energy.press import depth_at_press, holds_at_any_press, mean_press
-from asperity.analysis.passivity.recommended_stiffness import load_margins
+from asperity.analysis.passivity.device_loop import DeviceLoop
+from asperity.analysis.passivity.recommended_stiffness import (
+    StiffnessRecommendation,
+    load_margins,
+    recommend_on_loop,
+)
 from asperity.analysis.results import comparison_rows
 from asperity.core.errors import ParameterError
 from asperity.devices import load_device
@@ -150,13 +155,13 @@ def test_a_law_that_jumps_is_pressed_as_far_as_it_does_not() -> None:
 
 def test_the_depth_of_a_press_needs_few_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each depth costs a certified number, which takes half a second on a map."""
-    depths = []
-    start = comparison_rows.recommend_on_loop
-    monkeypatch.setattr(
-        comparison_rows,
-        "recommend_on_loop",
-        lambda loop, risk: depths.append(loop.surface.max_depth) or start(loop, risk),
-    )
+    depths: list[float] = []
+
+    def recommend(loop: DeviceLoop, risk: float) -> StiffnessRecommendation:
+        depths.append(loop.surface.max_depth)
+        return recommend_on_loop(loop, risk)
+
+    monkeypatch.setattr(comparison_rows, "recommend_on_loop", recommend)
     for law in "DE":
         depths.clear()
         asp.compare(WAVE, "touch", law, press=0.3)
