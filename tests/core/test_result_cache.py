@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 import numpy as np
 import pytest
@@ -31,9 +32,9 @@ Compute = Callable[[], Any]
 
 
 @pytest.fixture(autouse=True)
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """Use an empty namespace of results; compiled code is shared with other tests."""
-    monkeypatch.setattr(cache, "RESULTS_NAMESPACE", f"results-{tmp_path.name}")
+    monkeypatch.setattr(cache, "RESULTS_NAMESPACE", f"results-{uuid4().hex}")
     yield cache.cache_folder() / cache.RESULTS_NAMESPACE
     for entry in cache.list_entries():
         if entry.namespace == cache.RESULTS_NAMESPACE:

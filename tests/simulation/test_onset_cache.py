@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 import numpy as np
 import pytest
 
 from asperity.core import cache
-from asperity.core import cache as kept
 from asperity.laws import Law
 from asperity.simulation import Cartesian, Servo, SpringHand, Stationary, find_onset
 from asperity.simulation.lanes import BatchSimulation
@@ -34,12 +33,12 @@ LOOP: dict[str, Any] = {
 
 
 @pytest.fixture(autouse=True)
-def empty_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def empty_cache(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """An empty namespace of results; compiled code is shared with other tests."""
-    monkeypatch.setattr(kept, "RESULTS_NAMESPACE", f"results-{tmp_path.name}")
+    monkeypatch.setattr(cache, "RESULTS_NAMESPACE", f"results-{uuid4().hex}")
     yield
     for entry in cache.list_entries():
-        if entry.namespace == kept.RESULTS_NAMESPACE:
+        if entry.namespace == cache.RESULTS_NAMESPACE:
             entry.path.unlink()
 
 
