@@ -17,7 +17,7 @@ from asperity.core.checks import check_positive
 from asperity.core.errors import ParameterError
 from asperity.core.files import Serializable, content_digest
 from asperity.core.processes import report_fraction
-from asperity.core.units import format_quantity
+from asperity.core.units import format_quantity, format_stiffness
 from asperity.laws import Law
 from asperity.surface import Surface
 from asperity.textures.catalogue import TextureLike, as_texture
@@ -38,12 +38,17 @@ _STROKE_SAMPLES = 4000
 FORMULA = "formula"
 # Greatest size of a field that is baked without being asked for: some ten seconds.
 _AUTOMATIC_BYTES = 2**26
+_PRESS_POINTS = 256
+DEFAULT_REACH = 5.0 / 200.0
+"""Depth of a field below the lowest place of its surface [m]: 5 N at 200 N/m, the stiffness of soft
+devices; stiffer ones reach a greater force."""
 
 
 def bake(
     surface: Surface,
     resolution: float | None = None,
     *,
+    press: float | None = None,
     extent: Extent | None = None,
     progress: Progress | None = None,
     **goal: Any,
@@ -51,14 +56,17 @@ def bake(
     """Bake law H of a surface as a potential field, which is rendered without a search.
 
     Args:
-        surface: a surface with law H; the field extends down to min h - max_depth.
+        surface: a surface with law H; the field extends down to min h - max_depth, and to the
+            press.
         resolution: maximum spacing of the nodes [m]; by default the coarsest one at which the
             force differs from exact H by the share, within the size.
+        press: mean normal force F [N] that the field reaches at the stiffness k of the surface, at
+            min h - F/k; by default F/k is 25 mm: 5 N at 200 N/m.
         extent: width and depth [m], from the origin, of the part of a non-periodic texture to bake;
             it is mirrored at its border.
         progress: called with the finished fraction, from 0 to 1.
         **goal: ``share``, RMS difference from the exact force over the RMS of the texture's force
-            at each depth at which the mean force is at least 0.1 N on 3000 N/m, 0.05 (contact then
+            at each depth at which the mean force is at least 0.1 N on 3000 N/m, 0.06 (contact then
             also begins at most 10 µm or 2 % of the peak-to-valley height from the surface);
             ``max_gain``, certified q over max(1, c) at which smoothing of the nodes stops, 1.15, or
             ``None`` for no smoothing; ``max_bytes``, greatest size, 256 MB.
@@ -83,13 +91,13 @@ def bake(
         texture = _finite_part(texture, extent)
     field = bake_texture(
         texture,
-        surface.max_depth,
+        _field_depth(surface, press),
         surface.parameter("continuity"),
         resolution=resolution,
         goal=bake_goal,
         progress=progress,
     )
-    share = min(field.accuracy.shares)
+    share = field.accuracy.shares[0]
     if resolution is not None and share > _MAX_SHARE:
         lost = f"would differ from law H by {100.0 * share:.0f} % of the texture's force"
         reason = f"is coarser than the texture: {lost} at every depth"
@@ -151,6 +159,17 @@ def bake_mesh(
     return Surface(field, "H", stiffness, field.max_depth, continuity=continuity)
 
 
+def _field_depth(surface: Surface, press: float | None = None) -> float:
+    """Return the depth below the least height [m] down to which a field of a surface extends.
+
+    No point of the surface is lower, so that the mean normal force there is at least k times it.
+    """
+    reach = DEFAULT_REACH
+    if press is not None:
+        reach = check_positive("press", press, "N") / surface.stiffness
+    return max(surface.max_depth, reach)
+
+
 def _bake_goal(
     share: float = BakeGoal.share,
     max_gain: float | None = BakeGoal.max_gain,
@@ -194,7 +213,7 @@ def rendered_surface(
     if not (texture.domain.periodic or texture.is_mirrored or extent is not None):
         return surface
     content = texture.digest and content_digest(
-        texture.digest, surface.max_depth, surface.parameter("continuity"), *(extent or ())
+        texture.digest, _field_depth(surface), surface.parameter("continuity"), *(extent or ())
     )
 
     def compute() -> Texture:
@@ -304,8 +323,27 @@ def _try_search(surface: Surface, step: float) -> tuple[int, int, float]:
 
 
 def rendering_sentences(surface: Surface) -> tuple[str, ...]:
-    """Return how a surface is rendered, in one sentence, where law H was baked."""
-    return surface.texture.preparation[-1:] if surface.texture.baked_numbers else ()
+    """Return how a surface is rendered, where law H was baked: its field, and range of force."""
+    texture: Any = surface.texture
+    if not texture.baked_numbers:
+        return ()
+    return (*texture.preparation[-1:], *_force_range(surface, texture.accuracy.depths))
+
+
+def _force_range(surface: Surface, depths: Sequence[float]) -> tuple[str, ...]:
+    """Return the mean forces, of the field itself, between which its error is known."""
+    texture = surface.texture
+    if texture.is_body or not depths:
+        return ()
+    field = Surface(texture, "H", surface.stiffness, continuity=surface.parameter("continuity"))
+    size = (_PRESS_POINTS, len(texture.domain.spans))
+    xy = texture.domain.points(np.random.default_rng(0).uniform(size=size))
+    ends = []
+    for depth in (min(depths), max(depths)):
+        points = np.column_stack([xy, np.full(len(xy), texture.extremes[1] - depth)])
+        ends.append(format_quantity(float(field.force(points)[:, 2].mean()), "N"))
+    k = format_stiffness(surface.stiffness)
+    return (f"At {k} the presses of this field are {ends[0]} to {ends[1]}",)
 
 
 def _finite_part(texture: Texture, extent: Extent) -> Texture:

@@ -243,7 +243,8 @@ def test_field_of_256_kb_on_a_microcontroller(tmp_path: Path) -> None:
     if missing is not None:
         pytest.skip(f"not run: no {missing} here")
     waves = asp.Fourier([1e-4, 6e-5], [[2000.0, 0.0], [0.0, 3000.0]], [0.3, 1.1])
-    surface = asp.bake(Surface(waves, "H", 800.0, max_depth=3e-4), 51e-6, max_gain=None)
+    surface = Surface(waves, "H", 800.0, max_depth=3e-4)
+    surface = asp.bake(surface, 51e-6, press=0.24, max_gain=None)
     size = surface.texture.bytes
     assert 200_000 < size < 262_144
     firmware = build_firmware(surface, tmp_path)

@@ -110,6 +110,7 @@ def prepare_command(file: str, output: str, outputs: Outputs, **values: Any) -> 
 
 
 _BAKE = options.command_arguments("bake")
+_BAKED_LAW = (STIFFNESS, MAX_DEPTH, SHIPPED_LAW_ARGUMENTS["continuity"])
 
 
 @declare_command("bake")
@@ -119,7 +120,7 @@ _BAKE = options.command_arguments("bake")
 @click.option(
     "--repair", is_flag=True, help="With --body, fill open edges and turn triangles of the mesh."
 )
-@options.argument_options((*_BAKE, MAX_DEPTH, SHIPPED_LAW_ARGUMENTS["continuity"]))
+@options.argument_options((*_BAKE, *_BAKED_LAW))
 @options.plugin_option
 @options.file_options
 @output_options()
@@ -138,11 +139,13 @@ def bake_command(surface: str, output: str, *, body: bool, outputs: Outputs, **v
         raise ParameterError("repair", "requires --body: only a mesh is repaired")
     if values["texture"] is not None and not body:
         raise ParameterError("texture", "requires --body: it is laid on a mesh")
+    if values["press"] is not None and body:
+        raise ParameterError(
+            "press", "is of surfaces: a body is baked down to {max_depth}", max_depth=None
+        )
     check_outputs(force=outputs.force, output=output, json=outputs.json)
     with progress_bar("baking the field") as update:
-        law_values = options.provided_values(
-            values, (MAX_DEPTH, SHIPPED_LAW_ARGUMENTS["continuity"])
-        )
+        law_values = options.provided_values(values, _BAKED_LAW)
         bake_values = options.provided_values(values, _BAKE)
         if body:
             bake_values |= {"repair": repair, **_body_values(options.file_values(values))}

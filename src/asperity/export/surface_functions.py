@@ -308,7 +308,11 @@ class ProgramData:
 
 
 # Lengths of the arrays of a field that a program loads, in its record: template field_data.c.
-_LOADED_LENGTHS = {"c": ("{0}.count",), "columns": ("{0}.rows", "{0}.width", "4")}
+_LOADED_LENGTHS = {
+    "c": ("{0}.count",),
+    "columns": ("{0}.rows", "{0}.width", "4"),
+    "stretch": ("{0}.stretched", "7"),
+}
 
 
 def make_program_data(

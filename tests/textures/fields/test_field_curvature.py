@@ -120,8 +120,25 @@ def test_bernstein_coefficients_reproduce_the_spline() -> None:
     field = grid.arguments(depth)
     _plane, upward = hull_weights(field)
     for order, expected in enumerate((spline, slope, np.full(7, c0 - 2 * c1 + c2))):
-        found = upward[:, order] @ (c0, c1, c2) / field.iz**order
+        found = upward[:, order, :, 0] @ (c0, c1, c2) / field.iz**order
         np.testing.assert_allclose(found @ basis, expected, rtol=1e-12, atol=1e-14)
+
+
+def test_bounds_hold_where_cells_are_stretched() -> None:
+    """And those of the same coefficients on equal cells do not."""
+    knots = np.array([-30.0, -18.0, -6.0, 0.0, 3.0, 5.0, 6.1])
+    grid = FieldGrid(STEPS, (4, 3), np.zeros(2), 12, 1.1, -6.0, 1, PERIODIC, knots)
+    depth = 12.0 - grid.height(np.arange(12)) + 0.2 * RNG.normal(size=grid.node_counts)
+    stored = (depth - grid.offsets()).astype(np.float32)
+    field = grid.arguments(stored, 18.0)
+    points = random_points(grid, 6000)
+    points[:, 2] = RNG.uniform(-40.0, 12.0, len(points))
+    eigenvalues = np.linalg.eigvalsh(hessians(field, points))
+    upper, lower = bounds_of(field)[:, 0]
+    assert eigenvalues[:, -1].max() <= upper
+    assert -eigenvalues[:, 0].min() <= lower
+    assert eigenvalues[:, -1].max() > 0.5 * upper
+    assert bounds_of(grid.arguments(stored * 0.0, 18.0))[0, 0] != upper
 
 
 def test_eigenvalues_and_minors_agree_with_lapack() -> None:

@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from asperity.textures.fields.field_grid import FieldGrid
+from asperity.textures.fields.field_grid import GROWTH, FieldGrid
 from asperity.textures.fields.field_sampler import END, FIRST, MIRRORED, PERIODIC, REACH, ZERO
+from asperity.textures.fields.node_potentials import smooth
 from asperity.textures.kinds.sinusoid import Sinusoid
 from asperity.textures.spline.spline_texture import HeightMap
 
@@ -21,10 +22,35 @@ def grid(steps: list[list[float]], cells: tuple[int, ...], border: int = PERIODI
     return FieldGrid(np.array(steps), cells, np.array([1e-3, 2e-3]), 6, 0.1, 5.0, 1, border)
 
 
+@pytest.mark.parametrize("resolution", [1e-5, 0.7e-4])
+def test_levels_below_the_surface_are_ever_farther_apart(resolution: float) -> None:
+    fitted = FieldGrid.fit(WAVE.domain, WAVE.extremes, 25e-3, 1e-4, resolution)
+    sides = np.diff(fitted.knots)[::-1]
+    assert sides[0] == pytest.approx(resolution)
+    count = fitted.stretched - fitted.below - 1
+    ratios = sides[1:count] / sides[: count - 1]
+    assert ratios == pytest.approx(ratios[0])
+    assert 1.0 < ratios[0] <= GROWTH
+    assert sides[count:] == pytest.approx(sides[count - 1])
+    assert fitted.knots[fitted.below + 1] == pytest.approx(fitted.floor)
+    assert fitted.floor == pytest.approx(-0.1e-3 - 25e-3)
+    # Equal cells reach down to the lowest place, but for less than one of them.
+    assert -0.1e-3 - resolution < fitted.knots[-2] <= -0.1e-3 + 1e-12
+    level = np.linspace(0.0, fitted.levels - 1.0, 200)
+    np.testing.assert_allclose(fitted.level(fitted.height(level)), level, atol=1e-9)
+    # A mean of a linear depth is itself.
+    depths = -fitted.height(np.arange(fitted.levels))
+    means = (depths - fitted.offsets()).astype(np.float32)[None]
+    before = means.copy()
+    smooth(means, np.full(means.shape, 255, np.uint8), fitted)
+    np.testing.assert_allclose(means[0, :-1], before[0, :-1], atol=1e-3 * resolution)
+
+
 @pytest.mark.parametrize("fade", [0.0, 1e-4])
-@pytest.mark.parametrize("resolution", [0.7e-4, 1e-4, 3e-4, 1.0])
+@pytest.mark.parametrize("resolution", [3e-4, 1.0])
 def test_node_spacing_is_at_most_the_resolution(resolution: float, fade: float) -> None:
     fitted = FieldGrid.fit(WAVE.domain, WAVE.extremes, 0.35e-3, fade, resolution)
+    assert not fitted.stretched
     along, rise = fitted.spacing
     above = fitted.height(np.arange(fitted.levels)) > WAVE.extremes[1]
     first_above = int(above.argmax())

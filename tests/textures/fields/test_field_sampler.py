@@ -8,13 +8,16 @@ import math
 import numba
 import numpy as np
 import pytest
+from scipy.interpolate import BSpline
 
 from asperity.core.checks import FloatArray
 from asperity.textures.fields import field_sampler as kernels
 from asperity.textures.fields.field_grid import FieldGrid, SingleArray
 from asperity.textures.fields.field_sampler import MIRRORED, PERIODIC, ZERO, FieldArguments
+from asperity.textures.kinds.sinusoid import Sinusoid
 from asperity.textures.spline.bspline_kernels import fold_coordinate
 
+WAVE = Sinusoid(1e-4, 1e-3)
 STEPS = np.array([[1.1e-5, 0.3e-5], [-0.2e-5, 0.9e-5]])
 BORDERS = [PERIODIC, MIRRORED, ZERO]
 AXES = [1, 2]
@@ -237,12 +240,59 @@ def test_spline_weights_and_their_derivatives() -> None:
 
 
 def test_places_below_the_floor_are_above_the_bottom() -> None:
-    _grid, _dense, arguments = random_field(1, PERIODIC)
-    for w in (3.5, 4.0, 7.2):
-        assert kernels.field_level(w, arguments) == (w, 0.0)
-    assert kernels.field_level(3.5 - 3.0, arguments) == (3.5 - 3.0 * 0.75, 0.5)
-    for depth in (6.0, 7.5, 600.0):
-        assert kernels.field_level(3.5 - depth, arguments) == (0.5, depth / 6.0)
+    grid, _dense, arguments = random_field(1, PERIODIC)
+    for z in (grid.floor, 0.0, 1e-4):
+        assert kernels.field_level(z, arguments) == (z, 0.0)
+    side = grid.level_spacing
+    for depth, place, part in ((3.0, 2.25, 0.5), (6.0, 3.0, 1.0), (600.0, 3.0, 100.0)):
+        found = kernels.field_level(grid.floor - depth * side, arguments)
+        assert found == pytest.approx((grid.floor - place * side, part), rel=1e-12)
+
+
+def stretched_field() -> tuple[FieldGrid, SingleArray, FieldArguments]:
+    """Return a grid whose four lowest cells grow with depth, and random depths that grow too."""
+    knots = np.array([-9e-5, -5e-5, -3e-5, -1.4e-5, -0.6e-5])
+    start = np.array([2e-5, -1e-5])
+    grid = FieldGrid(STEPS, (7, 5), start, 12, 0.8e-5, -3e-5, 1, PERIODIC, knots)
+    rng = np.random.default_rng(4)
+    depths = 1e-4 - grid.height(np.arange(12)) + rng.uniform(0.0, 3e-5, grid.node_counts)
+    return grid, depths, grid.arguments((depths - grid.offsets()).astype(np.float32))
+
+
+def test_stretched_spline_is_that_of_its_knots() -> None:
+    """By SciPy's B-splines along z, and from cell to cell with the same value and slope."""
+    grid, depths, arguments = stretched_field()
+    top = grid.knots[-1] + grid.level_spacing * np.arange(1, 10)
+    knots = np.concatenate([[-1.7e-4], grid.knots, top])
+    places = np.array([[3.0, 2.0]])
+    xy = grid.positions(places)[0]
+    # At a node of the plane the weights are 1/8, 3/4, 1/8 along both axes.
+    share = np.array([0.125, 0.75, 0.125])
+    column = np.einsum("ijk,i,j->k", depths[2:5, 1:4], share, share)
+    spline = BSpline(knots, column, 2)
+    for z in np.append(np.linspace(-2.9e-5, 3e-5, 60), grid.knots[2:]):
+        *gradient, energy = kernels.field_slope(xy[0], xy[1], z, arguments)
+        depth = float(spline(z))
+        assert energy == pytest.approx(0.5 * depth**2, rel=1e-6)
+        assert gradient[2] == pytest.approx(depth * float(spline(z, 1)), rel=1e-5)
+        value, _xx, _xy, _xz, _yy, _yz, zz = kernels.field_expansion(xy[0], xy[1], z, arguments)
+        assert value == pytest.approx(energy, rel=1e-12)
+        if np.abs(z - grid.knots).min() > 1e-12:
+            expected = float(spline(z, 1)) ** 2 + depth * float(spline(z, 2))
+            assert zz == pytest.approx(expected, rel=1e-3, abs=1e-3)
+
+
+def test_small_coefficients_are_stored_of_deep_levels() -> None:
+    """A depth of 25 mm in single precision would be wrong by a nanometre."""
+    domain = WAVE.domain
+    grid = FieldGrid.fit(domain, (-1e-4, 1e-4), 25e-3, 0.0, 2e-5)
+    depths = np.broadcast_to(1e-4 - grid.height(np.arange(grid.levels)), grid.node_counts)
+    arguments = grid.arguments((depths - grid.offsets()).astype(np.float32))
+    assert arguments.c.max() < 4e-4
+    for z in np.linspace(-25e-3, 0.0, 40):
+        *gradient, energy = kernels.field_slope(3.3e-4, 0.0, float(z), arguments)
+        assert energy == pytest.approx(0.5 * (1e-4 - z) ** 2, rel=1e-7)
+        assert gradient[2] == pytest.approx(z - 1e-4, rel=1e-7)
 
 
 @pytest.mark.parametrize("border", BORDERS)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -11,7 +9,7 @@ from asperity.core.checks import FloatArray
 from asperity.kernels.fuse import fuse_surface
 from asperity.laws import LAWS
 from asperity.laws.clamps import NONE
-from asperity.textures.fields.field_grid import BLENDED, COARSE_STEP, FieldGrid
+from asperity.textures.fields.field_grid import FieldGrid
 from asperity.textures.fields.node_potentials import compute_potentials, split_columns, wrong_nodes
 from asperity.textures.kinds.fourier import Fourier
 from asperity.textures.kinds.named_surfaces import named_surface
@@ -93,7 +91,7 @@ def test_result_does_not_depend_on_the_levels_between() -> None:
 def test_grid_holds_the_depth_of_each_node(name: str) -> None:
     texture = TEXTURES[name]
     grid = FieldGrid.fit(texture.domain, texture.extremes, DEPTH, 0.0, MARGIN / 2.75)
-    grid = replace(grid, deep=0)
+    offsets = grid.offsets()
     seen: list[float] = []
     found = compute_potentials(split_columns(texture, 1.0), grid, seen.append)
     assert found.shape == grid.node_counts
@@ -101,42 +99,8 @@ def test_grid_holds_the_depth_of_each_node(name: str) -> None:
     for index in RNG.integers(0, grid.node_counts, (50, len(grid.node_counts))):
         (xy,) = grid.positions(index[None, :-1])
         point = np.array([[*xy, grid.height(index[-1])]])
-        value = max(exact_depths(texture, 1.0, point)[0, 0], -grid.margin)
-        assert found[tuple(index)] == pytest.approx(value, rel=1e-6, abs=1e-12)
-
-
-@pytest.mark.parametrize("deep", [1, 4, 5, 23])
-def test_depths_at_all_levels_are_means_of_computed_ones(deep: int) -> None:
-    domain, heights = TEXTURES["ridges"].domain, TEXTURES["ridges"].extremes
-    grid = replace(FieldGrid.fit(domain, heights, DEPTH, 0.0, MARGIN / 8.0), deep=deep)
-    computed, weights = grid.level_weights()
-    assert weights.min() >= 0.0
-    np.testing.assert_allclose(weights.sum(axis=0), 1.0, rtol=1e-14)
-    np.testing.assert_allclose(computed @ weights, np.arange(grid.levels), atol=1e-12)
-    away = computed[:, None] - np.arange(grid.levels)
-    variances = (away**2 * weights).sum(axis=0)
-    assert (variances[deep:] == 0.0).all()
-    # As ``FieldGrid.spread`` counts it, but for the levels that are exact in part.
-    assert variances.max() <= 0.25 * COARSE_STEP**2 * (1.0 + 1e-12)
-    spread = 0.25 * np.square(grid.spacing).sum() + variances.max() * grid.level_spacing**2
-    assert spread * (1.0 - 1e-12) <= grid.spread(0) <= replace(grid, deep=9).spread(0)
-    if deep > BLENDED:
-        np.testing.assert_allclose(variances[: deep - BLENDED], 0.25 * COARSE_STEP**2, rtol=1e-12)
-
-
-@pytest.mark.parametrize("name", ["ridges", "finite map"])
-def test_interpolated_depths_are_close_and_rise_at_most_as_counted(name: str) -> None:
-    texture = TEXTURES[name]
-    grid = FieldGrid.fit(texture.domain, texture.extremes, DEPTH, DEPTH, MARGIN / 4.0)
-    columns = split_columns(texture, 1.0)
-    exact = compute_potentials(columns, replace(grid, deep=0))
-    found = compute_potentials(columns, grid)
-    np.testing.assert_array_equal(found[..., grid.deep :], exact[..., grid.deep :])
-    error = np.abs(found - exact).max()
-    assert 0.0 < error <= 0.25 * COARSE_STEP * grid.level_spacing
-    steps = -np.diff(found, axis=-1) / grid.level_spacing
-    assert steps.min() >= 0.0
-    assert steps.max() <= 1.0 + 1.875 / BLENDED * 0.25 * COARSE_STEP
+        value = max(exact_depths(texture, 1.0, point)[0, 0], -grid.margin) - offsets[index[-1]]
+        assert found[tuple(index)] == pytest.approx(value, rel=1e-6, abs=1e-11)
 
 
 # --- depths from a lattice ------------------------------------------------------------------------
@@ -172,18 +136,20 @@ def test_columns_from_a_lattice_are_mostly_exact_and_never_less_deep(
 @pytest.mark.parametrize("name", ["profile", "ridges", "finite map"])
 def test_nodes_of_wrong_depth_are_found_and_replaced(name: str) -> None:
     texture = TEXTURES[name]
-    grid = replace(small_grid(texture), deep=0)
+    grid = small_grid(texture)
     columns = split_columns(texture, 1.0)
     exact = compute_potentials(columns, grid)
-    assert not wrong_nodes(exact, grid, 1.0).any()
+    assert not wrong_nodes(exact + grid.offsets(), grid, 1.0).any()
+    lowest = grid.height(grid.deep)
     step = max(grid.spacing)
 
     def disturbed(xy: FloatArray, z: FloatArray, margin: float, out: np.ndarray) -> None:
         columns(xy, z, margin, out)
         deeper = (np.arange(out.size) % 97 == 5).reshape(out.shape) & (out > 3.0 * step)
+        deeper &= z >= lowest
         out[deeper] += 0.5 * step
 
     spoilt = compute_potentials(disturbed, grid)
-    assert (spoilt != exact).mean() > 0.004
+    assert (spoilt != exact).mean() > 0.002
     found = compute_potentials(disturbed, grid, exact=columns)
-    np.testing.assert_array_equal(found, exact)
+    np.testing.assert_allclose(found, exact, atol=1e-10)

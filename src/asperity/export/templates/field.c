@@ -10,7 +10,10 @@ typedef struct {
     int32_t levels, border;
     double q, floor;
     int32_t below;
-    unsigned char reserved[68];
+    uint32_t stretched;
+    uint64_t stretch_offset;
+    double fade;
+    unsigned char reserved[48];
     uint32_t checksum, header_checksum;
 } @name@_field_header;
 
@@ -63,7 +66,7 @@ static inline int @name@_fits(const @name@_field_header *head, size_t size)
 {
     const double numbers[] = {head->m00, head->m01, head->m10, head->m11, head->iz,
                               head->z0, 1e7 * head->x0, 1e7 * head->y0, head->margin,
-                              head->lift};
+                              head->lift, head->floor, head->fade};
     const uint64_t places = (uint64_t)head->rows * head->width;
     size_t i;
     for (i = 0; i < sizeof numbers / sizeof numbers[0]; i++) {
@@ -71,7 +74,10 @@ static inline int @name@_fits(const @name@_field_header *head, size_t size)
             return 0;
         }
     }
-    return (head->rows == 1 || head->rows >= 4) && head->width >= 4 && head->iz > 0
+    return head->fade > 0 && head->stretch_offset <= size && head->stretch_offset % 8 == 0
+        && head->stretched <= (size - head->stretch_offset) / 56
+        && (int64_t)head->stretched < head->levels
+        && (head->rows == 1 || head->rows >= 4) && head->width >= 4 && head->iz > 0
         && places <= 0x7FFFFFFFu && head->levels >= 3 && head->border >= 0 && head->border <= 2
         && head->below >= 1 && head->below <= head->levels - 2
         && head->columns_offset <= size && head->columns_offset % 4 == 0
@@ -81,9 +87,10 @@ static inline int @name@_fits(const @name@_field_header *head, size_t size)
         && head->heights_offset >= sizeof *head && head->heights_offset <= size;
 }
 
-/* Whether every column lies inside the coefficients, and these are finite. */
+/* Whether every column lies inside the coefficients, and all numbers are finite. */
 static inline int @name@_is_consistent(
-    const @name@_field_header *head, const int32_t *columns, const float *c)
+    const @name@_field_header *head, const int32_t *columns, const float *c,
+    const double *stretch)
 {
     const size_t places = (size_t)head->rows * head->width;
     size_t i;
@@ -94,6 +101,11 @@ static inline int @name@_is_consistent(
             return 0;
         }
         if (first < end && (offset + first < 0 || offset + end > (int64_t)head->count)) {
+            return 0;
+        }
+    }
+    for (i = 0; i < (size_t)head->stretched * 7; i++) {
+        if (!(fabs(stretch[i]) <= 1e12)) {
             return 0;
         }
     }
@@ -111,23 +123,39 @@ static inline int @name@_check_file(const unsigned char *bytes, size_t size, @na
         return @NAME@_NO_FIELD;
     }
     memcpy(head, bytes, sizeof *head);
-    if (memcmp(head->magic, "ASPFIELD", 8) != 0 || head->version != 2
+    if (memcmp(head->magic, "ASPFIELD", 8) != 0 || head->version < 2 || head->version > 3
         || head->byte_order != 0x01020304u) {
         return @NAME@_NO_FIELD;
+    }
+    if (head->version == 2) { /* all cells are equally high */
+        head->fade = 2.0 * head->below / head->iz;
     }
     if (head->file_bytes != size || head->header_checksum != @name@_checksum(bytes, 252)
         || head->checksum != @name@_checksum(bytes + sizeof *head, size - sizeof *head)
         || !@name@_fits(head, size)
         || !@name@_is_consistent(
             head, (const int32_t *)(const void *)(bytes + head->columns_offset),
-            (const float *)(const void *)(bytes + head->values_offset))) {
+            (const float *)(const void *)(bytes + head->values_offset),
+            (const double *)(const void *)(bytes + head->stretch_offset))) {
         return @NAME@_DAMAGED;
     }
     return @NAME@_LOADED;
 }
 
-static inline void @name@_use(const @name@_field_header *head, const unsigned char *bytes)
+static inline void @name@_use(const @name@_field_header *head, unsigned char *bytes)
 {
+    size_t i;
+    for (i = 0; i < (size_t)head->stretched * 7; i++) { /* in the precision of the program */
+        double number;
+        @real@ value;
+        memcpy(&number, bytes + head->stretch_offset + i * sizeof number, sizeof number);
+        value = (@real@)number;
+        memcpy(bytes + head->stretch_offset + i * sizeof value, &value, sizeof value);
+    }
+    @name@_surface.stretch = (const @real@ *)(const void *)(bytes + head->stretch_offset);
+    @name@_surface.stretched = head->stretched;
+    @name@_surface.floor = (@real@)head->floor;
+    @name@_surface.fade = (@real@)head->fade;
     @name@_surface.columns = (const int32_t *)(const void *)(bytes + head->columns_offset);
     @name@_surface.c = (const float *)(const void *)(bytes + head->values_offset);
     @name@_surface.rows = head->rows;
@@ -169,7 +197,7 @@ static inline void @name@_use(const @name@_field_header *head, const unsigned ch
     free(@name@_surface.file);
     @name@_surface = @name@_no_field;
     if (memory != NULL) {
-        @name@_use(&head, (const unsigned char *)memory);
+        @name@_use(&head, (unsigned char *)memory);
         @name@_surface.file = memory;
         @name@_surface.used = (size_t)head.heights_offset;
     }

@@ -249,12 +249,13 @@ def field_page(field: PotentialField, path: str) -> page.Page:
     lowest = round(max(field.grid.floor, field.extremes[0] - field.max_depth), 12)
     floor = format_quantity(lowest, "m")
     bound = format_quantity(field.accuracy.bound, "m")
+    equal = format_quantity(round(field.grid.bounded_floor, 12), "m")
     onset = format_quantity(field.grid.onset_bound(field.passes), "m")
     *others, baked = field.preparation
     texts = (
         *[f"{text}." for text in others],
-        f"{baked}; a spline through exact depths differs by at most {bound} times the stiffness,"
-        f" and its contact begins at most {onset} above the surface, proved.",
+        f"{baked}; a spline through exact depths differs by at most {bound} times the stiffness"
+        f" above z = {equal}, and its contact begins at most {onset} above the surface, proved.",
         f"q⁺ at most {field.one_sided.upper:.4g}. Valid down to z = {floor}. {field.bytes} bytes.",
         f"File: {escape_unprintable(path)}",
     )

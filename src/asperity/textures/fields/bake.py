@@ -22,8 +22,10 @@ from asperity.textures.texture import Texture
 _MAX_PASSES = 10
 # Part of the cells above the goal that a pass may leave and still help.
 _STALLED = 0.8
-# Number of depths at which the difference from exact H is measured, and of probes at each of them.
+# Number of depths at which the difference from exact H is measured, for bodies and for surfaces,
+# and of probes at each of them.
 DEPTHS = 12
+PRESSES = 16
 PROBES = 256
 # Mean force over stiffness from which on differences count [m]: 0.1 N on a stiff device.
 LIGHT_TOUCH = 0.1 / 3000.0
@@ -57,7 +59,7 @@ class BakeGoal:
         max_bytes: greatest size of the coefficients.
     """
 
-    share: float = 0.05
+    share: float = 0.06
     max_gain: float = 1.15
     max_bytes: int = 2**28
 
@@ -127,10 +129,12 @@ class BakePlan:
         self.onset_limit = max(_ONSET[0], _ONSET[1] * (top - low))
         size = (PROBES, len(texture.domain.spans))
         xy = texture.domain.points(np.random.default_rng(0).uniform(size=size))
-        depths = (top - self.floor) * np.geomspace(LEAST_DEPTH, 1.0, DEPTHS)
+        deepest = top - self.floor
+        least = LEAST_DEPTH * min(deepest, 2.0 * (top - low) or deepest)
+        depths = np.geomspace(least, deepest, PRESSES)
         level = np.repeat(top - depths, PROBES)
-        points = np.column_stack([np.tile(xy, (DEPTHS, 1)), level])
-        self.set_probes(points, np.repeat(np.arange(DEPTHS), PROBES), depths)
+        points = np.column_stack([np.tile(xy, (PRESSES, 1)), level])
+        self.set_probes(points, np.repeat(np.arange(PRESSES), PROBES), depths)
         forces = self.force[-PROBES:, 2]
         self.lift = float(forces.min())
         self.fade = _FADE * float(np.ptp(forces))
@@ -156,6 +160,7 @@ class BakePlan:
         mean = np.column_stack([_mean_of_rows(part, self.rows, count) for part in self.force.T])
         around = np.square(self.force - mean[self.rows]).sum(axis=1)
         self.row_rms = np.sqrt(_mean_of_rows(around, self.rows, count))
+        self.presses = np.linalg.norm(mean, axis=1)
         self.texture_scale = float(np.abs(self.force).max())
 
     def set_shallow(self, points: FloatArray) -> None:
@@ -343,8 +348,10 @@ class BakePlan:
             rms=float(np.sqrt(np.square(difference).sum(axis=1).mean())),
             largest=float(np.linalg.norm(difference, axis=1).max()),
             depths=tuple(self.depths.tolist()),
+            presses=tuple(self.presses.tolist()),
             shares=tuple(self.shares(difference, self.rows).tolist()),
             onset=float(shift.max()),
+            onset_places=len(shift),
         )
         return field
 

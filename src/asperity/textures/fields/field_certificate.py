@@ -12,7 +12,14 @@ from asperity.core.checks import FloatArray
 from asperity.core.processes import run_in_threads
 from asperity.textures.fields import field_curvature, field_sampler
 from asperity.textures.fields.field_grid import FieldGrid
-from asperity.textures.fields.field_sampler import PERIODIC, ZERO, FieldArguments
+from asperity.textures.fields.field_sampler import (
+    OFFSETS,
+    PERIODIC,
+    RATE,
+    UPPER,
+    ZERO,
+    FieldArguments,
+)
 from asperity.textures.texture import CertifiedNumber
 
 Progress = Callable[[float], None]
@@ -49,7 +56,7 @@ def curvature_bounds(
     if grid.border != ZERO:
         bounds[0, :2] = 1.0  # of the flat wall far below
     numbers = _search(bounds, np.zeros((0, 0, 0), np.uint8), field, progress)
-    largest = float(field.c.max(initial=0.0))
+    largest = float(field.c.max(initial=0.0) + field.stretch[:, OFFSETS:].max(initial=0.0))
     rounding = _DIFFERENCE_ROUNDING * (largest / min(grid.spacing)) ** 2
     best = numbers[np.argmax(numbers[:, :, 1], axis=0), [0, 1]]
     at = grid.positions(best[:, 2 : 2 + len(grid.cells)])
@@ -113,10 +120,10 @@ def hull_weights(field: FieldArguments) -> tuple[FloatArray, FloatArray]:
     Returns:
         Weights of the 9 columns in ∂xx, ∂xy, ∂yy, ∂x, ∂y and 1 at the 9 coefficients in the plane,
         (9, 6, 9), those along the second axis first, or (3, 6, 3) for a profile; and of the 3
-        levels in 1, ∂z, ∂zz at the 3 coefficients along z, (3, 3, 3).
+        levels in 1, ∂z, ∂zz at the 3 coefficients along z, for the cell of each level,
+        (3, 3, 3, levels).
     """
     along = _BERNSTEIN
-    iz = field.iz
     across = along if field.columns.shape[0] > 1 else np.array([1.0, 0.0, 0.0]).reshape(3, 1, 1)
     size = 3 * across.shape[1]
 
@@ -128,8 +135,24 @@ def hull_weights(field: FieldArguments) -> tuple[FloatArray, FloatArray]:
     second = np.einsum("ra,rs...,sb->ab...", rates, second, rates)
     first = np.einsum("ra,r...->a...", rates, np.array([product(0, 1), product(1, 0)]))
     plane = np.stack([second[0, 0], second[0, 1], second[1, 1], *first, product(0, 0)], axis=1)
+    return np.ascontiguousarray(plane), _upward_weights(field)
+
+
+def _upward_weights(field: FieldArguments) -> FloatArray:
+    """Return the weights of three levels, (coefficient, derivative, level, cell)."""
+    along = _BERNSTEIN
+    iz = field.iz
     upward = np.stack([along[0], iz * along[1], iz * iz * along[2]], axis=1)
-    return np.ascontiguousarray(plane), upward
+    upward = np.repeat(upward[..., None], field.levels, axis=-1)
+    count = len(field.stretch)
+    rate, a, b = field.stretch[:, RATE : UPPER + 1].T
+    none = 0.0 * a
+    lowest = np.array([[a, 1.0 - a, none], [-2.0 * rate * a, 2.0 * rate * a, none]])
+    highest = np.array([[none, 1.0 - b, b], [none, -2.0 * rate * b, 2.0 * rate * b]])
+    middle = np.array([[none, none + 1.0, none], 0.5 * (lowest[1] + highest[1])])
+    upward[:, :2, :, :count] = lowest, middle, highest
+    upward[:, 2, :, :count] = rate * (highest[1] - lowest[1])
+    return np.ascontiguousarray(upward)
 
 
 def product_weights(field: FieldArguments) -> tuple[NDArray[np.int64], FloatArray]:

@@ -23,7 +23,13 @@ from numpy.typing import NDArray
 
 from asperity.core.checks import FloatArray
 from asperity.core.compiled import Kernels, local_array
-from asperity.textures.fields.field_sampler import PERIODIC, REACH, FieldArguments, field_triple
+from asperity.textures.fields.field_sampler import (
+    OFFSETS,
+    PERIODIC,
+    REACH,
+    FieldArguments,
+    field_triple,
+)
 
 IntArray = NDArray[np.int64]
 
@@ -70,6 +76,8 @@ def load_nodes(
     for q in range(3 * rows):
         for k in range(count):
             nodes[q, k] = field_triple(i + q // 3, j + q % 3, m + k, field)[1]
+            if m + k < field.stretch.shape[0]:
+                nodes[q, k] += field.stretch[m + k, OFFSETS + 1]
 
 
 def mix_nodes(nodes: FloatArray, count: int, n: int, plane: FloatArray, mixed: FloatArray) -> None:
@@ -85,6 +93,7 @@ def mix_nodes(nodes: FloatArray, count: int, n: int, plane: FloatArray, mixed: F
 
 
 def expand_run(
+    m: int,
     count: int,
     nodes: FloatArray,
     plane: FloatArray,
@@ -93,7 +102,7 @@ def expand_run(
     margin: float,
     hull: FloatArray,
 ) -> None:
-    """Write the Bernstein coefficients of S, ∇S and Hess S of a run of cells.
+    """Write the Bernstein coefficients of S, ∇S and Hess S of a run of cells from level m on.
 
     ``hull`` (27, 10, count) holds S, x, y, z, xx, xy, xz, yy, yz, zz.
     """
@@ -106,13 +115,12 @@ def expand_run(
             for t in range(10):
                 source = sources[t]
                 order = orders[t]
-                w0 = upward[g, order, 0]
-                w1 = upward[g, order, 1]
-                w2 = upward[g, order, 2]
                 shift = margin if t == 0 else 0.0
                 for k in range(count):
-                    value = w0 * mixed[source, k] + w1 * mixed[source, k + 1]
-                    hull[q, t, k] = value + w2 * mixed[source, k + 2] - shift
+                    value = upward[g, order, 0, m + k] * mixed[source, k]
+                    value += upward[g, order, 1, m + k] * mixed[source, k + 1]
+                    value += upward[g, order, 2, m + k] * mixed[source, k + 2]
+                    hull[q, t, k] = value - shift
 
 
 def measure_hulls(count: int, hull: FloatArray, work: FloatArray, size: int) -> None:
@@ -156,6 +164,7 @@ def exclude_cells(
     It is the least leading minor, of linearized matrices, or 1 where S is nowhere positive.
     """
     middle = size // 2
+    side = 0.5 * field.fade / field.below
     for q in range(size):
         for k in range(count):
             slack = work[0, k] * math.sqrt(work[1, k])
@@ -174,7 +183,7 @@ def exclude_cells(
             a = hull[middle, 1, k]
             b = hull[middle, 2, k]
             c = hull[middle, 3, k]
-            depth = field.lift + (field.below + 1 - m - k - 0.5 * (q % 3)) / field.iz
+            depth = field.lift + (field.below + 1 - m - k - 0.5 * (q % 3)) * side
             drop = rate * (s0 * c - s0 * z - hull[q, 0, k] * c - depth)
             sag = rate * work[0, k] * work[4, k]
             upper = least_minor(
@@ -248,6 +257,7 @@ def raise_bound(
     plus 1 - ψ'² times 1 less the same: no eigenvalue exceeds both bounds, and none is attained.
     """
     sign = 1.0 - 2.0 * row
+    side = 0.5 * field.fade / field.below
     rows = min(field.columns.shape[0], 3)
     for n in range(125 if rows > 1 else 25):
         e = n // 25
@@ -256,7 +266,7 @@ def raise_bound(
         w = place[2] + k + 0.25 * g - 0.5
         corner = rate == 0.0 and e % 4 + f % 4 + g % 4 == 0
         corner = corner and hull[9 * (e // 2) + 3 * (f // 2) + g // 2, 0, k] > 0.0
-        drop = -rate * (product[n, 6] + (field.below + 0.5 - w) / field.iz + field.lift)
+        drop = -rate * (product[n, 6] + (field.below + 0.5 - w) * side + field.lift)
         if rate > 0.0 and row == 0:
             bounds[0, 0] = max(bounds[0, 0], 1.0 - drop)
         zz = sign * (product[n, 5] - drop)
@@ -330,7 +340,7 @@ def hull_batch(
         first: first node along x.
         last: node after the last.
         plane: weights of the columns around a cell, (9, 6, 9); (3, 6, 3) for a profile.
-        upward: weights along z, (3, 3, 3).
+        upward: weights along z, (3, 3, 3, levels).
         pairs: coefficient of the product to which a pair of coefficients adds, (27, 27) or (9, 9).
         weights: its weight, likewise.
         bounds: (2, 5), for Hess T and for its negative: an upper bound of the greatest eigenvalue,
@@ -358,12 +368,12 @@ def hull_batch(
             while m < end:
                 above = m > field.below
                 count = min(32, (end if above else min(end, field.below + 1)) - m)
-                rate = 0.0 if above else 0.5 * field.iz / field.below
+                rate = 0.0 if above else 1.0 / field.fade
                 if tests and not marks[j, i, m : m + count].any():
                     m += count
                     continue
                 load_nodes(i, j, m - 1, count + 2, rows, nodes, field)
-                expand_run(count, nodes, plane, upward, mixed, field.margin, hull)
+                expand_run(m, count, nodes, plane, upward, mixed, field.margin, hull)
                 measure_hulls(count, hull, work, size)
                 exclude_cells(m, count, rate, hull, bounds, work, size, field)
                 place = (j, i, m)

@@ -31,16 +31,18 @@ from asperity.textures.spline.spline_texture import fit_spline
 from asperity.textures.texture import CertifiedNumber, Texture
 
 MAGIC = b"ASPFIELD"
-VERSION = 2
+VERSION = 3
+_UNSTRETCHED = 2  # the version before, whose cells are equally high
 _BYTE_ORDER = 0x01020304
 _ALIGNMENT = 4096
 _SCALE_TOLERANCE = 1e-9
 # Relative difference of bounds that a search finds in another order.
 _CLAIM_TOLERANCE = 1e-6
 _COUNTS = ("levels", "below", "border")
-_TUPLES = {"at", "depths", "shares"}
+_TUPLES = {"at", "depths", "shares", "presses"}
 """Tuples of numbers in the description; all others are single numbers."""
 _SCALARS = ("x0", "y0", "z0", "m00", "m01", "m10", "m11", "iz", "margin", "lift")
+_NUMBERS = (*_SCALARS, "floor", "fade")
 
 HEADER = np.dtype(
     [
@@ -61,7 +63,10 @@ HEADER = np.dtype(
         ("q", "<f8"),  # certified characteristic number
         ("floor", "<f8"),  # z down to which it is that of the spline [m]
         ("below", "<i4"),
-        ("reserved", "V68"),
+        ("stretched", "<u4"),
+        ("stretch_offset", "<u8"),  # float64 (stretched, 7)
+        ("fade", "<f8"),  # twice the height of the cells below the floor [m]
+        ("reserved", "V48"),
         ("checksum", "<u4"),  # CRC-32 of all that follows the header
         ("header_checksum", "<u4"),  # CRC-32 of the header before this entry
     ]
@@ -106,6 +111,7 @@ def _encode(field: PotentialField) -> tuple[NDArray[Any], list[tuple[int, bytes]
     description = json_text(field.describe() | stored).encode()
     parts = [
         np.ascontiguousarray(record.columns, "<i4").tobytes(),
+        np.ascontiguousarray(record.stretch, "<f8").tobytes(),
         np.ascontiguousarray(record.c, "<f4").tobytes(),
         np.ascontiguousarray(heights, "<f8").tobytes(),
         description,
@@ -122,13 +128,13 @@ def _encode(field: PotentialField) -> tuple[NDArray[Any], list[tuple[int, bytes]
     header["file_bytes"] = end
     header["count"] = record.c.size
     header["rows"], header["columns"] = record.columns.shape[:2]
-    names = ("columns_offset", "values_offset", "heights_offset", "json_offset")
+    header["stretched"] = len(record.stretch)
+    names = ("columns_offset", "stretch_offset", "values_offset", "heights_offset", "json_offset")
     for name, offset in zip(names, offsets, strict=True):
         header[name] = offset
-    for name in (*_SCALARS, *_COUNTS):
+    for name in (*_NUMBERS, *_COUNTS):
         header[name] = getattr(record, name)
     header["q"] = field.gain.upper
-    header["floor"] = field.grid.floor
     sections = list(zip(offsets, parts, strict=True))
     header["checksum"] = _checksum(sections, HEADER.itemsize)
     header["header_checksum"] = zlib.crc32(header.tobytes()[:-4])
@@ -191,8 +197,11 @@ def _decode(data: NDArray[np.uint8], build_texture: BuildTexture) -> PotentialFi
     columns = _section(data, header["columns_offset"], math.prod(shape), "<i4")
     values = _section(data, header["values_offset"], int(header["count"]), "<f4")
     described = json.loads(bytes(data[int(header["json_offset"]) :]))
-    numbers: dict[str, Any] = {name: header[name].item() for name in (*_SCALARS, *_COUNTS)}
-    record = FieldArguments(values, columns.reshape(shape), **numbers)
+    numbers: dict[str, Any] = {name: header[name].item() for name in (*_NUMBERS, *_COUNTS)}
+    if header["version"] == _UNSTRETCHED:
+        numbers["fade"] = 2.0 * numbers["below"] / numbers["iz"]
+    stretch = _section(data, header["stretch_offset"], 7 * int(header["stretched"]), "<f8")
+    record = FieldArguments(values, columns.reshape(shape), stretch.reshape(-1, 7), **numbers)
     count = math.prod(described["shape"]) * bool(described["shape"])
     heights = _section(data, header["heights_offset"], count, "<f8")
     field = assemble_field(record, described, heights, build_texture)
@@ -248,9 +257,13 @@ def assemble_field(
         floor=_number(numbers["floor"]),
         below=record.below,
         border=record.border,
+        knots=np.array(numbers.get("knots", ()), float),
     )
-    if grid.steps.shape != (len(grid.cells), 2) or not np.isfinite(grid.steps).all():
+    sizes = [grid.level_spacing, grid.floor, *grid.steps.ravel(), *grid.knots.ravel()]
+    if grid.steps.shape != (len(grid.cells), 2) or not np.isfinite(sizes).all():
         raise ValueError("its grid has no steps")
+    if not (grid.level_spacing > 0.0 and (np.diff(grid.knots.ravel()) > 0.0).all()):
+        raise ValueError("the levels of its grid do not rise")
     _check_record(record, grid)
     thin_map = described.get("thin_map")
     return PotentialField(
@@ -304,8 +317,9 @@ def _read_header(data: NDArray[np.uint8]) -> Any:
     header = data[: HEADER.itemsize].view(HEADER)[0]
     if header["byte_order"] != _BYTE_ORDER:
         raise SurfaceFileError("has another byte order, or is damaged")
-    if header["version"] != VERSION:
-        fault = f"is a .field file of version {header['version']}, of which {VERSION} is read"
+    if header["version"] not in (_UNSTRETCHED, VERSION):
+        known = f"{_UNSTRETCHED} and {VERSION} are read"
+        fault = f"is a .field file of version {header['version']}, of which {known}"
         raise SurfaceFileError(f"{fault}; bake it again")
     if header["header_checksum"] != zlib.crc32(data[: HEADER.itemsize - 4].data):
         raise SurfaceFileError("has a damaged header")
@@ -327,12 +341,15 @@ def _check_record(record: FieldArguments, grid: FieldGrid) -> None:
     fits = record.columns.shape == (rows, grid.cells[0] + 3, 4) and record.levels >= 3
     fits = fits and record.border in (PERIODIC, MIRRORED, ZERO)
     fits = fits and 1 <= record.below <= record.levels - 2
+    fits = fits and record.stretch.shape == grid.stretch_table().shape
+    fits = fits and len(record.stretch) < record.levels
     ordered = (first >= 0) & (first <= end) & (reach >= 0) & (reach <= record.levels)
     stored = (first == end) | ((offset + first >= 0) & (offset + end <= record.c.size))
-    numbers = np.array([getattr(record, name) for name in _SCALARS])
+    numbers = np.array([getattr(record, name) for name in _NUMBERS])
     if not (fits and ordered.all() and stored.all()):
         raise SurfaceFileError("has a damaged table of columns")
-    if not (np.isfinite(numbers).all() and record.iz > 0.0 and np.isfinite(record.c).all()):
+    finite = [np.isfinite(part).all() for part in (numbers, record.c, record.stretch)]
+    if not (all(finite) and record.iz > 0.0 and record.fade > 0.0):
         raise SurfaceFileError("has numbers that are not finite")
 
 
@@ -343,9 +360,11 @@ def _check_scales(header: Any, field: PotentialField) -> None:
         ValueError: it states both numbers.
     """
     grid = field.grid
-    scales = grid.scales() | {"q": field.gain.upper, "floor": grid.floor}
+    scales = grid.scales() | {"q": field.gain.upper}
+    if not np.allclose(grid.stretch_table(), field.arguments.stretch, _SCALE_TOLERANCE):
+        raise ValueError("its stretched cells are not those of its description")
     for name in scales:
-        number = header[name].item()
+        number = getattr(field.arguments, name, header["q"].item())
         if not math.isclose(number, scales[name], rel_tol=_SCALE_TOLERANCE, abs_tol=1e-12):
             expected = f"of its description {scales[name]:.9g}"
             raise ValueError(f"{name} of its header is {number:.9g}, {expected}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -11,16 +11,21 @@ from numpy.typing import NDArray
 
 from asperity.core.checks import FloatArray
 from asperity.textures.domain import Domain
-from asperity.textures.fields.field_sampler import MIRRORED, PERIODIC, ZERO, FieldArguments
+from asperity.textures.fields.field_sampler import (
+    MIRRORED,
+    PERIODIC,
+    RATE,
+    UPPER,
+    ZERO,
+    FieldArguments,
+)
 
 # Weight of both neighbours of a node along an axis in a smoothing pass.
 NEIGHBOUR_WEIGHT = 0.125
 # Steps over which the share of a smoothing pass rises from 0 to 1.
 RAMP = 5
-# Below the surface the depth is computed at every so many levels and interpolated, with a share
-# that rises from 0 to 1 over so many levels.
-COARSE_STEP = 2
-BLENDED = 5
+# Greatest height of a cell below the lowest place of a surface, over that of the one above.
+GROWTH = 1.25
 _MIN_STEPS = 4
 _MIN_BELOW = 2
 # Height above the surface at which coefficients end, in nodes: a cell with contact has no node
@@ -40,12 +45,13 @@ class FieldGrid:
         cells: number of steps along each of them.
         start: the first node [m], shape (2,).
         levels: number of levels of nodes along z, up to the margin above the highest point.
-        level_spacing: distance of the levels [m].
+        level_spacing: distance of the levels of equal cells [m].
         floor: z down to which the field is that of the spline [m].
         below: number of cells below the floor, at least 1; the lowest ends halfway between the two
             lowest levels.
         border: what the field is beyond its first and last node.
-        deep: number of levels below the surface, whose depth is interpolated along z.
+        knots: ends of the lowest cells along z, which are not equally high, rising [m]; a cell is
+            named by the level in its middle, and the highest one is as high as those above.
     """
 
     steps: FloatArray
@@ -56,7 +62,7 @@ class FieldGrid:
     floor: float
     below: int
     border: int
-    deep: int = 0
+    knots: FloatArray = field(default_factory=lambda: np.empty(0))
 
     @staticmethod
     def fit(
@@ -68,6 +74,8 @@ class FieldGrid:
     ) -> FieldGrid:
         """Return the coarsest grid whose nodes are at most the resolution apart.
 
+        Below the least height those along z are ever farther apart, by the ratio ``GROWTH``.
+
         Args:
             domain: the domain of the texture.
             heights: its least and greatest height [m].
@@ -78,19 +86,23 @@ class FieldGrid:
         lengths = np.hypot(*domain.spans.T)
         cells = [max(math.ceil(length / resolution), _MIN_STEPS) for length in lengths]
         floor = heights[0] - max_depth
-        inside = max(math.ceil((heights[1] - floor) / resolution), _MIN_STEPS)
-        spacing = (heights[1] - floor) / inside
-        below = max(math.ceil(fade / spacing), _MIN_BELOW)
+        spacing, inside, stretched = _cell_heights(heights, floor, resolution)
+        lowest = float(stretched[0]) if len(stretched) else spacing
+        below = max(math.ceil(fade / lowest), _MIN_BELOW)
+        knots = np.empty(0)
+        if len(stretched):
+            sides = np.concatenate([np.full(below + 1, lowest), stretched, [spacing]])
+            knots = floor - (below + 1) * lowest + np.append(0.0, np.cumsum(sides))
         grid = FieldGrid(
             steps=domain.spans / np.array(cells)[:, None],
             cells=tuple(cells),
             start=domain.origin,
-            levels=inside + below + 2,
+            levels=inside + len(stretched) + below + 2,
             level_spacing=spacing,
             floor=floor,
             below=below,
             border=PERIODIC if domain.periodic else MIRRORED,
-            deep=below + int(max_depth / spacing),
+            knots=knots,
         )
         return replace(grid, levels=grid.levels + math.ceil(grid.margin / grid.level_spacing))
 
@@ -134,33 +146,70 @@ class FieldGrid:
 
     def height(self, level: Any) -> Any:
         """Return z of a level [m]."""
-        return self.floor + (level - self.below - 0.5) * self.level_spacing
+        count = self.stretched
+        if not count:
+            return self.floor + (level - self.below - 0.5) * self.level_spacing
+        above = self.knots[-1] + (level + 0.5 - count) * self.level_spacing
+        inside = np.interp(np.add(level, 0.5), np.arange(count + 1), self.knots)
+        return np.where(np.add(level, 0.5) >= count, above, inside)
 
-    def level_weights(self) -> tuple[NDArray[np.intp], FloatArray]:
-        """Return the levels of which depths are computed, and their weights at all levels.
+    def level(self, z: FloatArray) -> Any:
+        """Return heights [m] in levels, the inverse of :meth:`height`."""
+        count = self.stretched
+        level = (z - self.height(count)) / self.level_spacing + count
+        inside = np.interp(z, self.knots, np.arange(count + 1)) - 0.5 if count else level
+        return np.where(level + 0.5 >= count, level, inside)
 
-        Deep levels are interpolated by a quadratic B-spline, whose coefficients are computed.
+    @property
+    def stretched(self) -> int:
+        """Number of the lowest cells, which are not equally high."""
+        return max(len(self.knots) - 1, 0)
 
-        Returns:
-            The numbers of the levels, rising, shape (n,), and the weights (n, levels).
+    @property
+    def fade(self) -> float:
+        """Twice the height of the cells below the floor [m]."""
+        lowest = self.knots[1] - self.knots[0] if self.stretched else self.level_spacing
+        return float(2 * self.below * lowest)
+
+    @property
+    def bounded_floor(self) -> float:
+        """Least z above which nodes are equally far apart [m]."""
+        return float(self.knots[-1]) if self.stretched else self.floor
+
+    @property
+    def deep(self) -> int:
+        """Number of levels deeper below the equal cells than these are high."""
+        top = float(self.height(self.levels)) - self.margin
+        return int(np.searchsorted(self.knots, 2.0 * self.bounded_floor - top))
+
+    def cell_shapes(self, level: FloatArray) -> FloatArray:
+        """Return 1/h, LOWER and UPPER of the cells of levels, (3, n)."""
+        shapes = np.empty((3, len(level)))
+        shapes[:] = [[1.0 / self.level_spacing], [0.5], [0.5]]
+        is_stretched = level < self.stretched
+        table = self.stretch_table()[:, RATE : UPPER + 1]
+        shapes[:, is_stretched] = table[level[is_stretched].astype(int)].T
+        return shapes
+
+    def offsets(self) -> FloatArray:
+        """Return what is subtracted from the depth at each level before it is stored [m].
+
+        It is the height of the knot below the highest of the stretched cells above the level.
         """
-        from scipy.interpolate import BSpline
+        heights = self.height(np.arange(self.levels))
+        return np.maximum(self.knots[-2] - heights, 0.0) if self.stretched else 0.0 * heights
 
-        if not self.deep:
-            return np.arange(self.levels), np.eye(self.levels)
-        deep = np.arange(self.deep)
-        exact = np.arange(max(self.deep - BLENDED + 1, 0), self.levels)
-        coarse = np.arange(-COARSE_STEP, self.deep + COARSE_STEP + 1, COARSE_STEP)
-        computed = np.union1d(coarse, exact)
-        weights = np.zeros((len(computed), self.levels))
-        weights[np.searchsorted(computed, exact), exact] = 1.0
-        rise = np.minimum((self.deep - deep) / BLENDED, 1.0)
-        share = rise**3 * (10.0 - 15.0 * rise + 6.0 * rise**2)
-        knots = COARSE_STEP * (np.arange(len(coarse) + 3) - 2.5)
-        weights[:, : self.deep] *= 1.0 - share
-        spline = BSpline.design_matrix(deep, knots, 2).toarray()
-        weights[np.searchsorted(computed, coarse), : self.deep] += share * spline.T
-        return computed, weights
+    def stretch_table(self) -> FloatArray:
+        """Return the entries of the stretched cells, (n, 7); see :class:`FieldArguments`."""
+        count = self.stretched
+        if not count:
+            return np.zeros((0, 7))
+        sides = np.append(np.diff(self.knots), self.level_spacing)
+        side = sides[:-1]
+        below = np.append(sides[0], side[:-1])
+        offsets = np.append(0.0, self.offsets())
+        parts = [self.knots[:-1], 1.0 / side, side / (below + side), side / (side + sides[1:])]
+        return np.column_stack([*parts, *[offsets[i : i + count] for i in range(3)]])
 
     def positions(self, index: NDArray[np.intp] | FloatArray) -> FloatArray:
         """Return x and y [m], (n, 2), of nodes of the plane (n, d)."""
@@ -181,13 +230,22 @@ class FieldGrid:
         """Return the greatest variance [m²] of the points of which S is the mean of the depth.
 
         A quadratic B-spline has the variance 1/4 of a squared step along each axis, and a smoothing
-        pass adds at most 1/4; the spline by which depths are interpolated has that of its steps.
+        pass adds at most 1/4.
         """
         variance = 0.25 + 2.0 * NEIGHBOUR_WEIGHT * passes
-        variance *= float(np.square(self.spacing).sum())
-        if self.deep:
-            variance += 0.25 * (COARSE_STEP * self.level_spacing) ** 2
-        return variance
+        return variance * float(np.square(self.spacing).sum())
+
+    def onset_bound(self, passes: int) -> float:
+        """Return a proved bound of the distance [m] above the surface at which contact begins.
+
+        S exceeds the depth by at most the standard deviation of the points of which it is the mean.
+        That depth is at least -margin. Cells at the surface are at most two above stretched ones.
+        """
+        square = self.spread(passes) + 0.25 * (GROWTH**4 - 1.0) * self.level_spacing**2
+        deviation = math.sqrt(square)
+        if deviation < self.margin:
+            return deviation
+        return self.margin + (1.5 + passes) * float(np.linalg.norm(self.spacing))
 
     def onset_bound(self, passes: int) -> float:
         """Return a proved bound of the distance [m] above the surface at which contact begins.
@@ -202,7 +260,7 @@ class FieldGrid:
     def error_bounds(
         self, gain: float, passes: int = 0, largest: float = 0.0
     ) -> tuple[float, float]:
-        """Return proved bounds of |∇T - ∇U| [m] and of |T - U| [m²].
+        """Return proved bounds of |∇T - ∇U| [m] and of |T - U| [m²] above ``bounded_floor``.
 
         S is the mean of the exact depth D, which is 1-Lipschitz, over points around the probe p
         with p as their mean; :meth:`spread` is their variance σ². Its derivative along a step h is
@@ -210,9 +268,7 @@ class FieldGrid:
         distances from p. For every point x, D(p) (D(x) - D(p)) is ∇U(p) · (x - p) up to
         (L + 1) |x - p|²/2, so D(p) times the derivative is that of U up to (L + 1) τ²/h; and S
         differs from D(p) by at most σ. The derivative of S is at most 1, and a smoothing pass may
-        add to it, since its weights differ between nodes. So does the share of an interpolated
-        depth along z, by at most 1.875/n between levels; that depth differs by at most a quarter of
-        a coarse step, since the depth falls along z. T is at most the mean of U; it is less by
+        add to it, since its weights differ between nodes. T is at most the mean of U; it is less by
         at most the variance of S where all points are inside, and by σ times the depth otherwise.
         Single precision rounds a coefficient at most three times, and less than 5 times in a pass.
 
@@ -228,15 +284,12 @@ class FieldGrid:
         change = NEIGHBOUR_WEIGHT * (1.0 / RAMP + 3.0 / 255.0)  # of the weight, and its rounding
         growth = 1.0 + 2.0 * change * steps.max() / steps.min()
         slope = growth ** (passes * (len(steps) - 1))
-        if self.deep:
-            slope *= 1.0 + 1.875 / BLENDED * 0.25 * COARSE_STEP
         components = (gain + 1.0) * (spread + 0.25 * square) / steps + slope * math.sqrt(spread)
         components += rounding * (slope + 2.0 * largest / steps)
         rates = np.linalg.pinv(self.steps).T * np.hypot(*self.steps.T)[:, None]
         # Derivatives along non-orthogonal steps amplify an error of the gradient.
         skew = max(1.0, float(np.linalg.norm(rates, 2)))
-        width = 1.5 * (1 + COARSE_STEP * bool(self.deep))
-        reach = (width + passes) * math.sqrt(float(square.sum()))
+        reach = (1.5 + passes) * math.sqrt(float(square.sum()))
         potential = max(0.5 * (gain + 1.0) * spread, reach * math.sqrt(spread))
         return skew * float(np.linalg.norm(components)), potential + largest * rounding
 
@@ -244,25 +297,29 @@ class FieldGrid:
         """Return the record of a field from its depths at the nodes.
 
         Args:
-            depths: [m], shape ``node_counts``: first axis, second axis, z.
+            depths: less the offsets of their levels [m], shape ``node_counts``: first axis, second
+                axis, z.
             lift: vertical force over the stiffness below the floor, less the depth there, at least
                 about [m].
         """
         rows = np.swapaxes(depths if len(self.cells) == 2 else depths[:, None], 0, 1)
         # One row after the other, since masks of a large field would take more memory than it does.
         cut = (_CUT - 1.0) * self.margin
-        first, end = np.stack([_column_limits(row, cut) for row in rows], axis=1)
+        offsets = self.offsets().astype(np.float32)
+        first, end = np.stack([_column_limits(row + offsets, cut) for row in rows], axis=1)
         reach = np.stack([_column_limits(row, 0.0)[1] for row in rows])
         starts = (np.cumsum(end - first) - (end - first).ravel()).reshape(first.shape)
         values = np.empty(int((end - first).sum()), np.float32)
         level = np.arange(self.levels)
         for row, low, high, start in zip(rows, first, end, starts[:, 0], strict=True):
-            part = row[(level >= low[:, None]) & (level < high[:, None])]
-            values[start : start + len(part)] = np.maximum(part + self.margin, 0.0)
+            stored = np.maximum(row + np.float32(self.margin), -offsets)
+            part = stored[(level >= low[:, None]) & (level < high[:, None])]
+            values[start : start + len(part)] = part
         table = np.stack([starts - first, first, end, reach], axis=-1).astype(np.int32)
         table = self._with_borders(table)
         counts = {"levels": self.levels, "below": self.below, "border": self.border}
-        return FieldArguments(values, table, **self.scales(), lift=lift, **counts)
+        stretch = self.stretch_table()
+        return FieldArguments(values, table, stretch, **self.scales(), lift=lift, **counts)
 
     def scales(self) -> dict[str, Any]:
         """Return the numbers of the record that follow from the nodes."""
@@ -271,9 +328,11 @@ class FieldGrid:
         # Rows of the pseudo-inverse's transpose: nodes per metre along each axis.
         rates[: len(self.cells)] = np.linalg.pinv(self.steps).T
         (m00, m01), (m10, m11) = rates.tolist()
-        scales = {"x0": x0, "y0": y0, "z0": float(self.height(0))}
+        z0 = float(self.height(self.stretched) - self.stretched * self.level_spacing)
+        scales = {"x0": x0, "y0": y0, "z0": z0}
         scales |= {"m00": m00, "m01": m01, "m10": m10, "m11": m11}
-        return scales | {"iz": 1.0 / self.level_spacing, "margin": self.margin}
+        scales |= {"iz": 1.0 / self.level_spacing, "margin": self.margin}
+        return scales | {"floor": self.floor, "fade": self.fade}
 
     def _with_borders(self, table: NDArray[np.int32]) -> NDArray[np.int32]:
         """Return the columns (rows, columns, 4) with those beyond the borders, and their reach."""
@@ -286,6 +345,33 @@ class FieldGrid:
             table[np.broadcast_to(outside, table.shape[:2])] = 0
         table[..., 3] = maximum_filter(table[..., 3], 3, mode="constant")
         return np.ascontiguousarray(table)
+
+
+def _cell_heights(
+    heights: tuple[float, float], floor: float, resolution: float
+) -> tuple[float, int, FloatArray]:
+    """Return the height of equal cells [m], their number, and the heights of those below them.
+
+    From the floor up; all are equal where the floor is so near that stretched ones are not fewer.
+    """
+    low, top = heights
+    spacing = min(resolution, (top - floor) / _MIN_STEPS)
+    inside = max(math.ceil((top - low) / spacing), 1)
+    rest = top - inside * spacing - floor
+    count = 1
+    while count * spacing < rest and spacing * _growth_sum(GROWTH, count) < rest:
+        count += 1
+    if count * spacing >= rest:
+        inside = math.ceil((top - floor) / spacing)
+        return (top - floor) / inside, inside, np.empty(0)
+    from scipy.optimize import brentq
+
+    growth = brentq(lambda ratio: spacing * _growth_sum(ratio, count) - rest, 1.0, GROWTH)
+    return spacing, inside, np.asarray(spacing * growth ** np.arange(count, 0.0, -1.0), float)
+
+
+def _growth_sum(ratio: float, count: int) -> float:
+    return float((ratio ** np.arange(1, count + 1)).sum())
 
 
 def _column_limits(row: SingleArray, least: float) -> NDArray[np.intp]:

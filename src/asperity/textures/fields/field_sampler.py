@@ -6,6 +6,10 @@ conservative and continuous whatever the coefficients are, and takes 27 of them.
 stored by columns of nodes along z, each from its first to its last coefficient that is not zero;
 outside of a column they are zero.
 
+The knots along z are equally spaced down to the lowest place of a surface, and ever farther apart
+below, where the depth changes slowly with z. There the coefficients are those of S less the height
+of a knot above z, which keeps them small: they are stored in single precision.
+
 Below the floor the field of a surface is evaluated at floor - ψ of the depth d below it, plus a
 function g(d): with r = d/F, where F/2 is the height of the cells below the floor, ψ' = 1 - r falls
 to zero, and with it the variation of the force along z, while g'' makes up for it, so that the
@@ -35,6 +39,15 @@ FIRST = 1
 END = 2
 REACH = 3
 
+# Entries of a stretched cell: z of its lower knot, 1/h of its height h, h over the sum of h and the
+# height of the cell below, likewise above, and what is subtracted from the coefficients of its
+# three levels.
+KNOT = 0
+RATE = 1
+LOWER = 2
+UPPER = 3
+OFFSETS = 4
+
 ThreeWeights = tuple[float, float, float]
 SixEntries = tuple[float, float, float, float, float, float]
 Vector = tuple[float, float, float]
@@ -47,9 +60,11 @@ class FieldArguments(NamedTuple):
         c: coefficients [m], column after column.
         columns: OFFSET, FIRST, END and REACH, shape (rows, columns, 4), with one node before the
             first and two after the last along both axes; one row for a profile.
+        stretch: KNOT, RATE, LOWER, UPPER and OFFSETS of the lowest cells, shape (n, 7); the others
+            are equally high.
         x0: the first node [m].
         y0: likewise.
-        z0: likewise.
+        z0: likewise, of equal cells down to level 0.
         m00: nodes per metre along the first axis of the field: x.
         m01: y.
         m10: along the second: x.
@@ -57,6 +72,8 @@ class FieldArguments(NamedTuple):
         iz: nodes per metre along z.
         margin: height above the surface at which coefficients are zero [m].
         lift: vertical force over the stiffness below the floor, less the depth, at least about [m].
+        floor: z down to which the field is that of the spline [m].
+        fade: F, twice the height of the cells below the floor [m].
         levels: number of levels.
         below: number of cells below the floor, at least 1.
         border: PERIODIC, MIRRORED or ZERO.
@@ -64,6 +81,7 @@ class FieldArguments(NamedTuple):
 
     c: NDArray[np.float32]
     columns: NDArray[np.int32]
+    stretch: FloatArray
     x0: float
     y0: float
     z0: float
@@ -74,6 +92,8 @@ class FieldArguments(NamedTuple):
     iz: float
     margin: float
     lift: float
+    floor: float
+    fade: float
     levels: int
     below: int
     border: int
@@ -118,20 +138,67 @@ def field_row_weights(rows: int, v: float) -> tuple[int, ThreeWeights, ThreeWeig
     return i, quadratic_weights(v - i), quadratic_weight_slopes(v - i)
 
 
-def field_level(w: float, field: FieldArguments) -> tuple[float, float]:
-    """Return where the spline is evaluated along z, in nodes, and the depth below the floor."""
-    floor = field.below + 0.5
-    if w >= floor:
-        return w, 0.0
-    r = (floor - w) / (2.0 * field.below)
+def field_level(z: float, field: FieldArguments) -> tuple[float, float]:
+    """Return the height at which the spline is evaluated [m], and the depth below the floor / F."""
+    if z >= field.floor:
+        return z, 0.0
+    r = (field.floor - z) / field.fade
     s = min(r, 1.0)
-    return floor - field.below * s * (2.0 - s), r
+    return field.floor - 0.5 * field.fade * s * (2.0 - s), r
+
+
+def field_cell(z: float, field: FieldArguments) -> tuple[int, float, float, float, float]:
+    """Return the level of the cell that holds z, z in cells from its middle, 1/h, LOWER, UPPER."""
+    stretch = field.stretch
+    w = (z - field.z0) * field.iz
+    high = stretch.shape[0]
+    if high == 0 or w >= high - 0.5:
+        m = int(w + 0.5)
+        return m, w - m, field.iz, 0.5, 0.5
+    low = 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if z >= stretch[middle, KNOT]:
+            low = middle
+        else:
+            high = middle
+    rate = stretch[low, RATE]
+    return (
+        low,
+        (z - stretch[low, KNOT]) * rate - 0.5,
+        rate,
+        stretch[low, LOWER],
+        stretch[low, UPPER],
+    )
+
+
+def level_weights(t: float, lower: float, upper: float) -> ThreeWeights:
+    """Return the weights of three levels at t in [-1/2, 1/2] from the middle of a cell."""
+    below = lower * (0.5 - t) * (0.5 - t)
+    above = upper * (0.5 + t) * (0.5 + t)
+    return below, 1.0 - below - above, above
+
+
+def level_weight_slopes(t: float, lower: float, upper: float) -> ThreeWeights:
+    """Return the derivatives of the weights by t."""
+    below = -2.0 * lower * (0.5 - t)
+    above = 2.0 * upper * (0.5 + t)
+    return below, -below - above, above
+
+
+def field_offset(m: int, weights: ThreeWeights, field: FieldArguments) -> float:
+    """Return the sum of what is subtracted from three coefficients around a level, weighted."""
+    stretch = field.stretch
+    if m >= stretch.shape[0]:
+        return 0.0
+    offset = weights[0] * stretch[m, OFFSETS] + weights[1] * stretch[m, OFFSETS + 1]
+    return float(offset + weights[2] * stretch[m, OFFSETS + 2])
 
 
 def field_descent(r: float, field: FieldArguments) -> Vector:
     """Return ψ', g' [m] and g [m²] at a depth of r F below the floor."""
     s = min(r, 1.0)
-    size = 2.0 * field.below / field.iz
+    size = field.fade
     beyond = size * (r - s)
     slope = s * (field.lift + size * s * (1.5 - 0.5 * s))
     value = size * s * s * (0.5 * field.lift + size * s * (0.5 - 0.125 * s))
@@ -171,12 +238,13 @@ def field_slope(
         return 0.0, 0.0, 0.0, 0.0
     u0 = quadratic_weights(u - j)
     u1 = quadratic_weight_slopes(u - j)
-    w, below = field_level(w, field)
-    m = int(w + 0.5)
-    w0 = quadratic_weights(w - m)
-    w1 = quadratic_weight_slopes(w - m)
-    depth = -field.margin
-    gu = gv = gw = 0.0
+    z, below = field_level(z, field)
+    m, t, rate, lower, upper = field_cell(z, field)
+    w0 = level_weights(t, lower, upper)
+    w1 = level_weight_slopes(t, lower, upper)
+    depth = field_offset(m, w0, field) - field.margin
+    gw = field_offset(m, w1, field)
+    gu = gv = 0.0
     for a in range(rows):
         value = along = upward = 0.0
         for b in range(3):
@@ -193,49 +261,54 @@ def field_slope(
         return 0.0, 0.0, 0.0, 0.0
     gu *= depth * u_sign
     gv *= depth * v_sign
-    gz = depth * field.iz * gw
+    gz = depth * rate * gw
     energy = 0.5 * depth * depth
     if below > 0.0:
-        rate, slope, added = field_descent(below, field)
-        gz = rate * gz - slope
+        share, slope, added = field_descent(below, field)
+        gz = share * gz - slope
         energy += added
     return field.m00 * gu + field.m10 * gv, field.m01 * gu + field.m11 * gv, gz, energy
 
 
 def field_hessian(
-    uu: float, uv: float, uw: float, vv: float, vw: float, ww: float, field: FieldArguments
+    uu: float, uv: float, uz: float, vv: float, vz: float, zz: float, field: FieldArguments
 ) -> SixEntries:
-    """Return xx, xy, xz, yy, yz, zz of a Hessian along the axes of the field, in nodes."""
+    """Return xx, xy, xz, yy, yz, zz of a Hessian along the axes of the field, in nodes, and z."""
     m00 = field.m00
     m01 = field.m01
     m10 = field.m10
     m11 = field.m11
-    iz = field.iz
     return (
         m00 * m00 * uu + 2.0 * m00 * m10 * uv + m10 * m10 * vv,
         m00 * m01 * uu + (m00 * m11 + m01 * m10) * uv + m10 * m11 * vv,
-        iz * (m00 * uw + m10 * vw),
+        m00 * uz + m10 * vz,
         m01 * m01 * uu + 2.0 * m01 * m11 * uv + m11 * m11 * vv,
-        iz * (m01 * uw + m11 * vw),
-        iz * iz * ww,
+        m01 * uz + m11 * vz,
+        zz,
     )
 
 
 def field_node_expansion(
-    u: float, v: float, w: float, field: FieldArguments
+    u: float, v: float, z: float, field: FieldArguments
 ) -> tuple[float, Vector, SixEntries]:
-    """Return S, its first derivatives and its second ones uu, uv, uw, vv, vw, ww in nodes."""
+    """Return S, its derivatives along u, v in nodes and z, and the second ones.
+
+    They are uu, uv, uz, vv, vz, zz.
+    """
     rows = min(field.columns.shape[0], 3)
     j = int(u + 0.5)
     u0 = quadratic_weights(u - j)
     u1 = quadratic_weight_slopes(u - j)
     i, v0, v1 = field_row_weights(field.columns.shape[0], v)
-    m = int(w + 0.5)
-    w0 = quadratic_weights(w - m)
-    w1 = quadratic_weight_slopes(w - m)
+    m, t, rate, lower, upper = field_cell(z, field)
+    w0 = level_weights(t, lower, upper)
+    w1 = level_weight_slopes(t, lower, upper)
+    w2 = (2.0 * lower, -2.0 * (lower + upper), 2.0 * upper)
     second = (1.0, -2.0, 1.0)
-    value = -field.margin
-    du = dv = dw = uu = uv = uw = vv = vw = ww = 0.0
+    value = field_offset(m, w0, field) - field.margin
+    dw = field_offset(m, w1, field)
+    ww = field_offset(m, w2, field)
+    du = dv = uu = uv = uw = vv = vw = 0.0
     for a in range(rows):
         for b in range(3):
             c0, c1, c2 = field_triple(i + a, j + b, m, field)
@@ -250,8 +323,9 @@ def field_node_expansion(
             uw += v0[a] * u1[b] * s1
             vv += second[a] * u0[b] * s0
             vw += v1[a] * u0[b] * s1
-            ww += v0[a] * u0[b] * (c0 - 2.0 * c1 + c2)
-    return value, (du, dv, dw), (uu, uv, uw, vv if rows > 1 else 0.0, vw, ww)
+            ww += v0[a] * u0[b] * (w2[0] * c0 + w2[1] * c1 + w2[2] * c2)
+    vv = vv if rows > 1 else 0.0
+    return value, (du, dv, rate * dw), (uu, uv, rate * uw, vv, rate * vw, rate * rate * ww)
 
 
 def field_expansion(
@@ -262,24 +336,23 @@ def field_expansion(
     u, u_sign, v, v_sign = field_coordinates(x, y, field)
     if w >= field.levels - 1.5 or u_sign * v_sign == 0.0:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    w, below = field_level(w, field)
-    s, (du, dv, dw), (uu, uv, uw, vv, vw, ww) = field_node_expansion(u, v, w, field)
+    z, below = field_level(z, field)
+    s, (du, dv, dz), (uu, uv, uz, vv, vz, zz) = field_node_expansion(u, v, z, field)
     if s <= 0.0:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     xx, xy, xz, yy, yz, zz = field_hessian(
         du * du + s * uu,
         (du * dv + s * uv) * u_sign * v_sign,
-        (du * dw + s * uw) * u_sign,
+        (du * dz + s * uz) * u_sign,
         dv * dv + s * vv,
-        (dv * dw + s * vw) * v_sign,
-        dw * dw + s * ww,
+        (dv * dz + s * vz) * v_sign,
+        dz * dz + s * zz,
         field,
     )
     rate, _slope, added = field_descent(below, field)
     curvature = 1.0 - rate * rate
     if 0.0 < below < 1.0:
-        size = 2.0 * field.below / field.iz
-        curvature = 1.5 * curvature + (field.lift + s * dw * field.iz) / size
+        curvature = 1.5 * curvature + (field.lift + s * dz) / field.fade
     return 0.5 * s * s + added, xx, xy, rate * xz, yy, rate * yz, rate * rate * zz + curvature
 
 

@@ -17,13 +17,7 @@ from asperity.laws import LAWS
 from asperity.laws.clamps import NONE
 from asperity.textures.fields import node_loop
 from asperity.textures.fields.field_certificate import Progress
-from asperity.textures.fields.field_grid import (
-    COARSE_STEP,
-    NEIGHBOUR_WEIGHT,
-    RAMP,
-    FieldGrid,
-    SingleArray,
-)
+from asperity.textures.fields.field_grid import NEIGHBOUR_WEIGHT, RAMP, FieldGrid, SingleArray
 from asperity.textures.fields.field_sampler import MIRRORED, PERIODIC, ZERO
 from asperity.textures.texture import Texture
 
@@ -33,10 +27,10 @@ _MAX_REPLACEMENTS = 4
 _TOLERANCE = 0.01
 _MODES: Any = {PERIODIC: "wrap", MIRRORED: "mirror", ZERO: "nearest"}
 
-# Writes the depth [m] in single precision, (n, levels), at columns of nodes at x, y (n, 2) and
-# rising z (levels,) [m]: sqrt(2U) inside, the negative distance of the surface outside, at least
-# -margin, the third argument; called by several threads at once.
-ColumnFunction = Callable[[FloatArray, FloatArray, float, SingleArray], object]
+# Writes the depth [m], (n, levels), at columns of nodes at x, y (n, 2) and rising z (levels,) [m]:
+# sqrt(2U) inside, the negative distance of the surface outside, at least -margin, the third
+# argument; called by several threads at once.
+ColumnFunction = Callable[[FloatArray, FloatArray, float, FloatArray], object]
 
 
 def split_columns(
@@ -44,18 +38,37 @@ def split_columns(
 ) -> ColumnFunction:
     """Return the function of the depth of law H of a texture.
 
-    It is exact; for the nodes of a grid it is that of close points where the texture finds them
-    from a lattice, in a fraction of the time: see :meth:`Texture.closest_lattice`.
+    It is exact; for the nodes of a grid that are not deep it is that of close points where the
+    texture finds them from a lattice, in a fraction of the time: see
+    :meth:`Texture.closest_lattice`.
     """
+    exact = _column_function(texture, continuity, (), texture.arguments)
+    if grid is None:
+        return exact
+    # The probe of law H's search is below the node by its depth over c.
+    lowest = float(grid.height(grid.deep)) - 2.0 * grid.level_spacing
+    bottom = lowest - (texture.extremes[1] - lowest) / max(continuity, 0.5)
+    overrides, arguments = texture.closest_lattice(grid.spacing, bottom)
+    if not overrides:
+        return exact
+    close = _column_function(texture, continuity, overrides, arguments)
+    highest = float(grid.height(grid.deep - 0.5))
+
+    def columns(xy: FloatArray, z: FloatArray, margin: float, out: FloatArray) -> None:
+        deep = int(np.searchsorted(z, highest))
+        for function, part in ((exact, slice(deep)), (close, slice(deep, None))):
+            depths = np.empty((len(xy), len(z[part])))
+            function(xy, z[part], margin, depths)
+            out[:, part] = depths
+
+    return columns
+
+
+def _column_function(
+    texture: Texture, continuity: float, overrides: tuple[ModuleType, ...], arguments: Any
+) -> ColumnFunction:
     from asperity.kernels.fuse import fuse_on_texture
 
-    overrides: tuple[ModuleType, ...] = ()
-    arguments = texture.arguments
-    if grid is not None:
-        # The probe of law H's search is below the node by its depth over c.
-        bottom = float(grid.height(-COARSE_STEP))
-        bottom -= (texture.extremes[1] - bottom) / max(continuity, 0.5)
-        overrides, arguments = texture.closest_lattice(grid.spacing, bottom)
     loops = fuse_on_texture(LAWS["H"], texture.sampler, NONE, (node_loop,), overrides)
     return lambda xy, z, margin, out: loops.column_batch(xy, z, out, continuity, margin, arguments)
 
@@ -68,35 +81,38 @@ def compute_potentials(
     exact: ColumnFunction | None = None,
     continuity: float = 1.0,
 ) -> SingleArray:
-    """Return the depth [m] at the nodes, shape ``grid.node_counts``, in single precision.
+    """Return the depth less the offset of the level [m] at the nodes, in single precision.
+
+    The shape is ``grid.node_counts``.
 
     Args:
         columns: the depth at columns of nodes.
         grid: the nodes.
         progress: called with the finished fraction.
         exact: likewise, exact, where ``columns`` may be too deep: it is used at nodes around which
-            the depth is not that of law H.
+            the depth is not that of law H, but not at deep ones.
         continuity: c of law H.
     """
     *plane, levels = grid.node_counts
     count = math.prod(plane)
     at_once = max(_NODES_PER_BLOCK // levels, 1)
-    computed, weights = grid.level_weights()
-    z = grid.height(computed)
-    depths = np.empty((count, len(z)), np.float32)
+    z = grid.height(np.arange(levels))
+    depths = np.empty((count, levels), np.float32)
+    offsets = grid.offsets()
 
     def fill(first: int) -> None:
         part = np.arange(first, min(first + at_once, count))
-        columns(_plane_positions(grid, part), z, grid.margin, depths[first : first + at_once])
+        block = np.empty((len(part), levels))
+        columns(_plane_positions(grid, part), z, grid.margin, block)
+        depths[first : first + at_once] = block - offsets
 
     run_in_threads(fill, range(0, count, at_once), progress)
     if exact is not None:
-        _replace_wrong(depths, exact, grid, z, continuity)
-    if grid.deep:
-        result = np.empty((count, levels), np.float32)
-        for first in range(0, count, at_once):
-            result[first : first + at_once] = depths[first : first + at_once] @ weights
-        depths = result
+        near = depths[:, grid.deep :]
+        single = offsets[grid.deep :].astype(np.float32)
+        whole = near + single
+        _replace_wrong(whole, exact, grid, z[grid.deep :], continuity)
+        np.subtract(whole, single, out=near)
     return depths.reshape(grid.node_counts)
 
 
@@ -129,7 +145,7 @@ def _replace_column(
 ) -> None:
     """Replace the wrong depths of a column, which is given by its number."""
     levels = np.flatnonzero(wrong[column])
-    found = np.empty((1, len(levels)), np.float32)
+    found = np.empty((1, len(levels)))
     exact(_plane_positions(grid, np.array([column])), z[levels], grid.margin, found)
     depths[column, levels] = found[0]
 
@@ -163,12 +179,12 @@ def interpolate_force(columns: ColumnFunction, grid: FieldGrid, points: FloatArr
     points are computed.
     """
     rates = np.linalg.pinv(grid.steps)
-    level = (points[:, 2:] - grid.height(0)) / grid.level_spacing
+    level = grid.level(points[:, 2:])
     index = np.column_stack([(points[:, :2] - grid.start) @ rates, level])
     nearest = np.rint(index)
     plane = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * len(grid.cells), indexing="ij"), axis=-1)
     plane = plane.reshape(-1, len(grid.cells))
-    nodes = np.empty((len(points), len(plane), 3), np.float32)
+    nodes = np.empty((len(points), len(plane), 3))
 
     def fill(row: int) -> None:
         xy = grid.positions(nearest[row, :-1] + plane)
@@ -177,15 +193,22 @@ def interpolate_force(columns: ColumnFunction, grid: FieldGrid, points: FloatArr
 
     run_in_threads(fill, range(len(points)), None)
     part = index - nearest
-    weights = np.stack([0.5 * (0.5 - part) ** 2, 0.75 - part**2, 0.5 * (0.5 + part) ** 2], axis=-1)
-    rises = np.stack([part - 0.5, -2.0 * part, part + 0.5], axis=-1)
-    values = np.maximum(nodes.astype(float) + grid.margin, 0.0)
+    rate, lower, upper = grid.cell_shapes(nearest[:, -1])
+    below = 0.5 - part
+    above = 0.5 + part
+    shares = np.full((2, *part.shape), 0.5)
+    shares[:, :, -1] = lower, upper
+    outer = shares[0] * below**2, shares[1] * above**2
+    weights = np.stack([outer[0], 1.0 - outer[0] - outer[1], outer[1]], axis=-1)
+    outer = -2.0 * shares[0] * below, 2.0 * shares[1] * above
+    rises = np.stack([outer[0], -outer[0] - outer[1], outer[1]], axis=-1)
+    values = np.maximum(nodes + grid.margin, 0.0)
     values = values.reshape(len(points), *[3] * part.shape[1])
     depth = _weighted_sum(values, weights) - grid.margin
     chosen = np.eye(part.shape[1], dtype=bool)[:, :, None]
     slopes = [_weighted_sum(values, np.where(axis, rises, weights)) for axis in chosen]
     slope = np.stack(slopes, axis=-1)
-    gradient = np.column_stack([slope[:, :-1] @ rates.T, slope[:, -1] / grid.level_spacing])
+    gradient = np.column_stack([slope[:, :-1] @ rates.T, slope[:, -1] * rate])
     return np.asarray(-np.maximum(depth, 0.0)[:, None] * gradient)
 
 
@@ -199,8 +222,10 @@ def _weighted_sum(values: FloatArray, weights: FloatArray) -> FloatArray:
 def smooth(depths: SingleArray, weights: NDArray[np.uint8], grid: FieldGrid) -> None:
     """Replace depths by means with weights w/8, 1 - w/4, w/8 along each axis, plane by plane.
 
-    They lower the gain where second derivatives jump. The lowest level, which has no neighbour
-    below, is left out along z; above the highest the depth is that of the highest.
+    They lower the gain where second derivatives jump. Where levels are farther apart, the weights
+    of neighbours along z are such that a mean has the same variance, and that a linear depth is its
+    own mean. The lowest level, which has no neighbour below, is left out along z; above the highest
+    the depth is that of the highest.
 
     Args:
         depths: [m], shape ``grid.node_counts``.
@@ -217,7 +242,18 @@ def smooth(depths: SingleArray, weights: NDArray[np.uint8], grid: FieldGrid) -> 
             change = ndimage.correlate1d(plane, [1.0, -2.0, 1.0], axis - (axis > other), mode=mode)
             if axis == depths.ndim - 1:
                 change[..., 0] = 0.0
+                count = grid.stretched
+                change[..., 1 : count + 1] = _stretched_change(plane[..., : count + 2], grid)
             np.add(plane, np.float32(NEIGHBOUR_WEIGHT / 255.0) * shares * change, out=plane)
+
+
+def _stretched_change(depths: SingleArray, grid: FieldGrid) -> FloatArray:
+    """Return the second derivative of the depth along z times the squared step of equal cells."""
+    levels = np.arange(depths.shape[-1])
+    steps = np.diff(grid.height(levels)) / grid.level_spacing
+    slopes = [np.diff(part, axis=-1) / steps for part in (depths, grid.offsets()[levels])]
+    changes = [2.0 * np.diff(slope, axis=-1) / (steps[:-1] + steps[1:]) for slope in slopes]
+    return np.asarray(changes[0] + changes[1])
 
 
 def spread_marks(marks: NDArray[np.uint8], border: int, ramp: int = RAMP) -> tuple[Any, Any]:

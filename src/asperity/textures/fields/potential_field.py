@@ -27,8 +27,9 @@ class FieldAccuracy:
     """Difference of a baked field from exact law H, forces over the stiffness.
 
     Attributes:
-        bound: greatest difference [m] of a spline through exact depths, proved for all z above the
-            floor. The depths of a map are not proved, but those at probes are compared with them.
+        bound: greatest difference [m] of a spline through exact depths, proved for all z above
+            those where nodes are farther apart along z. The depths of a map are not proved, but
+            those at probes are compared with them.
         potential_bound: that of the potentials [m²], likewise.
         rms: RMS difference of the forces [m], measured at random probes of the depths.
         largest: the greatest one measured [m].
@@ -36,7 +37,9 @@ class FieldAccuracy:
             surface. At the least of them the mean force is about 0.1 N at 3000 N/m.
         shares: RMS difference over the RMS of the texture's force at each of them: the exact force
             about its mean there.
+        presses: mean force at each of these depths [m]; of bodies, its norm.
         onset: greatest distance [m] from the surface at which contact was found to begin.
+        onset_places: number of random places where it was measured.
         is_limited: whether the goal was missed, because no finer field has the size allowed.
     """
 
@@ -46,7 +49,9 @@ class FieldAccuracy:
     largest: float = 0.0
     depths: tuple[float, ...] = ()
     shares: tuple[float, ...] = ()
+    presses: tuple[float, ...] = ()
     onset: float = 0.0
+    onset_places: int = 0
     is_limited: bool = False
 
     @property
@@ -159,6 +164,10 @@ class PotentialField(Texture, Tabular):
         depth = format_length(accuracy.worst_depth)
         deepest = format_length(max(accuracy.depths, default=0.0))
         onset = format_length(accuracy.onset)
+        presses = "depths"
+        if accuracy.presses:
+            ends = [format_length(end) for end in (accuracy.presses[0], accuracy.presses[-1])]
+            presses = f"presses of {ends[0]} to {ends[1]} times the stiffness"
         missed = ": more than asked for, the memory allows no finer field"
         claim = ""
         q = f"q at most {self.gain.upper:.4g}"
@@ -170,9 +179,9 @@ class PotentialField(Texture, Tabular):
             f"Law H baked as a potential field: {self.arguments.c.size} nodes,"
             f" {1e6 * self.resolution:.3g} µm apart, {how}; {q};{claim}"
             f" force {100 * accuracy.share:.2g} % RMS from exact H"
-            f" at the worst of {len(accuracy.depths)} depths (at {depth}; deeper than {deepest} it"
-            f" is not known){missed * accuracy.is_limited}; contact begins up to {onset} from the"
-            " surface at sampled places"
+            f" at the worst of {len(accuracy.depths)} {presses} (at {depth}; deeper than {deepest}"
+            f" it is not known){missed * accuracy.is_limited}; contact begins up to {onset} from"
+            f" the surface at {accuracy.onset_places or ''} sampled places".replace("  ", " ")
         )
         return (*self.source.preparation, text)
 
@@ -213,7 +222,7 @@ class PotentialField(Texture, Tabular):
         numbers = {name: getattr(self, name) for name in names}
         parts = {name: vars(getattr(self, name)) for name in ("gain", "one_sided", "accuracy")}
         nodes = {name: getattr(grid, name) for name in ("cells", "level_spacing", "floor")}
-        nodes |= {"steps": grid.steps.tolist(), "start": grid.start.tolist()}
+        nodes |= {name: getattr(grid, name).tolist() for name in ("steps", "start", "knots")}
         return {
             "kind": self.kind,
             "spacing": list(grid.spacing),

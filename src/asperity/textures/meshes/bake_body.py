@@ -10,7 +10,7 @@ from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.measured.lengths import format_length, format_lengths
 from asperity.textures.fields import bake
 from asperity.textures.fields.field_certificate import Progress
-from asperity.textures.fields.field_grid import FieldGrid, SingleArray
+from asperity.textures.fields.field_grid import FieldGrid
 from asperity.textures.fields.node_potentials import ColumnFunction, compute_potentials
 from asperity.textures.fields.potential_field import PotentialField, ThinRegion
 from asperity.textures.meshes import mesh_potential, triangle_tree
@@ -130,7 +130,7 @@ class _BodyLoops:
         self._loops.point_batch(points, self.law, out, crossings, self.body.tree)
         return out
 
-    def columns(self, xy: FloatArray, z: FloatArray, margin: float, out: SingleArray) -> FloatArray:
+    def columns(self, xy: FloatArray, z: FloatArray, margin: float, out: FloatArray) -> FloatArray:
         """Write the depths of columns of nodes; return the summary of each, (n, 7)."""
         summary = np.zeros((len(xy), 7))
         crossings = np.empty((_MOST_CROSSINGS, 2))
@@ -194,15 +194,13 @@ class _BodyLoops:
         width, depth, _levels = grid.node_counts
         index = np.stack(np.unravel_index(np.arange(width * depth), (width, depth)), axis=-1)
         self._xy = grid.positions(index)
-        empty = np.zeros((len(self._xy), 0), np.float32)
+        empty = np.zeros((len(self._xy), 0))
         self._summary = self.columns(self._xy, np.empty(0), grid.margin, empty)
         wrong = (self._summary[:, LEAST_WINDING] < 0.0) | (self._summary[:, GREATEST_WINDING] > 1.0)
         places = np.column_stack([self._xy, self._summary[:, FAULT_Z]])[wrong]
         _check_faults(self.body, make_fault(INTERSECTING, places))
 
-    def record_columns(
-        self, xy: FloatArray, z: FloatArray, margin: float, out: SingleArray
-    ) -> None:
+    def record_columns(self, xy: FloatArray, z: FloatArray, margin: float, out: FloatArray) -> None:
         """Write the depths of columns of the grid, and keep their summaries."""
         steps = np.rint((xy - self.grid.start) / self.grid.spacing[0]).astype(np.intp)
         rows = steps[:, 0] * self.grid.node_counts[1] + steps[:, 1]
