@@ -133,7 +133,7 @@ class Texture(Plottable, ABC):
     def closest_lattice(
         self,
         spacing: tuple[float, ...],  # noqa: ARG002 - for kinds that have a lattice
-        bottom: float,  # noqa: ARG002 - likewise
+        z: FloatArray,  # noqa: ARG002 - likewise
     ) -> tuple[tuple[ModuleType, ...], tuple[Any, ...]]:
         """Return modules that replace the closest-point search by a quick one, and their record.
 
@@ -141,8 +141,8 @@ class Texture(Plottable, ABC):
         and mostly the closest. By default the search is that of the sampler.
 
         Args:
-            spacing: distance of the places where it is used along each axis [m], z last.
-            bottom: z of the lowest one [m].
+            spacing: distance of the places where it is used along each axis of the plane [m].
+            z: of the levels of the lattice, rising [m].
         """
         return (), self.arguments
 

@@ -25,6 +25,9 @@ _NODES_PER_BLOCK = 10_000
 _MAX_REPLACEMENTS = 4
 # Part of a second derivative of 1 that is left to rounding.
 _TOLERANCE = 0.01
+# Step of the levels of a lattice where cells are equally high, and the number of those below all.
+_LATTICE_STEP = 2
+_LEVELS_BELOW = 4
 _MODES: Any = {PERIODIC: "wrap", MIRRORED: "mirror", ZERO: "nearest"}
 
 # Writes the depth [m], (n, levels), at columns of nodes at x, y (n, 2) and rising z (levels,) [m]:
@@ -38,30 +41,22 @@ def split_columns(
 ) -> ColumnFunction:
     """Return the function of the depth of law H of a texture.
 
-    It is exact; for the nodes of a grid that are not deep it is that of close points where the
-    texture finds them from a lattice, in a fraction of the time: see
-    :meth:`Texture.closest_lattice`.
+    It is exact; for the nodes of a grid it is that of close points where the texture finds them
+    from a lattice, in a fraction of the time: see :meth:`Texture.closest_lattice`.
     """
-    exact = _column_function(texture, continuity, (), texture.arguments)
-    if grid is None:
-        return exact
-    # The probe of law H's search is below the node by its depth over c.
-    lowest = float(grid.height(grid.deep)) - 2.0 * grid.level_spacing
-    bottom = lowest - (texture.extremes[1] - lowest) / max(continuity, 0.5)
-    overrides, arguments = texture.closest_lattice(grid.spacing, bottom)
-    if not overrides:
-        return exact
-    close = _column_function(texture, continuity, overrides, arguments)
-    highest = float(grid.height(grid.deep - 0.5))
-
-    def columns(xy: FloatArray, z: FloatArray, margin: float, out: FloatArray) -> None:
-        deep = int(np.searchsorted(z, highest))
-        for function, part in ((exact, slice(deep)), (close, slice(deep, None))):
-            depths = np.empty((len(xy), len(z[part])))
-            function(xy, z[part], margin, depths)
-            out[:, part] = depths
-
-    return columns
+    overrides: tuple[ModuleType, ...] = ()
+    arguments = texture.arguments
+    if grid is not None:
+        levels = np.arange(grid.levels)
+        z = grid.height(levels)
+        used = (levels < grid.stretched) | (levels % _LATTICE_STEP == 0)
+        # The probe of law H's search is below the node by its depth over c.
+        depth = texture.extremes[1] - z[0]
+        deepest = depth * (1.0 + 1.0 / max(continuity, 0.5))
+        below = texture.extremes[1] - np.geomspace(deepest, depth, _LEVELS_BELOW, endpoint=False)
+        lattice_z = np.concatenate([below, z[used]])
+        overrides, arguments = texture.closest_lattice(grid.spacing[:-1], lattice_z)
+    return _column_function(texture, continuity, overrides, arguments)
 
 
 def _column_function(
@@ -90,7 +85,7 @@ def compute_potentials(
         grid: the nodes.
         progress: called with the finished fraction.
         exact: likewise, exact, where ``columns`` may be too deep: it is used at nodes around which
-            the depth is not that of law H, but not at deep ones.
+            the depth is not that of law H.
         continuity: c of law H.
     """
     *plane, levels = grid.node_counts
@@ -108,11 +103,16 @@ def compute_potentials(
 
     run_in_threads(fill, range(0, count, at_once), progress)
     if exact is not None:
-        near = depths[:, grid.deep :]
-        single = offsets[grid.deep :].astype(np.float32)
-        whole = near + single
-        _replace_wrong(whole, exact, grid, z[grid.deep :], continuity)
-        np.subtract(whole, single, out=near)
+        _replace_wrong(depths, exact, grid, continuity)
+    high = np.arange(grid.stretched + 1)
+
+    def sharpen(first: int) -> None:
+        part = depths[first : first + at_once, : len(high)]
+        whole = part.astype(float) + offsets[high]
+        part[:, 1:-1] = grid.sharpened(whole, high) - offsets[high[1:-1]]
+
+    if grid.stretched:
+        run_in_threads(sharpen, range(0, count, at_once), None)
     return depths.reshape(grid.node_counts)
 
 
@@ -123,34 +123,37 @@ def _plane_positions(grid: FieldGrid, columns: NDArray[np.intp]) -> FloatArray:
 
 
 def _replace_wrong(
-    depths: SingleArray, exact: ColumnFunction, grid: FieldGrid, z: FloatArray, continuity: float
+    depths: SingleArray, exact: ColumnFunction, grid: FieldGrid, continuity: float
 ) -> None:
     """Replace depths at nodes, (columns, levels) [m], around which they are not those of law H."""
+    offsets = grid.offsets()
     for _ in range(_MAX_REPLACEMENTS):
-        volume = depths.reshape(*grid.node_counts[:-1], -1)
-        wrong = wrong_nodes(volume, grid, continuity).reshape(depths.shape)
+        wrong = np.empty(depths.shape, bool)
+        for level, offset in enumerate(offsets):
+            plane = depths[:, level].astype(float) + offset
+            marks = wrong_nodes(plane.reshape(*grid.node_counts[:-1], 1), grid, continuity)
+            wrong[:, level] = marks.ravel()
         columns = np.flatnonzero(wrong.any(axis=1)).tolist()
         if not columns:
             return
-        run_in_threads(partial(_replace_column, depths, exact, grid, z, wrong), columns, None)
+        run_in_threads(partial(_replace_column, depths, exact, grid, wrong), columns, None)
 
 
 def _replace_column(
     depths: SingleArray,
     exact: ColumnFunction,
     grid: FieldGrid,
-    z: FloatArray,
     wrong: NDArray[np.bool_],
     column: int,
 ) -> None:
     """Replace the wrong depths of a column, which is given by its number."""
     levels = np.flatnonzero(wrong[column])
     found = np.empty((1, len(levels)))
-    exact(_plane_positions(grid, np.array([column])), z[levels], grid.margin, found)
-    depths[column, levels] = found[0]
+    exact(_plane_positions(grid, np.array([column])), grid.height(levels), grid.margin, found)
+    depths[column, levels] = found[0] - grid.offsets()[levels]
 
 
-def wrong_nodes(depths: SingleArray, grid: FieldGrid, continuity: float) -> NDArray[np.bool_]:
+def wrong_nodes(depths: FloatArray, grid: FieldGrid, continuity: float) -> NDArray[np.bool_]:
     """Return the nodes whose depth [m] may be greater than that of law H, of the same shape.
 
     The second derivatives of law H's potential U are between -c and 1, and so is the second
@@ -184,12 +187,12 @@ def interpolate_force(columns: ColumnFunction, grid: FieldGrid, points: FloatArr
     nearest = np.rint(index)
     plane = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * len(grid.cells), indexing="ij"), axis=-1)
     plane = plane.reshape(-1, len(grid.cells))
-    nodes = np.empty((len(points), len(plane), 3))
+    nodes = np.empty((len(points), len(plane), 5))
+    levels = nearest[:, None, -1:] + np.arange(-2.0, 3.0)
 
     def fill(row: int) -> None:
         xy = grid.positions(nearest[row, :-1] + plane)
-        z = grid.height(nearest[row, -1] + np.array([-1.0, 0.0, 1.0]))
-        columns(xy, z, grid.margin, nodes[row])
+        columns(xy, grid.height(levels[row, 0]), grid.margin, nodes[row])
 
     run_in_threads(fill, range(len(points)), None)
     part = index - nearest
@@ -202,7 +205,7 @@ def interpolate_force(columns: ColumnFunction, grid: FieldGrid, points: FloatArr
     weights = np.stack([outer[0], 1.0 - outer[0] - outer[1], outer[1]], axis=-1)
     outer = -2.0 * shares[0] * below, 2.0 * shares[1] * above
     rises = np.stack([outer[0], -outer[0] - outer[1], outer[1]], axis=-1)
-    values = np.maximum(nodes + grid.margin, 0.0)
+    values = np.maximum(grid.sharpened(nodes, levels) + grid.margin, 0.0)
     values = values.reshape(len(points), *[3] * part.shape[1])
     depth = _weighted_sum(values, weights) - grid.margin
     chosen = np.eye(part.shape[1], dtype=bool)[:, :, None]

@@ -41,11 +41,10 @@ class LatticeArguments(NamedTuple):
         nearest: number of the node nearest to a place, (levels, rows, columns of places).
         first_x: the first node [m].
         first_y: likewise.
-        first_z: the lowest level [m].
+        z: of the levels, rising [m].
         stride: the places are every so many nodes along each axis.
         side_x: distance of the nodes [m].
         side_y: likewise; that of a profile is positive, too.
-        side_z: distance of the levels [m].
     """
 
     c: FloatArray
@@ -60,11 +59,10 @@ class LatticeArguments(NamedTuple):
     nearest: NDArray[np.int32]
     first_x: float
     first_y: float
-    first_z: float
+    z: FloatArray
     stride: int
     side_x: float
     side_y: float
-    side_z: float
 
 
 def nearest_nodes(
@@ -211,7 +209,7 @@ def nearest_stored(
     places_y, places_x = texture.nearest.shape[1:]
     j = node_below((x - texture.first_x) / (texture.side_x * texture.stride), places_x)
     i = node_below((y - texture.first_y) / (texture.side_y * texture.stride), places_y)
-    m = node_below((z - texture.first_z) / texture.side_z, texture.nearest.shape[0])
+    m = level_below(z, texture.z)
     for level in range(m, min(m + 2, texture.nearest.shape[0])):
         for row in range(i, min(i + 2, places_y)):
             for column in range(j, min(j + 2, places_x)):
@@ -263,3 +261,16 @@ def nearest_outside(
 def node_below(position: float, count: int) -> int:
     """Return the last node before a position, in nodes, that has another one after it."""
     return min(max(int(position), 0), max(count - 2, 0))
+
+
+def level_below(z: float, levels: FloatArray) -> int:
+    """Return the last of rising levels below z [m], or the first one."""
+    low = 0
+    high = len(levels)
+    while high - low > 1:
+        middle = (low + high) // 2
+        if z >= levels[middle]:
+            low = middle
+        else:
+            high = middle
+    return low

@@ -19,50 +19,51 @@ _LEAST_PADDING = 5
 # Nodes of the lattice per node of the spline, at least, and the most from one place to the next.
 _NODES_PER_PITCH = 2.0
 _MAX_STRIDE = 4
-# Step of the levels of the lattice, in steps of the levels where it is used.
-_LEVEL_STEP = 2
+# Greatest reach beyond the borders, over the longer side of the texture.
+_MOST_REACH = 0.5
 
 
 def build_lattice(
-    spline: Texture, pitches: Sequence[float], spacing: Sequence[float], bottom: float
+    spline: Texture, pitches: Sequence[float], spacing: Sequence[float], z: FloatArray
 ) -> LatticeArguments:
     """Return the record of a spline with a lattice.
 
     Args:
         spline: the texture.
         pitches: distance of its nodes along each axis [m].
-        spacing: greatest distance of the places along each axis [m], z last.
-        bottom: the lowest level [m].
+        spacing: greatest distance of the places along each axis [m].
+        z: of the levels, rising [m].
     """
     low, top = spline.extremes
     lengths = np.hypot(*spline.domain.spans.T)
-    counts = np.ceil(lengths / spacing[:-1])
+    counts = np.ceil(lengths / spacing)
     nodes = _NODES_PER_PITCH * lengths / (counts * pitches)
     stride = min(math.ceil(float(nodes.max())), _MAX_STRIDE)
     sides = lengths / (stride * counts)
+    # A point farther away than one above the lowest level is not the closest; nor is one much
+    # farther away than the deepest place, where the texture repeats.
+    reach = min(math.sqrt((top - low) * (top + low - 2.0 * z[0])), _MOST_REACH * lengths.max())
+    reach = max(reach, top - low)
     x, *others = [
-        _axis_nodes(start, side, int(count), stride, top - low)
+        _axis_nodes(start, side, int(count), stride, reach)
         for start, side, count in zip(spline.domain.origin, sides, counts, strict=False)
     ]
     y = others[0] if others else spline.domain.origin[1:]
     points = np.stack(np.meshgrid(x, y), axis=-1)
     heights = spline.height(points.reshape(-1, 2)).reshape(points.shape[:2])
-    side_z = _LEVEL_STEP * spacing[-1]
-    levels = math.ceil(max(top - bottom, side_z) / side_z) + 1
     rows = (len(y) - 1) // stride + 1
     columns = (len(x) - 1) // stride + 1
     numbers = dict(zip(SplineArguments._fields, spline.arguments, strict=True))
     lattice = LatticeArguments(
         **numbers,
         heights=heights,
-        nearest=np.empty((levels, rows, columns), np.int32),
+        nearest=np.empty((len(z), rows, columns), np.int32),
         first_x=float(x[0]),
         first_y=float(y[0]),
-        first_z=bottom,
+        z=z,
         stride=stride,
         side_x=float(sides[0]),
         side_y=float(sides[-1]),
-        side_z=side_z,
     )
     _fill_levels(lattice)
     return lattice
@@ -86,7 +87,7 @@ def _fill_levels(lattice: LatticeArguments) -> None:
     def fill(level: int) -> None:
         loops.nearest_nodes(
             lattice.heights,
-            lattice.first_z + level * lattice.side_z,
+            lattice.z[level],
             lattice.stride,
             lattice.side_x,
             lattice.side_y,

@@ -141,13 +141,13 @@ class Spline(Texture):
         return parts.heights, parts.nesting, parts.form.range, parts.waviness.range
 
     def closest_lattice(
-        self, spacing: tuple[float, ...], bottom: float
+        self, spacing: tuple[float, ...], z: FloatArray
     ) -> tuple[tuple[ModuleType, ...], tuple[Any, ...]]:
         """See :class:`Texture`."""
         from asperity.textures.spline import lattice_search
         from asperity.textures.spline.spline_lattice import build_lattice
 
-        return (lattice_search,), build_lattice(self, self._pitches, spacing, bottom)
+        return (lattice_search,), build_lattice(self, self._pitches, spacing, z)
 
     @property
     def _sides(self) -> tuple[float, ...]:
