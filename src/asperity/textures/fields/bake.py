@@ -46,6 +46,10 @@ _BYTES_PER_NODE = 4
 # Height of the cells in which a field fades below its floor, over the range of the vertical force
 # there.
 _FADE = 0.8
+# Growth of cells with depth over the share of the goal, of which it then causes about half however
+# close nodes are, and the most.
+_GROWTH_PER_SHARE = 3.0
+_MOST_GROWTH = 0.25
 
 
 @dataclass(frozen=True)
@@ -186,7 +190,8 @@ class BakePlan:
         """Return the coarsest grid of a resolution [m]."""
         heights = self.texture.extremes
         domain = self.texture.domain
-        return FieldGrid.fit(domain, heights, self.max_depth, self.fade, resolution)
+        growth = 1.0 + min(_GROWTH_PER_SHARE * self.goal.share, _MOST_GROWTH)
+        return FieldGrid.fit(domain, heights, self.max_depth, self.fade, resolution, growth)
 
     def shares(self, difference: FloatArray, rows: NDArray[np.intp]) -> FloatArray:
         """Return the RMS of differences over that of the texture's force, at each depth."""

@@ -239,6 +239,28 @@ def multiply_hull(
             product[n, 6] += w * s * hull[j, 3, k]
 
 
+def has_corner_above(k: int, size: int, hull: FloatArray, bounds: FloatArray) -> bool:
+    """Return whether an eigenvalue of Hess T or its negative is above its bound at a corner."""
+    for q in range(size):
+        s = hull[q, 0, k]
+        if q % 3 == 1 or q // 3 % 3 == 1 or q // 9 == 1 or s <= 0.0:
+            continue
+        x = hull[q, 1, k]
+        y = hull[q, 2, k]
+        z = hull[q, 3, k]
+        xx = s * hull[q, 4, k] + x * x
+        xy = s * hull[q, 5, k] + x * y
+        xz = s * hull[q, 6, k] + x * z
+        yy = s * hull[q, 7, k] + y * y
+        yz = s * hull[q, 8, k] + y * z
+        zz = s * hull[q, 9, k] + z * z
+        upper = least_minor(bounds[0, 0], xx, xy, xz, yy, yz, zz)
+        lower = least_minor(bounds[1, 0], -xx, -xy, -xz, -yy, -yz, -zz)
+        if min(upper, lower) < -MINOR_ROUNDING:
+            return True
+    return False
+
+
 def raise_bound(
     row: int,
     place: tuple[int, int, int],
@@ -312,12 +334,15 @@ def search_run(
     for k in range(count):
         if tests and marks[place[0], place[1], place[2] + k] == 0:
             continue
-        if not work[3, k] > MINOR_ROUNDING:
+        is_open = not work[3, k] > MINOR_ROUNDING
+        is_above = tests and is_open and rate == 0.0
+        is_above = is_above and has_corner_above(k, pairs.shape[0], hull, bounds)
+        if is_open and not is_above:
             multiply_hull(k, hull, pairs, weights, product)
             for row in range(2):
                 raise_bound(row, place, k, rate, hull, product, bounds, field)
         if tests:
-            is_above = bounds[0, 0] > upper or bounds[1, 0] > lower
+            is_above |= bounds[0, 0] > upper or bounds[1, 0] > lower
             marks[place[0], place[1], place[2] + k] = 1 if is_above else 0
             bounds[0, 0] = upper
             bounds[1, 0] = lower

@@ -24,8 +24,6 @@ from asperity.textures.fields.field_sampler import (
 NEIGHBOUR_WEIGHT = 0.125
 # Steps over which the share of a smoothing pass rises from 0 to 1.
 RAMP = 5
-# Greatest height of a cell below the lowest place of a surface, over that of the one above.
-GROWTH = 1.25
 _MIN_STEPS = 4
 _MIN_BELOW = 2
 # Height above the surface at which coefficients end, in nodes: a cell with contact has no node
@@ -71,10 +69,11 @@ class FieldGrid:
         max_depth: float,
         fade: float,
         resolution: float,
+        growth: float = 1.0,
     ) -> FieldGrid:
         """Return the coarsest grid whose nodes are at most the resolution apart.
 
-        Below the least height those along z are ever farther apart, by the ratio ``GROWTH``.
+        Below the least height those along z may be ever farther apart.
 
         Args:
             domain: the domain of the texture.
@@ -82,11 +81,12 @@ class FieldGrid:
             max_depth: depth of the floor below the least height [m].
             fade: least height of the cells below the floor [m].
             resolution: [m].
+            growth: greatest height of a cell below the least height, over that of the one above.
         """
         lengths = np.hypot(*domain.spans.T)
         cells = [max(math.ceil(length / resolution), _MIN_STEPS) for length in lengths]
         floor = heights[0] - max_depth
-        spacing, inside, stretched = _cell_heights(heights, floor, resolution)
+        spacing, inside, stretched = _cell_heights(heights, floor, resolution, growth)
         lowest = float(stretched[0]) if len(stretched) else spacing
         below = max(math.ceil(fade / lowest), _MIN_BELOW)
         knots = np.empty(0)
@@ -176,12 +176,6 @@ class FieldGrid:
         """Least z above which nodes are equally far apart [m]."""
         return float(self.knots[-1]) if self.stretched else self.floor
 
-    @property
-    def deep(self) -> int:
-        """Number of levels deeper below the equal cells than these are high."""
-        top = float(self.height(self.levels)) - self.margin
-        return int(np.searchsorted(self.knots, 2.0 * self.bounded_floor - top))
-
     def cell_shapes(self, level: FloatArray) -> FloatArray:
         """Return 1/h, LOWER and UPPER of the cells of levels, (3, n)."""
         shapes = np.empty((3, len(level)))
@@ -190,29 +184,6 @@ class FieldGrid:
         table = self.stretch_table()[:, RATE : UPPER + 1]
         shapes[:, is_stretched] = table[level[is_stretched].astype(int)].T
         return shapes
-
-    def sharpened(self, depths: FloatArray, levels: NDArray[np.intp] | FloatArray) -> FloatArray:
-        """Return depths at levels, but the first and the last, corrected where cells are high.
-
-        The spline of depths adds an eighth of the squared height of a cell times their second
-        derivative along z; the correction leaves that of the equal cells.
-
-        Args:
-            depths: [m], (..., n).
-            levels: rising by 1, broadcast to (..., n).
-        """
-        z = self.height(levels)
-        steps = np.diff(z)
-        curvature = 2.0 * np.diff(np.diff(depths) / steps) / (steps[..., :-1] + steps[..., 1:])
-        middle = levels[..., 1:-1]
-        side = self.cell_height(middle)
-        excess = 0.125 * (side**2 - self.level_spacing**2)
-        return np.asarray(depths[..., 1:-1] - excess * curvature)
-
-    def cell_height(self, level: Any) -> Any:
-        """Return the heights of the cells of levels [m]."""
-        sides = np.append(np.diff(self.knots), self.level_spacing)
-        return sides[np.minimum(level, self.stretched).astype(int)]
 
     def offsets(self) -> FloatArray:
         """Return what is subtracted from the depth at each level before it is stored [m].
@@ -264,11 +235,13 @@ class FieldGrid:
         S exceeds the depth by at most the standard deviation of the points of which it is the mean.
         That depth is at least -margin. Cells at the surface are at most two above stretched ones.
         """
-        square = self.spread(passes) + 0.25 * (GROWTH**4 - 1.0) * self.level_spacing**2
-        deviation = math.sqrt(square)
+        spacing = self.spacing
+        side = self.knots[-2] - self.knots[-3] if self.stretched > 1 else self.level_spacing
+        growth = (side / self.level_spacing) ** 2
+        deviation = math.sqrt(self.spread(passes) + 0.25 * (growth**2 - 1.0) * spacing[-1] ** 2)
         if deviation < self.margin:
             return deviation
-        return self.margin + (1.5 + passes) * float(np.linalg.norm(self.spacing))
+        return self.margin + (1.5 + passes) * float(np.linalg.norm(spacing))
 
     def onset_bound(self, passes: int) -> float:
         """Return a proved bound of the distance [m] above the surface at which contact begins.
@@ -371,7 +344,7 @@ class FieldGrid:
 
 
 def _cell_heights(
-    heights: tuple[float, float], floor: float, resolution: float
+    heights: tuple[float, float], floor: float, resolution: float, growth: float
 ) -> tuple[float, int, FloatArray]:
     """Return the height of equal cells [m], their number, and the heights of those below them.
 
@@ -382,15 +355,15 @@ def _cell_heights(
     inside = max(math.ceil((top - low) / spacing), 1)
     rest = top - inside * spacing - floor
     count = 1
-    while count * spacing < rest and spacing * _growth_sum(GROWTH, count) < rest:
+    while count * spacing < rest and spacing * _growth_sum(growth, count) < rest:
         count += 1
     if count * spacing >= rest:
         inside = math.ceil((top - floor) / spacing)
         return (top - floor) / inside, inside, np.empty(0)
     from scipy.optimize import brentq
 
-    growth = brentq(lambda ratio: spacing * _growth_sum(ratio, count) - rest, 1.0, GROWTH)
-    return spacing, inside, np.asarray(spacing * growth ** np.arange(count, 0.0, -1.0), float)
+    ratio = brentq(lambda trial: spacing * _growth_sum(trial, count) - rest, 1.0, growth)
+    return spacing, inside, np.asarray(spacing * ratio ** np.arange(count, 0.0, -1.0), float)
 
 
 def _growth_sum(ratio: float, count: int) -> float:

@@ -104,15 +104,6 @@ def compute_potentials(
     run_in_threads(fill, range(0, count, at_once), progress)
     if exact is not None:
         _replace_wrong(depths, exact, grid, continuity)
-    high = np.arange(grid.stretched + 1)
-
-    def sharpen(first: int) -> None:
-        part = depths[first : first + at_once, : len(high)]
-        whole = part.astype(float) + offsets[high]
-        part[:, 1:-1] = grid.sharpened(whole, high) - offsets[high[1:-1]]
-
-    if grid.stretched:
-        run_in_threads(sharpen, range(0, count, at_once), None)
     return depths.reshape(grid.node_counts)
 
 
@@ -187,12 +178,12 @@ def interpolate_force(columns: ColumnFunction, grid: FieldGrid, points: FloatArr
     nearest = np.rint(index)
     plane = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * len(grid.cells), indexing="ij"), axis=-1)
     plane = plane.reshape(-1, len(grid.cells))
-    nodes = np.empty((len(points), len(plane), 5))
-    levels = nearest[:, None, -1:] + np.arange(-2.0, 3.0)
+    nodes = np.empty((len(points), len(plane), 3))
 
     def fill(row: int) -> None:
         xy = grid.positions(nearest[row, :-1] + plane)
-        columns(xy, grid.height(levels[row, 0]), grid.margin, nodes[row])
+        z = grid.height(nearest[row, -1] + np.array([-1.0, 0.0, 1.0]))
+        columns(xy, z, grid.margin, nodes[row])
 
     run_in_threads(fill, range(len(points)), None)
     part = index - nearest
@@ -205,7 +196,7 @@ def interpolate_force(columns: ColumnFunction, grid: FieldGrid, points: FloatArr
     weights = np.stack([outer[0], 1.0 - outer[0] - outer[1], outer[1]], axis=-1)
     outer = -2.0 * shares[0] * below, 2.0 * shares[1] * above
     rises = np.stack([outer[0], -outer[0] - outer[1], outer[1]], axis=-1)
-    values = np.maximum(grid.sharpened(nodes, levels) + grid.margin, 0.0)
+    values = np.maximum(nodes + grid.margin, 0.0)
     values = values.reshape(len(points), *[3] * part.shape[1])
     depth = _weighted_sum(values, weights) - grid.margin
     chosen = np.eye(part.shape[1], dtype=bool)[:, :, None]
