@@ -35,11 +35,12 @@ _ONSET = 10e-6, 0.02
 # Depth at which the place of a body's surface is measured, over the greatest.
 SHALLOW = 0.04
 _TRIAL_BYTES = 2**20
-# Share of the goal that is aimed at, relative error of the resolution predicted for it, and the
-# probes of a prediction: every third.
-_AIM = 0.94
-_PREDICTION_STEP = 0.04
-_PREDICTION_PART = 3
+# Share of the goal that is aimed at; powers of the resolution that the share of the force and the
+# distance of contact are assumed to follow, and the least and greatest; least error over the goal.
+_AIM = 0.88
+_POWERS = 1.3, 2.0
+_POWER_RANGE = 0.7, 3.0
+_LEAST_ERROR = 0.01
 _MAX_TRIALS = 12
 _FLAT = 1e-9  # of the greatest force: less is rounding
 _BYTES_PER_NODE = 4
@@ -213,62 +214,38 @@ class BakePlan:
     def bake_coarsest(self, progress: Progress | None) -> PotentialField:
         """Return the field of the coarsest resolution that reaches the goal.
 
-        The share of a field that is not smoothed is computed for any resolution from few nodes, and
-        corrected by that of the fields that were tried, first one of few nodes.
+        Its errors follow powers of the resolution, first assumed and then those of two trials.
         """
         finest = self.finest_resolution()
         coarsest = max(self.grid(math.inf).spacing)
         resolution = max(self.finest_resolution(_TRIAL_BYTES), finest)
-        goal = self.goal.share
-        lower = finest
-        upper = coarsest
-        tried = set[float]()
+        limits = [finest, coarsest]
+        powers = np.array(_POWERS)
+        last = resolution, np.ones(2)
         for trial in range(_MAX_TRIALS):
             done = 1.0 - 0.5**trial
             field = self.bake(resolution, scale_progress(progress, done, 0.5 * (1.0 - done)))
-            share = max(field.accuracy.share, goal * field.accuracy.onset / self.onset_limit)
-            is_reached = share <= goal
-            if resolution == (coarsest if is_reached else finest) or 0.5 * goal <= share <= goal:
+            errors = self.relative_errors(field.accuracy)
+            is_reached = bool(errors.max() <= 1.0)
+            if resolution == limits[is_reached] or 0.5 <= errors.max() <= 1.0:
                 break
-            tried.add(resolution)
-            if is_reached:
-                lower = resolution
-            else:
-                upper = resolution
-            ratio = max(share, 0.01 * goal) / max(self.predict_share(resolution), 0.01 * goal)
-            resolution = self.predict_resolution(lower, upper, _AIM ** (trial + 1) * goal / ratio)
-            if resolution in tried:
-                resolution = math.sqrt(lower * upper)
-        if resolution == finest and share > goal:
+            limits[not is_reached] = resolution
+            if trial:
+                rise = np.log(errors / last[1]) / math.log(resolution / last[0])
+                powers = np.clip(rise, *_POWER_RANGE)
+            last = resolution, errors
+            resolution *= float(((_AIM / errors) ** (1.0 / powers)).min())
+            resolution = _between(resolution, limits, (finest, coarsest))
+        if resolution == finest and not is_reached:
             field.accuracy = replace(field.accuracy, is_limited=True)
         if progress is not None:
             progress(1.0)
         return field
 
-    def predict_resolution(self, finest: float, coarsest: float, share: float) -> float:
-        """Return the resolution [m] between limits at which an unsmoothed field has a share."""
-        from scipy.optimize import brentq
-
-        def excess(exponent: float) -> float:
-            return math.log(max(self.predict_share(math.exp(exponent)), 1e-9) / share)
-
-        limits = math.log(finest), math.log(coarsest)
-        if excess(limits[0]) >= 0.0:
-            return finest
-        if excess(limits[1]) <= 0.0:
-            return coarsest
-        return math.exp(brentq(excess, *limits, xtol=_PREDICTION_STEP))
-
-    def predict_share(self, resolution: float) -> float:
-        """Return the share of a field that is not smoothed, from the nodes around the probes."""
-        grid = self.grid(resolution)
-        part = slice(None, None, _PREDICTION_PART)
-        force = node_potentials.interpolate_force(self.node_columns(grid), grid, self.probes[part])
-        return float(self.shares(force - self.force[part], self.rows[part]).max())
-
-    def node_columns(self, _grid: FieldGrid) -> node_potentials.ColumnFunction:
-        """Return the function of the exact depth at columns of nodes of a grid."""
-        return self.columns
+    def relative_errors(self, accuracy: FieldAccuracy) -> FloatArray:
+        """Return the share of the force, and the distance of contact, over those of the goal."""
+        errors = accuracy.share / self.goal.share, accuracy.onset / self.onset_limit
+        return np.maximum(errors, _LEAST_ERROR)
 
     def finest_resolution(self, max_bytes: float = math.inf) -> float:
         """Return the finest resolution [m] of a field within the size allowed, to three digits."""
@@ -359,6 +336,15 @@ class BakePlan:
             onset_places=len(shift),
         )
         return field
+
+
+def _between(resolution: float, limits: list[float], ends: tuple[float, float]) -> float:
+    """Return a resolution between those tried, or one of the ends if none was tried beyond."""
+    lower, upper = limits
+    if lower < resolution < upper:
+        return resolution
+    limit = lower if resolution <= lower else upper
+    return limit if limit in ends else math.sqrt(lower * upper)
 
 
 def _mean_of_rows(values: FloatArray, rows: NDArray[np.intp], count: int) -> FloatArray:

@@ -11,14 +11,7 @@ from numpy.typing import NDArray
 
 from asperity.core.checks import FloatArray
 from asperity.textures.domain import Domain
-from asperity.textures.fields.field_sampler import (
-    MIRRORED,
-    PERIODIC,
-    RATE,
-    UPPER,
-    ZERO,
-    FieldArguments,
-)
+from asperity.textures.fields.field_sampler import MIRRORED, PERIODIC, ZERO, FieldArguments
 
 # Weight of both neighbours of a node along an axis in a smoothing pass.
 NEIGHBOUR_WEIGHT = 0.125
@@ -175,15 +168,6 @@ class FieldGrid:
     def bounded_floor(self) -> float:
         """Least z above which nodes are equally far apart [m]."""
         return float(self.knots[-1]) if self.stretched else self.floor
-
-    def cell_shapes(self, level: FloatArray) -> FloatArray:
-        """Return 1/h, LOWER and UPPER of the cells of levels, (3, n)."""
-        shapes = np.empty((3, len(level)))
-        shapes[:] = [[1.0 / self.level_spacing], [0.5], [0.5]]
-        is_stretched = level < self.stretched
-        table = self.stretch_table()[:, RATE : UPPER + 1]
-        shapes[:, is_stretched] = table[level[is_stretched].astype(int)].T
-        return shapes
 
     def offsets(self) -> FloatArray:
         """Return what is subtracted from the depth at each level before it is stored [m].

@@ -22,7 +22,7 @@ from asperity.textures.fields.field_sampler import MIRRORED, PERIODIC, ZERO
 from asperity.textures.texture import Texture
 
 _NODES_PER_BLOCK = 10_000
-_MAX_REPLACEMENTS = 4
+_MAX_REPLACEMENTS = 40
 # Part of a second derivative of 1 that is left to rounding.
 _TOLERANCE = 0.01
 # Step of the levels of a lattice where cells are equally high, and the number of those below all.
@@ -164,53 +164,6 @@ def wrong_nodes(depths: FloatArray, grid: FieldGrid, continuity: float) -> NDArr
         count = depths.shape[axis]
         wrong |= high.take(range(count), axis) | high.take(range(2, count + 2), axis)
     return wrong
-
-
-def interpolate_force(columns: ColumnFunction, grid: FieldGrid, points: FloatArray) -> FloatArray:
-    """Return the force over the stiffness [m], (n, 3), at points above the floor (n, 3) [m].
-
-    It is that of the spline of a field that is not smoothed, of which only the nodes around the
-    points are computed.
-    """
-    rates = np.linalg.pinv(grid.steps)
-    level = grid.level(points[:, 2:])
-    index = np.column_stack([(points[:, :2] - grid.start) @ rates, level])
-    nearest = np.rint(index)
-    plane = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * len(grid.cells), indexing="ij"), axis=-1)
-    plane = plane.reshape(-1, len(grid.cells))
-    nodes = np.empty((len(points), len(plane), 3))
-
-    def fill(row: int) -> None:
-        xy = grid.positions(nearest[row, :-1] + plane)
-        z = grid.height(nearest[row, -1] + np.array([-1.0, 0.0, 1.0]))
-        columns(xy, z, grid.margin, nodes[row])
-
-    run_in_threads(fill, range(len(points)), None)
-    part = index - nearest
-    rate, lower, upper = grid.cell_shapes(nearest[:, -1])
-    below = 0.5 - part
-    above = 0.5 + part
-    shares = np.full((2, *part.shape), 0.5)
-    shares[:, :, -1] = lower, upper
-    outer = shares[0] * below**2, shares[1] * above**2
-    weights = np.stack([outer[0], 1.0 - outer[0] - outer[1], outer[1]], axis=-1)
-    outer = -2.0 * shares[0] * below, 2.0 * shares[1] * above
-    rises = np.stack([outer[0], -outer[0] - outer[1], outer[1]], axis=-1)
-    values = np.maximum(nodes + grid.margin, 0.0)
-    values = values.reshape(len(points), *[3] * part.shape[1])
-    depth = _weighted_sum(values, weights) - grid.margin
-    chosen = np.eye(part.shape[1], dtype=bool)[:, :, None]
-    slopes = [_weighted_sum(values, np.where(axis, rises, weights)) for axis in chosen]
-    slope = np.stack(slopes, axis=-1)
-    gradient = np.column_stack([slope[:, :-1] @ rates.T, slope[:, -1] * rate])
-    return np.asarray(-np.maximum(depth, 0.0)[:, None] * gradient)
-
-
-def _weighted_sum(values: FloatArray, weights: FloatArray) -> FloatArray:
-    """Return the sum of values (n, 3, ..., 3) with products of weights (n, axes, 3)."""
-    for axis in reversed(range(weights.shape[1])):
-        values = np.einsum("n...i,ni->n...", values, weights[:, axis])
-    return values
 
 
 def smooth(depths: SingleArray, weights: NDArray[np.uint8], grid: FieldGrid) -> None:

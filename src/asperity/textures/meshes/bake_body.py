@@ -11,7 +11,7 @@ from asperity.measured.lengths import format_length, format_lengths
 from asperity.textures.fields import bake
 from asperity.textures.fields.field_certificate import Progress
 from asperity.textures.fields.field_grid import FieldGrid
-from asperity.textures.fields.node_potentials import ColumnFunction, compute_potentials
+from asperity.textures.fields.node_potentials import compute_potentials
 from asperity.textures.fields.potential_field import PotentialField, ThinRegion
 from asperity.textures.meshes import mesh_potential, triangle_tree
 from asperity.textures.meshes.mesh_body import (
@@ -307,11 +307,6 @@ class _BodyPlan(bake.BakePlan):
         field.thin_regions = thin
         field.thin_map = thin_map if thin else None
         return field
-
-    def node_columns(self, grid: FieldGrid) -> ColumnFunction:
-        """See :class:`BakePlan`."""
-        self.loops.set_tolerance(grid)
-        return self.loops.columns
 
     def grid(self, resolution: float) -> FieldGrid:
         """Return the grid around the body.
