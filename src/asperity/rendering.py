@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -97,7 +98,9 @@ def bake(
         goal=bake_goal,
         progress=progress,
     )
-    share = field.accuracy.shares[0]
+    low, top = texture.extremes
+    count = bisect_right(field.accuracy.depths, top - low + surface.max_depth)
+    share = min(field.accuracy.shares[: max(count, 1)])
     if resolution is not None and share > _MAX_SHARE:
         lost = f"would differ from law H by {100.0 * share:.0f} % of the texture's force"
         reason = f"is coarser than the texture: {lost} at every depth"

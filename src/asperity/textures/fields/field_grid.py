@@ -146,13 +146,6 @@ class FieldGrid:
         inside = np.interp(np.add(level, 0.5), np.arange(count + 1), self.knots)
         return np.where(np.add(level, 0.5) >= count, above, inside)
 
-    def level(self, z: FloatArray) -> Any:
-        """Return heights [m] in levels, the inverse of :meth:`height`."""
-        count = self.stretched
-        level = (z - self.height(count)) / self.level_spacing + count
-        inside = np.interp(z, self.knots, np.arange(count + 1)) - 0.5 if count else level
-        return np.where(level + 0.5 >= count, level, inside)
-
     @property
     def stretched(self) -> int:
         """Number of the lowest cells, which are not equally high."""
@@ -216,16 +209,18 @@ class FieldGrid:
     def onset_bound(self, passes: int) -> float:
         """Return a proved bound of the distance [m] above the surface at which contact begins.
 
-        S exceeds the depth by at most the standard deviation of the points of which it is the mean.
-        That depth is at least -margin. Cells at the surface are at most two above stretched ones.
+        S is the mean of the depth, cut at -margin, over points at distances r from the probe whose
+        root mean square is σ. It is not positive where the depth is less than -σ, σ < margin; nor
+        where it is less than -margin - a, a = σ²/(4 margin), since there S + margin is at most the
+        mean of r - a where that is positive, and r - a <= r²/(4 a). Cells at the surface are at
+        most two above stretched ones.
         """
-        spacing = self.spacing
         side = self.knots[-2] - self.knots[-3] if self.stretched > 1 else self.level_spacing
         growth = (side / self.level_spacing) ** 2
-        deviation = math.sqrt(self.spread(passes) + 0.25 * (growth**2 - 1.0) * spacing[-1] ** 2)
-        if deviation < self.margin:
-            return deviation
-        return self.margin + (1.5 + passes) * float(np.linalg.norm(spacing))
+        square = self.spread(passes) + 0.25 * (growth**2 - 1.0) * self.level_spacing**2
+        if square < self.margin**2:
+            return math.sqrt(square)
+        return self.margin + 0.25 * square / self.margin
 
     def onset_bound(self, passes: int) -> float:
         """Return a proved bound of the distance [m] above the surface at which contact begins.
