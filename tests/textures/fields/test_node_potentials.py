@@ -106,21 +106,21 @@ def test_grid_holds_the_depth_of_each_node(name: str) -> None:
 # --- depths from a lattice ------------------------------------------------------------------------
 
 
-def small_grid(texture: Texture) -> FieldGrid:
-    return FieldGrid.fit(texture.domain, texture.extremes, DEPTH, 0.0, MARGIN / 3.0)
+def small_grid(texture: Texture, depth: float = DEPTH) -> FieldGrid:
+    return FieldGrid.fit(texture.domain, texture.extremes, depth, 0.0, MARGIN / 3.0, 1.2)
 
 
-@pytest.mark.parametrize("continuity", [1.0, 4.0])
+@pytest.mark.parametrize(("continuity", "depth"), [(1.0, DEPTH), (4.0, DEPTH), (1.0, 30 * DEPTH)])
 @pytest.mark.parametrize("name", ["profile", "ridges", "finite map", "cloth"])
 def test_columns_from_a_lattice_are_mostly_exact_and_never_less_deep(
-    name: str, continuity: float
+    name: str, continuity: float, depth: float
 ) -> None:
     """Their points are points of the surface, so the potential is that of some weights."""
     texture = TEXTURES[name]
-    grid = small_grid(texture)
+    grid = small_grid(texture, depth)
     xy = texture.domain.points(RNG.uniform(size=(80, len(texture.domain.spans))))
     z = grid.height(np.arange(grid.levels, dtype=float))
-    exact = np.empty((len(xy), len(z)), np.float32)
+    exact = np.empty((len(xy), len(z)))
     found = np.empty_like(exact)
     split_columns(texture, continuity)(xy, z, grid.margin, exact)
     split_columns(texture, continuity, grid)(xy, z, grid.margin, found)
@@ -140,16 +140,14 @@ def test_nodes_of_wrong_depth_are_found_and_replaced(name: str) -> None:
     columns = split_columns(texture, 1.0)
     exact = compute_potentials(columns, grid)
     assert not wrong_nodes(exact + grid.offsets(), grid, 1.0).any()
-    lowest = grid.height(grid.deep)
     step = max(grid.spacing)
 
     def disturbed(xy: FloatArray, z: FloatArray, margin: float, out: np.ndarray) -> None:
         columns(xy, z, margin, out)
         deeper = (np.arange(out.size) % 97 == 5).reshape(out.shape) & (out > 3.0 * step)
-        deeper &= z >= lowest
         out[deeper] += 0.5 * step
 
     spoilt = compute_potentials(disturbed, grid)
-    assert (spoilt != exact).mean() > 0.002
+    assert (spoilt != exact).mean() > 0.004
     found = compute_potentials(disturbed, grid, exact=columns)
     np.testing.assert_allclose(found, exact, atol=1e-10)
