@@ -22,7 +22,7 @@ from asperity.textures.fields.field_sampler import MIRRORED, PERIODIC, ZERO
 from asperity.textures.texture import Texture
 
 _NODES_PER_BLOCK = 10_000
-_MAX_REPLACEMENTS = 40
+_MAX_REPLACEMENTS = 10
 # Part of a second derivative of 1 that is left to rounding.
 _TOLERANCE = 0.01
 # Step of the levels of a lattice where cells are equally high, and the number of those below all.
@@ -116,18 +116,36 @@ def _plane_positions(grid: FieldGrid, columns: NDArray[np.intp]) -> FloatArray:
 def _replace_wrong(
     depths: SingleArray, exact: ColumnFunction, grid: FieldGrid, continuity: float
 ) -> None:
-    """Replace depths at nodes, (columns, levels) [m], around which they are not those of law H."""
-    offsets = grid.offsets()
-    for _ in range(_MAX_REPLACEMENTS):
+    """Replace depths at nodes, (columns, levels) [m], around which they are not those of law H.
+
+    Where nodes beside replaced ones are found wrong, too, ever more around them are replaced.
+    """
+    replaced = np.zeros(depths.shape, bool)
+    for trial in range(_MAX_REPLACEMENTS):
         wrong = np.empty(depths.shape, bool)
-        for level, offset in enumerate(offsets):
-            plane = depths[:, level].astype(float) + offset
-            marks = wrong_nodes(plane.reshape(*grid.node_counts[:-1], 1), grid, continuity)
-            wrong[:, level] = marks.ravel()
+        for level in range(grid.levels):
+            wrong[:, level] = _wrong_at_level(depths, grid, continuity, level, 2**trial)
+        wrong &= ~replaced
+        replaced |= wrong
         columns = np.flatnonzero(wrong.any(axis=1)).tolist()
         if not columns:
             return
         run_in_threads(partial(_replace_column, depths, exact, grid, wrong), columns, None)
+
+
+def _wrong_at_level(
+    depths: SingleArray, grid: FieldGrid, continuity: float, level: int, size: int
+) -> NDArray[np.bool_]:
+    """Return the nodes of a level, by columns, less than a number of steps from a wrong one."""
+    from scipy import ndimage
+
+    stored = depths[:, level].astype(float)
+    whole = stored + grid.offsets()[level]
+    rounding = 2.0 * float(np.finfo(np.float32).eps * np.abs(stored).max() * np.abs(whole).max())
+    plane = whole.reshape(*grid.node_counts[:-1], 1)
+    marks = wrong_nodes(plane, grid, continuity, rounding)[..., 0]
+    mode = _MODES[grid.border]
+    return np.asarray(ndimage.maximum_filter(marks, 2 * size - 1, mode=mode)).ravel()
 
 
 def _replace_column(
@@ -144,12 +162,15 @@ def _replace_column(
     depths[column, levels] = found[0] - grid.offsets()[levels]
 
 
-def wrong_nodes(depths: FloatArray, grid: FieldGrid, continuity: float) -> NDArray[np.bool_]:
+def wrong_nodes(
+    depths: FloatArray, grid: FieldGrid, continuity: float, rounding: float = 0.0
+) -> NDArray[np.bool_]:
     """Return the nodes whose depth [m] may be greater than that of law H, of the same shape.
 
     The second derivatives of law H's potential U are between -c and 1, and so is the second
     difference over the square of a step along an axis. If it is less, the node in the middle has
-    too great a potential; if it is more, one of its neighbours.
+    too great a potential; if it is more, one of its neighbours. The rounding error [m²] of a
+    difference is allowed.
     """
     potential = 0.5 * np.square(np.maximum(depths, 0.0))
     wrong = np.zeros(depths.shape, bool)
@@ -159,8 +180,8 @@ def wrong_nodes(depths: FloatArray, grid: FieldGrid, continuity: float) -> NDArr
         mode: Any = "wrap" if grid.border == PERIODIC else "reflect"
         padded = np.pad(potential, ends, mode=mode)
         second = np.diff(padded, 2, axis=axis)
-        wrong |= second < -(continuity + _TOLERANCE) * step
-        high = np.pad(second > (1.0 + _TOLERANCE) * step, ends, mode=mode)
+        wrong |= second < -(continuity + _TOLERANCE) * step - rounding
+        high = np.pad(second > (1.0 + _TOLERANCE) * step + rounding, ends, mode=mode)
         count = depths.shape[axis]
         wrong |= high.take(range(count), axis) | high.take(range(2, count + 2), axis)
     return wrong
