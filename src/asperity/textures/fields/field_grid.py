@@ -209,18 +209,15 @@ class FieldGrid:
     def onset_bound(self, passes: int) -> float:
         """Return a proved bound of the distance [m] above the surface at which contact begins.
 
-        S is the mean of the depth, cut at -margin, over points at distances r from the probe whose
-        root mean square is σ. It is not positive where the depth is less than -σ, σ < margin; nor
-        where it is less than -margin - a, a = σ²/(4 margin), since there S + margin is at most the
-        mean of r - a where that is positive, and r - a <= r²/(4 a). Cells at the surface are at
-        most two above stretched ones.
+        S is the mean of the depth, cut at -margin, over points whose distances from the probe have
+        the root mean square σ. It is not positive where the depth is less than -σ: where σ is less
+        than twice the margin, as after ten passes, the cut does not change that. Cells at the
+        surface are at most two above stretched ones.
         """
         side = self.knots[-2] - self.knots[-3] if self.stretched > 1 else self.level_spacing
         growth = (side / self.level_spacing) ** 2
         square = self.spread(passes) + 0.25 * (growth**2 - 1.0) * self.level_spacing**2
-        if square < self.margin**2:
-            return math.sqrt(square)
-        return self.margin + 0.25 * square / self.margin
+        return math.sqrt(square)
 
     def onset_bound(self, passes: int) -> float:
         """Return a proved bound of the distance [m] above the surface at which contact begins.
