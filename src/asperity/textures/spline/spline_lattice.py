@@ -19,8 +19,6 @@ _LEAST_PADDING = 5
 # Nodes of the lattice per node of the spline, at least, and the most from one place to the next.
 _NODES_PER_PITCH = 2.0
 _MAX_STRIDE = 4
-# Greatest reach beyond the borders, over the longer side of the texture.
-_MOST_REACH = 0.5
 
 
 def build_lattice(
@@ -42,7 +40,7 @@ def build_lattice(
     sides = lengths / (stride * counts)
     # A point farther away than one above the lowest level is not the closest; nor is one much
     # farther away than the deepest place, where the texture repeats.
-    reach = min(math.sqrt((top - low) * (top + low - 2.0 * z[0])), _MOST_REACH * lengths.max())
+    reach = min(math.sqrt((top - low) * (top + low - 2.0 * z[0])), lengths.max() / len(lengths))
     reach = max(reach, top - low)
     x, *others = [
         _axis_nodes(start, side, int(count), stride, reach)
