@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from asperity.textures.fields.field_grid import GROWTH, FieldGrid
+from asperity.textures.fields.field_grid import FieldGrid
 from asperity.textures.fields.field_sampler import END, FIRST, MIRRORED, PERIODIC, REACH, ZERO
 from asperity.textures.fields.node_potentials import smooth
 from asperity.textures.kinds.sinusoid import Sinusoid
@@ -24,20 +23,18 @@ def grid(steps: list[list[float]], cells: tuple[int, ...], border: int = PERIODI
 
 @pytest.mark.parametrize("resolution", [1e-5, 0.7e-4])
 def test_levels_below_the_surface_are_ever_farther_apart(resolution: float) -> None:
-    fitted = FieldGrid.fit(WAVE.domain, WAVE.extremes, 25e-3, 1e-4, resolution)
+    fitted = FieldGrid.fit(WAVE.domain, WAVE.extremes, 25e-3, 1e-4, resolution, 1.2)
     sides = np.diff(fitted.knots)[::-1]
     assert sides[0] == pytest.approx(resolution)
     count = fitted.stretched - fitted.below - 1
     ratios = sides[1:count] / sides[: count - 1]
     assert ratios == pytest.approx(ratios[0])
-    assert 1.0 < ratios[0] <= GROWTH
+    assert 1.0 < ratios[0] <= 1.2
     assert sides[count:] == pytest.approx(sides[count - 1])
     assert fitted.knots[fitted.below + 1] == pytest.approx(fitted.floor)
     assert fitted.floor == pytest.approx(-0.1e-3 - 25e-3)
     # Equal cells reach down to the lowest place, but for less than one of them.
     assert -0.1e-3 - resolution < fitted.knots[-2] <= -0.1e-3 + 1e-12
-    level = np.linspace(0.0, fitted.levels - 1.0, 200)
-    np.testing.assert_allclose(fitted.level(fitted.height(level)), level, atol=1e-9)
     # A mean of a linear depth is itself.
     depths = -fitted.height(np.arange(fitted.levels))
     means = (depths - fitted.offsets()).astype(np.float32)[None]
@@ -133,19 +130,18 @@ def test_arguments_contain_the_position_of_the_first_node() -> None:
     assert (arguments.levels, arguments.border) == (6, MIRRORED)
 
 
-@pytest.mark.parametrize("passes", [0, 5, 10])
+@pytest.mark.parametrize("passes", [0, 6, 10])
 def test_contact_begins_within_the_bound_and_near_it_at_worst(passes: int) -> None:
-    """At a distance from a half-space, for points of the mean square of a spline.
+    """A half-space seen by the worst points of a mean square: one far inside, the others outside.
 
-    A share of the points is at one distance inside, the others beside the probe.
+    With a weight w of points at a distance σ/√w inside, S is positive up to the bound.
     """
-    fitted = replace(grid([[0.1, 0.0], [0.0, 0.1]], (4, 4)), deep=1)
+    fitted = grid([[0.1, 0.0], [0.0, 0.1]], (4, 4))
     bound = fitted.onset_bound(passes)
     shares = np.linspace(1e-3, 1.0, 1000)
     heights = np.linspace(0.0, 3.0 * bound, 3001)[:, None]
-    inside = np.maximum(
-        math.sqrt(fitted.spread(passes)) / np.sqrt(shares) - heights, -fitted.margin
-    )
+    distances = math.sqrt(fitted.spread(passes)) / np.sqrt(shares)
+    inside = np.maximum(distances - heights, -fitted.margin)
     means = shares * inside + (1.0 - shares) * np.maximum(-heights, -fitted.margin)
     highest = heights[(means > 1e-12).any(axis=1)].max()
     assert 0.99 * bound < highest <= bound

@@ -285,7 +285,7 @@ def test_stretched_spline_is_that_of_its_knots() -> None:
 def test_small_coefficients_are_stored_of_deep_levels() -> None:
     """A depth of 25 mm in single precision would be wrong by a nanometre."""
     domain = WAVE.domain
-    grid = FieldGrid.fit(domain, (-1e-4, 1e-4), 25e-3, 0.0, 2e-5)
+    grid = FieldGrid.fit(domain, (-1e-4, 1e-4), 25e-3, 0.0, 2e-5, 1.25)
     depths = np.broadcast_to(1e-4 - grid.height(np.arange(grid.levels)), grid.node_counts)
     arguments = grid.arguments((depths - grid.offsets()).astype(np.float32))
     assert arguments.c.max() < 4e-4

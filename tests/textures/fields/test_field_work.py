@@ -26,7 +26,8 @@ from asperity.surface import Surface
 @cache
 def cloth(max_gain: float | None) -> Surface:
     """Return baked cloth, which repeats after 3.36 mm."""
-    return asp.bake(Surface("cloth", "H", K, max_depth=DEPTH), 40e-6, max_gain=max_gain)
+    surface = Surface("cloth", "H", K, max_depth=DEPTH)
+    return asp.bake(surface, 40e-6, press=1e-6, max_gain=max_gain)
 
 
 @pytest.mark.parametrize(("max_gain", "count"), [(None, 30_000), (1.15, 5_000)])

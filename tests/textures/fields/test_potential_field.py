@@ -39,7 +39,8 @@ _RESOLUTION = {"sinusoid": 1e-5, "profile": 6e-6}
 def baked(name: str, c: float = 1.0, max_gain: float | None = None) -> tuple[Surface, Surface]:
     """Return a surface whose texture is a field, and the exact one."""
     surface = Surface(_TEXTURES[name], "H", K, continuity=c, max_depth=1.5e-4)
-    return asp.bake(surface, _RESOLUTION.get(name, 3e-5), max_gain=max_gain), surface
+    resolution = _RESOLUTION.get(name, 3e-5)
+    return asp.bake(surface, resolution, press=1e-6, max_gain=max_gain), surface
 
 
 def field_of(surface: Surface) -> PotentialField:
@@ -248,7 +249,7 @@ def test_file_of_another_version_is_refused_with_the_remedy(tmp_path: Path) -> N
     content = bytearray(path.read_bytes())
     content[8] += 1
     path.write_bytes(content)
-    with pytest.raises(SurfaceFileError, match=r"map\.field: is a \.field file of version 3.*bake"):
+    with pytest.raises(SurfaceFileError, match=r"map\.field: is a \.field file of version 4.*bake"):
         Surface(path, "H")
 
 
@@ -300,7 +301,7 @@ def test_lateral_force_does_not_grow_below_the_floor() -> None:
 def test_load_texture_takes_a_field(tmp_path: Path) -> None:
     path = tmp_path / "wave.field"
     surface = asp.Surface(asp.Sinusoid(1e-4, 1e-3), "H", max_depth=1e-4)
-    asp.save_field(path, asp.bake(surface, resolution=50e-6).texture)
+    asp.save_field(path, asp.bake(surface, resolution=50e-6, press=1e-6).texture)
     loaded = asp.load_texture(path)
     assert isinstance(loaded, PotentialField)
     assert loaded.digest == asp.Surface(path, "H").texture.digest

@@ -18,6 +18,8 @@ NEIGHBOUR_WEIGHT = 0.125
 # Steps over which the share of a smoothing pass rises from 0 to 1.
 RAMP = 5
 _MIN_STEPS = 4
+# Equal cells per stretched one below the lowest place of a surface, at least.
+_LEAST_SPARING = 1.5
 _MIN_BELOW = 2
 # Height above the surface at which coefficients end, in nodes: a cell with contact has no node
 # farther outside. The last part of it only adds levels of no effect.
@@ -324,7 +326,7 @@ def _cell_heights(
 ) -> tuple[float, int, FloatArray]:
     """Return the height of equal cells [m], their number, and the heights of those below them.
 
-    From the floor up; all are equal where the floor is so near that stretched ones are not fewer.
+    From the floor up; all are equal where the floor is so near that few would be spared.
     """
     low, top = heights
     spacing = min(resolution, (top - floor) / _MIN_STEPS)
@@ -333,7 +335,7 @@ def _cell_heights(
     count = 1
     while count * spacing < rest and spacing * _growth_sum(growth, count) < rest:
         count += 1
-    if count * spacing >= rest:
+    if _LEAST_SPARING * count * spacing >= rest:
         inside = math.ceil((top - floor) / spacing)
         return (top - floor) / inside, inside, np.empty(0)
     from scipy.optimize import brentq
