@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 from bench.stress import friction as friction_stress
 
+from asperity.analysis.passivity.recommended_stiffness import render_on_device
 from asperity.analysis.results.analyze import analyze
 from asperity.analysis.results.compare import compare
 from asperity.contacts.proxy_contacts import SplitContact
 from asperity.core.errors import ParameterError
+from asperity.devices import load_device
 from asperity.kernels.link import unit_from_module
 from asperity.laws import LAWS
 from asperity.rendering import (
@@ -20,8 +22,10 @@ from asperity.rendering import (
     bake,
     bake_mesh,
     coarsened_surface,
+    default_reach,
     is_searched,
     rendered_surface,
+    rendering_sentences,
 )
 from asperity.surface import Surface
 from asperity.textures.kinds.fourier import Fourier
@@ -58,6 +62,34 @@ def test_rendered_surface_is_baked_unless_a_search_is_asked_for() -> None:
         assert rendered_surface(other) is other
     with pytest.raises(ParameterError, match="rendering"):
         rendered_surface(surface, "exact")
+
+
+def test_field_is_as_deep_as_people_press() -> None:
+    surface = Surface(MILD, "H", 1000.0, max_depth=3e-5)
+    assert rendered_surface(surface).texture.max_depth == default_reach(1000.0) == 5e-3
+    assert rendered_surface(surface.to_stiffness(50.0)).texture.max_depth == 25e-3
+    assert rendered_surface(surface, reach=2e-3).texture.max_depth == 2e-3
+    assert rendered_surface(surface, reach=1e-5).texture.max_depth == 3e-5
+    assert bake(surface, press=2.0).texture.max_depth == 2e-3
+
+
+@pytest.mark.parametrize(("device", "force"), [("omega.3", 5.0), ("touch", 3.3)])
+def test_another_stiffness_has_the_same_field_and_its_own_forces(device: str, force: float) -> None:
+    soft = Surface(MILD, "H", 100.0, max_depth=3e-5)
+    one, other = (
+        render_on_device(surface, load_device(device), "field")
+        for surface in (soft, soft.to_stiffness(700.0))
+    )
+    assert one.texture.digest == other.texture.digest
+    (row,) = compare(MILD, device, laws="H", max_depth=3e-5).rows
+    assert row.surface.texture.digest == one.texture.digest
+    # The recommended start reaches the force, and no more than is due to its rounding.
+    assert force <= row.recommended_stiffness * one.texture.max_depth < 1.2 * force
+    deepest = [
+        float(rendering_sentences(surface)[1].split(" to ")[1].split()[0])
+        for surface in (one, other)
+    ]
+    assert deepest[1] == pytest.approx(7.0 * deepest[0], rel=0.02)
 
 
 def test_part_of_an_endless_texture_is_baked_and_mirrored_at_its_border() -> None:

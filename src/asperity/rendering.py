@@ -40,9 +40,10 @@ FORMULA = "formula"
 # Greatest size of a field that is baked without being asked for: some ten seconds.
 _AUTOMATIC_BYTES = 2**26
 _PRESS_POINTS = 256
-DEFAULT_REACH = 5.0 / 200.0
-"""Depth of a field below the lowest place of its surface [m]: 5 N at 200 N/m, the stiffness of soft
-devices; stiffer ones reach a greater force."""
+DEFAULT_PRESS = 5.0
+"""Mean normal force to which a field reaches where nothing else is known [N]."""
+# Depth that it then has at most: 5 N at 200 N/m, the stiffness of soft devices [m].
+_MAX_REACH = 25e-3
 
 
 def bake(
@@ -62,7 +63,7 @@ def bake(
         resolution: maximum spacing of the nodes [m]; by default the coarsest one at which the
             force differs from exact H by the share, within the size.
         press: mean normal force F [N] that the field reaches at the stiffness k of the surface, at
-            min h - F/k; by default F/k is 25 mm: 5 N at 200 N/m.
+            min h - F/k; 5 N by default, or less where that is below 25 mm.
         extent: width and depth [m], from the origin, of the part of a non-periodic texture to bake;
             it is mirrored at its border.
         progress: called with the finished fraction, from 0 to 1.
@@ -87,12 +88,26 @@ def bake(
     if not surface.law.contact.has_potential_field:
         raise ParameterError("surface", f"must have law H to be baked, not {surface.law}")
     bake_goal = _bake_goal(**goal)
+    reach = default_reach(surface.stiffness)
+    if press is not None:
+        reach = check_positive("press", press, "N") / surface.stiffness
+    return _bake(surface, reach, bake_goal, resolution, extent, progress)
+
+
+def _bake(
+    surface: Surface,
+    reach: float,
+    bake_goal: BakeGoal,
+    resolution: float | None = None,
+    extent: Extent | None = None,
+    progress: Progress | None = None,
+) -> Surface:
     texture = surface.texture
     if extent is not None:
         texture = _finite_part(texture, extent)
     field = bake_texture(
         texture,
-        _field_depth(surface, press),
+        max(surface.max_depth, reach),
         surface.parameter("continuity"),
         resolution=resolution,
         goal=bake_goal,
@@ -162,15 +177,17 @@ def bake_mesh(
     return Surface(field, "H", stiffness, field.max_depth, continuity=continuity)
 
 
-def _field_depth(surface: Surface, press: float | None = None) -> float:
-    """Return the depth below the least height [m] down to which a field of a surface extends.
+def default_reach(stiffness: float, press: float = DEFAULT_PRESS) -> float:
+    """Return the depth [m] below its least height down to which people press a surface, F/k.
 
-    No point of the surface is lower, so that the mean normal force there is at least k times it.
+    No point of the surface is lower, so that the mean normal force there is at least F. At most
+    25 mm are returned.
+
+    Args:
+        stiffness: k [N/m].
+        press: F [N]; no more than 5 N count.
     """
-    reach = DEFAULT_REACH
-    if press is not None:
-        reach = check_positive("press", press, "N") / surface.stiffness
-    return max(surface.max_depth, reach)
+    return min(min(press, DEFAULT_PRESS) / stiffness, _MAX_REACH)
 
 
 def _bake_goal(
@@ -193,6 +210,8 @@ def rendered_surface(
     rendering: str = FIELD,
     extent: Extent | None = None,
     progress: Progress = report_fraction,
+    *,
+    reach: float | None = None,
 ) -> Surface:
     """Return the surface as a loop renders it: law H baked where it would be searched.
 
@@ -204,6 +223,9 @@ def rendered_surface(
         rendering: ``"field"`` or ``"search"``.
         extent: see :func:`bake`.
         progress: see :func:`bake`.
+        reach: depth of the field below the least height [m], if that is more than ``max_depth``; by
+            default that of 5 N at the stiffness of the surface. With a device, see
+            :func:`~asperity.analysis.passivity.recommended_stiffness.render_on_device`.
 
     Raises:
         ParameterError: see :func:`bake`.
@@ -215,13 +237,14 @@ def rendered_surface(
     texture = surface.texture
     if not (texture.domain.periodic or texture.is_mirrored or extent is not None):
         return surface
+    depth = max(surface.max_depth, reach or default_reach(surface.stiffness))
     content = texture.digest and content_digest(
-        texture.digest, _field_depth(surface), surface.parameter("continuity"), *(extent or ())
+        texture.digest, depth, surface.parameter("continuity"), *(extent or ())
     )
 
     def compute() -> Texture:
-        options: Any = {"extent": extent, "progress": progress, "max_bytes": _AUTOMATIC_BYTES}
-        return bake(surface, **options).texture
+        goal = BakeGoal(max_bytes=_AUTOMATIC_BYTES)
+        return _bake(surface, depth, goal, extent=extent, progress=progress).texture
 
     return surface.to_texture(get_or_compute("field", content, compute))
 

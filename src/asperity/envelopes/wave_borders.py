@@ -29,6 +29,7 @@ from asperity.analysis.limits.limit_rules import (
 from asperity.analysis.passivity.recommended_stiffness import (
     StiffnessRecommendation,
     recommend_stiffness,
+    render_on_device,
 )
 from asperity.core.arguments import FIELD, SEARCH
 from asperity.core.cache import bypass_results
@@ -37,7 +38,7 @@ from asperity.core.files import Serializable
 from asperity.devices import Device
 from asperity.laws import Law, find_law
 from asperity.perception.grip import DEFAULT_GRIP, Grip, load_grip
-from asperity.rendering import is_searched, rendered_surface
+from asperity.rendering import is_searched
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
 from asperity.textures.fields.bake import BakeGoal
@@ -187,7 +188,7 @@ class WaveCase:
         depth = self.conditions.max_depth
         own = self.law_parameters
         surface = Surface(texture, self.law, max_depth=depth, law_parameters=own)
-        return rendered_surface(surface, self.rendering)
+        return render_on_device(surface, self.device, self.rendering)
 
     def recommend(self, texture: Texture, original: Original | None = None) -> Trial:
         """Return a texture at its recommended stiffness, without its waves."""

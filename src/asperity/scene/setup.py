@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from asperity.analysis.passivity.recommended_stiffness import render_on_device
 from asperity.analysis.results.compare import DEFAULT_DEVICE
 from asperity.core.arguments import FIELD, parse_arguments
 from asperity.core.display import describe
@@ -21,7 +22,7 @@ from asperity.devices import Device, load_device
 from asperity.devices.device_file import to_device_toml
 from asperity.laws import Law, distribute_parameters, find_law
 from asperity.recording.replay import file_digest
-from asperity.rendering import assess_rendering, rendered_surface, rendering_sentences
+from asperity.rendering import assess_rendering, rendering_sentences
 from asperity.scene import scene_defaults, sections
 from asperity.scene.scene_file import Scene
 from asperity.servo import safety
@@ -76,7 +77,7 @@ class Setup:
     @cached_property
     def rendered(self) -> Surface:
         """The surface as the loop renders it; see :mod:`asperity.rendering`."""
-        return rendered_surface(self.surface, self.rendering)
+        return render_on_device(self.surface, self.device, self.rendering)
 
     def simulate(
         self,
@@ -128,7 +129,7 @@ class Setup:
         self, notes: Iterable[str] = (), progress: Callable[[float], None] = report_fraction
     ) -> Setup:
         """Return the same loop with its field baked, and notes about it among its assumptions."""
-        rendered = rendered_surface(self.surface, self.rendering, progress=progress)
+        rendered = render_on_device(self.surface, self.device, self.rendering, progress=progress)
         searched = assess_rendering(rendered, update_rate=1.0 / self.servo.period)
         notes = (*notes, *rendering_sentences(rendered), searched.sentence(rendered.law))
         result = replace(self, assumptions=(*filter(None, notes), *self.assumptions))

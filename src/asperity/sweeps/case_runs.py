@@ -19,14 +19,17 @@ from typing import Any, cast
 
 import numpy as np
 
+from asperity.analysis.passivity.recommended_stiffness import render_on_device
 from asperity.analysis.results.check_limits import limits
 from asperity.analysis.results.compare import DEFAULT_DEVICE, compare
+from asperity.core.arguments import FIELD
 from asperity.core.checks import check_keywords
 from asperity.core.display import Tabular
 from asperity.core.errors import AsperityError, ParameterError, find_named
 from asperity.core.files import content_digest, package_digest, to_plain_data
+from asperity.devices import load_device
 from asperity.laws import REGISTERED_LAWS, find_law, find_laws
-from asperity.rendering import is_searched, rendered_surface
+from asperity.rendering import is_searched
 from asperity.scene.loops import onset, scan
 from asperity.scene.scene_file import Scene, build_scene
 from asperity.scene.scene_keys import with_values
@@ -95,7 +98,8 @@ def _bake(scene: Scene, _laws: Laws, options: Mapping[str, Any], _seed: int) -> 
     surface = Surface(scene.texture, **surface_keywords(values, find_law("H")))
     if not is_searched(surface):
         raise ParameterError("texture", "needs no field: its contact has a closed form")
-    rendered = rendered_surface(surface, **options)
+    device = load_device(scene.device or DEFAULT_DEVICE)
+    rendered = render_on_device(surface, device, FIELD, **options)
     if is_searched(rendered):
         raise ParameterError("extent", "is missing: this texture never repeats")
     return cast("Tabular", rendered.texture)  # a potential field
@@ -119,7 +123,7 @@ RUN_KINDS = {
         RunKind("limits", limits, _limits, (), ("top speed [m/s]", _FORCE), takes_laws=False),
         RunKind("onset", onset, _onset, ("law", "delay [samples]"), ("cycling [N/m]",)),
         RunKind("scan", scan, _scan, ("law", "speed [m/s]", "depth [m]"), (_FIELD_ENERGY,)),
-        RunKind("bake", rendered_surface, _bake, (), ("size [B]", "q"), takes_laws=False),
+        RunKind("bake", render_on_device, _bake, (), ("size [B]", "q"), takes_laws=False),
     )
 }
 """Runs by name."""

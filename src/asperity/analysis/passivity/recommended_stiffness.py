@@ -14,11 +14,15 @@ from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.passivity import criteria, device_loop
 from asperity.core.arguments import DEFAULT_STIFFNESS
 from asperity.core.files import Serializable
+from asperity.core.processes import report_fraction
 from asperity.core.units import round_down
 from asperity.devices import Device
 from asperity.laws import LAWS, Law
+from asperity.rendering import DEFAULT_PRESS, Extent, default_reach, is_searched, rendered_surface
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
+from asperity.textures.fields.bake import BakeGoal
+from asperity.textures.fields.field_certificate import Progress
 
 Basis = Literal["proved", "plausible", "bounded", "wall gain", "none"]
 
@@ -313,3 +317,31 @@ def unit_starts(device: Device) -> dict[str, float]:
         ).stiffness
         for letter in LAWS
     }
+
+
+def render_on_device(
+    surface: Surface,
+    device: Device,
+    rendering: str,
+    extent: Extent | None = None,
+    progress: Progress = report_fraction,
+) -> Surface:
+    """Return the surface as a loop renders it, baked as deep as people press it on a device.
+
+    That is to the device's greatest force, at most 5 N, at the recommended stiffness of a field,
+    whose gain is at most 1.15 max(1, c): the stiffness of the surface does not count.
+
+    Args:
+        surface: the surface.
+        device: the device.
+        rendering: see :func:`~asperity.rendering.rendered_surface`.
+        extent: see :func:`~asperity.rendering.rendered_surface`.
+        progress: see :func:`~asperity.rendering.rendered_surface`.
+    """
+    if not is_searched(surface):
+        return rendered_surface(surface, rendering)
+    gain = BakeGoal.max_gain * max(1.0, surface.parameter("continuity"))
+    q = Bound(gain, gain, "theorem")
+    start = recommend_stiffness(Surface(_GENTLE_TEXTURE, "H"), device, q, q).start
+    reach = default_reach(start, device.value("max_force") or DEFAULT_PRESS)
+    return rendered_surface(surface, rendering, extent, progress, reach=reach)

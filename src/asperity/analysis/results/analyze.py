@@ -17,7 +17,7 @@ from asperity.analysis.energy.continuity import Continuity, continuity
 from asperity.analysis.energy.leak import find_leak
 from asperity.analysis.energy.straight_scan import FrictionScan, Merit, friction_scan, merit
 from asperity.analysis.gain.characteristic import cached_number, curl_number, make_options
-from asperity.analysis.passivity.recommended_stiffness import recommend_stiffness
+from asperity.analysis.passivity.recommended_stiffness import recommend_stiffness, render_on_device
 from asperity.analysis.passivity.verdict import Passivity, passivity
 from asperity.analysis.results.compare import DEFAULT_DEVICE, recommended_law
 from asperity.core.arguments import FIELD
@@ -27,7 +27,7 @@ from asperity.core.errors import ParameterError
 from asperity.core.files import attributes_to_dict, to_plain_data
 from asperity.core.units import format_quantity
 from asperity.devices import Device, DeviceLike, load_device
-from asperity.rendering import Rendering, assess_rendering, rendered_surface
+from asperity.rendering import Rendering, assess_rendering
 from asperity.surface import SURFACE_KEYWORDS, Surface, default_max_depth
 from asperity.textures.catalogue import TextureLike, as_texture
 from asperity.textures.texture import Texture
@@ -247,7 +247,7 @@ def _resolve_surface(
     texture = as_texture(surface, name="surface")
     if "law" not in given:
         given["law"] = recommended_law(texture, device, rendering=rendering, **given)
-    surface = rendered_surface(Surface(texture, **given), rendering, extent)
+    surface = render_on_device(Surface(texture, **given), device, rendering, extent)
     if "stiffness" in given:
         return surface
     numbers = cached_number(surface, NORM), cached_number(surface, ONE_SIDED)

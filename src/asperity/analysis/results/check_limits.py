@@ -24,6 +24,7 @@ from asperity.analysis.passivity.recommended_stiffness import (
     StabilityLimit,
     StiffnessRecommendation,
     recommend_stiffness,
+    render_on_device,
 )
 from asperity.analysis.results.compare import DEFAULT_DEVICE, recommended_law
 from asperity.core.arguments import DEFAULT_STIFFNESS, FIELD
@@ -33,7 +34,6 @@ from asperity.core.files import Serializable, attributes_to_dict
 from asperity.devices import Device, DeviceLike, load_device
 from asperity.laws import Law
 from asperity.perception.grip import DEFAULT_GRIP, Grip, load_grip
-from asperity.rendering import rendered_surface
 from asperity.surface import SURFACE_KEYWORDS, Surface
 from asperity.textures.catalogue import TextureLike, as_texture
 from asperity.textures.texture import Texture
@@ -252,7 +252,7 @@ def limits(
         law = recommended_law(texture, device, max_depth, **conditions, **surface_arguments)
     k = DEFAULT_STIFFNESS if stiffness is None else stiffness
     surface = Surface(texture, law, k, max_depth, **surface_arguments)
-    surface = rendered_surface(surface, rendering)
+    surface = render_on_device(surface, device, rendering)
     q = cached_number(surface, NORM)
     one_sided = cached_number(surface, ONE_SIDED)
     recommended = recommend_stiffness(surface, device, q, one_sided)

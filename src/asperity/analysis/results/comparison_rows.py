@@ -17,7 +17,7 @@ from asperity.analysis.energy.straight_scan import merit as compute_merit
 from asperity.analysis.gain.characteristic import cached_number
 from asperity.analysis.limits.perceptibility import assess_perceptibility
 from asperity.analysis.passivity.device_loop import DeviceLoop, make_device_loop
-from asperity.analysis.passivity.recommended_stiffness import recommend_on_loop
+from asperity.analysis.passivity.recommended_stiffness import recommend_on_loop, render_on_device
 from asperity.analysis.passivity.verdict import assess_loop
 from asperity.analysis.results.recommendation import LawRow
 from asperity.core.arguments import FIELD
@@ -25,7 +25,7 @@ from asperity.core.processes import Part, report_part
 from asperity.core.units import round_down
 from asperity.devices import Device
 from asperity.perception.grip import Grip
-from asperity.rendering import assess_rendering, is_searched, rendered_surface
+from asperity.rendering import assess_rendering, is_searched
 from asperity.surface import Surface
 from asperity.textures.texture import TexturePart
 
@@ -60,7 +60,7 @@ def render_row(surface: Surface, query: ComparisonQuery) -> LawRow:
     greatest_press = None
     if query.press is not None:
         surface, greatest_press = _pressed_surface(surface, query, query.press)
-    row = _compute_row(rendered_surface(surface, query.rendering), query)
+    row = _compute_row(render_on_device(surface, query.device, query.rendering), query)
     if greatest_press is None:
         return row
     none = replace(row.passivity.stability_limit, stiffness=0.0, basis="none")
@@ -100,7 +100,7 @@ def _pressed_surface(
         soft = surface.to_stiffness(start(surface) / _FIELD_GAIN)
         surface = surface.to_depth(depth_at_press(soft, press))
     for _ in range(_RENDERINGS):
-        stiffness = round_down(start(rendered_surface(surface, query.rendering)))
+        stiffness = round_down(start(render_on_device(surface, query.device, query.rendering)))
         stiff = surface.to_stiffness(stiffness)
         if mean_press(stiff) >= press * (1.0 - _PRESS_TOLERANCE):
             break
