@@ -14,6 +14,7 @@ from asperity.analysis.results.analyze import analyze
 from asperity.analysis.results.compare import compare
 from asperity.contacts.proxy_contacts import SplitContact
 from asperity.core.errors import ParameterError
+from asperity.core.units import parse_quantity
 from asperity.devices import load_device
 from asperity.kernels.link import unit_from_module
 from asperity.laws import LAWS
@@ -85,11 +86,11 @@ def test_another_stiffness_has_the_same_field_and_its_own_forces(device: str, fo
     assert row.surface.texture.digest == one.texture.digest
     # The recommended start reaches the force, and no more than is due to its rounding.
     assert force <= row.recommended_stiffness * one.texture.max_depth < 1.2 * force
-    deepest = [
-        float(rendering_sentences(surface)[1].split(" to ")[1].split()[0])
-        for surface in (one, other)
-    ]
-    assert deepest[1] == pytest.approx(7.0 * deepest[0], rel=0.02)
+    forces = []
+    for surface in (one, other):
+        words = rendering_sentences(surface)[1].split()
+        forces.append(parse_quantity("press", " ".join(words[-2:]), "N"))
+    assert forces[1] == pytest.approx(7.0 * forces[0], rel=0.02)
 
 
 def test_part_of_an_endless_texture_is_baked_and_mirrored_at_its_border() -> None:

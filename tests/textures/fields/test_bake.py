@@ -164,8 +164,10 @@ def test_default_spacing_reaches_the_share_that_was_asked_for(texture: Texture) 
         assert np.linalg.norm(force, axis=1).mean() > 0.95 * LIGHT_TOUCH
         error = np.square(surface.force(points) / K - force).sum(axis=1).mean()
         around = np.square(force - force.mean(axis=0)).sum(axis=1).mean()
-        assert math.sqrt(float(error / around)) == pytest.approx(share, rel=0.25)
-    assert field.accuracy.depths[-1] == pytest.approx(top - texture.extremes[0] + 25e-3)
+        # What is stated is measured at 256 places, by which small shares scatter more.
+        scatter = max(0.25 * share, 0.1 * field.accuracy.share)
+        assert math.sqrt(float(error / around)) == pytest.approx(share, abs=scatter)
+    assert field.accuracy.depths[-1] == pytest.approx(top - texture.extremes[0] + 5.0 / K)
     coarse = asp.bake(exact, 3.0 * field.resolution).texture
     assert coarse.accuracy.share > 0.06
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 import math
 import random
@@ -21,6 +22,9 @@ from asperity.cli.main import cli
 from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.textures.fields import field_file
 from asperity.textures.fields.field_file import HEADER
+from asperity.textures.fields.potential_field import PotentialField
+
+_BEFORE = Path(__file__).with_name("wave-version-2.field.gz")
 
 
 @cache
@@ -51,6 +55,29 @@ def test_undamaged_file_is_read(tmp_path: Path) -> None:
     path = tmp_path / "wave.field"
     path.write_bytes(change_header())
     assert asp.load_texture(path).digest == asp.Surface(path, "H").texture.digest
+
+
+def test_file_of_the_version_before_has_the_same_forces(tmp_path: Path) -> None:
+    """Written by the program that wrote version 2; the forces are those that it printed."""
+    path = tmp_path / "wave.field"
+    path.write_bytes(gzip.decompress(_BEFORE.read_bytes()))
+    surface = asp.Surface(path, "H", stiffness=500.0)
+    points = [[1e-4, 0, -5e-5], [3e-4, 0, -1.7e-4], [6.3e-4, 2e-4, -2.3e-4], [9e-4, 0, -6e-4]]
+    expected = [
+        [-0.023973150887500756, 0.0, 0.04083289966402624],
+        [0.025662484305975217, 0.0, 0.09223671400172923],
+        [0.020822238894668506, 0.0, 0.07036510043721156],
+        [-0.03344129743935712, 0.0, 0.2500015563132453],
+    ]
+    np.testing.assert_allclose(surface.force(np.array(points)), expected, rtol=0.0, atol=1e-15)
+    field = surface.texture
+    assert isinstance(field, PotentialField)
+    assert field.gain.upper == pytest.approx(1.0802650858877603, rel=1e-9)
+    assert field.claimed_gain == field.gain.upper
+    again = asp.save_field(tmp_path / "again.field", field)
+    saved = asp.Surface(tmp_path / "again.field", "H", stiffness=500.0)
+    assert np.array_equal(saved.force(np.array(points)), surface.force(np.array(points)))
+    assert again.gain.upper == field.gain.upper
 
 
 @pytest.mark.parametrize("change", ["cut", "zeros"])

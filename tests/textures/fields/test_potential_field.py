@@ -106,8 +106,9 @@ def test_errors_are_within_their_bounds(name: str, c: float) -> None:
     error = np.linalg.norm(surface.force(points) - exact.force(points), axis=1) / K
     assert error.max() <= accuracy.bound
     assert accuracy.rms < accuracy.largest <= accuracy.bound
-    # The measured differences are from other points, between floor and surface.
-    assert 0.3 * error.max() < accuracy.largest
+    # The measured differences are from other points, at few depths: with c = 4 they miss the edges
+    # of the force, along which it jumps, where the cells are stretched.
+    assert (0.3 if c == 1.0 else 0.2) * error.max() < accuracy.largest
     states = [split_state(each, points).potential / K for each in (surface, exact)]
     stored = np.abs(states[0] - states[1]).max()
     assert 0.0 < stored <= accuracy.potential_bound * (1.0 + 1e-9)
@@ -282,8 +283,7 @@ def test_gain_below_the_floor_is_certified(name: str) -> None:
     assert far <= field.gain.upper * (1.0 + 1e-3)
     # Negative control: with a greater lift it exceeds it.
     record = field.arguments
-    fade = 2.0 * record.below / record.iz
-    steep = replace_arguments(field, record._replace(lift=record.lift + fade))
+    steep = replace_arguments(field, record._replace(lift=record.lift + record.fade))
     assert gains_below_the_floor(steep)[0] > field.gain.upper
 
 
