@@ -31,10 +31,11 @@ from asperity.rendering import (
 from asperity.surface import Surface
 from asperity.textures.kinds.fourier import Fourier
 from asperity.textures.kinds.sinusoid import Sinusoid
-from asperity.textures.spline.spline_texture import HeightMap
+from asperity.textures.spline.spline_texture import HeightMap, Profile
 
 ROUGH = HeightMap(4e-5 * np.random.default_rng(2).normal(size=(8, 9)), (1e-4, 1e-4), periodic=True)
 MILD = HeightMap(1e-5 * np.random.default_rng(2).normal(size=(4, 5)), (1e-4, 1e-4), periodic=True)
+LINE = Profile(1e-5 * np.random.default_rng(2).normal(size=5), 1e-4)
 ENDLESS = Fourier([5e-5, 4e-5], [[6000.0, 0.0], [6000.0 * 2**0.5, 0.0]])
 WAVE = Sinusoid(0.2e-3, 1e-3)
 
@@ -66,7 +67,7 @@ def test_rendered_surface_is_baked_unless_a_search_is_asked_for() -> None:
 
 
 def test_field_is_as_deep_as_people_press() -> None:
-    surface = Surface(MILD, "H", 1000.0, max_depth=3e-5)
+    surface = Surface(LINE, "H", 1000.0, max_depth=3e-5)
     assert rendered_surface(surface).texture.max_depth == default_reach(1000.0) == 5e-3
     assert rendered_surface(surface.to_stiffness(50.0)).texture.max_depth == 25e-3
     assert rendered_surface(surface, reach=2e-3).texture.max_depth == 2e-3
@@ -76,13 +77,13 @@ def test_field_is_as_deep_as_people_press() -> None:
 
 @pytest.mark.parametrize(("device", "force"), [("omega.3", 5.0), ("touch", 3.3)])
 def test_another_stiffness_has_the_same_field_and_its_own_forces(device: str, force: float) -> None:
-    soft = Surface(MILD, "H", 100.0, max_depth=3e-5)
+    soft = Surface(LINE, "H", 100.0, max_depth=3e-5)
     one, other = (
         render_on_device(surface, load_device(device), "field")
         for surface in (soft, soft.to_stiffness(700.0))
     )
     assert one.texture.digest == other.texture.digest
-    (row,) = compare(MILD, device, laws="H", max_depth=3e-5).rows
+    (row,) = compare(LINE, device, laws="H", max_depth=3e-5).rows
     assert row.surface.texture.digest == one.texture.digest
     # The recommended start reaches the force, and no more than is due to its rounding.
     assert force <= row.recommended_stiffness * one.texture.max_depth < 1.2 * force

@@ -103,12 +103,12 @@ def test_smoothing_is_widened_where_it_no_longer_lowers_the_gain(
 ) -> None:
     """Otherwise the borders of the smoothed parts raise the gain of this field again, to 1.27."""
     surface = Surface("cloth", "H")
-    field = asp.bake(surface, 40e-6, press=1e-3, max_gain=1.05).texture
+    field = asp.bake(surface, 40e-6, press=1e-6, max_gain=1.05).texture
     assert isinstance(field, PotentialField)
     assert field.passes == BakeGoal().passes
     assert 1.05 < field.gain.upper < 1.12
     monkeypatch.setattr(bake, "_STALLED", np.inf)
-    narrow = asp.bake(surface, 40e-6, press=1e-3, max_gain=1.05).texture
+    narrow = asp.bake(surface, 40e-6, press=1e-6, max_gain=1.05).texture
     assert isinstance(narrow, PotentialField)
     assert narrow.gain.upper > 1.2
 

@@ -104,13 +104,14 @@ def test_errors_are_within_their_bounds(name: str, c: float) -> None:
     surface, exact = baked(name, c)
     accuracy, points = field_of(surface).accuracy, probes(surface, 3000, seed=2)
     error = np.linalg.norm(surface.force(points) - exact.force(points), axis=1) / K
-    assert error.max() <= accuracy.bound
+    bounded = points[:, 2] >= field_of(surface).grid.bounded_floor
+    assert error[bounded].max() <= accuracy.bound
     assert accuracy.rms < accuracy.largest <= accuracy.bound
     # The measured differences are from other points, at few depths: with c = 4 they miss the edges
     # of the force, along which it jumps, where the cells are stretched.
     assert (0.3 if c == 1.0 else 0.2) * error.max() < accuracy.largest
     states = [split_state(each, points).potential / K for each in (surface, exact)]
-    stored = np.abs(states[0] - states[1]).max()
+    stored = np.abs(states[0] - states[1])[bounded].max()
     assert 0.0 < stored <= accuracy.potential_bound * (1.0 + 1e-9)
     if c == 1.0:
         assert error.max() > 0.02 * accuracy.bound
