@@ -170,7 +170,9 @@ class FieldGrid:
         It is the height of the knot below the highest of the stretched cells above the level.
         """
         heights = self.height(np.arange(self.levels))
-        return np.maximum(self.knots[-2] - heights, 0.0) if self.stretched else 0.0 * heights
+        if not self.stretched:
+            return np.zeros(self.levels)
+        return np.asarray(np.maximum(self.knots[-2] - heights, 0.0))
 
     def stretch_table(self) -> FloatArray:
         """Return the entries of the stretched cells, (n, 7); see :class:`FieldArguments`."""
