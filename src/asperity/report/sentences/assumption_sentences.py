@@ -308,12 +308,8 @@ def analysis_assumptions(analysis: Analysis) -> tuple[str, ...]:
     surface = analysis.surface
     texture = surface.texture
     search = analysis.rendering.sentence(surface.law)
-    sentences = [
-        *texture.preparation,
-        *rendering_sentences(surface)[1:],
-        *filter(None, [search]),
-        *_analysis_defaults(surface),
-    ]
+    steps = [*texture.preparation, *rendering_sentences(surface)[1:]]
+    sentences = [*steps, *filter(None, [search]), *_analysis_defaults(surface)]
     region = texture.domain.description
     if analysis.extent is not None:
         sides = [format_quantity(side, "m") for side in analysis.extent]
@@ -361,11 +357,8 @@ def _analysis_defaults(surface: Surface) -> list[str]:
 def limits_assumptions(result: Limits) -> tuple[str, ...]:
     """Return the assumptions of the limits."""
     surface = result.surface
-    sentences = [
-        *surface.texture.preparation,
-        *rendering_sentences(surface)[1:],
-        *_limits_defaults(result),
-    ]
+    steps = [*surface.texture.preparation, *rendering_sentences(surface)[1:]]
+    sentences = [*steps, *_limits_defaults(result)]
     sentences.append(f"Waves: {spectrum_description(result.spectrum)}")
     omitted = len(result.spectrum.waves) - len(result.waves)
     if omitted:
