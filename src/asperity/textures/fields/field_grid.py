@@ -223,16 +223,6 @@ class FieldGrid:
         square = self.spread(passes) + 0.25 * (growth**2 - 1.0) * self.level_spacing**2
         return math.sqrt(square)
 
-    def onset_bound(self, passes: int) -> float:
-        """Return a proved bound of the distance [m] above the surface at which contact begins.
-
-        S is the mean of the depth, cut at -margin, over points whose distances from the probe have
-        the root mean square σ. It is not positive where the probe is more than σ outside: where σ
-        is less than twice the margin, as after ten passes, the cut does not change that. A field
-        that was loaded does not say which levels are interpolated, so some are assumed to be.
-        """
-        return math.sqrt(replace(self, deep=max(self.deep, 1)).spread(passes))
-
     def error_bounds(
         self, gain: float, passes: int = 0, largest: float = 0.0
     ) -> tuple[float, float]:
