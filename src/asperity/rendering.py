@@ -25,6 +25,7 @@ from asperity.textures.catalogue import TextureLike, as_texture
 from asperity.textures.fields.bake import BakeGoal, bake_texture
 from asperity.textures.fields.field_certificate import Progress
 from asperity.textures.meshes.bake_body import bake_body
+from asperity.textures.meshes.dilate_body import dilate_body
 from asperity.textures.meshes.lay_texture import lay_texture
 from asperity.textures.meshes.mesh_body import load_mesh
 from asperity.textures.spline.spline_texture import HeightMap
@@ -134,6 +135,7 @@ def bake_mesh(
     repair: bool = False,
     texture: TextureLike | None = None,
     texture_side: str = "+z",
+    tip_radius: float | None = None,
     progress: Progress | None = None,
     **goal: Any,
 ) -> Surface:
@@ -152,6 +154,9 @@ def bake_mesh(
         texture: a texture to lay on the body, by which its surface is displaced along its normals;
             see :func:`~asperity.textures.meshes.lay_texture.lay_texture`.
         texture_side: the side on which it lies, ``"+x"`` to ``"-z"``.
+        tip_radius: radius of a ball that probes the body, texture included, in place of a point
+            [m]; the position is that of its centre, see
+            :func:`~asperity.textures.meshes.dilate_body.dilate_body`.
         progress: called with the finished fraction, from 0 to 1.
         **goal: share, max_gain and max_bytes of :func:`bake`; the share is that of the RMS force.
 
@@ -171,6 +176,8 @@ def bake_mesh(
     bake_goal = _bake_goal(**goal)
     if texture is not None:
         body = lay_texture(body, as_texture(texture), texture_side)
+    if tip_radius is not None:
+        body = dilate_body(body, tip_radius)
     field = bake_body(
         body, max_depth, continuity, resolution=resolution, goal=bake_goal, progress=progress
     )

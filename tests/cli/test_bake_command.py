@@ -62,11 +62,29 @@ def test_body_needs_a_unit_and_renders_its_side(tmp_path: Path) -> None:
     assert "unit" in str(refused.exception)
     assert not path.exists()
     options = ["--unit", "mm", "--resolution", "0.15mm", "--max-depth", "0.5mm"]
-    tip = call("bake", mesh, "--body", *options, "--tip-radius", "0.5mm", "-o", path)
-    assert "tip_radius does not apply to a body" in str(tip.exception)
+    form = call("bake", mesh, "--body", *options, "--form", "2", "-o", path)
+    assert "form does not apply to a body" in str(form.exception)
+    press = call("bake", mesh, "--body", *options, "--press", "2N", "-o", path)
+    assert "a body is baked down to --max-depth" in " ".join(str(press.exception).split())
     result = call("bake", mesh, "--body", *options, "-o", path)
     assert result.exit_code == 0, result.output
     force = Surface(path, "H", 1000.0).force([[5e-3 - 0.4e-3, 0.0, 0.0]])[0]
+    assert force == pytest.approx([0.4, 0.0, 0.0], abs=0.02)
+
+
+def test_body_is_probed_by_a_ball(tmp_path: Path) -> None:
+    """Its force begins a radius outside; a ball larger than the body is refused."""
+    mesh, path = tmp_path / "box.stl", tmp_path / "box.field"
+    trimesh.creation.box((10.0, 8.0, 6.0)).export(mesh)
+    options = ["--unit", "mm", "--resolution", "0.2mm", "--max-depth", "0.5mm", "-o", path]
+    refused = call("bake", mesh, "--body", "--tip-radius", "7mm", *options)
+    assert "tip_radius must be at most the shortest side of the body, 6 mm" in str(
+        refused.exception
+    )
+    assert not path.exists()
+    result = call("bake", mesh, "--body", "--tip-radius", "1mm", *options)
+    assert "ball of radius 1 mm, whose centre is the position" in " ".join(result.output.split())
+    force = Surface(path, "H", 1000.0).force([[5e-3 + 0.6e-3, 0.0, 0.0]])[0]
     assert force == pytest.approx([0.4, 0.0, 0.0], abs=0.02)
 
 

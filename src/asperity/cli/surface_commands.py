@@ -160,9 +160,9 @@ def bake_command(surface: str, output: str, *, body: bool, outputs: Outputs, **v
 
 
 def _body_values(values: dict[str, Any]) -> dict[str, Any]:
-    """Return the options of a file that apply to a mesh: its unit."""
-    for name in values.keys() - {"unit"}:
-        raise ParameterError(name, "does not apply to a body, which a point probes as it is")
+    """Return the options of a file that apply to a mesh: its unit, and the tip that probes it."""
+    for name in values.keys() - {"unit", "tip_radius"}:
+        raise ParameterError(name, "does not apply to a body")
     return values
 
 

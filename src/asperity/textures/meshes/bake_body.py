@@ -84,7 +84,7 @@ def bake_body(
     if not continuity >= 1.0:
         raise ParameterError("continuity", "must be at least 1 for a body", continuity)
     depth = DEFAULT_DEPTH if max_depth is None else check_positive("max_depth", max_depth, "m")
-    loops = _BodyLoops(body, BodyLaw(continuity, depth, np.inf))
+    loops = BodyLoops(body, BodyLaw(continuity, depth, np.inf))
     _check_faults(body, loops.find_contacts())
     deepest = loops.sample_depth()
     if max_depth is None and deepest > 0.0:
@@ -112,7 +112,7 @@ def _check_faults(body: MeshBody, faults: list[MeshFault]) -> None:
         raise SurfaceFileError(f"{body.name} has no defined inside: {faults[0]}")
 
 
-class _BodyLoops:
+class BodyLoops:
     """The compiled loops on one body, and what they find at the columns of a grid."""
 
     def __init__(self, body: MeshBody, law: BodyLaw) -> None:
@@ -270,7 +270,7 @@ class _BodyPlan(bake.BakePlan):
         self.gain = continuity
         self.lipschitz = continuity + 1.0
         self._law_arguments = (1.0, 0.0, 1.0, max_depth, 0.0, continuity)
-        self.loops = _BodyLoops(body, BodyLaw(continuity, max_depth, 0.0))
+        self.loops = BodyLoops(body, BodyLaw(continuity, max_depth, 0.0))
         thinnest = float(np.ptp(np.array(body.box), axis=0).min())
         self.coarsest = min(thinnest / _LEAST_CELLS, body.coarsest)
         self.onset_limit = np.inf  # it would ask of edges what few bodies need
