@@ -49,7 +49,7 @@ def distance(points: FloatArray, boxes: tuple[Box, ...]) -> FloatArray:
         lower, upper = np.array(box)
         outside = np.maximum(np.maximum(lower - points, points - upper), 0.0)
         parts.append(np.linalg.norm(outside, axis=1))
-    return np.min(parts, axis=0)
+    return np.asarray(np.min(parts, axis=0))
 
 
 def volume(body: MeshBody) -> float:
