@@ -20,7 +20,7 @@ from asperity.contacts.warm_start import new_warm_start
 from asperity.core.checks import FloatArray
 from asperity.rendering import bake
 from asperity.surface import Surface
-from asperity.textures.fields.field_sampler import FieldArguments
+from asperity.textures.fields.field_sampler import KNOT, FieldArguments
 from asperity.textures.fields.potential_field import PotentialField
 
 K = 1000.0
@@ -40,22 +40,29 @@ BISECTIONS, SAMPLES = 50, 40
 Force = Callable[[FloatArray], FloatArray]
 
 
-def node_coordinates(points: FloatArray, field: FieldArguments) -> FloatArray:
-    rates = np.diag([0.0, 0.0, field.iz])
-    rates[:2, :2] = [[field.m00, field.m01], [field.m10, field.m11]]
-    return np.asarray((points - [field.x0, field.y0, field.z0]) @ rates.T)
+def knot_shares(start: FloatArray, end: FloatArray, field: FieldArguments) -> FloatArray:
+    """Return the shares of edges (n, 3) at which they cross knots, (n, 3, crossings)."""
+    rates = np.array([[field.m00, field.m10], [field.m01, field.m11]])
+    a, b = ((points[:, :2] - [field.x0, field.y0]) @ rates for points in (start, end))
+    knots = np.floor(np.minimum(a, b) + 0.5)[..., None] + 0.5 + np.arange(MAX_CROSSINGS)
+    levels = field.z0 + (np.arange(field.levels + MAX_CROSSINGS) - 0.5) / field.iz
+    levels[: len(field.stretch)] = field.stretch[:, KNOT]
+    first = np.searchsorted(levels, np.minimum(start[:, 2], end[:, 2]), "right")
+    upward = levels[first[:, None] + np.arange(MAX_CROSSINGS)]
+    knots = np.concatenate([knots, upward[:, None]], axis=1)
+    a, b = np.column_stack([a, start[:, 2]]), np.column_stack([b, end[:, 2]])
+    assert (np.maximum(a, b) < knots[..., -1]).all()  # no more crossings than are looked for
+    with np.errstate(divide="ignore", invalid="ignore"):
+        shares = (knots - a[..., None]) / (b - a)[..., None]
+    return np.asarray(np.nan_to_num(shares, posinf=1.0, neginf=0.0))
 
 
 def edge_work(
     force: Force, start: FloatArray, end: FloatArray, field: FieldArguments
 ) -> FloatArray:
     """Return the work along edges (n, 3), each split where it crosses knots or the surface."""
-    a, b = node_coordinates(start, field), node_coordinates(end, field)
-    knots = np.floor(np.minimum(a, b) + 0.5)[..., None] + 0.5 + np.arange(MAX_CROSSINGS)
-    assert (np.maximum(a, b) < knots[..., -1]).all()  # no more crossings than are looked for
-    with np.errstate(divide="ignore", invalid="ignore"):
-        shares = np.nan_to_num((knots - a[..., None]) / (b - a)[..., None], posinf=1.0, neginf=0.0)
-    shares = np.sort(np.clip(shares.reshape(len(a), -1), 0.0, 1.0), axis=1)
+    shares = knot_shares(start, end, field)
+    shares = np.sort(np.clip(shares.reshape(len(start), -1), 0.0, 1.0), axis=1)
     shares = np.pad(shares, [(0, 0), (1, 1)], constant_values=(0.0, 1.0))
     shares = np.sort(np.hstack([shares, surface_crossings(force, start, end, shares)]), axis=1)
     lengths = np.diff(shares, axis=1)
@@ -87,12 +94,12 @@ def surface_crossings(
 
 
 def random_triangles(surface: Surface, count: int, seed: int) -> FloatArray:
-    """Return closed paths (n, 3, 3) of up to three nodes a side, in and around the surface."""
+    """Return closed paths (n, 3, 3) of up to three nodes a side, most of them near the surface."""
     texture, rng = surface.texture, np.random.default_rng(seed)
     assert isinstance(texture, PotentialField)
     centre = rng.uniform(-4e-3, 8e-3, (count, 1, 3))
     low, top = texture.grid.floor + 6e-5, texture.extremes[1] + 2e-5
-    centre[..., 2] = rng.uniform(low, top, (count, 1))
+    centre[..., 2] = top - (top - low) * rng.uniform(size=(count, 1)) ** 2
     return np.asarray(centre + rng.uniform(-5e-5, 5e-5, (count, 3, 3)))
 
 

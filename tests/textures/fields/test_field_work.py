@@ -25,12 +25,14 @@ from asperity.surface import Surface
 
 @cache
 def cloth(max_gain: float | None) -> Surface:
-    """Return baked cloth, which repeats after 3.36 mm."""
+    """Return cloth, which repeats after 3.36 mm, baked with cells that grow to 1 mm below it."""
     surface = Surface("cloth", "H", K, max_depth=DEPTH)
-    return asp.bake(surface, 40e-6, press=1e-6, max_gain=max_gain)
+    baked = asp.bake(surface, 40e-6, press=1.0, max_gain=max_gain)
+    assert len(baked.texture.arguments.stretch) > 5
+    return baked
 
 
-@pytest.mark.parametrize(("max_gain", "count"), [(None, 30_000), (1.15, 5_000)])
+@pytest.mark.parametrize(("max_gain", "count"), [(None, 10_000), (1.15, 5_000)])
 def test_random_loops_in_compiled_ticks_gain_nothing(max_gain: float | None, count: int) -> None:
     """|work| <= 1e-12 k l², l the longest edge; the same sum for law A does not vanish."""
     surface = cloth(max_gain)
