@@ -47,7 +47,7 @@ def as_exported(surface: Surface) -> Surface:
         extent = tuple(float(side) for side in np.abs(domain.spans).max(axis=0))
     low, high = surface.texture.extremes
     coarse = 0.25 * (high - low + surface.max_depth)
-    return bake(surface, coarse, extent=extent, max_gain=None)
+    return bake(surface, coarse, press=1e-6, extent=extent, max_gain=None)
 
 
 def header(

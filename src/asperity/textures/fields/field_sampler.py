@@ -189,7 +189,7 @@ def level_weight_slopes(t: float, lower: float, upper: float) -> ThreeWeights:
 def field_offset(m: int, weights: ThreeWeights, field: FieldArguments) -> float:
     """Return the sum of what is subtracted from three coefficients around a level, weighted."""
     stretch = field.stretch
-    if m < 0 or m >= stretch.shape[0]:
+    if stretch.shape[0] == 0 or m >= stretch.shape[0]:
         return 0.0
     offset = weights[0] * stretch[m, OFFSETS] + weights[1] * stretch[m, OFFSETS + 1]
     return float(offset + weights[2] * stretch[m, OFFSETS + 2])
