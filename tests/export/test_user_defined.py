@@ -34,7 +34,7 @@ def test_user_defined_law_and_texture_give_the_force_of_the_kernel(tmp_path: Pat
             name: asp.Surface(texture, law, max_depth=0.3e-3)
             for name, law in (("own", laws.STIFFENING), ("c", "C"), ("d", "D"), ("h", "H"))
         }
-        surfaces["h"] = asp.bake(surfaces["h"], 40e-6)
+        surfaces["h"] = asp.bake(surfaces["h"], 40e-6, press=1e-6)
         headers = {name: header(surface, name) for name, surface in surfaces.items()}
         for compiler in COMPILERS:
             program = library(tmp_path, compiler, headers, "-O1")

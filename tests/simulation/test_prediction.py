@@ -230,7 +230,7 @@ def test_nothing_is_predicted_below_the_floor_of_a_baked_field() -> None:
     """A run may press deeper than the field was baked; down to there its numbers hold."""
     heights = 2e-5 * np.random.default_rng(0).normal(size=(6, 6))
     surface = bake(Surface(HeightMap(heights, 1e-4, periodic=True), "H", max_depth=1e-4), 2e-5)
-    servo, floor = Servo(PERIOD, delay=1), surface.texture.extremes[0] - 1e-4
+    servo, floor = Servo(PERIOD, delay=1), surface.texture.grid.floor
     inside = predict(surface, PLANT, HAND, servo, onset("H", 1, low=floor + 1e-6))
     assert inside.depth > surface.max_depth
     assert inside.q == pytest.approx(surface.texture.baked_numbers["norm"].upper)
