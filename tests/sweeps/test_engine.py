@@ -18,8 +18,10 @@ from typing import Any
 import pytest
 
 import asperity as asp
+from asperity.analysis.passivity.recommended_stiffness import render_on_device
+from asperity.analysis.results.compare import DEFAULT_DEVICE
+from asperity.core.arguments import FIELD
 from asperity.core.errors import ParameterError
-from asperity.rendering import rendered_surface
 from asperity.sweeps.case_runs import compute_cases
 from asperity.sweeps.engine import LOST, Place, local_place, run_cases
 from asperity.sweeps.run_sweep import estimate_case_time, missing_cases, open_store, run_plan
@@ -298,17 +300,20 @@ def test_results_stay_readable_without_a_folder() -> None:
 
 @pytest.mark.caches_results
 def test_fields_are_baked_by_the_engine_and_kept() -> None:
-    depths = {"surface.max_depth": "10um,20um"}
-    result = asp.sweep("knurl", depths, "bake", processes=2)
+    axes = {"surface.continuity": "1,2"}
+    result = asp.sweep("knurl", axes, "bake", processes=2)
     rows = result.table_rows()
     texture = asp.named_surface("knurl")
-    for row, depth in zip(rows, (1e-5, 2e-5), strict=True):
-        surface = asp.Surface(texture, "H", max_depth=depth)
-        field = rendered_surface(surface, progress=lambda _part: pytest.fail("baked anew"))
+    device = asp.load_device(DEFAULT_DEVICE)
+    for row, continuity in zip(rows, (1.0, 2.0), strict=True):
+        surface = asp.Surface(texture, "H", continuity=continuity)
+        field = render_on_device(
+            surface, device, FIELD, progress=lambda _part: pytest.fail("baked anew")
+        )
         assert row["q"] == asp.characteristic_number(field).upper
         assert row["nodes"] * 4 == row["size [B]"]
     with pytest.raises(ParameterError, match="needs no field: its contact has a closed form"):
-        asp.sweep("sinusoid:amplitude=1mm,period=5mm", depths, "bake", processes=1)
+        asp.sweep("sinusoid:amplitude=1mm,period=5mm", axes, "bake", processes=1)
 
 
 def test_without_room_for_processes_this_one_computes(monkeypatch: pytest.MonkeyPatch) -> None:
