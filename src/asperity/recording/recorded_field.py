@@ -80,7 +80,7 @@ class LimitCounts(Serializable):
         max_force: the length to which forces are limited [N].
         force_resolution: step to which they are then rounded [N].
         max_depth: depth for which the surface was analysed [m].
-        force_limited: number of samples whose force was limited.
+        force_limited: number of samples whose force was limited, or that rounding leaves open.
         too_deep: number of samples below ``max_depth``.
         deepest: greatest depth of these [m]; 0 for none.
 

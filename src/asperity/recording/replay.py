@@ -138,7 +138,7 @@ def replay(recording: Recording | str | os.PathLike[str], surface: Surface | Non
     return result
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=1)  # the page and the data of one recording state it
 def recorded_limits(recording: Recording) -> LimitCounts | None:
     """Return how many rows of a recording are at the force limit and below ``max_depth``.
 
