@@ -119,7 +119,7 @@ def test_numbers_of_a_comparison_are_those_of_the_field() -> None:
     result = analyze(MILD, law="H", max_depth=3e-5, stiffness=500.0)
     assert result.q.upper == field.gain.upper
     assert "baked as a potential field" in " ".join(result.assumptions)
-    assert "At 500 N/m the presses of this field are" in " ".join(result.assumptions)
+    assert "At 500 N/m its error is known for presses of" in " ".join(result.assumptions)
 
 
 def test_comparison_of_a_field_has_one_row() -> None:

@@ -46,7 +46,7 @@ def knot_shares(start: FloatArray, end: FloatArray, field: FieldArguments) -> Fl
     a, b = ((points[:, :2] - [field.x0, field.y0]) @ rates for points in (start, end))
     knots = np.floor(np.minimum(a, b) + 0.5)[..., None] + 0.5 + np.arange(MAX_CROSSINGS)
     levels = field.z0 + (np.arange(field.levels + MAX_CROSSINGS) - 0.5) / field.iz
-    levels[: len(field.stretch)] = field.stretch[:, KNOT]
+    levels[: len(field.stretched_cells)] = field.stretched_cells[:, KNOT]
     first = np.searchsorted(levels, np.minimum(start[:, 2], end[:, 2]), "right")
     upward = levels[first[:, None] + np.arange(MAX_CROSSINGS)]
     knots = np.concatenate([knots, upward[:, None]], axis=1)

@@ -376,7 +376,7 @@ def _force_range(surface: Surface, depths: Sequence[float]) -> tuple[str, ...]:
         points = np.column_stack([xy, np.full(len(xy), texture.extremes[1] - depth)])
         ends.append(format_quantity(float(field.force(points)[:, 2].mean()), "N"))
     k = format_stiffness(surface.stiffness)
-    return (f"At {k} the presses of this field are {ends[0]} to {ends[1]}",)
+    return (f"At {k} its error is known for presses of {ends[0]} to {ends[1]}",)
 
 
 def _finite_part(texture: Texture, extent: Extent) -> Texture:

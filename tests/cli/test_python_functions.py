@@ -86,8 +86,9 @@ def write_waves(folder: Path, source: str) -> Path:
 def test_strokes_state_how_each_law_is_rendered(tmp_path: Path) -> None:
     scene = write_waves(tmp_path, STROKE)
     notes = asp.scan(scene, "WHD", speeds=0.1, strokes=3, device="touch").setup.assumptions
-    baked, searched = notes[:2]
+    baked, presses, searched = notes[:3]
     assert baked.startswith("Law H baked as a potential field: ")
+    assert presses.startswith("At 1000 N/m its error is known for presses of ")
     assert searched.startswith("Law D finds its contact by a search")
     assert len(set(notes)) == len(notes)
     plain = asp.scan(scene, "WC", speeds=0.1, strokes=3, device="touch").setup.assumptions

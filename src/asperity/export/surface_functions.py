@@ -311,7 +311,7 @@ class ProgramData:
 _LOADED_LENGTHS = {
     "c": ("{0}.count",),
     "columns": ("{0}.rows", "{0}.width", "4"),
-    "stretch": ("{0}.stretched", "7"),
+    "stretched_cells": ("{0}.stretched", "7"),
 }
 
 

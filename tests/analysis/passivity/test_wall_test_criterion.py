@@ -12,14 +12,14 @@ from hypothesis import strategies as st
 
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.leak import worst_loop
-from asperity.analysis.passivity.recommended_stiffness import recommend_stiffness
+from asperity.analysis.passivity.recommended_stiffness import recommend_stiffness, render_on_device
 from asperity.analysis.passivity.verdict import Passivity, passivity
 from asperity.analysis.results.analyze import analyze
 from asperity.analysis.results.check_limits import limits
 from asperity.analysis.results.compare import compare
+from asperity.core.arguments import FIELD
 from asperity.core.errors import ParameterError
 from asperity.devices import Device, device_names, load_device, override_device, parse_device
-from asperity.rendering import rendered_surface
 from asperity.surface import Surface
 from asperity.textures import Fourier, Profile, Sinusoid, Texture
 
@@ -399,7 +399,7 @@ def checked_passivity(
 ) -> Passivity:
     """Return the passivity result, after checking that compare, analyze and limits agree on it."""
     (row,) = compare(texture, device, law, stiffness, depth).rows
-    surface = rendered_surface(Surface(texture, law, stiffness, depth))
+    surface = render_on_device(Surface(texture, law, stiffness, depth), device, FIELD)
     result = analyze(surface, device).passivity
     assert row.passivity == result
     assert row.stability_limit == result.stability_limit

@@ -28,7 +28,7 @@ def cloth(max_gain: float | None) -> Surface:
     """Return cloth, which repeats after 3.36 mm, baked with cells that grow to 1 mm below it."""
     surface = Surface("cloth", "H", K, max_depth=DEPTH)
     baked = asp.bake(surface, 40e-6, press=1.0, max_gain=max_gain)
-    assert len(baked.texture.arguments.stretch) > 5
+    assert len(baked.texture.arguments.stretched_cells) > 5
     return baked
 
 

@@ -11,7 +11,7 @@ typedef struct {
     double q, floor;
     int32_t below;
     uint32_t stretched;
-    uint64_t stretch_offset;
+    uint64_t stretched_offset;
     double fade;
     unsigned char reserved[48];
     uint32_t checksum, header_checksum;
@@ -74,8 +74,8 @@ static inline int @name@_fits(const @name@_field_header *head, size_t size)
             return 0;
         }
     }
-    return head->fade > 0 && head->stretch_offset <= size && head->stretch_offset % 8 == 0
-        && head->stretched <= (size - head->stretch_offset) / 56
+    return head->fade > 0 && head->stretched_offset <= size && head->stretched_offset % 8 == 0
+        && head->stretched <= (size - head->stretched_offset) / 56
         && (int64_t)head->stretched < head->levels
         && (head->rows == 1 || head->rows >= 4) && head->width >= 4 && head->iz > 0
         && places <= 0x7FFFFFFFu && head->levels >= 3 && head->border >= 0 && head->border <= 2
@@ -90,7 +90,7 @@ static inline int @name@_fits(const @name@_field_header *head, size_t size)
 /* Whether every column lies inside the coefficients, and all numbers are finite. */
 static inline int @name@_is_consistent(
     const @name@_field_header *head, const int32_t *columns, const float *c,
-    const double *stretch)
+    const double *stretched_cells)
 {
     const size_t places = (size_t)head->rows * head->width;
     size_t i;
@@ -105,7 +105,7 @@ static inline int @name@_is_consistent(
         }
     }
     for (i = 0; i < (size_t)head->stretched * 7; i++) {
-        if (!(fabs(stretch[i]) <= 1e12)) {
+        if (!(fabs(stretched_cells[i]) <= 1e12)) {
             return 0;
         }
     }
@@ -117,7 +117,8 @@ static inline int @name@_is_consistent(
     return 1;
 }
 
-static inline int @name@_check_file(const unsigned char *bytes, size_t size, @name@_field_header *head)
+static inline int @name@_check_file(
+    const unsigned char *bytes, size_t size, @name@_field_header *head)
 {
     if (size < sizeof *head) {
         return @NAME@_NO_FIELD;
@@ -136,7 +137,7 @@ static inline int @name@_check_file(const unsigned char *bytes, size_t size, @na
         || !@name@_is_consistent(
             head, (const int32_t *)(const void *)(bytes + head->columns_offset),
             (const float *)(const void *)(bytes + head->values_offset),
-            (const double *)(const void *)(bytes + head->stretch_offset))) {
+            (const double *)(const void *)(bytes + head->stretched_offset))) {
         return @NAME@_DAMAGED;
     }
     return @NAME@_LOADED;
@@ -148,11 +149,11 @@ static inline void @name@_use(const @name@_field_header *head, unsigned char *by
     for (i = 0; i < (size_t)head->stretched * 7; i++) { /* in the precision of the program */
         double number;
         @real@ value;
-        memcpy(&number, bytes + head->stretch_offset + i * sizeof number, sizeof number);
+        memcpy(&number, bytes + head->stretched_offset + i * sizeof number, sizeof number);
         value = (@real@)number;
-        memcpy(bytes + head->stretch_offset + i * sizeof value, &value, sizeof value);
+        memcpy(bytes + head->stretched_offset + i * sizeof value, &value, sizeof value);
     }
-    @name@_surface.stretch = (const @real@ *)(const void *)(bytes + head->stretch_offset);
+    @name@_surface.stretched_cells = (const @real@ *)(const void *)(bytes + head->stretched_offset);
     @name@_surface.stretched = head->stretched;
     @name@_surface.floor = (@real@)head->floor;
     @name@_surface.fade = (@real@)head->fade;

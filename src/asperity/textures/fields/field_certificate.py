@@ -56,7 +56,7 @@ def curvature_bounds(
     if grid.border != ZERO:
         bounds[0, :2] = 1.0  # of the flat wall far below
     numbers = _search(bounds, np.zeros((0, 0, 0), np.uint8), field, progress)
-    largest = float(field.c.max(initial=0.0) + field.stretch[:, OFFSETS:].max(initial=0.0))
+    largest = float(field.c.max(initial=0.0) + field.stretched_cells[:, OFFSETS:].max(initial=0.0))
     rounding = _DIFFERENCE_ROUNDING * (largest / min(grid.spacing)) ** 2
     best = numbers[np.argmax(numbers[:, :, 1], axis=0), [0, 1]]
     at = grid.positions(best[:, 2 : 2 + len(grid.cells)])
@@ -144,8 +144,8 @@ def _upward_weights(field: FieldArguments) -> FloatArray:
     iz = field.iz
     upward = np.stack([along[0], iz * along[1], iz * iz * along[2]], axis=1)
     upward = np.repeat(upward[..., None], field.levels, axis=-1)
-    count = len(field.stretch)
-    rate, a, b = field.stretch[:, RATE : UPPER + 1].T
+    count = len(field.stretched_cells)
+    rate, a, b = field.stretched_cells[:, RATE : UPPER + 1].T
     none = 0.0 * a
     lowest = np.array([[a, 1.0 - a, none], [-2.0 * rate * a, 2.0 * rate * a, none]])
     highest = np.array([[none, 1.0 - b, b], [none, -2.0 * rate * b, 2.0 * rate * b]])

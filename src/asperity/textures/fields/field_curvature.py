@@ -76,8 +76,8 @@ def load_nodes(
     for q in range(3 * rows):
         for k in range(count):
             nodes[q, k] = field_triple(i + q // 3, j + q % 3, m + k, field)[1]
-            if m + k < field.stretch.shape[0]:
-                nodes[q, k] += field.stretch[m + k, OFFSETS + 1]
+            if m + k < field.stretched_cells.shape[0]:
+                nodes[q, k] += field.stretched_cells[m + k, OFFSETS + 1]
 
 
 def mix_nodes(nodes: FloatArray, count: int, n: int, plane: FloatArray, mixed: FloatArray) -> None:

@@ -64,7 +64,7 @@ HEADER = np.dtype(
         ("floor", "<f8"),  # z down to which it is that of the spline [m]
         ("below", "<i4"),
         ("stretched", "<u4"),
-        ("stretch_offset", "<u8"),  # float64 (stretched, 7)
+        ("stretched_offset", "<u8"),  # float64 (stretched, 7)
         ("fade", "<f8"),  # twice the height of the cells below the floor [m]
         ("reserved", "V48"),
         ("checksum", "<u4"),  # CRC-32 of all that follows the header
@@ -111,7 +111,7 @@ def _encode(field: PotentialField) -> tuple[NDArray[Any], list[tuple[int, bytes]
     description = json_text(field.describe() | stored).encode()
     parts = [
         np.ascontiguousarray(record.columns, "<i4").tobytes(),
-        np.ascontiguousarray(record.stretch, "<f8").tobytes(),
+        np.ascontiguousarray(record.stretched_cells, "<f8").tobytes(),
         np.ascontiguousarray(record.c, "<f4").tobytes(),
         np.ascontiguousarray(heights, "<f8").tobytes(),
         description,
@@ -128,8 +128,8 @@ def _encode(field: PotentialField) -> tuple[NDArray[Any], list[tuple[int, bytes]
     header["file_bytes"] = end
     header["count"] = record.c.size
     header["rows"], header["columns"] = record.columns.shape[:2]
-    header["stretched"] = len(record.stretch)
-    names = ("columns_offset", "stretch_offset", "values_offset", "heights_offset", "json_offset")
+    header["stretched"] = len(record.stretched_cells)
+    names = ("columns_offset", "stretched_offset", "values_offset", "heights_offset", "json_offset")
     for name, offset in zip(names, offsets, strict=True):
         header[name] = offset
     for name in (*_NUMBERS, *_COUNTS):
@@ -200,8 +200,8 @@ def _decode(data: NDArray[np.uint8], build_texture: BuildTexture) -> PotentialFi
     numbers: dict[str, Any] = {name: header[name].item() for name in (*_NUMBERS, *_COUNTS)}
     if header["version"] == _UNSTRETCHED:
         numbers["fade"] = 2.0 * numbers["below"] / numbers["iz"]
-    stretch = _section(data, header["stretch_offset"], 7 * int(header["stretched"]), "<f8")
-    record = FieldArguments(values, columns.reshape(shape), stretch.reshape(-1, 7), **numbers)
+    cells = _section(data, header["stretched_offset"], 7 * int(header["stretched"]), "<f8")
+    record = FieldArguments(values, columns.reshape(shape), cells.reshape(-1, 7), **numbers)
     count = math.prod(described["shape"]) * bool(described["shape"])
     heights = _section(data, header["heights_offset"], count, "<f8")
     field = assemble_field(record, described, heights, build_texture)
@@ -341,14 +341,14 @@ def _check_record(record: FieldArguments, grid: FieldGrid) -> None:
     fits = record.columns.shape == (rows, grid.cells[0] + 3, 4) and record.levels >= 3
     fits = fits and record.border in (PERIODIC, MIRRORED, ZERO)
     fits = fits and 1 <= record.below <= record.levels - 2
-    fits = fits and record.stretch.shape == grid.stretch_table().shape
-    fits = fits and len(record.stretch) < record.levels
+    fits = fits and record.stretched_cells.shape == grid.stretched_table().shape
+    fits = fits and len(record.stretched_cells) < record.levels
     ordered = (first >= 0) & (first <= end) & (reach >= 0) & (reach <= record.levels)
     stored = (first == end) | ((offset + first >= 0) & (offset + end <= record.c.size))
     numbers = np.array([getattr(record, name) for name in _NUMBERS])
     if not (fits and ordered.all() and stored.all()):
         raise SurfaceFileError("has a damaged table of columns")
-    finite = [np.isfinite(part).all() for part in (numbers, record.c, record.stretch)]
+    finite = [np.isfinite(part).all() for part in (numbers, record.c, record.stretched_cells)]
     if not (all(finite) and record.iz > 0.0 and record.fade > 0.0):
         raise SurfaceFileError("has numbers that are not finite")
 
@@ -361,7 +361,7 @@ def _check_scales(header: Any, field: PotentialField) -> None:
     """
     grid = field.grid
     scales = grid.scales() | {"q": field.gain.upper}
-    if not np.allclose(grid.stretch_table(), field.arguments.stretch, _SCALE_TOLERANCE):
+    if not np.allclose(grid.stretched_table(), field.arguments.stretched_cells, _SCALE_TOLERANCE):
         raise ValueError("its stretched cells are not those of its description")
     for name in scales:
         number = getattr(field.arguments, name, header["q"].item())

@@ -174,7 +174,7 @@ class FieldGrid:
             return np.zeros(self.levels)
         return np.asarray(np.maximum(self.knots[-2] - heights, 0.0))
 
-    def stretch_table(self) -> FloatArray:
+    def stretched_table(self) -> FloatArray:
         """Return the entries of the stretched cells, (n, 7); see :class:`FieldArguments`."""
         count = self.stretched
         if not count:
@@ -284,8 +284,8 @@ class FieldGrid:
         table = np.stack([starts - first, first, end, reach], axis=-1).astype(np.int32)
         table = self._with_borders(table)
         counts = {"levels": self.levels, "below": self.below, "border": self.border}
-        stretch = self.stretch_table()
-        return FieldArguments(values, table, stretch, **self.scales(), lift=lift, **counts)
+        stretched_cells = self.stretched_table()
+        return FieldArguments(values, table, stretched_cells, **self.scales(), lift=lift, **counts)
 
     def scales(self) -> dict[str, Any]:
         """Return the numbers of the record that follow from the nodes."""

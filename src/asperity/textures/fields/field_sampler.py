@@ -60,8 +60,8 @@ class FieldArguments(NamedTuple):
         c: coefficients [m], column after column.
         columns: OFFSET, FIRST, END and REACH, shape (rows, columns, 4), with one node before the
             first and two after the last along both axes; one row for a profile.
-        stretch: KNOT, RATE, LOWER, UPPER and OFFSETS of the lowest cells, shape (n, 7); the others
-            are equally high.
+        stretched_cells: KNOT, RATE, LOWER, UPPER and OFFSETS of the lowest cells, shape (n, 7); the
+            others are equally high.
         x0: the first node [m].
         y0: likewise.
         z0: likewise, of equal cells down to level 0.
@@ -81,7 +81,7 @@ class FieldArguments(NamedTuple):
 
     c: NDArray[np.float32]
     columns: NDArray[np.int32]
-    stretch: FloatArray
+    stretched_cells: FloatArray
     x0: float
     y0: float
     z0: float
@@ -149,26 +149,26 @@ def field_level(z: float, field: FieldArguments) -> tuple[float, float]:
 
 def field_cell(z: float, field: FieldArguments) -> tuple[int, float, float, float, float]:
     """Return the level of the cell that holds z, z in cells from its middle, 1/h, LOWER, UPPER."""
-    stretch = field.stretch
+    stretched_cells = field.stretched_cells
     w = (z - field.z0) * field.iz
-    high = stretch.shape[0]
+    high = stretched_cells.shape[0]
     if high == 0 or w >= high - 0.5:
         m = int(w + 0.5)
         return m, w - m, field.iz, 0.5, 0.5
     low = 1
     while high - low > 1:
         middle = (low + high) // 2
-        if z >= stretch[middle, KNOT]:
+        if z >= stretched_cells[middle, KNOT]:
             low = middle
         else:
             high = middle
-    rate = stretch[low, RATE]
+    rate = stretched_cells[low, RATE]
     return (
         low,
-        (z - stretch[low, KNOT]) * rate - 0.5,
+        (z - stretched_cells[low, KNOT]) * rate - 0.5,
         rate,
-        stretch[low, LOWER],
-        stretch[low, UPPER],
+        stretched_cells[low, LOWER],
+        stretched_cells[low, UPPER],
     )
 
 
@@ -188,11 +188,11 @@ def level_weight_slopes(t: float, lower: float, upper: float) -> ThreeWeights:
 
 def field_offset(m: int, weights: ThreeWeights, field: FieldArguments) -> float:
     """Return the sum of what is subtracted from three coefficients around a level, weighted."""
-    stretch = field.stretch
-    if stretch.shape[0] == 0 or m >= stretch.shape[0]:
+    stretched_cells = field.stretched_cells
+    if stretched_cells.shape[0] == 0 or m >= stretched_cells.shape[0]:
         return 0.0
-    offset = weights[0] * stretch[m, OFFSETS] + weights[1] * stretch[m, OFFSETS + 1]
-    return float(offset + weights[2] * stretch[m, OFFSETS + 2])
+    offset = weights[0] * stretched_cells[m, OFFSETS] + weights[1] * stretched_cells[m, OFFSETS + 1]
+    return float(offset + weights[2] * stretched_cells[m, OFFSETS + 2])
 
 
 def field_descent(r: float, field: FieldArguments) -> Vector:
