@@ -126,6 +126,7 @@ def test_without_shared_memory_all_comes_as_messages(page: Browser, lab: Started
         page.call("Page.navigate", url="about:blank")
         page.call("Page.navigate", url=lab.address)
         page.until("globalThis.lab?.frame && lab.hasPictures && lab.status.state == 'running'")
+        page.until("lab.status.has_control")  # once the page before is known to be gone
         assert not page.ask("lab.connection.usesBuffer")
         numbers = page.ask("lab.frame.number")
         page.until(f"lab.frame.number > {numbers} + 100")
