@@ -83,7 +83,7 @@ def print_nodes(console: Console) -> None:
         grid = FieldGrid.fit(texture.domain, texture.extremes, DEPTH, 0.0, resolution)
         xy = texture.domain.points(np.random.default_rng(1).uniform(size=(NODE_COLUMNS, 2)))
         z = grid.height(np.arange(grid.levels, dtype=float))
-        depths = np.empty((2, NODE_COLUMNS, grid.levels), np.float32)
+        depths = np.empty((2, NODE_COLUMNS, grid.levels))
         searches = [split_columns(texture, 1.0), split_columns(texture, 1.0, grid)]
         batches = [
             partial(search, xy, z, grid.margin, out)
@@ -106,7 +106,7 @@ def run(console: Console) -> None:
     missed: list[str] = []
     for name, (texture, resolution) in surfaces().items():
         exact = Surface(texture, "H", cases.STIFFNESS, max_depth=DEPTH)
-        baked = bake(exact, resolution, max_gain=None)
+        baked = bake(exact, resolution, press=1e-6, max_gain=None)  # no deeper than DEPTH
         field = baked.texture
         assert isinstance(field, PotentialField)
         times = stroke_times(baked, [stroke(texture, rate, TICKS) for rate in RATES])

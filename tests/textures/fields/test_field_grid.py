@@ -130,7 +130,7 @@ def test_arguments_contain_the_position_of_the_first_node() -> None:
     assert (arguments.levels, arguments.border) == (6, MIRRORED)
 
 
-@pytest.mark.parametrize("passes", [0, 6, 10])
+@pytest.mark.parametrize("passes", [0, 6, 15])
 def test_contact_begins_within_the_bound_and_near_it_at_worst(passes: int) -> None:
     """A half-space seen by the worst points of a mean square: one far inside, the others outside.
 

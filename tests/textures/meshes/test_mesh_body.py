@@ -18,7 +18,7 @@ from asperity.textures.catalogue import as_texture
 from asperity.textures.fields.bake import BakeGoal
 from asperity.textures.fields.field_file import save_field
 from asperity.textures.fields.potential_field import PotentialField
-from asperity.textures.meshes.bake_body import _BodyLoops, bake_body
+from asperity.textures.meshes.bake_body import BodyLoops, bake_body
 from asperity.textures.meshes.mesh_body import MeshBody, load_mesh
 from asperity.textures.meshes.mesh_potential import BodyLaw
 from asperity.textures.texture import Texture
@@ -32,7 +32,7 @@ def to_body(mesh: trimesh.Trimesh) -> MeshBody:
 
 def exact(body: MeshBody, points: np.ndarray, max_depth: float = 1.0) -> np.ndarray:
     law = BodyLaw(1.0, max_depth, 0.0)
-    return _BodyLoops(body, law).evaluate(np.ascontiguousarray(points, dtype=float))
+    return BodyLoops(body, law).evaluate(np.ascontiguousarray(points, dtype=float))
 
 
 @cache
@@ -169,7 +169,7 @@ def test_closed_paths_gain_nothing(name: str) -> None:
 def test_force_is_close_to_exact_h() -> None:
     field, body = baked("cube"), cube()
     surface = asp.Surface(field, "H", 1.0)
-    loops = _BodyLoops(body, BodyLaw(1.0, 0.6 * MM, 0.0))
+    loops = BodyLoops(body, BodyLaw(1.0, 0.6 * MM, 0.0))
     probes = loops.surface_probes(np.random.default_rng(5).uniform(0.0, 0.6 * MM, 2000))
     probes = probes[loops.evaluate(probes)[:, 4] > 0.0]
     difference = surface.force(probes) - loops.evaluate(probes)[:, 1:4]
@@ -336,7 +336,7 @@ def test_parts_that_share_a_face_are_united() -> None:
         trimesh.util.concatenate([first, first.copy().apply_translation((4 * MM, 4 * MM, 0.0))])
     )
     assert len(corner.triangles) == 24
-    assert not _BodyLoops(corner, BodyLaw(1.0, MM, np.inf)).find_contacts()
+    assert not BodyLoops(corner, BodyLaw(1.0, MM, np.inf)).find_contacts()
 
 
 @pytest.mark.parametrize("shift", [(4, 1, 0), (0.5, 0.3, 2), (4 + 2e-6, 1, 0)])
@@ -355,7 +355,7 @@ def test_gaps_and_sharp_hollows_are_no_contacts() -> None:
     spiky = trimesh.creation.icosphere(4, radius=MM)
     spiky.vertices *= 1.0 + 0.3 * np.random.default_rng(0).random((len(spiky.vertices), 1))
     for mesh in (trimesh.util.concatenate([first, second]), spiky):
-        assert not _BodyLoops(to_body(mesh), BodyLaw(1.0, MM, np.inf)).find_contacts()
+        assert not BodyLoops(to_body(mesh), BodyLaw(1.0, MM, np.inf)).find_contacts()
 
 
 @pytest.mark.parametrize("factor", [1e-6, 1e3])
@@ -394,7 +394,7 @@ def test_depth_of_a_slender_body_is_found_at_the_nodes() -> None:
     """A coarse lattice finds no point of a ring at that depth."""
     turn = trimesh.transformations.rotation_matrix(0.7, (0.3, 1.0, 0.6))
     ring = to_body(trimesh.creation.torus(3.0, 0.12, transform=turn).apply_scale(MM))
-    assert _BodyLoops(ring, BodyLaw(1.0, 0.11 * MM, np.inf)).sample_depth() < 0.11 * MM
+    assert BodyLoops(ring, BodyLaw(1.0, 0.11 * MM, np.inf)).sample_depth() < 0.11 * MM
     assert bake_body(ring, 0.11 * MM, resolution=0.05 * MM).max_depth == 0.11 * MM
 
 

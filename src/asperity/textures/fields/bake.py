@@ -19,7 +19,7 @@ from asperity.textures.fields.field_grid import RAMP, FieldGrid, SingleArray
 from asperity.textures.fields.potential_field import FieldAccuracy, PotentialField
 from asperity.textures.texture import Texture
 
-_MAX_PASSES = 10
+_MAX_PASSES = 15
 # Part of the cells above the goal that a pass may leave and still help.
 _STALLED = 0.8
 # Number of depths at which the difference from exact H is measured, for bodies and for surfaces,

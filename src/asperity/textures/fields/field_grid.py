@@ -215,7 +215,7 @@ class FieldGrid:
 
         S is the mean of the depth, cut at -margin, over points whose distances from the probe have
         the root mean square σ. It is not positive where the depth is less than -σ: where σ is less
-        than twice the margin, as after ten passes, the cut does not change that. Cells at the
+        than twice the margin, as after 15 passes, the cut does not change that. Cells at the
         surface are at most two above stretched ones.
         """
         side = self.knots[-2] - self.knots[-3] if self.stretched > 1 else self.level_spacing

@@ -311,8 +311,8 @@ class _BodyPlan(bake.BakePlan):
     def grid(self, resolution: float) -> FieldGrid:
         """Return the grid around the body.
 
-        Smoothed depths are means over points around a place, of a standard deviation of at most 1.7
-        spacings after ten passes: half a spacing outside of the box they are still negative.
+        Smoothed depths are means over points around a place, of a standard deviation of at most 2.0
+        spacings after 15 passes: half a spacing outside of the box they are still negative.
         """
         return FieldGrid.around(*self.loops.body.box, min(resolution, self.coarsest))
 
