@@ -55,6 +55,19 @@ def test_ways_along_one_height_enclose_no_area() -> None:
     assert not loops.encloses_area(2, 2)
 
 
+@pytest.mark.parametrize(("last", "counts"), [(0.1, False), (1.1, True)])
+def test_works_that_agree_by_chance_are_refined_once_more(
+    monkeypatch: pytest.MonkeyPatch, last: float, counts: bool
+) -> None:
+    corner = np.ones(3)
+    calls = RendererCalls(FunctionRenderer(np.zeros_like), Region(-corner, corner))
+    resolution = Resolution(0.0, (0.0, 0.0, 0.0), 0.0, 1e-7)
+    search = loop_search.LoopSearch(calls, resolution, 0.0, seed=0)
+    works = iter([1.0, 1.05, 1.1, last])
+    monkeypatch.setattr(search, "_turn_works", lambda _path: (np.array([next(works)]), np.zeros(1)))
+    assert search.measure(np.eye(3)).counts is counts
+
+
 def vortex_force(points: FloatArray) -> FloatArray:
     """Return a force that circulates around a vertical tube off the axes of the region [N]."""
     across = (points[:, 0] + points[:, 1]) / math.sqrt(2.0) - 3e-4

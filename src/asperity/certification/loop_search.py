@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -331,22 +332,32 @@ class LoopSearch:
     # --- work under refinement ---
 
     def measure(self, vertices: FloatArray) -> ClosedLoop:
-        """Return the loop through vertices with its work at one, two and four times the points."""
-        length = _length(vertices)
-        works = []
-        doubt = 0.0
-        for factor in (1, 2, 4):
-            path = subdivide(vertices, length / (_LOOP_POINTS * factor), 2 * factor)
+        """Return the loop through vertices with its work at one, two and four times the points.
+
+        One that counts is measured at eight times the points, too: of many loops, some have three
+        works that agree by chance.
+        """
+        loop = ClosedLoop(0.0, math.inf, _length(vertices), vertices, self._turns)
+        works: list[float] = []
+        for factor in (1, 2, 4, 8):
+            path = subdivide(vertices, loop.length / (_LOOP_POINTS * factor), 2 * factor)
             turn_works, doubts = self._turn_works(path[None])
             works.append(float(turn_works[0]))
-            doubt = float(doubts[0])
-        first, second, third = works
+            if factor >= 4:
+                error = self._work_error(works, float(doubts[0]), loop.length)
+                loop = replace(loop, energy=works[-1], error=error)
+                if abs(loop.energy) <= _ERRORS_PER_WORK * error:
+                    break
+        return loop
+
+    def _work_error(self, works: Sequence[float], doubt: float, length: float) -> float:
+        """Return the error [J] of the last of works, each at twice the points of the one before."""
+        first, second, third = works[-3:]
         changes = max(abs(second - first), abs(third - second), doubt)
-        error = math.inf
-        if math.isfinite(changes):
-            unknown = self._unknown_force + _ROUNDING * self.calls.largest_force
-            error = changes + unknown * length / _ERRORS_PER_WORK
-        return ClosedLoop(third, error, length, vertices, self._turns)
+        if not math.isfinite(changes):
+            return math.inf
+        unknown = self._unknown_force + _ROUNDING * self.calls.largest_force
+        return changes + unknown * length / _ERRORS_PER_WORK
 
     @property
     def _turns(self) -> int:
