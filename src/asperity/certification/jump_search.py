@@ -30,6 +30,7 @@ _SHORTEST = 1e-9
 _JUMP_EXPONENT = 0.2
 _HALVINGS = 4
 _TRIED_HALVINGS = 5
+_REPEATS = 2
 _LEFT = 0.25
 _CELLS = 100
 """Jumps in the same of this many cells along each axis of the region count once."""
@@ -163,8 +164,9 @@ class JumpSearch:
 
     def _record_jumps(self, segments: _Segments, changes: list[FloatArray], gain: float) -> None:
         paths = approach_paths(segments.approach, segments.start, segments.end)
-        # Noise that is rare does not come again.
-        size = np.minimum(changes[-1], step_changes(self.calls.along(paths))[1])
+        size = changes[-1]
+        for _ in range(_REPEATS):  # noise that is rare does not come again
+            size = np.minimum(size, step_changes(self.calls.along(paths))[1])
         before = np.maximum(changes[-1 - _HALVINGS], 1e-300)
         exponents = np.log2(np.maximum(size, 1e-300) / before) / -_HALVINGS
         explained = 3.0 * self.resolution.explained(gain) + 1e-9 * self.calls.largest_force
