@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -93,3 +94,12 @@ def test_ball_that_exceeds_the_body_is_refused() -> None:
         dilate_body(to_body(FOOT), 2.1 * MM)
     with pytest.raises(ParameterError, match="tip_radius must be positive"):
         dilate_body(to_body(FOOT), 0.0)
+
+
+def test_texture_is_resolved_or_refused() -> None:
+    """The nodes of a field of a textured body stay as fine as without the ball."""
+    body = replace(to_body(FOOT), coarsest=0.2 * MM)
+    assert dilate_body(body, 0.5 * MM).coarsest == body.coarsest
+    fine = replace(body, coarsest=0.01 * MM)
+    with pytest.raises(ParameterError, match="the texture needs 10 µm"):
+        dilate_body(fine, 0.5 * MM)

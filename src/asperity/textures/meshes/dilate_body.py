@@ -44,7 +44,8 @@ def dilate_body(body: MeshBody, radius: float) -> MeshBody:
         radius: of the ball [m].
 
     Raises:
-        ParameterError: the radius is not positive, or exceeds the shortest side of the body.
+        ParameterError: the radius is not positive, or exceeds the shortest side of the body, or
+            the body has a texture that the lattice would not resolve.
 
     Reference:
         Doi and Koide (1991), An efficient method of triangulating equi-valued surfaces by using
@@ -58,6 +59,10 @@ def dilate_body(body: MeshBody, radius: float) -> MeshBody:
         raise ParameterError("tip_radius", limit, radius)
     sides = upper - lower + 2.0 * radius
     step = max(float(np.cbrt(sides.prod() / _MAX_NODES)), radius / _STEPS_PER_RADIUS)
+    if step > body.coarsest:
+        needed = f"a lattice of {format_length(step)} is finest, the texture needs"
+        reason = f"cannot be applied: {needed} {format_length(body.coarsest)}"
+        raise ParameterError("tip_radius", reason, radius)
     counts = np.ceil(sides / step).astype(int) + 3
     start = 0.5 * (lower + upper - step * (counts - 1))
     ticks = [start[axis] + step * np.arange(counts[axis]) for axis in range(3)]
@@ -78,7 +83,8 @@ def dilate_body(body: MeshBody, radius: float) -> MeshBody:
         f"probed by a ball of radius {format_length(radius)}, whose centre is the position; its"
         f" surface is wrong by at most {format_length(error)} at {_SAMPLES} sampled places"
     )
-    return replace(dilated, faults=body.faults, repaired=body.repaired, notes=(*body.notes, note))
+    dilated = replace(dilated, faults=body.faults, repaired=body.repaired, coarsest=body.coarsest)
+    return replace(dilated, notes=(*body.notes, note))
 
 
 def _signed_distance(body: MeshBody, margin: float, ticks: list[FloatArray]) -> FloatArray:
