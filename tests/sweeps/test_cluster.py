@@ -23,7 +23,7 @@ from asperity.sweeps.run_sweep import run_plan
 from asperity.sweeps.sweep_plan import SweepPlan
 
 distributed: Any = pytest.importorskip("distributed", reason="not run: no distributed here")
-dask_config: Any = pytest.importorskip("dask").config
+dask_config: Any = pytest.importorskip("dask", reason="not run: no dask here").config
 # Dask leaves sockets to the garbage collector.
 pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 MakePlan = Callable[..., SweepPlan]
