@@ -102,7 +102,7 @@ class Sample(NamedTuple):
         if self.trial.waves is None:
             return {STABILITY: _LEAST_RATIO, FORCE: _LEAST_RATIO}
         waves = self.trial.waves.at_stiffness(stiffness)
-        response = perceptibility.respond(waves)
+        response = perceptibility.respond_felt(waves)
         texture = self.trial.surface.texture
         ratios = {
             STABILITY: self.trial.recommended.stiffness / stiffness,

@@ -144,14 +144,14 @@ class Trial:
         """Return the ratio of :func:`~asperity.analysis.limits.perceptibility.felt_ratio`."""
         if self.waves is None:
             return 0.0
-        return perceptibility.felt_ratio(self.waves, perceptibility.respond(self.waves))
+        return perceptibility.felt_ratio(self.waves, perceptibility.respond_felt(self.waves))
 
     @property
     def force_steps(self) -> float:
         """Amplitude of the force over γ force steps; infinite where the steps are unknown."""
         if self.waves is None:
             return 0.0
-        resolved = perceptibility.respond(self.waves).is_resolved
+        resolved = perceptibility.respond_felt(self.waves).is_resolved
         return perceptibility.force_step_ratio(self.waves.case, resolved)
 
     @property

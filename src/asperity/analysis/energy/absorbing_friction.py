@@ -13,6 +13,7 @@ import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -209,19 +210,30 @@ class _Plane:
     def density(self, free: FloatArray) -> tuple[float, FloatArray]:
         """Return W/length of the polygon by the midpoint rule [N], and its gradient [N/m]."""
         curve = self.curve(free)
-        step = np.roll(curve, -1, axis=1) - curve
+        step = _next_columns(curve) - curve
         forces, jacobians = self.surface.force_and_jacobian(self.points(curve + 0.5 * step))
         axes = np.array([[*self.line.direction, 0.0], [0.0, 0.0, 1.0]])
         force = axes @ forces.T
-        pull = force - 0.5 * np.einsum("ai,mij,bj,am->bm", axes, jacobians, axes, step)
-        push = force + 0.5 * np.einsum("ai,mij,bj,am->bm", axes, jacobians, axes, step)
+        turn = 0.5 * np.einsum("ai,mij,bj,am->bm", axes, jacobians, axes, step)
+        pull = force - turn
+        push = force + turn
         lengths = np.maximum(np.hypot(*step), np.finfo(float).tiny)
         length = float(lengths.sum())
         density = float((force * step).sum()) / length
         unit = step / lengths
-        slopes = np.roll(push, 1, axis=1) - pull - density * (np.roll(unit, 1, axis=1) - unit)
+        slopes = _last_columns(push) - pull - density * (_last_columns(unit) - unit)
         slopes[0] += np.interp(curve[0], self.columns, self.slope) * slopes[1]
         return density, slopes @ self.refinement / length
+
+
+def _next_columns(values: FloatArray) -> FloatArray:
+    """Return the columns (2, n) of a closed path turned by one: each has that of the next point."""
+    return np.concatenate([values[:, 1:], values[:, :1]], axis=1)
+
+
+def _last_columns(values: FloatArray) -> FloatArray:
+    """Return the columns (2, n) of a closed path turned by one: each has that of the last point."""
+    return np.concatenate([values[:, -1:], values[:, :-1]], axis=1)
 
 
 def _make_plane(
@@ -271,7 +283,7 @@ def _climb(
     """Return where a function within bounds is greatest, by limited-memory BFGS steps."""
     x = np.clip(start, low, high)
     value, slope = evaluate(x)
-    pairs: deque[tuple[FloatArray, FloatArray]] = deque(maxlen=_MEMORY)
+    pairs: deque[_Pair] = deque(maxlen=_MEMORY)
     before = value
     for count in range(_STEPS):
         if count % _STALLED_STEPS == 0:
@@ -293,28 +305,39 @@ def _climb(
             continue
         step = trial - x
         change = slope - trial_slope
-        if float((step * change).sum()) > 0.0:
-            pairs.append((step, change))
+        product = float((step * change).sum())
+        if product > 0.0:
+            pairs.append(_Pair(step, change, product))
         x, value, slope = trial, reached, trial_slope
     return x
 
 
-def _quasi_newton_direction(
-    slope: FloatArray, pairs: deque[tuple[FloatArray, FloatArray]]
-) -> FloatArray:
+class _Pair(NamedTuple):
+    """A step with the change of the slope on it.
+
+    Attributes:
+        step: shape (2, n).
+        change: slope before less slope after, shape (2, n).
+        product: sum of step times change, positive.
+    """
+
+    step: FloatArray
+    change: FloatArray
+    product: float
+
+
+def _quasi_newton_direction(slope: FloatArray, pairs: deque[_Pair]) -> FloatArray:
     """Return the inverse Hessian times the slope, from steps and the changes of slope on them."""
     if not pairs:
         return np.asarray(slope * (_FIRST_STEP / max(float(np.abs(slope).max()), 1e-300)))
     direction = slope.copy()
     shares = []
-    for step, change in reversed(pairs):
-        share = float((step * direction).sum()) / float((step * change).sum())
+    for step, change, product in reversed(pairs):
+        share = float((step * direction).sum()) / product
         direction -= share * change
         shares.append(share)
-    step, change = pairs[-1]
-    direction *= float((step * change).sum()) / float((change * change).sum())
-    for (step, change), share in zip(pairs, reversed(shares), strict=True):
-        direction += step * (
-            share - float((change * direction).sum()) / float((step * change).sum())
-        )
+    _step, change, product = pairs[-1]
+    direction *= product / float((change * change).sum())
+    for (step, change, product), share in zip(pairs, reversed(shares), strict=True):
+        direction += step * (share - float((change * direction).sum()) / product)
     return direction

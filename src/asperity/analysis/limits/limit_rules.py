@@ -188,6 +188,18 @@ class Decision:
     top_speeds: FloatArray
 
 
+def holds_for_waves(rule: LimitRule, case: LimitCase) -> NDArray[np.bool_]:
+    """Return whether a limit holds for each wave, shape (n,); true if undecidable."""
+    number = case.device.get(rule.device_field)
+    if number is None:
+        return np.full(len(case.wavelengths), True)
+    left, right = rule.sides(case, number)
+    # A stiffness of K₀/q may exceed it by rounding; the other limits are strict.
+    if rule.number == 5:
+        return np.atleast_1d(left <= right * (1.0 + 1e-12))
+    return np.atleast_1d(left < right)
+
+
 def evaluate_limit(rule: LimitRule, case: LimitCase, inequality: str | None = None) -> Decision:
     """Return whether a limit holds, wave by wave and for all waves.
 
@@ -209,8 +221,7 @@ def evaluate_limit(rule: LimitRule, case: LimitCase, inequality: str | None = No
         return Decision(limit, np.full(n, True), np.full(n, math.inf))
     number = case.device[field]
     left, right = np.broadcast_arrays(*map(np.atleast_1d, rule.sides(case, number)))
-    # A stiffness of K₀/q may exceed it by rounding; the other limits are strict.
-    holds = left < right if on_waves else left <= right * (1.0 + 1e-12)
+    holds = holds_for_waves(rule, case)
     top = np.where(holds, math.inf, 0.0)
     if rule.top_speed is not None:
         top = rule.top_speed(case, number)
