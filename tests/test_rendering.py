@@ -12,7 +12,7 @@ from bench.stress import friction as friction_stress
 from asperity.analysis.passivity.recommended_stiffness import render_on_device
 from asperity.analysis.results.analyze import analyze
 from asperity.analysis.results.compare import compare
-from asperity.contacts.proxy_contacts import SplitContact
+from asperity.contacts.contact_kinds import SplitContact
 from asperity.core.errors import ParameterError
 from asperity.core.units import parse_quantity
 from asperity.devices import load_device

@@ -20,8 +20,8 @@ from rich.table import Table
 
 from asperity.studies.design import StudyDesign, Values
 from asperity.studies.methods import METHODS
-from asperity.studies.psychometric import SLOPE_SPREAD, USUAL_SLOPE
 from asperity.studies.simulated_participants import Observer, simulate_run
+from asperity.studies.thresholds import SLOPE_SPREAD, USUAL_SLOPE
 
 COUNT, PARTICIPANTS, RESAMPLES, SPREAD = 1000, 12, 400, 0.3
 LAWS = {"surface.law": ("A", "C", "D", "H")}

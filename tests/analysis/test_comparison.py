@@ -18,11 +18,11 @@ from asperity.devices import load_device, override_device, parse_device
 from asperity.laws import Law
 from asperity.report.pages.comparison_columns import FULL_COLUMNS, SUMMARY_COLUMNS, comparison_table
 from asperity.report.pages.comparison_report import comparison_page
-from asperity.report.sentences.comparison_text import recommended_stiffness_text
+from asperity.report.sentences.comparison_sentences import recommended_stiffness_text
 from asperity.report.sentences.limit_sentences import force_magnitude_text, press_text
-from asperity.report.sentences.number_text import leak_text as leak_cell
-from asperity.report.sentences.number_text import limit_text
 from asperity.report.sentences.passivity_sentences import stiffness_limit_text
+from asperity.report.sentences.texts import leak_text as leak_cell
+from asperity.report.sentences.texts import limit_text
 
 PAPER = asp.Sinusoid(amplitude=0.8e-3, period=1e-3)
 

@@ -460,7 +460,7 @@ def test_compare_without_arguments_asks_on_a_terminal(
     code = CliRunner().invoke(cli, ["compare"]).exit_code
     assert code == 2
     terminal = SimpleNamespace(stdin=SimpleNamespace(isatty=lambda: True))
-    monkeypatch.setattr("asperity.cli.questions.sys", terminal)
+    monkeypatch.setattr("asperity.cli.guidance.sys", terminal)
     wave = "sinusoid:amplitude=0.1mm,period=2mm"
     answers = ["?", "sinusoidd", wave, "?", "tuoch", "touch", "0.2", "0.2mm"]
     done = CliRunner().invoke(cli, ["compare"], input="\n".join([*answers, ""]))

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from asperity.export import unity
+from asperity.export import targets
 
 Call = Callable[..., tuple[int, str, str]]
 WAVE = "sinusoid:amplitude=0.1mm,period=2mm"
@@ -34,7 +34,7 @@ def test_command_writes_what_is_dropped_into_assets(call: Call, tmp_path: Path) 
     assert json.loads((folder / "Asperity.texture.asmdef").read_text())["name"] == (
         "Asperity.texture"
     )
-    has_compiler = shutil.which(unity.COMPILER) is not None
+    has_compiler = shutil.which(targets.COMPILER) is not None
     assert bool(library) == has_compiler
     assert ("Library not built" in out) != has_compiler
     code, _out, err = call("export", WAVE, "--law", "C", "--lang", "unity", "-o", str(folder))
@@ -49,9 +49,9 @@ def test_without_a_compiler_the_command_is_given(
     target = tmp_path / "Wall"
     code, out, _err = call("export", WAVE, "--law", "C", "--lang", "unity", "-o", str(target))
     assert code == 0
-    assert f"Library not built, no {unity.COMPILER} here: README.txt says how" in out
+    assert f"Library not built, no {targets.COMPILER} here: README.txt says how" in out
     text = (target / "README.txt").read_text()
-    assert f"{unity.COMPILER} -std=c99" in text
+    assert f"{targets.COMPILER} -std=c99" in text
     assert "cmake -S Source~" in text
     assert not list(target.rglob("*.dll"))
 

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from tests.studies.study_cases import answers, design_of
 
-from asperity.studies.pairs import covariance, fit_scores, pseudo_values
-from asperity.studies.psychometric import LogLevels
+from asperity.studies.methods import covariance, fit_scores, pseudo_values
 from asperity.studies.scores import mean_interval
-from asperity.studies.thresholds import Staircase
+from asperity.studies.thresholds import LogLevels, Staircase
 
 # American League 1987: games won (rows) against each other team (columns), in the order
 # Milwaukee, Detroit, Toronto, New York, Boston, Cleveland, Baltimore; A. Agresti, Categorical Data

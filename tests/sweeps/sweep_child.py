@@ -6,8 +6,7 @@ import sys
 from functools import partial
 from pathlib import Path
 
-from asperity.sweeps.engine import local_place
-from asperity.sweeps.run_sweep import run_plan
+from asperity.sweeps.run_sweep import local_place, run_plan
 from asperity.sweeps.sweep_plan import make_plan
 
 COUNTING = str(Path(__file__).with_name("counting_run.py"))

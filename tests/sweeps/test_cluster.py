@@ -17,9 +17,8 @@ from typing import Any
 import pytest
 
 from asperity.core.errors import ParameterError
-from asperity.sweeps import engine
-from asperity.sweeps.engine import LOST, local_place
-from asperity.sweeps.run_sweep import run_plan
+from asperity.sweeps import run_sweep
+from asperity.sweeps.run_sweep import LOST, local_place, run_plan
 from asperity.sweeps.sweep_plan import SweepPlan
 
 distributed: Any = pytest.importorskip("distributed", reason="not run: no distributed here")
@@ -81,7 +80,7 @@ def test_the_table_is_the_same_while_workers_are_killed_leave_and_join(
     dask: Cluster, counting_plan: MakePlan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("SWEEP_PAUSE", "0.01")  # for the workers
-    monkeypatch.setattr(engine, "TASK_TIME", 0.1)
+    monkeypatch.setattr(run_sweep, "TASK_TIME", 0.1)
     plan = counting_plan("texture.period=1mm:2mm:900")
     for _ in range(3):
         dask.add_worker()
@@ -101,7 +100,7 @@ def test_the_table_is_the_same_while_workers_are_killed_leave_and_join(
 
     thread = threading.Thread(target=disturb, daemon=True)
     thread.start()
-    place = engine.cluster_place(dask.address)
+    place = run_sweep.cluster_place(dask.address)
     result = run_plan(plan, place, tmp_path / "run", lambda part: done.__setitem__(0, part))
     thread.join()
     assert events == ["killed", "left", "joined"]
@@ -122,7 +121,7 @@ def test_errors_and_lost_workers_are_rows(
         for _ in range(3):  # two of which the crash ends
             dask.add_worker()
         dask.wait(3)
-        result = run_plan(plan, engine.cluster_place(dask.address))
+        result = run_plan(plan, run_sweep.cluster_place(dask.address))
     assert result.errors == {1: "period fails here, got 0.00125", 3: LOST}
 
 
@@ -142,7 +141,7 @@ def test_a_scheduler_that_ends_is_one_line(
         dask_config.set({"distributed.comm.timeouts.connect": "1s"}),
         pytest.raises(ParameterError, match=r"scheduler was lost .*: the same command goes on"),
     ):
-        run_plan(plan, engine.cluster_place(dask.address), tmp_path / "run", end)
+        run_plan(plan, run_sweep.cluster_place(dask.address), tmp_path / "run", end)
     assert len(run_plan(plan, local_place(1), tmp_path / "run").table_rows()) == 400
 
 
@@ -151,7 +150,7 @@ def test_a_worker_of_another_version_is_refused(dask: Cluster, counting_plan: Ma
     dask.add_worker()
     other = replace(plan, template=replace(plan.template, package="other"))
     with pytest.raises(ParameterError, match="scheduler has a worker with another version"):
-        run_plan(other, engine.cluster_place(dask.address))
+        run_plan(other, run_sweep.cluster_place(dask.address))
 
 
 def test_another_version_of_dask_is_refused(
@@ -162,20 +161,20 @@ def test_another_version_of_dask_is_refused(
     versions["scheduler"]["packages"]["distributed"] = "1.0"
     monkeypatch.setattr(distributed.Client, "get_versions", lambda _client: versions)
     with pytest.raises(ParameterError, match=r"scheduler has distributed 1\.0, this process 20"):
-        run_plan(counting_plan("texture.period=1mm,2mm"), engine.cluster_place(dask.address))
+        run_plan(counting_plan("texture.period=1mm,2mm"), run_sweep.cluster_place(dask.address))
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nowhere", "tcp://", "gopher://x:1"])
 def test_a_scheduler_that_cannot_be_reached(
     address: str, counting_plan: MakePlan, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(engine, "_CONNECT_TIME", 0.5)
+    monkeypatch.setattr(run_sweep, "_CONNECT_TIME", 0.5)
     with pytest.raises(ParameterError, match="scheduler cannot be reached") as caught:
-        run_plan(counting_plan("texture.period=1mm,2mm"), engine.cluster_place(address))
+        run_plan(counting_plan("texture.period=1mm,2mm"), run_sweep.cluster_place(address))
     assert "\n" not in str(caught.value)
 
 
 def test_without_distributed_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed.scheduler", None)
     with pytest.raises(ParameterError, match=r"pip install 'asperity\[cluster\]'"):
-        engine.cluster_place("tcp://127.0.0.1:9")
+        run_sweep.cluster_place("tcp://127.0.0.1:9")

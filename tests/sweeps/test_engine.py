@@ -23,8 +23,16 @@ from asperity.analysis.results.compare import DEFAULT_DEVICE
 from asperity.core.arguments import FIELD
 from asperity.core.errors import ParameterError
 from asperity.sweeps.case_runs import compute_cases
-from asperity.sweeps.engine import LOST, Place, local_place, run_cases
-from asperity.sweeps.run_sweep import estimate_case_time, missing_cases, open_store, run_plan
+from asperity.sweeps.run_sweep import (
+    LOST,
+    Place,
+    estimate_case_time,
+    local_place,
+    missing_cases,
+    open_store,
+    run_cases,
+    run_plan,
+)
 from asperity.sweeps.sweep_plan import SweepPlan
 from asperity.sweeps.sweep_result import CASES_FILE, ResultStore
 
@@ -320,6 +328,6 @@ def test_without_room_for_processes_this_one_computes(monkeypatch: pytest.Monkey
     def refuse(*_: Any) -> Any:
         raise OSError(30, "Read-only file system")
 
-    monkeypatch.setattr("asperity.sweeps.engine.make_pool", refuse)
+    monkeypatch.setattr("asperity.sweeps.run_sweep.make_pool", refuse)
     with local_place(2).open() as executor:
         assert executor.submit(os.getpid).result() == os.getpid()

@@ -13,11 +13,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from asperity.cli import options
+from asperity.cli.guidance import AskingCommand, design_commands, next_commands, why_hint
 from asperity.cli.main import declare_command, option_writer
-from asperity.cli.next_commands import design_commands, next_commands, why_hint
 from asperity.cli.options import GRIP, REQUESTED_STIFFNESS, SPEED
 from asperity.cli.output import Outputs, check_outputs, output_options, step_bar
-from asperity.cli.questions import AskingCommand
 from asperity.core.arguments import MAX_DEPTH, Argument
 from asperity.core.errors import ParameterError
 from asperity.laws import LAWS, REGISTERED_LAWS

@@ -215,8 +215,7 @@ def sweep_command(
     SCENE is a scene file (TOML), a texture with its arguments or a measured file. With --output,
     the same command goes on where it was stopped.
     """
-    from asperity.sweeps.engine import cluster_place, local_place
-    from asperity.sweeps.run_sweep import run_plan
+    from asperity.sweeps.run_sweep import cluster_place, local_place, run_plan
     from asperity.sweeps.sweep_plan import make_plan
 
     processes = values["jobs"]

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from asperity.contacts.contact import Contact
-from asperity.contacts.height_contacts import NOMINAL, VERTICAL
-from asperity.contacts.proxy_contacts import NEAREST, SPLIT
+from asperity.contacts.contact_kinds import NEAREST, NOMINAL, SPLIT, VERTICAL
 
 __all__ = ["CONTACTS", "Contact"]
 

@@ -32,9 +32,9 @@ from asperity.report.pages.comparison_columns import comparison_table as compari
 from asperity.report.pages.comparison_report import comparison_page, comparisons_page, design_page
 from asperity.report.pages.limits_report import envelope_page, limits_page
 from asperity.report.pages.measured_report import surface_summary_page
-from asperity.report.sentences.number_text import interval_text, readable_name, witness_text
 from asperity.report.sentences.result_texts import describe as describe
 from asperity.report.sentences.surface_text import describe_texture
+from asperity.report.sentences.texts import interval_text, readable_name, witness_text
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
 
@@ -67,7 +67,7 @@ def __dir__() -> list[str]:
 @singledispatch
 def find_page(result: Any) -> Page | None:
     """Return the page of a result; ``None`` for a result without one."""
-    from asperity.report.pages.loop_pages import (
+    from asperity.report.pages.sweep_report import (
         find_loop_page,  # needs the simulation and the paper
     )
 

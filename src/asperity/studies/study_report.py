@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 from asperity.core.units import count_text
 from asperity.report.document import page
 from asperity.report.document.page import Cell, Media, Page, Row, Section, Table, TableLayout
-from asperity.report.pages.loop_pages import find_loop_page
-from asperity.report.sentences.number_text import NOT_AVAILABLE
+from asperity.report.pages.sweep_report import find_loop_page
+from asperity.report.sentences.texts import NOT_AVAILABLE
 from asperity.studies.design import describe_source
 from asperity.studies.methods import METHODS
 from asperity.studies.simulated_participants import StudyPlan, plan

@@ -17,7 +17,7 @@ from asperity.core.units import count_text
 from asperity.studies.design import StudyDesign, TrialRecord, describe_source
 from asperity.studies.methods import EXCLUSIONS, METHODS
 from asperity.studies.scores import Interval, Score
-from asperity.sweeps.table_files import TableFiles
+from asperity.sweeps.sweep_result import TableFiles
 
 SCHEMA = 1
 POOLED = "pooled"

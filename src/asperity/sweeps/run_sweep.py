@@ -1,19 +1,30 @@
-"""Sweep a scene: compute all cases of a plan that are not in its results folder."""
+"""Sweep a scene: compute all cases of a plan that are not in its results folder.
+
+Cases are submitted to an executor, and what comes back is recorded: computed in this process, in
+processes of this machine, or by the workers of Dask's distributed scheduler.
+"""
 
 from __future__ import annotations
 
+import logging
 import os
 import tempfile
+import time
 import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
+from contextlib import AbstractContextManager, contextmanager, suppress
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import islice
 from pathlib import Path
+from queue import SimpleQueue
 from typing import Any
 
 from asperity.core.arguments import check_integer
 from asperity.core.errors import ParameterError
-from asperity.core.processes import available_cores
-from asperity.sweeps.case_runs import Case, Outcome, compute_cases
-from asperity.sweeps.engine import Place, cluster_place, local_place, run_cases
+from asperity.core.processes import available_cores, end_pool, make_pool
+from asperity.sweeps.case_runs import Case, CaseTemplate, Outcome, compute_cases
 from asperity.sweeps.sweep_plan import SweepPlan, make_plan
 from asperity.sweeps.sweep_result import ResultStore, SweepResult
 
@@ -52,7 +63,7 @@ def sweep(
         processes: number of worker processes; 1 for none; default: one per core. A script that
             starts some needs the usual ``if __name__ == "__main__":``.
         scheduler: address of a scheduler of Dask, whose workers compute instead; see
-            :func:`~asperity.sweeps.engine.cluster_place`.
+            :func:`~asperity.sweeps.run_sweep.cluster_place`.
         progress: called with the completed fraction of the cases that were left.
         **options: further arguments of :func:`asperity.compare`, :func:`asperity.limits`,
             :func:`asperity.onset` or :func:`asperity.scan`.
@@ -125,3 +136,235 @@ def estimate_case_time(plan: SweepPlan) -> float:
     """
     compute_cases(plan.template, [(0, plan.values(0))])
     return compute_cases(plan.template, [(len(plan) - 1, plan.values(len(plan) - 1))])[0]
+
+
+Record = Callable[[Sequence[Outcome]], None]
+TASKS_PER_WORKER = 4
+"""Tasks that are submitted at a time, so that no worker waits for the next."""
+MAX_CASES_PER_TASK = 4096
+LOST = "its worker process ended: killed, crashed or out of memory"
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where cases are computed.
+
+    Attributes:
+        open: returns a context of the executor that computes them.
+        n_tasks: returns the number of tasks to be submitted at a time.
+        task_time: returns the time that a task is to take at least [s], so that its own cost does
+            not count; 0 for one case per task.
+        lost: error of a task whose worker process ended.
+    """
+
+    open: Callable[[], AbstractContextManager[Executor]]
+    n_tasks: Callable[[], int] = lambda: 1
+    task_time: Callable[[], float] = lambda: 0.0
+    lost: type[Exception] = BrokenExecutor
+
+
+class SerialExecutor(Executor):
+    """Executor that computes a task in this process, when it is submitted."""
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Return the future of a task that is done."""
+        future: Future[Any] = Future()
+        future.set_result(fn(*args, **kwargs))
+        return future
+
+
+def local_place(processes: int) -> Place:
+    """Return worker processes on this machine; for one process, this one."""
+    if processes == 1:
+        return Place(SerialExecutor)
+    return Place(lambda: _open_pool(processes), lambda: TASKS_PER_WORKER * processes)
+
+
+@contextmanager
+def _open_pool(processes: int) -> Iterator[Executor]:
+    """Open a pool of processes, which end at once if the block ends with an error."""
+    from multiprocessing import active_children
+
+    others = set(active_children())
+    pool = None
+    with suppress(OSError):  # no room for semaphores, as in some containers
+        pool = make_pool(processes)
+    if pool is None:
+        yield SerialExecutor()
+        return
+    try:
+        try:
+            pool.submit(int).result()
+        except BrokenExecutor:
+            words = "end when they start: a script needs  if __name__ == '__main__':  around sweep"
+            raise ParameterError("processes", words) from None
+        yield pool
+        pool.shutdown()
+    except BaseException:  # also for an interrupt
+        end_pool(pool, others)
+        raise
+
+
+def run_cases(place: Place, template: CaseTemplate, cases: Iterator[Case], record: Record) -> None:
+    """Compute cases and record each when it is done, in any order.
+
+    A case whose worker process ends is computed once more alone; if that process ends too, its
+    outcome is an error.
+
+    Args:
+        place: where to compute.
+        template: what the cases share.
+        cases: number and values of each.
+        record: called in this thread with outcomes.
+    """
+    while lost := _run_until_lost(place, template, cases, record, place.n_tasks):
+        alone = iter(lost)
+        while culprits := _run_until_lost(place, template, alone, record, lambda: 1):
+            record([Outcome(index, error=LOST) for index, _ in culprits])
+
+
+def _run_until_lost(
+    place: Place,
+    template: CaseTemplate,
+    cases: Iterator[Case],
+    record: Record,
+    n_tasks: Callable[[], int],
+) -> list[Case]:
+    """Compute cases until a worker process ends; return the cases that are lost."""
+    lost: list[Case] = []
+    tasks: dict[Future[Any], list[Case]] = {}
+    done = SimpleQueue[Future[Any]]()
+    size = 1
+    with place.open() as executor:
+        while True:
+            while not lost and len(tasks) < n_tasks() and (batch := list(islice(cases, size))):
+                future = _submit(executor, place, template, batch)
+                tasks[future] = batch
+                future.add_done_callback(done.put)
+            if not tasks:
+                return lost
+            future = done.get()
+            batch = tasks.pop(future)
+            try:
+                seconds, outcomes = future.result()
+            except place.lost:
+                lost += batch
+                continue
+            record(outcomes)
+            ideal = place.task_time() * len(batch) / max(seconds, 1e-9)
+            size = max(1, min(MAX_CASES_PER_TASK, round(ideal)))
+
+
+def _submit(
+    executor: Executor, place: Place, template: CaseTemplate, batch: list[Case]
+) -> Future[Any]:
+    try:
+        return executor.submit(compute_cases, template, batch)
+    except place.lost as error:
+        future: Future[Any] = Future()
+        future.set_exception(error)
+        return future
+
+
+TASK_TIME = 0.5
+TASK_TIME_PER_WORKER = 2e-3
+"""Time that a task is to take at least [s]: all workers together then finish at most 500 tasks in a
+second, half of what the scheduler manages (0.2 to 1 ms for each)."""
+_CONNECT_TIME = 10.0
+_MAX_TASKS = 10_000
+
+
+def cluster_place(address: str) -> Place:
+    """Return the workers of a scheduler of Dask.
+
+    Workers may join and leave while cases are computed; a task of a worker that ends is computed by
+    another. A worker with another version of asperity is an error.
+
+    Args:
+        address: "tcp://host:8786", or as for ``distributed.Client``.
+
+    Raises:
+        ParameterError: if distributed is not installed.
+    """
+    try:
+        from distributed.scheduler import KilledWorker
+    except ImportError:
+        words = "needs Dask's distributed: pip install 'asperity[cluster]'"
+        raise ParameterError("scheduler", words) from None
+    clients: list[Any] = []
+
+    @contextmanager
+    def connect() -> Iterator[Executor]:
+        with _connect(address) as client:
+            clients[:] = [client]
+            yield _ClientExecutor(client)
+
+    @lru_cache(maxsize=1)
+    def count_workers(_second: int) -> int:
+        return len(clients[0].scheduler_info(n_workers=-1)["workers"])
+
+    def workers() -> int:
+        return max(1, count_workers(int(time.monotonic())))  # asked for once a second
+
+    return Place(
+        connect,
+        lambda: min(_MAX_TASKS, TASKS_PER_WORKER * workers()),
+        lambda: max(TASK_TIME, TASK_TIME_PER_WORKER * workers()),
+        KilledWorker,
+    )
+
+
+class _ClientExecutor(Executor):
+    """Executor of a client; that of Dask fails at times for a result that was lost with a worker.
+
+    Args:
+        client: of a scheduler.
+    """
+
+    def __init__(self, client: Any) -> None:
+        self._client = client
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Return the future of a task that any worker computes."""
+        future: Future[Any] = Future()
+        remote = self._client.submit(fn, *args, pure=False, **kwargs)
+        self._client.loop.add_callback(self._copy_result, remote, future)
+        return future
+
+    async def _copy_result(self, remote: Any, future: Future[Any]) -> None:
+        try:
+            future.set_result(await self._client.gather(remote, asynchronous=True))
+        except BaseException as error:  # also a cancelled task
+            future.set_exception(error)
+
+
+@contextmanager
+def _connect(address: str) -> Iterator[Any]:
+    """Open a client whose scheduler has the same versions."""
+    from distributed import Client
+
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # its messages are not for the user
+    try:
+        client = Client(address, timeout=_CONNECT_TIME, set_as_default=False)
+        versions = client.get_versions()
+    except (OSError, ValueError, TypeError) as error:
+        words = f"cannot be reached: {' '.join(str(error).split())[:200]}"
+        raise ParameterError("scheduler", words, address) from None
+    with client:
+        _check_versions(versions)
+        try:
+            yield client
+        except (CancelledError, OSError) as error:
+            words = f"was lost ({type(error).__name__}): the same command goes on from here"
+            raise ParameterError("scheduler", words, address) from None
+
+
+def _check_versions(versions: dict[str, Any]) -> None:
+    """Check that scheduler and workers have the Python and the Dask of this process."""
+    expected = versions["client"]["packages"]
+    for other in (versions["scheduler"], *versions["workers"].values()):
+        packages = other["packages"] if other else {}
+        for name in ("python", "distributed", "msgpack", "cloudpickle"):
+            if packages.get(name) != expected[name]:
+                words = f"has {name} {packages.get(name)}, this process {expected[name]}"
+                raise ParameterError("scheduler", words)

@@ -11,7 +11,7 @@ import pytest
 from asperity.analysis import loop_work
 from asperity.analysis.energy.field_energy import anchored_segments
 from asperity.contacts.contact import Contact
-from asperity.contacts.height_contacts import VerticalContact
+from asperity.contacts.contact_kinds import VerticalContact
 from asperity.core.arguments import Argument
 from asperity.laws import LAWS, Law
 from asperity.surface import Surface

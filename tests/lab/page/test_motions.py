@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 from tests.lab.browser import Browser, needs_browser
 
-from asperity.report.sentences.number_text import limit_text
+from asperity.report.sentences.texts import limit_text
 
 FED = "document.getElementById('energy-card').classList.contains('supplies-energy')"
 QUIET = "The limit is conservative for this hand: in "

@@ -9,7 +9,7 @@ from tests.lab.page.test_motions import render
 
 import asperity as asp
 from asperity.lab.scene_state import make_scene_state
-from asperity.report.sentences.number_text import limit_text
+from asperity.report.sentences.texts import limit_text
 from asperity.scene import load_scene
 
 DEPTH = 1e-6 * round(random.uniform(300.0, 340.0), 3)

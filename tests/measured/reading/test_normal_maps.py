@@ -14,10 +14,9 @@ import asperity as asp
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.export.surface_maps import normal_png, sample_map
-from asperity.measured import slopes
 from asperity.measured.preparation import prepare
-from asperity.measured.reading import read_surface
-from asperity.measured.slopes import integrate_slopes
+from asperity.measured.reading import normal_map, read_surface
+from asperity.measured.reading.normal_map import integrate_slopes
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "writers"))
 from image_writer import write_png, write_tiff
@@ -120,7 +119,7 @@ def test_a_map_that_does_not_repeat_is_mirrored() -> None:
     centred = heights - heights.mean()
     assert np.abs(found.heights - centred).max() < 0.02 * np.ptp(heights)
     # Negative control: taken as one period, the same slopes give other heights.
-    forced = slopes._solve(along_x, along_y, is_periodic=True).heights
+    forced = normal_map._solve(along_x, along_y, is_periodic=True).heights
     assert np.abs(forced - centred).max() > 0.2 * np.ptp(heights)
 
 

@@ -14,8 +14,8 @@ from asperity.devices import parse_device
 from asperity.report import comparison_table, html_text
 from asperity.report.pages.comparison_report import comparison_page
 from asperity.report.pictures.plotting import plot
-from asperity.report.sentences.number_text import limit_text
 from asperity.report.sentences.surface_text import describe_texture
+from asperity.report.sentences.texts import limit_text
 from asperity.textures.catalogue import CATALOGUE
 
 TEXTURE = asp.Sinusoid(amplitude=0.2e-3, period=2e-3)

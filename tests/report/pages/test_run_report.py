@@ -12,7 +12,7 @@ from tests.report.report_pages import terminal
 from asperity.report.document.html import render_page
 from asperity.report.pages.run_report import ledger_rows, run_page
 from asperity.report.sentences.loop_text import closure_text, run_answer
-from asperity.report.sentences.number_text import energy_text
+from asperity.report.sentences.texts import energy_text
 from asperity.scene import load_scene
 from asperity.scene.setup import Setup, make_setup
 from asperity.simulation import Run

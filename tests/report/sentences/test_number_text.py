@@ -6,7 +6,7 @@ import math
 import random
 
 from asperity.analysis.bounds.bound import Bound
-from asperity.report.sentences.number_text import (
+from asperity.report.sentences.texts import (
     interval_text,
     lower_bound_text,
     range_text,

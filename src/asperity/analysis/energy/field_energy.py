@@ -17,7 +17,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from asperity.contacts.proxy_contacts import SPLIT
+from asperity.contacts.contact_kinds import SPLIT
 from asperity.core.checks import FloatArray, check_array, check_points, check_positive
 from asperity.core.errors import ParameterError
 from asperity.core.units import format_quantity

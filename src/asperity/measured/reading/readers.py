@@ -280,8 +280,9 @@ def read_surface(
 
     Returns:
         The heights [m] of the file, and the pitch if the file has one. Heights of images have no
-        unit: ``relative`` is True, and the pitch None. Those of a normal map follow from its slopes
-        (:func:`asperity.measured.slopes.integrate_slopes`) and are in units of the pitch.
+        unit: ``relative`` is True, and the pitch None. Those of a normal map follow from its
+        slopes (:func:`asperity.measured.reading.normal_map.integrate_slopes`), in units of the
+        pitch.
 
     Raises:
         SurfaceFileError: the file cannot be read, with the reason.

@@ -14,8 +14,7 @@ from enum import Flag, auto
 from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from asperity.report.sentences.number_text import yes_no_text
-from asperity.report.sentences.texts import figure_text
+from asperity.report.sentences.texts import figure_text, yes_no_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -15,7 +15,7 @@ from asperity.laws.clamps import NONE
 from asperity.report.document import page
 from asperity.report.document.page import HEADED, Cell, Media, Row, Section, Table, TableLayout
 from asperity.report.pages.catalogue_report import device_numbers_table
-from asperity.report.sentences import number_text
+from asperity.report.sentences import texts
 from asperity.report.sentences.analysis_text import (
     bound_notes,
     computed_bounds,
@@ -53,9 +53,9 @@ def leak_facts(analysis: Analysis) -> list[tuple[str, str]]:
     direction = ", ".join([f"{float(part) + 0.0:.6g}" for part in line.direction])
     start = ", ".join([f"{1e3 * float(part) + 0.0:.6g}" for part in line.start])
     plane = f"vertical, along ({direction}) through ({start}) mm"
-    energy = number_text.NOT_AVAILABLE
+    energy = texts.NOT_AVAILABLE
     if not math.isnan(leak.energy):
-        energy = number_text.range_text(leak.energy, leak.upper_per_period, "J")
+        energy = texts.range_text(leak.energy, leak.upper_per_period, "J")
         energy += f" per traversal ({leak.method})"
     facts = [
         ("energy", energy),
@@ -78,7 +78,7 @@ def leak_facts(analysis: Analysis) -> list[tuple[str, str]]:
         facts.append(("greatest W/length", loop))
     facts += [("v*", critical_speed_text(analysis)), ("thrust", thrust_text(analysis))]
     if density is not None and density.upper > 0.0:
-        area = number_text.range_text(density.lower, density.upper, "J/m²")
+        area = texts.range_text(density.lower, density.upper, "J/m²")
         facts.append(("small loops", f"gain at most {area}: the greatest |curl f|"))
     return facts
 
@@ -87,17 +87,17 @@ def merit_facts(analysis: Analysis) -> list[tuple[str, str]]:
     """Return strength, support and force on the scan that compares laws."""
     scan = analysis.merit
     surface = analysis.surface
-    strength = number_text.merit_text(scan.strength)
+    strength = texts.merit_text(scan.strength)
     if not surface.texture.scan_line().periodic:
         strength += " m"
     facts = [
         ("strength T", strength),
-        ("support S", number_text.merit_text(scan.support)),
+        ("support S", texts.merit_text(scan.support)),
         ("RMS force", f"{format_quantity(scan.ripple * surface.stiffness, 'N')} RMS at this k"),
         ("height", f"z = {format_quantity(scan.height, 'm')}"),
     ]
     if analysis.friction_force is not None:
-        facts.append(("friction", number_text.friction_force_text(analysis.friction_force)))
+        facts.append(("friction", texts.friction_force_text(analysis.friction_force)))
     if scan.contact_lost > 0.0:
         facts.append(("no contact", f"on {100.0 * scan.contact_lost:.0f} % of the scan"))
     return facts
@@ -114,11 +114,8 @@ def bounds_table(analysis: Analysis) -> Table:
         bounds.append(("|curl f| [N/m]", density))
     rows = []
     for name, bound in bounds:
-        ends = [
-            number_text.lower_bound_text(bound.lower),
-            number_text.upper_bound_text(bound.upper),
-        ]
-        rows.append(Row([Cell(name, "l"), *ends, bound.method, number_text.witness_text(bound)]))
+        ends = [texts.lower_bound_text(bound.lower), texts.upper_bound_text(bound.upper)]
+        rows.append(Row([Cell(name, "l"), *ends, bound.method, texts.witness_text(bound)]))
     return Table(_BOUND_HEADINGS, rows, (1, 2), TableLayout(wrap=(4,)))
 
 
@@ -131,8 +128,8 @@ def criteria_table(passivity: Passivity) -> Table:
             Cell(criterion.name, "l"),
             Cell(criterion.formula, "line"),
             page.holds_cell(criterion.holds),
-            number_text.limit_text(criterion.limit),
-            number_text.margin_text(criterion.margin),
+            texts.limit_text(criterion.limit),
+            texts.margin_text(criterion.margin),
             Cell(criterion.conclusion, subtext=criterion.assumptions),
         ]
         style = "dim" if criterion.holds is None else ""
@@ -143,9 +140,9 @@ def criteria_table(passivity: Passivity) -> Table:
 def _jumps_table(analysis: Analysis) -> Table:
     """Return one row per depth at which a jump was located."""
     jumps = analysis.continuity.jumps
-    depths = number_text.format_in_one_unit([jump.depth for jump in jumps], "m")
-    sizes = number_text.format_in_one_unit([jump.size for jump in jumps], "N")
-    places = [number_text.position_text(jump.before) for jump in jumps]
+    depths = texts.format_in_one_unit([jump.depth for jump in jumps], "m")
+    sizes = texts.format_in_one_unit([jump.size for jump in jumps], "N")
+    places = [texts.position_text(jump.before) for jump in jumps]
     rows = [Row(cells) for cells in zip(depths, sizes, places, strict=True)]
     return Table(_JUMP_HEADINGS, rows, (0, 1), TableLayout(wrap=(2,)))
 
@@ -194,19 +191,19 @@ def _facts(analysis: Analysis) -> list[tuple[str, str]]:
     return [
         ("Surface", str(surface.texture.describe()["kind"])),
         ("Peak to valley", format_quantity(surface.texture.peak_to_valley, "m")),
-        ("Law", f"{surface.law.letter}, {number_text.readable_name(surface.law.name)}"),
+        ("Law", f"{surface.law.letter}, {texts.readable_name(surface.law.name)}"),
         ("Device", analysis.device.name),
         ("Stiffness", f"{surface.stiffness:g} N/m"),
         ("Pressed to", format_quantity(surface.max_depth, "m")),
-        ("Characteristic number q", number_text.interval_text(analysis.q)),
-        (f"Greatest stiffness by {decisive.name}", number_text.limit_text(decisive.limit)),
+        ("Characteristic number q", texts.interval_text(analysis.q)),
+        (f"Greatest stiffness by {decisive.name}", texts.limit_text(decisive.limit)),
     ]
 
 
 def _bounds_section(analysis: Analysis) -> Section:
     law = analysis.surface.law
     return Section(
-        f"Law {law.letter}, {number_text.readable_name(law.name)}: suprema over the working region",
+        f"Law {law.letter}, {texts.readable_name(law.name)}: suprema over the working region",
         [bounds_table(analysis)],
         notes=bound_notes(analysis),
         media=_MEDIA | Media.NOTEBOOK,
@@ -244,10 +241,10 @@ def _figure_sections(analysis: Analysis, *names: str) -> list[Section]:
     """Return the figures of these names."""
     sections = []
     leak = analysis.leak
-    gained = number_text.range_text(leak.energy, leak.upper_per_period, "J")
+    gained = texts.range_text(leak.energy, leak.upper_per_period, "J")
     values: dict[str, object] = {
         "letter": analysis.surface.law.letter,
-        "q": number_text.interval_text(analysis.q),
+        "q": texts.interval_text(analysis.q),
         "loop": "",
     }
     if len(leak.vertices):
@@ -284,7 +281,7 @@ def reproduction_lines(analysis: Analysis, texture_code: str = "") -> list[str]:
     lines.append(f"s = asp.Surface({texture}, {_surface_arguments(surface)})")
     evaluation = _evaluate_witness(analysis)
     if evaluation is None:
-        q = number_text.interval_text(analysis.q)
+        q = texts.interval_text(analysis.q)
         return [*lines, f"print(asp.characteristic_number(s))  # {q}, {analysis.q.method}"]
     point, value, remark = evaluation
     arguments = f"[{[float(v) for v in point]}]"

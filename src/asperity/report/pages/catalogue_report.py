@@ -29,9 +29,8 @@ from asperity.report.sentences.analysis_text import (
     verified_text,
     wall_test_text,
 )
-from asperity.report.sentences.number_text import readable_name
 from asperity.report.sentences.surface_text import argument_text, arguments_text, unit_name
-from asperity.report.sentences.texts import table_notes
+from asperity.report.sentences.texts import readable_name, table_notes
 from asperity.textures.catalogue import CATALOGUE
 from asperity.textures.kinds.named_surfaces import LIBRARY
 from asperity.textures.texture import Texture, TextureKind

@@ -27,7 +27,7 @@ from asperity.report.sentences.answer_sentences import (
     recommendation_text,
 )
 from asperity.report.sentences.assumption_sentences import comparison_defaults
-from asperity.report.sentences.comparison_text import (
+from asperity.report.sentences.comparison_sentences import (
     case_title,
     design_answer,
     field_alt_text,
@@ -42,9 +42,15 @@ from asperity.report.sentences.comparison_text import (
     surface_alt_text,
 )
 from asperity.report.sentences.limit_sentences import percent
-from asperity.report.sentences.number_text import NOT_AVAILABLE, bound_text, position_text
 from asperity.report.sentences.surface_text import describe_texture, texture_name
-from asperity.report.sentences.texts import column_meanings, figure_text, glossary
+from asperity.report.sentences.texts import (
+    NOT_AVAILABLE,
+    bound_text,
+    column_meanings,
+    figure_text,
+    glossary,
+    position_text,
+)
 
 _FOOTER = f"{page.PAPER_CITATION}. {page.NO_PERCEPTUAL_TEST}"
 

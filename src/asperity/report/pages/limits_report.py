@@ -31,9 +31,15 @@ from asperity.report.sentences.analysis_text import (
     symbol_lines,
 )
 from asperity.report.sentences.limit_sentences import speed_text, texture_amount_text
-from asperity.report.sentences.number_text import readable_name, side_text, yes_no_text
 from asperity.report.sentences.surface_text import texture_name
-from asperity.report.sentences.texts import figure_text, glossary, table_notes
+from asperity.report.sentences.texts import (
+    figure_text,
+    glossary,
+    readable_name,
+    side_text,
+    table_notes,
+    yes_no_text,
+)
 
 _LIMIT_HEADINGS = ("", "limit", "condition", "left", "right", "holds", "for", "at speeds")
 _NAME_COLUMN = 1

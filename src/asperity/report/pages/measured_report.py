@@ -28,7 +28,6 @@ from asperity.report.document.page import (
     Table,
     TableLayout,
 )
-from asperity.report.sentences.number_text import NOT_AVAILABLE, decimal_text
 from asperity.report.sentences.surface_text import (
     lay_text,
     measurement_answer,
@@ -38,7 +37,7 @@ from asperity.report.sentences.surface_text import (
     surface_summary_text,
     texture_text,
 )
-from asperity.report.sentences.texts import sentence_case
+from asperity.report.sentences.texts import NOT_AVAILABLE, decimal_text, sentence_case
 from asperity.textures.fields.potential_field import PotentialField
 from asperity.textures.texture import Texture
 

@@ -49,7 +49,6 @@ from asperity.report.document.page import (
 from asperity.report.pages import sweep_report
 from asperity.report.pictures import paper_pictures
 from asperity.report.pictures.loop_pictures import onset_figure
-from asperity.report.sentences.number_text import energy_text, number_text
 from asperity.report.sentences.paper_text import (
     VERDICT_TEXTS,
     evidence_text,
@@ -59,7 +58,13 @@ from asperity.report.sentences.paper_text import (
     verdict_counts_text,
     wall_summary_text,
 )
-from asperity.report.sentences.texts import sentence, sentence_case, table_notes
+from asperity.report.sentences.texts import (
+    energy_text,
+    number_text,
+    sentence,
+    sentence_case,
+    table_notes,
+)
 
 
 def claims_page(

@@ -40,8 +40,8 @@ from asperity.report.sentences.loop_text import (
     surface_metadata,
     timing_lines,
 )
-from asperity.report.sentences.number_text import NOT_AVAILABLE, energy_text, readable_name
 from asperity.report.sentences.surface_text import describe_texture, texture_name
+from asperity.report.sentences.texts import NOT_AVAILABLE, energy_text, readable_name
 from asperity.scene.setup import Setup
 from asperity.servo.calibration.calibrator import AxisCalibration, Calibration
 from asperity.servo.calibration.measured_device import format_uncertainty

@@ -1,4 +1,7 @@
-"""Reports of sweeps: ranges over cases, onsets of limit cycles, energy per stroke over speed."""
+"""Reports of sweeps: ranges over cases, onsets of limit cycles, energy per stroke over speed.
+
+Also the table of pages of such results, which a comparison need not import.
+"""
 
 from __future__ import annotations
 
@@ -6,22 +9,35 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import partial, singledispatch
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 from asperity.core.units import count_text, format_quantity
+from asperity.paper.table_two import TableTwo
+from asperity.recording.recording import Recording
+from asperity.recording.replay import Replay
 from asperity.report.document import page
-from asperity.report.document.page import Cell, Cells, Media, Page, Row, Section, Table, TableLayout
+from asperity.report.document.page import (
+    Cell,
+    Cells,
+    Media,
+    Page,
+    Row,
+    Section,
+    Table,
+    TableLayout,
+    notebook_page,
+)
+from asperity.report.pages import run_report
 from asperity.report.pages.run_report import LOOP_FOOTER, loop_facts
-from asperity.report.sentences.loop_text import onset_answer, stroke_answer
-from asperity.report.sentences.number_text import NOT_AVAILABLE, millijoules, number_text
-from asperity.report.sentences.texts import table_notes
+from asperity.report.sentences.loop_text import onset_answer, stroke_answer, work_text
+from asperity.report.sentences.texts import NOT_AVAILABLE, millijoules, number_text, table_notes
 from asperity.scene.sweeps import OnsetSweep, StrokeSweep
+from asperity.simulation import Run
 from asperity.simulation.onset import Prediction
 from asperity.simulation.scan import Stroke
-from asperity.sweeps.sweep_result import CASE, SweepResult
-from asperity.sweeps.table_files import UNIT
+from asperity.sweeps.sweep_result import CASE, UNIT, SweepResult
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -260,3 +276,29 @@ def _error_tables(result: SweepResult) -> list[Table]:
     rows = [Row([str(count), str(firsts[error]), error]) for error, count in counts]
     headings = ("cases", f"first {CASE}", "error")
     return [Table(headings, rows, (0, 1), TableLayout(wrap=(2,)))]
+
+
+@singledispatch
+def find_loop_page(_result: Any) -> Page | None:
+    """Return the page of a result; ``None`` for a result without one."""
+    return None
+
+
+find_loop_page.register(Recording, run_report.recording_page)
+find_loop_page.register(Replay, run_report.replay_page)
+find_loop_page.register(OnsetSweep, onset_page)
+find_loop_page.register(StrokeSweep, strokes_page)
+find_loop_page.register(SweepResult, sweep_page)
+
+
+@find_loop_page.register
+def _run_page(result: Run) -> Page:
+    answer = f"{work_text(result.surface, result)}."
+    page = notebook_page(answer, run_report.ledger_table(result))
+    return Page("", answer, (), [*page.sections, *run_report.figure_sections(result)])
+
+
+@find_loop_page.register
+def _table_two_page(result: TableTwo) -> Page:
+    head, *rows = result.cells()
+    return notebook_page(result.parameters, Table(head, [Row(cells) for cells in rows]))

@@ -22,7 +22,7 @@ from asperity.core.units import format_quantity
 from asperity.report.pictures import analysis_windows, law_pictures, style
 from asperity.report.pictures.scan_plane import CurlField, curl_field
 from asperity.report.sentences.analysis_text import gain_remark
-from asperity.report.sentences.number_text import interval_text, range_text
+from asperity.report.sentences.texts import interval_text, range_text
 
 FigureArea = Figure | SubFigure
 

@@ -21,7 +21,7 @@ from asperity.analysis.results.compare import Comparison
 from asperity.analysis.results.recommendation import LawRow
 from asperity.core.units import format_quantity
 from asperity.report.pictures import scan_plane, style
-from asperity.report.sentences.number_text import bound_text, number_text, strength_has_unit
+from asperity.report.sentences.texts import bound_text, number_text, strength_has_unit
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
 

@@ -16,9 +16,8 @@ from asperity.paper.cycle_experiments import CycleCount, PassivityExperiment, bu
 from asperity.paper.experiments import BumpExperiment, Experiments, ScanningExperiment
 from asperity.paper.figures import ForceField, LoopEnergy, force_fields, loop_energies
 from asperity.report.pictures import style
-from asperity.report.sentences.number_text import readable_name
 from asperity.report.sentences.paper_text import loop_energy_text
-from asperity.report.sentences.texts import table_notes
+from asperity.report.sentences.texts import readable_name, table_notes
 from asperity.simulation.onset import Prediction
 
 _COLUMNS = 4

@@ -25,7 +25,7 @@ from asperity.report.pictures.device_pictures import (
 )
 from asperity.report.pictures.loop_pictures import recording_figure, run_figure
 from asperity.report.pictures.surface_pictures import draw_surface, surface_size
-from asperity.report.sentences.comparison_text import conservation_remarks
+from asperity.report.sentences.comparison_sentences import conservation_remarks
 from asperity.simulation import Run
 from asperity.surface import Surface
 from asperity.textures.texture import Texture

@@ -21,7 +21,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import FuncFormatter
 
 from asperity.laws import Law
-from asperity.report.sentences.number_text import readable_name
+from asperity.report.sentences.texts import readable_name
 
 BACKGROUND = "#ffffff"
 """Background of every picture."""

@@ -14,14 +14,14 @@ from asperity.envelopes.envelope import DeviceEnvelope, LawEnvelope
 from asperity.envelopes.wave_borders import WaveBorders
 from asperity.report.sentences import limit_sentences
 from asperity.report.sentences.limit_sentences import speed_text
-from asperity.report.sentences.number_text import (
+from asperity.report.sentences.texts import (
     FRICTION_PROOF,
     INFINITY_SIGN,
     NOT_AVAILABLE,
     interval_text,
+    sentence,
     yes_no_text,
 )
-from asperity.report.sentences.texts import sentence
 
 _SYMBOLS = {
     "T": "update_rate",

@@ -25,7 +25,6 @@ from asperity.report.sentences.limit_sentences import (
     unknown_frequencies_text,
     unverified_text,
 )
-from asperity.report.sentences.number_text import FRICTION_PROOF
 from asperity.report.sentences.passivity_sentences import (
     buzz_text,
     delay_clause,
@@ -35,7 +34,7 @@ from asperity.report.sentences.passivity_sentences import (
     update_rate_text,
 )
 from asperity.report.sentences.surface_text import describe_texture
-from asperity.report.sentences.texts import sentence_case
+from asperity.report.sentences.texts import FRICTION_PROOF, sentence_case
 
 
 def recommendation_text(

@@ -28,7 +28,6 @@ from asperity.report.sentences.limit_sentences import (
     speed_text,
     stiffness_text,
 )
-from asperity.report.sentences.number_text import loss_text
 from asperity.report.sentences.passivity_sentences import (
     buzz_text,
     damping_assumption,
@@ -38,6 +37,7 @@ from asperity.report.sentences.passivity_sentences import (
     stiffness_limit_text,
     update_rate_text,
 )
+from asperity.report.sentences.texts import loss_text
 from asperity.surface import Surface, default_max_depth
 from asperity.textures.texture import Texture
 

@@ -12,9 +12,8 @@ from asperity.devices import Device
 from asperity.recording.recorded_field import LimitCounts
 from asperity.recording.recording import Recording
 from asperity.recording.replay import Replay, recorded_limits
-from asperity.report.sentences.number_text import energy_text
 from asperity.report.sentences.surface_text import describe_texture
-from asperity.report.sentences.texts import sentence
+from asperity.report.sentences.texts import energy_text, sentence
 from asperity.scene.doctor import MachineReport
 from asperity.scene.setup import Setup
 from asperity.servo.calibration.calibrator import Calibration

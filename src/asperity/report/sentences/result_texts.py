@@ -21,15 +21,15 @@ from asperity.report.sentences import (
     assumption_sentences,
     comparison_sentences,
     limit_sentences,
-    number_text,
     passivity_sentences,
+    texts,
 )
 from asperity.surface import Surface
 
 _TEXTS: dict[tuple[type, str], Callable[[Any], Any]] = {
     (Analysis, "answer"): assumption_sentences.analysis_answer,
     (Analysis, "assumptions"): assumption_sentences.analysis_assumptions,
-    (Bound, "interval"): number_text.interval_text,
+    (Bound, "interval"): texts.interval_text,
     (Comparison, "recommendation"): answer_sentences.recommendation_text,
     (Comparison, "reasons"): answer_sentences.recommendation_reasons,
     (Comparison, "assumptions"): assumption_sentences.comparison_assumptions,

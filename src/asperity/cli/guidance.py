@@ -1,21 +1,105 @@
-"""Commands to type next, below the answer of a command, ready to paste."""
+"""Questions of ``asperity compare`` on a terminal, and commands to type next."""
 
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping
+import sys
+from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cli.main import repeat_options, write_option
+from asperity.cli.main import HeadedCommand, repeat_options, write_option
+from asperity.cli.options import option_help, parse_devices
+from asperity.core.arguments import MAX_DEPTH
+from asperity.core.errors import AsperityError, ParameterError
 from asperity.core.units import format_quantity
 from asperity.laws import registered_arguments
+from asperity.measured.file_arguments import FILE_ARGUMENTS
 
 if TYPE_CHECKING:
     from asperity.analysis.results.compare import Comparison
     from asperity.analysis.results.recommendation import LawRow
     from asperity.envelopes.find_design import Design
+
+_FILE_ARGUMENTS = {argument.name: argument for argument in FILE_ARGUMENTS}
+
+
+class AskingCommand(HeadedCommand):
+    """Command that asks for its arguments on a terminal, if there are none."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Parse the arguments, or the answers, which are shown as a command."""
+        if not args and sys.stdin.isatty():
+            args = ask_arguments()
+            click.echo(f"asperity {self.name} {shlex.join(args)}", err=True)
+        return super().parse_args(ctx, args)
+
+
+def ask_arguments() -> list[str]:
+    """Return surface, device and depth as typed arguments; each answer is checked at once."""
+    from asperity.devices import device_names
+    from asperity.textures.catalogue import CATALOGUE
+
+    surface = _ask("Surface: a kind, a name, or a file; ? lists them", "cloth", CATALOGUE, _check)
+    arguments = [surface]
+    values: dict[str, Any] = {}
+    while (missing := _find_missing(surface, values)) is not None:
+        argument = _FILE_ARGUMENTS[missing.argument]
+        click.echo(str(missing), err=True)
+        text = _ask(
+            option_help(argument), argument.example or None, argument.choices, argument.parse
+        )
+        values[argument.name] = argument.parse(text)
+        arguments += [f"--{argument.name.replace('_', '-')}", text]
+    question = "Device of the catalogue, or a TOML file; ? lists them"
+    arguments += ["--device", _ask(question, "omega.3", device_names(), parse_devices)]
+    depth = _ask("Greatest depth, such as 0.5mm, or Enter", "", (), _check_depth)
+    return [*arguments, "--max-depth", depth] if depth else arguments
+
+
+def _ask(
+    question: str, default: str | None, names: Iterable[str], check: Callable[[str], Any]
+) -> str:
+    """Return an answer that is accepted; a refusal is explained, and ? lists the names."""
+    while True:
+        text: str = click.prompt(question, default, show_default=bool(default), err=True)
+        if text.strip() == "?":
+            click.echo(f"known: {', '.join(names)}", err=True)
+            continue
+        try:
+            check(text)
+        except AsperityError as error:
+            click.echo(str(error), err=True)
+        else:
+            return text
+
+
+def _check(surface: str) -> None:
+    """Refuse a surface that cannot be read, except for arguments that are asked for next."""
+    _find_missing(surface, {})
+
+
+def _find_missing(surface: str, values: dict[str, Any]) -> ParameterError | None:
+    """Return the error of a surface that lacks an argument of a file; ``None`` for none.
+
+    Raises:
+        AsperityError: for a surface that cannot be read at all.
+    """
+    from asperity.scene import load_scene
+
+    try:
+        load_scene(surface, values)
+    except ParameterError as error:
+        if error.argument not in _FILE_ARGUMENTS:
+            raise
+        return error
+    return None
+
+
+def _check_depth(text: str) -> None:
+    if text:
+        MAX_DEPTH.validate(MAX_DEPTH.parse(text))
 
 
 def why_hint(why: bool) -> str:
@@ -43,9 +127,9 @@ def _use_commands(surface: str, row: LawRow, changed: Mapping[str, str]) -> str:
         row: the law at its stiffness.
         changed: texts of options that differ from those of the running command.
     """
-    from asperity.report.sentences import number_text
+    from asperity.report.sentences import texts
 
-    k = number_text.limit_text(row.surface.stiffness).replace(" ", "")
+    k = texts.limit_text(row.surface.stiffness).replace(" ", "")
     used = {*row.law.arguments, *row.surface.friction_values}
     names = {"device", "plugin", "settings", "max_depth", *used}
     typed = repeat_options(names, registered_arguments().keys() - used, changed)
