@@ -18,7 +18,7 @@ from asperity.core.arguments import (
 from asperity.core.errors import ParameterError
 from asperity.measured.file_arguments import FILE_ARGUMENTS, PREPARATION_ARGUMENTS
 from asperity.measured.preparation import prepare
-from asperity.scene.sections import CLAMP, LAW
+from asperity.scene.scene_file import CLAMP, LAW
 from asperity.surface import Surface
 from asperity.textures import load_texture
 

@@ -400,7 +400,7 @@ def load_surface(
     """
     from asperity.frictional import check_arguments_apply
     from asperity.scene import load_scene
-    from asperity.scene.sections import surface_keywords
+    from asperity.scene.scene_file import surface_keywords
 
     requested = surface_values(values)
     scene = load_scene(source, file_values(values))

@@ -67,7 +67,6 @@ class PluginRegistry:
 def plugin_registries() -> tuple[PluginRegistry, ...]:
     """Return all registries."""
     from asperity import laws
-    from asperity.analysis.gain.theorems import THEOREMS
     from asperity.analysis.passivity.criteria import CRITERIA
     from asperity.derive.derivatives import symbolic_force
     from asperity.measured.reading import Reader, readers
@@ -82,7 +81,6 @@ def plugin_registries() -> tuple[PluginRegistry, ...]:
         PluginRegistry(readers.USER_READERS, Reader, readers.register),
         PluginRegistry(driver_registry.DRIVER_KINDS, DriverKind, driver_registry.register_driver),
         PluginRegistry(CRITERIA),
-        PluginRegistry(THEOREMS),
     )
 
 

@@ -17,8 +17,7 @@ from asperity.devices import Device, DeviceLike, load_device
 from asperity.laws import REGISTERED_LAWS, find_law
 from asperity.laws.clamps import BACKED
 from asperity.scene.loops import SceneLike, as_scene, make_loop
-from asperity.scene.scene_file import Scene
-from asperity.scene.sections import surface_keywords
+from asperity.scene.scene_file import Scene, surface_keywords
 from asperity.scene.setup import SIMULATED_DRIVER, Setup
 from asperity.servo.drivers.simulated import simulated_driver
 from asperity.servo.loop_memory import EndReason, LoopStatistics

@@ -12,8 +12,7 @@ from asperity.core.errors import ParameterError
 from asperity.devices import DeviceLike, load_device
 from asperity.frictional import check_arguments_apply
 from asperity.laws import REGISTERED_LAWS, Law, find_law, find_laws, registered_arguments
-from asperity.scene.scene_file import Scene, load_scene
-from asperity.scene.sections import SURFACE_FIELDS
+from asperity.scene.scene_file import SURFACE_FIELDS, Scene, load_scene
 from asperity.scene.setup import Setup, make_setup
 from asperity.scene.sweeps import (
     DEFAULT_DELAYS,

@@ -11,8 +11,15 @@ from asperity.core.arguments import Argument
 from asperity.core.errors import ParameterError, suggest_names
 from asperity.devices import FIELD_TABLE, device_names
 from asperity.measured.file_arguments import SYNTHETIC_ARGUMENTS
-from asperity.scene.scene_file import DEVICE_ID, TEXTURE_KINDS
-from asperity.scene.sections import HANDS, MOTIONS, RUN_ARGUMENTS, SectionKind, surface_arguments
+from asperity.scene.scene_file import (
+    DEVICE_ID,
+    HANDS,
+    MOTIONS,
+    RUN_ARGUMENTS,
+    TEXTURE_KINDS,
+    SectionKind,
+    surface_arguments,
+)
 from asperity.servo import safety
 from asperity.textures.texture import TextureKind
 

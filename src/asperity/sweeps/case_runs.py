@@ -31,9 +31,8 @@ from asperity.devices import load_device
 from asperity.laws import REGISTERED_LAWS, find_law, find_laws
 from asperity.rendering import is_searched
 from asperity.scene.loops import onset, scan
-from asperity.scene.scene_file import Scene, build_scene
+from asperity.scene.scene_file import Scene, build_scene, surface_keywords
 from asperity.scene.scene_keys import with_values
-from asperity.scene.sections import surface_keywords
 from asperity.surface import Surface
 
 LAW_KEY = "surface.law"

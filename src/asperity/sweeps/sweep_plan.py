@@ -25,9 +25,8 @@ from asperity.core.version import __version__
 from asperity.devices import load_device
 from asperity.laws import find_law, find_laws
 from asperity.recording.replay import file_digest
-from asperity.scene.scene_file import DEVICE_ID, read_scene
+from asperity.scene.scene_file import DEVICE_ID, read_scene, to_scene_values
 from asperity.scene.scene_keys import find_varied_arguments
-from asperity.scene.sections import to_scene_values
 from asperity.sweeps.case_runs import LAW_KEY, CaseTemplate, find_run
 
 SCHEMA = 1

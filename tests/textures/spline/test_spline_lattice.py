@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from asperity.textures.spline.spline_lattice import build_lattice
+from asperity.textures.spline.pyramid import build_lattice
 from asperity.textures.spline.spline_texture import HeightMap, Profile
 
 RNG = np.random.default_rng(11)

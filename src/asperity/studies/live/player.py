@@ -21,9 +21,8 @@ from asperity.devices import Device
 from asperity.loop.shared_trace import COLUMNS
 from asperity.recording.writer import RecordingWriter
 from asperity.scene.device_run import without_hand
-from asperity.scene.scene_file import build_scene
+from asperity.scene.scene_file import build_scene, to_scene_values
 from asperity.scene.scene_keys import with_values
-from asperity.scene.sections import to_scene_values
 from asperity.scene.setup import Setup, make_setup
 from asperity.servo.driver import Driver
 from asperity.servo.drivers.simulated import simulated_driver

@@ -1,18 +1,28 @@
-"""Pyramids of certified bounds over the cells of a spline, for closest-point searches.
+"""Pyramids of certified bounds over the cells of a spline, and lattices, for closest points.
 
 A box of the finest level has one cell of a profile, or two by two cells of a map; each further
 level has boxes of twice the side. A box has five numbers, rounded outward to single precision: a
 lower and an upper bound of the height [m], a bound of the second derivatives times the pitch [1], a
 bound of the third derivatives times the squared pitch [1], and a bound of the greatest eigenvalue
 of -Hess h times the pitch, at least 0, which is the curvature of crests.
+
+A lattice, from which most closest points are found, stands beside it; see ``lattice_search``.
 """
 
 from __future__ import annotations
+
+import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from asperity.core.checks import FloatArray
+from asperity.core.processes import run_in_threads
+from asperity.textures.spline import lattice_search
+from asperity.textures.spline.bspline_kernels import SplineArguments
+from asperity.textures.spline.lattice_search import LatticeArguments
+from asperity.textures.texture import Texture
 
 # Cells of a map that are processed together, so that they fit the processor caches.
 _TILE_ROWS = 128
@@ -207,3 +217,88 @@ def _build_levels(finest: Float32Array) -> Pyramid:
     boxes = np.concatenate(parts)
     boxes[:, 0] *= -1.0
     return np.ascontiguousarray(boxes), np.array(starts, dtype=np.int64)
+
+
+# Least number of places beyond the borders of the texture.
+_LEAST_PADDING = 5
+# Nodes of the lattice per node of the spline, at least, and the most from one place to the next.
+_NODES_PER_PITCH = 2.0
+_MAX_STRIDE = 4
+
+
+def build_lattice(
+    spline: Texture, pitches: Sequence[float], spacing: Sequence[float], z: FloatArray
+) -> LatticeArguments:
+    """Return the record of a spline with a lattice.
+
+    Args:
+        spline: the texture.
+        pitches: distance of its nodes along each axis [m].
+        spacing: greatest distance of the places along each axis [m].
+        z: of the levels, rising [m].
+    """
+    low, top = spline.extremes
+    lengths = np.hypot(*spline.domain.spans.T)
+    counts = np.ceil(lengths / spacing)
+    nodes = _NODES_PER_PITCH * lengths / (counts * pitches)
+    stride = min(math.ceil(float(nodes.max())), _MAX_STRIDE)
+    sides = lengths / (stride * counts)
+    # A point farther away than one above the lowest level is not the closest; nor is one much
+    # farther away than the deepest place, where the texture repeats.
+    reach = min(math.sqrt((top - low) * (top + low - 2.0 * z[0])), lengths.max() / len(lengths))
+    reach = max(reach, top - low)
+    x, *others = [
+        _axis_nodes(start, side, int(count), stride, reach)
+        for start, side, count in zip(spline.domain.origin, sides, counts, strict=False)
+    ]
+    y = others[0] if others else spline.domain.origin[1:]
+    points = np.stack(np.meshgrid(x, y), axis=-1)
+    heights = spline.height(points.reshape(-1, 2)).reshape(points.shape[:2])
+    rows = (len(y) - 1) // stride + 1
+    columns = (len(x) - 1) // stride + 1
+    numbers = dict(zip(SplineArguments._fields, spline.arguments, strict=True))
+    lattice = LatticeArguments(
+        **numbers,
+        heights=heights,
+        nearest=np.empty((len(z), rows, columns), np.int32),
+        first_x=float(x[0]),
+        first_y=float(y[0]),
+        z=z,
+        stride=stride,
+        side_x=float(sides[0]),
+        side_y=float(sides[-1]),
+    )
+    _fill_levels(lattice)
+    return lattice
+
+
+def _axis_nodes(start: float, side: float, count: int, stride: int, reach: float) -> FloatArray:
+    """Return the nodes along an axis [m]: those of the texture and as many places as it reaches."""
+    padding = math.ceil(reach / (stride * side)) + _LEAST_PADDING
+    nodes = np.arange(-padding * stride, (count + padding) * stride + 1)
+    return np.asarray(start + side * nodes)
+
+
+def _fill_levels(lattice: LatticeArguments) -> None:
+    """Write the nearest nodes of each level, in threads."""
+    from asperity.kernels.fuse import fuse_module
+
+    loops = fuse_module(lattice_search)
+    rows, columns = lattice.heights.shape
+    longer = max(rows, columns)
+
+    def fill(level: int) -> None:
+        loops.nearest_nodes(
+            lattice.heights,
+            lattice.z[level],
+            lattice.stride,
+            lattice.side_x,
+            lattice.side_y,
+            np.empty((rows + 1, longer)),
+            np.empty((rows, lattice.nearest.shape[2]), np.int32),
+            np.empty(longer, np.int32),
+            np.empty(longer + 1),
+            lattice.nearest[level],
+        )
+
+    run_in_threads(fill, range(len(lattice.nearest)), None)

@@ -145,7 +145,7 @@ class Spline(Texture):
     ) -> tuple[tuple[ModuleType, ...], tuple[Any, ...]]:
         """See :class:`Texture`."""
         from asperity.textures.spline import lattice_search
-        from asperity.textures.spline.spline_lattice import build_lattice
+        from asperity.textures.spline.pyramid import build_lattice
 
         return (lattice_search,), build_lattice(self, self._pitches, spacing, z)
 
