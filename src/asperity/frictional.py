@@ -157,8 +157,11 @@ class Frictional(Plottable, ABC):
                 raise ParameterError(name, reason, given[name])
         friction = self.contact_friction
         if friction is not None and friction.modulation and self.texture.is_body:
-            limit = "must be 0 on a closed body, whose height is no texture"
-            raise ParameterError("friction_modulation", limit, friction.modulation)
+            raise ParameterError(
+                "friction_modulation",
+                "must be 0 on a closed body, whose height is no texture",
+                friction.modulation,
+            )
 
     @property
     def loop_arguments(self) -> tuple[float, ...]:

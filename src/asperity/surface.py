@@ -174,8 +174,11 @@ class Surface(Frictional):
         texture = state["texture"]
         texture.check_law(law.contact, parameters)
         if state["max_depth"] > texture.depth_limit:
-            limit = f"must be at most {texture.depth_limit:.9g} m, the depth of the baked field"
-            raise ParameterError("max_depth", limit, state["max_depth"])
+            raise ParameterError(
+                "max_depth",
+                f"must be at most {texture.depth_limit:.9g} m, the depth of the baked field",
+                state["max_depth"],
+            )
         vars(self).update(state, law=law, law_parameters=MappingProxyType(parameters))
 
     def _replace(self, **values: Any) -> Surface:
@@ -442,8 +445,11 @@ class Surface(Frictional):
         longest = float(np.hypot(*deflections.T).max(initial=0.0))
         # Tolerate the rounding of a deflection of exactly that length.
         if longest > self.max_deflection * (1.0 + 1e-12):
-            limit = f"must not be longer than max_deflection = {self.max_deflection} m"
-            raise ParameterError("deflection", limit, longest)
+            raise ParameterError(
+                "deflection",
+                f"must not be longer than max_deflection = {self.max_deflection} m",
+                longest,
+            )
         return (deflections,)
 
 

@@ -363,8 +363,9 @@ def surface_values(values: Mapping[str, Any]) -> dict[str, Any]:
         result["law"] = values["law"]
     for name, value in values["settings"].law.items():
         if name in result:
-            flag = f"--{name.replace('_', '-')}"
-            raise ParameterError(name, f"is given twice: by {flag} and by --set {name}=...")
+            raise ParameterError(
+                name, f"is given twice: by --{name.replace('_', '-')} and by --set {name}=..."
+            )
         result[name] = value
     return result
 

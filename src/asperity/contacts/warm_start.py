@@ -55,6 +55,7 @@ def check_warm_start(warm_start: FloatArray) -> FloatArray:
     """
     is_state = isinstance(warm_start, np.ndarray) and warm_start.shape == (WARM_START_SIZE,)
     if not (is_state and warm_start[BUDGET] > 0.0):
-        words = "must be an array of asperity.contacts.warm_start.new_warm_start"
-        raise ParameterError("warm_start", words)
+        raise ParameterError(
+            "warm_start", "must be an array of asperity.contacts.warm_start.new_warm_start"
+        )
     return warm_start

@@ -340,8 +340,9 @@ def check_not_existing(name: str, path: str | os.PathLike[str], *, force: bool) 
         ParameterError: if it exists and ``force`` is false.
     """
     if not force and os.path.lexists(path):
-        text = f"exists: {escape_unprintable(path)}; {{force}} replaces it"
-        raise ParameterError(name, text, force=True)
+        raise ParameterError(
+            name, f"exists: {escape_unprintable(path)}; {{force}} replaces it", force=True
+        )
 
 
 def check_output(name: str, path: str | None, *, force: bool) -> None:

@@ -69,8 +69,8 @@ class LawEnvelope(Serializable):
     @written
     def decades(self) -> float:
         """Area of the region in decades of amplitude times decades of wavelength."""
-        along = np.log10([one.wavelength for one in self.borders])
-        widths = np.array([one.decades for one in self.borders])
+        along = np.log10([border.wavelength for border in self.borders])
+        widths = np.array([border.decades for border in self.borders])
         return float(np.sum(0.5 * (widths[1:] + widths[:-1]) * np.diff(along)))
 
     def renders(self, wave: Wave) -> bool:
@@ -169,18 +169,18 @@ class Envelope(Plottable, Reportable, Tabular):
 
     def __getitem__(self, device: str) -> DeviceEnvelope:
         """Return the envelope of a device by its id."""
-        return {one.device.id: one for one in self.devices}[device]
+        return {envelope.device.id: envelope for envelope in self.devices}[device]
 
     def __repr__(self) -> str:
-        regions = (f"{one.device.id}: law {one.widest.letter} widest" for one in self.devices)
+        regions = [f"{part.device.id}: law {part.widest.letter} widest" for part in self.devices]
         return f"<Envelope, {'; '.join(regions)}>"
 
     def table_rows(self) -> list[dict[str, Any]]:
         """Return a row per device, law and wavelength; SI units, ``None`` where there is none."""
         return [
-            {"device": one.device.id, "law": law.letter} | _border_row(border)
-            for one in self.devices
-            for law in one.laws
+            {"device": part.device.id, "law": law.letter} | _border_row(border)
+            for part in self.devices
+            for law in part.laws
             for border in law.borders
         ]
 
@@ -251,12 +251,13 @@ def envelope(
     cases = make_cases(device, laws, law_parameters, envelope, conditions)
     devices = list(dict.fromkeys(case.device.id for case in cases))
     checked = cases[0].conditions
-    given = [] if surface is None else check_items("surface", surface)
-    textures = [(_surface_name(one), as_texture(one)) for one in given]
+    sources = [] if surface is None else check_items("surface", surface)
+    textures = [(_surface_name(source), as_texture(source)) for source in sources]
     lengths = WAVELENGTHS if wavelengths is None else _check_wavelengths(wavelengths)
-    found = _compute(cases, lengths, progress)
+    envelopes = _compute(cases, lengths, progress)
     regions = tuple(
-        _device_envelope([law for law in found if law.case.device.id == one]) for one in devices
+        _device_envelope([law for law in envelopes if law.case.device.id == name])
+        for name in devices
     )
     peaks = tuple(
         _locate_peaks(name, compute_spectrum(texture).waves, regions) for name, texture in textures
@@ -301,20 +302,22 @@ def make_cases(
     Raises:
         ParameterError: for an argument that cannot be used, or a device with too little data.
     """
-    devices = [load_device(one) for one in check_items("device", device)]
-    for one in devices:
-        if lacks_data(one):
+    devices = [load_device(name) for name in check_items("device", device)]
+    for known in devices:
+        if lacks_data(known):
             raise ParameterError(
-                "device", f'{one.id} needs max_stiffness: add max_stiffness = "... N/m" to its file'
+                "device",
+                f'{known.id} needs max_stiffness: add max_stiffness = "... N/m" to its file',
             )
-    if len({one.id for one in devices}) < len(devices):
-        raise ParameterError("device", "names one device twice", [one.id for one in devices])
+    names = [known.id for known in devices]
+    if len(set(names)) < len(names):
+        raise ParameterError("device", "names one device twice", names)
     chosen = textured_laws() if laws is None else find_laws(laws)
     parameters = distribute_parameters(law_parameters or {}, chosen)
     checked = make_conditions(function, **conditions)
     return [
-        WaveCase(law.letter if is_shipped_law(law) else law, own, one, checked)
-        for one in devices
+        WaveCase(law.letter if is_shipped_law(law) else law, own, known, checked)
+        for known in devices
         for law, own in zip(chosen, parameters, strict=True)
     ]
 
@@ -386,7 +389,7 @@ def _locate_peaks(
     largest = sorted(peaks, key=lambda wave: -wave.share)[:_MAX_PEAKS]
     peaks = [wave for wave in peaks if wave in largest]
     rendered = tuple(
-        tuple("".join(law.letter for law in one.laws if law.renders(wave)) for wave in peaks)
-        for one in regions
+        tuple("".join(law.letter for law in part.laws if law.renders(wave)) for wave in peaks)
+        for part in regions
     )
     return SurfacePeaks(name, tuple(peaks), rendered)

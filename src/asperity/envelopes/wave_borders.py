@@ -212,7 +212,7 @@ class WaveCase:
 
     def _unmagnified(self, surface: Surface, texture: Texture, factor: float) -> Surface:
         """Return the surface whose lengths are shorter by a factor: its numbers are the same."""
-        units = {name: one.unit for name, one in surface.law.arguments.items()}
+        units = {name: argument.unit for name, argument in surface.law.arguments.items()}
         shorter = {
             name: value / factor if units[name] == "m" else value
             for name, value in surface.law_parameters.items()

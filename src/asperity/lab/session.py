@@ -223,11 +223,11 @@ class Session:
         """If a guided tour runs, discard requested changes, and request the scene before it."""
         with self._requests.mutex:
             queue = self._requests.queue
-            changes = [one for one in queue if isinstance(one, Mapping)]
-            names = {one.get(SCENE_KEY) for one in changes}
+            changes = [change for change in queue if isinstance(change, Mapping)]
+            names = {change.get(SCENE_KEY) for change in changes}
             is_running = PREVIOUS_SCENE in self.saved_scenes.scenes or TOUR_SCENE in names
-            for one in changes if is_running else ():
-                queue.remove(one)
+            for change in changes if is_running else ():
+                queue.remove(change)
         if is_running:
             self.change({SCENE_KEY: PREVIOUS_SCENE})
 

@@ -118,8 +118,9 @@ def find_cutoffs(
         return Cutoffs(short, None, note)
     long = check_positive("l_cutoff", l_cutoff, "m")
     if long <= short:
-        limit = f"must be longer than s_cutoff, {format_length(short)} [m]"
-        raise ParameterError("l_cutoff", limit, l_cutoff)
+        raise ParameterError(
+            "l_cutoff", f"must be longer than s_cutoff, {format_length(short)} [m]", l_cutoff
+        )
     _check_at_most("l_cutoff", long, longest)
     return Cutoffs(short, long, note)
 
@@ -199,16 +200,18 @@ def _s_cutoff(max_pitch: float, max_length: float, s_cutoff: float | None) -> tu
     length = check_positive("s_cutoff", s_cutoff, "m")
     # The tolerance admits a limit that the user computed in rounded decimals.
     if length < 2.0 * max_pitch * (1 - 5e-7):
-        limit = f"must be at least two samples, {format_length(2 * max_pitch)} [m]"
-        raise ParameterError("s_cutoff", limit, length)
+        raise ParameterError(
+            "s_cutoff", f"must be at least two samples, {format_length(2 * max_pitch)} [m]", length
+        )
     _check_at_most("s_cutoff", length, max_length)
     return length, ""
 
 
 def _check_at_most(name: str, length: float, max_length: float) -> None:
     if length > max_length * (1 + 5e-7):
-        limit = f"must be at most the surface's length, {format_length(max_length)} [m]"
-        raise ParameterError(name, limit, length)
+        raise ParameterError(
+            name, f"must be at most the surface's length, {format_length(max_length)} [m]", length
+        )
 
 
 _MAX_COMPARISONS = 5e10  # about a minute at 1 to 3 ns each
@@ -267,8 +270,11 @@ def dilate(
     try:
         felt = grey_dilation(heights, footprint=is_compared, structure=ball, mode=mode)
     except MemoryError:  # its offsets at a border are the square of the compared points
-        limit = f"is {count} points wide, more than fit into memory; give a coarser map"
-        raise ParameterError("tip_radius", limit, radius) from None
+        raise ParameterError(
+            "tip_radius",
+            f"is {count} points wide, more than fit into memory; give a coarser map",
+            radius,
+        ) from None
     return np.asarray(felt)
 
 
@@ -281,8 +287,11 @@ def check_tip_radius(shape: Shape, pitch: Pitch, radius: float) -> None:
     check_positive("tip_radius", radius, "m")
     extent = min(side_lengths(shape, pitch))
     if radius > extent * (1 + 5e-7):
-        limit = f"must be at most the surface's shorter side, {format_length(extent)} [m]"
-        raise ParameterError("tip_radius", limit, radius)
+        raise ParameterError(
+            "tip_radius",
+            f"must be at most the surface's shorter side, {format_length(extent)} [m]",
+            radius,
+        )
 
 
 def apply_tip(

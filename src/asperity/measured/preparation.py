@@ -367,11 +367,12 @@ def _check_missing(heights: FloatArray, max_missing: float) -> None:
         raise ParameterError("surface", "has no valid point: all heights are missing")
     if missing > max_missing:
         share = "a quarter" if max_missing == MAX_MISSING else f"{100.0 * max_missing:.1f} %"
-        text = (
+        raise ParameterError(
+            "surface",
             f"misses {100.0 * missing:.1f} % of its points; at most {share} can be filled, "
-            "unless you allow more: {max_missing}"
+            "unless you allow more: {max_missing}",
+            max_missing=math.ceil(100 * missing) / 100,
         )
-        raise ParameterError("surface", text, max_missing=math.ceil(100 * missing) / 100)
 
 
 def _resolve_pitch(

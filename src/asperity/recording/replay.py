@@ -197,8 +197,11 @@ def recorded_field(recording: Recording) -> RecordedField:
     metadata = _surface_metadata(recording)
     data = recording.attachment(TEXTURE_FILE)
     if data is None:
-        text = "does not hold its surface, which was too large: name it as {surface}"
-        raise ParameterError("recording", text, surface=None)
+        raise ParameterError(
+            "recording",
+            "does not hold its surface, which was too large: name it as {surface}",
+            surface=None,
+        )
     return read_field(metadata, data)
 
 

@@ -75,8 +75,9 @@ def recommend_law_and_stiffness(
         return chosen, f"Law {row.law.letter}, as compare recommends"
     if not row.recommended_stiffness:
         reason = f"is missing, and none is known to be stable for law {row.law.letter}"
-        text = f"{reason} on {device.id}: try {{stiffness}}"
-        raise ParameterError("stiffness", text, stiffness="100 N/m")
+        raise ParameterError(
+            "stiffness", f"{reason} on {device.id}: try {{stiffness}}", stiffness="100 N/m"
+        )
     chosen["stiffness"] = row.recommended_stiffness
     stiffness = format_quantity(row.recommended_stiffness, "N/m")
     return chosen, f"Law {row.law.letter} at {stiffness}, as compare recommends"
@@ -101,8 +102,9 @@ def check_stiffness_limit(setup: Setup, *, accept_risk: bool = False) -> None:
         ParameterError: otherwise, with the reason.
     """
     if not accept_risk and (reason := excess_stiffness_reason(setup.rendered, setup.device)):
-        text = f"is refused: {reason}; {{accept_risk}} accepts it"
-        raise ParameterError("stiffness", text, accept_risk=True)
+        raise ParameterError(
+            "stiffness", f"is refused: {reason}; {{accept_risk}} accepts it", accept_risk=True
+        )
 
 
 def simulated_process(setup: Setup, prestarted: PrestartedProcess | None = None) -> ServoProcess:

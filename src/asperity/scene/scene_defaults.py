@@ -83,8 +83,10 @@ def _make_five_bar(
 def _make_mass(device: Device, has_resonance: bool) -> tuple[Plant, list[str]]:
     mass = device.value("apparent_mass")
     if mass is None:
-        words = 'is not known: give [device] apparent_mass = "50 g"'
-        raise ParameterError("device", f"{device.id}: its apparent_mass {words}")
+        raise ParameterError(
+            "device",
+            f'{device.id}: its apparent_mass is not known: give [device] apparent_mass = "50 g"',
+        )
     notes = []
     values: dict[str, float] = {}
     for field, words in (("damping", "physical damping"), ("friction", "dry friction")):

@@ -175,8 +175,11 @@ def _reject_code(content: Mapping[str, Any]) -> None:
     sections = [section for section in content.values() if isinstance(section, dict)]
     for name in (name for section in (content, *sections) for name in section):
         if name.replace("-", "_").lower() in {"law_module", "law_modules", "plugin", "plugins"}:
-            text = "is refused: a scene never runs code; name the file to the program, as {plugin}"
-            raise ParameterError(name, text, plugin=None)
+            raise ParameterError(
+                name,
+                "is refused: a scene never runs code; name the file to the program, as {plugin}",
+                plugin=None,
+            )
 
 
 def _scene_device(section: Mapping[str, Any]) -> Device:

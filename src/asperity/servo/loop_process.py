@@ -229,6 +229,7 @@ def lock_device(driver: Driver) -> Iterator[None]:
             try:
                 stack.enter_context(hold_lock(name, shared=name == kind and bool(device)))
             except BlockingIOError as user:
-                words = f"finds the device in use by process {user}"
-                raise ParameterError("driver", words) from None
+                raise ParameterError(
+                    "driver", f"finds the device in use by process {user}"
+                ) from None
         yield

@@ -230,8 +230,9 @@ class ServoProcess:
         from asperity.servo.safety import excess_stiffness_reason
 
         if self._device is None:
-            words = "is not known to the loop, so no limit is: ServoProcess(..., device=...)"
-            raise ParameterError("device", words)
+            raise ParameterError(
+                "device", "is not known to the loop, so no limit is: ServoProcess(..., device=...)"
+            )
         if reason := excess_stiffness_reason(surface, self._device):
             raise ParameterError("stiffness", f"is refused: {reason}; accept_risk=True renders it")
 
@@ -339,8 +340,11 @@ def require_max_force(driver: Driver, servo: Servo) -> None:
         ParameterError: if it is not known.
     """
     if driver.has_moving_handle and not math.isfinite(servo.max_force):
-        text = "is not known: a device that moves needs it, such as {max_force}"
-        raise ParameterError("max_force", text, max_force="3 N")
+        raise ParameterError(
+            "max_force",
+            "is not known: a device that moves needs it, such as {max_force}",
+            max_force="3 N",
+        )
 
 
 def _pickle(value: object) -> tuple[loop_process.ModuleFiles, bytes]:

@@ -117,8 +117,9 @@ class Strokes(NamedPart):
         if not math.isfinite(math.dist(self.start, self.end)):
             raise ParameterError("end", "must be at a finite distance from start [m]", self.end)
         if not (self.period > 0.0 and math.isfinite(self.duration)):
-            limit = "must make a stroke last, and all of them a finite time [m/s]"
-            raise ParameterError("speed", limit, self.speed)
+            raise ParameterError(
+                "speed", "must make a stroke last, and all of them a finite time [m/s]", self.speed
+            )
 
     @property
     def period(self) -> float:
@@ -388,8 +389,11 @@ class BandHand(Hand):
         nonnegative("tension", self.tension, "N")
         nonnegative("damping", self.damping, "N s/m")
         if self.rest_length <= 0.0:
-            limit = f"must be less than stiffness * length = {self.stiffness * self.length:g} N"
-            raise ParameterError("tension", limit, self.tension)
+            raise ParameterError(
+                "tension",
+                f"must be less than stiffness * length = {self.stiffness * self.length:g} N",
+                self.tension,
+            )
 
     @property
     def rest_length(self) -> float:

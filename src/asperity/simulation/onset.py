@@ -265,13 +265,15 @@ def _check_arguments(
     if hand.is_prescribed:
         raise ParameterError("hand", "must not prescribe the motion: such a handle never cycles")
     if check_positive("duration", duration, "s") < _MIN_SAMPLES * servo.period:
-        limit = f"must be at least {_MIN_SAMPLES} samples, {_MIN_SAMPLES * servo.period:g} s"
-        raise ParameterError("duration", limit, duration)
+        raise ParameterError(
+            "duration",
+            f"must be at least {_MIN_SAMPLES} samples, {_MIN_SAMPLES * servo.period:g} s",
+            duration,
+        )
     if not is_at_rest(motion, duration):
         raise ParameterError("motion", "must be at rest in the second half of the run")
     if isinstance(starts, bool) or not (1 <= starts <= _MAX_STARTS and starts == int(starts)):
-        limit = f"must be a whole number, 1 to {_MAX_STARTS}"
-        raise ParameterError("starts", limit, starts)
+        raise ParameterError("starts", f"must be a whole number, 1 to {_MAX_STARTS}", starts)
 
 
 # Relative tolerance of the characteristic numbers: far below the bracket of an onset.

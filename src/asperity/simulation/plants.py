@@ -95,8 +95,9 @@ class Plant(NamedPart, ABC):
             ParameterError: if they are not, with the name of the argument.
         """
         if self.is_planar and (points[..., 1] != 0.0).any():
-            words = f"must stay at y = 0: a {self.kind} moves in the x-z plane"
-            raise ParameterError(argument, words)
+            raise ParameterError(
+                argument, f"must stay at y = 0: a {self.kind} moves in the x-z plane"
+            )
 
     def workspace_violation(self, position: FloatArray) -> str:
         """Return why a position [m] is outside the workspace; empty if it is inside."""

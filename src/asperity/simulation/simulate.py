@@ -99,8 +99,9 @@ class Simulation(Lane):
         if first == 0:
             self._energy_at_start = self._loop.stored_energy(self.state, anchor[0])
         if trace.ndim != 2 or trace.shape[1] != len(COLUMNS):
-            words = f"must have rows of {len(COLUMNS)} numbers, got shape {trace.shape}"
-            raise ParameterError("trace", words)
+            raise ParameterError(
+                "trace", f"must have rows of {len(COLUMNS)} numbers, got shape {trace.shape}"
+            )
         self.counters[FIRST_SAMPLE] = first
         self.rows_written = self._loop.run([self], len(anchor) - 1, anchor, trace, every)
         self._anchor = anchor[self.samples - first].copy()
@@ -275,8 +276,9 @@ def count_samples(duration: float, period: float) -> int:
         ParameterError: for a duration of no sample, or of too many.
     """
     if not duration / period <= MAX_SAMPLES:
-        limit = f"must be at most {MAX_SAMPLES:g} samples of {period:g} s"
-        raise ParameterError("duration", limit, duration)
+        raise ParameterError(
+            "duration", f"must be at most {MAX_SAMPLES:g} samples of {period:g} s", duration
+        )
     samples = round(duration / period)
     if samples < 1:
         raise ParameterError("duration", f"must be at least one period, {period} s", duration)
@@ -299,8 +301,9 @@ def _open_trace(
     if not isinstance(trace, (str, os.PathLike)):
         raise ParameterError("trace", "must be True, False or a path", trace)
     if Path(trace).suffix.lower() not in (".mcap", ""):
-        words = "must end in .mcap; such a recording can be exported as .csv"
-        raise ParameterError("trace", words, os.fspath(trace))
+        raise ParameterError(
+            "trace", "must end in .mcap; such a recording can be exported as .csv", os.fspath(trace)
+        )
     return RecordingWriter(trace, COLUMNS, metadata(), field_attachments(surface), "trace")
 
 

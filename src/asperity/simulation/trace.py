@@ -73,8 +73,9 @@ class DecimatedTrace:
         try:
             self._table = np.empty((math.ceil(rows / self._step), len(COLUMNS)))
         except (MemoryError, ValueError):  # more than the address space
-            limit = f"needs memory for {rows} rows: give a path, or a larger 'every'"
-            raise ParameterError("trace", limit) from None
+            raise ParameterError(
+                "trace", f"needs memory for {rows} rows: give a path, or a larger 'every'"
+            ) from None
         self._rows_seen = 0
         self._row_count = 0
 

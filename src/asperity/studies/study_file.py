@@ -93,8 +93,12 @@ def build_study(content: Mapping[str, Any], folder: Path) -> Study:
     arguments = {argument.name: argument for argument in varied.values()}
     for name in arguments:
         if not name.startswith(("texture.", "surface.")):
-            words = "cannot change while the participant holds the device: texture.* and surface.*"
-            raise ParameterError("vary", f"{name} {words} can")
+            raise ParameterError(
+                "vary",
+                f"{name} "
+                "cannot change while the participant holds the device: texture.* and surface.*"
+                " can",
+            )
     if _STIFFNESS_KEY in arguments and "texture_force" in settings:
         raise ParameterError("study.texture_force", f"sets {_STIFFNESS_KEY}, which is varied, too")
     for level in levels:

@@ -106,8 +106,12 @@ def _check_source(folder: Path, simulated: str) -> None:
     recorded = str(_read_plan(folder).get("simulated") or "")
     if recorded != simulated:
         holds = f"holds answers of {describe_source(recorded)}"
-        words = f"{holds}, with which those of {describe_source(simulated)} must not be mixed"
-        raise ParameterError("output", f"{words}: choose another folder", str(folder))
+        raise ParameterError(
+            "output",
+            f"{holds}, with which those of {describe_source(simulated)} must not be mixed"
+            ": choose another folder",
+            str(folder),
+        )
 
 
 def _read_plan(folder: str | Path) -> dict[str, Any]:
@@ -178,8 +182,11 @@ def _read_number(path: Path) -> int:
     except (OSError, ValueError):
         text = ""
     if _NUMBER.fullmatch(text) is None:
-        words = f"has no number of {path.name} in {path.name}/{_NUMBER_FILE}"
-        raise ParameterError("folder", f"{words}: restore the file, or remove {path.name}")
+        raise ParameterError(
+            "folder",
+            f"has no number of {path.name} in {path.name}/{_NUMBER_FILE}"
+            f": restore the file, or remove {path.name}",
+        )
     return int(text)
 
 
@@ -192,8 +199,11 @@ def _check_known(folder: str | Path, code: str, *, is_new: bool) -> dict[str, in
     """Check that a participant exists, or is new; return the numbers of all by code."""
     known = list_participants(folder)
     if code in known and is_new:
-        text = f"{code} exists already: {{resume}} goes on where it stopped"
-        raise ParameterError("participant", text, resume=True)
+        raise ParameterError(
+            "participant",
+            f"{code} exists already: {{resume}} goes on where it stopped",
+            resume=True,
+        )
     if code not in known and not is_new:
         raise _unknown_error(code, known)
     return known
@@ -227,16 +237,16 @@ def _replay(path: Path, study: Study, number: int) -> tuple[Method, list[TrialRe
     try:
         lines = (path / ANSWERS_FILE).read_bytes().split(b"\n")
     except OSError as error:
-        words = f"has no answers of {path.name}: {path.name}/{ANSWERS_FILE}: {error.strerror}"
-        raise ParameterError("folder", words) from None
+        raise ParameterError(
+            "folder", f"has no answers of {path.name}: {path.name}/{ANSWERS_FILE}: {error.strerror}"
+        ) from None
     for count, line in enumerate(lines[:-1], start=1):  # the last one is empty or torn
         shown: Any = method.next()
         try:
             record = _parse_line(line, study, shown, path.name)
         except (ValueError, TypeError, AttributeError, RecursionError):
             words = f"has a damaged line {count}, or one of another study, in"
-            words = f"{words} {path.name}/{ANSWERS_FILE}"
-            raise ParameterError("folder", words) from None
+            raise ParameterError("folder", f"{words} {path.name}/{ANSWERS_FILE}") from None
         codes = shown and stimulus_codes(study, path.name, shown)
         if (record.trial, record.codes) != (count, codes):
             reason = f"trial {count} of {path.name} was not made by this study and version"
@@ -393,7 +403,7 @@ def remove_participant(folder: str | Path, code: str) -> list[str]:
         raise _no_study(folder)
     is_replaced = path.is_symlink() or path.is_file()  # where the folder was
     if path not in known and not is_replaced and not os.path.lexists(path / ANSWERS_FILE):
-        raise _unknown_error(code, [one.name for one in known])
+        raise _unknown_error(code, [participant.name for participant in known])
     locked = path.parent if is_replaced else path
     derived = find_derived_files(folder)
     names = [f"{code}/", *derived]
@@ -435,5 +445,5 @@ def _allow_changes(path: Path) -> None:
 def _link_texts(path: Path) -> list[str]:
     """Return the links that are deleted with a participant, whose targets are not."""
     paths = [path] if path.is_symlink() else sorted(path.rglob("*"))
-    links = [one for one in paths if one.is_symlink()]
+    links = [path for path in paths if path.is_symlink()]
     return [f"{link.name} (a link; {os.readlink(link)} stays)" for link in links]

@@ -74,8 +74,11 @@ class RunKind:
         names = inspect.signature(self.function).parameters.keys()
         check_keywords(options, names - _SCENE_ARGUMENTS, lambda: None)
         if laws is not None and not self.takes_laws:
-            text = f"do not apply to {self.name}, which takes one: {{vary}} gives several"
-            raise ParameterError("laws", text, vary=f"{LAW_KEY}=A,B")
+            raise ParameterError(
+                "laws",
+                f"do not apply to {self.name}, which takes one: {{vary}} gives several",
+                vary=f"{LAW_KEY}=A,B",
+            )
 
 
 def _compare(scene: Scene, laws: Laws, options: Mapping[str, Any], _seed: int) -> Tabular:
@@ -197,8 +200,10 @@ def compute_cases(template: CaseTemplate, cases: Sequence[Case]) -> tuple[float,
     """
     start = time.perf_counter()
     if template.package != package_digest():
-        words = "has a worker with another version of asperity, Python, NumPy, SciPy or Numba"
-        raise ParameterError("scheduler", words)
+        raise ParameterError(
+            "scheduler",
+            "has a worker with another version of asperity, Python, NumPy, SciPy or Numba",
+        )
     _prepare(template.prepare)
     with _ONE_CASE:
         outcomes = [_compute_case(template, *case) for case in cases]

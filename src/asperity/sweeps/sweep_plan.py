@@ -310,8 +310,9 @@ def design_points(design: str, ranges: Mapping[str, Range]) -> list[dict[str, An
     if points < 2 or points & (points - 1) or not ranges:
         near = f"sobol:{2 ** min(20, max(1, points.bit_length()))}"
         if points and not ranges:
-            text = "needs a range to vary, such as {vary}"
-            raise ParameterError("design", text, design, vary="KEY=START:STOP")
+            raise ParameterError(
+                "design", "needs a range to vary, such as {vary}", design, vary="KEY=START:STOP"
+            )
         raise ParameterError("design", f"must be sobol:N, N a power of two, such as {near}", design)
     from scipy.stats import qmc
 

@@ -240,13 +240,13 @@ _RADIUS_FACTOR = 1.0 - 1e-9
 
 def _stateful_leak(surface: Surface, line: ScanLine) -> Leak:
     """Return the worst of the paper's path of (27) and of loops at constant depth."""
-    found = [light_then_deep_loop(surface, line), in_plane_loop(surface, line)]
-    worst = max(found, key=lambda loop: loop.energy)
+    loops = [light_then_deep_loop(surface, line), in_plane_loop(surface, line)]
+    worst = max(loops, key=lambda loop: loop.energy)
     pressing = 0.5 * surface.stiffness * surface.max_depth**2
     if worst.energy <= LOOP_TOLERANCE * pressing:  # error of the quadrature
         none = LoopOrigin(LoopKind.NO_GAIN)
         return replace(_sampled_leak(0.0, line, none, np.zeros((0, 3))), steady=0.0)
-    densest = max(found, key=lambda loop: loop.energy / loop.length)
+    densest = max(loops, key=lambda loop: loop.energy / loop.length)
     density = densest.energy / densest.length
     absorbing = AbsorbingFriction(density, math.inf, densest.energy, densest.vertices)
     winding = [both_sides_path(surface, at, line.direction) for at in line.points(_START_POINTS)]

@@ -249,16 +249,16 @@ def shortest_wavelengths(
     rate = device.value("update_rate")
     step = device.value("position_resolution")
     bandwidth = device.value("bandwidth")
-    found = []
+    lengths = []
     if rate is not None:
-        found.append((time_samples * speed / rate, 1, f"{time_samples:g} updates"))
+        lengths.append((time_samples * speed / rate, 1, f"{time_samples:g} updates"))
     if step is not None:
-        found.append((position_samples * step, 2, f"{position_samples:g} position steps"))
+        lengths.append((position_samples * step, 2, f"{position_samples:g} position steps"))
         if time_samples != position_samples:
-            found.append((time_samples * step, 3, f"{time_samples:g} position steps"))
+            lengths.append((time_samples * step, 3, f"{time_samples:g} position steps"))
     if bandwidth is not None:
-        found.append((speed / bandwidth, 6, "bandwidth"))
-    return sorted(found)
+        lengths.append((speed / bandwidth, 6, "bandwidth"))
+    return sorted(lengths)
 
 
 def check_sample_count(name: str, value: float | None) -> float:

@@ -155,7 +155,7 @@ def classify_perceptibility(
     else:
         tiers = {name: respond(waves.with_device(name, data[name])).tier for name in doubtful}
         # Numbers may hide a texture together that none of them hides alone.
-        masking = [one for one in doubtful if tiers[one] != response.tier] or list(doubtful)
+        masking = [field for field in doubtful if tiers[field] != response.tier] or list(doubtful)
     forces = waves.case.forces
     resolved = response.is_resolved
     motions = np.where(resolved, response.motions, 0.0)
@@ -182,7 +182,9 @@ def classify_perceptibility(
         apparent_mass=response.apparent_mass,
         extrapolated=not waves.grip.is_known(rendered).all(),
         known_frequencies=(waves.grip.frequency[0], waves.grip.frequency[-1]),
-        missing_data=tuple(one for one in (*MASKING_FIELDS, *_HAND_FIELDS) if one not in data),
+        missing_data=tuple(
+            field for field in (*MASKING_FIELDS, *_HAND_FIELDS) if field not in data
+        ),
         unverified=tuple(masking),
         remedies=(),
         spectrum=response,
@@ -281,31 +283,33 @@ def force_step_ratio(case: LimitCase, resolved: NDArray[np.bool_]) -> float:
 def _find_remedies(waves: WaveScan, is_felt_magnified: Callable[[float], bool]) -> list[Remedy]:
     """Return the changes that make a texture felt, each by itself and confirmed."""
     case = waves.case
-    found = []
+    remedies = []
     first = _first_felt(_FACTORS, waves.magnified)
     if first is not None:
         tries = (round_up(first * share, 2) for share in _MAGNIFICATION_TRIES)
         if factor := next((factor for factor in tries if is_felt_magnified(factor)), None):
-            found.append(Remedy("magnify", factor))
+            remedies.append(Remedy("magnify", factor))
     # What is printed is confirmed: values are rounded before they are tried.
-    slower = (round_down(case.speed / one, 2) for one in _FACTORS)
-    faster = (min(round_up(case.speed * one, 2), MAX_SPEED) for one in _FACTORS)
+    slower = (round_down(case.speed / factor, 2) for factor in _FACTORS)
+    faster = (min(round_up(case.speed * factor, 2), MAX_SPEED) for factor in _FACTORS)
     tried = (_first_felt(values, waves.at_speed) for values in (slower, faster))
-    if speeds := [one for one in tried if one is not None]:
+    if speeds := [speed for speed in tried if speed is not None]:
         nearest = min(speeds, key=lambda speed: abs(math.log(speed / case.speed)))
-        found.append(Remedy("speed", nearest))
+        remedies.append(Remedy("speed", nearest))
     for name in ("apparent_mass", "force_resolution", "position_resolution"):
         assumed = DEFAULT_APPARENT_MASS if name == "apparent_mass" else 0.0
         value = case.device.get(name, assumed)
-        finer = (round_down(value / one, 2) for one in _FACTORS if value)
+        finer = (round_down(value / factor, 2) for factor in _FACTORS if value)
         if (enough := _first_felt(finer, partial(waves.with_device, name))) is not None:
-            found.append(Remedy(name, enough))
-    return found
+            remedies.append(Remedy(name, enough))
+    return remedies
 
 
 def _first_felt(values: Iterable[float], change: Callable[[float], WaveScan]) -> float | None:
     """Return the first value of a change at which a texture is felt; ``None`` if there is none."""
-    return next((float(one) for one in values if respond_felt(change(one)).tier == "felt"), None)
+    return next(
+        (float(value) for value in values if respond_felt(change(value)).tier == "felt"), None
+    )
 
 
 Tier = Literal["felt", "borderline", "unknown", "not felt"]

@@ -240,8 +240,9 @@ def _resolve_surface(
     given = {name: value for name, value in arguments.items() if value is not None}
     if isinstance(surface, Surface):
         for name in given:
-            words = "belongs to the surface: give a texture, or change it by to_law, to_stiffness"
-            raise ParameterError(name, words)
+            raise ParameterError(
+                name, "belongs to the surface: give a texture, or change it by to_law, to_stiffness"
+            )
         return surface
     check_keywords(given, SURFACE_KEYWORDS, analyze)
     texture = as_texture(surface, name="surface")

@@ -390,7 +390,9 @@ def _rendered_waves(
     decisions: Sequence[limit_rules.Decision],
 ) -> tuple[RenderedWave, ...]:
     """Return the significant waves, each with its limits."""
-    on_waves = [one for one in decisions if one.limit.holds is not None and one.limit.number != 5]
+    on_waves = [
+        rule for rule in decisions if rule.limit.holds is not None and rule.limit.number != 5
+    ]
     waves = [spectrum.waves[i] for i in np.flatnonzero(is_significant)]
     return tuple(
         RenderedWave(
@@ -399,8 +401,8 @@ def _rendered_waves(
             share=wave.share,
             frequency=case.speed / wave.wavelength,
             force=float(case.forces[i]),
-            holds={one.limit.number: bool(one.holds[i]) for one in on_waves},
-            top_speed=min((float(one.top_speeds[i]) for one in on_waves), default=math.inf),
+            holds={rule.limit.number: bool(rule.holds[i]) for rule in on_waves},
+            top_speed=min((float(rule.top_speeds[i]) for rule in on_waves), default=math.inf),
         )
         for i, wave in enumerate(waves)
     )

@@ -256,10 +256,10 @@ def _make_comparison(
 
 def _compared_laws(texture: Texture, laws: str | Sequence[str | Law]) -> tuple[Law, ...]:
     """Return the laws; where all are compared on a baked field, those that have one."""
-    found = find_laws(laws)
-    if texture.baked_numbers and len(found) >= len(ALL_LAWS):
-        return tuple([law for law in found if law.contact.has_potential_field])
-    return found
+    chosen = find_laws(laws)
+    if texture.baked_numbers and len(chosen) >= len(ALL_LAWS):
+        return tuple([law for law in chosen if law.contact.has_potential_field])
+    return chosen
 
 
 def lacks_data(device: Device) -> bool:

@@ -80,7 +80,7 @@ class DeviceComparisons(Reportable, Tabular):
 
     def table_rows(self) -> list[dict[str, Any]]:
         """Return the main numbers of each device, depth and law; SI units."""
-        return [row for one in self.comparisons for row in one.table_rows()]
+        return [row for comparison in self.comparisons for row in comparison.table_rows()]
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units, with a schema number."""

@@ -70,8 +70,9 @@ def _check_array(array: np.ndarray[Any, np.dtype[Any]]) -> None:
     if array.dtype.kind not in "iuf":
         raise SurfaceFileError(f"array of type {array.dtype}; integers or floats are expected")
     if array.ndim not in (1, 2) or min(array.shape) < 1:
-        wanted = "(ny, nx) for a map or (n,) for a profile is expected"
-        raise SurfaceFileError(f"array of shape {array.shape}; {wanted}")
+        raise SurfaceFileError(
+            f"array of shape {array.shape}; (ny, nx) for a map or (n,) for a profile is expected"
+        )
     reader.check_point_count(*array.shape[::-1])
 
 

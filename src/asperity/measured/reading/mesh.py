@@ -172,8 +172,11 @@ def _check_overhangs(areas: FloatArray, overhanging: NDArray[np.bool_]) -> None:
     advice = "a height field has one height at each point: cut them off"
     if area > _CLOSED_BODY_FRACTION * total:
         advice = "it looks like a whole body: cut off the textured side"
-    part = f"{1e6 * area:.4g} mm² or {100.0 * area / total:.2f} % of the surface"
-    raise SurfaceFileError(f"{int(overhanging.sum())} triangles overhang, {part}; {advice}")
+    raise SurfaceFileError(
+        f"{int(overhanging.sum())} triangles overhang, "
+        f"{1e6 * area:.4g} mm² or {100.0 * area / total:.2f} % of the surface"
+        f"; {advice}"
+    )
 
 
 _MIN_AREA_SAVING = 0.02  # least relative saving of area for which the axes are turned

@@ -66,8 +66,10 @@ def read_instrument(file: SurfaceFile, options: ReadingOptions) -> RawSurface | 
                 channel = _select_channel(reader, file.name, options.channel)
                 if channel is not None:
                     if fault := _WRONG_FORMATS.get(reader.format()):
-                        what = f"a {reader.name()} file, which {LIBRARY} may misread"
-                        raise SurfaceFileError(f"{what}: {fault}; export it as X3P or SDF")
+                        raise SurfaceFileError(
+                            f"a {reader.name()} file, which {LIBRARY} may misread"
+                            f": {fault}; export it as X3P or SDF"
+                        )
                     return _to_surface(reader, channel, file, options)
                 names = [f"{c.name!r} ({c.data_kind.value})" for c in reader.channels]
                 channels = channels or ", ".join(names) or "none"

@@ -283,8 +283,9 @@ def reject_positions(table: TextTable) -> None:
     rows, columns = np.array(values.shape) > _MIN_POSITIONS
     if (across and (down or columns)) or (down and rows):
         fault = "the first row or column looks like positions or numbers of the others"
-        text = f"{fault}: remove it, and give their distance as {{pitch}}"
-        raise SurfaceFileError(text, pitch=None)
+        raise SurfaceFileError(
+            f"{fault}: remove it, and give their distance as {{pitch}}", pitch=None
+        )
 
 
 def _is_axis(values: FloatArray) -> bool:

@@ -83,8 +83,10 @@ class _Archive:
             raise SurfaceFileError(f"{name} has {info.file_size} bytes; at most {limit} are read")
         if expected and info.file_size != expected:
             fault = "is truncated" if info.file_size < expected else "is too long"
-            needed = f"the matrix dimension and data types require {expected}"
-            raise SurfaceFileError(f"{name} {fault}: {info.file_size} bytes, {needed}")
+            raise SurfaceFileError(
+                f"{name} {fault}: {info.file_size} bytes, "
+                f"the matrix dimension and data types require {expected}"
+            )
         if info.compress_size > self.size:  # zipfile would allocate this size
             raise SurfaceFileError(f"{name} is truncated")
         content = self.zip_file.read(info)

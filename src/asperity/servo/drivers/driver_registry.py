@@ -71,6 +71,7 @@ def _driver_of_device(device: Device | None) -> str:
     if device is None or not device.driver:
         reason = "no device is given" if device is None else f"{device.id} names none"
         examples = ", ".join(kind.example for kind in DRIVER_KINDS.values())
-        words = f"of the device is not known, {reason}: choose from {examples}"
-        raise ParameterError("driver", words)
+        raise ParameterError(
+            "driver", f"of the device is not known, {reason}: choose from {examples}"
+        )
     return device.driver

@@ -270,11 +270,11 @@ def _connect() -> WebSocketClient:
     except ProtocolError as error:
         raise ParameterError("driver", f"finds no Inverse Service at {where}: {error}") from None
     except OSError as error:
-        words = (
+        raise ParameterError(
+            "driver",
             f"needs the Haply Inverse Service, which does not answer at {where} ({error}): install"
-            f" and start the Haply Hub (docs.haply.co), or name host and port in {SERVICE}"
-        )
-        raise ParameterError("driver", words) from None
+            f" and start the Haply Hub (docs.haply.co), or name host and port in {SERVICE}",
+        ) from None
 
 
 def _list_devices(connection: WebSocketClient) -> list[dict[str, Any]]:

@@ -100,8 +100,9 @@ def simulated_driver(
     """
     samples = round(duration / servo.period)
     if not 0 < samples <= MAX_SAMPLES:
-        limit = f"must be 1 to {MAX_SAMPLES} samples of {servo.period:g} s"
-        raise ParameterError("duration", limit, duration)
+        raise ParameterError(
+            "duration", f"must be 1 to {MAX_SAMPLES} samples of {servo.period:g} s", duration
+        )
     position, speed = initial_motion(plant, hand, servo, motion, start, velocity)
     anchor = anchor_points(motion, servo.period, plant, 0, samples)
     body = sampled_plant(plant, hand, servo)
@@ -182,7 +183,11 @@ def replay_driver(path: str, period: float) -> ReplayDriver:
     if np.abs(steps - period).max() > 1e-3 * period:
         recorded = format_quantity(1.0 / np.median(steps), "Hz")
         rate = format_quantity(1.0 / period, "Hz")
-        words = f"{path} is not sampled evenly at {rate}: most of it is at {recorded}"
-        raise ParameterError("driver", f"{words} ({{update_rate}})", update_rate=recorded)
+        raise ParameterError(
+            "driver",
+            f"{path} is not sampled evenly at {rate}: most of it is at {recorded}"
+            f" ({{update_rate}})",
+            update_rate=recorded,
+        )
     points = np.column_stack([recording[name] for name in "xyz"])
     return ReplayDriver(np.ascontiguousarray(points))

@@ -227,8 +227,9 @@ class LoopPlayer:
         self._next_row = first + len(rows)
         self._writer.append(np.hstack([rows, np.tile(self._marks, (len(rows), 1))]))
         if self._loop.poll() is not EndReason.RUNNING:
-            text = "has ended: {resume} goes on where it stopped"
-            raise ParameterError("driver", text, resume=True)
+            raise ParameterError(
+                "driver", "has ended: {resume} goes on where it stopped", resume=True
+            )
         if len(rows) and self._next_row > self._ramp_end and rows[-1, _SHARE] > 1.0 - 1e-9:
             self._full_row = min(self._full_row, self._next_row)
             self._marks[1] = self._interval

@@ -90,8 +90,9 @@ class Terminal(ExitStack):
         if pressed is None:
             return None
         if not pressed:
-            text = "is closed: {resume} goes on where it stopped"
-            raise ParameterError("terminal", text, resume=True)
+            raise ParameterError(
+                "terminal", "is closed: {resume} goes on where it stopped", resume=True
+            )
         return _SEQUENCES.get(pressed, pressed.decode("ascii", "replace").lower())
 
 

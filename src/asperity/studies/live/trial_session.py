@@ -197,8 +197,10 @@ def simulate_session(participant: Participant, stimuli: Stimuli, observer: Obser
     """
     if participant.simulated in {"", SIMULATED_DEVICE}:
         source = describe_source(participant.simulated)
-        words = f"{participant.code} belongs to {source}: simulated answers need another folder"
-        raise ParameterError("participant", words)
+        raise ParameterError(
+            "participant",
+            f"{participant.code} belongs to {source}: simulated answers need another folder",
+        )
     design = participant.study.design
     setup = stimuli.setup
     strength = hand_strength(design, lambda one: (setup(one).surface, setup(one).device))

@@ -305,8 +305,9 @@ def lay_tiles(
 ) -> Patch:
     """Return 2 x 2 tiles."""
     if joint_width > tile_size:
-        limit = f"must be at most the tile, {tile_size:g} m"
-        raise ParameterError("joint_width", limit, joint_width)
+        raise ParameterError(
+            "joint_width", f"must be at most the tile, {tile_size:g} m", joint_width
+        )
     cell = tile_size + joint_width
     pitch = _TILES * cell / _TILE_NODES
     inside = _distance_from_edge(tile_size, joint_width)

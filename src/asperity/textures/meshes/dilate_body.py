@@ -55,8 +55,11 @@ def dilate_body(body: MeshBody, radius: float) -> MeshBody:
     lower, upper = body.box
     shortest = float((upper - lower).min())
     if radius > shortest:
-        limit = f"must be at most the shortest side of the body, {format_length(shortest)}"
-        raise ParameterError("tip_radius", limit, radius)
+        raise ParameterError(
+            "tip_radius",
+            f"must be at most the shortest side of the body, {format_length(shortest)}",
+            radius,
+        )
     sides = upper - lower + 2.0 * radius
     step = max(float(np.cbrt(sides.prod() / _MAX_NODES)), radius / _STEPS_PER_RADIUS)
     if step > body.coarsest:
