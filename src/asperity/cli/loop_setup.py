@@ -8,8 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cli import options
-from asperity.cli.options import Command, file_values
+from asperity.cli.options import (
+    LAW_OPTIONS,
+    Command,
+    device_option,
+    file_options,
+    file_values,
+    law_option,
+    law_options,
+    select_device,
+    surface_values,
+)
 from asperity.cli.output import progress_bar, step_bar
 from asperity.core.arguments import STIFFNESS, Argument
 from asperity.core.errors import ParameterError, print_message
@@ -40,14 +49,14 @@ def loop_options(
             option is an error and not shown.
         several_laws: whether the command has ``--laws``, which replaces ``--law`` in the help.
     """
-    arguments = (stiffness or STIFFNESS, *options.LAW_OPTIONS[1:])
+    arguments = (stiffness or STIFFNESS, *LAW_OPTIONS[1:])
 
     def decorate(command: Command) -> Command:
         hidden = () if stiffness else arguments[:1]
-        command = options.law_options(arguments, hidden)(options.file_options(command))
+        command = law_options(arguments, hidden)(file_options(command))
         help_text = "Device, in place of the scene's.  [default: the scene's, else omega.3]"
-        command = options.device_option(help_text)(command)
-        law = options.law_option("Law, in place of the scene's.", hidden=several_laws)
+        command = device_option(help_text)(command)
+        law = law_option("Law, in place of the scene's.", hidden=several_laws)
         return click.argument("scene")(law(command))
 
     return decorate
@@ -86,12 +95,12 @@ def load_setup(
     if driver is None and not source.lower().endswith(".toml"):
         fault = "must be a scene file (.toml) with [texture], [hand] and [motion]"
         raise ParameterError("scene", fault, source)
-    requested = options.surface_values(values)
+    requested = surface_values(values)
     if laws:
         requested.setdefault("law", find_law("W"))
     with progress_bar("reading the surface"):
         scene = load_scene(source, file_values(values))
-    device = options.select_device(values["device"], scene, values)
+    device = select_device(values["device"], scene, values)
     note = ""
     surface = {**scene.surface, **requested}
     if driver is not None:

@@ -15,10 +15,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.core import files
 from asperity.core.cache import bypass
 from asperity.core.errors import ParameterError, escape_unprintable
-from asperity.core.files import STANDARD_OUTPUT, check_output
+from asperity.core.files import STANDARD_OUTPUT, check_output, json_text, text_digest, write_bytes
 
 if TYPE_CHECKING:
     from asperity.report.document.page import Page
@@ -183,12 +182,12 @@ class Outputs:
             extra_line: printed after the result, if any.
         """
         if self.json is not None:
-            write_output("json", self.json, files.json_text(data))
+            write_output("json", self.json, json_text(data))
         if self.html is not None:
             from asperity.report.document.html import Origin, render_page
 
             command_line = escape_unprintable(shlex.join(["asperity", *sys.argv[1:]]))
-            origin = Origin(command_line, files.text_digest(files.json_text(data)))
+            origin = Origin(command_line, text_digest(json_text(data)))
             with progress_bar("drawing the report"):
                 text = render_page(page, origin)
             write_output("html", self.html, text)
@@ -317,4 +316,4 @@ def write_output(name: str, path: str, text: str) -> None:
     if path == STANDARD_OUTPUT:
         click.echo(text, nl=not text.endswith("\n"))
     else:
-        files.write_bytes(name, path, text.encode())
+        write_bytes(name, path, text.encode())

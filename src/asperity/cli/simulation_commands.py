@@ -16,10 +16,20 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cli import options
 from asperity.cli.loop_setup import load_setup, loop_options, select_laws, stiffness_option
 from asperity.cli.main import StrictGroup, declare_command
-from asperity.cli.options import plugin_option
+from asperity.cli.options import (
+    GRIP,
+    JOBS,
+    SPEED,
+    argument_options,
+    command_arguments,
+    laws_option,
+    list_parser,
+    plugin_option,
+    provided_values,
+    single_value_parser,
+)
 from asperity.cli.output import Outputs, force_option, is_confirmed, output_options, progress_bar
 from asperity.cli.plugins import has_plugins, load_plugin_files, plugin_files
 from asperity.core.errors import ParameterError, escape_unprintable
@@ -34,12 +44,12 @@ if TYPE_CHECKING:
     from asperity.sweeps.sweep_result import SweepResult
 
 _STIFFNESS = stiffness_option("the scene's, else 1000 N/m")
-_SIMULATE_ARGUMENTS = options.command_arguments("simulate")
+_SIMULATE_ARGUMENTS = command_arguments("simulate")
 
 
 @declare_command("simulate")
 @loop_options(_STIFFNESS)
-@options.argument_options(_SIMULATE_ARGUMENTS)
+@argument_options(_SIMULATE_ARGUMENTS)
 @click.option(
     "--trace", "trace_path", metavar="PATH", help="Write the samples to a recording ('run.mcap')."
 )
@@ -104,17 +114,17 @@ def _confirm_long_run(setup: Setup, *, has_trace: bool) -> None:
         raise ParameterError("duration", fault)
 
 
-_DELAYS, *_ONSET_SEARCH, _DURATION = options.command_arguments("onset")
-_laws_option = options.laws_option("Laws to simulate.  [default: all]")
+_DELAYS, *_ONSET_SEARCH, _DURATION = command_arguments("onset")
+_laws_option = laws_option("Laws to simulate.  [default: all]")
 _report_options = output_options()
 
 
 @declare_command("onset")
 @loop_options(None, several_laws=True)
 @_laws_option
-@options.argument_options([_DELAYS], options.list_parser)
-@options.argument_options(_ONSET_SEARCH, options.single_value_parser)
-@options.argument_options([_DURATION])
+@argument_options([_DELAYS], list_parser)
+@argument_options(_ONSET_SEARCH, single_value_parser)
+@argument_options([_DURATION])
 @_report_options
 def onset_command(
     scene: str, outputs: Outputs, laws: tuple[Law, ...] | None, **values: Any
@@ -133,7 +143,7 @@ def onset_command(
     delays = values["delays"] or DEFAULT_DELAYS
     done = count(1)
     total = len(chosen) * len(delays)
-    search = options.provided_values(values, _ONSET_SEARCH)
+    search = provided_values(values, _ONSET_SEARCH)
     with progress_bar("simulating onsets") as update:
         result = sweep_onsets(
             setup, chosen, delays, progress=lambda: update(next(done) / total), **search
@@ -144,14 +154,14 @@ def onset_command(
     outputs.write(result, onset_page(result))
 
 
-*_SCAN_LISTS, _STROKES = options.command_arguments("scan")
+*_SCAN_LISTS, _STROKES = command_arguments("scan")
 
 
 @declare_command("scan")
 @loop_options(_STIFFNESS, several_laws=True)
 @_laws_option
-@options.argument_options(_SCAN_LISTS, options.list_parser)
-@options.argument_options([_STROKES], options.single_value_parser)
+@argument_options(_SCAN_LISTS, list_parser)
+@argument_options([_STROKES], single_value_parser)
 @_report_options
 def scan_command(scene: str, outputs: Outputs, laws: tuple[Law, ...] | None, **values: Any) -> None:
     """Simulate strokes on the surface of SCENE; report their energy by law, speed and depth.
@@ -162,7 +172,7 @@ def scan_command(scene: str, outputs: Outputs, laws: tuple[Law, ...] | None, **v
 
     chosen = select_laws(laws, values["law"])
     setup = load_setup(scene, values, laws=chosen)
-    arguments = options.provided_values(values, (*_SCAN_LISTS, _STROKES))
+    arguments = provided_values(values, (*_SCAN_LISTS, _STROKES))
     with progress_bar("simulating strokes") as update:
         result = sweep_strokes(setup, chosen, progress=update, **arguments)
 
@@ -171,7 +181,7 @@ def scan_command(scene: str, outputs: Outputs, laws: tuple[Law, ...] | None, **v
     outputs.write(result, strokes_page(result))
 
 
-_RUN, _DESIGN, _SCHEDULER = options.command_arguments("sweep")
+_RUN, _DESIGN, _SCHEDULER = command_arguments("sweep")
 _SINGLE = (*_ONSET_SEARCH, _STROKES)
 _MAX_UNASKED_CASES = 10_000
 """Number of cases above which a sweep is asked for."""
@@ -186,11 +196,11 @@ _MAX_UNASKED_CASES = 10_000
     help="Vary a key of the scene: KEY=START:STOP:COUNT, KEY=START:STOP:COUNTlog or KEY=a,b,c;"
     " may be repeated, for all combinations.",
 )
-@options.argument_options([_RUN, _DESIGN, _SCHEDULER, options.JOBS])
+@argument_options([_RUN, _DESIGN, _SCHEDULER, JOBS])
 @_laws_option
-@options.argument_options([options.SPEED, options.GRIP, _DURATION])
-@options.argument_options([_DELAYS, *_SCAN_LISTS], options.list_parser)
-@options.argument_options(_SINGLE, options.single_value_parser)
+@argument_options([SPEED, GRIP, _DURATION])
+@argument_options([_DELAYS, *_SCAN_LISTS], list_parser)
+@argument_options(_SINGLE, single_value_parser)
 @click.option(
     "-o",
     "--output",
@@ -198,7 +208,7 @@ _MAX_UNASKED_CASES = 10_000
     help="Results folder, in which the same command goes on where it was stopped.",
 )
 @click.option("--yes", is_flag=True, help=f"Compute more than {_MAX_UNASKED_CASES} cases.")
-@options.plugin_option
+@plugin_option
 @_report_options
 def sweep_command(
     scene: str,
@@ -221,7 +231,7 @@ def sweep_command(
     processes = values["jobs"]
     if processes is None:
         processes = available_cores()
-    options.JOBS.validate(processes)
+    JOBS.validate(processes)
     scheduler = values["scheduler"]
     place = cluster_place(scheduler) if scheduler is not None else local_place(processes)
     prepare = _prepare_worker() if processes > 1 or scheduler is not None else b""
@@ -231,9 +241,7 @@ def sweep_command(
         values["run"] or str(_RUN.default),
         design=values["design"] or "",
         laws=[law.letter for law in laws or ()] or None,
-        options=options.provided_values(
-            values, [options.SPEED, options.GRIP, _DURATION, _DELAYS, *_SCAN_LISTS, *_SINGLE]
-        ),
+        options=provided_values(values, [SPEED, GRIP, _DURATION, _DELAYS, *_SCAN_LISTS, *_SINGLE]),
         prepare=prepare,
     )
     if not yes and len(plan) > _MAX_UNASKED_CASES:

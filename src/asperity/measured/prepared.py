@@ -15,10 +15,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.core import files
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError, SurfaceFileError
-from asperity.core.files import Serializable, json_text, open_atomic, open_input, to_plain_data
+from asperity.core.files import (
+    Serializable,
+    check_output,
+    json_text,
+    open_atomic,
+    open_input,
+    to_plain_data,
+)
 from asperity.measured.form import HeightStatistics
 from asperity.measured.lengths import Pitch, is_pitch
 from asperity.measured.parameters import ParameterValues, compute_parameters, find_parameter
@@ -227,7 +233,7 @@ def check_output_path(path: Path, source: Path) -> None:
     """
     if path.exists() and source.exists() and path.samefile(source):
         raise ParameterError("output", "must be another file than the surface", str(path))
-    files.check_output("output", str(path), force=True)
+    check_output("output", str(path), force=True)
 
 
 def is_prepared(path: FilePath) -> bool:

@@ -11,13 +11,21 @@ import numpy as np
 
 from asperity.core.checks import FloatArray
 from asperity.core.files import OMITTED, Serializable, to_plain_data
-from asperity.paper import cycle_experiments as setups
 from asperity.paper.cases import MENDED
 from asperity.paper.cycle_experiments import (
+    ALL_LAWS,
+    ENTRIES,
+    GUESSED_BUMP,
+    GUESSED_HANDS,
+    HANDS,
+    SPEEDS,
+    TRACE_STRIDE,
     DeviceExperiment,
     PassivityExperiment,
+    bump_setup,
     device_experiment,
     passivity_experiment,
+    stroke_setup,
 )
 from asperity.scene.sweeps import map_threads
 from asperity.simulation import Strokes
@@ -76,18 +84,18 @@ class BumpExperiment(Serializable):
     """
 
     bumps: tuple[BumpRun, ...]
-    guessed: tuple[str, ...] = setups.GUESSED_BUMP
+    guessed: tuple[str, ...] = GUESSED_BUMP
 
 
 @lru_cache(maxsize=16)
 def simulate_bump(law: str, entry: str) -> BumpRun:
     """Simulate a hand that moves over the bump and back."""
-    run = setups.bump_setup(law, entry).simulate()
+    run = bump_setup(law, entry).simulate()
     contact = np.any(run.applied != 0.0, axis=1)
     summed = run.energies["supplied"].sum(axis=1)
     window = min(_WINDOW, len(summed) - 1)
     x, _y, z = run.ledger.supplied
-    traced = slice(None, None, setups.TRACE_STRIDE)
+    traced = slice(None, None, TRACE_STRIDE)
     return BumpRun(
         law=law,
         entry=entry,
@@ -106,7 +114,7 @@ def simulate_bump(law: str, entry: str) -> BumpRun:
 
 def bump_experiment(laws: str = BUMP_LAWS) -> BumpExperiment:
     """Simulate section V.C for both entries."""
-    jobs = [(law, entry) for entry in setups.ENTRIES for law in laws]
+    jobs = [(law, entry) for entry in ENTRIES for law in laws]
     return BumpExperiment(map_threads(simulate_bump, jobs))
 
 
@@ -159,7 +167,7 @@ class ScanningExperiment(Serializable):
 
     strokes: tuple[HandStroke, ...]
     traces: tuple[EnergyTrace, ...] = field(metadata=OMITTED)
-    guessed: tuple[str, ...] = setups.GUESSED_HANDS
+    guessed: tuple[str, ...] = GUESSED_HANDS
 
     def strokes_of(self, law: str) -> tuple[Stroke, ...]:
         """Return the strokes of a law for all hands and speeds."""
@@ -168,7 +176,7 @@ class ScanningExperiment(Serializable):
 
 @lru_cache(maxsize=128)
 def _simulate_stroke(law: str, hand: str, speed: float) -> HandStroke:
-    setup = setups.stroke_setup(law, hand, speed)
+    setup = stroke_setup(law, hand, speed)
     assert isinstance(setup.motion, Strokes)
     depth = -setup.motion.start[2]
     loop = setup.surface, setup.plant, setup.hand, setup.servo, setup.motion
@@ -179,18 +187,18 @@ def _simulate_stroke(law: str, hand: str, speed: float) -> HandStroke:
 @lru_cache(maxsize=16)
 def energy_trace(law: str) -> EnergyTrace:
     """Return the energies of the first stroke, of about a second, as in figure 6."""
-    setup = setups.stroke_setup(law)
+    setup = stroke_setup(law)
     assert isinstance(setup.motion, Strokes)
     run = setup.simulate()
-    traced = slice(0, round(setup.motion.period / run.period), setups.TRACE_STRIDE)
+    traced = slice(0, round(setup.motion.period / run.period), TRACE_STRIDE)
     exact = run.energies["supplied"][traced][:, [0, 2]]
     paper = run.energies["same_sample"][traced][:, [0, 2]]
     return EnergyTrace(law, run.time[traced], exact, paper)
 
 
-def scanning_experiment(laws: str = setups.ALL_LAWS) -> ScanningExperiment:
+def scanning_experiment(laws: str = ALL_LAWS) -> ScanningExperiment:
     """Simulate section V.B for every hand and speed."""
-    jobs = [(law, hand, speed) for law in laws for hand in setups.HANDS for speed in setups.SPEEDS]
+    jobs = [(law, hand, speed) for law in laws for hand in HANDS for speed in SPEEDS]
     traces = map_threads(energy_trace, [(law,) for law in FIGURE_6_LAWS if law[0] in laws])
     return ScanningExperiment(map_threads(_simulate_stroke, jobs), traces)
 

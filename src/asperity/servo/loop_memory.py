@@ -15,9 +15,20 @@ from asperity.contacts.warm_start import WARM_START_SIZE
 from asperity.core.checks import FloatArray
 from asperity.core.errors import AsperityError, ParameterError
 from asperity.core.files import Serializable
-from asperity.loop import shared_trace as words
 from asperity.loop.interface import STOP_NOW, STOP_RAMPED
-from asperity.loop.shared_trace import COLUMNS, SharedBlock
+from asperity.loop.shared_trace import (
+    COLUMNS,
+    CONTROL_SIZE,
+    FORCE_LIMIT_COUNT,
+    HEARTBEAT_WORD,
+    LAST_START_TIME,
+    LATENESS_HISTOGRAM,
+    PERIOD_HISTOGRAM,
+    ROW_COUNT,
+    STATUS_SIZE,
+    STOP_WORD,
+    SharedBlock,
+)
 
 BUFFER_ROWS = 40_000
 """Rows that the memory holds: 4 s of the fastest loop."""
@@ -36,8 +47,8 @@ class LoopMemory:
 
     def __init__(self) -> None:
         try:
-            self._control = _allocate(ctypes.c_int64, words.CONTROL_SIZE)
-            self._status = _allocate(ctypes.c_int64, words.STATUS_SIZE)
+            self._control = _allocate(ctypes.c_int64, CONTROL_SIZE)
+            self._status = _allocate(ctypes.c_int64, STATUS_SIZE)
             self._table = _allocate(ctypes.c_double, BUFFER_ROWS * len(COLUMNS))
             self._search = _allocate(ctypes.c_double, WARM_START_SIZE)
         except OSError as error:
@@ -63,7 +74,7 @@ class LoopMemory:
     @property
     def row_count(self) -> int:
         """Number of rows written since the start."""
-        return int(self._status[words.ROW_COUNT])
+        return int(self._status[ROW_COUNT])
 
     @property
     def status(self) -> list[int]:
@@ -72,12 +83,12 @@ class LoopMemory:
 
     def send_heartbeat(self) -> None:
         """Send a heartbeat."""
-        self._control[words.HEARTBEAT_WORD] += 1
+        self._control[HEARTBEAT_WORD] += 1
 
     def request_stop(self, *, now: bool = False) -> None:
         """Request the loop to release the force, by a ramp or now, and to end."""
         wanted = STOP_NOW if now else STOP_RAMPED
-        self._control[words.STOP_WORD] = max(wanted, self._control[words.STOP_WORD])
+        self._control[STOP_WORD] = max(wanted, self._control[STOP_WORD])
 
     def rows(self, first_row: int) -> tuple[FloatArray, int]:
         """Return the available rows from a number on, and the number of the first."""
@@ -122,11 +133,11 @@ class LoopStatistics(Serializable):
     @classmethod
     def from_status(cls, status: Sequence[int]) -> LoopStatistics:
         """Return the statistics of the words of a loop, see :mod:`asperity.loop.shared_trace`."""
-        rows, late, skipped, lateness = status[: words.FORCE_LIMIT_COUNT]
-        forces, slews, deep, deepest = status[words.FORCE_LIMIT_COUNT : words.LAST_START_TIME]
-        first = words.LATENESS_HISTOGRAM
-        second = words.PERIOD_HISTOGRAM
-        histograms = tuple(status[first:second]), tuple(status[second : words.STATUS_SIZE])
+        rows, late, skipped, lateness = status[:FORCE_LIMIT_COUNT]
+        forces, slews, deep, deepest = status[FORCE_LIMIT_COUNT:LAST_START_TIME]
+        first = LATENESS_HISTOGRAM
+        second = PERIOD_HISTOGRAM
+        histograms = tuple(status[first:second]), tuple(status[second:STATUS_SIZE])
         limits = forces, slews, deep, 1e-12 * deepest
         return cls(rows, late, skipped, 1e-9 * lateness, *limits, *histograms)
 

@@ -9,8 +9,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from asperity.core.units import count_text
-from asperity.report.document import page
-from asperity.report.document.page import Cell, Media, Page, Row, Section, Table, TableLayout
+from asperity.report.document.page import (
+    Cell,
+    Media,
+    Page,
+    Paragraph,
+    Row,
+    Section,
+    Table,
+    TableLayout,
+    pairs_table,
+    picture_section,
+    terminal_section,
+)
 from asperity.report.pages.sweep_report import find_loop_page
 from asperity.report.sentences.texts import NOT_AVAILABLE
 from asperity.studies.design import describe_source
@@ -47,8 +58,8 @@ def study_page(result: StudyResult) -> Page:
     functions = [_figure(result, "Psychometric functions", _FUNCTIONS)]
     pooled = Section("Pooled", [table], notes=[result.included_score.pooled_interval])
     rules = [(name.replace("_", " "), f"{x:g}") for name, x in exclusion_rules(design).items()]
-    excluded = [page.Paragraph(f"{name}: {why}.") for name, why in result.excluded.items()]
-    nobody = page.Paragraph("Nobody is excluded.")
+    excluded = [Paragraph(f"{name}: {why}.") for name, why in result.excluded.items()]
+    nobody = Paragraph("Nobody is excluded.")
     source = f" – {describe_source(result.simulated)}" if result.simulated else ""
     return Page(
         title=f"Study: {design.question or design.kind}{source}",
@@ -63,12 +74,12 @@ def study_page(result: StudyResult) -> Page:
             ("Units", "SI; lengths in m, stiffness in N/m"),
         ],
         sections=[
-            page.terminal_section(table),
+            terminal_section(table),
             _figure(result, "Scores", scores, f"{scores[0].upper()}{scores[1:]}. {_BARS}"),
             pooled,
             *(functions if kind.has_function and result.included else ()),
             Section("Participants", [_participant_table(result)], notes=[score.interval]),
-            Section("Exclusion", [page.pairs_table(rules), *(excluded or [nobody])], _RULES),
+            Section("Exclusion", [pairs_table(rules), *(excluded or [nobody])], _RULES),
         ],
     )
 
@@ -157,7 +168,7 @@ def _participant_table(result: StudyResult) -> Table:
 def _figure(result: StudyResult, title: str, text: str, caption: str = "") -> Section:
     media = Media.HTML | Media.NOTEBOOK
     draw = partial(_draw, result, title)
-    return page.picture_section(title, draw, text, caption or f"{text}.", media=media)
+    return picture_section(title, draw, text, caption or f"{text}.", media=media)
 
 
 def _draw(result: StudyResult, title: str) -> Figure:

@@ -24,8 +24,7 @@ from asperity.analysis.bounds.branch_and_bound import (
     supremum,
 )
 from asperity.analysis.bounds.sampling import highest_point, sample_supremum
-from asperity.analysis.gain import proofs
-from asperity.analysis.gain.proofs import CrestProblem
+from asperity.analysis.gain.proofs import CrestProblem, q_d
 from asperity.core.checks import FloatArray
 from asperity.enclosures.cells import Cells
 from asperity.surface import Surface
@@ -201,7 +200,7 @@ def crest_number(surface: Surface, options: SearchOptions) -> bound.Bound:
 
 
 def _crest_number_of_wave(surface: Surface, wave: SingleWave) -> bound.Bound:
-    value = proofs.q_d(wave, surface.max_depth)
+    value = q_d(wave, surface.max_depth)
     note = "formula on a sinusoid"
     if math.isinf(value):
         crest = sharpest_crest(surface.texture)

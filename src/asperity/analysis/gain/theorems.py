@@ -19,8 +19,22 @@ from asperity.analysis.bounds.bound import (
 )
 from asperity.analysis.bounds.branch_and_bound import Problem
 from asperity.analysis.gain import medial_axis, proofs
-from asperity.analysis.gain import proofs as forms
-from asperity.analysis.gain.proofs import NormalChangeProblem, SlopeProblem
+from asperity.analysis.gain.proofs import (
+    NormalChangeProblem,
+    SlopeProblem,
+    WaveFormula,
+    curl_a,
+    curl_e,
+    one_sided_a,
+    phase_b,
+    phase_c,
+    phase_steepest,
+    phase_trough,
+    q_a,
+    q_b,
+    q_c,
+    q_g,
+)
 from asperity.enclosures.cells import Cells
 from asperity.laws import LAWS, Law
 from asperity.laws.clamps import BACKED, LATERAL, WHOLE, Clamp
@@ -49,8 +63,8 @@ class ClosedForm:
         phase: 2πx/l where it is attained, as a function of the same.
     """
 
-    value: forms.WaveFormula
-    phase: forms.WaveFormula
+    value: WaveFormula
+    phase: WaveFormula
 
 
 @dataclass(frozen=True)
@@ -150,9 +164,9 @@ THEOREMS: dict[Law, Theorem] = {
     ),
     LAWS["A"]: Theorem(
         closed_forms={
-            NORM: ClosedForm(forms.q_a, forms.phase_steepest),
-            ONE_SIDED: ClosedForm(forms.one_sided_a, forms.phase_steepest),
-            CURL: ClosedForm(forms.curl_a, forms.phase_steepest),
+            NORM: ClosedForm(q_a, phase_steepest),
+            ONE_SIDED: ClosedForm(one_sided_a, phase_steepest),
+            CURL: ClosedForm(curl_a, phase_steepest),
         },
         reductions={
             NORM: Reduction(_slope_problem(1.0), lambda _surface, slope: math.hypot(1.0, slope)),
@@ -166,16 +180,13 @@ THEOREMS: dict[Law, Theorem] = {
         residual=math.sin,
     ),
     LAWS["B"]: Theorem(
-        closed_forms={NORM: ClosedForm(forms.q_b, forms.phase_b)},
+        closed_forms={NORM: ClosedForm(q_b, phase_b)},
         norm_bound=_norm_bound_from(lambda slope, curvature: math.hypot(1.0, slope) + curvature),
         not_raised_by_clamp={WHOLE: (NORM,)},
         residual=lambda angle: math.tan(0.5 * angle) ** 2,
     ),
     LAWS["C"]: Theorem(
-        closed_forms={
-            NORM: ClosedForm(forms.q_c, forms.phase_c),
-            ONE_SIDED: ClosedForm(forms.q_c, forms.phase_c),
-        },
+        closed_forms={NORM: ClosedForm(q_c, phase_c), ONE_SIDED: ClosedForm(q_c, phase_c)},
         norm_bound=_norm_bound_from(lambda slope, curvature: 1.0 + slope * slope + curvature),
         not_raised_by_clamp=dict.fromkeys((WHOLE, BACKED), (ONE_SIDED,)),
     ),
@@ -188,7 +199,7 @@ THEOREMS: dict[Law, Theorem] = {
     ),
     LAWS["E"]: Theorem(
         constants={NORM: _UNIT_NORM, ONE_SIDED: Constant(1.0, _LEVEL_REASON)},
-        closed_forms={CURL: ClosedForm(forms.curl_e, forms.phase_steepest)},
+        closed_forms={CURL: ClosedForm(curl_e, phase_steepest)},
         reductions={
             CURL: Reduction(
                 _slope_problem(0.0), lambda _surface, slope: slope / math.hypot(1.0, slope)
@@ -207,7 +218,7 @@ THEOREMS: dict[Law, Theorem] = {
         not_raised_by_clamp=dict.fromkeys(_ALL_CLAMPS, (NORM, ONE_SIDED)),
     ),
     LAWS["G"]: Theorem(
-        closed_forms={NORM: ClosedForm(forms.q_g, forms.phase_trough)},
+        closed_forms={NORM: ClosedForm(q_g, phase_trough)},
         reductions={
             NORM: Reduction(
                 lambda surface, cells: NormalChangeProblem(cells, 1.0 / surface.max_depth),

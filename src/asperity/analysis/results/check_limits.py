@@ -14,8 +14,15 @@ from numpy.typing import NDArray
 from asperity.analysis.bounds.bound import NORM, ONE_SIDED, Bound
 from asperity.analysis.energy.straight_scan import scan_force
 from asperity.analysis.gain.characteristic import cached_number
-from asperity.analysis.limits import limit_rules
-from asperity.analysis.limits.limit_rules import Limit
+from asperity.analysis.limits.limit_rules import (
+    DEFAULT_SPEED,
+    LIMIT_RULES,
+    Decision,
+    Limit,
+    LimitCase,
+    check_sample_count,
+    evaluate_limit,
+)
 from asperity.analysis.limits.perceptibility import Perceptibility, assess_perceptibility
 from asperity.analysis.limits.spectrum import MIN_SHARE, Spectrum, compute_spectrum
 from asperity.analysis.limits.wave_scan import wave_forces
@@ -296,11 +303,11 @@ def _default_names(
 
 def _scan_settings(speed: float | None, samples: Mapping[str, float | None]) -> dict[str, Any]:
     """Return speed and numbers of samples, checked."""
-    settings = {"speed": limit_rules.DEFAULT_SPEED}
+    settings = {"speed": DEFAULT_SPEED}
     if speed is not None:
         settings["speed"] = check_positive("speed", speed, "m/s")
     for name, count in samples.items():
-        settings[name] = limit_rules.check_sample_count(name, count)
+        settings[name] = check_sample_count(name, count)
     return settings
 
 
@@ -321,7 +328,7 @@ def _evaluate_limits(
     data = {field: datum.value for field, datum in device.data.items()}
     if recommended.wall_stiffness is not None:
         data["max_stiffness"] = recommended.wall_stiffness
-    case = limit_rules.LimitCase(
+    case = LimitCase(
         device=data,
         wavelengths=spectrum.wavelengths[is_significant],
         forces=forces[is_significant],
@@ -331,10 +338,8 @@ def _evaluate_limits(
         **settings,
     )
     decisions = [
-        limit_rules.evaluate_limit(
-            rule, case, f"{gain_symbol} k ≤ K₀" if rule.number == 5 else None
-        )
-        for rule in limit_rules.LIMIT_RULES
+        evaluate_limit(rule, case, f"{gain_symbol} k ≤ K₀" if rule.number == 5 else None)
+        for rule in LIMIT_RULES
     ]
     six = tuple(decision.limit for decision in decisions)
     top = min((limit.speeds[1] for limit in six if limit.speeds is not None), default=math.inf)
@@ -386,8 +391,8 @@ def _significant_waves(spectrum: Spectrum, forces: FloatArray) -> NDArray[np.boo
 def _rendered_waves(
     spectrum: Spectrum,
     is_significant: NDArray[np.bool_],
-    case: limit_rules.LimitCase,
-    decisions: Sequence[limit_rules.Decision],
+    case: LimitCase,
+    decisions: Sequence[Decision],
 ) -> tuple[RenderedWave, ...]:
     """Return the significant waves, each with its limits."""
     on_waves = [

@@ -29,13 +29,12 @@ from asperity.measured.reader import (
     ReadingOptions,
     SurfaceFile,
 )
-from asperity.measured.reading import surface_topography
 from asperity.measured.reading.grids import NPY_MAGIC, is_sdf, read_npy, read_sdf
 from asperity.measured.reading.image_files import PNG_MAGIC, TIFF_MAGIC, read_png, read_tiff
 from asperity.measured.reading.isolation import describe_exception, read_isolated
 from asperity.measured.reading.mesh import is_binary_stl, is_obj, is_text_stl, read_mesh
 from asperity.measured.reading.prf import is_prf, read_prf
-from asperity.measured.reading.surface_topography import has_library
+from asperity.measured.reading.surface_topography import LIBRARY, has_library, read_instrument
 from asperity.measured.reading.text_reader import read_text
 from asperity.measured.reading.x3p import read_x3p
 
@@ -162,8 +161,8 @@ FALLBACK_READERS = (
     Reader("a text file", lambda file: file.is_text, _read_text, ("unit",), certain=False),
     Reader(
         "an instrument's file",
-        lambda _: surface_topography.has_library(),
-        surface_topography.read_instrument,
+        lambda _: has_library(),
+        read_instrument,
         ("channel", "unit"),
         certain=False,
         is_isolated=True,
@@ -206,7 +205,7 @@ def external_reader_version() -> str | None:
         return None
     if not has_library():
         return ""
-    return version(surface_topography.LIBRARY)
+    return version(LIBRARY)
 
 
 def _guard_reader(reader: Reader) -> Reader:

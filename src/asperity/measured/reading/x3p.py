@@ -14,15 +14,21 @@ from numpy.typing import NDArray
 
 from asperity.core.checks import FloatArray
 from asperity.core.errors import SurfaceFileError
-from asperity.measured import reader
 from asperity.measured.lengths import parse_number
-from asperity.measured.reader import ARCHIVE_ERRORS, measure_spacing
+from asperity.measured.reader import (
+    ARCHIVE_ERRORS,
+    RawSurface,
+    ReadingOptions,
+    SurfaceFile,
+    check_point_count,
+    measure_spacing,
+)
 
 DTYPES = {"I": "<i2", "L": "<i4", "F": "<f4", "D": "<f8"}
 _MAX_XML = 64 * 2**20
 
 
-def read_x3p(file: reader.SurfaceFile, _options: reader.ReadingOptions) -> reader.RawSurface:
+def read_x3p(file: SurfaceFile, _options: ReadingOptions) -> RawSurface:
     """Read an X3P surface or profile.
 
     Heights are offset + increment * stored for an incremental height axis, and offset + stored
@@ -44,7 +50,7 @@ def read_x3p(file: reader.SurfaceFile, _options: reader.ReadingOptions) -> reade
         raise SurfaceFileError(f"damaged zip archive ({error})") from error
 
 
-def _read_archive(archive: _Archive, name: str) -> reader.RawSurface:
+def _read_archive(archive: _Archive, name: str) -> RawSurface:
     main = archive.read("main.xml", limit=_MAX_XML)
     notes: list[str] = []
     header = parse_header(main, notes)
@@ -56,9 +62,9 @@ def _read_archive(archive: _Archive, name: str) -> reader.RawSurface:
     heights = coordinates["CZ"].reshape(header.shape)
     px = _find_step(header, header.axes[0], coordinates, along=1)
     if header.is_profile:  # one row has no distance to the next
-        return reader.RawSurface(heights[0], (px,), name, tuple(notes))
+        return RawSurface(heights[0], (px,), name, tuple(notes))
     py = _find_step(header, header.axes[1], coordinates, along=0)
-    return reader.RawSurface(heights, (px, py), name, tuple(notes))
+    return RawSurface(heights, (px, py), name, tuple(notes))
 
 
 # --- the archive --------------------------------------------------------------------------------
@@ -275,7 +281,7 @@ def _parse_shape(root: ET.Element, is_profile: bool) -> tuple[int, int]:
         raise SurfaceFileError(f"SizeZ is {nz}: a file of several layers is no single surface")
     if is_profile and ny != 1:
         raise SurfaceFileError(f"a profile (PRF) has SizeY 1, got {ny}")
-    reader.check_point_count(nx, ny)
+    check_point_count(nx, ny)
     return ny, nx
 
 

@@ -12,10 +12,28 @@ from asperity.analysis.results.analyze import PASSIVITY_FIELDS, Analysis
 from asperity.core.units import format_quantity
 from asperity.laws import LAWS, SHIPPED_LAW_ARGUMENTS
 from asperity.laws.clamps import NONE
-from asperity.report.document import page
-from asperity.report.document.page import HEADED, Cell, Media, Row, Section, Table, TableLayout
+from asperity.report.document.page import (
+    HEADED,
+    NO_PERCEPTUAL_TEST,
+    PAPER_CITATION,
+    Block,
+    Cell,
+    Cells,
+    DefinitionList,
+    Media,
+    Page,
+    Paragraph,
+    Row,
+    Section,
+    Table,
+    TableLayout,
+    assumption_sections,
+    figure_section,
+    holds_cell,
+    pairs_table,
+    plot_later,
+)
 from asperity.report.pages.catalogue_report import device_numbers_table
-from asperity.report.sentences import texts
 from asperity.report.sentences.analysis_text import (
     bound_notes,
     computed_bounds,
@@ -27,7 +45,23 @@ from asperity.report.sentences.passivity_sentences import (
     stability_limit_text,
 )
 from asperity.report.sentences.surface_text import texture_name
-from asperity.report.sentences.texts import glossary, sentence
+from asperity.report.sentences.texts import (
+    NOT_AVAILABLE,
+    format_in_one_unit,
+    friction_force_text,
+    glossary,
+    interval_text,
+    limit_text,
+    lower_bound_text,
+    margin_text,
+    merit_text,
+    position_text,
+    range_text,
+    readable_name,
+    sentence,
+    upper_bound_text,
+    witness_text,
+)
 from asperity.surface import Surface
 
 _BOUND_HEADINGS = ("number", "lower", "upper", "method", "attained at")
@@ -53,9 +87,9 @@ def leak_facts(analysis: Analysis) -> list[tuple[str, str]]:
     direction = ", ".join([f"{float(part) + 0.0:.6g}" for part in line.direction])
     start = ", ".join([f"{1e3 * float(part) + 0.0:.6g}" for part in line.start])
     plane = f"vertical, along ({direction}) through ({start}) mm"
-    energy = texts.NOT_AVAILABLE
+    energy = NOT_AVAILABLE
     if not math.isnan(leak.energy):
-        energy = texts.range_text(leak.energy, leak.upper_per_period, "J")
+        energy = range_text(leak.energy, leak.upper_per_period, "J")
         energy += f" per traversal ({leak.method})"
     facts = [
         ("energy", energy),
@@ -78,7 +112,7 @@ def leak_facts(analysis: Analysis) -> list[tuple[str, str]]:
         facts.append(("greatest W/length", loop))
     facts += [("v*", critical_speed_text(analysis)), ("thrust", thrust_text(analysis))]
     if density is not None and density.upper > 0.0:
-        area = texts.range_text(density.lower, density.upper, "J/m²")
+        area = range_text(density.lower, density.upper, "J/m²")
         facts.append(("small loops", f"gain at most {area}: the greatest |curl f|"))
     return facts
 
@@ -87,17 +121,17 @@ def merit_facts(analysis: Analysis) -> list[tuple[str, str]]:
     """Return strength, support and force on the scan that compares laws."""
     scan = analysis.merit
     surface = analysis.surface
-    strength = texts.merit_text(scan.strength)
+    strength = merit_text(scan.strength)
     if not surface.texture.scan_line().periodic:
         strength += " m"
     facts = [
         ("strength T", strength),
-        ("support S", texts.merit_text(scan.support)),
+        ("support S", merit_text(scan.support)),
         ("RMS force", f"{format_quantity(scan.ripple * surface.stiffness, 'N')} RMS at this k"),
         ("height", f"z = {format_quantity(scan.height, 'm')}"),
     ]
     if analysis.friction_force is not None:
-        facts.append(("friction", texts.friction_force_text(analysis.friction_force)))
+        facts.append(("friction", friction_force_text(analysis.friction_force)))
     if scan.contact_lost > 0.0:
         facts.append(("no contact", f"on {100.0 * scan.contact_lost:.0f} % of the scan"))
     return facts
@@ -114,8 +148,8 @@ def bounds_table(analysis: Analysis) -> Table:
         bounds.append(("|curl f| [N/m]", density))
     rows = []
     for name, bound in bounds:
-        ends = [texts.lower_bound_text(bound.lower), texts.upper_bound_text(bound.upper)]
-        rows.append(Row([Cell(name, "l"), *ends, bound.method, texts.witness_text(bound)]))
+        ends = [lower_bound_text(bound.lower), upper_bound_text(bound.upper)]
+        rows.append(Row([Cell(name, "l"), *ends, bound.method, witness_text(bound)]))
     return Table(_BOUND_HEADINGS, rows, (1, 2), TableLayout(wrap=(4,)))
 
 
@@ -124,12 +158,12 @@ def criteria_table(passivity: Passivity) -> Table:
     rows = []
     for criterion in passivity.criteria:
         decides = criterion.name == passivity.decided_by
-        cells: page.Cells = [
+        cells: Cells = [
             Cell(criterion.name, "l"),
             Cell(criterion.formula, "line"),
-            page.holds_cell(criterion.holds),
-            texts.limit_text(criterion.limit),
-            texts.margin_text(criterion.margin),
+            holds_cell(criterion.holds),
+            limit_text(criterion.limit),
+            margin_text(criterion.margin),
             Cell(criterion.conclusion, subtext=criterion.assumptions),
         ]
         style = "dim" if criterion.holds is None else ""
@@ -140,9 +174,9 @@ def criteria_table(passivity: Passivity) -> Table:
 def _jumps_table(analysis: Analysis) -> Table:
     """Return one row per depth at which a jump was located."""
     jumps = analysis.continuity.jumps
-    depths = texts.format_in_one_unit([jump.depth for jump in jumps], "m")
-    sizes = texts.format_in_one_unit([jump.size for jump in jumps], "N")
-    places = [texts.position_text(jump.before) for jump in jumps]
+    depths = format_in_one_unit([jump.depth for jump in jumps], "m")
+    sizes = format_in_one_unit([jump.size for jump in jumps], "N")
+    places = [position_text(jump.before) for jump in jumps]
     rows = [Row(cells) for cells in zip(depths, sizes, places, strict=True)]
     return Table(_JUMP_HEADINGS, rows, (0, 1), TableLayout(wrap=(2,)))
 
@@ -150,7 +184,7 @@ def _jumps_table(analysis: Analysis) -> Table:
 # --- the page -------------------------------------------------------------------------------------
 
 
-def analysis_page(analysis: Analysis, texture_code: str = "") -> page.Page:
+def analysis_page(analysis: Analysis, texture_code: str = "") -> Page:
     """Return the report: verdict, numbers, criteria, figures and assumptions.
 
     Args:
@@ -163,7 +197,7 @@ def analysis_page(analysis: Analysis, texture_code: str = "") -> page.Page:
     name = analysis.device.name
     # The map of a profile shows no more than its section.
     gain_figures = ("gain", "depth") if surface.texture.is_profile else ("gain", "top", "depth")
-    return page.Page(
+    return Page(
         title=f"{texture_name(surface.texture)}, law {surface.law.letter}, on the {name}",
         answer=analysis.answer,
         facts=_facts(analysis),
@@ -171,17 +205,17 @@ def analysis_page(analysis: Analysis, texture_code: str = "") -> page.Page:
             _bounds_section(analysis),
             *_figure_sections(analysis, *gain_figures),
             *_criteria_sections(analysis),
-            Section("Worst loop", [page.pairs_table(leak_facts(analysis))], media=_MEDIA),
+            Section("Worst loop", [pairs_table(leak_facts(analysis))], media=_MEDIA),
             *_figure_sections(analysis, "field"),
             _continuity_section(analysis),
-            Section("On a straight scan", [page.pairs_table(merit_facts(analysis))], media=_MEDIA),
-            Section("Reproduce q", [page.Paragraph(code, "code")], media=_MEDIA),
-            *page.assumption_sections(
+            Section("On a straight scan", [pairs_table(merit_facts(analysis))], media=_MEDIA),
+            Section("Reproduce q", [Paragraph(code, "code")], media=_MEDIA),
+            *assumption_sections(
                 analysis.assumptions, device_numbers_table(analysis.device, PASSIVITY_FIELDS)
             ),
-            Section("How to read it", [page.DefinitionList(glossary("analysis"))]),
+            Section("How to read it", [DefinitionList(glossary("analysis"))]),
         ],
-        footer=f"{page.PAPER_CITATION}. {page.NO_PERCEPTUAL_TEST}",
+        footer=f"{PAPER_CITATION}. {NO_PERCEPTUAL_TEST}",
     )
 
 
@@ -191,19 +225,19 @@ def _facts(analysis: Analysis) -> list[tuple[str, str]]:
     return [
         ("Surface", str(surface.texture.describe()["kind"])),
         ("Peak to valley", format_quantity(surface.texture.peak_to_valley, "m")),
-        ("Law", f"{surface.law.letter}, {texts.readable_name(surface.law.name)}"),
+        ("Law", f"{surface.law.letter}, {readable_name(surface.law.name)}"),
         ("Device", analysis.device.name),
         ("Stiffness", f"{surface.stiffness:g} N/m"),
         ("Pressed to", format_quantity(surface.max_depth, "m")),
-        ("Characteristic number q", texts.interval_text(analysis.q)),
-        (f"Greatest stiffness by {decisive.name}", texts.limit_text(decisive.limit)),
+        ("Characteristic number q", interval_text(analysis.q)),
+        (f"Greatest stiffness by {decisive.name}", limit_text(decisive.limit)),
     ]
 
 
 def _bounds_section(analysis: Analysis) -> Section:
     law = analysis.surface.law
     return Section(
-        f"Law {law.letter}, {texts.readable_name(law.name)}: suprema over the working region",
+        f"Law {law.letter}, {readable_name(law.name)}: suprema over the working region",
         [bounds_table(analysis)],
         notes=bound_notes(analysis),
         media=_MEDIA | Media.NOTEBOOK,
@@ -222,8 +256,8 @@ def _criteria_sections(analysis: Analysis) -> list[Section]:
     stiffness = f"Stiffness: {limit}"
     verdict = f"{passivity.verdict}. It rests on: {passivity.decided_by}"
     caption = sentence("criteria", verdict=verdict, stiffness=stiffness)
-    undecided = page.DefinitionList(undecided_criteria(analysis))
-    blocks: list[page.Block] = [short, undecided, page.Paragraph(stiffness)]
+    undecided = DefinitionList(undecided_criteria(analysis))
+    blocks: list[Block] = [short, undecided, Paragraph(stiffness)]
     return [
         Section(title, [table], caption, media=Media.HTML | Media.NOTEBOOK),
         Section(f"{title} {passivity.verdict}", blocks, media=HEADED),
@@ -231,7 +265,7 @@ def _criteria_sections(analysis: Analysis) -> list[Section]:
 
 
 def _continuity_section(analysis: Analysis) -> Section:
-    blocks: list[page.Block] = [page.Paragraph(analysis.continuity.reason)]
+    blocks: list[Block] = [Paragraph(analysis.continuity.reason)]
     if analysis.continuity.jumps:
         blocks.append(_jumps_table(analysis))
     return Section("Continuity", blocks, media=_MEDIA)
@@ -241,19 +275,19 @@ def _figure_sections(analysis: Analysis, *names: str) -> list[Section]:
     """Return the figures of these names."""
     sections = []
     leak = analysis.leak
-    gained = texts.range_text(leak.energy, leak.upper_per_period, "J")
+    gained = range_text(leak.energy, leak.upper_per_period, "J")
     values: dict[str, object] = {
         "letter": analysis.surface.law.letter,
-        "q": texts.interval_text(analysis.q),
+        "q": interval_text(analysis.q),
         "loop": "",
     }
     if len(leak.vertices):
         values["loop"] = f"; the worst loop gains {gained}"
     for name in names:
-        figure = page.plot_later(analysis, name)
+        figure = plot_later(analysis, name)
         media = Media.HTML | Media.NOTEBOOK if name == "gain" else Media.HTML
         text = f"analysis.{name}"
-        sections.append(page.figure_section(text, figure, (), 3, media, **values))
+        sections.append(figure_section(text, figure, (), 3, media, **values))
     return sections
 
 
@@ -281,7 +315,7 @@ def reproduction_lines(analysis: Analysis, texture_code: str = "") -> list[str]:
     lines.append(f"s = asp.Surface({texture}, {_surface_arguments(surface)})")
     evaluation = _evaluate_witness(analysis)
     if evaluation is None:
-        q = texts.interval_text(analysis.q)
+        q = interval_text(analysis.q)
         return [*lines, f"print(asp.characteristic_number(s))  # {q}, {analysis.q.method}"]
     point, value, remark = evaluation
     arguments = f"[{[float(v) for v in point]}]"

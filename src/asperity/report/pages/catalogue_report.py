@@ -12,16 +12,20 @@ from asperity.core.arguments import Argument
 from asperity.core.errors import find_named
 from asperity.core.units import format_quantity
 from asperity.devices import FIELD_TABLE, Device, WallTest
-from asperity.report.document import page
 from asperity.report.document.page import (
     HEADED,
+    Block,
+    Cards,
     Cell,
     Media,
     Page,
+    Paragraph,
+    Picture,
     Row,
     Section,
     Table,
     TableLayout,
+    terminal_section,
 )
 from asperity.report.sentences.analysis_text import (
     datum_text,
@@ -58,8 +62,8 @@ def devices_page(devices: Sequence[Device], *, detailed: bool = False) -> Page:
     notes = table_notes("devices")
     if all(datum.verified for device in devices for datum in device.data.values()):
         notes = notes[1:]  # the first explains the mark of unverified data
-    last = page.terminal_section(notes=notes)
-    return Page("", "", (), [page.terminal_section(_devices_table(devices)), last])
+    last = terminal_section(notes=notes)
+    return Page("", "", (), [terminal_section(_devices_table(devices)), last])
 
 
 def _devices_table(devices: Sequence[Device]) -> Table:
@@ -131,8 +135,8 @@ def _device_sections(device: Device) -> list[Section]:
     parts = [access, *[[note] for note in device.notes], missing]
     return [
         Section(title, (), media=HEADED),
-        page.terminal_section(_device_table(device)),
-        *[page.terminal_section(*map(page.Paragraph, lines)) for lines in parts if lines],
+        terminal_section(_device_table(device)),
+        *[terminal_section(*map(Paragraph, lines)) for lines in parts if lines],
     ]
 
 
@@ -235,9 +239,9 @@ def _list_sections(entries: Sequence[SurfaceEntry], *, detailed: bool) -> list[S
     headings = ("name", "summary and arguments", "size", "height")
     table = Table(headings, rows, (2, 3), TableLayout(wrap=(1,), gap=2))
     if detailed:
-        return [page.terminal_section(table), *map(_arguments_section, entries)]
-    notes = map(page.Paragraph, table_notes("surfaces"))
-    return [page.terminal_section(table), page.terminal_section(*notes)]
+        return [terminal_section(table), *map(_arguments_section, entries)]
+    notes = map(Paragraph, table_notes("surfaces"))
+    return [terminal_section(table), terminal_section(*notes)]
 
 
 def _arguments_section(entry: SurfaceEntry) -> Section:
@@ -254,7 +258,7 @@ def _arguments_section(entry: SurfaceEntry) -> Section:
     ]
     headings = ("argument", "unit", "default", "meaning")
     table = Table(headings, rows, layout=TableLayout(wrap=(2, 3), gap=2))
-    return page.terminal_section(table, *map(page.Paragraph, _source_notes(entry.kind)))
+    return terminal_section(table, *map(Paragraph, _source_notes(entry.kind)))
 
 
 def _source_notes(kind: TextureKind) -> list[str]:
@@ -275,13 +279,13 @@ def surfaces_page(
         "Named surfaces": [_card(entry, command) for entry in entries if entry.is_named],
         "Kinds of textures": [_card(entry, command) for entry in entries if not entry.is_named],
     }
-    sections = [Section(title, [page.Cards(cards)]) for title, cards in groups.items() if cards]
+    sections = [Section(title, [Cards(cards)]) for title, cards in groups.items() if cards]
     return Page(
         title="Named surfaces and kinds of textures",
         answer="",
         sections=[
             *_list_sections(entries, detailed=detailed),
-            Section("", [*map(page.Paragraph, table_notes("cards"))]),
+            Section("", [*map(Paragraph, table_notes("cards"))]),
             *sections,
         ],
     )
@@ -299,10 +303,10 @@ def _card(entry: SurfaceEntry, command: str) -> Section:
         Row([Cell(unit_name(argument), "mono"), argument.default_text, argument_text(argument)])
         for argument in kind.arguments
     ]
-    blocks: list[page.Block] = [
-        page.Picture(partial(_draw_card, entry.texture), f"{kind.name}: {kind.summary}.", dpi=110),
-        page.Paragraph(f"{entry.size_text}, {entry.height_text} from peak to valley", "note"),
-        page.Paragraph(f"{command} {shlex.quote(entry.specification)}".strip(), "mono"),
+    blocks: list[Block] = [
+        Picture(partial(_draw_card, entry.texture), f"{kind.name}: {kind.summary}.", dpi=110),
+        Paragraph(f"{entry.size_text}, {entry.height_text} from peak to valley", "note"),
+        Paragraph(f"{command} {shlex.quote(entry.specification)}".strip(), "mono"),
         Table(("argument", "default", "meaning"), rows),
     ]
     notes = _source_notes(kind)

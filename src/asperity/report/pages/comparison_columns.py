@@ -22,7 +22,6 @@ from asperity.report.document.page import (
     terminal_section,
 )
 from asperity.report.document.terminal import rich_table
-from asperity.report.sentences import texts
 from asperity.report.sentences.comparison_sentences import (
     recommended_stiffness_text,
     row_limit_text,
@@ -33,7 +32,20 @@ from asperity.report.sentences.limit_sentences import (
     tier_text,
 )
 from asperity.report.sentences.passivity_sentences import stability_limit_text
-from asperity.report.sentences.texts import column_meanings, table_notes
+from asperity.report.sentences.texts import (
+    FRICTION_PROOF,
+    NOT_AVAILABLE,
+    balance_text,
+    bound_text,
+    column_meanings,
+    is_sampled,
+    leak_text,
+    merit_text,
+    readable_name,
+    strength_has_unit,
+    table_notes,
+    yes_no_text,
+)
 
 _WIDE_GAP_CONSOLE = 90
 """Console width [characters] from which columns are two characters apart."""
@@ -67,7 +79,7 @@ def has_sampled(comparison: Comparison) -> bool:
     rows = comparison.rows
     numbers = [number for row in rows for number in (row.q, row.one_sided)]
     leaks = [row.leak.method == "sampled" for row in rows]
-    return any(map(texts.is_sampled, numbers)) or any(leaks)
+    return any(map(is_sampled, numbers)) or any(leaks)
 
 
 # --- tables ---------------------------------------------------------------------------------------
@@ -88,24 +100,24 @@ def _given_stiffness_cell(row: LawRow, _comparison: Comparison) -> Cell:
 def _texture_force_cell(row: LawRow, _comparison: Comparison) -> Cell:
     """Return the RMS texture force that the device resolves."""
     if row.perceptibility is None:
-        return Cell(texts.NOT_AVAILABLE)
+        return Cell(NOT_AVAILABLE)
     text = force_magnitude_text(row.resolved_force)
     return Cell(text, note=texture_amount_text(row.perceptibility))
 
 
 def _leak_cell(row: LawRow, _comparison: Comparison) -> Cell:
-    return Cell(texts.leak_text(row.leak), note=row.leak.description)
+    return Cell(leak_text(row.leak), note=row.leak.description)
 
 
 def _continuity_cell(row: LawRow, value: bool | None) -> Cell:
-    return Cell(texts.yes_no_text(value), note=row.continuous_reason)
+    return Cell(yes_no_text(value), note=row.continuous_reason)
 
 
 def _conservation_cell(row: LawRow, _comparison: Comparison) -> Cell:
     reason = row.conservative_reason
     if row.energy_balance == "dissipative":
-        reason = f"{reason}; {texts.FRICTION_PROOF}"
-    return Cell(texts.balance_text(row.energy_balance), note=reason)
+        reason = f"{reason}; {FRICTION_PROOF}"
+    return Cell(balance_text(row.energy_balance), note=reason)
 
 
 def _basis_cell(row: LawRow, _comparison: Comparison) -> Cell:
@@ -118,16 +130,16 @@ def _basis_cell(row: LawRow, _comparison: Comparison) -> Cell:
 
 def _oscillation_cell(row: LawRow, _comparison: Comparison) -> Cell:
     if row.perceptibility is None and not row.is_textureless:
-        return Cell(texts.NOT_AVAILABLE)
+        return Cell(NOT_AVAILABLE)
     return Cell(force_magnitude_text(row.texture_force))
 
 
 def _bound_cell(bound: Bound) -> Cell:
-    return Cell(texts.bound_text(bound), note=f"{bound.method}: {bound.note}")
+    return Cell(bound_text(bound), note=f"{bound.method}: {bound.note}")
 
 
 _LETTER_COLUMN = LawColumn("law", lambda row, _: Cell(row.law.letter, "l"))
-NAME_COLUMN = LawColumn("name", lambda row, _: Cell(texts.readable_name(row.law.name)), False, 112)
+NAME_COLUMN = LawColumn("name", lambda row, _: Cell(readable_name(row.law.name)), False, 112)
 _START_COLUMN = LawColumn("start at", _recommendation_cell, True)
 _GIVEN_COLUMN = LawColumn("at", _given_stiffness_cell, True)
 SUMMARY_COLUMNS = (
@@ -149,8 +161,8 @@ FULL_COLUMNS = (
     LawColumn("conser-\nvative", _conservation_cell, False, 80),
     LawColumn("worst\nleak", _leak_cell, True, 60),
     LawColumn("contin-\nuous", lambda row, _: _continuity_cell(row, row.continuous), False, 80),
-    LawColumn("T", lambda row, _: Cell(texts.merit_text(row.strength)), True, 80),
-    LawColumn("S", lambda row, _: Cell(texts.merit_text(row.support)), True, 80),
+    LawColumn("T", lambda row, _: Cell(merit_text(row.strength)), True, 80),
+    LawColumn("S", lambda row, _: Cell(merit_text(row.support)), True, 80),
     LawColumn("RMS\nforce", _oscillation_cell, True, 80),
 )
 
@@ -179,7 +191,7 @@ def laws_table(comparison: Comparison, columns: Sequence[LawColumn]) -> Table:
     )
     numeric = [i for i, column in enumerate(columns) if column.is_numeric]
     headings = [column.heading for column in columns]
-    if texts.strength_has_unit(comparison):
+    if strength_has_unit(comparison):
         headings = ["T [m]" if heading == "T" else heading for heading in headings]
     return Table(headings, rows, numeric, layout)
 

@@ -14,12 +14,29 @@ from asperity.core.errors import ArgumentWriter, write_keyword
 from asperity.core.units import format_quantity, format_stiffness
 from asperity.envelopes.find_design import Design
 from asperity.envelopes.searches import MET
-from asperity.report.document import page
-from asperity.report.document.page import Cell, Media, Page, Row, Section, Table, TableLayout
+from asperity.report.document.page import (
+    HEADED,
+    NO_PERCEPTUAL_TEST,
+    PAPER_CITATION,
+    SCREEN,
+    BulletList,
+    Cell,
+    DefinitionList,
+    Media,
+    Page,
+    Paragraph,
+    Picture,
+    Row,
+    Section,
+    Table,
+    TableLayout,
+    assumption_sections,
+    plot_later,
+    terminal_section,
+)
 from asperity.report.pages.catalogue_report import device_numbers_table
 from asperity.report.pages.comparison_columns import law_rows, law_sections, terminal_sections
 from asperity.report.pages.measured_report import measured_sections, thin_sections
-from asperity.report.sentences import limit_sentences
 from asperity.report.sentences.analysis_text import datum_text
 from asperity.report.sentences.answer_sentences import (
     methods_text,
@@ -41,7 +58,12 @@ from asperity.report.sentences.comparison_sentences import (
     spectrum_alt_text,
     surface_alt_text,
 )
-from asperity.report.sentences.limit_sentences import percent
+from asperity.report.sentences.limit_sentences import (
+    force_magnitude_text,
+    percent,
+    speed_text,
+    tier_text,
+)
 from asperity.report.sentences.surface_text import describe_texture, texture_name
 from asperity.report.sentences.texts import (
     NOT_AVAILABLE,
@@ -52,7 +74,7 @@ from asperity.report.sentences.texts import (
     position_text,
 )
 
-_FOOTER = f"{page.PAPER_CITATION}. {page.NO_PERCEPTUAL_TEST}"
+_FOOTER = f"{PAPER_CITATION}. {NO_PERCEPTUAL_TEST}"
 
 
 def comparison_page(
@@ -69,8 +91,8 @@ def comparison_page(
         why: whether a terminal shows the reasons of the answer and all assumptions.
         write_argument: writes an argument that changes the answer, as in Python or as an option.
     """
-    reasons = [page.BulletList(recommendation_reasons(comparison, write_argument))]
-    assumed = page.assumption_sections(
+    reasons = [BulletList(recommendation_reasons(comparison, write_argument))]
+    assumed = assumption_sections(
         comparison.assumptions,
         device_numbers_table(comparison.device, list(comparison.device.data)),
         brief=None if why else comparison_defaults(comparison),
@@ -80,7 +102,7 @@ def comparison_page(
         answer=recommendation_text(comparison, write_argument),
         facts=_facts(comparison),
         sections=[
-            *([Section("Why:", reasons, media=page.HEADED)] if why else []),
+            *([Section("Why:", reasons, media=HEADED)] if why else []),
             *terminal_sections(comparison, full),
             Section("Why", reasons),
             *law_sections(comparison),
@@ -89,7 +111,7 @@ def comparison_page(
             *measured_sections(comparison.texture),
             *assumed,
             _provenance_section(comparison),
-            Section("How to read it", [page.DefinitionList(glossary("comparison"))]),
+            Section("How to read it", [DefinitionList(glossary("comparison"))]),
         ],
         footer=_FOOTER,
         methods=methods_text(comparison),
@@ -106,7 +128,7 @@ def _facts(comparison: Comparison) -> list[tuple[str, str]]:
         ("K₀, stiffest smooth wall", datum_text(device.wall_test)),
         ("Stiffness", requested_stiffness_text(comparison)),
         ("Pressed to", _pressed_text(comparison)),
-        ("Scanned at", limit_sentences.speed_text(comparison.speed)),
+        ("Scanned at", speed_text(comparison.speed)),
     ]
 
 
@@ -123,7 +145,7 @@ def _figure_sections(comparison: Comparison) -> list[Section]:
     sections = []
     for name, describe in _FIGURE_DESCRIPTIONS.items():
         text = partial(describe, comparison)
-        picture = page.Picture(page.plot_later(comparison, name), text, name, find_digest)
+        picture = Picture(plot_later(comparison, name), text, name, find_digest)
         media = Media.HTML | Media.NOTEBOOK if name == "merit" else Media.HTML
         title, caption, _ = figure_text(f"comparison.{name}", depth=depth, stiffness=stiffness)
         sections.append(Section(title, [picture], caption, media=media))
@@ -203,8 +225,8 @@ def _case_row(comparison: Comparison) -> Row:
             depth,
             Cell(text, "l", note=comparison.recommendation),
             start,
-            limit_sentences.force_magnitude_text(best.resolved_force),
-            limit_sentences.tier_text(best.perceptibility),
+            force_magnitude_text(best.resolved_force),
+            tier_text(best.perceptibility),
         ]
     )
 
@@ -229,7 +251,7 @@ def comparisons_page(comparisons: DeviceComparisons, why: bool = False) -> Page:
     common = _common_assumptions(cases)
     defaults = set(chain.from_iterable(map(comparison_defaults, cases)))
     brief = None if why else [text for text in common if text in defaults]
-    assumed = page.assumption_sections(common, brief=brief)
+    assumed = assumption_sections(common, brief=brief)
     return Page(
         title=f"{texture_name(texture)} on several devices",
         answer=comparisons.recommendation,
@@ -238,11 +260,11 @@ def comparisons_page(comparisons: DeviceComparisons, why: bool = False) -> Page:
             ("Peak to valley", format_quantity(texture.peak_to_valley, "m")),
         ],
         sections=[
-            page.terminal_section(table),
-            *[page.terminal_section(page.Paragraph(text)) for text in (*answers, *missing)],
+            terminal_section(table),
+            *[terminal_section(Paragraph(text)) for text in (*answers, *missing)],
             *[section for section in assumed if Media.TERMINAL in section.media],
-            Section("", [table, *map(page.Paragraph, missing)], media=Media.NOTEBOOK),
-            Section("Summary", [table, page.DefinitionList(column_meanings("cases"))]),
+            Section("", [table, *map(Paragraph, missing)], media=Media.NOTEBOOK),
+            Section("Summary", [table, DefinitionList(column_meanings("cases"))]),
             *map(_case_section, cases),
             *_missing_sections(missing),
             *measured_sections(texture),
@@ -264,26 +286,24 @@ def _common_assumptions(cases: Sequence[Comparison]) -> list[str]:
 def _missing_sections(sentences: Sequence[str]) -> list[Section]:
     if not sentences:
         return []
-    return [Section("Missing", [page.BulletList(sentences)])]
+    return [Section("Missing", [BulletList(sentences)])]
 
 
 def _case_section(comparison: Comparison) -> Section:
     """Return answer, laws and assumptions of one device and depth."""
 
     def cells(row: LawRow) -> list[str | Cell]:
-        felt = limit_sentences.tier_text(row.perceptibility)
+        felt = tier_text(row.perceptibility)
         return [Cell(row.law.letter, "l"), recommended_stiffness_text(row), felt, row.verdict]
 
     rows = law_rows(comparison, cells)
     table = Table(("law", "start at", "felt?", "verdict"), rows, (1,))
     answer = comparison.recommendation
     assumptions = comparison.assumptions
-    return Section(
-        case_title(comparison), [page.Paragraph(answer), table, page.BulletList(assumptions)]
-    )
+    return Section(case_title(comparison), [Paragraph(answer), table, BulletList(assumptions)])
 
 
-def design_page(result: Design, why: bool = False) -> page.Page:
+def design_page(result: Design, why: bool = False) -> Page:
     """Return the report: answer, margins, what is lost, and the comparison of the answer."""
     compared = comparison_page(result.comparison, why=why)
     rows = []
@@ -294,12 +314,12 @@ def design_page(result: Design, why: bool = False) -> page.Page:
         elif name in result.binding:
             remark = Cell("limits the answer")
         rows.append(Row([name, f"{ratio:.3g}", remark]))
-    media = page.SCREEN | Media.HEADING
+    media = SCREEN | Media.HEADING
     title = "Margins: by which factor each requirement is exceeded"
     sections = [Section(title, [Table(("requirement", "margin", ""), rows, (1,))], media=media)]
     if result.lost:
         sections.append(Section("What the device takes away", [_lost_table(result)], media=media))
-    return page.Page(
+    return Page(
         title=f"Design for {result.comparison.device.name}",
         answer=design_answer(result),
         facts=compared.facts,

@@ -12,25 +12,40 @@ from asperity.core.errors import ParameterError
 from asperity.core.files import write_bytes
 from asperity.core.units import format_quantity
 from asperity.envelopes.envelope import LISTED, DeviceEnvelope, Envelope
-from asperity.report.document import page
 from asperity.report.document.page import (
+    FIGURE_SUFFIXES,
+    NO_PERCEPTUAL_TEST,
+    PAPER_CITATION,
     SCREEN,
     Cell,
+    Cells,
+    DefinitionList,
     Media,
+    Page,
     Picture,
     Row,
     Section,
     Table,
     TableLayout,
+    assumption_sections,
+    figure_bytes,
+    figure_section,
+    holds_cell,
+    plot_later,
 )
 from asperity.report.pages.catalogue_report import device_numbers_table
-from asperity.report.sentences import limit_sentences
 from asperity.report.sentences.analysis_text import (
     amplitude_range_text,
     envelope_answer,
     symbol_lines,
 )
-from asperity.report.sentences.limit_sentences import speed_text, texture_amount_text
+from asperity.report.sentences.limit_sentences import (
+    percent,
+    speed_text,
+    speeds_text,
+    stiffness_text,
+    texture_amount_text,
+)
 from asperity.report.sentences.surface_text import texture_name
 from asperity.report.sentences.texts import (
     figure_text,
@@ -64,14 +79,14 @@ def six_limits_table(result: check_limits.Limits) -> Table:
     """Return one row per limit: number, name, condition, both sides, result, share and speeds."""
     rows = []
     for limit in result.limits:
-        cells: page.Cells = [
+        cells: Cells = [
             Cell(str(limit.number), "l"),
             limit.name,
             limit.inequality,
             side_text(limit.left, limit.unit),
             side_text(limit.right, limit.unit),
-            page.holds_cell(limit.holds),
-            "" if limit.share is None else limit_sentences.percent(limit.share),
+            holds_cell(limit.holds),
+            "" if limit.share is None else percent(limit.share),
             _speeds_cell(limit),
         ]
         rows.append(Row(cells, style=_STYLES[limit.holds]))
@@ -81,7 +96,7 @@ def six_limits_table(result: check_limits.Limits) -> Table:
 def _speeds_cell(limit: Limit) -> str:
     if limit.missing_data:
         return f"needs {', '.join(limit.missing_data)}"
-    return limit_sentences.speeds_text(limit.speeds)
+    return speeds_text(limit.speeds)
 
 
 def listed_waves(result: check_limits.Limits) -> list[check_limits.RenderedWave]:
@@ -94,18 +109,18 @@ def _waves_table(result: check_limits.Limits, *, short: bool) -> Table:
     """Return wave, force and the limits met, a row per wave; ``short`` abbreviates the limits."""
 
     def cell(holds: bool | None) -> str | Cell:
-        return yes_no_text(holds)[0] if short else page.holds_cell(holds)
+        return yes_no_text(holds)[0] if short else holds_cell(holds)
 
     rows = [
         Row(
             [
                 format_quantity(wave.wavelength, "m"),
                 format_quantity(wave.amplitude, "m"),
-                limit_sentences.percent(wave.share),
+                percent(wave.share),
                 format_quantity(wave.frequency, "Hz"),
                 format_quantity(wave.force, "N", digits=2),
                 *[cell(wave.holds.get(number)) for number in WAVE_LIMITS],
-                limit_sentences.speeds_text((0.0, wave.top_speed)),
+                speeds_text((0.0, wave.top_speed)),
             ]
         )
         for wave in listed_waves(result)
@@ -115,14 +130,14 @@ def _waves_table(result: check_limits.Limits, *, short: bool) -> Table:
     return Table(headings, rows, range(len(_WAVE_HEADINGS)))
 
 
-def limits_page(result: check_limits.Limits) -> page.Page:
+def limits_page(result: check_limits.Limits) -> Page:
     """Return the report: answer, limits, figure, waves and assumptions."""
     fields = [*dict.fromkeys([limit.device_field for limit in result.limits]), "friction"]
     notes = [*symbol_lines(result), *table_notes("limits")]
     limits = [six_limits_table(result)]
     surface = result.surface
     name = result.device.name
-    return page.Page(
+    return Page(
         title=f"Limits of {texture_name(surface.texture)}, law {surface.law.letter}, on the {name}",
         answer=result.answer,
         facts=_facts(result),
@@ -130,12 +145,10 @@ def limits_page(result: check_limits.Limits) -> page.Page:
             Section("The six limits", limits, notes=notes, media=SCREEN | Media.NOTEBOOK),
             _figure_section(result),
             *_waves_sections(result),
-            *page.assumption_sections(
-                result.assumptions, device_numbers_table(result.device, fields)
-            ),
-            Section("How to read it", [page.DefinitionList(glossary("limits"))]),
+            *assumption_sections(result.assumptions, device_numbers_table(result.device, fields)),
+            Section("How to read it", [DefinitionList(glossary("limits"))]),
         ],
-        footer=f"{page.PAPER_CITATION}, section II.B. {page.NO_PERCEPTUAL_TEST}",
+        footer=f"{PAPER_CITATION}, section II.B. {NO_PERCEPTUAL_TEST}",
     )
 
 
@@ -149,18 +162,18 @@ def _facts(result: check_limits.Limits) -> list[tuple[str, str]]:
         ("Law", f"{law.letter}, {readable_name(law.name)}"),
         ("Device", result.device.name),
         ("Scanning speed", speed_text(result.speed)),
-        ("Stiffness", limit_sentences.stiffness_text(result)),
-        ("Speeds at which all decided limits hold", limit_sentences.speeds_text(result.speeds)),
+        ("Stiffness", stiffness_text(result)),
+        ("Speeds at which all decided limits hold", speeds_text(result.speeds)),
         ("Texture force", f"{texture_amount_text(perceptibility)}: {perceptibility.tier}"),
     ]
 
 
 def _figure_section(result: check_limits.Limits) -> Section:
     met = sum([all(wave.holds.values()) for wave in result.waves])
-    figure = page.plot_later(result)
+    figure = plot_later(result)
     media = Media.HTML | Media.NOTEBOOK
     count = len(result.waves)
-    return page.figure_section("limits.waves", figure, media=media, count=count, met=met)
+    return figure_section("limits.waves", figure, media=media, count=count, met=met)
 
 
 def _waves_sections(result: check_limits.Limits) -> list[Section]:
@@ -178,11 +191,11 @@ def _waves_sections(result: check_limits.Limits) -> list[Section]:
 
 
 _ALL = SCREEN | Media.HEADING
-SUFFIXES = (".csv", *page.FIGURE_SUFFIXES)
+SUFFIXES = (".csv", *FIGURE_SUFFIXES)
 """Suffixes of the files to which an envelope is written."""
 
 
-def envelope_page(result: Envelope) -> page.Page:
+def envelope_page(result: Envelope) -> Page:
     """Return the report: answer, diagram, ranges by law, points and assumptions."""
     names = ", ".join([envelope.device.name for envelope in result.devices])
     stiffness = format_quantity(result.conditions.min_stiffness, "N/m")
@@ -190,12 +203,12 @@ def envelope_page(result: Envelope) -> page.Page:
     title, caption, alt = figure_text(
         "envelope.regions", stiffness=stiffness, speed=speed, count=len(result.devices)
     )
-    figure = Picture(page.plot_later(result), alt)
+    figure = Picture(plot_later(result), alt)
     tables = [
         Section(envelope.device.name, [_ranges_table(envelope)], media=_ALL)
         for envelope in result.devices
     ]
-    return page.Page(
+    return Page(
         title=f"Sinusoids rendered by {names}",
         answer=" ".join(map(envelope_answer, result.devices)),
         facts=[("Devices", names), ("Least stiffness", stiffness), ("Scanning speed", speed)],
@@ -203,10 +216,10 @@ def envelope_page(result: Envelope) -> page.Page:
             Section(title, [figure], caption, media=Media.HTML | Media.NOTEBOOK),
             *tables,
             *_points_sections(result),
-            *page.assumption_sections(result.assumptions),
-            Section("How to read it", [page.DefinitionList(glossary("envelope"))]),
+            *assumption_sections(result.assumptions),
+            Section("How to read it", [DefinitionList(glossary("envelope"))]),
         ],
-        footer=f"{page.PAPER_CITATION}, section II.B. {page.NO_PERCEPTUAL_TEST}",
+        footer=f"{PAPER_CITATION}, section II.B. {NO_PERCEPTUAL_TEST}",
     )
 
 
@@ -221,7 +234,7 @@ def _ranges_table(envelope: DeviceEnvelope) -> Table:
     for law in envelope.laws:
         curl = yes_no_text(not law.conservative)
         ranges = [amplitude_range_text(law.borders[i]) for i in shown]
-        cells: page.Cells = [Cell(law.letter, "l"), f"{law.decades:.2f}", curl, *ranges]
+        cells: Cells = [Cell(law.letter, "l"), f"{law.decades:.2f}", curl, *ranges]
         rows.append(Row(cells, law is envelope.widest, law=law.letter))
     layout = TableLayout(drop_order=[0, 1, *range(3, 3 + len(shown)), 2], gap=2)
     return Table(("law", "decades²", "curl", *lengths), rows, range(3, 3 + len(shown)), layout)
@@ -254,8 +267,8 @@ def write_envelope(result: Envelope, path: str) -> None:
         ParameterError: for another suffix, or a file that cannot be written.
     """
     suffix = check_suffix(path)
-    if suffix in page.FIGURE_SUFFIXES:
-        content = page.figure_bytes(result, suffix)
+    if suffix in FIGURE_SUFFIXES:
+        content = figure_bytes(result, suffix)
     else:
         text = io.StringIO()
         rows = result.table_rows()

@@ -17,16 +17,22 @@ from asperity.measured.form import SurfaceDecomposition, decompose_surface
 from asperity.measured.parameters import SurfaceParameter, find_parameter
 from asperity.measured.prepared import PreparationStage, PreparedSurface
 from asperity.measured.reading.measured_file import MeasurementSummary, StepChange, decimate
-from asperity.report.document import page
 from asperity.report.document.page import (
     HEADED,
     SCREEN,
+    BulletList,
     Cell,
     Media,
+    Page,
+    Paragraph,
     Row,
     Section,
     Table,
     TableLayout,
+    figure_section,
+    pairs_table,
+    picture_section,
+    terminal_section,
 )
 from asperity.report.sentences.surface_text import (
     lay_text,
@@ -161,19 +167,19 @@ def _compute_parts(texture: Texture) -> SurfaceDecomposition:
 # --- pages ----------------------------------------------------------------------------------------
 
 
-def surface_summary_page(summary: MeasurementSummary) -> page.Page:
+def surface_summary_page(summary: MeasurementSummary) -> Page:
     """Return the report: parameters, parts, and the surface before and after each step."""
     prepared = summary.prepared
     title = "After each step"
     sections = [
-        page.terminal_section(page.Paragraph(surface_summary_text(prepared))),
+        terminal_section(Paragraph(surface_summary_text(prepared))),
         *_stage_sections(prepared, title),
         *_parts_sections(summary),
         *_figure_sections(summary),
         *_step_sections(prepared),
         *_definition_sections(prepared),
     ]
-    return page.Page(
+    return Page(
         title=f"Parameters of the surface {summary.source}",
         answer=measurement_answer(summary),
         facts=[("Surface", surface_summary_text(prepared))],
@@ -181,14 +187,14 @@ def surface_summary_page(summary: MeasurementSummary) -> page.Page:
     )
 
 
-def preparation_page(prepared: PreparedSurface, path: str) -> page.Page:
+def preparation_page(prepared: PreparedSurface, path: str) -> Page:
     """Return the steps of a preparation, for a terminal: parameters, size and path of the file."""
     blocks = [
-        page.Paragraph(surface_summary_text(prepared), "code"),
-        page.Paragraph(f"Saved: {escape_unprintable(path)}", "code"),
+        Paragraph(surface_summary_text(prepared), "code"),
+        Paragraph(f"Saved: {escape_unprintable(path)}", "code"),
     ]
-    last = page.terminal_section(*blocks)
-    return page.Page("", "", (), [*_step_sections(prepared), *_stage_sections(prepared, ""), last])
+    last = terminal_section(*blocks)
+    return Page("", "", (), [*_step_sections(prepared), *_stage_sections(prepared, ""), last])
 
 
 def _stage_sections(prepared: PreparedSurface, title: str) -> list[Section]:
@@ -201,8 +207,8 @@ def _step_sections(prepared: PreparedSurface) -> list[Section]:
     """Return the preparation steps, numbered in a terminal."""
     numbered = [(f"{number}", step) for number, step in enumerate(prepared.steps, start=1)]
     return [
-        Section("Preparation", [page.BulletList(prepared.steps)]),
-        Section("Preparation:", [page.pairs_table(numbered)], media=HEADED),
+        Section("Preparation", [BulletList(prepared.steps)]),
+        Section("Preparation:", [pairs_table(numbered)], media=HEADED),
     ]
 
 
@@ -222,7 +228,7 @@ def _figure_sections(summary: MeasurementSummary) -> list[Section]:
         description = f"The surface after preparation: {size}."
         heights = {"heights": decimate(summary.prepared.heights)}
         figure = partial(_draw_heights, heights, summary.sides)
-        return [page.picture_section("The surface", figure, description, "After preparation.")]
+        return [picture_section("The surface", figure, description, "After preparation.")]
     first, *others = summary.changes
     return [_change_section(first, 2), *(_change_section(change, 3) for change in others)]
 
@@ -234,7 +240,7 @@ def _change_section(change: StepChange, level: int) -> Section:
     removed = change.before - change.after
     maps = {"before": change.before, "after": change.after, "removed": removed}
     figure = partial(_draw_heights, maps, change.sides)
-    return page.picture_section(title, figure, f"{title}. {caption}.", caption, level=level)
+    return picture_section(title, figure, f"{title}. {caption}.", caption, level=level)
 
 
 def _draw_heights(heights_by_title: Mapping[str, FloatArray], sides: tuple[float, ...]) -> Figure:
@@ -243,7 +249,7 @@ def _draw_heights(heights_by_title: Mapping[str, FloatArray], sides: tuple[float
     return heights_figure(heights_by_title, sides)
 
 
-def field_page(field: PotentialField, path: str) -> page.Page:
+def field_page(field: PotentialField, path: str) -> Page:
     """Return the numbers of a baked field, for a terminal, and the path of its file."""
     lowest = round(max(field.grid.floor, field.extremes[0] - field.max_depth), 12)
     floor = format_quantity(lowest, "m")
@@ -258,8 +264,8 @@ def field_page(field: PotentialField, path: str) -> page.Page:
         f"q⁺ at most {field.one_sided.upper:.4g}. Valid down to z = {floor}. {field.bytes} bytes.",
         f"File: {escape_unprintable(path)}",
     )
-    numbers = Section("", [page.Paragraph(text) for text in texts], media=SCREEN)
-    return page.Page("Baked field", "", (), [numbers, *thin_sections(field)])
+    numbers = Section("", [Paragraph(text) for text in texts], media=SCREEN)
+    return Page("Baked field", "", (), [numbers, *thin_sections(field)])
 
 
 def thin_sections(texture: Texture) -> list[Section]:
@@ -272,4 +278,4 @@ def thin_sections(texture: Texture) -> list[Section]:
     half = format_quantity(texture.thin_regions[0].half_thickness, "m")
     figure = partial(thin_parts_figure, texture, texture.thin_map)
     count = len(texture.thin_regions)
-    return [page.figure_section("field.thin", figure, depth=depth, count=count, half=half)]
+    return [figure_section("field.thin", figure, depth=depth, count=count, half=half)]

@@ -14,9 +14,10 @@ from asperity.core.units import count_text, format_quantity
 from asperity.devices import Device
 from asperity.recording.recording import Recording, open_recording
 from asperity.recording.replay import Replay
-from asperity.report.document import page
 from asperity.report.document.html import Origin, render_page
 from asperity.report.document.page import (
+    FIGURE_SUFFIXES,
+    PAPER_CITATION,
     SCREEN,
     Media,
     Page,
@@ -25,7 +26,13 @@ from asperity.report.document.page import (
     Section,
     Table,
     TableLayout,
+    assumption_sections,
+    facts_section,
+    figure_bytes,
+    figure_section,
+    plot_later,
     terminal_page,
+    terminal_section,
 )
 from asperity.report.sentences.loop_text import (
     CAUSE_TEXT,
@@ -53,7 +60,7 @@ from asperity.simulation.trace import MAX_ROWS
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-LOOP_FOOTER = f"{page.PAPER_CITATION}, section V"
+LOOP_FOOTER = f"{PAPER_CITATION}, section V"
 _LEDGER_HEADINGS = ("energy", "x", "y", "z", "sum")
 
 
@@ -134,9 +141,9 @@ def run_page(setup: Setup, run: Run) -> Page:
         sections=[
             *figure_sections(run),
             Section("Energy ledger", [ledger], caption),
-            page.terminal_section(ledger, notes=[caption]),
-            page.facts_section(run_facts(setup, run)),
-            *page.assumption_sections(setup.assumptions),
+            terminal_section(ledger, notes=[caption]),
+            facts_section(run_facts(setup, run)),
+            *assumption_sections(setup.assumptions),
         ],
         footer=LOOP_FOOTER,
     )
@@ -163,7 +170,7 @@ def _motion_section(
 ) -> Section:
     """Return the figure of a loop with its description, which ends in a text."""
     span = format_quantity(duration, "s")
-    return page.figure_section("loop.run", figure, media=media, span=span, end=end)
+    return figure_section("loop.run", figure, media=media, span=span, end=end)
 
 
 # --- recordings -----------------------------------------------------------------------------------
@@ -205,7 +212,7 @@ def columns_table(recording: Recording, ranges: tuple[FloatArray, FloatArray]) -
 
 def replay_page(replay: Replay) -> Page:
     """Return the result of a replay and its notes, for a terminal and a notebook."""
-    notes = [page.Paragraph(note) for note in replay.notes]
+    notes = [Paragraph(note) for note in replay.notes]
     media = Media.TERMINAL | Media.NOTEBOOK
     return Page("", replay_answer(replay), (), [Section("", notes, media=media)] if notes else [])
 
@@ -219,7 +226,7 @@ def recording_page(
     media = Media.HTML | Media.NOTEBOOK
     figures = []
     if recording.rows > 1:
-        draw = page.plot_later(recording)
+        draw = plot_later(recording)
         figures.append(_motion_section(draw, recording.duration, "", media))
     return Page(
         title=f"Recording {recording.path.name}",
@@ -228,8 +235,8 @@ def recording_page(
         sections=[
             *figures,
             Section("Columns", [columns], media=SCREEN | Media.NOTEBOOK),
-            page.facts_section(facts),
-            *page.assumption_sections(recording.metadata.get("assumptions", ())),
+            facts_section(facts),
+            *assumption_sections(recording.metadata.get("assumptions", ())),
         ],
     )
 
@@ -242,15 +249,13 @@ def write_recording_report(recording: Recording, path: str) -> None:
             be written.
     """
     suffix = Path(path).suffix.lower()
-    if suffix not in (".html", *page.FIGURE_SUFFIXES):
-        raise ParameterError(
-            "output", f"must end in .html, {', '.join(page.FIGURE_SUFFIXES)}", path
-        )
+    if suffix not in (".html", *FIGURE_SUFFIXES):
+        raise ParameterError("output", f"must end in .html, {', '.join(FIGURE_SUFFIXES)}", path)
     if suffix == ".html":
         origin = Origin(content=text_digest(json_text(recording)))
         content = render_page(recording_page(recording), origin).encode()
     else:
-        content = page.figure_bytes(recording, suffix)
+        content = figure_bytes(recording, suffix)
     write_bytes("output", path, content)
 
 

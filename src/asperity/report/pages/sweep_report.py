@@ -29,8 +29,14 @@ from asperity.report.document.page import (
     TableLayout,
     notebook_page,
 )
-from asperity.report.pages import run_report
-from asperity.report.pages.run_report import LOOP_FOOTER, loop_facts
+from asperity.report.pages.run_report import (
+    LOOP_FOOTER,
+    figure_sections,
+    ledger_table,
+    loop_facts,
+    recording_page,
+    replay_page,
+)
 from asperity.report.sentences.loop_text import onset_answer, stroke_answer, work_text
 from asperity.report.sentences.texts import NOT_AVAILABLE, millijoules, number_text, table_notes
 from asperity.scene.sweeps import OnsetSweep, StrokeSweep
@@ -284,8 +290,8 @@ def find_loop_page(_result: Any) -> Page | None:
     return None
 
 
-find_loop_page.register(Recording, run_report.recording_page)
-find_loop_page.register(Replay, run_report.replay_page)
+find_loop_page.register(Recording, recording_page)
+find_loop_page.register(Replay, replay_page)
 find_loop_page.register(OnsetSweep, onset_page)
 find_loop_page.register(StrokeSweep, strokes_page)
 find_loop_page.register(SweepResult, sweep_page)
@@ -294,8 +300,8 @@ find_loop_page.register(SweepResult, sweep_page)
 @find_loop_page.register
 def _run_page(result: Run) -> Page:
     answer = f"{work_text(result.surface, result)}."
-    page = notebook_page(answer, run_report.ledger_table(result))
-    return Page("", answer, (), [*page.sections, *run_report.figure_sections(result)])
+    page = notebook_page(answer, ledger_table(result))
+    return Page("", answer, (), [*page.sections, *figure_sections(result)])
 
 
 @find_loop_page.register

@@ -12,8 +12,7 @@ from asperity.core.units import format_quantity
 from asperity.devices import FIELD_TABLE, FIELD_UNITS, Datum, Device, WallTest
 from asperity.envelopes.envelope import DeviceEnvelope, LawEnvelope
 from asperity.envelopes.wave_borders import WaveBorders
-from asperity.report.sentences import limit_sentences
-from asperity.report.sentences.limit_sentences import speed_text
+from asperity.report.sentences.limit_sentences import speed_text, stiffness_text
 from asperity.report.sentences.texts import (
     FRICTION_PROOF,
     INFINITY_SIGN,
@@ -100,7 +99,7 @@ def symbol_lines(result: check_limits.Limits) -> list[str]:
         q = f"{result.gain.value:.4g}"
     numbers = ", ".join(values) or "no data"
     speed = speed_text(result.speed)
-    stiffness = limit_sentences.stiffness_text(result)
+    stiffness = stiffness_text(result)
     return [
         sentence("symbols", speed=speed, limits=result, device=device.name, numbers=numbers),
         sentence("gain_symbol", law=surface.law.letter, stiffness=stiffness, limits=result, q=q),

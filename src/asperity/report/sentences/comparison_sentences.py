@@ -14,7 +14,6 @@ from asperity.analysis.results.recommendation import LawRow
 from asperity.core.units import count_text, format_quantity, format_stiffness, round_down
 from asperity.envelopes.find_design import Design
 from asperity.envelopes.searches import FORCE
-from asperity.report.sentences import texts
 from asperity.report.sentences.answer_sentences import friction_text
 from asperity.report.sentences.limit_sentences import (
     force_magnitude_text,
@@ -31,9 +30,11 @@ from asperity.report.sentences.passivity_sentences import (
     stiffness_limit_text,
 )
 from asperity.report.sentences.texts import (
+    SAMPLED_MARK,
     bound_text,
     friction_force_text,
     leak_text,
+    limit_text,
     sentence,
     sentence_case,
 )
@@ -166,7 +167,7 @@ def row_limit_text(row: LawRow) -> str:
     limit = row.stability_limit
     if not limit.stiffness or not row.conservative:
         return "none"
-    mark = texts.SAMPLED_MARK if limit.sampled else ""
+    mark = SAMPLED_MARK if limit.sampled else ""
     return f"{mark}{format_quantity(round_down(limit.stiffness), 'N/m')}"
 
 
@@ -175,7 +176,7 @@ def recommended_stiffness_text(row: LawRow) -> str:
     stiffness = row.recommended_stiffness
     if stiffness == row.surface.stiffness and not row.is_useful:
         return "none useful"
-    return texts.limit_text(stiffness) if stiffness else "none"
+    return limit_text(stiffness) if stiffness else "none"
 
 
 def requested_stiffness_text(comparison: Comparison) -> str:
@@ -216,7 +217,7 @@ def _target_text(result: Design) -> str:
 def _design_text(result: Design) -> str:
     """Return letter, stiffness and size of a design."""
     texture = result.comparison.texture
-    stiffness = texts.limit_text(result.row.surface.stiffness)
+    stiffness = limit_text(result.row.surface.stiffness)
     height = format_quantity(texture.peak_to_valley, "m")
     measure = "large" if texture.single_wave is None else "high"
     letter = result.row.law.letter

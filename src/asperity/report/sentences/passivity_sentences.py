@@ -8,8 +8,19 @@ from dataclasses import replace
 
 from asperity.analysis.energy.closed_loops import AbsorbingFriction, Leak, LoopKind
 from asperity.analysis.energy.continuity import Continuity, ContinuityCause
-from asperity.analysis.passivity import criteria
-from asperity.analysis.passivity.criteria import Criterion
+from asperity.analysis.passivity.criteria import (
+    DELAY,
+    DRY_FRICTION,
+    LEAK,
+    ONE_SIDED,
+    PAPER,
+    QUANTIZATION,
+    VIRTUAL,
+    WALL,
+    WALL_TEST,
+    Criterion,
+    dry_friction_criterion,
+)
 from asperity.analysis.passivity.device_loop import (
     BuzzBound,
     DeviceLoop,
@@ -77,7 +88,7 @@ def delivery_text(loop: DeviceLoop) -> str:
     speed v damping absorbs σ₀ v of it. So it delivers energy below v* = f_c*/σ₀, at most σ₀ v*²/4
     at v*/2.
     """
-    if criteria.dry_friction_criterion(loop).holds:
+    if dry_friction_criterion(loop).holds:
         return "delivers no energy on slow loops: the device's dry friction absorbs it"
     speed = critical_speed(loop)
     if loop.leak is None or (speed is None and not has_known_leak(loop)):
@@ -203,9 +214,9 @@ _HOLDS_TEXT = {True: "holds", False: "does not hold", None: "not decidable"}
 
 def _conclusion(loop: DeviceLoop, criterion: Criterion) -> str:
     """Return the conclusion of a criterion in words."""
-    if criterion.name == criteria.LEAK:
+    if criterion.name == LEAK:
         return _leak_conclusion(loop, criterion)
-    if criterion.name == criteria.DRY_FRICTION:
+    if criterion.name == DRY_FRICTION:
         return _dry_friction_conclusion(loop, criterion)
     if criterion.obstacle is Obstacle.CURL:
         return f"not applicable: the law is not conservative ({loop.surface.facts.reason})"
@@ -221,7 +232,7 @@ def _conclusion(loop: DeviceLoop, criterion: Criterion) -> str:
 def _presliding_clause(loop: DeviceLoop, criterion: Criterion) -> str:
     """Return that κ alone is too stiff for a device; empty if it is not."""
     _share, fixed = presliding(loop.surface)
-    if not fixed or criterion.limit != 0.0 or criterion.name == criteria.QUANTIZATION:
+    if not fixed or criterion.limit != 0.0 or criterion.name == QUANTIZATION:
         return ""
     stiffness = format_quantity(float(fixed), "N/m")
     return f": the presliding stiffness, {stiffness}, is more than the device allows"
@@ -285,7 +296,7 @@ def _criterion_assumptions(loop: DeviceLoop, criterion: Criterion) -> str:
     """Return the assumptions with the region and the numbers used, unverified ones marked."""
     describe = _ASSUMPTIONS.get(criterion.name)
     assumptions = criterion.assumptions if describe is None else describe(loop)
-    if criterion.name in (criteria.LEAK, criteria.DRY_FRICTION) and loop.conservative:
+    if criterion.name in (LEAK, DRY_FRICTION) and loop.conservative:
         return assumptions
     data = loop.device.data
     numbers = []
@@ -381,22 +392,22 @@ def _dry_friction_assumptions(loop: DeviceLoop) -> str:
 
 
 _ASSUMPTIONS: dict[str, Callable[[DeviceLoop], str]] = {
-    criteria.PAPER: lambda _loop: (
+    PAPER: lambda _loop: (
         "zero-order hold; no certificate for a field with curl, nor from 2 samples of delay on"
     ),
-    criteria.ONE_SIDED: lambda _loop: f"{_COMMON}, no delay, no virtual damping",
-    criteria.DELAY: lambda _loop: (
+    ONE_SIDED: lambda _loop: f"{_COMMON}, no delay, no virtual damping",
+    DELAY: lambda _loop: (
         f"{_COMMON}, d whole samples of delay, no virtual damping, no quantisation"
     ),
-    criteria.VIRTUAL: _virtual_damping_assumptions,
-    criteria.QUANTIZATION: _quantization_assumptions,
-    criteria.WALL: lambda _loop: (
+    VIRTUAL: _virtual_damping_assumptions,
+    QUANTIZATION: _quantization_assumptions,
+    WALL: lambda _loop: (
         "the paper's III.B as printed, for every law; a rule of thumb: that a wall did not cycle "
         "proves no damping, and no norm bounds what a field with curl gains"
     ),
-    criteria.WALL_TEST: _wall_test_assumptions,
-    criteria.LEAK: _leak_assumptions,
-    criteria.DRY_FRICTION: _dry_friction_assumptions,
+    WALL_TEST: _wall_test_assumptions,
+    LEAK: _leak_assumptions,
+    DRY_FRICTION: _dry_friction_assumptions,
 }
 """The assumptions of the shipped criteria; a user-defined one has its own."""
 

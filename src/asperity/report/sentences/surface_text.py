@@ -17,8 +17,13 @@ from asperity.measured.lengths import format_counts, format_lengths
 from asperity.measured.parameters import MAX_CORRELATION_POINTS
 from asperity.measured.prepared import PreparationStage, PreparedSurface
 from asperity.measured.reading.measured_file import MeasurementSummary
-from asperity.report.sentences import texts
-from asperity.report.sentences.texts import energy_text, sentence, sentence_case
+from asperity.report.sentences.texts import (
+    energy_text,
+    readable_name,
+    sentence,
+    sentence_case,
+    yes_no_text,
+)
 from asperity.surface import Surface
 from asperity.textures.catalogue import CATALOGUE
 from asperity.textures.texture import Texture, TextureKind
@@ -52,13 +57,13 @@ def describe_texture(description: dict[str, Any]) -> str:
             parts.append(f"{len(values)} {name}")
             continue
         numbers = [_value_text(name, number, declared.get(name)) for number in values]
-        parts.append(f"{texts.readable_name(name)} {' × '.join(numbers)}")
+        parts.append(f"{readable_name(name)} {' × '.join(numbers)}")
     return f"{description['kind']}: {', '.join(parts)}"
 
 
 def _value_text(name: str, value: Any, argument: Argument | None) -> str:
     if isinstance(value, bool):
-        return texts.yes_no_text(value)
+        return yes_no_text(value)
     if argument is not None:
         return argument.format_value(value)
     if name in _LENGTH_NAMES and isinstance(value, float):
@@ -75,7 +80,7 @@ def texture_name(texture: Texture) -> str:
         'Sinusoid'
     """
     description = texture.describe().get("source", texture.describe())
-    return texture.file_name or texts.readable_name(description["kind"]).capitalize()
+    return texture.file_name or readable_name(description["kind"]).capitalize()
 
 
 def parts_text(parts: SurfaceDecomposition) -> str:
