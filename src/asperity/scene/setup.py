@@ -23,8 +23,16 @@ from asperity.devices.device_file import to_device_toml
 from asperity.laws import Law, distribute_parameters, find_law
 from asperity.recording.replay import file_digest
 from asperity.rendering import assess_rendering, rendering_sentences
-from asperity.scene import scene_defaults, scene_file
-from asperity.scene.scene_file import Scene
+from asperity.scene import scene_defaults
+from asperity.scene.scene_file import (
+    DURATION,
+    HANDS,
+    MOTIONS,
+    RUN_ARGUMENTS,
+    Scene,
+    build_section,
+    surface_keywords,
+)
 from asperity.servo import safety
 from asperity.servo.safety import Safety
 from asperity.simulation import Hand, Motion, Plant, Run, Servo, simulate
@@ -187,16 +195,14 @@ def make_setup(
             nearest), or a value is wrong.
     """
     merged = {**scene.surface, **(surface or {})}
-    run = parse_arguments("run", scene.loop.get("run", {}), scene_file.RUN_ARGUMENTS)
+    run = parse_arguments("run", scene.loop.get("run", {}), RUN_ARGUMENTS)
     if "law" not in merged:
         raise ParameterError("law", "is missing: give {law}, or name one in [surface]", law="B")
     if use_defaults and not {"hand", "motion"} & scene.loop.keys():
         return _make_default_setup(scene, merged, device, duration or run.get("duration"))
     _require_sections(scene)
-    hand = scene_file.build_section("hand", scene.loop["hand"], scene_file.HANDS, scene.folder)
-    motion = scene_file.build_section(
-        "motion", scene.loop["motion"], scene_file.MOTIONS, scene.folder
-    )
+    hand = build_section("hand", scene.loop["hand"], HANDS, scene.folder)
+    motion = build_section("motion", scene.loop["motion"], MOTIONS, scene.folder)
     limits = parse_arguments("servo", scene.loop.get("servo", {}), safety.ARGUMENTS)
     chosen = device or scene.device or load_device(DEFAULT_DEVICE)
     needs_plant = not hand.is_prescribed
@@ -274,7 +280,7 @@ def _make_default_setup(
 def _make_surface(texture: Texture, values: Mapping[str, Any], laws: Sequence[Law]) -> Surface:
     """Return the surface of a loop, with the parameters of all its laws."""
     all_laws = [*laws, find_law(values["law"])]
-    keywords = scene_file.surface_keywords(values, *all_laws)
+    keywords = surface_keywords(values, *all_laws)
     keywords.pop("rendering", None)
     parameters = keywords.pop("law_parameters", {})
     surface = Surface(texture, **keywords)
@@ -289,7 +295,7 @@ def _resolve_duration(
 ) -> tuple[float, list[str]]:
     for duration in (argument, from_scene):
         if duration is not None:
-            return scene_file.DURATION.validate(duration), []
+            return DURATION.validate(duration), []
     ends = getattr(motion, "duration", 0.0)
     if ends > 0.0:
         return float(ends), []
