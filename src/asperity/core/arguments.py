@@ -9,12 +9,12 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 from asperity.core.errors import ParameterError, suggest_names
-from asperity.core.files import attributes_to_dict
+from asperity.core.files import OMITTED, Serializable
 from asperity.core.units import format_quantity, parse_quantity, parse_size
 
 Form = Literal[
@@ -40,7 +40,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 @dataclass(frozen=True)
-class Argument:
+class Argument(Serializable):
     """An argument of a texture kind, a law, a preparation, a surface or a scene section.
 
     Attributes:
@@ -66,12 +66,12 @@ class Argument:
     default_description: str = ""
     form: Form = "quantity"
     required: bool = False
-    minimum: float = 0.0
-    maximum: float = math.inf
+    minimum: float = field(default=0.0, metadata=OMITTED)
+    maximum: float = field(default=math.inf, metadata=OMITTED)
     choices: tuple[str, ...] = ()
-    must_be_positive: bool = False
-    example: str = ""
-    keyword: str = ""
+    must_be_positive: bool = field(default=False, metadata=OMITTED)
+    example: str = field(default="", metadata=OMITTED)
+    keyword: str = field(default="", metadata=OMITTED)
 
     def parse(self, value: Any) -> Any:
         """Return the value [SI] of a text, a number or a list, without a check of the bounds.
@@ -144,11 +144,6 @@ class Argument:
         if self.default_description or self.default is None:
             return self.default_description
         return self.format_value(self.default)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data in SI units."""
-        excluded = ("minimum", "maximum", "must_be_positive", "example", "keyword")
-        return attributes_to_dict(self, exclude=excluded)
 
 
 def read_arguments(

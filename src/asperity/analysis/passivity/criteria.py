@@ -10,9 +10,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from typing import Any
 
 from asperity.analysis.gain.theorems import residual_bound
 from asperity.analysis.passivity.device_loop import (
@@ -27,7 +26,7 @@ from asperity.analysis.passivity.device_loop import (
     round_down_exactly,
 )
 from asperity.core.errors import ParameterError
-from asperity.core.files import attributes_to_dict
+from asperity.core.files import OMITTED, Serializable
 
 PAPER = "paper (1)"
 ONE_SIDED = "one-sided"
@@ -41,7 +40,7 @@ DRY_FRICTION = "dry friction"
 
 
 @dataclass(frozen=True)
-class Criterion:
+class Criterion(Serializable):
     """One criterion of passivity.
 
     Attributes:
@@ -67,13 +66,9 @@ class Criterion:
     assumptions: str = ""
     missing: tuple[str, ...] = ()
     conclusion: str = ""
-    upper_limit: float | None = None
-    obstacle: Obstacle | None = None
-    used_fields: tuple[str, ...] = ()
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data, SI units; an unbounded number is written as the string "inf"."""
-        return attributes_to_dict(self, exclude=("upper_limit", "obstacle", "used_fields"))
+    upper_limit: float | None = field(default=None, metadata=OMITTED)
+    obstacle: Obstacle | None = field(default=None, metadata=OMITTED)
+    used_fields: tuple[str, ...] = field(default=(), metadata=OMITTED)
 
 
 # --- rules of the form k (w⁺ q⁺ + w q) <= budget --------------------------------------------------
@@ -102,7 +97,7 @@ class StiffnessRule:
 
 def evaluate_rule(loop: DeviceLoop, rule: StiffnessRule) -> Criterion:
     """Return the criterion of a rule for a surface on a device."""
-    missing = tuple(field for field in rule.required_fields if loop.device.value(field) is None)
+    missing = tuple(name for name in rule.required_fields if loop.device.value(name) is None)
     fields = (*rule.required_fields, *rule.used_fields)
     formula = rule.formula
     if any(presliding(loop.surface)):
