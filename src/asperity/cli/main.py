@@ -35,8 +35,8 @@ GROUPS = read_toml("commands", Path(__file__).with_name("commands.toml"))
 COMMANDS = {name: entry for group in GROUPS.values() for name, entry in group.items()}
 
 _FILE_OPTIONS = {argument.name: argument for argument in FILE_ARGUMENTS}
+# Options of a measured file that every help shows.
 _USUAL = {"unit", "green", "pitch", "height_range", "tip_radius", "magnify"}
-"""Options of a measured file that every help shows."""
 _HEADINGS = {
     "Law": {"law", "laws", "clamp", "stiffness", "max_depth", "rendering", *SHIPPED_LAW_ARGUMENTS},
     "Device and hand": {"device", "driver", "speed", "grip", "settings"},

@@ -90,8 +90,8 @@ _SAMPLE_TIME = 2e-7  # [s], about
 _ROW_TIME = 5e-7  # [s]
 _ROW_BYTES = 300
 _MAX_UNASKED_TIME = 600.0
+# Estimated time [s] and trace [bytes] of a simulation above which it is asked for.
 _MAX_UNASKED_SIZE = 1e10
-"""Estimated time [s] and trace [bytes] of a simulation above which it is asked for."""
 
 
 def _confirm_long_run(setup: Setup, *, has_trace: bool) -> None:
@@ -183,8 +183,8 @@ def scan_command(scene: str, outputs: Outputs, laws: tuple[Law, ...] | None, **v
 
 _RUN, _DESIGN, _SCHEDULER = command_arguments("sweep")
 _SINGLE = (*_ONSET_SEARCH, _STROKES)
+# Number of cases above which a sweep is asked for.
 _MAX_UNASKED_CASES = 10_000
-"""Number of cases above which a sweep is asked for."""
 
 
 @declare_command("sweep")

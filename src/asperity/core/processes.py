@@ -188,8 +188,8 @@ def precompute(work: Callable[[Any], Any], tasks: Sequence[Any]) -> Iterator[Ite
         queue.stop()
 
 
+# In a worker: where the calling process reads the progress of each task.
 _FRACTIONS: list[Any] = []
-"""In a worker: where the calling process reads the progress of each task."""
 
 
 def _share_fractions(fractions: Any) -> None:

@@ -41,11 +41,11 @@ WAVELENGTHS = tuple(sorted({*np.geomspace(0.05e-3, 20e-3, 54).tolist(), *LISTED}
 """Wavelengths of an envelope by default [m]."""
 GENTLE_WAVE = Sinusoid(1e-5, 1e-3)
 _MAX_PEAKS = 8
+# Least share of the widest region with which a law renders nearly as much.
 _NEAR = 0.9
-"""Least share of the widest region with which a law renders nearly as much."""
+# Ratio of the wavelengths on both sides of an edge. A wave is resolved if it is longer than a
+# limit of the device, not if it is as long.
 _EDGE = 1.0 + 1e-6
-"""Ratio of the wavelengths on both sides of an edge. A wave is resolved if it is longer than a
-limit of the device, not if it is as long."""
 
 
 @dataclass(frozen=True)

@@ -49,14 +49,14 @@ EQUAL = 1.01
 """Factor within which ratios count as equal."""
 
 _LEAST_RATIO = 1e-30
+# Weight of the logarithm by which a requirement is missed, against force and size.
 _PENALTY = 100.0
-"""Weight of the logarithm by which a requirement is missed, against force and size."""
 _TOLERANCE = 1e-3
 _MAX_FACTOR = 100.0
 _FACTORS_PER_DECADE = 4
 _REFINED_FACTORS = 3
+# Stiffnesses tried at a factor: the force on the hand has resonances.
 _STIFFNESSES = 48
-"""Stiffnesses tried at a factor: the force on the hand has resonances."""
 
 
 @dataclass(frozen=True)

@@ -48,8 +48,8 @@ DEFAULT_MIN_STIFFNESS = 100.0
 """Least stiffness of a wall [N/m]: a press of 1 N sinks in by at most 10 mm."""
 
 Original = tuple[Texture, float]
+# Points of a period of one wave: forces that bend differ by 1e-4 from those of 16384 points.
 _SCAN_POINTS = 256
-"""Points of a period of one wave: forces that bend differ by 1e-4 from those of 16384 points."""
 
 
 @dataclass(frozen=True)
@@ -264,12 +264,12 @@ class WaveCase:
 AMPLITUDE_RANGE = (1e-8, 10e-3)
 """Amplitudes searched [m]."""
 _SCANNED_PER_DECADE = 3
+# Half of the logarithmic interval in which a border is sought first.
 _NEAR = 0.15
-"""Half of the logarithmic interval in which a border is sought first."""
+# Absolute tolerance of the logarithm of an amplitude at a border.
 _TOLERANCE = 1e-3
-"""Absolute tolerance of the logarithm of an amplitude at a border."""
+# Least ratio, between scanned amplitudes, near which a narrow region is searched.
 _TIP = 0.3
-"""Least ratio, between scanned amplitudes, near which a narrow region is searched."""
 
 
 AMPLITUDE_LIMITS = {4: "force_limit", 5: "gain_limit"}

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
 _BARS = "Bars are 95 % intervals; an end that the data do not bound is left out."
 _FUNCTIONS = "Share of right answers over the level, with the fitted psychometric functions"
+# Titles of the sections of a study file that the page repeats.
 _FACTS = {
     "vary": "Stimuli",
     "method": "Options",
@@ -43,7 +44,6 @@ _FACTS = {
     "surface": "Surface",
     "device": "Device",
 }
-"""Titles of the sections of a study file that the page repeats."""
 _RULES = "The rules stand in the study file, and were stated before the study."
 
 

@@ -43,6 +43,7 @@ _NUMBER_FILE = "number.txt"
 SCHEMA = 1
 _CODE = re.compile(r"(?=.*\d)[A-Za-z0-9][A-Za-z0-9_-]{0,15}")
 _NUMBER = re.compile(r"\d{1,9}\s*")
+# Types of the entries of a line of answers; early versions did not state ``simulated``.
 _TYPES = {
     "run": int,
     "trial": int,
@@ -52,7 +53,6 @@ _TYPES = {
     "started": str,
     "simulated": str,
 }
-"""Types of the entries of a line of answers; early versions did not state ``simulated``."""
 
 
 def check_participant(code: str) -> str:

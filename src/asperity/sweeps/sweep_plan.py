@@ -170,8 +170,8 @@ def _absolute(value: Any) -> Any:
     return value
 
 
+# Forms of arguments of which a single number is a value.
 _NUMBER_FORMS = ("quantity", "integer", "pair", "axes")
-"""Forms of arguments of which a single number is a value."""
 _STEPS = re.compile(r"(\d*)\s*(log)?")
 
 

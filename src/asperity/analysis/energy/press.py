@@ -23,8 +23,8 @@ _MAX_HALVINGS = 8
 _EDGE_HALVINGS = 4
 _LEAST_SHARE = 1e-300
 _ROOT_TOLERANCE = 1e-4
+# Growth of the press per doubling of the depth below which it counts as its greatest.
 _LEAST_GAIN = 1.01
-"""Growth of the press per doubling of the depth below which it counts as its greatest."""
 
 
 def mean_press(surface: Surface) -> float:

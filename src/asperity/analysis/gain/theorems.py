@@ -254,11 +254,11 @@ def _baked_number(
     return number
 
 
+# A baked field: its numbers are those of its coefficients.
 _BAKED = Theorem(
     special_proofs={measure: _baked_number(measure) for measure in (NORM, ONE_SIDED)},
     gain_above_height=lambda surface, _height: surface.texture.baked_numbers[NORM.name].upper,
 )
-"""A baked field: its numbers are those of its coefficients."""
 
 
 def theorem_on(surface: Surface) -> Theorem:

@@ -94,8 +94,8 @@ def _source_digest(path: str | os.PathLike[str], options: Mapping[str, Any]) -> 
     return content_digest(whole, os.path.basename(os.fspath(path)), library, named)
 
 
+# Greatest number of points along each side of a map in pictures.
 _MAX_SIDE_POINTS = 360
-"""Greatest number of points along each side of a map in pictures."""
 _MAX_LINE_POINTS = 4096
 
 

@@ -20,6 +20,7 @@ _LENGTH = (1, 0, 0)
 _FORCE = (0, 0, 1)
 _STIFFNESS = (-1, 0, 1)
 _NUMBER = (0, 0, 0)
+# Exponents of metre, second and newton of the quantities in the limits.
 _DIMENSIONS = {
     "v": (1, -1, 0),
     "T": (0, 1, 0),
@@ -36,7 +37,6 @@ _DIMENSIONS = {
     "gamma": _NUMBER,
     "q": _NUMBER,
 }
-"""Exponents of metre, second and newton of the quantities in the limits."""
 Quantities = Mapping[str, float]
 Inequality = Callable[[Quantities], tuple[float, float]]
 _CASES = 400

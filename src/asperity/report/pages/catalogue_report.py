@@ -42,8 +42,9 @@ from asperity.textures.texture import Texture, TextureKind
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+# Console width [characters] from which the full name has a column.
 _NAME_MIN_CONSOLE = 96
-"""Console width [characters] from which the full name has a column."""
+# The data that distinguish devices, by heading; all data are listed for one device.
 _COLUMNS = {
     "max\nforce": "max_force",
     "stiffest\nwall": "max_stiffness",
@@ -52,7 +53,6 @@ _COLUMNS = {
     "update\nrate": "update_rate",
     "damping\nσ₀(B)": "damping",
 }
-"""The data that distinguish devices, by heading; all data are listed for one device."""
 
 
 def devices_page(devices: Sequence[Device], *, detailed: bool = False) -> Page:

@@ -47,8 +47,8 @@ from asperity.report.sentences.texts import (
     yes_no_text,
 )
 
+# Console width [characters] from which columns are two characters apart.
 _WIDE_GAP_CONSOLE = 90
-"""Console width [characters] from which columns are two characters apart."""
 
 
 @dataclass(frozen=True)

@@ -171,6 +171,7 @@ def _describe_force(comparison: Comparison) -> str:
     return force_alt_text(comparison, force_segment(comparison.texture).length)
 
 
+# Functions that describe the figures of a comparison, in the order of its page.
 _FIGURE_DESCRIPTIONS: dict[str, Callable[[Comparison], str]] = {
     "surface": _describe_surface,
     "spectrum": _describe_spectrum,
@@ -181,7 +182,6 @@ _FIGURE_DESCRIPTIONS: dict[str, Callable[[Comparison], str]] = {
     "merit": merit_alt_text,
     "risk": risk_alt_text,
 }
-"""Functions that describe the figures of a comparison, in the order of its page."""
 
 
 def _provenance_section(comparison: Comparison) -> Section:

@@ -60,8 +60,8 @@ _LIMIT_HEADINGS = ("", "limit", "condition", "left", "right", "holds", "for", "a
 _NAME_COLUMN = 1
 _SHARE_COLUMN = 6
 _SPEEDS_COLUMN = 7
+# Console width [characters] from which names have one line and shares are shown.
 _WIDE_CONSOLE = 96
-"""Console width [characters] from which names have one line and shares are shown."""
 _LIMITS_LAYOUT = TableLayout(
     wrap=(_NAME_COLUMN, _SPEEDS_COLUMN),
     max_widths={_NAME_COLUMN: len("reconstruction")},

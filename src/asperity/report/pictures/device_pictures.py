@@ -27,8 +27,8 @@ from asperity.report.sentences.limit_sentences import grip_text, speed_text, sti
 from asperity.textures.texture import Texture
 
 _LINE_POINTS = 4096
+# Least amplitude in a figure, as a share of the greatest.
 _LEAST_SHARE = 1e-4
-"""Least amplitude in a figure, as a share of the greatest."""
 # Samples per period for a correct reconstruction, 5 to 10 in section II.B of the paper.
 _SAMPLES_PER_PERIOD = 5.0
 _SCAN_SPEED = 0.1  # of a fast stroke [m/s]

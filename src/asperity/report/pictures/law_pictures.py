@@ -388,12 +388,12 @@ def add_gain_colorbar(
     bar.ax.xaxis.set_minor_locator(NullLocator())
 
 
+# Width of the panel in a narrow window [points].
 _NARROW_WIDTH = 200.0
-"""Width of the panel in a narrow window [points]."""
+# Height of the panel [points].
 _MERIT_HEIGHT = 275.0
-"""Height of the panel [points]."""
+# Width and height of a letter [points].
 _LETTER = 11.0
-"""Width and height of a letter [points]."""
 
 
 def _free_rise(x: float, y: float, taken: Sequence[tuple[float, float]]) -> float:

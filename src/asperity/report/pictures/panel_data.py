@@ -271,12 +271,12 @@ def _round_value(value: float, digits: int) -> float | int | None:
 
 # --- as text --------------------------------------------------------------------------------------
 
+# Up to this number all panels are listed, otherwise those that vary most and least.
 _MAX_LISTED_PANELS = 3
-"""Up to this number all panels are listed, otherwise those that vary most and least."""
+# Up to this number quantities are listed by line, otherwise by axis.
 _MAX_QUANTITIES = 6
-"""Up to this number quantities are listed by line, otherwise by axis."""
+# Up to this number single points are listed, otherwise counted.
 _MAX_LISTED_POINTS = 12
-"""Up to this number single points are listed, otherwise counted."""
 
 
 def ranges_text(panels: Sequence[Panel]) -> str:

@@ -46,8 +46,8 @@ colours above.
 TITLE = 10.0
 LABEL = 9.0
 TICK = 8.0
+# Distance between the labels of axes beside each other [inch].
 _AXES_GAP = 0.2
-"""Distance between the labels of axes beside each other [inch]."""
 HEIGHTS = "cividis"
 WIDE_COLORBAR: dict[str, Any]
 WIDE_COLORBAR = {"location": "bottom", "shrink": 0.5, "aspect": 40, "extend": "both"}

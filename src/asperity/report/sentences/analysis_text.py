@@ -22,6 +22,7 @@ from asperity.report.sentences.texts import (
     yes_no_text,
 )
 
+# Data of a device by their symbols in the limits.
 _SYMBOLS = {
     "T": "update_rate",
     "δ": "position_resolution",
@@ -29,7 +30,6 @@ _SYMBOLS = {
     "K₀": "max_stiffness",
     "F₀": "bandwidth",
 }
-"""Data of a device by their symbols in the limits."""
 
 
 def computed_bounds(analysis: Analysis) -> list[tuple[str, Bound]]:
@@ -159,6 +159,7 @@ def amplitude_range_text(border: WaveBorders) -> str:
 
 
 UNVERIFIED_MARK = "?"
+# The data without which some results are undecided.
 _USED_FIELDS = (
     "max_stiffness",
     "position_resolution",
@@ -168,7 +169,6 @@ _USED_FIELDS = (
     "damping",
     "friction",
 )
-"""The data without which some results are undecided."""
 
 
 def datum_text(datum: Datum | None) -> str:

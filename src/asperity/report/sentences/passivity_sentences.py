@@ -391,6 +391,7 @@ def _dry_friction_assumptions(loop: DeviceLoop) -> str:
     return "f_c: least_friction, taken per length of path at every speed; slow motion, no hold"
 
 
+# The assumptions of the shipped criteria; a user-defined one has its own.
 _ASSUMPTIONS: dict[str, Callable[[DeviceLoop], str]] = {
     PAPER: lambda _loop: (
         "zero-order hold; no certificate for a field with curl, nor from 2 samples of delay on"
@@ -409,7 +410,6 @@ _ASSUMPTIONS: dict[str, Callable[[DeviceLoop], str]] = {
     LEAK: _leak_assumptions,
     DRY_FRICTION: _dry_friction_assumptions,
 }
-"""The assumptions of the shipped criteria; a user-defined one has its own."""
 
 
 _CONTINUITY = {

@@ -25,8 +25,8 @@ from asperity.textures.plane_waves import PlaneWaves
 from asperity.textures.spline.spline_texture import fit_spline
 from asperity.textures.texture import Texture
 
+# Points per node of a grid for a sum of waves that a tip traces: it leaves creases.
 _TIP_REFINEMENT = 16
-"""Points per node of a grid for a sum of waves that a tip traces: it leaves creases."""
 _MAX_TIP_POINTS = 1024  # along a side
 
 
