@@ -89,11 +89,11 @@ def _make_mass(device: Device, has_resonance: bool) -> tuple[Plant, list[str]]:
         )
     notes = []
     values: dict[str, float] = {}
-    for field, words in (("damping", "physical damping"), ("friction", "dry friction")):
+    for field, quantity in (("damping", "physical damping"), ("friction", "dry friction")):
         value = device.value(field)
         values[field] = value or 0.0
         if value is None:
-            notes.append(f"The {words} of {device.name} is not known; none is simulated")
+            notes.append(f"The {quantity} of {device.name} is not known; none is simulated")
     mode = None
     if has_resonance:
         bandwidth = device.value("bandwidth")
@@ -176,12 +176,12 @@ def default_hand_sections(
     motion = {"kind": "strokes", "speed": f"{_SPEED} m/s", "count": count}
     for name, end in zip(("start", "end"), ends, strict=True):
         motion[name] = [f"{value!r} m" for value in end]
-    words = (
+    note = (
         f"A simulated hand is pulled {format_quantity(depth, 'm')} deep by a spring of"
         f" {format_quantity(pull, 'N/m')} and strokes"
         f" {format_quantity(length, 'm')} to and fro at {format_quantity(_SPEED, 'm/s')}"
     )
-    return {"hand": hand, "motion": motion}, words
+    return {"hand": hand, "motion": motion}, note
 
 
 def _default_stroke(texture: Texture, *, along_x: bool) -> tuple[FloatArray, FloatArray]:

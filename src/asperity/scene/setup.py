@@ -271,10 +271,10 @@ def _make_default_setup(
     chosen, assumed = scene_defaults.with_assumed_mass(chosen)
     span = duration or scene_defaults.DEFAULT_STROKE_DURATION
     built = _make_surface(scene.texture, surface, ())
-    hand, words = scene_defaults.default_hand_sections(built, chosen, span)
+    hand, hand_note = scene_defaults.default_hand_sections(built, chosen, span)
     whole = replace(scene, loop={**scene.loop, **hand})
     setup = make_setup(whole, surface=surface, device=chosen, duration=span)
-    return replace(setup, assumptions=(words, *assumed, *setup.assumptions))
+    return replace(setup, assumptions=(hand_note, *assumed, *setup.assumptions))
 
 
 def _make_surface(texture: Texture, values: Mapping[str, Any], laws: Sequence[Law]) -> Surface:

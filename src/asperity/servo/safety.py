@@ -123,12 +123,12 @@ def check_passivity_damping(safety: Safety, device: Device, servo: Servo) -> Non
         raise ParameterError("passivity_damping", text, apparent_mass="50 g")
     bound = mass / ((1 + servo.delay) * servo.period)
     if damping > bound:
-        words = (
+        requirement = (
             f"must be at most m/((1 + d) T) = {format_quantity(bound, 'N*s/m', digits=3)}, with the"
             f" apparent mass m of {device.id}, the period T and a delay of d = {servo.delay}"
             " samples: above it the controller may feed energy into the handle"
         )
-        raise ParameterError("passivity_damping", words, damping)
+        raise ParameterError("passivity_damping", requirement, damping)
 
 
 DEFAULT_SAFETY = Safety()

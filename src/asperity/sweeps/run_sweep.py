@@ -196,8 +196,8 @@ def _open_pool(processes: int) -> Iterator[Executor]:
         try:
             pool.submit(int).result()
         except BrokenExecutor:
-            words = "end when they start: a script needs  if __name__ == '__main__':  around sweep"
-            raise ParameterError("processes", words) from None
+            reason = "end when they start: a script needs  if __name__ == '__main__':  around sweep"
+            raise ParameterError("processes", reason) from None
         yield pool
         pool.shutdown()
     except BaseException:  # also for an interrupt
@@ -289,8 +289,8 @@ def cluster_place(address: str) -> Place:
     try:
         from distributed.scheduler import KilledWorker
     except ImportError:
-        words = "needs Dask's distributed: pip install 'asperity[cluster]'"
-        raise ParameterError("scheduler", words) from None
+        reason = "needs Dask's distributed: pip install 'asperity[cluster]'"
+        raise ParameterError("scheduler", reason) from None
     clients: list[Any] = []
 
     @contextmanager
@@ -348,15 +348,15 @@ def _connect(address: str) -> Iterator[Any]:
         client = Client(address, timeout=_CONNECT_TIME, set_as_default=False)
         versions = client.get_versions()
     except (OSError, ValueError, TypeError) as error:
-        words = f"cannot be reached: {' '.join(str(error).split())[:200]}"
-        raise ParameterError("scheduler", words, address) from None
+        reason = f"cannot be reached: {' '.join(str(error).split())[:200]}"
+        raise ParameterError("scheduler", reason, address) from None
     with client:
         _check_versions(versions)
         try:
             yield client
         except (CancelledError, OSError) as error:
-            words = f"was lost ({type(error).__name__}): the same command goes on from here"
-            raise ParameterError("scheduler", words, address) from None
+            reason = f"was lost ({type(error).__name__}): the same command goes on from here"
+            raise ParameterError("scheduler", reason, address) from None
 
 
 def _check_versions(versions: dict[str, Any]) -> None:
@@ -366,5 +366,5 @@ def _check_versions(versions: dict[str, Any]) -> None:
         packages = other["packages"] if other else {}
         for name in ("python", "distributed", "msgpack", "cloudpickle"):
             if packages.get(name) != expected[name]:
-                words = f"has {name} {packages.get(name)}, this process {expected[name]}"
-                raise ParameterError("scheduler", words)
+                reason = f"has {name} {packages.get(name)}, this process {expected[name]}"
+                raise ParameterError("scheduler", reason)

@@ -154,8 +154,8 @@ def _write_file(path: str | os.PathLike[str], write: Callable[[IO[bytes]], None]
         with open_atomic(path) as stream:
             write(stream)
     except OSError as error:
-        words = f"cannot be written: {error.strerror}"
-        raise ParameterError("output", words, os.fspath(path)) from None
+        requirement = f"cannot be written: {error.strerror}"
+        raise ParameterError("output", requirement, os.fspath(path)) from None
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,8 +233,8 @@ class SweepResult(Reportable, TableFiles):
         try:
             dataset = complete.set_index(keys + index).to_xarray()
         except ImportError:
-            words = "needs xarray: pip install xarray; or use table_rows()"
-            raise ParameterError("to_xarray", words) from None
+            requirement = "needs xarray: pip install xarray; or use table_rows()"
+            raise ParameterError("to_xarray", requirement) from None
         for name in dataset.variables:
             if match := UNIT.fullmatch(str(name)):
                 dataset[name].attrs["units"] = match[2]
@@ -347,8 +347,8 @@ def lock_folder(folder: Path) -> Iterator[None]:
     except ParameterError:
         raise
     except (OSError, ValueError) as error:
-        words = f"must be a folder that can be written: {getattr(error, 'strerror', error)}"
-        raise ParameterError("output", words, str(folder)) from None
+        requirement = f"must be a folder that can be written: {getattr(error, 'strerror', error)}"
+        raise ParameterError("output", requirement, str(folder)) from None
 
 
 def check_plan(path: Path, plan: Mapping[str, Any], kind: str) -> None:
@@ -366,8 +366,8 @@ def check_plan(path: Path, plan: Mapping[str, Any], kind: str) -> None:
     text = json_text(plan)
     if not path.exists():
         if any(file.name != LOCK_FILE for file in folder.iterdir()):
-            words = f"is neither empty nor the folder of a {kind}"
-            raise ParameterError("output", words, str(folder))
+            requirement = f"is neither empty nor the folder of a {kind}"
+            raise ParameterError("output", requirement, str(folder))
         write_bytes("output", path, text.encode())
         return
     with open_input(path) as stream:
@@ -375,5 +375,5 @@ def check_plan(path: Path, plan: Mapping[str, Any], kind: str) -> None:
     expected = json.loads(text)
     differing = [name for name, value in expected.items() if recorded.get(name) != value]
     if differing:
-        words = f"holds another {kind} (other {', '.join(differing)}): choose another folder"
-        raise ParameterError("output", words, str(folder))
+        requirement = f"holds another {kind} (other {', '.join(differing)}): choose another folder"
+        raise ParameterError("output", requirement, str(folder))

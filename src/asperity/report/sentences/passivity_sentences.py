@@ -283,13 +283,13 @@ def _dry_friction_conclusion(loop: DeviceLoop, criterion: Criterion) -> str:
     datum = loop.device.data.get("friction")
     if datum is None or loop.leak is None or not criterion.missing:
         return answer
-    words = "may be enough"
+    judgement = "may be enough"
     if datum.value >= loop.leak.absorbing.upper:
-        words = "would be enough"
+        judgement = "would be enough"
     elif datum.value < loop.leak.absorbing.found:
-        words = "is not enough"
+        judgement = "is not enough"
     mark = "" if datum.verified else " (not verified)"
-    return f"{answer}; friction {datum.text}{mark}, typical or at most, {words}"
+    return f"{answer}; friction {datum.text}{mark}, typical or at most, {judgement}"
 
 
 def _criterion_assumptions(loop: DeviceLoop, criterion: Criterion) -> str:

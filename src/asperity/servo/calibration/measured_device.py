@@ -47,8 +47,8 @@ def measured_device(
         suffix = ", simulated and measured"
     data = {field: datum for field, datum in base.data.items() if field not in _MEASURED_FIELDS}
 
-    def add(field: str, value: float, words: str) -> None:
-        data[field] = _datum(value, FIELD_UNITS[field], f"{source}: {words}", origin)
+    def add(field: str, value: float, method: str) -> None:
+        data[field] = _datum(value, FIELD_UNITS[field], f"{source}: {method}", origin)
 
     wall = _wall_test(calibration, source, origin)
     if wall is not None:
@@ -57,17 +57,17 @@ def measured_device(
     rate = calibration.update_rate
     if resolution.value:
         noise = format_quantity(calibration.noise.value, "m", digits=2)
-        words = f"{_with_uncertainty(resolution, 'm')}, noise at rest {noise}"
-        add("position_resolution", resolution.value, words)
+        method = f"{_with_uncertainty(resolution, 'm')}, noise at rest {noise}"
+        add("position_resolution", resolution.value, method)
     add("update_rate", rate.value, f"fresh readings, {_with_uncertainty(rate, 'Hz')}")
     if not calibration.delay.alternatives:
-        words = "the delay that fits best whatever is left out"
-        add("delay_samples", calibration.delay.samples, words)
+        method = "the delay that fits best whatever is left out"
+        add("delay_samples", calibration.delay.samples, method)
     dynamics = [axis.dynamics for axis in calibration.axes]
     damping = min(d.damping.value - SAFETY_SIGMAS * d.damping.uncertainty for d in dynamics)
     if damping > 0.0:
-        words = _describe_axes(calibration, "damping", "N*s/m")
-        add("damping", damping, f"{words}; the least, less two uncertainties")
+        method = _describe_axes(calibration, "damping", "N*s/m")
+        add("damping", damping, f"{method}; the least, less two uncertainties")
     friction = max(max(axis.friction.value, 0.0) for axis in dynamics)
     add("friction", friction, f"{_describe_axes(calibration, 'friction', 'N')}; the greatest")
     mass = min(axis.mass.value for axis in dynamics)
