@@ -49,10 +49,9 @@ docs: $(VENV)/development  ## Build the documentation into docs/_build/html
 compatibility: $(VENV)/installer  ## Tests with the lowest and the newest versions, on each Python
 	bash .ci/compatibility
 
-dist: $(VENV)/runtime  ## Build the wheel and the source distribution into dist/
+dist: $(VENV)/runtime  ## Build the wheel, with machine code, and the source distribution into dist/
 	@git diff --quiet HEAD 2>/dev/null || echo "note: not a commit: uncommitted changes are packed, too"
-	rm -rf dist
-	$(BIN)/python -m hatchling build
+	bash .ci/dist
 
 dist-test: $(VENV)/development  ## Install the wheel on Python 3.11 to 3.14 without a compiler, run it
 	ASPERITY_DIST_TEST=yes $(BIN)/python -m pytest -n 0 tests/test_distribution.py

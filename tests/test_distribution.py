@@ -112,6 +112,17 @@ def test_wheel_contains_the_package_and_nothing_else(built: dict[str, Path]) -> 
     assert kinds >= {".toml", ".j2", ".js", ".css", ".html", ".c", ".h", "__init__.pyi", "py.typed"}
 
 
+def test_wheel_contains_machine_code_of_the_source(unpacked: Path) -> None:
+    """``make dist`` puts it into the unpacked source distribution, and builds the wheel there."""
+    name = "src/asperity/machine_code/cpython-311/0123"
+    (unpacked / name).parent.mkdir(parents=True)
+    (unpacked / name).write_bytes(b"code")
+    with ZipFile(build(unpacked)["wheel"]) as wheel:
+        assert wheel.read(name.removeprefix("src/")) == b"code"
+    shutil.rmtree(unpacked / "dist")
+    shutil.rmtree((unpacked / name).parents[1])
+
+
 def test_build_is_reproducible(built: dict[str, Path], unpacked: Path, copy: Path) -> None:
     """The same files give the same bytes, at another time and from the source distribution."""
     digests = {kind: hashlib.sha256(path.read_bytes()).digest() for kind, path in built.items()}

@@ -31,8 +31,8 @@ USED: dict[str, tuple[Any, str, tuple[str, ...] | None, str]] = {
         ("self",),
         "LinkOnlyLibrary",
     ),
-    "link": (codegen.CPUCodeLibrary, "_get_module_for_linking", ("self",), "SharedLibrary"),
-    "empty": (codegen.CPUCodegen, "_create_empty_module", ("self", "name"), "SharedLibrary"),
+    "link": (codegen.CPUCodeLibrary, "_get_module_for_linking", ("self",), "WideVectorLibrary"),
+    "empty": (codegen.CPUCodegen, "_create_empty_module", ("self", "name"), "WideVectorLibrary"),
     "add": (codegen.CodeLibrary, "add_ir_module", ("self", "ir_module"), "WideVectorLibrary"),
     "lower": (typed_passes.NativeLowering, "run_pass", ("self", "state"), "LinkOnlyLowering"),
     "pipeline": (compiler.Compiler, "define_pipelines", ("self",), "LoopCompiler"),
@@ -65,7 +65,8 @@ def test_libraries_know_what_they_link() -> None:
     message = f"Numba {numba.__version__}: CPUCodeLibrary changed; adapt "
     library = codegen.JITCPUCodegen("a test").create_library("a test")
     assert library._linking_libraries == [], message + "_shared_callees"
-    assert library._shared_module is None, message + "SharedLibrary"
+    assert library._shared_module is None, message + "WideVectorLibrary"
+    assert library.codegen._engine._defined_symbols == set(), message + "MachineCodeCache._rebuild"
 
 
 def test_pipeline_has_one_lowering_pass() -> None:

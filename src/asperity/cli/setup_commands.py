@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,10 +22,8 @@ from asperity.core.units import count_text
 
 if TYPE_CHECKING:
     from asperity.devices import Device
-    from asperity.laws import Law
     from asperity.servo.calibration.excitation import CalibrationRig
     from asperity.simulation.servo import Servo
-    from asperity.textures import Texture
 
 
 @declare_command("init")
@@ -106,54 +104,31 @@ def doctor_command(outputs: output.Outputs) -> None:
 
 @declare_command("warm")
 @jobs_option
-def warm_command() -> None:
+@click.option(
+    "--pack",
+    metavar="FOLDER",
+    help="Write the code into this folder of a package, for all processors of x86-64-v3 or arm64.",
+)
+def warm_command(pack: str | None) -> None:
     """Compile the shipped laws for every texture kind and store the code in the cache.
 
     Functions that are in the cache are not compiled again. Afterwards, comparisons of shipped
-    laws compile nothing.
+    laws compile nothing, nor do simulate, run and lab on the default device with the code that
+    --pack writes, which make dist calls.
     """
+    from asperity.lab import precompile
     from asperity.laws import LAWS
 
     laws = tuple(LAWS.values())
-    textures = sample_textures()
-    with output.step_bar("compiling", len(textures) * len(laws)) as step:
-        precompile(laws, textures, step)
+    textures = precompile.sample_textures()
+    works = [precompile.precompile]
+    if pack is not None:
+        works.append(precompile.precompile_loops)
+    count = len(works) * len(textures) * len(laws)
+    with precompile.packing(pack), output.step_bar("compiling", count) as step:
+        for work in works:
+            work(laws, textures, step)
     click.echo(f"Compiled: {count_text(len(laws), 'law')} on {', '.join(textures)}")
-
-
-def sample_textures() -> dict[str, Texture]:
-    """Return a small texture for each kind of height function, by name."""
-    from asperity.textures import Fourier, HeightMap, Profile, Sinusoid
-
-    bumps = [0.0, 1.0e-5, 0.0, 2.0e-5]
-    return {
-        "sinusoids": Sinusoid(1.0e-5, 1.0e-3),
-        "sums of waves": Fourier([1.0e-5, 1.0e-5], [[2.0e3, 0.0], [0.0, 3.0e3]]),
-        "sums of parallel waves": Fourier([1.0e-5, 1.0e-5], [[2.0e3, 0.0], [3.0e3, 0.0]]),
-        "profiles": Profile(bumps, 1.0e-3),
-        "maps": HeightMap([bumps] * 4, 1.0e-3),
-    }
-
-
-def precompile(
-    laws: Sequence[Law], textures: Mapping[str, Texture], step: Callable[[str], None]
-) -> None:
-    """Compare laws on textures to compile all functions of a comparison.
-
-    Args:
-        laws: the laws.
-        textures: textures by name.
-        step: called with a description of each step.
-    """
-    from asperity.analysis.results.compare import compare
-
-    for name, texture in textures.items():
-
-        def report(letter: str, name: str = name) -> None:
-            step(f"law {letter} on {name}")
-
-        with cache.bypass_results():
-            compare(texture, laws=laws, progress=report)
 
 
 @declare_command("devices")

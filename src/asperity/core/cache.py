@@ -170,11 +170,20 @@ def get_entry(namespace: str, key: str) -> bytes | None:
         else:
             _warn_about_folder(f"cannot be read ({_error_text(error)}): {_CONSEQUENCE}")
         return None
-    if data[:_HEADER_SIZE] == _MAGIC + _entry_digest(key, data[_HEADER_SIZE:]):
-        with suppress(OSError):  # the folder may be read-only
-            os.utime(path)  # entries are evicted in the order of their last use
-        return data[_HEADER_SIZE:]
-    quarantine(namespace, key)
+    content = entry_content(key, data)
+    if content is None:
+        quarantine(namespace, key)
+        return None
+    with suppress(OSError):  # the folder may be read-only
+        os.utime(path)  # entries are evicted in the order of their last use
+    return content
+
+
+def entry_content(key: str, data: bytes) -> bytes | None:
+    """Return the content of the file of an entry; ``None`` if it is damaged or of another key."""
+    content = data[_HEADER_SIZE:]
+    if data[:_HEADER_SIZE] == _MAGIC + _entry_digest(key, content):
+        return content
     return None
 
 
@@ -199,7 +208,7 @@ def quarantine(namespace: str, key: str) -> None:
     path = _entry_path(namespace, key)
     with suppress(OSError):  # another process may be replacing it
         path.replace(path.with_name(path.name + _QUARANTINE_SUFFIX))
-    _warn_once(f"the cache {cache_folder()} had damaged entries: they were moved aside")
+    warn_once(f"the cache {cache_folder()} had damaged entries: they were moved aside")
 
 
 # Bytes that this process may write before it measures the whole folder again.
@@ -225,7 +234,12 @@ def _evict(written: int) -> None:
 
 
 def _entry_path(namespace: str, key: str) -> Path:
-    return cache_folder() / namespace / hashlib.sha256(key.encode()).hexdigest()[:40]
+    return cache_folder() / namespace / entry_name(key)
+
+
+def entry_name(key: str) -> str:
+    """Return the name of the file of an entry."""
+    return hashlib.sha256(key.encode()).hexdigest()[:40]
 
 
 def _entry_digest(key: str, content: bytes) -> bytes:
@@ -322,7 +336,7 @@ def _distrust_reason(status: os.stat_result) -> str:
 _warned: set[str] = set()
 
 
-def _warn_once(message: str, topic: str = "") -> None:
+def warn_once(message: str, topic: str = "") -> None:
     """Warn once per process and topic; default topic: the message."""
     if (topic or message) not in _warned:
         _warned.add(topic or message)
@@ -331,7 +345,7 @@ def _warn_once(message: str, topic: str = "") -> None:
 
 def _warn_about_folder(problem: str, folder: Path | None = None) -> None:
     # One warning per folder: what cannot be read can seldom be written.
-    _warn_once(f"the cache {folder or cache_folder()} {problem}", str(cache_folder()))
+    warn_once(f"the cache {folder or cache_folder()} {problem}", str(cache_folder()))
 
 
 def _error_text(error: OSError | ValueError) -> str:

@@ -3,10 +3,10 @@
 Private names: ``JITCodeLibrary`` with its methods ``_optimize_final_module``,
 ``_finalize_final_module``, ``_finalize_dynamic_globals``, ``_verify_declare_only_symbols`` and
 ``_get_module_for_linking`` and its ``_linking_libraries`` and ``_shared_module``,
-``CPUCodegen._create_empty_module``, ``_dynfunc.make_function``,
-``Dispatcher._cache`` and ``_compiler``, ``CompileResult._rebuild`` and ``_reduce``. The dependency
-on Numba has an upper bound for their sake, and ``tests/kernels/test_numba_internals.py`` says which
-of them a new version changes.
+``CPUCodegen._create_empty_module`` and ``_engine``, ``JitEngine._defined_symbols``,
+``_dynfunc.make_function``, ``Dispatcher._cache`` and ``_compiler``, ``CompileResult._rebuild`` and
+``_reduce``, ``registry.cpu_target``. The dependency on Numba has an upper bound for their sake, and
+``tests/kernels/test_numba_internals.py`` says which of them a new version changes.
 
 Compilers. Numba optimises each function and generates machine code for it with everything that it
 calls, again at each level of a chain of calls. Only functions that Python calls need that. The
@@ -17,7 +17,8 @@ own, which its callers call. Loops are compiled for the widest vector registers 
 Cache. Numba's own cache unpickles an index and code without verification: a flipped bit crashes
 every start, a planted file is executed. Here each compiled overload is one entry of
 :mod:`asperity.core.cache`, verified before anything is unpickled, and there is no index. Of two
-processes that need the same code at the same time one compiles it and the other waits.
+processes that need the same code at the same time one compiles it and the other waits. Before that,
+code is looked for in the package itself, see :mod:`asperity.core.packed_code`.
 """
 
 from __future__ import annotations
@@ -26,16 +27,32 @@ import hashlib
 import pickle
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from types import FunctionType, ModuleType
 from typing import Any
 
 import llvmlite  # type: ignore[import-untyped]  # it has no types
 import numba
 from numba import _dynfunc  # type: ignore[attr-defined]  # of compiled code
-from numba.core import codegen, compiler, compiler_machinery, dispatcher, serialize, typed_passes
+from numba.core import (
+    codegen,
+    compiler,
+    compiler_machinery,
+    dispatcher,
+    registry,
+    serialize,
+    typed_passes,
+)
 
 from asperity.core import cache
 from asperity.core.compiled import COMPILE_CALLBACKS
+from asperity.core.packed_code import (
+    CODE_NAMESPACE,
+    INTERPRETER,
+    CodeTarget,
+    PackedCode,
+    find_packed_code,
+)
 from asperity.core.processes import defer_interrupt
 
 # Numba is untyped.
@@ -82,10 +99,11 @@ class LinkOnlyLowering(_Lowering):  # type: ignore[misc]  # see above
 
 
 class WideVectorLibrary(_Library):  # type: ignore[misc]  # see above
-    """Code in the widest vector registers of the processor.
+    """Code in the widest vector registers of the processor, which callers call by its symbol.
 
-    For many processors LLVM uses half of an AVX-512 register, because programs with a few wide
-    instructions would run at a lower clock rate. A loop over many points consists of them.
+    Other code is copied into its callers. For many processors LLVM uses half of an AVX-512
+    register, because programs with a few wide instructions would run at a lower clock rate. A loop
+    over many points consists of them.
     """
 
     def add_ir_module(self, ir_module: Any) -> None:
@@ -94,25 +112,6 @@ class WideVectorLibrary(_Library):  # type: ignore[misc]  # see above
             if not function.is_declaration:
                 set.add(function.attributes, '"prefer-vector-width"="512"')
         super().add_ir_module(ir_module)
-
-
-@_register(mutates_CFG=True, analysis_only=False)
-class WideVectorLowering(_Lowering):  # type: ignore[misc]  # see above
-    """Numba's lowering from typed code to machine code, in wide registers."""
-
-    _name = "wide_lowering"
-    library_class = WideVectorLibrary
-
-    def run_pass(self, state: Any) -> bool:
-        """Lower a function."""
-        state.library = self.library_class(state.targetctx.codegen(), state.func_id.func_qualname)
-        state.library.enable_object_caching()
-        changed: bool = super().run_pass(state)
-        return changed
-
-
-class SharedLibrary(WideVectorLibrary):
-    """Code that its callers call by its symbol; other code is copied into every caller."""
 
     def _get_module_for_linking(self) -> Any:
         return self._shared_module
@@ -124,11 +123,24 @@ class SharedLibrary(WideVectorLibrary):
 
 
 @_register(mutates_CFG=True, analysis_only=False)
+class WideVectorLowering(_Lowering):  # type: ignore[misc]  # see above
+    """Numba's lowering from typed code to machine code, in wide registers."""
+
+    _name = "wide_lowering"
+
+    def run_pass(self, state: Any) -> bool:
+        """Lower a function."""
+        state.library = WideVectorLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
+        changed: bool = super().run_pass(state)
+        return changed
+
+
+@_register(mutates_CFG=True, analysis_only=False)
 class SharedLowering(WideVectorLowering):
     """The same, with a symbol that is equal in all processes."""
 
     _name = "shared_lowering"
-    library_class = SharedLibrary
 
     def run_pass(self, state: Any) -> bool:
         """Lower a function."""
@@ -216,10 +228,10 @@ def _global_key(value: object, known_ids: dict[FunctionType, int]) -> object:
     return repr(value) if isinstance(value, (int, float)) else id(value)
 
 
-CODE_NAMESPACE = "code"
 # Numba is untyped.
 _CompileResult: Any = compiler.CompileResult
 _serialize: Any = serialize.dumps
+_config: Any = numba.config
 
 
 class MachineCodeCache:
@@ -227,10 +239,12 @@ class MachineCodeCache:
 
     Args:
         function: the Python function; its module is named by the content of all that is compiled.
+        is_called: whether Python calls it.
     """
 
-    def __init__(self, function: FunctionType) -> None:
+    def __init__(self, function: FunctionType, is_called: bool) -> None:
         self._function = function
+        self._is_called = is_called
 
     @property
     def cache_path(self) -> str:
@@ -239,33 +253,55 @@ class MachineCodeCache:
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the compiled overload of a signature, or ``None`` to compile it."""
-        key = self._key(sig, target_context.codegen())
+        target = code_target(target_context.codegen())
+        target_context.refresh()
+        packed = find_packed_code(target)
+        overload = self._load_packed(packed, sig, target_context)
+        if overload is not None:
+            return overload
+        key = self._key(sig, target, _interpreter())
         overload = self._load_cached(key, target_context)
         if overload is None and cache.wait_and_lock(CODE_NAMESPACE, key):
             overload = self._load_cached(key, target_context)
             if overload is not None:
                 cache.unlock(CODE_NAMESPACE, key)
         if overload is None:
+            packed.warn(self._packed_key(sig, packed))
             self._report(self._function.__name__)
         return overload
+
+    def _load_packed(self, packed: PackedCode, sig: Any, target_context: Any) -> Any:
+        content = packed.get_entry(self._packed_key(sig, packed))
+        if content is None:
+            return None
+        with suppress(Exception):  # see _load_cached
+            return self._rebuild(content, target_context)
+        return None
 
     def _report(self, loop: str) -> None:
         for callback in COMPILE_CALLBACKS:
             callback(loop)
 
     def _load_cached(self, key: str, target_context: Any) -> Any:
-        target_context.refresh()
         content = cache.get_entry(CODE_NAMESPACE, key)
         if content is None:
             return None
         try:
-            *parts, callees = pickle.loads(content)
-            for module, name, types in callees:
-                getattr(sys.modules[module], name).compile(types)
-            return self._mark(_CompileResult._rebuild(target_context, *parts))
+            return self._rebuild(content, target_context)
         except Exception:  # of another build of Numba: whatever it raises, compile again
             cache.quarantine(CODE_NAMESPACE, key)
             return None
+
+    def _rebuild(self, content: bytes, target_context: Any) -> Any:
+        *parts, callees = pickle.loads(content)
+        for module, name, types in callees:
+            getattr(sys.modules[module], name).compile(types)
+        if (
+            self._is_called
+        ):  # Numba looks for this name in the code that callers copy: there is none
+            engine = target_context.codegen()._engine
+            engine._defined_symbols.add(parts[1].llvm_cpython_wrapper_name)
+        return self._mark(_CompileResult._rebuild(target_context, *parts))
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Store a compiled overload."""
@@ -274,7 +310,7 @@ class MachineCodeCache:
         # compiled function uses its environment.
         module = self._function.__module__
         own = tuple([env for env in environments if env.globals["__name__"] == module])
-        key = self._key(sig, data.codegen)
+        key = self._key(sig, code_target(data.codegen), _interpreter())
         content = (*parts, own, _shared_callees(data.library))
         cache.put_entry(CODE_NAMESPACE, key, _serialize(content))
         cache.unlock(CODE_NAMESPACE, key)
@@ -286,12 +322,30 @@ class MachineCodeCache:
         result.library.origin = (function.__module__, function.__name__, result.signature.args)
         return result
 
-    def _key(self, sig: Any, codegen: Any) -> str:
+    def _packed_key(self, sig: Any, packed: PackedCode) -> str:
+        if packed.target is None:
+            return ""
+        return self._key(sig, packed.target, INTERPRETER)
+
+    def _key(self, sig: Any, target: CodeTarget, interpreter: str) -> str:
         """Return what the machine code depends on: source, types, processor and versions."""
-        versions = (sys.version, numba.__version__, llvmlite.__version__, sys.byteorder)
+        versions = (interpreter, target.numba, target.llvmlite, sys.byteorder)
         types = (str(sig), *map(_record_fields, sig))
         function = (self._function.__module__, self._function.__name__, types)
-        return repr((*function, codegen.magic_tuple(), *versions))
+        return repr((*function, tuple(target[2:]), *versions))
+
+
+def code_target(codegen: Any = None) -> CodeTarget:
+    """Return what this process compiles for."""
+    codegen = codegen or registry.cpu_target.target_context.codegen()
+    return CodeTarget(numba.__version__, llvmlite.__version__, *codegen.magic_tuple())
+
+
+def _interpreter() -> str:
+    """Return the interpreter for which code is compiled: for a named processor, of any build."""
+    if _config.CPU_NAME is None:
+        return sys.version
+    return INTERPRETER
 
 
 def _shared_callees(library: Any) -> tuple[Any, ...]:
@@ -332,7 +386,8 @@ def cache_machine_code(decorator: Callable[..., Any]) -> Callable[..., Any]:
                 return compile_overload(signature)
 
         dispatcher.compile = compile_whole
-        dispatcher._cache = MachineCodeCache(function)
+        is_called = "no_cpython_wrapper" not in dispatcher.targetoptions
+        dispatcher._cache = MachineCodeCache(function, is_called)
         return dispatcher
 
     return decorate

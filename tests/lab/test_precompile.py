@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from tests.helpers.fused_code import forget_fused_modules
 
-from asperity.cli import setup_commands as warm
 from asperity.core import cache
+from asperity.lab import precompile as warm
 from asperity.laws import LAWS
 
 
