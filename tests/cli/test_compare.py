@@ -302,6 +302,11 @@ def test_zero_speeds_loose_grips_and_negative_masses_are_refused(
     code, out, err = call(command, SPEC, *given, "--html", str(page))
     assert (code, out, page.exists()) == (2, "", False)
     assert message in " ".join(err.split())
+
+
+@pytest.mark.parametrize("command", ["compare", "limits"])
+def test_a_grip_with_a_stiffness_is_accepted(call: Call, tmp_path: Path, command: str) -> None:
+    grip = tmp_path / "grip.toml"
     grip.write_text(LOOSE_GRIP.replace('"0 N/m"', '"1 N/m"'), "utf-8")
     assert call(command, SPEC, "--grip", str(grip))[0] == 0
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -33,19 +34,26 @@ from asperity.textures.fields.field_file import HEADER, save_field
 KINDS = ("fourier", "map", "periodic profile")
 
 
-def bake(texture: Texture, resolution: float | None = None) -> Surface:
-    """Return a surface with law H of a texture, baked coarsely unless a resolution is given."""
-    low, high = texture.extremes
-    depth = max(high - low, 1e-5)
-    surface = Surface(texture, "H", 800.0, max_depth=depth)
-    return asp.bake(surface, resolution or 0.1 * depth, press=1e-6)
+@pytest.fixture(scope="module")
+def baked(make_texture: Callable[[str], Texture]) -> Callable[[str], Surface]:
+    """Return a function that returns law H of a kind of texture, baked coarsely and only once."""
+
+    @cache
+    def bake(kind: str) -> Surface:
+        texture = make_texture(kind)
+        low, high = texture.extremes
+        depth = max(high - low, 1e-5)
+        surface = Surface(texture, "H", 800.0, max_depth=depth)
+        return asp.bake(surface, 0.1 * depth, press=1e-6)
+
+    return bake
 
 
 @pytest.mark.parametrize("flags", [("-O1",), ("-O3", "-march=native"), ("-O2", "-std=gnu99")])
 def test_field_in_the_source_gives_the_force_of_the_kernel(
-    make_texture: Callable[[str], Texture], flags: tuple[str, ...], tmp_path: Path
+    baked: Callable[[str], Surface], flags: tuple[str, ...], tmp_path: Path
 ) -> None:
-    surfaces = {f"t{i}": bake(make_texture(kind)) for i, kind in enumerate(KINDS)}
+    surfaces = {f"t{i}": baked(kind) for i, kind in enumerate(KINDS)}
     headers = {name: header(s, name, folder=tmp_path) for name, s in surfaces.items()}
     for compiler in COMPILERS:
         program = library(tmp_path, compiler, headers, *flags)
@@ -58,7 +66,7 @@ def test_field_in_the_source_gives_the_force_of_the_kernel(
 
 # --- loaded from a file ---------------------------------------------------------------------------
 
-SANITIZE = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-O1", "-g")
+SANITIZE = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-O0", "-g")
 _LOADER = """
 #include <stdio.h>
 #include "t.h"
@@ -109,10 +117,10 @@ def run_loader(folder: Path, field: str) -> np.ndarray:
     ("compiler", "flags"), [("gcc", ()), ("gcc", ("-DT_POSIX",)), ("clang", ("-DT_POSIX",))]
 )
 def test_loaded_field_gives_the_force_of_the_kernel(
-    make_texture: Callable[[str], Texture], compiler: str, flags: tuple[str, ...], tmp_path: Path
+    baked: Callable[[str], Surface], compiler: str, flags: tuple[str, ...], tmp_path: Path
 ) -> None:
     """One program loads fields of another shape, too, and a profile."""
-    surfaces = {kind: bake(make_texture(kind)) for kind in KINDS}
+    surfaces = {kind: baked(kind) for kind in KINDS}
     build_loader(tmp_path, surfaces["map"], compiler, *flags)
     for kind, surface in surfaces.items():
         save_field(tmp_path / "a.field", surface.texture)
@@ -128,9 +136,9 @@ def test_loaded_field_gives_the_force_of_the_kernel(
 
 @pytest.mark.parametrize("flags", [(), ("-DT_POSIX",)])
 def test_damaged_fields_are_refused(
-    make_texture: Callable[[str], Texture], flags: tuple[str, ...], tmp_path: Path
+    baked: Callable[[str], Surface], flags: tuple[str, ...], tmp_path: Path
 ) -> None:
-    surface = bake(make_texture("map"))
+    surface = baked("map")
     build_loader(tmp_path, surface, "gcc", *flags)
     save_field(tmp_path / "whole.field", surface.texture)
     probes(surface.texture, surface.max_depth, 8, 5).tofile(tmp_path / "points.bin")
@@ -152,10 +160,10 @@ def test_damaged_fields_are_refused(
 
 @pytest.mark.parametrize("flags", [(), ("-DT_POSIX",)])
 def test_offset_of_the_heights_lies_behind_the_header(
-    make_texture: Callable[[str], Texture], flags: tuple[str, ...], tmp_path: Path
+    baked: Callable[[str], Surface], flags: tuple[str, ...], tmp_path: Path
 ) -> None:
     """Up to it pages are touched before the loop: with 0 the byte before the file was read."""
-    surface = bake(make_texture("map"))
+    surface = baked("map")
     build_loader(tmp_path, surface, "gcc", *flags)
     save_field(tmp_path / "a.field", surface.texture)
     probes(surface.texture, surface.max_depth, 8, 5).tofile(tmp_path / "points.bin")
@@ -197,9 +205,9 @@ int main(void)
 
 @pytest.mark.parametrize("flags", [(), ("-DT_POSIX",)])
 def test_a_file_that_is_cut_does_not_reach_the_loaded_field(
-    make_texture: Callable[[str], Texture], flags: tuple[str, ...], tmp_path: Path
+    baked: Callable[[str], Surface], flags: tuple[str, ...], tmp_path: Path
 ) -> None:
-    surface = bake(make_texture("map"))
+    surface = baked("map")
     build_loader(tmp_path, surface, "gcc", *flags)
     save_field(tmp_path / "a.field", surface.texture)
     (tmp_path / "main.c").write_text(_CHANGED_LOADER)
@@ -209,10 +217,10 @@ def test_a_file_that_is_cut_does_not_reach_the_loaded_field(
 
 
 def test_wrong_checksum_does_not_hide_a_table_that_points_outside(
-    make_texture: Callable[[str], Texture], tmp_path: Path
+    baked: Callable[[str], Surface], tmp_path: Path
 ) -> None:
     """The checksums of a file can be right and its table wrong: it is refused all the same."""
-    surface = bake(make_texture("map"))
+    surface = baked("map")
     build_loader(tmp_path, surface, "gcc")
     save_field(tmp_path / "a.field", surface.texture)
     content = bytearray((tmp_path / "a.field").read_bytes())
@@ -227,12 +235,14 @@ def test_wrong_checksum_does_not_hide_a_table_that_points_outside(
     run_command(tool("sh"), "run.sh", cwd=tmp_path)
 
 
-def test_law_h_is_exported_baked_only(make_texture: Callable[[str], Texture]) -> None:
+def test_law_h_is_exported_baked_only(
+    make_texture: Callable[[str], Texture], baked: Callable[[str], Surface]
+) -> None:
     with pytest.raises(ParameterError, match="must be baked to export law H"):
         ExportRequest(Surface(make_texture("map"), "H"))
     with pytest.raises(ParameterError, match="load needs a baked field"):
         ExportRequest(Surface(make_texture("map"), "B"), loads_field=True)
-    assert ExportRequest(bake(make_texture("map"))).evaluation_budget == 1.0
+    assert ExportRequest(baked("map")).evaluation_budget == 1.0
 
 
 # --- on a microcontroller -------------------------------------------------------------------------

@@ -22,7 +22,7 @@ from tests.helpers.c_programs import (
 from asperity.surface import Surface
 from asperity.textures import Texture
 
-SANITIZE = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-O1", "-g")
+SANITIZE = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-O0", "-g")
 LAWS = "BDFH"
 _MAIN = """
 static int {name}_run(const char *file)
