@@ -113,26 +113,26 @@ class Frictional(Plottable, ABC):
     @cached_property
     def contact_friction(self) -> Friction | None:
         """Friction of the surface; ``None`` without friction, and for law F."""
-        given = self._explicit_parameters
-        if not given.get("friction") or "friction" in self.law.parameters:
+        parameters = self._explicit_parameters
+        if not parameters.get("friction") or "friction" in self.law.parameters:
             return None
         if not (self.facts.conservative and accepts_friction(self.law)):
             return None
         share = TEXTURED_SHARE if self.depends_on_texture else FLAT_SHARE
-        return make_friction(given, self.stiffness, share, in_space=self.texture.is_body)
+        return make_friction(parameters, self.stiffness, share, in_space=self.texture.is_body)
 
     @property
     def friction_values(self) -> dict[str, float]:
         """Arguments of the friction that acts, by name; κ only where it is given."""
         if self.contact_friction is None:
             return {}
-        given = self._explicit_parameters
-        return {name: given[name] for name in FRICTION_ARGUMENTS if name in given}
+        parameters = self._explicit_parameters
+        return {name: parameters[name] for name in FRICTION_ARGUMENTS if name in parameters}
 
     def without_friction(self) -> Self:
         """Return a copy without friction, whose force is that of the law alone."""
-        given = self._explicit_parameters.items()
-        rest = {name: value for name, value in given if name not in FRICTION_ARGUMENTS}
+        parameters = self._explicit_parameters.items()
+        rest = {name: value for name, value in parameters if name not in FRICTION_ARGUMENTS}
         return self._replace(_explicit_parameters=rest)
 
     def to_friction(self, friction: float) -> Self:
@@ -150,11 +150,11 @@ class Frictional(Plottable, ABC):
 
     def _check_friction(self) -> None:
         """Check the friction that was given; on a law with curl it has no effect."""
-        given = self._explicit_parameters
-        for name in FRICTION_ARGUMENTS.keys() & given.keys():
+        parameters = self._explicit_parameters
+        for name in FRICTION_ARGUMENTS.keys() & parameters.keys():
             if self.law.stateful and name not in self.law.parameters:
                 reason = f"cannot be used with law {self.law}, which has state of its own"
-                raise ParameterError(name, reason, given[name])
+                raise ParameterError(name, reason, parameters[name])
         friction = self.contact_friction
         if friction is not None and friction.modulation and self.texture.is_body:
             raise ParameterError(

@@ -168,8 +168,8 @@ def _remedy_command(surface: str, result: Comparison) -> str:
     Without such a change, and for a scene, which may magnify too: what the device renders.
     """
     row = result.nearest_row
-    found = row.perceptibility.remedies if row is not None and row.perceptibility else ()
-    values = {remedy.kind: remedy.value for remedy in reversed(found)}
+    remedies = row.perceptibility.remedies if row is not None and row.perceptibility else ()
+    values = {remedy.kind: remedy.value for remedy in reversed(remedies)}
     if surface.endswith(".toml") or not {"magnify", "speed"} & set(values):
         return shlex.join(["asperity", "envelope", "--device", result.device.id])
     ctx = click.get_current_context()

@@ -199,10 +199,12 @@ class NearestContact(Contact):
     def depth_code(self) -> list[str]:
         """Return the distance found with half the budget of a tick; it is never too short."""
         lines, condition = self.detection_code(frozenset())
-        found = f"closest_point_within_budget(x, y, z, x, y, {0.5 * self.max_evaluations}, texture)"
+        search_call = (
+            f"closest_point_within_budget(x, y, z, x, y, {0.5 * self.max_evaluations}, texture)"
+        )
         return [
             *[*lines, f"if not {condition}:", "    return 0.0"],
-            f"closest_x, closest_y, h, _hx, _hy, _error_bound, _evaluations = {found}",
+            f"closest_x, closest_y, h, _hx, _hy, _error_bound, _evaluations = {search_call}",
             "return math.sqrt((x - closest_x)**2 + (y - closest_y)**2 + (z - h)**2)",
         ]
 

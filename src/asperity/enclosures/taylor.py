@@ -228,15 +228,15 @@ def reciprocal(x: TaylorModel) -> TaylorModel:
     """Return 1/x, unbounded if x may be zero."""
     sign = np.where(x.c < 0.0, -1.0, 1.0)
     positive = TaylorModel(sign * x.c, sign * x.g, x.e)
-    one = _enclose_smooth(
+    enclosed = _enclose_smooth(
         positive,
         lambda v: 1.0 / v,
         lambda v: -1.0 / (v * v),
         lambda low, _high: 2.0 / low**3,
         positive_domain=True,
     )
-    assert isinstance(one, TaylorModel)
-    return TaylorModel(sign * one.c, sign * one.g, one.e)
+    assert isinstance(enclosed, TaylorModel)
+    return TaylorModel(sign * enclosed.c, sign * enclosed.g, enclosed.e)
 
 
 def _max_abs(low: FloatArray, high: FloatArray) -> FloatArray:
@@ -244,8 +244,8 @@ def _max_abs(low: FloatArray, high: FloatArray) -> FloatArray:
 
 
 def _asin_second_derivative_bound(low: FloatArray, high: FloatArray) -> FloatArray:
-    most = _max_abs(low, high)
-    return np.asarray(np.where(most < 1.0, most * (1.0 - most * most) ** -1.5, np.inf))
+    largest = _max_abs(low, high)
+    return np.asarray(np.where(largest < 1.0, largest * (1.0 - largest * largest) ** -1.5, np.inf))
 
 
 # f, f' and a bound of |f''| on [low, high]; True where f is smooth only for positive arguments.

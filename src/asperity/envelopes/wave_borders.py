@@ -223,10 +223,10 @@ class WaveCase:
 
     def _number(self, surface: Surface, measure: JacobianMeasure) -> Bound:
         """Return a number of a surface; of law H that is searched, the one to which it is baked."""
-        found = cached_number(surface, measure)
+        number = cached_number(surface, measure)
         if self.rendering == SEARCH and is_searched(surface):
-            return replace(found, upper=BakeGoal.max_gain * found.upper)
-        return found
+            return replace(number, upper=BakeGoal.max_gain * number.upper)
+        return number
 
     def trial(self, texture: Texture, original: Original | None = None) -> Trial:
         """Return a texture at its recommended stiffness, with its waves.
@@ -318,11 +318,11 @@ def find_borders(case: WaveCase, wavelengths: Sequence[float]) -> tuple[WaveBord
 
     The borders at one wavelength are where those at the next one are sought first.
     """
-    found: list[WaveBorders] = []
+    borders: list[WaveBorders] = []
     with bypass_results():
         for wavelength in wavelengths:
-            found.append(_find_wave_borders(case, wavelength, found[-1] if found else None))
-    return tuple(found)
+            borders.append(_find_wave_borders(case, wavelength, borders[-1] if borders else None))
+    return tuple(borders)
 
 
 def _find_wave_borders(case: WaveCase, wavelength: float, near: WaveBorders | None) -> WaveBorders:
@@ -422,5 +422,5 @@ def _maximum(function: LogRatio, scanned: Sequence[float], at: int) -> float:
     from scipy.optimize import minimize_scalar
 
     bounds = scanned[max(at - 1, 0)], scanned[min(at + 1, len(scanned) - 1)]
-    found = minimize_scalar(lambda x: -function(x), bounds=bounds, method="bounded")
-    return max((float(found.x), scanned[at]), key=function)
+    peak = minimize_scalar(lambda x: -function(x), bounds=bounds, method="bounded")
+    return max((float(peak.x), scanned[at]), key=function)

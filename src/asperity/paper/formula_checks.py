@@ -150,9 +150,9 @@ def check_zero_outside(law: str) -> Check:
     height = surface.texture.height(np.column_stack([x, 0 * x]))
     level = 0.0 * x if law in "WFG" else height
     force = surface.force(np.column_stack([x, 0 * x, level + 1e-9]))
-    most = float(np.abs(force).max())
+    largest = float(np.abs(force).max())
     return check_statement(
-        f"force 1 nm outside at most {most:g} N", printed=most == 0.0, outside=most
+        f"force 1 nm outside at most {largest:g} N", printed=largest == 0.0, outside=largest
     )
 
 

@@ -241,9 +241,9 @@ def _read(path: Path, stream: IO[bytes], size: int) -> Recording:
         _check_head(stream, head_end, texts, attachments)
     rows = _check_rows(stream, chunks, row_encoding.row_type(len(columns)))
     version = texts["version"]
-    found = tuple(chunks)
+    positions = tuple(chunks)
     return Recording(
-        path, columns, rows, metadata, version, is_complete, size - end, found, attachments
+        path, columns, rows, metadata, version, is_complete, size - end, positions, attachments
     )
 
 

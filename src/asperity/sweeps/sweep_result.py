@@ -72,7 +72,7 @@ class TableFiles(Tabular):
         for row in self.iterate_rows():
             for name, value in row.items():
                 types.setdefault(name, set()).update({type(value)} - {type(None)})
-        return {name: _common_type(found or {str}) for name, found in types.items()}
+        return {name: _common_type(kinds or {str}) for name, kinds in types.items()}
 
     def table_rows(self) -> list[dict[str, Any]]:
         """Return the rows in their order; SI units. An unknown value is ``None``."""

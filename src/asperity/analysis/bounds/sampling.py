@@ -222,6 +222,6 @@ def highest_point(texture: Texture) -> FloatArray:
     if texture.single_wave is not None:
         return point_at_phase(texture.single_wave, 0.5 * math.pi)
     cells = texture.sampling_cells()
-    found = sample_supremum(HeightProblem(cells))
-    assert found.at is not None
-    return np.asarray(cells.to_plane(found.at[None])[0])
+    highest = sample_supremum(HeightProblem(cells))
+    assert highest.at is not None
+    return np.asarray(cells.to_plane(highest.at[None])[0])

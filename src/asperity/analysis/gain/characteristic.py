@@ -256,18 +256,18 @@ def certify(surface: Surface, measure: JacobianMeasure, options: SearchOptions) 
         upper = reduction.to_number(surface, direct.upper)
         return _make_bound(surface, measure, problem, direct, upper, text)
     try:
-        found = options.supremum(problem)
+        supremum = options.supremum(problem)
     except TypeError as error:
         text = f"the law has no interval kernel ({error}); not a proof"
         return _make_bound(surface, measure, problem, sample_supremum(problem), math.inf, text)
-    upper = reduction.to_number(surface, found.upper) * _ROUNDING_FACTOR
-    text = f"branch and bound, {found.cell_count} cells"
-    if not found.converged:
+    upper = reduction.to_number(surface, supremum.upper) * _ROUNDING_FACTOR
+    text = f"branch and bound, {supremum.cell_count} cells"
+    if not supremum.converged:
         text += "; the work limit was reached before the tolerance"
         upper = min(upper, derivative_bound(surface, measure))
-    bound = _make_bound(surface, measure, problem, found, upper, text)
+    bound = _make_bound(surface, measure, problem, supremum, upper, text)
     if (
-        found.converged
+        supremum.converged
         and bound.gap > 1.01 * options.relative_tolerance(problem.cells)
         and bound.upper > _ZERO_THRESHOLD
     ):
@@ -345,21 +345,21 @@ def include_clamp(
         return unclamped
     problem = _clamp_problem(surface, measure, options, unclamped.upper)
     try:
-        found = None if problem is None else options.supremum(problem)
+        supremum = None if problem is None else options.supremum(problem)
     except (AttributeError, TypeError, ValueError):  # a piecewise kernel or an unknown function
-        found = None
-    if problem is None or found is None:
+        supremum = None
+    if problem is None or supremum is None:
         note = f"{unclamped.note}; nothing is proved where the clamp acts, below max_depth"
         return replace(unclamped, upper=math.inf, method="sampled", note=note)
-    if found.upper <= problem.floor:
+    if supremum.upper <= problem.floor:
         return unclamped
     clamp = surface.effective_clamp
-    note = f"where the {clamp} clamp acts; branch and bound, {found.cell_count} cells"
-    upper = found.upper * _ROUNDING_FACTOR
-    if found.at is None:
+    note = f"where the {clamp} clamp acts; branch and bound, {supremum.cell_count} cells"
+    upper = supremum.upper * _ROUNDING_FACTOR
+    if supremum.at is None:
         return replace(unclamped, upper=upper, method="certified", note=note)
-    xy = problem.cells.to_plane(found.at[None])[0]
-    depths = problem.depths(found.at, surface)
+    xy = problem.cells.to_plane(supremum.at[None])[0]
+    depths = problem.depths(supremum.at, surface)
     witnesses = [witness_at_depth(surface, measure, xy, depth) for depth in depths]
     witness = max(witnesses, key=lambda witness: witness.value)
     top = checked_upper_bound(surface, measure, upper, witness)

@@ -83,15 +83,15 @@ def sharpest_crest(
     cells = texture.cells(extent, margin)
     if cells is None:
         cells = texture.sampling_cells()
-        found = sample_supremum(CrestProblem(cells))
+        crest_bound = sample_supremum(CrestProblem(cells))
     else:
         # Cells without a refined gap reach only their default gap in reasonable time.
         least_gap = 0.0 if cells.refined_gap else cells.default_gap
         gap = max(_CURVATURE_TOLERANCE, least_gap)
-        found = supremum(CrestProblem(cells), gap, cheap_gap=cells.refined_gap)
-    if found.at is None:
+        crest_bound = supremum(CrestProblem(cells), gap, cheap_gap=cells.refined_gap)
+    if crest_bound.at is None:
         return None
-    return _make_crest(texture, cells.to_plane(found.at[None])[0], found.upper)
+    return _make_crest(texture, cells.to_plane(crest_bound.at[None])[0], crest_bound.upper)
 
 
 def _make_crest(texture: Texture, xy: FloatArray, max_curvature: float) -> Crest | None:
@@ -184,10 +184,10 @@ def crest_number(surface: Surface, options: SearchOptions) -> bound.Bound:
     least = crest.min_radius
     cells = texture.cells(options.extent, options.margin(surface))
     if cells is not None:
-        found = options.supremum(CrestProblem(cells, depth))
-        least = 1.0 / found.upper
-        if found.at is not None:
-            xy = cells.to_plane(found.at[None])[0]
+        crest_bound = options.supremum(CrestProblem(cells, depth))
+        least = 1.0 / crest_bound.upper
+        if crest_bound.at is not None:
+            xy = cells.to_plane(crest_bound.at[None])[0]
     else:
         least = max(least, 1.0 / texture.bounds[1])
     witness = bound.witness_in_contact(surface, bound.NORM, xy, depth)

@@ -373,10 +373,10 @@ class FrictionProblem(Problem):
         angles = np.array(
             [touch[values.argmax()], touch[index] + step * min(max(shift, -1.0), 1.0)]
         )
-        found = self._entries(height * np.sin(angles), slope * np.cos(angles))
-        best = int(found.argmax())
+        entries = self._entries(height * np.sin(angles), slope * np.cos(angles))
+        best = int(entries.argmax())
         at = np.array([angles[best] - wave.phase])
-        return Supremum(float(found[best]), upper, at, len(corner), converged=True)
+        return Supremum(float(entries[best]), upper, at, len(corner), converged=True)
 
 
 @lru_cache(maxsize=1)

@@ -247,9 +247,9 @@ def _baked_number(
     measure: JacobianMeasure,
 ) -> Callable[[Surface, medial_axis.SearchOptions], Bound]:
     def number(surface: Surface, _options: medial_axis.SearchOptions) -> Bound:
-        found = surface.texture.baked_numbers[measure.name]
+        baked = surface.texture.baked_numbers[measure.name]
         note = "hull of the second differences of the field; attained on one side of a knot"
-        return Bound(found.lower, found.upper, "certified", found.at, note)
+        return Bound(baked.lower, baked.upper, "certified", baked.at, note)
 
     return number
 

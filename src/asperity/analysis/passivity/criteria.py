@@ -337,8 +337,8 @@ def dry_friction_criterion(loop: DeviceLoop) -> Criterion:
         proved = _max_stiffness(loop.friction, Fraction(bound) / loop.stiffness)
         margin = round_down_exactly(proved / loop.stiffness)
         result = replace(result, limit=round_down_exactly(proved), margin=margin)
-    found = Fraction(loop.leak.absorbing.found) / loop.stiffness
-    possible = _max_stiffness(loop.friction, found)
+    density = Fraction(loop.leak.absorbing.found) / loop.stiffness
+    possible = _max_stiffness(loop.friction, density)
     result = replace(result, upper_limit=round_down_exactly(possible))
     if loop.stiffness <= proved:
         return replace(result, holds=True)

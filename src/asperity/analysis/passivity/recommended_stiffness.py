@@ -179,12 +179,12 @@ class Margin(Serializable):
 
     def at_risk(self, risk: float) -> Margin:
         """Return the margin at which at most a share of the random loops cycles, 1 % or more."""
-        found = self
+        margin = self
         for point in self.curve[1:]:
             if risk <= LEAST_RISK or point.cycles > risk * self.curve_loops:
                 break
-            found = replace(self, loops=self.curve_loops, **point._asdict())
-        return found
+            margin = replace(self, loops=self.curve_loops, **point._asdict())
+        return margin
 
     @property
     def frequency(self) -> float:

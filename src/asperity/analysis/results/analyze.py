@@ -237,19 +237,19 @@ def _resolve_surface(
     arguments: dict[str, Any],
 ) -> Surface:
     """Return the surface, of a texture as rendered, by default as recommended."""
-    given = {name: value for name, value in arguments.items() if value is not None}
+    keywords = {name: value for name, value in arguments.items() if value is not None}
     if isinstance(surface, Surface):
-        for name in given:
+        for name in keywords:
             raise ParameterError(
                 name, "belongs to the surface: give a texture, or change it by to_law, to_stiffness"
             )
         return surface
-    check_keywords(given, SURFACE_KEYWORDS, analyze)
+    check_keywords(keywords, SURFACE_KEYWORDS, analyze)
     texture = as_texture(surface, name="surface")
-    if "law" not in given:
-        given["law"] = recommended_law(texture, device, rendering=rendering, **given)
-    surface = render_on_device(Surface(texture, **given), device, rendering, extent)
-    if "stiffness" in given:
+    if "law" not in keywords:
+        keywords["law"] = recommended_law(texture, device, rendering=rendering, **keywords)
+    surface = render_on_device(Surface(texture, **keywords), device, rendering, extent)
+    if "stiffness" in keywords:
         return surface
     numbers = cached_number(surface, NORM), cached_number(surface, ONE_SIDED)
     return surface.to_stiffness(recommend_stiffness(surface, device, *numbers).start)

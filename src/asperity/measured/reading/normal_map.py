@@ -57,17 +57,17 @@ def normals_to_surface(normals: FloatArray, name: str, green: str | None) -> Raw
     rows, columns = normals.shape[:2]
     require_memory(2 * columns, 2 * rows)  # mirrored
     upward = np.maximum(normals[..., 2], _MIN_Z)
-    found = {
+    candidates = {
         direction: integrate_slopes(-normals[..., 0] / upward, sign * normals[..., 1] / upward)
         for direction, sign in (("up", 1.0), ("down", -1.0))
     }
     if green is None:
-        raise _direction_error(name, found)
-    surface = found.pop(green)
-    (other,) = found.values()
+        raise _direction_error(name, candidates)
+    surface = candidates.pop(green)
+    (other,) = candidates.values()
     notes.append(f"no heights have {100.0 * surface.residue:.2g} % of the slopes (RMS residue)")
     if other.residue < 0.5 * surface.residue:
-        (opposite,) = found
+        (opposite,) = candidates
         notes.append(f"with green {opposite} only {100.0 * other.residue:.2g} %: is it {green}?")
     border = "its borders fit: one period" if surface.is_periodic else "mirrored at its borders"
     notes.append(border)
@@ -84,11 +84,11 @@ def _find_named_direction(name: str) -> str | None:
     return next((up for up, words in _NAMED.items() if re.search(_WORD.format(words), stem)), None)
 
 
-def _direction_error(name: str, found: dict[str, IntegratedSlopes]) -> ParameterError:
+def _direction_error(name: str, candidates: dict[str, IntegratedSlopes]) -> ParameterError:
     residues = " and ".join(
-        [f"{100.0 * one.residue:.2g} % with green {way}" for way, one in found.items()]
+        [f"{100.0 * slopes.residue:.2g} % with green {way}" for way, slopes in candidates.items()]
     )
-    likely = min(found, key=lambda way: found[way].residue)
+    likely = min(candidates, key=lambda way: candidates[way].residue)
     return ParameterError(
         "green",
         f"is required: {name} is a normal map, whose green channel points up (glTF, OpenGL) or down"

@@ -241,8 +241,8 @@ def pixels_to_surface(
         notes = (*notes, "alpha channel dropped: opaque everywhere")
     normals = decode_normals(values)
     if normals is not None:
-        found = normals_to_surface(normals, name, options.green)
-        return replace(found, pitch=scale.pitch, notes=(*notes, *found.notes))
+        surface = normals_to_surface(normals, name, options.green)
+        return replace(surface, pitch=scale.pitch, notes=(*notes, *surface.notes))
     if options.green is not None:
         raise ParameterError("green", f"must not be given: {name} is no normal map", options.green)
     grey, notes = _to_grey(values, notes)

@@ -273,18 +273,18 @@ def _check_stiffening() -> claim.Check:
     work, stiffening, slip, stored, rises = balances.T
     error = float(np.abs(work - (stiffening - slip - stored)).max()) / whole
     without = float(np.abs(work + slip + stored).max()) / whole
-    most = float((work / (0.5 * reach**2 * rises)).max())
+    share = float((work / (0.5 * reach**2 * rises)).max())
     greatest = 0.5 * (1.0 + surface.modulation_depth) * whole
     return claim.check_statement(
         f"on {_PATHS} random closed paths W = ∫|d|²/2 dκ - ∫κ d·da - ΔS within {error:.0e} of "
         f"½κ₀Dμd_max, off by {without:.2f} without the first integral; a rise of κ from 0 gains "
-        f"up to ½κ₀Dμ max(1 - m) d_max = {1e3 * greatest:.3f} mJ, these paths {most:.2f} of their "
+        f"up to ½κ₀Dμ max(1 - m) d_max = {1e3 * greatest:.3f} mJ, these paths {share:.2f} of their "
         f"rises; with a constant κ and the same limit the best path gives {1e3 * mended:+.3f} mJ",
-        printed=error < 1e-5 and without > 0.01 and most <= 1.0 and mended < 0.0,
+        printed=error < 1e-5 and without > 0.01 and share <= 1.0 and mended < 0.0,
         error_of_the_identity=error,
         error_without_stiffening=without,
         greatest_gain_of_a_rise=greatest,
-        share_of_the_rises=most,
+        share_of_the_rises=share,
         best_path_of_F_mended=mended,
     )
 

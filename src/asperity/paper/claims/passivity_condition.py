@@ -154,7 +154,7 @@ def product_bound() -> Check:
     draw = np.random.default_rng(2)
     size = 1e-9
     worst = 0.0
-    most = 0.0
+    share = 0.0
     for law in "ABCDEG":
         for spot in generic_probes(law, 3):
             matrix = spot.compiled_jacobian()
@@ -167,11 +167,11 @@ def product_bound() -> Check:
             change = spot.surface.force(ends) - spot.surface.force(ends - in_space)
             off = np.linalg.norm(change[:, ::2] - steps @ matrix.T, axis=1)
             worst = max(worst, float(off.max() / (size * norm)))
-            most = max(most, float(np.linalg.norm(change, axis=1).max() / (size * norm)))
+            share = max(share, float(np.linalg.norm(change, axis=1).max() / (size * norm)))
     return check_statement(
-        printed=worst < 1e-5 and abs(most - 1.0) < 1e-5,
+        printed=worst < 1e-5 and abs(share - 1.0) < 1e-5,
         greatest_difference=worst,
-        greatest_share=most,
+        greatest_share=share,
     )
 
 

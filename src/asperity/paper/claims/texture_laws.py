@@ -76,11 +76,11 @@ def _least_norm_share(
 ) -> float:
     """Return the least norm at multiples of a step over the greatest norm of each texture."""
     least = math.inf
-    for case, most, step in zip(cases, max_norms, steps, strict=True):
+    for case, max_norm, step in zip(cases, max_norms, steps, strict=True):
         x = np.arange(1, 6) * step
         slope = case.texture.gradient(np.column_stack([x, 0 * x]))[:, 0]
         norms = case.stiffness * np.hypot(1.0, slope)
-        least = min(least, float(norms.min()) / most)
+        least = min(least, float(norms.min()) / max_norm)
     return least
 
 

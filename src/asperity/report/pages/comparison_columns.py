@@ -179,8 +179,8 @@ def law_rows(comparison: Comparison, cells: Callable[[LawRow], Sequence[str | Ce
 def laws_table(comparison: Comparison, columns: Sequence[LawColumn]) -> Table:
     """Return one row per law with these columns."""
     if comparison.stiffness is not None:
-        given = {id(_START_COLUMN): _GIVEN_COLUMN}
-        columns = [given.get(id(column), column) for column in columns]
+        replaced = {id(_START_COLUMN): _GIVEN_COLUMN}
+        columns = [replaced.get(id(column), column) for column in columns]
     rows = law_rows(comparison, lambda row: [column.cell(row, comparison) for column in columns])
     names = [single_line(column.heading) for column in columns]
     meanings = dict(column_meanings("laws"))

@@ -235,16 +235,16 @@ def _draw_waves(
 
 def _draw_wavelength_limits(result: Limits, panels: Sequence[Axes]) -> list[float]:
     """Draw the shortest wavelengths in both panels; return them."""
-    found = shortest_wavelengths(
+    wavelengths = shortest_wavelengths(
         result.device, result.speed, result.time_samples, result.position_samples
     )
-    for level, (least, number, reason) in enumerate(found):
+    for level, (least, number, reason) in enumerate(wavelengths):
         text = f"{number}: {reason}, {format_quantity(least, 'm')}"
         _draw_wavelength_limit(panels, least, text, 0.97 - 0.11 * level)
-    if found:
+    if wavelengths:
         for axes in panels:
-            axes.axvspan(1e-12, found[-1][0] * _MILLI, color=style.ORANGE, alpha=0.06, lw=0.0)
-    return [least for least, _number, _reason in found]
+            axes.axvspan(1e-12, wavelengths[-1][0] * _MILLI, color=style.ORANGE, alpha=0.06, lw=0.0)
+    return [least for least, _number, _reason in wavelengths]
 
 
 def _draw_force_limits(result: Limits, axes: Axes, scale: float) -> None:

@@ -271,7 +271,7 @@ def sweep_figure(result: SweepResult, name: str) -> Figure:
         if row.get(name) is not None:
             group = tuple([_text(row[key]) for key in others if key in columns])
             groups.setdefault(group, []).append([row[key] for key in (*axes_names, name)])
-    labels = [_use_millimetres(groups.values(), i, one) for i, one in enumerate(axes_names)]
+    labels = [_use_millimetres(groups.values(), i, column) for i, column in enumerate(axes_names)]
     if len(axes_names) == 1:
         return _line_figure(groups, labels[0], name)
     return _map_figure(groups, labels, name, is_grid=not plan.design)

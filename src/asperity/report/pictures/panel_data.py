@@ -75,13 +75,13 @@ class Panel:
 
 def extract_panels(figure: Figure) -> list[Panel]:
     """Return the panels of a figure, which must have been drawn, as that places the panels."""
-    found = []
+    panels = []
     for axes in figure.axes:
         if axes.get_label() != _COLORBAR_LABEL and axes.get_visible() and axes.axison:
             panel = _extract_panel(figure, axes)
             if panel.series or panel.field is not None:
-                found.append(panel)
-    return found
+                panels.append(panel)
+    return panels
 
 
 def _extract_panel(figure: Figure, axes: Axes) -> Panel:
@@ -177,13 +177,13 @@ def _resample_mesh(mesh: QuadMesh, x: FloatArray, y: FloatArray) -> FloatArray:
     count = corners.shape[0] - 1
     height = corners.shape[1] - 1
     values = np.asarray(mesh.get_array(), dtype=float).reshape(count, height)
-    found = np.full((len(y), len(x)), math.nan)
+    resampled = np.full((len(y), len(x)), math.nan)
     for column, i in enumerate(np.searchsorted(corners[:, 0, 0], x) - 1):
         if 0 <= i < count:
             rows = np.searchsorted(0.5 * (corners[i, :, 1] + corners[i + 1, :, 1]), y) - 1
             there = (rows >= 0) & (rows < height)
-            found[there, column] = values[i, rows[there]]
-    return found
+            resampled[there, column] = values[i, rows[there]]
+    return resampled
 
 
 def _resample_image(image: AxesImage, x: FloatArray, y: FloatArray) -> FloatArray:
@@ -331,8 +331,8 @@ def _add_range(
 ) -> None:
     known = values[np.isfinite(values)]
     if known.size:
-        found = (panel, float(known.min()), float(known.max()))
-        groups.setdefault(name, []).append(found)
+        member = (panel, float(known.min()), float(known.max()))
+        groups.setdefault(name, []).append(member)
 
 
 def _members_text(members: list[tuple[str, float, float]]) -> str:

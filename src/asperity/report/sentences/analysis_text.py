@@ -128,10 +128,10 @@ def envelope_answer(envelope: DeviceEnvelope) -> str:
 def _near_law_text(law: LawEnvelope, other: LawEnvelope) -> str:
     """Return how much another law renders, and where its greatest amplitudes differ most."""
     pairs = zip(law.borders, other.borders, strict=True)
-    shared = [(one, two) for one, two in pairs if one.decades and two.decades]
-    one, two = max(shared, key=lambda pair: abs(math.log(pair[1].top / pair[0].top)))
-    tops = [format_quantity(border.top, "m", digits=2) for border in (two, one)]
-    at = format_quantity(one.wavelength, "m")
+    shared = [(first, second) for first, second in pairs if first.decades and second.decades]
+    first, second = max(shared, key=lambda pair: abs(math.log(pair[1].top / pair[0].top)))
+    tops = [format_quantity(border.top, "m", digits=2) for border in (second, first)]
+    at = format_quantity(first.wavelength, "m")
     near = f"law {other.letter} renders nearly as much, {other.decades:.2f}"
     return f"{near}, and at {at} amplitudes up to {tops[0]} where {law.letter} reaches {tops[1]}"
 

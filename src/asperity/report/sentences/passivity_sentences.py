@@ -112,10 +112,12 @@ def absorbing_friction_text(friction: AbsorbingFriction) -> str:
     """
     planes = "1 plane" if friction.planes == 1 else f"{friction.planes} planes"
     least = format_quantity(round_down(friction.found), "N")
-    found = f"at least {least}, greatest W/length of {planes}" if friction.planes else "unknown"
+    requirement = (
+        f"at least {least}, greatest W/length of {planes}" if friction.planes else "unknown"
+    )
     if math.isinf(friction.upper):
-        return f"{found}; no friction is proved to be enough"
-    return f"{found}; {format_quantity(round_up(friction.upper), 'N')} proved to be enough"
+        return f"{requirement}; no friction is proved to be enough"
+    return f"{requirement}; {format_quantity(round_up(friction.upper), 'N')} proved to be enough"
 
 
 def energy_gained_text(loop: DeviceLoop) -> str:

@@ -129,8 +129,8 @@ def _upper_bounds(
         cells: cells along the side of a box.
     """
     single = c.astype(np.float32)
-    found = _max_over_boxes(function, _bernstein_coefficients(single, degrees, cells), cells)
-    return np.maximum(found, 0.0) + _ROUNDING_ALLOWANCE * float(np.abs(single).max())
+    greatest = _max_over_boxes(function, _bernstein_coefficients(single, degrees, cells), cells)
+    return np.maximum(greatest, 0.0) + _ROUNDING_ALLOWANCE * float(np.abs(single).max())
 
 
 def _height_bounds(
