@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from asperity.analysis.bounds.bound import NORM, spectral_norm
 from asperity.analysis.bounds.sampling import dense_maximum
@@ -255,6 +257,14 @@ def _scan_force(surface: Surface, points: int | None = None) -> ScanForce:
     )
 
 
+def sliding_state(surface: Surface, count: int) -> tuple[NDArray[Any], ...]:
+    """Return deflection and sliding of a law with state that slides along its scan line."""
+    if not surface.law.stateful:
+        return ()
+    deflection = surface.max_deflection * surface.texture.scan_line().direction
+    return np.tile(deflection, (count, 1)), np.ones(count, dtype=bool)
+
+
 def _scan_forces_and_slopes(
     surface: Surface, line: ScanLine, height: float, points: int | None = None
 ) -> tuple[FloatArray, FloatArray, float]:
@@ -264,12 +274,7 @@ def _scan_forces_and_slopes(
     xy = parallel_line_points(surface.texture, line, points or count)
     shape = xy.shape[:2]
     flat = np.column_stack([xy.reshape(-1, 2), np.full(math.prod(shape), height)])
-    if surface.law.stateful:
-        trailing = np.tile(surface.parameter("max_deflection") * line.direction, (len(flat), 1))
-        sliding = np.ones(len(flat), dtype=bool)
-        forces, jacobians = surface.force_and_jacobian(flat, trailing, sliding)
-    else:
-        forces, jacobians = surface.force_and_jacobian(flat)
+    forces, jacobians = surface.force_and_jacobian(flat, *sliding_state(surface, len(flat)))
     lost = float(np.mean(~jacobians.any(axis=(1, 2))))
     slopes = -jacobians[:, 2, 2].reshape(shape) / surface.stiffness
     return forces.reshape(*shape, 3) / surface.stiffness, slopes, lost

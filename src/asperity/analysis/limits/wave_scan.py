@@ -8,7 +8,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from asperity.analysis.energy.straight_scan import friction_scan, scan_force, scan_height
+from asperity.analysis.energy.straight_scan import (
+    friction_scan,
+    scan_force,
+    scan_height,
+    sliding_state,
+)
 from asperity.analysis.gain.surface_cache import cached_result, stiffness_factor
 from asperity.analysis.limits.limit_rules import LimitCase
 from asperity.analysis.limits.spectrum import (
@@ -174,12 +179,7 @@ def wave_forces(surface: Surface, spectrum: Spectrum) -> FloatArray:
 def scan_forces(surface: Surface, xy: FloatArray) -> FloatArray:
     """Return the forces [N], shape (n, 3), at points (n, 2) [m] of the scan's height."""
     probes = np.column_stack([xy, np.full(len(xy), scan_height(surface))])
-    if not surface.law.stateful:
-        return surface.force(probes)
-    direction = surface.texture.scan_line().direction
-    return surface.force(
-        probes, np.tile(surface.parameter("max_deflection") * direction, (len(xy), 1))
-    )
+    return surface.force(probes, *sliding_state(surface, len(xy))[:1])
 
 
 def slip_forces(surface: Surface, xy: FloatArray) -> FloatArray:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from asperity.analysis.bounds.bound import spectral_norm
-from asperity.analysis.energy.straight_scan import scan_height
+from asperity.analysis.energy.straight_scan import scan_height, sliding_state
 from asperity.core.checks import FloatArray
 from asperity.surface import Surface
 from asperity.textures.texture import ScanLine, Texture
@@ -95,17 +95,6 @@ def choose_segment(texture: Texture, target_length: float, max_length: float) ->
     return ScanSegment(line, start, length)
 
 
-def sliding_state(surface: Surface, count: int, *, jacobian: bool = False) -> dict[str, FloatArray]:
-    """Return the state arguments of a law with state: fully deflected, sliding along the line."""
-    if not surface.law.stateful:
-        return {}
-    direction = surface.texture.scan_line().direction
-    deflection = np.tile(surface.max_deflection * direction, (count, 1))
-    if not jacobian:
-        return {"deflection": deflection}
-    return {"deflection": deflection, "sliding": np.ones(count, dtype=bool)}
-
-
 @dataclass(frozen=True)
 class PlaneForces:
     """Forces in the vertical plane of the scan.
@@ -127,7 +116,7 @@ def _compute_plane_forces(
     surface: Surface, segment: ScanSegment, along: FloatArray, xy: FloatArray, z: FloatArray
 ) -> PlaneForces:
     points = np.column_stack([xy, z])
-    forces = surface.force(points, **sliding_state(surface, len(points)))
+    forces = surface.force(points, *sliding_state(surface, len(points))[:1])
     return PlaneForces(along, z, forces[:, :2] @ segment.line.direction, forces[:, 2])
 
 
@@ -176,7 +165,7 @@ def secant_gain(surface: Surface, points: FloatArray) -> FloatArray:
     secant across that line is at least the jump over the distance of the points.
     """
     flat = points.reshape(-1, 3)
-    force = surface.force(flat, **sliding_state(surface, len(flat))).reshape(points.shape)
+    force = surface.force(flat, *sliding_state(surface, len(flat))[:1]).reshape(points.shape)
     gain = np.zeros(points.shape[:2])
     for axis in (0, 1):
         change = np.linalg.norm(np.diff(force, axis=axis), axis=2)
@@ -219,7 +208,7 @@ def curl_field(
     fractions = (np.arange(rows) + 0.5) / rows
     z = bottom + (tops - bottom)[:, None] * fractions
     points = np.column_stack([np.repeat(xy, rows, axis=0), z.ravel()])
-    J = surface.jacobian(points, **sliding_state(surface, len(points), jacobian=True))
+    J = surface.jacobian(points, *sliding_state(surface, len(points)))
     direction = segment.line.direction
     curl = J[:, :2, 2] @ direction - J[:, 2, :2] @ direction
     corner_z = bottom + (corner_tops - bottom)[:, None] * np.linspace(0.0, 1.0, rows + 1)

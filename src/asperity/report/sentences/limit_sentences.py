@@ -13,6 +13,7 @@ from asperity.analysis.results.recommendation import LawRow
 from asperity.core.units import format_quantity, round_down
 from asperity.devices import Device
 from asperity.perception.grip import Grip
+from asperity.report.sentences.texts import side_text
 
 _ZERO_HEIGHT = 1e-12  # [m], far below the size of an atom: rounding
 
@@ -262,13 +263,9 @@ def _met_share_text(result: Limits, failing: Sequence[Limit]) -> str:
 
 def _failure_text(limit: Limit) -> str:
     """Return both sides of a limit that fails, for the wave that violates it most."""
-    left = _side_text(limit.left, limit.unit)
-    right = _side_text(limit.right, limit.unit)
+    left = side_text(limit.left, limit.unit)
+    right = side_text(limit.right, limit.unit)
     return f"limit {limit.number} ({limit.name}) fails, {left} against {right}"
-
-
-def _side_text(side: float | None, unit: str) -> str:
-    return "–" if side is None else format_quantity(side, unit)
 
 
 def _speed_advice(result: Limits, failing: Sequence[Limit]) -> str:
