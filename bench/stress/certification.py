@@ -1,7 +1,8 @@
 """What a search of our own laws as black boxes finds, and what it claims of harmless renderers.
 
-``python -m bench.stress.certification [SECONDS]`` compares the gain and the leak that a search of
-so many seconds (10 by default) finds with the certified ones, on five surfaces;
+``python -m bench.stress.certification [SECONDS [SURFACE [LAWS]]]`` compares the gain and the leak
+that a search of so many seconds (10 by default) finds with the certified ones, on five surfaces, or
+on one (such as knurl) for some laws (such as BG);
 ``python -m bench.stress.certification controls [COUNT]`` searches so many conservative renderers
 (200 by default), exact, in single precision, with steps of position and of force, with noise, for
 0.7 s each, and prints how many had a fault;
@@ -41,13 +42,15 @@ _NODES = 24
 CONTROL_SECONDS = 0.7
 
 
-def search_laws(seconds: float) -> None:
+def search_laws(seconds: float, surface_name: str | None = None, laws: str = LAWS) -> None:
     """Print the shares of the certified gain and leak that are found."""
     textures = {name: cases.textures()[name] for name in ("sinusoid", "fourier", "heightmap")}
     textures |= {name: named_surface(name) for name in ("cloth", "knurl")}
     table = number_table("surface", "law", "gain / certified", "leak / worst loop", "calls", left=2)
+    if surface_name is not None:
+        textures = {surface_name: textures[surface_name]}
     for name, texture in track(textures.items(), "searching"):
-        for law in LAWS:
+        for law in laws:
             surface = Surface(texture, law, stiffness=cases.STIFFNESS)
             found = _search(surface, seconds)
             gain = cases.STIFFNESS * characteristic_number(surface).upper
@@ -233,10 +236,10 @@ def search_controls(count: int) -> None:
 
 
 if __name__ == "__main__":
-    numbers = [float(argument) for argument in sys.argv[2:]]
-    if sys.argv[1:2] == ["controls"]:
-        search_controls(*[int(number) for number in numbers or [200]])
-    elif sys.argv[1:2] == ["jumps"]:
-        search_jumps(*[int(number) for number in numbers or [100]])
+    arguments = sys.argv[1:]
+    if arguments[:1] == ["controls"]:
+        search_controls(*[int(number) for number in arguments[1:] or ["200"]])
+    elif arguments[:1] == ["jumps"]:
+        search_jumps(*[int(number) for number in arguments[1:] or ["100"]])
     else:
-        search_laws(float(sys.argv[1]) if len(sys.argv) > 1 else 10.0)
+        search_laws(float(arguments[0]) if arguments else 10.0, *arguments[1:])

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from asperity.certification import loop_search
 from asperity.certification.column_loops import find_column_loops
@@ -23,7 +24,6 @@ def test_heights_are_those_of_the_best_sum_of_neighbours(seed: int) -> None:
     circulations[::4, 8:] = np.nan  # outside of the region
     circulations[5, :3] = np.nan
     circulations[9] = -1.0
-    circulations[10] = np.nan
     loops = find_column_loops(np.eye(3), circulations)
     for column, values in enumerate(circulations):
         inside = np.flatnonzero(np.isfinite(values))
@@ -31,28 +31,66 @@ def test_heights_are_those_of_the_best_sum_of_neighbours(seed: int) -> None:
         for start in inside:
             best = max(best, float(np.nancumsum(values[start:]).max()))
         assert loops.works[column] == pytest.approx(best, abs=1e-12)
+        low = rows * loops.forwards[column]
+        high = rows * loops.backwards[column]
         if best == 0.0:
+            assert low == high == inside[0] + 0.5
             continue
-        # Heights are nodes, but no farther out than the middle of the outermost cells.
-        low = math.floor(rows * loops.forwards[column])
-        high = math.ceil(rows * loops.backwards[column])
-        assert np.nansum(values[low:high]) == pytest.approx(best, abs=1e-12)
-        assert loops.forwards[column] * rows >= inside[0] + 0.5
-        assert loops.backwards[column] * rows <= inside[-1] + 0.5
+        assert np.nansum(values[max(round(low), 0) : round(high)]) == pytest.approx(best, abs=1e-12)
+        # At the border of the region a way is a cell beyond it, where the path is cut.
+        assert inside[0] - 1 <= low < high <= inside[-1] + 2
+        assert round(low) != inside[0]
+        assert round(high) != inside[-1] + 1
+
+
+def test_ways_pass_neither_gaps_within_columns_nor_columns_without_a_common_height() -> None:
+    circulations = np.full((6, 9), np.nan)
+    circulations[:4, :3] = 1.0
+    circulations[:4, 5:] = -1.0
+    circulations[:4, 7] = 2.5  # less than the lower part
+    circulations[4:, 5:] = 1.0  # as much, in fewer columns
+    loops = find_column_loops(np.eye(3), circulations)
+    assert loops.works.tolist() == [3.0, 3.0, 3.0, 3.0, 0.0, 0.0]
+    circulations[3, 3:5] = -1e-3  # joins all
+    joined = find_column_loops(np.eye(3), circulations)
+    assert joined.works.tolist() == pytest.approx([3.0, 3.0, 3.0, 3.498, 4.0, 4.0])
 
 
 def test_ways_along_one_height_enclose_no_area() -> None:
-    """One cell a column is inside: the ways both pass its middle."""
-    circulations = np.full((4, 3), np.nan)
-    circulations[:, 1] = 1.0
+    circulations = np.full((4, 3), -1.0)
     loops = find_column_loops(np.eye(3), circulations)
-    assert (loops.works > 0.0).all()
     assert not loops.encloses_area(0, 4)
-    circulations[2, 2] = 1.0
+    circulations[2, 1] = 1.0
     loops = find_column_loops(np.eye(3), circulations)
     assert loops.encloses_area(0, 4)
     assert loops.encloses_area(2, 3)
     assert not loops.encloses_area(2, 2)
+
+
+def test_loop_follows_the_border_of_the_region_between_the_nodes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A constant curl c gains c times the area: that of the region between two waves."""
+    monkeypatch.setattr(loop_search, "time", SimpleNamespace(monotonic=lambda: 0.0))
+    monkeypatch.setattr(RendererCalls, "rate", 1e5)
+
+    def force(points: FloatArray) -> FloatArray:
+        return 1e3 * points[:, 2:] * [1.0, 0.0, 0.0]
+
+    def inside(points: FloatArray) -> NDArray[np.bool_]:
+        wave = 0.5e-3 * np.sin(6e3 * points[:, 0])
+        return np.asarray(np.abs(points[:, 2] - wave) < 0.3e-3)
+
+    corner = np.full(3, 1e-3)
+    calls = RendererCalls(FunctionRenderer(force), Region(-corner, corner, inside))
+    resolution = Resolution(0.0, (0.0, 0.0, 0.0), 0.0, 1e-7)
+    search = loop_search.LoopSearch(calls, resolution, 0.0, seed=0)
+    plane = np.array([[-1e-3, 0.0, -1e-3], [2e-3, 0.0, 0.0], [0.0, 0.0, 2e-3]])
+    search._record_columns(-search._circulations(plane, 80), plane)
+    assert search.best is not None
+    # Half a cell at each end of the plane is left out.
+    area = 0.6e-3 * 2e-3 * 79.0 / 80.0
+    assert 0.95 * 1e3 * area < search.best.energy <= 1e3 * area
 
 
 @pytest.mark.parametrize(("last", "counts"), [(0.1, False), (1.1, True)])

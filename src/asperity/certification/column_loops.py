@@ -55,24 +55,53 @@ def find_column_loops(plane: FloatArray, circulations: FloatArray) -> ColumnLoop
         circulations: work around each cell [J], shape (n, m); NaN outside of the region.
 
     Returns:
-        Their heights are no farther out than the middle of a cell of the region.
+        A way along the outermost cells of the region is a cell farther out, beyond its border.
     """
     is_inside = np.isfinite(circulations)
-    sums = np.pad(np.cumsum(np.where(is_inside, circulations, 0.0), axis=1), ((0, 0), (1, 0)))
+    # No sum across a gap of the region is positive.
+    barriers = -1.0 - np.nansum(np.abs(circulations), axis=1, keepdims=True)
+    sums = np.pad(np.cumsum(np.where(is_inside, circulations, barriers), axis=1), ((0, 0), (1, 0)))
     is_reached = np.pad(is_inside, ((0, 0), (0, 1))) | np.pad(is_inside, ((0, 0), (1, 0)))
     least = np.minimum.accumulate(np.where(is_reached, sums, np.inf), axis=1)
     works = np.where(is_reached, sums - least, 0.0)
     highest = np.argmax(works, axis=1)
     columns = np.arange(len(sums))
-    is_lowest = is_reached & (sums == least[columns, highest][:, None])
-    forwards = _inner_heights(np.argmax(is_lowest, axis=1), is_inside)
-    backwards = _inner_heights(highest, is_inside)
-    return ColumnLoops(plane, works[columns, highest], forwards, backwards)
+    lowest = np.argmax(is_reached & (sums == least[columns, highest][:, None]), axis=1)
+    works = works[columns, highest]
+    bottom = np.argmax(is_inside, axis=1)
+    lowest, highest = np.where(works > 0.0, [lowest, highest], bottom)
+    groups = np.cumsum(_has_gap(lowest, is_inside) | _has_gap(highest, is_inside))
+    works = np.where(groups == np.argmax(np.bincount(groups, works)), works, 0.0)
+    forwards = _way_heights(lowest, is_inside, works)
+    backwards = _way_heights(highest, is_inside, works)
+    return ColumnLoops(plane, works, forwards, backwards)
 
 
-def _inner_heights(rows: IntArray, is_inside: NDArray[np.bool_]) -> FloatArray:
-    """Return heights of borders of cells within the middles of the outermost cells inside."""
+def _has_gap(rows: IntArray, is_inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return whether a way leaves the region on its way to each column from the one before.
+
+    Args:
+        rows: of nodes at which the way passes the columns, shape (n,).
+        is_inside: whether each cell is in the region, shape (n, m).
+    """
+    either = np.copy(is_inside)
+    either[1:] |= is_inside[:-1]
+    gaps = np.pad(np.cumsum(~either, axis=1), ((0, 0), (1, 0)))
+    columns = np.arange(len(rows))
+    before = rows[np.maximum(columns - 1, 0)]
+    return np.asarray(gaps[columns, rows] != gaps[columns, before])
+
+
+def _way_heights(rows: IntArray, is_inside: NDArray[np.bool_], works: FloatArray) -> FloatArray:
+    """Return heights of rows of nodes: at the border of the region a cell beyond it.
+
+    Where there is no work they are in the middles of the outermost cells.
+    """
     count = is_inside.shape[1]
     first = np.argmax(is_inside, axis=1) + 0.5
     last = count - np.argmax(is_inside[:, ::-1], axis=1) - 0.5
-    return np.asarray(np.clip(rows, first, last) / count)
+    columns = np.arange(len(rows))
+    padded = np.pad(is_inside, ((0, 0), (1, 1)))
+    outwards = 1.0 * padded[columns, rows] - padded[columns, rows + 1]
+    heights = np.where(works > 0.0, rows + outwards, np.clip(rows, first, last))
+    return np.asarray(heights / count)

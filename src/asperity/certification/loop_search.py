@@ -33,10 +33,16 @@ TURNS = 3
 """Turns of a loop of a renderer with memory; the last one counts."""
 _ERRORS_PER_WORK = 5.0
 _ROUNDING = 1e-8
-_COARSE_CELLS = 24
-_FINE_CELLS = 320
+_COARSE_CELLS = 32
+_MIDDLE_CELLS = 128
+_FINE_CELLS = 400
+"""Cells of a grid along each side: to find planes, to choose between them, to walk loops."""
 _PLANES = 32
-_REFINED = 6
+_CHOSEN_PLANES = 10
+_LOOPS_A_ROUND = 12
+_REFINED_POLYGONS = 6
+_WAY_PARTS = 4
+_BORDER_MARGIN = 0.005
 _POLYGONS = 48
 _TRIED_POLYGONS = 1000
 _VERTICES = 8
@@ -131,18 +137,28 @@ class LoopSearch:
     # --- grids of planes ---
 
     def _search_planes(self, deadline: float) -> None:
-        """Find planes of much circulation on a coarse grid, and their loops on a fine one."""
+        """Find planes of much circulation on a coarse grid, and their loops on finer ones."""
         now = time.monotonic()
         budget = self.calls.rate * max(deadline - now, 0.0)
         cells = int(min(_COARSE_CELLS, max(6.0, math.sqrt(budget / 200.0))))
-        fine_cells = int(min(_FINE_CELLS, max(cells, 0.2 * math.sqrt(budget))))
+        fine_cells = int(min(_FINE_CELLS, max(cells, 0.25 * math.sqrt(budget))))
         count = int(min(_PLANES, max(4.0, 0.05 * budget / cells**2)))
-        for plane in self._best_planes(count, cells, now + 0.5 * (deadline - now)):
+        planes = self._best_planes(count, cells, now + 0.5 * (deadline - now))
+        middle_cells = int(min(_MIDDLE_CELLS, max(cells, 0.1 * math.sqrt(budget))))
+        works = [self._simple_work(plane, middle_cells) for plane in planes]
+        found = 0
+        for plane in planes[np.argsort(works)[::-1]]:
             circulations = self._circulations(plane, fine_cells)
             for sign in (1.0, -1.0):
-                self._record_columns(sign * circulations, plane)
-            if _is_past(deadline):
+                found += self._record_columns(sign * circulations, plane)
+            if found >= _LOOPS_A_ROUND or _is_past(deadline):
                 break
+
+    def _simple_work(self, plane: FloatArray, cells: int) -> float:
+        """Return the greatest work of a simple loop of a grid [J], not refined."""
+        circulations = self._circulations(plane, cells)
+        works = [find_column_loops(plane, sign * circulations).works for sign in (1.0, -1.0)]
+        return float(np.sum(works, axis=1).max())
 
     def _best_planes(self, count: int, cells: int, deadline: float) -> FloatArray:
         """Return the planes of most circulation on a grid, the best first, shape (n, 3, 3).
@@ -162,7 +178,7 @@ class LoopSearch:
         )
         planes = np.concatenate([self._vertical_planes(ends), flat])
         energies = np.concatenate([energies, self._plane_energies(flat, cells)])
-        return planes[np.argsort(-energies)[:_REFINED]]
+        return planes[np.argsort(-energies)[:_CHOSEN_PLANES]]
 
     def _plane_energies(self, planes: FloatArray, cells: int) -> FloatArray:
         """Return the sums of the magnitudes of the circulations of planes [J], shape (n,)."""
@@ -222,35 +238,56 @@ class LoopSearch:
         whole = inside[:-1, :-1] & inside[1:, :-1] & inside[:-1, 1:] & inside[1:, 1:]
         return np.where(whole, work, np.nan)
 
-    def _record_columns(self, circulations: FloatArray, plane: FloatArray) -> None:
+    def _record_columns(self, circulations: FloatArray, plane: FloatArray) -> int:
         """Measure the simple loop of greatest energy in a plane, and a part of greater density.
 
         A loop passes the columns of the grid forwards at one height and backwards at another; that
         against the sense of the circulations is tried with their signs changed.
+
+        Returns:
+            How many of the two count.
         """
         column_loops = find_column_loops(plane, circulations)
         columns = np.flatnonzero(column_loops.works > 0.0)
         if not len(columns):
-            return
+            return 0
         first = int(columns[0])
         end = int(columns[-1]) + 1
-        for _ in range(2):
+        for found in range(2):
             if not column_loops.encloses_area(first, end):
-                return
-            loop = self.measure(column_loops.path(first, end))
+                return found
+            loop = self.measure(self._path_within(column_loops.path(first, end)))
             if loop.energy < 0.0:
                 loop = replace(loop, energy=-loop.energy, path=loop.path[::-1])
-            if not loop.counts:
-                self.rejected += 1
-                return
-            self._keep(loop)
+            if not self._keep(loop):
+                return found
             first, end = column_loops.densest_columns(loop.density)
+        return 2
 
-    def _keep(self, loop: ClosedLoop) -> None:
+    def _path_within(self, path: FloatArray) -> FloatArray:
+        """Return a path through columns, there and back, with what is outside at the border.
+
+        Points of a way are moved towards the middle between both ways.
+        """
+        points = subdivide(path, math.inf, _WAY_PARTS)
+        middles = 0.5 * (points + np.roll(points[::-1], 1 - _WAY_PARTS, axis=0))
+        limited = self.calls.region.limit(middles, points)
+        is_moved = (limited != points).any(axis=1)
+        # Straight parts between points of a curved border are outside.
+        limited[is_moved] += _BORDER_MARGIN * (middles - limited)[is_moved]
+        is_moved[::_WAY_PARTS] = True
+        return limited[is_moved]
+
+    def _keep(self, loop: ClosedLoop) -> bool:
+        """Keep a loop if it is the best; return whether it counts."""
+        if not loop.counts:
+            self.rejected += 1
+            return False
         if self.best is None or loop.energy > self.best.energy:
             self.best = loop
         if self.densest is None or loop.density > self.densest.density:
             self.densest = loop
+        return True
 
     # --- polygons of a renderer with memory ---
 
@@ -270,7 +307,7 @@ class LoopSearch:
                 _FIRST_SPREAD * region.size,
                 _STAGE_STEPS,
             )
-            self._measure_polygons(polygons[:_REFINED])
+            self._measure_polygons(polygons[:_REFINED_POLYGONS])
             if _is_past(deadline):
                 return
             best = polygons[: max(len(polygons) // 4, _LEAST_POLYGONS)]
@@ -279,11 +316,7 @@ class LoopSearch:
 
     def _measure_polygons(self, polygons: FloatArray) -> None:
         for polygon in polygons:
-            loop = self.measure(polygon)
-            if loop.counts:
-                self._keep(loop)
-            else:
-                self.rejected += 1
+            self._keep(self.measure(polygon))
 
     def _starting_polygons(self, deadline: float) -> FloatArray:
         """Return the best of random polygons, of more the faster the renderer is [m]."""
