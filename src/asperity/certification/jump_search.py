@@ -8,6 +8,7 @@ keeps it.
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import dataclass
 
@@ -32,6 +33,14 @@ _HALVINGS = 4
 _TRIED_HALVINGS = 5
 _REPEATS = 2
 _LEFT = 0.25
+_BORDER_SHARE = 0.1
+_POINTS_PER_NODE = 32
+_BORDER_NODES = 64
+_BORDER_SAMPLES = 512
+_LIFTS = 3
+_FOLLOWING_SHARE = 0.3
+_TILT = 1.5
+_LEAST_REACH = 0.004
 _CELLS = 100
 """Jumps in the same of this many cells along each axis of the region count once."""
 
@@ -71,10 +80,14 @@ class JumpSearch:
     """
 
     def __init__(self, calls: RendererCalls, resolution: Resolution, seed: int) -> None:
+        from scipy.stats import qmc
+
         self.calls = calls
         self.resolution = resolution
         self.steepest = np.zeros((0, 2, 3))
         self._random = np.random.default_rng(seed)
+        self._halton = qmc.Halton(1, seed=seed)
+        self._new: list[_Segments] = []
         self._jumps: dict[tuple[int, ...], ForceJump] = {}
         self._shortest = max(_SHORTEST, 20.0 * resolution.position_error)
 
@@ -96,18 +109,59 @@ class JumpSearch:
             approach, start, end, trend = [np.array([row]) for row in rows]
             self._bisect(_find_segments(self.calls, approach, start, end, trend), 0.0)
             gain = 0.0 if self._jumps else steepest.value  # that of a jump explains nothing
+        left = deadline - time.monotonic()
+        followed_from = deadline - _FOLLOWING_SHARE * left
+        border = self._find_border(_BORDER_SHARE * self.calls.rate * left)
         while True:
             # Many lines with few samples see many places, few lines with many see small jumps.
             batch = int(min(max(_SHARE_PER_BATCH * self.calls.rate, _LEAST_BATCH), _LARGEST_BATCH))
             samples = min(_SAMPLES * 4 ** max(int(self._random.integers(-2, 4)), 0), batch)
             size = float(np.sqrt(np.square(self.calls.region.size).sum()))
             samples = min(samples, int(size / (32.0 * self._shortest)) + 8)
-            self._search_lines(self._random_lines(max(batch // samples, 1)), samples, gain)
+            lines = self._random_lines(max(batch // samples, 1), samples)
+            inside = self.calls.region.contains(lines.reshape(-1, 3)).reshape(lines.shape[:2])
+            self._search_lines(lines, inside, gain)
+            samples = min(samples, _BORDER_SAMPLES)
+            lines = self._border_lines(border, max(batch // (2 * samples), 1), samples)
+            self._search_lines(lines, np.ones(lines.shape[:2], dtype=bool), gain)
+            if time.monotonic() >= followed_from:
+                self._follow(gain, deadline)
             if time.monotonic() >= deadline:
                 return
 
-    def _random_lines(self, count: int) -> FloatArray:
-        """Return the ends of lines through the region, half of them parallel to an axis."""
+    def _find_border(self, budget: float) -> FloatArray:
+        """Return heights of the lower border of the region on a square grid [m], shape (n, n).
+
+        Args:
+            budget: number of points that may be looked at.
+        """
+        count = int(min(math.sqrt(max(budget, 0.0) / _POINTS_PER_NODE) + 4.0, _BORDER_NODES))
+        side = np.linspace(0.0, 1.0, count)
+        x, y = np.meshgrid(side, side, indexing="ij")
+        nodes = np.stack([x, y, np.zeros_like(x)], axis=2).reshape(-1, 3)
+        lowest = self.calls.region.lowest(self.calls.region.points(nodes))
+        return lowest[:, 2].reshape(x.shape)
+
+    def _border_lines(self, border: FloatArray, count: int, samples: int) -> FloatArray:
+        """Return lines along the lower border, as many along x as along y, (2 count, samples, 3).
+
+        Small sets of jumps of a god-object, which reach up from below, are beside this border.
+        """
+        across = self._halton.random(count)
+        along = np.linspace(0.0, 1.0, samples)
+        fractions = np.zeros((2 * count, samples, 3))
+        fractions[..., 0] = along
+        fractions[..., 1] = np.tile(across, (2, 1))
+        fractions[count:, :, :2] = fractions[count:, :, 1::-1]
+        lines = self.calls.region.points(fractions)
+        rows = np.concatenate(
+            [_interpolate(border.T, across[:, 0]), _interpolate(border, across[:, 0])]
+        )
+        lines[..., 2] = _interpolate(rows.T, along).T
+        return lines
+
+    def _random_lines(self, count: int, samples: int) -> FloatArray:
+        """Return lines through the region, half parallel to an axis, (count, samples, 3)."""
         region = self.calls.region
         ends = region.points(self._random.uniform(size=(count, 2, 3)))
         axis = self._random.integers(6, size=count)
@@ -115,26 +169,51 @@ class JumpSearch:
         is_along = axis[:, None] == np.arange(3)
         across[:, 0] = np.where(is_along, region.low, across[:, 0])
         across[:, 1] = np.where(is_along, region.high, across[:, 1])
-        return np.where((axis < 3)[:, None, None], across, ends)
-
-    def _search_lines(self, ends: FloatArray, samples: int, gain: float) -> None:
-        """Search lines between two points each, shape (n, 2, 3)."""
+        ends = np.where((axis < 3)[:, None, None], across, ends)
         shares = np.linspace(0.0, 1.0, samples)[:, None]
-        lines = ends[:, :1] + shares * (ends[:, 1:] - ends[:, :1])
+        return np.asarray(ends[:, :1] + shares * (ends[:, 1:] - ends[:, :1]))
+
+    def _search_lines(self, lines: FloatArray, used: NDArray[np.bool_], gain: float) -> None:
+        """Search lines, shape (n, m, 3), at samples that are used, shape (n, m)."""
         if self.calls.approaches:
             forces = self.calls.along(lines)
         else:
             forces = self.calls.at(lines.reshape(-1, 3)).reshape(lines.shape)
-        inside = self.calls.region.contains(lines.reshape(-1, 3)).reshape(lines.shape[:2])
-        forces = np.where(inside[:, :, None], forces, np.nan)
+        forces = np.where(used[:, :, None], forces, np.nan)
         line, first = self._bent_samples(lines, forces)
-        if len(first):
-            steps = np.diff(forces, axis=1)
-            trend = 0.5 * (steps[line, first - 1] + steps[line, first + 2])
-            length = np.sqrt(np.square(lines[line, 1] - lines[line, 0]).sum(axis=1))
-            trend = np.nan_to_num(trend) / length[:, None]
-            segments = (lines[line, 0], lines[line, first], lines[line, first + 2])
-            self._bisect(_find_segments(self.calls, *segments, trend), gain)
+        steps = np.diff(forces, axis=1)
+        trend = 0.5 * (steps[line, first - 1] + steps[line, first + 2])
+        length = np.sqrt(np.square(lines[line, 1] - lines[line, 0]).sum(axis=1))
+        trend = np.nan_to_num(trend) / length[:, None]
+        ends = (lines[line, 0], lines[line, first], lines[line, first + 2])
+        segments = _find_segments(self.calls, *ends, trend)
+        for _ in range(_LIFTS):
+            segments = self._lifted(self._bisect(segments, gain))
+
+    def _lifted(self, segments: _Segments) -> _Segments:
+        """Return segments outside of the region as longer ones at its border above."""
+        return self._moved(segments, self.calls.region.lowest(segments.middle) - segments.middle)
+
+    def _follow(self, gain: float, deadline: float) -> None:
+        """Search beside new jumps, from cell to cell along their surface."""
+        cell = self.calls.region.size / _CELLS
+        while self._new and time.monotonic() < deadline:
+            segments = self._new.pop(0)
+            along = np.argmax(np.abs(segments.direction) / cell, axis=1)
+            for shift in (1, 2):
+                offsets = cell * (np.arange(3) == ((along + shift) % 3)[:, None])
+                for sign in (1.0, -1.0):
+                    self._bisect(self._moved(segments, sign * offsets), gain)
+
+    def _moved(self, segments: _Segments, offsets: FloatArray) -> _Segments:
+        """Return longer segments at offsets from some, where no jump is known, in the region."""
+        middle = segments.middle + offsets
+        spread = np.sqrt(np.square(offsets).sum(axis=1))[:, None]
+        reach = (_TILT * spread + _LEAST_REACH * self.calls.region.size) * segments.direction
+        chosen = self.calls.region.contains(middle)
+        chosen[chosen] = [self._cell(at) not in self._jumps for at in middle[chosen]]
+        ends = (segments.approach, middle - reach, middle + reach, segments.trend)
+        return _find_segments(self.calls, *[array[chosen] for array in ends])
 
     def _bent_samples(self, lines: FloatArray, forces: FloatArray) -> tuple[IntArray, IntArray]:
         """Return lines and first samples where the force bends most, and no jump is known."""
@@ -147,22 +226,27 @@ class JumpSearch:
         chosen &= [self._cell(at) not in self._jumps for at in lines[line, first + 1]]
         return line[chosen], first[chosen]
 
-    def _bisect(self, segments: _Segments, gain: float) -> None:
-        """Halve segments, and record the jumps; a gain explains changes [N/m]."""
+    def _bisect(self, segments: _Segments, gain: float) -> _Segments:
+        """Halve segments, and record the jumps; a gain explains changes [N/m].
+
+        Returns:
+            The jumps outside of the region.
+        """
         changes = [segments.excess]
-        while segments.lengths.max() > self._shortest:
+        while segments.lengths.max(initial=0.0) > self._shortest:
             if len(changes) == _TRIED_HALVINGS:  # most are smooth
                 is_left = changes[-1] > _LEFT * changes[0]
-                if not is_left.any():
-                    return
                 segments = segments.select(is_left)
                 changes = [change[is_left] for change in changes]
             segments.halve(self.calls)
             changes.append(segments.excess)
-        if len(changes) > _HALVINGS:  # else they are as short as the resolution
-            self._record_jumps(segments, changes, gain)
+        if len(changes) <= _HALVINGS or not len(changes[0]):  # short as the resolution, or none
+            return segments.select(np.zeros(len(changes[0]), dtype=bool))
+        return self._record_jumps(segments, changes, gain)
 
-    def _record_jumps(self, segments: _Segments, changes: list[FloatArray], gain: float) -> None:
+    def _record_jumps(
+        self, segments: _Segments, changes: list[FloatArray], gain: float
+    ) -> _Segments:
         paths = approach_paths(segments.approach, segments.start, segments.end)
         size = changes[-1]
         for _ in range(_REPEATS):  # noise that is rare does not come again
@@ -175,17 +259,22 @@ class JumpSearch:
         steepest = int(np.argmax(np.where(is_jump, 0.0, size / lengths)))
         ends = [segments.start[steepest], segments.end[steepest]]
         self.steepest = np.concatenate([self.steepest, [ends]])
-        middle = 0.5 * (segments.start + segments.end)
-        direction = (segments.end - segments.start) / lengths[:, None]
-        for index in np.flatnonzero(is_jump):
+        middle = segments.middle
+        is_inside = self.calls.region.contains(middle)
+        is_new = is_jump & is_inside
+        is_new[is_new] = [self._cell(at) not in self._jumps for at in middle[is_new]]
+        self._new.append(segments.select(is_new))
+        for index in np.flatnonzero(is_jump & is_inside):
             at, along, approach = [
-                tuple(row[index].tolist()) for row in (middle, direction, segments.approach)
+                tuple(row[index].tolist())
+                for row in (middle, segments.direction, segments.approach)
             ]
             found, over, exponent = [float(row[index]) for row in (size, lengths, exponents)]
             cell = self._cell(middle[index])
             known = self._jumps.get(cell)
             if known is None or found > known.size:
                 self._jumps[cell] = ForceJump(at, along, found, over, exponent, approach)
+        return segments.select(is_jump & ~is_inside)
 
     def _cell(self, at: FloatArray) -> tuple[int, ...]:
         region = self.calls.region
@@ -226,6 +315,16 @@ class _Segments:
         return np.asarray(np.sqrt(np.square(self.end - self.start).sum(axis=1)))
 
     @property
+    def middle(self) -> FloatArray:
+        """Their middles [m], shape (n, 3)."""
+        return 0.5 * (self.start + self.end)
+
+    @property
+    def direction(self) -> FloatArray:
+        """Their directions, unit vectors, shape (n, 3)."""
+        return (self.end - self.start) / self.lengths[:, None]
+
+    @property
     def excess(self) -> FloatArray:
         """Magnitudes of the changes of force beyond the trend [N], shape (n,)."""
         return _excess(self.start_force, self.end_force, self.trend * self.lengths[:, None])
@@ -245,6 +344,14 @@ class _Segments:
         self.start_force = np.where(goes_right, force, self.start_force)
         self.end = np.where(goes_right, self.end, middle)
         self.end_force = np.where(goes_right, self.end_force, force)
+
+
+def _interpolate(rows: FloatArray, fractions: FloatArray) -> FloatArray:
+    """Return rows between those of an array, at fractions of their number, (n, columns)."""
+    places = (len(rows) - 1) * fractions
+    first = np.minimum(places.astype(int), len(rows) - 2)
+    shares = (places - first)[:, None]
+    return np.asarray((1.0 - shares) * rows[first] + shares * rows[first + 1])
 
 
 def _find_segments(

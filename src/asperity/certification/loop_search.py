@@ -22,6 +22,7 @@ from functools import partial
 
 import numpy as np
 
+from asperity.analysis.energy.closed_loops import polygon_length
 from asperity.certification.climbing import climb
 from asperity.certification.column_loops import find_column_loops
 from asperity.certification.region import RendererCalls
@@ -276,7 +277,7 @@ class LoopSearch:
         # Straight parts between points of a curved border are outside.
         limited[is_moved] += _BORDER_MARGIN * (middles - limited)[is_moved]
         is_moved[::_WAY_PARTS] = True
-        return limited[is_moved]
+        return np.asarray(limited[is_moved])
 
     def _keep(self, loop: ClosedLoop) -> bool:
         """Keep a loop if it is the best; return whether it counts."""
@@ -370,7 +371,7 @@ class LoopSearch:
         One that counts is measured at eight times the points, too: of many loops, some have three
         works that agree by chance.
         """
-        loop = ClosedLoop(0.0, math.inf, _length(vertices), vertices, self._turns)
+        loop = ClosedLoop(0.0, math.inf, polygon_length(vertices), vertices, self._turns)
         works: list[float] = []
         for factor in (1, 2, 4, 8):
             path = subdivide(vertices, loop.length / (_LOOP_POINTS * factor), 2 * factor)
@@ -485,8 +486,3 @@ def resample(vertices: FloatArray, count: int) -> FloatArray:
 
 def _is_past(deadline: float) -> bool:
     return time.monotonic() >= deadline
-
-
-def _length(vertices: FloatArray) -> float:
-    steps = np.roll(vertices, -1, axis=0) - vertices
-    return float(np.sqrt(np.square(steps).sum(axis=1)).sum())

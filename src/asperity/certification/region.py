@@ -19,6 +19,7 @@ Predicate = Callable[[FloatArray], NDArray[np.bool_]]
 _REACH = 0.1
 """Distance from the origin [m] within which a surface is looked for."""
 _BORDER_HALVINGS = 8
+_LEVELS = 24
 _OVERHEAD = 1e-6
 _APPROACH = np.append(np.linspace(0.0, 1.0, 13), [1.0, 1.0, 1.0])
 """Shares of an approach: steps, and a rest in which a proxy settles."""
@@ -59,6 +60,14 @@ class Region:
     def points(self, fractions: FloatArray) -> FloatArray:
         """Return the points at fractions of the box, shape (n, 3)."""
         return self.low + fractions * self.size
+
+    def lowest(self, points: FloatArray) -> FloatArray:
+        """Return the lowest points of the region above points [m], shape (n, 3) both."""
+        columns = np.repeat(points[:, None], _LEVELS, axis=1)
+        columns[..., 2] = np.linspace(points[:, 2], self.high[2], _LEVELS, axis=1)
+        first = np.argmax(self.contains(columns.reshape(-1, 3)).reshape(-1, _LEVELS), axis=1)
+        rows = np.arange(len(points))
+        return self.limit(columns[rows, first], columns[rows, np.maximum(first - 1, 0)])
 
     def limit(self, starts: FloatArray, ends: FloatArray) -> FloatArray:
         """Return the ends of steps [m], or where they leave the region, shape (..., 3).
@@ -118,6 +127,8 @@ class RendererCalls:
 
     def along(self, paths: FloatArray) -> FloatArray:
         """Return forces along paths, each after a reset, shape (n, m, 3); NaN if not finite."""
+        if not len(paths):
+            return paths
         began = time.perf_counter()
         forces = np.array(self.renderer.forces(np.ascontiguousarray(paths)), dtype=np.float64)
         self.seconds += time.perf_counter() - began
