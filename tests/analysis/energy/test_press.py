@@ -54,6 +54,28 @@ def test_clamps_and_laws_of_one_gain_hold_at_any_press() -> None:
     assert not holds_at_any_press(Surface(WAVE, "C", clamp="lateral"))
 
 
+def greatest_gain(surface: Surface, lowest: float) -> float:
+    """Return the greatest ‖J‖/k at random points down to a height [m], below all of the texture."""
+    rng = np.random.default_rng(3)
+    points = np.column_stack(
+        [rng.uniform(-2e-3, 2e-3, (20_000, 2)), rng.uniform(lowest, -2e-4, 20_000)]
+    )
+    _force, jacobian = surface.force_and_jacobian(points)
+    norms = np.linalg.norm(np.asarray(jacobian), ord=2, axis=(1, 2))
+    return float(norms.max()) / surface.stiffness
+
+
+def test_a_baked_field_holds_at_any_press() -> None:
+    """Its gain is that of its coefficients, far below the deepest of them too; that of C grows."""
+    baked = asp.bake(Surface(WAVE, "H", 700.0, 5e-4), press=0.2)
+    assert holds_at_any_press(baked)
+    upper = characteristic_number(baked).upper
+    for lowest in (-1e-3, -0.1):
+        assert 0.9 < greatest_gain(baked, lowest) <= upper
+    shallow = Surface(WAVE, "C", 700.0, 5e-4)
+    assert greatest_gain(shallow, -0.1) > 2.0 * characteristic_number(shallow).upper
+
+
 def stiffest_by_definition(texture: Texture, law: str, wall: float, press: float) -> float:
     """Return the greatest k with k q(D(F)) <= c K₀ by bisection of k; 0 if there is none.
 

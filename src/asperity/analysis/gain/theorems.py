@@ -254,10 +254,12 @@ def _baked_number(
     return number
 
 
-# A baked field: its numbers are those of its coefficients.
+# A baked field: its numbers are those of its coefficients, in all of space. The field of a body
+# ends within it.
 _BAKED = Theorem(
     special_proofs={measure: _baked_number(measure) for measure in (NORM, ONE_SIDED)},
     gain_above_height=lambda surface, _height: surface.texture.baked_numbers[NORM.name].upper,
+    holds_at_any_depth=lambda surface: not surface.texture.is_body,
 )
 
 
