@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from asperity.certification import loop_search
-from asperity.certification.column_loops import find_column_loops
+from asperity.certification.column_loops import find_circulations, find_column_loops
 from asperity.certification.region import Region, RendererCalls
 from asperity.certification.renderers import FunctionRenderer
 from asperity.certification.resolution import Resolution
@@ -86,7 +86,7 @@ def test_loop_follows_the_border_of_the_region_between_the_nodes(
     resolution = Resolution(0.0, (0.0, 0.0, 0.0), 0.0, 1e-7)
     search = loop_search.LoopSearch(calls, resolution, 0.0, seed=0)
     plane = np.array([[-1e-3, 0.0, -1e-3], [2e-3, 0.0, 0.0], [0.0, 0.0, 2e-3]])
-    search._record_columns(-search._circulations(plane, 80), plane)
+    search._record_columns(-find_circulations(calls, plane, 80), plane)
     assert search.best is not None
     # Half a cell at each end of the plane is left out.
     area = 0.6e-3 * 2e-3 * 79.0 / 80.0

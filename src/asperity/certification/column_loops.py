@@ -1,4 +1,7 @@
-"""Loops that pass the columns of a plane grid forwards at one height and backwards at another."""
+"""Grids of planes: circulations of their cells, and the loops that pass their columns.
+
+A loop passes the columns forwards at one height and backwards at another.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,60 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from asperity.certification.region import Region, RendererCalls
 from asperity.core.checks import FloatArray, IntArray
+
+
+def random_ends(region: Region, count: int, random: np.random.Generator) -> FloatArray:
+    """Return two points for each vertical plane, half of these along an axis, (n, 2, 3)."""
+    ends = region.points(random.uniform(size=(count, 2, 3)))
+    for pair in ends:
+        across = int(random.integers(2))
+        along = 1 - across
+        if random.uniform() < 0.5:
+            pair[1, across] = pair[0, across]
+        pair[:, along] = region.low[along], region.high[along]
+    return ends
+
+
+def vertical_planes(region: Region, ends: FloatArray) -> FloatArray:
+    """Return corners and sides of rectangles above lines, as high as the region, (n, 3, 3)."""
+    corners = ends[:, 0].copy()
+    corners[:, 2] = region.low[2]
+    sides = ends[:, 1] - ends[:, 0]
+    sides[:, 2] = 0.0
+    heights = np.broadcast_to(region.size * [0.0, 0.0, 1.0], corners.shape)
+    return np.stack([corners, sides, heights], axis=1)
+
+
+def horizontal_planes(region: Region, shares: FloatArray) -> FloatArray:
+    """Return corners and sides of rectangles at shares of the height of the region, (n, 3, 3)."""
+    planes = np.zeros((len(shares), 3, 3))
+    planes[:, 0] = region.low
+    planes[:, 0, 2] += region.size[2] * shares
+    planes[:, 1, 0] = region.size[0]
+    planes[:, 2, 1] = region.size[1]
+    return planes
+
+
+def find_circulations(calls: RendererCalls, plane: FloatArray, cells: int) -> FloatArray:
+    """Return the work around each cell of a grid, NaN outside of the region, shape (n, m)."""
+    corner, side, height = plane
+    # About square cells, as many in all.
+    ratio = min(max(math.sqrt(math.hypot(*side) / math.hypot(*height)), 1 / 3), 3.0)
+    columns = int(cells * ratio)
+    rows = int(cells / ratio)
+    x = np.arange(columns + 1.0)[:, None, None] / columns * side
+    z = np.arange(rows + 1.0)[:, None] / rows * height
+    along = corner + x[:-1] + 0.5 / columns * side + z
+    up = corner + x + z[:-1] + 0.5 / rows * height
+    work_along = calls.at(along.reshape(-1, 3)).reshape(along.shape) @ side / columns
+    work_up = calls.at(up.reshape(-1, 3)).reshape(up.shape) @ height / rows
+    work = work_along[:, :-1] + work_up[1:] - work_along[:, 1:] - work_up[:-1]
+    corners = corner + x + z
+    inside = calls.region.contains(corners.reshape(-1, 3)).reshape(columns + 1, rows + 1)
+    whole = inside[:-1, :-1] & inside[1:, :-1] & inside[:-1, 1:] & inside[1:, 1:]
+    return np.where(whole, work, np.nan)
 
 
 @dataclass(frozen=True)
@@ -44,7 +100,8 @@ class ColumnLoops:
         taken = 2.0 * density * math.hypot(*self.plane[1]) / len(self.works)
         sums = np.concatenate([np.zeros(1), np.cumsum(self.works - taken)])
         end = int(np.argmax(sums - np.minimum.accumulate(sums)))
-        return int(np.argmin(sums[: end + 1])), end
+        before = sums[: end + 1]
+        return int(np.flatnonzero(before == before.min())[-1]), end
 
 
 def find_column_loops(plane: FloatArray, circulations: FloatArray) -> ColumnLoops:
@@ -70,14 +127,14 @@ def find_column_loops(plane: FloatArray, circulations: FloatArray) -> ColumnLoop
     works = works[columns, highest]
     bottom = np.argmax(is_inside, axis=1)
     lowest, highest = np.where(works > 0.0, [lowest, highest], bottom)
-    groups = np.cumsum(_has_gap(lowest, is_inside) | _has_gap(highest, is_inside))
+    groups = np.cumsum(_crosses_gap(lowest, is_inside) | _crosses_gap(highest, is_inside))
     works = np.where(groups == np.argmax(np.bincount(groups, works)), works, 0.0)
     forwards = _way_heights(lowest, is_inside, works)
     backwards = _way_heights(highest, is_inside, works)
     return ColumnLoops(plane, works, forwards, backwards)
 
 
-def _has_gap(rows: IntArray, is_inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _crosses_gap(rows: IntArray, is_inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return whether a way leaves the region on its way to each column from the one before.
 
     Args:

@@ -173,10 +173,8 @@ class RendererPool:
         parts = np.array_split(paths, copies)
         for renderer, part in zip(self._renderers, parts, strict=False):
             renderer.send("forces", part)
-        forces = []
-        for renderer, part in zip(self._renderers, parts, strict=False):
-            forces.append(renderer.receive(part))
-        return np.concatenate(forces)
+        pairs = zip(self._renderers, parts, strict=False)
+        return np.concatenate([renderer.receive(part) for renderer, part in pairs])
 
     def call_times(self, points: FloatArray) -> FloatArray:
         """Return the time of a call at each point [s], shape (n,)."""

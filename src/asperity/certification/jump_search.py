@@ -125,7 +125,7 @@ class JumpSearch:
             lines = self._border_lines(border, max(batch // (2 * samples), 1), samples)
             self._search_lines(lines, np.ones(lines.shape[:2], dtype=bool), gain)
             if time.monotonic() >= followed_from:
-                self._follow(gain, deadline)
+                self._follow_surfaces(gain, deadline)
             if time.monotonic() >= deadline:
                 return
 
@@ -139,7 +139,7 @@ class JumpSearch:
         side = np.linspace(0.0, 1.0, count)
         x, y = np.meshgrid(side, side, indexing="ij")
         nodes = np.stack([x, y, np.zeros_like(x)], axis=2).reshape(-1, 3)
-        lowest = self.calls.region.lowest(self.calls.region.points(nodes))
+        lowest = self.calls.region.lowest_points(self.calls.region.points(nodes))
         return lowest[:, 2].reshape(x.shape)
 
     def _border_lines(self, border: FloatArray, count: int, samples: int) -> FloatArray:
@@ -155,9 +155,9 @@ class JumpSearch:
         fractions[count:, :, :2] = fractions[count:, :, 1::-1]
         lines = self.calls.region.points(fractions)
         rows = np.concatenate(
-            [_interpolate(border.T, across[:, 0]), _interpolate(border, across[:, 0])]
+            [_interpolate_rows(border.T, across[:, 0]), _interpolate_rows(border, across[:, 0])]
         )
-        lines[..., 2] = _interpolate(rows.T, along).T
+        lines[..., 2] = _interpolate_rows(rows.T, along).T
         return lines
 
     def _random_lines(self, count: int, samples: int) -> FloatArray:
@@ -175,11 +175,7 @@ class JumpSearch:
 
     def _search_lines(self, lines: FloatArray, used: NDArray[np.bool_], gain: float) -> None:
         """Search lines, shape (n, m, 3), at samples that are used, shape (n, m)."""
-        if self.calls.approaches:
-            forces = self.calls.along(lines)
-        else:
-            forces = self.calls.at(lines.reshape(-1, 3)).reshape(lines.shape)
-        forces = np.where(used[:, :, None], forces, np.nan)
+        forces = np.where(used[:, :, None], self.calls.on_curves(lines), np.nan)
         line, first = self._bent_samples(lines, forces)
         steps = np.diff(forces, axis=1)
         trend = 0.5 * (steps[line, first - 1] + steps[line, first + 2])
@@ -188,13 +184,15 @@ class JumpSearch:
         ends = (lines[line, 0], lines[line, first], lines[line, first + 2])
         segments = _find_segments(self.calls, *ends, trend)
         for _ in range(_LIFTS):
-            segments = self._lifted(self._bisect(segments, gain))
+            segments = self._segments_above(self._bisect(segments, gain))
 
-    def _lifted(self, segments: _Segments) -> _Segments:
+    def _segments_above(self, segments: _Segments) -> _Segments:
         """Return segments outside of the region as longer ones at its border above."""
-        return self._moved(segments, self.calls.region.lowest(segments.middle) - segments.middle)
+        return self._segments_beside(
+            segments, self.calls.region.lowest_points(segments.middle) - segments.middle
+        )
 
-    def _follow(self, gain: float, deadline: float) -> None:
+    def _follow_surfaces(self, gain: float, deadline: float) -> None:
         """Search beside new jumps, from cell to cell along their surface."""
         cell = self.calls.region.size / _CELLS
         while self._new and time.monotonic() < deadline:
@@ -203,9 +201,9 @@ class JumpSearch:
             for shift in (1, 2):
                 offsets = cell * (np.arange(3) == ((along + shift) % 3)[:, None])
                 for sign in (1.0, -1.0):
-                    self._bisect(self._moved(segments, sign * offsets), gain)
+                    self._bisect(self._segments_beside(segments, sign * offsets), gain)
 
-    def _moved(self, segments: _Segments, offsets: FloatArray) -> _Segments:
+    def _segments_beside(self, segments: _Segments, offsets: FloatArray) -> _Segments:
         """Return longer segments at offsets from some, where no jump is known, in the region."""
         middle = segments.middle + offsets
         spread = np.sqrt(np.square(offsets).sum(axis=1))[:, None]
@@ -346,7 +344,7 @@ class _Segments:
         self.end_force = np.where(goes_right, self.end_force, force)
 
 
-def _interpolate(rows: FloatArray, fractions: FloatArray) -> FloatArray:
+def _interpolate_rows(rows: FloatArray, fractions: FloatArray) -> FloatArray:
     """Return rows between those of an array, at fractions of their number, (n, columns)."""
     places = (len(rows) - 1) * fractions
     first = np.minimum(places.astype(int), len(rows) - 2)

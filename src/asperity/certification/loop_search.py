@@ -24,7 +24,13 @@ import numpy as np
 
 from asperity.analysis.energy.closed_loops import polygon_length
 from asperity.certification.climbing import climb
-from asperity.certification.column_loops import find_column_loops
+from asperity.certification.column_loops import (
+    find_circulations,
+    find_column_loops,
+    horizontal_planes,
+    random_ends,
+    vertical_planes,
+)
 from asperity.certification.region import RendererCalls
 from asperity.certification.resolution import Resolution
 from asperity.core.checks import FloatArray
@@ -146,18 +152,18 @@ class LoopSearch:
         count = int(min(_PLANES, max(4.0, 0.05 * budget / cells**2)))
         planes = self._best_planes(count, cells, now + 0.5 * (deadline - now))
         middle_cells = int(min(_MIDDLE_CELLS, max(cells, 0.1 * math.sqrt(budget))))
-        works = [self._simple_work(plane, middle_cells) for plane in planes]
+        works = [self._best_loop_work(plane, middle_cells) for plane in planes]
         found = 0
         for plane in planes[np.argsort(works)[::-1]]:
-            circulations = self._circulations(plane, fine_cells)
+            circulations = find_circulations(self.calls, plane, fine_cells)
             for sign in (1.0, -1.0):
                 found += self._record_columns(sign * circulations, plane)
             if found >= _LOOPS_A_ROUND or _is_past(deadline):
                 break
 
-    def _simple_work(self, plane: FloatArray, cells: int) -> float:
+    def _best_loop_work(self, plane: FloatArray, cells: int) -> float:
         """Return the greatest work of a simple loop of a grid [J], not refined."""
-        circulations = self._circulations(plane, cells)
+        circulations = find_circulations(self.calls, plane, cells)
         works = [find_column_loops(plane, sign * circulations).works for sign in (1.0, -1.0)]
         return float(np.sum(works, axis=1).max())
 
@@ -167,77 +173,24 @@ class LoopSearch:
         Vertical planes climb; a horizontal plane has a random height.
         """
         region = self.calls.region
-        flat = self._horizontal_planes(count // 4)
+        flat = horizontal_planes(region, self._random.uniform(size=count // 4))
         ends, energies = climb(
-            self._random_ends(count),
-            lambda ends: self._plane_energies(self._vertical_planes(ends), cells),
+            random_ends(region, count, self._random),
+            lambda ends: self._plane_energies(vertical_planes(region, ends), cells),
             lambda _starts, ends: np.clip(ends, region.low, region.high),
             partial(_is_past, deadline),
             self._random,
             _FIRST_SPREAD * region.size,
             _STEPS,
         )
-        planes = np.concatenate([self._vertical_planes(ends), flat])
+        planes = np.concatenate([vertical_planes(region, ends), flat])
         energies = np.concatenate([energies, self._plane_energies(flat, cells)])
         return planes[np.argsort(-energies)[:_CHOSEN_PLANES]]
 
     def _plane_energies(self, planes: FloatArray, cells: int) -> FloatArray:
         """Return the sums of the magnitudes of the circulations of planes [J], shape (n,)."""
-        sums = []
-        for plane in planes:
-            sums.append(np.nansum(np.abs(self._circulations(plane, cells))))
-        return np.array(sums)
-
-    def _random_ends(self, count: int) -> FloatArray:
-        """Return two points for each vertical plane, half of these along an axis, (n, 2, 3)."""
-        region = self.calls.region
-        ends = region.points(self._random.uniform(size=(count, 2, 3)))
-        for pair in ends:
-            across = int(self._random.integers(2))
-            along = 1 - across
-            if self._random.uniform() < 0.5:
-                pair[1, across] = pair[0, across]
-            pair[:, along] = region.low[along], region.high[along]
-        return ends
-
-    def _vertical_planes(self, ends: FloatArray) -> FloatArray:
-        """Return corners and sides of rectangles above lines, as high as the region, (n, 3, 3)."""
-        region = self.calls.region
-        corners = ends[:, 0].copy()
-        corners[:, 2] = region.low[2]
-        sides = ends[:, 1] - ends[:, 0]
-        sides[:, 2] = 0.0
-        heights = np.broadcast_to(region.size * [0.0, 0.0, 1.0], corners.shape)
-        return np.stack([corners, sides, heights], axis=1)
-
-    def _horizontal_planes(self, count: int) -> FloatArray:
-        """Return corners and sides of rectangles across the region at heights, (n, 3, 3)."""
-        region = self.calls.region
-        planes = np.zeros((count, 3, 3))
-        planes[:, 0] = region.low
-        planes[:, 0, 2] += region.size[2] * self._random.uniform(size=count)
-        planes[:, 1, 0] = region.size[0]
-        planes[:, 2, 1] = region.size[1]
-        return planes
-
-    def _circulations(self, plane: FloatArray, cells: int) -> FloatArray:
-        """Return the work around each cell of a grid, NaN outside of the region, shape (n, m)."""
-        corner, side, height = plane
-        # About square cells, as many in all.
-        ratio = min(max(math.sqrt(math.hypot(*side) / math.hypot(*height)), 1 / 3), 3.0)
-        columns = int(cells * ratio)
-        rows = int(cells / ratio)
-        x = np.arange(columns + 1.0)[:, None, None] / columns * side
-        z = np.arange(rows + 1.0)[:, None] / rows * height
-        along = corner + x[:-1] + 0.5 / columns * side + z
-        up = corner + x + z[:-1] + 0.5 / rows * height
-        work_along = self.calls.at(along.reshape(-1, 3)).reshape(along.shape) @ side / columns
-        work_up = self.calls.at(up.reshape(-1, 3)).reshape(up.shape) @ height / rows
-        work = work_along[:, :-1] + work_up[1:] - work_along[:, 1:] - work_up[:-1]
-        corners = corner + x + z
-        inside = self.calls.region.contains(corners.reshape(-1, 3)).reshape(columns + 1, rows + 1)
-        whole = inside[:-1, :-1] & inside[1:, :-1] & inside[:-1, 1:] & inside[1:, 1:]
-        return np.where(whole, work, np.nan)
+        circulations = [find_circulations(self.calls, plane, cells) for plane in planes]
+        return np.array([np.nansum(np.abs(works)) for works in circulations])
 
     def _record_columns(self, circulations: FloatArray, plane: FloatArray) -> int:
         """Measure the simple loop of greatest energy in a plane, and a part of greater density.
@@ -249,11 +202,7 @@ class LoopSearch:
             How many of the two count.
         """
         column_loops = find_column_loops(plane, circulations)
-        columns = np.flatnonzero(column_loops.works > 0.0)
-        if not len(columns):
-            return 0
-        first = int(columns[0])
-        end = int(columns[-1]) + 1
+        first, end = column_loops.densest_columns(0.0)
         for found in range(2):
             if not column_loops.encloses_area(first, end):
                 return found
@@ -405,10 +354,7 @@ class LoopSearch:
         """
         turns = self._turns
         walks = np.concatenate([np.tile(curves, (1, turns, 1)), curves[:, :1]], axis=1)
-        if self.calls.approaches:
-            forces = self.calls.along(walks)
-        else:
-            forces = self.calls.at(walks.reshape(-1, 3)).reshape(walks.shape)
+        forces = self.calls.on_curves(walks)
         steps = np.diff(walks, axis=1)
         works = (0.5 * (forces[:, 1:] + forces[:, :-1]) * steps).sum(axis=2)
         works = works.reshape(len(curves), turns, -1).sum(axis=2)

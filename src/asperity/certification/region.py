@@ -61,7 +61,7 @@ class Region:
         """Return the points at fractions of the box, shape (n, 3)."""
         return self.low + fractions * self.size
 
-    def lowest(self, points: FloatArray) -> FloatArray:
+    def lowest_points(self, points: FloatArray) -> FloatArray:
         """Return the lowest points of the region above points [m], shape (n, 3) both."""
         columns = np.repeat(points[:, None], _LEVELS, axis=1)
         columns[..., 2] = np.linspace(points[:, 2], self.high[2], _LEVELS, axis=1)
@@ -141,6 +141,12 @@ class RendererCalls:
     def at(self, points: FloatArray) -> FloatArray:
         """Return the force at points, each after a reset, shape (n, 3)."""
         return self.along(points[:, None])[:, 0]
+
+    def on_curves(self, curves: FloatArray) -> FloatArray:
+        """Return forces on curves, which a renderer with memory walks, shape (n, m, 3) both."""
+        if self.approaches:
+            return self.along(curves)
+        return self.at(curves.reshape(-1, 3)).reshape(curves.shape)
 
     def after(self, approaches: FloatArray, starts: FloatArray, points: FloatArray) -> FloatArray:
         """Return the forces at points [N], shape (n, m, 3).

@@ -255,7 +255,7 @@ class LibraryRenderer(LocalRenderer):
         self._prefix = source.name
         self._check_abi()
         self._addresses = [self._address("reset"), self._address("force")]
-        self._is_opened = self._has("open")
+        self._is_opened = self._has_function("open")
         self._state = ctypes.c_void_p(self._find_state(source.text))
         self.rate = source.rate or self._call("rate", ctypes.c_double, self._state) or 0.0
         rotation = (ctypes.c_double * 9)(1, 0, 0, 0, 1, 0, 0, 0, 1)
@@ -316,17 +316,17 @@ class LibraryRenderer(LocalRenderer):
 
     def _call(self, name: str, result: Any, *arguments: Any) -> Any:
         """Call a function of the library; ``None`` if it has none of this name."""
-        if not self._has(name):
+        if not self._has_function(name):
             return None
         function = getattr(self._library, f"{self._prefix}_{name}")
         function.restype = result
         return function(*arguments)
 
-    def _has(self, name: str) -> bool:
+    def _has_function(self, name: str) -> bool:
         return hasattr(self._library, f"{self._prefix}_{name}")
 
     def _address(self, name: str) -> int:
-        if not self._has(name):
+        if not self._has_function(name):
             raise RendererError(
                 f"{self._library._name} has no function {self._prefix}_{name}; "
                 "the prefix of its functions is the argument name"

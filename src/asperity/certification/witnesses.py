@@ -77,10 +77,7 @@ def witness_paths(result: Certification) -> dict[str, FloatArray]:
 
 def walk(calls: RendererCalls, paths: dict[str, FloatArray]) -> list[WitnessPath]:
     """Return witnesses with the forces of a renderer along their paths."""
-    witnesses = []
-    for name, path in paths.items():
-        witnesses.append(WitnessPath(name, path, calls.along(path[None])[0]))
-    return witnesses
+    return [WitnessPath(name, path, calls.along(path[None])[0]) for name, path in paths.items()]
 
 
 def witness_text(witnesses: list[WitnessPath]) -> str:
