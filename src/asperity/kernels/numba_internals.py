@@ -296,9 +296,8 @@ class MachineCodeCache:
         *parts, callees = pickle.loads(content)
         for module, name, types in callees:
             getattr(sys.modules[module], name).compile(types)
-        if (
-            self._is_called
-        ):  # Numba looks for this name in the code that callers copy: there is none
+        # Numba looks for this name in the code that callers copy: there is none.
+        if self._is_called:
             engine = target_context.codegen()._engine
             engine._defined_symbols.add(parts[1].llvm_cpython_wrapper_name)
         return self._mark(_CompileResult._rebuild(target_context, *parts))
