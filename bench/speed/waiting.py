@@ -1,9 +1,8 @@
 """What people wait for: processor and wall time of whole commands, first, again, and changed.
 
-Every command is a process of its own; each surface, the onset and the paper begin with an empty
-cache folder. Processor seconds are those of the process and of all that it starts. Repeated
-commands take turns; a ratio is to the first comparison of the same surface, the median over the
-rounds.
+Every command is a process of its own; waits with the same folder share a cache, which is empty at
+the first of them. Processor seconds are those of the process and of all that it starts. Of what is
+repeated, which is indented, the median of some rounds counts.
 """
 
 from __future__ import annotations
@@ -12,133 +11,104 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
-from dataclasses import dataclass
+import urllib.request
 from pathlib import Path
 from time import perf_counter
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
+from tests.lab.started import Started
+
+from bench.speed.timing import number_table
 
 ROOT = Path(__file__).parents[2]
-PROGRAM = (sys.executable, "-m", "asperity")
 LIMIT = 900.0  # [s] per command
 ROUNDS = 3
 
-HELP = ("--help",)
-DEMO = ("compare", "examples/demo.toml")
-SINUSOID = ("compare", "sinusoid:amplitude=0.8mm,period=1mm")
-MEASURED = ("compare", "../shared/data/sample-land.x3p", "--magnify", "20")
-CHANGED = ("--device", "touch", "--stiffness", "700N/m")
-ONSET = ("onset", "examples/press.toml")
-CLOSER = (*ONSET, "--tolerance", "0.051")  # another question: no answer is kept
-REPRODUCE = ("reproduce",)
+DEMO = "compare examples/demo.toml"
+SINUSOID = "compare sinusoid:amplitude=0.8mm,period=1mm"
+LAND = "../shared/data/sample-land.x3p --magnify 20"
+MEASURED = f"compare {LAND}"
+CHANGED = "--device touch --stiffness 700N/m"
+HTML = "--html {folder}/report.html --force"
+ONSET = "onset examples/press.toml"
+BAKED = "-o {folder}/baked.field --force"
+LAB = "lab --no-browser"
 
-
-@dataclass(frozen=True)
-class Times:
-    """What a command took.
-
-    Attributes:
-        processor: of it and of all that it started [s].
-        wall: [s].
-    """
-
-    processor: float
-    wall: float
-
-
-class _NotRunError(Exception):
-    """A command that cannot be measured; says why."""
+WAITS = [
+    ("--help", "--help", "demo", ""),
+    ("first compare of the demo", DEMO, "demo", "wall 20"),
+    ("  the same again", DEMO, "demo", "processor 1.5"),
+    ("first compare of a sinusoid", SINUSOID, "sinusoid", "wall 6"),
+    ("  the same again", SINUSOID, "sinusoid", "processor 0.5"),
+    ("  another device and stiffness", f"{SINUSOID} {CHANGED}", "sinusoid", "processor 0.6"),
+    ("first compare of a measured surface", MEASURED, "measured", "wall 25"),
+    ("  the same again", MEASURED, "measured", "processor 1.2"),
+    ("  another device and stiffness", f"{MEASURED} {CHANGED}", "measured", "processor 1.4"),
+    ("first with a report", f"{MEASURED} {HTML}", "measured", ""),
+    ("  the same again", MEASURED, "measured", "processor 1.2"),
+    (
+        "  export of its field, 6 million numbers",
+        f"export {LAND} --law H -o {{folder}}/texture.h --force",
+        "measured",
+        "wall 3",
+    ),
+    *((f"bake {name}", f"bake {name} {BAKED}", "bake", "wall 6") for name in ("cloth", "knurl")),
+    *((f"bake {name}", f"bake {name} {BAKED}", "bake", "wall 6") for name in ("tile", "wood")),
+    ("bake sandpaper", f"bake sandpaper {BAKED}", "bake", "wall 15"),
+    ("bake a measured surface", f"bake {LAND} {BAKED}", "bake", "wall 15"),
+    ("first page of the lab", LAB, "lab", "wall 5"),
+    ("  the same again", LAB, "lab", ""),
+    (f"{ONSET}, first", ONSET, "onset", ""),
+    # Another question, of which no answer is in the cache.
+    ("another width, all compiled", f"{ONSET} --tolerance 0.051", "onset", "processor 12"),
+    ("reproduce, first", "reproduce", "paper", "wall 120"),
+    ("  the same again", "reproduce", "paper", "processor 45"),
+]
+"""What is waited for, its command, the folder of its cache, and the goal [s]."""
 
 
 def run(console: Console) -> None:
-    """Print the table; what cannot be run is said below it."""
-    table = Table("work", "processor [s]", "wall [s]", "of the first", "goal")
+    """Print the table; what cannot be run is said in it."""
+    table = number_table("work", "processor [s]", "wall [s]", "goal")
     with tempfile.TemporaryDirectory() as folder:
-        caches = [Path(folder, name) for name in ("demo", "sinusoid", "measured", "onset", "paper")]
-        for cache in caches:
-            cache.mkdir(mode=0o700)
-        demo, sinusoid, measured, onset, paper = caches
-        missing = [
-            *_time_single(table, HELP, "--help", "", demo),
-            *_time_comparisons(table, DEMO, "the demo", demo),
-            *_time_comparisons(table, SINUSOID, "a sinusoid", sinusoid),
-            *_time_comparisons(table, MEASURED, "a measured surface", measured),
-            *_time_single(table, ONSET, "onset examples/press.toml, first", "", onset),
-            *_time_single(table, CLOSER, "  all compiled, another width", "processor 12", onset),
-            *_time_single(table, CLOSER, "  the same again", "", onset),
-            *_time_single(table, REPRODUCE, "reproduce, first", "wall 120", paper),
-            *_time_single(table, REPRODUCE, "reproduce again", "processor 45", paper),
-        ]
+        for name, command, cache, goal in WAITS:
+            rounds = ROUNDS if name.startswith(" ") else 1
+            words = command.format(folder=folder).split()
+            try:
+                times = [_time_command(words, Path(folder, cache)) for _ in range(rounds)]
+            except (OSError, AssertionError, subprocess.SubprocessError) as reason:
+                table.add_row(name, "not run", str(reason).splitlines()[0], goal)
+                continue
+            table.add_row(name, *[f"{value:.2f}" for value in np.median(times, axis=0)], goal)
     console.print(table)
-    for line in missing:
-        console.print(line, soft_wrap=True)
 
 
-def _time_comparisons(table: Table, words: tuple[str, ...], name: str, cache: Path) -> list[str]:
-    """Add the rows of one surface: first, again, changed, with a report."""
-    html = ("--html", str(cache.parent / "report.html"))
-    try:
-        first = _time_command(words, cache)
-        _time_command((*words, *html), cache)
-        found = np.array(
-            [
-                [_time_command((*words, *more), cache).processor for more in ((), CHANGED, html)]
-                for _ in range(ROUNDS)
-            ]
+def _time_command(words: list[str], cache: Path) -> tuple[float, float]:
+    """Return what a command took: of the processor, and until it ended or showed its page [s]."""
+    cache.mkdir(mode=0o700, exist_ok=True)
+    environment = os.environ | {"ASPERITY_CACHE_DIR": str(cache)}
+    command = [sys.executable, "-m", "asperity", *words]
+    before = os.times()
+    start = perf_counter()
+    if words[0] == "lab":
+        wall = _time_page(command, environment)
+    else:
+        subprocess.run(
+            command, cwd=ROOT, check=True, capture_output=True, timeout=LIMIT, env=environment
         )
-    except _NotRunError as reason:
-        return [f"{name}: not run: {reason}"]
-    again, changed, report = np.median(found, axis=0)
-    table.add_row(
-        f"first compare of {name}", f"{first.processor:.1f}", f"{first.wall:.1f}", "1", "wall 15"
-    )
-    for said, value, goal in (
-        ("the same again", again, "processor 1.5"),
-        ("another device and stiffness", changed, "processor 2"),
-        ("with --html, again", report, ""),
-    ):
-        table.add_row(f"  {said}", f"{value:.2f}", "", f"{value / first.processor:.3f}", goal)
-    return []
-
-
-def _time_single(
-    table: Table, words: tuple[str, ...], name: str, goal: str, cache: Path
-) -> Sequence[str]:
-    try:
-        taken = _time_command(words, cache)
-    except _NotRunError as reason:
-        return [f"{name}: not run: {reason}"]
-    table.add_row(name, f"{taken.processor:.2f}", f"{taken.wall:.2f}", "", goal)
-    return []
-
-
-def _time_command(words: tuple[str, ...], cache: Path) -> Times:
-    """Return what a command took.
-
-    Raises:
-        _NotRunError: if a file is missing, it fails, or takes too long.
-    """
-    if words[1:] and words[1].startswith("..") and not (ROOT / words[1]).exists():
-        raise _NotRunError("the file is missing")
-    before, start = os.times(), perf_counter()
-    try:
-        done = subprocess.run(
-            [*PROGRAM, *words],
-            cwd=ROOT,
-            check=False,
-            capture_output=True,
-            text=True,
-            timeout=LIMIT,
-            env=os.environ | {"ASPERITY_CACHE_DIR": str(cache)},
-        )
-    except subprocess.TimeoutExpired:
-        raise _NotRunError(f"took longer than {LIMIT:.0f} s") from None
-    wall, after = perf_counter() - start, os.times()
-    if done.returncode != 0:
-        last = (done.stderr.strip().splitlines() or ["no message"])[-1]
-        raise _NotRunError(f"exit code {done.returncode}: {last}")
+        wall = perf_counter() - start
+    after = os.times()
     used = after.children_user + after.children_system
-    return Times(used - before.children_user - before.children_system, wall)
+    return used - before.children_user - before.children_system, wall
+
+
+def _time_page(command: list[str], environment: dict[str, str]) -> float:
+    start = perf_counter()
+    lab = Started(command=command, environment=environment)
+    try:
+        with urllib.request.urlopen(lab.address, timeout=60) as page:
+            page.read()
+        return perf_counter() - start
+    finally:
+        lab.close()

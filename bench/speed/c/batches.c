@@ -1,20 +1,26 @@
-/* Batches of forces written for vector registers by hand: eight points at a time. NAME_force(points,
-   n, texture, k, force) as in reference.c; n is a multiple of eight. Built with gcc
-   -std=gnu11 -O3 -march=native -fno-math-errno -shared -fPIC (gnu11: it may fuse products and sums). */
+/* Batches of forces written for vector registers by hand, as wide as the processor's: eight points at
+   a time with AVX-512, else four. NAME_force(points, n, texture, k, force) as in reference.c; n is a
+   multiple of eight. Built with gcc -std=gnu11 -O3 -march=native -fno-math-errno -shared -fPIC (gnu11:
+   it may fuse products and sums). */
 #include <string.h>
-#ifdef __AVX512F__
+#ifdef __AVX__
 #include <immintrin.h>
 #endif
 
 #include "textures.h"
 
-typedef double vec __attribute__((vector_size(64)));
+#ifdef __AVX512F__
+#define LANES 8
+#else
+#define LANES 4
+#endif
+typedef double vec __attribute__((vector_size(8 * LANES)));
 typedef double four __attribute__((vector_size(32)));
-typedef long mask __attribute__((vector_size(64)));
+typedef long mask __attribute__((vector_size(8 * LANES)));
 
 static inline vec all(double x)
 {
-    return (vec){x, x, x, x, x, x, x, x};
+    return (vec){0.0} + x;
 }
 
 static inline vec load(const double *p)
@@ -34,36 +40,43 @@ static inline vec choose(mask where, vec a, vec b)
     return (vec)((where & (mask)a) | (~where & (mask)b));
 }
 
-#ifdef __AVX512F__
-static inline vec root(vec x)
+/* Integers up to 2^51 from numbers without a fraction; AVX2 has no instruction for it. */
+static inline mask whole(vec x)
 {
-    return (vec)_mm512_sqrt_pd((__m512d)x);
+    return (mask)(x + 0x1.8p52) & 0x7ffffffffffff;
 }
 
-static inline vec down(vec x)
-{
-    return (vec)_mm512_roundscale_pd((__m512d)x, _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC);
-}
-#else
 static inline vec root(vec x)
 {
-    for (int i = 0; i < 8; i++)
+#if defined __AVX512F__
+    return (vec)_mm512_sqrt_pd((__m512d)x);
+#elif defined __AVX__
+    return (vec)_mm256_sqrt_pd((__m256d)x);
+#else
+    for (int i = 0; i < LANES; i++)
         x[i] = sqrt(x[i]);
     return x;
+#endif
 }
 
 static inline vec down(vec x)
 {
+#if defined __AVX512F__
+    return (vec)_mm512_roundscale_pd((__m512d)x, _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC);
+#elif defined __AVX__
+    return (vec)_mm256_floor_pd((__m256d)x);
+#else
     const vec cut = __builtin_convertvector(__builtin_convertvector(x, mask), vec);
     return cut - choose(cut > x, all(1.0), all(0.0));
-}
 #endif
+}
 
 struct point {
     vec x, y, z;
 };
 
-/* Eight rows of three: to three vectors, and back. */
+/* Rows of three: to three vectors, and back. */
+#if LANES == 8
 static inline struct point rows(const double *p)
 {
     const vec a = load(p), b = load(p + 8), c = load(p + 16);
@@ -86,6 +99,25 @@ static inline void store_rows(double *p, vec x, vec y, vec z)
     store(p + 8, __builtin_shuffle(b, z, (mask){10, 1, 2, 11, 4, 5, 12, 7}));
     store(p + 16, __builtin_shuffle(c, z, (mask){0, 13, 2, 3, 14, 5, 6, 15}));
 }
+
+#else
+static inline struct point rows(const double *p)
+{
+    const vec a = load(p), b = load(p + 4), c = load(p + 8);
+    return (struct point){
+        .x = __builtin_shuffle(__builtin_shuffle(a, b, (mask){0, 3, 6, 0}), c, (mask){0, 1, 2, 5}),
+        .y = __builtin_shuffle(__builtin_shuffle(a, b, (mask){1, 4, 7, 0}), c, (mask){0, 1, 2, 6}),
+        .z = __builtin_shuffle(__builtin_shuffle(a, b, (mask){2, 5, 0, 0}), c, (mask){0, 1, 4, 7}),
+    };
+}
+
+static inline void store_rows(double *p, vec x, vec y, vec z)
+{
+    store(p, __builtin_shuffle(__builtin_shuffle(x, y, (mask){0, 4, 0, 1}), z, (mask){0, 1, 4, 3}));
+    store(p + 4, __builtin_shuffle(__builtin_shuffle(x, y, (mask){5, 0, 2, 6}), z, (mask){0, 5, 2, 3}));
+    store(p + 8, __builtin_shuffle(__builtin_shuffle(x, y, (mask){0, 3, 7, 0}), z, (mask){6, 1, 2, 7}));
+}
+#endif
 
 struct slopes {
     vec h, hx, hy;
@@ -182,6 +214,10 @@ static inline void vec_weights(vec t, vec w[4], vec d[4])
     d[3] = 0.5 * tt;
 }
 
+#if LANES == 8
+#define PAIR(i) two_rows(c + at[i], c + at[4 + i])
+#define TURN(i, j, k, l) (mask){i, j, k, l, 4 + i, 4 + j, 4 + k, 4 + l}
+#define FAR 8
 static inline vec two_rows(const double *a, const double *b)
 {
     four low, high;
@@ -189,20 +225,24 @@ static inline vec two_rows(const double *a, const double *b)
     memcpy(&high, b, sizeof high);
     return __builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7);
 }
+#else
+#define PAIR(i) load(c + at[i])
+#define TURN(i, j, k, l) (mask){i, j, k, l}
+#define FAR 4
+#endif
 
-/* Four neighbours of each of eight points: loaded row by row and turned, faster than gathered. */
+/* Four neighbours of each point: loaded row by row and turned, faster than gathered. */
 static inline void neighbours(const double *c, const long *at, vec out[4])
 {
-    const vec a = two_rows(c + at[0], c + at[4]), b = two_rows(c + at[1], c + at[5]);
-    const vec d = two_rows(c + at[2], c + at[6]), e = two_rows(c + at[3], c + at[7]);
-    const vec ab = __builtin_shuffle(a, b, (mask){0, 8, 2, 10, 4, 12, 6, 14});
-    const vec ba = __builtin_shuffle(a, b, (mask){1, 9, 3, 11, 5, 13, 7, 15});
-    const vec de = __builtin_shuffle(d, e, (mask){0, 8, 2, 10, 4, 12, 6, 14});
-    const vec ed = __builtin_shuffle(d, e, (mask){1, 9, 3, 11, 5, 13, 7, 15});
-    out[0] = __builtin_shuffle(ab, de, (mask){0, 1, 8, 9, 4, 5, 12, 13});
-    out[1] = __builtin_shuffle(ba, ed, (mask){0, 1, 8, 9, 4, 5, 12, 13});
-    out[2] = __builtin_shuffle(ab, de, (mask){2, 3, 10, 11, 6, 7, 14, 15});
-    out[3] = __builtin_shuffle(ba, ed, (mask){2, 3, 10, 11, 6, 7, 14, 15});
+    const vec a = PAIR(0), b = PAIR(1), d = PAIR(2), e = PAIR(3);
+    const vec ab = __builtin_shuffle(a, b, TURN(0, FAR, 2, FAR + 2));
+    const vec ba = __builtin_shuffle(a, b, TURN(1, FAR + 1, 3, FAR + 3));
+    const vec de = __builtin_shuffle(d, e, TURN(0, FAR, 2, FAR + 2));
+    const vec ed = __builtin_shuffle(d, e, TURN(1, FAR + 1, 3, FAR + 3));
+    out[0] = __builtin_shuffle(ab, de, TURN(0, 1, FAR, FAR + 1));
+    out[1] = __builtin_shuffle(ba, ed, TURN(0, 1, FAR, FAR + 1));
+    out[2] = __builtin_shuffle(ab, de, TURN(2, 3, FAR + 2, FAR + 3));
+    out[3] = __builtin_shuffle(ba, ed, TURN(2, 3, FAR + 2, FAR + 3));
 }
 
 static inline __attribute__((always_inline)) struct slopes heightmap_at(const struct vec_heightmap *k, vec x, vec y)
@@ -211,7 +251,7 @@ static inline __attribute__((always_inline)) struct slopes heightmap_at(const st
     const struct vec_place u = vec_locate((x - m->x0) * m->ix, &k->x, m->periodic);
     const struct vec_place v = vec_locate((y - m->y0) * m->iy, &k->y, m->periodic);
     const long stride = m->nx + 3;
-    const mask at = __builtin_convertvector(v.cell * (double)stride + u.cell, mask);
+    const mask at = whole(v.cell * (double)stride + u.cell);
     vec w[4], w1[4], g[4], g1[4], c[4];
     struct slopes s = {.h = all(0.0), .hx = all(0.0), .hy = all(0.0)};
     vec_weights(u.t, w, w1);
@@ -234,7 +274,7 @@ static inline __attribute__((always_inline)) struct slopes heightmap_at(const st
                                double k, double *restrict f)                               \
     {                                                                                      \
         const __auto_type texture = kind##_known(given);                                   \
-        for (const double *end = p + 3 * n; p != end; p += 24, f += 24) {                  \
+        for (const double *end = p + 3 * n; p != end; p += 3 * LANES, f += 3 * LANES) {                  \
             const struct point q = rows(p);                                                \
             const struct slopes s = kind##_at(&texture, q.x, q.y);                         \
             const vec depth = DEPTH;                                                       \
