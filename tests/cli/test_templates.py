@@ -14,7 +14,7 @@ from asperity.core.arguments import parse_arguments
 from asperity.devices import FIELD_UNITS, load_device
 from asperity.devices.device_file import device_template
 from asperity.scene import load_scene
-from asperity.scene.scene_file import RUN_ARGUMENTS
+from asperity.scene.loop_sections import RUN_ARGUMENTS
 from asperity.scene.scene_keys import scene_template
 from asperity.scene.setup import make_setup
 

@@ -23,7 +23,8 @@ from asperity.measured.reading.pixels import ome_scale
 from asperity.measured.reading.readers import SIGNATURE_READERS
 from asperity.measured.reading.text_reader import read_text
 from asperity.measured.reading.x3p import parse_header
-from asperity.scene.scene_file import load_scene, read_path
+from asperity.scene.loop_sections import read_path
+from asperity.scene.scene_file import load_scene
 
 MAX_LENGTH = 100_000  # [bytes]
 SECONDS = 1.0  # processor time, as the machine may be busy

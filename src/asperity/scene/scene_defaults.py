@@ -12,7 +12,7 @@ from asperity.core.errors import ParameterError
 from asperity.core.units import format_quantity
 from asperity.devices import Device, override_device
 from asperity.devices.five_bar import FiveBar
-from asperity.scene.scene_file import BRAKES
+from asperity.scene.loop_sections import BRAKES
 from asperity.simulation import Cartesian, Pantograph, Plant, Resonance, Servo
 from asperity.surface import Surface
 from asperity.textures.texture import Texture

@@ -11,15 +11,8 @@ from asperity.core.arguments import Argument
 from asperity.core.errors import ParameterError, suggest_names
 from asperity.devices import FIELD_TABLE, device_names
 from asperity.measured.file_arguments import SYNTHETIC_ARGUMENTS
-from asperity.scene.scene_file import (
-    DEVICE_ID,
-    HANDS,
-    MOTIONS,
-    RUN_ARGUMENTS,
-    TEXTURE_KINDS,
-    SectionKind,
-    surface_arguments,
-)
+from asperity.scene.loop_sections import HANDS, MOTIONS, RUN_ARGUMENTS, SectionKind
+from asperity.scene.scene_file import DEVICE_ID, TEXTURE_KINDS, surface_arguments
 from asperity.servo import safety
 from asperity.textures.texture import TextureKind
 

@@ -24,15 +24,8 @@ from asperity.laws import Law, distribute_parameters, find_law
 from asperity.recording.replay import file_digest
 from asperity.rendering import assess_rendering, rendering_sentences
 from asperity.scene import scene_defaults
-from asperity.scene.scene_file import (
-    DURATION,
-    HANDS,
-    MOTIONS,
-    RUN_ARGUMENTS,
-    Scene,
-    build_section,
-    surface_keywords,
-)
+from asperity.scene.loop_sections import DURATION, HANDS, MOTIONS, RUN_ARGUMENTS, build_section
+from asperity.scene.scene_file import Scene, surface_keywords
 from asperity.servo import safety
 from asperity.servo.safety import Safety
 from asperity.simulation import Hand, Motion, Plant, Run, Servo, simulate

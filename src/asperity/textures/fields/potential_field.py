@@ -164,6 +164,7 @@ class PotentialField(Texture, Tabular):
         depth = format_length(accuracy.worst_depth)
         deepest = format_length(max(accuracy.depths, default=0.0))
         onset = format_length(accuracy.onset)
+        places = f"{accuracy.onset_places} " if accuracy.onset_places else ""
         presses = "depths"
         if accuracy.presses:
             ends = [format_length(end) for end in (accuracy.presses[0], accuracy.presses[-1])]
@@ -181,7 +182,7 @@ class PotentialField(Texture, Tabular):
             f" force {100 * accuracy.share:.2g} % RMS from exact H"
             f" at the worst of {len(accuracy.depths)} {presses} (at {depth}; deeper than {deepest}"
             f" it is not known){missed * accuracy.is_limited}; contact begins up to {onset} from"
-            f" the surface at {accuracy.onset_places or ''} sampled places".replace("  ", " ")
+            f" the surface at {places}sampled places"
         )
         return (*self.source.preparation, text)
 
